@@ -1,0 +1,89 @@
+//! What a site asks for: the levels, their rules and the figures in them.
+
+use jiff::SignedDuration;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// How grave an alert is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Level {
+    /// Nothing to report.
+    Green,
+    /// Something has changed: look.
+    Yellow,
+    /// Failure is more likely than not within the outlook.
+    Orange,
+    /// Failure within the time that an evacuation takes cannot be excluded.
+    Red,
+    /// The monitor cannot tell: no data, a sensor fault, a stale model.
+    Unknown,
+}
+
+impl Level {
+    /// The word in events, config and hooks.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Green => "green",
+            Self::Yellow => "yellow",
+            Self::Orange => "orange",
+            Self::Red => "red",
+            Self::Unknown => "unknown",
+        }
+    }
+}
+
+impl fmt::Display for Level {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// Plain thresholds, a floor beside the model: the level is at least `level` while one is exceeded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Threshold {
+    /// The level that it calls.
+    pub level: Level,
+    /// Velocity, mm/day.
+    pub velocity_mm_per_day: Option<f64>,
+    /// Displacement since the first reading, mm.
+    pub displacement_mm: Option<f64>,
+    /// Acceleration, mm/day per day.
+    pub acceleration_mm_per_day2: Option<f64>,
+}
+
+/// The figures in the level rules.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Policy {
+    /// How long it takes to bring everyone out.
+    pub evacuation_time: SignedDuration,
+    /// How far ahead orange and yellow look.
+    pub outlook: SignedDuration,
+    /// Passing this velocity is failure, mm/day.
+    pub critical_velocity_mm_per_day: f64,
+    /// Chance of failure within the evacuation time that calls red.
+    pub red_chance: f64,
+    /// Chance of failure within the outlook that calls orange.
+    pub orange_chance: f64,
+    /// Chance of failure within the outlook that calls yellow.
+    pub yellow_chance: f64,
+    /// Plain thresholds beside the model.
+    pub thresholds: Vec<Threshold>,
+    /// How long a slope must hold a steady velocity before its level falls.
+    pub steady_for: SignedDuration,
+}
+
+impl Default for Policy {
+    fn default() -> Self {
+        Self {
+            evacuation_time: SignedDuration::from_hours(24),
+            outlook: SignedDuration::from_hours(30 * 24),
+            critical_velocity_mm_per_day: 1000.0,
+            red_chance: 0.05,
+            orange_chance: 0.5,
+            yellow_chance: 0.1,
+            thresholds: Vec::new(),
+            steady_for: SignedDuration::from_hours(7 * 24),
+        }
+    }
+}

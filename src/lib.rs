@@ -1,0 +1,20 @@
+//! slipwatch: a streaming early-warning monitor for landslides.
+//!
+//! The map, from the ground up; arrows go one way, and a test holds them:
+//!
+//! ```text
+//! main -> cli -> runtime, config -> monitor -> alert, regime, forecast -> fit -> model -> reading
+//! ```
+//!
+//! Everything from `monitor` down is pure: no clock, no files, no network, no ambient randomness.
+
+pub mod alert;
+pub mod cli;
+pub mod config;
+pub mod fit;
+pub mod forecast;
+pub mod model;
+pub mod monitor;
+pub mod reading;
+pub mod regime;
+pub mod runtime;

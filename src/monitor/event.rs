@@ -1,0 +1,154 @@
+//! What the monitor says: one JSON object a line, in data time, nothing from the wall clock.
+
+use crate::alert::Level;
+use crate::reading::{BenchmarkId, Timestamp};
+use crate::regime::Regime;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// One thing that the monitor says.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Event {
+    /// Data time: the measured-at time of the reading that caused it.
+    pub time: Timestamp,
+    /// What happened.
+    #[serde(flatten)]
+    pub kind: EventKind,
+    /// To which benchmark; `None` for the site as a whole.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub benchmark: Option<BenchmarkId>,
+}
+
+/// The kinds of event.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "event", rename_all = "kebab-case")]
+pub enum EventKind {
+    /// The law was fitted again with a larger t_max.
+    Refit {
+        /// The newest reading used.
+        t_max: Timestamp,
+        /// Which regime, with what probability.
+        regime: RegimeReport,
+        /// When the critical velocity is passed.
+        failure_time: FailureTime,
+        /// The straight line through inverse velocity.
+        inverse_velocity: InverseVelocity,
+        /// Inflection of the fitted velocity.
+        transition_time: Option<Timestamp>,
+        /// The velocity now, mm/day.
+        velocity_mm_per_day: Option<f64>,
+        /// Chance of failure within the evacuation time.
+        chance_within_evacuation_time: f64,
+        /// Chance of failure within the outlook.
+        chance_within_outlook: f64,
+    },
+    /// The probability of instability crossed over.
+    RegimeFlip {
+        /// The regime before.
+        from: Regime,
+        /// The regime after.
+        to: Regime,
+        /// The probability of the new one.
+        probability: f64,
+    },
+    /// The inverse-velocity intercept moved over successive refits.
+    InterceptDrift {
+        /// The intercept last announced.
+        from: Timestamp,
+        /// The intercept now.
+        to: Timestamp,
+        /// How fast it moves, days a day of new readings.
+        drift_days_per_day: f64,
+        /// How fast the fitted law itself would have it move.
+        expected_days_per_day: Option<f64>,
+    },
+    /// The transition time moved with t_max.
+    TransitionDrift {
+        /// The transition time last announced.
+        from: Timestamp,
+        /// The transition time now.
+        to: Timestamp,
+        /// How fast it moves, days a day of new readings.
+        drift_days_per_day: f64,
+    },
+    /// A level was entered or left.
+    Alert {
+        /// The level.
+        level: Level,
+        /// Firing, recovering or resolved.
+        state: AlertState,
+        /// Stable over retries, restarts and replays.
+        key: String,
+        /// The rule that called it.
+        rule: String,
+        /// One line for a person.
+        text: String,
+    },
+    /// The monitor cannot rely on what it is told.
+    Fault {
+        /// `no-data`, `out-of-range`, `out-of-order`, ...
+        kind: String,
+        /// One line for a person.
+        text: String,
+    },
+    /// The end of a replay.
+    Summary(Summary),
+}
+
+/// Where an alert is in its life.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum AlertState {
+    /// The level is in force.
+    Firing,
+    /// The level is no longer in force.
+    Resolved,
+}
+
+/// The regime's label and all probabilities.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RegimeReport {
+    /// The regime, or `undetermined`.
+    pub label: Regime,
+    /// Probability of kappa > 0.
+    pub probability_unstable: f64,
+    /// Probability of r > 0.
+    pub probability_accelerating: f64,
+    /// Every regime's probability.
+    pub probabilities: BTreeMap<Regime, f64>,
+}
+
+/// The time of first passage of the critical velocity; quantiles are unconditional.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FailureTime {
+    /// 5 % quantile, `None` when not reached within the horizon.
+    pub low: Option<Timestamp>,
+    /// Median.
+    pub median: Option<Timestamp>,
+    /// 95 % quantile.
+    pub high: Option<Timestamp>,
+    /// Chance of passage within the horizon.
+    pub probability: f64,
+    /// How far the forecast looks, days.
+    pub horizon_days: f64,
+}
+
+/// The straight line through 1/v.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct InverseVelocity {
+    /// Where the line meets zero, `None` when it does not fall.
+    pub failure_time: Option<Timestamp>,
+    /// Of the line, `None` when there is none.
+    pub r_squared: Option<f64>,
+}
+
+/// Counts at the end of a replay.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Summary {
+    /// Readings taken in.
+    pub readings: u64,
+    /// Refits made.
+    pub refits: u64,
+    /// Alerts that fired.
+    pub alerts: u64,
+}

@@ -1,0 +1,62 @@
+//! The vocabulary of the measured world: benchmarks, quantities, units, readings, channels.
+//!
+//! Values keep the unit in which they were measured, so that a recording converted there and back
+//! is the same readings; the science converts to millimetres and days at its own door.
+
+mod series;
+mod unit;
+
+pub use jiff::Timestamp;
+pub use series::{Channel, Disorder, Reading, Recording, Sample, Series};
+pub use unit::{LengthUnit, Quantity, TimeUnit, Unit, UnitError};
+
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// Seconds in a day, the unit of time inside the science.
+pub const SECONDS_PER_DAY: f64 = 86_400.0;
+
+/// The name of one measured point on a slope.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct BenchmarkId(String);
+
+impl BenchmarkId {
+    /// Wraps a name as it stands in the file or the config.
+    pub fn new(name: impl Into<String>) -> Self {
+        Self(name.into())
+    }
+
+    /// The name itself.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl fmt::Display for BenchmarkId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+/// Days from `epoch` to `time`, negative before it.
+pub fn days_since(epoch: Timestamp, time: Timestamp) -> f64 {
+    let nanoseconds = time.as_nanosecond() - epoch.as_nanosecond();
+    nanoseconds as f64 / 1e9 / SECONDS_PER_DAY
+}
+
+/// The instant `days` after `epoch`, to the nearest millisecond; `None` outside the calendar.
+pub fn after_days(epoch: Timestamp, days: f64) -> Option<Timestamp> {
+    let milliseconds = (days * SECONDS_PER_DAY * 1e3).round();
+    if !milliseconds.is_finite() || milliseconds.abs() > 1e17 {
+        return None;
+    }
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "bounded by 1e17 just above"
+    )]
+    let milliseconds = milliseconds as i64;
+    epoch
+        .checked_add(jiff::SignedDuration::from_millis(milliseconds))
+        .ok()
+}

@@ -1,0 +1,245 @@
+//! Units of displacement and velocity: their names in files, and their size in mm and days.
+
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// What a reading measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Quantity {
+    /// Cumulative downslope displacement.
+    Displacement,
+    /// Downslope velocity.
+    Velocity,
+}
+
+impl Quantity {
+    /// The word used in file columns, topics and output.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Displacement => "displacement",
+            Self::Velocity => "velocity",
+        }
+    }
+}
+
+impl fmt::Display for Quantity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// A unit of length.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum LengthUnit {
+    /// Millimetre.
+    Millimetre,
+    /// Centimetre.
+    Centimetre,
+    /// Metre.
+    Metre,
+    /// Inch, 25.4 mm.
+    Inch,
+    /// International foot, 304.8 mm.
+    Foot,
+}
+
+impl LengthUnit {
+    const ALL: [Self; 5] = [
+        Self::Millimetre,
+        Self::Centimetre,
+        Self::Metre,
+        Self::Inch,
+        Self::Foot,
+    ];
+
+    /// The symbol in files: `mm cm m in ft`.
+    pub fn symbol(self) -> &'static str {
+        match self {
+            Self::Millimetre => "mm",
+            Self::Centimetre => "cm",
+            Self::Metre => "m",
+            Self::Inch => "in",
+            Self::Foot => "ft",
+        }
+    }
+
+    /// Millimetres in one of this unit.
+    pub fn millimetres(self) -> f64 {
+        match self {
+            Self::Millimetre => 1.0,
+            Self::Centimetre => 10.0,
+            Self::Metre => 1000.0,
+            Self::Inch => 25.4,
+            Self::Foot => 304.8,
+        }
+    }
+}
+
+/// The time in a velocity's denominator.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum TimeUnit {
+    /// Hour.
+    Hour,
+    /// Day of 24 hours.
+    Day,
+    /// Julian year of 365.25 days.
+    Year,
+}
+
+impl TimeUnit {
+    const ALL: [Self; 3] = [Self::Hour, Self::Day, Self::Year];
+
+    /// The word in output: `h`, `day`, `yr`.
+    pub fn symbol(self) -> &'static str {
+        match self {
+            Self::Hour => "h",
+            Self::Day => "day",
+            Self::Year => "yr",
+        }
+    }
+
+    fn spellings(self) -> &'static [&'static str] {
+        match self {
+            Self::Hour => &["h", "hour"],
+            Self::Day => &["day", "d"],
+            Self::Year => &["yr", "year", "a"],
+        }
+    }
+
+    /// Days in one of this unit.
+    pub fn days(self) -> f64 {
+        match self {
+            Self::Hour => 1.0 / 24.0,
+            Self::Day => 1.0,
+            Self::Year => 365.25,
+        }
+    }
+}
+
+/// The unit of a benchmark's readings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Unit {
+    /// A displacement.
+    Length(LengthUnit),
+    /// A velocity.
+    Rate(LengthUnit, TimeUnit),
+}
+
+/// A unit that is not one of those known.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "unknown unit {given:?}: expected mm, cm, m, in or ft, or one of these per h, day or yr (mm_per_h, m/day)"
+)]
+pub struct UnitError {
+    /// The text that was given.
+    pub given: String,
+}
+
+impl Unit {
+    /// Millimetres.
+    pub const MM: Self = Self::Length(LengthUnit::Millimetre);
+    /// Millimetres per day.
+    pub const MM_PER_DAY: Self = Self::Rate(LengthUnit::Millimetre, TimeUnit::Day);
+
+    /// The quantity that this unit measures.
+    pub fn quantity(self) -> Quantity {
+        match self {
+            Self::Length(_) => Quantity::Displacement,
+            Self::Rate(..) => Quantity::Velocity,
+        }
+    }
+
+    /// How many mm (or mm/day) one of this unit is.
+    pub fn factor(self) -> f64 {
+        match self {
+            Self::Length(length) => length.millimetres(),
+            Self::Rate(length, time) => length.millimetres() / time.days(),
+        }
+    }
+
+    /// The suffix of a file column: `mm`, `mm_per_day`.
+    pub fn column_suffix(self) -> String {
+        match self {
+            Self::Length(length) => length.symbol().to_owned(),
+            Self::Rate(length, time) => format!("{}_per_{}", length.symbol(), time.symbol()),
+        }
+    }
+
+    /// Parses `mm`, `mm_per_day`, `mm/d`, `m per day`, `cm/yr`.
+    ///
+    /// # Errors
+    /// [`UnitError`] names the text when it is no known unit.
+    pub fn parse(text: &str) -> Result<Self, UnitError> {
+        let fail = || UnitError {
+            given: text.to_owned(),
+        };
+        let plain = text.trim().to_ascii_lowercase();
+        let (length, time) = split_rate(&plain);
+        let length = LengthUnit::ALL
+            .into_iter()
+            .find(|unit| unit.symbol() == length)
+            .ok_or_else(fail)?;
+        match time {
+            None => Ok(Self::Length(length)),
+            Some(time) => TimeUnit::ALL
+                .into_iter()
+                .find(|unit| unit.spellings().contains(&time))
+                .map(|time| Self::Rate(length, time))
+                .ok_or_else(fail),
+        }
+    }
+}
+
+fn split_rate(text: &str) -> (&str, Option<&str>) {
+    for separator in ["_per_", " per ", "/"] {
+        if let Some((length, time)) = text.split_once(separator) {
+            return (length.trim(), Some(time.trim()));
+        }
+    }
+    (text, None)
+}
+
+impl fmt::Display for Unit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Length(length) => f.write_str(length.symbol()),
+            Self::Rate(length, time) => write!(f, "{}/{}", length.symbol(), time.symbol()),
+        }
+    }
+}
+
+impl Serialize for Unit {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl<'de> Deserialize<'de> for Unit {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        Self::parse(&text).map_err(serde::de::Error::custom)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_unit_is_read_in_every_spelling_that_files_use() {
+        for text in ["mm_per_day", "mm/d", "mm per day", " MM/Day "] {
+            assert_eq!(Unit::parse(text).unwrap(), Unit::MM_PER_DAY, "{text}");
+        }
+        assert_eq!(Unit::parse("ft").unwrap().factor(), 304.8);
+        assert!((Unit::parse("m/yr").unwrap().factor() - 1000.0 / 365.25).abs() < 1e-12);
+    }
+
+    #[test]
+    fn an_unknown_unit_is_named_in_the_error() {
+        for text in ["furlong", "mm/fortnight", "", "mm/"] {
+            let error = Unit::parse(text).unwrap_err();
+            assert!(error.to_string().contains(&format!("{text:?}")), "{error}");
+        }
+    }
+}

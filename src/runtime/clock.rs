@@ -1,0 +1,29 @@
+//! The only place that knows the time.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "the one module that may read the clock"
+)]
+
+use jiff::Timestamp;
+use std::time::{Duration, Instant};
+
+/// The wall clock's time.
+pub fn now() -> Timestamp {
+    Timestamp::now()
+}
+
+/// A running stopwatch, for figures such as `seconds` in a fit's report.
+#[derive(Debug, Clone, Copy)]
+pub struct Stopwatch(Instant);
+
+impl Stopwatch {
+    /// Starts it.
+    pub fn start() -> Self {
+        Self(Instant::now())
+    }
+
+    /// The time since its start.
+    pub fn elapsed(self) -> Duration {
+        self.0.elapsed()
+    }
+}

@@ -1,0 +1,3 @@
+//! The thin shell around the monitor: clock, files, signals, hooks.
+
+pub mod clock;
