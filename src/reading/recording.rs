@@ -305,7 +305,10 @@ mod tests {
         let centimetres = Unit::parse("cm").unwrap();
         let parts = vec![one("a", Unit::MM, &[]), one("a", centimetres, &[])];
         let error = Recording::merge(parts).unwrap_err().to_string();
-        assert!(error.contains("benchmark a") && error.contains("cm"), "{error}");
+        assert!(
+            error.contains("benchmark a") && error.contains("cm"),
+            "{error}"
+        );
     }
 
     #[test]
@@ -330,7 +333,10 @@ mod tests {
         let chosen = merged.series(Some(&a), Some(Quantity::Velocity)).unwrap();
         assert_eq!(chosen.unit, Unit::MM_PER_DAY);
         let error = merged.series(Some(&a), None).unwrap_err().to_string();
-        assert!(error.contains("a displacement (mm), a velocity (mm/day)"), "{error}");
+        assert!(
+            error.contains("a displacement (mm), a velocity (mm/day)"),
+            "{error}"
+        );
         assert!(!error.contains("b displacement"), "{error}");
     }
 

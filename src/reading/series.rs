@@ -17,6 +17,14 @@ pub struct Reading {
     pub sigma: Option<f64>,
 }
 
+impl Reading {
+    /// Whether its numbers are such as may enter or leave: finite, the standard error positive.
+    pub fn is_sound(&self) -> bool {
+        let positive = |sigma: f64| sigma.is_finite() && sigma > 0.0;
+        self.value.is_finite() && self.sigma.is_none_or(positive)
+    }
+}
+
 /// All readings of one quantity of one benchmark.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
@@ -89,10 +97,7 @@ impl AddAssign for Disorder {
     }
 }
 
-fn settle_rows<T: Copy + PartialEq>(
-    rows: &mut Vec<T>,
-    time: impl Fn(&T) -> Timestamp,
-) -> Disorder {
+fn settle_rows<T: Copy + PartialEq>(rows: &mut Vec<T>, time: impl Fn(&T) -> Timestamp) -> Disorder {
     let mut disorder = Disorder::default();
     let mut latest = Timestamp::MIN;
     for row in rows.iter() {
