@@ -6,4 +6,5 @@ mod quasi_random;
 mod rates;
 
 pub use posterior::{Curvature, Ensemble, Posterior, Sample as LawSample};
+pub(crate) use rates::displacement_sigma;
 pub use rates::{Observation, Observations, Rate, RateOptions};
