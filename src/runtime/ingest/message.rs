@@ -69,15 +69,14 @@ impl Topic {
 }
 
 fn escape(name: &str) -> String {
-    let mut escaped = String::new();
-    for byte in name.bytes() {
+    let one = |byte: u8| {
         if byte.is_ascii_alphanumeric() || b"-_.~".contains(&byte) {
-            escaped.push(char::from(byte));
+            char::from(byte).to_string()
         } else {
-            escaped.push_str(&format!("%{byte:02X}"));
+            format!("%{byte:02X}")
         }
-    }
-    escaped
+    };
+    name.bytes().map(one).collect()
 }
 
 /// A name that others wrote without escapes, or with what only looks like one, stands as it is.
