@@ -11,8 +11,8 @@ use measured::measured;
 use proptest::prelude::*;
 use slipwatch::reading::{BenchmarkId, Disorder, Reading, Recording, Series, Unit};
 use slipwatch::runtime::ingest::{
-    IngestError, ReadOptions, convert, encode_mcap, read_channels, read_files, write_csv,
-    write_mcap,
+    CsvRows, IngestError, Item, ReadOptions, convert, encode_mcap, read_channels, read_files,
+    write_csv, write_mcap,
 };
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -228,6 +228,51 @@ fn rows_out_of_order_repeated_or_corrected_are_settled_and_counted() {
     assert_eq!(values, [9.0, 2.0]);
     assert_eq!((disorder.repeated, disorder.corrected), (1, 1));
     assert_eq!(disorder.out_of_order, 2);
+}
+
+#[test]
+fn a_file_followed_row_by_row_gives_what_the_whole_file_gives() {
+    let text = "time,a_displacement_mm,a_sigma_mm,b_velocity_mm_per_h,rain_mm\n\
+                2020-01-01T00:00:00Z,1,0.5,,3\n2020-01-02T00:00:00Z,,,4,\n";
+    let options = ReadOptions {
+        averaging: Some(SignedDuration::from_hours(1)),
+        ..ReadOptions::default()
+    };
+    let folder = TempDir::new().unwrap();
+    let file = write(&folder, "x.csv", text);
+    let (whole, _) = read_files(std::slice::from_ref(&file), &options).unwrap();
+
+    let mut lines = text.lines().zip(1..);
+    let mut rows = CsvRows::new(&file, lines.next().unwrap().0, &options).unwrap();
+    let bad = rows
+        .row(2, "2020-01-01T00:00:00Z,1,0.5,nonsense,3")
+        .unwrap_err();
+    assert!(bad.to_string().contains("nonsense"), "{bad}");
+    let items: Vec<Item> = lines
+        .flat_map(|(text, line)| rows.row(line, text).unwrap())
+        .collect();
+    let [a, b] = [&whole.series[0], &whole.series[1]];
+    let expected = [
+        Item::Reading {
+            benchmark: a.benchmark.clone(),
+            unit: a.unit,
+            averaging: None,
+            reading: a.readings[0],
+        },
+        Item::Sample {
+            channel: "rain_mm".to_owned(),
+            unit: Some("mm".to_owned()),
+            sample: whole.channels[0].samples[0],
+        },
+        Item::Reading {
+            benchmark: b.benchmark.clone(),
+            unit: b.unit,
+            averaging: Some(SignedDuration::from_hours(1)),
+            reading: b.readings[0],
+        },
+    ];
+    assert_eq!(items, expected);
+    assert_eq!(b.averaging, Some(SignedDuration::from_hours(1)));
 }
 
 #[test]

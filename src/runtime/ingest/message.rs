@@ -334,6 +334,27 @@ mod tests {
     }
 
     #[test]
+    fn the_channels_metadata_say_the_time_base_and_the_averaging() {
+        let decode = |key: &str, text: &str| {
+            let metadata = [(key.to_owned(), text.to_owned())].into();
+            let json = br#"{"value": 1, "unit": "mm/h"}"#;
+            decode_message("/benchmarks/a/velocity", &metadata, 1_500_000_000, json)
+        };
+        let since = "seconds since 1963-08-02T00:00:00Z";
+        let Ok(Some(Item::Reading { reading, .. })) = decode(TIME_BASE, since) else {
+            panic!("no reading")
+        };
+        assert_eq!(reading.time.to_string(), "1963-08-02T00:00:01.5Z");
+        let Ok(Some(Item::Reading { averaging, .. })) = decode(AVERAGING, "0.5") else {
+            panic!("no reading")
+        };
+        assert_eq!(averaging, Some(SignedDuration::from_millis(500)));
+        for (key, text) in [(TIME_BASE, "noon"), (AVERAGING, "0"), (AVERAGING, "NaN")] {
+            assert_eq!(decode(key, text).unwrap_err().field, key, "{text}");
+        }
+    }
+
+    #[test]
     fn what_is_no_reading_is_named_by_field_and_value() {
         let cases = [
             ("[1]", "message", "[1]"),
