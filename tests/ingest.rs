@@ -36,11 +36,20 @@ fn error_of(text: &str) -> String {
 #[test]
 fn a_recording_converted_there_and_back_is_the_same_readings() {
     let names = [
+        "baishuihe_2006.csv",
+        "bazimen_2006.csv",
         "century_2013_31-1930.csv",
-        "century_2014_southwest.csv",
+        "century_2013_31-1931.csv",
+        "century_2013_40-1938.csv",
         "century_2013_rain.csv",
-        "salmon_falls_2017.csv",
+        "century_2014_southwest.csv",
+        "columbia_1985_marker1.csv",
+        "columbia_1985_rain.csv",
+        "houston_msfx_2013.csv",
         "lanzada_2025_f1.csv",
+        "lanzada_2025_f4.csv",
+        "lanzada_2025_rock_temperature.csv",
+        "salmon_falls_2017.csv",
     ];
     let options = ReadOptions::default();
     for file in names.into_iter().filter_map(measured) {
