@@ -3,7 +3,8 @@
 //! The coordinates are those of the present: velocity, slope r and curvature kappa of the inverse
 //! velocity at the window's last reading. The law runs backwards from there through the readings, so
 //! no sample has failed already, and a forecast starts where the slope is now. Priors: flat in ln v and
-//! r; kappa, times the window's length, Cauchy with scale 3; given the sign of kappa, p uniform in
+//! r, but r times the newest sampling interval normal with standard deviation 0.25 (what would be over
+//! within one interval rests on one reading); kappa, times the window's length, Cauchy with scale 3; given the sign of kappa, p uniform in
 //! (0, 0.6) (m from 1 to 2.5) or (-1, 0) (m from 0.5 to 1). Readings scatter by a relative error c
 //! beside their own sigma, Student t with 6 degrees of freedom; correlation between neighbours lowers
 //! the weight of the whole likelihood.
@@ -59,6 +60,8 @@ pub struct Posterior {
 const STUDENT: f64 = 6.0;
 /// Scale of the prior on kappa times the window's length.
 const KAPPA_SCALE: f64 = 3.0;
+/// Standard deviation of the prior on r times the newest sampling interval.
+const SLOPE_PER_INTERVAL: f64 = 0.25;
 /// Prior relative scatter, and the number of readings it counts for.
 const PRIOR_SCATTER: (f64, f64) = (0.1, 3.0);
 /// Samples drawn.
@@ -115,6 +118,7 @@ struct Problem<'a> {
     curvature: Curvature,
     now: f64,
     length: f64,
+    interval: f64,
     scatter: f64,
     temper: f64,
     robust: Vec<f64>,
@@ -138,6 +142,7 @@ impl<'a> Problem<'a> {
             curvature,
             now: last.to,
             length,
+            interval: newest_interval(rates),
             scatter: PRIOR_SCATTER.0,
             temper: 1.0,
             robust: vec![1.0; rates.len()],
@@ -219,6 +224,12 @@ impl<'a> Problem<'a> {
         (rate.velocity - predicted) / self.spread(rate, scale)
     }
 
+    /// How far the present slope r outruns the sampling, in prior standard deviations: an acceleration
+    /// that would be over within the newest interval rests on one reading.
+    fn unresolved(&self, r_length: f64) -> f64 {
+        r_length / self.length * self.interval / SLOPE_PER_INTERVAL
+    }
+
     fn mode(&self, start: &Vector3<f64>) -> Option<Mode> {
         match self.curvature {
             Curvature::Free => self.search::<3>(start),
@@ -234,7 +245,7 @@ impl<'a> Problem<'a> {
         let mut predicted = vec![0.0; count];
         let optimum = least_squares::minimise(
             nalgebra::SVector::<f64, N>::from_fn(|i, _| start[i]),
-            count + 1,
+            count + 2,
             80,
             |at, out| {
                 let at = widen(at);
@@ -246,6 +257,7 @@ impl<'a> Problem<'a> {
                 }
                 // The Cauchy prior as one more residual.
                 out[count] = (2.0 * (at[2] / KAPPA_SCALE).powi(2).ln_1p()).sqrt();
+                out[count + 1] = self.unresolved(at[1]);
                 true
             },
         )?;
@@ -340,13 +352,19 @@ impl<'a> Problem<'a> {
             let Some(log_likelihood) = self.log_likelihood(&law, &mut predicted) else {
                 continue;
             };
-            let prior = -(at[2] / KAPPA_SCALE).powi(2).ln_1p();
+            let prior = -(at[2] / KAPPA_SCALE).powi(2).ln_1p() - 0.5 * self.unresolved(at[1]).powi(2);
             let log_weight =
                 self.temper * log_likelihood + prior - log_proposal(z.norm_squared(), dimensions);
             drawn.push((law, log_weight));
         }
         normalise(drawn)
     }
+}
+
+/// The longest of the last three spacings between rates, days.
+fn newest_interval(rates: &[Rate]) -> f64 {
+    let newest = &rates[rates.len().saturating_sub(4)..];
+    newest.windows(2).map(|pair| pair[1].to - pair[0].to).fold(0.0, f64::max)
 }
 
 /// The share of the likelihood that correlated residuals are worth: (1 - rho) / (1 + rho).

@@ -127,30 +127,29 @@ pub(crate) fn displacement_sigma(values: &[Observation]) -> f64 {
 }
 
 fn displacement_rates(values: &[Observation]) -> Vec<Rate> {
-    let (Some(first), Some(last)) = (values.first(), values.last()) else {
-        return Vec::new();
-    };
+    let (Some(first), Some(last)) = (values.first(), values.last()) else { return Vec::new() };
     let common = displacement_sigma(values);
     let longest = (last.t_days - first.t_days) * LONGEST_SHARE;
+    let between = |earlier: &Observation, later: &Observation| {
+        let span = later.t_days - earlier.t_days;
+        let noise = later.sigma.unwrap_or(common).hypot(earlier.sigma.unwrap_or(common));
+        let velocity = (later.value - earlier.value) / span;
+        Rate { from: earlier.t_days, to: later.t_days, velocity, sigma: noise / span }
+    };
     let mut rates = Vec::new();
-    let mut later = *last;
-    for value in values.iter().rev().skip(1) {
-        let span = later.t_days - value.t_days;
-        let slip = later.value - value.value;
-        let noise = later
-            .sigma
-            .unwrap_or(common)
-            .hypot(value.sigma.unwrap_or(common));
-        if slip < CLEAR_OF_NOISE * noise && span < longest {
-            continue;
+    let mut end = values.len() - 1;
+    for start in (0..values.len() - 1).rev() {
+        let rate = between(&values[start], &values[end]);
+        let clear = rate.velocity > CLEAR_OF_NOISE * rate.sigma;
+        // A step just before must not be smeared over the stillness after it.
+        let breaks = start > 0 && {
+            let next = between(&values[start - 1], &values[start]);
+            (next.velocity - rate.velocity).abs() > CLEAR_OF_NOISE * next.sigma.hypot(rate.sigma)
+        };
+        if clear || breaks || rate.to - rate.from >= longest {
+            rates.push(rate);
+            end = start;
         }
-        rates.push(Rate {
-            from: value.t_days,
-            to: later.t_days,
-            velocity: slip / span,
-            sigma: noise / span,
-        });
-        later = *value;
     }
     rates.reverse();
     rates

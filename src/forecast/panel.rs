@@ -5,6 +5,7 @@
 //! undeclared load is one more such ensemble.
 
 use super::Passage;
+use super::filter::Filter;
 use crate::fit::{Curvature, Ensemble, Observation, Observations, Posterior, Rate, RateOptions};
 use crate::model::{Accuracy, Law, Trajectory};
 use crate::reading::Quantity;
@@ -29,18 +30,24 @@ const fn role(curvature: Curvature, share: f64, fewest: usize) -> Role {
     }
 }
 
-const ROLES: [Role; 7] = [
+const ROLES: [Role; 5] = [
     role(Curvature::Free, 1.0, 8),
-    role(Curvature::Free, 0.5, 12),
-    role(Curvature::Free, 0.25, 16),
-    role(Curvature::Zero, 1.0, 8),
-    role(Curvature::Zero, 0.5, 8),
-    role(Curvature::Zero, 0.25, 8),
-    role(Curvature::Zero, 0.125, 8),
+    role(Curvature::Free, 0.5, 16),
+    role(Curvature::Zero, 1.0, 16),
+    role(Curvature::Zero, 0.5, 16),
+    role(Curvature::Zero, 0.25, 16),
 ];
 
-/// No member's say falls below this share, however it scored.
-const LEAST_SHARE: f64 = 0.04;
+/// The filter's say: the one member that knows that the load may change is never outvoted.
+const FILTER_SHARE: f64 = 0.75;
+/// Fewest readings before anything is forecast: below it the priors would speak, not the slope.
+pub const FEWEST_READINGS: usize = 8;
+/// Fewest rates before the fitted windows have a say in the forecast.
+const FEWEST_RATES: usize = 16;
+/// How far the forecast looks, days.
+pub const HORIZON_DAYS: f64 = 400.0;
+/// No window's share among the windows falls below this, however it scored.
+const LEAST_SHARE: f64 = 0.05;
 /// Memory of a score: a reading this many readings ago counts 1/e.
 const SCORE_MEMORY: f64 = 12.0;
 /// A prediction is never worse than this in log score: one outlier does not decide.
@@ -56,14 +63,16 @@ struct Member {
 /// What the panel says after its newest reading.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outlook {
+    /// The newest reading, days.
+    pub now_days: f64,
     /// Days to the critical velocity, from the newest reading.
     pub passage: Passage,
     /// Probability of each regime.
     pub regimes: BTreeMap<Regime, f64>,
     /// The velocity now, mm/day, by the panel's median.
     pub velocity_mm_per_day: f64,
-    /// The most probable law over the longest window, t = 0 now.
-    pub law: Law,
+    /// The most probable law over the longest window, t = 0 now; `None` with too few rates.
+    pub law: Option<Law>,
     /// Rates of the whole record, oldest first.
     pub rates: Vec<Rate>,
 }
@@ -73,79 +82,58 @@ pub struct Outlook {
 pub struct Panel {
     members: Vec<Member>,
     scored_to_days: f64,
-    pub filter: super::filter::Filter,
-}
-
-impl Default for Panel {
-    fn default() -> Self {
-        let members = ROLES.map(|role| Member {
-            role,
-            posterior: None,
-            score: 0.0,
-        });
-        Self {
-            members: members.to_vec(),
-            scored_to_days: f64::NEG_INFINITY,
-            filter: super::filter::Filter::new(1),
-        }
-    }
+    filter: Filter,
 }
 
 impl Panel {
-    /// Scores every member on the newest reading, refits it, and says what they expect together;
-    /// `None` with too few readings to go on.
+    /// A panel that has seen nothing; `seed` feeds the filter's generator.
+    pub fn new(seed: u64) -> Self {
+        let members = ROLES.map(|role| Member { role, posterior: None, score: 0.0 });
+        Self { members: members.to_vec(), scored_to_days: f64::NEG_INFINITY, filter: Filter::new(seed) }
+    }
+
+    /// Scores every member on the newest reading, refits it, and says what they expect together of
+    /// passing `critical` mm/day; `None` with too few readings to go on.
     pub fn update(&mut self, observations: &Observations, critical: f64) -> Option<Outlook> {
         self.score(observations);
         self.filter.update(observations);
         let rates = observations.rates(0..observations.values.len(), RateOptions::default());
-        let mut fitted = 0;
         for member in &mut self.members {
             let window = window(&rates, member.role);
             let warm = member.posterior.take();
-            member.posterior = window
-                .and_then(|window| Posterior::fit(window, member.role.curvature, warm.as_ref()));
-            fitted += usize::from(member.posterior.is_some());
+            member.posterior =
+                window.and_then(|window| Posterior::fit(window, member.role.curvature, warm.as_ref()));
         }
-        if fitted == 0 {
+        if observations.values.len() < FEWEST_READINGS {
             return None;
         }
-        Some(self.outlook(rates, critical))
+        Some(self.outlook(rates, observations.values.last()?.t_days, critical))
     }
 
-    fn outlook(&self, rates: Vec<Rate>, critical: f64) -> Outlook {
-        let weighed = self.weights();
-        let parts: Vec<(Passage, f64)> = weighed
-            .iter()
-            .map(|(p, weight)| (Passage::of(&p.ensemble, critical, 0.0), *weight))
-            .collect();
-        let velocity = weighted_median(weighed.iter().flat_map(|(p, weight)| {
-            p.ensemble
-                .samples
-                .iter()
-                .map(move |sample| (sample.law.v_i, sample.weight * weight))
-        }));
+    fn outlook(&mut self, rates: Vec<Rate>, now_days: f64, critical: f64) -> Outlook {
+        let filtered = self.filter.passage(critical, HORIZON_DAYS);
+        let weighed = if rates.len() >= FEWEST_RATES { self.weights() } else { Vec::new() };
+        let mut parts: Vec<(Passage, f64)> = Vec::new();
+        for (posterior, weight) in &weighed {
+            let later = now_days - posterior.ensemble.now_days;
+            parts.push((Passage::of(&posterior.ensemble, critical, later), weight * (1.0 - FILTER_SHARE)));
+        }
+        parts.push((filtered, FILTER_SHARE));
         Outlook {
+            now_days,
             passage: Passage::mixture(&parts),
             regimes: self.regimes(),
-            velocity_mm_per_day: velocity,
+            velocity_mm_per_day: self.filter.velocity().unwrap_or(f64::NAN),
             law: self.longest_law(),
             rates,
         }
     }
 
     /// The best sample of the law over the longest window that has one.
-    fn longest_law(&self) -> Law {
-        let posterior = self
-            .members
-            .iter()
-            .find_map(|member| member.posterior.as_ref());
-        let best = posterior.and_then(|p| {
-            p.ensemble
-                .samples
-                .iter()
-                .max_by(|a, b| a.weight.total_cmp(&b.weight))
-        });
-        best.map_or_else(|| Law::from_fit(1.0, 0.0, 0.0, 0.0), |sample| sample.law)
+    fn longest_law(&self) -> Option<Law> {
+        let posterior = self.members.iter().find_map(|member| member.posterior.as_ref())?;
+        let samples = posterior.ensemble.samples.iter();
+        samples.max_by(|a, b| a.weight.total_cmp(&b.weight)).map(|sample| sample.law)
     }
 
     /// Members and their say: scores through a softmax, with a floor.
@@ -187,44 +175,6 @@ impl Panel {
             }
         }
         regimes
-    }
-
-    /// debug
-    pub fn debug2(&mut self) -> String {
-        let p = self.filter.passage(1000.0, 400.0);
-        let q = |s| {
-            p.quantile(s, 400.0)
-                .map_or("-".into(), |d: f64| format!("{:.2}", d))
-        };
-        format!(
-            "F v={:.2} P12h={:.3} P24h={:.3} P3d={:.3} P30={:.3} P400={:.2} q=[{} {} {}]",
-            self.filter.velocity().unwrap_or(0.0),
-            p.chance_within(0.5),
-            p.chance_within(1.0),
-            p.chance_within(3.0),
-            p.chance_within(30.0),
-            p.chance_within(400.0),
-            q(0.05),
-            q(0.5),
-            q(0.95)
-        )
-    }
-    /// debug
-    pub fn debug(&self) -> String {
-        self.weights()
-            .iter()
-            .map(|(p, w)| {
-                let q = Passage::of(&p.ensemble, 1000.0, 0.0);
-                format!(
-                    "{w:.2}:{:.2}/{}/c{:.2}",
-                    q.chance_within(4000.0),
-                    q.quantile(0.5, 4000.0)
-                        .map_or("-".into(), |d| format!("{d:.2}")),
-                    p.ensemble.scatter
-                )
-            })
-            .collect::<Vec<_>>()
-            .join(" ")
     }
 
     fn score(&mut self, observations: &Observations) {
@@ -318,16 +268,3 @@ fn mean_velocity(law: &Law, from: f64, to: f64) -> Option<f64> {
     Some((displacement(to)? - displacement(to - step)?) / step)
 }
 
-fn weighted_median(values: impl Iterator<Item = (f64, f64)>) -> f64 {
-    let mut values: Vec<(f64, f64)> = values.collect();
-    values.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let half = values.iter().map(|(_, w)| w).sum::<f64>() / 2.0;
-    let mut reached = 0.0;
-    for (value, weight) in &values {
-        reached += weight;
-        if reached >= half {
-            return *value;
-        }
-    }
-    f64::NAN
-}

@@ -21,6 +21,15 @@ impl Accuracy {
         }
     }
 
+    /// A bound on the work: more segments than a solution within f64's range needs, or than a fit can
+    /// use (a law that needs more is about to leave its domain).
+    fn most_segments(self) -> usize {
+        match self {
+            Self::Full => 4000,
+            Self::Fit => 48,
+        }
+    }
+
     /// ln y below which the last stretch before failure is solved by the time that remains.
     fn ln_y_of_tail(self) -> f64 {
         match self {
@@ -29,9 +38,6 @@ impl Accuracy {
         }
     }
 }
-
-/// More segments than any solution within f64's range needs; a bound, not a setting.
-const MAX_SEGMENTS: usize = 4000;
 
 /// Position on a trajectory.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,7 +67,7 @@ impl Trajectory {
         let mut segments = Vec::with_capacity(16);
         let mut tail = None;
         let (mut t, mut y, mut slip) = (0.0, 1.0, 0.0);
-        while t <= end_days && segments.len() < MAX_SEGMENTS {
+        while t <= end_days && segments.len() < accuracy.most_segments() {
             if failure_days.is_some() && f64::ln(y) < accuracy.ln_y_of_tail() {
                 tail = Some((t, f64::ln(y), slip));
                 break;
@@ -105,7 +111,11 @@ impl Trajectory {
             .segments
             .partition_point(|segment| segment.start <= t)
             .saturating_sub(1);
-        let (y, slip) = self.segments.get(index)?.at(t);
+        let segment = self.segments.get(index)?;
+        if t > segment.start + segment.span * (1.0 + 1e-9) {
+            return None;
+        }
+        let (y, slip) = segment.at(t);
         (y > 0.0).then(|| self.motion(y, slip))
     }
 

@@ -35,6 +35,7 @@ pub(super) struct Filter {
     particles: Vec<Particle>,
     weights: Vec<f64>,
     generator: Pcg64,
+    reset: Option<Reset>,
     taken: usize,
     now_days: f64,
 }
@@ -46,6 +47,7 @@ impl Filter {
             particles: Vec::new(),
             weights: Vec::new(),
             generator: Pcg64::seed_from_u64(seed),
+            reset: None,
             taken: 0,
             now_days: 0.0,
         }
@@ -79,6 +81,7 @@ impl Filter {
             .map(|_| Particle::draw(&reset, &mut self.generator))
             .collect();
         self.weights = vec![1.0 / PARTICLES as f64; PARTICLES];
+        self.reset = Some(reset);
         self.now_days = first[0].t_days;
         self.taken = 1;
     }
@@ -106,20 +109,21 @@ impl Filter {
         }
         let effective = 1.0 / self.weights.iter().map(|w| w * w).sum::<f64>();
         if effective < RESAMPLE_BELOW * PARTICLES as f64 {
-            self.resample(observations.quantity);
+            self.resample();
         }
         total.ln()
     }
 
     /// Systematic resampling; the copies' parameters are jittered a little so that they stay apart.
-    fn resample(&mut self, quantity: Quantity) {
+    fn resample(&mut self) {
+        let Some(reset) = self.reset else { return };
         let picked = self.systematic(PARTICLES);
         self.particles = picked
             .into_iter()
             .map(|index| self.particles[index].clone())
             .collect();
         for particle in &mut self.particles {
-            particle.jitter(quantity, &mut self.generator);
+            particle.jitter(&reset, &mut self.generator);
         }
         self.weights.fill(1.0 / PARTICLES as f64);
     }

@@ -19,7 +19,8 @@ pub(super) struct Reset {
     quantity: Quantity,
     first_value: f64,
     velocity: f64,
-    days: f64,
+    /// Sampling interval, days: the unit of time of every prior.
+    pub(super) interval_days: f64,
 }
 
 impl Reset {
@@ -34,7 +35,7 @@ impl Reset {
             quantity,
             first_value: start.value,
             velocity: velocity.max(1e-3),
-            days,
+            interval_days: days / (first.len() - 1) as f64,
         }
     }
 }
@@ -63,17 +64,19 @@ struct Parameters {
 }
 
 impl Parameters {
-    fn draw(quantity: Quantity, generator: &mut impl Rng) -> Self {
+    /// Log-uniform priors in units of the sampling interval, so that a slope watched by the minute and
+    /// one watched by the month are met with the same open mind.
+    fn draw(quantity: Quantity, interval_days: f64, generator: &mut impl Rng) -> Self {
         let noise = if has_zero(quantity) {
             log_uniform(generator, 0.05, 20.0)
         } else {
             log_uniform(generator, 0.01, 0.3)
         };
         Self {
-            q: log_uniform(generator, 0.005, 1.0),
-            eta: log_uniform(generator, 1e-5, 0.3),
+            q: log_uniform(generator, 0.003, 0.15) / interval_days.sqrt(),
+            eta: log_uniform(generator, 1e-6, 0.02) / interval_days.powf(1.5),
             sigma: log_uniform(generator, 0.02, 0.6),
-            tau: log_uniform(generator, 0.05, 40.0),
+            tau: log_uniform(generator, 2.0, 60.0) * interval_days,
             noise,
         }
     }
@@ -114,8 +117,8 @@ impl Particle {
         } else {
             -1.0
         };
-        let s = sign * w * log_uniform(generator, 1e-4, 0.3 / reset.days.clamp(0.05, 10.0));
-        let own = Parameters::draw(reset.quantity, generator);
+        let s = sign * w * fresh_slope(reset.interval_days, generator);
+        let own = Parameters::draw(reset.quantity, reset.interval_days, generator);
         Self {
             w,
             s,
@@ -247,7 +250,7 @@ impl Particle {
 
     /// Small moves of the particle's own parameters, and now and then a fresh draw: without it a cloud
     /// that has agreed on a wrong answer never leaves it.
-    pub(super) fn jitter(&mut self, quantity: Quantity, generator: &mut impl Rng) {
+    pub(super) fn jitter(&mut self, reset: &Reset, generator: &mut impl Rng) {
         for parameter in [
             &mut self.q,
             &mut self.eta,
@@ -258,7 +261,7 @@ impl Particle {
             *parameter *= (JITTER * normal(generator)).exp();
         }
         if generator.random::<f64>() < FRESH {
-            let own = Parameters::draw(quantity, generator);
+            let own = Parameters::draw(reset.quantity, reset.interval_days, generator);
             (self.q, self.eta, self.sigma, self.tau, self.noise) =
                 (own.q, own.eta, own.sigma, own.tau, own.noise);
         }
@@ -268,7 +271,7 @@ impl Particle {
             } else {
                 -1.0
             };
-            self.s = sign * self.w * log_uniform(generator, 1e-4, 3.0);
+            self.s = sign * self.w * fresh_slope(reset.interval_days, generator);
         }
     }
 
@@ -300,6 +303,11 @@ impl Particle {
         }
         None
     }
+}
+
+/// |s| / w in 1/day: from a thousandth of the velocity an interval to a tenth.
+fn fresh_slope(interval_days: f64, generator: &mut impl Rng) -> f64 {
+    log_uniform(generator, 1e-4, 0.1) / interval_days
 }
 
 fn student(z: f64) -> f64 {
