@@ -3,26 +3,70 @@ use slipwatch::{fit::*, forecast::*, reading::*, runtime::ingest};
 fn main() {
     let start = std::time::Instant::now();
     let a: Vec<String> = std::env::args().skip(1).collect();
-    let (bench, avg, evac, every): (_, f64, f64, usize) = (a[1].clone(), a[2].parse().unwrap(), a[3].parse().unwrap(), a[4].parse().unwrap());
-    let (rec, _) = ingest::read_files(&[std::path::PathBuf::from(&a[0])], &ingest::ReadOptions::default()).unwrap();
-    for s in rec.series.iter().filter(|s| bench == "x" || s.benchmark.as_str() == bench) {
+    let (bench, avg, evac, every): (_, f64, f64, usize) = (
+        a[1].clone(),
+        a[2].parse().unwrap(),
+        a[3].parse().unwrap(),
+        a[4].parse().unwrap(),
+    );
+    let (rec, _) = ingest::read_files(
+        &[std::path::PathBuf::from(&a[0])],
+        &ingest::ReadOptions::default(),
+    )
+    .unwrap();
+    for s in rec
+        .series
+        .iter()
+        .filter(|s| bench == "x" || s.benchmark.as_str() == bench)
+    {
         println!("== {}", s.benchmark);
         let t0 = s.readings[0].time;
-        let mut obs = Observations { quantity: s.quantity(), averaging_days: avg / 24.0, values: vec![] };
+        let mut obs = Observations {
+            quantity: s.quantity(),
+            averaging_days: avg / 24.0,
+            values: vec![],
+        };
         let mut panel = Panel::new(1);
         let mut worst = 0.0_f64;
         for (i, r) in s.readings.iter().enumerate() {
-            obs.values.push(Observation { t_days: days_since(t0, r.time), value: r.value * s.unit.factor(), sigma: None });
-            let Some(o) = panel.update(&obs, 1000.0) else { continue };
+            obs.values.push(Observation {
+                t_days: days_since(t0, r.time),
+                value: r.value * s.unit.factor(),
+                sigma: None,
+            });
+            let Some(o) = panel.update(&obs, 1000.0) else {
+                continue;
+            };
             worst = worst.max(o.passage.chance_within(evac / 24.0));
-            if i % every != 0 && i + 1 != s.readings.len() { continue; }
+            if i % every != 0 && i + 1 != s.readings.len() {
+                continue;
+            }
             let n = o.rates.len();
             let line = InverseVelocityLine::fit(&o.rates[n - (n / 4).max(8).min(n)..]);
-            let q = |s| o.passage.quantile(s, 4000.0).map_or("-".into(), |d: f64| format!("{:.2}", d));
-            println!("{} t={:.2} n={} v={:.2} Pe={:.3} P30={:.3} q=[{} {} {}] line={} | {}", r.time, obs.values[i].t_days, n, o.velocity_mm_per_day,
-                o.passage.chance_within(evac / 24.0), o.passage.chance_within(30.0), q(0.05), q(0.5), q(0.95),
-                line.and_then(|l| l.intercept_days).map_or("-".into(), |d| format!("{:.2}", d - obs.values[i].t_days)),
-                o.regimes.values().map(|v| format!("{v:.2}")).collect::<Vec<_>>().join(" "));
+            let q = |s| {
+                o.passage
+                    .quantile(s, 4000.0)
+                    .map_or("-".into(), |d: f64| format!("{:.2}", d))
+            };
+            println!(
+                "{} t={:.2} n={} v={:.2} Pe={:.3} P30={:.3} q=[{} {} {}] line={} | {}",
+                r.time,
+                obs.values[i].t_days,
+                n,
+                o.velocity_mm_per_day,
+                o.passage.chance_within(evac / 24.0),
+                o.passage.chance_within(30.0),
+                q(0.05),
+                q(0.5),
+                q(0.95),
+                line.and_then(|l| l.intercept_days)
+                    .map_or("-".into(), |d| format!("{:.2}", d - obs.values[i].t_days)),
+                o.regimes
+                    .values()
+                    .map(|v| format!("{v:.2}"))
+                    .collect::<Vec<_>>()
+                    .join(" ")
+            );
         }
         println!("worst Pe {worst:.3}");
     }

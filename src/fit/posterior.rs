@@ -352,7 +352,8 @@ impl<'a> Problem<'a> {
             let Some(log_likelihood) = self.log_likelihood(&law, &mut predicted) else {
                 continue;
             };
-            let prior = -(at[2] / KAPPA_SCALE).powi(2).ln_1p() - 0.5 * self.unresolved(at[1]).powi(2);
+            let prior =
+                -(at[2] / KAPPA_SCALE).powi(2).ln_1p() - 0.5 * self.unresolved(at[1]).powi(2);
             let log_weight =
                 self.temper * log_likelihood + prior - log_proposal(z.norm_squared(), dimensions);
             drawn.push((law, log_weight));
@@ -364,7 +365,10 @@ impl<'a> Problem<'a> {
 /// The longest of the last three spacings between rates, days.
 fn newest_interval(rates: &[Rate]) -> f64 {
     let newest = &rates[rates.len().saturating_sub(4)..];
-    newest.windows(2).map(|pair| pair[1].to - pair[0].to).fold(0.0, f64::max)
+    newest
+        .windows(2)
+        .map(|pair| pair[1].to - pair[0].to)
+        .fold(0.0, f64::max)
 }
 
 /// The share of the likelihood that correlated residuals are worth: (1 - rho) / (1 + rho).

@@ -127,14 +127,24 @@ pub(crate) fn displacement_sigma(values: &[Observation]) -> f64 {
 }
 
 fn displacement_rates(values: &[Observation]) -> Vec<Rate> {
-    let (Some(first), Some(last)) = (values.first(), values.last()) else { return Vec::new() };
+    let (Some(first), Some(last)) = (values.first(), values.last()) else {
+        return Vec::new();
+    };
     let common = displacement_sigma(values);
     let longest = (last.t_days - first.t_days) * LONGEST_SHARE;
     let between = |earlier: &Observation, later: &Observation| {
         let span = later.t_days - earlier.t_days;
-        let noise = later.sigma.unwrap_or(common).hypot(earlier.sigma.unwrap_or(common));
+        let noise = later
+            .sigma
+            .unwrap_or(common)
+            .hypot(earlier.sigma.unwrap_or(common));
         let velocity = (later.value - earlier.value) / span;
-        Rate { from: earlier.t_days, to: later.t_days, velocity, sigma: noise / span }
+        Rate {
+            from: earlier.t_days,
+            to: later.t_days,
+            velocity,
+            sigma: noise / span,
+        }
     };
     let mut rates = Vec::new();
     let mut end = values.len() - 1;

@@ -88,8 +88,16 @@ pub struct Panel {
 impl Panel {
     /// A panel that has seen nothing; `seed` feeds the filter's generator.
     pub fn new(seed: u64) -> Self {
-        let members = ROLES.map(|role| Member { role, posterior: None, score: 0.0 });
-        Self { members: members.to_vec(), scored_to_days: f64::NEG_INFINITY, filter: Filter::new(seed) }
+        let members = ROLES.map(|role| Member {
+            role,
+            posterior: None,
+            score: 0.0,
+        });
+        Self {
+            members: members.to_vec(),
+            scored_to_days: f64::NEG_INFINITY,
+            filter: Filter::new(seed),
+        }
     }
 
     /// Scores every member on the newest reading, refits it, and says what they expect together of
@@ -101,10 +109,15 @@ impl Panel {
         for member in &mut self.members {
             let window = window(&rates, member.role);
             let warm = member.posterior.take();
-            member.posterior =
-                window.and_then(|window| Posterior::fit(window, member.role.curvature, warm.as_ref()));
+            member.posterior = window
+                .and_then(|window| Posterior::fit(window, member.role.curvature, warm.as_ref()));
         }
-        if observations.values.len() < FEWEST_READINGS {
+        let independent = if observations.quantity == Quantity::Velocity {
+            rates.len()
+        } else {
+            observations.values.len()
+        };
+        if independent < FEWEST_READINGS {
             return None;
         }
         Some(self.outlook(rates, observations.values.last()?.t_days, critical))
@@ -112,11 +125,29 @@ impl Panel {
 
     fn outlook(&mut self, rates: Vec<Rate>, now_days: f64, critical: f64) -> Outlook {
         let filtered = self.filter.passage(critical, HORIZON_DAYS);
-        let weighed = if rates.len() >= FEWEST_RATES { self.weights() } else { Vec::new() };
+        let weighed = if rates.len() >= FEWEST_RATES {
+            self.weights()
+        } else {
+            Vec::new()
+        };
         let mut parts: Vec<(Passage, f64)> = Vec::new();
         for (posterior, weight) in &weighed {
             let later = now_days - posterior.ensemble.now_days;
-            parts.push((Passage::of(&posterior.ensemble, critical, later), weight * (1.0 - FILTER_SHARE)));
+            parts.push((
+                Passage::of(&posterior.ensemble, critical, later),
+                weight * (1.0 - FILTER_SHARE),
+            ));
+        }
+        if std::env::var("DBG").is_ok() {
+            let txt: Vec<String> = parts
+                .iter()
+                .map(|(p, w)| format!("{w:.2}:{:.2}", p.chance_within(1.0)))
+                .collect();
+            println!(
+                "   t={now_days:.2} F={:.3} {}",
+                filtered.chance_within(1.0),
+                txt.join(" ")
+            );
         }
         parts.push((filtered, FILTER_SHARE));
         Outlook {
@@ -131,9 +162,14 @@ impl Panel {
 
     /// The best sample of the law over the longest window that has one.
     fn longest_law(&self) -> Option<Law> {
-        let posterior = self.members.iter().find_map(|member| member.posterior.as_ref())?;
+        let posterior = self
+            .members
+            .iter()
+            .find_map(|member| member.posterior.as_ref())?;
         let samples = posterior.ensemble.samples.iter();
-        samples.max_by(|a, b| a.weight.total_cmp(&b.weight)).map(|sample| sample.law)
+        samples
+            .max_by(|a, b| a.weight.total_cmp(&b.weight))
+            .map(|sample| sample.law)
     }
 
     /// Members and their say: scores through a softmax, with a floor.
@@ -267,4 +303,3 @@ fn mean_velocity(law: &Law, from: f64, to: f64) -> Option<f64> {
     let step = to.abs().max(1e-3) * 1e-4;
     Some((displacement(to)? - displacement(to - step)?) / step)
 }
-

@@ -92,9 +92,10 @@ impl Filter {
             averaging_days: observations.averaging_days,
         };
         let days = newest.t_days - self.now_days;
+        let suggested = self.suggested(observations, newest);
         let mut total = 0.0;
         for (particle, weight) in self.particles.iter_mut().zip(&mut self.weights) {
-            particle.advance(days, &mut self.generator);
+            *weight *= particle.advance(days, suggested, &mut self.generator);
             *weight *= particle.weigh(&dynamics, newest, &mut self.generator);
             total += *weight;
         }
@@ -112,6 +113,19 @@ impl Filter {
             self.resample();
         }
         total.ln()
+    }
+
+    /// The velocity that the newest reading implies by itself, mm/day.
+    fn suggested(&self, observations: &Observations, newest: &Observation) -> f64 {
+        match observations.quantity {
+            Quantity::Velocity => newest.value,
+            Quantity::Displacement => {
+                let before = observations.values.get(self.taken.wrapping_sub(2));
+                before.map_or(0.0, |before| {
+                    (newest.value - before.value) / (newest.t_days - before.t_days)
+                })
+            }
+        }
     }
 
     /// Systematic resampling; the copies' parameters are jittered a little so that they stay apart.

@@ -44,16 +44,20 @@ impl Reset {
 const LAGS: usize = 4;
 /// Nothing moves faster: a bound for particles that have failed, mm/day.
 const FASTEST: f64 = 1e6;
-/// Chance, a reading, of a sudden load step, and its scale in ln v.
-const STEP: (f64, f64) = (0.005, 0.8);
-/// Chance, a reading, that a displacement instrument was reset, and the range of resets, mm.
-const INSTRUMENT_RESET: (f64, f64) = (1e-3, 300.0);
+/// Prior of a sudden load step: its chance, a reading, and its scale in ln v.
+const STEP: (f64, f64) = (0.003, 0.7);
+/// Share of particles that try the load step which the newest reading suggests, and their scatter about it.
+const SUGGESTED: (f64, f64) = (0.04, 0.25);
+/// A benchmark that still reads has not collapsed: nothing that reads moves faster, mm/day.
+const COLLAPSED: f64 = 1e5;
+/// Chance, a reading, that a displacement instrument was reset, and the scale of resets, mm.
+const INSTRUMENT_RESET: (f64, f64) = (1e-3, 60.0);
 /// Degrees of freedom of the reading noise.
 const STUDENT: f64 = 4.0;
 /// Jitter of ln parameters at resampling.
 const JITTER: f64 = 0.05;
 /// Chance, at resampling, of fresh parameters, and of a fresh slope.
-const FRESH: f64 = 0.02;
+const FRESH: f64 = 0.004;
 
 struct Parameters {
     q: f64,
@@ -143,8 +147,10 @@ impl Particle {
         self.f.exp() / self.w
     }
 
-    /// Moves `days` on, in steps that resolve the acceleration.
-    pub(super) fn advance(&mut self, days: f64, generator: &mut impl Rng) {
+    /// Moves `days` on, in steps that resolve the acceleration. `suggested` is the velocity that the
+    /// newest reading implies; returns the importance weight of having looked at it.
+    pub(super) fn advance(&mut self, days: f64, suggested: f64, generator: &mut impl Rng) -> f64 {
+        let weight = self.maybe_step(suggested, generator);
         let mut left = days;
         for _ in 0..12 {
             let to_failure = if self.s > 0.0 {
@@ -164,11 +170,29 @@ impl Particle {
         if left > 1e-12 * days {
             self.step(left, generator);
         }
-        if generator.random::<f64>() < STEP.0 {
-            self.w *= (-STEP.1 * normal(generator)).exp();
-        }
         self.past.rotate_right(1);
         self.past[0] = (days, self.x);
+        if self.velocity() > COLLAPSED {
+            0.0
+        } else {
+            weight
+        }
+    }
+
+    /// A load step, proposed where the newest reading points and weighed by its prior.
+    fn maybe_step(&mut self, suggested: f64, generator: &mut impl Rng) -> f64 {
+        if !(suggested > 0.0) || generator.random::<f64>() >= SUGGESTED.0 {
+            return (1.0 - STEP.0) / (1.0 - SUGGESTED.0);
+        }
+        let z = normal(generator);
+        let jump = (suggested / self.velocity()).ln() + SUGGESTED.1 * z;
+        let prior = STEP.0 * student(jump / STEP.1) / STEP.1;
+        // 0.3989 is the density of the standard normal at 0.
+        let proposal = SUGGESTED.0 * 0.398_942 * (-0.5 * z * z).exp() / SUGGESTED.1;
+        let shrink = (-jump).exp();
+        self.w *= shrink;
+        self.s *= shrink;
+        prior / proposal
     }
 
     fn step(&mut self, days: f64, generator: &mut impl Rng) {
