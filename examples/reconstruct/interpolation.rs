@@ -1,7 +1,7 @@
 //! Straight lines between stated points.
 
 /// The value at `x` of the straight lines through `points`, constant beyond their ends.
-pub fn between(points: &[(f64, f64)], x: f64) -> f64 {
+pub(crate) fn between(points: &[(f64, f64)], x: f64) -> f64 {
     let after = points.partition_point(|point| point.0 <= x);
     match (after.checked_sub(1).map(|i| points[i]), points.get(after)) {
         (Some(left), Some(right)) => {

@@ -5,6 +5,7 @@
 use crate::interpolation::between;
 use crate::loaded_law::Block;
 use crate::noise::{ColouredNoise, rounded};
+use crate::provenance::Provenance;
 use anyhow::{Context, Result};
 use jiff::civil::{Date, date};
 use jiff::tz::TimeZone;
@@ -14,10 +15,9 @@ use slipwatch::model::Law;
 use slipwatch::reading::{
     BenchmarkId, Channel, Reading, Recording, Sample, Series, Timestamp, Unit, days_since,
 };
-use std::collections::BTreeMap;
 
 /// File name of the recording.
-pub const FILE: &str = "la-clapiere-1982-1995-reconstruction.mcap";
+pub(crate) const FILE: &str = "la-clapiere-1982-1995-reconstruction.mcap";
 /// Paper: 1982.9, monthly. Invented: the day of the month and the hour (00:00 UTC).
 const FIRST_READING: Date = date(1982, 11, 25);
 /// Paper: to 1995. Invented: the month.
@@ -32,25 +32,19 @@ const M: f64 = 0.98;
 /// Paper: the same fit.
 const X_I: f64 = 39.0;
 /// Invented: T in days, by which the block is still far from its steady velocity in 1986.
-const T_DAYS: f64 = 16.75;
+const T_DAYS: f64 = 20.0;
 /// Paper: 1.5 m/yr in 1975-1982, which the law has at its start under the year's mean load.
 const INITIAL_MM_PER_DAY: f64 = 1500.0 / 365.25;
 
 /// Invented: how fast the slope answers the river, days.
 const RESPONSE_DAYS: f64 = 15.0;
 /// Invented: log-load per m3/s of the flow's response, for the paper's seasonal maxima.
-const RIVER_GAIN: f64 = 0.028;
-/// Invented: the response at which the river's log-load is zero; e^f is 1 in the mean of 1983-1985.
-const RIVER_ZERO_M3_S: f64 = 17.0;
+const RIVER_GAIN: f64 = 0.07;
+/// Invented: the response at which the river's log-load is zero; e^f is about 1.1 in the mean of 1983-1985.
+const RIVER_ZERO_M3_S: f64 = 17.6;
 /// Log-load that is not the river's, by year. Paper: there is one in 1986 and 1987, after a
 /// crack freed a block in 1985-1986. Invented: its course and size, for 80 and 90 mm/day in 1987.
-const EXTRA_LOAD: [(f64, f64); 5] = [
-    (1985.9, 0.0),
-    (1986.6, 0.2),
-    (1987.3, 0.35),
-    (1987.7, 0.35),
-    (1988.0, 0.35),
-];
+const EXTRA_LOAD: [(f64, f64); 3] = [(1985.9, 0.0), (1986.5, 0.4), (1987.1, 0.47)];
 
 /// Paper: the regime changes at the end of 1987, and the seasons never come back.
 const CHANGE: f64 = 1987.85;
@@ -59,9 +53,9 @@ const FADE_YEARS: f64 = 0.15;
 /// Invented: B/A after the change.
 const M_AFTER: f64 = 0.8;
 /// Invented: the steady velocity after it, slightly above the level before 1986 (paper), mm/day.
-const STEADY_AFTER_MM_PER_DAY: f64 = 9.0;
+const STEADY_AFTER_MM_PER_DAY: f64 = 5.6;
 /// Invented: relaxation time to it, days, for a sixth of the peak over 1988-1990 (paper).
-const RELAXATION_AFTER_DAYS: f64 = 800.0;
+const RELAXATION_AFTER_DAYS: f64 = 2200.0;
 
 /// Invented: standard error of a monthly position, mm.
 const NOISE_MM: f64 = 10.0;
@@ -83,8 +77,8 @@ mod river {
     pub(super) const STORM_DAYS: std::ops::Range<f64> = 265.0..335.0;
     pub(super) const STORM_M3_S: std::ops::Range<f64> = 12.0..45.0;
     pub(super) const RECESSION_DAYS: f64 = 9.0;
-    /// A rain of early October 1987, within the range of the others.
-    pub(super) const STORM_OF_1987: (f64, f64) = (279.0, 38.0);
+    /// Two rains of early October 1987, each within the range of the others.
+    pub(super) const STORMS_OF_1987: [(f64, f64); 2] = [(275.0, 34.0), (284.0, 32.0)];
     /// Standard deviation of ln(flow) and its memory from day to day.
     pub(super) const NOISE: f64 = 0.08;
     pub(super) const NOISE_MEMORY: f64 = 0.7;
@@ -92,35 +86,35 @@ mod river {
 
 /// One day of the years in which the river acts on the slope.
 #[derive(Debug, Clone, Copy)]
-pub struct Day {
+pub(crate) struct Day {
     /// Its start.
-    pub time: Timestamp,
+    pub(crate) time: Timestamp,
     /// Decimal year.
-    pub year: f64,
+    pub(crate) year: f64,
     /// The Tinée's flow, m3/s.
-    pub flow_m3_s: f64,
+    pub(crate) flow_m3_s: f64,
     /// The river's log-load on the slope, while it holds.
-    pub river_load: f64,
+    pub(crate) river_load: f64,
 }
 
 /// Displacement and velocity of the benchmark at the start of a day.
 #[derive(Debug, Clone, Copy)]
-pub struct Motion {
+pub(crate) struct Motion {
     /// When.
-    pub time: Timestamp,
+    pub(crate) time: Timestamp,
     /// Decimal year.
-    pub year: f64,
+    pub(crate) year: f64,
     /// Since the first reading, mm.
-    pub slip_mm: f64,
+    pub(crate) slip_mm: f64,
     /// Instantaneous, mm/day.
-    pub velocity: f64,
+    pub(crate) velocity: f64,
 }
 
 /// The reconstruction, from its constants and seed alone.
 ///
 /// # Errors
 /// When a constant makes no law or no date.
-pub fn recording() -> Result<Recording> {
+pub(crate) fn recording() -> Result<Recording> {
     let days = days()?;
     let noise = ColouredNoise::new(SEED, NOISE_MM, 0.0);
     let due = |motion: &Motion| motion.time.to_zoned(TimeZone::UTC).day() == FIRST_READING.day();
@@ -149,7 +143,7 @@ pub fn recording() -> Result<Recording> {
     Ok(Recording {
         series: vec![series],
         channels: vec![channel],
-        provenance: provenance(),
+        provenance: provenance().entries(),
     })
 }
 
@@ -157,7 +151,7 @@ pub fn recording() -> Result<Recording> {
 ///
 /// # Errors
 /// When a constant makes no law or no date.
-pub fn motions(days: &[Day]) -> Result<Vec<Motion>> {
+pub(crate) fn motions(days: &[Day]) -> Result<Vec<Motion>> {
     let scale = INITIAL_MM_PER_DAY * (M * X_I.ln()).exp();
     let before = Law::from_paper(M, X_I, T_DAYS, scale)?;
     let after = law_after(before.v_i)?;
@@ -206,7 +200,7 @@ fn river_hold(year: f64) -> f64 {
 ///
 /// # Errors
 /// When a constant makes no date.
-pub fn days() -> Result<Vec<Day>> {
+pub(crate) fn days() -> Result<Vec<Day>> {
     let mut random = Pcg64::seed_from_u64(SEED);
     let mut seasons = Vec::new();
     for year in FIRST_FLOW.year()..=LAST_READING.year() {
@@ -255,7 +249,7 @@ impl Season {
             storms.push((day, random.random_range(river::STORM_M3_S)));
         }
         if year == 1987 {
-            storms = vec![river::STORM_OF_1987];
+            storms = river::STORMS_OF_1987.to_vec();
         }
         Self {
             start: date(year, 1, 1),
@@ -299,16 +293,17 @@ fn decimal_year(day: Date) -> Result<f64> {
     Ok(f64::from(day.year()) + days_since(new_year, midnight(day)?) / year_days)
 }
 
-fn provenance() -> BTreeMap<String, String> {
-    let law = "m = 0.98, x_i = 39 and 1.5 m/yr at the start from the paper, under a log-load of the \
-        river, an extra one in 1986-87 that is not the river's, and another friction from the end of 1987 \
-        on, chosen so that the paper's statements hold";
-    let invented = "readings on the 25th at 00:00 UTC; T; the Tinee's flow, day by day; its response time \
-        and gain; the extra load's course; the friction after 1987; noise of 10 mm in displacement";
-    crate::provenance(
-        "La Clapiere, France, 1982.9 to 1995, benchmark 10",
-        law,
-        invented,
-        SEED,
-    )
+fn provenance() -> Provenance<'static> {
+    Provenance {
+        title: "La Clapière, France, 1982.9 to 1995: displacement of benchmark 10",
+        stated: "m = 0.98 and x_i = 39; 1.5 m/yr before 1982.9; seasonal velocity maxima of 1982 \
+                 to 1985 of the order of or under 30 mm/day, after snow melt and autumn rain; 80 \
+                 mm/day in summer and 90 in October 1987, which the river does not explain; six \
+                 times slower over 1988-1990, slightly above the level before 1986 in the end, \
+                 the seasons gone",
+        invented: "readings on the 25th at 00:00 UTC; T; every value of the Tinée's flow; the \
+                   slope's response time and gain to it; the course and size of the extra log-load \
+                   of 1986-1987; the date and friction of the change; noise of 10 mm in displacement",
+        seed: SEED,
+    }
 }

@@ -4,30 +4,30 @@ use slipwatch::model::Law;
 
 /// Where a loaded block is: its inverse velocity under the law alone, and its slip.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Block {
+pub(crate) struct Block {
     /// Days since the start.
-    pub days: f64,
+    pub(crate) days: f64,
     /// v_i e^f / v.
-    pub y: f64,
+    pub(crate) y: f64,
     /// Displacement since the start, mm.
-    pub slip_mm: f64,
+    pub(crate) slip_mm: f64,
 }
 
 impl Block {
     /// At the start of its motion.
-    pub const START: Self = Self {
+    pub(crate) const START: Self = Self {
         days: 0.0,
         y: 1.0,
         slip_mm: 0.0,
     };
 
     /// Velocity under log-load `f`, mm/day.
-    pub fn velocity(&self, law: &Law, f: f64) -> f64 {
+    pub(crate) fn velocity(&self, law: &Law, f: f64) -> f64 {
         law.v_i * f.exp() / self.y
     }
 
     /// The block one Runge-Kutta step of `step` days later, under the log-load `f` of days.
-    pub fn step(&self, law: &Law, f: impl Fn(f64) -> f64, step: f64) -> Self {
+    pub(crate) fn step(&self, law: &Law, f: impl Fn(f64) -> f64, step: f64) -> Self {
         let b = law.a + law.r;
         let slopes = |load: f64, y: f64| {
             let gain = load.exp();
@@ -51,7 +51,7 @@ impl Block {
     }
 
     /// The block `days` later, in `steps` equal steps.
-    pub fn advance(self, law: &Law, f: impl Fn(f64) -> f64, days: f64, steps: u32) -> Self {
+    pub(crate) fn advance(self, law: &Law, f: impl Fn(f64) -> f64, days: f64, steps: u32) -> Self {
         let step = days / f64::from(steps);
         (0..steps).fold(self, |block, _| block.step(law, &f, step))
     }

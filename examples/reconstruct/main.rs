@@ -3,35 +3,34 @@
 //! No table of these records is available. What is written follows the statements of
 //! Helmstetter et al. (2004) and is invented where they are silent; every constant says which.
 
+mod facts;
 mod interpolation;
 mod la_clapiere;
 mod loaded_law;
 mod noise;
+mod provenance;
 mod vaiont;
 
 use anyhow::{Context, Result};
-use slipwatch::runtime::ingest::{write_csv, write_mcap};
-use std::collections::BTreeMap;
+use slipwatch::reading::Recording;
+use slipwatch::runtime::ingest::write_mcap;
+use std::io::Write;
 use std::path::PathBuf;
 
 fn main() -> Result<()> {
     let folder = std::env::args_os().nth(1);
     let folder = PathBuf::from(folder.context("give the folder to write into")?);
-    for m in la_clapiere::motions(&la_clapiere::days()?)?.iter().step_by(10) { println!("{:.3} {:.1} {:.0}", m.year, m.velocity, m.slip_mm); }
-    write_mcap(&vaiont::recording()?, &folder.join(vaiont::FILE))?;
-    write_mcap(&la_clapiere::recording()?, &folder.join(la_clapiere::FILE))?;
-    Ok(())
+    let vaiont = vaiont::recording()?;
+    facts::vaiont(&vaiont, vaiont::DAY_ZERO.parse()?)?;
+    let la_clapiere = la_clapiere::recording()?;
+    facts::la_clapiere(&la_clapiere)?;
+    facts::la_clapiere_motion(&la_clapiere::motions(&la_clapiere::days()?)?)?;
+    write(&vaiont, &folder.join(vaiont::FILE))?;
+    write(&la_clapiere, &folder.join(la_clapiere::FILE))
 }
 
-fn provenance(title: &str, law: &str, invented: &str, seed: u64) -> BTreeMap<String, String> {
-    let seed = seed.to_string();
-    let entries = [
-        ("title", title),
-        ("kind", "reconstruction"),
-        ("statement", "These are not measured values."),
-        ("law", law),
-        ("invented", invented),
-        ("seed", &seed),
-    ];
-    entries.into_iter().map(|(k, v)| (k.to_owned(), v.to_owned())).collect()
+fn write(recording: &Recording, file: &std::path::Path) -> Result<()> {
+    write_mcap(recording, file)?;
+    writeln!(std::io::stdout(), "wrote {}", file.display())?;
+    Ok(())
 }

@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 
 /// Stationary first-order autoregressive noise of mean zero.
 #[derive(Debug)]
-pub struct ColouredNoise {
+pub(crate) struct ColouredNoise {
     random: Pcg64,
     sigma: f64,
     memory: f64,
@@ -15,7 +15,7 @@ pub struct ColouredNoise {
 
 impl ColouredNoise {
     /// Noise of standard deviation `sigma`, of which each value keeps the part `memory` of the one before.
-    pub fn new(seed: u64, sigma: f64, memory: f64) -> Self {
+    pub(crate) fn new(seed: u64, sigma: f64, memory: f64) -> Self {
         Self {
             random: Pcg64::seed_from_u64(seed),
             sigma,
@@ -44,7 +44,7 @@ fn standard_normal(random: &mut impl Rng) -> f64 {
 }
 
 /// `value` with `places` decimals, as an observer would have written it down.
-pub fn rounded(value: f64, places: i32) -> f64 {
+pub(crate) fn rounded(value: f64, places: i32) -> f64 {
     let scale = 10_f64.powi(places);
     (value * scale).round() / scale
 }
