@@ -66,7 +66,13 @@ fn every_reconstruction_says_that_it_is_not_measured() {
         let provenance = committed(file).provenance;
         assert_eq!(provenance["kind"], "reconstruction", "{file}");
         assert!(provenance["statement"].contains("not measured"), "{file}");
-        for key in ["title", "sources", "stated_by_the_source", "invented", "seed"] {
+        for key in [
+            "title",
+            "sources",
+            "stated_by_the_source",
+            "invented",
+            "seed",
+        ] {
             assert!(!provenance[key].is_empty(), "{file}: {key}");
         }
     }
@@ -111,7 +117,10 @@ fn the_rivers_of_1986_to_1988_are_not_anomalously_high() {
     assert_eq!(flow.name, "tinee_flow_m3_s");
     let mean = |years: std::ops::RangeInclusive<i16>| {
         let year = |time: jiff::Timestamp| time.to_zoned(jiff::tz::TimeZone::UTC).year();
-        let inside = flow.samples.iter().filter(|s| years.contains(&year(s.time)));
+        let inside = flow
+            .samples
+            .iter()
+            .filter(|s| years.contains(&year(s.time)));
         let values: Vec<f64> = inside.map(|sample| sample.value).collect();
         values.iter().sum::<f64>() / values.len() as f64
     };

@@ -30,7 +30,11 @@ pub(crate) fn vaiont(recording: &Recording, day_zero: Timestamp) -> Result<()> {
         all.push(points);
     }
     let velocities = || all.iter().flatten().map(|point| point.1);
-    holds("slowest", velocities().fold(f64::INFINITY, f64::min), 4.5..6.0)?;
+    holds(
+        "slowest",
+        velocities().fold(f64::INFINITY, f64::min),
+        4.5..6.0,
+    )?;
     holds("fastest", velocities().fold(0.0, f64::max), 200.0..300.0)?;
     let [five, fifty, sixty_three, sixty_seven] = &all[..] else {
         anyhow::bail!("not four benchmarks");
@@ -47,16 +51,28 @@ pub(crate) fn vaiont(recording: &Recording, day_zero: Timestamp) -> Result<()> {
     // Bending upwards in 1/v: the earlier the readings, the sooner their line meets zero.
     let early = zero_of_line(&sixty_seven[..47]);
     let late = zero_of_line(&sixty_seven[54..]);
-    holds("67's late line behind its early one, days", late - early, 3.0..20.0)?;
+    holds(
+        "67's late line behind its early one, days",
+        late - early,
+        3.0..20.0,
+    )?;
     let growths = all.iter().map(|points| growth(points));
-    holds("growth of the last days, mean", growths.sum::<f64>() / 4.0, 0.5..0.95)
+    holds(
+        "growth of the last days, mean",
+        growths.sum::<f64>() / 4.0,
+        0.5..0.95,
+    )
 }
 
 fn vaiont_benchmark(id: &str, points: &[(f64, f64)]) -> Result<()> {
     for count in LINE_READINGS {
         let zero = zero_of_line(&points[points.len() - count..]);
         let near = CRITICAL_DAY - 1.0..CRITICAL_DAY + 1.0;
-        holds(&format!("{id}: 1/v of {count} days is zero on day"), zero, near)?;
+        holds(
+            &format!("{id}: 1/v of {count} days is zero on day"),
+            zero,
+            near,
+        )?;
     }
     let displacement_m = points
         .windows(2)
@@ -65,7 +81,11 @@ fn vaiont_benchmark(id: &str, points: &[(f64, f64)]) -> Result<()> {
         / 1000.0;
     holds(&format!("{id}: displacement, m"), displacement_m, 0.8..4.0)?;
     // Exhausted: less than 1/(t_c - t) gains over the last readings.
-    holds(&format!("{id}: growth of the last days"), growth(points), 0.3..1.0)
+    holds(
+        &format!("{id}: growth of the last days"),
+        growth(points),
+        0.3..1.0,
+    )
 }
 
 /// How much ln(v) gained over the last four days, over what 1/(t_c - t) gains.
@@ -103,7 +123,11 @@ pub(crate) fn la_clapiere(recording: &Recording) -> Result<()> {
         let (first, last) = first.zip(last).context("no readings in these years")?;
         Ok((last.1 - first.1) / (last.0 - first.0) / 1000.0)
     };
-    holds("rate of the first year, m/yr", rate(1982.8..1983.95)?, 1.3..2.4)?;
+    holds(
+        "rate of the first year, m/yr",
+        rate(1982.8..1983.95)?,
+        1.3..2.4,
+    )?;
     let before = rate(1982.8..1986.0)?;
     let peak = points
         .windows(2)
@@ -111,8 +135,16 @@ pub(crate) fn la_clapiere(recording: &Recording) -> Result<()> {
         .fold(0.0, f64::max);
     holds("fastest month, mm/day", peak, 55.0..95.0)?;
     let afterwards = rate(1988.0..1991.0)? * 1000.0 / 365.25;
-    holds("1987's 90 mm/day over 1988-1990", 90.0 / afterwards, 5.0..7.0)?;
-    holds("1994-1995 over 1982-1985", rate(1994.0..1996.0)? / before, 1.0..1.5)
+    holds(
+        "1987's 90 mm/day over 1988-1990",
+        90.0 / afterwards,
+        5.0..7.0,
+    )?;
+    holds(
+        "1994-1995 over 1982-1985",
+        rate(1994.0..1996.0)? / before,
+        1.0..1.5,
+    )
 }
 
 /// Paper: the velocities of benchmark 10 from day to day.
@@ -125,8 +157,16 @@ pub(crate) fn la_clapiere_motion(motions: &[Motion]) -> Result<()> {
         inside.map(|motion| motion.velocity).fold(0.0, f64::max)
     };
     holds("fastest of 1982-1985", fastest(1982.0..1986.0), 15.0..30.0)?;
-    holds("fastest of summer 1987", fastest(1987.4..1987.7), 77.0..83.0)?;
-    holds("fastest of October 1987", fastest(1987.75..1987.84), 87.0..93.0)?;
+    holds(
+        "fastest of summer 1987",
+        fastest(1987.4..1987.7),
+        77.0..83.0,
+    )?;
+    holds(
+        "fastest of October 1987",
+        fastest(1987.75..1987.84),
+        87.0..93.0,
+    )?;
     // No season returns: from 1989 on the velocity falls from every day to the next.
     let later = motions.windows(2).filter(|pair| pair[0].year >= 1989.0);
     for pair in later {
@@ -142,11 +182,15 @@ fn points(recording: &Recording, id: &str, epoch: Timestamp) -> Result<Vec<(f64,
         .iter()
         .find(|series| series.benchmark.as_str() == id)
         .with_context(|| format!("no benchmark {id}"))?;
-    let point = |reading: &slipwatch::reading::Reading| (days_since(epoch, reading.time), reading.value);
+    let point =
+        |reading: &slipwatch::reading::Reading| (days_since(epoch, reading.time), reading.value);
     Ok(series.readings.iter().map(point).collect())
 }
 
 fn holds(what: &str, value: f64, within: Range<f64>) -> Result<()> {
-    ensure!(within.contains(&value), "{what}: {value:.3}, not within {within:?}");
+    ensure!(
+        within.contains(&value),
+        "{what}: {value:.3}, not within {within:?}"
+    );
     Ok(())
 }

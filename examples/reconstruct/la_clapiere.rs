@@ -32,7 +32,7 @@ const M: f64 = 0.98;
 /// Paper: the same fit.
 const X_I: f64 = 39.0;
 /// Invented: T in days, by which the block is still far from its steady velocity in 1986.
-const T_DAYS: f64 = 20.0;
+const T_DAYS: f64 = 30.0;
 /// Paper: 1.5 m/yr in 1975-1982, which the law has at its start under the year's mean load.
 const INITIAL_MM_PER_DAY: f64 = 1500.0 / 365.25;
 
@@ -40,16 +40,23 @@ const INITIAL_MM_PER_DAY: f64 = 1500.0 / 365.25;
 const RESPONSE_DAYS: f64 = 15.0;
 /// Invented: log-load per m3/s of the flow's response, for the paper's seasonal maxima.
 const RIVER_GAIN: f64 = 0.07;
-/// Invented: the response at which the river's log-load is zero; e^f is about 1.1 in the mean of 1983-1985.
-const RIVER_ZERO_M3_S: f64 = 17.6;
+/// Invented: the response at which the river's log-load is zero; e^f is about 1.15 in the mean of 1983-1985.
+const RIVER_ZERO_M3_S: f64 = 16.8;
 /// Log-load that is not the river's, by year. Paper: there is one in 1986 and 1987, after a
 /// crack freed a block in 1985-1986. Invented: its course and size, for 80 and 90 mm/day in 1987.
-const EXTRA_LOAD: [(f64, f64); 3] = [(1985.9, 0.0), (1986.5, 0.4), (1987.1, 0.47)];
+const EXTRA_LOAD: [(f64, f64); 5] = [
+    (1985.9, 0.0),
+    (1986.5, 0.9),
+    (1987.0, 0.785),
+    (1987.6, 0.785),
+    (1987.72, 0.295),
+];
 
 /// Paper: the regime changes at the end of 1987, and the seasons never come back.
 const CHANGE: f64 = 1987.85;
-/// Invented: the river's hold fades over this long, years.
-const FADE_YEARS: f64 = 0.15;
+/// Part of the river's log-load that acts, by year. Paper: a model of the river tuned on 1982-1986
+/// fails after, and the seasons never come back. Invented: how the river's hold weakens.
+const RIVER_HOLD: [(f64, f64); 4] = [(1986.0, 1.0), (1987.0, 0.3), (1987.85, 0.3), (1988.0, 0.0)];
 /// Invented: B/A after the change.
 const M_AFTER: f64 = 0.8;
 /// Invented: the steady velocity after it, slightly above the level before 1986 (paper), mm/day.
@@ -165,7 +172,7 @@ pub(crate) fn motions(days: &[Day]) -> Result<Vec<Motion>> {
             let part = t - first;
             let river = today.river_load + part * (tomorrow.river_load - today.river_load);
             let year = today.year + part / DAYS_PER_YEAR;
-            river * river_hold(year) + between(&EXTRA_LOAD, year)
+            river * between(&RIVER_HOLD, year) + between(&EXTRA_LOAD, year)
         };
         let law = if today.year < CHANGE { &before } else { &after };
         motions.push(Motion {
@@ -188,12 +195,13 @@ fn law_after(v_i: f64) -> Result<Law> {
     // d(a y^p)/dy = -1 / relaxation
     let a = ((1.0 - p) * ln_y).exp() / (-p * RELAXATION_AFTER_DAYS);
     let b = a * (p * ln_y - remaining).exp();
-    Ok(Law { v_i, r: b - a, kappa: a * p, p, a })
-}
-
-/// How much of the river's load still acts: 1 before the change, 0 once it has faded.
-fn river_hold(year: f64) -> f64 {
-    (1.0 - (year - CHANGE) / FADE_YEARS).clamp(0.0, 1.0)
+    Ok(Law {
+        v_i,
+        r: b - a,
+        kappa: a * p,
+        p,
+        a,
+    })
 }
 
 /// The river and its hold on the slope, day by day.

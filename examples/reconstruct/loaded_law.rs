@@ -33,11 +33,7 @@ impl Block {
             let gain = load.exp();
             (law.a * y.powf(law.p) - b * gain, law.v_i * gain / y)
         };
-        let (f_0, f_half, f_1) = (
-            f(self.days),
-            f(self.days + step / 2.0),
-            f(self.days + step),
-        );
+        let (f_0, f_half, f_1) = (f(self.days), f(self.days + step / 2.0), f(self.days + step));
         let k_1 = slopes(f_0, self.y);
         let k_2 = slopes(f_half, self.y + step / 2.0 * k_1.0);
         let k_3 = slopes(f_half, self.y + step / 2.0 * k_2.0);

@@ -41,6 +41,8 @@ impl Provenance<'_> {
                 "cargo run --release --example reconstruct -- recordings",
             ),
         ];
-        entries.map(|(key, value)| (key.to_owned(), value.to_owned())).into()
+        entries
+            .map(|(key, value)| (key.to_owned(), value.to_owned()))
+            .into()
     }
 }

@@ -61,7 +61,7 @@ const BENCHMARKS: [Benchmark; 4] = [
             t_days: 3790.0,
             d: 0.175,
         },
-        exhaustion_per_day: 0.05,
+        exhaustion_per_day: 0.035,
     },
     Benchmark {
         id: "50",
@@ -71,7 +71,7 @@ const BENCHMARKS: [Benchmark; 4] = [
             theta_i_days: 69.3,
             v_i: 5.0,
         },
-        exhaustion_per_day: 0.03,
+        exhaustion_per_day: 0.015,
     },
     Benchmark {
         id: "63",
@@ -81,7 +81,7 @@ const BENCHMARKS: [Benchmark; 4] = [
             t_days: 2040.0,
             d: 0.23,
         },
-        exhaustion_per_day: 0.06,
+        exhaustion_per_day: 0.055,
     },
     Benchmark {
         id: "67",
@@ -172,7 +172,6 @@ fn velocities(benchmark: &Benchmark) -> Result<Vec<f64>> {
     }
     Ok(velocities)
 }
-
 
 fn provenance() -> Provenance<'static> {
     Provenance {
