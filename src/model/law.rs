@@ -1,5 +1,6 @@
 //! The parameters of the law, in the regular form and in the paper's.
 
+use super::tail;
 use crate::regime::Regime;
 
 /// The law under constant load, in its regular coordinates. Times are in days, velocities in any
@@ -204,6 +205,48 @@ impl Law {
         let z = (2.0 * self.r / self.kappa + 1.0) / (2.0 - self.p);
         let ln_y = inverse_box_cox_ln(z, self.p);
         ln_y.is_finite().then_some(ln_y)
+    }
+
+    /// Days from t = 0 until the velocity first reaches `velocity`; `None` when it never does.
+    pub fn days_to_velocity(&self, velocity: f64) -> Option<f64> {
+        let ln_y = (self.v_i / velocity).ln();
+        if ln_y >= 0.0 {
+            return Some(0.0);
+        }
+        let stops_short =
+            self.kappa < 0.0 && self.ln_y_steady().is_some_and(|steady| steady >= ln_y);
+        if !(self.r > 0.0) || stops_short {
+            return None;
+        }
+        Some(tail::days_between(self, 0.0, ln_y)).filter(|days| days.is_finite())
+    }
+
+    /// Days from t = 0 to the velocity's inflection; `None` where there is none after it.
+    pub fn transition_days(&self) -> Option<f64> {
+        let ln_y = self.ln_y_transition().filter(|ln_y| *ln_y < 0.0)?;
+        self.days_to_velocity(self.v_i * (-ln_y).exp())
+    }
+
+    /// The same motion seen backwards in time.
+    pub fn reversed(&self) -> Self {
+        Self {
+            r: -self.r,
+            kappa: -self.kappa,
+            a: -self.a,
+            ..*self
+        }
+    }
+
+    /// The same solution with t = 0 moved to where the inverse velocity is `y`.
+    pub fn from_y(&self, y: f64) -> Self {
+        let shrink = ((self.p - 1.0) * y.ln()).exp();
+        Self {
+            v_i: self.v_i / y,
+            r: -self.slope(y) / y,
+            kappa: self.kappa * shrink,
+            p: self.p,
+            a: self.a * shrink,
+        }
     }
 
     /// How the state of this law is to be read.

@@ -26,21 +26,44 @@ pub(super) fn fails_from(law: &Law, ln_y: f64) -> bool {
 }
 
 /// Days from inverse velocity exp(ln_y) to the singularity; needs [`fails_from`].
-///
-/// Panels double in width from the distance to the pole of 1/slope (the steady state) on, which
-/// keeps every panel's Bernstein ellipse wide enough for 16 nodes to reach rounding.
 pub(super) fn remaining_days(law: &Law, ln_y: f64) -> f64 {
-    // y' = y exp(-s): remaining = y * integral of exp(-s) / (r - kappa bc(y')) ds
-    let integrand = |s: f64| (-s).exp() / -slope_at_ln(law, ln_y - s);
-    let pole = law.ln_y_steady().map_or(f64::INFINITY, |pole| pole - ln_y);
-    let mut width = pole.clamp(1e-9, 1.5);
+    days_between(law, ln_y, ln_y - DEEPEST_E_FOLD)
+}
+
+/// Days that the law takes to accelerate from one inverse velocity to a smaller one.
+pub(super) fn days_between(law: &Law, ln_y_from: f64, ln_y_to: f64) -> f64 {
+    // y = y_from exp(-s): days = y_from * integral of exp(-s) / (r - kappa bc(y)) ds
+    let integrand = |s: f64| (-s).exp() / -slope_at_ln(law, ln_y_from - s);
+    ln_y_from.exp() * integrate_down(law, (ln_y_from, ln_y_to), integrand)
+}
+
+/// Slip over v_i between two inverse velocities of an acceleration: d slip / d ln y = 1 / slope.
+pub(super) fn slip_between(law: &Law, ln_y_from: f64, ln_y_to: f64) -> f64 {
+    integrate_down(law, (ln_y_from, ln_y_to), |s| {
+        1.0 / -slope_at_ln(law, ln_y_from - s)
+    })
+}
+
+/// Integrates over s = ln(y_from / y). Panels keep their distance from the pole of 1/slope (the steady
+/// state, behind or ahead), so that 16 nodes reach rounding on each.
+fn integrate_down(law: &Law, span: (f64, f64), integrand: impl Fn(f64) -> f64) -> f64 {
+    let end = span.0 - span.1;
+    let pole = law
+        .ln_y_steady()
+        .map_or(f64::INFINITY, |pole| span.0 - pole);
+    let smoothest = 1.5 / law.p.abs().max(1.0);
     let (mut from, mut sum) = (0.0, 0.0);
-    while from < DEEPEST_E_FOLD {
-        sum += panel(&integrand, from, from + width);
-        from += width;
-        width = (2.0 * width).min(6.0);
+    while from < end {
+        let clearance = if pole > from {
+            0.5 * (pole - from)
+        } else {
+            from - pole
+        };
+        let to = (from + clearance.clamp(1e-9, smoothest.max(0.5 * from).min(6.0))).min(end);
+        sum += panel(&integrand, from, to);
+        from = to;
     }
-    ln_y.exp() * sum
+    sum
 }
 
 /// 16-point Gauss-Legendre quadrature over one panel.
@@ -66,24 +89,6 @@ pub(super) fn ln_y_with_remaining(law: &Law, remaining: f64, ln_y_start: f64) ->
         }
     }
     ln_y
-}
-
-/// Slip over v_i between two inverse velocities on the way to failure: d slip / d ln y = 1 / slope.
-pub(super) fn slip_between(law: &Law, ln_y_from: f64, ln_y_to: f64) -> f64 {
-    let integrand = |s: f64| 1.0 / -slope_at_ln(law, ln_y_from - s);
-    let end = ln_y_from - ln_y_to;
-    let pole = law
-        .ln_y_steady()
-        .map_or(f64::INFINITY, |pole| pole - ln_y_from);
-    let mut width = pole.clamp(1e-9, 1.5);
-    let (mut from, mut sum) = (0.0, 0.0);
-    while from < end {
-        let to = (from + width).min(end);
-        sum += panel(&integrand, from, to);
-        from = to;
-        width = (2.0 * width).min(6.0 / law.p.abs().max(0.1));
-    }
-    sum
 }
 
 fn slope_at_ln(law: &Law, ln_y: f64) -> f64 {

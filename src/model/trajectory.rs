@@ -128,47 +128,6 @@ impl Trajectory {
         })
     }
 
-    /// First time, in days, at which the velocity reaches `velocity`; `None` if it does not within
-    /// the span that was solved.
-    pub fn first_passage(&self, velocity: f64) -> Option<f64> {
-        let y_target = self.law.v_i / velocity;
-        if y_target >= 1.0 {
-            return Some(0.0);
-        }
-        if self.law.r <= 0.0 {
-            return None;
-        }
-        if let Some((start, ln_y_start, _)) = self.tail
-            && y_target.ln() <= ln_y_start
-        {
-            let remaining = tail::remaining_days(&self.law, y_target.ln());
-            return self
-                .failure_days
-                .map(|failure| (failure - remaining).max(start));
-        }
-        let after = |segment: &&Segment| segment.at(segment.start + segment.span).0 <= y_target;
-        let segment = self.segments.iter().find(after)?;
-        let (mut low, mut high) = (segment.start, segment.start + segment.span);
-        for _ in 0..80 {
-            let middle = f64::midpoint(low, high);
-            if segment.at(middle).0 <= y_target {
-                high = middle
-            } else {
-                low = middle
-            }
-        }
-        Some(f64::midpoint(low, high))
-    }
-
-    /// Days to the velocity's inflection, where the solved span holds one.
-    pub fn transition_days(&self) -> Option<f64> {
-        let ln_y = self.law.ln_y_transition()?;
-        if self.law.r <= 0.0 || ln_y >= 0.0 {
-            return None;
-        }
-        self.first_passage(self.law.v_i * (-ln_y).exp())
-    }
-
     fn motion(&self, y: f64, slip: f64) -> Motion {
         Motion {
             y,
