@@ -88,7 +88,7 @@ fn vaiont_benchmark(id: &str, points: &[(f64, f64)]) -> Result<()> {
     )
 }
 
-/// How much ln(v) gained over the last four days, over what 1/(t_c - t) gains.
+/// How much ln(v) gained over the last four days, over what `1/(t_c - t)` gains.
 fn growth(points: &[(f64, f64)]) -> f64 {
     let (from, to) = (points[points.len() - 5], points[points.len() - 1]);
     (to.1 / from.1).ln() / ((CRITICAL_DAY - from.0) / (CRITICAL_DAY - to.0)).ln()

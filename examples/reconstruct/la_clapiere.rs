@@ -161,7 +161,7 @@ pub(crate) fn recording() -> Result<Recording> {
 pub(crate) fn motions(days: &[Day]) -> Result<Vec<Motion>> {
     let scale = INITIAL_MM_PER_DAY * (M * X_I.ln()).exp();
     let before = Law::from_paper(M, X_I, T_DAYS, scale)?;
-    let after = law_after(before.v_i)?;
+    let after = law_after(before.v_i);
     let start = midnight(FIRST_READING)?;
     let mut block = Block::START;
     let mut motions = Vec::new();
@@ -187,7 +187,7 @@ pub(crate) fn motions(days: &[Day]) -> Result<Vec<Motion>> {
 }
 
 /// The law after the change: it relaxes to its own steady velocity under the extra load that remains.
-fn law_after(v_i: f64) -> Result<Law> {
+fn law_after(v_i: f64) -> Law {
     let remaining = EXTRA_LOAD[EXTRA_LOAD.len() - 1].1;
     // Under the log-load f, the steady y is v_i e^f / v, and there a y^p = b e^f.
     let ln_y = (v_i / STEADY_AFTER_MM_PER_DAY).ln() + remaining;
@@ -195,13 +195,13 @@ fn law_after(v_i: f64) -> Result<Law> {
     // d(a y^p)/dy = -1 / relaxation
     let a = ((1.0 - p) * ln_y).exp() / (-p * RELAXATION_AFTER_DAYS);
     let b = a * (p * ln_y - remaining).exp();
-    Ok(Law {
+    Law {
         v_i,
         r: b - a,
         kappa: a * p,
         p,
         a,
-    })
+    }
 }
 
 /// The river and its hold on the slope, day by day.

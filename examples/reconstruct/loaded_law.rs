@@ -7,7 +7,7 @@ use slipwatch::model::Law;
 pub(crate) struct Block {
     /// Days since the start.
     pub(crate) days: f64,
-    /// v_i e^f / v.
+    /// `v_i e^f / v`.
     pub(crate) y: f64,
     /// Displacement since the start, mm.
     pub(crate) slip_mm: f64,

@@ -32,9 +32,9 @@ const STEPS_PER_DAY: u32 = 200;
 
 /// The state and scales that the law of a benchmark starts from.
 enum Start {
-    /// The paper's x_i, T in days and D in mm/day, for m other than 1.
+    /// The paper's `x_i`, T in days and D in mm/day, for m other than 1.
     Scaled { x_i: f64, t_days: f64, d: f64 },
-    /// S theta_i, theta_i in days and the first velocity in mm/day, for m = 1.
+    /// `S theta_i`, `theta_i` in days and the first velocity in mm/day, for m = 1.
     Unit {
         s_theta_i: f64,
         theta_i_days: f64,
