@@ -15,7 +15,7 @@ mod provenance;
 #[path = "../examples/reconstruct/vaiont.rs"]
 mod vaiont;
 
-use slipwatch::model::Law;
+use slipwatch::model::{Accuracy, Law, Trajectory};
 use slipwatch::reading::{Recording, days_since};
 use slipwatch::runtime::ingest::{ReadOptions, encode_mcap, read_files};
 use std::io::Cursor;
@@ -27,12 +27,20 @@ fn path(file: &str) -> PathBuf {
         .join(file)
 }
 
+#[expect(
+    clippy::unwrap_used,
+    reason = "a file that cannot be read fails the test"
+)]
 fn committed(file: &str) -> Recording {
     let (recording, disorder) = read_files(&[path(file)], &ReadOptions::default()).unwrap();
     assert_eq!(disorder, slipwatch::reading::Disorder::default(), "{file}");
     recording
 }
 
+#[expect(
+    clippy::unwrap_used,
+    reason = "a file that cannot be read fails the test"
+)]
 fn assert_reproduced(file: &str, again: &Recording) {
     let mut bytes = Cursor::new(Vec::new());
     encode_mcap(again, &mut bytes).unwrap();
@@ -100,7 +108,6 @@ fn the_reservoir_falls_from_26_september_while_the_velocity_rises() {
 
 #[test]
 fn a_constant_load_moves_the_loaded_law_as_it_moves_the_law() {
-    use slipwatch::model::{Accuracy, Trajectory};
     let law = Law::from_paper(1.35, 0.05, 3790.0, 0.175).unwrap();
     let block = loaded_law::Block::START.advance(&law, |_| 0.0, 60.0, 12_000);
     let motion = Trajectory::solve(&law, 60.0, Accuracy::Full)

@@ -123,7 +123,7 @@ pub(crate) struct Motion {
 /// When a constant makes no law or no date.
 pub(crate) fn recording() -> Result<Recording> {
     let days = days()?;
-    let noise = ColouredNoise::new(SEED, NOISE_MM, 0.0);
+    let noise = ColouredNoise::new(SEED + 2, NOISE_MM, 0.0);
     let due = |motion: &Motion| motion.time.to_zoned(TimeZone::UTC).day() == FIRST_READING.day();
     let motions = motions(&days)?;
     let readings = motions.iter().filter(|motion| due(motion)).zip(noise);
