@@ -1,0 +1,36 @@
+//! Writes the reconstructions of two historic records into a folder: `reconstruct recordings`.
+//!
+//! No table of these records is available. What is written follows the statements of
+//! Helmstetter et al. (2004) and is invented where they are silent; every constant says which.
+
+mod facts;
+mod interpolation;
+mod la_clapiere;
+mod loaded_law;
+mod noise;
+mod provenance;
+mod vaiont;
+
+use anyhow::{Context, Result};
+use slipwatch::reading::Recording;
+use slipwatch::runtime::ingest::write_mcap;
+use std::io::Write;
+use std::path::PathBuf;
+
+fn main() -> Result<()> {
+    let folder = std::env::args_os().nth(1);
+    let folder = PathBuf::from(folder.context("give the folder to write into")?);
+    let vaiont = vaiont::recording()?;
+    facts::vaiont(&vaiont, vaiont::DAY_ZERO.parse()?)?;
+    let la_clapiere = la_clapiere::recording()?;
+    facts::la_clapiere(&la_clapiere)?;
+    facts::la_clapiere_motion(&la_clapiere::motions(&la_clapiere::days()?)?)?;
+    write(&vaiont, &folder.join(vaiont::FILE))?;
+    write(&la_clapiere, &folder.join(la_clapiere::FILE))
+}
+
+fn write(recording: &Recording, file: &std::path::Path) -> Result<()> {
+    write_mcap(recording, file)?;
+    writeln!(std::io::stdout(), "wrote {}", file.display())?;
+    Ok(())
+}
