@@ -12,8 +12,8 @@ pub(super) fn policy(mut section: Section<'_>, base: &Policy) -> Policy {
     let velocity = section.parsed("critical_velocity", value::speed);
     let steady_for = section.parsed("steady_for", value::duration);
     let policy = Policy {
-        evacuation_time: given(&evacuation_time, base.evacuation_time),
-        outlook: given(&outlook, base.outlook),
+        evacuation_time: given(evacuation_time.as_ref(), base.evacuation_time),
+        outlook: given(outlook.as_ref(), base.outlook),
         critical_velocity_mm_per_day: velocity
             .map_or(base.critical_velocity_mm_per_day, |given| given.value),
         red_chance: section.chance("red_chance").unwrap_or(base.red_chance),
@@ -23,7 +23,7 @@ pub(super) fn policy(mut section: Section<'_>, base: &Policy) -> Policy {
         yellow_chance: section
             .chance("yellow_chance")
             .unwrap_or(base.yellow_chance),
-        steady_for: given(&steady_for, base.steady_for),
+        steady_for: given(steady_for.as_ref(), base.steady_for),
         thresholds: thresholds(&mut section, base),
     };
     doubts(&section, &policy, evacuation_time.as_ref());
@@ -31,8 +31,8 @@ pub(super) fn policy(mut section: Section<'_>, base: &Policy) -> Policy {
     policy
 }
 
-fn given(value: &Option<Placed<SignedDuration>>, otherwise: SignedDuration) -> SignedDuration {
-    value.as_ref().map_or(otherwise, |given| given.value)
+fn given(value: Option<&Placed<SignedDuration>>, otherwise: SignedDuration) -> SignedDuration {
+    value.map_or(otherwise, |given| given.value)
 }
 
 fn thresholds(section: &mut Section<'_>, base: &Policy) -> Vec<Threshold> {

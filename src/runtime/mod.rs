@@ -1,3 +1,7 @@
 //! The thin shell around the monitor: clock, files, signals, hooks.
 
 pub mod clock;
+pub mod deliver;
+pub mod delivered;
+pub mod hook;
+pub mod journal;
