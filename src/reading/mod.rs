@@ -3,11 +3,13 @@
 //! Values keep the unit in which they were measured, so that a recording converted there and back
 //! is the same readings; the science converts to millimetres and days at its own door.
 
+mod recording;
 mod series;
 mod unit;
 
 pub use jiff::Timestamp;
-pub use series::{Channel, Disorder, Reading, Recording, Sample, Series};
+pub use recording::{MergeError, Recording, SelectError};
+pub use series::{Channel, Disorder, Reading, Sample, Series};
 pub use unit::{LengthUnit, Quantity, TimeUnit, Unit, UnitError};
 
 use serde::{Deserialize, Serialize};

@@ -3,7 +3,7 @@
 use super::{BenchmarkId, Quantity, Timestamp, Unit};
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::ops::AddAssign;
 
 /// One reading of one benchmark, in the unit of its series.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -15,6 +15,14 @@ pub struct Reading {
     /// Its standard error, positive, in the same unit, where the source gives one.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub sigma: Option<f64>,
+}
+
+impl Reading {
+    /// Whether its numbers are such as may enter or leave: finite, the standard error positive.
+    pub fn is_sound(&self) -> bool {
+        let positive = |sigma: f64| sigma.is_finite() && sigma > 0.0;
+        self.value.is_finite() && self.sigma.is_none_or(positive)
+    }
 }
 
 /// All readings of one quantity of one benchmark.
@@ -34,6 +42,12 @@ impl Series {
     /// Displacement or velocity.
     pub fn quantity(&self) -> Quantity {
         self.unit.quantity()
+    }
+
+    /// Puts rows that stand in order of arrival into strictly increasing time: an exact repeat is
+    /// dropped, and of two values for one time the later to arrive stands.
+    pub fn settle(&mut self) -> Disorder {
+        settle_rows(&mut self.readings, |reading| reading.time)
     }
 }
 
@@ -57,8 +71,15 @@ pub struct Channel {
     pub samples: Vec<Sample>,
 }
 
+impl Channel {
+    /// Puts rows in order as [`Series::settle`] does.
+    pub fn settle(&mut self) -> Disorder {
+        settle_rows(&mut self.samples, |sample| sample.time)
+    }
+}
+
 /// What putting rows in order met.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Disorder {
     /// Rows that repeated an earlier row exactly.
     pub repeated: usize,
@@ -68,13 +89,79 @@ pub struct Disorder {
     pub out_of_order: usize,
 }
 
-/// Everything one or more files hold.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Recording {
-    /// The benchmarks' readings, by benchmark, then quantity.
-    pub series: Vec<Series>,
-    /// The covariates, by name.
-    pub channels: Vec<Channel>,
-    /// Where the data come from, as the file's own metadata say.
-    pub provenance: BTreeMap<String, String>,
+impl AddAssign for Disorder {
+    fn add_assign(&mut self, other: Self) {
+        self.repeated += other.repeated;
+        self.corrected += other.corrected;
+        self.out_of_order += other.out_of_order;
+    }
+}
+
+fn settle_rows<T: Copy + PartialEq>(rows: &mut Vec<T>, time: impl Fn(&T) -> Timestamp) -> Disorder {
+    let mut disorder = Disorder::default();
+    let mut latest = Timestamp::MIN;
+    for row in rows.iter() {
+        disorder.out_of_order += usize::from(time(row) < latest);
+        latest = latest.max(time(row));
+    }
+    // Stable, so that rows of one time keep their order of arrival.
+    rows.sort_by_key(|row| time(row));
+    rows.dedup_by(|later, kept| {
+        if time(later) != time(kept) {
+            return false;
+        }
+        if later == kept {
+            disorder.repeated += 1;
+        } else {
+            disorder.corrected += 1;
+            *kept = *later;
+        }
+        true
+    });
+    disorder
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn series(rows: &[(i64, f64)]) -> Series {
+        let readings = rows
+            .iter()
+            .map(|&(second, value)| Reading {
+                time: Timestamp::from_second(second).unwrap(),
+                value,
+                sigma: None,
+            })
+            .collect();
+        Series {
+            benchmark: BenchmarkId::new("a"),
+            unit: Unit::MM,
+            averaging: None,
+            readings,
+        }
+    }
+
+    #[test]
+    fn rows_in_order_are_left_as_they_are() {
+        let mut settled = series(&[(1, 1.0), (2, 1.0), (3, 5.0)]);
+        assert_eq!(settled.settle(), Disorder::default());
+        assert_eq!(settled, series(&[(1, 1.0), (2, 1.0), (3, 5.0)]));
+    }
+
+    #[test]
+    fn a_repeat_is_dropped_a_correction_stands_and_a_late_row_finds_its_place() {
+        let mut settled = series(&[(1, 1.0), (3, 3.0), (2, 2.0), (3, 3.0), (1, 9.0)]);
+        let disorder = settled.settle();
+        assert_eq!(settled, series(&[(1, 9.0), (2, 2.0), (3, 3.0)]));
+        assert_eq!((disorder.repeated, disorder.corrected), (1, 1));
+        assert_eq!(disorder.out_of_order, 2);
+    }
+
+    #[test]
+    fn a_value_corrected_and_corrected_back_counts_twice() {
+        let mut settled = series(&[(1, 1.0), (1, 2.0), (1, 1.0)]);
+        assert_eq!(settled.settle().corrected, 2);
+        assert_eq!(settled, series(&[(1, 1.0)]));
+    }
 }

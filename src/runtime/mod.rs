@@ -4,4 +4,7 @@ pub mod clock;
 pub mod deliver;
 pub mod delivered;
 pub mod hook;
+pub mod ingest;
 pub mod journal;
+pub mod shutdown;
+pub mod tail;

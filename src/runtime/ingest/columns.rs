@@ -1,0 +1,428 @@
+//! What the columns of a CSV file mean, by their names alone.
+
+use super::IngestError;
+use crate::reading::{BenchmarkId, Unit};
+use std::path::Path;
+use std::str::FromStr;
+
+/// What a mapped column holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Measure {
+    /// Readings in this unit.
+    Reading(Unit),
+    /// Standard errors of the readings, in this unit.
+    Sigma(Unit),
+}
+
+/// A column whose meaning is given rather than named: `NAME=ID:QUANTITY:UNIT`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ColumnMap {
+    /// The column's name in the header.
+    pub column: String,
+    /// The benchmark whose readings it holds.
+    pub benchmark: BenchmarkId,
+    /// What it holds of it.
+    pub measure: Measure,
+}
+
+/// A column map that cannot be understood.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "{given:?}: {problem}, expected NAME=ID:QUANTITY:UNIT with displacement, velocity or sigma as QUANTITY, such as prism4=31-1930:displacement:mm"
+)]
+pub struct ColumnMapError {
+    /// The text that was given.
+    pub given: String,
+    /// What is wrong with it.
+    pub problem: String,
+}
+
+impl FromStr for ColumnMap {
+    type Err = ColumnMapError;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let fail = |problem: String| ColumnMapError {
+            given: text.to_owned(),
+            problem,
+        };
+        let (column, meaning) = text
+            .split_once('=')
+            .ok_or_else(|| fail("no '=' in it".to_owned()))?;
+        let mut parts = meaning.rsplitn(3, ':').map(str::trim);
+        let (Some(unit), Some(quantity), Some(benchmark)) =
+            (parts.next(), parts.next(), parts.next())
+        else {
+            return Err(fail("not three parts after the '='".to_owned()));
+        };
+        if column.trim().is_empty() || benchmark.is_empty() {
+            return Err(fail("no name of the column or the benchmark".to_owned()));
+        }
+        let unit = Unit::parse(unit).map_err(|error| fail(error.to_string()))?;
+        let measure = match quantity.to_ascii_lowercase().as_str() {
+            "sigma" => Measure::Sigma(unit),
+            name if name == unit.quantity().name() => Measure::Reading(unit),
+            "displacement" | "velocity" => {
+                return Err(fail(format!("{unit} is no unit of {quantity}")));
+            }
+            _ => return Err(fail(format!("unknown quantity {quantity:?}"))),
+        };
+        Ok(Self {
+            column: column.trim().to_owned(),
+            benchmark: BenchmarkId::new(benchmark),
+            measure,
+        })
+    }
+}
+
+/// One column, as the row parser uses it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Column {
+    Time,
+    Days,
+    Reading {
+        benchmark: BenchmarkId,
+        unit: Unit,
+        sigma: Option<SigmaColumn>,
+    },
+    /// Read together with the reading it belongs to.
+    Sigma,
+    Channel {
+        unit: Option<String>,
+    },
+}
+
+/// Where a reading's standard error stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct SigmaColumn {
+    pub(super) index: usize,
+    pub(super) unit: Unit,
+}
+
+/// What a column's name says.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Name<'a> {
+    Time,
+    Days,
+    /// The ID, where the name has one.
+    Measure(Option<&'a str>, Measure),
+    Channel(Option<&'a str>),
+    /// `displacement` and the like, with no known unit.
+    WithoutUnit,
+}
+
+const KEYWORDS: [&str; 3] = ["displacement", "velocity", "sigma"];
+
+/// Reads a column's name.
+pub(super) fn name_of(column: &str) -> Name<'_> {
+    let plain = column.to_ascii_lowercase();
+    match plain.as_str() {
+        "time" => return Name::Time,
+        "t_days" => return Name::Days,
+        _ => {}
+    }
+    for keyword in KEYWORDS {
+        for (at, _) in plain.rmatch_indices(keyword) {
+            if let Some(measure) = measure_at(&plain, at, keyword) {
+                match column[..at].strip_suffix('_') {
+                    None if at == 0 => return Name::Measure(None, measure),
+                    Some(id) if !id.is_empty() => return Name::Measure(Some(id), measure),
+                    _ => {}
+                }
+            }
+        }
+    }
+    if lacks_a_unit(&plain) {
+        return Name::WithoutUnit;
+    }
+    Name::Channel(channel_unit(column))
+}
+
+fn measure_at(plain: &str, at: usize, keyword: &str) -> Option<Measure> {
+    let unit = plain[at + keyword.len()..].strip_prefix('_')?;
+    let unit = Unit::parse(unit).ok()?;
+    match keyword {
+        "sigma" => Some(Measure::Sigma(unit)),
+        _ if unit.quantity().name() == keyword => Some(Measure::Reading(unit)),
+        _ => None,
+    }
+}
+
+/// `velocity_kmh` is a reading in a unit that is not known; `displacement_sensor_voltage_v` is a
+/// covariate.
+fn lacks_a_unit(plain: &str) -> bool {
+    KEYWORDS
+        .iter()
+        .filter_map(|keyword| plain.strip_prefix(keyword))
+        .any(|rest| match rest.strip_prefix('_') {
+            None => rest.is_empty(),
+            Some(unit) => !unit.replacen("_per_", "/", 1).contains('_'),
+        })
+}
+
+const CHANNEL_UNITS: [&str; 41] = [
+    "mm", "cm", "m", "in", "ft", "km", "c", "f", "k", "degc", "degf", "deg_c", "deg_f", "deg",
+    "m3_s", "m3_per_s", "l_s", "l_per_s", "cfs", "m_s", "m_per_s", "km_h", "km_per_h", "pa", "hpa",
+    "kpa", "mpa", "bar", "mbar", "psi", "kn", "percent", "pct", "v", "mv", "ma", "hz", "s", "w_m2",
+    "g", "ppm",
+];
+
+/// The longest known unit at a name's end: `mm_per_day` of `rain_mm_per_day`.
+pub(super) fn channel_unit(name: &str) -> Option<&str> {
+    name.match_indices('_')
+        .map(|(at, _)| &name[at + 1..])
+        .find(|suffix| {
+            let plain = suffix.to_ascii_lowercase();
+            CHANNEL_UNITS.contains(&plain.as_str()) || Unit::parse(&plain).is_ok()
+        })
+}
+
+/// A header, understood.
+#[derive(Debug, Clone)]
+pub(super) struct Layout {
+    pub(super) names: Vec<String>,
+    pub(super) columns: Vec<Column>,
+    pub(super) time: usize,
+}
+
+struct Sigma {
+    index: usize,
+    benchmark: BenchmarkId,
+    unit: Unit,
+}
+
+impl Layout {
+    pub(super) fn new(
+        file: &Path,
+        names: Vec<String>,
+        maps: &[ColumnMap],
+    ) -> Result<Self, IngestError> {
+        let fail = |column: &str, problem, expected| IngestError::Header {
+            file: file.into(),
+            column: column.to_owned(),
+            problem,
+            expected,
+        };
+        let stem = BenchmarkId::new(file.file_stem().unwrap_or_default().to_string_lossy());
+        let mut columns = Vec::new();
+        let mut sigmas = Vec::new();
+        for (index, name) in names.iter().enumerate() {
+            if name.is_empty() {
+                return Err(fail(
+                    name,
+                    "a column without a name",
+                    "a name for every column",
+                ));
+            }
+            if names[..index].contains(name) {
+                return Err(fail(name, "the name stands twice", "every name once"));
+            }
+            let map = maps.iter().find(|map| map.column == *name);
+            let (benchmark, measure) = match (map, name_of(name)) {
+                (Some(map), _) => (map.benchmark.clone(), map.measure),
+                (None, Name::Measure(id, measure)) => {
+                    (id.map_or_else(|| stem.clone(), BenchmarkId::new), measure)
+                }
+                (None, Name::WithoutUnit) => {
+                    let expected = "a unit at its end: mm, cm, m, in or ft, a velocity per h, day or yr, such as displacement_mm or velocity_mm_per_h";
+                    return Err(fail(name, "a reading without a known unit", expected));
+                }
+                (None, Name::Time) => {
+                    columns.push(Column::Time);
+                    continue;
+                }
+                (None, Name::Days) => {
+                    columns.push(Column::Days);
+                    continue;
+                }
+                (None, Name::Channel(unit)) => {
+                    let unit = unit.map(str::to_owned);
+                    columns.push(Column::Channel { unit });
+                    continue;
+                }
+            };
+            columns.push(match measure {
+                Measure::Reading(unit) => Column::Reading {
+                    benchmark,
+                    unit,
+                    sigma: None,
+                },
+                Measure::Sigma(unit) => {
+                    sigmas.push(Sigma {
+                        index,
+                        benchmark,
+                        unit,
+                    });
+                    Column::Sigma
+                }
+            });
+        }
+        let time = Self::time_column(&columns, &names, fail)?;
+        let mut layout = Self {
+            names,
+            columns,
+            time,
+        };
+        layout.refuse_twins(fail)?;
+        layout.pair(sigmas, fail)?;
+        Ok(layout)
+    }
+
+    fn time_column(
+        columns: &[Column],
+        names: &[String],
+        fail: impl Fn(&str, &'static str, &'static str) -> IngestError,
+    ) -> Result<usize, IngestError> {
+        let is_time = |column: &&Column| matches!(column, Column::Time | Column::Days);
+        let expected = "one column named time (RFC 3339) or t_days, and comma-separated fields";
+        let Some(time) = columns.iter().position(|column| is_time(&column)) else {
+            return Err(fail("time", "there is no such column", expected));
+        };
+        if columns.iter().filter(is_time).count() > 1 {
+            return Err(fail(
+                &names[time],
+                "a second column gives the time",
+                expected,
+            ));
+        }
+        if columns.len() == 1 {
+            let expected =
+                "a column named [ID_]displacement_UNIT or [ID_]velocity_UNIT, or a covariate";
+            return Err(fail(&names[time], "it is the only column", expected));
+        }
+        Ok(time)
+    }
+
+    fn refuse_twins(
+        &self,
+        fail: impl Fn(&str, &'static str, &'static str) -> IngestError,
+    ) -> Result<(), IngestError> {
+        let mut met = std::collections::BTreeSet::new();
+        for (name, column) in self.names.iter().zip(&self.columns) {
+            if let Column::Reading {
+                benchmark, unit, ..
+            } = column
+                && !met.insert((benchmark, unit.quantity()))
+            {
+                let expected = "one column for each quantity of a benchmark";
+                return Err(fail(
+                    name,
+                    "the benchmark has another such column",
+                    expected,
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Gives every standard error to the reading of its benchmark that has its kind of unit.
+    fn pair(
+        &mut self,
+        sigmas: Vec<Sigma>,
+        fail: impl Fn(&str, &'static str, &'static str) -> IngestError,
+    ) -> Result<(), IngestError> {
+        for given in sigmas {
+            let place = self.columns.iter_mut().find_map(|column| match column {
+                Column::Reading {
+                    benchmark,
+                    unit,
+                    sigma,
+                } if *benchmark == given.benchmark && unit.quantity() == given.unit.quantity() => {
+                    Some(sigma)
+                }
+                _ => None,
+            });
+            let name = &self.names[given.index];
+            let expected = "one standard error for each column of readings, of the same benchmark and kind of unit";
+            match place {
+                None => return Err(fail(name, "there are no readings it belongs to", expected)),
+                Some(Some(_)) => return Err(fail(name, "the readings have another", expected)),
+                Some(place) => {
+                    *place = Some(SigmaColumn {
+                        index: given.index,
+                        unit: given.unit,
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_says_benchmark_quantity_and_unit() {
+        let per_hour = Unit::parse("mm/h").unwrap();
+        let cases = [
+            ("displacement_mm", None, Measure::Reading(Unit::MM)),
+            ("velocity_mm_per_h", None, Measure::Reading(per_hour)),
+            (
+                "31-1930_displacement_mm",
+                Some("31-1930"),
+                Measure::Reading(Unit::MM),
+            ),
+            (
+                "a_b_velocity_mm_per_d",
+                Some("a_b"),
+                Measure::Reading(Unit::MM_PER_DAY),
+            ),
+            ("blkm_sigma_mm", Some("blkm"), Measure::Sigma(Unit::MM)),
+            ("A_Displacement_MM", Some("A"), Measure::Reading(Unit::MM)),
+        ];
+        for (name, id, measure) in cases {
+            assert_eq!(name_of(name), Name::Measure(id, measure), "{name}");
+        }
+    }
+
+    #[test]
+    fn every_other_name_is_a_channel_with_its_longest_unit() {
+        let cases = [
+            ("lake_level_m", Some("m")),
+            ("rain_mm_per_day", Some("mm_per_day")),
+            ("river_flow_cfs", Some("cfs")),
+            ("inflow_m3_s", Some("m3_s")),
+            ("air_temperature_max_f", Some("f")),
+            ("wind_velocity_m_per_s", Some("m_per_s")),
+            ("displacement_sensor_voltage_v", Some("v")),
+            ("humidity_percent", Some("percent")),
+            ("quality", None),
+            ("m", None),
+        ];
+        for (name, unit) in cases {
+            assert_eq!(name_of(name), Name::Channel(unit), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_reading_in_no_known_unit_is_refused_rather_than_taken_for_a_covariate() {
+        for name in ["displacement", "velocity_kmh", "velocity_m_per_s", "sigma"] {
+            assert_eq!(name_of(name), Name::WithoutUnit, "{name}");
+        }
+    }
+
+    #[test]
+    fn a_column_map_says_what_a_name_does_not() {
+        let map: ColumnMap = "Prism 4=31:1930:displacement:mm".parse().unwrap();
+        assert_eq!(map.column, "Prism 4");
+        assert_eq!(map.benchmark.as_str(), "31:1930");
+        assert_eq!(map.measure, Measure::Reading(Unit::MM));
+    }
+
+    #[test]
+    fn a_bad_column_map_is_told_what_is_wrong() {
+        let cases = [
+            ("abc", "no '='"),
+            ("a=b:displacement", "three parts"),
+            ("a=b:displacement:mm/d", "mm/day is no unit of displacement"),
+            ("a=b:speed:mm/d", "unknown quantity \"speed\""),
+            ("a=b:displacement:furlong", "furlong"),
+            ("=b:displacement:mm", "no name"),
+        ];
+        for (text, problem) in cases {
+            let error = text.parse::<ColumnMap>().unwrap_err().to_string();
+            assert!(error.contains(problem) && error.contains(text), "{error}");
+        }
+    }
+}

@@ -1,0 +1,97 @@
+//! Turns a file of readings into another format.
+
+use super::atomic::write_atomically;
+use super::{Format, ReadOptions, encode_mcap, read_files, write_csv};
+use crate::reading::{BenchmarkId, Disorder, Quantity, Recording, Unit};
+use anyhow::Context;
+use serde::Serialize;
+use std::io::BufWriter;
+use std::path::Path;
+
+/// What was converted.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ConvertReport {
+    /// The series written.
+    pub series: Vec<SeriesCount>,
+    /// The channels written.
+    pub channels: Vec<ChannelCount>,
+    /// What putting the rows in order met.
+    pub disorder: Disorder,
+    /// What the input says and the output has no place for.
+    pub left_out: Vec<String>,
+}
+
+/// How much of a series was written.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SeriesCount {
+    /// Whose readings.
+    pub benchmark: BenchmarkId,
+    /// Which quantity.
+    pub quantity: Quantity,
+    /// In which unit.
+    pub unit: Unit,
+    /// How many.
+    pub readings: usize,
+}
+
+/// How much of a channel was written.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ChannelCount {
+    /// The channel's name.
+    pub name: String,
+    /// How many values.
+    pub samples: usize,
+}
+
+/// Reads `input` and writes it as `output`, each CSV or MCAP by its extension. The output is wholly
+/// there afterwards or untouched.
+///
+/// # Errors
+/// An [`IngestError`](super::IngestError) (to be had by `downcast_ref`), with the files named.
+pub fn convert(
+    input: &Path,
+    output: &Path,
+    options: &ReadOptions,
+) -> anyhow::Result<ConvertReport> {
+    let format = Format::of(output)?;
+    let (recording, disorder) = read_files(&[input.to_owned()], options)?;
+    write_atomically(output, |out| match format {
+        Format::Csv => write_csv(&recording, BufWriter::new(out)),
+        Format::Mcap => encode_mcap(&recording, out),
+    })
+    .with_context(|| format!("converting {} to {}", input.display(), output.display()))?;
+    Ok(report(&recording, disorder, format))
+}
+
+fn report(recording: &Recording, disorder: Disorder, format: Format) -> ConvertReport {
+    let series = recording.series.iter().map(|series| SeriesCount {
+        benchmark: series.benchmark.clone(),
+        quantity: series.quantity(),
+        unit: series.unit,
+        readings: series.readings.len(),
+    });
+    let channels = recording.channels.iter().map(|channel| ChannelCount {
+        name: channel.name.clone(),
+        samples: channel.samples.len(),
+    });
+    let mut left_out = Vec::new();
+    if format == Format::Csv {
+        for series in &recording.series {
+            if let Some(span) = series.averaging {
+                left_out.push(format!(
+                    "averaging of {} {}: {span}",
+                    series.benchmark,
+                    series.quantity()
+                ));
+            }
+        }
+        let provenance = recording.provenance.iter();
+        left_out.extend(provenance.map(|(key, value)| format!("provenance, {key}: {value}")));
+    }
+    ConvertReport {
+        series: series.collect(),
+        channels: channels.collect(),
+        disorder,
+        left_out,
+    }
+}

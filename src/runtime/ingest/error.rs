@@ -1,0 +1,160 @@
+//! What can be wrong with a file of readings, with the place where it is.
+
+use super::MessageError;
+use crate::reading::MergeError;
+use std::io;
+use std::path::PathBuf;
+
+/// A file that cannot be read or written, or holds what it should not.
+#[derive(Debug, thiserror::Error)]
+pub enum IngestError {
+    /// The file cannot be opened or read.
+    #[error("cannot read {}", file.display())]
+    Read {
+        /// The file.
+        file: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The file cannot be written.
+    #[error("cannot write {}", file.display())]
+    Write {
+        /// The file.
+        file: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The extension is none that is known.
+    #[error("{}: unknown kind of file, expected a name that ends in .csv or .mcap", file.display())]
+    UnknownFormat {
+        /// The file.
+        file: PathBuf,
+    },
+    /// A column of the header cannot be what it is.
+    #[error("{}, line 1, column {column:?}: {problem}, expected {expected}", file.display())]
+    Header {
+        /// The file.
+        file: PathBuf,
+        /// The column's name.
+        column: String,
+        /// What is wrong with it.
+        problem: &'static str,
+        /// What would be right.
+        expected: &'static str,
+    },
+    /// A line has more or fewer fields than the header, or cannot be split.
+    #[error("{}, line {line}: found {found}, expected {expected} fields as in the header", file.display())]
+    Line {
+        /// The file.
+        file: PathBuf,
+        /// The line, the header being 1.
+        line: u64,
+        /// What stands there.
+        found: String,
+        /// The number of columns in the header.
+        expected: usize,
+    },
+    /// A cell holds what cannot stand there.
+    #[error("{}, line {line}, column {column:?}: found {value:?}, expected {expected}", file.display())]
+    Field {
+        /// The file.
+        file: PathBuf,
+        /// The line, the header being 1.
+        line: u64,
+        /// The column's name.
+        column: String,
+        /// What stands there.
+        value: String,
+        /// What would be right.
+        expected: &'static str,
+    },
+    /// A column without a single value.
+    #[error("{}, column {column:?}: found no value in any row, expected at least one number", file.display())]
+    EmptyColumn {
+        /// The file.
+        file: PathBuf,
+        /// The column's name.
+        column: String,
+    },
+    /// A header with nothing below it, or nothing at all.
+    #[error("{}: found no {missing}, expected a header line and at least one row", file.display())]
+    Empty {
+        /// The file.
+        file: PathBuf,
+        /// What is not there.
+        missing: &'static str,
+    },
+    /// A column given by name that no file has.
+    #[error("no file has a column {column:?}: expected one of {available:?}")]
+    NoSuchColumn {
+        /// The name that was given.
+        column: String,
+        /// The columns that there are.
+        available: Vec<String>,
+    },
+    /// A file of covariates that holds none.
+    #[error("{}: found benchmarks only, expected at least one covariate channel", file.display())]
+    NoChannels {
+        /// The file.
+        file: PathBuf,
+    },
+    /// An MCAP file that is truncated, fails a checksum or breaks the format.
+    #[error("{}: the file is damaged or incomplete, nothing of it is used", file.display())]
+    Damaged {
+        /// The file.
+        file: PathBuf,
+        /// What the MCAP reader met.
+        source: mcap::McapError,
+    },
+    /// An MCAP file whose summary counts other messages than the file holds.
+    #[error("{}: found {found} messages, expected {expected} as its statistics say", file.display())]
+    MessageCount {
+        /// The file.
+        file: PathBuf,
+        /// The messages that are there.
+        found: u64,
+        /// The messages that should be there.
+        expected: u64,
+    },
+    /// An MCAP file with nothing for us.
+    #[error(
+        "{}: found topics {topics:?}, expected /benchmarks/ID/displacement, /benchmarks/ID/velocity or /channels/NAME with messages",
+        file.display()
+    )]
+    NoTopics {
+        /// The file.
+        file: PathBuf,
+        /// The topics that there are.
+        topics: Vec<String>,
+    },
+    /// A message that cannot be a reading.
+    #[error("{}, message {number}: {problem}", file.display())]
+    Message {
+        /// The file.
+        file: PathBuf,
+        /// Which message of the whole file, the first being 1.
+        number: u64,
+        /// What is wrong with it.
+        problem: Box<MessageError>,
+    },
+    /// Readings that the format of the output cannot hold.
+    #[error("{name}: {problem}, expected {expected}")]
+    Unwritable {
+        /// The series or channel.
+        name: String,
+        /// What is wrong with it.
+        problem: &'static str,
+        /// What would be right.
+        expected: &'static str,
+    },
+    /// Files that cannot be joined.
+    #[error(transparent)]
+    Merge(#[from] MergeError),
+}
+
+impl IngestError {
+    /// Whether the system failed us, rather than the data being bad.
+    pub fn is_io(&self) -> bool {
+        matches!(self, Self::Read { .. } | Self::Write { .. })
+    }
+}

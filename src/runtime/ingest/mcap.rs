@@ -1,0 +1,193 @@
+//! Reads MCAP files, whole and checked: every checksum, every length, every value.
+//!
+//! A file that is truncated or fails a checksum is refused as a whole, since what can be read of it
+//! might be less, or other, than what was measured. Topics that are neither benchmarks nor channels
+//! are left out.
+
+use super::collect::Collector;
+use super::mcap_write::PROVENANCE;
+use super::message::{MessageError, Topic, decode_message};
+use super::{IngestError, Item, ReadOptions};
+use crate::reading::{Disorder, Recording};
+use ::mcap::McapError;
+use ::mcap::records::{Channel, Record};
+use ::mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+/// The longest record or decompressed chunk, in bytes: a damaged length must not become an
+/// allocation. Writers make chunks of about one megabyte unless told otherwise.
+const RECORD_LENGTH_LIMIT: usize = 64 << 20;
+
+/// Reads one file.
+pub(super) fn read_mcap(
+    file: &Path,
+    options: &ReadOptions,
+) -> Result<(Recording, Disorder), IngestError> {
+    let fail = |source| IngestError::Read {
+        file: file.into(),
+        source,
+    };
+    let mut input = File::open(file).map_err(fail)?;
+    let mut reader = LinearReader::new_with_options(
+        LinearReaderOptions::default()
+            .with_check_finishes_after_end_magic(true)
+            .with_prevalidate_chunk_crcs(true)
+            .with_validate_chunk_crcs(true)
+            .with_validate_data_section_crc(true)
+            .with_validate_summary_section_crc(true)
+            .with_record_length_limit(RECORD_LENGTH_LIMIT),
+    );
+    let mut contents = Contents::new(file, options);
+    while let Some(event) = reader.next_event() {
+        match event.map_err(|source| contents.damaged(source))? {
+            LinearReadEvent::ReadRequest(wanted) => {
+                let read = input.read(reader.insert(wanted)).map_err(fail)?;
+                reader.notify_read(read);
+            }
+            LinearReadEvent::Record { opcode, data } => {
+                let record = ::mcap::parse_record(opcode, data);
+                contents.take(record.map_err(|source| contents.damaged(source))?)?;
+            }
+        }
+    }
+    contents.finish()
+}
+
+struct Contents<'a> {
+    file: &'a Path,
+    options: &'a ReadOptions,
+    channels: BTreeMap<u16, Channel>,
+    collected: Collector,
+    provenance: BTreeMap<String, String>,
+    messages: u64,
+    taken: u64,
+    counted: Option<u64>,
+}
+
+impl<'a> Contents<'a> {
+    fn new(file: &'a Path, options: &'a ReadOptions) -> Self {
+        Self {
+            file,
+            options,
+            channels: BTreeMap::new(),
+            collected: Collector::default(),
+            provenance: BTreeMap::new(),
+            messages: 0,
+            taken: 0,
+            counted: None,
+        }
+    }
+
+    fn damaged(&self, source: McapError) -> IngestError {
+        IngestError::Damaged {
+            file: self.file.into(),
+            source,
+        }
+    }
+
+    #[expect(
+        clippy::wildcard_enum_match_arm,
+        reason = "records that hold no readings, among them kinds yet to be invented"
+    )]
+    fn take(&mut self, record: Record<'_>) -> Result<(), IngestError> {
+        match record {
+            Record::Channel(channel) => {
+                let known = self.channels.get(&channel.id);
+                if known.is_some_and(|known| *known != channel) {
+                    return Err(self.damaged(McapError::ConflictingChannels(channel.topic)));
+                }
+                if known.is_none() && Topic::parse(&channel.topic).is_none() {
+                    tracing::info!(file = %self.file.display(), topic = channel.topic, "left out: neither a benchmark nor a channel");
+                }
+                self.channels.insert(channel.id, channel);
+            }
+            Record::Message { header, data } => {
+                self.messages += 1;
+                let Some(channel) = self.channels.get(&header.channel_id) else {
+                    let unknown = McapError::UnknownChannel(header.sequence, header.channel_id);
+                    return Err(self.damaged(unknown));
+                };
+                let item = decode_checked(channel, header.publish_time, &data)
+                    .map_err(|problem| self.message(problem))?;
+                if let Some(item) = item {
+                    self.collect(&channel.topic.clone(), item)?;
+                }
+            }
+            Record::Metadata(metadata) if metadata.name == PROVENANCE => {
+                self.provenance.extend(metadata.metadata);
+            }
+            Record::Statistics(statistics) => self.counted = Some(statistics.message_count),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn collect(&mut self, topic: &str, mut item: Item) -> Result<(), IngestError> {
+        let mut field = "unit";
+        if let Item::Reading {
+            unit, averaging, ..
+        } = &mut item
+        {
+            *averaging = self.options.averaging_of(*unit, *averaging);
+        }
+        self.taken += 1;
+        self.collected.add(item).map_err(|odd| {
+            if odd.expected.contains("averaging") {
+                field = super::message::AVERAGING;
+            }
+            self.message(MessageError {
+                topic: topic.to_owned(),
+                field,
+                value: format!("{:?}", odd.found),
+                expected: odd.expected,
+            })
+        })
+    }
+
+    fn message(&self, problem: MessageError) -> IngestError {
+        IngestError::Message {
+            file: self.file.into(),
+            number: self.messages,
+            problem: Box::new(problem),
+        }
+    }
+
+    fn finish(self) -> Result<(Recording, Disorder), IngestError> {
+        if let Some(expected) = self.counted
+            && expected != self.messages
+        {
+            return Err(IngestError::MessageCount {
+                file: self.file.into(),
+                found: self.messages,
+                expected,
+            });
+        }
+        if self.taken == 0 {
+            let topics = self.channels.into_values().map(|channel| channel.topic);
+            return Err(IngestError::NoTopics {
+                file: self.file.into(),
+                topics: topics.collect(),
+            });
+        }
+        Ok(self.collected.finish(self.provenance))
+    }
+}
+
+fn decode_checked(
+    channel: &Channel,
+    publish_time: u64,
+    payload: &[u8],
+) -> Result<Option<Item>, MessageError> {
+    if channel.message_encoding != "json" && Topic::parse(&channel.topic).is_some() {
+        return Err(MessageError {
+            topic: channel.topic.clone(),
+            field: "message_encoding",
+            value: format!("{:?}", channel.message_encoding),
+            expected: "json",
+        });
+    }
+    decode_message(&channel.topic, &channel.metadata, publish_time, payload)
+}

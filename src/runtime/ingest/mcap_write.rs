@@ -1,0 +1,203 @@
+//! Writes a recording as MCAP: a topic for each series and channel, zstd chunks with checksums, a
+//! summary with statistics, and an index of messages.
+//!
+//! A converted file has no arrival times: `log_time` and `publish_time` both carry when a value was
+//! measured. MCAP times are unsigned nanoseconds, so nothing before 1970 can stand there: if the
+//! recording's first value is older, all of them count from that value instead, which keeps the
+//! order, and `time_base` in every MCAP channel's metadata says so. The JSON `time` is the truth in
+//! either case. A series or channel without any value leaves no trace.
+
+use super::IngestError;
+use super::atomic::write_atomically;
+use super::message::{AVERAGING, Payload, SINCE, TIME_BASE, Topic, UNIX};
+use crate::reading::{Channel, Reading, Recording, Series, Timestamp};
+use ::mcap::records::{MessageHeader, Metadata};
+use ::mcap::{Compression, McapError, WriteOptions, Writer};
+use std::collections::BTreeMap;
+use std::io::{self, BufWriter, Seek, Write};
+use std::path::Path;
+
+/// The name of the MCAP metadata record that says where the data come from.
+pub(super) const PROVENANCE: &str = "provenance";
+
+const READING_SCHEMA: &str = r#"{"title":"slipwatch.Reading","description":"One reading of a benchmark, standard error in the same unit","type":"object","properties":{"time":{"type":"string","format":"date-time"},"value":{"type":"number"},"unit":{"type":"string"},"sigma":{"type":"number","exclusiveMinimum":0}},"required":["time","value","unit"]}"#;
+const SAMPLE_SCHEMA: &str = r#"{"title":"slipwatch.Sample","description":"One value of a covariate","type":"object","properties":{"time":{"type":"string","format":"date-time"},"value":{"type":"number"},"unit":{"type":"string"}},"required":["time","value"]}"#;
+
+/// Writes a recording into a file, which is wholly there afterwards or untouched.
+///
+/// # Errors
+/// As [`encode_mcap`], and [`IngestError::Write`] when the file cannot be written.
+pub fn write_mcap(recording: &Recording, file: &Path) -> Result<(), IngestError> {
+    write_atomically(file, |out| encode_mcap(recording, out))
+}
+
+/// Writes a recording as MCAP. The same recording gives the same bytes.
+///
+/// # Errors
+/// [`IngestError::Unwritable`] for a value that is not finite or a time out of MCAP's range,
+/// [`IngestError::Write`] when `out` fails.
+pub fn encode_mcap(recording: &Recording, out: impl Write + Seek) -> Result<(), IngestError> {
+    let outgoing = outgoing(recording)?;
+    encode(recording, &outgoing, BufWriter::new(out)).map_err(|error| IngestError::Write {
+        file: "the MCAP output".into(),
+        source: match error {
+            McapError::Io(source) => source,
+            other => io::Error::other(other),
+        },
+    })
+}
+
+/// One topic on its way out.
+struct Outgoing {
+    topic: Topic,
+    unit: Option<String>,
+    metadata: BTreeMap<String, String>,
+    rows: Vec<(u64, Reading)>,
+}
+
+fn outgoing(recording: &Recording) -> Result<Vec<Outgoing>, IngestError> {
+    let series = recording.series.iter().map(from_series);
+    let channels = recording.channels.iter().map(from_channel);
+    let topics: Vec<_> = series.chain(channels).collect();
+    let times = topics
+        .iter()
+        .flat_map(|(_, rows)| rows.iter().map(|row| row.time));
+    let first = times.min().unwrap_or(Timestamp::UNIX_EPOCH);
+    let (base, time_base) = if first < Timestamp::UNIX_EPOCH {
+        (first, format!("{SINCE}{first}"))
+    } else {
+        (Timestamp::UNIX_EPOCH, UNIX.to_owned())
+    };
+    topics
+        .into_iter()
+        .filter(|(_, rows)| !rows.is_empty())
+        .map(|(mut topic, rows)| {
+            topic
+                .metadata
+                .insert(TIME_BASE.to_owned(), time_base.clone());
+            topic.rows = timed(&topic, rows, base)?;
+            Ok(topic)
+        })
+        .collect()
+}
+
+fn from_series(series: &Series) -> (Outgoing, Vec<Reading>) {
+    let mut metadata = BTreeMap::new();
+    if let Some(span) = series.averaging {
+        let seconds = if span.subsec_nanos() == 0 {
+            span.as_secs().to_string()
+        } else {
+            format!("{:?}", span.as_secs_f64())
+        };
+        metadata.insert(AVERAGING.to_owned(), seconds);
+    }
+    let topic = Outgoing {
+        topic: Topic::Benchmark(series.benchmark.clone(), series.quantity()),
+        unit: Some(series.unit.to_string()),
+        metadata,
+        rows: Vec::new(),
+    };
+    (topic, series.readings.clone())
+}
+
+fn from_channel(channel: &Channel) -> (Outgoing, Vec<Reading>) {
+    let topic = Outgoing {
+        topic: Topic::Channel(channel.name.clone()),
+        unit: channel.unit.clone(),
+        metadata: BTreeMap::new(),
+        rows: Vec::new(),
+    };
+    let as_reading = |sample: &crate::reading::Sample| Reading {
+        time: sample.time,
+        value: sample.value,
+        sigma: None,
+    };
+    (topic, channel.samples.iter().map(as_reading).collect())
+}
+
+fn timed(
+    topic: &Outgoing,
+    rows: Vec<Reading>,
+    base: Timestamp,
+) -> Result<Vec<(u64, Reading)>, IngestError> {
+    let fail = |problem, expected| IngestError::Unwritable {
+        name: topic.topic.name(),
+        problem,
+        expected,
+    };
+    rows.into_iter()
+        .map(|row| {
+            if !row.is_sound() {
+                let expected = "finite values, and standard errors above zero";
+                return Err(fail("a value that is not finite", expected));
+            }
+            let nanoseconds = row.time.as_nanosecond() - base.as_nanosecond();
+            u64::try_from(nanoseconds)
+                .map(|time| (time, row))
+                .map_err(|_| fail("a time too late for MCAP", "less than 584 years in all"))
+        })
+        .collect()
+}
+
+fn encode(
+    recording: &Recording,
+    outgoing: &[Outgoing],
+    out: impl Write + Seek,
+) -> Result<(), McapError> {
+    let mut writer = WriteOptions::new()
+        .compression(Some(Compression::Zstd))
+        // No threads of its own: readings are few, and the bytes must not depend on the machine.
+        .compression_threads(0)
+        .library(concat!("slipwatch ", env!("CARGO_PKG_VERSION")))
+        .create(out)?;
+    if !recording.provenance.is_empty() {
+        writer.write_metadata(&Metadata {
+            name: PROVENANCE.to_owned(),
+            metadata: recording.provenance.clone(),
+        })?;
+    }
+    let mut ids = Vec::new();
+    for one in outgoing {
+        ids.push(declare(&mut writer, one)?);
+    }
+    let mut order: Vec<(u64, usize, usize)> = Vec::new();
+    for (which, one) in outgoing.iter().enumerate() {
+        order.extend(
+            one.rows
+                .iter()
+                .enumerate()
+                .map(|(row, (time, _))| (*time, which, row)),
+        );
+    }
+    order.sort_unstable();
+    for (time, which, row) in order {
+        let one = &outgoing[which];
+        let reading = one.rows[row].1;
+        let payload = Payload {
+            time: reading.time,
+            value: reading.value,
+            unit: one.unit.as_deref(),
+            sigma: reading.sigma,
+        };
+        let header = MessageHeader {
+            channel_id: ids[which],
+            sequence: u32::try_from(row).unwrap_or(u32::MAX),
+            log_time: time,
+            publish_time: time,
+        };
+        let json = serde_json::to_vec(&payload).map_err(io::Error::from)?;
+        writer.write_to_known_channel(&header, &json)?;
+    }
+    writer.finish()?;
+    writer.into_inner().flush()?;
+    Ok(())
+}
+
+fn declare<W: Write + Seek>(writer: &mut Writer<W>, one: &Outgoing) -> Result<u16, McapError> {
+    let (name, schema) = match one.topic {
+        Topic::Benchmark(..) => ("slipwatch.Reading", READING_SCHEMA),
+        Topic::Channel(_) => ("slipwatch.Sample", SAMPLE_SCHEMA),
+    };
+    let schema = writer.add_schema(name, "jsonschema", schema.as_bytes())?;
+    writer.add_channel(schema, &one.topic.name(), "json", &one.metadata)
+}

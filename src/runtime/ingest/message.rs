@@ -1,0 +1,365 @@
+//! One reading as an MCAP message: its topic, and its JSON.
+//!
+//! Topics are `/benchmarks/ID/displacement`, `/benchmarks/ID/velocity` and `/channels/NAME`; in an
+//! ID or a NAME every byte but letters, digits and `-_.~` stands as `%` and two hexadecimal digits.
+//!
+//! The message is `{"time", "value", "unit", "sigma"?}`. Its `time` is the truth for when it was
+//! measured; where it has none, the MCAP `publish_time` is, in nanoseconds since the instant that
+//! `time_base` in the MCAP channel's metadata names, or else since 1970.
+
+use super::Item;
+use super::columns::channel_unit;
+use crate::reading::{BenchmarkId, Quantity, Reading, Sample, Timestamp, Unit};
+use jiff::SignedDuration;
+use serde::Serialize;
+use serde_json::Value;
+use std::collections::BTreeMap;
+
+/// The metadata key for the span of which a velocity is the mean, in seconds.
+pub(super) const AVERAGING: &str = "averaging_s";
+/// The metadata key for the instant from which MCAP times count.
+pub(super) const TIME_BASE: &str = "time_base";
+/// The time base of every time from 1970 on.
+pub(super) const UNIX: &str = "unix";
+/// What precedes the instant in a time base that is not 1970.
+pub(super) const SINCE: &str = "seconds since ";
+
+/// A message on one of our topics that is no reading.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("topic {topic}, field {field:?}: found {value}, expected {expected}")]
+pub struct MessageError {
+    /// The topic.
+    pub topic: String,
+    /// The field of the message, or of the channel's metadata.
+    pub field: &'static str,
+    /// What stands there.
+    pub value: String,
+    /// What would be right.
+    pub expected: &'static str,
+}
+
+/// What a topic is for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Topic {
+    Benchmark(BenchmarkId, Quantity),
+    Channel(String),
+}
+
+impl Topic {
+    /// `None` for a topic that is not ours.
+    pub(super) fn parse(topic: &str) -> Option<Self> {
+        if let Some(name) = topic.strip_prefix("/channels/") {
+            return (!name.is_empty()).then(|| Self::Channel(unescape(name)));
+        }
+        let (id, quantity) = topic.strip_prefix("/benchmarks/")?.rsplit_once('/')?;
+        let quantity = [Quantity::Displacement, Quantity::Velocity]
+            .into_iter()
+            .find(|one| one.name() == quantity)?;
+        (!id.is_empty()).then(|| Self::Benchmark(BenchmarkId::new(unescape(id)), quantity))
+    }
+
+    pub(super) fn name(&self) -> String {
+        match self {
+            Self::Benchmark(id, quantity) => {
+                format!("/benchmarks/{}/{quantity}", escape(id.as_str()))
+            }
+            Self::Channel(name) => format!("/channels/{}", escape(name)),
+        }
+    }
+}
+
+fn escape(name: &str) -> String {
+    let mut escaped = String::new();
+    for byte in name.bytes() {
+        if byte.is_ascii_alphanumeric() || b"-_.~".contains(&byte) {
+            escaped.push(char::from(byte));
+        } else {
+            escaped.push_str(&format!("%{byte:02X}"));
+        }
+    }
+    escaped
+}
+
+/// A name that others wrote without escapes, or with what only looks like one, stands as it is.
+fn unescape(name: &str) -> String {
+    escaped_bytes(name.as_bytes())
+        .and_then(|bytes| String::from_utf8(bytes).ok())
+        .unwrap_or_else(|| name.to_owned())
+}
+
+fn escaped_bytes(mut rest: &[u8]) -> Option<Vec<u8>> {
+    let mut bytes = Vec::new();
+    while let Some((&byte, after)) = rest.split_first() {
+        rest = after;
+        if byte == b'%' {
+            let (digits, after) = rest.split_at_checked(2)?;
+            let digits = std::str::from_utf8(digits).ok()?;
+            bytes.push(u8::from_str_radix(digits, 16).ok()?);
+            rest = after;
+        } else {
+            bytes.push(byte);
+        }
+    }
+    Some(bytes)
+}
+
+/// A message as it is written.
+#[derive(Debug, Serialize)]
+pub(super) struct Payload<'a> {
+    pub(super) time: Timestamp,
+    pub(super) value: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) unit: Option<&'a str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) sigma: Option<f64>,
+}
+
+/// Decodes one message; `None` if its topic is not one of ours. `metadata` is that of its MCAP
+/// channel, `publish_time` its own in nanoseconds.
+///
+/// # Errors
+/// [`MessageError`] names the field that is wrong.
+pub fn decode_message(
+    topic: &str,
+    metadata: &BTreeMap<String, String>,
+    publish_time: u64,
+    payload: &[u8],
+) -> Result<Option<Item>, MessageError> {
+    let Some(meant) = Topic::parse(topic) else {
+        return Ok(None);
+    };
+    let fields = Fields {
+        topic,
+        message: serde_json::from_slice(payload).unwrap_or(Value::Null),
+    };
+    if !fields.message.is_object() {
+        let text = String::from_utf8_lossy(payload).into_owned();
+        return Err(fields.fail("message", text, "a JSON object {time, value, unit, sigma?}"));
+    }
+    let time = fields.time(metadata, publish_time)?;
+    let value = fields.number("value")?;
+    let value = value.ok_or_else(|| fields.fail("value", "nothing", "a finite number"))?;
+    Ok(Some(match meant {
+        Topic::Benchmark(benchmark, quantity) => Item::Reading {
+            benchmark,
+            unit: fields.unit(quantity)?,
+            averaging: fields.averaging(metadata)?,
+            reading: Reading {
+                time,
+                value,
+                sigma: fields.sigma()?,
+            },
+        },
+        Topic::Channel(channel) => Item::Sample {
+            unit: fields
+                .text("unit")?
+                .or_else(|| channel_unit(&channel))
+                .map(str::to_owned),
+            channel,
+            sample: Sample { time, value },
+        },
+    }))
+}
+
+struct Fields<'a> {
+    topic: &'a str,
+    message: Value,
+}
+
+impl Fields<'_> {
+    fn fail(
+        &self,
+        field: &'static str,
+        value: impl Into<String>,
+        expected: &'static str,
+    ) -> MessageError {
+        MessageError {
+            topic: self.topic.to_owned(),
+            field,
+            value: value.into(),
+            expected,
+        }
+    }
+
+    fn text(&self, field: &'static str) -> Result<Option<&str>, MessageError> {
+        match self.message.get(field) {
+            None | Some(Value::Null) => Ok(None),
+            Some(Value::String(text)) => Ok(Some(text)),
+            Some(other) => Err(self.fail(field, other.to_string(), "a text")),
+        }
+    }
+
+    fn number(&self, field: &'static str) -> Result<Option<f64>, MessageError> {
+        match self.message.get(field) {
+            None => Ok(None),
+            Some(found) => match found.as_f64().filter(|number| number.is_finite()) {
+                Some(number) => Ok(Some(number)),
+                None => Err(self.fail(field, found.to_string(), "a finite number")),
+            },
+        }
+    }
+
+    fn time(
+        &self,
+        metadata: &BTreeMap<String, String>,
+        publish_time: u64,
+    ) -> Result<Timestamp, MessageError> {
+        if let Some(text) = self.text("time")? {
+            let expected = "an RFC 3339 time with its offset";
+            return text.parse().map_err(|_| self.fail("time", text, expected));
+        }
+        let base = match metadata.get(TIME_BASE).map(String::as_str) {
+            // A publish time of zero is one that nobody set.
+            None | Some(UNIX) if publish_time == 0 => {
+                return Err(self.fail("time", "nothing, nor a publish_time", "either of them"));
+            }
+            None | Some(UNIX) => Timestamp::UNIX_EPOCH,
+            Some(text) => text
+                .strip_prefix(SINCE)
+                .and_then(|instant| instant.parse().ok())
+                .ok_or_else(|| {
+                    self.fail(TIME_BASE, text, "unix, or seconds since an RFC 3339 time")
+                })?,
+        };
+        let nanosecond = base.as_nanosecond() + i128::from(publish_time);
+        Timestamp::from_nanosecond(nanosecond).map_err(|_| {
+            self.fail(
+                "publish_time",
+                publish_time.to_string(),
+                "a time within the calendar",
+            )
+        })
+    }
+
+    fn unit(&self, quantity: Quantity) -> Result<Unit, MessageError> {
+        let expected = match quantity {
+            Quantity::Displacement => "a unit of displacement: mm, cm, m, in or ft",
+            Quantity::Velocity => "a unit of velocity such as mm/h, mm/day or m/yr",
+        };
+        let text = self.text("unit")?.unwrap_or_default();
+        Unit::parse(text)
+            .ok()
+            .filter(|unit| unit.quantity() == quantity)
+            .ok_or_else(|| self.fail("unit", format!("{text:?}"), expected))
+    }
+
+    fn sigma(&self) -> Result<Option<f64>, MessageError> {
+        match self.message.get("sigma") {
+            Some(Value::Null) => Ok(None),
+            _ => match self.number("sigma")? {
+                Some(sigma) if sigma <= 0.0 => {
+                    Err(self.fail("sigma", sigma.to_string(), "a positive standard error"))
+                }
+                sigma => Ok(sigma),
+            },
+        }
+    }
+
+    fn averaging(
+        &self,
+        metadata: &BTreeMap<String, String>,
+    ) -> Result<Option<SignedDuration>, MessageError> {
+        let Some(text) = metadata.get(AVERAGING) else {
+            return Ok(None);
+        };
+        text.parse()
+            .ok()
+            .and_then(|seconds| SignedDuration::try_from_secs_f64(seconds).ok())
+            .filter(SignedDuration::is_positive)
+            .map(Some)
+            .ok_or_else(|| {
+                self.fail(
+                    AVERAGING,
+                    format!("{text:?}"),
+                    "a positive number of seconds",
+                )
+            })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn decode(payload: &str) -> Result<Option<Item>, MessageError> {
+        decode_message(
+            "/benchmarks/a/displacement",
+            &BTreeMap::new(),
+            1_000_000_000,
+            payload.as_bytes(),
+        )
+    }
+
+    #[test]
+    fn a_name_with_odd_characters_has_a_topic_of_its_own() {
+        for name in ["31-1930", "a/b", "a%2Fb", "Ü 5", "/", "displacement"] {
+            let topic = Topic::Benchmark(BenchmarkId::new(name), Quantity::Velocity);
+            let text = topic.name();
+            assert_eq!(text.matches('/').count(), 3, "{text}");
+            assert_eq!(Topic::parse(&text), Some(topic));
+            let topic = Topic::Channel(name.to_owned());
+            assert_eq!(Topic::parse(&topic.name()), Some(topic));
+        }
+    }
+
+    #[test]
+    fn a_name_that_nobody_escaped_stands_as_it_is() {
+        let cases = [
+            ("/benchmarks/100%/velocity", "100%"),
+            ("/benchmarks/west/5/velocity", "west/5"),
+            ("/benchmarks/a%ff/velocity", "a%ff"),
+        ];
+        for (topic, id) in cases {
+            let expected = Topic::Benchmark(BenchmarkId::new(id), Quantity::Velocity);
+            assert_eq!(Topic::parse(topic), Some(expected));
+        }
+    }
+
+    #[test]
+    fn another_topic_is_none_of_ours() {
+        for topic in ["/tf", "/benchmarks/a", "/benchmarks/a/tilt", "/channels/"] {
+            assert_eq!(decode_message(topic, &BTreeMap::new(), 1, b"{}"), Ok(None));
+        }
+    }
+
+    #[test]
+    fn the_time_in_the_message_stands_over_its_publish_time() {
+        let stated = decode(r#"{"time": "1963-08-02T00:00:00Z", "value": 1, "unit": "mm"}"#);
+        let silent = decode(r#"{"value": 1, "unit": "mm"}"#);
+        let time = |item| match item {
+            Ok(Some(Item::Reading { reading, .. })) => reading.time.to_string(),
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(time(stated), "1963-08-02T00:00:00Z");
+        assert_eq!(time(silent), "1970-01-01T00:00:01Z");
+    }
+
+    #[test]
+    fn what_is_no_reading_is_named_by_field_and_value() {
+        let cases = [
+            ("[1]", "message", "[1]"),
+            ("{\"value\": NaN}", "message", "NaN"),
+            ("{\"unit\": \"mm\"}", "value", "nothing"),
+            ("{\"value\": null, \"unit\": \"mm\"}", "value", "null"),
+            ("{\"value\": \"1\", \"unit\": \"mm\"}", "value", "\"1\""),
+            ("{\"value\": 1}", "unit", "\"\""),
+            ("{\"value\": 1, \"unit\": \"mm/d\"}", "unit", "mm/d"),
+            (
+                "{\"value\": 1, \"unit\": \"mm\", \"sigma\": 0}",
+                "sigma",
+                "0",
+            ),
+            (
+                "{\"value\": 1, \"unit\": \"mm\", \"time\": \"noon\"}",
+                "time",
+                "noon",
+            ),
+        ];
+        for (payload, field, value) in cases {
+            let error = decode(payload).unwrap_err();
+            assert_eq!(error.field, field, "{payload}");
+            assert!(error.value.contains(value), "{error}");
+            assert!(error.to_string().contains("/benchmarks/a/displacement"));
+        }
+    }
+}

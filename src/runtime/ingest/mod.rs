@@ -1,0 +1,159 @@
+//! Files of readings in and out: CSV and MCAP become one [`Recording`], and back.
+
+mod atomic;
+mod collect;
+mod columns;
+mod convert;
+mod csv;
+mod error;
+mod mcap;
+mod mcap_write;
+mod message;
+
+pub use columns::{ColumnMap, ColumnMapError, Measure};
+pub use convert::{ChannelCount, ConvertReport, SeriesCount, convert};
+pub use csv::{CsvRows, write_csv};
+pub use error::IngestError;
+pub use mcap_write::{encode_mcap, write_mcap};
+pub use message::{MessageError, decode_message};
+
+use crate::reading::{BenchmarkId, Channel, Disorder, Quantity, Reading, Recording, Sample, Unit};
+use jiff::{SignedDuration, Timestamp};
+use std::path::{Path, PathBuf};
+
+/// What a file does not say of itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReadOptions {
+    /// Day 0 of a `t_days` column.
+    pub epoch: Timestamp,
+    /// What columns mean whose names do not say it.
+    pub columns: Vec<ColumnMap>,
+    /// The span over which velocities are means, for series that state none.
+    pub averaging: Option<SignedDuration>,
+}
+
+impl Default for ReadOptions {
+    fn default() -> Self {
+        Self {
+            epoch: Timestamp::constant(946_684_800, 0),
+            columns: Vec::new(),
+            averaging: None,
+        }
+    }
+}
+
+impl ReadOptions {
+    fn averaging_of(&self, unit: Unit, stated: Option<SignedDuration>) -> Option<SignedDuration> {
+        match unit.quantity() {
+            Quantity::Velocity => stated.or(self.averaging),
+            Quantity::Displacement => stated,
+        }
+    }
+}
+
+/// One value on its way in.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Item {
+    /// A reading of a benchmark.
+    Reading {
+        /// Whose.
+        benchmark: BenchmarkId,
+        /// Its unit, which also says the quantity.
+        unit: Unit,
+        /// For velocities: the span before the time stamp over which it is the mean.
+        averaging: Option<SignedDuration>,
+        /// The reading itself.
+        reading: Reading,
+    },
+    /// A value of a covariate.
+    Sample {
+        /// The channel's name.
+        channel: String,
+        /// Its unit, where known.
+        unit: Option<String>,
+        /// The value itself.
+        sample: Sample,
+    },
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Format {
+    Csv,
+    Mcap,
+}
+
+impl Format {
+    fn of(file: &Path) -> Result<Self, IngestError> {
+        let extension = file.extension().unwrap_or_default().to_string_lossy();
+        match extension.to_ascii_lowercase().as_str() {
+            "csv" => Ok(Self::Csv),
+            "mcap" => Ok(Self::Mcap),
+            _ => Err(IngestError::UnknownFormat { file: file.into() }),
+        }
+    }
+}
+
+/// Reads and joins files, CSV or MCAP by extension; a later file stands over an earlier one.
+///
+/// # Errors
+/// [`IngestError`] names the first thing found wrong; nothing is silently left out but MCAP
+/// topics that are neither benchmarks nor channels.
+pub fn read_files(
+    paths: &[PathBuf],
+    options: &ReadOptions,
+) -> Result<(Recording, Disorder), IngestError> {
+    let mut parts = Vec::new();
+    let mut disorder = Disorder::default();
+    let mut columns = Vec::new();
+    for path in paths {
+        let (recording, met) = match Format::of(path)? {
+            Format::Csv => {
+                let table = csv::read_csv(path, options)?;
+                columns.extend(table.columns);
+                (table.recording, table.disorder)
+            }
+            Format::Mcap => mcap::read_mcap(path, options)?,
+        };
+        parts.push(recording);
+        disorder += met;
+    }
+    for map in &options.columns {
+        if !columns.contains(&map.column) {
+            return Err(IngestError::NoSuchColumn {
+                column: map.column.clone(),
+                available: columns,
+            });
+        }
+    }
+    let (recording, overlap) = Recording::merge(parts)?;
+    disorder += overlap;
+    Ok((recording, disorder))
+}
+
+/// Reads covariates kept in files of their own; benchmarks that stand there too are left out.
+///
+/// # Errors
+/// [`IngestError`] as [`read_files`]; also for a file without any channel.
+pub fn read_channels(
+    paths: &[PathBuf],
+    options: &ReadOptions,
+) -> Result<(Vec<Channel>, Disorder), IngestError> {
+    let options = ReadOptions {
+        columns: Vec::new(),
+        ..options.clone()
+    };
+    let mut parts = Vec::new();
+    let mut disorder = Disorder::default();
+    for path in paths {
+        let (mut recording, met) = read_files(std::slice::from_ref(path), &options)?;
+        if recording.channels.is_empty() {
+            return Err(IngestError::NoChannels { file: path.clone() });
+        }
+        recording.series.clear();
+        parts.push(recording);
+        disorder += met;
+    }
+    let (recording, overlap) = Recording::merge(parts)?;
+    disorder += overlap;
+    Ok((recording.channels, disorder))
+}
