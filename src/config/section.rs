@@ -174,15 +174,39 @@ fn benchmark(
             "write a unit of the quantity",
         );
     }
+    let unit = unit
+        .map(|given| given.value)
+        .or_else(|| column_unit(&section, column.as_ref()?));
     section.finish();
     Some(Benchmark {
         id: BenchmarkId::new(id?.value),
         source: source?,
         column: column.map(|given| given.value),
         quantity: quantity.map(|given| given.value),
-        unit: unit.map(|given| given.value),
+        unit,
         averaging: averaging.map(|given| given.value),
     })
+}
+
+/// The unit that the column's name ends in.
+fn column_unit(section: &Section<'_>, column: &Placed<String>) -> Option<Unit> {
+    let plain = column.value.to_ascii_lowercase();
+    let unit = ["displacement_", "velocity_"].iter().find_map(|keyword| {
+        let (_, unit) = plain.rsplit_once(keyword)?;
+        let unit = Unit::parse(unit).ok()?;
+        keyword.starts_with(unit.quantity().name()).then_some(unit)
+    });
+    if unit.is_none() && !section.has("unit") {
+        section.error(
+            &column.at,
+            format!(
+                "benchmark.column = {:?} does not say its unit",
+                column.value
+            ),
+            "add unit = \"mm\" or unit = \"mm_per_day\"",
+        );
+    }
+    unit
 }
 
 fn benchmark_source(section: &mut Section<'_>, sources: &[Source]) -> Option<String> {

@@ -3,8 +3,13 @@
 pub mod clock;
 pub mod deliver;
 pub mod delivered;
+pub mod event_log;
 pub mod hook;
 pub mod ingest;
 pub mod journal;
+pub mod log;
+pub mod run;
+mod seen;
 pub mod shutdown;
+pub mod site;
 pub mod tail;

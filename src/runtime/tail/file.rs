@@ -157,7 +157,8 @@ impl FileTail {
             self.mark = read_at(&file, self.mark_start(), self.at - self.mark_start())?;
         }
         // A suspect record is looked at again although nothing changes any more.
-        let suspect = matches!(self.content, Content::Mcap { suspect: Some(at), .. } if at == self.at);
+        let suspect =
+            matches!(self.content, Content::Mcap { suspect: Some(at), .. } if at == self.at);
         self.idle = (!moved && !suspect).then_some(glance);
         Ok(moved)
     }
@@ -167,8 +168,8 @@ impl FileTail {
     }
 
     fn is_same(&self, file: &File, glance: Glance) -> io::Result<bool> {
-        if self.at == 0 && !matches!(self.content, Content::Refused) {
-            return Ok(true);
+        if self.at == 0 {
+            return Ok(!matches!(self.content, Content::Refused));
         }
         if self.place != Some(glance.place) || glance.size < self.at {
             return Ok(false);
@@ -207,7 +208,9 @@ impl FileTail {
         };
         match rows.row(line.number, &text) {
             Ok(items) => {
-                let arrivals = items.into_iter().filter_map(|one| self.decoder.arrival(one));
+                let arrivals = items
+                    .into_iter()
+                    .filter_map(|one| self.decoder.arrival(one));
                 self.pending.extend(arrivals);
             }
             Err(error) => self.quarantine_line(line.number, &text, &error),
@@ -218,12 +221,12 @@ impl FileTail {
         self.quarantined += 1;
         let (file, total) = (self.path.display(), self.quarantined);
         let text: String = text.chars().take(SHOWN).collect();
-        tracing::warn!(%file, line = number, text, error, total, "line quarantined");
+        tracing::warn!(%file, line = number, text, %error, total, "line quarantined");
     }
 
     fn refuse(&mut self, error: &dyn std::error::Error) {
         self.quarantined += 1;
-        tracing::warn!(file = %self.path.display(), error, "file refused until it is replaced");
+        tracing::warn!(file = %self.path.display(), %error, "file refused until it is replaced");
         self.content = Content::Refused;
     }
 

@@ -113,7 +113,10 @@ mod tests {
         assert_eq!(texts(lines.feed(b"a\n2017-06-0")), ["a"]);
         assert!(lines.feed(b"6,12").is_empty());
         let line = lines.feed(b".5\n").remove(0);
-        assert_eq!((line.number, line.text.unwrap().as_str()), (2, "2017-06-06,12.5"));
+        assert_eq!(
+            (line.number, line.text.unwrap().as_str()),
+            (2, "2017-06-06,12.5")
+        );
     }
 
     #[test]

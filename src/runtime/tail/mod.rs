@@ -98,14 +98,12 @@ impl Watch {
             return;
         };
         self.unwatched.retain(|folder| {
-            folder.is_dir()
-                && watcher
-                    .watch(folder, RecursiveMode::NonRecursive)
-                    .inspect_err(
-                        |error| tracing::debug!(folder = %folder.display(), %error, "not watched"),
-                    )
-                    .is_err()
-                || !folder.is_dir()
+            let watched = watcher.watch(folder, RecursiveMode::NonRecursive);
+            watched
+                .inspect_err(
+                    |error| tracing::debug!(folder = %folder.display(), %error, "not watched"),
+                )
+                .is_err()
         });
     }
 }
