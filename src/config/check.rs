@@ -25,9 +25,6 @@ pub struct Summary {
 
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for warning in &self.warnings {
-            writeln!(f, "{warning}")?;
-        }
         write!(
             f,
             "ok: {} (sources: {}, benchmarks: {}, hooks: {}, state in {})",
