@@ -270,3 +270,24 @@ async fn closing_does_not_wait_longer_than_its_limit_and_leaves_nothing_running(
     let pid = read(&folder, "pid").trim().to_owned();
     eventually("the child's end", || !is_running(&pid)).await;
 }
+
+#[test]
+fn the_sample_hook_says_it_in_one_line_for_a_person() {
+    let sample = Path::new(env!("CARGO_MANIFEST_DIR")).join("deploy/notify.sh");
+    let output = std::process::Command::new(sample)
+        .env("SLIPWATCH_STATUS", "Test")
+        .env("SLIPWATCH_SITE", "Monte Toc")
+        .env("SLIPWATCH_LEVEL", "red")
+        .env("SLIPWATCH_STATE", "firing")
+        .env("SLIPWATCH_BENCHMARK", "5")
+        .env("SLIPWATCH_TIME", "2017-06-06T17:00:00Z")
+        .env("SLIPWATCH_FAILURE_TIME", "")
+        .stdin(std::process::Stdio::null())
+        .output()
+        .unwrap();
+    assert_eq!(
+        String::from_utf8(output.stdout).unwrap(),
+        "[Test] Monte Toc: red firing at benchmark 5, 2017-06-06T17:00:00Z, \
+         failure expected unknown\n"
+    );
+}

@@ -32,10 +32,11 @@ pub fn run(file: &Path, format: LogFormat) -> anyhow::Result<ExitCode> {
         .context("cannot start the asynchronous runtime")?;
     let ended = runtime.block_on(async {
         let shutdown = Shutdown::on_signals().context("cannot listen for signals")?;
-        anyhow::Ok(daemon::run(&config, shutdown).await)
+        let (progress, _) = tokio::sync::watch::channel(daemon::Progress::default());
+        anyhow::Ok(daemon::run(&config, shutdown, &progress).await)
     })?;
     Ok(match ended {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(_counts) => ExitCode::SUCCESS,
         Err(error) => {
             exit::complain(&error);
             match error {

@@ -6,14 +6,14 @@ use super::delivered::Delivered;
 use super::event_log::EventLog;
 use super::hook::Status;
 use super::shutdown::{self, Shutdown};
-use super::site::{Sinks, Site};
+use super::site::{Counts, Sinks, Site};
 use super::tail::{self, Batch, Follower};
 use crate::config::Config;
 use std::fs::{File, TryLockError};
 use std::io;
 use std::path::PathBuf;
 use std::time::Duration;
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, watch};
 use tokio::task::JoinHandle;
 
 /// Batches between the files and the monitor.
@@ -22,6 +22,15 @@ const BATCHES: usize = 4;
 const DRAIN_LIMIT: Duration = Duration::from_secs(20);
 /// How often time is let pass when nothing arrives.
 const TICK: Duration = Duration::from_secs(1);
+
+/// How far the daemon has come.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Progress {
+    /// What has been counted.
+    pub counts: Counts,
+    /// Whether the past has been read.
+    pub is_caught_up: bool,
+}
 
 /// Why the daemon ended other than by being asked to.
 #[derive(Debug, thiserror::Error)]
@@ -45,7 +54,8 @@ pub enum RunError {
     Follow(#[from] tokio::task::JoinError),
 }
 
-/// Runs the site until `shutdown` is asked for; needs a multi-threaded tokio runtime.
+/// Runs the site until `shutdown` is asked for and returns what it has counted, which `progress`
+/// shows on the way; needs a multi-threaded tokio runtime.
 ///
 /// Every file is read from its start each time: there are no saved offsets yet, the past is
 /// rebuilt. What was written to `events.ndjson` is not written again, and what a hook has taken
@@ -53,7 +63,11 @@ pub enum RunError {
 ///
 /// # Errors
 /// [`RunError`]; being asked to stop is none.
-pub async fn run(config: &Config, shutdown: Shutdown) -> Result<(), RunError> {
+pub async fn run(
+    config: &Config,
+    shutdown: Shutdown,
+    progress: &watch::Sender<Progress>,
+) -> Result<Counts, RunError> {
     let State {
         events,
         delivered,
@@ -72,7 +86,7 @@ pub async fn run(config: &Config, shutdown: Shutdown) -> Result<(), RunError> {
     let (sender, receiver) = mpsc::channel(BATCHES);
     let source = tokio::spawn(tail::follow(follower, sender, stopped));
     tracing::info!(site = config.site.name, state = %config.site.state_dir.display(), "started");
-    let worked = work(&mut site, receiver, shutdown).await;
+    let worked = work(&mut site, receiver, shutdown, progress).await;
     stop.pull();
     let counts = site.counts();
     let closed = site.close(clock::now(), DRAIN_LIMIT).await;
@@ -80,7 +94,7 @@ pub async fn run(config: &Config, shutdown: Shutdown) -> Result<(), RunError> {
     let followed = joined(source).await;
     let folder = config.site.state_dir.clone();
     (worked.and(closed.map(drop))).map_err(|source| RunError::State { folder, source })?;
-    followed
+    followed.map(|()| counts)
 }
 
 async fn joined(source: JoinHandle<Result<(), tokio::task::JoinError>>) -> Result<(), RunError> {
@@ -92,8 +106,9 @@ async fn work(
     site: &mut Site,
     mut batches: mpsc::Receiver<Batch>,
     mut shutdown: Shutdown,
+    progress: &watch::Sender<Progress>,
 ) -> io::Result<()> {
-    let mut is_backfill = true;
+    let mut is_caught_up = false;
     let mut tick = tokio::time::interval(TICK);
     tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
     loop {
@@ -104,15 +119,16 @@ async fn work(
                 let Some(batch) = batch else { return Ok(()) };
                 let still = shutdown.clone();
                 tokio::task::block_in_place(|| take_batch(site, &batch, &still))?;
-                if batch.caught_up && is_backfill {
-                    is_backfill = false;
-                    let counts = site.counts();
+                let counts = site.counts();
+                if batch.caught_up && !is_caught_up {
+                    is_caught_up = true;
                     tracing::info!(?counts, "caught up");
                     site.caught_up(clock::now());
                 }
+                progress.send_replace(Progress { counts, is_caught_up });
             }
             // Data time is the clock's only once the past has been read.
-            _ = tick.tick(), if !is_backfill => tokio::task::block_in_place(|| {
+            _ = tick.tick(), if is_caught_up => tokio::task::block_in_place(|| {
                 let now = clock::now();
                 site.pass(now);
                 site.commit(now)

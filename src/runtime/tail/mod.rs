@@ -28,6 +28,9 @@ use tokio::time::MissedTickBehavior;
 /// How often the files are looked at when nothing wakes us.
 const RESCAN: Duration = Duration::from_secs(2);
 
+/// After a change: how long the next ones are waited for, so that a busy writer costs one look.
+const SETTLE: Duration = Duration::from_millis(50);
+
 /// Follows until `shutdown` is asked for or nobody takes the batches any more.
 ///
 /// Every round is sent, an empty one too: that the files hold no more is news.
@@ -57,7 +60,7 @@ pub async fn follow(
         }
         if caught_up {
             tokio::select! {
-                () = watch.wake.notified() => {}
+                () = watch.wake.notified() => tokio::time::sleep(SETTLE).await,
                 _ = rescan.tick() => {}
                 () = shutdown.requested() => return Ok(()),
             }
