@@ -1,78 +1,27 @@
 //! What goes into a file of readings comes out of it again, and what is wrong with it is named.
 #![allow(missing_docs, reason = "the claims are the names")]
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod made_up;
 mod measured;
 
 use jiff::{SignedDuration, Timestamp};
+use made_up::{assert_identical, made_up, read};
 use measured::measured;
 use proptest::prelude::*;
-use slipwatch::reading::{
-    BenchmarkId, Channel, Disorder, Reading, Recording, Sample, Series, Unit,
-};
+use slipwatch::reading::{BenchmarkId, Disorder, Reading, Recording, Series, Unit};
 use slipwatch::runtime::ingest::{
-    IngestError, ReadOptions, convert, encode_mcap, read_channels, read_files, write_csv,
-    write_mcap,
+    CsvRows, IngestError, Item, ReadOptions, convert, encode_mcap, read_channels, read_files,
+    write_csv, write_mcap,
 };
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-fn reading(time: &str, value: f64, sigma: Option<f64>) -> Reading {
-    let time = time.parse().unwrap();
-    Reading { time, value, sigma }
-}
-
-/// Readings from before 1970 on, standard errors, averaging, awkward names and numbers.
-fn made_up() -> Recording {
-    Recording {
-        series: vec![
-            Series {
-                benchmark: BenchmarkId::new("5"),
-                unit: Unit::MM_PER_DAY,
-                averaging: Some(SignedDuration::from_mins(90)),
-                readings: vec![
-                    reading("1963-08-02T00:00:00Z", 5.0, Some(0.1)),
-                    reading("1963-08-02T00:00:00.000000001Z", 0.1 + 0.2, None),
-                    reading("1971-01-01T00:00:00Z", 1e300, Some(5e-324)),
-                ],
-            },
-            Series {
-                benchmark: BenchmarkId::new("west wall/Ü 5,\"b\""),
-                unit: Unit::parse("ft").unwrap(),
-                averaging: None,
-                readings: vec![reading("1963-08-03T00:00:00Z", -1.0 / 3.0, None)],
-            },
-        ],
-        channels: vec![
-            Channel {
-                name: "lake_level_m".to_owned(),
-                unit: Some("m".to_owned()),
-                samples: vec![Sample {
-                    time: "1963-08-01T12:00:00Z".parse().unwrap(),
-                    value: 650.25,
-                }],
-            },
-            Channel {
-                name: "quality/of day".to_owned(),
-                unit: None,
-                samples: vec![Sample {
-                    time: "1963-08-01T12:00:00Z".parse().unwrap(),
-                    value: f64::MIN_POSITIVE,
-                }],
-            },
-        ],
-        provenance: [("title".to_owned(), "made up".to_owned())].into(),
-    }
-}
-
 fn write(folder: &TempDir, name: &str, text: &str) -> PathBuf {
     let file = folder.path().join(name);
     fs::write(&file, text).unwrap();
     file
-}
-
-fn read(file: &Path) -> Result<(Recording, Disorder), IngestError> {
-    read_files(&[file.to_owned()], &ReadOptions::default())
 }
 
 fn read_text(text: &str) -> Result<(Recording, Disorder), IngestError> {
@@ -84,31 +33,23 @@ fn error_of(text: &str) -> String {
     read_text(text).unwrap_err().to_string()
 }
 
-/// Compares bits too: `==` holds 0.0 and -0.0 for one number.
-fn assert_identical(a: &Recording, b: &Recording) {
-    assert_eq!(a, b);
-    let bits = |recording: &Recording| -> Vec<u64> {
-        let readings = recording.series.iter().flat_map(|series| &series.readings);
-        let samples = recording
-            .channels
-            .iter()
-            .flat_map(|channel| &channel.samples);
-        readings
-            .flat_map(|row| [row.value.to_bits(), row.sigma.unwrap_or(0.0).to_bits()])
-            .chain(samples.map(|row| row.value.to_bits()))
-            .collect()
-    };
-    assert_eq!(bits(a), bits(b));
-}
-
 #[test]
 fn a_recording_converted_there_and_back_is_the_same_readings() {
     let names = [
+        "baishuihe_2006.csv",
+        "bazimen_2006.csv",
         "century_2013_31-1930.csv",
-        "century_2014_southwest.csv",
+        "century_2013_31-1931.csv",
+        "century_2013_40-1938.csv",
         "century_2013_rain.csv",
-        "salmon_falls_2017.csv",
+        "century_2014_southwest.csv",
+        "columbia_1985_marker1.csv",
+        "columbia_1985_rain.csv",
+        "houston_msfx_2013.csv",
         "lanzada_2025_f1.csv",
+        "lanzada_2025_f4.csv",
+        "lanzada_2025_rock_temperature.csv",
+        "salmon_falls_2017.csv",
     ];
     let options = ReadOptions::default();
     for file in names.into_iter().filter_map(measured) {
@@ -125,16 +66,6 @@ fn a_recording_converted_there_and_back_is_the_same_readings() {
         let held: usize = original.series.iter().map(|one| one.readings.len()).sum();
         assert_eq!(counted, held);
     }
-}
-
-#[test]
-fn mcap_holds_times_before_1970_standard_errors_averaging_names_and_provenance() {
-    let folder = TempDir::new().unwrap();
-    let file = folder.path().join("made-up.mcap");
-    write_mcap(&made_up(), &file).unwrap();
-    let (back, disorder) = read(&file).unwrap();
-    assert_identical(&made_up(), &back);
-    assert_eq!(disorder, Disorder::default());
 }
 
 #[test]
@@ -155,50 +86,6 @@ fn csv_holds_all_but_averaging_and_provenance_and_convert_says_so() {
     };
     let (told, _) = read_files(&[table], &hour_and_half).unwrap();
     assert_eq!(told.series, made_up().series);
-}
-
-#[test]
-fn a_recording_in_mcap_is_the_same_bytes_every_time_and_stands_readable_for_all() {
-    use std::os::unix::fs::PermissionsExt;
-    let folder = TempDir::new().unwrap();
-    let [first, second] = ["a.mcap", "b.mcap"].map(|name| folder.path().join(name));
-    write_mcap(&made_up(), &first).unwrap();
-    write_mcap(&made_up(), &second).unwrap();
-    assert_eq!(fs::read(&first).unwrap(), fs::read(&second).unwrap());
-    let plain = write(&folder, "plain", "");
-    let mode = |file: &Path| fs::metadata(file).unwrap().permissions().mode() & 0o777;
-    assert_eq!(mode(&first), mode(&plain));
-}
-
-#[test]
-fn a_recording_has_what_viewers_need() {
-    let mut bytes = std::io::Cursor::new(Vec::new());
-    encode_mcap(&made_up(), &mut bytes).unwrap();
-    let bytes = bytes.into_inner();
-    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
-    assert_eq!(summary.stats.unwrap().message_count, 6);
-    assert_eq!(summary.metadata_indexes[0].name, "provenance");
-    assert!(!summary.chunk_indexes.is_empty());
-    let messages: Vec<_> = mcap::MessageStream::new(&bytes)
-        .unwrap()
-        .map(Result::unwrap)
-        .collect();
-    assert!(messages.is_sorted_by_key(|message| message.log_time));
-    for message in &messages {
-        let channel = &message.channel;
-        let schema = channel.schema.as_ref().unwrap();
-        assert_eq!(schema.encoding, "jsonschema");
-        serde_json::from_slice::<serde_json::Value>(&schema.data).unwrap();
-        assert_eq!(channel.message_encoding, "json");
-        let base = &channel.metadata["time_base"];
-        assert_eq!(base, "seconds since 1963-08-01T12:00:00Z");
-    }
-    let first: serde_json::Value = serde_json::from_slice(&messages[2].data).unwrap();
-    assert_eq!(messages[2].channel.topic, "/benchmarks/5/velocity");
-    assert_eq!(
-        first.to_string(),
-        r#"{"time":"1963-08-02T00:00:00Z","value":5.0,"unit":"mm/day","sigma":0.1}"#
-    );
 }
 
 #[test]
@@ -353,6 +240,51 @@ fn rows_out_of_order_repeated_or_corrected_are_settled_and_counted() {
 }
 
 #[test]
+fn a_file_followed_row_by_row_gives_what_the_whole_file_gives() {
+    let text = "time,a_displacement_mm,a_sigma_mm,b_velocity_mm_per_h,rain_mm\n\
+                2020-01-01T00:00:00Z,1,0.5,,3\n2020-01-02T00:00:00Z,,,4,\n";
+    let options = ReadOptions {
+        averaging: Some(SignedDuration::from_hours(1)),
+        ..ReadOptions::default()
+    };
+    let folder = TempDir::new().unwrap();
+    let file = write(&folder, "x.csv", text);
+    let (whole, _) = read_files(std::slice::from_ref(&file), &options).unwrap();
+
+    let mut lines = text.lines().zip(1..);
+    let mut rows = CsvRows::new(&file, lines.next().unwrap().0, &options).unwrap();
+    let bad = rows
+        .row(2, "2020-01-01T00:00:00Z,1,0.5,nonsense,3")
+        .unwrap_err();
+    assert!(bad.to_string().contains("nonsense"), "{bad}");
+    let items: Vec<Item> = lines
+        .flat_map(|(text, line)| rows.row(line, text).unwrap())
+        .collect();
+    let [a, b] = [&whole.series[0], &whole.series[1]];
+    let expected = [
+        Item::Reading {
+            benchmark: a.benchmark.clone(),
+            unit: a.unit,
+            averaging: None,
+            reading: a.readings[0],
+        },
+        Item::Sample {
+            channel: "rain_mm".to_owned(),
+            unit: Some("mm".to_owned()),
+            sample: whole.channels[0].samples[0],
+        },
+        Item::Reading {
+            benchmark: b.benchmark.clone(),
+            unit: b.unit,
+            averaging: Some(SignedDuration::from_hours(1)),
+            reading: b.readings[0],
+        },
+    ];
+    assert_eq!(items, expected);
+    assert_eq!(b.averaging, Some(SignedDuration::from_hours(1)));
+}
+
+#[test]
 fn a_column_map_names_the_benchmark_and_must_meet_its_column() {
     let folder = TempDir::new().unwrap();
     let file = write(
@@ -444,121 +376,6 @@ fn a_number_that_is_not_finite_is_not_written() {
     let mut bytes = std::io::Cursor::new(Vec::new());
     assert!(encode_mcap(&recording, &mut bytes).is_err());
     assert!(write_csv(&recording, Vec::new()).is_err());
-}
-
-/// An archive of some length, for damage to be done to.
-fn archive() -> (Recording, Vec<u8>) {
-    let mut recording = made_up();
-    recording.series[0].readings = (0..400_i32)
-        .map(|day| Reading {
-            time: Timestamp::from_second(i64::from(day) * 86_400).unwrap(),
-            value: f64::from(day).sqrt(),
-            sigma: Some(0.5),
-        })
-        .collect();
-    let mut bytes = std::io::Cursor::new(Vec::new());
-    encode_mcap(&recording, &mut bytes).unwrap();
-    (recording, bytes.into_inner())
-}
-
-#[test]
-fn a_flipped_bit_is_refused_or_changes_nothing() {
-    let folder = TempDir::new().unwrap();
-    let file = folder.path().join("a.mcap");
-    let (recording, bytes) = archive();
-    let mut refused = 0;
-    for step in 0..600 {
-        // Spread over the whole file, every bit of a byte in turn.
-        let at = step * bytes.len() / 600;
-        let mut damaged = bytes.clone();
-        damaged[at] ^= 1 << (step % 8);
-        fs::write(&file, &damaged).unwrap();
-        match read(&file) {
-            Ok((read, _)) => assert_identical(&recording, &read),
-            Err(_) => refused += 1,
-        }
-    }
-    assert!(refused > 500, "only {refused} of 600 flips were noticed");
-}
-
-#[test]
-fn a_truncated_archive_is_refused() {
-    let folder = TempDir::new().unwrap();
-    let file = folder.path().join("a.mcap");
-    let (recording, bytes) = archive();
-    for length in (0..bytes.len()).step_by(37).chain([bytes.len() - 1]) {
-        fs::write(&file, &bytes[..length]).unwrap();
-        let error = read(&file).unwrap_err();
-        assert!(
-            matches!(error, IngestError::Damaged { .. }),
-            "{length}: {error}"
-        );
-    }
-    fs::write(&file, &bytes).unwrap();
-    assert_identical(&recording, &read(&file).unwrap().0);
-}
-
-/// A file as another program may write it.
-fn foreign(messages: &[(&str, &str)]) -> Vec<u8> {
-    let mut bytes = std::io::Cursor::new(Vec::new());
-    let mut writer = mcap::WriteOptions::new().create(&mut bytes).unwrap();
-    for (sequence, (topic, json)) in (1..).zip(messages) {
-        let channel = writer
-            .add_channel(0, topic, "json", &std::collections::BTreeMap::new())
-            .unwrap();
-        let header = mcap::records::MessageHeader {
-            channel_id: channel,
-            sequence,
-            log_time: 2_000_000_000 * u64::from(sequence),
-            publish_time: 1_000_000_000 * u64::from(sequence),
-        };
-        writer
-            .write_to_known_channel(&header, json.as_bytes())
-            .unwrap();
-    }
-    writer.finish().unwrap();
-    drop(writer);
-    bytes.into_inner()
-}
-
-#[test]
-fn a_foreign_archive_is_read_by_publish_time_and_other_topics_are_left_out() {
-    let folder = TempDir::new().unwrap();
-    let file = folder.path().join("a.mcap");
-    let bytes = foreign(&[
-        ("/tf", "not even json"),
-        ("/benchmarks/5/velocity", r#"{"value": 7, "unit": "mm/h"}"#),
-        ("/channels/lake_level_m", r#"{"value": 7}"#),
-    ]);
-    fs::write(&file, bytes).unwrap();
-    let (recording, _) = read(&file).unwrap();
-    let first = recording.series[0].readings[0];
-    assert_eq!(first.time, Timestamp::from_second(2).unwrap());
-    assert_eq!(recording.channels[0].unit.as_deref(), Some("m"));
-}
-
-#[test]
-fn a_bad_message_is_named_with_file_topic_and_number() {
-    let folder = TempDir::new().unwrap();
-    let file = folder.path().join("a.mcap");
-    let good = ("/benchmarks/5/velocity", r#"{"value": 7, "unit": "mm/h"}"#);
-    for (json, field, value) in [
-        (r#"{"value": null, "unit": "mm/h"}"#, "value", "null"),
-        (r#"{"value": 7, "unit": "mm/day"}"#, "unit", "mm/day"),
-        (r#"{"value": 7, "unit": "mm"}"#, "unit", "mm"),
-    ] {
-        fs::write(&file, foreign(&[good, (good.0, json)])).unwrap();
-        let error = read(&file).unwrap_err().to_string();
-        for part in ["a.mcap", "message 2", good.0, field, value] {
-            assert!(error.contains(part), "{part} is not in: {error}");
-        }
-    }
-    fs::write(&file, foreign(&[("/tf", "x")])).unwrap();
-    let error = read(&file).unwrap_err().to_string();
-    assert!(
-        error.contains("/tf") && error.contains("/benchmarks/ID"),
-        "{error}"
-    );
 }
 
 prop_compose! {

@@ -26,7 +26,13 @@ pub(super) fn write_atomically(
         .permissions(Permissions::from_mode(0o666))
         .tempfile_in(folder)
         .map_err(fail)?;
-    write(temporary.as_file_mut())?;
+    write(temporary.as_file_mut()).map_err(|error| {
+        if let IngestError::Write { source, .. } = error {
+            fail(source)
+        } else {
+            error
+        }
+    })?;
     temporary.as_file().sync_all().map_err(fail)?;
     temporary.persist(file).map_err(|error| fail(error.error))?;
     Ok(())

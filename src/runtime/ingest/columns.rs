@@ -321,15 +321,19 @@ impl Layout {
         fail: impl Fn(&str, &'static str, &'static str) -> IngestError,
     ) -> Result<(), IngestError> {
         for given in sigmas {
-            let place = self.columns.iter_mut().find_map(|column| match column {
-                Column::Reading {
+            let place = self.columns.iter_mut().find_map(|column| {
+                if let Column::Reading {
                     benchmark,
                     unit,
                     sigma,
-                } if *benchmark == given.benchmark && unit.quantity() == given.unit.quantity() => {
+                } = column
+                    && *benchmark == given.benchmark
+                    && unit.quantity() == given.unit.quantity()
+                {
                     Some(sigma)
+                } else {
+                    None
                 }
-                _ => None,
             });
             let name = &self.names[given.index];
             let expected = "one standard error for each column of readings, of the same benchmark and kind of unit";

@@ -9,46 +9,56 @@
 
 use super::collect::Collector;
 use super::columns::{Column, Layout, Measure, Name, SigmaColumn, name_of};
+use super::split::Splitter;
 use super::{IngestError, Item, ReadOptions};
 use crate::reading::{Disorder, Reading, Recording, Sample, Timestamp, Unit, after_days};
+use ::csv::StringRecord;
 use std::collections::BTreeSet;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 /// Reads the rows of one file, one at a time; what the columns are is decided by the header alone.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct CsvRows {
     file: PathBuf,
     layout: Layout,
     options: ReadOptions,
     filled: Vec<bool>,
+    splitter: Splitter,
+    cells: StringRecord,
 }
 
 impl CsvRows {
     /// Understands a header. The file's stem is the benchmark of columns that name none.
     ///
     /// # Errors
-    /// [`IngestError::Header`] or [`IngestError::Line`] says what is wrong with the header.
+    /// [`IngestError::Header`], [`IngestError::BadHeader`] or [`IngestError::Empty`] says what is wrong
+    /// with the header.
     pub fn new(file: &Path, header: &str, options: &ReadOptions) -> Result<Self, IngestError> {
         let header = header.strip_prefix('\u{feff}').unwrap_or(header);
-        let names = split(header).map_err(|found| IngestError::Line {
-            file: file.into(),
-            line: 1,
-            found,
-            expected: 2,
-        })?;
-        if names.iter().all(String::is_empty) {
+        let mut splitter = Splitter::new();
+        let mut cells = StringRecord::new();
+        splitter
+            .split(header, &mut cells)
+            .map_err(|found| IngestError::BadHeader {
+                file: file.into(),
+                found,
+            })?;
+        if cells.iter().all(str::is_empty) {
             return Err(IngestError::Empty {
                 file: file.into(),
                 missing: "header",
             });
         }
+        let names = cells.iter().map(str::to_owned).collect();
         let layout = Layout::new(file, names, &options.columns)?;
         Ok(Self {
             file: file.into(),
             filled: vec![false; layout.names.len()],
             layout,
             options: options.clone(),
+            splitter,
+            cells,
         })
     }
 
@@ -64,9 +74,6 @@ impl CsvRows {
     /// [`IngestError::Line`] or [`IngestError::Field`] names the place; the parser is unharmed
     /// and takes the next row.
     pub fn row(&mut self, line: u64, text: &str) -> Result<Vec<Item>, IngestError> {
-        if text.trim().is_empty() {
-            return Ok(Vec::new());
-        }
         let expected = self.layout.names.len();
         let fail = |found| IngestError::Line {
             file: self.file.clone(),
@@ -74,17 +81,15 @@ impl CsvRows {
             found,
             expected,
         };
-        let cells = split(text).map_err(fail)?;
-        if cells.len() != expected {
-            return Err(fail(format!("{} fields", cells.len())));
+        self.splitter.split(text, &mut self.cells).map_err(fail)?;
+        if self.cells.is_empty() {
+            return Ok(Vec::new());
         }
-        let row = Row {
-            rows: self,
-            line,
-            cells: &cells,
-        };
-        let items = row.items()?;
-        for (filled, cell) in self.filled.iter_mut().zip(&cells) {
+        if self.cells.len() != expected {
+            return Err(fail(format!("{} fields", self.cells.len())));
+        }
+        let items = Row { rows: self, line }.items()?;
+        for (filled, cell) in self.filled.iter_mut().zip(&self.cells) {
             *filled |= !cell.is_empty();
         }
         Ok(items)
@@ -97,27 +102,9 @@ impl CsvRows {
     }
 }
 
-fn split(line: &str) -> Result<Vec<String>, String> {
-    let line = line.trim_end_matches(['\r', '\n']);
-    let mut reader = ::csv::ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .trim(::csv::Trim::All)
-        .buffer_capacity(line.len().max(1))
-        .from_reader(line.as_bytes());
-    let mut records = reader.records();
-    let first = records.next().transpose().map_err(|e| e.to_string())?;
-    if records.next().is_some() {
-        return Err("a line break within the line".to_owned());
-    }
-    let cells = first.iter().flat_map(|record| record.iter());
-    Ok(cells.map(str::to_owned).collect())
-}
-
 struct Row<'a> {
     rows: &'a CsvRows,
     line: u64,
-    cells: &'a [String],
 }
 
 impl Row<'_> {
@@ -168,13 +155,13 @@ impl Row<'_> {
                 .ok_or_else(|| self.fail(index, expected));
         }
         let expected = "an RFC 3339 time with its offset, such as 2013-11-20T20:31:19+10:00";
-        self.cells[index]
+        self.rows.cells[index]
             .parse()
             .map_err(|_| self.fail(index, expected))
     }
 
     fn number(&self, index: usize) -> Result<Option<f64>, IngestError> {
-        let cell = &self.cells[index];
+        let cell = &self.rows.cells[index];
         if cell.is_empty() {
             return Ok(None);
         }
@@ -209,7 +196,7 @@ impl Row<'_> {
             file: self.rows.file.clone(),
             line: self.line,
             column: self.rows.layout.names[index].clone(),
-            value: self.cells[index].clone(),
+            value: self.rows.cells[index].to_owned(),
             expected,
         }
     }

@@ -42,6 +42,14 @@ pub enum IngestError {
         /// What would be right.
         expected: &'static str,
     },
+    /// The header cannot be split into names.
+    #[error("{}, line 1: found {found}, expected a header of comma-separated names", file.display())]
+    BadHeader {
+        /// The file.
+        file: PathBuf,
+        /// What stands there.
+        found: String,
+    },
     /// A line has more or fewer fields than the header, or cannot be split.
     #[error("{}, line {line}: found {found}, expected {expected} fields as in the header", file.display())]
     Line {

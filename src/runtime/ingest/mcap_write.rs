@@ -40,10 +40,7 @@ pub fn encode_mcap(recording: &Recording, out: impl Write + Seek) -> Result<(), 
     let outgoing = outgoing(recording)?;
     encode(recording, &outgoing, BufWriter::new(out)).map_err(|error| IngestError::Write {
         file: "the MCAP output".into(),
-        source: match error {
-            McapError::Io(source) => source,
-            other => io::Error::other(other),
-        },
+        source: io::Error::other(error),
     })
 }
 

@@ -69,15 +69,14 @@ impl Topic {
 }
 
 fn escape(name: &str) -> String {
-    let mut escaped = String::new();
-    for byte in name.bytes() {
+    let one = |byte: u8| {
         if byte.is_ascii_alphanumeric() || b"-_.~".contains(&byte) {
-            escaped.push(char::from(byte));
+            char::from(byte).to_string()
         } else {
-            escaped.push_str(&format!("%{byte:02X}"));
+            format!("%{byte:02X}")
         }
-    }
-    escaped
+    };
+    name.bytes().map(one).collect()
 }
 
 /// A name that others wrote without escapes, or with what only looks like one, stands as it is.
@@ -332,6 +331,27 @@ mod tests {
         };
         assert_eq!(time(stated), "1963-08-02T00:00:00Z");
         assert_eq!(time(silent), "1970-01-01T00:00:01Z");
+    }
+
+    #[test]
+    fn the_channels_metadata_say_the_time_base_and_the_averaging() {
+        let decode = |key: &str, text: &str| {
+            let metadata = [(key.to_owned(), text.to_owned())].into();
+            let json = br#"{"value": 1, "unit": "mm/h"}"#;
+            decode_message("/benchmarks/a/velocity", &metadata, 1_500_000_000, json)
+        };
+        let since = "seconds since 1963-08-02T00:00:00Z";
+        let Ok(Some(Item::Reading { reading, .. })) = decode(TIME_BASE, since) else {
+            panic!("no reading")
+        };
+        assert_eq!(reading.time.to_string(), "1963-08-02T00:00:01.5Z");
+        let Ok(Some(Item::Reading { averaging, .. })) = decode(AVERAGING, "0.5") else {
+            panic!("no reading")
+        };
+        assert_eq!(averaging, Some(SignedDuration::from_millis(500)));
+        for (key, text) in [(TIME_BASE, "noon"), (AVERAGING, "0"), (AVERAGING, "NaN")] {
+            assert_eq!(decode(key, text).unwrap_err().field, key, "{text}");
+        }
     }
 
     #[test]

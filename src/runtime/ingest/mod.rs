@@ -9,6 +9,7 @@ mod error;
 mod mcap;
 mod mcap_write;
 mod message;
+mod split;
 
 pub use columns::{ColumnMap, ColumnMapError, Measure};
 pub use convert::{ChannelCount, ConvertReport, SeriesCount, convert};
