@@ -1,0 +1,240 @@
+//! From readings to mean velocities over intervals, each with its standard error.
+//!
+//! Displacement differences over short intervals are noise; intervals are merged, newest first,
+//! until the slip in them stands clear of it, so that slow creep and fast sliding are both resolved.
+
+use crate::reading::Quantity;
+use std::ops::Range;
+
+/// One reading in the science's units: days and mm, or mm/day.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Observation {
+    /// Days since the epoch of the series.
+    pub t_days: f64,
+    /// mm or mm/day.
+    pub value: f64,
+    /// Standard error in the same unit, where the source gives one.
+    pub sigma: Option<f64>,
+}
+
+/// The readings of one benchmark, in the science's units, time strictly increasing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Observations {
+    /// Displacement or velocity.
+    pub quantity: Quantity,
+    /// For velocities: the span, in days, before each time over which it is the mean; 0: a point value.
+    pub averaging_days: f64,
+    /// The readings.
+    pub values: Vec<Observation>,
+}
+
+/// A mean velocity over an interval.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rate {
+    /// Start, days.
+    pub from: f64,
+    /// End, days; equal to `from` for a point value.
+    pub to: f64,
+    /// mm/day.
+    pub velocity: f64,
+    /// Standard error from the reading's noise, mm/day; the scatter of the motion itself is not in it.
+    pub sigma: f64,
+}
+
+impl Rate {
+    /// The middle of the interval, days.
+    pub fn middle(&self) -> f64 {
+        f64::midpoint(self.from, self.to)
+    }
+}
+
+/// Bounds on the work that follows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RateOptions {
+    /// At most this many rates; older ones are merged in pairs beyond it.
+    pub most: usize,
+}
+
+impl Default for RateOptions {
+    fn default() -> Self {
+        Self { most: 160 }
+    }
+}
+
+/// Slip that stands clear of the noise, in standard errors of a difference.
+const CLEAR_OF_NOISE: f64 = 6.0;
+
+/// No merged interval is longer than this share of the record, so that a slow slope keeps some.
+const LONGEST_SHARE: f64 = 1.0 / 16.0;
+
+/// Noise floor of a displacement series without scatter: the resolution of its own digits, mm.
+const LEAST_DISPLACEMENT_SIGMA_MM: f64 = 1e-3;
+
+impl Observations {
+    /// The rates in the readings of `range`, oldest first.
+    pub fn rates(&self, range: Range<usize>, options: RateOptions) -> Vec<Rate> {
+        let Some(values) = self.values.get(range) else {
+            return Vec::new();
+        };
+        let rates = match self.quantity {
+            Quantity::Velocity => self.velocity_rates(values),
+            Quantity::Displacement => displacement_rates(values),
+        };
+        halve_until(rates, options.most)
+    }
+
+    /// Overlapping windows repeat each other: readings are kept half a window apart at least.
+    fn velocity_rates(&self, values: &[Observation]) -> Vec<Rate> {
+        let spacing = 0.5 * self.averaging_days;
+        let mut rates: Vec<Rate> = Vec::new();
+        for value in values.iter().rev() {
+            if rates
+                .last()
+                .is_some_and(|later| later.to - value.t_days < spacing * 0.999)
+            {
+                continue;
+            }
+            rates.push(Rate {
+                from: value.t_days - self.averaging_days,
+                to: value.t_days,
+                velocity: value.value,
+                sigma: value.sigma.unwrap_or(0.0),
+            });
+        }
+        rates.reverse();
+        rates
+    }
+}
+
+/// The standard error of one displacement reading, mm: from how far each stands from the line between
+/// its neighbours, by the median, so that neither steps nor acceleration raise it.
+pub(crate) fn displacement_sigma(values: &[Observation]) -> f64 {
+    let mut misfits: Vec<f64> = values
+        .windows(3)
+        .map(|w| {
+            let share = (w[1].t_days - w[0].t_days) / (w[2].t_days - w[0].t_days);
+            let line = w[0].value + share * (w[2].value - w[0].value);
+            let size = (1.0 + share * share + (1.0 - share) * (1.0 - share)).sqrt();
+            (w[1].value - line).abs() / size
+        })
+        .collect();
+    if misfits.is_empty() {
+        return LEAST_DISPLACEMENT_SIGMA_MM;
+    }
+    misfits.sort_by(f64::total_cmp);
+    // The median of |normal| is 0.6745 of its standard deviation.
+    (misfits[misfits.len() / 2] / 0.6745).max(LEAST_DISPLACEMENT_SIGMA_MM)
+}
+
+fn displacement_rates(values: &[Observation]) -> Vec<Rate> {
+    let (Some(first), Some(last)) = (values.first(), values.last()) else {
+        return Vec::new();
+    };
+    let common = displacement_sigma(values);
+    let longest = (last.t_days - first.t_days) * LONGEST_SHARE;
+    let mut rates = Vec::new();
+    let mut later = *last;
+    for value in values.iter().rev().skip(1) {
+        let span = later.t_days - value.t_days;
+        let slip = later.value - value.value;
+        let noise = later
+            .sigma
+            .unwrap_or(common)
+            .hypot(value.sigma.unwrap_or(common));
+        if slip < CLEAR_OF_NOISE * noise && span < longest {
+            continue;
+        }
+        rates.push(Rate {
+            from: value.t_days,
+            to: later.t_days,
+            velocity: slip / span,
+            sigma: noise / span,
+        });
+        later = *value;
+    }
+    rates.reverse();
+    rates
+}
+
+/// Merges the older half in neighbouring pairs until there are no more than `most`.
+fn halve_until(mut rates: Vec<Rate>, most: usize) -> Vec<Rate> {
+    while rates.len() > most.max(2) {
+        let older = rates.len() / 2;
+        let merged: Vec<Rate> = rates[..older].chunks(2).map(merge).collect();
+        rates.splice(..older, merged);
+    }
+    rates
+}
+
+fn merge(pair: &[Rate]) -> Rate {
+    let [earlier, later] = pair else {
+        return pair[0];
+    };
+    let weight = |rate: &Rate| (rate.to - rate.from).max(1e-12);
+    let total = weight(earlier) + weight(later);
+    Rate {
+        from: earlier.from,
+        to: later.to,
+        velocity: (weight(earlier) * earlier.velocity + weight(later) * later.velocity) / total,
+        sigma: (weight(earlier) * earlier.sigma).hypot(weight(later) * later.sigma) / total,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn displacement(values: &[(f64, f64)]) -> Observations {
+        let values = values.iter().map(|(t_days, value)| Observation {
+            t_days: *t_days,
+            value: *value,
+            sigma: None,
+        });
+        Observations {
+            quantity: Quantity::Displacement,
+            averaging_days: 0.0,
+            values: values.collect(),
+        }
+    }
+
+    #[test]
+    fn creep_under_the_noise_is_merged_until_it_stands_clear() {
+        let noise = [0.6, -0.9, 0.2, 1.1, -0.4, -0.7, 0.8, -0.1];
+        let values: Vec<(f64, f64)> = (0..400_u32)
+            .map(|i| (f64::from(i), 0.1 * f64::from(i) + noise[i as usize % 8]))
+            .collect();
+        let rates = displacement(&values).rates(0..400, RateOptions::default());
+        assert!(rates.len() >= 8, "{}", rates.len());
+        for rate in &rates {
+            assert!((rate.velocity - 0.1).abs() < 4.0 * rate.sigma, "{rate:?}");
+        }
+    }
+
+    #[test]
+    fn fast_sliding_keeps_every_reading() {
+        let values: Vec<(f64, f64)> = (0..30_u32)
+            .map(|i| (f64::from(i), 100.0 * f64::from(i)))
+            .collect();
+        assert_eq!(
+            displacement(&values)
+                .rates(0..30, RateOptions::default())
+                .len(),
+            29
+        );
+    }
+
+    #[test]
+    fn overlapping_windows_are_counted_once() {
+        let values = (0..13).map(|i| Observation {
+            t_days: f64::from(i) / 288.0,
+            value: 1.0,
+            sigma: None,
+        });
+        let hourly = Observations {
+            quantity: Quantity::Velocity,
+            averaging_days: 1.0 / 24.0,
+            values: values.collect(),
+        };
+        assert_eq!(hourly.rates(0..13, RateOptions::default()).len(), 3);
+    }
+}

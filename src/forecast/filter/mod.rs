@@ -1,0 +1,179 @@
+//! A particle filter of the law under an undeclared load: one bounded update a reading.
+//!
+//! With constant parameters the law grows sure of whatever its oldest readings say. Here each particle
+//! carries the inverse velocity w of the law alone, its slope s, and a log-load f that nobody declared:
+//!
+//! ```text
+//! dX/dt = e^f / w     dw/dt = -s e^f     ds = (q |s| + eta w) dW     f: Ornstein-Uhlenbeck (sigma, tau)
+//! ```
+//!
+//! and its own q, eta, sigma, tau and reading noise, drawn from broad log-uniform priors. A particle may
+//! also take a sudden load step, or explain a jump of a displacement reading as a reset of the
+//! instrument. The generator is seeded and part of the state, so a replay draws the same numbers.
+
+mod particle;
+
+use super::Passage;
+use crate::fit::{Observation, Observations};
+use crate::reading::Quantity;
+use particle::{Dynamics, Particle, Reset};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+/// Particles carried.
+const PARTICLES: usize = 2000;
+/// Particles run forward for a forecast.
+const FORECAST_PARTICLES: usize = 500;
+/// Readings that set the scale of the priors before the first update.
+const READINGS_FOR_PRIOR: usize = 3;
+/// Resample when the effective number falls below this share.
+const RESAMPLE_BELOW: f64 = 0.5;
+
+/// The filter of one benchmark.
+#[derive(Debug, Clone)]
+pub(super) struct Filter {
+    particles: Vec<Particle>,
+    weights: Vec<f64>,
+    generator: Pcg64,
+    taken: usize,
+    now_days: f64,
+}
+
+impl Filter {
+    /// A filter that has seen nothing; equal seeds draw equal numbers.
+    pub(super) fn new(seed: u64) -> Self {
+        Self {
+            particles: Vec::new(),
+            weights: Vec::new(),
+            generator: Pcg64::seed_from_u64(seed),
+            taken: 0,
+            now_days: 0.0,
+        }
+    }
+
+    /// Takes in the readings that are new and returns ln of the predictive density of the newest, in
+    /// the reading's own unit; `None` until the priors are set, or where nothing is new.
+    pub(super) fn update(&mut self, observations: &Observations) -> Option<f64> {
+        if observations.values.len() < READINGS_FOR_PRIOR {
+            return None;
+        }
+        if self.particles.is_empty() {
+            self.start(observations);
+        }
+        let mut log_density = None;
+        while let Some(newest) = observations.values.get(self.taken) {
+            let apart = newest.t_days - self.now_days;
+            self.taken += 1;
+            // Trailing means repeat each other: half a window apart at least.
+            if apart >= 0.5 * observations.averaging_days * 0.999 {
+                log_density = Some(self.take(observations, newest));
+            }
+        }
+        log_density
+    }
+
+    fn start(&mut self, observations: &Observations) {
+        let first = &observations.values[..READINGS_FOR_PRIOR];
+        let reset = Reset::from_first(observations.quantity, first);
+        self.particles = (0..PARTICLES)
+            .map(|_| Particle::draw(&reset, &mut self.generator))
+            .collect();
+        self.weights = vec![1.0 / PARTICLES as f64; PARTICLES];
+        self.now_days = first[0].t_days;
+        self.taken = 1;
+    }
+
+    fn take(&mut self, observations: &Observations, newest: &Observation) -> f64 {
+        let dynamics = Dynamics {
+            quantity: observations.quantity,
+            averaging_days: observations.averaging_days,
+        };
+        let days = newest.t_days - self.now_days;
+        let mut total = 0.0;
+        for (particle, weight) in self.particles.iter_mut().zip(&mut self.weights) {
+            particle.advance(days, &mut self.generator);
+            *weight *= particle.weigh(&dynamics, newest, &mut self.generator);
+            total += *weight;
+        }
+        self.now_days = newest.t_days;
+        if !(total.is_finite() && total > 0.0) {
+            // No particle can explain it: the next readings decide among all of them.
+            self.weights.fill(1.0 / PARTICLES as f64);
+            return f64::NEG_INFINITY;
+        }
+        for weight in &mut self.weights {
+            *weight /= total;
+        }
+        let effective = 1.0 / self.weights.iter().map(|w| w * w).sum::<f64>();
+        if effective < RESAMPLE_BELOW * PARTICLES as f64 {
+            self.resample(observations.quantity);
+        }
+        total.ln()
+    }
+
+    /// Systematic resampling; the copies' parameters are jittered a little so that they stay apart.
+    fn resample(&mut self, quantity: Quantity) {
+        let picked = self.systematic(PARTICLES);
+        self.particles = picked
+            .into_iter()
+            .map(|index| self.particles[index].clone())
+            .collect();
+        for particle in &mut self.particles {
+            particle.jitter(quantity, &mut self.generator);
+        }
+        self.weights.fill(1.0 / PARTICLES as f64);
+    }
+
+    fn systematic(&mut self, count: usize) -> Vec<usize> {
+        let mut position: f64 = self.generator.random::<f64>() / count as f64;
+        let (mut picked, mut reached) = (Vec::with_capacity(count), 0.0);
+        for (index, weight) in self.weights.iter().enumerate() {
+            reached += weight;
+            while position < reached && picked.len() < count {
+                picked.push(index);
+                position += 1.0 / count as f64;
+            }
+        }
+        picked.resize(count, self.weights.len() - 1);
+        picked
+    }
+
+    /// Runs particles on until they pass `critical` mm/day or `horizon_days` are over.
+    pub(super) fn passage(&mut self, critical: f64, horizon_days: f64) -> Passage {
+        if self.particles.is_empty() {
+            return Passage::default();
+        }
+        let picked = self.systematic(FORECAST_PARTICLES);
+        // Forecasts draw from a copy: how often one asks must not change what comes next.
+        let mut generator = self.generator.clone();
+        let share = 1.0 / FORECAST_PARTICLES as f64;
+        let times = picked.into_iter().filter_map(|index| {
+            let mut particle = self.particles[index].clone();
+            particle
+                .days_to(critical, horizon_days, &mut generator)
+                .map(|days| (days, share))
+        });
+        Passage::from_times(times.collect())
+    }
+
+    /// The weighted median velocity, mm/day; `None` before the first readings.
+    pub(super) fn velocity(&self) -> Option<f64> {
+        let mut velocities: Vec<(f64, f64)> = self
+            .particles
+            .iter()
+            .zip(&self.weights)
+            .map(|(p, w)| (p.velocity(), *w))
+            .collect();
+        velocities.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut reached = 0.0;
+        velocities.into_iter().find_map(|(velocity, weight)| {
+            reached += weight;
+            (reached >= 0.5).then_some(velocity)
+        })
+    }
+}
+
+/// Whether a quantity is read as an absolute position, whose zero a reset moves.
+pub(super) fn has_zero(quantity: Quantity) -> bool {
+    quantity == Quantity::Displacement
+}

@@ -1,0 +1,82 @@
+//! The straight line through inverse velocity, as practitioners draw it (Fukuzono 1985).
+
+use crate::fit::Rate;
+
+/// Ordinary least squares of 1/v against time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct InverseVelocityLine {
+    /// Where it meets zero, days; `None` when it does not fall.
+    pub intercept_days: Option<f64>,
+    /// Its coefficient of determination.
+    pub r_squared: f64,
+}
+
+/// Fewer points than this make no line.
+const FEWEST: usize = 4;
+
+impl InverseVelocityLine {
+    /// The line through the rates that move forward and stand clear of their noise; `None` under four.
+    pub fn fit(rates: &[Rate]) -> Option<Self> {
+        let usable = rates
+            .iter()
+            .filter(|rate| rate.velocity > 2.0 * rate.sigma && rate.velocity > 0.0);
+        let points: Vec<(f64, f64)> = usable
+            .map(|rate| (rate.middle(), 1.0 / rate.velocity))
+            .collect();
+        Self::through(&points)
+    }
+
+    /// The line through (days, inverse velocity) points; `None` under four.
+    pub fn through(points: &[(f64, f64)]) -> Option<Self> {
+        if points.len() < FEWEST {
+            return None;
+        }
+        let n = points.len() as f64;
+        let mean_t = points.iter().map(|(t, _)| t).sum::<f64>() / n;
+        let mean_y = points.iter().map(|(_, y)| y).sum::<f64>() / n;
+        let (mut tt, mut ty, mut yy) = (0.0, 0.0, 0.0);
+        for (t, y) in points {
+            tt += (t - mean_t) * (t - mean_t);
+            ty += (t - mean_t) * (y - mean_y);
+            yy += (y - mean_y) * (y - mean_y);
+        }
+        if tt <= 0.0 {
+            return None;
+        }
+        let slope = ty / tt;
+        let intercept_days = (slope < 0.0).then(|| mean_t - mean_y / slope);
+        let r_squared = if yy > 0.0 { ty * ty / (tt * yy) } else { 0.0 };
+        Some(Self {
+            intercept_days,
+            r_squared,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_line_meets_zero_at_the_singularity_of_m_one() {
+        let points: Vec<(f64, f64)> = (0..20)
+            .map(|i| (f64::from(i), 0.02 * (30.0 - f64::from(i))))
+            .collect();
+        let line = InverseVelocityLine::through(&points).unwrap();
+        assert!((line.intercept_days.unwrap() - 30.0).abs() < 1e-9);
+        assert!((line.r_squared - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_slope_that_slows_down_has_no_intercept() {
+        let points: Vec<(f64, f64)> = (0..20)
+            .map(|i| (f64::from(i), 1.0 + f64::from(i)))
+            .collect();
+        assert_eq!(
+            InverseVelocityLine::through(&points)
+                .unwrap()
+                .intercept_days,
+            None
+        );
+    }
+}
