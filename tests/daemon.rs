@@ -1,5 +1,11 @@
 //! The daemon and its core, with real folders, files and hooks.
 
+#![expect(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test fails by panicking"
+)]
+
 use jiff::{SignedDuration, Timestamp};
 use slipwatch::alert::Level;
 use slipwatch::config::{self, Config};

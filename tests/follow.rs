@@ -1,5 +1,7 @@
 //! Files that grow, shrink and are replaced while they are followed.
 
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use slipwatch::config::{self, Config};
 use slipwatch::monitor::Input;
 use slipwatch::runtime::ingest::{ReadOptions, read_files};
@@ -73,6 +75,10 @@ fn config_in(folder: &Path, kind: &str, benchmarks: &str) -> Config {
          kind = \"{kind}\"\npath = \"*.{kind}\"\n{benchmarks}"
     );
     config::parse(&text, &folder.join("site.toml")).unwrap()
+}
+
+fn row_at(time: jiff::Timestamp, value: i64) -> String {
+    format!("{time},{value}\n")
 }
 
 fn row(day: u32, value: f64) -> String {
@@ -184,7 +190,7 @@ fn a_long_history_comes_whole_in_more_than_one_batch() {
     let mut text = HEADER.to_owned();
     for second in 0..20_000 {
         let time = jiff::Timestamp::from_second(1_500_000_000 + second).unwrap();
-        text.push_str(&format!("{time},{second}\n"));
+        text.push_str(&row_at(time, second));
     }
     bench.write("5.csv", &text);
     let expected: Vec<String> = (0..20_000).map(|second| format!("5:{second}")).collect();

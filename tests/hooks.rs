@@ -1,5 +1,11 @@
 //! Hooks that misbehave, run for real: each is a script in a temporary folder.
 
+#![expect(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test fails by panicking"
+)]
+
 use slipwatch::alert::Level;
 use slipwatch::config::HookConfig;
 use slipwatch::monitor::{AlertState, Event, EventKind};

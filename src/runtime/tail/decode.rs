@@ -58,48 +58,51 @@ impl Decoder {
 
     /// The item as the monitor takes it; `None` when nobody asked for it.
     pub(super) fn arrival(&self, item: Item) -> Option<Arrival> {
-        Some(match item {
+        match item {
             Item::Reading {
                 benchmark,
                 unit,
                 averaging,
                 reading,
-            } => Arrival {
+            } => self.wants(&benchmark, unit).then(|| Arrival {
                 time: reading.time,
                 input: Input::Reading {
-                    averaging: self.averaging(&benchmark, unit, averaging)?,
+                    averaging: self.averaging(&benchmark, unit, averaging),
                     benchmark,
                     unit,
                     reading,
                 },
-            },
+            }),
             Item::Sample {
                 channel, sample, ..
-            } => Arrival {
+            } => Some(Arrival {
                 time: sample.time,
                 input: Input::Sample { channel, sample },
-            },
-        })
+            }),
+        }
     }
 
-    /// The averaging of a wanted reading; `None` for one that is not wanted.
+    fn wants(&self, benchmark: &BenchmarkId, unit: Unit) -> bool {
+        let Some(wanted) = self.wanted(benchmark) else {
+            return self.wanted.is_empty();
+        };
+        let quantity = wanted.quantity.or(wanted.unit.map(Unit::quantity));
+        quantity.is_none_or(|quantity| quantity == unit.quantity())
+    }
+
     fn averaging(
         &self,
         benchmark: &BenchmarkId,
         unit: Unit,
         stated: Option<SignedDuration>,
-    ) -> Option<Option<SignedDuration>> {
-        if self.wanted.is_empty() {
-            return Some(stated);
-        }
-        let wanted = self.wanted.iter().find(|one| one.id == *benchmark)?;
-        let quantity = wanted.quantity.or(wanted.unit.map(Unit::quantity));
-        if quantity.is_some_and(|quantity| quantity != unit.quantity()) {
-            return None;
-        }
-        Some(match unit.quantity() {
-            Quantity::Velocity => stated.or(wanted.averaging),
+    ) -> Option<SignedDuration> {
+        match unit.quantity() {
+            Quantity::Velocity => stated.or_else(|| self.wanted(benchmark)?.averaging),
             Quantity::Displacement => stated,
-        })
+        }
+    }
+
+    fn wanted(&self, benchmark: &BenchmarkId) -> Option<&Benchmark> {
+        self.wanted.iter().find(|one| one.id == *benchmark)
     }
 }
