@@ -53,6 +53,29 @@ fn the_example_config_is_right_and_says_what_it_means() {
 }
 
 #[test]
+fn the_least_config_is_taken_with_the_defaults() {
+    let config = config::parse(RIGHT, Path::new("site.toml")).unwrap();
+    assert_eq!(
+        config.settings,
+        slipwatch::monitor::Settings::default(),
+        "nothing given, nothing changed"
+    );
+    assert_eq!(config.hooks[0].timeout.as_secs(), 10);
+    assert!(config.benchmarks.is_empty());
+}
+
+#[test]
+fn a_column_that_does_not_say_its_unit_needs_one() {
+    assert_eq!(
+        problem("[[benchmark]]\nid = \"5\"\ncolumn = \"ext_1\"\n"),
+        "site.toml:12:10: error: benchmark.column = \"ext_1\" does not say its unit; \
+         add unit = \"mm\" or unit = \"mm_per_day\""
+    );
+    let unit = "[[benchmark]]\nid = \"5\"\ncolumn = \"ext_1\"\nunit = \"mm_per_h\"\n";
+    assert!(config::parse(&format!("{RIGHT}{unit}"), Path::new("site.toml")).is_ok());
+}
+
+#[test]
 fn a_bad_unit_is_named_with_its_line_and_the_fix() {
     assert_eq!(
         problem("[alert]\ncritical_velocity = \"1 furlong/day\"\n"),

@@ -16,7 +16,7 @@ use slipwatch::runtime::delivered::Delivered;
 use slipwatch::runtime::event_log::EventLog;
 use slipwatch::runtime::hook::Status;
 use slipwatch::runtime::run::{Progress, RunError, run};
-use slipwatch::runtime::shutdown;
+use slipwatch::runtime::shutdown::{self, Shutdown};
 use slipwatch::runtime::site::{Counts, Sinks, Site};
 use slipwatch::runtime::tail::Arrival;
 use std::fs::{self, OpenOptions};
@@ -307,4 +307,13 @@ async fn a_state_folder_that_cannot_be_made_is_said_so() {
     fs::write(folder.path().join("state"), "a file").unwrap();
     let error = Daemon::start(&config).task.await.unwrap().unwrap_err();
     assert!(error.to_string().contains("state folder"), "{error}");
+}
+
+#[tokio::test]
+async fn sigterm_asks_for_the_stop() {
+    let mut shutdown = Shutdown::on_signals().unwrap();
+    assert!(!shutdown.is_requested());
+    nix::sys::signal::raise(nix::sys::signal::Signal::SIGTERM).unwrap();
+    let asked = tokio::time::timeout(LIMIT, shutdown.requested()).await;
+    assert!(asked.is_ok());
 }

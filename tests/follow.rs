@@ -135,6 +135,29 @@ fn an_atomically_replaced_file_is_read_from_its_start() {
 }
 
 #[test]
+fn what_was_written_before_a_rotation_is_read_from_the_old_file() {
+    for new_name_at_once in [true, false] {
+        let mut bench = Bench::new("csv");
+        bench.write("5.csv", &format!("{HEADER}{}", row(1, 1.0)));
+        assert_eq!(bench.news(), ["5:1"]);
+        bench.append("5.csv", &row(2, 2.0));
+        fs::rename(bench.path("5.csv"), bench.path("5.csv.1")).unwrap();
+        let new = format!("{HEADER}{}", row(4, 4.0));
+        if new_name_at_once {
+            bench.write("5.csv", &new);
+            assert_eq!(bench.news(), ["5:2", "5:4"]);
+        } else {
+            assert_eq!(bench.news(), ["5:2"]);
+            // A writer may hold the old file open for a while.
+            bench.append("5.csv.1", &row(3, 3.0));
+            assert_eq!(bench.news(), ["5:3"]);
+            bench.write("5.csv", &new);
+            assert_eq!(bench.news(), ["5:4"]);
+        }
+    }
+}
+
+#[test]
 fn a_deleted_file_that_comes_back_is_read_again() {
     let mut bench = Bench::new("csv");
     bench.write("5.csv", &format!("{HEADER}{}", row(1, 1.0)));

@@ -1,6 +1,7 @@
 //! `check`: the site file and what it names on this machine, without starting anything.
 
 use super::{Config, ConfigError, HookConfig, Source, load};
+use crate::reading::Quantity;
 use jiff::SignedDuration;
 use serde::Serialize;
 use std::fmt;
@@ -92,7 +93,10 @@ fn slow_sampling(config: &Config) -> impl Iterator<Item = String> {
             .get(&benchmark.id)
             .unwrap_or(&config.settings.policy);
         let averaging = benchmark.averaging.unwrap_or(SignedDuration::ZERO);
-        (averaging >= policy.evacuation_time).then(|| {
+        let is_mean = benchmark
+            .unit
+            .is_none_or(|unit| unit.quantity() == Quantity::Velocity);
+        (is_mean && averaging >= policy.evacuation_time).then(|| {
             format!(
                 "benchmark {:?}: averaging {averaging:#} is not shorter than evacuation_time {:#}; \
                  this sampling cannot protect anyone, measure more often",

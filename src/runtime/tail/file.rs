@@ -36,6 +36,8 @@ pub(super) struct FileTail {
     pub(super) quarantined: u64,
     /// The last error, so that it is logged once.
     trouble: Option<String>,
+    /// Where we were when the file was last found under another name.
+    left_at: Option<u64>,
 }
 
 #[derive(Debug)]
@@ -72,9 +74,18 @@ impl Content {
 
 /// Which file it is, as the file system counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Place {
+pub(super) struct Place {
     device: u64,
     inode: u64,
+}
+
+impl Place {
+    pub(super) fn of(metadata: &Metadata) -> Self {
+        Self {
+            device: metadata.dev(),
+            inode: metadata.ino(),
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -87,10 +98,7 @@ struct Glance {
 impl Glance {
     fn at(metadata: &Metadata) -> Self {
         Self {
-            place: Place {
-                device: metadata.dev(),
-                inode: metadata.ino(),
-            },
+            place: Place::of(metadata),
             size: metadata.size(),
             modified: (metadata.mtime(), metadata.mtime_nsec()),
         }
@@ -110,7 +118,30 @@ impl FileTail {
             pending: VecDeque::new(),
             quarantined: 0,
             trouble: None,
+            left_at: None,
         }
+    }
+
+    /// Whether this is no longer the file under its name.
+    pub(super) fn is_other_than(&self, place: Place) -> bool {
+        self.place.is_some_and(|own| own != place)
+    }
+
+    /// The file is no longer under its name: finds it in its folder under another, so that what
+    /// was written before a rotation is read. `None` when it is not there or nothing came since.
+    pub(super) fn leave(&mut self) -> Option<PathBuf> {
+        if self.left_at == Some(self.at) {
+            return None;
+        }
+        let place = self.place?;
+        let entries = std::fs::read_dir(self.path.parent()?).ok()?;
+        let path = entries.flatten().find_map(|entry| {
+            let metadata = entry.metadata().ok()?;
+            (Place::of(&metadata) == place).then(|| entry.path())
+        })?;
+        self.left_at = Some(self.at);
+        self.path.clone_from(&path);
+        Some(path)
     }
 
     /// Reads until something is pending or there is no more for now.

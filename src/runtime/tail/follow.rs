@@ -1,7 +1,7 @@
 //! Follows the files of all sources and puts what they hold in the order of its measurement.
 
 use super::decode::{Arrival, Decoder};
-use super::file::FileTail;
+use super::file::{FileTail, Place};
 use crate::config::{Benchmark, FilePattern, Source};
 use crate::reading::Timestamp;
 use std::collections::{BTreeMap, BTreeSet};
@@ -21,14 +21,18 @@ pub struct Batch {
     pub caught_up: bool,
 }
 
+/// A source's number and a path.
+type Key = (usize, PathBuf);
+
 /// Every followed file, and which folders to look for more.
 #[derive(Debug)]
 pub struct Follower {
     sources: Vec<(FilePattern, Arc<Decoder>)>,
-    files: BTreeMap<(usize, PathBuf), FileTail>,
+    files: BTreeMap<Key, FileTail>,
     /// The earliest pending value of each file; between two rounds there is none.
-    heads: BTreeSet<(Timestamp, (usize, PathBuf))>,
+    heads: BTreeSet<(Timestamp, Key)>,
     missing: BTreeSet<PathBuf>,
+    quarantined_in_gone: u64,
 }
 
 impl Follower {
@@ -43,6 +47,7 @@ impl Follower {
             files: BTreeMap::new(),
             heads: BTreeSet::new(),
             missing: BTreeSet::new(),
+            quarantined_in_gone: 0,
         }
     }
 
@@ -54,7 +59,8 @@ impl Follower {
 
     /// Lines, records and files that could not be used so far.
     pub fn quarantined(&self) -> u64 {
-        self.files.values().map(|file| file.quarantined).sum()
+        let in_files: u64 = self.files.values().map(|file| file.quarantined).sum();
+        in_files + self.quarantined_in_gone
     }
 
     /// Reads the next values. What the files held when a round began is merged by time over all
@@ -89,12 +95,52 @@ impl Follower {
 
     /// Looks for files that have come or gone.
     fn rescan(&mut self) {
-        let mut present = BTreeSet::new();
+        let present = self.list();
+        let is_gone = |key: &Key, file: &FileTail| match present.get(key) {
+            None => true,
+            Some(place) => file.is_other_than(*place),
+        };
+        let gone: Vec<Key> = self
+            .files
+            .iter()
+            .filter_map(|(key, file)| is_gone(key, file).then(|| key.clone()))
+            .collect();
+        for key in gone {
+            let Some(mut file) = self.files.remove(&key) else {
+                continue;
+            };
+            let moved = file.leave().map(|path| (key.0, path));
+            match moved.filter(|moved| !present.contains_key(moved)) {
+                Some(moved) => {
+                    tracing::info!(file = %key.1.display(), now = %moved.1.display(), "renamed");
+                    self.files.insert(moved, file);
+                }
+                None => {
+                    tracing::info!(file = %key.1.display(), "gone");
+                    self.quarantined_in_gone += file.quarantined;
+                }
+            }
+        }
+        for key in present.into_keys() {
+            if !self.files.contains_key(&key) {
+                tracing::info!(file = %key.1.display(), "followed");
+                let decoder = Arc::clone(&self.sources[key.0].1);
+                let file = FileTail::new(key.1.clone(), decoder);
+                self.files.insert(key, file);
+            }
+        }
+    }
+
+    fn list(&mut self) -> BTreeMap<Key, Place> {
+        let mut present = BTreeMap::new();
         for (index, (pattern, _)) in self.sources.iter().enumerate() {
             match list(pattern) {
-                Ok(paths) => {
+                Ok(files) => {
                     self.missing.remove(pattern.folder());
-                    present.extend(paths.into_iter().map(|path| (index, path)));
+                    let keyed = files
+                        .into_iter()
+                        .map(|(path, place)| ((index, path), place));
+                    present.extend(keyed);
                 }
                 Err(error) => {
                     let folder = pattern.folder().to_owned();
@@ -105,32 +151,24 @@ impl Follower {
                 }
             }
         }
-        self.files.retain(|key, file| {
-            let stays = present.contains(key);
-            if !stays {
-                tracing::info!(file = %file.path().display(), "gone");
-            }
-            stays
-        });
-        for key in present {
-            if !self.files.contains_key(&key) {
-                tracing::info!(file = %key.1.display(), "followed");
-                let decoder = Arc::clone(&self.sources[key.0].1);
-                let file = FileTail::new(key.1.clone(), decoder);
-                self.files.insert(key, file);
-            }
-        }
+        present
     }
 }
 
-fn list(pattern: &FilePattern) -> io::Result<Vec<PathBuf>> {
-    let mut paths = Vec::new();
+fn list(pattern: &FilePattern) -> io::Result<Vec<(PathBuf, Place)>> {
+    let mut files = Vec::new();
     for entry in std::fs::read_dir(pattern.folder())? {
         let entry = entry?;
         let name = entry.file_name();
-        if name.to_str().is_some_and(|name| pattern.matches(name)) && entry.path().is_file() {
-            paths.push(entry.path());
+        if !name.to_str().is_some_and(|name| pattern.matches(name)) {
+            continue;
+        }
+        // Not the entry's own: a link counts as the file that it leads to.
+        if let Ok(metadata) = std::fs::metadata(entry.path())
+            && metadata.is_file()
+        {
+            files.push((entry.path(), Place::of(&metadata)));
         }
     }
-    Ok(paths)
+    Ok(files)
 }
