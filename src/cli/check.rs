@@ -1,13 +1,13 @@
 //! `check CONFIG`: whether the site file is right.
 
 use super::exit;
-use crate::config;
+use crate::config::{self, ConfigError};
 use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 
-/// Checks the site file `file` and says what it amounts to: 0 when it is right, 78 when not, 74
-/// when it cannot be read. Warnings go to stderr.
+/// Checks the site file `file` and says what it amounts to: 0 when it is right, 78 when it is not
+/// or cannot be read. Warnings and problems go to stderr; with `json` the problems to stdout as well.
 ///
 /// # Errors
 /// When the result cannot be written.
@@ -27,7 +27,11 @@ pub fn run(file: &Path, json: bool) -> anyhow::Result<ExitCode> {
         }
         Err(error) => {
             exit::complain(&error);
-            Ok(exit::of_config(&error))
+            if json && let ConfigError::Invalid { problems } = &error {
+                let problems = serde_json::json!({ "problems": problems });
+                writeln!(stdout, "{problems}")?;
+            }
+            Ok(exit::CONFIG.into())
         }
     }
 }

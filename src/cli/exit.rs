@@ -1,9 +1,7 @@
 //! The exit codes, and the words that go with them to stderr.
 
-use crate::config::ConfigError;
 use std::fmt::Display;
 use std::io::Write;
-use std::process::ExitCode;
 
 /// The job found trouble.
 pub(super) const TROUBLE: u8 = 1;
@@ -11,13 +9,6 @@ pub(super) const TROUBLE: u8 = 1;
 pub(super) const IO: u8 = 74;
 /// The config is wrong.
 pub(super) const CONFIG: u8 = 78;
-
-pub(super) fn of_config(error: &ConfigError) -> ExitCode {
-    match error {
-        ConfigError::Unreadable { .. } => IO.into(),
-        ConfigError::Invalid { .. } => CONFIG.into(),
-    }
-}
 
 /// Writes a line to stderr; nobody can be told when that fails.
 pub(super) fn complain(what: &dyn Display) {

@@ -20,7 +20,7 @@ pub fn run(file: &Path, format: LogFormat) -> anyhow::Result<ExitCode> {
         Ok(config) => config,
         Err(error) => {
             exit::complain(&error);
-            return Ok(exit::of_config(&error));
+            return Ok(exit::CONFIG.into());
         }
     };
     for warning in &config.warnings {

@@ -1,11 +1,13 @@
 //! What is wrong with a site file: where, what, and how to put it right.
 
+use serde::Serialize;
 use std::fmt;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Whether the daemon may start with it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Severity {
     /// The file is refused.
     Error,
@@ -14,7 +16,7 @@ pub enum Severity {
 }
 
 /// One thing that is wrong with a site file.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Problem {
     /// The site file.
     pub file: PathBuf,

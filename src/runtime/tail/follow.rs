@@ -103,22 +103,20 @@ impl Follower {
         let gone: Vec<Key> = self
             .files
             .iter()
-            .filter_map(|(key, file)| is_gone(key, file).then(|| key.clone()))
+            .filter(|(key, file)| is_gone(key, file))
+            .map(|(key, _)| key.clone())
             .collect();
         for key in gone {
             let Some(mut file) = self.files.remove(&key) else {
                 continue;
             };
             let moved = file.leave().map(|path| (key.0, path));
-            match moved.filter(|moved| !present.contains_key(moved)) {
-                Some(moved) => {
-                    tracing::info!(file = %key.1.display(), now = %moved.1.display(), "renamed");
-                    self.files.insert(moved, file);
-                }
-                None => {
-                    tracing::info!(file = %key.1.display(), "gone");
-                    self.quarantined_in_gone += file.quarantined;
-                }
+            if let Some(moved) = moved.filter(|moved| !present.contains_key(moved)) {
+                tracing::info!(file = %key.1.display(), now = %moved.1.display(), "renamed");
+                self.files.insert(moved, file);
+            } else {
+                tracing::info!(file = %key.1.display(), "gone");
+                self.quarantined_in_gone += file.quarantined;
             }
         }
         for key in present.into_keys() {
