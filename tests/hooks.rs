@@ -125,7 +125,7 @@ async fn a_hook_gets_the_documented_environment_and_the_alert_on_stdin() {
 
 #[tokio::test]
 async fn a_hook_that_hangs_is_killed_with_its_children() {
-    let (folder, mut config) = hook("sleep 1000 & echo $! > pid; wait");
+    let (folder, mut config) = hook("sleep 90 & echo $! > pid; wait");
     config.timeout = Duration::from_secs(2);
     assert_eq!(run(&config, &alert()).await, Outcome::TimedOut);
     let pid = read(&folder, "pid").trim().to_owned();
@@ -138,7 +138,7 @@ async fn a_hook_that_ignores_a_long_stdin_blocks_nothing() {
     let (_folder, config) = hook("exit 0");
     let long = alert_of(Level::Red, "k", &"x".repeat(200_000));
     assert_eq!(run(&config, &long).await, Outcome::Done);
-    let (_folder, mut config) = hook("sleep 1000");
+    let (_folder, mut config) = hook("sleep 90");
     config.timeout = Duration::from_millis(300);
     assert_eq!(run(&config, &long).await, Outcome::TimedOut);
 }
@@ -152,7 +152,7 @@ async fn a_hook_that_floods_stdout_runs_to_its_end() {
 
 #[tokio::test]
 async fn a_grandchild_that_holds_stdout_open_is_not_waited_for() {
-    let (folder, config) = hook("sleep 1000 & echo $! > pid; exit 0");
+    let (folder, config) = hook("sleep 90 & echo $! > pid; exit 0");
     assert_eq!(run(&config, &alert()).await, Outcome::Done);
     let pid = read(&folder, "pid").trim().to_owned();
     assert!(is_running(&pid), "it was to outlive the hook");
@@ -268,7 +268,7 @@ async fn what_a_hook_has_taken_is_not_sent_again_after_a_restart() {
 
 #[tokio::test]
 async fn closing_does_not_wait_longer_than_its_limit_and_leaves_nothing_running() {
-    let (folder, config) = hook("sleep 1000 & echo $! > pid; wait");
+    let (folder, config) = hook("sleep 90 & echo $! > pid; wait");
     let dispatcher = Dispatcher::start(&[config], &quick_retry(), Delivered::default());
     dispatcher.offer(&alert());
     eventually("the hook's start", || read(&folder, "pid").ends_with('\n')).await;
