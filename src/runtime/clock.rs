@@ -27,3 +27,8 @@ impl Stopwatch {
         self.0.elapsed()
     }
 }
+
+/// The instant `delay` from now on the runtime's own clock, for waits.
+pub(crate) fn later(delay: Duration) -> tokio::time::Instant {
+    tokio::time::Instant::now() + delay
+}

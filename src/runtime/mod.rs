@@ -1,4 +1,15 @@
 //! The thin shell around the monitor: clock, files, signals, hooks.
 
 pub mod clock;
+pub mod deliver;
+pub mod delivered;
+pub mod event_log;
+pub mod hook;
 pub mod ingest;
+pub mod journal;
+pub mod log;
+pub mod run;
+mod seen;
+pub mod shutdown;
+pub mod site;
+pub mod tail;

@@ -1,0 +1,122 @@
+//! `[alert]`: the figures in the level rules, the site's and a benchmark's own.
+
+use super::table::{Placed, Section};
+use super::value;
+use crate::alert::{Level, Policy, Threshold};
+use jiff::SignedDuration;
+
+/// Reads the table over `base`, whose figures stand where the table gives none.
+pub(super) fn policy(mut section: Section<'_>, base: &Policy) -> Policy {
+    let evacuation_time = section.parsed("evacuation_time", value::duration);
+    let outlook = section.parsed("outlook", value::duration);
+    let velocity = section.parsed("critical_velocity", value::speed);
+    let steady_for = section.parsed("steady_for", value::duration);
+    let policy = Policy {
+        evacuation_time: given(evacuation_time.as_ref(), base.evacuation_time),
+        outlook: given(outlook.as_ref(), base.outlook),
+        critical_velocity_mm_per_day: velocity
+            .map_or(base.critical_velocity_mm_per_day, |given| given.value),
+        red_chance: section.chance("red_chance").unwrap_or(base.red_chance),
+        orange_chance: section
+            .chance("orange_chance")
+            .unwrap_or(base.orange_chance),
+        yellow_chance: section
+            .chance("yellow_chance")
+            .unwrap_or(base.yellow_chance),
+        steady_for: given(steady_for.as_ref(), base.steady_for),
+        thresholds: thresholds(&mut section, base),
+    };
+    doubts(&section, &policy, evacuation_time.as_ref());
+    section.finish();
+    policy
+}
+
+fn given(value: Option<&Placed<SignedDuration>>, otherwise: SignedDuration) -> SignedDuration {
+    value.map_or(otherwise, |given| given.value)
+}
+
+fn thresholds(section: &mut Section<'_>, base: &Policy) -> Vec<Threshold> {
+    let tables = section.tables("threshold", "alert.threshold");
+    if tables.is_empty() {
+        return base.thresholds.clone();
+    }
+    tables.into_iter().filter_map(threshold).collect()
+}
+
+fn threshold(mut section: Section<'_>) -> Option<Threshold> {
+    section.required("level", "\"orange\"")?;
+    let level = section.parsed("level", value::raised_level);
+    let velocity = section.parsed("velocity", value::speed);
+    let displacement = section.parsed("displacement", value::length);
+    let acceleration = section.parsed("acceleration", value::acceleration);
+    let keys = ["velocity", "displacement", "acceleration"];
+    if !keys.iter().any(|key| section.has(key)) {
+        section.error(
+            section.at(),
+            "alert.threshold has nothing to compare".to_owned(),
+            "add velocity = \"50 mm/day\", displacement = \"500 mm\" or acceleration = \"5 mm/day/day\"",
+        );
+    }
+    section.finish();
+    Some(Threshold {
+        level: level?.value,
+        velocity_mm_per_day: velocity.map(|given| given.value),
+        displacement_mm: displacement.map(|given| given.value),
+        acceleration_mm_per_day2: acceleration.map(|given| given.value),
+    })
+}
+
+/// Figures that are each allowed and together cannot mean what was intended.
+fn doubts(
+    section: &Section<'_>,
+    policy: &Policy,
+    evacuation_time: Option<&Placed<SignedDuration>>,
+) {
+    let at = evacuation_time.map_or(section.at(), |given| &given.at);
+    if policy.evacuation_time > policy.outlook {
+        section.warning(
+            at,
+            format!(
+                "evacuation_time {:#} is longer than outlook {:#}: red would be called before orange",
+                policy.evacuation_time, policy.outlook
+            ),
+            "make outlook several times evacuation_time",
+        );
+    }
+    if policy.yellow_chance > policy.orange_chance {
+        section.warning(
+            section.at(),
+            format!(
+                "yellow_chance {} is above orange_chance {}: yellow would never be called first",
+                policy.yellow_chance, policy.orange_chance
+            ),
+            "make yellow_chance the smaller one",
+        );
+    }
+    for (name, quantity) in [
+        ("velocity", (|t| t.velocity_mm_per_day) as Figure),
+        ("displacement", |t| t.displacement_mm),
+        ("acceleration", |t| t.acceleration_mm_per_day2),
+    ] {
+        if let Some((low, high)) = inverted(&policy.thresholds, quantity) {
+            section.warning(
+                section.at(),
+                format!("the {name} threshold of {high} is below the one of {low}"),
+                "let a graver level begin at a larger figure",
+            );
+        }
+    }
+}
+
+type Figure = fn(&Threshold) -> Option<f64>;
+
+/// A level and a graver one that begins below it.
+fn inverted(thresholds: &[Threshold], figure: Figure) -> Option<(Level, Level)> {
+    let mut pairs = thresholds
+        .iter()
+        .flat_map(|low| thresholds.iter().map(move |high| (low, high)));
+    pairs.find_map(|(low, high)| {
+        let (at_low, at_high) = (figure(low)?, figure(high)?);
+        (low.level < high.level && at_high < at_low).then_some((low.level, high.level))
+    })
+}

@@ -1,0 +1,121 @@
+//! `check`: the site file and what it names on this machine, without starting anything.
+
+use super::{Config, ConfigError, HookConfig, Source, load};
+use crate::reading::Quantity;
+use jiff::SignedDuration;
+use serde::Serialize;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// What a right config amounts to.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Summary {
+    /// The site's name.
+    pub site: String,
+    /// Where the daemon keeps what it writes.
+    pub state_dir: PathBuf,
+    /// How many sources.
+    pub sources: usize,
+    /// How many benchmarks; zero means whatever the files name.
+    pub benchmarks: usize,
+    /// How many hooks.
+    pub hooks: usize,
+    /// What is doubtful, one line each.
+    pub warnings: Vec<String>,
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "ok: {} (sources: {}, benchmarks: {}, hooks: {}, state in {})",
+            self.site,
+            self.sources,
+            self.benchmarks,
+            self.hooks,
+            self.state_dir.display()
+        )
+    }
+}
+
+/// Checks the site file at `file`; what it names and is not there yet is a warning.
+///
+/// # Errors
+/// [`ConfigError`] as from [`load`].
+pub fn check(file: &Path) -> Result<Summary, ConfigError> {
+    let config = load(file)?;
+    let mut warnings: Vec<String> = config.warnings.iter().map(ToString::to_string).collect();
+    let place = file.display();
+    warnings.extend(
+        (config.sources.iter().filter_map(missing_folder))
+            .chain(config.hooks.iter().filter_map(missing_program))
+            .chain(slow_sampling(&config))
+            .map(|what| format!("{place}: warning: {what}")),
+    );
+    Ok(Summary {
+        site: config.site.name,
+        state_dir: config.site.state_dir,
+        sources: config.sources.len(),
+        benchmarks: config.benchmarks.len(),
+        hooks: config.hooks.len(),
+        warnings,
+    })
+}
+
+fn missing_folder(source: &Source) -> Option<String> {
+    let folder = source.pattern.folder();
+    (!folder.is_dir()).then(|| {
+        format!(
+            "source {:?}: there is no folder {}; create it before readings are due",
+            source.id,
+            folder.display()
+        )
+    })
+}
+
+fn missing_program(hook: &HookConfig) -> Option<String> {
+    let program = hook.program();
+    let named_by_path = program.components().count() > 1;
+    (named_by_path && !program.is_file()).then(|| {
+        format!(
+            "hook: there is no program {}; alerts would go nowhere",
+            program.display()
+        )
+    })
+}
+
+/// A mean over longer than the evacuation takes shows the danger when it is too late.
+fn slow_sampling(config: &Config) -> impl Iterator<Item = String> {
+    config.benchmarks.iter().filter_map(|benchmark| {
+        let policy = config
+            .settings
+            .benchmarks
+            .get(&benchmark.id)
+            .unwrap_or(&config.settings.policy);
+        let averaging = benchmark.averaging.unwrap_or(SignedDuration::ZERO);
+        let is_mean = benchmark
+            .unit
+            .is_none_or(|unit| unit.quantity() == Quantity::Velocity);
+        (is_mean && averaging >= policy.evacuation_time).then(|| {
+            format!(
+                "benchmark {:?}: averaging {averaging:#} is not shorter than evacuation_time {:#}; \
+                 this sampling cannot protect anyone, measure more often",
+                benchmark.id.as_str(),
+                policy.evacuation_time
+            )
+        })
+    })
+}
+
+impl HookConfig {
+    /// The program's path: a name with a slash starts at the config's folder, a bare one is looked
+    /// up in `PATH`.
+    pub fn program(&self) -> PathBuf {
+        let name = self.run.first().map_or("", String::as_str);
+        if name.contains('/') {
+            self.folder.join(name)
+        } else {
+            PathBuf::from(name)
+        }
+    }
+}

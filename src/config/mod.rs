@@ -1,0 +1,176 @@
+//! The site file: TOML with units, unknown keys refused, all problems reported together.
+
+mod alert;
+mod check;
+mod pattern;
+mod problem;
+mod section;
+mod table;
+mod value;
+
+pub use check::{Summary, check};
+pub use pattern::FilePattern;
+pub use problem::{ConfigError, Problem, Severity};
+
+use crate::alert::Level;
+use crate::monitor::Settings;
+use crate::reading::{BenchmarkId, Quantity, Timestamp, Unit};
+use jiff::SignedDuration;
+use problem::Notebook;
+use std::cell::RefCell;
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use table::Section;
+
+/// A site as its file describes it, every path resolved.
+#[derive(Debug, Clone)]
+pub struct Config {
+    /// The file itself.
+    pub file: PathBuf,
+    /// `[site]`.
+    pub site: SiteConfig,
+    /// `[[source]]`, at least one.
+    pub sources: Vec<Source>,
+    /// `[[benchmark]]`; with none, whatever benchmarks the files name are taken.
+    pub benchmarks: Vec<Benchmark>,
+    /// `[alert]` and the benchmarks' own, as the monitor takes them.
+    pub settings: Settings,
+    /// `[[event]]`.
+    pub declared: Vec<DeclaredEvent>,
+    /// `[[hook]]`.
+    pub hooks: Vec<HookConfig>,
+    /// What is doubtful, but not refused.
+    pub warnings: Vec<Problem>,
+}
+
+/// `[site]`.
+#[derive(Debug, Clone)]
+pub struct SiteConfig {
+    /// What hooks call it.
+    pub name: String,
+    /// Where the daemon keeps what it writes.
+    pub state_dir: PathBuf,
+    /// Where the daemon would answer questions.
+    pub listen: Option<SocketAddr>,
+    /// The zone that people there live in.
+    pub time_zone: jiff::tz::TimeZone,
+}
+
+/// What a source's files hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SourceKind {
+    /// Comma-separated text with a header.
+    Csv,
+    /// MCAP recordings.
+    Mcap,
+}
+
+impl SourceKind {
+    /// The word in the config.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Csv => "csv",
+            Self::Mcap => "mcap",
+        }
+    }
+}
+
+/// `[[source]]`: files that readings come from.
+#[derive(Debug, Clone)]
+pub struct Source {
+    /// What benchmarks call it.
+    pub id: String,
+    /// What the files hold.
+    pub kind: SourceKind,
+    /// Which files.
+    pub pattern: FilePattern,
+}
+
+/// `[[benchmark]]`: one measured point.
+#[derive(Debug, Clone)]
+pub struct Benchmark {
+    /// Its name.
+    pub id: BenchmarkId,
+    /// The source that its readings come from.
+    pub source: String,
+    /// The column that holds them; with none, the one whose name has the benchmark's id.
+    pub column: Option<String>,
+    /// Which of its quantities to take; with none, all.
+    pub quantity: Option<Quantity>,
+    /// The column's unit, where the column's name does not say it.
+    pub unit: Option<Unit>,
+    /// The span over which each velocity is the mean.
+    pub averaging: Option<SignedDuration>,
+}
+
+/// `[[event]]`: something people did to the site or its instruments.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DeclaredEvent {
+    /// When.
+    pub time: Timestamp,
+    /// To which benchmark; `None` for the whole site.
+    pub benchmark: Option<BenchmarkId>,
+    /// `reset`, `maintenance` or `blast`.
+    pub kind: String,
+}
+
+/// `[[hook]]`: a program to run when a level is entered or left.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct HookConfig {
+    /// The program and its arguments.
+    pub run: Vec<String>,
+    /// Which levels it is run for.
+    pub levels: Vec<Level>,
+    /// After this it is killed.
+    pub timeout: Duration,
+    /// Where it runs: the config's folder.
+    pub folder: PathBuf,
+}
+
+/// Reads the site file at `file`.
+///
+/// # Errors
+/// [`ConfigError`] when it cannot be read, or with every problem found in it.
+pub fn load(file: &Path) -> Result<Config, ConfigError> {
+    let text = std::fs::read_to_string(file).map_err(|source| ConfigError::Unreadable {
+        file: file.to_owned(),
+        source,
+    })?;
+    parse(&text, file)
+}
+
+/// Reads a site file's `text`; relative paths in it start at the folder of `file`.
+///
+/// # Errors
+/// [`ConfigError::Invalid`] with every problem found.
+pub fn parse(text: &str, file: &Path) -> Result<Config, ConfigError> {
+    let notebook = RefCell::new(Notebook::new(file, text));
+    let (document, syntax) = toml::de::DeTable::parse_recoverable(text);
+    for error in &syntax {
+        let at = error.span().unwrap_or(0..0);
+        let message = error.message().replace('\n', ", ");
+        notebook
+            .borrow_mut()
+            .error(&at, message, "write it as TOML 1.0 asks");
+    }
+    let config = if syntax.is_empty() {
+        let mut root = Section::root(document.get_ref(), &notebook);
+        let config = section::document(&mut root, file);
+        root.finish();
+        config
+    } else {
+        None
+    };
+    let problems = notebook.into_inner().close();
+    let refused = problems
+        .iter()
+        .any(|problem| problem.severity == Severity::Error);
+    match config {
+        Some(config) if !refused => Ok(Config {
+            warnings: problems,
+            ..config
+        }),
+        Some(_) | None => Err(ConfigError::Invalid { problems }),
+    }
+}

@@ -1,0 +1,324 @@
+//! The tables of the site file, one function each.
+
+use super::table::{Placed, Section};
+use super::{
+    Benchmark, Config, DeclaredEvent, FilePattern, HookConfig, SiteConfig, Source, SourceKind,
+    alert, value,
+};
+use crate::alert::{Level, Policy};
+use crate::monitor::Settings;
+use crate::reading::{BenchmarkId, Quantity, Timestamp, Unit};
+use jiff::tz::TimeZone;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use std::time::Duration;
+
+const HOOK_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// The whole file; `None` where something without which there is no config is missing.
+pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
+    let base = file.parent().unwrap_or(Path::new(""));
+    let site = site(root.table("site", "site"), base);
+    let sources = sources(root, base);
+    let policy = alert::policy(root.table("alert", "alert"), &Policy::default());
+    let (benchmarks, own) = benchmarks(root, &sources, &policy);
+    let declared = declared(root, &benchmarks);
+    let hooks: Vec<HookConfig> = root
+        .tables("hook", "hook")
+        .into_iter()
+        .filter_map(|section| hook(section, base))
+        .collect();
+    if hooks.is_empty() && !root.has("hook") {
+        root.warning(
+            root.at(),
+            "there is no [[hook]]: nobody is told of an alert".to_owned(),
+            "add [[hook]] with run = [\"./notify.sh\"]",
+        );
+    }
+    Some(Config {
+        file: file.to_owned(),
+        site: site?,
+        sources,
+        benchmarks,
+        settings: Settings {
+            policy,
+            benchmarks: own,
+        },
+        declared,
+        hooks,
+        warnings: Vec::new(),
+    })
+}
+
+fn site(mut section: Section<'_>, base: &Path) -> Option<SiteConfig> {
+    let name = section.required("name", "\"Monte Toc\"");
+    let state_dir = section.required("state_dir", "\"state\"");
+    let listen = section.parsed("listen", |text| {
+        text.parse()
+            .map_err(|_| "write an address and a port: \"127.0.0.1:8642\"".to_owned())
+    });
+    let time_zone = section.parsed("time_zone", |text| {
+        TimeZone::get(text).map_err(|_| "write an IANA name, such as \"Europe/Rome\"".to_owned())
+    });
+    section.finish();
+    Some(SiteConfig {
+        name: name?.value,
+        state_dir: base.join(state_dir?.value),
+        listen: listen.map(|given| given.value),
+        time_zone: time_zone.map_or(TimeZone::UTC, |given| given.value),
+    })
+}
+
+fn sources(root: &mut Section<'_>, base: &Path) -> Vec<Source> {
+    let sections = root.tables("source", "source");
+    if sections.is_empty() {
+        root.error(
+            root.at(),
+            "there is no [[source]]".to_owned(),
+            "add [[source]] with id, kind and path",
+        );
+    }
+    let mut taken = BTreeSet::new();
+    sections
+        .into_iter()
+        .filter_map(|section| source(section, base, &mut taken))
+        .collect()
+}
+
+fn source(mut section: Section<'_>, base: &Path, taken: &mut BTreeSet<String>) -> Option<Source> {
+    let id = section.required("id", "\"logger\"");
+    unique(&section, id.as_ref(), taken);
+    let kind = section
+        .required("kind", "\"csv\"")
+        .and_then(|_| section.parsed("kind", source_kind));
+    let pattern = section
+        .required("path", "\"incoming/*.csv\"")
+        .and_then(|_| section.parsed("path", |text| FilePattern::parse(text, base)));
+    section.finish();
+    Some(Source {
+        id: id?.value,
+        kind: kind?.value,
+        pattern: pattern?.value,
+    })
+}
+
+fn source_kind(text: &str) -> Result<SourceKind, String> {
+    match text {
+        "csv" => Ok(SourceKind::Csv),
+        "mcap" => Ok(SourceKind::Mcap),
+        "ndjson" | "toa5" | "mqtt" | "nats" => {
+            Err("not yet supported; supported: csv, mcap".to_owned())
+        }
+        _ => Err("supported: csv, mcap".to_owned()),
+    }
+}
+
+fn unique(section: &Section<'_>, id: Option<&Placed<String>>, taken: &mut BTreeSet<String>) {
+    let Some(id) = id else { return };
+    if !taken.insert(id.value.clone()) {
+        section.error(
+            &id.at,
+            format!("{} = {:?} is there twice", section.path("id"), id.value),
+            "give each its own id",
+        );
+    }
+}
+
+type Own = BTreeMap<BenchmarkId, Policy>;
+
+fn benchmarks(
+    root: &mut Section<'_>,
+    sources: &[Source],
+    policy: &Policy,
+) -> (Vec<Benchmark>, Own) {
+    let (mut taken, mut own, mut benchmarks) = (BTreeSet::new(), Own::new(), Vec::new());
+    for mut section in root.tables("benchmark", "benchmark") {
+        let id = section.required("id", "\"5\"");
+        unique(&section, id.as_ref(), &mut taken);
+        let policy = section
+            .has("alert")
+            .then(|| alert::policy(section.table("alert", "benchmark.alert"), policy));
+        // Asked for in any case, so that it is among the known keys.
+        section.table("alert", "benchmark.alert");
+        let benchmark = benchmark(section, id, sources);
+        if let (Some(benchmark), Some(policy)) = (&benchmark, policy) {
+            own.insert(benchmark.id.clone(), policy);
+        }
+        benchmarks.extend(benchmark);
+    }
+    (benchmarks, own)
+}
+
+fn benchmark(
+    mut section: Section<'_>,
+    id: Option<Placed<String>>,
+    sources: &[Source],
+) -> Option<Benchmark> {
+    let source = benchmark_source(&mut section, sources);
+    let column = section.text("column");
+    let quantity = section.parsed("quantity", |text| match text {
+        "displacement" => Ok(Quantity::Displacement),
+        "velocity" => Ok(Quantity::Velocity),
+        _ => Err("write displacement or velocity".to_owned()),
+    });
+    let unit = section.parsed("unit", |text| {
+        Unit::parse(text).map_err(|error| error.to_string())
+    });
+    let averaging = section.parsed("averaging", value::duration);
+    if let (Some(unit), Some(quantity)) = (&unit, &quantity)
+        && unit.value.quantity() != quantity.value
+    {
+        section.error(
+            &unit.at,
+            format!("benchmark.unit {} is no {}", unit.value, quantity.value),
+            "write a unit of the quantity",
+        );
+    }
+    let unit = unit
+        .map(|given| given.value)
+        .or_else(|| column_unit(&section, column.as_ref()?));
+    section.finish();
+    Some(Benchmark {
+        id: BenchmarkId::new(id?.value),
+        source: source?,
+        column: column.map(|given| given.value),
+        quantity: quantity.map(|given| given.value),
+        unit,
+        averaging: averaging.map(|given| given.value),
+    })
+}
+
+/// The unit that the column's name ends in.
+fn column_unit(section: &Section<'_>, column: &Placed<String>) -> Option<Unit> {
+    let plain = column.value.to_ascii_lowercase();
+    let unit = ["displacement_", "velocity_"].iter().find_map(|keyword| {
+        let (_, unit) = plain.rsplit_once(keyword)?;
+        let unit = Unit::parse(unit).ok()?;
+        keyword.starts_with(unit.quantity().name()).then_some(unit)
+    });
+    if unit.is_none() && !section.has("unit") {
+        section.error(
+            &column.at,
+            format!(
+                "benchmark.column = {:?} does not say its unit",
+                column.value
+            ),
+            "add unit = \"mm\" or unit = \"mm_per_day\"",
+        );
+    }
+    unit
+}
+
+fn benchmark_source(section: &mut Section<'_>, sources: &[Source]) -> Option<String> {
+    let known: Vec<&str> = sources.iter().map(|source| source.id.as_str()).collect();
+    match (section.text("source"), known.as_slice()) {
+        (None, [only]) => Some((*only).to_owned()),
+        (None, []) => None,
+        (None, _) => {
+            section.error(
+                section.at(),
+                "benchmark.source is missing, and there are several sources".to_owned(),
+                format!("add source = with one of: {}", known.join(", ")),
+            );
+            None
+        }
+        (Some(given), _) if known.contains(&given.value.as_str()) => Some(given.value),
+        (Some(given), _) => {
+            section.error(
+                &given.at,
+                format!("benchmark.source = {:?} is no [[source]]", given.value),
+                format!("known sources: {}", known.join(", ")),
+            );
+            None
+        }
+    }
+}
+
+fn declared(root: &mut Section<'_>, benchmarks: &[Benchmark]) -> Vec<DeclaredEvent> {
+    root.tables("event", "event")
+        .into_iter()
+        .filter_map(|section| declared_event(section, benchmarks))
+        .collect()
+}
+
+fn declared_event(mut section: Section<'_>, benchmarks: &[Benchmark]) -> Option<DeclaredEvent> {
+    let time = section
+        .required("time", "\"2017-06-06T17:00:00Z\"")
+        .and_then(|_| {
+            section.parsed("time", |text| {
+                text.parse::<Timestamp>()
+                    .map_err(|_| "write it as in \"2017-06-06T17:00:00Z\"".to_owned())
+            })
+        });
+    let kind = section.required("kind", "\"reset\"").and_then(|_| {
+        section.parsed("kind", |text| match text {
+            "maintenance" | "reset" | "blast" => Ok(text.to_owned()),
+            _ => Err("write maintenance, reset or blast".to_owned()),
+        })
+    });
+    let benchmark = section.text("benchmark");
+    if let Some(given) = &benchmark
+        && !benchmarks.is_empty()
+        && benchmarks
+            .iter()
+            .all(|known| known.id.as_str() != given.value)
+    {
+        section.error(
+            &given.at,
+            format!("event.benchmark = {:?} is no [[benchmark]]", given.value),
+            "name one that is declared, or leave it out for the whole site",
+        );
+    }
+    section.finish();
+    Some(DeclaredEvent {
+        time: time?.value,
+        benchmark: benchmark.map(|given| BenchmarkId::new(given.value)),
+        kind: kind?.value,
+    })
+}
+
+fn hook(mut section: Section<'_>, base: &Path) -> Option<HookConfig> {
+    let run = section.texts("run");
+    if run.as_ref().is_none_or(|run| run.value.is_empty()) {
+        let at = run.as_ref().map_or(section.at(), |run| &run.at);
+        section.error(
+            at,
+            "hook.run names no program".to_owned(),
+            "write run = [\"./notify.sh\"]",
+        );
+    }
+    let levels = hook_levels(&mut section);
+    let timeout = section.parsed("timeout", value::duration);
+    section.finish();
+    Some(HookConfig {
+        run: run?.value.into_iter().map(|word| word.value).collect(),
+        levels,
+        timeout: timeout.map_or(HOOK_TIMEOUT, |given| given.value.unsigned_abs()),
+        folder: base.to_owned(),
+    })
+}
+
+fn hook_levels(section: &mut Section<'_>) -> Vec<Level> {
+    let Some(words) = section.texts("levels") else {
+        return vec![Level::Orange, Level::Red, Level::Unknown];
+    };
+    if words.value.is_empty() {
+        section.error(
+            &words.at,
+            "hook.levels is empty: the hook would never run".to_owned(),
+            "write levels = [\"orange\", \"red\"]",
+        );
+    }
+    let mut levels = Vec::new();
+    for word in words.value {
+        match value::level(&word.value) {
+            Ok(level) => levels.push(level),
+            Err(fix) => section.error(
+                &word.at,
+                format!("hook.levels has {:?}, which is no level", word.value),
+                fix,
+            ),
+        }
+    }
+    levels
+}

@@ -1,0 +1,250 @@
+//! Typed reading of one TOML table: every key asked for is known, every other one is a problem.
+
+use super::problem::Notebook;
+use std::cell::RefCell;
+use std::ops::Range;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// A value and where it stands.
+#[derive(Debug, Clone)]
+pub(super) struct Placed<T> {
+    pub(super) value: T,
+    pub(super) at: Range<usize>,
+}
+
+/// One table of the site file while it is being read.
+#[derive(Debug)]
+pub(super) struct Section<'t> {
+    name: &'static str,
+    table: Option<&'t DeTable<'t>>,
+    at: Range<usize>,
+    asked: Vec<&'static str>,
+    notebook: &'t RefCell<Notebook>,
+}
+
+impl<'t> Section<'t> {
+    /// The whole document.
+    pub(super) fn root(table: &'t DeTable<'t>, notebook: &'t RefCell<Notebook>) -> Self {
+        Self {
+            name: "",
+            table: Some(table),
+            at: 0..0,
+            asked: Vec::new(),
+            notebook,
+        }
+    }
+
+    /// Where the table begins.
+    pub(super) fn at(&self) -> &Range<usize> {
+        &self.at
+    }
+
+    /// Whether the file has this key, rightly written or not.
+    pub(super) fn has(&self, key: &str) -> bool {
+        self.table.is_some_and(|table| table.contains_key(key))
+    }
+
+    pub(super) fn error(&self, at: &Range<usize>, what: String, fix: impl Into<String>) {
+        self.notebook.borrow_mut().error(at, what, fix);
+    }
+
+    pub(super) fn warning(&self, at: &Range<usize>, what: String, fix: impl Into<String>) {
+        self.notebook.borrow_mut().warning(at, what, fix);
+    }
+
+    /// `alert.outlook`, as messages name it.
+    pub(super) fn path(&self, key: &str) -> String {
+        if self.name.is_empty() {
+            key.to_owned()
+        } else {
+            format!("{}.{key}", self.name)
+        }
+    }
+
+    fn get(&mut self, key: &'static str) -> Option<&'t Spanned<DeValue<'t>>> {
+        if !self.asked.contains(&key) {
+            self.asked.push(key);
+        }
+        self.table?.get(key)
+    }
+
+    fn wrong_type(&self, key: &str, value: &Spanned<DeValue<'_>>, wanted: &str, example: &str) {
+        let found = value.get_ref().type_str();
+        self.error(
+            &value.span(),
+            format!("{} is of type {found}, not {wanted}", self.path(key)),
+            format!("write {example}"),
+        );
+    }
+
+    /// A string.
+    pub(super) fn text(&mut self, key: &'static str) -> Option<Placed<String>> {
+        let value = self.get(key)?;
+        let Some(text) = value.get_ref().as_str() else {
+            self.wrong_type(key, value, "a string", &format!("{key} = \"...\""));
+            return None;
+        };
+        Some(Placed {
+            value: text.to_owned(),
+            at: value.span(),
+        })
+    }
+
+    /// A string that must be there and not be empty.
+    pub(super) fn required(&mut self, key: &'static str, example: &str) -> Option<Placed<String>> {
+        if !self.has(key) {
+            self.asked.push(key);
+            self.error(
+                &self.at,
+                format!("{} is missing", self.path(key)),
+                format!("add {key} = {example}"),
+            );
+            return None;
+        }
+        let text = self.text(key)?;
+        if text.value.trim().is_empty() {
+            self.error(
+                &text.at,
+                format!("{} is empty", self.path(key)),
+                format!("write {key} = {example}"),
+            );
+            return None;
+        }
+        Some(text)
+    }
+
+    /// A string with a meaning; `Err` says what to write instead.
+    pub(super) fn parsed<T>(
+        &mut self,
+        key: &'static str,
+        parse: impl FnOnce(&str) -> Result<T, String>,
+    ) -> Option<Placed<T>> {
+        let text = self.text(key)?;
+        match parse(&text.value) {
+            Ok(value) => Some(Placed { value, at: text.at }),
+            Err(fix) => {
+                self.error(
+                    &text.at,
+                    format!("{} = {:?} cannot be used", self.path(key), text.value),
+                    fix,
+                );
+                None
+            }
+        }
+    }
+
+    /// A number strictly between 0 and 1.
+    pub(super) fn chance(&mut self, key: &'static str) -> Option<f64> {
+        let value = self.get(key)?;
+        let number: Option<f64> = match value.get_ref() {
+            DeValue::Float(float) => float.as_str().replace('_', "").parse().ok(),
+            DeValue::Integer(integer) => integer.as_str().parse().ok(),
+            DeValue::String(_)
+            | DeValue::Boolean(_)
+            | DeValue::Datetime(_)
+            | DeValue::Array(_)
+            | DeValue::Table(_) => None,
+        };
+        match number {
+            Some(number) if number > 0.0 && number < 1.0 => Some(number),
+            Some(_) | None => {
+                self.error(
+                    &value.span(),
+                    format!("{} is not a chance", self.path(key)),
+                    "write a number between 0 and 1, such as 0.05",
+                );
+                None
+            }
+        }
+    }
+
+    /// A list of strings.
+    pub(super) fn texts(&mut self, key: &'static str) -> Option<Placed<Vec<Placed<String>>>> {
+        let value = self.get(key)?;
+        let example = format!("{key} = [\"...\"]");
+        let Some(array) = value.get_ref().as_array() else {
+            self.wrong_type(key, value, "a list of strings", &example);
+            return None;
+        };
+        let mut texts = Vec::new();
+        for item in array {
+            match item.get_ref().as_str() {
+                Some(text) => texts.push(Placed {
+                    value: text.to_owned(),
+                    at: item.span(),
+                }),
+                None => self.wrong_type(key, item, "a string", &example),
+            }
+        }
+        Some(Placed {
+            value: texts,
+            at: value.span(),
+        })
+    }
+
+    /// The table under `key`; one without keys where the file has none.
+    pub(super) fn table(&mut self, key: &'static str, name: &'static str) -> Section<'t> {
+        let (table, at) = match self.get(key) {
+            None => (None, self.at.clone()),
+            Some(value) => {
+                let table = value.get_ref().as_table();
+                if table.is_none() {
+                    self.wrong_type(key, value, "a table", &format!("[{name}]"));
+                }
+                (table, value.span())
+            }
+        };
+        self.child(name, table, at)
+    }
+
+    /// The tables under `key`, in the order of the file.
+    pub(super) fn tables(&mut self, key: &'static str, name: &'static str) -> Vec<Section<'t>> {
+        let Some(value) = self.get(key) else {
+            return Vec::new();
+        };
+        let example = format!("[[{name}]]");
+        let Some(array) = value.get_ref().as_array() else {
+            self.wrong_type(key, value, "a list of tables", &example);
+            return Vec::new();
+        };
+        let mut sections = Vec::new();
+        for item in array {
+            match item.get_ref().as_table() {
+                Some(table) => sections.push(self.child(name, Some(table), item.span())),
+                None => self.wrong_type(key, item, "a table", &example),
+            }
+        }
+        sections
+    }
+
+    fn child(
+        &self,
+        name: &'static str,
+        table: Option<&'t DeTable<'t>>,
+        at: Range<usize>,
+    ) -> Section<'t> {
+        Section {
+            name,
+            table,
+            at,
+            asked: Vec::new(),
+            notebook: self.notebook,
+        }
+    }
+
+    /// Reports the keys that nothing asked for.
+    pub(super) fn finish(self) {
+        let Some(table) = self.table else { return };
+        for (key, _) in table {
+            let name: &str = key.get_ref();
+            if !self.asked.contains(&name) {
+                self.error(
+                    &key.span(),
+                    format!("unknown key {}", self.path(name)),
+                    format!("known here: {}", self.asked.join(", ")),
+                );
+            }
+        }
+    }
+}

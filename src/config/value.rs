@@ -1,0 +1,108 @@
+//! Values with units: durations, speeds, accelerations, levels. `Err` says what to write instead.
+
+use crate::alert::Level;
+use crate::reading::{Quantity, Unit};
+use jiff::SignedDuration;
+
+/// A duration longer than zero: `12h`, `30d`, `1h 30min`.
+pub(super) fn duration(text: &str) -> Result<SignedDuration, String> {
+    let parsed = humantime::parse_duration(text)
+        .map_err(|_| "write a number and a unit: \"10s\", \"12h\", \"30d\"".to_owned())?;
+    if parsed.is_zero() {
+        return Err("write a duration longer than zero, such as \"12h\"".to_owned());
+    }
+    SignedDuration::try_from(parsed).map_err(|_| "write a shorter duration".to_owned())
+}
+
+/// A speed in mm/day: `1 m/day`, `50 mm/day`.
+pub(super) fn speed(text: &str) -> Result<f64, String> {
+    measure(text, Quantity::Velocity, "\"50 mm/day\" or \"1 m/day\"")
+}
+
+/// A length in mm: `500 mm`.
+pub(super) fn length(text: &str) -> Result<f64, String> {
+    measure(text, Quantity::Displacement, "\"500 mm\" or \"2 m\"")
+}
+
+/// An acceleration in mm/day per day: `5 mm/day/day`.
+pub(super) fn acceleration(text: &str) -> Result<f64, String> {
+    let fix = || "write a positive number and a unit: \"5 mm/day/day\"".to_owned();
+    let (number, unit) = split(text).ok_or_else(fix)?;
+    let (rate, per) = unit.rsplit_once('/').ok_or_else(fix)?;
+    let rate = Unit::parse(rate).map_err(|_| fix())?;
+    let per = Unit::parse(&format!("mm/{per}")).map_err(|_| fix())?;
+    if rate.quantity() != Quantity::Velocity {
+        return Err(fix());
+    }
+    Ok(number * rate.factor() * per.factor())
+}
+
+fn measure(text: &str, quantity: Quantity, examples: &str) -> Result<f64, String> {
+    let fix = || format!("write a positive number and a unit: {examples}");
+    let (number, unit) = split(text).ok_or_else(fix)?;
+    let unit = Unit::parse(unit).map_err(|_| fix())?;
+    if unit.quantity() == quantity {
+        Ok(number * unit.factor())
+    } else {
+        Err(fix())
+    }
+}
+
+fn split(text: &str) -> Option<(f64, &str)> {
+    let text = text.trim();
+    let end = text
+        .find(|c: char| !(c.is_ascii_digit() || "+-.".contains(c)))
+        .unwrap_or(text.len());
+    let number: f64 = text[..end].parse().ok()?;
+    (number.is_finite() && number > 0.0).then(|| (number, text[end..].trim()))
+}
+
+/// A level by its word.
+pub(super) fn level(text: &str) -> Result<Level, String> {
+    [
+        Level::Green,
+        Level::Yellow,
+        Level::Orange,
+        Level::Red,
+        Level::Unknown,
+    ]
+    .into_iter()
+    .find(|level| level.name() == text)
+    .ok_or_else(|| "write green, yellow, orange, red or unknown".to_owned())
+}
+
+/// A level that calls for something to be done.
+pub(super) fn raised_level(text: &str) -> Result<Level, String> {
+    match level(text) {
+        Ok(level @ (Level::Yellow | Level::Orange | Level::Red)) => Ok(level),
+        Ok(Level::Green | Level::Unknown) | Err(_) => Err("write yellow, orange or red".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_with_a_unit_comes_out_in_millimetres_and_days() {
+        assert_eq!(speed("1 m/day"), Ok(1000.0));
+        assert!((speed("2mm/h").unwrap() - 48.0).abs() < 1e-9);
+        assert_eq!(length("2 m"), Ok(2000.0));
+        assert_eq!(acceleration("5 mm/day/day"), Ok(5.0));
+        assert!((acceleration("1 mm/h/h").unwrap() - 576.0).abs() < 1e-9);
+        assert_eq!(duration("1d 12h"), Ok(SignedDuration::from_hours(36)));
+    }
+
+    #[test]
+    fn a_value_without_a_unit_or_of_another_kind_is_refused() {
+        for text in ["5", "5 mm", "-5 mm/day", "0 mm/day", "NaN mm/day", "mm/day"] {
+            assert!(speed(text).is_err(), "{text}");
+        }
+        for text in ["5 mm/day", "5 mm", "5 mm/day/furlong"] {
+            assert!(acceleration(text).is_err(), "{text}");
+        }
+        for text in ["0s", "12", "", "-1h"] {
+            assert!(duration(text).is_err(), "{text}");
+        }
+    }
+}

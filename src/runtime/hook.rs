@@ -1,0 +1,326 @@
+//! Runs one hook once: cleaned environment, alert on stdin, own process group, killed at its timeout.
+
+use crate::alert::Level;
+use crate::config::HookConfig;
+use crate::monitor::{AlertState, Event, EventKind};
+use crate::reading::Timestamp;
+use nix::sys::signal::{Signal, killpg};
+use nix::unistd::Pid;
+use serde::Serialize;
+use std::os::unix::process::ExitStatusExt;
+use std::process::{ExitStatus, Stdio};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWriteExt};
+use tokio::process::{Child, Command};
+use tokio::task::JoinHandle;
+
+/// What of our own environment a hook sees.
+const KEPT_VARIABLES: [&str; 4] = ["PATH", "HOME", "LANG", "TZ"];
+/// Longest value of a variable, bytes.
+const LONGEST_VALUE: usize = 4096;
+/// How much of a hook's output is kept, bytes a stream.
+const LONGEST_OUTPUT: usize = 64 * 1024;
+/// After the hook's end: how long what it has just written may take to arrive.
+const OUTPUT_GRACE: Duration = Duration::from_millis(200);
+/// After the kill: how long the kernel may take to report the end.
+const KILL_GRACE: Duration = Duration::from_secs(5);
+
+/// Whether a message means what it says; CAP 1.2's words.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Status {
+    /// The daemon's own.
+    Actual,
+    /// From a replay.
+    Exercise,
+    /// From `hook test`.
+    Test,
+}
+
+impl Status {
+    /// The word in `SLIPWATCH_STATUS`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Actual => "Actual",
+            Self::Exercise => "Exercise",
+            Self::Test => "Test",
+        }
+    }
+}
+
+/// An alert on its way to people.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Alert {
+    /// The monitor's event.
+    pub event: Event,
+    /// Which level.
+    pub level: Level,
+    /// Firing or resolved.
+    pub state: AlertState,
+    /// The event's idempotency key.
+    pub key: String,
+    /// The site's name.
+    pub site: String,
+    /// The benchmark's forecast of failure when the alert was called, its median.
+    pub failure_time: Option<Timestamp>,
+    /// Whether it means what it says.
+    pub status: Status,
+}
+
+impl Alert {
+    /// The alert in `event`; `None` where it is an event of another kind.
+    pub fn new(
+        event: &Event,
+        site: &str,
+        failure_time: Option<Timestamp>,
+        status: Status,
+    ) -> Option<Self> {
+        let EventKind::Alert {
+            level, state, key, ..
+        } = &event.kind
+        else {
+            return None;
+        };
+        Some(Self {
+            level: *level,
+            state: *state,
+            key: key.clone(),
+            event: event.clone(),
+            site: site.to_owned(),
+            failure_time,
+            status,
+        })
+    }
+
+    fn variables(&self, attempt: u32) -> [(&'static str, String); 10] {
+        let benchmark = self.event.benchmark.as_ref();
+        let optional_time = self.failure_time.map(|time| time.to_string());
+        [
+            ("SLIPWATCH_EVENT", "alert".to_owned()),
+            ("SLIPWATCH_KEY", self.key.clone()),
+            ("SLIPWATCH_SITE", self.site.clone()),
+            (
+                "SLIPWATCH_BENCHMARK",
+                benchmark.map(ToString::to_string).unwrap_or_default(),
+            ),
+            ("SLIPWATCH_LEVEL", self.level.name().to_owned()),
+            ("SLIPWATCH_STATE", state_name(self.state).to_owned()),
+            ("SLIPWATCH_TIME", self.event.time.to_string()),
+            ("SLIPWATCH_FAILURE_TIME", optional_time.unwrap_or_default()),
+            ("SLIPWATCH_ATTEMPT", attempt.to_string()),
+            ("SLIPWATCH_STATUS", self.status.name().to_owned()),
+        ]
+    }
+
+    fn body(&self, attempt: u32) -> Result<Vec<u8>, serde_json::Error> {
+        #[derive(Serialize)]
+        struct Body<'a> {
+            #[serde(flatten)]
+            event: &'a Event,
+            site: &'a str,
+            failure_time: Option<Timestamp>,
+            status: Status,
+            attempt: u32,
+            schema_version: u32,
+        }
+        let mut body = serde_json::to_vec(&Body {
+            event: &self.event,
+            site: &self.site,
+            failure_time: self.failure_time,
+            status: self.status,
+            attempt,
+            schema_version: 1,
+        })?;
+        body.push(b'\n');
+        Ok(body)
+    }
+}
+
+/// The word in `SLIPWATCH_STATE`.
+pub(crate) fn state_name(state: AlertState) -> &'static str {
+    match state {
+        AlertState::Firing => "firing",
+        AlertState::Resolved => "resolved",
+    }
+}
+
+/// How a run of a hook ended.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Outcome {
+    /// Exit code 0: the message is on its way.
+    Done,
+    /// Another exit code.
+    Failed(i32),
+    /// Ended by a signal that was not ours.
+    Signalled(i32),
+    /// Killed with all its children when the time was up.
+    TimedOut,
+    /// It could not be run at all.
+    NotStarted(String),
+}
+
+/// Runs `hook` for `alert`; `attempt` counts from 1.
+pub async fn run(hook: &HookConfig, alert: &Alert, attempt: u32) -> Outcome {
+    let mut child = match start(hook, alert, attempt) {
+        Ok(child) => child,
+        Err(reason) => return Outcome::NotStarted(reason),
+    };
+    let body = match alert.body(attempt) {
+        Ok(body) => body,
+        Err(error) => return Outcome::NotStarted(error.to_string()),
+    };
+    let mut group = Group::of(&child);
+    let writer = child.stdin.take().map(|mut stdin| {
+        // A hook may leave stdin unread: its closing the pipe is no error, its filling up only
+        // holds this task, which ends with the hook.
+        tokio::spawn(async move {
+            let _ = stdin.write_all(&body).await;
+        })
+    });
+    let stdout = child.stdout.take().map(Capture::of);
+    let stderr = child.stderr.take().map(Capture::of);
+    let ended = tokio::time::timeout(hook.timeout, child.wait()).await;
+    let outcome = match ended {
+        Ok(Ok(status)) => {
+            group.leave();
+            outcome(status)
+        }
+        Ok(Err(error)) => Outcome::NotStarted(error.to_string()),
+        Err(_elapsed) => {
+            group.kill();
+            // Reaps the child; a process stuck in the kernel must not hold the alerts up.
+            let _ = tokio::time::timeout(KILL_GRACE, child.wait()).await;
+            Outcome::TimedOut
+        }
+    };
+    if let Some(writer) = writer {
+        writer.abort();
+    }
+    let (stdout, stderr) = tokio::join!(finish(stdout), finish(stderr));
+    tracing::info!(hook = ?hook.run, key = alert.key, attempt, ?outcome, stdout, stderr, "hook ended");
+    outcome
+}
+
+fn start(hook: &HookConfig, alert: &Alert, attempt: u32) -> Result<Child, String> {
+    let program = hook.program();
+    let mut command = Command::new(&program);
+    command
+        .args(hook.run.iter().skip(1))
+        .env_clear()
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .process_group(0)
+        .kill_on_drop(true);
+    if !hook.folder.as_os_str().is_empty() {
+        command.current_dir(&hook.folder);
+    }
+    for name in KEPT_VARIABLES {
+        if let Some(value) = std::env::var_os(name) {
+            command.env(name, value);
+        }
+    }
+    for (name, value) in alert.variables(attempt) {
+        command.env(name, capped(&value));
+    }
+    command
+        .spawn()
+        .map_err(|error| format!("{}: {error}", program.display()))
+}
+
+/// What the kernel takes as a variable's value: no NUL, not too long, cut between characters.
+fn capped(value: &str) -> String {
+    let clean = value.replace('\0', " ");
+    let mut end = clean.len().min(LONGEST_VALUE);
+    while !clean.is_char_boundary(end) {
+        end -= 1;
+    }
+    clean[..end].to_owned()
+}
+
+fn outcome(status: ExitStatus) -> Outcome {
+    match (status.code(), status.signal()) {
+        (Some(0), _) => Outcome::Done,
+        (Some(code), _) => Outcome::Failed(code),
+        (None, signal) => Outcome::Signalled(signal.unwrap_or_default()),
+    }
+}
+
+/// A hook's process group, killed when the run is given up half-way.
+#[derive(Debug)]
+struct Group(Option<Pid>);
+
+impl Group {
+    fn of(child: &Child) -> Self {
+        let id = child.id().and_then(|id| i32::try_from(id).ok());
+        Self(id.map(Pid::from_raw))
+    }
+
+    /// The hook has ended by itself; its number may soon be another process's.
+    fn leave(&mut self) {
+        self.0 = None;
+    }
+
+    fn kill(&mut self) {
+        if let Some(group) = self.0.take() {
+            let _ = killpg(group, Signal::SIGKILL);
+        }
+    }
+}
+
+impl Drop for Group {
+    fn drop(&mut self) {
+        self.kill();
+    }
+}
+
+/// Reads a stream to its end and keeps its first part, so that neither a flood nor a grandchild
+/// that holds the stream open stops anything.
+#[derive(Debug)]
+struct Capture {
+    kept: Arc<Mutex<Vec<u8>>>,
+    reader: JoinHandle<()>,
+}
+
+impl Capture {
+    fn of(mut stream: impl AsyncRead + Unpin + Send + 'static) -> Self {
+        let kept = Arc::new(Mutex::new(Vec::new()));
+        let sink = Arc::clone(&kept);
+        let reader = tokio::spawn(async move {
+            let mut buffer = vec![0; 8192];
+            while let Ok(count @ 1..) = stream.read(&mut buffer).await {
+                let mut kept = sink.lock().unwrap_or_else(PoisonError::into_inner);
+                let room = LONGEST_OUTPUT - kept.len();
+                kept.extend_from_slice(&buffer[..count.min(room)]);
+            }
+        });
+        Self { kept, reader }
+    }
+}
+
+async fn finish(capture: Option<Capture>) -> String {
+    let Some(mut capture) = capture else {
+        return String::new();
+    };
+    if tokio::time::timeout(OUTPUT_GRACE, &mut capture.reader)
+        .await
+        .is_err()
+    {
+        capture.reader.abort();
+    }
+    let kept = capture.kept.lock().unwrap_or_else(PoisonError::into_inner);
+    String::from_utf8_lossy(&kept).trim_end().to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_is_cut_between_characters_and_has_no_nul() {
+        let long = "\u{e9}".repeat(3000);
+        assert_eq!(capped(&long).len(), LONGEST_VALUE);
+        assert_eq!(capped(&format!("a{long}")).len(), LONGEST_VALUE - 1);
+        assert_eq!(capped("a\0b"), "a b");
+    }
+}

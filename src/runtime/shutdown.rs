@@ -1,0 +1,57 @@
+//! The wish to stop, handed down as an argument.
+
+use tokio::signal::unix::{SignalKind, signal};
+use tokio::sync::watch;
+
+/// Whoever holds this can ask for the stop; dropping it asks as well.
+#[derive(Debug)]
+pub struct Trigger(watch::Sender<bool>);
+
+/// Whoever holds this learns of the wish.
+#[derive(Debug, Clone)]
+pub struct Shutdown(watch::Receiver<bool>);
+
+/// A wish not yet made, and its two ends.
+pub fn pair() -> (Trigger, Shutdown) {
+    let (sender, receiver) = watch::channel(false);
+    (Trigger(sender), Shutdown(receiver))
+}
+
+impl Trigger {
+    /// Asks for the stop.
+    pub fn pull(&self) {
+        self.0.send_replace(true);
+    }
+}
+
+impl Shutdown {
+    /// Ends when the stop is asked for.
+    pub async fn requested(&mut self) {
+        // An error means that the trigger is gone: nobody is left who could ask.
+        let _ = self.0.wait_for(|asked| *asked).await;
+    }
+
+    /// Whether it has been asked for.
+    pub fn is_requested(&self) -> bool {
+        *self.0.borrow() || self.0.has_changed().is_err()
+    }
+
+    /// The wish that SIGTERM and SIGINT make; needs a tokio runtime.
+    ///
+    /// # Errors
+    /// When the signals cannot be listened for.
+    pub fn on_signals() -> std::io::Result<Self> {
+        let mut terminate = signal(SignalKind::terminate())?;
+        let mut interrupt = signal(SignalKind::interrupt())?;
+        let (trigger, shutdown) = pair();
+        tokio::spawn(async move {
+            let name = tokio::select! {
+                _ = terminate.recv() => "SIGTERM",
+                _ = interrupt.recv() => "SIGINT",
+            };
+            tracing::info!(signal = name, "stopping");
+            trigger.pull();
+        });
+        Ok(shutdown)
+    }
+}

@@ -1,0 +1,352 @@
+//! Follows one file: where we are in it, whether it is still the same, and what came.
+
+use super::decode::{Arrival, Decoder};
+use super::lines::{Line, Lines};
+use super::records::{self, Channels, Frame, HEADER_BYTES, MAGIC, RawMessage};
+use crate::config::SourceKind;
+use crate::runtime::ingest::{CsvRows, decode_message};
+use std::collections::VecDeque;
+use std::fs::{File, Metadata};
+use std::io;
+use std::os::unix::fs::{FileExt, MetadataExt};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Bytes of text that are read at once.
+const READ_BYTES: usize = 16 * 1024;
+/// Bytes before the offset that must not change.
+const MARK_BYTES: u64 = 256;
+/// How much of a bad line stands in the log, characters.
+const SHOWN: usize = 200;
+
+/// One followed file.
+#[derive(Debug)]
+pub(super) struct FileTail {
+    path: PathBuf,
+    decoder: Arc<Decoder>,
+    content: Content,
+    /// Everything before this has been read.
+    at: u64,
+    place: Option<Place>,
+    /// The last bytes before `at`: another file of the same number and size has others.
+    mark: Vec<u8>,
+    /// As of the last look that found nothing more; the file is opened only when it differs.
+    idle: Option<Glance>,
+    pub(super) pending: VecDeque<Arrival>,
+    pub(super) quarantined: u64,
+    /// The last error, so that it is logged once.
+    trouble: Option<String>,
+    /// Where we were when the file was last found under another name.
+    left_at: Option<u64>,
+}
+
+#[derive(Debug)]
+enum Content {
+    Csv {
+        lines: Lines,
+        rows: Option<Box<CsvRows>>,
+    },
+    Mcap {
+        channels: Channels,
+        /// A damaged last record may be one that is still being written: it gets a second look.
+        suspect: Option<u64>,
+    },
+    /// Not to be read until it is another file.
+    Refused,
+    /// Complete: nothing comes after it.
+    Complete,
+}
+
+impl Content {
+    fn of(kind: SourceKind) -> Self {
+        match kind {
+            SourceKind::Csv => Self::Csv {
+                lines: Lines::default(),
+                rows: None,
+            },
+            SourceKind::Mcap => Self::Mcap {
+                channels: Channels::default(),
+                suspect: None,
+            },
+        }
+    }
+}
+
+/// Which file it is, as the file system counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Place {
+    device: u64,
+    inode: u64,
+}
+
+impl Place {
+    pub(super) fn of(metadata: &Metadata) -> Self {
+        Self {
+            device: metadata.dev(),
+            inode: metadata.ino(),
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Glance {
+    place: Place,
+    size: u64,
+    modified: (i64, i64),
+}
+
+impl Glance {
+    fn at(metadata: &Metadata) -> Self {
+        Self {
+            place: Place::of(metadata),
+            size: metadata.size(),
+            modified: (metadata.mtime(), metadata.mtime_nsec()),
+        }
+    }
+}
+
+impl FileTail {
+    pub(super) fn new(path: PathBuf, decoder: Arc<Decoder>) -> Self {
+        Self {
+            content: Content::of(decoder.kind),
+            path,
+            decoder,
+            at: 0,
+            place: None,
+            mark: Vec::new(),
+            idle: None,
+            pending: VecDeque::new(),
+            quarantined: 0,
+            trouble: None,
+            left_at: None,
+        }
+    }
+
+    /// Whether this is no longer the file under its name.
+    pub(super) fn is_other_than(&self, place: Place) -> bool {
+        self.place.is_some_and(|own| own != place)
+    }
+
+    /// The file is no longer under its name: finds it in its folder under another, so that what
+    /// was written before a rotation is read. `None` when it is not there or nothing came since.
+    pub(super) fn leave(&mut self) -> Option<PathBuf> {
+        if self.left_at == Some(self.at) {
+            return None;
+        }
+        let place = self.place?;
+        let entries = std::fs::read_dir(self.path.parent()?).ok()?;
+        let path = entries.flatten().find_map(|entry| {
+            let metadata = entry.metadata().ok()?;
+            (Place::of(&metadata) == place).then(|| entry.path())
+        })?;
+        self.left_at = Some(self.at);
+        self.path.clone_from(&path);
+        Some(path)
+    }
+
+    /// Reads until something is pending or there is no more for now.
+    pub(super) fn refill(&mut self) {
+        while self.pending.is_empty() {
+            match self.advance() {
+                Ok(true) => self.trouble = None,
+                Ok(false) => return,
+                Err(error) => {
+                    let trouble = error.to_string();
+                    if self.trouble.as_ref() != Some(&trouble) {
+                        let file = self.path.display();
+                        tracing::warn!(%file, %error, "cannot read; will look again");
+                        self.trouble = Some(trouble);
+                    }
+                    return;
+                }
+            }
+        }
+    }
+
+    /// One read; `false` when there is no more for now.
+    fn advance(&mut self) -> io::Result<bool> {
+        let glance = Glance::at(&std::fs::metadata(&self.path)?);
+        if self.idle == Some(glance) {
+            return Ok(false);
+        }
+        let file = File::open(&self.path)?;
+        let glance = Glance::at(&file.metadata()?);
+        if !self.is_same(&file, glance)? {
+            tracing::info!(file = %self.path.display(), at = self.at, "another file: read from its start");
+            self.content = Content::of(self.decoder.kind);
+            self.at = 0;
+        }
+        self.place = Some(glance.place);
+        let before = self.at;
+        match &self.content {
+            Content::Csv { .. } => self.read_text(&file)?,
+            Content::Mcap { .. } => self.read_record(&file, glance.size)?,
+            Content::Refused | Content::Complete => {}
+        }
+        let moved = self.at != before;
+        if moved {
+            self.mark = read_at(&file, self.mark_start(), self.at - self.mark_start())?;
+        }
+        // A suspect record is looked at again although nothing changes any more.
+        let suspect =
+            matches!(self.content, Content::Mcap { suspect: Some(at), .. } if at == self.at);
+        self.idle = (!moved && !suspect).then_some(glance);
+        Ok(moved)
+    }
+
+    fn mark_start(&self) -> u64 {
+        self.at.saturating_sub(MARK_BYTES)
+    }
+
+    fn is_same(&self, file: &File, glance: Glance) -> io::Result<bool> {
+        if self.at == 0 {
+            return Ok(!matches!(self.content, Content::Refused));
+        }
+        if self.place != Some(glance.place) || glance.size < self.at {
+            return Ok(false);
+        }
+        Ok(read_at(file, self.mark_start(), self.at - self.mark_start())? == self.mark)
+    }
+
+    fn read_text(&mut self, file: &File) -> io::Result<()> {
+        let mut buffer = vec![0; READ_BYTES];
+        let count = file.read_at(&mut buffer, self.at)?;
+        self.at += count as u64;
+        let Content::Csv { lines, .. } = &mut self.content else {
+            return Ok(());
+        };
+        for line in lines.feed(&buffer[..count]) {
+            self.take_line(line);
+        }
+        Ok(())
+    }
+
+    fn take_line(&mut self, line: Line) {
+        let Content::Csv { rows, .. } = &mut self.content else {
+            return;
+        };
+        let text = match line.text {
+            Ok(text) => text,
+            Err(fault) => return self.quarantine_line(line.number, "", &fault),
+        };
+        let Some(rows) = rows else {
+            let options = self.decoder.options(&self.path);
+            match CsvRows::new(&self.path, &text, &options) {
+                Ok(understood) => *rows = Some(Box::new(understood)),
+                Err(error) => self.refuse(&error),
+            }
+            return;
+        };
+        match rows.row(line.number, &text) {
+            Ok(items) => {
+                let arrivals = items
+                    .into_iter()
+                    .filter_map(|one| self.decoder.arrival(one));
+                self.pending.extend(arrivals);
+            }
+            Err(error) => self.quarantine_line(line.number, &text, &error),
+        }
+    }
+
+    fn quarantine_line(&mut self, number: u64, text: &str, error: &dyn std::error::Error) {
+        self.quarantined += 1;
+        let (file, total) = (self.path.display(), self.quarantined);
+        let text: String = text.chars().take(SHOWN).collect();
+        tracing::warn!(%file, line = number, text, %error, total, "line quarantined");
+    }
+
+    fn refuse(&mut self, error: &dyn std::error::Error) {
+        self.quarantined += 1;
+        tracing::warn!(file = %self.path.display(), %error, "file refused until it is replaced");
+        self.content = Content::Refused;
+    }
+
+    fn read_record(&mut self, file: &File, size: u64) -> io::Result<()> {
+        if self.at == 0 {
+            return self.read_magic(file, size);
+        }
+        if size < self.at + HEADER_BYTES as u64 {
+            return Ok(());
+        }
+        let mut header = [0; HEADER_BYTES];
+        file.read_exact_at(&mut header, self.at)?;
+        let body_at = self.at + HEADER_BYTES as u64;
+        match records::frame(header, size - body_at) {
+            Frame::Wait => {}
+            Frame::Skip { length } => self.at = body_at + length,
+            Frame::Read { opcode, length } => {
+                let body = read_at(file, body_at, length)?;
+                let end = body_at + length;
+                self.take_record(opcode, &body, end, end == size);
+            }
+            Frame::End => {
+                tracing::info!(file = %self.path.display(), "recording complete");
+                self.content = Content::Complete;
+            }
+            Frame::Damaged { length } => {
+                let error = io::Error::other(format!("a record of {length} bytes at {}", self.at));
+                self.refuse(&error);
+            }
+        }
+        Ok(())
+    }
+
+    fn read_magic(&mut self, file: &File, size: u64) -> io::Result<()> {
+        let length = MAGIC.len() as u64;
+        if size >= length {
+            if read_at(file, 0, length)? == MAGIC {
+                self.at = length;
+            } else {
+                self.refuse(&io::Error::other("not an MCAP file"));
+            }
+        }
+        Ok(())
+    }
+
+    fn take_record(&mut self, opcode: u8, body: &[u8], end: u64, is_last: bool) {
+        let Content::Mcap { channels, suspect } = &mut self.content else {
+            return;
+        };
+        match channels.decode(opcode, body) {
+            Ok(messages) => {
+                self.at = end;
+                for message in messages {
+                    self.take_message(&message);
+                }
+            }
+            Err(_) if is_last && *suspect != Some(self.at) => *suspect = Some(self.at),
+            Err(error) => {
+                self.quarantined += 1;
+                let (file, offset, total) = (self.path.display(), self.at, self.quarantined);
+                tracing::warn!(%file, offset, %error, total, "record quarantined");
+                self.at = end;
+            }
+        }
+    }
+
+    fn take_message(&mut self, message: &RawMessage) {
+        let RawMessage {
+            topic,
+            metadata,
+            publish_time,
+            payload,
+        } = message;
+        match decode_message(topic, metadata, *publish_time, payload) {
+            Ok(item) => self
+                .pending
+                .extend(item.and_then(|one| self.decoder.arrival(one))),
+            Err(error) => {
+                self.quarantined += 1;
+                let (file, total) = (self.path.display(), self.quarantined);
+                tracing::warn!(%file, %error, total, "message quarantined");
+            }
+        }
+    }
+}
+
+fn read_at(file: &File, at: u64, length: u64) -> io::Result<Vec<u8>> {
+    let length = usize::try_from(length).map_err(io::Error::other)?;
+    let mut bytes = vec![0; length];
+    file.read_exact_at(&mut bytes, at)?;
+    Ok(bytes)
+}

@@ -1,0 +1,172 @@
+//! Follows the files of all sources and puts what they hold in the order of its measurement.
+
+use super::decode::{Arrival, Decoder};
+use super::file::{FileTail, Place};
+use crate::config::{Benchmark, FilePattern, Source};
+use crate::reading::Timestamp;
+use std::collections::{BTreeMap, BTreeSet};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Values in one batch at most.
+const BATCH: usize = 1000;
+
+/// Values in the order of their measurement, as far as they had arrived.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Batch {
+    /// The values.
+    pub arrivals: Vec<Arrival>,
+    /// Whether the files hold no more for now.
+    pub caught_up: bool,
+}
+
+/// A source's number and a path.
+type Key = (usize, PathBuf);
+
+/// Every followed file, and which folders to look for more.
+#[derive(Debug)]
+pub struct Follower {
+    sources: Vec<(FilePattern, Arc<Decoder>)>,
+    files: BTreeMap<Key, FileTail>,
+    /// The earliest pending value of each file; between two rounds there is none.
+    heads: BTreeSet<(Timestamp, Key)>,
+    missing: BTreeSet<PathBuf>,
+    quarantined_in_gone: u64,
+}
+
+impl Follower {
+    /// Follows nothing yet.
+    pub fn new(sources: &[Source], benchmarks: &[Benchmark]) -> Self {
+        let sources = sources.iter().map(|source| {
+            let decoder = Arc::new(Decoder::new(source, benchmarks));
+            (source.pattern.clone(), decoder)
+        });
+        Self {
+            sources: sources.collect(),
+            files: BTreeMap::new(),
+            heads: BTreeSet::new(),
+            missing: BTreeSet::new(),
+            quarantined_in_gone: 0,
+        }
+    }
+
+    /// The folders to watch.
+    pub fn folders(&self) -> BTreeSet<PathBuf> {
+        let folders = self.sources.iter().map(|(pattern, _)| pattern.folder());
+        folders.map(Path::to_owned).collect()
+    }
+
+    /// Lines, records and files that could not be used so far.
+    pub fn quarantined(&self) -> u64 {
+        let in_files: u64 = self.files.values().map(|file| file.quarantined).sum();
+        in_files + self.quarantined_in_gone
+    }
+
+    /// Reads the next values. What the files held when a round began is merged by time over all
+    /// files before the next round looks at them again: years of history in many files arrive as
+    /// if they had come in live.
+    pub fn poll(&mut self) -> Batch {
+        if self.heads.is_empty() {
+            self.rescan();
+            for (key, file) in &mut self.files {
+                file.refill();
+                self.heads
+                    .extend(file.pending.front().map(|head| (head.time, key.clone())));
+            }
+        }
+        let mut arrivals = Vec::new();
+        while arrivals.len() < BATCH
+            && let Some((_, key)) = self.heads.pop_first()
+        {
+            let Some(file) = self.files.get_mut(&key) else {
+                continue;
+            };
+            arrivals.extend(file.pending.pop_front());
+            file.refill();
+            self.heads
+                .extend(file.pending.front().map(|head| (head.time, key)));
+        }
+        Batch {
+            caught_up: self.heads.is_empty(),
+            arrivals,
+        }
+    }
+
+    /// Looks for files that have come or gone.
+    fn rescan(&mut self) {
+        let present = self.list();
+        let is_gone = |key: &Key, file: &FileTail| match present.get(key) {
+            None => true,
+            Some(place) => file.is_other_than(*place),
+        };
+        let gone: Vec<Key> = self
+            .files
+            .iter()
+            .filter(|(key, file)| is_gone(key, file))
+            .map(|(key, _)| key.clone())
+            .collect();
+        for key in gone {
+            let Some(mut file) = self.files.remove(&key) else {
+                continue;
+            };
+            let moved = file.leave().map(|path| (key.0, path));
+            if let Some(moved) = moved.filter(|moved| !present.contains_key(moved)) {
+                tracing::info!(file = %key.1.display(), now = %moved.1.display(), "renamed");
+                self.files.insert(moved, file);
+            } else {
+                tracing::info!(file = %key.1.display(), "gone");
+                self.quarantined_in_gone += file.quarantined;
+            }
+        }
+        for key in present.into_keys() {
+            if !self.files.contains_key(&key) {
+                tracing::info!(file = %key.1.display(), "followed");
+                let decoder = Arc::clone(&self.sources[key.0].1);
+                let file = FileTail::new(key.1.clone(), decoder);
+                self.files.insert(key, file);
+            }
+        }
+    }
+
+    fn list(&mut self) -> BTreeMap<Key, Place> {
+        let mut present = BTreeMap::new();
+        for (index, (pattern, _)) in self.sources.iter().enumerate() {
+            match list(pattern) {
+                Ok(files) => {
+                    self.missing.remove(pattern.folder());
+                    let keyed = files
+                        .into_iter()
+                        .map(|(path, place)| ((index, path), place));
+                    present.extend(keyed);
+                }
+                Err(error) => {
+                    let folder = pattern.folder().to_owned();
+                    if !self.missing.contains(&folder) {
+                        tracing::warn!(folder = %folder.display(), %error, "cannot list; will look again");
+                        self.missing.insert(folder);
+                    }
+                }
+            }
+        }
+        present
+    }
+}
+
+fn list(pattern: &FilePattern) -> io::Result<Vec<(PathBuf, Place)>> {
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(pattern.folder())? {
+        let entry = entry?;
+        let name = entry.file_name();
+        if !name.to_str().is_some_and(|name| pattern.matches(name)) {
+            continue;
+        }
+        // Not the entry's own: a link counts as the file that it leads to.
+        if let Ok(metadata) = std::fs::metadata(entry.path())
+            && metadata.is_file()
+        {
+            files.push((entry.path(), Place::of(&metadata)));
+        }
+    }
+    Ok(files)
+}

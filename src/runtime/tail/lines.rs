@@ -1,0 +1,143 @@
+//! Cuts a growing text into lines: bytes in, whole lines out, a partial last one held.
+
+/// Longest line that is read, bytes.
+pub const LONGEST_LINE: usize = 64 * 1024;
+
+/// A whole line, without its newline.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Line {
+    /// Its number, from 1.
+    pub number: u64,
+    /// Its text, or why it cannot be one.
+    pub text: Result<String, LineFault>,
+}
+
+/// Why a line is no text.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum LineFault {
+    /// Longer than [`LONGEST_LINE`].
+    #[error("longer than {LONGEST_LINE} bytes")]
+    TooLong,
+    /// Not UTF-8.
+    #[error("not UTF-8: {shown:?}")]
+    NotUtf8 {
+        /// What can be shown of it.
+        shown: String,
+    },
+    /// It has NUL bytes, as a file has that was not synced before the power failed.
+    #[error("has NUL bytes")]
+    Nul,
+}
+
+/// The state between two reads; memory is bounded by [`LONGEST_LINE`].
+#[derive(Debug, Default)]
+pub struct Lines {
+    partial: Vec<u8>,
+    too_long: bool,
+    number: u64,
+}
+
+impl Lines {
+    /// Takes the next bytes of the file and returns the lines that they complete.
+    pub fn feed(&mut self, bytes: &[u8]) -> Vec<Line> {
+        let mut lines = Vec::new();
+        let mut rest = bytes;
+        while let Some(end) = rest.iter().position(|byte| *byte == b'\n') {
+            self.hold(&rest[..end]);
+            lines.push(self.complete());
+            rest = &rest[end + 1..];
+        }
+        self.hold(rest);
+        lines
+    }
+
+    fn hold(&mut self, bytes: &[u8]) {
+        if self.too_long || self.partial.len() + bytes.len() > LONGEST_LINE {
+            self.too_long = true;
+            self.partial = Vec::new();
+        } else {
+            self.partial.extend_from_slice(bytes);
+        }
+    }
+
+    fn complete(&mut self) -> Line {
+        self.number += 1;
+        let bytes = std::mem::take(&mut self.partial);
+        let text = if std::mem::take(&mut self.too_long) {
+            Err(LineFault::TooLong)
+        } else if bytes.contains(&0) {
+            Err(LineFault::Nul)
+        } else {
+            String::from_utf8(bytes).map_err(|error| LineFault::NotUtf8 {
+                shown: shown(error.as_bytes()),
+            })
+        };
+        Line {
+            number: self.number,
+            text: text.map(|text| text.trim_end_matches('\r').to_owned()),
+        }
+    }
+}
+
+fn shown(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).chars().take(200).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn texts(lines: Vec<Line>) -> Vec<String> {
+        lines.into_iter().map(|line| line.text.unwrap()).collect()
+    }
+
+    #[test]
+    fn the_lines_are_the_same_however_the_bytes_are_split() {
+        let text = "time,é\r\n1,2\n\n3,4\n5,";
+        let whole = Lines::default().feed(text.as_bytes());
+        for step in 1..text.len() {
+            let mut lines = Lines::default();
+            let split: Vec<Line> = text
+                .as_bytes()
+                .chunks(step)
+                .flat_map(|part| lines.feed(part))
+                .collect();
+            assert_eq!(split, whole, "{step} bytes a read");
+        }
+        assert_eq!(texts(whole), ["time,é", "1,2", "", "3,4"]);
+    }
+
+    #[test]
+    fn a_partial_line_is_held_until_its_newline() {
+        let mut lines = Lines::default();
+        assert_eq!(texts(lines.feed(b"a\n2017-06-0")), ["a"]);
+        assert!(lines.feed(b"6,12").is_empty());
+        let line = lines.feed(b".5\n").remove(0);
+        assert_eq!(
+            (line.number, line.text.unwrap().as_str()),
+            (2, "2017-06-06,12.5")
+        );
+    }
+
+    #[test]
+    fn a_line_that_is_no_text_spoils_no_other() {
+        let mut lines = Lines::default();
+        let got = lines.feed(b"a\n\xff\xfe\nb\n\0\0\nc\n");
+        assert_eq!(got[2].text.as_deref(), Ok("b"));
+        assert_eq!(got[4].text.as_deref(), Ok("c"));
+        assert!(matches!(got[1].text, Err(LineFault::NotUtf8 { .. })));
+        assert_eq!(got[3].text, Err(LineFault::Nul));
+    }
+
+    #[test]
+    fn a_line_without_end_takes_no_more_memory_than_the_longest_line() {
+        let mut lines = Lines::default();
+        for _ in 0..1000 {
+            assert!(lines.feed(&[b'x'; 10_000]).is_empty());
+            assert!(lines.partial.capacity() <= 2 * LONGEST_LINE);
+        }
+        let got = lines.feed(b"\nnext\n");
+        assert_eq!(got[0].text, Err(LineFault::TooLong));
+        assert_eq!(got[1].text.as_deref(), Ok("next"));
+    }
+}

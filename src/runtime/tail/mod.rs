@@ -1,0 +1,112 @@
+//! Follows growing files: CSV line by line, MCAP record by record.
+//!
+//! [`lines`] and [`records`] are pure; [`Follower`] reads files when asked; [`follow`] is the
+//! asynchronous shell that asks: when a watched folder changes, and every two seconds in any case,
+//! because a watch can be lost, overflow, or never work on a network's file system.
+//!
+//! There are no saved offsets: a follower reads every file from its start, and whoever takes the
+//! values drops what it has seen.
+
+mod decode;
+mod file;
+mod follow;
+pub mod lines;
+pub mod records;
+
+pub use decode::Arrival;
+pub use follow::{Batch, Follower};
+
+use super::shutdown::Shutdown;
+use notify::{RecommendedWatcher, RecursiveMode, Watcher};
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::sync::{Notify, mpsc};
+use tokio::time::MissedTickBehavior;
+
+/// How often the files are looked at when nothing wakes us.
+const RESCAN: Duration = Duration::from_secs(2);
+
+/// After a change: how long the next ones are waited for, so that a busy writer costs one look.
+const SETTLE: Duration = Duration::from_millis(50);
+
+/// Follows until `shutdown` is asked for or nobody takes the batches any more.
+///
+/// Every round is sent, an empty one too: that the files hold no more is news.
+///
+/// # Errors
+/// When a reading task broke off.
+pub async fn follow(
+    mut follower: Follower,
+    batches: mpsc::Sender<Batch>,
+    mut shutdown: Shutdown,
+) -> Result<(), tokio::task::JoinError> {
+    let mut watch = Watch::new(follower.folders());
+    let mut rescan = tokio::time::interval(RESCAN);
+    rescan.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    loop {
+        watch.renew();
+        let batch;
+        (follower, batch) = tokio::task::spawn_blocking(move || {
+            let batch = follower.poll();
+            (follower, batch)
+        })
+        .await?;
+        let caught_up = batch.caught_up;
+        tokio::select! {
+            sent = batches.send(batch) => if sent.is_err() { return Ok(()) },
+            () = shutdown.requested() => return Ok(()),
+        }
+        if caught_up {
+            tokio::select! {
+                () = watch.wake.notified() => tokio::time::sleep(SETTLE).await,
+                _ = rescan.tick() => {}
+                () = shutdown.requested() => return Ok(()),
+            }
+        }
+    }
+}
+
+/// One watcher for all folders.
+#[derive(Debug)]
+struct Watch {
+    watcher: Option<RecommendedWatcher>,
+    unwatched: BTreeSet<PathBuf>,
+    wake: Arc<Notify>,
+}
+
+impl Watch {
+    fn new(folders: BTreeSet<PathBuf>) -> Self {
+        let wake = Arc::new(Notify::new());
+        let waker = Arc::clone(&wake);
+        let watcher = notify::recommended_watcher(move |event: notify::Result<notify::Event>| {
+            // Reading a file is an event too, and our own reading must not wake us.
+            if event.is_ok_and(|event| !event.kind.is_access()) {
+                waker.notify_one();
+            }
+        })
+        .inspect_err(|error| tracing::warn!(%error, "no watcher: files are looked at in turn"))
+        .ok();
+        Self {
+            watcher,
+            unwatched: folders,
+            wake,
+        }
+    }
+
+    /// Watches the folders that could not be watched so far.
+    fn renew(&mut self) {
+        let Some(watcher) = &mut self.watcher else {
+            return;
+        };
+        self.unwatched.retain(|folder| {
+            let watched = watcher.watch(folder, RecursiveMode::NonRecursive);
+            watched
+                .inspect_err(
+                    |error| tracing::debug!(folder = %folder.display(), %error, "not watched"),
+                )
+                .is_err()
+        });
+    }
+}

@@ -1,0 +1,224 @@
+//! Frames the records of an MCAP file while it is being written: bytes in, messages out.
+//!
+//! A record is taken only when it is whole, and a chunk only after its CRC. The writer of a
+//! seekable file leaves the length of the chunk it is filling at `u64::MAX` and comes back for it,
+//! so nothing of an unfinished record is kept: its header is read again each time.
+
+use mcap::records::{ChunkHeader, Record, op};
+use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::{McapError, parse_record};
+use std::collections::BTreeMap;
+
+/// What every MCAP file begins and ends with.
+pub const MAGIC: &[u8; 8] = b"\x89MCAP0\r\n";
+/// Opcode and length, before every record.
+pub const HEADER_BYTES: usize = 9;
+/// Longest record that is read into memory, and longest content of a chunk, bytes.
+pub const LONGEST_RECORD: u64 = 64 * 1024 * 1024;
+
+/// What stands at an offset.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Frame {
+    /// Nothing whole yet.
+    Wait,
+    /// A whole record to be read and handed to [`Channels::decode`].
+    Read {
+        /// Its kind.
+        opcode: u8,
+        /// Bytes after the header.
+        length: u64,
+    },
+    /// A whole record that has no messages.
+    Skip {
+        /// Bytes after the header.
+        length: u64,
+    },
+    /// The footer: nothing comes after it.
+    End,
+    /// A length that cannot be true; what comes after it cannot be found.
+    Damaged {
+        /// The length.
+        length: u64,
+    },
+}
+
+/// Says what to do with the record whose header is given and which is followed by `available` more
+/// bytes of the file.
+pub fn frame(header: [u8; HEADER_BYTES], available: u64) -> Frame {
+    let [opcode, length @ ..] = header;
+    let length = u64::from_le_bytes(length);
+    let needed = matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE | op::CHUNK);
+    if opcode == op::CHUNK && length == u64::MAX {
+        Frame::Wait
+    } else if needed && length > LONGEST_RECORD {
+        Frame::Damaged { length }
+    } else if length > available {
+        Frame::Wait
+    } else if opcode == op::FOOTER {
+        Frame::End
+    } else if needed {
+        Frame::Read { opcode, length }
+    } else {
+        Frame::Skip { length }
+    }
+}
+
+/// A message with what its channel says of it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RawMessage {
+    /// The channel's topic.
+    pub topic: String,
+    /// The channel's metadata.
+    pub metadata: BTreeMap<String, String>,
+    /// When it was measured, nanoseconds in the channel's time base.
+    pub publish_time: u64,
+    /// The message itself.
+    pub payload: Vec<u8>,
+}
+
+/// A record that cannot be used; the ones after it can.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordFault {
+    /// It contradicts itself or its CRC.
+    #[error("{0}")]
+    Broken(#[from] McapError),
+    /// A chunk that says it is larger than what is taken.
+    #[error("a chunk of {bytes} bytes, more than {LONGEST_RECORD}")]
+    Bomb {
+        /// How large it says it is.
+        bytes: u64,
+    },
+    /// A chunk whose header does not fit its content.
+    #[error("a chunk whose lengths contradict each other")]
+    Contradiction,
+    /// A message on a channel that the file has not described.
+    #[error("a message on the unknown channel {id}")]
+    UnknownChannel {
+        /// The channel's number.
+        id: u16,
+    },
+    /// A channel's number that now means another topic.
+    #[error("channel {id} was {before} and is now {after}")]
+    ChannelReused {
+        /// The channel's number.
+        id: u16,
+        /// Its topic before.
+        before: String,
+        /// Its topic now.
+        after: String,
+    },
+}
+
+/// The channels that the file has described so far.
+#[derive(Debug, Default)]
+pub struct Channels {
+    by_id: BTreeMap<u16, (String, BTreeMap<String, String>)>,
+}
+
+impl Channels {
+    /// The messages in one whole record.
+    ///
+    /// # Errors
+    /// [`RecordFault`]; the table of channels is as it was, or as far as the record was right.
+    pub fn decode(&mut self, opcode: u8, body: &[u8]) -> Result<Vec<RawMessage>, RecordFault> {
+        let mut messages = Vec::new();
+        if opcode == op::CHUNK {
+            for (opcode, body) in unpack(body)? {
+                self.take(opcode, &body, &mut messages)?;
+            }
+        } else {
+            self.take(opcode, body, &mut messages)?;
+        }
+        Ok(messages)
+    }
+
+    fn take(
+        &mut self,
+        opcode: u8,
+        body: &[u8],
+        messages: &mut Vec<RawMessage>,
+    ) -> Result<(), RecordFault> {
+        if opcode == op::CHANNEL
+            && let Record::Channel(channel) = parse_record(opcode, body)?
+        {
+            if let Some((before, _)) = self.by_id.get(&channel.id)
+                && *before != channel.topic
+            {
+                return Err(RecordFault::ChannelReused {
+                    id: channel.id,
+                    before: before.clone(),
+                    after: channel.topic,
+                });
+            }
+            let meaning = (channel.topic, channel.metadata);
+            self.by_id.insert(channel.id, meaning);
+        } else if opcode == op::MESSAGE
+            && let Record::Message { header, data } = parse_record(opcode, body)?
+        {
+            let id = header.channel_id;
+            let Some((topic, metadata)) = self.by_id.get(&id) else {
+                return Err(RecordFault::UnknownChannel { id });
+            };
+            messages.push(RawMessage {
+                topic: topic.clone(),
+                metadata: metadata.clone(),
+                publish_time: header.publish_time,
+                payload: data.into_owned(),
+            });
+        }
+        Ok(())
+    }
+}
+
+/// The records in a chunk, none of them handed out before the CRC of all is right.
+fn unpack(body: &[u8]) -> Result<Vec<(u8, Vec<u8>)>, RecordFault> {
+    let Record::Chunk { header, data } = parse_record(op::CHUNK, body)? else {
+        return Err(RecordFault::Contradiction);
+    };
+    distrust(&header, &data)?;
+    let limit = usize::try_from(LONGEST_RECORD).unwrap_or(usize::MAX);
+    let mut reader = LinearReader::new_with_options(
+        LinearReaderOptions::default()
+            .with_skip_start_magic(true)
+            .with_skip_end_magic(true)
+            .with_prevalidate_chunk_crcs(true)
+            .with_record_length_limit(limit),
+    );
+    let mut input = vec![op::CHUNK];
+    input.extend_from_slice(&(body.len() as u64).to_le_bytes());
+    input.extend_from_slice(body);
+    let mut rest = input.as_slice();
+    let mut records = Vec::new();
+    while let Some(event) = reader.next_event() {
+        match event? {
+            LinearReadEvent::ReadRequest(wanted) => {
+                let (now, later) = rest.split_at(wanted.min(rest.len()));
+                reader.insert(now.len()).copy_from_slice(now);
+                reader.notify_read(now.len());
+                rest = later;
+            }
+            LinearReadEvent::Record { data, opcode } => records.push((opcode, data.to_vec())),
+        }
+    }
+    Ok(records)
+}
+
+/// Checks what no CRC covers: the lengths in the header, before anything is allocated for them.
+fn distrust(header: &ChunkHeader, data: &[u8]) -> Result<(), RecordFault> {
+    if header.uncompressed_size > LONGEST_RECORD {
+        return Err(RecordFault::Bomb {
+            bytes: header.uncompressed_size,
+        });
+    }
+    if !header.compression.is_empty() {
+        return Ok(());
+    }
+    let mut rest = data;
+    while let Some((start, after)) = rest.split_first_chunk::<HEADER_BYTES>() {
+        let [_opcode, length @ ..] = *start;
+        let length = usize::try_from(u64::from_le_bytes(length)).unwrap_or(usize::MAX);
+        rest = after.get(length..).ok_or(RecordFault::Contradiction)?;
+    }
+    let whole = rest.is_empty() && header.uncompressed_size == data.len() as u64;
+    whole.then_some(()).ok_or(RecordFault::Contradiction)
+}

@@ -1,0 +1,199 @@
+//! What the site file may say, and the exact words when it is wrong.
+
+use slipwatch::alert::Level;
+use slipwatch::config::{self, ConfigError, SourceKind};
+use slipwatch::reading::BenchmarkId;
+use std::path::Path;
+
+const RIGHT: &str = r#"[site]
+name = "Toc"
+state_dir = "state"
+[[source]]
+id = "logger"
+kind = "csv"
+path = "incoming/*.csv"
+[[hook]]
+run = ["./notify.sh"]
+"#;
+
+fn problems(text: &str) -> Vec<String> {
+    match config::parse(text, Path::new("site.toml")) {
+        Err(ConfigError::Invalid { problems }) => {
+            problems.iter().map(ToString::to_string).collect()
+        }
+        other => panic!("taken as right: {other:?}"),
+    }
+}
+
+fn problem(addition: &str) -> String {
+    let mut problems = problems(&format!("{RIGHT}{addition}"));
+    assert_eq!(problems.len(), 1, "{problems:#?}");
+    problems.remove(0)
+}
+
+#[test]
+fn the_example_config_is_right_and_says_what_it_means() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("config/example.toml");
+    let config = config::load(&file).unwrap();
+    assert!(config.warnings.is_empty(), "{:?}", config.warnings);
+    assert_eq!(config.site.name, "Monte Toc");
+    assert_eq!(config.site.state_dir, file.parent().unwrap().join("state"));
+    assert_eq!(config.sources[1].kind, SourceKind::Mcap);
+    assert_eq!(config.benchmarks.len(), 3);
+    let policy = &config.settings.policy;
+    assert_eq!(policy.evacuation_time.as_hours(), 12);
+    assert!((policy.critical_velocity_mm_per_day - 1000.0).abs() < 1e-9);
+    assert_eq!(policy.thresholds.len(), 2);
+    assert_eq!(policy.thresholds[1].acceleration_mm_per_day2, Some(5.0));
+    let own = &config.settings.benchmarks[&BenchmarkId::new("upper")];
+    assert_eq!(own.evacuation_time.as_hours(), 6);
+    assert_eq!(own.thresholds, policy.thresholds, "inherited");
+    assert!(config.hooks[0].levels.contains(&Level::Unknown));
+    assert!(config.hooks[0].program().is_file(), "the sample hook");
+}
+
+#[test]
+fn the_least_config_is_taken_with_the_defaults() {
+    let config = config::parse(RIGHT, Path::new("site.toml")).unwrap();
+    assert_eq!(
+        config.settings,
+        slipwatch::monitor::Settings::default(),
+        "nothing given, nothing changed"
+    );
+    assert_eq!(config.hooks[0].timeout.as_secs(), 10);
+    assert!(config.benchmarks.is_empty());
+}
+
+#[test]
+fn a_column_that_does_not_say_its_unit_needs_one() {
+    assert_eq!(
+        problem("[[benchmark]]\nid = \"5\"\ncolumn = \"ext_1\"\n"),
+        "site.toml:12:10: error: benchmark.column = \"ext_1\" does not say its unit; \
+         add unit = \"mm\" or unit = \"mm_per_day\""
+    );
+    let unit = "[[benchmark]]\nid = \"5\"\ncolumn = \"ext_1\"\nunit = \"mm_per_h\"\n";
+    assert!(config::parse(&format!("{RIGHT}{unit}"), Path::new("site.toml")).is_ok());
+}
+
+#[test]
+fn a_bad_unit_is_named_with_its_line_and_the_fix() {
+    assert_eq!(
+        problem("[alert]\ncritical_velocity = \"1 furlong/day\"\n"),
+        "site.toml:11:21: error: alert.critical_velocity = \"1 furlong/day\" cannot be used; \
+         write a positive number and a unit: \"50 mm/day\" or \"1 m/day\""
+    );
+}
+
+#[test]
+fn an_unknown_key_is_refused_with_the_known_ones() {
+    assert_eq!(
+        problem("[alert]\nevacuation_tme = \"12h\"\n"),
+        "site.toml:11:1: error: unknown key alert.evacuation_tme; known here: evacuation_time, \
+         outlook, critical_velocity, steady_for, red_chance, orange_chance, yellow_chance, threshold"
+    );
+    assert_eq!(
+        problem("[allert]\n"),
+        "site.toml:10:2: error: unknown key allert; known here: site, source, alert, benchmark, \
+         event, hook"
+    );
+}
+
+#[test]
+fn an_id_that_is_there_twice_is_refused() {
+    assert_eq!(
+        problem("[[benchmark]]\nid = \"5\"\n[[benchmark]]\nid = \"5\"\n"),
+        "site.toml:13:6: error: benchmark.id = \"5\" is there twice; give each its own id"
+    );
+    assert_eq!(
+        problem("[[source]]\nid = \"logger\"\nkind = \"mcap\"\npath = \"x.mcap\"\n"),
+        "site.toml:11:6: error: source.id = \"logger\" is there twice; give each its own id"
+    );
+}
+
+#[test]
+fn a_benchmark_that_names_a_missing_source_is_refused() {
+    assert_eq!(
+        problem("[[benchmark]]\nid = \"5\"\nsource = \"lager\"\n"),
+        "site.toml:12:10: error: benchmark.source = \"lager\" is no [[source]]; \
+         known sources: logger"
+    );
+}
+
+#[test]
+fn a_duration_of_zero_is_refused() {
+    assert_eq!(
+        problem("[alert]\nevacuation_time = \"0h\"\n"),
+        "site.toml:11:19: error: alert.evacuation_time = \"0h\" cannot be used; \
+         write a duration longer than zero, such as \"12h\""
+    );
+    assert!(problem("timeout = \"0s\"\n").contains("site.toml:10:11: error: hook.timeout"));
+}
+
+#[test]
+fn a_kind_that_is_not_built_yet_says_so() {
+    assert_eq!(
+        problem("[[source]]\nid = \"b\"\nkind = \"mqtt\"\npath = \"x\"\n"),
+        "site.toml:12:8: error: source.kind = \"mqtt\" cannot be used; \
+         not yet supported; supported: csv, mcap"
+    );
+}
+
+#[test]
+fn all_problems_are_reported_together_in_the_order_of_the_file() {
+    let found = problems(
+        "[site]\nname = 5\n[[source]]\nid = \"a\"\nkind = \"csv\"\npath = \"in/*/*.csv\"\n\
+         [alert]\noutlook = \"30\"\nred_chance = 5\n[[hook]]\nrun = []\nlevels = [\"purple\"]\n",
+    );
+    let lines: Vec<&str> = found
+        .iter()
+        .map(|problem| problem.split(' ').next().unwrap())
+        .collect();
+    assert_eq!(
+        lines,
+        [
+            "site.toml:1:1:",
+            "site.toml:2:8:",
+            "site.toml:6:8:",
+            "site.toml:8:11:",
+            "site.toml:9:14:",
+            "site.toml:11:7:",
+            "site.toml:12:11:"
+        ],
+        "{found:#?}"
+    );
+}
+
+#[test]
+fn what_is_no_toml_is_reported_with_its_place() {
+    let found = problems("[site\nname = \"Toc\"\n");
+    assert!(found[0].starts_with("site.toml:1:6: error: "), "{found:?}");
+}
+
+#[test]
+fn a_policy_that_cannot_mean_anything_is_a_warning() {
+    let text = format!("{RIGHT}[alert]\nevacuation_time = \"40d\"\noutlook = \"30d\"\n");
+    let config = config::parse(&text, Path::new("site.toml")).unwrap();
+    assert_eq!(
+        config.warnings[0].to_string(),
+        "site.toml:11:19: warning: evacuation_time 960h is longer than outlook 720h: red would be \
+         called before orange; make outlook several times evacuation_time"
+    );
+}
+
+#[test]
+fn check_warns_when_the_sampling_cannot_protect_and_when_the_hook_is_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("site.toml");
+    let addition = "[[benchmark]]\nid = \"5\"\naveraging = \"24h\"\n\
+                    [alert]\nevacuation_time = \"12h\"\n";
+    std::fs::write(&file, format!("{RIGHT}{addition}")).unwrap();
+    let summary = config::check(&file).unwrap();
+    let warnings = summary.warnings.join("\n");
+    assert_eq!(summary.warnings.len(), 3, "{warnings}");
+    assert!(
+        warnings.contains("averaging 24h is not shorter"),
+        "{warnings}"
+    );
+    assert!(warnings.contains("there is no program"), "{warnings}");
+    assert!(warnings.contains("there is no folder"), "{warnings}");
+}

@@ -1,0 +1,299 @@
+//! Hooks that misbehave, run for real: each is a script in a temporary folder.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test fails by panicking"
+)]
+
+use slipwatch::alert::Level;
+use slipwatch::config::HookConfig;
+use slipwatch::monitor::{AlertState, Event, EventKind};
+use slipwatch::reading::BenchmarkId;
+use slipwatch::runtime::deliver::{Dispatcher, Retry};
+use slipwatch::runtime::delivered::Delivered;
+use slipwatch::runtime::hook::{self, Alert, Outcome, Status};
+use std::path::Path;
+use std::time::Duration;
+use tempfile::TempDir;
+
+const LIMIT: Duration = Duration::from_secs(60);
+
+fn alert_of(level: Level, key: &str, text: &str) -> Alert {
+    let event = Event {
+        time: "2017-06-06T17:00:00Z".parse().unwrap(),
+        benchmark: Some(BenchmarkId::new("5")),
+        kind: EventKind::Alert {
+            level,
+            state: AlertState::Firing,
+            key: key.to_owned(),
+            rule: "chance".to_owned(),
+            text: text.to_owned(),
+        },
+    };
+    let failure_time = Some("2017-06-07T12:00:00Z".parse().unwrap());
+    Alert::new(&event, "Monte Toc", failure_time, Status::Actual).unwrap()
+}
+
+fn alert() -> Alert {
+    alert_of(Level::Red, "toc/5/red/1", "red at 5")
+}
+
+/// A hook that runs `script` with sh in a folder of its own.
+fn hook(script: &str) -> (TempDir, HookConfig) {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("hook.sh"), script).unwrap();
+    let config = HookConfig {
+        run: vec!["/bin/sh".to_owned(), "hook.sh".to_owned()],
+        levels: vec![Level::Orange, Level::Red],
+        timeout: Duration::from_secs(30),
+        folder: folder.path().to_owned(),
+    };
+    (folder, config)
+}
+
+fn read(folder: &TempDir, name: &str) -> String {
+    std::fs::read_to_string(folder.path().join(name)).unwrap_or_default()
+}
+
+fn is_running(pid: &str) -> bool {
+    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
+    !stat.is_empty() && !stat.contains(") Z ")
+}
+
+/// Waits until `claim` holds; how long that takes is not what is tested.
+async fn eventually(what: &str, mut claim: impl FnMut() -> bool) {
+    for _ in 0..3000 {
+        if claim() {
+            return;
+        }
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    panic!("never: {what}");
+}
+
+async fn run(hook_config: &HookConfig, alert: &Alert) -> Outcome {
+    tokio::time::timeout(LIMIT, hook::run(hook_config, alert, 1))
+        .await
+        .expect("the hook's run never ended")
+}
+
+#[tokio::test]
+async fn a_hook_gets_the_documented_environment_and_the_alert_on_stdin() {
+    let (folder, config) = hook("env > env; cat > stdin");
+    assert_eq!(run(&config, &alert()).await, Outcome::Done);
+    let env = read(&folder, "env");
+    for line in [
+        "SLIPWATCH_EVENT=alert",
+        "SLIPWATCH_KEY=toc/5/red/1",
+        "SLIPWATCH_SITE=Monte Toc",
+        "SLIPWATCH_BENCHMARK=5",
+        "SLIPWATCH_LEVEL=red",
+        "SLIPWATCH_STATE=firing",
+        "SLIPWATCH_TIME=2017-06-06T17:00:00Z",
+        "SLIPWATCH_FAILURE_TIME=2017-06-07T12:00:00Z",
+        "SLIPWATCH_ATTEMPT=1",
+        "SLIPWATCH_STATUS=Actual",
+    ] {
+        assert!(env.lines().any(|had| had == line), "{line} not in\n{env}");
+    }
+    // What the shell itself sets is not ours.
+    let allowed = ["PATH", "HOME", "LANG", "TZ", "PWD", "OLDPWD", "SHLVL", "_"];
+    for line in env.lines() {
+        let name = line.split('=').next().unwrap();
+        assert!(
+            name.starts_with("SLIPWATCH_") || allowed.contains(&name),
+            "{name} leaked"
+        );
+    }
+    let stdin = read(&folder, "stdin");
+    assert_eq!(stdin.lines().count(), 1);
+    let body: serde_json::Value = serde_json::from_str(&stdin).unwrap();
+    for (key, value) in [
+        ("event", "alert"),
+        ("benchmark", "5"),
+        ("level", "red"),
+        ("state", "firing"),
+        ("key", "toc/5/red/1"),
+        ("status", "Actual"),
+        ("failure_time", "2017-06-07T12:00:00Z"),
+    ] {
+        assert_eq!(body[key], value, "{key}");
+    }
+    assert_eq!(body["attempt"], 1);
+}
+
+#[tokio::test]
+async fn a_hook_that_hangs_is_killed_with_its_children() {
+    let (folder, mut config) = hook("sleep 90 & echo $! > pid; wait");
+    config.timeout = Duration::from_secs(2);
+    assert_eq!(run(&config, &alert()).await, Outcome::TimedOut);
+    let pid = read(&folder, "pid").trim().to_owned();
+    assert!(!pid.is_empty(), "the script had no time to start");
+    eventually("the child's end", || !is_running(&pid)).await;
+}
+
+#[tokio::test]
+async fn a_hook_that_ignores_a_long_stdin_blocks_nothing() {
+    let (_folder, config) = hook("exit 0");
+    let long = alert_of(Level::Red, "k", &"x".repeat(200_000));
+    assert_eq!(run(&config, &long).await, Outcome::Done);
+    let (_folder, mut config) = hook("sleep 90");
+    config.timeout = Duration::from_millis(300);
+    assert_eq!(run(&config, &long).await, Outcome::TimedOut);
+}
+
+#[tokio::test]
+async fn a_hook_that_floods_stdout_runs_to_its_end() {
+    let (folder, config) = hook("head -c 5000000 /dev/zero; echo done > end");
+    assert_eq!(run(&config, &alert()).await, Outcome::Done);
+    assert_eq!(read(&folder, "end"), "done\n");
+}
+
+#[tokio::test]
+async fn a_grandchild_that_holds_stdout_open_is_not_waited_for() {
+    let (folder, config) = hook("sleep 90 & echo $! > pid; exit 0");
+    assert_eq!(run(&config, &alert()).await, Outcome::Done);
+    let pid = read(&folder, "pid").trim().to_owned();
+    assert!(is_running(&pid), "it was to outlive the hook");
+    let status = std::process::Command::new("kill").arg(&pid).status();
+    assert!(status.unwrap().success());
+}
+
+#[tokio::test]
+async fn a_hook_that_is_missing_or_not_executable_is_not_started() {
+    let (folder, mut config) = hook("");
+    config.run = vec!["./nowhere.sh".to_owned()];
+    let outcome = run(&config, &alert()).await;
+    assert!(
+        matches!(&outcome, Outcome::NotStarted(why) if why.contains("nowhere.sh")),
+        "{outcome:?}"
+    );
+    std::fs::write(folder.path().join("plain.sh"), "#!/bin/sh\n").unwrap();
+    config.run = vec!["./plain.sh".to_owned()];
+    let outcome = run(&config, &alert()).await;
+    assert!(
+        matches!(&outcome, Outcome::NotStarted(why) if why.contains("denied")),
+        "{outcome:?}"
+    );
+}
+
+#[tokio::test]
+async fn an_exit_code_and_a_signal_are_told_apart() {
+    let (_folder, config) = hook("exit 7");
+    assert_eq!(run(&config, &alert()).await, Outcome::Failed(7));
+    let (_folder, config) = hook("kill -9 $$");
+    assert_eq!(run(&config, &alert()).await, Outcome::Signalled(9));
+}
+
+fn quick_retry() -> Retry {
+    Retry {
+        attempts: 5,
+        first_delay: Duration::from_millis(10),
+        ..Retry::default()
+    }
+}
+
+#[tokio::test]
+async fn a_hook_that_fails_is_tried_again_with_the_same_key() {
+    let (folder, config) = hook(
+        "echo $SLIPWATCH_ATTEMPT $SLIPWATCH_KEY >> calls\n[ $SLIPWATCH_ATTEMPT -ge 3 ] || exit 1",
+    );
+    let dispatcher = Dispatcher::start(&[config], &quick_retry(), Delivered::default());
+    dispatcher.offer(&alert());
+    eventually("three calls", || {
+        read(&folder, "calls").lines().count() == 3
+    })
+    .await;
+    assert_eq!(dispatcher.close(LIMIT).await, Some(0));
+    assert_eq!(
+        read(&folder, "calls"),
+        "1 toc/5/red/1\n2 toc/5/red/1\n3 toc/5/red/1\n"
+    );
+}
+
+#[tokio::test]
+async fn an_alert_that_waits_for_its_retry_holds_up_no_other() {
+    let (folder, config) =
+        hook("echo $SLIPWATCH_KEY >> calls; [ $SLIPWATCH_KEY != first ] || exit 1");
+    let slow = Retry {
+        first_delay: Duration::from_secs(3600),
+        longest_delay: Duration::from_secs(3600),
+        ..Retry::default()
+    };
+    let dispatcher = Dispatcher::start(&[config], &slow, Delivered::default());
+    dispatcher.offer(&alert_of(Level::Orange, "first", ""));
+    eventually("the first call", || read(&folder, "calls") == "first\n").await;
+    dispatcher.offer(&alert_of(Level::Red, "second", ""));
+    eventually("the second call", || {
+        read(&folder, "calls") == "first\nsecond\n"
+    })
+    .await;
+    // On the way out the waiting one gets a last chance.
+    assert_eq!(dispatcher.close(LIMIT).await, Some(1));
+    assert_eq!(read(&folder, "calls"), "first\nsecond\nfirst\n");
+}
+
+#[tokio::test]
+async fn only_the_levels_that_a_hook_asks_for_reach_it() {
+    let (folder, config) = hook("echo $SLIPWATCH_LEVEL >> calls");
+    let dispatcher = Dispatcher::start(&[config], &quick_retry(), Delivered::default());
+    for level in [Level::Yellow, Level::Orange, Level::Unknown, Level::Red] {
+        dispatcher.offer(&alert_of(level, level.name(), ""));
+    }
+    assert_eq!(dispatcher.close(LIMIT).await, Some(0));
+    assert_eq!(read(&folder, "calls"), "orange\nred\n");
+}
+
+async fn deliver_once(config: &HookConfig, receipts: &Path) {
+    let delivered = Delivered::open(receipts).unwrap();
+    let dispatcher = Dispatcher::start(std::slice::from_ref(config), &quick_retry(), delivered);
+    dispatcher.offer(&alert());
+    assert_eq!(dispatcher.close(LIMIT).await, Some(0));
+}
+
+#[tokio::test]
+async fn what_a_hook_has_taken_is_not_sent_again_after_a_restart() {
+    let (folder, config) = hook("echo call >> calls");
+    let receipts = folder.path().join("delivered.ndjson");
+    deliver_once(&config, &receipts).await;
+    deliver_once(&config, &receipts).await;
+    assert_eq!(read(&folder, "calls"), "call\n");
+    // The same alert at another hook is another delivery.
+    let mut other = config.clone();
+    other.run.push("--other".to_owned());
+    deliver_once(&other, &receipts).await;
+    assert_eq!(read(&folder, "calls"), "call\ncall\n");
+}
+
+#[tokio::test]
+async fn closing_does_not_wait_longer_than_its_limit_and_leaves_nothing_running() {
+    let (folder, config) = hook("sleep 90 & echo $! > pid; wait");
+    let dispatcher = Dispatcher::start(&[config], &quick_retry(), Delivered::default());
+    dispatcher.offer(&alert());
+    eventually("the hook's start", || read(&folder, "pid").ends_with('\n')).await;
+    assert_eq!(dispatcher.close(Duration::from_millis(100)).await, None);
+    let pid = read(&folder, "pid").trim().to_owned();
+    eventually("the child's end", || !is_running(&pid)).await;
+}
+
+#[test]
+fn the_sample_hook_says_it_in_one_line_for_a_person() {
+    let sample = Path::new(env!("CARGO_MANIFEST_DIR")).join("deploy/notify.sh");
+    let output = std::process::Command::new(sample)
+        .env("SLIPWATCH_STATUS", "Test")
+        .env("SLIPWATCH_SITE", "Monte Toc")
+        .env("SLIPWATCH_LEVEL", "red")
+        .env("SLIPWATCH_STATE", "firing")
+        .env("SLIPWATCH_BENCHMARK", "5")
+        .env("SLIPWATCH_TIME", "2017-06-06T17:00:00Z")
+        .env("SLIPWATCH_FAILURE_TIME", "")
+        .stdin(std::process::Stdio::null())
+        .output()
+        .unwrap();
+    assert_eq!(
+        String::from_utf8(output.stdout).unwrap(),
+        "[Test] Monte Toc: red firing at benchmark 5, 2017-06-06T17:00:00Z, \
+         failure expected unknown\n"
+    );
+}
