@@ -37,9 +37,15 @@ fn vaiont_reconstruction_5_and_63_fail_within_three_days_of_the_intercept_from_t
             if days_before(vaiont_intercept(), refit.time) > 10.0 {
                 continue;
             }
-            let median = refit.median.unwrap_or_else(|| panic!("{id}: no failure at {}", refit.time));
+            let median = refit
+                .median
+                .unwrap_or_else(|| panic!("{id}: no failure at {}", refit.time));
             let error = days_before(vaiont_intercept(), median);
-            assert!(error.abs() <= 3.0, "{id} at {}: {median}, {error:.2} d early", refit.time);
+            assert!(
+                error.abs() <= 3.0,
+                "{id} at {}: {median}, {error:.2} d early",
+                refit.time
+            );
             seen += 1;
         }
         assert!(seen >= 7, "{id}: {seen} refits in the last ten days");
@@ -51,8 +57,13 @@ fn vaiont_reconstruction_5_and_63_are_orange_ten_days_before_and_red_before_the_
     for id in ["5", "63"] {
         let crisis = vaiont(id);
         let orange = crisis.first(Level::Orange).unwrap();
-        assert!(days_before(vaiont_intercept(), orange) >= 10.0, "{id}: orange only at {orange}");
-        let red = crisis.first(Level::Red).unwrap_or_else(|| panic!("{id}: never red"));
+        assert!(
+            days_before(vaiont_intercept(), orange) >= 10.0,
+            "{id}: orange only at {orange}"
+        );
+        let red = crisis
+            .first(Level::Red)
+            .unwrap_or_else(|| panic!("{id}: never red"));
         assert!(days_before(vaiont_intercept(), red) > 0.0, "{id}: {red}");
         assert_eq!(crisis.last_level(), Level::Red, "{id}");
     }
@@ -66,9 +77,15 @@ fn vaiont_reconstruction_67_and_50_have_their_intercept_within_three_days_by_the
             if days_before(vaiont_intercept(), refit.time) > 7.0 {
                 continue;
             }
-            let intercept = refit.intercept.unwrap_or_else(|| panic!("{id}: no line at {}", refit.time));
+            let intercept = refit
+                .intercept
+                .unwrap_or_else(|| panic!("{id}: no line at {}", refit.time));
             let error = days_before(vaiont_intercept(), intercept);
-            assert!(error.abs() <= 3.0, "{id} at {}: {intercept}, {error:.2} d early", refit.time);
+            assert!(
+                error.abs() <= 3.0,
+                "{id} at {}: {intercept}, {error:.2} d early",
+                refit.time
+            );
             seen += 1;
         }
         assert!(seen >= 4, "{id}: {seen} refits in the last week");
@@ -95,13 +112,21 @@ fn no_century_south_west_prism_is_ever_red() {
     assert_eq!(all.len(), 11);
     for prism in &all {
         let crisis = Crisis::play(prism, &policy(24));
-        assert_eq!(crisis.first(Level::Red), None, "{}: {:?}", prism.benchmark, crisis.levels());
+        assert_eq!(
+            crisis.first(Level::Red),
+            None,
+            "{}: {:?}",
+            prism.benchmark,
+            crisis.levels()
+        );
     }
 }
 
 #[test]
 fn lanzada_f1_turns_red_between_48_and_6_hours_before_the_collapse_and_stays_red() {
-    let Some(path) = measured::measured("lanzada_2025_f1.csv") else { return };
+    let Some(path) = measured::measured("lanzada_2025_f1.csv") else {
+        return;
+    };
     let collapse: Timestamp = "2025-11-11T08:15:00+01:00".parse().unwrap();
     let all = series(&path, Some(SignedDuration::from_hours(1)));
     let crisis = Crisis::play(&all[0], &policy(12));

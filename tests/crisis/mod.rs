@@ -23,24 +23,38 @@ pub struct Refit {
 
 /// All series of a file, each velocity the mean of `averaging` where given.
 pub fn series(path: &Path, averaging: Option<jiff::SignedDuration>) -> Vec<Series> {
-    let options = ReadOptions { averaging, ..ReadOptions::default() };
-    read_files(&[path.to_path_buf()], &options).unwrap().0.series
+    let options = ReadOptions {
+        averaging,
+        ..ReadOptions::default()
+    };
+    read_files(&[path.to_path_buf()], &options)
+        .unwrap()
+        .0
+        .series
 }
 
 /// A file of the project's own recordings.
 pub fn recording(name: &str) -> std::path::PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings").join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("recordings")
+        .join(name)
 }
 
 /// The default policy with another evacuation time.
 pub fn policy(evacuation_hours: i64) -> Policy {
-    Policy { evacuation_time: jiff::SignedDuration::from_hours(evacuation_hours), ..Policy::default() }
+    Policy {
+        evacuation_time: jiff::SignedDuration::from_hours(evacuation_hours),
+        ..Policy::default()
+    }
 }
 
 impl Crisis {
     /// Plays one series, and lets the deadlines between its readings pass.
     pub fn play(series: &Series, policy: &Policy) -> Self {
-        let mut monitor = Monitor::new(Settings { policy: policy.clone(), ..Settings::default() });
+        let mut monitor = Monitor::new(Settings {
+            policy: policy.clone(),
+            ..Settings::default()
+        });
         let mut events = Vec::new();
         for reading in &series.readings {
             while let Some(due) = monitor.next_deadline().filter(|due| *due <= reading.time) {
@@ -67,7 +81,13 @@ impl Crisis {
 
     pub fn refits(&self) -> Vec<Refit> {
         let refit = |event: &Event| match &event.kind {
-            EventKind::Refit { regime, failure_time, inverse_velocity, chance_within_evacuation_time, .. } => {
+            EventKind::Refit {
+                regime,
+                failure_time,
+                inverse_velocity,
+                chance_within_evacuation_time,
+                ..
+            } => {
                 let stable = slipwatch::regime::Regime::StableAccelerating;
                 Some(Refit {
                     time: event.time,
@@ -96,7 +116,10 @@ impl Crisis {
         let entered = |(_, l, state): &(Timestamp, Level, AlertState)| {
             *l >= level && *l != Level::Unknown && *state == AlertState::Firing
         };
-        self.levels().into_iter().find(entered).map(|(time, ..)| time)
+        self.levels()
+            .into_iter()
+            .find(entered)
+            .map(|(time, ..)| time)
     }
 
     /// The level in force at the end.

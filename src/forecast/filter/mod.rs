@@ -76,7 +76,7 @@ impl Filter {
 
     fn start(&mut self, observations: &Observations) {
         let first = &observations.values[..READINGS_FOR_PRIOR];
-        let reset = Reset::from_first(observations.quantity, first);
+        let reset = Reset::from_first(&how(observations), first);
         self.particles = (0..PARTICLES)
             .map(|_| Particle::draw(&reset, &mut self.generator))
             .collect();
@@ -87,10 +87,7 @@ impl Filter {
 
     fn take(&mut self, observations: &Observations, index: usize) -> f64 {
         let newest = &observations.values[index];
-        let dynamics = Dynamics {
-            quantity: observations.quantity,
-            averaging_days: observations.averaging_days,
-        };
+        let dynamics = how(observations);
         let days = newest.t_days - self.now_days;
         let suggested = suggested(observations, index);
         let mut total = 0.0;
@@ -175,6 +172,13 @@ impl Filter {
             reached += weight;
             (reached >= 0.5).then_some(velocity)
         })
+    }
+}
+
+fn how(observations: &Observations) -> Dynamics {
+    Dynamics {
+        quantity: observations.quantity,
+        averaging_days: observations.averaging_days,
     }
 }
 
