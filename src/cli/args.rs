@@ -35,7 +35,7 @@ pub struct FileArgs {
     /// Each velocity is the mean of so long a time before it, such as 1h
     #[arg(long, value_name = "DURATION", value_parser = value::duration)]
     pub averaging: Option<SignedDuration>,
-    /// Day 0 of a t_days column
+    /// Day 0 of a column `t_days`
     #[arg(long, value_name = "TIME", default_value = "2000-01-01T00:00:00Z")]
     pub epoch: Timestamp,
 }

@@ -76,7 +76,7 @@ fn code_of(error: &(dyn Error + 'static)) -> Option<u8> {
 }
 
 fn is_broken_pipe(error: &anyhow::Error) -> bool {
-    let of_a_file = error.chain().any(|cause| cause.is::<IngestError>());
+    let of_a_file = error.is::<IngestError>();
     let broken = |cause: &(dyn Error + 'static)| {
         let io = cause.downcast_ref::<io::Error>();
         let json = cause.downcast_ref::<serde_json::Error>();

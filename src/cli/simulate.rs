@@ -6,19 +6,14 @@ use crate::regime::Regime;
 use serde::Serialize;
 use std::io::{self, Write};
 
-/// Solve the law: CSV of t (days), x (theta/theta_i at m = 1), velocity, displacement
+/// Solve the law: CSV of t (days), x (`theta/theta_i` at m = 1), velocity, displacement
 ///
 /// From the singularity on there is no motion: the values are empty (CSV) or null (JSON).
 #[derive(Debug, clap::Args)]
 #[command(allow_negative_numbers = true)]
 pub(super) struct Args {
-    /// m = B/A, neither 0 nor 1
-    #[arg(
-        long,
-        value_name = "M",
-        required_unless_present = "s_theta",
-        conflicts_with = "s_theta"
-    )]
+    /// m = B/A; 0 makes no law, and 1 needs --s-theta
+    #[arg(long, value_name = "M", required_unless_present = "s_theta")]
     m: Option<f64>,
     /// The initial state
     #[arg(
@@ -28,10 +23,10 @@ pub(super) struct Args {
         conflicts_with = "s_theta"
     )]
     x_i: Option<f64>,
-    /// m = 1: the control parameter S theta_i, which takes the place of m and x_i
+    /// m = 1: the control parameter S `theta_i`, which takes the place of `x_i`
     #[arg(long, value_name = "S")]
     s_theta: Option<f64>,
-    /// The time unit T in days; at m = 1 the contacts' initial age theta_i
+    /// The time unit T in days; at m = 1 the contacts' initial age `theta_i`
     #[arg(long, value_name = "T", default_value_t = 1.0)]
     t_unit_days: f64,
     /// The velocity scale D; at m = 1 the initial velocity
@@ -90,6 +85,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
 
 fn law(args: &Args) -> anyhow::Result<Law> {
     Ok(match (args.s_theta, args.m, args.x_i) {
+        (Some(_), Some(m), _) if (m - 1.0).abs() >= f64::EPSILON => {
+            let problem = format!("--m: found {m}, expected 1 or none beside --s-theta");
+            return Err(UsageError(problem).into());
+        }
         (Some(s_theta), ..) => Law::at_unit_m(s_theta, args.t_unit_days, args.scale)?,
         (None, Some(m), Some(x_i)) => Law::from_paper(m, x_i, args.t_unit_days, args.scale)?,
         (None, ..) => {
