@@ -55,9 +55,4 @@ impl Silence {
         self.silent = true;
         self.newest
     }
-
-    /// Whether the benchmark is silent.
-    pub(super) fn is_silent(&self) -> bool {
-        self.silent
-    }
 }
