@@ -221,10 +221,15 @@ impl Law {
         Some(tail::days_between(self, 0.0, ln_y)).filter(|days| days.is_finite())
     }
 
-    /// Days from t = 0 to the velocity's inflection; `None` where there is none after it.
+    /// Days from t = 0 to the velocity's inflection, negative where it is past; `None` where there is none.
     pub fn transition_days(&self) -> Option<f64> {
-        let ln_y = self.ln_y_transition().filter(|ln_y| *ln_y < 0.0)?;
-        self.days_to_velocity(self.v_i * (-ln_y).exp())
+        let ln_y = self.ln_y_transition()?;
+        if ln_y <= 0.0 {
+            return self.days_to_velocity(self.v_i * (-ln_y).exp());
+        }
+        let past = self.r > 0.0 && self.slope(ln_y.exp()) < 0.0;
+        past.then(|| -tail::days_between(self, ln_y, 0.0))
+            .filter(|days| days.is_finite())
     }
 
     /// The same motion seen backwards in time.
