@@ -134,11 +134,14 @@ impl Track {
         let intercept = line
             .and_then(|line| line.intercept_days)
             .filter(|days| *days > now - 1.0 && *days < now + FARTHEST_INTERCEPT * length);
+        // An inflection is a prediction only while it lies ahead of a slope that accelerates.
+        let accelerating = report(outlook).probability_accelerating > 0.7;
         let transition = outlook
             .law
+            .filter(|_| accelerating)
             .and_then(|law| law.transition_days())
             .map(|days| now + days)
-            .filter(|days| *days > now - length && *days < now + FARTHEST_INTERCEPT * length);
+            .filter(|days| *days > now && *days < now + FARTHEST_INTERCEPT * length);
         let mut events =
             vec![self.refit_event(policy, time, outlook, (line, intercept, transition))];
         events.extend(self.flip(policy, time, outlook));

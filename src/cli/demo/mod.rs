@@ -10,7 +10,6 @@ use crate::config::HookConfig;
 use crate::monitor::{Event, Settings};
 use crate::reading::Recording;
 use crate::runtime::ingest::{ReadOptions, read_files};
-use crate::runtime::log::{self, LogFormat};
 use crate::runtime::replay::{self, Pace, Plan};
 use crate::runtime::shutdown::Shutdown;
 use anyhow::Context;
@@ -38,7 +37,6 @@ const TOLD: &str = "told.txt";
 
 /// Plays every crisis, then the table.
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
-    log::init(LogFormat::Text);
     let folder = tempfile::tempdir().context("cannot make a folder for the demo's state")?;
     let mut out = io::stdout().lock();
     let mut table = vec![verdict::HEAD.to_owned()];

@@ -25,7 +25,7 @@ pub(super) struct Timeline {
 }
 
 /// The columns' heads.
-pub(super) const HEAD: &str = "t_max       point    v mm/day  regime (probability)          failure: median [5 % .. 95 %] chance   1/v is zero  level";
+pub(super) const HEAD: &str = "t_max       point    v mm/day  regime (probability)          failure: median [5 % .. 95 %]          1/v is zero  level";
 
 impl Timeline {
     pub(super) fn new(crisis: &Crisis, readings: usize) -> Self {
