@@ -34,17 +34,32 @@ fn what(kind: &EventKind) -> String {
             from,
             to,
             drift_days_per_day,
-            ..
-        } => drift(
-            "inverse-velocity intercept",
-            (*from, *to),
-            *drift_days_per_day,
-        ),
+            expected_days_per_day,
+        } => {
+            let expected = expected_days_per_day.map_or_else(String::new, |drift| {
+                format!("; the fitted law expects {drift:+.2}")
+            });
+            drift(
+                "inverse-velocity intercept",
+                (*from, *to),
+                *drift_days_per_day,
+            ) + &expected
+        }
         EventKind::TransitionDrift {
             from,
             to,
             drift_days_per_day,
         } => drift("transition time", (*from, *to), *drift_days_per_day),
+        EventKind::UnexplainedResidual {
+            surprise_nats,
+            velocity_mm_per_day,
+        } => {
+            let velocity =
+                velocity_mm_per_day.map_or_else(String::new, |v| format!(", {v:.3} mm/day"));
+            format!(
+                "unexplained residual: e^{surprise_nats:.0} times less likely than the usual reading{velocity}"
+            )
+        }
         EventKind::Alert {
             level, state, text, ..
         } => {

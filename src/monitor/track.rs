@@ -145,6 +145,17 @@ impl Track {
         let mut events =
             vec![self.refit_event(policy, time, outlook, (line, intercept, transition))];
         events.extend(self.flip(policy, time, outlook));
+        if let Some(surprise_nats) = outlook.surprise_nats {
+            self.look_until(policy, time, "unexplained-residual");
+            let velocity_mm_per_day = outlook.rates.last().map(|rate| rate.velocity);
+            events.push(self.event(
+                time,
+                EventKind::UnexplainedResidual {
+                    surprise_nats,
+                    velocity_mm_per_day,
+                },
+            ));
+        }
         let least = (length / 40.0).max(0.02);
         if let Some(moved) = self.intercept.update(now, intercept, least) {
             let expected = outlook

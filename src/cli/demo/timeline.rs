@@ -99,6 +99,14 @@ impl Timeline {
                 day(*from),
                 day(*to)
             )),
+            EventKind::UnexplainedResidual {
+                velocity_mm_per_day,
+                ..
+            } => Some(format!(
+                "{}  {id:<8}   a reading that nobody expected: {:.1} mm/day",
+                day(event.time),
+                velocity_mm_per_day.unwrap_or(f64::NAN)
+            )),
             EventKind::Fault { kind, .. } => {
                 Some(format!("{}  {id:<8}   fault: {kind}", day(event.time)))
             }
