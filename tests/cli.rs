@@ -7,6 +7,7 @@ use assert_cmd::assert::Assert;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::fs::{self, OpenOptions};
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -363,7 +364,7 @@ fn site(folder: &Path) -> (PathBuf, PathBuf) {
     let mut text = "time,displacement_mm\n".to_owned();
     for day in 1..=30 {
         let slip = f64::from(day) * 0.5 + f64::from(day % 3) * 0.01;
-        text.push_str(&format!("2020-01-{day:02}T00:00:00Z,{slip}\n"));
+        writeln!(text, "2020-01-{day:02}T00:00:00Z,{slip}").unwrap();
     }
     fs::write(&readings, text).unwrap();
     let config = folder.join("site.toml");

@@ -6,7 +6,7 @@ use crate::reading::Timestamp;
 /// One event on one line: when, where, what.
 pub(super) fn line(event: &Event) -> String {
     let place = event.benchmark.as_ref().map_or("site", |id| id.as_str());
-    format!("{}  {place}  {}", event.time, what(&event.kind))
+    format!("{}  {place}  {}", minute(event.time), what(&event.kind))
 }
 
 fn what(kind: &EventKind) -> String {
@@ -79,13 +79,14 @@ fn what(kind: &EventKind) -> String {
 }
 
 fn drift(name: &str, (from, to): (Timestamp, Timestamp), days_per_day: f64) -> String {
+    let (from, to) = (minute(from), minute(to));
     format!("{name} drifts: {from} to {to} ({days_per_day:+.2} days a day)")
 }
 
 fn forecast(failure: &FailureTime) -> String {
     let chance = 100.0 * failure.probability;
     let horizon = failure.horizon_days;
-    let bound = |time: Option<Timestamp>| time.map_or("never".to_owned(), |time| time.to_string());
+    let bound = |time: Option<Timestamp>| time.map_or("later".to_owned(), minute);
     match failure.median.or(failure.low) {
         None => format!("no failure foreseen ({chance:.0} % within {horizon:.0} days)"),
         Some(_) => format!(
@@ -95,4 +96,9 @@ fn forecast(failure: &FailureTime) -> String {
             bound(failure.high)
         ),
     }
+}
+
+/// To the minute: people read this, and no forecast is finer.
+fn minute(time: Timestamp) -> String {
+    time.strftime("%Y-%m-%d %H:%MZ").to_string()
 }
