@@ -7,6 +7,11 @@ use crate::model::{Accuracy, Law, Trajectory};
 /// Refits before anything is announced.
 const FEWEST: usize = 5;
 
+/// Refits in a row that must agree that it moved.
+const AGREEING: u32 = 3;
+/// A law whose own line would run faster than this says nothing of it, days a day.
+const FASTEST_EXPECTED: f64 = 10.0;
+
 /// A predicted time that moved.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Moved {
@@ -22,6 +27,8 @@ pub(super) struct Moved {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Drift {
     refits: usize,
+    /// Refits in a row at which it stood later (positive) or earlier (negative) by enough.
+    agreeing: i32,
     /// (t_max, predicted) at the last announcement, days.
     announced: Option<(f64, f64)>,
 }
@@ -48,9 +55,16 @@ impl Drift {
             return None;
         };
         let enough = least.max(0.25 * (from_days - t_max).abs());
-        if (to_days - from_days).abs() < enough || t_max <= since {
+        let moved = to_days - from_days;
+        self.agreeing = match (moved >= enough, moved <= -enough) {
+            (true, _) => self.agreeing.max(0) + 1,
+            (_, true) => self.agreeing.min(0) - 1,
+            (false, false) => 0,
+        };
+        if self.agreeing.unsigned_abs() < AGREEING || t_max <= since {
             return None;
         }
+        self.agreeing = 0;
         self.announced = Some((t_max, to_days));
         Some(Moved {
             from_days,
@@ -76,7 +90,7 @@ pub(super) fn expected_by_the_law(law: &Law, rates: &[Rate], now_days: f64) -> O
         let points: Option<Vec<(f64, f64)>> = points.collect();
         InverseVelocityLine::through(&points?)?.intercept_days
     };
-    Some((line(later)? - line(0.0)?) / later).filter(|drift| drift.is_finite())
+    Some((line(later)? - line(0.0)?) / later).filter(|drift| drift.abs() <= FASTEST_EXPECTED)
 }
 
 #[cfg(test)]
