@@ -246,7 +246,7 @@ impl<'a> Problem<'a> {
         let optimum = least_squares::minimise(
             nalgebra::SVector::<f64, N>::from_fn(|i, _| start[i]),
             count + 2,
-            80,
+            &least_squares::Limits::evaluations(80),
             |at, out| {
                 let at = widen(at);
                 if !self.predict(&self.law(&at, 0.0), &mut predicted) {
