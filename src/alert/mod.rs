@@ -2,6 +2,10 @@
 //!
 //! This module never sees a parameter of the law, only chances and observed motion.
 
+mod latch;
 mod policy;
+mod rules;
 
+pub use latch::{Entered, Latch, Transition};
 pub use policy::{Level, Policy, Threshold};
+pub use rules::{Call, Evidence};

@@ -1,19 +1,27 @@
 //! `check CONFIG`: whether the site file is right.
 
+use super::args::{Format, OutputArgs};
 use super::exit;
 use crate::config::{self, ConfigError};
 use std::io::Write;
-use std::path::Path;
-use std::process::ExitCode;
+use std::path::PathBuf;
 
-/// Checks the site file `file` and says what it amounts to: 0 when it is right, 78 when it is not
-/// or cannot be read. Warnings and problems go to stderr; with `json` the problems to stdout as well.
-///
-/// # Errors
-/// When the result cannot be written.
-pub fn run(file: &Path, json: bool) -> anyhow::Result<ExitCode> {
+/// Check a site's config and say everything that is wrong with it
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// The site's config
+    #[arg(value_name = "CONFIG")]
+    config: PathBuf,
+    #[command(flatten)]
+    output: OutputArgs,
+}
+
+/// Says what the site file amounts to. Warnings and problems go to stderr; with JSON the problems
+/// go to stdout as well.
+pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    let json = args.output.format == Format::Json;
     let mut stdout = std::io::stdout().lock();
-    match config::check(file) {
+    match config::check(&args.config) {
         Ok(summary) => {
             for warning in &summary.warnings {
                 exit::complain(&warning);
@@ -23,15 +31,14 @@ pub fn run(file: &Path, json: bool) -> anyhow::Result<ExitCode> {
             } else {
                 writeln!(stdout, "{summary}")?;
             }
-            Ok(ExitCode::SUCCESS)
+            Ok(())
         }
         Err(error) => {
-            exit::complain(&error);
             if json && let ConfigError::Invalid { problems } = &error {
                 let problems = serde_json::json!({ "problems": problems });
                 writeln!(stdout, "{problems}")?;
             }
-            Ok(exit::CONFIG.into())
+            Err(error.into())
         }
     }
 }

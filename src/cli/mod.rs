@@ -1,12 +1,48 @@
 //! The commands, their flags and their exit codes.
 
-pub mod check;
+pub mod args;
+mod check;
+mod convert;
 mod exit;
-pub mod run;
+mod replay;
+mod run;
+mod simulate;
+mod text;
 
+use clap::{Parser, Subcommand};
 use std::process::ExitCode;
+
+/// Streaming landslide early warning, built on the slider-block friction law.
+#[derive(Debug, Parser)]
+#[command(version, arg_required_else_help = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Run(run::Args),
+    Check(check::Args),
+    Replay(replay::Args),
+    Simulate(simulate::Args),
+    Convert(convert::Args),
+}
 
 /// Parses the command line, runs the command, and turns the outcome into an exit code.
 pub fn main() -> ExitCode {
-    ExitCode::SUCCESS
+    let done = match Cli::try_parse() {
+        Ok(cli) => match cli.command {
+            Command::Run(args) => run::run(&args),
+            Command::Check(args) => check::run(&args),
+            Command::Replay(args) => replay::run(&args),
+            Command::Simulate(args) => simulate::run(&args),
+            Command::Convert(args) => convert::run(&args),
+        },
+        Err(error) => return exit::of_parser(&error),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => exit::report(&error),
+    }
 }

@@ -1,48 +1,48 @@
 //! `run CONFIG`: the daemon, until SIGTERM or SIGINT.
 
-use super::exit;
+use super::args::{Format, OutputArgs};
 use crate::config;
 use crate::runtime::log::{self, LogFormat};
-use crate::runtime::run::{self as daemon, RunError};
+use crate::runtime::run as daemon;
 use crate::runtime::shutdown::Shutdown;
 use anyhow::Context;
-use std::path::Path;
-use std::process::ExitCode;
+use std::path::PathBuf;
 
-/// Runs the daemon with the site file `file`: 0 when it was asked to stop, 78 for a bad config, 74
-/// when the state folder cannot be used.
-///
-/// # Errors
-/// When the program itself cannot start: no runtime, no signals.
-pub fn run(file: &Path, format: LogFormat) -> anyhow::Result<ExitCode> {
-    log::init(format);
-    let config = match config::load(file) {
-        Ok(config) => config,
-        Err(error) => {
-            exit::complain(&error);
-            return Ok(exit::CONFIG.into());
-        }
-    };
+/// Watch a site: follow its files, write events to its state folder, run its hooks
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// The site's config
+    #[arg(value_name = "CONFIG")]
+    config: PathBuf,
+    /// How the log on stderr looks [default: as --format]
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    log: Option<LogFormat>,
+    #[command(flatten)]
+    output: OutputArgs,
+}
+
+/// Runs the daemon until it is asked to stop.
+pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    log::init(args.log.unwrap_or(match args.output.format {
+        Format::Text => LogFormat::Text,
+        Format::Json => LogFormat::Json,
+    }));
+    let config = config::load(&args.config)?;
     for warning in &config.warnings {
         tracing::warn!(%warning, "doubtful config");
     }
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .enable_all()
-        .build()
-        .context("cannot start the asynchronous runtime")?;
-    let ended = runtime.block_on(async {
+    asynchronous()?.block_on(async {
         let shutdown = Shutdown::on_signals().context("cannot listen for signals")?;
         let (progress, _) = tokio::sync::watch::channel(daemon::Progress::default());
-        anyhow::Ok(daemon::run(&config, shutdown, &progress).await)
-    })?;
-    Ok(match ended {
-        Ok(_counts) => ExitCode::SUCCESS,
-        Err(error) => {
-            exit::complain(&error);
-            match error {
-                RunError::State { .. } | RunError::InUse { .. } => exit::IO.into(),
-                RunError::Follow(_) => exit::TROUBLE.into(),
-            }
-        }
+        daemon::run(&config, shutdown, &progress).await?;
+        Ok(())
     })
+}
+
+/// The runtime that the daemon and a replay need.
+pub(super) fn asynchronous() -> anyhow::Result<tokio::runtime::Runtime> {
+    tokio::runtime::Builder::new_multi_thread()
+        .enable_all()
+        .build()
+        .context("cannot start the asynchronous runtime")
 }

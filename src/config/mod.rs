@@ -6,7 +6,7 @@ mod pattern;
 mod problem;
 mod section;
 mod table;
-mod value;
+pub(crate) mod value;
 
 pub use check::{Summary, check};
 pub use pattern::FilePattern;

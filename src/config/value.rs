@@ -5,7 +5,7 @@ use crate::reading::{Quantity, Unit};
 use jiff::SignedDuration;
 
 /// A duration longer than zero: `12h`, `30d`, `1h 30min`.
-pub(super) fn duration(text: &str) -> Result<SignedDuration, String> {
+pub(crate) fn duration(text: &str) -> Result<SignedDuration, String> {
     let parsed = humantime::parse_duration(text)
         .map_err(|_| "write a number and a unit: \"10s\", \"12h\", \"30d\"".to_owned())?;
     if parsed.is_zero() {
@@ -15,7 +15,7 @@ pub(super) fn duration(text: &str) -> Result<SignedDuration, String> {
 }
 
 /// A speed in mm/day: `1 m/day`, `50 mm/day`.
-pub(super) fn speed(text: &str) -> Result<f64, String> {
+pub(crate) fn speed(text: &str) -> Result<f64, String> {
     measure(text, Quantity::Velocity, "\"50 mm/day\" or \"1 m/day\"")
 }
 

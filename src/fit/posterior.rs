@@ -64,6 +64,8 @@ const KAPPA_SCALE: f64 = 3.0;
 const SLOPE_PER_INTERVAL: f64 = 0.25;
 /// Prior relative scatter, and the number of readings it counts for.
 const PRIOR_SCATTER: (f64, f64) = (0.1, 3.0);
+/// The most that the likelihood is trusted: parameters are not constant over years, as the law has them.
+const MOST_TRUST: f64 = 0.5;
 /// Samples drawn.
 const SAMPLES: u32 = 128;
 /// Proposal widths: the Laplace approximation's own, and twice it, in equal parts.
@@ -382,7 +384,7 @@ fn temper(residuals: &[f64]) -> f64 {
         return 1.0;
     }
     let rho = (products / squares).clamp(0.0, 0.95);
-    (1.0 - rho) / (1.0 + rho)
+    MOST_TRUST.min((1.0 - rho) / (1.0 + rho))
 }
 
 /// A square root of the proposal's covariance.

@@ -43,7 +43,7 @@ const FILTER_SHARE: f64 = 0.75;
 /// Fewest readings before anything is forecast: below it the priors would speak, not the slope.
 pub const FEWEST_READINGS: usize = 8;
 /// Fewest rates before the fitted windows have a say in the forecast.
-const FEWEST_RATES: usize = 16;
+const FEWEST_RATES: usize = 24;
 /// How far the forecast looks, days.
 pub const HORIZON_DAYS: f64 = 400.0;
 /// No window's share among the windows falls below this, however it scored.
@@ -137,17 +137,6 @@ impl Panel {
                 Passage::of(&posterior.ensemble, critical, later),
                 weight * (1.0 - FILTER_SHARE),
             ));
-        }
-        if std::env::var("DBG").is_ok() {
-            let txt: Vec<String> = parts
-                .iter()
-                .map(|(p, w)| format!("{w:.2}:{:.2}", p.chance_within(1.0)))
-                .collect();
-            println!(
-                "   t={now_days:.2} F={:.3} {}",
-                filtered.chance_within(1.0),
-                txt.join(" ")
-            );
         }
         parts.push((filtered, FILTER_SHARE));
         Outlook {

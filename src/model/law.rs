@@ -15,24 +15,24 @@ pub struct Law {
     pub kappa: f64,
     /// 1 - 1/m, with m = B/A.
     pub p: f64,
-    /// Healing rate a = m / theta_i, 1/day, kept apart because kappa = a p loses it at m = 1.
+    /// Healing rate a = m / `theta_i`, 1/day, kept apart because kappa = a p loses it at m = 1.
     pub a: f64,
 }
 
-/// The paper's parameters; x_i, T and D do not exist at m = 1, where S theta_i is the control.
+/// The paper's parameters; `x_i`, T and D do not exist at m = 1, where S `theta_i` is the control.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PaperParameters {
     /// m = B/A; infinite where p = 1.
     pub m: f64,
-    /// Initial state x_i.
+    /// Initial state `x_i`.
     pub x_i: Option<f64>,
-    /// Time unit T = D_c/D, days.
+    /// Time unit T = `D_c/D`, days.
     pub t_unit_days: Option<f64>,
     /// Velocity scale D.
     pub d: Option<f64>,
-    /// Characteristic slip D_c.
+    /// Characteristic slip `D_c`.
     pub d_c: Option<f64>,
-    /// S theta_i = b/a.
+    /// S `theta_i` = b/a.
     pub s_theta_i: Option<f64>,
 }
 
@@ -52,7 +52,7 @@ pub enum SteadyState {
 pub enum StateSense {
     /// The paper's x.
     X,
-    /// theta / theta_i, at m = 1 where there is no x.
+    /// theta / `theta_i`, at m = 1 where there is no x.
     RelativeAge,
 }
 
@@ -96,7 +96,7 @@ impl Law {
         })
     }
 
-    /// At m = 1, from S theta_i, the contacts' initial age theta_i in days and the initial velocity.
+    /// At m = 1, from S `theta_i`, the contacts' initial age `theta_i` in days and the initial velocity.
     ///
     /// # Errors
     /// [`LawError`] names the parameter that makes no law.
@@ -215,19 +215,25 @@ impl Law {
         }
         let stops_short =
             self.kappa < 0.0 && self.ln_y_steady().is_some_and(|steady| steady >= ln_y);
-        if !(self.r > 0.0) || stops_short {
+        if self.r <= 0.0 || self.r.is_nan() || stops_short {
             return None;
         }
         Some(tail::days_between(self, 0.0, ln_y)).filter(|days| days.is_finite())
     }
 
-    /// Days from t = 0 to the velocity's inflection; `None` where there is none after it.
+    /// Days from t = 0 to the velocity's inflection, negative where it is past; `None` where there is none.
     pub fn transition_days(&self) -> Option<f64> {
-        let ln_y = self.ln_y_transition().filter(|ln_y| *ln_y < 0.0)?;
-        self.days_to_velocity(self.v_i * (-ln_y).exp())
+        let ln_y = self.ln_y_transition()?;
+        if ln_y <= 0.0 {
+            return self.days_to_velocity(self.v_i * (-ln_y).exp());
+        }
+        let past = self.r > 0.0 && self.slope(ln_y.exp()) < 0.0;
+        past.then(|| -tail::days_between(self, ln_y, 0.0))
+            .filter(|days| days.is_finite())
     }
 
     /// The same motion seen backwards in time.
+    #[must_use]
     pub fn reversed(&self) -> Self {
         Self {
             r: -self.r,
@@ -238,6 +244,7 @@ impl Law {
     }
 
     /// The same solution with t = 0 moved to where the inverse velocity is `y`.
+    #[must_use]
     pub fn from_y(&self, y: f64) -> Self {
         let shrink = ((self.p - 1.0) * y.ln()).exp();
         Self {
@@ -258,7 +265,7 @@ impl Law {
         }
     }
 
-    /// The state at inverse velocity y: the paper's x, or theta/theta_i at m = 1.
+    /// The state at inverse velocity y: the paper's x, or `theta/theta_i` at m = 1.
     pub fn state(&self, y: f64) -> Option<f64> {
         match self.state_sense() {
             StateSense::RelativeAge => Some(y),

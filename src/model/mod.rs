@@ -1,6 +1,6 @@
 //! The slider-block friction law of Helmstetter et al. (2004): parameters, exact solution, failure time.
 //!
-//! In the inverse velocity y = v_i/v and p = 1 - 1/m the law is one regular equation,
+//! In the inverse velocity `y = v_i/v` and p = 1 - 1/m the law is one regular equation,
 //! `dy/dt = -r + kappa (y^p - 1)/p`, finite and smooth through m = 1.
 
 mod law;

@@ -1,6 +1,6 @@
 //! The last stretch before a finite-time singularity, as a function of the time that remains.
 //!
-//! Time cannot resolve it (t_c - t cancels), so y is solved for from
+//! Time cannot resolve it (`t_c` - t cancels), so y is solved for from
 //! `t_c - t = integral from 0 to y of dy / (r - kappa bc(y; p))`.
 
 use super::law::Law;
@@ -20,12 +20,12 @@ const NODES: [(f64, f64); 8] = [
 /// Beyond this many e-folds below y the rest of the integral is under the rounding of the sum.
 const DEEPEST_E_FOLD: f64 = 42.0;
 
-/// Whether the law runs into a finite-time singularity from inverse velocity exp(ln_y) on.
+/// Whether the law runs into a finite-time singularity from inverse velocity `exp(ln_y)` on.
 pub(super) fn fails_from(law: &Law, ln_y: f64) -> bool {
     law.kappa >= 0.0 && law.p < 1.0 && slope_at_ln(law, ln_y) < 0.0
 }
 
-/// Days from inverse velocity exp(ln_y) to the singularity; needs [`fails_from`].
+/// Days from inverse velocity `exp(ln_y)` to the singularity; needs [`fails_from`].
 pub(super) fn remaining_days(law: &Law, ln_y: f64) -> f64 {
     days_between(law, ln_y, ln_y - DEEPEST_E_FOLD)
 }
@@ -37,14 +37,14 @@ pub(super) fn days_between(law: &Law, ln_y_from: f64, ln_y_to: f64) -> f64 {
     ln_y_from.exp() * integrate_down(law, (ln_y_from, ln_y_to), integrand)
 }
 
-/// Slip over v_i between two inverse velocities of an acceleration: d slip / d ln y = 1 / slope.
+/// Slip over `v_i` between two inverse velocities of an acceleration: d slip / d ln y = 1 / slope.
 pub(super) fn slip_between(law: &Law, ln_y_from: f64, ln_y_to: f64) -> f64 {
     integrate_down(law, (ln_y_from, ln_y_to), |s| {
         1.0 / -slope_at_ln(law, ln_y_from - s)
     })
 }
 
-/// Integrates over s = ln(y_from / y). Panels keep their distance from the pole of 1/slope (the steady
+/// Integrates over s = `ln(y_from / y)`. Panels keep their distance from the pole of 1/slope (the steady
 /// state, behind or ahead), so that 16 nodes reach rounding on each.
 fn integrate_down(law: &Law, span: (f64, f64), integrand: impl Fn(f64) -> f64) -> f64 {
     let end = span.0 - span.1;

@@ -5,7 +5,7 @@ use super::law::{Law, box_cox};
 /// The highest order that a segment can hold.
 pub(super) const MAX_ORDER: usize = 30;
 
-/// y(t) and the slip over v_i from `start`, as polynomials in t - start, good up to `span`.
+/// y(t) and the slip over `v_i` from `start`, as polynomials in t - start, good up to `span`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Segment {
     pub(super) start: f64,
@@ -59,7 +59,7 @@ impl Segment {
         }
     }
 
-    /// (y, slip / v_i) at time `t`.
+    /// (y, `slip / v_i`) at time `t`.
     pub(super) fn at(&self, t: f64) -> (f64, f64) {
         let h = t - self.start;
         let mut y = self.y[self.order];

@@ -42,11 +42,11 @@ impl Accuracy {
 /// Position on a trajectory.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
-    /// Inverse velocity over its initial value, v_i / v.
+    /// Inverse velocity over its initial value, `v_i / v`.
     pub y: f64,
-    /// Velocity, in the unit of v_i.
+    /// Velocity, in the unit of `v_i`.
     pub velocity: f64,
-    /// Displacement since t = 0, in the unit of v_i times days.
+    /// Displacement since t = 0, in the unit of `v_i` times days.
     pub displacement: f64,
 }
 
@@ -55,13 +55,13 @@ pub struct Motion {
 pub struct Trajectory {
     law: Law,
     segments: Vec<Segment>,
-    /// Where the segments stop: (t, ln y, slip / v_i) at the start of the tail before failure.
+    /// Where the segments stop: (t, ln y, `slip / v_i`) at the start of the tail before failure.
     tail: Option<(f64, f64, f64)>,
     failure_days: Option<f64>,
 }
 
 impl Trajectory {
-    /// Solves `law` over [0, end_days].
+    /// Solves `law` over `[0, end_days]`.
     pub fn solve(law: &Law, end_days: f64, accuracy: Accuracy) -> Self {
         let failure_days = tail::fails_from(law, 0.0).then(|| tail::remaining_days(law, 0.0));
         let mut segments = Vec::with_capacity(16);

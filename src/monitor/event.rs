@@ -23,7 +23,7 @@ pub struct Event {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "kebab-case")]
 pub enum EventKind {
-    /// The law was fitted again with a larger t_max.
+    /// The law was fitted again with a larger `t_max`.
     Refit {
         /// The newest reading used.
         t_max: Timestamp,
@@ -62,7 +62,7 @@ pub enum EventKind {
         /// How fast the fitted law itself would have it move.
         expected_days_per_day: Option<f64>,
     },
-    /// The transition time moved with t_max.
+    /// The transition time moved with `t_max`.
     TransitionDrift {
         /// The transition time last announced.
         from: Timestamp,
@@ -151,4 +151,23 @@ pub struct Summary {
     pub refits: u64,
     /// Alerts that fired.
     pub alerts: u64,
+}
+
+impl Summary {
+    /// Counts one event.
+    pub(super) fn count(&mut self, kind: &EventKind) {
+        match kind {
+            EventKind::Refit { .. } => self.refits += 1,
+            EventKind::Alert {
+                state: AlertState::Firing,
+                ..
+            } => self.alerts += 1,
+            EventKind::Alert { .. }
+            | EventKind::RegimeFlip { .. }
+            | EventKind::InterceptDrift { .. }
+            | EventKind::TransitionDrift { .. }
+            | EventKind::Fault { .. }
+            | EventKind::Summary(_) => {}
+        }
+    }
 }

@@ -1,5 +1,9 @@
 //! Which regime the slope is in, with what probability, and when it flipped.
 
+mod tracker;
+
+pub use tracker::{Flip, Tracker, label, leader};
+
 use serde::{Deserialize, Serialize};
 use std::fmt;
 

@@ -8,6 +8,7 @@ pub mod hook;
 pub mod ingest;
 pub mod journal;
 pub mod log;
+pub mod replay;
 pub mod run;
 mod seen;
 pub mod shutdown;

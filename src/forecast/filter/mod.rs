@@ -14,7 +14,7 @@
 mod particle;
 
 use super::Passage;
-use crate::fit::{Observation, Observations};
+use crate::fit::Observations;
 use crate::reading::Quantity;
 use particle::{Dynamics, Particle, Reset};
 use rand::{RngExt, SeedableRng};
@@ -36,7 +36,6 @@ pub(super) struct Filter {
     weights: Vec<f64>,
     generator: Pcg64,
     reset: Option<Reset>,
-    taken: usize,
     now_days: f64,
 }
 
@@ -48,7 +47,6 @@ impl Filter {
             weights: Vec::new(),
             generator: Pcg64::seed_from_u64(seed),
             reset: None,
-            taken: 0,
             now_days: 0.0,
         }
     }
@@ -63,12 +61,14 @@ impl Filter {
             self.start(observations);
         }
         let mut log_density = None;
-        while let Some(newest) = observations.values.get(self.taken) {
-            let apart = newest.t_days - self.now_days;
-            self.taken += 1;
+        let new = observations
+            .values
+            .partition_point(|value| value.t_days <= self.now_days);
+        for index in new..observations.values.len() {
+            let apart = observations.values[index].t_days - self.now_days;
             // Trailing means repeat each other: half a window apart at least.
             if apart >= 0.5 * observations.averaging_days * 0.999 {
-                log_density = Some(self.take(observations, newest));
+                log_density = Some(self.take(observations, index));
             }
         }
         log_density
@@ -76,23 +76,20 @@ impl Filter {
 
     fn start(&mut self, observations: &Observations) {
         let first = &observations.values[..READINGS_FOR_PRIOR];
-        let reset = Reset::from_first(observations.quantity, first);
+        let reset = Reset::from_first(&how(observations), first);
         self.particles = (0..PARTICLES)
             .map(|_| Particle::draw(&reset, &mut self.generator))
             .collect();
         self.weights = vec![1.0 / PARTICLES as f64; PARTICLES];
         self.reset = Some(reset);
         self.now_days = first[0].t_days;
-        self.taken = 1;
     }
 
-    fn take(&mut self, observations: &Observations, newest: &Observation) -> f64 {
-        let dynamics = Dynamics {
-            quantity: observations.quantity,
-            averaging_days: observations.averaging_days,
-        };
+    fn take(&mut self, observations: &Observations, index: usize) -> f64 {
+        let newest = &observations.values[index];
+        let dynamics = how(observations);
         let days = newest.t_days - self.now_days;
-        let suggested = self.suggested(observations, newest);
+        let suggested = suggested(observations, index);
         let mut total = 0.0;
         for (particle, weight) in self.particles.iter_mut().zip(&mut self.weights) {
             *weight *= particle.advance(days, suggested, &mut self.generator);
@@ -113,19 +110,6 @@ impl Filter {
             self.resample();
         }
         total.ln()
-    }
-
-    /// The velocity that the newest reading implies by itself, mm/day.
-    fn suggested(&self, observations: &Observations, newest: &Observation) -> f64 {
-        match observations.quantity {
-            Quantity::Velocity => newest.value,
-            Quantity::Displacement => {
-                let before = observations.values.get(self.taken.wrapping_sub(2));
-                before.map_or(0.0, |before| {
-                    (newest.value - before.value) / (newest.t_days - before.t_days)
-                })
-            }
-        }
     }
 
     /// Systematic resampling; the copies' parameters are jittered a little so that they stay apart.
@@ -188,6 +172,29 @@ impl Filter {
             reached += weight;
             (reached >= 0.5).then_some(velocity)
         })
+    }
+}
+
+fn how(observations: &Observations) -> Dynamics {
+    Dynamics {
+        quantity: observations.quantity,
+        averaging_days: observations.averaging_days,
+    }
+}
+
+/// The velocity that a reading implies by itself, mm/day.
+fn suggested(observations: &Observations, index: usize) -> f64 {
+    let newest = &observations.values[index];
+    match observations.quantity {
+        Quantity::Velocity => newest.value,
+        Quantity::Displacement => {
+            let before = index
+                .checked_sub(1)
+                .and_then(|before| observations.values.get(before));
+            before.map_or(0.0, |before| {
+                (newest.value - before.value) / (newest.t_days - before.t_days)
+            })
+        }
     }
 }
 

@@ -24,18 +24,18 @@ pub(super) struct Reset {
 }
 
 impl Reset {
-    pub(super) fn from_first(quantity: Quantity, first: &[Observation]) -> Self {
+    pub(super) fn from_first(how: &Dynamics, first: &[Observation]) -> Self {
         let (start, end) = (first[0], first[first.len() - 1]);
         let days = (end.t_days - start.t_days).max(1e-6);
-        let velocity = match quantity {
+        let velocity = match how.quantity {
             Quantity::Displacement => (end.value - start.value).abs() / days,
             Quantity::Velocity => start.value.abs(),
         };
         Self {
-            quantity,
+            quantity: how.quantity,
             first_value: start.value,
             velocity: velocity.max(1e-3),
-            interval_days: days / (first.len() - 1) as f64,
+            interval_days: (days / (first.len() - 1) as f64).max(0.5 * how.averaging_days),
         }
     }
 }
@@ -45,7 +45,7 @@ const LAGS: usize = 4;
 /// Nothing moves faster: a bound for particles that have failed, mm/day.
 const FASTEST: f64 = 1e6;
 /// Prior of a sudden load step: its chance, a reading, and its scale in ln v.
-const STEP: (f64, f64) = (0.003, 0.7);
+const STEP: (f64, f64) = (0.002, 0.7);
 /// Share of particles that try the load step which the newest reading suggests, and their scatter about it.
 const SUGGESTED: (f64, f64) = (0.04, 0.25);
 /// A benchmark that still reads has not collapsed: nothing that reads moves faster, mm/day.
@@ -57,7 +57,7 @@ const STUDENT: f64 = 4.0;
 /// Jitter of ln parameters at resampling.
 const JITTER: f64 = 0.05;
 /// Chance, at resampling, of fresh parameters, and of a fresh slope.
-const FRESH: f64 = 0.004;
+const FRESH: f64 = 0.003;
 
 struct Parameters {
     q: f64,
@@ -78,7 +78,7 @@ impl Parameters {
         };
         Self {
             q: log_uniform(generator, 0.003, 0.15) / interval_days.sqrt(),
-            eta: log_uniform(generator, 1e-6, 0.02) / interval_days.powf(1.5),
+            eta: log_uniform(generator, 1e-6, 0.006) / interval_days.powf(1.5),
             sigma: log_uniform(generator, 0.02, 0.6),
             tau: log_uniform(generator, 2.0, 60.0) * interval_days,
             noise,
@@ -329,9 +329,9 @@ impl Particle {
     }
 }
 
-/// |s| / w in 1/day: from a thousandth of the velocity an interval to a tenth.
+/// |s| / w in 1/day: what doubles the velocity in 70,000 intervals to what does in 20.
 fn fresh_slope(interval_days: f64, generator: &mut impl Rng) -> f64 {
-    log_uniform(generator, 1e-4, 0.1) / interval_days
+    log_uniform(generator, 1e-5, 0.03) / interval_days
 }
 
 fn student(z: f64) -> f64 {

@@ -1,0 +1,107 @@
+//! The rules: which level the evidence calls for, before any memory.
+
+use super::policy::{Level, Policy, Threshold};
+use crate::reading::Timestamp;
+
+/// What is known of one benchmark after a reading.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Evidence {
+    /// Data time.
+    pub now: Timestamp,
+    /// Chance of passing the critical velocity within the evacuation time, where there is a forecast.
+    pub chance_within_evacuation_time: Option<f64>,
+    /// The same within the outlook.
+    pub chance_within_outlook: Option<f64>,
+    /// Latest observed velocity, mm/day; `None` before the second reading.
+    pub velocity_mm_per_day: Option<f64>,
+    /// Displacement since the first reading, mm, for benchmarks that measure it.
+    pub displacement_mm: Option<f64>,
+    /// Latest observed acceleration, mm/day per day.
+    pub acceleration_mm_per_day2: Option<f64>,
+    /// What else asks for a look: a flip to instability, an intercept drifting in.
+    pub causes: Vec<&'static str>,
+}
+
+/// The level that the evidence calls for, and why.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Call {
+    /// The level.
+    pub level: Level,
+    /// The rule's short name.
+    pub rule: &'static str,
+}
+
+impl Policy {
+    /// The gravest call that the evidence makes.
+    pub fn call(&self, evidence: &Evidence) -> Call {
+        let reaches =
+            |chance: Option<f64>, limit: f64| chance.is_some_and(|chance| chance >= limit);
+        let mut call = if reaches(evidence.chance_within_evacuation_time, self.red_chance) {
+            Call {
+                level: Level::Red,
+                rule: "chance-within-evacuation-time",
+            }
+        } else if reaches(evidence.chance_within_outlook, self.orange_chance) {
+            Call {
+                level: Level::Orange,
+                rule: "chance-within-outlook",
+            }
+        } else if reaches(evidence.chance_within_outlook, self.yellow_chance) {
+            Call {
+                level: Level::Yellow,
+                rule: "chance-within-outlook",
+            }
+        } else if let Some(cause) = evidence.causes.first() {
+            Call {
+                level: Level::Yellow,
+                rule: cause,
+            }
+        } else {
+            Call {
+                level: Level::Green,
+                rule: "quiet",
+            }
+        };
+        for threshold in &self.thresholds {
+            if let Some(rule) = threshold.exceeded(evidence)
+                && threshold.level > call.level
+            {
+                call = Call {
+                    level: threshold.level,
+                    rule,
+                };
+            }
+        }
+        call
+    }
+}
+
+impl Threshold {
+    fn exceeded(&self, evidence: &Evidence) -> Option<&'static str> {
+        let over = |value: Option<f64>, limit: Option<f64>| match (value, limit) {
+            (Some(value), Some(limit)) => value >= limit,
+            (None, _) | (_, None) => false,
+        };
+        let checks = [
+            (
+                "velocity-threshold",
+                evidence.velocity_mm_per_day,
+                self.velocity_mm_per_day,
+            ),
+            (
+                "displacement-threshold",
+                evidence.displacement_mm,
+                self.displacement_mm,
+            ),
+            (
+                "acceleration-threshold",
+                evidence.acceleration_mm_per_day2,
+                self.acceleration_mm_per_day2,
+            ),
+        ];
+        checks
+            .into_iter()
+            .find(|(_, value, limit)| over(*value, *limit))
+            .map(|(rule, ..)| rule)
+    }
+}

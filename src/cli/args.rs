@@ -1,0 +1,182 @@
+//! Flags that several commands share, and the loading of what they name.
+
+use super::exit;
+use crate::alert::Policy;
+use crate::config::value;
+use crate::reading::{BenchmarkId, Disorder, Quantity, Recording, SelectError, Series, Timestamp};
+use crate::runtime::ingest::{ColumnMap, IngestError, ReadOptions, read_channels, read_files};
+use jiff::SignedDuration;
+use std::path::PathBuf;
+
+/// How results look.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Format {
+    /// For people.
+    #[default]
+    Text,
+    /// For programs.
+    Json,
+}
+
+/// `--format`.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub struct OutputArgs {
+    /// How results look on stdout
+    #[arg(long, value_enum, default_value_t, value_name = "FORMAT")]
+    pub format: Format,
+}
+
+/// What files do not say of themselves.
+#[derive(Debug, Clone, clap::Args)]
+pub struct FileArgs {
+    /// What a CSV column means whose name does not say it
+    #[arg(long = "column", value_name = "NAME=ID:QUANTITY:UNIT")]
+    pub columns: Vec<ColumnMap>,
+    /// Each velocity is the mean of so long a time before it, such as 1h
+    #[arg(long, value_name = "DURATION", value_parser = value::duration)]
+    pub averaging: Option<SignedDuration>,
+    /// Day 0 of a column `t_days`
+    #[arg(long, value_name = "TIME", default_value = "2000-01-01T00:00:00Z")]
+    pub epoch: Timestamp,
+}
+
+impl FileArgs {
+    /// The same for the readers.
+    pub fn options(&self) -> ReadOptions {
+        ReadOptions {
+            epoch: self.epoch,
+            columns: self.columns.clone(),
+            averaging: self.averaging,
+        }
+    }
+}
+
+/// Which readings, and what they mean: common to all commands that read some.
+#[derive(Debug, Clone, clap::Args)]
+pub struct ReadingArgs {
+    /// Readings, CSV or MCAP; a later file stands over an earlier one
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+    /// Take this benchmark only
+    #[arg(long, value_name = "ID")]
+    pub benchmark: Option<String>,
+    /// Take this quantity only: displacement or velocity
+    #[arg(long, value_name = "QUANTITY", value_parser = quantity)]
+    pub quantity: Option<Quantity>,
+    /// Covariates that stand in a file of their own
+    #[arg(long, value_name = "FILE")]
+    pub channels: Vec<PathBuf>,
+    /// The meaning of the files.
+    #[command(flatten)]
+    pub file: FileArgs,
+    /// How long it takes to bring everyone out, such as 12h
+    #[arg(long, value_name = "DURATION", value_parser = value::duration)]
+    pub evacuation_time: Option<SignedDuration>,
+    /// Passing this velocity is failure, such as "1 m/day"
+    #[arg(long, value_name = "VELOCITY", value_parser = value::speed)]
+    pub critical_velocity: Option<f64>,
+}
+
+/// What the files hold.
+#[derive(Debug, Clone)]
+pub struct Loaded {
+    /// Readings and covariates, in order.
+    pub recording: Recording,
+    /// What putting them in order met.
+    pub disorder: Disorder,
+}
+
+impl ReadingArgs {
+    /// Reads all files, and warns on stderr of rows that were not in order.
+    ///
+    /// # Errors
+    /// [`IngestError`] as [`read_files`] and [`read_channels`].
+    pub fn load(&self) -> Result<Loaded, IngestError> {
+        let options = self.file.options();
+        let (mut recording, mut disorder) = read_files(&self.files, &options)?;
+        if !self.channels.is_empty() {
+            let (channels, met) = read_channels(&self.channels, &options)?;
+            let covariates = Recording {
+                channels,
+                ..Recording::default()
+            };
+            let (merged, overlap) = Recording::merge(vec![recording, covariates])?;
+            recording = merged;
+            disorder += met;
+            disorder += overlap;
+        }
+        warn_of(disorder);
+        Ok(Loaded {
+            recording,
+            disorder,
+        })
+    }
+
+    /// The one series that `--benchmark` and `--quantity` mean.
+    ///
+    /// # Errors
+    /// [`SelectError`] when none fits, or several do.
+    pub fn series<'a>(&self, recording: &'a Recording) -> Result<&'a Series, SelectError> {
+        let benchmark = self.benchmark.as_ref().map(BenchmarkId::new);
+        recording.series(benchmark.as_ref(), self.quantity)
+    }
+
+    /// Keeps the series that `--benchmark` and `--quantity` allow, however many.
+    ///
+    /// # Errors
+    /// [`SelectError`] when none is left.
+    pub fn narrow(&self, recording: &mut Recording) -> Result<(), SelectError> {
+        if let Err(error @ (SelectError::Nothing { .. } | SelectError::NoSuch { .. })) =
+            self.series(recording)
+        {
+            return Err(error);
+        }
+        recording.series.retain(|series| {
+            let benchmark = self.benchmark.as_deref();
+            benchmark.is_none_or(|id| series.benchmark.as_str() == id)
+                && self.quantity.is_none_or(|one| series.quantity() == one)
+        });
+        Ok(())
+    }
+
+    /// `base` with the figures that the flags give.
+    #[must_use]
+    pub fn policy(&self, base: &Policy) -> Policy {
+        let velocity = self.critical_velocity;
+        Policy {
+            evacuation_time: self.evacuation_time.unwrap_or(base.evacuation_time),
+            critical_velocity_mm_per_day: velocity.unwrap_or(base.critical_velocity_mm_per_day),
+            ..base.clone()
+        }
+    }
+}
+
+/// Warns on stderr of rows that were not in order.
+pub(super) fn warn_of(disorder: Disorder) {
+    let kinds = [
+        (
+            disorder.repeated,
+            "repeated an earlier row and were dropped",
+        ),
+        (
+            disorder.corrected,
+            "gave another value for a time; the later row stands",
+        ),
+        (
+            disorder.out_of_order,
+            "stood before an earlier time and were put in order",
+        ),
+    ];
+    for (rows, what) in kinds {
+        if rows > 0 {
+            exit::complain(&format_args!("warning: {rows} rows {what}"));
+        }
+    }
+}
+
+fn quantity(text: &str) -> Result<Quantity, String> {
+    [Quantity::Displacement, Quantity::Velocity]
+        .into_iter()
+        .find(|quantity| quantity.name() == text)
+        .ok_or_else(|| "expected displacement or velocity".to_owned())
+}

@@ -1,0 +1,46 @@
+//! `convert IN OUT`: readings from one file format to another.
+
+use super::args::{FileArgs, Format, OutputArgs, warn_of};
+use super::exit;
+use crate::runtime::ingest;
+use std::io::Write;
+use std::path::PathBuf;
+
+/// Convert readings between CSV and MCAP, by the names' endings
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// The file to read
+    #[arg(value_name = "IN")]
+    input: PathBuf,
+    /// The file to write, replaced when it is there
+    #[arg(value_name = "OUT")]
+    out: PathBuf,
+    #[command(flatten)]
+    file: FileArgs,
+    #[command(flatten)]
+    output: OutputArgs,
+}
+
+/// Converts, and says what was written and what the output has no place for.
+pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    let report = ingest::convert(&args.input, &args.out, &args.file.options())?;
+    warn_of(report.disorder);
+    for what in &report.left_out {
+        exit::complain(&format_args!("warning: left out: {what}"));
+    }
+    let mut stdout = std::io::stdout().lock();
+    match args.output.format {
+        Format::Json => writeln!(stdout, "{}", serde_json::to_string(&report)?)?,
+        Format::Text => {
+            for series in &report.series {
+                let (id, quantity) = (&series.benchmark, series.quantity);
+                let (readings, unit) = (series.readings, series.unit);
+                writeln!(stdout, "{id}: {readings} readings of {quantity} in {unit}")?;
+            }
+            for channel in &report.channels {
+                writeln!(stdout, "{}: {} samples", channel.name, channel.samples)?;
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,110 @@
+//! `replay FILE...`: the monitor over recorded readings, in data time.
+
+use super::args::{Format, OutputArgs, ReadingArgs};
+use super::run::asynchronous;
+use super::{exit, text};
+use crate::config::{self, Config};
+use crate::monitor::{Event, Settings};
+use crate::reading::{Quantity, Recording, Timestamp};
+use crate::runtime::log::{self, LogFormat};
+use crate::runtime::replay::{self, Pace, Plan};
+use crate::runtime::shutdown::Shutdown;
+use anyhow::Context;
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+/// What a site without a config is called.
+const NAMELESS: &str = "replay";
+
+/// Play recorded readings through the monitor, in their own time
+///
+/// The events are those that the daemon would have said; the last one is a summary.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    #[command(flatten)]
+    readings: ReadingArgs,
+    /// The site whose alert policy and averaging hold; default is the policy's defaults
+    #[arg(long, value_name = "CONFIG")]
+    config: Option<PathBuf>,
+    /// max, or how many seconds of data go by in a second
+    #[arg(long, value_name = "max|N", default_value = "max", value_parser = pace)]
+    speed: Pace,
+    /// Stop at this time of the data
+    #[arg(long, value_name = "TIME")]
+    until: Option<Timestamp>,
+    /// Run the hooks of --config, told that it is an exercise
+    #[arg(long, requires = "config")]
+    hooks: bool,
+    #[command(flatten)]
+    output: OutputArgs,
+}
+
+/// Replays the files and prints the events.
+pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    log::init(LogFormat::Text);
+    let config = args.config.as_deref().map(config::load).transpose()?;
+    for warning in config.iter().flat_map(|config| &config.warnings) {
+        exit::complain(warning);
+    }
+    let mut recording = args.readings.load()?.recording;
+    args.readings.narrow(&mut recording)?;
+    if let Some(config) = &config {
+        lend_averaging(&mut recording, config);
+    }
+    let settings = settings(args, config.as_ref());
+    let plan = Plan {
+        site: config.as_ref().map_or(NAMELESS, |config| &config.site.name),
+        settings: &settings,
+        hooks: config
+            .as_ref()
+            .filter(|_| args.hooks)
+            .map_or(&[], |config| &config.hooks),
+        pace: args.speed,
+        until: args.until,
+    };
+    let mut stdout = io::stdout().lock();
+    asynchronous()?.block_on(async {
+        let shutdown = Shutdown::on_signals().context("cannot listen for signals")?;
+        let mut print = |event: &Event| print(&mut stdout, event, args.output.format);
+        replay::replay(&recording, &plan, shutdown, &mut print).await?;
+        Ok(())
+    })
+}
+
+fn print(out: &mut impl Write, event: &Event, format: Format) -> io::Result<()> {
+    let line = match format {
+        Format::Json => serde_json::to_string(event)?,
+        Format::Text => text::line(event),
+    };
+    writeln!(out, "{line}")
+}
+
+fn settings(args: &Args, config: Option<&Config>) -> Settings {
+    let mut settings = config.map_or_else(Settings::default, |config| config.settings.clone());
+    settings.policy = args.readings.policy(&settings.policy);
+    for policy in settings.benchmarks.values_mut() {
+        *policy = args.readings.policy(policy);
+    }
+    settings
+}
+
+/// Velocities whose file states no averaging have that of the config, as in the daemon.
+fn lend_averaging(recording: &mut Recording, config: &Config) {
+    for series in &mut recording.series {
+        let mut known = config.benchmarks.iter();
+        let ours = known.find(|one| one.id == series.benchmark);
+        if series.quantity() == Quantity::Velocity && series.averaging.is_none() {
+            series.averaging = ours.and_then(|benchmark| benchmark.averaging);
+        }
+    }
+}
+
+fn pace(text: &str) -> Result<Pace, String> {
+    if text == "max" {
+        return Ok(Pace::Max);
+    }
+    match text.parse::<f64>() {
+        Ok(times) if times.is_finite() && times > 0.0 => Ok(Pace::Times(times)),
+        Ok(_) | Err(_) => Err("expected max or a number above 0".to_owned()),
+    }
+}

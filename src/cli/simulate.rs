@@ -1,0 +1,141 @@
+//! `simulate`: the law itself, at the times asked for.
+
+use super::exit::UsageError;
+use crate::model::{Accuracy, Law, Trajectory};
+use crate::regime::Regime;
+use serde::Serialize;
+use std::io::{self, Write};
+
+/// Solve the law: CSV of t (days), x (`theta/theta_i` at m = 1), velocity, displacement
+///
+/// From the singularity on there is no motion: the values are empty (CSV) or null (JSON).
+#[derive(Debug, clap::Args)]
+#[command(allow_negative_numbers = true)]
+pub(super) struct Args {
+    /// m = B/A; 0 makes no law, and 1 needs --s-theta
+    #[arg(long, value_name = "M", required_unless_present = "s_theta")]
+    m: Option<f64>,
+    /// The initial state
+    #[arg(
+        long,
+        value_name = "X",
+        required_unless_present = "s_theta",
+        conflicts_with = "s_theta"
+    )]
+    x_i: Option<f64>,
+    /// m = 1: the control parameter S `theta_i`, which takes the place of `x_i`
+    #[arg(long, value_name = "S")]
+    s_theta: Option<f64>,
+    /// The time unit T in days; at m = 1 the contacts' initial age `theta_i`
+    #[arg(long, value_name = "T", default_value_t = 1.0)]
+    t_unit_days: f64,
+    /// The velocity scale D; at m = 1 the initial velocity
+    #[arg(long, value_name = "D", default_value_t = 1.0)]
+    scale: f64,
+    /// Days since the start
+    #[arg(
+        long,
+        value_name = "A,B,...",
+        value_delimiter = ',',
+        required = true,
+        allow_hyphen_values = true
+    )]
+    times: Vec<f64>,
+    /// How results look on stdout; text is CSV too
+    #[arg(long, value_enum, default_value_t, value_name = "FORMAT")]
+    format: TableFormat,
+}
+
+#[derive(Debug, Clone, Copy, Default, clap::ValueEnum)]
+enum TableFormat {
+    #[default]
+    Text,
+    Json,
+    Csv,
+}
+
+#[derive(Debug, Serialize)]
+struct Row {
+    t: f64,
+    x: Option<f64>,
+    velocity: Option<f64>,
+    displacement: Option<f64>,
+}
+
+#[derive(Debug, Serialize)]
+struct Simulation {
+    regime: Regime,
+    failure_days: Option<f64>,
+    transition_days: Option<f64>,
+    rows: Vec<Row>,
+}
+
+/// Solves the law and prints it.
+pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    let law = law(args)?;
+    let simulation = simulate(&law, &args.times)?;
+    let mut stdout = io::BufWriter::new(io::stdout().lock());
+    match args.format {
+        TableFormat::Json => writeln!(stdout, "{}", serde_json::to_string(&simulation)?)?,
+        TableFormat::Text | TableFormat::Csv => write_csv(&simulation.rows, &mut stdout)?,
+    }
+    stdout.flush()?;
+    Ok(())
+}
+
+fn law(args: &Args) -> anyhow::Result<Law> {
+    Ok(match (args.s_theta, args.m, args.x_i) {
+        (Some(_), Some(m), _) if (m - 1.0).abs() >= f64::EPSILON => {
+            let problem = format!("--m: found {m}, expected 1 or none beside --s-theta");
+            return Err(UsageError(problem).into());
+        }
+        (Some(s_theta), ..) => Law::at_unit_m(s_theta, args.t_unit_days, args.scale)?,
+        (None, Some(m), Some(x_i)) => Law::from_paper(m, x_i, args.t_unit_days, args.scale)?,
+        (None, ..) => {
+            let problem = "expected --m and --x-i, or --s-theta";
+            return Err(UsageError(problem.to_owned()).into());
+        }
+    })
+}
+
+fn simulate(law: &Law, times: &[f64]) -> anyhow::Result<Simulation> {
+    if let Some(t) = times.iter().find(|t| !(t.is_finite() && **t >= 0.0)) {
+        let problem = format!("--times: found {t}, expected finite numbers of days, 0 or later");
+        return Err(UsageError(problem).into());
+    }
+    let end = times.iter().copied().fold(0.0, f64::max);
+    let trajectory = Trajectory::solve(law, end, Accuracy::Full);
+    let failure_days = trajectory.failure_days().filter(|days| days.is_finite());
+    let rows = times.iter().map(|&t| {
+        let motion = trajectory.at(t);
+        if motion.is_none() && failure_days.is_none_or(|failure| t < failure) {
+            anyhow::bail!("the law could not be solved as far as day {t:?}");
+        }
+        let finite = |value: f64| Some(value).filter(|value| value.is_finite());
+        Ok(Row {
+            t,
+            x: motion
+                .and_then(|motion| law.state(motion.y))
+                .and_then(finite),
+            velocity: motion.and_then(|motion| finite(motion.velocity)),
+            displacement: motion.and_then(|motion| finite(motion.displacement)),
+        })
+    });
+    Ok(Simulation {
+        regime: law.regime(),
+        failure_days,
+        transition_days: law.transition_days(),
+        rows: rows.collect::<anyhow::Result<_>>()?,
+    })
+}
+
+fn write_csv(rows: &[Row], out: &mut impl Write) -> io::Result<()> {
+    // Debug, unlike Display, writes large and small numbers with an exponent.
+    let cell = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:?}"));
+    writeln!(out, "t,x,velocity,displacement")?;
+    for row in rows {
+        let (x, velocity) = (cell(row.x), cell(row.velocity));
+        writeln!(out, "{:?},{x},{velocity},{}", row.t, cell(row.displacement))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,117 @@
+//! The readings of one benchmark, in the science's units and in time order, bounded by count.
+
+use crate::fit::{Observation, Observations};
+use crate::reading::{Reading, SECONDS_PER_DAY, Timestamp, Unit, days_since};
+use jiff::SignedDuration;
+
+/// Where readings come from, as far as their meaning goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Source {
+    /// Their unit.
+    pub(super) unit: Unit,
+    /// For velocities, the span of the mean.
+    pub(super) averaging: Option<SignedDuration>,
+}
+
+/// What became of a reading.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Taken {
+    /// It is the newest.
+    Newest,
+    /// It was filled in before readings that are already there.
+    Late,
+    /// Its time was known with this other value, in the science's unit, which it replaces.
+    Corrected(f64),
+    /// It was known.
+    Known,
+    /// It measures another quantity than the benchmark's first reading did.
+    OtherQuantity,
+}
+
+/// Readings kept; beyond it every second one of the older half is let go.
+const MOST_READINGS: usize = 4096;
+
+/// The readings of one benchmark.
+#[derive(Debug, Clone)]
+pub(super) struct History {
+    pub(super) epoch: Timestamp,
+    pub(super) observations: Observations,
+    first_displacement_mm: f64,
+}
+
+impl History {
+    pub(super) fn new(source: Source, epoch: Timestamp) -> Self {
+        let averaging_days = source
+            .averaging
+            .map_or(0.0, |span| span.as_secs_f64() / SECONDS_PER_DAY);
+        let observations = Observations {
+            quantity: source.unit.quantity(),
+            averaging_days,
+            values: Vec::new(),
+        };
+        Self {
+            epoch,
+            observations,
+            first_displacement_mm: 0.0,
+        }
+    }
+
+    /// Days since the epoch.
+    pub(super) fn days(&self, time: Timestamp) -> f64 {
+        days_since(self.epoch, time)
+    }
+
+    pub(super) fn take(&mut self, source: Source, reading: &Reading) -> Taken {
+        if source.unit.quantity() != self.observations.quantity {
+            return Taken::OtherQuantity;
+        }
+        let factor = source.unit.factor();
+        let new = Observation {
+            t_days: self.days(reading.time),
+            value: reading.value * factor,
+            sigma: reading.sigma.map(|sigma| sigma * factor),
+        };
+        let values = &mut self.observations.values;
+        if values.is_empty() {
+            self.first_displacement_mm = new.value;
+        }
+        let at = values.partition_point(|old| old.t_days < new.t_days);
+        match values.get_mut(at) {
+            None => {
+                values.push(new);
+                self.thin();
+                Taken::Newest
+            }
+            Some(old) if old.t_days > new.t_days => {
+                values.insert(at, new);
+                Taken::Late
+            }
+            Some(old) if *old == new => Taken::Known,
+            Some(old) => {
+                let before = old.value;
+                *old = new;
+                Taken::Corrected(before)
+            }
+        }
+    }
+
+    /// Displacement since the first reading, mm, where displacement is what is measured.
+    pub(super) fn displacement_mm(&self) -> Option<f64> {
+        let newest = self.observations.values.last()?;
+        (self.observations.quantity == crate::reading::Quantity::Displacement)
+            .then_some(newest.value - self.first_displacement_mm)
+    }
+
+    fn thin(&mut self) {
+        let values = &mut self.observations.values;
+        if values.len() <= MOST_READINGS {
+            return;
+        }
+        let half = values.len() / 2;
+        let mut index = 0;
+        values.retain(|_| {
+            index += 1;
+            index > half || index % 2 == 1
+        });
+    }
+}

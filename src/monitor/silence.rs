@@ -1,0 +1,63 @@
+//! How long a benchmark may be silent: silence is not safety.
+
+use crate::reading::Timestamp;
+use jiff::SignedDuration;
+use std::collections::VecDeque;
+
+/// Spacings remembered.
+const REMEMBERED: usize = 9;
+/// A benchmark may skip this many of its usual readings.
+const MAY_SKIP: i32 = 4;
+/// No benchmark is called silent within this time.
+const LEAST: SignedDuration = SignedDuration::from_mins(30);
+
+/// Watches the spacing of one benchmark's readings.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Silence {
+    newest: Option<Timestamp>,
+    spacings: VecDeque<SignedDuration>,
+    silent: bool,
+}
+
+impl Silence {
+    /// Notes a reading; true when it ends a silence.
+    pub(super) fn broken_by(&mut self, time: Timestamp) -> bool {
+        if let Some(newest) = self.newest {
+            if time <= newest {
+                return false;
+            }
+            self.spacings.push_back(time.duration_since(newest));
+            if self.spacings.len() > REMEMBERED {
+                self.spacings.pop_front();
+            }
+        }
+        self.newest = Some(time);
+        std::mem::take(&mut self.silent)
+    }
+
+    /// When silence becomes a fault; `None` while the usual spacing is unknown, or when it already is one.
+    pub(super) fn deadline(&self) -> Option<Timestamp> {
+        if self.silent || self.spacings.len() < 3 {
+            return None;
+        }
+        let mut sorted: Vec<SignedDuration> = self.spacings.iter().copied().collect();
+        sorted.sort_unstable();
+        let allowed = sorted[sorted.len() / 2].checked_mul(MAY_SKIP)?.max(LEAST);
+        // The longest gap seen lately is no silence either.
+        self.newest?.checked_add(allowed.max(*sorted.last()?)).ok()
+    }
+
+    /// The time of the last reading when `now` has reached the deadline; from then on it is silent.
+    pub(super) fn begins(&mut self, now: Timestamp) -> Option<Timestamp> {
+        if self.deadline().is_none_or(|deadline| now < deadline) {
+            return None;
+        }
+        self.silent = true;
+        self.newest
+    }
+
+    /// Whether the benchmark is silent.
+    pub(super) fn is_silent(&self) -> bool {
+        self.silent
+    }
+}

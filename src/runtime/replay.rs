@@ -1,0 +1,170 @@
+//! Recorded readings through the daemon's own site, in data time: the wall clock decides nothing.
+
+use super::clock;
+use super::deliver::{Dispatcher, Retry};
+use super::delivered::Delivered;
+use super::event_log::EventLog;
+use super::hook::Status;
+use super::shutdown::Shutdown;
+use super::site::{Counts, Sinks, Site};
+use super::tail::Arrival;
+use crate::config::HookConfig;
+use crate::monitor::{Event, Input, Settings};
+use crate::reading::{Recording, Timestamp};
+use std::io;
+use std::time::Duration;
+
+/// How long the hooks may take to finish after the last reading.
+const DRAIN_LIMIT: Duration = Duration::from_secs(600);
+
+/// How fast data time goes by.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Pace {
+    /// As fast as the monitor works.
+    Max,
+    /// So many seconds of data a second, a finite number above zero.
+    Times(f64),
+}
+
+/// What a replay is to do.
+#[derive(Debug, Clone, Copy)]
+pub struct Plan<'a> {
+    /// What hooks call the site.
+    pub site: &'a str,
+    /// The monitor's.
+    pub settings: &'a Settings,
+    /// The hooks to run, as an exercise.
+    pub hooks: &'a [HookConfig],
+    /// How fast.
+    pub pace: Pace,
+    /// Where in data time to stop; the end of the recording if that comes first.
+    pub until: Option<Timestamp>,
+}
+
+/// Why a replay did not come to its end.
+#[derive(Debug, thiserror::Error)]
+pub enum ReplayError {
+    /// The recording begins later than the replay is to stop.
+    #[error("no reading up to {until}: expected a time at or after the first one, {first}")]
+    NothingUntil {
+        /// Where it was to stop.
+        until: Timestamp,
+        /// The first reading.
+        first: Timestamp,
+    },
+    /// The events could not be written.
+    #[error("cannot write the events: {0}")]
+    Output(#[from] io::Error),
+    /// It was asked to stop.
+    #[error("interrupted")]
+    Interrupted,
+    /// Hooks did not take what they were given.
+    #[error("the replay is complete, but its hooks did not take every alert (the log says which)")]
+    Undelivered,
+}
+
+/// Everything in `recording` as it would have arrived: by time, and at one time the covariates
+/// before the readings, each by name.
+pub fn arrivals(recording: &Recording) -> Vec<Arrival> {
+    let samples = recording.channels.iter().flat_map(|channel| {
+        channel.samples.iter().map(|sample| Arrival {
+            time: sample.time,
+            input: Input::Sample {
+                channel: channel.name.clone(),
+                sample: *sample,
+            },
+        })
+    });
+    let readings = recording.series.iter().flat_map(|series| {
+        series.readings.iter().map(|reading| Arrival {
+            time: reading.time,
+            input: Input::Reading {
+                benchmark: series.benchmark.clone(),
+                unit: series.unit,
+                averaging: series.averaging,
+                reading: *reading,
+            },
+        })
+    });
+    let mut arrivals: Vec<Arrival> = samples.chain(readings).collect();
+    // Stable: what has one time keeps the order above.
+    arrivals.sort_by_key(|arrival| arrival.time);
+    arrivals
+}
+
+/// Plays `recording` and hands every event to `each`, the summary last; needs a multi-threaded
+/// tokio runtime where there are hooks. Neither the pace nor the hooks change the events, and those
+/// up to `plan.until` are the beginning of those of the whole recording.
+///
+/// # Errors
+/// [`ReplayError`].
+pub async fn replay(
+    recording: &Recording,
+    plan: &Plan<'_>,
+    mut shutdown: Shutdown,
+    each: &mut (dyn FnMut(&Event) -> io::Result<()> + '_),
+) -> Result<Counts, ReplayError> {
+    let arrivals = arrivals(recording);
+    let (Some(first), Some(last)) = (arrivals.first(), arrivals.last()) else {
+        return Ok(Counts::default());
+    };
+    let end = plan.until.map_or(last.time, |until| until.min(last.time));
+    if end < first.time {
+        let (until, first) = (end, first.time);
+        return Err(ReplayError::NothingUntil { until, first });
+    }
+    let mut site = Site::new(plan.site, plan.settings.clone(), sinks(plan.hooks));
+    let started = clock::later(Duration::ZERO);
+    for arrival in arrivals.iter().take_while(|arrival| arrival.time <= end) {
+        if let Some(wait) = wait(plan.pace, first.time, arrival.time) {
+            tokio::select! {
+                () = tokio::time::sleep_until(started + wait) => {}
+                () = shutdown.requested() => {}
+            }
+        }
+        if shutdown.is_requested() {
+            return Err(ReplayError::Interrupted);
+        }
+        told(&site.take(arrival, arrival.time), each)?;
+        site.commit(arrival.time)?;
+    }
+    told(&site.pass(end), each)?;
+    site.commit(end)?;
+    let (summary, counts) = (site.summary(), site.counts());
+    let lost = site.close(end, DRAIN_LIMIT).await?;
+    told(summary.as_slice(), each)?;
+    match lost {
+        Some(0) => Ok(counts),
+        Some(_) | None => Err(ReplayError::Undelivered),
+    }
+}
+
+fn told(
+    events: &[Event],
+    each: &mut (dyn FnMut(&Event) -> io::Result<()> + '_),
+) -> Result<(), ReplayError> {
+    Ok(events.iter().try_for_each(each)?)
+}
+
+/// Nothing is kept: what a replay says and sends is its output.
+fn sinks(hooks: &[HookConfig]) -> Sinks {
+    let start = || Dispatcher::start(hooks, &Retry::default(), Delivered::default());
+    Sinks {
+        events: EventLog::default(),
+        alerts: (!hooks.is_empty()).then(start),
+        status: Status::Exercise,
+    }
+}
+
+/// How long after the start `time` is due; `None` for at once.
+fn wait(pace: Pace, first: Timestamp, time: Timestamp) -> Option<Duration> {
+    let Pace::Times(times) = pace else {
+        return None;
+    };
+    let seconds = time.duration_since(first).as_secs_f64() / times;
+    // A wait beyond what a duration can hold is as good as one that it can.
+    Some(Duration::try_from_secs_f64(seconds).map_or(FOREVER, |wait| wait.min(FOREVER)))
+}
+
+/// About thirty years.
+const FOREVER: Duration = Duration::from_secs(1_000_000_000);

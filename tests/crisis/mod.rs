@@ -1,0 +1,142 @@
+//! Drives the monitor over one recorded benchmark and keeps what it said.
+
+use slipwatch::alert::{Level, Policy};
+use slipwatch::monitor::{AlertState, Event, EventKind, Input, Monitor, Settings};
+use slipwatch::reading::{BenchmarkId, Series, Timestamp, days_since};
+use slipwatch::runtime::ingest::{ReadOptions, read_files};
+use std::path::Path;
+
+/// One benchmark's crisis as the monitor lived it.
+pub struct Crisis {
+    pub events: Vec<Event>,
+}
+
+/// One refit, as far as the claims need it.
+#[derive(Debug, Clone, Copy)]
+pub struct Refit {
+    pub time: Timestamp,
+    pub median: Option<Timestamp>,
+    pub intercept: Option<Timestamp>,
+    pub stable_accelerating: f64,
+    pub red_chance: f64,
+}
+
+/// All series of a file, each velocity the mean of `averaging` where given.
+pub fn series(path: &Path, averaging: Option<jiff::SignedDuration>) -> Vec<Series> {
+    let options = ReadOptions {
+        averaging,
+        ..ReadOptions::default()
+    };
+    read_files(&[path.to_path_buf()], &options)
+        .unwrap()
+        .0
+        .series
+}
+
+/// A file of the project's own recordings.
+pub fn recording(name: &str) -> std::path::PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("recordings")
+        .join(name)
+}
+
+/// The default policy with another evacuation time.
+pub fn policy(evacuation_hours: i64) -> Policy {
+    Policy {
+        evacuation_time: jiff::SignedDuration::from_hours(evacuation_hours),
+        ..Policy::default()
+    }
+}
+
+impl Crisis {
+    /// Plays one series, and lets the deadlines between its readings pass.
+    pub fn play(series: &Series, policy: &Policy) -> Self {
+        let mut monitor = Monitor::new(Settings {
+            policy: policy.clone(),
+            ..Settings::default()
+        });
+        let mut events = Vec::new();
+        for reading in &series.readings {
+            while let Some(due) = monitor.next_deadline().filter(|due| *due <= reading.time) {
+                events.extend(monitor.step(due, &Input::Tick));
+            }
+            let input = Input::Reading {
+                benchmark: series.benchmark.clone(),
+                unit: series.unit,
+                averaging: series.averaging,
+                reading: *reading,
+            };
+            events.extend(monitor.step(reading.time, &input));
+        }
+        Self { events }
+    }
+
+    /// Plays the benchmark `id` of a recording.
+    pub fn of(file: &Path, id: &str, policy: &Policy) -> Self {
+        let all = series(file, None);
+        let wanted = BenchmarkId::new(id);
+        let series = all.iter().find(|s| s.benchmark == wanted).unwrap();
+        Self::play(series, policy)
+    }
+
+    pub fn refits(&self) -> Vec<Refit> {
+        let refit = |event: &Event| match &event.kind {
+            EventKind::Refit {
+                regime,
+                failure_time,
+                inverse_velocity,
+                chance_within_evacuation_time,
+                ..
+            } => {
+                let stable = slipwatch::regime::Regime::StableAccelerating;
+                Some(Refit {
+                    time: event.time,
+                    median: failure_time.median,
+                    intercept: inverse_velocity.failure_time,
+                    stable_accelerating: regime.probabilities[&stable],
+                    red_chance: *chance_within_evacuation_time,
+                })
+            }
+            _ => None,
+        };
+        self.events.iter().filter_map(refit).collect()
+    }
+
+    /// When a level was entered and left, in order.
+    pub fn levels(&self) -> Vec<(Timestamp, Level, AlertState)> {
+        let alert = |event: &Event| match &event.kind {
+            EventKind::Alert { level, state, .. } => Some((event.time, *level, *state)),
+            _ => None,
+        };
+        self.events.iter().filter_map(alert).collect()
+    }
+
+    /// When a level at least this grave was first entered.
+    pub fn first(&self, level: Level) -> Option<Timestamp> {
+        let entered = |(_, l, state): &(Timestamp, Level, AlertState)| {
+            *l >= level && *l != Level::Unknown && *state == AlertState::Firing
+        };
+        self.levels()
+            .into_iter()
+            .find(entered)
+            .map(|(time, ..)| time)
+    }
+
+    /// The level in force at the end.
+    pub fn last_level(&self) -> Level {
+        let mut level = Level::Green;
+        for (_, changed, state) in self.levels() {
+            match (changed, state) {
+                (Level::Unknown, _) => {}
+                (entered, AlertState::Firing) => level = entered,
+                (_, AlertState::Resolved) => level = Level::Green,
+            }
+        }
+        level
+    }
+}
+
+/// Days from `time` to `event`.
+pub fn days_before(event: Timestamp, time: Timestamp) -> f64 {
+    days_since(time, event)
+}
