@@ -26,7 +26,7 @@ from scipy.integrate import odeint
 from scipy.optimize import minimize
 
 LOWEST_M, HIGHEST_M = -20.0, 29.0
-MOST_STEPS = 5000
+MOST_STEPS = 300  # between two readings
 
 
 def state_and_slip(times, m, ln_x_i, ln_t):
@@ -44,8 +44,8 @@ def state_and_slip(times, m, ln_x_i, ln_t):
         slope,
         [ln_x_i, 0.0],
         ends,
-        rtol=1e-10,
-        atol=1e-12,
+        rtol=1e-9,
+        atol=1e-11,
         mxstep=MOST_STEPS,
         full_output=True,
     )
@@ -88,7 +88,7 @@ def invert(times, values, displacement, starts, seed):
             random.normal(0.0, 2.0),
             np.log(length) + random.normal(0.0, 2.5),
         ]
-        options = {"maxiter": 2000, "maxfev": 4000, "xatol": 1e-8, "fatol": 1e-12}
+        options = {"maxiter": 1000, "maxfev": 1500, "xatol": 1e-8, "fatol": 1e-12}
         found = minimize(
             rms,
             start,

@@ -9,7 +9,7 @@ mod quasi_random;
 mod rates;
 
 pub use constant_load::{ConstantLoad, Exponent, Outcome, Place, Solution};
-pub use posterior::{Curvature, Ensemble, Posterior, Sample as LawSample};
+pub use posterior::{Curvature, Ensemble, P_PRIOR, Posterior, Sample as LawSample};
 pub use projection::PointReadings;
 pub(crate) use rates::displacement_sigma;
 pub use rates::{Observation, Observations, Rate, RateOptions};

@@ -6,5 +6,5 @@ mod panel;
 mod passage;
 
 pub use line::InverseVelocityLine;
-pub use panel::{FEWEST_READINGS, HORIZON_DAYS, Outlook, Panel};
+pub use panel::{FEWEST_READINGS, HORIZON_DAYS, Outlook, Panel, seed_of};
 pub use passage::Passage;
