@@ -1,8 +1,8 @@
 //! Coordinates in which every point is a law: unbounded but for a box, and regular over the record.
 //!
 //! With constant load the velocity only rises or only falls. Anchored at one end of the record, with
-//! the direction and the branch of m fixed, the law is free in ln |r|, in ln g (g = |p| times the smaller
-//! of |a| and |b|, so that a and b keep one sign) and in ln |m|. A branch with m < 1 relaxes forwards in
+//! the direction and the branch of m fixed, the law is free in ln |r|, in ln |ln y_s| (y_s the steady
+//! state, on the side where a and b have one sign) and in ln |m|. A branch with m < 1 relaxes forwards in
 //! time and one with m > 1 backwards, so each is anchored where it starts to relax; where the velocity is
 //! greatest at the other end, that end makes a second chart.
 
@@ -14,19 +14,19 @@ pub(super) const HIGHEST_M: f64 = 29.0;
 /// The lowest m that is looked for.
 pub(super) const LOWEST_M: f64 = -20.0;
 /// m itself is no nearer to 0 than this, where there is no law.
-pub(super) const LEAST_SIZE_OF_M: f64 = 0.01;
+const LEAST_SIZE_OF_M: f64 = 1e-3;
 /// m is no nearer to 1 than exp(1e-8) within a branch: m = 1 is a law by itself.
-const LEAST_LN_M: f64 = 1e-8;
+pub(super) const LEAST_LN_M: f64 = 1e-8;
 
 /// Bounds of ln(|r| L), L the record's length.
 const LN_SLOPE: (f64, f64) = (-14.0, 16.0);
-/// Bounds of ln(g L).
-const LN_CURVATURE: (f64, f64) = (-21.0, 14.0);
+/// Bounds of ln |ln y_s|: from a steady state that is all but reached to none.
+const LN_STEADY: (f64, f64) = (-12.0, 20.0);
 
 /// Where the search looks first: |r| L.
 const SLOPES: [f64; 8] = [0.03, 0.2, 0.7, 2.0, 6.0, 20.0, 80.0, 400.0];
-/// Where the search looks first: g L.
-const CURVATURES: [f64; 7] = [0.01, 0.3, 1.0, 3.0, 10.0, 40.0, 150.0];
+/// Where the search looks first: |ln y_s|.
+const STEADY: [f64; 7] = [0.05, 0.3, 1.0, 3.0, 8.0, 25.0, 100.0];
 
 /// The ranges of m that hold different laws.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,7 +57,7 @@ pub(super) enum Anchor {
     End,
 }
 
-/// One set of coordinates (ln |r| L, ln g L, ln |m|).
+/// One set of coordinates (ln |r| L, ln |ln y_s|, ln |m|).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Chart {
     pub(super) branch: Branch,
@@ -127,39 +127,37 @@ impl Chart {
     /// The law at a point, y = 1 and velocity 1 at the anchor; `length` is the record's, days.
     pub(super) fn law(self, at: &Vector3<f64>, length: f64) -> Law {
         let p = self.branch.p(at[2]);
-        let slope = at[0].exp() / length;
-        let least = at[1].exp() / length;
-        // r = b - a: the larger of |a| and |b| follows from the direction and the sign of m.
-        let a_is_larger =
-            (self.direction == Direction::Accelerating) == (self.branch == Branch::BelowZero);
-        let size = if a_is_larger {
-            least + slope * p.abs()
+        let r = self.direction.signed(at[0].exp() / length);
+        // b/a = y_s^p and r = b - a; whatever y_s, a and b come out with the sign of m.
+        let kappa = r * p / (p * self.steady_side() * at[1].exp()).exp_m1();
+        Law::from_fit(1.0, r, kappa, p)
+    }
+
+    /// The sign of ln y_s: m < 1 goes to the steady velocity, m > 1 comes from it.
+    fn steady_side(self) -> f64 {
+        let comes_from_it = self.branch == Branch::AboveOne;
+        if comes_from_it == (self.direction == Direction::Accelerating) {
+            1.0
         } else {
-            least
-        };
-        let kappa = if self.branch == Branch::AboveOne {
-            size
-        } else {
-            -size
-        };
-        Law::from_fit(1.0, self.direction.signed(slope), kappa, p)
+            -1.0
+        }
     }
 
     /// Lowest and highest corner of the chart.
     pub(super) fn corners(self) -> (Vector3<f64>, Vector3<f64>) {
         let ln_m = self.branch.ln_m();
         (
-            Vector3::new(LN_SLOPE.0, LN_CURVATURE.0, ln_m.0),
-            Vector3::new(LN_SLOPE.1, LN_CURVATURE.1, ln_m.1),
+            Vector3::new(LN_SLOPE.0, LN_STEADY.0, ln_m.0),
+            Vector3::new(LN_SLOPE.1, LN_STEADY.1, ln_m.1),
         )
     }
 
     /// The points of one m where the search looks first.
     pub(super) fn points(ln_m: f64) -> impl Iterator<Item = Vector3<f64>> {
         SLOPES.into_iter().flat_map(move |slope| {
-            CURVATURES
+            STEADY
                 .into_iter()
-                .map(move |curvature| Vector3::new(slope.ln(), curvature.ln(), ln_m))
+                .map(move |steady| Vector3::new(slope.ln(), steady.ln(), ln_m))
         })
     }
 }

@@ -5,8 +5,8 @@
 //! points of each m of the grid, and polished again from the best of those. Nothing is random.
 
 use super::chart::{
-    Anchor, Branch, CHARTS, Chart, Direction, HIGHEST_M, LOWEST_M, law_at_unit_m, slope_bounds,
-    unit_m_starts,
+    Anchor, Branch, CHARTS, Chart, Direction, HIGHEST_M, LEAST_LN_M, LOWEST_M, law_at_unit_m,
+    slope_bounds, unit_m_starts,
 };
 use super::least_squares::{self, Limits, Optimum};
 use super::projection::PointReadings;
@@ -103,6 +103,9 @@ pub struct ConstantLoad {
 const POLISH: (usize, usize) = (60, 1500);
 /// Starts for each m of the grid, and last polishes for each chart.
 const STARTS: (usize, usize) = (2, 3);
+/// A last polish is begun afresh while it gained more than this, relative, and at most so often.
+const RESTART_GAIN: f64 = 1e-7;
+const MOST_RESTARTS: usize = 6;
 /// Minima kept beside the best with m > 1, m = 1 and m < 1.
 const MOST_MINIMA: usize = 8;
 /// Relative difference of rms under which two results are one minimum.
@@ -113,6 +116,8 @@ const GAIN_OVER_UNIT_M: f64 = 1e-7;
 const AT_BOUND: f64 = 1e-3;
 /// A minimum must leave less than this share of the rms about a constant velocity.
 const WORTH_MENTION: f64 = 0.999;
+/// And no more than so many times the rms of the best.
+const WORST: f64 = 3.0;
 
 impl ConstantLoad {
     /// Inverts the readings.
@@ -217,25 +222,46 @@ impl<'a> Search<'a> {
         polished.sort_by(|a, b| a.cost.total_cmp(&b.cost));
         polished.dedup_by(|a, b| (a.cost - b.cost).abs() <= SAME_RMS * b.cost);
         polished.truncate(STARTS.1);
-        let last = limits((low, high), POLISH.1);
-        let finished = polished
+        let finished: Vec<Optimum<3>> = polished
             .into_iter()
-            .filter_map(|first| self.polish(first.at, chart.anchor, &last, law));
-        let finished: Vec<Optimum<3>> = finished.collect();
+            .filter_map(|first| self.settle(first, chart.anchor, (low, high), law))
+            .collect();
+        let place = |at: &Vector3<f64>| {
+            let side = at[2] <= low[2] + AT_BOUND || at[2] >= high[2] - AT_BOUND;
+            if exponent == Exponent::Free && side && at[2].abs() > AT_BOUND {
+                Place::AtBoundOfM
+            } else {
+                Place::Inside
+            }
+        };
         finished
             .into_iter()
-            .filter_map(|optimum| {
-                let at_bound =
-                    optimum.at[2] <= low[2] + AT_BOUND || optimum.at[2] >= high[2] - AT_BOUND;
-                let runs_into_one = optimum.at[2].abs() < 1e-6;
-                let place = if at_bound && !runs_into_one && exponent == Exponent::Free {
-                    Place::AtBoundOfM
-                } else {
-                    Place::Inside
-                };
-                self.found(&law(&optimum.at), chart.anchor, (&optimum, place))
+            .filter_map(|end| {
+                let place = place(&end.at);
+                self.found(&law(&end.at), chart.anchor, (&end, place))
             })
             .collect()
+    }
+
+    /// Polishes to the end, afresh as long as it gains: a curved valley stalls a search before its floor.
+    fn settle(
+        &mut self,
+        first: Optimum<3>,
+        anchor: Anchor,
+        corners: (Vector3<f64>, Vector3<f64>),
+        law: impl Fn(&Vector3<f64>) -> Law + Copy,
+    ) -> Option<Optimum<3>> {
+        let limits = limits(corners, POLISH.1);
+        let mut best = first;
+        for _ in 0..MOST_RESTARTS {
+            let next = self.polish(best.at, anchor, &limits, law)?;
+            let gain = best.cost - next.cost;
+            best = next;
+            if gain <= RESTART_GAIN * best.cost {
+                break;
+            }
+        }
+        Some(best)
     }
 
     /// The best laws with m = 1, one in each direction: y is a straight line.
@@ -376,31 +402,66 @@ fn m_of(solution: &Solution) -> f64 {
     1.0 / (1.0 - solution.law.p)
 }
 
-/// Where a branch has only run into m = 1, m = 1 is the better account.
+/// Where a branch has only run into m = 1, that is the better account; what is left of the branch is
+/// the law next to it, whose x_i, T and D mean nothing.
 fn prefer_unit_m(found: &mut Vec<Found>) {
-    let Some(index) = found.iter().position(|one| one.solution.law.p == 0.0) else {
+    let Some(unit) = found.iter().find(|one| one.solution.law.p == 0.0).copied() else {
         return;
     };
-    let unit = found[index];
-    let gains = |one: &Found| one.solution.rms < unit.solution.rms * (1.0 - GAIN_OVER_UNIT_M);
+    let unit_rms = unit.solution.rms;
+    for one in found.iter_mut() {
+        let law = &mut one.solution.law;
+        let same = (one.solution.rms - unit_rms).abs() <= GAIN_OVER_UNIT_M * unit_rms;
+        if law.p == 0.0 || !same {
+            continue;
+        }
+        let side = if law.p > 0.0 && law.p < 1.0 {
+            1.0
+        } else {
+            -1.0
+        };
+        *law = Law {
+            kappa: side * f64::MIN_POSITIVE,
+            p: side * LEAST_LN_M,
+            a: f64::NAN,
+            ..unit.solution.law
+        };
+        one.solution.place = Place::Inside;
+    }
+    let gains = |one: &Found| one.solution.rms < unit_rms * (1.0 - GAIN_OVER_UNIT_M);
     if found.first().is_some_and(|best| !gains(best)) {
-        found.remove(index);
-        found.insert(0, unit);
+        // Stable: only the best law with m = 1 moves, to the front.
+        let at = found.iter().position(|one| one.solution.law.p == 0.0);
+        found[..=at.unwrap_or(0)].rotate_right(1);
+    }
+}
+
+/// The side of m = 1 on which a law stands.
+fn side(law: &Law) -> i8 {
+    if law.p == 0.0 {
+        0
+    } else if law.p > 0.0 && law.p < 1.0 {
+        1
+    } else {
+        -1
     }
 }
 
 /// The minima that differ, best first, and the best of m > 1, m = 1 and m < 1 whatever their worth.
 fn distinct(found: &[Found], flat: f64, exponent: Exponent) -> Vec<Solution> {
-    let side = |law: &Law| law.p.partial_cmp(&0.0);
+    let best = found.first().map_or(0.0, |best| best.solution.rms);
     let mut kept: Vec<Solution> = Vec::new();
     for Found { solution, .. } in found {
         let first_of_side = kept.iter().all(|one| side(&one.law) != side(&solution.law));
         let same = |one: &Solution| {
-            (one.rms - solution.rms).abs() <= SAME_RMS * solution.rms
+            let bound = solution.place == Place::AtBoundOfM && one.place == solution.place;
+            let close = (one.rms - solution.rms).abs() <= SAME_RMS * solution.rms;
+            (close || bound)
                 && side(&one.law) == side(&solution.law)
                 && (one.law.r > 0.0) == (solution.law.r > 0.0)
         };
-        let new = solution.rms < WORTH_MENTION * flat && !kept.iter().any(same);
+        let worthy = solution.rms < WORTH_MENTION * flat && solution.rms <= WORST * best;
+        let new = worthy && !kept.iter().any(same);
         if first_of_side || (new && kept.len() < MOST_MINIMA && exponent == Exponent::Free) {
             kept.push(*solution);
         }
