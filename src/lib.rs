@@ -4,6 +4,7 @@
 //!
 //! ```text
 //! main -> cli -> runtime, config -> monitor -> alert, regime, forecast -> fit -> model -> reading
+//!         cli -> inversion -> regime, forecast, fit
 //! ```
 //!
 //! Everything from `monitor` down is pure: no clock, no files, no network, no ambient randomness.
@@ -13,6 +14,7 @@ pub mod cli;
 pub mod config;
 pub mod fit;
 pub mod forecast;
+pub mod inversion;
 pub mod model;
 pub mod monitor;
 pub mod reading;

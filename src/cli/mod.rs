@@ -5,9 +5,12 @@ mod check;
 mod convert;
 mod demo;
 mod exit;
+mod fit;
 mod replay;
 mod run;
 mod simulate;
+mod sweep;
+mod table;
 mod text;
 
 use clap::{Parser, Subcommand};
@@ -27,6 +30,8 @@ enum Command {
     Run(run::Args),
     Check(check::Args),
     Replay(replay::Args),
+    Fit(fit::Args),
+    Sweep(sweep::Args),
     Simulate(simulate::Args),
     Convert(convert::Args),
 }
@@ -39,6 +44,8 @@ pub fn main() -> ExitCode {
             Command::Run(args) => run::run(&args),
             Command::Check(args) => check::run(&args),
             Command::Replay(args) => replay::run(&args),
+            Command::Fit(args) => fit::run(&args),
+            Command::Sweep(args) => sweep::run(&args),
             Command::Simulate(args) => simulate::run(&args),
             Command::Convert(args) => convert::run(&args),
         },

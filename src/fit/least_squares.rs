@@ -26,14 +26,47 @@ pub(super) struct Optimum<const N: usize> {
 const RELATIVE_GAIN: f64 = 1e-13;
 const JACOBIAN_STEP: f64 = 1e-5;
 
+/// Where a search may go, how far, and how finely it differentiates.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Limits<const N: usize> {
+    pub(super) lowest: SVector<f64, N>,
+    pub(super) highest: SVector<f64, N>,
+    /// Coordinates smaller than this are differentiated as if they were of this size.
+    pub(super) scale: f64,
+    pub(super) most_evaluations: usize,
+}
+
+impl<const N: usize> Limits<N> {
+    /// No bounds but that on the work.
+    pub(super) fn evaluations(most_evaluations: usize) -> Self {
+        Self {
+            lowest: SVector::repeat(f64::NEG_INFINITY),
+            highest: SVector::repeat(f64::INFINITY),
+            scale: 1e-2,
+            most_evaluations,
+        }
+    }
+
+    fn clamp(&self, at: &SVector<f64, N>) -> SVector<f64, N> {
+        SVector::from_fn(|i, _| at[i].clamp(self.lowest[i], self.highest[i]))
+    }
+
+    /// Whether coordinate `i` stands at a bound that descent would cross.
+    fn holds(&self, i: usize, at: &SVector<f64, N>, gradient: &SVector<f64, N>) -> bool {
+        (at[i] <= self.lowest[i] && gradient[i] >= 0.0)
+            || (at[i] >= self.highest[i] && gradient[i] <= 0.0)
+    }
+}
+
 /// Minimises the sum of squares of `residuals(point, out)`, which returns false outside the model's domain.
 /// `None` when the start itself lies outside.
 pub(super) fn minimise<const N: usize>(
     start: SVector<f64, N>,
     count: usize,
-    most_evaluations: usize,
+    limits: &Limits<N>,
     mut residuals: impl FnMut(&SVector<f64, N>, &mut [f64]) -> bool,
 ) -> Option<Optimum<N>> {
+    let most_evaluations = limits.most_evaluations;
     let mut buffers = Buffers {
         here: vec![0.0; count],
         there: vec![0.0; count],
@@ -48,13 +81,14 @@ pub(super) fn minimise<const N: usize>(
     let mut termination = Termination::TooManyEvaluations;
     let mut information = SMatrix::zeros();
     while evaluations < most_evaluations {
-        let (normal, gradient) = jacobian(&at, &mut buffers, &mut residuals);
+        let (normal, gradient) = jacobian(&at, limits.scale, &mut buffers, &mut residuals);
         evaluations += N;
         information = normal;
+        let (normal, gradient) = hold_bounds(limits, &at, normal, gradient);
         let mut gained = None;
         while damping < 1e12 && evaluations < most_evaluations {
             let step = damped_step(&normal, &gradient, damping);
-            let there = at + step;
+            let there = limits.clamp(&(at + step));
             evaluations += 1;
             let inside = residuals(&there, &mut buffers.there);
             let new_cost = if inside {
@@ -98,6 +132,25 @@ fn sum_of_squares(values: &[f64]) -> f64 {
     if sum.is_finite() { sum } else { f64::INFINITY }
 }
 
+/// Takes the coordinates that are held by a bound out of the step.
+fn hold_bounds<const N: usize>(
+    limits: &Limits<N>,
+    at: &SVector<f64, N>,
+    mut normal: SMatrix<f64, N, N>,
+    mut gradient: SVector<f64, N>,
+) -> (SMatrix<f64, N, N>, SVector<f64, N>) {
+    for i in (0..N)
+        .filter(|i| limits.holds(*i, at, &gradient))
+        .collect::<Vec<_>>()
+    {
+        normal.row_mut(i).fill(0.0);
+        normal.column_mut(i).fill(0.0);
+        normal[(i, i)] = 1.0;
+        gradient[i] = 0.0;
+    }
+    (normal, gradient)
+}
+
 fn damped_step<const N: usize>(
     normal: &SMatrix<f64, N, N>,
     gradient: &SVector<f64, N>,
@@ -115,11 +168,12 @@ fn damped_step<const N: usize>(
 /// J^T J and J^T r by forward differences, backward where forward leaves the domain.
 fn jacobian<const N: usize>(
     at: &SVector<f64, N>,
+    scale: f64,
     buffers: &mut Buffers,
     residuals: &mut impl FnMut(&SVector<f64, N>, &mut [f64]) -> bool,
 ) -> (SMatrix<f64, N, N>, SVector<f64, N>) {
     for i in 0..N {
-        let size = JACOBIAN_STEP * at[i].abs().max(1e-2);
+        let size = JACOBIAN_STEP * at[i].abs().max(scale);
         let mut taken = 0.0;
         for step in [size, -size] {
             let mut there = *at;

@@ -1,10 +1,15 @@
 //! The inversion of the law: from readings to velocities with errors, the best fit, and the posterior.
 
+mod chart;
+mod constant_load;
 mod least_squares;
 mod posterior;
+mod projection;
 mod quasi_random;
 mod rates;
 
-pub use posterior::{Curvature, Ensemble, Posterior, Sample as LawSample};
+pub use constant_load::{ConstantLoad, Exponent, Outcome, Place, Solution};
+pub use posterior::{Curvature, Ensemble, P_PRIOR, Posterior, Sample as LawSample};
+pub use projection::PointReadings;
 pub(crate) use rates::displacement_sigma;
 pub use rates::{Observation, Observations, Rate, RateOptions};

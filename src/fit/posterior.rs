@@ -66,6 +66,8 @@ const SLOPE_PER_INTERVAL: f64 = 0.25;
 const PRIOR_SCATTER: (f64, f64) = (0.1, 3.0);
 /// The most that the likelihood is trusted: parameters are not constant over years, as the law has them.
 const MOST_TRUST: f64 = 0.5;
+/// The prior of p spans this, m from 0.5 to 2.5.
+pub const P_PRIOR: (f64, f64) = (-1.0, 0.6);
 /// Samples drawn.
 const SAMPLES: u32 = 128;
 /// Proposal widths: the Laplace approximation's own, and twice it, in equal parts.
@@ -248,7 +250,7 @@ impl<'a> Problem<'a> {
         let optimum = least_squares::minimise(
             nalgebra::SVector::<f64, N>::from_fn(|i, _| start[i]),
             count + 2,
-            80,
+            &least_squares::Limits::evaluations(80),
             |at, out| {
                 let at = widen(at);
                 if !self.predict(&self.law(&at, 0.0), &mut predicted) {
@@ -343,8 +345,8 @@ impl<'a> Problem<'a> {
             let at = mode.at + root * z;
             let p = match self.curvature {
                 Curvature::Zero => 0.0,
-                Curvature::Free if at[2] > 0.0 => 0.6 * u[3],
-                Curvature::Free => -u[3],
+                Curvature::Free if at[2] > 0.0 => P_PRIOR.1 * u[3],
+                Curvature::Free => P_PRIOR.0 * u[3],
             };
             let law = self.law(&at, p);
             // b and m have one sign: where the law would need S < 0 there is none.

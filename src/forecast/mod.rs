@@ -7,5 +7,5 @@ mod passage;
 mod surprise;
 
 pub use line::InverseVelocityLine;
-pub use panel::{FEWEST_READINGS, HORIZON_DAYS, Outlook, Panel};
+pub use panel::{FEWEST_READINGS, HORIZON_DAYS, Outlook, Panel, seed_of};
 pub use passage::Passage;

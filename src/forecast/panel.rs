@@ -233,6 +233,14 @@ impl Panel {
     }
 }
 
+/// The seed of a benchmark's panel, FNV-1a of its name: every benchmark draws its own numbers, the same
+/// in every run.
+pub fn seed_of(name: &str) -> u64 {
+    name.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    })
+}
+
 fn window(rates: &[Rate], role: Role) -> Option<&[Rate]> {
     #[expect(
         clippy::cast_possible_truncation,

@@ -6,7 +6,7 @@ use super::history::{History, Source, Taken};
 use super::silence::Silence;
 use crate::alert::{Entered, Evidence, Latch, Level, Policy, Transition};
 use crate::fit::Rate;
-use crate::forecast::{HORIZON_DAYS, InverseVelocityLine, Outlook, Panel};
+use crate::forecast::{HORIZON_DAYS, InverseVelocityLine, Outlook, Panel, seed_of};
 use crate::reading::{BenchmarkId, Reading, SECONDS_PER_DAY, Timestamp, after_days};
 use crate::regime::{Regime, Tracker, label};
 use jiff::SignedDuration;
@@ -415,11 +415,4 @@ fn report(outlook: &Outlook) -> RegimeReport {
 
 fn days(span: SignedDuration) -> f64 {
     span.as_secs_f64() / SECONDS_PER_DAY
-}
-
-/// FNV-1a of the name: every benchmark draws its own numbers, the same in every run.
-fn seed_of(name: &str) -> u64 {
-    name.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-    })
 }

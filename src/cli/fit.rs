@@ -1,0 +1,227 @@
+//! `fit FILE`: one inversion.
+
+use super::args::{Format, OutputArgs, ReadingArgs};
+use super::table::{Table, number, time};
+use crate::alert::Policy;
+use crate::fit::Exponent;
+use crate::inversion::{Estimate, FitReport, Inversion, Options};
+use crate::reading::{Quantity, Series, Timestamp, Unit};
+use crate::runtime::clock::Stopwatch;
+use std::fmt::Write as _;
+use std::io::{self, Write};
+
+/// Invert one benchmark's readings: the law's parameters, the regime, the failure time
+///
+/// The best fit and its rms are those of the constant-load law by unweighted least squares. Intervals
+/// bound 90 %. Failure is the first passage of --critical-velocity.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    #[command(flatten)]
+    readings: ReadingArgs,
+    #[command(flatten)]
+    inversion: InversionArgs,
+    #[command(flatten)]
+    output: OutputArgs,
+}
+
+/// What `fit` and `sweep` hold and choose.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub(super) struct InversionArgs {
+    /// Use no reading before this
+    #[arg(long, value_name = "TIME")]
+    from: Option<Timestamp>,
+    /// Use no reading after this
+    #[arg(long, value_name = "TIME")]
+    until: Option<Timestamp>,
+    /// Hold m at this value
+    #[arg(long, value_name = "m=M", value_parser = fixed)]
+    fix: Option<f64>,
+}
+
+impl InversionArgs {
+    /// The same for the inversion.
+    pub(super) fn options(&self, readings: &ReadingArgs) -> Options {
+        let policy = readings.policy(&Policy::default());
+        Options {
+            from: self.from,
+            until: self.until,
+            exponent: self.fix.map_or(Exponent::Free, Exponent::Fixed),
+            critical_velocity_mm_per_day: policy.critical_velocity_mm_per_day,
+            evacuation_time: policy.evacuation_time,
+            ..Options::default()
+        }
+    }
+}
+
+/// Reads the files, inverts the series and prints the result.
+pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    let loaded = args.readings.load()?;
+    let series = args.readings.series(&loaded.recording)?;
+    let options = args.inversion.options(&args.readings);
+    let report = report(series, &options);
+    let mut stdout = io::stdout().lock();
+    match args.output.format {
+        Format::Json => writeln!(stdout, "{}", serde_json::to_string(&report)?)?,
+        Format::Text => write!(stdout, "{}", text(&report))?,
+    }
+    stdout.flush()?;
+    Ok(())
+}
+
+/// Inverts a series; `seconds` is what the least squares took.
+pub(super) fn report(series: &Series, options: &Options) -> FitReport {
+    let inversion = Inversion::new(series, options);
+    let stopwatch = Stopwatch::start();
+    let least_squares = inversion.least_squares();
+    let seconds = stopwatch.elapsed().as_secs_f64();
+    inversion.report(&least_squares, seconds)
+}
+
+/// `m=1.5`.
+fn fixed(text: &str) -> Result<f64, String> {
+    let value = text.strip_prefix("m=").and_then(|m| m.parse::<f64>().ok());
+    value
+        .filter(|m| m.is_finite() && *m != 0.0 && (-20.0..=29.0).contains(m))
+        .ok_or_else(|| "expected m=M with M from -20 to 29, not 0".to_owned())
+}
+
+fn text(report: &FitReport) -> String {
+    let mut out = String::new();
+    // Writing to a string cannot fail.
+    let _ = writeln!(
+        out,
+        "benchmark {}, {} in {}, {} readings, {} to {}",
+        report.benchmark,
+        report.quantity,
+        report.unit,
+        report.readings,
+        time(report.first),
+        time(report.last),
+    );
+    let _ = writeln!(
+        out,
+        "{}; rms {} {}, {} laws solved in {:.1} ms\n",
+        report.termination,
+        number(report.rms),
+        report.unit,
+        report.evaluations,
+        report.seconds * 1e3,
+    );
+    out.push_str(&summary(report).to_string());
+    out.push('\n');
+    out.push_str(&parameters(report).to_string());
+    if !report.alternatives.0.is_empty() {
+        out.push('\n');
+        out.push_str(&alternatives(report).to_string());
+    }
+    out
+}
+
+fn summary(report: &FitReport) -> Table {
+    let percent = |share: Option<f64>| {
+        share.map_or("-".to_owned(), |share| format!("{:.0} %", 100.0 * share))
+    };
+    let regime = &report.regime;
+    let failure = &report.failure_time;
+    let line = &report.inverse_velocity;
+    let mut table = Table::plain();
+    table.row([
+        "regime".to_owned(),
+        format!(
+            "{} (unstable {}, accelerating {})",
+            regime.label,
+            percent(regime.probability_unstable),
+            percent(regime.probability_accelerating),
+        ),
+    ]);
+    table.row([
+        "failure".to_owned(),
+        format!(
+            "{} within {:.0} days, {} within the evacuation time",
+            percent(failure.probability),
+            failure.horizon_days,
+            percent(failure.chance_within_evacuation_time),
+        ),
+    ]);
+    table.row([
+        "  5, 50, 95 %".to_owned(),
+        [failure.low, failure.median, failure.high]
+            .map(time)
+            .join("  "),
+    ]);
+    table.row([
+        "inverse velocity".to_owned(),
+        format!(
+            "meets zero {} (r squared {})",
+            time(line.failure_time),
+            number(line.r_squared)
+        ),
+    ]);
+    let alpha = line.alpha.map_or("-".to_owned(), |alpha| {
+        let bounds = [alpha.low, alpha.high].map(number).join(" to ");
+        format!("{} ({bounds})", number(alpha.best))
+    });
+    table.row(["  alpha".to_owned(), alpha]);
+    table.row(["transition".to_owned(), time(report.transition_time)]);
+    table
+}
+
+fn parameters(report: &FitReport) -> Table {
+    let velocity = match report.unit {
+        unit @ Unit::Rate(..) => unit.to_string(),
+        unit @ Unit::Length(_) => format!("{unit}/day"),
+    };
+    let length = match report.unit {
+        Unit::Length(length) | Unit::Rate(length, _) => length.symbol(),
+    };
+    let p = &report.parameters;
+    let rows: [(&str, &Estimate, &str); 9] = [
+        ("m", &p.m, ""),
+        ("x_i", &p.x_i, ""),
+        ("T", &p.t_unit_days, "days"),
+        ("D", &p.d, &velocity),
+        ("D_c", &p.d_c, length),
+        ("S theta_i", &p.s_theta_i, ""),
+        ("v_i", &p.v_i, &velocity),
+        ("r", &p.r_per_day, "1/day"),
+        ("kappa", &p.kappa_per_day, "1/day"),
+    ];
+    let mut table = Table::headed(["parameter", "best fit", "5 %", "95 %", "unit"]);
+    for (name, estimate, unit) in rows {
+        table.row([
+            name.to_owned(),
+            number(estimate.best),
+            number(estimate.low),
+            number(estimate.high),
+            unit.to_owned(),
+        ]);
+    }
+    table
+}
+
+fn alternatives(report: &FitReport) -> Table {
+    let unit = report.unit;
+    let d = match unit.quantity() {
+        Quantity::Velocity => format!("D {unit}"),
+        Quantity::Displacement => format!("D {unit}/day"),
+    };
+    let mut table = Table::headed([
+        "minimum m".to_owned(),
+        "x_i".to_owned(),
+        "T days".to_owned(),
+        d,
+        format!("rms {unit}"),
+        "regime".to_owned(),
+    ]);
+    for one in &report.alternatives.0 {
+        table.row([
+            number(one.m),
+            number(one.x_i),
+            number(one.t_unit_days),
+            number(one.d),
+            number(one.rms),
+            one.regime.to_string(),
+        ]);
+    }
+    table
+}

@@ -1,0 +1,129 @@
+//! `sweep FILE`: the inversion over growing `t_max`, a row each.
+
+use super::args::{Format, OutputArgs, ReadingArgs};
+use super::fit::InversionArgs;
+use super::table::{Table, number, time};
+use crate::inversion::{SweepOptions, SweepReport, SweepRow, sweep};
+use crate::reading::Timestamp;
+use std::io::{self, Write};
+
+/// Invert one benchmark's readings up to one `t_max` after another
+///
+/// What each inversion would have said at the time: its regime, m, failure time and alternatives.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    #[command(flatten)]
+    readings: ReadingArgs,
+    #[command(flatten)]
+    inversion: InversionArgs,
+    /// The first and the last `t_max`; either may be left out
+    #[arg(long, value_name = "FIRST..LAST", value_parser = range, default_value = "..")]
+    t_max: Range,
+    /// How many rows
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = steps)]
+    steps: usize,
+    #[command(flatten)]
+    output: OutputArgs,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Range {
+    first: Option<Timestamp>,
+    last: Option<Timestamp>,
+}
+
+/// Reads the files, inverts the series many times and prints the rows.
+pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    let loaded = args.readings.load()?;
+    let series = args.readings.series(&loaded.recording)?;
+    let options = args.inversion.options(&args.readings);
+    let steps = SweepOptions {
+        first: args.t_max.first,
+        last: args.t_max.last,
+        steps: args.steps,
+    };
+    let report = sweep(series, &options, &steps);
+    let mut stdout = io::stdout().lock();
+    match args.output.format {
+        Format::Json => writeln!(stdout, "{}", serde_json::to_string(&report)?)?,
+        Format::Text => write!(stdout, "{}", text(&report))?,
+    }
+    stdout.flush()?;
+    Ok(())
+}
+
+/// `FIRST..LAST`.
+fn range(text: &str) -> Result<Range, String> {
+    let expected = || "expected FIRST..LAST, each an RFC 3339 time or nothing".to_owned();
+    let (first, last) = text.split_once("..").ok_or_else(expected)?;
+    let one = |part: &str| match part {
+        "" => Ok(None),
+        part => part.parse().map(Some).map_err(|_| expected()),
+    };
+    Ok(Range {
+        first: one(first)?,
+        last: one(last)?,
+    })
+}
+
+fn steps(text: &str) -> Result<usize, String> {
+    let count = text.parse().ok();
+    count
+        .filter(|count| (1..=1000).contains(count))
+        .ok_or_else(|| "expected 1 to 1000".to_owned())
+}
+
+fn text(report: &SweepReport) -> String {
+    let unit = report.unit;
+    let first = time(report.first);
+    let mut table = Table::headed([
+        "t_max".to_owned(),
+        "n".to_owned(),
+        "regime".to_owned(),
+        "unstable".to_owned(),
+        "m".to_owned(),
+        "x_i".to_owned(),
+        "transition".to_owned(),
+        "failure 5 %".to_owned(),
+        "failure 50 %".to_owned(),
+        "chance".to_owned(),
+        "1/v = 0".to_owned(),
+        "minima".to_owned(),
+        format!("rms {unit}"),
+    ]);
+    for row in &report.rows {
+        table.row(cells(row));
+    }
+    let (benchmark, quantity) = (&report.benchmark, report.quantity);
+    format!("benchmark {benchmark}, {quantity} in {unit}, readings from {first}\n\n{table}")
+}
+
+fn cells(row: &SweepRow) -> [String; 13] {
+    let percent = |share: Option<f64>| {
+        share.map_or("-".to_owned(), |share| format!("{:.0} %", 100.0 * share))
+    };
+    let minima = row.alternatives.range_of_m();
+    let minima = minima.map_or("-".to_owned(), |(low, high)| {
+        format!("{}: m {low:.2} to {high:.2}", row.alternatives.0.len())
+    });
+    let fit = if row.rms.is_some() {
+        number(row.rms)
+    } else {
+        row.termination.clone()
+    };
+    [
+        time(Some(row.t_max)),
+        row.readings.to_string(),
+        row.regime.label.to_string(),
+        percent(row.regime.probability_unstable),
+        number(row.m),
+        number(row.x_i),
+        time(row.transition_time),
+        time(row.failure_time.low),
+        time(row.failure_time.median),
+        percent(row.failure_time.probability),
+        time(row.inverse_velocity.failure_time),
+        minima,
+        fit,
+    ]
+}

@@ -1,0 +1,247 @@
+//! One inversion as it is reported: the best fit, what the readings leave open, and what follows from it.
+//!
+//! The best fit and the alternatives are those of the constant-load law by unweighted least squares;
+//! intervals and regime come from the posterior, the failure time from the panel that the monitor uses.
+
+mod estimate;
+mod growth;
+mod outlook;
+mod report;
+mod sweep;
+
+pub use report::{
+    Alternative, Alternatives, Estimate, FailureTime, FitReport, InverseVelocity, Parameters,
+    RegimeReport,
+};
+pub use sweep::{SweepOptions, SweepReport, SweepRow, sweep};
+
+use crate::fit::{
+    ConstantLoad, Curvature, Exponent, Observation, Observations, PointReadings, Posterior, Rate,
+    RateOptions, Solution,
+};
+use crate::forecast::{HORIZON_DAYS, InverseVelocityLine, Outlook, Panel, seed_of};
+use crate::model::Law;
+use crate::reading::{LengthUnit, Series, TimeUnit, Timestamp, Unit, after_days, days_since};
+use jiff::SignedDuration;
+
+/// What is asked of an inversion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// First instant of the readings used.
+    pub from: Option<Timestamp>,
+    /// Last instant of the readings used.
+    pub until: Option<Timestamp>,
+    /// Whether m is fitted or given.
+    pub exponent: Exponent,
+    /// Passing this velocity is failure, mm/day.
+    pub critical_velocity_mm_per_day: f64,
+    /// How long it takes to bring everyone out; for the text only.
+    pub evacuation_time: SignedDuration,
+    /// How far the forecast looks, days; at most [`HORIZON_DAYS`].
+    pub horizon_days: f64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            from: None,
+            until: None,
+            exponent: Exponent::Free,
+            critical_velocity_mm_per_day: 1000.0,
+            evacuation_time: SignedDuration::from_hours(24),
+            horizon_days: HORIZON_DAYS,
+        }
+    }
+}
+
+/// The trailing share of the rates through which the line is drawn, and the fewest of them.
+const LINE: (f64, usize) = (0.25, 8);
+
+/// An intercept beyond this many lengths of the record is no prediction.
+const FARTHEST_INTERCEPT: f64 = 3.0;
+
+/// The readings of one inversion, chosen and in the science's units.
+#[derive(Debug, Clone)]
+pub struct Inversion {
+    series: Series,
+    observations: Observations,
+    options: Options,
+}
+
+impl Inversion {
+    /// Chooses the readings that `options` ask for; what is not finite is left out.
+    pub fn new(series: &Series, options: &Options) -> Self {
+        let mut chosen = Series {
+            readings: Vec::new(),
+            ..series.clone()
+        };
+        let inside = |time: Timestamp| {
+            options.from.is_none_or(|from| time >= from)
+                && options.until.is_none_or(|until| time <= until)
+        };
+        let sound = |value: f64| (value * series.unit.factor()).is_finite();
+        let readings = series.readings.iter();
+        chosen.readings = readings
+            .filter(|reading| inside(reading.time) && reading.is_sound() && sound(reading.value))
+            .copied()
+            .collect();
+        chosen.settle();
+        let observations = observations(&chosen);
+        Self {
+            series: chosen,
+            observations,
+            options: *options,
+        }
+    }
+
+    /// The readings used.
+    pub fn series(&self) -> &Series {
+        &self.series
+    }
+
+    /// The constant-load fit, unweighted, the readings taken as point values in their own unit.
+    pub fn least_squares(&self) -> ConstantLoad {
+        let pairs = self
+            .series
+            .readings
+            .iter()
+            .zip(&self.observations.values)
+            .map(|(reading, observation)| (observation.t_days, reading.value));
+        let readings = PointReadings::new(self.series.quantity(), pairs);
+        ConstantLoad::fit(&readings, self.options.exponent)
+    }
+
+    /// Everything there is to say; `seconds` is what [`Self::least_squares`] took, by the caller's clock.
+    pub fn report(&self, least_squares: &ConstantLoad, seconds: f64) -> FitReport {
+        let count = self.observations.values.len();
+        let outlook = self.outlooks(&[count]).pop();
+        self.assemble(least_squares, seconds, outlook.flatten().as_ref())
+    }
+
+    fn assemble(
+        &self,
+        least_squares: &ConstantLoad,
+        seconds: f64,
+        outlook: Option<&Outlook>,
+    ) -> FitReport {
+        let rates = self.rates();
+        let posterior = Posterior::fit(&rates, Curvature::Free, None);
+        let regime = RegimeReport::of(posterior.as_ref());
+        let best = least_squares.best();
+        let first = self.series.readings.first().map(|reading| reading.time);
+        FitReport {
+            benchmark: self.series.benchmark.clone(),
+            quantity: self.series.quantity(),
+            unit: self.series.unit,
+            readings: self.series.readings.len(),
+            first,
+            last: self.series.readings.last().map(|reading| reading.time),
+            onset: first,
+            parameters: estimate::parameters(self, best, posterior.as_ref()),
+            alternatives: Alternatives::of(self, least_squares),
+            transition_time: best
+                .and_then(|best| best.law.transition_days())
+                .and_then(|days| self.time_at(days)),
+            failure_time: FailureTime::of(self, outlook),
+            inverse_velocity: self.inverse_velocity(&rates, regime.probability_accelerating),
+            regime,
+            rms: best.map(|best| best.rms).filter(|rms| rms.is_finite()),
+            evaluations: least_squares.evaluations,
+            seconds,
+            termination: least_squares.outcome.to_string(),
+        }
+    }
+
+    /// What the monitor's panel says after each of `counts` readings (increasing).
+    fn outlooks(&self, counts: &[usize]) -> Vec<Option<Outlook>> {
+        let panel = Panel::new(seed_of(self.series.benchmark.as_str()));
+        let critical = self.options.critical_velocity_mm_per_day;
+        outlook::outlooks(panel, &self.observations, critical, counts)
+    }
+
+    fn rates(&self) -> Vec<Rate> {
+        let all = 0..self.observations.values.len();
+        self.observations.rates(all, RateOptions::default())
+    }
+
+    fn inverse_velocity(&self, rates: &[Rate], accelerating: Option<f64>) -> InverseVelocity {
+        let (share, fewest) = LINE;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a share of a count"
+        )]
+        let wanted = ((rates.len() as f64 * share).round() as usize).max(fewest);
+        let newest = &rates[rates.len().saturating_sub(wanted)..];
+        let line = InverseVelocityLine::fit(newest);
+        let alpha = if accelerating.is_some_and(|probability| probability >= 0.5) {
+            growth::exponent(rates)
+        } else {
+            None
+        };
+        let (now, length) = match (rates.first(), self.observations.values.last()) {
+            (Some(first), Some(last)) => (last.t_days, last.t_days - first.from),
+            _ => (0.0, 0.0),
+        };
+        let is_prediction =
+            |days: &f64| *days > now - 1.0 && *days < now + FARTHEST_INTERCEPT * length;
+        InverseVelocity {
+            failure_time: line
+                .and_then(|line| line.intercept_days)
+                .filter(is_prediction)
+                .and_then(|days| self.time_at(days)),
+            r_squared: line.map(|line| line.r_squared).filter(|r| r.is_finite()),
+            alpha,
+        }
+    }
+
+    /// The instant `days` after the first reading.
+    fn time_at(&self, days: f64) -> Option<Timestamp> {
+        after_days(self.series.readings.first()?.time, days)
+    }
+
+    /// Velocities of the readings' unit in one mm/day.
+    fn velocity_per_mm_per_day(&self) -> f64 {
+        1.0 / self.velocity_unit().factor()
+    }
+
+    /// The unit of v_i and D: the readings' own, or its length per day for displacements.
+    fn velocity_unit(&self) -> Unit {
+        match self.series.unit {
+            Unit::Length(length) => Unit::Rate(length, TimeUnit::Day),
+            rate @ Unit::Rate(..) => rate,
+        }
+    }
+
+    /// The length that D_c is in.
+    fn length_unit(&self) -> LengthUnit {
+        match self.series.unit {
+            Unit::Length(length) | Unit::Rate(length, _) => length,
+        }
+    }
+}
+
+/// The law of a solution with its velocity in mm/day.
+fn law_in_mm_per_day(inversion: &Inversion, solution: &Solution) -> Law {
+    Law {
+        v_i: solution.law.v_i / inversion.velocity_per_mm_per_day(),
+        ..solution.law
+    }
+}
+
+/// Readings in mm (or mm/day) and days from the first.
+fn observations(series: &Series) -> Observations {
+    let factor = series.unit.factor();
+    let epoch = series.readings.first().map(|reading| reading.time);
+    let values = series.readings.iter().map(|reading| Observation {
+        t_days: epoch.map_or(0.0, |epoch| days_since(epoch, reading.time)),
+        value: reading.value * factor,
+        sigma: reading.sigma.map(|sigma| sigma * factor),
+    });
+    let seconds = series.averaging.map_or(0.0, |span| span.as_secs_f64());
+    Observations {
+        quantity: series.quantity(),
+        averaging_days: seconds / crate::reading::SECONDS_PER_DAY,
+        values: values.collect(),
+    }
+}

@@ -1,0 +1,225 @@
+//! The report of one inversion, key for key as scripts read it: what is unbounded or missing is null.
+
+use super::Inversion;
+use crate::fit::{ConstantLoad, Posterior};
+use crate::forecast::Outlook;
+use crate::reading::{BenchmarkId, Quantity, Timestamp, Unit};
+use crate::regime::{Regime, label};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// One inversion.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FitReport {
+    /// Whose readings.
+    pub benchmark: BenchmarkId,
+    /// Displacement or velocity.
+    pub quantity: Quantity,
+    /// The readings' unit.
+    pub unit: Unit,
+    /// How many were used.
+    pub readings: usize,
+    /// The first one used.
+    pub first: Option<Timestamp>,
+    /// The last one used.
+    pub last: Option<Timestamp>,
+    /// Where the law starts: t = 0 of x_i, v_i, r and kappa.
+    pub onset: Option<Timestamp>,
+    /// Which regime, with what probability.
+    pub regime: RegimeReport,
+    /// The law's parameters.
+    pub parameters: Parameters,
+    /// The distinct minima of the misfit, best first.
+    pub alternatives: Alternatives,
+    /// Inflection of the best fit's velocity.
+    pub transition_time: Option<Timestamp>,
+    /// When the critical velocity is passed.
+    pub failure_time: FailureTime,
+    /// The straight line through inverse velocity.
+    pub inverse_velocity: InverseVelocity,
+    /// Root mean square residual of the best fit, in the readings' unit.
+    pub rms: Option<f64>,
+    /// Laws solved for the best fit.
+    pub evaluations: usize,
+    /// What the best fit took.
+    pub seconds: f64,
+    /// Why it ended.
+    pub termination: String,
+}
+
+/// A best value and the bounds of 90 %.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Of the best fit; `None` where that law has none.
+    pub best: Option<f64>,
+    /// 5 % quantile; `None` where it is unbounded.
+    pub low: Option<f64>,
+    /// 95 % quantile; `None` where it is unbounded.
+    pub high: Option<f64>,
+}
+
+/// The law's parameters at the first reading.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Parameters {
+    /// m = B/A.
+    pub m: Estimate,
+    /// Initial state.
+    pub x_i: Estimate,
+    /// T, days.
+    pub t_unit_days: Estimate,
+    /// D, in the readings' velocity unit (for displacements, their length per day).
+    pub d: Estimate,
+    /// D_c, in the readings' length.
+    pub d_c: Estimate,
+    /// S theta_i.
+    pub s_theta_i: Estimate,
+    /// Velocity, in the unit of D.
+    pub v_i: Estimate,
+    /// Initial slope of the inverse-velocity plot, 1/day.
+    pub r_per_day: Estimate,
+    /// Its curvature, 1/day.
+    pub kappa_per_day: Estimate,
+}
+
+/// A minimum of the misfit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Alternative {
+    /// m = B/A.
+    pub m: Option<f64>,
+    /// Initial state; `None` at m = 1.
+    pub x_i: Option<f64>,
+    /// T, days.
+    pub t_unit_days: Option<f64>,
+    /// D.
+    pub d: Option<f64>,
+    /// Root mean square residual.
+    pub rms: Option<f64>,
+    /// Its regime.
+    pub regime: Regime,
+}
+
+/// The minima, best first.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[serde(transparent)]
+pub struct Alternatives(pub Vec<Alternative>);
+
+/// The regime by the posterior.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RegimeReport {
+    /// The regime, or `undetermined` under 60 %.
+    pub label: Regime,
+    /// Probability of kappa > 0; `None` with too few readings for a posterior.
+    pub probability_unstable: Option<f64>,
+    /// Probability of r > 0 at the last reading.
+    pub probability_accelerating: Option<f64>,
+    /// Every regime's probability.
+    pub probabilities: BTreeMap<Regime, Option<f64>>,
+}
+
+/// First passage of the critical velocity; quantiles are unconditional.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct FailureTime {
+    /// 5 % quantile.
+    pub low: Option<Timestamp>,
+    /// Median.
+    pub median: Option<Timestamp>,
+    /// 95 % quantile.
+    pub high: Option<Timestamp>,
+    /// Chance of passage within the horizon; `None` with too few readings for a forecast.
+    pub probability: Option<f64>,
+    /// How far the forecast looks, days.
+    pub horizon_days: f64,
+    /// Chance of passage within the evacuation time; for the text.
+    #[serde(skip)]
+    pub chance_within_evacuation_time: Option<f64>,
+}
+
+/// The straight line through 1/v, and the exponent that would straighten it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct InverseVelocity {
+    /// Where the line through the trailing quarter meets zero.
+    pub failure_time: Option<Timestamp>,
+    /// Its coefficient of determination.
+    pub r_squared: Option<f64>,
+    /// Exponent of dv/dt = A v^alpha over the record; `None` where it does not accelerate.
+    pub alpha: Option<Estimate>,
+}
+
+impl Alternatives {
+    pub(super) fn of(inversion: &Inversion, least_squares: &ConstantLoad) -> Self {
+        let one = |solution: &crate::fit::Solution| {
+            let best = super::estimate::best(inversion, Some(solution));
+            Alternative {
+                m: best.m,
+                x_i: best.x_i,
+                t_unit_days: best.t_unit_days,
+                d: best.d,
+                rms: Some(solution.rms).filter(|rms| rms.is_finite()),
+                regime: solution.law.regime(),
+            }
+        };
+        Self(least_squares.minima.iter().map(one).collect())
+    }
+
+    /// The lowest and the highest m among them.
+    pub fn range_of_m(&self) -> Option<(f64, f64)> {
+        let ms = || self.0.iter().filter_map(|one| one.m);
+        let low = ms().min_by(f64::total_cmp)?;
+        let high = ms().max_by(f64::total_cmp)?;
+        Some((low, high))
+    }
+}
+
+impl RegimeReport {
+    pub(super) fn of(posterior: Option<&Posterior>) -> Self {
+        let Some(posterior) = posterior else {
+            return Self {
+                label: Regime::Undetermined,
+                probability_unstable: None,
+                probability_accelerating: None,
+                probabilities: Regime::KNOWN.into_iter().map(|r| (r, None)).collect(),
+            };
+        };
+        let samples = &posterior.ensemble.samples;
+        let share = |wanted: &dyn Fn(Regime) -> bool| {
+            let met = samples.iter().filter(|one| wanted(one.law.regime()));
+            met.map(|one| one.weight).sum::<f64>().min(1.0)
+        };
+        let each: Vec<(Regime, f64)> = Regime::KNOWN
+            .into_iter()
+            .map(|regime| (regime, share(&|one| one == regime)))
+            .collect();
+        let known: BTreeMap<Regime, f64> = each.iter().copied().collect();
+        let [unstable, stable, slowing, _] = Regime::KNOWN;
+        Self {
+            label: label(&known),
+            probability_unstable: Some(share(&|one| one == unstable || one == slowing)),
+            probability_accelerating: Some(share(&|one| one == unstable || one == stable)),
+            probabilities: each.into_iter().map(|(r, p)| (r, Some(p))).collect(),
+        }
+    }
+}
+
+impl FailureTime {
+    pub(super) fn of(inversion: &Inversion, outlook: Option<&Outlook>) -> Self {
+        let horizon_days = inversion
+            .options
+            .horizon_days
+            .clamp(0.0, crate::forecast::HORIZON_DAYS);
+        let at = |share: f64| {
+            let outlook = outlook?;
+            let days = outlook.passage.quantile(share, horizon_days)?;
+            inversion.time_at(outlook.now_days + days)
+        };
+        let chance = |days: f64| outlook.map(|outlook| outlook.passage.chance_within(days));
+        let evacuation = inversion.options.evacuation_time.as_secs_f64();
+        Self {
+            low: at(0.05),
+            median: at(0.5),
+            high: at(0.95),
+            probability: chance(horizon_days),
+            horizon_days,
+            chance_within_evacuation_time: chance(evacuation / crate::reading::SECONDS_PER_DAY),
+        }
+    }
+}
