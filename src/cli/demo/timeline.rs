@@ -77,28 +77,9 @@ impl Timeline {
                 "{}  {id:<8}   regime flips from {from} to {to} ({probability:.2})",
                 day(event.time)
             )),
-            EventKind::InterceptDrift {
-                from,
-                to,
-                drift_days_per_day,
-                expected_days_per_day,
-            } => {
-                let expected = expected_days_per_day.map_or_else(String::new, |drift| {
-                    format!(", {drift:+.1} expected by the fitted law")
-                });
-                Some(format!(
-                    "{}  {id:<8}   1/v intercept drifts from {} to {} ({drift_days_per_day:+.1} days a day{expected})",
-                    day(event.time),
-                    day(*from),
-                    day(*to)
-                ))
+            EventKind::InterceptDrift { .. } | EventKind::TransitionDrift { .. } => {
+                drift(id, event)
             }
-            EventKind::TransitionDrift { from, to, .. } => Some(format!(
-                "{}  {id:<8}   transition time drifts from {} to {}",
-                day(event.time),
-                day(*from),
-                day(*to)
-            )),
             EventKind::UnexplainedResidual {
                 velocity_mm_per_day,
                 ..
@@ -113,6 +94,39 @@ impl Timeline {
             EventKind::Summary(_) => None,
         }
     }
+}
+
+fn drift(id: &BenchmarkId, event: &Event) -> Option<String> {
+    let (what, from, to, figures) = match &event.kind {
+        EventKind::InterceptDrift {
+            from,
+            to,
+            drift_days_per_day,
+            expected_days_per_day,
+        } => {
+            let expected = expected_days_per_day.map_or_else(String::new, |drift| {
+                format!(", {drift:+.1} expected by the fitted law")
+            });
+            (
+                "1/v intercept",
+                from,
+                to,
+                format!(" ({drift_days_per_day:+.1} days a day{expected})"),
+            )
+        }
+        EventKind::TransitionDrift { from, to, .. } => ("transition time", from, to, String::new()),
+        EventKind::Refit { .. }
+        | EventKind::RegimeFlip { .. }
+        | EventKind::UnexplainedResidual { .. }
+        | EventKind::Alert { .. }
+        | EventKind::Fault { .. }
+        | EventKind::Summary(_) => return None,
+    };
+    let (from, to) = (day(*from), day(*to));
+    Some(format!(
+        "{}  {id:<8}   {what} drifts from {from} to {to}{figures}",
+        day(event.time)
+    ))
 }
 
 fn row(id: &BenchmarkId, event: &Event, level: Option<Level>) -> Option<String> {
