@@ -270,8 +270,12 @@ fn a_replay_tells_the_hooks_that_it_is_an_exercise_and_tells_them_every_alert() 
     let mut told: Vec<String> = told.lines().map(str::to_owned).collect();
     levels.sort();
     told.sort();
+    assert!(!levels.is_empty());
     assert_eq!(told, levels);
     assert!(!folder.path().join("state").exists());
+    // A hook that fails is trouble, and the events are the same.
+    fs::write(folder.path().join("hook.sh"), "exit 3\n").unwrap();
+    assert_eq!(out(&slipwatch(&args).code(1)), said);
 }
 
 #[test]
