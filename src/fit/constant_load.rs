@@ -10,6 +10,7 @@ use super::chart::{
 };
 use super::least_squares::{self, Limits, Optimum};
 use super::projection::PointReadings;
+use super::simplex;
 use crate::model::{Accuracy, Law, Trajectory};
 use nalgebra::{SVector, Vector1, Vector3};
 use std::fmt;
@@ -106,6 +107,9 @@ const STARTS: (usize, usize) = (2, 3);
 /// A last polish is begun afresh while it gained more than this, relative, and at most so often.
 const RESTART_GAIN: f64 = 1e-7;
 const MOST_RESTARTS: usize = 6;
+/// First step and evaluations of the simplex; it is tried where the cost is within this of the best.
+const SIMPLEX: (f64, usize) = (0.3, 400);
+const NEAR_BEST: f64 = 1.5;
 /// Minima kept beside the best with m > 1, m = 1 and m < 1.
 const MOST_MINIMA: usize = 8;
 /// Relative difference of rms under which two results are one minimum.
@@ -132,9 +136,17 @@ impl ConstantLoad {
         let mut search = Search::new(readings);
         let mut found = Vec::new();
         if exponent != Exponent::Fixed(1.0) {
-            for chart in CHARTS {
-                found.extend(search.chart(chart, exponent));
+            let region = |chart: Chart| Region::new(chart, exponent);
+            let mut ends: Vec<(Region, Optimum<3>)> = Vec::new();
+            for region in CHARTS.into_iter().filter_map(region) {
+                let minima = search.minima(&region);
+                ends.extend(minima.into_iter().map(|end| (region, end)));
             }
+            search.sharpen(&mut ends);
+            found.extend(
+                ends.iter()
+                    .filter_map(|(region, end)| search.law_of(region, end)),
+            );
         }
         if matches!(exponent, Exponent::Free | Exponent::Fixed(1.0)) {
             found.extend(search.unit_m());
@@ -198,63 +210,35 @@ impl<'a> Search<'a> {
     }
 
     /// The best minima on one chart.
-    fn chart(&mut self, chart: Chart, exponent: Exponent) -> Vec<Found> {
-        let (mut low, mut high) = chart.corners();
-        let mut grid: Vec<f64> = chart.branch.grid().iter().map(|m| m.abs().ln()).collect();
-        if let Exponent::Fixed(m) = exponent {
-            if Branch::of(m) != Some(chart.branch) {
-                return Vec::new();
-            }
-            let ln_m = m.abs().ln();
-            (low[2], high[2], grid) = (ln_m, ln_m, vec![ln_m]);
-        }
-        let length = self.readings.length_days();
+    fn minima(&mut self, region: &Region) -> Vec<Optimum<3>> {
+        let (chart, length) = (region.chart, self.readings.length_days());
         let law = |at: &Vector3<f64>| chart.law(at, length);
+        let first = limits((region.low, region.high), POLISH.0);
         let mut polished = Vec::new();
-        for ln_m in grid {
+        for ln_m in region.grid() {
             let scored = Chart::points(ln_m).map(|at| (at, self.cost(&law(&at), chart.anchor)));
             let scored: Vec<(Vector3<f64>, f64)> = scored.collect();
             for start in lowest_apart(scored) {
-                let limits = limits((low, high), POLISH.0);
-                polished.extend(self.polish(start, chart.anchor, &limits, law));
+                polished.extend(self.polish(start, chart.anchor, &first, law));
             }
         }
         polished.sort_by(|a, b| a.cost.total_cmp(&b.cost));
         polished.dedup_by(|a, b| (a.cost - b.cost).abs() <= SAME_RMS * b.cost);
         polished.truncate(STARTS.1);
-        let finished: Vec<Optimum<3>> = polished
+        polished
             .into_iter()
-            .filter_map(|first| self.settle(first, chart.anchor, (low, high), law))
-            .collect();
-        let place = |at: &Vector3<f64>| {
-            let side = at[2] <= low[2] + AT_BOUND || at[2] >= high[2] - AT_BOUND;
-            if exponent == Exponent::Free && side && at[2].abs() > AT_BOUND {
-                Place::AtBoundOfM
-            } else {
-                Place::Inside
-            }
-        };
-        finished
-            .into_iter()
-            .filter_map(|end| {
-                let place = place(&end.at);
-                self.found(&law(&end.at), chart.anchor, (&end, place))
-            })
+            .filter_map(|start| self.settle(start, region))
             .collect()
     }
 
     /// Polishes to the end, afresh as long as it gains: a curved valley stalls a search before its floor.
-    fn settle(
-        &mut self,
-        first: Optimum<3>,
-        anchor: Anchor,
-        corners: (Vector3<f64>, Vector3<f64>),
-        law: impl Fn(&Vector3<f64>) -> Law + Copy,
-    ) -> Option<Optimum<3>> {
-        let limits = limits(corners, POLISH.1);
-        let mut best = first;
+    fn settle(&mut self, start: Optimum<3>, region: &Region) -> Option<Optimum<3>> {
+        let (chart, length) = (region.chart, self.readings.length_days());
+        let limits = limits((region.low, region.high), POLISH.1);
+        let mut best = start;
         for _ in 0..MOST_RESTARTS {
-            let next = self.polish(best.at, anchor, &limits, law)?;
+            let law = |at: &Vector3<f64>| chart.law(at, length);
+            let next = self.polish(best.at, chart.anchor, &limits, law)?;
             let gain = best.cost - next.cost;
             best = next;
             if gain <= RESTART_GAIN * best.cost {
@@ -262,6 +246,35 @@ impl<'a> Search<'a> {
             }
         }
         Some(best)
+    }
+
+    /// Takes the best end of every chart that comes near the best of all through a simplex.
+    fn sharpen(&mut self, ends: &mut [(Region, Optimum<3>)]) {
+        ends.sort_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
+        let lowest = ends.first().map_or(0.0, |(_, end)| end.cost);
+        let mut done: Vec<Chart> = Vec::new();
+        for (region, end) in ends {
+            let (chart, length) = (region.chart, self.readings.length_days());
+            if end.cost > NEAR_BEST * lowest || done.contains(&chart) {
+                continue;
+            }
+            done.push(chart);
+            let (at, cost) = simplex::descend(end.at, SIMPLEX.0, SIMPLEX.1, |at| {
+                let at = region.inside(at);
+                self.cost(&chart.law(&at, length), chart.anchor)
+            });
+            if cost < end.cost {
+                (end.at, end.cost) = (region.inside(&at), cost);
+                if let Some(settled) = self.settle(end.clone(), region) {
+                    *end = settled;
+                }
+            }
+        }
+    }
+
+    fn law_of(&mut self, region: &Region, end: &Optimum<3>) -> Option<Found> {
+        let law = region.chart.law(&end.at, self.readings.length_days());
+        self.found(&law, region.chart.anchor, (end, region.place(&end.at)))
     }
 
     /// The best laws with m = 1, one in each direction: y is a straight line.
@@ -358,6 +371,54 @@ impl<'a> Search<'a> {
             minima: distinct(&found, flat, exponent),
             evaluations,
             outcome,
+        }
+    }
+}
+
+/// A chart and the part of it that is searched.
+#[derive(Debug, Clone, Copy)]
+struct Region {
+    chart: Chart,
+    low: Vector3<f64>,
+    high: Vector3<f64>,
+}
+
+impl Region {
+    /// `None` where a fixed m does not stand on the chart.
+    fn new(chart: Chart, exponent: Exponent) -> Option<Self> {
+        let (mut low, mut high) = chart.corners();
+        if let Exponent::Fixed(m) = exponent {
+            if Branch::of(m) != Some(chart.branch) {
+                return None;
+            }
+            (low[2], high[2]) = (m.abs().ln(), m.abs().ln());
+        }
+        Some(Self { chart, low, high })
+    }
+
+    fn is_fixed(&self) -> bool {
+        self.low[2] >= self.high[2]
+    }
+
+    /// ln |m| where the search looks first.
+    fn grid(&self) -> Vec<f64> {
+        if self.is_fixed() {
+            return vec![self.low[2]];
+        }
+        let grid = self.chart.branch.grid();
+        grid.iter().map(|m| m.abs().ln()).collect()
+    }
+
+    fn inside(&self, at: &Vector3<f64>) -> Vector3<f64> {
+        Vector3::from_fn(|i, _| at[i].clamp(self.low[i], self.high[i]))
+    }
+
+    fn place(&self, at: &Vector3<f64>) -> Place {
+        let side = at[2] <= self.low[2] + AT_BOUND || at[2] >= self.high[2] - AT_BOUND;
+        if side && !self.is_fixed() && at[2].abs() > AT_BOUND {
+            Place::AtBoundOfM
+        } else {
+            Place::Inside
         }
     }
 }

@@ -7,6 +7,7 @@ mod posterior;
 mod projection;
 mod quasi_random;
 mod rates;
+mod simplex;
 
 pub use constant_load::{ConstantLoad, Exponent, Outcome, Place, Solution};
 pub use posterior::{Curvature, Ensemble, P_PRIOR, Posterior, Sample as LawSample};
