@@ -2,6 +2,7 @@
 
 mod chart;
 mod constant_load;
+mod global_search;
 mod least_squares;
 mod posterior;
 mod projection;
