@@ -109,8 +109,8 @@ impl Branch {
     pub(super) fn grid(self) -> [f64; 5] {
         match self {
             Self::AboveOne => [1.05, 1.35, 2.0, 5.0, 20.0],
-            Self::BelowOne => [0.97, 0.8, 0.5, 0.2, 0.05],
-            Self::BelowZero => [-15.0, -3.0, -1.0, -0.3, -0.05],
+            Self::BelowOne => [0.95, 0.6, 0.25, 0.08, 0.02],
+            Self::BelowZero => [-12.0, -2.0, -0.6, -0.15, -0.02],
         }
     }
 

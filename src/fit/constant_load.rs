@@ -4,14 +4,11 @@
 //! with m other than 1, is searched on a fixed grid, polished by Levenberg-Marquardt from the best
 //! points of each m of the grid, and polished again from the best of those. Nothing is random.
 
-use super::chart::{
-    Anchor, Branch, CHARTS, Chart, Direction, HIGHEST_M, LEAST_LN_M, LOWEST_M, law_at_unit_m,
-    slope_bounds, unit_m_starts,
-};
-use super::least_squares::{self, Limits, Optimum};
+use super::chart::{Branch, HIGHEST_M, LEAST_LN_M, LOWEST_M};
+use super::global_search::{Found, Search};
+use super::least_squares::Termination;
 use super::projection::PointReadings;
-use crate::model::{Accuracy, Law, Trajectory};
-use nalgebra::{SVector, Vector1, Vector3};
+use crate::model::Law;
 use std::fmt;
 
 /// A law that fits, at a local minimum of the misfit.
@@ -99,21 +96,12 @@ pub struct ConstantLoad {
     pub outcome: Outcome,
 }
 
-/// Evaluations of a first and of a last polish.
-const POLISH: (usize, usize) = (60, 1500);
-/// Starts for each m of the grid, and last polishes for each chart.
-const STARTS: (usize, usize) = (2, 3);
-/// A last polish is begun afresh while it gained more than this, relative, and at most so often.
-const RESTART_GAIN: f64 = 1e-7;
-const MOST_RESTARTS: usize = 6;
 /// Minima kept beside the best with m > 1, m = 1 and m < 1.
 const MOST_MINIMA: usize = 8;
 /// Relative difference of rms under which two results are one minimum.
-const SAME_RMS: f64 = 1e-3;
+pub(super) const SAME_RMS: f64 = 1e-3;
 /// A branch that gains less than this on m = 1, relative to its rms, has run into m = 1.
 const GAIN_OVER_UNIT_M: f64 = 1e-7;
-/// A search that ends this near to a bound of ln m has run into it.
-const AT_BOUND: f64 = 1e-3;
 /// A minimum must leave less than this share of the rms about a constant velocity.
 const WORTH_MENTION: f64 = 0.999;
 /// And no more than so many times the rms of the best.
@@ -130,16 +118,8 @@ impl ConstantLoad {
             };
         }
         let mut search = Search::new(readings);
-        let mut found = Vec::new();
-        if exponent != Exponent::Fixed(1.0) {
-            for chart in CHARTS {
-                found.extend(search.chart(chart, exponent));
-            }
-        }
-        if matches!(exponent, Exponent::Free | Exponent::Fixed(1.0)) {
-            found.extend(search.unit_m());
-        }
-        search.conclude(found, exponent)
+        let found = search.run(exponent);
+        conclude(&search, found, exponent)
     }
 
     /// The best of all.
@@ -163,239 +143,24 @@ fn refuse(readings: &PointReadings, exponent: Exponent) -> Option<Outcome> {
     readings.all_equal().then_some(Outcome::AllEqual)
 }
 
-/// A polished point.
-#[derive(Debug, Clone, Copy)]
-struct Found {
-    solution: Solution,
-    cost: f64,
-    termination: least_squares::Termination,
-}
-
-struct Search<'a> {
-    readings: &'a PointReadings,
-    basis: Vec<f64>,
-    residuals: Vec<f64>,
-    evaluations: usize,
-}
-
-impl<'a> Search<'a> {
-    fn new(readings: &'a PointReadings) -> Self {
-        Self {
-            readings,
-            basis: Vec::with_capacity(readings.count()),
-            residuals: vec![0.0; readings.count()],
-            evaluations: 0,
+/// Ranks what was found.
+fn conclude(search: &Search, mut found: Vec<Found>, exponent: Exponent) -> ConstantLoad {
+    found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    prefer_unit_m(&mut found);
+    let outcome = match found.first() {
+        None => Outcome::NoForwardMotion,
+        Some(best) if best.termination != Termination::Converged => Outcome::Stopped,
+        Some(best) if best.solution.place == Place::AtBoundOfM => {
+            Outcome::AtBoundOfM(m_of(&best.solution))
         }
-    }
-
-    fn cost(&mut self, law: &Law, anchor: Anchor) -> f64 {
-        self.evaluations += 1;
-        let (basis, residuals) = (&mut self.basis, &mut self.residuals);
-        match self.readings.residuals(law, anchor, basis, residuals) {
-            Some(_) => residuals.iter().map(|residual| residual * residual).sum(),
-            None => f64::INFINITY,
-        }
-    }
-
-    /// The best minima on one chart.
-    fn chart(&mut self, chart: Chart, exponent: Exponent) -> Vec<Found> {
-        let (mut low, mut high) = chart.corners();
-        let mut grid: Vec<f64> = chart.branch.grid().iter().map(|m| m.abs().ln()).collect();
-        if let Exponent::Fixed(m) = exponent {
-            if Branch::of(m) != Some(chart.branch) {
-                return Vec::new();
-            }
-            let ln_m = m.abs().ln();
-            (low[2], high[2], grid) = (ln_m, ln_m, vec![ln_m]);
-        }
-        let length = self.readings.length_days();
-        let law = |at: &Vector3<f64>| chart.law(at, length);
-        let mut polished = Vec::new();
-        for ln_m in grid {
-            let scored = Chart::points(ln_m).map(|at| (at, self.cost(&law(&at), chart.anchor)));
-            let scored: Vec<(Vector3<f64>, f64)> = scored.collect();
-            for start in lowest_apart(scored) {
-                let limits = limits((low, high), POLISH.0);
-                polished.extend(self.polish(start, chart.anchor, &limits, law));
-            }
-        }
-        polished.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-        polished.dedup_by(|a, b| (a.cost - b.cost).abs() <= SAME_RMS * b.cost);
-        polished.truncate(STARTS.1);
-        let finished: Vec<Optimum<3>> = polished
-            .into_iter()
-            .filter_map(|first| self.settle(first, chart.anchor, (low, high), law))
-            .collect();
-        let place = |at: &Vector3<f64>| {
-            let side = at[2] <= low[2] + AT_BOUND || at[2] >= high[2] - AT_BOUND;
-            if exponent == Exponent::Free && side && at[2].abs() > AT_BOUND {
-                Place::AtBoundOfM
-            } else {
-                Place::Inside
-            }
-        };
-        finished
-            .into_iter()
-            .filter_map(|end| {
-                let place = place(&end.at);
-                self.found(&law(&end.at), chart.anchor, (&end, place))
-            })
-            .collect()
-    }
-
-    /// Polishes to the end, afresh as long as it gains: a curved valley stalls a search before its floor.
-    fn settle(
-        &mut self,
-        first: Optimum<3>,
-        anchor: Anchor,
-        corners: (Vector3<f64>, Vector3<f64>),
-        law: impl Fn(&Vector3<f64>) -> Law + Copy,
-    ) -> Option<Optimum<3>> {
-        let limits = limits(corners, POLISH.1);
-        let mut best = first;
-        for _ in 0..MOST_RESTARTS {
-            let next = self.polish(best.at, anchor, &limits, law)?;
-            let gain = best.cost - next.cost;
-            best = next;
-            if gain <= RESTART_GAIN * best.cost {
-                break;
-            }
-        }
-        Some(best)
-    }
-
-    /// The best laws with m = 1, one in each direction: y is a straight line.
-    fn unit_m(&mut self) -> Vec<Found> {
-        let length = self.readings.length_days();
-        let mut found = Vec::new();
-        for (direction, anchor) in [
-            (Direction::Accelerating, Anchor::End),
-            (Direction::Decelerating, Anchor::Start),
-        ] {
-            let law = |at: &Vector1<f64>| law_at_unit_m(direction, at[0], length);
-            let bounds = slope_bounds();
-            let limits = limits((Vector1::new(bounds.0), Vector1::new(bounds.1)), POLISH.1);
-            let starts: Vec<_> = unit_m_starts()
-                .filter_map(|start| self.polish(Vector1::new(start), anchor, &limits, law))
-                .collect();
-            let best = starts.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
-            found.extend(best.and_then(|optimum| {
-                self.found(&law(&optimum.at), anchor, (&optimum, Place::Inside))
-            }));
-        }
-        found
-    }
-
-    fn polish<const N: usize>(
-        &mut self,
-        start: SVector<f64, N>,
-        anchor: Anchor,
-        limits: &Limits<N>,
-        law: impl Fn(&SVector<f64, N>) -> Law,
-    ) -> Option<Optimum<N>> {
-        let (readings, basis) = (self.readings, &mut self.basis);
-        let mut solved = 0;
-        let optimum = least_squares::minimise(start, readings.count(), limits, |at, out| {
-            solved += 1;
-            readings.residuals(&law(at), anchor, basis, out).is_some()
-        });
-        self.evaluations += solved;
-        optimum
-    }
-
-    /// The law of an optimum, moved to the first reading.
-    fn found<const N: usize>(
-        &mut self,
-        law: &Law,
-        anchor: Anchor,
-        end: (&Optimum<N>, Place),
-    ) -> Option<Found> {
-        let linear = self
-            .readings
-            .residuals(law, anchor, &mut self.basis, &mut self.residuals)?;
-        let scaled = Law {
-            v_i: linear.velocity,
-            ..*law
-        };
-        let (law, displacement_at_start) = match anchor {
-            Anchor::Start => (scaled, linear.displacement),
-            Anchor::End => {
-                let length = self.readings.length_days();
-                let past = Trajectory::solve(&scaled.reversed(), length, Accuracy::Full);
-                let motion = past.at(length)?;
-                let start = same_direction(scaled.from_y(motion.y), &scaled);
-                (start, linear.displacement - motion.displacement)
-            }
-        };
-        Some(Found {
-            solution: Solution {
-                law,
-                displacement_at_start,
-                rms: self.readings.rms(end.0.cost),
-                place: end.1,
-            },
-            cost: end.0.cost,
-            termination: end.0.termination,
-        })
-    }
-
-    fn conclude(&self, mut found: Vec<Found>, exponent: Exponent) -> ConstantLoad {
-        let evaluations = self.evaluations;
-        found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-        prefer_unit_m(&mut found);
-        let outcome = match found.first() {
-            None => Outcome::NoForwardMotion,
-            Some(best) if best.termination != least_squares::Termination::Converged => {
-                Outcome::Stopped
-            }
-            Some(best) if best.solution.place == Place::AtBoundOfM => {
-                Outcome::AtBoundOfM(m_of(&best.solution))
-            }
-            Some(_) => Outcome::Converged,
-        };
-        let flat = self.readings.rms(self.readings.cost_of_no_change());
-        ConstantLoad {
-            minima: distinct(&found, flat, exponent),
-            evaluations,
-            outcome,
-        }
-    }
-}
-
-fn limits<const N: usize>(
-    corners: (SVector<f64, N>, SVector<f64, N>),
-    most_evaluations: usize,
-) -> Limits<N> {
-    Limits {
-        lowest: corners.0,
-        highest: corners.1,
-        scale: 1.0,
-        ..Limits::evaluations(most_evaluations)
-    }
-}
-
-/// Near the steady state the slope is the difference of two equal numbers; its sign is known.
-fn same_direction(start: Law, end: &Law) -> Law {
-    let least = f64::EPSILON * start.kappa.abs().max(f64::MIN_POSITIVE);
-    let r = if end.r > 0.0 {
-        start.r.max(least)
-    } else {
-        start.r.min(-least)
+        Some(_) => Outcome::Converged,
     };
-    Law { r, ..start }
-}
-
-/// The lowest points of a grid of one m that do not stand beside one another.
-fn lowest_apart(mut scored: Vec<(Vector3<f64>, f64)>) -> Vec<Vector3<f64>> {
-    scored.retain(|(_, cost)| cost.is_finite());
-    scored.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let mut taken: Vec<Vector3<f64>> = Vec::new();
-    for (at, _) in scored {
-        if taken.len() < STARTS.0 && taken.iter().all(|other| (at - other).amax() > 2.0) {
-            taken.push(at);
-        }
+    let flat = search.readings.rms(search.readings.cost_of_no_change());
+    ConstantLoad {
+        minima: distinct(&found, flat, exponent),
+        evaluations: search.evaluations,
+        outcome,
     }
-    taken
 }
 
 fn m_of(solution: &Solution) -> f64 {

@@ -2,11 +2,13 @@
 
 mod chart;
 mod constant_load;
+mod global_search;
 mod least_squares;
 mod posterior;
 mod projection;
 mod quasi_random;
 mod rates;
+mod simplex;
 
 pub use constant_load::{ConstantLoad, Exponent, Outcome, Place, Solution};
 pub use posterior::{Curvature, Ensemble, P_PRIOR, Posterior, Sample as LawSample};

@@ -183,7 +183,7 @@ impl RegimeReport {
         let samples = &posterior.ensemble.samples;
         let share = |wanted: &dyn Fn(Regime) -> bool| {
             let met = samples.iter().filter(|one| wanted(one.law.regime()));
-            met.map(|one| one.weight).sum::<f64>().min(1.0)
+            met.fold(0.0, |sum, one| sum + one.weight).min(1.0)
         };
         let each: Vec<(Regime, f64)> = Regime::KNOWN
             .into_iter()
@@ -211,7 +211,10 @@ impl FailureTime {
             let days = outlook.passage.quantile(share, horizon_days)?;
             inversion.time_at(outlook.now_days + days)
         };
-        let chance = |days: f64| outlook.map(|outlook| outlook.passage.chance_within(days));
+        let chance = |days: f64| {
+            // An empty sum is -0.
+            outlook.map(|outlook| outlook.passage.chance_within(days) + 0.0)
+        };
         let evacuation = inversion.options.evacuation_time.as_secs_f64();
         Self {
             low: at(0.05),

@@ -112,7 +112,9 @@ impl Track {
         };
         let latched = match self.latch.level() {
             Level::Green | Level::Unknown => String::new(),
-            level => format!("; {level} stays in force"),
+            level @ (Level::Yellow | Level::Orange | Level::Red) => {
+                format!("; {level} stays in force")
+            }
         };
         let text = format!(
             "benchmark {}: no reading since {newest}{latched}",
