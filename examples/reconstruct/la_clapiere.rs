@@ -117,6 +117,17 @@ pub(crate) struct Motion {
     pub(crate) velocity: f64,
 }
 
+/// Which loads act: to tell how much of the slip each accounts for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Loads {
+    /// Neither the river nor the extra load: the law alone.
+    Neither,
+    /// The river alone.
+    River,
+    /// Both, as recorded.
+    Both,
+}
+
 /// The reconstruction, from its constants and seed alone.
 ///
 /// # Errors
@@ -125,7 +136,7 @@ pub(crate) fn recording() -> Result<Recording> {
     let days = days()?;
     let noise = ColouredNoise::new(SEED + 2, NOISE_MM, 0.0);
     let due = |motion: &Motion| motion.time.to_zoned(TimeZone::UTC).day() == FIRST_READING.day();
-    let motions = motions(&days)?;
+    let motions = motions(&days, Loads::Both)?;
     let readings = motions.iter().filter(|motion| due(motion)).zip(noise);
     let readings = readings.map(|(motion, noise)| Reading {
         time: motion.time,
@@ -158,7 +169,7 @@ pub(crate) fn recording() -> Result<Recording> {
 ///
 /// # Errors
 /// When a constant makes no law or no date.
-pub(crate) fn motions(days: &[Day]) -> Result<Vec<Motion>> {
+pub(crate) fn motions(days: &[Day], loads: Loads) -> Result<Vec<Motion>> {
     let scale = INITIAL_MM_PER_DAY * (M * X_I.ln()).exp();
     let before = Law::from_paper(M, X_I, T_DAYS, scale)?;
     let after = law_after(before.v_i);
@@ -172,7 +183,12 @@ pub(crate) fn motions(days: &[Day]) -> Result<Vec<Motion>> {
             let part = t - first;
             let river = today.river_load + part * (tomorrow.river_load - today.river_load);
             let year = today.year + part / DAYS_PER_YEAR;
-            river * between(&RIVER_HOLD, year) + between(&EXTRA_LOAD, year)
+            let river = river * between(&RIVER_HOLD, year);
+            match loads {
+                Loads::Neither => 0.0,
+                Loads::River => river,
+                Loads::Both => river + between(&EXTRA_LOAD, year),
+            }
         };
         let law = if today.year < CHANGE { &before } else { &after };
         motions.push(Motion {
@@ -184,6 +200,29 @@ pub(crate) fn motions(days: &[Day]) -> Result<Vec<Motion>> {
         block = block.advance(law, load, 1.0, STEPS_PER_DAY);
     }
     Ok(motions)
+}
+
+/// Slip, mm, at the end of each of the first five years under each choice of loads.
+///
+/// # Errors
+/// When a constant makes no law or no date.
+pub(crate) fn shares(days: &[Day]) -> Result<Vec<(f64, [f64; 3])>> {
+    let law_alone = motions(days, Loads::Neither)?;
+    let with_river = motions(days, Loads::River)?;
+    let with_both = motions(days, Loads::Both)?;
+    let yearly = (1..=5).map(|years| years * 365 + years / 4);
+    let rows = yearly.filter_map(|day| {
+        let year = law_alone.get(day)?.year;
+        Some((
+            year,
+            [
+                law_alone[day].slip_mm,
+                with_river[day].slip_mm,
+                with_both[day].slip_mm,
+            ],
+        ))
+    });
+    Ok(rows.collect())
 }
 
 /// The law after the change: it relaxes to its own steady velocity under the extra load that remains.

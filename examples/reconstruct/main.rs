@@ -24,9 +24,25 @@ fn main() -> Result<()> {
     facts::vaiont(&vaiont, vaiont::DAY_ZERO.parse()?)?;
     let la_clapiere = la_clapiere::recording()?;
     facts::la_clapiere(&la_clapiere)?;
-    facts::la_clapiere_motion(&la_clapiere::motions(&la_clapiere::days()?)?)?;
+    let days = la_clapiere::days()?;
+    let motions = la_clapiere::motions(&days, la_clapiere::Loads::Both)?;
+    facts::la_clapiere_motion(&motions)?;
+    tell_shares(&days)?;
     write(&vaiont, &folder.join(vaiont::FILE))?;
     write(&la_clapiere, &folder.join(la_clapiere::FILE))
+}
+
+/// How much of La Clapière's slip the law alone, the river and the extra load account for.
+fn tell_shares(days: &[la_clapiere::Day]) -> Result<()> {
+    let mut out = std::io::stdout().lock();
+    writeln!(
+        out,
+        "La Clapière, slip since the first reading, mm: law alone, + river, + extra load"
+    )?;
+    for (year, [law, river, both]) in la_clapiere::shares(days)? {
+        writeln!(out, "{year:.1}  {law:6.0}  {river:6.0}  {both:6.0}")?;
+    }
+    Ok(())
 }
 
 fn write(recording: &Recording, file: &std::path::Path) -> Result<()> {
