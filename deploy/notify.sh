@@ -2,7 +2,12 @@
 # Sample hook: one line for a person, from the environment; the alert itself is JSON on stdin.
 # Replace the echo with whatever reaches people. Exit 0 only once the message is on its way:
 # any other exit makes the daemon try again, with the same SLIPWATCH_KEY.
+# With a file's name as argument the line is appended there.
 set -eu
 cat >/dev/null  # a hook may leave stdin unread; a real one reads the JSON here
-echo "[$SLIPWATCH_STATUS] $SLIPWATCH_SITE: $SLIPWATCH_LEVEL $SLIPWATCH_STATE at benchmark" \
-    "${SLIPWATCH_BENCHMARK:-(site)}, $SLIPWATCH_TIME, failure expected ${SLIPWATCH_FAILURE_TIME:-unknown}"
+line="[$SLIPWATCH_STATUS] $SLIPWATCH_SITE: $SLIPWATCH_LEVEL $SLIPWATCH_STATE at benchmark ${SLIPWATCH_BENCHMARK:-(site)}, $SLIPWATCH_TIME, failure expected ${SLIPWATCH_FAILURE_TIME:-unknown}"
+if [ $# -gt 0 ]; then
+    echo "$line" >>"$1"
+else
+    echo "$line"
+fi

@@ -238,22 +238,22 @@ impl Daemon {
 async fn the_daemon_takes_the_past_and_what_is_added_and_ends_when_asked() {
     let (folder, config) = site_folder();
     let file = folder.path().join("incoming/logger.csv");
-    write_rows(&file, 0..2000);
+    write_rows(&file, 0..300);
     let mut daemon = Daemon::start(&config);
     daemon
         .until("the past", |progress| progress.is_caught_up)
         .await;
-    write_rows(&file, 2000..2010);
-    let all = |progress: &Progress| progress.counts.taken >= 2 * 2010;
+    write_rows(&file, 300..310);
+    let all = |progress: &Progress| progress.counts.taken >= 2 * 310;
     daemon.until("what was added", all).await;
-    assert_eq!(daemon.stop().await.taken, 2 * 2010);
+    assert_eq!(daemon.stop().await.taken, 2 * 310);
     // A restart rebuilds the past from the same file.
     let mut daemon = Daemon::start(&config);
     daemon
         .until("the past", |progress| progress.is_caught_up)
         .await;
     let counts = daemon.stop().await;
-    assert_eq!((counts.taken, counts.repeated), (2 * 2010, 0));
+    assert_eq!((counts.taken, counts.repeated), (2 * 310, 0));
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

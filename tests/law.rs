@@ -1,5 +1,7 @@
 //! The law against 20-digit reference solutions (tests/reference, with the script that makes them).
 
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use slipwatch::model::{Accuracy, Law, Trajectory};
 
 struct Row {

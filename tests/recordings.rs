@@ -33,7 +33,7 @@ fn every_recording_says_where_it_comes_from() {
         }
         let kind = &provenance["kind"];
         assert!(
-            ["measured", "reconstructed"].contains(&kind.as_str()),
+            ["measured", "reconstruction"].contains(&kind.as_str()),
             "{kind}"
         );
     }

@@ -33,6 +33,11 @@ impl Provenance<'_> {
                  V. Pisarenko, \"Slider-block friction model for landslides: application to \
                  Vaiont and La Clapière landslides\", J. Geophys. Res., 2004",
             ),
+            (
+                "attribution",
+                "computed by this project's generator from statements in the source",
+            ),
+            ("licence", "MIT OR Apache-2.0"),
             ("stated_by_the_source", self.stated),
             ("invented", self.invented),
             ("seed", &seed),

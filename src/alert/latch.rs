@@ -39,9 +39,19 @@ pub struct Latch {
     /// Since when the evidence has called for less.
     below_since: Option<Timestamp>,
     /// Since when, and from which velocity on, the slope has been steady.
-    steady: Option<(Timestamp, f64)>,
+    steady: Option<Steady>,
 }
 
+/// A stretch of steady motion.
+#[derive(Debug, Clone, Copy)]
+struct Steady {
+    since: Timestamp,
+    velocity: f64,
+    readings: usize,
+}
+
+/// Readings that make a stretch, however far apart.
+const FEWEST_STEADY: usize = 4;
 /// A steady slope does not gain more than this factor.
 const STEADY_GAIN: f64 = 1.2;
 /// Observed deceleration: this share of the highest velocity at the level.
@@ -88,14 +98,21 @@ impl Latch {
             return;
         };
         self.peak_velocity = self.peak_velocity.max(velocity);
-        let holds = self
-            .steady
-            .is_some_and(|(_, start)| velocity <= STEADY_GAIN * start.max(0.0));
         if velocity >= policy.critical_velocity_mm_per_day || call.level >= self.level {
             self.steady = None;
-        } else if !holds {
-            self.steady = Some((evidence.now, velocity));
+            return;
         }
+        let begin = Steady {
+            since: evidence.now,
+            velocity,
+            readings: 0,
+        };
+        let holds = |steady: &Steady| velocity <= STEADY_GAIN * steady.velocity.max(0.0);
+        let stretch = self.steady.filter(holds).unwrap_or(begin);
+        self.steady = Some(Steady {
+            readings: stretch.readings + 1,
+            ..stretch
+        });
     }
 
     fn reason_to_fall(
@@ -115,9 +132,10 @@ impl Latch {
         if below && velocity <= SLOWED_TO * self.peak_velocity {
             return Some("decelerated");
         }
-        self.steady
-            .is_some_and(|(since, _)| for_long(since, policy.steady_for))
-            .then_some("steady")
+        let steady = self.steady.is_some_and(|stretch| {
+            stretch.readings >= FEWEST_STEADY && for_long(stretch.since, policy.steady_for)
+        });
+        steady.then_some("steady")
     }
 
     fn enter(&mut self, now: Timestamp, call: &Call) -> Vec<Transition> {

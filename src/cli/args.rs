@@ -154,22 +154,23 @@ impl ReadingArgs {
 /// Warns on stderr of rows that were not in order.
 pub(super) fn warn_of(disorder: Disorder) {
     let kinds = [
+        ("repeated an earlier one", disorder.repeated, "dropped"),
         (
-            disorder.repeated,
-            "repeated an earlier row and were dropped",
-        ),
-        (
+            "gave another value for a time already read",
             disorder.corrected,
-            "gave another value for a time; the later row stands",
+            "the later one stands",
         ),
         (
+            "stood before an earlier time",
             disorder.out_of_order,
-            "stood before an earlier time and were put in order",
+            "put in order",
         ),
     ];
-    for (rows, what) in kinds {
+    for (what, rows, remedy) in kinds {
         if rows > 0 {
-            exit::complain(&format_args!("warning: {rows} rows {what}"));
+            exit::complain(&format_args!(
+                "warning: rows that {what}: {rows} ({remedy})"
+            ));
         }
     }
 }

@@ -320,7 +320,7 @@ fn limits<const N: usize>(
         lowest: corners.0,
         highest: corners.1,
         scale: 1.0,
-        most_evaluations,
+        ..Limits::evaluations(most_evaluations)
     }
 }
 

@@ -23,6 +23,7 @@ pub(super) struct Optimum<const N: usize> {
     pub(super) termination: Termination,
 }
 
+/// Gain of a step, as a share of the cost, at which a search has converged.
 const RELATIVE_GAIN: f64 = 1e-13;
 const JACOBIAN_STEP: f64 = 1e-5;
 
@@ -34,6 +35,8 @@ pub(super) struct Limits<const N: usize> {
     /// Coordinates smaller than this are differentiated as if they were of this size.
     pub(super) scale: f64,
     pub(super) most_evaluations: usize,
+    /// Gain of a step, as a share of the cost, at which it has converged.
+    pub(super) least_gain: f64,
 }
 
 impl<const N: usize> Limits<N> {
@@ -44,7 +47,13 @@ impl<const N: usize> Limits<N> {
             highest: SVector::repeat(f64::INFINITY),
             scale: 1e-2,
             most_evaluations,
+            least_gain: RELATIVE_GAIN,
         }
+    }
+
+    /// The same, content with a coarser optimum.
+    pub(super) fn to_gain(self, least_gain: f64) -> Self {
+        Self { least_gain, ..self }
     }
 
     fn clamp(&self, at: &SVector<f64, N>) -> SVector<f64, N> {
@@ -105,7 +114,7 @@ pub(super) fn minimise<const N: usize>(
             }
             damping *= 6.0;
         }
-        if gained.is_none_or(|gain| gain <= RELATIVE_GAIN * cost) {
+        if gained.is_none_or(|gain| gain <= limits.least_gain * cost) {
             if gained.is_some() || damping >= 1e12 {
                 termination = Termination::Converged;
             }

@@ -68,8 +68,10 @@ const PRIOR_SCATTER: (f64, f64) = (0.1, 3.0);
 const MOST_TRUST: f64 = 0.5;
 /// The prior of p spans this, m from 0.5 to 2.5.
 pub const P_PRIOR: (f64, f64) = (-1.0, 0.6);
+/// The mode is where a proposal is centred: this share of the cost is fine enough.
+const MODE_GAIN: f64 = 1e-5;
 /// Samples drawn.
-const SAMPLES: u32 = 128;
+const SAMPLES: u32 = 96;
 /// Proposal widths: the Laplace approximation's own, and twice it, in equal parts.
 const WIDTHS: [f64; 2] = [1.0, 2.2];
 
@@ -85,7 +87,8 @@ impl Posterior {
         let mut evaluations = 0;
         let mut mode = None;
         let starts = problem.starts(warm);
-        for _ in 0..3 {
+        let rounds = if warm.is_some() { 2 } else { 3 };
+        for _ in 0..rounds {
             let from: Vec<Vector3<f64>> = mode.map_or_else(|| starts.clone(), |m: Mode| vec![m.at]);
             let found = from.iter().filter_map(|start| problem.mode(start));
             let best = found
@@ -250,7 +253,7 @@ impl<'a> Problem<'a> {
         let optimum = least_squares::minimise(
             nalgebra::SVector::<f64, N>::from_fn(|i, _| start[i]),
             count + 2,
-            &least_squares::Limits::evaluations(80),
+            &least_squares::Limits::evaluations(60).to_gain(MODE_GAIN),
             |at, out| {
                 let at = widen(at);
                 if !self.predict(&self.law(&at, 0.0), &mut predicted) {

@@ -57,7 +57,7 @@ pub struct RateOptions {
 
 impl Default for RateOptions {
     fn default() -> Self {
-        Self { most: 160 }
+        Self { most: 96 }
     }
 }
 

@@ -4,6 +4,7 @@ mod filter;
 mod line;
 mod panel;
 mod passage;
+mod surprise;
 
 pub use line::InverseVelocityLine;
 pub use panel::{FEWEST_READINGS, HORIZON_DAYS, Outlook, Panel, seed_of};

@@ -6,6 +6,7 @@
 
 use super::Passage;
 use super::filter::Filter;
+use super::surprise::Surprise;
 use crate::fit::{Curvature, Ensemble, Observation, Observations, Posterior, Rate, RateOptions};
 use crate::model::{Accuracy, Law, Trajectory};
 use crate::reading::Quantity;
@@ -67,6 +68,8 @@ pub struct Outlook {
     pub now_days: f64,
     /// Days to the critical velocity, from the newest reading.
     pub passage: Passage,
+    /// How much less likely the newest reading was than usual, ln, where that stands out.
+    pub surprise_nats: Option<f64>,
     /// Probability of each regime.
     pub regimes: BTreeMap<Regime, f64>,
     /// The velocity now, mm/day, by the panel's median.
@@ -83,6 +86,7 @@ pub struct Panel {
     members: Vec<Member>,
     scored_to_days: f64,
     filter: Filter,
+    surprise: Surprise,
 }
 
 impl Panel {
@@ -97,6 +101,7 @@ impl Panel {
             members: members.to_vec(),
             scored_to_days: f64::NEG_INFINITY,
             filter: Filter::new(seed),
+            surprise: Surprise::default(),
         }
     }
 
@@ -104,7 +109,10 @@ impl Panel {
     /// passing `critical` mm/day; `None` with too few readings to go on.
     pub fn update(&mut self, observations: &Observations, critical: f64) -> Option<Outlook> {
         self.score(observations);
-        self.filter.update(observations);
+        let surprise = self
+            .filter
+            .update(observations)
+            .and_then(|log_density| self.surprise.of(log_density));
         let rates = observations.rates(0..observations.values.len(), RateOptions::default());
         for member in &mut self.members {
             let window = window(&rates, member.role);
@@ -120,7 +128,9 @@ impl Panel {
         if independent < FEWEST_READINGS {
             return None;
         }
-        Some(self.outlook(rates, observations.values.last()?.t_days, critical))
+        let mut outlook = self.outlook(rates, observations.values.last()?.t_days, critical);
+        outlook.surprise_nats = surprise;
+        Some(outlook)
     }
 
     fn outlook(&mut self, rates: Vec<Rate>, now_days: f64, critical: f64) -> Outlook {
@@ -142,6 +152,7 @@ impl Panel {
         Outlook {
             now_days,
             passage: Passage::mixture(&parts),
+            surprise_nats: None,
             regimes: self.regimes(),
             velocity_mm_per_day: self.filter.velocity().unwrap_or(f64::NAN),
             law: self.longest_law(),

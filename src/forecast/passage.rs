@@ -42,7 +42,7 @@ impl Passage {
     /// The chance of passage within `days`.
     pub fn chance_within(&self, days: f64) -> f64 {
         let within = self.times.iter().take_while(|(time, _)| *time <= days);
-        within.map(|(_, share)| share).sum::<f64>().min(1.0)
+        within.fold(0.0, |sum, (_, share)| sum + share).min(1.0)
     }
 
     /// Days to the unconditional `share` quantile; `None` when it is not reached within `horizon_days`.

@@ -93,7 +93,7 @@ pub(super) fn ln_y_with_remaining(law: &Law, remaining: f64, ln_y_start: f64) ->
 
 fn slope_at_ln(law: &Law, ln_y: f64) -> f64 {
     if law.p == 0.0 {
-        return law.kappa.mul_add(ln_y, -law.r);
+        return law.kappa * ln_y - law.r;
     }
-    law.kappa.mul_add((law.p * ln_y).exp_m1() / law.p, -law.r)
+    law.kappa * ((law.p * ln_y).exp_m1() / law.p) - law.r
 }

@@ -33,7 +33,7 @@ impl Segment {
         for k in 0..order {
             let next = (k + 1) as f64;
             y[k + 1] = if k == 0 {
-                law.kappa.mul_add(b[0], -law.r)
+                law.kappa * b[0] - law.r
             } else {
                 law.kappa * b[k] / next
             };
@@ -65,8 +65,8 @@ impl Segment {
         let mut y = self.y[self.order];
         let mut slip = self.slip[self.order];
         for k in (0..self.order).rev() {
-            y = y.mul_add(h, self.y[k]);
-            slip = slip.mul_add(h, self.slip[k]);
+            y = y * h + self.y[k];
+            slip = slip * h + self.slip[k];
         }
         (y, slip)
     }

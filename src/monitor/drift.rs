@@ -3,12 +3,14 @@
 use crate::fit::Rate;
 use crate::forecast::InverseVelocityLine;
 use crate::model::{Accuracy, Law, Trajectory};
-use std::collections::VecDeque;
 
-/// Refits over which a drift is measured.
-const REFITS: usize = 12;
 /// Refits before anything is announced.
 const FEWEST: usize = 5;
+
+/// Refits in a row that must agree that it moved.
+const AGREEING: u32 = 3;
+/// A law whose own line would run faster than this says nothing of it, days a day.
+const FASTEST_EXPECTED: f64 = 10.0;
 
 /// A predicted time that moved.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,16 +19,18 @@ pub(super) struct Moved {
     pub(super) from_days: f64,
     /// The time now, days.
     pub(super) to_days: f64,
-    /// Days a day of new readings, by least squares over the latest refits.
+    /// Days of movement a day of new readings since then.
     pub(super) drift_days_per_day: f64,
 }
 
 /// Follows one predicted time over successive refits.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Drift {
-    /// (t_max, predicted), days.
-    refits: VecDeque<(f64, f64)>,
-    announced: Option<f64>,
+    refits: usize,
+    /// Refits in a row at which it stood later (positive) or earlier (negative) by enough.
+    agreeing: i32,
+    /// (t_max, predicted) at the last announcement, days.
+    announced: Option<(f64, f64)>,
 }
 
 impl Drift {
@@ -38,44 +42,35 @@ impl Drift {
         predicted: Option<f64>,
         least: f64,
     ) -> Option<Moved> {
-        let Some(predicted) = predicted else {
-            self.refits.clear();
-            self.announced = None;
+        let Some(to_days) = predicted else {
+            *self = Self::default();
             return None;
         };
-        self.refits.push_back((t_max, predicted));
-        if self.refits.len() > REFITS {
-            self.refits.pop_front();
-        }
-        if self.refits.len() < FEWEST {
+        self.refits += 1;
+        if self.refits < FEWEST {
             return None;
         }
-        let Some(from_days) = self.announced else {
-            self.announced = Some(predicted);
+        let Some((since, from_days)) = self.announced else {
+            self.announced = Some((t_max, to_days));
             return None;
         };
         let enough = least.max(0.25 * (from_days - t_max).abs());
-        if (predicted - from_days).abs() < enough {
+        let moved = to_days - from_days;
+        self.agreeing = match (moved >= enough, moved <= -enough) {
+            (true, _) => self.agreeing.max(0) + 1,
+            (_, true) => self.agreeing.min(0) - 1,
+            (false, false) => 0,
+        };
+        if self.agreeing.unsigned_abs() < AGREEING || t_max <= since {
             return None;
         }
-        self.announced = Some(predicted);
+        self.agreeing = 0;
+        self.announced = Some((t_max, to_days));
         Some(Moved {
             from_days,
-            to_days: predicted,
-            drift_days_per_day: self.slope(),
+            to_days,
+            drift_days_per_day: (to_days - from_days) / (t_max - since),
         })
-    }
-
-    fn slope(&self) -> f64 {
-        let n = self.refits.len() as f64;
-        let mean = |f: fn(&(f64, f64)) -> f64| self.refits.iter().map(f).sum::<f64>() / n;
-        let (mean_t, mean_p) = (mean(|r| r.0), mean(|r| r.1));
-        let (mut tt, mut tp) = (0.0, 0.0);
-        for (t, p) in &self.refits {
-            tt += (t - mean_t) * (t - mean_t);
-            tp += (t - mean_t) * (p - mean_p);
-        }
-        if tt > 0.0 { tp / tt } else { 0.0 }
     }
 }
 
@@ -95,7 +90,7 @@ pub(super) fn expected_by_the_law(law: &Law, rates: &[Rate], now_days: f64) -> O
         let points: Option<Vec<(f64, f64)>> = points.collect();
         InverseVelocityLine::through(&points?)?.intercept_days
     };
-    Some((line(later)? - line(0.0)?) / later).filter(|drift| drift.is_finite())
+    Some((line(later)? - line(0.0)?) / later).filter(|drift| drift.abs() <= FASTEST_EXPECTED)
 }
 
 #[cfg(test)]

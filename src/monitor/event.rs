@@ -71,6 +71,13 @@ pub enum EventKind {
         /// How fast it moves, days a day of new readings.
         drift_days_per_day: f64,
     },
+    /// The newest reading is one that nobody expected: a step, a load that was not declared, a fault.
+    UnexplainedResidual {
+        /// How much less likely it was than the usual reading, ln.
+        surprise_nats: f64,
+        /// The velocity that it implies, mm/day.
+        velocity_mm_per_day: Option<f64>,
+    },
     /// A level was entered or left.
     Alert {
         /// The level.
@@ -166,6 +173,7 @@ impl Summary {
             | EventKind::RegimeFlip { .. }
             | EventKind::InterceptDrift { .. }
             | EventKind::TransitionDrift { .. }
+            | EventKind::UnexplainedResidual { .. }
             | EventKind::Fault { .. }
             | EventKind::Summary(_) => {}
         }

@@ -1,7 +1,7 @@
 //! The readings of one benchmark, in the science's units and in time order, bounded by count.
 
 use crate::fit::{Observation, Observations};
-use crate::reading::{Reading, SECONDS_PER_DAY, Timestamp, Unit, days_since};
+use crate::reading::{Quantity, Reading, SECONDS_PER_DAY, Timestamp, Unit, days_since};
 use jiff::SignedDuration;
 
 /// Where readings come from, as far as their meaning goes.
@@ -98,8 +98,22 @@ impl History {
     /// Displacement since the first reading, mm, where displacement is what is measured.
     pub(super) fn displacement_mm(&self) -> Option<f64> {
         let newest = self.observations.values.last()?;
-        (self.observations.quantity == crate::reading::Quantity::Displacement)
+        (self.observations.quantity == Quantity::Displacement)
             .then_some(newest.value - self.first_displacement_mm)
+    }
+
+    /// The velocity that the newest readings show by themselves, mm/day.
+    pub(super) fn newest_velocity(&self) -> Option<f64> {
+        let values = &self.observations.values;
+        match self.observations.quantity {
+            Quantity::Velocity => values.last().map(|newest| newest.value),
+            Quantity::Displacement => {
+                let [.., before, newest] = values.as_slice() else {
+                    return None;
+                };
+                Some((newest.value - before.value) / (newest.t_days - before.t_days))
+            }
+        }
     }
 
     fn thin(&mut self) {

@@ -20,19 +20,19 @@ pub(super) struct Silence {
 }
 
 impl Silence {
-    /// Notes a reading; true when it ends a silence.
-    pub(super) fn broken_by(&mut self, time: Timestamp) -> bool {
+    /// Notes a reading; when it ends a silence, the reading before which that one began.
+    pub(super) fn broken_by(&mut self, time: Timestamp) -> Option<Timestamp> {
         if let Some(newest) = self.newest {
             if time <= newest {
-                return false;
+                return None;
             }
             self.spacings.push_back(time.duration_since(newest));
             if self.spacings.len() > REMEMBERED {
                 self.spacings.pop_front();
             }
         }
-        self.newest = Some(time);
-        std::mem::take(&mut self.silent)
+        let before = self.newest.replace(time);
+        before.filter(|_| std::mem::take(&mut self.silent))
     }
 
     /// When silence becomes a fault; `None` while the usual spacing is unknown, or when it already is one.
@@ -54,10 +54,5 @@ impl Silence {
         }
         self.silent = true;
         self.newest
-    }
-
-    /// Whether the benchmark is silent.
-    pub(super) fn is_silent(&self) -> bool {
-        self.silent
     }
 }

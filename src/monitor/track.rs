@@ -90,12 +90,9 @@ impl Track {
             }
         }
         let mut events = Vec::new();
-        if self.silence.broken_by(time) {
-            events.push(self.unknown(
-                time,
-                AlertState::Resolved,
-                format!("benchmark {} reads again", self.benchmark),
-            ));
+        if let Some(since) = self.silence.broken_by(time) {
+            let text = format!("benchmark {} reads again", self.benchmark);
+            events.push(self.unknown((time, since), AlertState::Resolved, text));
         }
         let outlook = self.panel.update(
             &self.history.observations,
@@ -123,7 +120,7 @@ impl Track {
         );
         vec![
             self.fault(now, "no-data", text.clone()),
-            self.unknown(now, AlertState::Firing, text),
+            self.unknown((now, newest), AlertState::Firing, text),
         ]
     }
 
@@ -134,14 +131,28 @@ impl Track {
         let intercept = line
             .and_then(|line| line.intercept_days)
             .filter(|days| *days > now - 1.0 && *days < now + FARTHEST_INTERCEPT * length);
+        // An inflection is a prediction only while it lies ahead of a slope that accelerates.
+        let accelerating = report(outlook).probability_accelerating > 0.7;
         let transition = outlook
             .law
+            .filter(|_| accelerating)
             .and_then(|law| law.transition_days())
             .map(|days| now + days)
-            .filter(|days| *days > now - length && *days < now + FARTHEST_INTERCEPT * length);
+            .filter(|days| *days > now && *days < now + FARTHEST_INTERCEPT * length);
         let mut events =
             vec![self.refit_event(policy, time, outlook, (line, intercept, transition))];
         events.extend(self.flip(policy, time, outlook));
+        if let Some(surprise_nats) = outlook.surprise_nats {
+            self.look_until(policy, time, "unexplained-residual");
+            let velocity_mm_per_day = outlook.rates.last().map(|rate| rate.velocity);
+            events.push(self.event(
+                time,
+                EventKind::UnexplainedResidual {
+                    surprise_nats,
+                    velocity_mm_per_day,
+                },
+            ));
+        }
         let least = (length / 40.0).max(0.02);
         if let Some(moved) = self.intercept.update(now, intercept, least) {
             let expected = outlook
@@ -243,7 +254,10 @@ impl Track {
             now: time,
             chance_within_evacuation_time: within(policy.evacuation_time),
             chance_within_outlook: within(policy.outlook),
-            velocity_mm_per_day: rates.last().map(|rate| rate.velocity),
+            velocity_mm_per_day: rates.last().map_or_else(
+                || self.history.newest_velocity(),
+                |rate| Some(rate.velocity),
+            ),
             displacement_mm: self.history.displacement_mm(),
             acceleration_mm_per_day2: acceleration(rates),
             causes: self
@@ -327,18 +341,21 @@ impl Track {
             .map(|until| (until, cause));
     }
 
-    fn unknown(&self, time: Timestamp, state: AlertState, text: String) -> Event {
-        let key = format!("{}/{}/no-data", self.benchmark, Level::Unknown);
-        self.event(
-            time,
-            EventKind::Alert {
-                level: Level::Unknown,
-                state,
-                key,
-                rule: "no-data".to_owned(),
-                text,
-            },
-        )
+    /// A silence that began after the reading of `since`: part of the key, so that each is told anew.
+    fn unknown(
+        &self,
+        (time, since): (Timestamp, Timestamp),
+        state: AlertState,
+        text: String,
+    ) -> Event {
+        let kind = EventKind::Alert {
+            level: Level::Unknown,
+            state,
+            key: format!("{}/{}/{since}", self.benchmark, Level::Unknown),
+            rule: "no-data".to_owned(),
+            text,
+        };
+        self.event(time, kind)
     }
 
     fn fault(&self, time: Timestamp, kind: &str, text: String) -> Event {

@@ -37,7 +37,7 @@ impl BenchmarkId {
 
 impl fmt::Display for BenchmarkId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
+        f.pad(&self.0)
     }
 }
 
@@ -47,18 +47,19 @@ pub fn days_since(epoch: Timestamp, time: Timestamp) -> f64 {
     nanoseconds as f64 / 1e9 / SECONDS_PER_DAY
 }
 
-/// The instant `days` after `epoch`, to the nearest millisecond; `None` outside the calendar.
+/// The instant `days` after `epoch`, to the nearest second (no forecast is finer); `None` outside
+/// the calendar.
 pub fn after_days(epoch: Timestamp, days: f64) -> Option<Timestamp> {
-    let milliseconds = (days * SECONDS_PER_DAY * 1e3).round();
-    if !milliseconds.is_finite() || milliseconds.abs() > 1e17 {
+    let seconds = (days * SECONDS_PER_DAY).round();
+    if !seconds.is_finite() || seconds.abs() > 1e14 {
         return None;
     }
     #[expect(
         clippy::cast_possible_truncation,
-        reason = "bounded by 1e17 just above"
+        reason = "bounded by 1e14 just above"
     )]
-    let milliseconds = milliseconds as i64;
+    let seconds = seconds as i64;
     epoch
-        .checked_add(jiff::SignedDuration::from_millis(milliseconds))
+        .checked_add(jiff::SignedDuration::from_secs(seconds))
         .ok()
 }

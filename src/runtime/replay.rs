@@ -14,6 +14,8 @@ use crate::reading::{Recording, Timestamp};
 use std::io;
 use std::time::Duration;
 
+/// The longest wait, about thirty years: as good as one that no duration can hold.
+const LONGEST_WAIT: Duration = Duration::from_secs(1_000_000_000);
 /// How long the hooks may take to finish after the last reading.
 const DRAIN_LIMIT: Duration = Duration::from_secs(600);
 
@@ -162,9 +164,62 @@ fn wait(pace: Pace, first: Timestamp, time: Timestamp) -> Option<Duration> {
         return None;
     };
     let seconds = time.duration_since(first).as_secs_f64() / times;
-    // A wait beyond what a duration can hold is as good as one that it can.
-    Some(Duration::try_from_secs_f64(seconds).map_or(FOREVER, |wait| wait.min(FOREVER)))
+    let wait = Duration::try_from_secs_f64(seconds).unwrap_or(LONGEST_WAIT);
+    Some(wait.min(LONGEST_WAIT))
 }
 
-/// About thirty years.
-const FOREVER: Duration = Duration::from_secs(1_000_000_000);
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reading::{BenchmarkId, Channel, Reading, Sample, Series, Unit};
+
+    fn at(second: i64) -> Timestamp {
+        Timestamp::from_second(second).unwrap()
+    }
+
+    fn series(benchmark: &str, seconds: &[i64]) -> Series {
+        let reading = |&second: &i64| Reading {
+            time: at(second),
+            value: 1.0,
+            sigma: None,
+        };
+        Series {
+            benchmark: BenchmarkId::new(benchmark),
+            unit: Unit::MM,
+            averaging: None,
+            readings: seconds.iter().map(reading).collect(),
+        }
+    }
+
+    #[test]
+    fn values_come_by_time_then_covariates_first_then_by_benchmark() {
+        let recording = Recording {
+            series: vec![series("a", &[1, 3]), series("b", &[1, 2, 3])],
+            channels: vec![Channel {
+                name: "rain_mm".to_owned(),
+                unit: None,
+                samples: vec![Sample {
+                    time: at(3),
+                    value: 0.0,
+                }],
+            }],
+            ..Recording::default()
+        };
+        let name = |arrival: &Arrival| match &arrival.input {
+            Input::Reading { benchmark, .. } => benchmark.as_str().to_owned(),
+            Input::Sample { channel, .. } => channel.clone(),
+            Input::Tick => String::new(),
+        };
+        let names: Vec<String> = arrivals(&recording).iter().map(name).collect();
+        assert_eq!(names, ["a", "b", "b", "rain_mm", "a", "b"]);
+    }
+
+    #[test]
+    fn the_pace_divides_data_time() {
+        assert_eq!(wait(Pace::Max, at(0), at(100)), None);
+        let tenth = wait(Pace::Times(10.0), at(0), at(100));
+        assert_eq!(tenth, Some(Duration::from_secs(10)));
+        let slowest = wait(Pace::Times(1e-300), at(0), at(100));
+        assert_eq!(slowest, Some(LONGEST_WAIT));
+    }
+}

@@ -7,22 +7,23 @@ use slipwatch::runtime::ingest::{ReadOptions, read_files};
 use std::path::Path;
 
 /// One benchmark's crisis as the monitor lived it.
-pub struct Crisis {
-    pub events: Vec<Event>,
+pub(crate) struct Crisis {
+    pub(crate) events: Vec<Event>,
 }
 
 /// One refit, as far as the claims need it.
 #[derive(Debug, Clone, Copy)]
-pub struct Refit {
-    pub time: Timestamp,
-    pub median: Option<Timestamp>,
-    pub intercept: Option<Timestamp>,
-    pub stable_accelerating: f64,
-    pub red_chance: f64,
+pub(crate) struct Refit {
+    pub(crate) time: Timestamp,
+    pub(crate) median: Option<Timestamp>,
+    pub(crate) intercept: Option<Timestamp>,
+    pub(crate) stable_accelerating: f64,
+    #[allow(dead_code, reason = "shown where a claim about a refit fails")]
+    pub(crate) red_chance: f64,
 }
 
 /// All series of a file, each velocity the mean of `averaging` where given.
-pub fn series(path: &Path, averaging: Option<jiff::SignedDuration>) -> Vec<Series> {
+pub(crate) fn series(path: &Path, averaging: Option<jiff::SignedDuration>) -> Vec<Series> {
     let options = ReadOptions {
         averaging,
         ..ReadOptions::default()
@@ -34,14 +35,14 @@ pub fn series(path: &Path, averaging: Option<jiff::SignedDuration>) -> Vec<Serie
 }
 
 /// A file of the project's own recordings.
-pub fn recording(name: &str) -> std::path::PathBuf {
+pub(crate) fn recording(name: &str) -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("recordings")
         .join(name)
 }
 
 /// The default policy with another evacuation time.
-pub fn policy(evacuation_hours: i64) -> Policy {
+pub(crate) fn policy(evacuation_hours: i64) -> Policy {
     Policy {
         evacuation_time: jiff::SignedDuration::from_hours(evacuation_hours),
         ..Policy::default()
@@ -50,7 +51,7 @@ pub fn policy(evacuation_hours: i64) -> Policy {
 
 impl Crisis {
     /// Plays one series, and lets the deadlines between its readings pass.
-    pub fn play(series: &Series, policy: &Policy) -> Self {
+    pub(crate) fn play(series: &Series, policy: &Policy) -> Self {
         let mut monitor = Monitor::new(Settings {
             policy: policy.clone(),
             ..Settings::default()
@@ -72,47 +73,50 @@ impl Crisis {
     }
 
     /// Plays the benchmark `id` of a recording.
-    pub fn of(file: &Path, id: &str, policy: &Policy) -> Self {
+    pub(crate) fn of(file: &Path, id: &str, policy: &Policy) -> Self {
         let all = series(file, None);
         let wanted = BenchmarkId::new(id);
         let series = all.iter().find(|s| s.benchmark == wanted).unwrap();
         Self::play(series, policy)
     }
 
-    pub fn refits(&self) -> Vec<Refit> {
-        let refit = |event: &Event| match &event.kind {
-            EventKind::Refit {
+    pub(crate) fn refits(&self) -> Vec<Refit> {
+        let refit = |event: &Event| {
+            let EventKind::Refit {
                 regime,
                 failure_time,
                 inverse_velocity,
                 chance_within_evacuation_time,
                 ..
-            } => {
-                let stable = slipwatch::regime::Regime::StableAccelerating;
-                Some(Refit {
-                    time: event.time,
-                    median: failure_time.median,
-                    intercept: inverse_velocity.failure_time,
-                    stable_accelerating: regime.probabilities[&stable],
-                    red_chance: *chance_within_evacuation_time,
-                })
-            }
-            _ => None,
+            } = &event.kind
+            else {
+                return None;
+            };
+            let stable = slipwatch::regime::Regime::StableAccelerating;
+            Some(Refit {
+                time: event.time,
+                median: failure_time.median,
+                intercept: inverse_velocity.failure_time,
+                stable_accelerating: regime.probabilities[&stable],
+                red_chance: *chance_within_evacuation_time,
+            })
         };
         self.events.iter().filter_map(refit).collect()
     }
 
     /// When a level was entered and left, in order.
-    pub fn levels(&self) -> Vec<(Timestamp, Level, AlertState)> {
-        let alert = |event: &Event| match &event.kind {
-            EventKind::Alert { level, state, .. } => Some((event.time, *level, *state)),
-            _ => None,
+    pub(crate) fn levels(&self) -> Vec<(Timestamp, Level, AlertState)> {
+        let alert = |event: &Event| {
+            let EventKind::Alert { level, state, .. } = &event.kind else {
+                return None;
+            };
+            Some((event.time, *level, *state))
         };
         self.events.iter().filter_map(alert).collect()
     }
 
     /// When a level at least this grave was first entered.
-    pub fn first(&self, level: Level) -> Option<Timestamp> {
+    pub(crate) fn first(&self, level: Level) -> Option<Timestamp> {
         let entered = |(_, l, state): &(Timestamp, Level, AlertState)| {
             *l >= level && *l != Level::Unknown && *state == AlertState::Firing
         };
@@ -123,7 +127,7 @@ impl Crisis {
     }
 
     /// The level in force at the end.
-    pub fn last_level(&self) -> Level {
+    pub(crate) fn last_level(&self) -> Level {
         let mut level = Level::Green;
         for (_, changed, state) in self.levels() {
             match (changed, state) {
@@ -137,6 +141,6 @@ impl Crisis {
 }
 
 /// Days from `time` to `event`.
-pub fn days_before(event: Timestamp, time: Timestamp) -> f64 {
+pub(crate) fn days_before(event: Timestamp, time: Timestamp) -> f64 {
     days_since(time, event)
 }

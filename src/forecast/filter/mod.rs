@@ -23,7 +23,7 @@ use rand_pcg::Pcg64;
 /// Particles carried.
 const PARTICLES: usize = 2000;
 /// Particles run forward for a forecast.
-const FORECAST_PARTICLES: usize = 500;
+const FORECAST_PARTICLES: usize = 400;
 /// Readings that set the scale of the priors before the first update.
 const READINGS_FOR_PRIOR: usize = 3;
 /// Resample when the effective number falls below this share.

@@ -1,0 +1,77 @@
+//! What one reading costs: a solution of the law, a posterior, an update of the whole panel.
+
+#![expect(clippy::unwrap_used, reason = "a bench fails by panicking")]
+
+use divan::{Bencher, black_box};
+use slipwatch::fit::{Curvature, Observation, Observations, Posterior, RateOptions};
+use slipwatch::forecast::Panel;
+use slipwatch::model::{Accuracy, Law, Trajectory};
+use slipwatch::reading::{BenchmarkId, Quantity, days_since};
+use slipwatch::runtime::ingest::{ReadOptions, read_files};
+use std::path::Path;
+
+/// The readings that a fit is given here, and the passage that is asked for.
+const READINGS: usize = 67;
+const CRITICAL_MM_PER_DAY: f64 = 1000.0;
+
+fn main() {
+    divan::main();
+}
+
+/// The first readings of benchmark 5 of the reconstruction of Vaiont.
+fn observations() -> Observations {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings");
+    let file = folder.join("vaiont-1963-reconstruction.mcap");
+    let (recording, _) = read_files(&[file], &ReadOptions::default()).unwrap();
+    let benchmark = BenchmarkId::new("5");
+    let series = recording.series(Some(&benchmark), None).unwrap();
+    let first = series.readings[0].time;
+    let values = series.readings.iter().take(READINGS);
+    Observations {
+        quantity: Quantity::Velocity,
+        averaging_days: 0.0,
+        values: values
+            .map(|reading| Observation {
+                t_days: days_since(first, reading.time),
+                value: reading.value * series.unit.factor(),
+                sigma: reading.sigma,
+            })
+            .collect(),
+    }
+}
+
+#[divan::bench(args = [Accuracy::Fit, Accuracy::Full])]
+fn trajectory_of_an_unstable_slope(accuracy: Accuracy) -> Trajectory {
+    let law = Law::from_paper(1.35, 0.6, 1.0, 1.0).unwrap();
+    Trajectory::solve(black_box(&law), 1.28, accuracy)
+}
+
+#[divan::bench(args = [Accuracy::Fit, Accuracy::Full])]
+fn trajectory_of_a_stable_slope(accuracy: Accuracy) -> Trajectory {
+    let law = Law::from_paper(0.98, 39.0, 1.0, 1.0).unwrap();
+    Trajectory::solve(black_box(&law), 400.0, accuracy)
+}
+
+#[divan::bench]
+fn posterior_of_67_readings(bencher: Bencher) {
+    let rates = observations().rates(0..READINGS, RateOptions::default());
+    bencher.bench(|| Posterior::fit(black_box(&rates), Curvature::Free, None));
+}
+
+/// The newest of 67 readings, taken by a panel that has seen the others.
+#[divan::bench]
+fn panel_update_at_67_readings(bencher: Bencher) {
+    let all = observations();
+    let mut panel = Panel::new(1);
+    for count in 1..READINGS {
+        let values = all.values[..count].to_vec();
+        let seen = Observations {
+            values,
+            ..all.clone()
+        };
+        panel.update(&seen, CRITICAL_MM_PER_DAY);
+    }
+    bencher
+        .with_inputs(|| panel.clone())
+        .bench_values(|mut panel| panel.update(black_box(&all), CRITICAL_MM_PER_DAY));
+}

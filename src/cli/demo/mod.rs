@@ -1,0 +1,194 @@
+//! `demo`: the archived crises through the daemon's own site, on an accelerated clock, with a real hook.
+
+mod crisis;
+mod timeline;
+mod verdict;
+
+use super::run::asynchronous;
+use crate::alert::{Level, Policy};
+use crate::config::HookConfig;
+use crate::monitor::{Event, Settings};
+use crate::reading::Recording;
+use crate::runtime::ingest::{ReadOptions, read_files};
+use crate::runtime::replay::{self, Pace, Plan};
+use crate::runtime::shutdown::Shutdown;
+use anyhow::Context;
+use crisis::{CRISES, Crisis};
+use indicatif::{ProgressBar, ProgressStyle};
+use jiff::SignedDuration;
+use std::io::{self, Write};
+use std::path::Path;
+use std::time::Duration;
+use timeline::Timeline;
+
+/// Show the main job: archived crises played through the monitor as it would have lived them
+///
+/// Needs nothing. Alerts go to a sample hook, a real process; state lies in a temporary folder.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// How long each crisis takes to play, such as 5s; 0s plays as fast as the monitor works
+    #[arg(long, value_name = "DURATION", value_parser = humantime::parse_duration, default_value = "5s")]
+    pace: Duration,
+}
+
+const HOOK: &str = include_str!("../../../deploy/notify.sh");
+/// Where the sample hook writes what it was told.
+const TOLD: &str = "told.txt";
+
+/// Plays every crisis, then the table.
+pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    let folder = tempfile::tempdir().context("cannot make a folder for the demo's state")?;
+    let mut out = io::stdout().lock();
+    let mut table = vec![verdict::HEAD.to_owned()];
+    let runtime = asynchronous()?;
+    for crisis in &CRISES {
+        let recording = recording(folder.path(), crisis)?;
+        introduce(&mut out, crisis, &recording)?;
+        let mut timeline = Timeline::new(
+            crisis,
+            recording.series.iter().map(|s| s.readings.len()).sum(),
+        );
+        runtime.block_on(play(
+            args,
+            folder.path(),
+            crisis,
+            &recording,
+            &mut |event| {
+                let told = timeline.tell(event);
+                told.map_or(Ok(()), |line| writeln!(out, "{line}"))
+            },
+        ))?;
+        tell_hook(&mut out, folder.path())?;
+        table.extend(
+            timeline
+                .records
+                .iter()
+                .map(|(id, record)| verdict::line(crisis, id, record)),
+        );
+    }
+    writeln!(out, "\nWhat was called when, against what happened\n")?;
+    for line in table {
+        writeln!(out, "{line}")?;
+    }
+    writeln!(
+        out,
+        "\nA reconstruction fulfils what the literature states of a slope whose readings are not public; it is not"
+    )?;
+    writeln!(
+        out,
+        "data. recordings/README.md says what each rests on. Next: slipwatch replay recordings/*.mcap; slipwatch --help"
+    )?;
+    Ok(())
+}
+
+/// Reads the crisis's benchmarks and covariates from the program's own copy of the recording.
+fn recording(folder: &Path, crisis: &Crisis) -> anyhow::Result<Recording> {
+    let file = folder.join(crisis.file);
+    std::fs::write(&file, crisis.recording)
+        .with_context(|| format!("cannot write {}", file.display()))?;
+    let (mut recording, _) = read_files(&[file], &ReadOptions::default())?;
+    recording
+        .series
+        .retain(|series| crisis.benchmarks.contains(&series.benchmark.as_str()));
+    Ok(recording)
+}
+
+fn introduce(out: &mut impl Write, crisis: &Crisis, recording: &Recording) -> io::Result<()> {
+    let readings: usize = recording
+        .series
+        .iter()
+        .map(|series| series.readings.len())
+        .sum();
+    let (site, kind) = (crisis.site, crisis.kind.to_uppercase());
+    writeln!(
+        out,
+        "\n=== {site}: {kind}; {readings} readings; evacuation time {} h; failure is 1 m/day\n",
+        crisis.evacuation_hours
+    )?;
+    writeln!(out, "{}", timeline::HEAD)
+}
+
+async fn play(
+    args: &Args,
+    folder: &Path,
+    crisis: &Crisis,
+    recording: &Recording,
+    each: &mut (dyn FnMut(&Event) -> io::Result<()> + '_),
+) -> anyhow::Result<()> {
+    let policy = Policy {
+        evacuation_time: SignedDuration::from_hours(crisis.evacuation_hours),
+        ..Policy::default()
+    };
+    let settings = Settings {
+        policy,
+        ..Settings::default()
+    };
+    let hooks = [sample_hook(folder)?];
+    let arrivals = replay::arrivals(recording);
+    let plan = Plan {
+        site: crisis.site,
+        settings: &settings,
+        hooks: &hooks,
+        pace: pace(args, &arrivals),
+        until: None,
+    };
+    let bar = bar(arrivals.len());
+    let shutdown = Shutdown::on_signals().context("cannot listen for signals")?;
+    let mut tell = |event: &Event| {
+        bar.set_position(arrivals.partition_point(|arrival| arrival.time <= event.time) as u64);
+        bar.suspend(|| each(event))
+    };
+    replay::replay(recording, &plan, shutdown, &mut tell).await?;
+    bar.finish_and_clear();
+    Ok(())
+}
+
+/// The bar hides itself where stderr is no terminal.
+fn bar(length: usize) -> ProgressBar {
+    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} values, {elapsed}").ok();
+    let bar = ProgressBar::new(length as u64);
+    style.map_or(bar.clone(), |style| bar.with_style(style))
+}
+
+/// So many seconds of data a second that the whole crisis takes as long as was asked.
+fn pace(args: &Args, arrivals: &[crate::runtime::tail::Arrival]) -> Pace {
+    let (Some(first), Some(last)) = (arrivals.first(), arrivals.last()) else {
+        return Pace::Max;
+    };
+    let span = last.time.duration_since(first.time).as_secs_f64();
+    let times = span / args.pace.as_secs_f64();
+    if times.is_finite() && times > 0.0 {
+        Pace::Times(times)
+    } else {
+        Pace::Max
+    }
+}
+
+fn sample_hook(folder: &Path) -> anyhow::Result<HookConfig> {
+    use std::os::unix::fs::PermissionsExt;
+    let script = folder.join("notify.sh");
+    std::fs::write(&script, HOOK)
+        .and_then(|()| std::fs::set_permissions(&script, std::fs::Permissions::from_mode(0o755)))
+        .with_context(|| format!("cannot write {}", script.display()))?;
+    Ok(HookConfig {
+        run: vec![script.display().to_string(), TOLD.to_owned()],
+        levels: vec![Level::Orange, Level::Red, Level::Unknown],
+        timeout: Duration::from_secs(10),
+        folder: folder.to_owned(),
+    })
+}
+
+/// Prints what the hook wrote, and empties it for the next crisis.
+fn tell_hook(out: &mut impl Write, folder: &Path) -> anyhow::Result<()> {
+    let file = folder.join(TOLD);
+    let told = std::fs::read_to_string(&file).unwrap_or_default();
+    writeln!(out, "\nthe hook, a process of its own, wrote:")?;
+    if told.is_empty() {
+        writeln!(out, "  nothing: it is run for orange, red and unknown")?;
+    }
+    for line in told.lines() {
+        writeln!(out, "  {line}")?;
+    }
+    std::fs::write(&file, "")?;
+    Ok(())
+}

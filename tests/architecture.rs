@@ -1,0 +1,449 @@
+//! Arrows among the modules go one way, the core is pure, and files stay small.
+//!
+//! The sources are read as text: a small tokeniser finds every path (`crate::fit::Rate`, a `use` with
+//! braces, a chain of `super`), outside comments, strings and the `#[cfg(test)]` part of a file.
+
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// Which modules a module may name. A new module gets a row here, and a place in ARCHITECTURE.md.
+const ARROWS: [(&str, &[&str]); 11] = [
+    ("reading", &[]),
+    ("regime", &[]),
+    ("model", &["reading", "regime"]),
+    ("fit", &["model", "reading", "regime"]),
+    ("forecast", &["fit", "model", "reading", "regime"]),
+    ("alert", &["reading"]),
+    (
+        "monitor",
+        &["alert", "fit", "forecast", "model", "reading", "regime"],
+    ),
+    (
+        "inversion",
+        &["fit", "forecast", "model", "monitor", "reading", "regime"],
+    ),
+    ("config", &["alert", "monitor", "reading"]),
+    (
+        "runtime",
+        &[
+            "alert",
+            "config",
+            "fit",
+            "forecast",
+            "inversion",
+            "model",
+            "monitor",
+            "reading",
+            "regime",
+        ],
+    ),
+    (
+        "cli",
+        &[
+            "alert",
+            "config",
+            "fit",
+            "forecast",
+            "inversion",
+            "model",
+            "monitor",
+            "reading",
+            "regime",
+            "runtime",
+        ],
+    ),
+];
+
+/// Modules that know no clock, no files, no network and no ambient randomness.
+const PURE: [&str; 8] = [
+    "reading",
+    "regime",
+    "model",
+    "fit",
+    "forecast",
+    "alert",
+    "monitor",
+    "inversion",
+];
+
+/// Beginnings of paths that a pure module may not have.
+const IMPURE_PATHS: [&[&str]; 12] = [
+    &["tokio"],
+    &["std", "fs"],
+    &["std", "net"],
+    &["std", "env"],
+    &["std", "process"],
+    &["std", "thread"],
+    &["std", "time", "Instant"],
+    &["std", "time", "SystemTime"],
+    &["std", "time", "*"],
+    &["jiff", "Zoned", "now"],
+    &["rand", "rng"],
+    &["rand", "random"],
+];
+
+/// Names that are impure whatever stands before them.
+const IMPURE_NAMES: [&str; 7] = [
+    "Instant",
+    "SystemTime",
+    "OsRng",
+    "SysRng",
+    "ThreadRng",
+    "thread_rng",
+    "from_os_rng",
+];
+
+/// Lines of a file without its tests.
+const LONGEST_FILE: usize = 500;
+
+/// One source file: its module's path and the text of what is not a test.
+struct Source {
+    file: PathBuf,
+    module: Vec<String>,
+    text: String,
+}
+
+fn sources() -> Vec<Source> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut folders = vec![root.clone()];
+    let mut sources = Vec::new();
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let file = entry.unwrap().path();
+            if file.is_dir() {
+                folders.push(file);
+            } else if file.extension().is_some_and(|extension| extension == "rs") {
+                let module = module_of(file.strip_prefix(&root).unwrap());
+                let text = without_tests(&std::fs::read_to_string(&file).unwrap()).to_owned();
+                sources.push(Source { file, module, text });
+            }
+        }
+    }
+    sources.sort_by(|a, b| a.file.cmp(&b.file));
+    assert!(sources.len() > 50, "{} files", sources.len());
+    sources
+}
+
+/// `fit/rates.rs` is fit, rates; `fit/mod.rs` is fit; `lib.rs` is the crate itself.
+fn module_of(file: &Path) -> Vec<String> {
+    let file = file.with_extension("");
+    let names = file.iter().map(|name| name.to_str().unwrap().to_owned());
+    names
+        .filter(|name| !["mod", "lib", "main"].contains(&name.as_str()))
+        .collect()
+}
+
+/// The text up to the module of tests that closes it.
+fn without_tests(text: &str) -> &str {
+    let tests = text
+        .match_indices("#[cfg(test)]")
+        .find(|(at, mark)| text[at + mark.len()..].trim_start().starts_with("mod "));
+    tests.map_or(text, |(at, _)| &text[..at])
+}
+
+/// Names, `::` and single other characters, without comments and literals.
+fn tokens(text: &str) -> Vec<String> {
+    let mut rest = text;
+    let mut tokens = Vec::new();
+    while let Some(c) = rest.chars().next() {
+        let length = if rest.starts_with("//") {
+            rest.find('\n').unwrap_or(rest.len())
+        } else if rest.starts_with("/*") {
+            rest.find("*/").map_or(rest.len(), |at| at + 2)
+        } else if let Some(length) = raw_string(rest) {
+            length
+        } else if c == '"' {
+            quoted(rest, '"')
+        } else if c == '\'' {
+            character(rest)
+        } else if c.is_alphanumeric() || c == '_' {
+            let word = |c: char| c.is_alphanumeric() || c == '_';
+            let length = rest.find(|c| !word(c)).unwrap_or(rest.len());
+            tokens.push(rest[..length].to_owned());
+            length
+        } else if rest.starts_with("::") {
+            tokens.push("::".to_owned());
+            2
+        } else {
+            if !c.is_whitespace() {
+                tokens.push(c.to_string());
+            }
+            c.len_utf8()
+        };
+        rest = &rest[length..];
+    }
+    tokens
+}
+
+/// The length of `r"…"`, `r#"…"#`, `br"…"` at the start of `text`.
+fn raw_string(text: &str) -> Option<usize> {
+    let after = text.strip_prefix("br").or_else(|| text.strip_prefix('r'))?;
+    let hashes = after.find(|c| c != '#')?;
+    let body = after[hashes..].strip_prefix('"')?;
+    let close = format!("\"{}", "#".repeat(hashes));
+    let end = body.find(&close)? + close.len();
+    Some(text.len() - body.len() + end)
+}
+
+/// The length of a literal in quotes, escapes included.
+fn quoted(text: &str, quote: char) -> usize {
+    let mut is_escaped = false;
+    for (at, c) in text.char_indices().skip(1) {
+        if c == quote && !is_escaped {
+            return at + c.len_utf8();
+        }
+        is_escaped = c == '\\' && !is_escaped;
+    }
+    text.len()
+}
+
+/// The length of a character literal; of a lifetime only its mark.
+fn character(text: &str) -> usize {
+    let mut after = text.chars().skip(1);
+    match (after.next(), after.next()) {
+        (Some('\\'), _) | (Some(_), Some('\'')) => quoted(text, '\''),
+        _ => 1,
+    }
+}
+
+/// Every path with a `::` in it, the braces of a `use` multiplied out.
+fn paths(text: &str) -> Vec<Vec<String>> {
+    let tokens = tokens(text);
+    let mut found = Vec::new();
+    let mut at = 0;
+    while at < tokens.len() {
+        if is_name(&tokens[at]) {
+            at = path(&tokens, at, &[], &mut found);
+        } else {
+            at += 1;
+        }
+    }
+    found.retain(|path| path.len() > 1);
+    found
+}
+
+fn is_name(token: &str) -> bool {
+    token.starts_with(|c: char| c.is_alphanumeric() || c == '_')
+}
+
+/// Reads one path behind `prefix` and returns where it ends.
+fn path(tokens: &[String], start: usize, prefix: &[String], found: &mut Vec<Vec<String>>) -> usize {
+    let token = |at: usize| tokens.get(at).map_or("", String::as_str);
+    let mut path_so_far = prefix.to_vec();
+    let mut at = start;
+    loop {
+        if token(at) == "{" {
+            return group(tokens, at + 1, &path_so_far, found);
+        }
+        if !(is_name(token(at)) || token(at) == "*") {
+            break;
+        }
+        path_so_far.push(tokens[at].clone());
+        at += 1;
+        if token(at) != "::" {
+            break;
+        }
+        at += 1;
+    }
+    found.push(path_so_far);
+    at
+}
+
+/// Reads the paths in braces and returns where they close.
+fn group(
+    tokens: &[String],
+    start: usize,
+    prefix: &[String],
+    found: &mut Vec<Vec<String>>,
+) -> usize {
+    let mut at = start;
+    while let Some(token) = tokens.get(at) {
+        at = match token.as_str() {
+            "}" => return at + 1,
+            // Another name is no path.
+            "as" => at + 2,
+            name if is_name(name) || name == "*" => path(tokens, at, prefix, found),
+            _ => at + 1,
+        };
+    }
+    at
+}
+
+/// The module of the crate that `path` leads to from within `module`.
+fn target<'a>(module: &[String], path: &'a [String]) -> Option<&'a str> {
+    let ups = path.iter().take_while(|name| *name == "super").count();
+    if path[0] == "crate" {
+        path.get(1).map(String::as_str)
+    } else if ups > 0 && ups == module.len() {
+        path.get(ups).map(String::as_str)
+    } else {
+        None
+    }
+}
+
+/// The arrows that `text` in `module` draws to other modules.
+fn arrows(module: &[String], text: &str) -> BTreeSet<String> {
+    let paths = paths(text);
+    let targets = paths.iter().filter_map(|path| target(module, path));
+    targets
+        .filter(|target| module.first().is_none_or(|own| own != target))
+        .map(str::to_owned)
+        .collect()
+}
+
+/// What in `text` has no place in a pure module.
+fn impurities(text: &str) -> BTreeSet<String> {
+    let of_paths = paths(text).into_iter().filter(|path| {
+        let begins = |impure: &&[&str]| path.iter().zip(impure.iter()).all(|(a, b)| a == b);
+        IMPURE_PATHS
+            .iter()
+            .any(|impure| path.len() >= impure.len() && begins(impure))
+    });
+    let of_names = tokens(text).into_iter();
+    of_paths
+        .map(|path| path.join("::"))
+        .chain(of_names.filter(|name| IMPURE_NAMES.contains(&name.as_str())))
+        .collect()
+}
+
+#[test]
+fn arrows_among_modules_go_one_way() {
+    let allowed = BTreeMap::from(ARROWS);
+    let mut wrong = Vec::new();
+    for source in sources() {
+        let Some(module) = source.module.first() else {
+            continue; // lib.rs and main.rs
+        };
+        let Some(allowed) = allowed.get(module.as_str()) else {
+            wrong.push(format!("{module} has no row in ARROWS"));
+            continue;
+        };
+        for arrow in arrows(&source.module, &source.text) {
+            if !allowed.contains(&arrow.as_str()) {
+                wrong.push(format!("{}: {module} -> {arrow}", source.file.display()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn the_table_of_arrows_has_no_circle() {
+    let mut left = BTreeMap::from(ARROWS);
+    while !left.is_empty() {
+        let leads_nowhere = |row: &(&&str, &&[&str])| row.1.iter().all(|to| !left.contains_key(to));
+        let Some(done) = left.iter().find(leads_nowhere).map(|row| *row.0) else {
+            panic!("a circle among {:?}", left.keys());
+        };
+        left.remove(done);
+    }
+}
+
+#[test]
+fn a_level_is_decided_without_the_law_and_the_law_fitted_without_a_level() {
+    let allowed = BTreeMap::from(ARROWS);
+    let alert = allowed["alert"];
+    assert!(!alert.contains(&"model") && !alert.contains(&"fit"));
+    for science in ["regime", "model", "fit", "forecast"] {
+        assert!(!allowed[science].contains(&"alert"), "{science}");
+    }
+}
+
+#[test]
+fn the_core_is_pure() {
+    let mut wrong = Vec::new();
+    for source in sources() {
+        let is_pure = |module: &String| PURE.contains(&module.as_str());
+        if source.module.first().is_some_and(is_pure) {
+            for what in impurities(&source.text) {
+                wrong.push(format!("{}: {what}", source.file.display()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn every_file_is_short_and_says_its_job_in_its_first_line() {
+    let mut wrong = Vec::new();
+    for source in sources() {
+        let lines = source.text.lines().count();
+        if lines > LONGEST_FILE {
+            wrong.push(format!("{}: {lines} lines", source.file.display()));
+        }
+        if !source.text.starts_with("//! ") {
+            wrong.push(format!("{}: no job", source.file.display()));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+mod the_reader_of_sources {
+    use super::*;
+
+    fn module(path: &str) -> Vec<String> {
+        path.split("::").map(str::to_owned).collect()
+    }
+
+    fn found(path: &str, text: &str) -> Vec<String> {
+        arrows(&module(path), text).into_iter().collect()
+    }
+
+    #[test]
+    fn sees_every_way_to_name_a_module() {
+        assert_eq!(found("alert", "use crate::model::Law;"), ["model"]);
+        assert_eq!(found("alert", "let x = crate::fit::solve(1);"), ["fit"]);
+        let nested = "use crate::{fit::{Rate, Rates}, model as law, reading::*};";
+        assert_eq!(found("alert", nested), ["fit", "model", "reading"]);
+        assert_eq!(found("alert", "pub use super::fit::Rate;"), ["fit"]);
+        assert_eq!(found("alert::policy", "super::super::fit::f()"), ["fit"]);
+        assert_eq!(found("alert", "use super::{fit, model};"), ["fit", "model"]);
+        assert_eq!(found("alert", "Vec::<crate::fit::Rate>::new()"), ["fit"]);
+    }
+
+    #[test]
+    fn sees_none_where_there_is_none() {
+        let innocent = [
+            "use super::policy::Level;",
+            "use crate::alert::Level;",
+            "// use crate::fit::Rate;",
+            "/* crate::fit */ fn f<'a>(x: &'a str) {}",
+            "let s = \"crate::fit\\\" crate::fit\"; let q = '\"';",
+            "let s = r#\"crate::fit \" crate::fit\"#;",
+            "let fit = fit::rate();",
+        ];
+        for text in innocent {
+            assert!(found("alert::policy", text).is_empty(), "{text}");
+        }
+        assert_eq!(found("alert", "let q = '\"'; crate::fit::f(\"\")"), ["fit"]);
+    }
+
+    #[test]
+    fn sees_the_clock_the_files_and_ambient_randomness() {
+        for text in [
+            "use std::fs::File;",
+            "use std::{fmt, fs};",
+            "use std::{io, time::{Duration, Instant}};",
+            "use std::time; fn f() { time::SystemTime::now(); }",
+            "tokio::time::sleep(d)",
+            "std::env::var(\"DBG\")",
+            "rand::rngs::OsRng",
+            "Pcg::from_os_rng()",
+        ] {
+            assert!(!impurities(text).is_empty(), "{text}");
+        }
+        let clean = "use std::time::Duration; use std::{fmt, collections::BTreeMap};";
+        assert!(impurities(clean).is_empty());
+    }
+
+    #[test]
+    fn leaves_out_the_tests_and_nothing_else() {
+        let text = "#[cfg(test)]\nuse a;\nfn f() {}\n#[cfg(test)]\nmod tests {}\n";
+        assert_eq!(without_tests(text), "#[cfg(test)]\nuse a;\nfn f() {}\n");
+        assert_eq!(module_of(Path::new("fit/rates.rs")), ["fit", "rates"]);
+        assert_eq!(module_of(Path::new("fit/mod.rs")), ["fit"]);
+        assert!(module_of(Path::new("lib.rs")).is_empty());
+    }
+}

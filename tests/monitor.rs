@@ -1,0 +1,234 @@
+//! What a site relies on from the monitor, on slopes made by the law itself (with seeded noise).
+
+use jiff::{SignedDuration, ToSpan};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use slipwatch::alert::{Level, Policy, Threshold};
+use slipwatch::model::{Accuracy, Law, Trajectory};
+use slipwatch::monitor::{AlertState, Event, EventKind, Input, Monitor, Settings};
+use slipwatch::reading::{BenchmarkId, Reading, Timestamp, Unit};
+
+fn start() -> Timestamp {
+    "2020-01-01T00:00:00Z".parse().unwrap()
+}
+
+/// Daily displacements of a law, mm, with uniform noise of half a millimetre.
+fn displacements(law: &Law, days: i64) -> Vec<(Timestamp, f64)> {
+    let mut generator = Pcg64::seed_from_u64(7);
+    let motion = Trajectory::solve(law, days as f64, Accuracy::Full);
+    let one = |day: i64| {
+        let slip = motion.at(day as f64)?.displacement;
+        Some((
+            start() + (24 * day).hours(),
+            slip + generator.random::<f64>() - 0.5,
+        ))
+    };
+    (0..days).map_while(one).collect()
+}
+
+fn input(time: Timestamp, value: f64, unit: Unit) -> Input {
+    let reading = Reading {
+        time,
+        value,
+        sigma: None,
+    };
+    Input::Reading {
+        benchmark: BenchmarkId::new("a"),
+        unit,
+        averaging: None,
+        reading,
+    }
+}
+
+fn monitor(policy: Policy) -> Monitor {
+    Monitor::new(Settings {
+        policy,
+        ..Settings::default()
+    })
+}
+
+fn play(monitor: &mut Monitor, readings: &[(Timestamp, f64)]) -> Vec<Event> {
+    let step =
+        |(time, value): &(Timestamp, f64)| monitor.step(*time, &input(*time, *value, Unit::MM));
+    readings.iter().flat_map(step).collect()
+}
+
+fn levels(events: &[Event]) -> Vec<(Level, AlertState)> {
+    let one = |event: &Event| match &event.kind {
+        EventKind::Alert { level, state, .. } => Some((*level, *state)),
+        _ => None,
+    };
+    events.iter().filter_map(one).collect()
+}
+
+/// m = 1.3, fails after some 49 days.
+fn failing() -> Law {
+    Law::from_paper(1.3, 0.3, 125.0, 1.5).unwrap()
+}
+
+#[test]
+fn a_failing_slope_goes_through_orange_to_red_before_it_fails() {
+    let law = failing();
+    let failure = Trajectory::solve(&law, 1.0, Accuracy::Full)
+        .failure_days()
+        .unwrap();
+    assert!((40.0..90.0).contains(&failure), "{failure}");
+    let mut monitor = monitor(Policy {
+        evacuation_time: SignedDuration::from_hours(72),
+        ..Policy::default()
+    });
+    let events = play(&mut monitor, &displacements(&law, 200));
+    let firing: Vec<Level> = levels(&events)
+        .into_iter()
+        .map(|(level, _)| level)
+        .collect();
+    assert!(firing.contains(&Level::Orange), "{firing:?}");
+    assert_eq!(firing.last(), Some(&Level::Red));
+}
+
+#[test]
+fn a_slope_that_saturates_under_the_critical_velocity_is_never_red() {
+    // m = 0.8, from 2 mm/day to a steady 30 mm/day.
+    let law = Law::from_paper(0.8, 30.0, 2.0, 30.0).unwrap();
+    let readings = displacements(&law, 250);
+    assert_eq!(readings.len(), 250);
+    let events = play(&mut monitor(Policy::default()), &readings);
+    assert!(
+        !levels(&events)
+            .iter()
+            .any(|(level, _)| *level == Level::Red),
+        "{:?}",
+        levels(&events)
+    );
+}
+
+#[test]
+fn a_sensor_that_dies_while_accelerating_leaves_its_level_latched() {
+    let mut monitor = monitor(Policy {
+        evacuation_time: SignedDuration::from_hours(72),
+        ..Policy::default()
+    });
+    let readings = displacements(&failing(), 200);
+    play(&mut monitor, &readings);
+    assert_eq!(monitor.level(&BenchmarkId::new("a")), Some(Level::Red));
+    let due = monitor.next_deadline().unwrap();
+    assert!(due > readings.last().unwrap().0);
+    let events = monitor.step(due, &Input::Tick);
+    assert_eq!(
+        levels(&events),
+        [(Level::Unknown, AlertState::Firing)],
+        "beside red, not instead of it"
+    );
+    assert!(matches!(&events[0].kind, EventKind::Fault { kind, .. } if kind == "no-data"));
+    assert_eq!(monitor.level(&BenchmarkId::new("a")), Some(Level::Red));
+    assert_eq!(monitor.next_deadline(), None, "said once");
+}
+
+#[test]
+fn every_silence_has_a_key_of_its_own() {
+    let mut monitor = monitor(Policy::default());
+    let mut keys = Vec::new();
+    for first in [0, 100] {
+        let readings: Vec<(Timestamp, f64)> = (first..first + 20)
+            .map(|day: i64| (start() + (24 * day).hours(), day as f64))
+            .collect();
+        let mut events = play(&mut monitor, &readings);
+        let due = monitor.next_deadline().unwrap();
+        events.extend(monitor.step(due, &Input::Tick));
+        for event in events {
+            if let EventKind::Alert {
+                level: Level::Unknown,
+                state: AlertState::Firing,
+                key,
+                ..
+            } = event.kind
+            {
+                keys.push(key);
+            }
+        }
+    }
+    assert_eq!(keys.len(), 2);
+    assert_ne!(keys[0], keys[1]);
+}
+
+#[test]
+fn two_monitors_say_the_same_byte_for_byte() {
+    let readings = displacements(&failing(), 40);
+    let said = || {
+        let events = play(&mut monitor(Policy::default()), &readings);
+        serde_json::to_string(&events).unwrap()
+    };
+    let once = said();
+    assert!(once.contains("\"refit\""));
+    assert_eq!(once, said());
+}
+
+#[test]
+fn plain_thresholds_act_before_there_is_any_forecast() {
+    let threshold = Threshold {
+        level: Level::Red,
+        velocity_mm_per_day: Some(50.0),
+        displacement_mm: None,
+        acceleration_mm_per_day2: None,
+    };
+    let mut monitor = monitor(Policy {
+        thresholds: vec![threshold],
+        ..Policy::default()
+    });
+    let readings = [(start(), 0.0), (start() + 24.hours(), 80.0)];
+    let events = play(&mut monitor, &readings);
+    assert_eq!(levels(&events), [(Level::Red, AlertState::Firing)]);
+    assert!(
+        !events
+            .iter()
+            .any(|event| matches!(event.kind, EventKind::Refit { .. }))
+    );
+}
+
+#[test]
+fn readings_twice_out_of_order_or_corrected_do_not_stop_it() {
+    let mut monitor = monitor(Policy::default());
+    let readings = displacements(&failing(), 30);
+    play(&mut monitor, &readings[..20]);
+    assert!(
+        play(&mut monitor, &readings[19..20]).is_empty(),
+        "a repeated reading says nothing"
+    );
+    let corrected = play(&mut monitor, &[(readings[19].0, 99.0)]);
+    assert!(matches!(&corrected[0].kind, EventKind::Fault { kind, .. } if kind == "corrected"));
+    let late = play(
+        &mut monitor,
+        &[(readings[10].0 + 1.hours(), readings[10].1)],
+    );
+    assert!(matches!(&late[0].kind, EventKind::Fault { kind, .. } if kind == "out-of-order"));
+    let after = play(&mut monitor, &readings[20..]);
+    assert_eq!(
+        after
+            .iter()
+            .filter(|e| matches!(e.kind, EventKind::Refit { .. }))
+            .count(),
+        10
+    );
+}
+
+#[test]
+fn the_drift_of_the_intercept_stands_beside_what_the_law_expects() {
+    let mut monitor = monitor(Policy::default());
+    let events = play(&mut monitor, &displacements(&failing(), 200));
+    let drifts: Vec<(f64, Option<f64>)> = events
+        .iter()
+        .filter_map(|event| match &event.kind {
+            EventKind::InterceptDrift {
+                drift_days_per_day,
+                expected_days_per_day,
+                ..
+            } => Some((*drift_days_per_day, *expected_days_per_day)),
+            _ => None,
+        })
+        .collect();
+    assert!(!drifts.is_empty());
+    assert!(
+        drifts.iter().any(|(_, expected)| expected.is_some()),
+        "{drifts:?}"
+    );
+}
