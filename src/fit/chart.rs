@@ -1,7 +1,7 @@
 //! Coordinates in which every point is a law: unbounded but for a box, and regular over the record.
 //!
 //! With constant load the velocity only rises or only falls. Anchored at one end of the record, with
-//! the direction and the branch of m fixed, the law is free in ln |r|, in ln |ln y_s| (y_s the steady
+//! the direction and the branch of m fixed, the law is free in ln |r|, in ln |ln `y_s`| (`y_s` the steady
 //! state, on the side where a and b have one sign) and in ln |m|. A branch with m < 1 relaxes forwards in
 //! time and one with m > 1 backwards, so each is anchored where it starts to relax; where the velocity is
 //! greatest at the other end, that end makes a second chart.
@@ -20,12 +20,12 @@ pub(super) const LEAST_LN_M: f64 = 1e-8;
 
 /// Bounds of ln(|r| L), L the record's length.
 const LN_SLOPE: (f64, f64) = (-14.0, 16.0);
-/// Bounds of ln |ln y_s|: from a steady state that is all but reached to none.
+/// Bounds of ln |ln `y_s|`: from a steady state that is all but reached to none.
 const LN_STEADY: (f64, f64) = (-12.0, 20.0);
 
 /// Where the search looks first: |r| L.
 const SLOPES: [f64; 8] = [0.03, 0.2, 0.7, 2.0, 6.0, 20.0, 80.0, 400.0];
-/// Where the search looks first: |ln y_s|.
+/// Where the search looks first: |ln `y_s`|.
 const STEADY: [f64; 7] = [0.05, 0.3, 1.0, 3.0, 8.0, 25.0, 100.0];
 
 /// The ranges of m that hold different laws.
@@ -57,7 +57,7 @@ pub(super) enum Anchor {
     End,
 }
 
-/// One set of coordinates (ln |r| L, ln |ln y_s|, ln |m|).
+/// One set of coordinates (ln |r| L, ln |ln `y_s`|, ln |m|).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Chart {
     pub(super) branch: Branch,
@@ -133,7 +133,7 @@ impl Chart {
         Law::from_fit(1.0, r, kappa, p)
     }
 
-    /// The sign of ln y_s: m < 1 goes to the steady velocity, m > 1 comes from it.
+    /// The sign of ln `y_s`: m < 1 goes to the steady velocity, m > 1 comes from it.
     fn steady_side(self) -> f64 {
         let comes_from_it = self.branch == Branch::AboveOne;
         if comes_from_it == (self.direction == Direction::Accelerating) {

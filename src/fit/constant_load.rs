@@ -130,8 +130,9 @@ impl ConstantLoad {
 
 /// What makes an inversion pointless.
 fn refuse(readings: &PointReadings, exponent: Exponent) -> Option<Outcome> {
+    let is_one = exponent == Exponent::Fixed(1.0);
     if let Exponent::Fixed(m) = exponent
-        && !(m == 1.0 || (Branch::of(m).is_some() && (LOWEST_M..=HIGHEST_M).contains(&m)))
+        && !(is_one || (Branch::of(m).is_some() && (LOWEST_M..=HIGHEST_M).contains(&m)))
     {
         return Some(Outcome::NotAnExponent(m));
     }
@@ -168,8 +169,8 @@ fn m_of(solution: &Solution) -> f64 {
 }
 
 /// Where a branch has only run into m = 1, that is the better account; what is left of the branch is
-/// the law next to it, whose x_i, T and D mean nothing.
-fn prefer_unit_m(found: &mut Vec<Found>) {
+/// the law next to it, whose `x_i`, T and D mean nothing.
+fn prefer_unit_m(found: &mut [Found]) {
     let Some(unit) = found.iter().find(|one| one.solution.law.p == 0.0).copied() else {
         return;
     };

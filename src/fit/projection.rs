@@ -37,7 +37,9 @@ impl PointReadings {
             }
         }
         let first = days.first().copied().unwrap_or(0.0);
-        days.iter_mut().for_each(|day| *day -= first);
+        for day in &mut days {
+            *day -= first;
+        }
         let centre = match quantity {
             Quantity::Velocity => 0.0,
             Quantity::Displacement => values.iter().map(|v| v / values.len() as f64).sum::<f64>(),
@@ -75,7 +77,9 @@ impl PointReadings {
 
     /// Whether they are all one number.
     pub(super) fn all_equal(&self) -> bool {
-        self.values.windows(2).all(|pair| pair[0] == pair[1])
+        self.values
+            .windows(2)
+            .all(|pair| pair[0].total_cmp(&pair[1]).is_eq())
     }
 
     /// The unknowns of the law that are found by projection, without the nonlinear ones.
@@ -114,7 +118,7 @@ impl PointReadings {
     ) -> Option<Linear> {
         self.basis(law, anchor, basis)?;
         let linear = self.project(basis, out);
-        (linear.velocity > 0.0 && linear.velocity.is_finite()).then(|| Linear {
+        (linear.velocity > 0.0 && linear.velocity.is_finite()).then_some(Linear {
             velocity: linear.velocity * self.scale,
             displacement: linear.displacement * self.scale + self.centre,
         })

@@ -2,7 +2,7 @@
 //!
 //! A bound is null where it is the prior's and not the readings': m's where more than 4 % of the
 //! probability stands in the outermost 5 % of the prior's range of p on that side, the others' where
-//! most of the tail beyond the bound does.
+//! most of the tail beyond the bound does; those of `x_i`, T and D also where m may be on either side of 1.
 
 use super::report::{Estimate, Parameters};
 use super::{Inversion, law_in_mm_per_day};
@@ -49,6 +49,12 @@ pub(super) fn parameters(
     let fixed = matches!(inversion.options.exponent, Exponent::Fixed(_));
     // A posterior over m says nothing of what hangs on m when that is given.
     let of_m = if fixed { &[] } else { samples.as_slice() };
+    // x_i, T and D have their pole at m = 1: bounds on either side of it would bound nothing.
+    let of_x = if stands_on_both_sides(&samples) {
+        &[]
+    } else {
+        of_m
+    };
     let with = |best: Option<f64>, of: &[Drawn], pick: &dyn Fn(&Values) -> Option<f64>| Estimate {
         best,
         low: bound(of, Side::Low, pick),
@@ -56,9 +62,9 @@ pub(super) fn parameters(
     };
     Parameters {
         m: exponent(inversion, best.m, of_m),
-        x_i: with(best.x_i, of_m, &|values| values.x_i),
-        t_unit_days: with(best.t_unit_days, of_m, &|values| values.t_unit_days),
-        d: with(best.d, of_m, &|values| values.d),
+        x_i: with(best.x_i, of_x, &|values| values.x_i),
+        t_unit_days: with(best.t_unit_days, of_x, &|values| values.t_unit_days),
+        d: with(best.d, of_x, &|values| values.d),
         d_c: with(best.d_c, of_m, &|values| values.d_c),
         s_theta_i: with(best.s_theta_i, of_m, &|values| values.s_theta_i),
         v_i: with(best.v_i, &samples, &|values| values.v_i),
@@ -95,6 +101,17 @@ fn at_start(inversion: &Inversion, posterior: &Posterior) -> Vec<Drawn> {
         })
     };
     posterior.ensemble.samples.iter().filter_map(back).collect()
+}
+
+/// Whether more than the share that an edge may hold has m above 1, and as much below.
+fn stands_on_both_sides(samples: &[Drawn]) -> bool {
+    let share = |above: bool| {
+        let met = samples
+            .iter()
+            .filter(|one| one.values.m.is_some_and(|m| (m > 1.0) == above));
+        met.map(|one| one.weight).sum::<f64>()
+    };
+    share(true) > MOST_AT_EDGE && share(false) > MOST_AT_EDGE
 }
 
 /// The parameters of a law whose velocity is in mm/day.
@@ -165,7 +182,7 @@ fn quantile(
     let held: f64 = sorted.iter().map(|(_, one)| one.weight).sum();
     let tail = total * if side == Side::Low { LOW } else { 1.0 - HIGH };
     let (mut reached, mut at_edge) = (total - held, 0.0);
-    if !(reached < tail) {
+    if reached >= tail || samples.is_empty() {
         return None;
     }
     for (value, one) in sorted {

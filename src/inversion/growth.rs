@@ -1,7 +1,7 @@
 //! The exponent of dv/dt = A v^alpha (Fukuzono 1985, Voight 1988) by profile least squares in ln v.
 //!
-//! For alpha > 1, ln v = c - ln(t_c - t) / (alpha - 1); alpha = 1 is exponential growth, and below it
-//! ln v = c + ln(t - t_0) / (1 - alpha). alpha = 2 is the straight line through inverse velocity.
+//! For alpha > 1, ln v = c - `ln(t_c` - t) / (alpha - 1); alpha = 1 is exponential growth, and below it
+//! ln v = c + ln(t - `t_0`) / (1 - alpha). alpha = 2 is the straight line through inverse velocity.
 
 use super::report::Estimate;
 use crate::fit::Rate;
@@ -60,7 +60,7 @@ pub(super) fn exponent(rates: &[Rate]) -> Option<Estimate> {
         return None;
     };
     let length = last.0 - first.0;
-    if points.len() < FEWEST || !(length > 0.0) {
+    if points.len() < FEWEST || length <= 0.0 {
         return None;
     }
     let profile = profile(&points, length);
@@ -167,7 +167,7 @@ mod tests {
     /// dv/dt = v^alpha towards a pole at day 30, with a scatter of 3 %.
     fn rates(alpha: f64) -> Vec<Rate> {
         let scatter = [0.02, -0.03, 0.01, 0.03, -0.02, -0.01, 0.0];
-        (0..28)
+        (0..28_u32)
             .map(|day| {
                 let left = 30.0 - f64::from(day);
                 let velocity = left.powf(-1.0 / (alpha - 1.0)) * (1.0 + scatter[day as usize % 7]);

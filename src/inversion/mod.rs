@@ -205,7 +205,7 @@ impl Inversion {
         1.0 / self.velocity_unit().factor()
     }
 
-    /// The unit of v_i and D: the readings' own, or its length per day for displacements.
+    /// The unit of `v_i` and D: the readings' own, or its length per day for displacements.
     fn velocity_unit(&self) -> Unit {
         match self.series.unit {
             Unit::Length(length) => Unit::Rate(length, TimeUnit::Day),
@@ -213,7 +213,7 @@ impl Inversion {
         }
     }
 
-    /// The length that D_c is in.
+    /// The length that `D_c` is in.
     fn length_unit(&self) -> LengthUnit {
         match self.series.unit {
             Unit::Length(length) | Unit::Rate(length, _) => length,

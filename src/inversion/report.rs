@@ -23,7 +23,7 @@ pub struct FitReport {
     pub first: Option<Timestamp>,
     /// The last one used.
     pub last: Option<Timestamp>,
-    /// Where the law starts: t = 0 of x_i, v_i, r and kappa.
+    /// Where the law starts: t = 0 of `x_i`, `v_i`, r and kappa.
     pub onset: Option<Timestamp>,
     /// Which regime, with what probability.
     pub regime: RegimeReport,
@@ -69,9 +69,9 @@ pub struct Parameters {
     pub t_unit_days: Estimate,
     /// D, in the readings' velocity unit (for displacements, their length per day).
     pub d: Estimate,
-    /// D_c, in the readings' length.
+    /// `D_c`, in the readings' length.
     pub d_c: Estimate,
-    /// S theta_i.
+    /// S `theta_i`.
     pub s_theta_i: Estimate,
     /// Velocity, in the unit of D.
     pub v_i: Estimate,

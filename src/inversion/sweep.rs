@@ -1,16 +1,16 @@
-//! The inversion over growing t_max from a fixed start: what would have been said, and when.
+//! The inversion over growing `t_max` from a fixed start: what would have been said, and when.
 
 use super::report::{Alternatives, FailureTime, InverseVelocity, RegimeReport};
 use super::{FitReport, Inversion, Options};
 use crate::reading::{BenchmarkId, Quantity, SECONDS_PER_DAY, Series, Timestamp, Unit};
 use serde::Serialize;
 
-/// Where t_max runs.
+/// Where `t_max` runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SweepOptions {
-    /// The first t_max; by default after a quarter of the readings, and eight at least.
+    /// The first `t_max`; by default after a quarter of the readings, and eight at least.
     pub first: Option<Timestamp>,
-    /// The last t_max; by default the last reading.
+    /// The last `t_max`; by default the last reading.
     pub last: Option<Timestamp>,
     /// How many, evenly spaced in time.
     pub steps: usize,
@@ -28,7 +28,7 @@ impl Default for SweepOptions {
 
 /// A bound on the work of one sweep.
 const MOST_STEPS: usize = 1000;
-/// Readings before the first t_max, by default.
+/// Readings before the first `t_max`, by default.
 const FEWEST: usize = 8;
 
 /// A sweep.
@@ -42,11 +42,11 @@ pub struct SweepReport {
     pub unit: Unit,
     /// The first reading, where every row starts.
     pub first: Option<Timestamp>,
-    /// One inversion a row, in increasing t_max.
+    /// One inversion a row, in increasing `t_max`.
     pub rows: Vec<SweepRow>,
 }
 
-/// The inversion up to one t_max.
+/// The inversion up to one `t_max`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SweepRow {
     /// No later reading was used.
@@ -73,7 +73,7 @@ pub struct SweepRow {
     pub termination: String,
 }
 
-/// Inverts `series` up to each t_max in turn.
+/// Inverts `series` up to each `t_max` in turn.
 pub fn sweep(series: &Series, options: &Options, steps: &SweepOptions) -> SweepReport {
     let whole = Inversion::new(series, options);
     let t_maxes = t_maxes(whole.series(), steps);
@@ -101,7 +101,7 @@ pub fn sweep(series: &Series, options: &Options, steps: &SweepOptions) -> SweepR
     }
 }
 
-/// The t_max of every row, none twice.
+/// The `t_max` of every row, none twice.
 fn t_maxes(series: &Series, steps: &SweepOptions) -> Vec<Timestamp> {
     let readings = &series.readings;
     let (Some(start), Some(end)) = (readings.first(), readings.last()) else {
