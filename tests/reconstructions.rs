@@ -57,7 +57,8 @@ fn the_vaiont_reconstruction_keeps_the_papers_statements() {
 #[test]
 fn the_la_clapiere_reconstruction_keeps_the_papers_statements() {
     facts::la_clapiere(&committed(la_clapiere::FILE)).unwrap();
-    let motions = la_clapiere::motions(&la_clapiere::days().unwrap()).unwrap();
+    let motions =
+        la_clapiere::motions(&la_clapiere::days().unwrap(), la_clapiere::Loads::Both).unwrap();
     facts::la_clapiere_motion(&motions).unwrap();
 }
 
@@ -133,4 +134,18 @@ fn the_rivers_of_1986_to_1988_are_not_anomalously_high() {
     };
     let ratio = mean(1986..=1988) / mean(1983..=1985);
     assert!((0.85..1.1).contains(&ratio), "{ratio}");
+}
+
+#[test]
+fn the_acceleration_of_1987_is_the_extra_loads_and_not_the_rivers() {
+    let days = la_clapiere::days().unwrap();
+    let shares = la_clapiere::shares(&days).unwrap();
+    assert_eq!(shares.len(), 5);
+    let (_, [law, river, both]) = shares[4];
+    assert!(law < river && river < 0.4 * both, "{law} {river} {both}");
+    let (_, [_, river_1985, both_1985]) = shares[2];
+    assert!(
+        (river_1985 - both_1985).abs() < 1.0,
+        "no extra load before 1986"
+    );
 }

@@ -76,7 +76,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     )?;
     writeln!(
         out,
-        "data. recordings/README.md says what each rests on. Next: slipwatch replay recordings/*.mcap; slipwatch --help"
+        "data. recordings/README.md says what each rests on. Next: slipwatch replay recordings/century-mine-2013.mcap; slipwatch --help"
     )?;
     Ok(())
 }

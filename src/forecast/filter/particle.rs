@@ -181,7 +181,7 @@ impl Particle {
 
     /// A load step, proposed where the newest reading points and weighed by its prior.
     fn maybe_step(&mut self, suggested: f64, generator: &mut impl Rng) -> f64 {
-        if !(suggested > 0.0) || generator.random::<f64>() >= SUGGESTED.0 {
+        if suggested <= 0.0 || generator.random::<f64>() >= SUGGESTED.0 {
             return (1.0 - STEP.0) / (1.0 - SUGGESTED.0);
         }
         let z = normal(generator);
