@@ -1,12 +1,13 @@
 //! The level in force: it rises with the evidence, and falls on observed motion alone.
 //!
 //! A forecast that changes its mind does not lower a level. What does: the slope has slowed to half the
-//! highest velocity seen at this level and the evidence has called for less ever since a whole
-//! evacuation time; or it has held a velocity under the critical one, without gaining, for the stated time.
+//! highest velocity seen at this level, without gaining, for a whole evacuation time in which the evidence
+//! called for less; or it has held a velocity under the critical one, without gaining, for the stated time.
 
 use super::policy::{Level, Policy};
 use super::rules::{Call, Evidence};
 use crate::reading::Timestamp;
+use jiff::SignedDuration;
 
 /// A change of the level in force.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -35,24 +36,25 @@ pub enum Entered {
 pub struct Latch {
     level: Level,
     since: Option<Timestamp>,
+    /// Highest settled velocity since the level was entered, mm/day.
     peak_velocity: f64,
-    /// Since when the evidence has called for less.
-    below_since: Option<Timestamp>,
-    /// Since when, and from which velocity on, the slope has been steady.
-    steady: Option<Steady>,
+    /// While the evidence calls for less: the motion at half the peak velocity or under.
+    slow: Option<Stretch>,
+    /// While the evidence calls for less: the motion under the critical velocity.
+    steady: Option<Stretch>,
 }
 
-/// A stretch of steady motion.
+/// A stretch of motion that does not gain.
 #[derive(Debug, Clone, Copy)]
-struct Steady {
+struct Stretch {
     since: Timestamp,
     velocity: f64,
     readings: usize,
 }
 
 /// Readings that make a stretch, however far apart.
-const FEWEST_STEADY: usize = 4;
-/// A steady slope does not gain more than this factor.
+const FEWEST_READINGS: usize = 4;
+/// Motion that does not gain stays under this factor of what it was when the stretch began.
 const STEADY_GAIN: f64 = 1.2;
 /// Observed deceleration: this share of the highest velocity at the level.
 const SLOWED_TO: f64 = 0.5;
@@ -63,9 +65,49 @@ impl Default for Latch {
             level: Level::Green,
             since: None,
             peak_velocity: 0.0,
-            below_since: None,
+            slow: None,
             steady: None,
         }
+    }
+}
+
+impl Stretch {
+    /// One more reading of the stretch, or a new one, or none where `holds` is not the case.
+    fn go_on(stretch: Option<Self>, holds: Holds, now: Timestamp, velocity: f64) -> Option<Self> {
+        if holds == Holds::No {
+            return None;
+        }
+        let begin = Self {
+            since: now,
+            velocity,
+            readings: 0,
+        };
+        let going_on = stretch.filter(|stretch| velocity <= STEADY_GAIN * stretch.velocity);
+        let stretch = going_on.unwrap_or(begin);
+        Some(Self {
+            readings: stretch.readings + 1,
+            ..stretch
+        })
+    }
+
+    fn lasts(stretch: Option<Self>, now: Timestamp, span: SignedDuration) -> Holds {
+        let lasts = stretch.is_some_and(|stretch| {
+            stretch.readings >= FEWEST_READINGS && now.duration_since(stretch.since) >= span
+        });
+        Holds::from(lasts)
+    }
+}
+
+/// Whether a condition is met.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Holds {
+    Yes,
+    No,
+}
+
+impl From<bool> for Holds {
+    fn from(met: bool) -> Self {
+        if met { Self::Yes } else { Self::No }
     }
 }
 
@@ -78,41 +120,27 @@ impl Latch {
     /// Takes the evidence of one reading and says how the level changes.
     pub fn update(&mut self, policy: &Policy, evidence: &Evidence) -> Vec<Transition> {
         let call = policy.call(evidence);
-        self.observe(policy, evidence, &call);
         if call.level > self.level {
-            return self.enter(evidence.now, &call);
+            return self.enter(evidence, &call);
         }
+        self.observe(policy, evidence, &call);
         match self.reason_to_fall(policy, evidence, &call) {
-            Some(rule) => self.fall(evidence.now, &call, rule),
+            Some(rule) => self.fall(evidence, &call, rule),
             None => Vec::new(),
         }
     }
 
     fn observe(&mut self, policy: &Policy, evidence: &Evidence, call: &Call) {
-        if call.level >= self.level {
-            self.below_since = None;
-        } else if self.below_since.is_none() {
-            self.below_since = Some(evidence.now);
-        }
-        let Some(velocity) = evidence.velocity_mm_per_day else {
+        // Backwards is motion too: a reading that fell back is no deceleration.
+        let Some(velocity) = evidence.settled_velocity_mm_per_day.map(f64::abs) else {
             return;
         };
         self.peak_velocity = self.peak_velocity.max(velocity);
-        if velocity >= policy.critical_velocity_mm_per_day || call.level >= self.level {
-            self.steady = None;
-            return;
-        }
-        let begin = Steady {
-            since: evidence.now,
-            velocity,
-            readings: 0,
-        };
-        let holds = |steady: &Steady| velocity <= STEADY_GAIN * steady.velocity.max(0.0);
-        let stretch = self.steady.filter(holds).unwrap_or(begin);
-        self.steady = Some(Steady {
-            readings: stretch.readings + 1,
-            ..stretch
-        });
+        let less = call.level < self.level;
+        let slowed = less && velocity <= SLOWED_TO * self.peak_velocity;
+        let steady = less && velocity < policy.critical_velocity_mm_per_day;
+        self.slow = Stretch::go_on(self.slow, slowed.into(), evidence.now, velocity);
+        self.steady = Stretch::go_on(self.steady, steady.into(), evidence.now, velocity);
     }
 
     fn reason_to_fall(
@@ -124,60 +152,48 @@ impl Latch {
         if call.level >= self.level {
             return None;
         }
-        let velocity = evidence.velocity_mm_per_day?;
-        let for_long = |since: Timestamp, span| evidence.now.duration_since(since) >= span;
-        let below = self
-            .below_since
-            .is_some_and(|since| for_long(since, policy.evacuation_time));
-        if below && velocity <= SLOWED_TO * self.peak_velocity {
+        if Stretch::lasts(self.slow, evidence.now, policy.evacuation_time) == Holds::Yes {
             return Some("decelerated");
         }
-        let steady = self.steady.is_some_and(|stretch| {
-            stretch.readings >= FEWEST_STEADY && for_long(stretch.since, policy.steady_for)
-        });
-        steady.then_some("steady")
+        (Stretch::lasts(self.steady, evidence.now, policy.steady_for) == Holds::Yes)
+            .then_some("steady")
     }
 
-    fn enter(&mut self, now: Timestamp, call: &Call) -> Vec<Transition> {
-        *self = Self {
-            level: call.level,
-            since: Some(now),
-            peak_velocity: self.peak_velocity,
-            ..Self::default()
-        };
+    fn enter(&mut self, evidence: &Evidence, call: &Call) -> Vec<Transition> {
+        self.begin(evidence, call.level);
         vec![Transition {
             level: call.level,
             entered: Entered::Yes,
-            since: now,
+            since: evidence.now,
             rule: call.rule,
         }]
     }
 
-    fn fall(&mut self, now: Timestamp, call: &Call, rule: &'static str) -> Vec<Transition> {
-        let since = self.since.unwrap_or(now);
+    fn fall(&mut self, evidence: &Evidence, call: &Call, rule: &'static str) -> Vec<Transition> {
+        let now = evidence.now;
         let left = Transition {
             level: self.level,
             entered: Entered::No,
-            since,
+            since: self.since.unwrap_or(now),
             rule,
         };
-        *self = Self {
-            level: call.level,
-            since: Some(now),
-            ..Self::default()
-        };
         if call.level == Level::Green {
+            self.begin(evidence, Level::Green);
             return vec![left];
         }
-        vec![
-            left,
-            Transition {
-                level: call.level,
-                entered: Entered::Yes,
-                since: now,
-                rule: call.rule,
-            },
-        ]
+        let mut transitions = vec![left];
+        transitions.extend(self.enter(evidence, call));
+        transitions
+    }
+
+    fn begin(&mut self, evidence: &Evidence, level: Level) {
+        let velocity = evidence.settled_velocity_mm_per_day.map_or(0.0, f64::abs);
+        *self = Self {
+            level,
+            since: Some(evidence.now),
+            peak_velocity: velocity,
+            ..Self::default()
+        };
     }
 }
 
@@ -194,6 +210,7 @@ mod tests {
             chance_within_evacuation_time: Some(chance),
             chance_within_outlook: Some(chance),
             velocity_mm_per_day: Some(velocity),
+            settled_velocity_mm_per_day: Some(velocity),
             displacement_mm: None,
             acceleration_mm_per_day2: None,
             causes: Vec::new(),
@@ -231,6 +248,20 @@ mod tests {
         let fall = latch.update(&policy, &evidence(25, 0.0, 30.0));
         assert_eq!((fall[0].level, fall[0].rule), (Level::Red, "decelerated"));
         assert_eq!(latch.level(), Level::Green);
+    }
+
+    #[test]
+    fn one_slow_reading_or_a_backward_one_lowers_nothing() {
+        let (policy, mut latch) = red_at_hundred();
+        for hour in 1..24 * 6 {
+            let velocity = if hour % 30 == 0 {
+                -60.0
+            } else {
+                100.0 + 2.0 * f64::from(i32::try_from(hour).unwrap())
+            };
+            latch.update(&policy, &evidence(hour, 0.0, velocity));
+            assert_eq!(latch.level(), Level::Red, "hour {hour}");
+        }
     }
 
     #[test]

@@ -14,6 +14,8 @@ pub struct Evidence {
     pub chance_within_outlook: Option<f64>,
     /// Latest observed velocity, mm/day; `None` before the second reading.
     pub velocity_mm_per_day: Option<f64>,
+    /// The median of the latest few, which neither an outlier nor a reset moves: what a level falls by.
+    pub settled_velocity_mm_per_day: Option<f64>,
     /// Displacement since the first reading, mm, for benchmarks that measure it.
     pub displacement_mm: Option<f64>,
     /// Latest observed acceleration, mm/day per day.

@@ -61,6 +61,10 @@ impl Default for RateOptions {
     }
 }
 
+/// Nothing is resolved in less than half an hour: readings closer together are one, and what fails
+/// sooner than that nobody can be brought away from.
+pub const FINEST_DAYS: f64 = 1.0 / 48.0;
+
 /// Slip that stands clear of the noise, in standard errors of a difference.
 const CLEAR_OF_NOISE: f64 = 6.0;
 
@@ -83,9 +87,32 @@ impl Observations {
         halve_until(rates, options.most)
     }
 
+    /// Readings at least this far apart, days, count as different ones: half a window of a trailing
+    /// mean, and [`FINEST_DAYS`].
+    pub fn spacing_days(&self) -> f64 {
+        (0.5 * self.averaging_days).max(FINEST_DAYS)
+    }
+
+    /// The first readings that count as different ones, `most` of them at most.
+    pub fn spaced(&self, most: usize) -> Vec<Observation> {
+        let mut spaced: Vec<Observation> = Vec::new();
+        for value in &self.values {
+            let apart = spaced
+                .last()
+                .is_none_or(|last| value.t_days - last.t_days >= 0.999 * self.spacing_days());
+            if apart {
+                spaced.push(*value);
+            }
+            if spaced.len() == most {
+                break;
+            }
+        }
+        spaced
+    }
+
     /// Overlapping windows repeat each other: readings are kept half a window apart at least.
     fn velocity_rates(&self, values: &[Observation]) -> Vec<Rate> {
-        let spacing = 0.5 * self.averaging_days;
+        let spacing = self.spacing_days();
         let mut rates: Vec<Rate> = Vec::new();
         for value in values.iter().rev() {
             if rates
@@ -134,10 +161,9 @@ fn displacement_rates(values: &[Observation]) -> Vec<Rate> {
     let longest = (last.t_days - first.t_days) * LONGEST_SHARE;
     let between = |earlier: &Observation, later: &Observation| {
         let span = later.t_days - earlier.t_days;
-        let noise = later
-            .sigma
-            .unwrap_or(common)
-            .hypot(earlier.sigma.unwrap_or(common));
+        // A stated error is often the instrument's alone: the scatter seen is the least there is.
+        let error = |value: &Observation| value.sigma.map_or(common, |sigma| sigma.max(common));
+        let noise = error(later).hypot(error(earlier));
         let velocity = (later.value - earlier.value) / span;
         Rate {
             from: earlier.t_days,
@@ -156,7 +182,8 @@ fn displacement_rates(values: &[Observation]) -> Vec<Rate> {
             let next = between(&values[start - 1], &values[start]);
             (next.velocity - rate.velocity).abs() > CLEAR_OF_NOISE * next.sigma.hypot(rate.sigma)
         };
-        if clear || breaks || rate.to - rate.from >= longest {
+        let long_enough = rate.to - rate.from >= 0.999 * FINEST_DAYS;
+        if long_enough && (clear || breaks || rate.to - rate.from >= longest) {
             rates.push(rate);
             end = start;
         }

@@ -45,6 +45,8 @@ const FILTER_SHARE: f64 = 0.75;
 pub const FEWEST_READINGS: usize = 8;
 /// Fewest rates before the fitted windows have a say in the forecast.
 const FEWEST_RATES: usize = 24;
+/// A slope at 50 m/day has failed by any account, mm/day.
+const FASTEST_CRITICAL: f64 = 5e4;
 /// How far the forecast looks, days.
 pub const HORIZON_DAYS: f64 = 400.0;
 /// No window's share among the windows falls below this, however it scored.
@@ -120,22 +122,25 @@ impl Panel {
             member.posterior = window
                 .and_then(|window| Posterior::fit(window, member.role.curvature, warm.as_ref()));
         }
-        let independent = if observations.quantity == Quantity::Velocity {
-            rates.len()
-        } else {
-            observations.values.len()
-        };
-        if independent < FEWEST_READINGS {
+        if observations.spaced(FEWEST_READINGS).len() < FEWEST_READINGS {
             return None;
         }
-        let mut outlook = self.outlook(rates, observations.values.last()?.t_days, critical);
+        let mut outlook = self.outlook(
+            rates,
+            observations.values.last()?.t_days,
+            critical.min(FASTEST_CRITICAL),
+        );
         outlook.surprise_nats = surprise;
         Some(outlook)
     }
 
     fn outlook(&mut self, rates: Vec<Rate>, now_days: f64, critical: f64) -> Outlook {
-        let filtered = self.filter.passage(critical, HORIZON_DAYS);
-        let weighed = if rates.len() >= FEWEST_RATES {
+        let filtered = if measurably_moves(&rates) {
+            self.filter.passage(critical, HORIZON_DAYS, now_days)
+        } else {
+            Passage::default()
+        };
+        let weighed = if rates.len() >= FEWEST_RATES && measurably_moves(&rates) {
             self.weights()
         } else {
             Vec::new()
@@ -218,7 +223,7 @@ impl Panel {
             return;
         };
         let apart = newest.t_days - self.scored_to_days;
-        if apart < 0.5 * observations.averaging_days * 0.999 {
+        if apart <= 0.0 || apart < 0.5 * observations.averaging_days * 0.999 {
             return;
         }
         self.scored_to_days = newest.t_days;
@@ -239,6 +244,15 @@ pub fn seed_of(name: &str) -> u64 {
     name.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
     })
+}
+
+/// Whether any of the newest rates stands clear of its noise: where none does, a forecast would be the
+/// prior's and not the slope's.
+fn measurably_moves(rates: &[Rate]) -> bool {
+    let newest = &rates[rates.len().saturating_sub(6)..];
+    newest
+        .iter()
+        .any(|rate| rate.velocity > 2.0 * rate.sigma && rate.velocity > 0.0)
 }
 
 fn window(rates: &[Rate], role: Role) -> Option<&[Rate]> {

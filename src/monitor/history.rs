@@ -24,12 +24,17 @@ pub(super) enum Taken {
     Corrected(f64),
     /// It was known.
     Known,
+    /// It lies beyond anything a slope does, in the science's unit.
+    OutOfRange(f64),
     /// It measures another quantity than the benchmark's first reading did.
     OtherQuantity,
 }
 
 /// Readings kept; beyond it every second one of the older half is let go.
 const MOST_READINGS: usize = 4096;
+
+/// No displacement in mm, or velocity in mm/day, is larger: a thousand kilometres.
+const FARTHEST: f64 = 1e9;
 
 /// The readings of one benchmark.
 #[derive(Debug, Clone)]
@@ -71,6 +76,9 @@ impl History {
             value: reading.value * factor,
             sigma: reading.sigma.map(|sigma| sigma * factor),
         };
+        if !new.value.is_finite() || new.value.abs() > FARTHEST {
+            return Taken::OutOfRange(new.value);
+        }
         let values = &mut self.observations.values;
         if values.is_empty() {
             self.first_displacement_mm = new.value;
@@ -114,6 +122,13 @@ impl History {
                 Some((newest.value - before.value) / (newest.t_days - before.t_days))
             }
         }
+    }
+
+    /// How many of the newest readings have one and the same value.
+    pub(super) fn identical(&self) -> usize {
+        let values = &self.observations.values;
+        let same = |pair: &&[Observation]| pair[0].value.to_bits() == pair[1].value.to_bits();
+        values.windows(2).rev().take_while(same).count() + usize::from(!values.is_empty())
     }
 
     fn thin(&mut self) {

@@ -17,6 +17,11 @@ const FEWEST_IN_LINE: usize = 8;
 /// An intercept beyond this many lengths of the record is no prediction.
 const FARTHEST_INTERCEPT: f64 = 3.0;
 
+/// Rates whose median is the settled velocity.
+const SETTLED: usize = 5;
+/// So many readings in a row with one value are a stuck sensor, or a resolution too coarse to tell.
+const STUCK: usize = 24;
+
 /// Everything the monitor knows of one benchmark.
 #[derive(Debug)]
 pub(super) struct Track {
@@ -31,6 +36,7 @@ pub(super) struct Track {
     /// Until when something that happened asks for a look, and what.
     look: Option<(Timestamp, &'static str)>,
     faulted: bool,
+    newest: Option<Timestamp>,
 }
 
 impl Track {
@@ -47,6 +53,7 @@ impl Track {
             silence: Silence::default(),
             look: None,
             faulted: false,
+            newest: None,
         }
     }
 
@@ -65,32 +72,16 @@ impl Track {
         source: Source,
         reading: &Reading,
     ) -> Vec<Event> {
-        let time = reading.time;
-        match self.history.take(source, reading) {
-            Taken::Newest => {}
-            Taken::Known => return Vec::new(),
-            Taken::Late => {
-                return vec![self.fault(time, "out-of-order", format!("a reading of {time} came after later ones; the windows use it from the next refit on"))];
-            }
-            Taken::Corrected(before) => {
-                let text = format!(
-                    "the reading of {time} was corrected; it was {before} {}",
-                    self.unit()
-                );
-                return vec![self.fault(time, "corrected", text)];
-            }
-            Taken::OtherQuantity if self.faulted => return Vec::new(),
-            Taken::OtherQuantity => {
-                self.faulted = true;
-                let text = format!(
-                    "benchmark {} gives a second quantity; only the first is monitored",
-                    self.benchmark
-                );
-                return vec![self.fault(time, "second-quantity", text)];
-            }
+        let taken = self.history.take(source, reading);
+        let mut events: Vec<Event> = self.complaint(taken, reading.time).into_iter().collect();
+        match taken {
+            Taken::Known | Taken::OtherQuantity | Taken::OutOfRange(_) => return events,
+            Taken::Newest => self.newest = Some(reading.time),
+            // What came late or was corrected is judged at once, as of the newest reading.
+            Taken::Late | Taken::Corrected(_) => {}
         }
-        let mut events = Vec::new();
-        if let Some(since) = self.silence.broken_by(time) {
+        let time = self.newest.unwrap_or(reading.time);
+        if let Some(since) = self.silence.broken_by(reading.time) {
             let text = format!("benchmark {} reads again", self.benchmark);
             events.push(self.unknown((time, since), AlertState::Resolved, text));
         }
@@ -103,6 +94,52 @@ impl Track {
         }
         events.extend(self.alert(policy, time, outlook.as_ref()));
         events
+    }
+
+    /// What is wrong with a reading, where something is.
+    fn complaint(&mut self, taken: Taken, time: Timestamp) -> Option<Event> {
+        let (kind, text) = match taken {
+            Taken::Newest if self.history.identical() == STUCK => {
+                let text = format!(
+                    "benchmark {}: {STUCK} readings in a row are the same",
+                    self.benchmark
+                );
+                ("stuck", text)
+            }
+            Taken::Newest | Taken::Known => return None,
+            Taken::Late => (
+                "out-of-order",
+                format!("the reading of {time} came after later ones"),
+            ),
+            Taken::Corrected(before) => {
+                let text = format!(
+                    "the reading of {time} was corrected; it was {before} {}",
+                    self.unit()
+                );
+                ("corrected", text)
+            }
+            Taken::OutOfRange(value) => {
+                let text = format!(
+                    "the reading of {time} is {value:e} {}: no slope does that",
+                    self.unit()
+                );
+                ("out-of-range", text)
+            }
+            Taken::OtherQuantity if self.faulted => return None,
+            Taken::OtherQuantity => {
+                self.faulted = true;
+                let text = format!(
+                    "benchmark {} gives a second quantity; only the first is monitored",
+                    self.benchmark
+                );
+                ("second-quantity", text)
+            }
+        };
+        Some(self.fault(
+            self.newest.map_or(time, |newest| newest.max(time)),
+            kind,
+            text,
+        ))
     }
 
     /// Data time has come to `now` without a reading.
@@ -260,6 +297,7 @@ impl Track {
                 || self.history.newest_velocity(),
                 |rate| Some(rate.velocity),
             ),
+            settled_velocity_mm_per_day: settled(rates),
             displacement_mm: self.history.displacement_mm(),
             acceleration_mm_per_day2: acceleration(rates),
             causes: self
@@ -395,6 +433,18 @@ fn recent(rates: &[Rate]) -> &[Rate] {
     )]
     let share = (rates.len() as f64 * LINE_SHARE).round() as usize;
     &rates[rates.len().saturating_sub(share.max(FEWEST_IN_LINE))..]
+}
+
+/// The median of the latest rates, mm/day.
+fn settled(rates: &[Rate]) -> Option<f64> {
+    let mut latest: Vec<f64> = rates
+        .iter()
+        .rev()
+        .take(SETTLED)
+        .map(|rate| rate.velocity)
+        .collect();
+    latest.sort_by(f64::total_cmp);
+    latest.get(latest.len() / 2).copied()
 }
 
 fn acceleration(rates: &[Rate]) -> Option<f64> {

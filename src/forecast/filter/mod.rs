@@ -14,7 +14,7 @@
 mod particle;
 
 use super::Passage;
-use crate::fit::Observations;
+use crate::fit::{Observation, Observations};
 use crate::reading::Quantity;
 use particle::{Dynamics, Particle, Reset};
 use rand::{RngExt, SeedableRng};
@@ -54,11 +54,12 @@ impl Filter {
     /// Takes in the readings that are new and returns ln of the predictive density of the newest, in
     /// the reading's own unit; `None` until the priors are set, or where nothing is new.
     pub(super) fn update(&mut self, observations: &Observations) -> Option<f64> {
-        if observations.values.len() < READINGS_FOR_PRIOR {
-            return None;
-        }
         if self.particles.is_empty() {
-            self.start(observations);
+            let first = observations.spaced(READINGS_FOR_PRIOR);
+            if first.len() < READINGS_FOR_PRIOR {
+                return None;
+            }
+            self.start(observations, &first);
         }
         let mut log_density = None;
         let new = observations
@@ -66,16 +67,14 @@ impl Filter {
             .partition_point(|value| value.t_days <= self.now_days);
         for index in new..observations.values.len() {
             let apart = observations.values[index].t_days - self.now_days;
-            // Trailing means repeat each other: half a window apart at least.
-            if apart >= 0.5 * observations.averaging_days * 0.999 {
+            if apart >= 0.999 * observations.spacing_days() {
                 log_density = Some(self.take(observations, index));
             }
         }
         log_density
     }
 
-    fn start(&mut self, observations: &Observations) {
-        let first = &observations.values[..READINGS_FOR_PRIOR];
+    fn start(&mut self, observations: &Observations, first: &[Observation]) {
         let reset = Reset::from_first(&how(observations), first);
         self.particles = (0..PARTICLES)
             .map(|_| Particle::draw(&reset, &mut self.generator))
@@ -89,17 +88,22 @@ impl Filter {
         let newest = &observations.values[index];
         let dynamics = how(observations);
         let days = newest.t_days - self.now_days;
-        let suggested = suggested(observations, index);
+        let suggested = suggested(observations, self.now_days, newest);
         let mut total = 0.0;
         for (particle, weight) in self.particles.iter_mut().zip(&mut self.weights) {
             *weight *= particle.advance(days, suggested, &mut self.generator);
             *weight *= particle.weigh(&dynamics, newest, &mut self.generator);
+            if !weight.is_finite() {
+                *weight = 0.0;
+            }
             total += *weight;
         }
         self.now_days = newest.t_days;
-        if !(total.is_finite() && total > 0.0) {
-            // No particle can explain it: the next readings decide among all of them.
-            self.weights.fill(1.0 / PARTICLES as f64);
+        if total <= 0.0 {
+            // No particle can explain it: begin again from here.
+            let from = index.saturating_sub(READINGS_FOR_PRIOR - 1);
+            self.start(observations, &observations.values[from..=index]);
+            self.now_days = newest.t_days;
             return f64::NEG_INFINITY;
         }
         for weight in &mut self.weights {
@@ -140,8 +144,8 @@ impl Filter {
         picked
     }
 
-    /// Runs particles on until they pass `critical` mm/day or `horizon_days` are over.
-    pub(super) fn passage(&mut self, critical: f64, horizon_days: f64) -> Passage {
+    /// Runs particles on until they pass `critical` mm/day or `horizon_days` are over; days from `now_days`.
+    pub(super) fn passage(&mut self, critical: f64, horizon_days: f64, now_days: f64) -> Passage {
         if self.particles.is_empty() {
             return Passage::default();
         }
@@ -149,11 +153,12 @@ impl Filter {
         // Forecasts draw from a copy: how often one asks must not change what comes next.
         let mut generator = self.generator.clone();
         let share = 1.0 / FORECAST_PARTICLES as f64;
+        let later = now_days - self.now_days;
         let times = picked.into_iter().filter_map(|index| {
             let mut particle = self.particles[index].clone();
             particle
                 .days_to(critical, horizon_days, &mut generator)
-                .map(|days| (days, share))
+                .map(|days| ((days - later).max(0.0), share))
         });
         Passage::from_times(times.collect())
     }
@@ -183,12 +188,14 @@ fn how(observations: &Observations) -> Dynamics {
 }
 
 /// The velocity that a reading implies by itself, mm/day.
-fn suggested(observations: &Observations, index: usize) -> f64 {
-    let newest = &observations.values[index];
+fn suggested(observations: &Observations, since_days: f64, newest: &Observation) -> f64 {
     match observations.quantity {
         Quantity::Velocity => newest.value,
         Quantity::Displacement => {
-            let before = index
+            let after = observations
+                .values
+                .partition_point(|value| value.t_days <= since_days);
+            let before = after
                 .checked_sub(1)
                 .and_then(|before| observations.values.get(before));
             before.map_or(0.0, |before| {

@@ -1,7 +1,7 @@
 //! One particle: its state, its own parameters, how it moves and how it weighs a reading.
 
 use super::has_zero;
-use crate::fit::Observation;
+use crate::fit::{FINEST_DAYS, Observation};
 use crate::reading::Quantity;
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -35,7 +35,9 @@ impl Reset {
             quantity: how.quantity,
             first_value: start.value,
             velocity: velocity.max(1e-3),
-            interval_days: (days / (first.len() - 1) as f64).max(0.5 * how.averaging_days),
+            interval_days: (days / (first.len() - 1) as f64)
+                .max(0.5 * how.averaging_days)
+                .max(FINEST_DAYS),
         }
     }
 }
@@ -78,7 +80,7 @@ impl Parameters {
         };
         Self {
             q: log_uniform(generator, 0.003, 0.15) / interval_days.sqrt(),
-            eta: log_uniform(generator, 1e-6, 0.006) / interval_days.powf(1.5),
+            eta: log_uniform(generator, 1e-6, 0.004) / interval_days.powf(1.5),
             sigma: log_uniform(generator, 0.02, 0.6),
             tau: log_uniform(generator, 2.0, 60.0) * interval_days,
             noise,
@@ -239,7 +241,8 @@ impl Particle {
                 }
             }
             Quantity::Displacement => {
-                let spread = reading.sigma.unwrap_or(self.noise);
+                // The stated error is often the instrument's alone.
+                let spread = self.noise.hypot(reading.sigma.unwrap_or(0.0));
                 let own = (1.0 - INSTRUMENT_RESET.0)
                     * student((reading.value - self.zero - self.x) / spread)
                     / spread;
@@ -329,9 +332,9 @@ impl Particle {
     }
 }
 
-/// |s| / w in 1/day: what doubles the velocity in 70,000 intervals to what does in 20.
+/// |s| / w in 1/day: what doubles the velocity in 70,000 intervals to what does in 35.
 fn fresh_slope(interval_days: f64, generator: &mut impl Rng) -> f64 {
-    log_uniform(generator, 1e-5, 0.03) / interval_days
+    log_uniform(generator, 1e-5, 0.02) / interval_days
 }
 
 fn student(z: f64) -> f64 {
