@@ -239,3 +239,57 @@ fn the_drift_of_the_intercept_stands_beside_what_the_law_expects() {
         "{drifts:?}"
     );
 }
+
+#[test]
+fn a_slope_that_moves_backwards_is_no_quiet_slope() {
+    let readings: Vec<(Timestamp, f64)> = displacements(&failing(), 200)
+        .into_iter()
+        .map(|(time, value)| (time, -value))
+        .collect();
+    let events = play(&mut monitor(Policy::default()), &readings);
+    let fault = |event: &&Event| matches!(&event.kind, EventKind::Fault { kind, .. } if kind == "moves-backwards");
+    assert_eq!(events.iter().filter(fault).count(), 1);
+    assert!(levels(&events).contains(&(Level::Yellow, AlertState::Firing)));
+}
+
+#[test]
+fn a_still_or_stuck_sensor_is_named_and_raises_no_level() {
+    let readings: Vec<(Timestamp, f64)> = (0..200)
+        .map(|hour: i64| (start() + hour.hours(), 5.0))
+        .collect();
+    let events = play(&mut monitor(Policy::default()), &readings);
+    assert!(levels(&events).is_empty(), "{:?}", levels(&events));
+    let stuck =
+        |event: &&Event| matches!(&event.kind, EventKind::Fault { kind, .. } if kind == "stuck");
+    assert_eq!(events.iter().filter(stuck).count(), 1);
+}
+
+#[test]
+fn readings_by_the_second_on_a_still_slope_raise_no_red() {
+    let mut generator = Pcg64::seed_from_u64(3);
+    let readings: Vec<(Timestamp, f64)> = (0..400)
+        .map(|second: i64| (start() + second.seconds(), generator.random::<f64>()))
+        .collect();
+    let events = play(&mut monitor(Policy::default()), &readings);
+    assert!(levels(&events).is_empty(), "{:?}", levels(&events));
+}
+
+#[test]
+fn a_value_beyond_any_slope_is_refused_by_name() {
+    let mut monitor = monitor(Policy::default());
+    let mut readings = displacements(&failing(), 30);
+    readings[20].1 = 1e308;
+    let events = play(&mut monitor, &readings);
+    assert!(
+        events
+            .iter()
+            .any(|e| matches!(&e.kind, EventKind::Fault { kind, .. } if kind == "out-of-range"))
+    );
+    assert_eq!(
+        events
+            .iter()
+            .filter(|e| matches!(e.kind, EventKind::Refit { .. }))
+            .count(),
+        22
+    );
+}

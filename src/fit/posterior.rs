@@ -65,7 +65,7 @@ const SLOPE_PER_INTERVAL: f64 = 0.25;
 /// Prior relative scatter, and the number of readings it counts for.
 const PRIOR_SCATTER: (f64, f64) = (0.1, 3.0);
 /// The most that the likelihood is trusted: parameters are not constant over years, as the law has them.
-const MOST_TRUST: f64 = 0.5;
+const MOST_TRUST: f64 = 0.35;
 /// The prior of p spans this, m from 0.5 to 2.5.
 pub const P_PRIOR: (f64, f64) = (-1.0, 0.6);
 /// The mode is where a proposal is centred: this share of the cost is fine enough.

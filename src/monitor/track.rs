@@ -36,6 +36,7 @@ pub(super) struct Track {
     /// Until when something that happened asks for a look, and what.
     look: Option<(Timestamp, &'static str)>,
     faulted: bool,
+    backwards: bool,
     newest: Option<Timestamp>,
 }
 
@@ -53,6 +54,7 @@ impl Track {
             silence: Silence::default(),
             look: None,
             faulted: false,
+            backwards: false,
             newest: None,
         }
     }
@@ -289,7 +291,7 @@ impl Track {
     fn alert(&mut self, policy: &Policy, time: Timestamp, outlook: Option<&Outlook>) -> Vec<Event> {
         let within = |span| outlook.map(|o| o.passage.chance_within(days(span)));
         let rates = outlook.map_or(&[][..], |outlook| &outlook.rates);
-        let evidence = Evidence {
+        let mut evidence = Evidence {
             now: time,
             chance_within_evacuation_time: within(policy.evacuation_time),
             chance_within_outlook: within(policy.outlook),
@@ -307,11 +309,27 @@ impl Track {
                 .into_iter()
                 .collect(),
         };
+        let mut events: Vec<Event> = Vec::new();
+        // Until it moves forward again: one reading more or less does not change the matter.
+        let still = self.backwards && settled(rates).is_some_and(|velocity| velocity < 0.0);
+        let was_backwards = std::mem::replace(&mut self.backwards, still || moves_backwards(rates));
+        if self.backwards && !was_backwards {
+            let text = format!(
+                "benchmark {} moves upslope: is the sign of its readings right?",
+                self.benchmark
+            );
+            events.push(self.fault(time, "moves-backwards", text));
+        }
+        if self.backwards {
+            self.look_until(policy, time, "moves-backwards");
+            evidence.causes.push("moves-backwards");
+        }
         let transitions = self.latch.update(policy, &evidence);
-        transitions
+        let told = transitions
             .iter()
-            .map(|change| self.alert_event(time, policy, &evidence, change))
-            .collect()
+            .map(|change| self.alert_event(time, policy, &evidence, change));
+        events.extend(told);
+        events
     }
 
     fn alert_event(
@@ -433,6 +451,15 @@ fn recent(rates: &[Rate]) -> &[Rate] {
     )]
     let share = (rates.len() as f64 * LINE_SHARE).round() as usize;
     &rates[rates.len().saturating_sub(share.max(FEWEST_IN_LINE))..]
+}
+
+/// Whether all of the latest rates stand clear of their noise on the wrong side of zero.
+fn moves_backwards(rates: &[Rate]) -> bool {
+    let latest = &rates[rates.len().saturating_sub(SETTLED)..];
+    latest.len() == SETTLED
+        && latest
+            .iter()
+            .all(|rate| rate.velocity < -3.0 * rate.sigma && rate.velocity < 0.0)
 }
 
 /// The median of the latest rates, mm/day.

@@ -332,9 +332,12 @@ impl Particle {
     }
 }
 
-/// |s| / w in 1/day: what doubles the velocity in 70,000 intervals to what does in 35.
+/// |s| / w in 1/day: from what doubles the velocity in 70,000 intervals to what does in 35, and the
+/// faster the rarer: few slopes are met in their last days.
 fn fresh_slope(interval_days: f64, generator: &mut impl Rng) -> f64 {
-    log_uniform(generator, 1e-5, 0.02) / interval_days
+    let (slowest, fastest) = (1e-5_f64, 0.02_f64);
+    let share = generator.random::<f64>().powi(3);
+    slowest * (fastest / slowest).powf(share) / interval_days
 }
 
 fn student(z: f64) -> f64 {
