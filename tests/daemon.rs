@@ -169,6 +169,41 @@ async fn an_old_alert_still_in_force_is_told_when_its_readings_are_recent() {
 }
 
 #[tokio::test]
+async fn an_old_alert_in_force_is_told_in_whatever_batch_it_comes_and_once() {
+    let (folder, config) = site_folder();
+    let wall = noon() + hours(24 * 3);
+    let mut site = site(&config);
+    site.take(&reading(noon() - hours(2), 4.0), wall);
+    site.caught_up(wall);
+    // The backlog: silence at its end does not make the red past.
+    site.handle(&alert(noon() - hours(1), Level::Orange, AlertState::Firing));
+    site.handle(&alert(noon(), Level::Red, AlertState::Firing));
+    site.commit(wall).unwrap();
+    assert_eq!(site.counts().long_past, 2);
+    for _batch in 0..3 {
+        site.caught_up(wall);
+    }
+    assert_eq!(site.counts().long_past, 1, "the orange, superseded");
+    close(site, wall).await;
+    let told = lines(&folder, "told");
+    assert_eq!(told, [format!("5/red/{} Actual", noon().as_second())]);
+}
+
+#[tokio::test]
+async fn an_alert_of_a_benchmark_that_nobody_watches_any_more_fires_no_hook() {
+    let (folder, config) = site_folder();
+    let mut site = site(&config);
+    let wall = noon() + hours(24 * 30 + 1);
+    site.take(&reading(noon(), 4.0), wall);
+    site.handle(&alert(noon(), Level::Red, AlertState::Firing));
+    site.commit(wall).unwrap();
+    site.caught_up(wall);
+    close(site, wall).await;
+    assert_eq!(lines(&folder, "told"), [""; 0]);
+    assert_eq!(lines(&folder, "state/events.ndjson").len(), 1);
+}
+
+#[tokio::test]
 async fn a_value_counts_once_a_correction_counts_and_the_future_never() {
     let (_folder, config) = site_folder();
     let mut site = site(&config);
@@ -200,6 +235,145 @@ fn write_rows(file: &Path, rows: std::ops::Range<i64>) {
         let time = noon() + hours(row);
         writeln!(file, "{time},{row},{row}.5").unwrap();
     }
+}
+
+/// Hourly readings that accelerate towards a failure, then go on at the speed reached, up to `end`.
+fn crisis(end: Timestamp) -> Vec<String> {
+    let (accelerating, steady) = (110, 30);
+    let displacement = |row: i32| {
+        let row = f64::from(row);
+        let within = row.min(f64::from(accelerating));
+        let beyond = row - within;
+        200.0 * (120.0 / (120.0 - within)).ln() + beyond * 200.0 / (120.0 - within)
+    };
+    let last = accelerating + steady;
+    (0..=last)
+        .map(|row| {
+            let time = end - hours(i64::from(last - row));
+            format!("{time},{:.4}", displacement(row))
+        })
+        .collect()
+}
+
+/// The site with a short evacuation, whose hook is told of silence too.
+fn crisis_folder() -> (TempDir, Config) {
+    let (folder, _) = site_folder();
+    let file = folder.path().join("site.toml");
+    let text = fs::read_to_string(&file).unwrap();
+    let text = text
+        .replace("\"12h\"", "\"3h\"")
+        .replace("\"red\"]", "\"red\", \"unknown\"]");
+    fs::write(&file, text).unwrap();
+    let config = config::load(&file).unwrap();
+    (folder, config)
+}
+
+fn append(folder: &TempDir, rows: &[String]) {
+    let file = folder.path().join("incoming/logger.csv");
+    let before =
+        fs::read_to_string(&file).unwrap_or_else(|_| "time,5_displacement_mm\n".to_owned());
+    let mut text = rows.join("\n");
+    text.push('\n');
+    fs::write(&file, before + &text).unwrap();
+}
+
+/// Waits until `claim` holds; how long that takes is not what is tested.
+async fn eventually(what: &str, mut claim: impl FnMut() -> bool) {
+    for _ in 0..6000 {
+        if claim() {
+            return;
+        }
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    panic!("never: {what}");
+}
+
+/// The alerts of `level` that the site has called: when, and the key.
+fn called(folder: &TempDir, level: Level) -> Vec<(Timestamp, String)> {
+    let events = lines(folder, "state/events.ndjson");
+    let events = events
+        .iter()
+        .map(|line| serde_json::from_str::<Event>(line).unwrap());
+    events
+        .filter_map(|event| match event.kind {
+            EventKind::Alert {
+                level: own,
+                state: AlertState::Firing,
+                key,
+                ..
+            } if own == level => Some((event.time, key)),
+            _ => None,
+        })
+        .collect()
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_red_that_comes_with_the_backlog_of_a_logger_that_was_silent_is_told() {
+    let (folder, config) = crisis_folder();
+    let now = slipwatch::runtime::clock::now();
+    let rows = crisis(now);
+    append(&folder, &rows[..70]);
+    let mut daemon = Daemon::start(&config);
+    daemon
+        .until("the past", |progress| progress.is_caught_up)
+        .await;
+    append(&folder, &rows[70..]);
+    let is_told = || {
+        lines(&folder, "told")
+            .iter()
+            .any(|line| line.starts_with("5/red/"))
+    };
+    eventually("the red told", is_told).await;
+    daemon.stop().await;
+    let red = called(&folder, Level::Red);
+    let (time, _) = &red[0];
+    assert!(*time < now - hours(6), "{time} is not long past at {now}");
+    // A restart tells nobody twice.
+    let mut daemon = Daemon::start(&config);
+    daemon
+        .until("the past", |progress| progress.is_caught_up)
+        .await;
+    daemon.stop().await;
+    let told = lines(&folder, "told");
+    let reds = told.iter().filter(|line| line.starts_with("5/red/"));
+    assert_eq!(reds.count(), 1, "{told:?}");
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_silence_that_began_before_the_start_is_told() {
+    let (folder, config) = crisis_folder();
+    let now = slipwatch::runtime::clock::now();
+    append(&folder, &crisis(now - hours(48))[..40]);
+    let mut daemon = Daemon::start(&config);
+    daemon
+        .until("the past", |progress| progress.is_caught_up)
+        .await;
+    let is_told = || {
+        lines(&folder, "told")
+            .iter()
+            .any(|line| line.starts_with("5/unknown/"))
+    };
+    eventually("the silence told", is_told).await;
+    daemon.stop().await;
+    let (time, _) = &called(&folder, Level::Unknown)[0];
+    assert!(*time < now - hours(6), "{time} is not long past at {now}");
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn an_archived_crisis_fires_no_hook() {
+    let (folder, config) = crisis_folder();
+    append(&folder, &crisis("1963-10-09T22:00:00Z".parse().unwrap()));
+    let mut daemon = Daemon::start(&config);
+    daemon
+        .until("the past", |progress| progress.is_caught_up)
+        .await;
+    eventually("the silence after it", || {
+        !called(&folder, Level::Unknown).is_empty()
+    })
+    .await;
+    daemon.stop().await;
+    assert_eq!(called(&folder, Level::Red).len(), 1);
+    assert_eq!(lines(&folder, "told"), [""; 0]);
 }
 
 /// A daemon at work.
