@@ -5,6 +5,7 @@ pub mod deliver;
 pub mod delivered;
 pub mod event_log;
 pub mod hook;
+mod in_hand;
 pub mod ingest;
 pub mod journal;
 pub mod log;

@@ -57,7 +57,7 @@ type Place = (Option<BenchmarkId>, bool);
 #[derive(Debug)]
 struct Standing {
     alert: Alert,
-    /// Whether it has been on its way to the hooks.
+    /// Whether it has been offered to the hooks.
     is_sent: bool,
 }
 
@@ -191,6 +191,9 @@ impl Site {
                 self.send(&alert);
             } else {
                 self.counts.long_past += 1;
+                if let Some(alerts) = &self.sinks.alerts {
+                    alerts.supersede(&alert);
+                }
             }
             self.stand(alert, is_sent);
         }
@@ -224,8 +227,13 @@ impl Site {
     /// Readings that merely stop do not make an alert past; silence is not safety.
     pub fn caught_up(&mut self, wall: Timestamp) {
         let mut standing = std::mem::take(&mut self.standing);
-        for one in standing.values_mut().filter(|one| !one.is_sent) {
-            if self.is_watched(one.alert.event.benchmark.as_ref(), wall) {
+        for one in standing.values_mut() {
+            if one.is_sent {
+                // Again: there may have been no room for it. The hooks that have it ignore it.
+                if one.alert.must_arrive() {
+                    self.send(&one.alert);
+                }
+            } else if self.is_watched(one.alert.event.benchmark.as_ref(), wall) {
                 self.send(&one.alert);
                 one.is_sent = true;
                 self.counts.long_past = self.counts.long_past.saturating_sub(1);
