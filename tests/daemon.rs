@@ -217,6 +217,7 @@ async fn a_value_counts_once_a_correction_counts_and_the_future_never() {
         repeated: 2,
         from_the_future: 1,
         long_past: 0,
+        unwritten: 0,
     };
     assert_eq!(site.counts(), expected);
     close(site, wall).await;
@@ -293,7 +294,7 @@ fn called(folder: &TempDir, level: Level) -> Vec<(Timestamp, String)> {
     let events = lines(folder, "state/events.ndjson");
     let events = events
         .iter()
-        .map(|line| serde_json::from_str::<Event>(line).unwrap());
+        .filter_map(|line| serde_json::from_str::<Event>(line).ok());
     events
         .filter_map(|event| match event.kind {
             EventKind::Alert {
@@ -357,6 +358,114 @@ async fn a_silence_that_began_before_the_start_is_told() {
     daemon.stop().await;
     let (time, _) = &called(&folder, Level::Unknown)[0];
     assert!(*time < now - hours(6), "{time} is not long past at {now}");
+}
+
+/// The program itself, so that its limits are its own; ended with the test.
+struct Program(std::process::Child);
+
+impl Program {
+    fn start(folder: &TempDir, limit: &str) -> Self {
+        let mut log = fs::File::create(folder.path().join("log")).unwrap();
+        let mut child = std::process::Command::new("prlimit")
+            .args([limit, env!("CARGO_BIN_EXE_slipwatch"), "run", "site.toml"])
+            .current_dir(folder.path())
+            .stderr(std::process::Stdio::piped())
+            .spawn()
+            .unwrap();
+        // A pipe has no limit.
+        let mut stderr = child.stderr.take().unwrap();
+        std::thread::spawn(move || std::io::copy(&mut stderr, &mut log));
+        Self(child)
+    }
+
+    fn limit(&self, limit: &str) {
+        let pid = self.0.id().to_string();
+        let status = std::process::Command::new("prlimit")
+            .args(["--pid", &pid, limit])
+            .status();
+        assert!(status.unwrap().success());
+    }
+
+    fn is_running(&mut self) -> bool {
+        self.0.try_wait().unwrap().is_none()
+    }
+
+    fn stop(mut self) {
+        let pid = nix::unistd::Pid::from_raw(i32::try_from(self.0.id()).unwrap());
+        nix::sys::signal::kill(pid, nix::sys::signal::Signal::SIGTERM).unwrap();
+        assert!(self.0.wait().unwrap().success());
+    }
+}
+
+impl Drop for Program {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+#[tokio::test]
+async fn a_full_disk_ends_neither_the_daemon_nor_its_hooks_and_what_waited_is_written() {
+    let (folder, _) = crisis_folder();
+    append(&folder, &crisis(slipwatch::runtime::clock::now()));
+    // No file may grow beyond 4 kB: the write fails as on a full disk.
+    let mut program = Program::start(&folder, "--fsize=4096:unlimited");
+    let log = || lines(&folder, "log").join("\n");
+    let is_told = || {
+        lines(&folder, "told")
+            .iter()
+            .any(|line| line.starts_with("5/red/"))
+    };
+    eventually("the red told", is_told).await;
+    eventually("the full disk logged", || {
+        log().contains("no room on the disk")
+    })
+    .await;
+    assert!(called(&folder, Level::Red).is_empty(), "there was room");
+    assert!(program.is_running(), "{}", log());
+    program.limit("--fsize=unlimited");
+    eventually("the red written", || {
+        !called(&folder, Level::Red).is_empty()
+    })
+    .await;
+    program.stop();
+    // Nothing is torn, nothing there twice.
+    let events = lines(&folder, "state/events.ndjson");
+    let distinct: std::collections::BTreeSet<&String> = events.iter().collect();
+    assert_eq!(distinct.len(), events.len());
+    for line in &events {
+        serde_json::from_str::<Event>(line).unwrap();
+    }
+}
+
+#[tokio::test]
+async fn a_receipt_that_finds_no_room_still_keeps_the_hook_from_being_told_twice() {
+    let (folder, _) = crisis_folder();
+    append(&folder, &crisis(slipwatch::runtime::clock::now()));
+    // Hooks inherit the limit: this one leaves nothing behind but the names of empty files.
+    let script = "mkdir -p told-$SLIPWATCH_LEVEL/$$";
+    fs::write(folder.path().join("hook.sh"), script).unwrap();
+    let mut program = Program::start(&folder, "--fsize=0:unlimited");
+    let calls = || {
+        let calls = fs::read_dir(folder.path().join("told-red"));
+        calls.map_or(0, Iterator::count)
+    };
+    eventually("the red told", || calls() > 0).await;
+    program.limit("--fsize=unlimited");
+    let receipts = || lines(&folder, "state/delivered.ndjson");
+    eventually("its receipt", || {
+        receipts().iter().any(|line| line.contains("\"red\""))
+    })
+    .await;
+    assert!(program.is_running());
+    program.stop();
+    let program = Program::start(&folder, "--fsize=unlimited");
+    eventually("the past", || {
+        lines(&folder, "log").join("").contains("caught up")
+    })
+    .await;
+    program.stop();
+    assert_eq!(calls(), 1);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

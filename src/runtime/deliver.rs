@@ -121,6 +121,13 @@ impl Dispatcher {
         is_taken
     }
 
+    /// Makes the receipts durable that found no room on the disk before.
+    pub fn commit(&self) {
+        if let Err(error) = locked(&self.delivered).commit() {
+            tracing::warn!(%error, "receipts lost: a restart may send their alerts again");
+        }
+    }
+
     /// What `alert` supersedes or resolves is not tried again, whether a hook hears of `alert` or not.
     pub fn supersede(&self, alert: &Alert) {
         for way in &self.hooks {
@@ -158,6 +165,7 @@ impl Dispatcher {
             lost
         };
         let lost = tokio::time::timeout(limit, all).await.ok();
+        self.commit();
         if lost.is_none() {
             tracing::error!(limit_s = limit.as_secs_f64(), "hooks stopped half-way");
         }

@@ -1,5 +1,6 @@
 //! The thin shell around the monitor: clock, files, signals, hooks.
 
+mod backlog;
 pub mod clock;
 pub mod deliver;
 pub mod delivered;

@@ -73,6 +73,9 @@ pub async fn run(
         delivered,
         lock: _lock,
     } = State::open(config)?;
+    if let Err(error) = shutdown::survive_the_file_limit() {
+        tracing::warn!(%error, "a limit on the length of files would end this process");
+    }
     let dispatcher = Dispatcher::start(&config.hooks, &Retry::default(), delivered);
     let sinks = Sinks {
         events,

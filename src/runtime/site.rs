@@ -48,6 +48,8 @@ pub struct Counts {
     pub from_the_future: u64,
     /// Alerts that fired no hook because they are long past.
     pub long_past: u64,
+    /// Events that are not in the log because the disk was full for too long.
+    pub unwritten: u64,
 }
 
 /// Where an alert stands: one level is in force at a benchmark, and beside it perhaps `unknown`.
@@ -176,7 +178,8 @@ impl Site {
         ));
     }
 
-    /// Makes the events durable, then hands the alerts to the hooks, but for what began longer
+    /// Makes the events durable (on a full disk they wait for the next time), then hands the
+    /// alerts to the hooks, but for what began longer
     /// before `wall` than twice the evacuation time: of that, [`Site::caught_up`] sends what is
     /// still in force.
     ///
@@ -184,6 +187,10 @@ impl Site {
     /// When the events cannot be made durable; the alerts go out all the same.
     pub fn commit(&mut self, wall: Timestamp) -> io::Result<()> {
         let recorded = self.sinks.events.commit();
+        self.counts.unwritten = self.sinks.events.dropped();
+        if let Some(alerts) = &self.sinks.alerts {
+            alerts.commit();
+        }
         for alert in std::mem::take(&mut self.fresh) {
             let age = wall.duration_since(alert.event.time);
             let is_sent = age <= self.freshness(alert.event.benchmark.as_ref());
