@@ -468,6 +468,36 @@ async fn a_receipt_that_finds_no_room_still_keeps_the_hook_from_being_told_twice
     assert_eq!(calls(), 1);
 }
 
+#[tokio::test]
+async fn check_and_run_warn_of_each_declared_event_and_of_listen() {
+    let (folder, _) = site_folder();
+    let file = folder.path().join("site.toml");
+    let text = fs::read_to_string(&file).unwrap();
+    assert!(config::check(&file).unwrap().warnings.is_empty());
+    let listen = "[site]\nlisten = \"127.0.0.1:8642\"\n";
+    let events = "[[event]]\ntime = \"2017-06-06T17:00:00Z\"\nkind = \"reset\"\n\
+                  [[event]]\ntime = \"2017-06-07T17:00:00Z\"\nkind = \"blast\"\nbenchmark = \"5\"\n";
+    fs::write(&file, text.replace("[site]\n", listen) + events).unwrap();
+    let warnings = config::check(&file).unwrap().warnings;
+    assert_eq!(warnings.len(), 3, "{warnings:?}");
+    let program = Program::start(&folder, "--fsize=unlimited");
+    let log = || lines(&folder, "log").join("\n");
+    eventually("its start", || log().contains("caught up")).await;
+    program.stop();
+    for said in [warnings.join("\n"), log()] {
+        assert_eq!(
+            said.matches("declared events have no effect yet").count(),
+            2,
+            "{said}"
+        );
+        assert_eq!(
+            said.matches("nothing listens there yet").count(),
+            1,
+            "{said}"
+        );
+    }
+}
+
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn an_archived_crisis_fires_no_hook() {
     let (folder, config) = crisis_folder();

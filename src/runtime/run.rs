@@ -76,6 +76,9 @@ pub async fn run(
     if let Err(error) = shutdown::survive_the_file_limit() {
         tracing::warn!(%error, "a limit on the length of files would end this process");
     }
+    for what in config.without_effect() {
+        tracing::warn!("{what}");
+    }
     let dispatcher = Dispatcher::start(&config.hooks, &Retry::default(), delivered);
     let sinks = Sinks {
         events,
