@@ -27,6 +27,9 @@ use tempfile::TempDir;
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
 
+#[path = "daemon/crisis.rs"]
+mod crisis;
+
 const LIMIT: Duration = Duration::from_secs(60);
 const MULTI: &str = "time,5_displacement_mm,6_displacement_mm\n";
 
@@ -169,6 +172,41 @@ async fn an_old_alert_still_in_force_is_told_when_its_readings_are_recent() {
 }
 
 #[tokio::test]
+async fn an_old_alert_in_force_is_told_in_whatever_batch_it_comes_and_once() {
+    let (folder, config) = site_folder();
+    let wall = noon() + hours(24 * 3);
+    let mut site = site(&config);
+    site.take(&reading(noon() - hours(2), 4.0), wall);
+    site.caught_up(wall);
+    // The backlog: silence at its end does not make the red past.
+    site.handle(&alert(noon() - hours(1), Level::Orange, AlertState::Firing));
+    site.handle(&alert(noon(), Level::Red, AlertState::Firing));
+    site.commit(wall).unwrap();
+    assert_eq!(site.counts().long_past, 2);
+    for _batch in 0..3 {
+        site.caught_up(wall);
+    }
+    assert_eq!(site.counts().long_past, 1, "the orange, superseded");
+    close(site, wall).await;
+    let told = lines(&folder, "told");
+    assert_eq!(told, [format!("5/red/{} Actual", noon().as_second())]);
+}
+
+#[tokio::test]
+async fn an_alert_of_a_benchmark_that_nobody_watches_any_more_fires_no_hook() {
+    let (folder, config) = site_folder();
+    let mut site = site(&config);
+    let wall = noon() + hours(24 * 30 + 1);
+    site.take(&reading(noon(), 4.0), wall);
+    site.handle(&alert(noon(), Level::Red, AlertState::Firing));
+    site.commit(wall).unwrap();
+    site.caught_up(wall);
+    close(site, wall).await;
+    assert_eq!(lines(&folder, "told"), [""; 0]);
+    assert_eq!(lines(&folder, "state/events.ndjson").len(), 1);
+}
+
+#[tokio::test]
 async fn a_value_counts_once_a_correction_counts_and_the_future_never() {
     let (_folder, config) = site_folder();
     let mut site = site(&config);
@@ -182,6 +220,7 @@ async fn a_value_counts_once_a_correction_counts_and_the_future_never() {
         repeated: 2,
         from_the_future: 1,
         long_past: 0,
+        unwritten: 0,
     };
     assert_eq!(site.counts(), expected);
     close(site, wall).await;

@@ -222,9 +222,9 @@ async fn an_alert_that_waits_for_its_retry_holds_up_no_other() {
         ..Retry::default()
     };
     let dispatcher = Dispatcher::start(&[config], &slow, Delivered::default());
-    dispatcher.offer(&alert_of(Level::Orange, "first", ""));
+    dispatcher.offer(&alert_of(Level::Red, "first", ""));
     eventually("the first call", || read(&folder, "calls") == "first\n").await;
-    dispatcher.offer(&alert_of(Level::Red, "second", ""));
+    dispatcher.offer(&alert_of(Level::Orange, "second", ""));
     eventually("the second call", || {
         read(&folder, "calls") == "first\nsecond\n"
     })
@@ -232,6 +232,100 @@ async fn an_alert_that_waits_for_its_retry_holds_up_no_other() {
     // On the way out the waiting one gets a last chance.
     assert_eq!(dispatcher.close(LIMIT).await, Some(1));
     assert_eq!(read(&folder, "calls"), "first\nsecond\nfirst\n");
+}
+
+fn tireless_retry() -> Retry {
+    Retry {
+        attempts: 2,
+        first_delay: Duration::from_millis(1),
+        longest_delay: Duration::from_millis(2),
+        ..Retry::default()
+    }
+}
+
+fn calls(folder: &TempDir, key: &str) -> usize {
+    let calls = read(folder, "calls");
+    calls.lines().filter(|line| *line == key).count()
+}
+
+/// A hook that notes each key and fails until there is a file `fixed`.
+const BROKEN: &str = "echo $SLIPWATCH_KEY >> calls; [ -e fixed ]";
+
+#[tokio::test]
+async fn an_orange_a_red_and_an_unknown_are_tried_until_the_hook_takes_them() {
+    let (folder, mut config) = hook(BROKEN);
+    config.levels = vec![Level::Yellow, Level::Orange, Level::Red, Level::Unknown];
+    for level in [Level::Orange, Level::Red, Level::Unknown] {
+        let delivered = Delivered::open(&folder.path().join("receipts")).unwrap();
+        let dispatcher =
+            Dispatcher::start(std::slice::from_ref(&config), &tireless_retry(), delivered);
+        let alert = alert_of(level, level.name(), "");
+        assert!(dispatcher.offer(&alert));
+        eventually("twelve calls", || calls(&folder, level.name()) >= 12).await;
+        // What is in hand is not taken twice, what has been taken not again.
+        assert!(dispatcher.offer(&alert));
+        std::fs::write(folder.path().join("fixed"), "").unwrap();
+        let receipt = format!("\"key\":\"{level}\"");
+        eventually("its receipt", || {
+            read(&folder, "receipts").contains(&receipt)
+        })
+        .await;
+        assert_eq!(dispatcher.close(LIMIT).await, Some(0), "{level}");
+        std::fs::remove_file(folder.path().join("fixed")).unwrap();
+    }
+    // A yellow is given up.
+    let dispatcher = Dispatcher::start(&[config], &tireless_retry(), Delivered::default());
+    dispatcher.offer(&alert_of(Level::Yellow, "yellow", ""));
+    eventually("two calls", || calls(&folder, "yellow") == 2).await;
+    assert_eq!(dispatcher.close(LIMIT).await, Some(1));
+    assert_eq!(calls(&folder, "yellow"), 2);
+}
+
+#[tokio::test]
+async fn what_is_superseded_or_resolved_is_not_tried_again() {
+    let (folder, mut config) = hook(BROKEN);
+    config.levels = vec![Level::Orange, Level::Unknown];
+    let dispatcher = Dispatcher::start(&[config], &tireless_retry(), Delivered::default());
+    let orange = alert_of(Level::Orange, "orange", "");
+    dispatcher.offer(&orange);
+    eventually("some calls", || calls(&folder, "orange") >= 3).await;
+    // The hook does not ask for red, but hears no more of the orange either. Another level's
+    // alert in hand shows that the worker goes on.
+    dispatcher.supersede(&alert_of(Level::Red, "red", ""));
+    dispatcher.offer(&alert_of(Level::Unknown, "unknown", ""));
+    eventually("some calls", || calls(&folder, "unknown") >= 5).await;
+    let before = calls(&folder, "orange");
+    eventually("more calls", || calls(&folder, "unknown") >= 10).await;
+    assert_eq!(calls(&folder, "orange"), before);
+    // Neither does it hear more of a silence that has ended.
+    let mut end = alert_of(Level::Unknown, "unknown", "");
+    end.state = AlertState::Resolved;
+    std::fs::write(folder.path().join("hook.sh"), "exit 0").unwrap();
+    dispatcher.offer(&end);
+    assert!(dispatcher.close(LIMIT).await.is_some());
+}
+
+#[tokio::test]
+async fn an_alert_that_found_no_room_can_be_offered_again() {
+    let (folder, config) =
+        hook("echo $SLIPWATCH_KEY >> calls; until [ -e go ]; do sleep 0.01; done");
+    let dispatcher = Dispatcher::start(&[config], &quick_retry(), Delivered::default());
+    let keys: Vec<String> = (0..)
+        .map(|number| format!("k{number}"))
+        .take(5000)
+        .collect();
+    let full = |key: &&String| !dispatcher.offer(&alert_of(Level::Red, key, ""));
+    let refused = keys.iter().find(full).expect("never full").clone();
+    std::fs::write(
+        folder.path().join("hook.sh"),
+        "echo $SLIPWATCH_KEY >> calls",
+    )
+    .unwrap();
+    std::fs::write(folder.path().join("go"), "").unwrap();
+    let again = alert_of(Level::Red, &refused, "");
+    eventually("room", || dispatcher.offer(&again)).await;
+    assert!(dispatcher.close(LIMIT).await.is_some());
+    assert_eq!(calls(&folder, &refused), 1);
 }
 
 #[tokio::test]

@@ -50,6 +50,7 @@ pub fn check(file: &Path) -> Result<Summary, ConfigError> {
         (config.sources.iter().filter_map(missing_folder))
             .chain(config.hooks.iter().filter_map(missing_program))
             .chain(slow_sampling(&config))
+            .chain(config.without_effect())
             .map(|what| format!("{place}: warning: {what}")),
     );
     Ok(Summary {
@@ -105,6 +106,27 @@ fn slow_sampling(config: &Config) -> impl Iterator<Item = String> {
             )
         })
     })
+}
+
+impl Config {
+    /// What is accepted and does nothing yet, one line each.
+    pub fn without_effect(&self) -> Vec<String> {
+        let events = self.declared.iter().map(|event| {
+            let place = match &event.benchmark {
+                Some(benchmark) => format!("benchmark {:?}", benchmark.as_str()),
+                None => "the whole site".to_owned(),
+            };
+            format!(
+                "event: {} of {} at {place}: declared events have no effect yet; \
+                 expect what it does to the readings to be taken for motion",
+                event.kind, event.time
+            )
+        });
+        let listen = self.site.listen.map(|address| {
+            format!("site.listen = \"{address}\": nothing listens there yet; leave it out")
+        });
+        listen.into_iter().chain(events).collect()
+    }
 }
 
 impl HookConfig {

@@ -1,12 +1,16 @@
 //! Takes alerts to the hooks: a worker and a bounded queue each, retries that hold nothing up.
+//!
+//! Orange, red and unknown are tried until the hook takes them, they are resolved or superseded, or
+//! the daemon stops; the next start then offers them again. Whatever else is given up in the end.
 
 use super::clock;
 use super::delivered::Delivered;
 use super::hook::{self, Alert, Outcome};
+use super::in_hand::InHand;
 use crate::config::HookConfig;
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tokio::sync::mpsc;
 use tokio::task::{JoinHandle, JoinSet};
@@ -18,7 +22,7 @@ const QUEUE: usize = 1024;
 /// How often and how fast a hook is tried again.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Retry {
-    /// Attempts in all.
+    /// Attempts in all, for what need not arrive.
     pub attempts: u32,
     /// The wait after the first; it doubles each time.
     pub first_delay: Duration,
@@ -53,10 +57,18 @@ impl Retry {
     }
 }
 
+/// The way to one hook.
+#[derive(Debug)]
+struct Way {
+    hook: HookConfig,
+    queue: mpsc::Sender<Alert>,
+    in_hand: Arc<Mutex<InHand>>,
+}
+
 /// The way to all hooks.
 #[derive(Debug)]
 pub struct Dispatcher {
-    hooks: Vec<(HookConfig, mpsc::Sender<Alert>)>,
+    hooks: Vec<Way>,
     workers: JoinSet<usize>,
     delivered: Arc<Mutex<Delivered>>,
 }
@@ -68,17 +80,25 @@ impl Dispatcher {
         let mut workers = JoinSet::new();
         let mut queues = Vec::new();
         for hook in hooks {
-            let (sender, receiver) = mpsc::channel(QUEUE);
+            let (queue, receiver) = mpsc::channel(QUEUE);
+            let in_hand = Arc::new(Mutex::new(InHand::default()));
             let worker = Worker {
                 hook: Arc::new(hook.clone()),
                 retry: retry.clone(),
                 delivered: Arc::clone(&delivered),
+                in_hand: Arc::clone(&in_hand),
                 waiting: BTreeMap::new(),
+                untried: 0,
                 taken: 0,
                 lost: 0,
             };
             workers.spawn(worker.run(receiver));
-            queues.push((hook.clone(), sender));
+            let hook = hook.clone();
+            queues.push(Way {
+                hook,
+                queue,
+                in_hand,
+            });
         }
         Self {
             hooks: queues,
@@ -87,22 +107,50 @@ impl Dispatcher {
         }
     }
 
-    /// Hands `alert` to every hook that asks for its level and has not taken it before. Never
-    /// waits: what finds a queue full is lost for this run, and said to be.
-    pub fn offer(&self, alert: &Alert) {
-        for (hook, queue) in &self.hooks {
-            if !hook.levels.contains(&alert.level) {
-                continue;
-            }
-            let name = hook.name();
-            let delivered = &self.delivered;
-            let known = delivered.lock().unwrap_or_else(PoisonError::into_inner);
-            if known.has(alert, &name) {
-                tracing::debug!(hook = name, key = alert.key, "delivered before");
-            } else if let Err(error) = queue.try_send(alert.clone()) {
-                tracing::error!(hook = name, key = alert.key, %error, "alert lost: queue full");
+    /// Hands `alert` to every hook that asks for its level, has not taken it before and does not
+    /// have it in hand. Never waits: what finds a queue full is not taken in hand, and said to be;
+    /// `false` then.
+    pub fn offer(&self, alert: &Alert) -> bool {
+        self.supersede(alert);
+        let mut is_taken = true;
+        for way in &self.hooks {
+            if way.hook.levels.contains(&alert.level) {
+                is_taken &= self.offer_to(way, alert);
             }
         }
+        is_taken
+    }
+
+    /// Makes the receipts durable that found no room on the disk before.
+    pub fn commit(&self) {
+        if let Err(error) = locked(&self.delivered).commit() {
+            tracing::warn!(%error, "receipts lost: a restart may send their alerts again");
+        }
+    }
+
+    /// What `alert` supersedes or resolves is not tried again, whether a hook hears of `alert` or not.
+    pub fn supersede(&self, alert: &Alert) {
+        for way in &self.hooks {
+            locked(&way.in_hand).supersede(alert);
+        }
+    }
+
+    fn offer_to(&self, way: &Way, alert: &Alert) -> bool {
+        let (name, key) = (way.hook.name(), &alert.key);
+        // In hand first: a worker notes the receipt before it lets go.
+        let mut in_hand = locked(&way.in_hand);
+        if !in_hand.take(alert) {
+            return true;
+        }
+        if locked(&self.delivered).has(alert, &name) {
+            in_hand.release(alert);
+            tracing::debug!(hook = name, key, "delivered before");
+        } else if let Err(error) = way.queue.try_send(alert.clone()) {
+            in_hand.release(alert);
+            tracing::error!(hook = name, key, %error, "no room for an alert");
+            return false;
+        }
+        true
     }
 
     /// Lets the workers finish what waits, each alert once more at most, and stops them after
@@ -117,6 +165,7 @@ impl Dispatcher {
             lost
         };
         let lost = tokio::time::timeout(limit, all).await.ok();
+        self.commit();
         if lost.is_none() {
             tracing::error!(limit_s = limit.as_secs_f64(), "hooks stopped half-way");
         }
@@ -131,21 +180,27 @@ impl HookConfig {
     }
 }
 
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 #[derive(Debug)]
 struct Waiting {
     alert: Alert,
     attempt: u32,
 }
 
-type Run = JoinHandle<(Waiting, Outcome)>;
-
 #[derive(Debug)]
 struct Worker {
     hook: Arc<HookConfig>,
     retry: Retry,
     delivered: Arc<Mutex<Delivered>>,
+    in_hand: Arc<Mutex<InHand>>,
     /// By when it is due, then in order of arrival: a retry never holds up a new alert.
     waiting: BTreeMap<(Instant, u64), Waiting>,
+    /// How many of them wait for their first attempt. Only these keep the queue waiting: those
+    /// that must arrive are few, because their benchmark's next one ends their retries.
+    untried: usize,
     taken: u64,
     lost: usize,
 }
@@ -153,7 +208,7 @@ struct Worker {
 impl Worker {
     async fn run(mut self, mut queue: mpsc::Receiver<Alert>) -> usize {
         let mut open = true;
-        let mut running: Option<AbortOnDrop> = None;
+        let mut running: Option<Running> = None;
         loop {
             if running.is_none() {
                 running = self.next_run(open);
@@ -163,13 +218,14 @@ impl Worker {
             }
             let due = self.waiting.keys().next().map(|(due, _)| *due);
             tokio::select! {
-                alert = queue.recv(), if open && self.waiting.len() < QUEUE => match alert {
+                alert = queue.recv(), if open && self.untried < QUEUE => match alert {
                     Some(alert) => self.wait(Waiting { alert, attempt: 1 }, clock::later(Duration::ZERO)),
                     None => open = false,
                 },
-                ended = finished(&mut running), if running.is_some() => {
-                    running = None;
-                    self.settle(ended, open);
+                outcome = finished(&mut running), if running.is_some() => {
+                    if let Some(run) = running.take() {
+                        self.settle(&run.waiting, outcome.as_ref(), open);
+                    }
                 }
                 () = until(due), if running.is_none() && due.is_some() => {}
             }
@@ -177,37 +233,40 @@ impl Worker {
     }
 
     /// Starts the first alert that is due; on the way out everything is.
-    fn next_run(&mut self, open: bool) -> Option<AbortOnDrop> {
-        let (due, _) = *self.waiting.keys().next()?;
-        if open && due > clock::later(Duration::ZERO) {
-            return None;
+    fn next_run(&mut self, open: bool) -> Option<Running> {
+        loop {
+            let (due, _) = *self.waiting.keys().next()?;
+            if open && due > clock::later(Duration::ZERO) {
+                return None;
+            }
+            let (_, waiting) = self.waiting.pop_first()?;
+            if waiting.attempt == 1 {
+                self.untried -= 1;
+            } else if self.is_over(&waiting.alert) {
+                self.drop_over(&waiting.alert);
+                continue;
+            }
+            let (hook, alert) = (Arc::clone(&self.hook), waiting.alert.clone());
+            let attempt = waiting.attempt;
+            let task = tokio::spawn(async move { hook::run(&hook, &alert, attempt).await });
+            return Some(Running { task, waiting });
         }
-        let (_, waiting) = self.waiting.pop_first()?;
-        let hook = Arc::clone(&self.hook);
-        Some(AbortOnDrop(tokio::spawn(async move {
-            let outcome = hook::run(&hook, &waiting.alert, waiting.attempt).await;
-            (waiting, outcome)
-        })))
     }
 
-    fn settle(&mut self, ended: Option<(Waiting, Outcome)>, open: bool) {
-        let Some((mut waiting, outcome)) = ended else {
-            tracing::error!(hook = self.hook.name(), "alert lost: its run broke off");
-            self.lost += 1;
-            return;
-        };
+    fn settle(&mut self, waiting: &Waiting, outcome: Option<&Outcome>, open: bool) {
         let (hook, key) = (self.hook.name(), waiting.alert.key.clone());
-        if outcome == Outcome::Done {
-            let mut delivered = self
-                .delivered
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner);
-            if let Err(error) = delivered.note(&waiting.alert, &hook) {
+        let attempt = waiting.attempt;
+        let goes_on = waiting.alert.must_arrive() || attempt < self.retry.attempts;
+        if outcome == Some(&Outcome::Done) {
+            if let Err(error) = locked(&self.delivered).note(&waiting.alert, &hook) {
                 tracing::warn!(hook, key, %error, "no receipt: a restart may send it again");
             }
-        } else if open && waiting.attempt < self.retry.attempts {
-            let delay = self.retry.delay(&key, waiting.attempt);
-            let (attempt, delay_s) = (waiting.attempt, delay.as_secs_f64());
+            locked(&self.in_hand).release(&waiting.alert);
+        } else if self.is_over(&waiting.alert) {
+            self.drop_over(&waiting.alert);
+        } else if open && goes_on {
+            let delay = self.retry.delay(&key, attempt);
+            let delay_s = delay.as_secs_f64();
             tracing::warn!(
                 hook,
                 key,
@@ -216,34 +275,53 @@ impl Worker {
                 delay_s,
                 "hook will be retried"
             );
-            waiting.attempt += 1;
-            self.wait(waiting, clock::later(delay));
+            let again = Waiting {
+                alert: waiting.alert.clone(),
+                attempt: attempt.saturating_add(1),
+            };
+            self.wait(again, clock::later(delay));
         } else {
-            let attempts = waiting.attempt;
-            tracing::error!(hook, key, attempts, ?outcome, "alert not delivered");
+            tracing::error!(hook, key, attempt, ?outcome, "alert not delivered");
             self.lost += 1;
+            locked(&self.in_hand).release(&waiting.alert);
         }
+    }
+
+    fn is_over(&self, alert: &Alert) -> bool {
+        locked(&self.in_hand).is_over(alert)
+    }
+
+    fn drop_over(&mut self, alert: &Alert) {
+        let (hook, key) = (self.hook.name(), &alert.key);
+        tracing::error!(hook, key, "alert not delivered before it was over");
+        self.lost += 1;
+        locked(&self.in_hand).release(alert);
     }
 
     fn wait(&mut self, waiting: Waiting, due: Instant) {
         self.taken += 1;
+        self.untried += usize::from(waiting.attempt == 1);
         self.waiting.insert((due, self.taken), waiting);
     }
 }
 
-/// A hook's run ends with its worker.
+/// A hook's run, and for what. It ends with its worker.
 #[derive(Debug)]
-struct AbortOnDrop(Run);
+struct Running {
+    task: JoinHandle<Outcome>,
+    waiting: Waiting,
+}
 
-impl Drop for AbortOnDrop {
+impl Drop for Running {
     fn drop(&mut self) {
-        self.0.abort();
+        self.task.abort();
     }
 }
 
-async fn finished(running: &mut Option<AbortOnDrop>) -> Option<(Waiting, Outcome)> {
+/// `None` when the run broke off.
+async fn finished(running: &mut Option<Running>) -> Option<Outcome> {
     match running {
-        Some(run) => (&mut run.0).await.ok(),
+        Some(run) => (&mut run.task).await.ok(),
         None => None,
     }
 }

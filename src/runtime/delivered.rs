@@ -6,6 +6,7 @@ use std::collections::BTreeSet;
 use std::io;
 use std::path::Path;
 
+use super::backlog::{Backlog, Worth};
 use super::journal::Journal;
 
 /// One alert that a hook has taken.
@@ -32,6 +33,7 @@ impl Receipt {
 #[derive(Debug, Default)]
 pub struct Delivered {
     receipts: BTreeSet<Receipt>,
+    pending: Backlog,
     journal: Option<Journal>,
 }
 
@@ -52,6 +54,7 @@ impl Delivered {
         })?;
         Ok(Self {
             receipts,
+            pending: Backlog::default(),
             journal: Some(journal),
         })
     }
@@ -61,17 +64,30 @@ impl Delivered {
         self.receipts.contains(&Receipt::of(alert, hook))
     }
 
-    /// Notes that `hook` has taken this alert.
+    /// Notes that `hook` has taken this alert: in any case until the daemon stops, and on a full
+    /// disk no longer than that unless [`Delivered::commit`] finds room.
     ///
     /// # Errors
     /// When the receipt cannot be made durable; the alert may then be sent once more, after a
     /// restart, with the same key.
     pub fn note(&mut self, alert: &Alert, hook: &str) -> io::Result<()> {
         let receipt = Receipt::of(alert, hook);
-        if let Some(journal) = &mut self.journal {
-            journal.append(&[serde_json::to_string(&receipt)?])?;
-        }
+        let line = serde_json::to_string(&receipt)?;
         self.receipts.insert(receipt);
-        Ok(())
+        if self.journal.is_some() {
+            self.pending.add(Worth::Much, line);
+        }
+        self.commit()
+    }
+
+    /// Makes durable what found no room before.
+    ///
+    /// # Errors
+    /// When that fails for another reason than a full disk.
+    pub fn commit(&mut self) -> io::Result<()> {
+        match &mut self.journal {
+            Some(journal) => self.pending.append_to(journal, "receipts").map(drop),
+            None => Ok(()),
+        }
     }
 }

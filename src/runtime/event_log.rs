@@ -1,7 +1,9 @@
-//! The site's events as NDJSON: appended once each, durable before any hook is told.
+//! The site's events as NDJSON: appended once each, durable before any hook is told, unless the
+//! disk is full: then they wait, and the hooks are told all the same.
 
+use super::backlog::{Backlog, Worth};
 use super::journal::Journal;
-use crate::monitor::Event;
+use crate::monitor::{Event, EventKind};
 use std::collections::BTreeSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io;
@@ -14,7 +16,7 @@ use std::path::Path;
 #[derive(Debug, Default)]
 pub struct EventLog {
     known: BTreeSet<u64>,
-    pending: Vec<String>,
+    pending: Backlog,
     journal: Option<Journal>,
 }
 
@@ -30,7 +32,7 @@ impl EventLog {
         })?;
         Ok(Self {
             known,
-            pending: Vec::new(),
+            pending: Backlog::default(),
             journal: Some(journal),
         })
     }
@@ -42,19 +44,26 @@ impl EventLog {
         match serde_json::to_string(event) {
             Ok(line) => {
                 if self.known.insert(fingerprint(&line)) {
-                    self.pending.push(line);
+                    let is_refit = matches!(event.kind, EventKind::Refit { .. });
+                    let worth = if is_refit { Worth::Little } else { Worth::Much };
+                    self.pending.add(worth, line);
                 }
             }
             Err(error) => tracing::error!(?event, %error, "event lost: no JSON"),
         }
     }
 
+    /// Makes the events durable, or on a full disk keeps them until the next time.
     pub(super) fn commit(&mut self) -> io::Result<()> {
-        let lines = std::mem::take(&mut self.pending);
         match &mut self.journal {
-            Some(journal) => journal.append(&lines),
+            Some(journal) => self.pending.append_to(journal, "events").map(drop),
             None => Ok(()),
         }
+    }
+
+    /// Events dropped because the disk was full for too long; a restart says them again.
+    pub(super) fn dropped(&self) -> u64 {
+        self.pending.dropped()
     }
 }
 

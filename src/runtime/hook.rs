@@ -92,6 +92,14 @@ impl Alert {
         })
     }
 
+    /// Whether it is tried until a hook has taken it: people's safety hangs on it.
+    pub fn must_arrive(&self) -> bool {
+        match self.level {
+            Level::Orange | Level::Red | Level::Unknown => self.state == AlertState::Firing,
+            Level::Green | Level::Yellow => false,
+        }
+    }
+
     fn variables(&self, attempt: u32) -> [(&'static str, String); 10] {
         let benchmark = self.event.benchmark.as_ref();
         let optional_time = self.failure_time.map(|time| time.to_string());

@@ -1,13 +1,27 @@
 //! An append-only file of lines: synced after each batch, healed after a torn write.
+//!
+//! A full disk is no end: what could not be appended is cut off again, and whoever keeps the lines
+//! can append them later.
 
 use std::fs::{File, OpenOptions};
-use std::io::{self, BufRead, BufReader, Write};
+use std::io::{self, BufRead, BufReader, ErrorKind, Write};
 use std::path::Path;
 
 /// An open file of lines.
 #[derive(Debug)]
 pub struct Journal {
     file: File,
+    /// After a failed append: how long the file was before it.
+    torn_at: Option<u64>,
+}
+
+/// Whether `error` says that there is no room: on the disk, in the quota, or up to the longest
+/// file allowed.
+pub(super) fn is_full(error: &io::Error) -> bool {
+    matches!(
+        error.kind(),
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge
+    )
 }
 
 impl Journal {
@@ -42,22 +56,38 @@ impl Journal {
             // Makes the file's own name durable.
             File::open(folder)?.sync_all()?;
         }
-        Ok(Self { file })
+        Ok(Self {
+            file,
+            torn_at: None,
+        })
     }
 
     /// Appends lines and returns when they are on the disk.
     ///
     /// # Errors
     /// When they may not be there. A failed sync is never retried: the system may have thrown the
-    /// pages away and would report success the second time.
+    /// pages away and would report success the second time. Appending the lines anew is something
+    /// else: the next call first cuts off whatever this one has left.
     pub fn append(&mut self, lines: &[String]) -> io::Result<()> {
         if lines.is_empty() {
             return Ok(());
         }
+        let mut whole = self.file.metadata()?.len();
+        if let Some(torn_at) = self.torn_at
+            && torn_at < whole
+        {
+            self.file.set_len(torn_at)?;
+            whole = torn_at;
+        }
         let mut batch = lines.join("\n");
         batch.push('\n');
-        self.file.write_all(batch.as_bytes())?;
-        self.file.sync_data()
+        self.torn_at = Some(whole);
+        let written = (self.file.write_all(batch.as_bytes())).and_then(|()| self.file.sync_data());
+        // Readers of the file should not see half a line for long.
+        if written.is_ok() || self.file.set_len(whole).is_ok() {
+            self.torn_at = None;
+        }
+        written
     }
 }
 

@@ -1,10 +1,12 @@
 //! The thin shell around the monitor: clock, files, signals, hooks.
 
+mod backlog;
 pub mod clock;
 pub mod deliver;
 pub mod delivered;
 pub mod event_log;
 pub mod hook;
+mod in_hand;
 pub mod ingest;
 pub mod journal;
 pub mod log;

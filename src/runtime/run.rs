@@ -73,6 +73,12 @@ pub async fn run(
         delivered,
         lock: _lock,
     } = State::open(config)?;
+    if let Err(error) = shutdown::survive_the_file_limit() {
+        tracing::warn!(%error, "a limit on the length of files would end this process");
+    }
+    for what in config.without_effect() {
+        tracing::warn!("{what}");
+    }
     let dispatcher = Dispatcher::start(&config.hooks, &Retry::default(), delivered);
     let sinks = Sinks {
         events,
@@ -108,7 +114,8 @@ async fn work(
     mut shutdown: Shutdown,
     progress: &watch::Sender<Progress>,
 ) -> io::Result<()> {
-    let mut is_caught_up = false;
+    // Once, and as of the last batch: a logger that was away hands in its backlog in several.
+    let (mut is_caught_up, mut is_up_to_date) = (false, false);
     let mut tick = tokio::time::interval(TICK);
     tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
     loop {
@@ -119,11 +126,14 @@ async fn work(
                 let Some(batch) = batch else { return Ok(()) };
                 let still = shutdown.clone();
                 tokio::task::block_in_place(|| take_batch(site, &batch, &still))?;
+                is_up_to_date = batch.caught_up;
+                if is_up_to_date {
+                    site.caught_up(clock::now());
+                }
                 let counts = site.counts();
-                if batch.caught_up && !is_caught_up {
+                if is_up_to_date && !is_caught_up {
                     is_caught_up = true;
                     tracing::info!(?counts, "caught up");
-                    site.caught_up(clock::now());
                 }
                 progress.send_replace(Progress { counts, is_caught_up });
             }
@@ -131,7 +141,11 @@ async fn work(
             _ = tick.tick(), if is_caught_up => tokio::task::block_in_place(|| {
                 let now = clock::now();
                 site.pass(now);
-                site.commit(now)
+                site.commit(now)?;
+                if is_up_to_date {
+                    site.caught_up(now);
+                }
+                Ok::<(), io::Error>(())
             })?,
         }
     }

@@ -1,5 +1,6 @@
 //! The wish to stop, handed down as an argument.
 
+use nix::sys::signal::Signal;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::watch;
 
@@ -54,4 +55,13 @@ impl Shutdown {
         });
         Ok(shutdown)
     }
+}
+
+/// From now on a file at its longest is an error of the write, not the end of the process.
+///
+/// # Errors
+/// When the signal cannot be listened for.
+pub(super) fn survive_the_file_limit() -> std::io::Result<()> {
+    // The handler stays when its listener goes.
+    signal(SignalKind::from_raw(Signal::SIGXFSZ as i32)).map(drop)
 }

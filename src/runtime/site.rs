@@ -9,7 +9,7 @@ use super::event_log::EventLog;
 use super::hook::{Alert, Status};
 use super::seen::{Novelty, Seen};
 use super::tail::Arrival;
-use crate::alert::Level;
+use crate::alert::{Level, Policy};
 use crate::monitor::{AlertState, Event, EventKind, Input, Monitor, Settings};
 use crate::reading::{BenchmarkId, Timestamp};
 use jiff::SignedDuration;
@@ -23,6 +23,8 @@ const MOST_TICKS: usize = 1_000_000;
 const CLOCK_TOLERANCE: SignedDuration = SignedDuration::from_hours(1);
 /// An alert younger than this is never long past.
 const LEAST_FRESHNESS: SignedDuration = SignedDuration::from_hours(1);
+/// A benchmark that gave a reading within this time is still watched, whatever its policy says.
+const LEAST_WATCHED: SignedDuration = SignedDuration::from_hours(30 * 24);
 
 /// Where a site's events go.
 #[derive(Debug)]
@@ -46,9 +48,20 @@ pub struct Counts {
     pub from_the_future: u64,
     /// Alerts that fired no hook because they are long past.
     pub long_past: u64,
+    /// Events that are not in the log because the disk was full for too long.
+    pub unwritten: u64,
 }
 
-type Standing = (Option<BenchmarkId>, &'static str);
+/// Where an alert stands: one level is in force at a benchmark, and beside it perhaps `unknown`.
+type Place = (Option<BenchmarkId>, bool);
+
+/// An alert in force.
+#[derive(Debug)]
+struct Standing {
+    alert: Alert,
+    /// Whether it has been offered to the hooks.
+    is_sent: bool,
+}
 
 /// One site at work.
 #[derive(Debug)]
@@ -64,8 +77,8 @@ pub struct Site {
     failure_times: BTreeMap<Option<BenchmarkId>, Timestamp>,
     /// Alerts since the last commit.
     fresh: Vec<Alert>,
-    /// Alerts in force that no hook was told of because they began long ago.
-    standing: BTreeMap<Standing, Alert>,
+    /// What is in force: neither resolved nor superseded.
+    standing: BTreeMap<Place, Standing>,
     counts: Counts,
 }
 
@@ -165,42 +178,86 @@ impl Site {
         ));
     }
 
-    /// Makes the events durable, then hands the alerts to the hooks, but for what is long past at
-    /// `wall`.
+    /// Makes the events durable (on a full disk they wait for the next time), then hands the
+    /// alerts to the hooks, but for what began longer
+    /// before `wall` than twice the evacuation time: of that, [`Site::caught_up`] sends what is
+    /// still in force.
     ///
     /// # Errors
     /// When the events cannot be made durable; the alerts go out all the same.
     pub fn commit(&mut self, wall: Timestamp) -> io::Result<()> {
         let recorded = self.sinks.events.commit();
+        self.counts.unwritten = self.sinks.events.dropped();
+        if let Some(alerts) = &self.sinks.alerts {
+            alerts.commit();
+        }
         for alert in std::mem::take(&mut self.fresh) {
-            let place = (alert.event.benchmark.clone(), alert.level.name());
-            self.standing.remove(&place);
             let age = wall.duration_since(alert.event.time);
-            if age <= self.freshness(alert.event.benchmark.as_ref()) {
+            let is_sent = age <= self.freshness(alert.event.benchmark.as_ref());
+            if is_sent {
                 self.send(&alert);
             } else {
                 self.counts.long_past += 1;
-                if alert.state == AlertState::Firing && alert.level != Level::Green {
-                    self.standing.insert(place, alert);
+                if let Some(alerts) = &self.sinks.alerts {
+                    alerts.supersede(&alert);
                 }
             }
+            self.stand(alert, is_sent);
         }
         recorded
     }
 
-    /// The history has been read: an alert that began long ago and is still in force, at a
-    /// benchmark whose readings are recent, is not past at all, and goes out.
-    pub fn caught_up(&mut self, wall: Timestamp) {
-        for ((benchmark, _), alert) in std::mem::take(&mut self.standing) {
-            let newest = match &benchmark {
-                Some(benchmark) => self.newest.get(benchmark),
-                None => self.newest.values().max(),
-            };
-            let limit = self.freshness(benchmark.as_ref());
-            if newest.is_some_and(|newest| wall.duration_since(*newest) <= limit) {
-                self.send(&alert);
+    /// Notes what is in force: a level supersedes the lower ones of its benchmark, and its end
+    /// ends them too.
+    fn stand(&mut self, alert: Alert, is_sent: bool) {
+        let is_unknown = alert.level == Level::Unknown;
+        let place = (alert.event.benchmark.clone(), is_unknown);
+        let had = self.standing.get(&place);
+        if had.is_some_and(|had| had.alert.level > alert.level) {
+            return;
+        }
+        match alert.state {
+            AlertState::Firing if alert.level != Level::Green => {
+                self.standing.insert(place, Standing { alert, is_sent });
+            }
+            AlertState::Firing | AlertState::Resolved => {
+                self.standing.remove(&place);
             }
         }
+    }
+
+    /// Everything there is has been read: what is in force and was not sent because it began long
+    /// ago goes out, however long ago that was.
+    ///
+    /// Only a benchmark that nobody watches any more is spared. Its newest reading is older than
+    /// 30 days, the outlook and twice the evacuation time, whichever is the longest: an archive.
+    /// Readings that merely stop do not make an alert past; silence is not safety.
+    pub fn caught_up(&mut self, wall: Timestamp) {
+        let mut standing = std::mem::take(&mut self.standing);
+        for one in standing.values_mut() {
+            if one.is_sent {
+                // Again: there may have been no room for it. The hooks that have it ignore it.
+                if one.alert.must_arrive() {
+                    self.send(&one.alert);
+                }
+            } else if self.is_watched(one.alert.event.benchmark.as_ref(), wall) {
+                self.send(&one.alert);
+                one.is_sent = true;
+                self.counts.long_past = self.counts.long_past.saturating_sub(1);
+            }
+        }
+        self.standing = standing;
+    }
+
+    fn is_watched(&self, benchmark: Option<&BenchmarkId>, wall: Timestamp) -> bool {
+        let newest = match benchmark {
+            Some(benchmark) => self.newest.get(benchmark),
+            None => self.newest.values().max(),
+        };
+        let limit = (self.freshness(benchmark))
+            .max(self.policy(benchmark).outlook)
+            .max(LEAST_WATCHED);
+        newest.is_some_and(|newest| wall.duration_since(*newest) <= limit)
     }
 
     fn send(&self, alert: &Alert) {
@@ -210,13 +267,14 @@ impl Site {
     }
 
     fn freshness(&self, benchmark: Option<&BenchmarkId>) -> SignedDuration {
-        let own = benchmark.and_then(|benchmark| self.settings.benchmarks.get(benchmark));
-        let policy = own.unwrap_or(&self.settings.policy);
-        policy
-            .evacuation_time
+        (self.policy(benchmark).evacuation_time)
             .checked_mul(2)
             .unwrap_or(SignedDuration::MAX)
             .max(LEAST_FRESHNESS)
+    }
+
+    fn policy(&self, benchmark: Option<&BenchmarkId>) -> &Policy {
+        benchmark.map_or(&self.settings.policy, |one| self.settings.policy(one))
     }
 
     /// What has been counted.

@@ -1,0 +1,66 @@
+//! What a hook's worker has in hand: neither taken by the hook nor given up.
+
+use super::hook::{Alert, state_name};
+use crate::alert::Level;
+use crate::monitor::AlertState;
+use crate::reading::BenchmarkId;
+use std::collections::BTreeMap;
+
+/// What tells an alert from every other: its key, its level and its state.
+type Token = (String, Level, &'static str);
+
+#[derive(Debug)]
+struct Entry {
+    benchmark: Option<BenchmarkId>,
+    state: AlertState,
+    /// Superseded, or resolved: not worth another attempt.
+    is_over: bool,
+}
+
+/// The alerts in one worker's hand, its queue included.
+#[derive(Debug, Default)]
+pub(super) struct InHand(BTreeMap<Token, Entry>);
+
+impl InHand {
+    /// Takes `alert` in hand; `false` when it is there already.
+    pub(super) fn take(&mut self, alert: &Alert) -> bool {
+        let token = token(alert);
+        if self.0.contains_key(&token) {
+            return false;
+        }
+        let entry = Entry {
+            benchmark: alert.event.benchmark.clone(),
+            state: alert.state,
+            is_over: false,
+        };
+        self.0.insert(token, entry);
+        true
+    }
+
+    pub(super) fn release(&mut self, alert: &Alert) {
+        self.0.remove(&token(alert));
+    }
+
+    pub(super) fn is_over(&self, alert: &Alert) -> bool {
+        self.0.get(&token(alert)).is_some_and(|entry| entry.is_over)
+    }
+
+    /// `alert` has come: what it supersedes or resolves at its benchmark is over. A level ends
+    /// itself and the lower ones; `unknown` stands for itself.
+    pub(super) fn supersede(&mut self, alert: &Alert) {
+        let own = token(alert);
+        for (token, entry) in &mut self.0 {
+            let same_place = entry.benchmark == alert.event.benchmark
+                && (token.1 == Level::Unknown) == (alert.level == Level::Unknown);
+            // An end does not make an earlier end untrue; a new beginning does.
+            let is_touched = alert.state == AlertState::Firing || entry.state == AlertState::Firing;
+            if same_place && is_touched && token.1 <= alert.level && *token != own {
+                entry.is_over = true;
+            }
+        }
+    }
+}
+
+fn token(alert: &Alert) -> Token {
+    (alert.key.clone(), alert.level, state_name(alert.state))
+}
