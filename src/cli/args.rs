@@ -6,6 +6,8 @@ use crate::config::value;
 use crate::reading::{BenchmarkId, Disorder, Quantity, Recording, SelectError, Series, Timestamp};
 use crate::runtime::ingest::{ColumnMap, IngestError, ReadOptions, read_channels, read_files};
 use jiff::SignedDuration;
+use serde::Serialize;
+use std::io::{self, Write};
 use std::path::PathBuf;
 
 /// How results look.
@@ -24,6 +26,26 @@ pub struct OutputArgs {
     /// How results look on stdout
     #[arg(long, value_enum, default_value_t, value_name = "FORMAT")]
     pub format: Format,
+}
+
+impl OutputArgs {
+    /// Prints a result: as one JSON object, or as `text` says it.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub(super) fn print<T: Serialize>(
+        self,
+        result: &T,
+        text: impl Fn(&T) -> String,
+    ) -> anyhow::Result<()> {
+        let mut stdout = io::stdout().lock();
+        match self.format {
+            Format::Json => writeln!(stdout, "{}", serde_json::to_string(result)?)?,
+            Format::Text => write!(stdout, "{}", text(result))?,
+        }
+        stdout.flush()?;
+        Ok(())
+    }
 }
 
 /// What files do not say of themselves.

@@ -1,6 +1,6 @@
 //! `fit FILE`: one inversion.
 
-use super::args::{Format, OutputArgs, ReadingArgs};
+use super::args::{OutputArgs, ReadingArgs};
 use super::table::{Table, number, time};
 use crate::alert::Policy;
 use crate::fit::Exponent;
@@ -8,7 +8,6 @@ use crate::inversion::{Estimate, FitReport, Inversion, Options};
 use crate::reading::{Quantity, Series, Timestamp, Unit};
 use crate::runtime::clock::Stopwatch;
 use std::fmt::Write as _;
-use std::io::{self, Write};
 
 /// Invert one benchmark's readings: the law's parameters, the regime, the failure time
 ///
@@ -59,13 +58,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let series = args.readings.series(&loaded.recording)?;
     let options = args.inversion.options(&args.readings);
     let report = report(series, &options);
-    let mut stdout = io::stdout().lock();
-    match args.output.format {
-        Format::Json => writeln!(stdout, "{}", serde_json::to_string(&report)?)?,
-        Format::Text => write!(stdout, "{}", text(&report))?,
-    }
-    stdout.flush()?;
-    Ok(())
+    args.output.print(&report, text)
 }
 
 /// Inverts a series; `seconds` is what the least squares took.

@@ -1,11 +1,10 @@
 //! `sweep FILE`: the inversion over growing `t_max`, a row each.
 
-use super::args::{Format, OutputArgs, ReadingArgs};
+use super::args::{OutputArgs, ReadingArgs};
 use super::fit::InversionArgs;
 use super::table::{Table, number, time};
 use crate::inversion::{SweepOptions, SweepReport, SweepRow, sweep};
 use crate::reading::Timestamp;
-use std::io::{self, Write};
 
 /// Invert one benchmark's readings up to one `t_max` after another
 ///
@@ -43,13 +42,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         steps: args.steps,
     };
     let report = sweep(series, &options, &steps);
-    let mut stdout = io::stdout().lock();
-    match args.output.format {
-        Format::Json => writeln!(stdout, "{}", serde_json::to_string(&report)?)?,
-        Format::Text => write!(stdout, "{}", text(&report))?,
-    }
-    stdout.flush()?;
-    Ok(())
+    args.output.print(&report, text)
 }
 
 /// `FIRST..LAST`.

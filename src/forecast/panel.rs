@@ -74,8 +74,6 @@ pub struct Outlook {
     pub surprise_nats: Option<f64>,
     /// Probability of each regime.
     pub regimes: BTreeMap<Regime, f64>,
-    /// The velocity now, mm/day, by the panel's median.
-    pub velocity_mm_per_day: f64,
     /// The most probable law over the longest window, t = 0 now; `None` with too few rates.
     pub law: Option<Law>,
     /// Rates of the whole record, oldest first.
@@ -125,44 +123,32 @@ impl Panel {
         if observations.spaced(FEWEST_READINGS).len() < FEWEST_READINGS {
             return None;
         }
-        let mut outlook = self.outlook(
-            rates,
-            observations.values.last()?.t_days,
-            critical.min(FASTEST_CRITICAL),
-        );
-        outlook.surprise_nats = surprise;
-        Some(outlook)
-    }
-
-    fn outlook(&mut self, rates: Vec<Rate>, now_days: f64, critical: f64) -> Outlook {
-        let filtered = if measurably_moves(&rates) {
-            self.filter.passage(critical, HORIZON_DAYS, now_days)
+        let now_days = observations.values.last()?.t_days;
+        let weighed = self.weights();
+        let regimes = regimes(&weighed);
+        let law = self.longest_law();
+        let passage = if measurably_moves(&rates) {
+            let windows = if rates.len() >= FEWEST_RATES {
+                weighed
+            } else {
+                Vec::new()
+            };
+            let critical = critical.min(FASTEST_CRITICAL);
+            let mut parts = passages(&windows, critical, now_days);
+            let filtered = self.filter.passage(critical, HORIZON_DAYS, now_days);
+            parts.push((filtered, FILTER_SHARE));
+            Passage::mixture(&parts)
         } else {
             Passage::default()
         };
-        let weighed = if rates.len() >= FEWEST_RATES && measurably_moves(&rates) {
-            self.weights()
-        } else {
-            Vec::new()
-        };
-        let mut parts: Vec<(Passage, f64)> = Vec::new();
-        for (posterior, weight) in &weighed {
-            let later = now_days - posterior.ensemble.now_days;
-            parts.push((
-                Passage::of(&posterior.ensemble, critical, later),
-                weight * (1.0 - FILTER_SHARE),
-            ));
-        }
-        parts.push((filtered, FILTER_SHARE));
-        Outlook {
+        Some(Outlook {
             now_days,
-            passage: Passage::mixture(&parts),
-            surprise_nats: None,
-            regimes: self.regimes(),
-            velocity_mm_per_day: self.filter.velocity().unwrap_or(f64::NAN),
-            law: self.longest_law(),
+            passage,
+            surprise_nats: surprise,
+            regimes,
+            law,
             rates,
-        }
+        })
     }
 
     /// The best sample of the law over the longest window that has one.
@@ -178,44 +164,30 @@ impl Panel {
     }
 
     /// Members and their say: scores through a softmax, with a floor.
-    fn weights(&self) -> Vec<(&Posterior, f64)> {
-        let present = self
-            .members
-            .iter()
-            .filter_map(|m| m.posterior.as_ref().map(|p| (p, m.score)));
-        let present: Vec<(&Posterior, f64)> = present.collect();
+    fn weights(&self) -> Vec<Weighed<'_>> {
+        let present = self.members.iter().filter_map(|member| {
+            member
+                .posterior
+                .as_ref()
+                .map(|posterior| (member, posterior))
+        });
+        let present: Vec<(&Member, &Posterior)> = present.collect();
         let best = present
             .iter()
-            .map(|(_, score)| *score)
+            .map(|(member, _)| member.score)
             .fold(f64::NEG_INFINITY, f64::max);
-        let total: f64 = present.iter().map(|(_, score)| (score - best).exp()).sum();
+        let total: f64 = present
+            .iter()
+            .map(|(member, _)| (member.score - best).exp())
+            .sum();
         let free = 1.0 - LEAST_SHARE * present.len() as f64;
         let share = |score: f64| LEAST_SHARE + free * (score - best).exp() / total;
-        present
-            .into_iter()
-            .map(|(p, score)| (p, share(score)))
-            .collect()
-    }
-
-    /// The regimes' probabilities, by the members that fit the full law.
-    fn regimes(&self) -> BTreeMap<Regime, f64> {
-        let mut regimes: BTreeMap<Regime, f64> =
-            Regime::KNOWN.into_iter().map(|r| (r, 0.0)).collect();
-        let weighed = self.weights();
-        let is_law = |p: &Posterior| {
-            self.members.iter().any(|m| {
-                m.role.curvature == Curvature::Free
-                    && m.posterior.as_ref().is_some_and(|q| std::ptr::eq(p, q))
-            })
+        let weigh = |(member, posterior): (&'_ Member, _)| Weighed {
+            curvature: member.role.curvature,
+            posterior,
+            weight: share(member.score),
         };
-        let laws: Vec<&(&Posterior, f64)> = weighed.iter().filter(|(p, _)| is_law(p)).collect();
-        let total: f64 = laws.iter().map(|(_, weight)| weight).sum();
-        for (posterior, weight) in laws {
-            for sample in &posterior.ensemble.samples {
-                *regimes.entry(sample.law.regime()).or_default() += sample.weight * weight / total;
-            }
-        }
-        regimes
+        present.into_iter().map(weigh).collect()
     }
 
     fn score(&mut self, observations: &Observations) {
@@ -227,15 +199,50 @@ impl Panel {
             return;
         }
         self.scored_to_days = newest.t_days;
+        let newest = Newest::of(observations, before, newest);
         for member in &mut self.members {
             let Some(posterior) = &member.posterior else {
                 continue;
             };
-            let log_score = log_score(&posterior.ensemble, observations, (before, newest));
+            let log_score = newest.log_score(&posterior.ensemble);
             member.score =
                 member.score * (1.0 - 1.0 / SCORE_MEMORY) + log_score.max(WORST_LOG_SCORE);
         }
     }
+}
+
+/// A fitted window and its say among the windows.
+struct Weighed<'a> {
+    curvature: Curvature,
+    posterior: &'a Posterior,
+    weight: f64,
+}
+
+/// The regimes' probabilities, by the windows that fit the full law.
+fn regimes(weighed: &[Weighed<'_>]) -> BTreeMap<Regime, f64> {
+    let mut regimes: BTreeMap<Regime, f64> = Regime::KNOWN.into_iter().map(|r| (r, 0.0)).collect();
+    let laws = || {
+        weighed
+            .iter()
+            .filter(|one| one.curvature == Curvature::Free)
+    };
+    let total: f64 = laws().map(|one| one.weight).sum();
+    for one in laws() {
+        for sample in &one.posterior.ensemble.samples {
+            *regimes.entry(sample.law.regime()).or_default() += sample.weight * one.weight / total;
+        }
+    }
+    regimes
+}
+
+/// What each window says of passing `critical` mm/day, days from `now_days`, with its say in the whole.
+fn passages(weighed: &[Weighed<'_>], critical: f64, now_days: f64) -> Vec<(Passage, f64)> {
+    let one = |one: &Weighed<'_>| {
+        let ensemble = &one.posterior.ensemble;
+        let passage = Passage::of(ensemble, critical, now_days - ensemble.now_days);
+        (passage, one.weight * (1.0 - FILTER_SHARE))
+    };
+    weighed.iter().map(one).collect()
 }
 
 /// The seed of a benchmark's panel, FNV-1a of its name: every benchmark draws its own numbers, the same
@@ -265,46 +272,58 @@ fn window(rates: &[Rate], role: Role) -> Option<&[Rate]> {
     (rates.len() >= role.fewest).then(|| &rates[rates.len().saturating_sub(wanted)..])
 }
 
-/// ln of the predictive density of the newest reading's velocity, relative to that velocity.
-fn log_score(
-    ensemble: &Ensemble,
-    observations: &Observations,
-    pair: (&Observation, &Observation),
-) -> f64 {
-    let (before, newest) = pair;
-    let sigma_one = newest.sigma.unwrap_or(0.0);
-    let (from, observed, sigma) = match observations.quantity {
-        Quantity::Velocity => (
-            newest.t_days - observations.averaging_days,
-            newest.value,
-            sigma_one,
-        ),
-        Quantity::Displacement => {
-            let span = newest.t_days - before.t_days;
-            let noise =
-                crate::fit::displacement_sigma(&observations.values) * std::f64::consts::SQRT_2;
-            (
-                before.t_days,
-                (newest.value - before.value) / span,
-                sigma_one.max(noise) / span,
-            )
-        }
-    };
-    let mut density = 0.0;
-    for sample in &ensemble.samples {
-        let Some(predicted) = mean_velocity(
-            &sample.law,
-            from - ensemble.now_days,
-            newest.t_days - ensemble.now_days,
-        ) else {
-            continue;
+/// The newest reading as the velocity that members are scored on.
+struct Newest {
+    from_days: f64,
+    to_days: f64,
+    velocity: f64,
+    sigma: f64,
+}
+
+impl Newest {
+    fn of(observations: &Observations, before: &Observation, newest: &Observation) -> Self {
+        let stated = newest.sigma.unwrap_or(0.0);
+        let (from_days, velocity, sigma) = match observations.quantity {
+            Quantity::Velocity => (
+                newest.t_days - observations.averaging_days,
+                newest.value,
+                stated,
+            ),
+            Quantity::Displacement => {
+                let span = newest.t_days - before.t_days;
+                let noise =
+                    crate::fit::displacement_sigma(&observations.values) * std::f64::consts::SQRT_2;
+                (
+                    before.t_days,
+                    (newest.value - before.value) / span,
+                    stated.max(noise) / span,
+                )
+            }
         };
-        let spread = sigma.hypot(ensemble.scatter * predicted).max(1e-12);
-        let z = (observed - predicted) / spread;
-        density += sample.weight * (-3.5 * (z * z / 6.0).ln_1p()).exp() / spread;
+        Self {
+            from_days,
+            to_days: newest.t_days,
+            velocity,
+            sigma,
+        }
     }
-    let scale = observed.abs().max(sigma).max(1e-12);
-    (density * scale).max(1e-300).ln()
+
+    /// ln of the predictive density of this velocity, relative to its size.
+    fn log_score(&self, ensemble: &Ensemble) -> f64 {
+        let from = self.from_days - ensemble.now_days;
+        let to = self.to_days - ensemble.now_days;
+        let mut density = 0.0;
+        for sample in &ensemble.samples {
+            let Some(predicted) = mean_velocity(&sample.law, from, to) else {
+                continue;
+            };
+            let spread = self.sigma.hypot(ensemble.scatter * predicted).max(1e-12);
+            let z = (self.velocity - predicted) / spread;
+            density += sample.weight * (-3.5 * (z * z / 6.0).ln_1p()).exp() / spread;
+        }
+        let scale = self.velocity.abs().max(self.sigma).max(1e-12);
+        (density * scale).max(1e-300).ln()
+    }
 }
 
 /// Mean velocity of a law between two times about its t = 0; `None` past its failure.

@@ -162,22 +162,6 @@ impl Filter {
         });
         Passage::from_times(times.collect())
     }
-
-    /// The weighted median velocity, mm/day; `None` before the first readings.
-    pub(super) fn velocity(&self) -> Option<f64> {
-        let mut velocities: Vec<(f64, f64)> = self
-            .particles
-            .iter()
-            .zip(&self.weights)
-            .map(|(p, w)| (p.velocity(), *w))
-            .collect();
-        velocities.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut reached = 0.0;
-        velocities.into_iter().find_map(|(velocity, weight)| {
-            reached += weight;
-            (reached >= 0.5).then_some(velocity)
-        })
-    }
 }
 
 fn how(observations: &Observations) -> Dynamics {
