@@ -5,6 +5,8 @@
 
 mod coefficients;
 mod law;
+mod load;
+mod loaded;
 mod path;
 mod relaxation;
 mod scalar;
@@ -14,5 +16,7 @@ mod taylor;
 mod trajectory;
 
 pub use law::{Law, LawError, PaperParameters, StateSense, SteadyState};
+pub use load::Load;
+pub use loaded::LoadedLaw;
 pub use sensitivity::{DaysWithGradient, Gradient, MotionWithGradients, Sensitivities};
 pub use trajectory::{Accuracy, Motion, Trajectory};

@@ -113,7 +113,10 @@ impl<S: Scalar> Path<S> {
             };
         }
         let beside = self.departure.iter().chain(&self.arrival);
-        if let Some(beside) = beside.into_iter().find(|one| t >= one.start && t <= one.end) {
+        if let Some(beside) = beside
+            .into_iter()
+            .find(|one| t >= one.start && t <= one.end)
+        {
             return Place::At(beside.at(t));
         }
         let index = self

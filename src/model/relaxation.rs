@@ -29,12 +29,7 @@ pub(super) struct Relaxation<S> {
 
 impl<S: Scalar> Relaxation<S> {
     /// From `at`, (y, `slip / v_i`) at `start`; `None` where the steady state is far or is not.
-    pub(super) fn new(
-        law: &Coefficients<S>,
-        order: usize,
-        start: f64,
-        at: (S, S),
-    ) -> Option<Self> {
+    pub(super) fn new(law: &Coefficients<S>, order: usize, start: f64, at: (S, S)) -> Option<Self> {
         if law.kappa.value() == 0.0 {
             return None;
         }

@@ -158,11 +158,7 @@ impl Div for Dual {
     type Output = Self;
     fn div(self, other: Self) -> Self {
         let value = self.value / other.value;
-        self.combined(
-            other,
-            value,
-            (1.0 / other.value, -value / other.value),
-        )
+        self.combined(other, value, (1.0 / other.value, -value / other.value))
     }
 }
 

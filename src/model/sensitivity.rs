@@ -87,17 +87,13 @@ impl Sensitivities {
         let ln_y_0 = y_0.value.ln();
         let ln_y = tail::ln_y_with_remaining(law, remaining, ln_y_0);
         let y = ln_y.exp();
-        let (slope_0, slope) = (
-            tail::slope_at_ln(law, ln_y_0),
-            tail::slope_at_ln(law, ln_y),
-        );
+        let (slope_0, slope) = (tail::slope_at_ln(law, ln_y_0), tail::slope_at_ln(law, ln_y));
         let days_by = tail::days_between_by(law, ln_y_0, ln_y);
         let slip_by = tail::slip_between_by(law, ln_y_0, ln_y);
         let later = |k: usize| y_0.by[k] / slope_0 - days_by[k];
         let y_by = |k: usize| slope * later(k);
-        let slip = |k: usize| {
-            slip_0.by[k] + slip_by[k] + later(k) / y - y_0.by[k] / (slope_0 * y_0.value)
-        };
+        let slip =
+            |k: usize| slip_0.by[k] + slip_by[k] + later(k) / y - y_0.by[k] / (slope_0 * y_0.value);
         let at = (
             Dual {
                 value: y,

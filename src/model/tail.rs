@@ -115,11 +115,7 @@ fn integrate_down<const N: usize>(
 }
 
 /// 16-point Gauss-Legendre quadrature over one panel.
-fn panel<const N: usize>(
-    integrand: &impl Fn(f64) -> [f64; N],
-    from: f64,
-    to: f64,
-) -> [f64; N] {
+fn panel<const N: usize>(integrand: &impl Fn(f64) -> [f64; N], from: f64, to: f64) -> [f64; N] {
     let (middle, half) = (f64::midpoint(from, to), (to - from) / 2.0);
     let mut sum = [0.0; N];
     for (x, w) in NODES {
