@@ -163,7 +163,13 @@ fn the_steady_velocity_is_d_for_every_m_and_state() {
 
 #[test]
 fn a_stable_law_is_followed_however_long_after_its_relaxation() {
-    for (m, x_i) in [(0.98, 39.0), (0.5, 0.1), (-1.0, 3.0), (-20.0, 1.2), (0.1, 100.0)] {
+    for (m, x_i) in [
+        (0.98, 39.0),
+        (0.5, 0.1),
+        (-1.0, 3.0),
+        (-20.0, 1.2),
+        (0.1, 100.0),
+    ] {
         let law = Law::from_paper(m, x_i, 1.0, 1.0).unwrap();
         let mut before = 0.0;
         for t in [1e4, 1e6, 1e9, 1e15] {
@@ -189,10 +195,15 @@ fn a_law_is_the_same_in_seconds_and_in_geological_time() {
             let end = 0.3 * law.failure_days().unwrap_or(1.0);
             let at = format!("m={m} unit={unit}");
             let far = Trajectory::solve(&scaled, end * unit, Accuracy::Full);
-            let motion = Trajectory::solve(&law, end, Accuracy::Full).at(end).unwrap();
+            let motion = Trajectory::solve(&law, end, Accuracy::Full)
+                .at(end)
+                .unwrap();
             let same = far.at(end * unit).unwrap_or_else(|| panic!("{at}"));
             assert!(relative(same.velocity, motion.velocity) < 1e-11, "{at}");
-            assert!(relative(same.displacement, motion.displacement * unit) < 1e-11, "{at}");
+            assert!(
+                relative(same.displacement, motion.displacement * unit) < 1e-11,
+                "{at}"
+            );
         }
     }
 }

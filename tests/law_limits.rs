@@ -1,7 +1,5 @@
 //! The limits that the paper states, and the relation of displacement to velocity, on every kind of law.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use proptest::prelude::*;
 use slipwatch::model::{Accuracy, Law, Trajectory};
 
@@ -16,23 +14,32 @@ fn a_hardening_block_slides_a_finite_distance() {
         // The integral of v dt = D T x^-m dx / (1 - x^(1-m)) to x = infinity.
         let finite = -6.0 * (-x_i.powf(1.0 - m)).ln_1p() / (m - 1.0);
         let mut left = f64::INFINITY;
-        for t in [1e2, 1e6, 1e12] {
+        for t in [1e6, 1e9, 1e12] {
             let motion = Trajectory::solve(&law, t, Accuracy::Full).at(t).unwrap();
             let now = finite - motion.displacement;
             assert!(now <= left && now > -1e-9, "m={m} t={t}: {now}");
             left = now;
             // What is left: v ~ D (t/T)^-m, whose integral falls as t^(1-m).
             let rest = 6.0 * (t / 3.0).powf(1.0 - m) / (m - 1.0);
-            if t > 1e5 {
-                assert!((now - rest).abs() < 1e-2 * rest + 1e-9, "m={m} t={t}: {now} not {rest}");
-            }
+            // The next term is x^(1-m) of it, and x nears t/T.
+            let next = 2.0 * (t / 3.0).powf(1.0 - m) * rest;
+            assert!(
+                (now - rest).abs() < next + 1e-12,
+                "m={m} t={t}: {now} not {rest}"
+            );
         }
     }
 }
 
 #[test]
 fn a_stable_block_forgets_its_start_within_t_star() {
-    for (m, x_i) in [(0.5, 4.0), (0.98, 39.0), (0.1, 0.5), (-1.0, 3.0), (-20.0, 1.2)] {
+    for (m, x_i) in [
+        (0.5, 4.0),
+        (0.98, 39.0),
+        (0.1, 0.5),
+        (-1.0, 3.0),
+        (-20.0, 1.2),
+    ] {
         let law = Law::from_paper(m, x_i, 5.0, 2.0).unwrap();
         let t_star = 5.0 / (1.0 - m);
         assert!(relative(law.relaxation_days().unwrap(), t_star) < 1e-12);
@@ -41,7 +48,7 @@ fn a_stable_block_forgets_its_start_within_t_star() {
             let motion = Trajectory::solve(&law, t, Accuracy::Full).at(t).unwrap();
             motion.velocity - 2.0
         };
-        let from = if m == 0.98 { 18.0 } else { 10.0 } * t_star;
+        let from = if x_i > 10.0 { 28.0 } else { 10.0 } * t_star;
         let fall = (excess(from) / excess(from + t_star)).ln();
         assert!((fall - 1.0).abs() < 1e-3, "m={m}: {fall}");
     }
@@ -49,7 +56,13 @@ fn a_stable_block_forgets_its_start_within_t_star() {
 
 #[test]
 fn velocity_runs_away_as_the_inverse_of_the_time_that_is_left() {
-    for (m, x_i) in [(1.35, 0.6), (1.5, 0.05), (3.0, 0.5), (29.0, 0.9), (1.01, 0.9)] {
+    for (m, x_i) in [
+        (1.24, 0.3),
+        (1.35, 0.6),
+        (1.5, 0.05),
+        (3.0, 0.5),
+        (29.0, 0.9),
+    ] {
         let law = Law::from_paper(m, x_i, 2.0, 7.0).unwrap();
         let failure = law.failure_days().unwrap();
         let solution = Trajectory::solve(&law, 2.0 * failure, Accuracy::Full);
@@ -60,7 +73,10 @@ fn velocity_runs_away_as_the_inverse_of_the_time_that_is_left() {
         };
         // The next term is of order (t_c - t)^(1 - 1/m).
         let fall = (error(1e-8) / error(1e-9)).log10();
-        assert!((fall - (1.0 - 1.0 / m)).abs() < 0.02 * fall + 2e-3, "m={m}: {fall}");
+        assert!(
+            (fall - (1.0 - 1.0 / m)).abs() < 0.02 * fall + 2e-3,
+            "m={m}: {fall}"
+        );
     }
     let law = Law::at_unit_m(1.5, 2.0, 3.0).unwrap();
     let solution = Trajectory::solve(&law, 10.0, Accuracy::Full);
@@ -80,7 +96,10 @@ fn a_block_far_along_fails_after_x_i_to_the_m_over_m() {
         let fall = (error(1e-7) / error(1e-8)).log10();
         let last = error(1e-8);
         let expected = m - 1.0;
-        assert!(last < 1e-14 || (fall - expected).abs() < 0.05 * expected, "m={m}: {fall} {last}");
+        assert!(
+            last < 1e-14 || (fall - expected).abs() < 0.05 * expected,
+            "m={m}: {fall} {last}"
+        );
     }
     // And is far from it otherwise: 1.2885 T, not 0.3719 T.
     let law = Law::from_paper(1.35, 0.6, 1.0, 1.0).unwrap();
@@ -89,7 +108,13 @@ fn a_block_far_along_fails_after_x_i_to_the_m_over_m() {
 
 #[test]
 fn a_block_with_negative_m_goes_to_its_steady_velocity_from_both_sides() {
-    for (m, x_i) in [(-1.0, 3.0), (-0.5, 0.4), (-20.0, 0.5), (-20.0, 4.0), (-3000.0, 1.01)] {
+    for (m, x_i) in [
+        (-1.0, 3.0),
+        (-0.5, 0.4),
+        (-20.0, 0.5),
+        (-20.0, 4.0),
+        (-3000.0, 1.01),
+    ] {
         let law = Law::from_paper(m, x_i, 1.0, 1.0).unwrap();
         assert_eq!(law.failure_days(), None);
         let solution = Trajectory::solve(&law, 100.0, Accuracy::Full);
@@ -127,7 +152,9 @@ fn at_m_of_one_a_block_below_its_threshold_slows_as_one_over_time() {
         assert!(relative(law.failure_days().unwrap(), failure) < 1e-14);
     }
     let steady = Law::at_unit_m(1.0, 2.0, 3.0).unwrap();
-    let motion = Trajectory::solve(&steady, 50.0, Accuracy::Full).at(50.0).unwrap();
+    let motion = Trajectory::solve(&steady, 50.0, Accuracy::Full)
+        .at(50.0)
+        .unwrap();
     assert_eq!((motion.velocity, motion.displacement), (3.0, 150.0));
 }
 
@@ -135,12 +162,16 @@ fn at_m_of_one_a_block_below_its_threshold_slows_as_one_over_time() {
 fn the_law_passes_through_m_of_one_without_a_seam() {
     // The same r and kappa / p = a: what changes with p is of its order.
     let at_one = Law::at_unit_m(1.5, 2.0, 3.0).unwrap();
-    let unit = Trajectory::solve(&at_one, 1.0, Accuracy::Full).at(1.0).unwrap();
+    let unit = Trajectory::solve(&at_one, 1.0, Accuracy::Full)
+        .at(1.0)
+        .unwrap();
     let mut apart = f64::INFINITY;
     for p in [1e-3, 1e-6, 1e-9, 1e-12] {
         for p in [p, -p] {
             let law = Law::from_fit(3.0, at_one.r, at_one.a * p, p);
-            let motion = Trajectory::solve(&law, 1.0, Accuracy::Full).at(1.0).unwrap();
+            let motion = Trajectory::solve(&law, 1.0, Accuracy::Full)
+                .at(1.0)
+                .unwrap();
             let difference = relative(motion.velocity, unit.velocity);
             assert!(difference < 2.0 * p.abs() + 1e-14, "p={p}: {difference:e}");
             assert!(difference < apart || difference < 1e-14);
@@ -158,7 +189,8 @@ fn closed_slip(law: &Law, y: f64) -> (f64, f64) {
     let (first, second) = (bent.ln_1p(), law.p * y.ln());
     let divisor = law.r * law.p + law.kappa;
     let slip = (first - second) / divisor;
-    let digits = (first.abs() + second.abs() + (bent / (1.0 + bent)).abs()) / (first - second).abs();
+    let digits =
+        (first.abs() + second.abs() + (bent / (1.0 + bent)).abs()) / (first - second).abs();
     let of_divisor = ((law.r * law.p).abs() + law.kappa.abs()) / divisor.abs();
     (slip, 4.0 * f64::EPSILON * (digits + of_divisor))
 }
@@ -197,12 +229,21 @@ proptest! {
 fn displacement_has_its_limits_where_the_closed_relation_has_none() {
     // r = 0: nothing changes. r p + kappa = p b = 0, without steady slip: y^p = 1 + kappa t' with no b.
     let still = Law::from_fit(2.0, 0.0, 0.25, 0.25);
-    let motion = Trajectory::solve(&still, 40.0, Accuracy::Full).at(40.0).unwrap();
+    let motion = Trajectory::solve(&still, 40.0, Accuracy::Full)
+        .at(40.0)
+        .unwrap();
     assert_eq!((motion.velocity, motion.displacement), (2.0, 80.0));
     for p in [0.25, 0.5, -0.5] {
         let a = 0.5;
         // b = 0: dy/dt = a y^p, so y^(1-p) = 1 + (1-p) a t, and slip = (y^-p - 1) / (-p a).
-        let law = Law { v_i: 2.0, r: -a, kappa: a * p, p, a, b: 0.0 };
+        let law = Law {
+            v_i: 2.0,
+            r: -a,
+            kappa: a * p,
+            p,
+            a,
+            b: 0.0,
+        };
         let t = 7.0;
         let y = (1.0 + (1.0 - p) * a * t).powf(1.0 / (1.0 - p));
         let slip = 2.0 * (1.0 - y.powf(-p)) / (p * a);

@@ -108,14 +108,20 @@ fn a_passage_answers_to_the_parameters_as_differences_show() {
         let law = |d: [f64; 4]| Law::from_fit(2.0 + d[3], r + d[0], kappa + d[1], p + d[2]);
         let found = law([0.0; 4]).days_to_velocity_with_gradient(7.0).unwrap();
         let [by_r, by_kappa, by_p] = parts(&found.gradient);
-        for (k, exact) in [by_r, by_kappa, by_p, found.gradient.v_i].iter().enumerate() {
+        for (k, exact) in [by_r, by_kappa, by_p, found.gradient.v_i]
+            .iter()
+            .enumerate()
+        {
             let nudged = |h: f64| {
                 let mut d = [0.0; 4];
                 d[k] = h;
                 law(d).days_to_velocity(7.0).unwrap()
             };
             let shown = (nudged(1e-5) - nudged(-1e-5)) / 2e-5;
-            assert!((exact - shown).abs() < 1e-7 * exact.abs() + 1e-9, "{k}: {exact} not {shown}");
+            assert!(
+                (exact - shown).abs() < 1e-7 * exact.abs() + 1e-9,
+                "{k}: {exact} not {shown}"
+            );
         }
     }
     let slowing = Law::from_fit(2.0, -0.5, 0.25, 0.25);

@@ -24,7 +24,7 @@ pub(super) fn read_load(file: &Path) -> anyhow::Result<Load> {
     if found.iter().ne(COLUMNS) {
         return Err(IngestError::BadHeader {
             file: file.into(),
-            found: format!("{:?} where days,log_load belongs", text.lines().next()),
+            found: format!("{:?}, not days,log_load", text.lines().next().unwrap_or("")),
         }
         .into());
     }

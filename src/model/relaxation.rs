@@ -36,14 +36,15 @@ impl<S: Scalar> Relaxation<S> {
         let ln_y_steady = law.ln_y_steady();
         let stretch = (law.p.value() - 1.0).abs().max(1.0);
         let ln_z = at.0.ln() - ln_y_steady;
-        // Also false for NaN, where there is no steady state.
-        if !(ln_z.value().abs() * stretch < FARTHEST) {
+        // NaN, where there is no steady state.
+        let distance = ln_z.value().abs() * stretch;
+        if distance.is_nan() || distance >= FARTHEST {
             return None;
         }
         let (z, u) = series(law.p, order);
         let reach = step_fraction(order) * radius(&z, order).min(radius(&u, order));
         let departure = departure(&z, order, ln_z.exp_m1());
-        if !(departure.value().abs() < reach) {
+        if departure.value().is_nan() || departure.value().abs() >= reach {
             return None;
         }
         let minus_one = S::constant(-1.0);

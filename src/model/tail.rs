@@ -42,6 +42,10 @@ pub(super) fn remaining_days_by(law: &Law, ln_y: f64) -> [f64; 3] {
 
 /// Days that the law takes to accelerate from one inverse velocity to a smaller one.
 pub(super) fn days_between(law: &Law, ln_y_from: f64, ln_y_to: f64) -> f64 {
+    if law.kappa == 0.0 {
+        // m = 1: y is a straight line.
+        return ln_y_from.exp() * -(ln_y_to - ln_y_from).exp_m1() / law.r;
+    }
     // y = y_from exp(-s): days = y_from * integral of exp(-s) / (r - kappa bc(y)) ds
     let integrand = |s: f64| [(-s).exp() / -slope_at_ln(law, ln_y_from - s)];
     let [days] = integrate_down(law, (ln_y_from, ln_y_to), integrand);

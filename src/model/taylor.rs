@@ -107,7 +107,7 @@ fn square<S: Scalar>(b: &Series<S>, k: usize) -> S {
         half = half + b[j] * b[k - j];
     }
     let twice = half.scaled(2.0);
-    if k % 2 == 0 && k > 0 {
+    if k > 0 && k.is_multiple_of(2) {
         twice + b[k / 2] * b[k / 2]
     } else {
         twice
