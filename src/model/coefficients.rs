@@ -26,6 +26,18 @@ impl Coefficients<f64> {
             b: law.b,
         }
     }
+
+    /// Of the same law while the log-load keeps the value that `gain` is the exponential of.
+    pub(super) fn under(law: &Law, gain: f64) -> Self {
+        let b = law.b * gain;
+        Self {
+            r: law.r + law.b * (gain - 1.0),
+            kappa: law.kappa,
+            p: law.p,
+            a: law.a,
+            b,
+        }
+    }
 }
 
 impl Coefficients<Dual> {

@@ -1,12 +1,15 @@
 //! The law while its load changes: v = `v_i` e^f / y, dy/dt = a y^p - b e^f.
 //!
 //! Taylor steps of a given order, from knot to knot of the load and no farther than the series reaches:
-//! the error of a step of h is of order h^(order + 1). Nothing is kept but the step at hand, so that a
+//! the error of a step of h is of order h^(order + 1). While the load stands still beside a steady state
+//! that attracts, the closed form of the relaxation takes over. Nothing is kept but the step at hand, so that a
 //! search may call this without allocating. Not in it: the direct response of the contacts to a change
 //! of normal stress (Linker and Dieterich, 1992).
 
+use super::coefficients::Coefficients;
 use super::law::{Law, LawError};
 use super::load::{Load, Stretch};
+use super::relaxation::Relaxation;
 use super::trajectory::{Accuracy, Motion};
 use std::ops::ControlFlow;
 
@@ -28,6 +31,7 @@ pub struct LoadedLaw<'a> {
     load: &'a Load,
     order: usize,
     fraction: f64,
+    order_of_relaxation: usize,
 }
 
 /// Where the block is: its inverse velocity without the load's share, and its slip over `v_i`.
@@ -50,6 +54,8 @@ struct Step {
     order: usize,
     y: Series,
     slip: Series,
+    /// In place of the series, where the block stays beside a steady state.
+    relaxation: Option<Relaxation<f64>>,
 }
 
 /// What comes after a step.
@@ -85,6 +91,7 @@ impl<'a> LoadedLaw<'a> {
             load,
             order,
             fraction,
+            order_of_relaxation: accuracy.order(),
         })
     }
 
@@ -107,13 +114,13 @@ impl<'a> LoadedLaw<'a> {
         });
     }
 
-    /// Days to the singularity, if it comes by `horizon` days.
+    /// Days to the singularity, if it comes by `horizon` (finite) days.
     pub fn failure_days(&self, horizon: f64) -> Option<f64> {
         self.follow(horizon, |_| ControlFlow::Continue(()))
             .filter(|days| *days <= horizon)
     }
 
-    /// Days until the velocity first reaches `velocity`, if it does by `horizon` days. A rise and fall
+    /// Days until the velocity first reaches `velocity`, if it does by `horizon` (finite) days. A rise and fall
     /// within one step is seen by its top; steps are shorter than the solution's own time.
     pub fn days_to_velocity(&self, velocity: f64, horizon: f64) -> Option<f64> {
         let mut found = None;
@@ -140,7 +147,12 @@ impl<'a> LoadedLaw<'a> {
             let (stretch, passed) = self.load.stretch(block.t, block.passed);
             steps = if passed == block.passed { steps + 1 } else { 0 };
             block.passed = passed;
-            let step = Step::expand(&self.law, (self.order, self.fraction), &block, stretch);
+            let mut step = Step::expand(&self.law, (self.order, self.fraction), &block, stretch);
+            if let Some(relaxation) = self.relaxation(&block, stretch) {
+                step.relaxation = Some(relaxation);
+                step.end = stretch.until;
+            }
+            step.end = step.end.min(end.next_up());
             if see(&step).is_break() {
                 return None;
             }
@@ -151,6 +163,18 @@ impl<'a> LoadedLaw<'a> {
             }
         }
         None
+    }
+
+    /// The rest of a stretch whose load stands still, beside a steady state that attracts.
+    fn relaxation(&self, block: &Block, stretch: Stretch) -> Option<Relaxation<f64>> {
+        if stretch.per_day != 0.0 {
+            return None;
+        }
+        let gain = stretch.log_load.exp();
+        let coefficients = Coefficients::under(&self.law, gain);
+        let at = (block.y, block.slip / gain);
+        Relaxation::new(&coefficients, self.order_of_relaxation, block.t, at)
+            .filter(|relaxation| relaxation.end.is_infinite())
     }
 
     fn motion(&self, step: &Step, t: f64) -> Motion {
@@ -229,6 +253,7 @@ impl Step {
             order,
             y,
             slip,
+            relaxation: None,
         }
     }
 
@@ -262,6 +287,10 @@ impl Step {
 
     /// (y, `slip / v_i`) at time `t`.
     fn at(&self, t: f64) -> (f64, f64) {
+        if let Some(relaxation) = &self.relaxation {
+            let (y, slip) = relaxation.at(t);
+            return (y, slip * self.stretch.log_load.exp());
+        }
         let h = (t - self.start) / self.unit;
         let (mut y, mut slip) = (self.y[self.order], self.slip[self.order]);
         for k in (0..self.order).rev() {
@@ -271,8 +300,12 @@ impl Step {
         (y, slip)
     }
 
-    /// d ln v / dt times the step's unit: what the load adds, less what the contacts do.
+    /// d ln v / dt times the step's unit: what the load adds, less what the contacts do. A relaxation
+    /// has no extreme, and 0 here.
     fn growth(&self, t: f64) -> f64 {
+        if self.relaxation.is_some() {
+            return 0.0;
+        }
         let h = (t - self.start) / self.unit;
         let mut slope = 0.0;
         for k in (1..=self.order).rev() {
@@ -472,6 +505,25 @@ mod tests {
         let found = loaded.days_to_velocity(top * 0.9999, 100.0).unwrap();
         assert!((4.9..5.0).contains(&found), "{found}");
         assert_eq!(loaded.days_to_velocity(top * 1.0001, 100.0), None);
+    }
+
+    #[test]
+    fn a_stable_block_is_followed_for_ever_once_its_load_stands_still() {
+        let law = Law::from_paper(0.9, 4.0, 1.0, 1.0).unwrap();
+        let load = Load::new(vec![(0.0, 0.0), (30.0, 0.2), (60.0, 0.1)]).unwrap();
+        let loaded = LoadedLaw::new(&law, &load, Accuracy::Full).unwrap();
+        let mut motions = [None; 4];
+        loaded.motions(&[1e3, 1e6, 1e9, 1e15], &mut motions);
+        // a y^p = b e^f and m = 1 / (1 - p): v = D e^(f / (1 - m)).
+        let steady = (0.1_f64 / 0.1).exp();
+        let mut before = (0.0, 0.0);
+        for (t, motion) in [1e3, 1e6, 1e9, 1e15].into_iter().zip(motions) {
+            let motion = motion.unwrap();
+            assert!((motion.velocity / steady - 1.0).abs() < 1e-9, "{t}");
+            let mean = (motion.displacement - before.1) / (t - before.0);
+            assert!(t < 1e5 || (mean / steady - 1.0).abs() < 1e-9, "{t}: {mean}");
+            before = (t, motion.displacement);
+        }
     }
 
     #[test]
