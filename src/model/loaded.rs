@@ -508,6 +508,28 @@ mod tests {
     }
 
     #[test]
+    fn a_velocity_that_is_reached_between_two_steps_only_is_seen() {
+        // The law would accelerate, the load falls: a top that no knot marks.
+        let law = Law::from_paper(0.5, 4.0, 1.0, 1.0).unwrap();
+        let load = Load::new(vec![(0.0, 0.0), (100.0, -10.0)]).unwrap();
+        let loaded = LoadedLaw::new(&law, &load, Accuracy::Fit).unwrap();
+        let days: Vec<f64> = (0..20_000).map(|k| f64::from(k) * 1e-3).collect();
+        let mut motions = vec![None; days.len()];
+        loaded.motions(&days, &mut motions);
+        let velocities = motions.iter().flatten().map(|motion| motion.velocity);
+        let top = velocities.fold(0.0, f64::max);
+        let at = motions
+            .iter()
+            .position(|motion| motion.unwrap().velocity >= top);
+        let at = days[at.unwrap()];
+        assert!((0.5..15.0).contains(&at), "{at}");
+        // Just under the top, where no step happens to end.
+        let found = loaded.days_to_velocity(top * (1.0 - 1e-9), 20.0).unwrap();
+        assert!((found - at).abs() < 0.01, "{found} not {at}");
+        assert_eq!(loaded.days_to_velocity(top * (1.0 + 1e-6), 20.0), None);
+    }
+
+    #[test]
     fn a_stable_block_is_followed_for_ever_once_its_load_stands_still() {
         let law = Law::from_paper(0.9, 4.0, 1.0, 1.0).unwrap();
         let load = Load::new(vec![(0.0, 0.0), (30.0, 0.2), (60.0, 0.1)]).unwrap();
