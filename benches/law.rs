@@ -5,7 +5,7 @@
 use divan::{Bencher, black_box};
 use slipwatch::fit::{Curvature, Observation, Observations, Posterior, RateOptions};
 use slipwatch::forecast::Panel;
-use slipwatch::model::{Accuracy, Law, Trajectory};
+use slipwatch::model::{Accuracy, Law, Load, LoadedLaw, Motion, Sensitivities, Trajectory};
 use slipwatch::reading::{BenchmarkId, Quantity, days_since};
 use slipwatch::runtime::ingest::{ReadOptions, read_files};
 use std::path::Path;
@@ -50,6 +50,26 @@ fn trajectory_of_an_unstable_slope(accuracy: Accuracy) -> Trajectory {
 fn trajectory_of_a_stable_slope(accuracy: Accuracy) -> Trajectory {
     let law = Law::from_paper(0.98, 39.0, 1.0, 1.0).unwrap();
     Trajectory::solve(black_box(&law), 400.0, accuracy)
+}
+
+/// With the derivatives by every parameter, to set beside the solution alone.
+#[divan::bench(args = [Accuracy::Fit, Accuracy::Full])]
+fn sensitivities_of_an_unstable_slope(bencher: Bencher, accuracy: Accuracy) {
+    let law = Law::from_paper(1.35, 0.6, 1.0, 1.0).unwrap();
+    let mut solution = Sensitivities::solve(&law, 1.28, accuracy);
+    bencher.bench_local(|| solution.solve_again(black_box(&law), 1.28, accuracy));
+}
+
+/// A year of daily loads, read on 67 days.
+#[divan::bench(args = [Accuracy::Fit, Accuracy::Full])]
+fn a_year_under_daily_loads(bencher: Bencher, accuracy: Accuracy) {
+    let law = Law::from_paper(0.9, 4.0, 30.0, 1.0).unwrap();
+    let days: Vec<f64> = (0..366).map(f64::from).collect();
+    let load = Load::sampled(|day| 0.1 * (day / 58.0).sin(), &days).unwrap();
+    let loaded = LoadedLaw::new(&law, &load, accuracy).unwrap();
+    let times: Vec<f64> = (0_u32..67).map(|k| f64::from(k) * 5.4).collect();
+    let mut motions: Vec<Option<Motion>> = vec![None; times.len()];
+    bencher.bench_local(|| loaded.motions(black_box(&times), &mut motions));
 }
 
 #[divan::bench]

@@ -176,6 +176,57 @@ fn simulate_meets_the_reference_solutions() {
     }
 }
 
+/// The base of these: m = 1, y = 1 - 0.25 t at rest, v = 3 / y.
+const UNDER_LOAD: [&str; 9] = [
+    "simulate",
+    "--s-theta",
+    "1.5",
+    "--t-unit-days",
+    "2",
+    "--scale",
+    "3",
+    "--times",
+    "2,1,0",
+];
+
+#[test]
+fn simulate_follows_a_load_from_a_file() {
+    let (_folder, path) = file("load.csv", "days,log_load\n0,0\n1,0\n1,0.5\n");
+    let text = out(&slipwatch(&[&UNDER_LOAD[..], &["--load", &path]].concat()).success());
+    let got = rows(&text);
+    let steady = rows(&out(&slipwatch(&UNDER_LOAD).success()));
+    // Before the step nothing differs; on it the velocity is up by e^0.5, and the slip is the same.
+    assert_eq!(got[2], steady[2]);
+    let ratio = |k: usize| got[1][k].unwrap() / steady[1][k].unwrap();
+    assert!((ratio(2) - 0.5_f64.exp()).abs() < 1e-12 && (ratio(3) - 1.0).abs() < 1e-12);
+    // Then dy/dt = 0.5 - 0.75 e^0.5.
+    let y = 0.75 + 0.5 - 0.75 * 0.5_f64.exp();
+    let fast = 3.0 * 0.5_f64.exp() / y;
+    assert!((got[0][2].unwrap() / fast - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn a_load_that_cannot_be_read_is_said_with_its_place() {
+    for (text, parts) in [
+        ("days,log_load\n0,0\n1,x\n", ["line 3", "log_load", "\"x\""]),
+        ("days,log_load\n2,0\n1,0\n", ["line 3", "days", "\"1\""]),
+        (
+            "days,log_load\n2\n",
+            ["line 2", "found 1 field", "expected 2"],
+        ),
+        ("t,f\n2,0\n", ["line 1", "t,f", "days,log_load"]),
+        ("days,log_load\n", ["load.csv", "no row", "expected"]),
+    ] {
+        let (_folder, path) = file("load.csv", text);
+        let done = slipwatch(&[&UNDER_LOAD[..], &["--load", &path]].concat()).code(65);
+        for part in parts {
+            assert!(err(&done).contains(part), "{text:?}: {}", err(&done));
+        }
+    }
+    let done = slipwatch(&[&UNDER_LOAD[..], &["--load", "/nowhere/load.csv"]].concat()).code(74);
+    assert!(err(&done).contains("/nowhere/load.csv"));
+}
+
 #[test]
 fn simulate_has_nothing_to_say_from_the_singularity_on() {
     let args = [

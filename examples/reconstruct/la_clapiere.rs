@@ -240,6 +240,7 @@ fn law_after(v_i: f64) -> Law {
         kappa: a * p,
         p,
         a,
+        b,
     }
 }
 

@@ -6,6 +6,7 @@ mod convert;
 mod demo;
 mod exit;
 mod fit;
+mod load;
 mod replay;
 mod run;
 mod simulate;

@@ -1,10 +1,12 @@
 //! `simulate`: the law itself, at the times asked for.
 
 use super::exit::UsageError;
-use crate::model::{Accuracy, Law, Trajectory};
+use super::load::read_load;
+use crate::model::{Accuracy, Law, Load, LoadedLaw, Motion, Trajectory};
 use crate::regime::Regime;
 use serde::Serialize;
 use std::io::{self, Write};
+use std::path::PathBuf;
 
 /// Solve the law: CSV of t (days), x (`theta/theta_i` at m = 1), velocity, displacement
 ///
@@ -41,6 +43,10 @@ pub(super) struct Args {
         allow_hyphen_values = true
     )]
     times: Vec<f64>,
+    /// The load on the slope: CSV of days,log_load, the change of (tau/sigma')/A, linear between its lines;
+    /// two lines of one day are a step. The law's initial velocity is that without load
+    #[arg(long, value_name = "FILE.csv")]
+    load: Option<PathBuf>,
     /// How results look on stdout; text is CSV too
     #[arg(long, value_enum, default_value_t, value_name = "FORMAT")]
     format: TableFormat,
@@ -73,7 +79,8 @@ struct Simulation {
 /// Solves the law and prints it.
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let law = law(args)?;
-    let simulation = simulate(&law, &args.times)?;
+    let load = args.load.as_deref().map(read_load).transpose()?;
+    let simulation = simulate(&law, load.as_ref(), &args.times)?;
     let mut stdout = io::BufWriter::new(io::stdout().lock());
     match args.format {
         TableFormat::Json => writeln!(stdout, "{}", serde_json::to_string(&simulation)?)?,
@@ -98,16 +105,54 @@ fn law(args: &Args) -> anyhow::Result<Law> {
     })
 }
 
-fn simulate(law: &Law, times: &[f64]) -> anyhow::Result<Simulation> {
+/// The motion at each time asked for, and what the law says of itself.
+struct Solution {
+    motions: Vec<Option<Motion>>,
+    failure_days: Option<f64>,
+    transition_days: Option<f64>,
+}
+
+/// Under a constant load.
+fn unloaded(law: &Law, times: &[f64]) -> Solution {
+    let end = times.iter().copied().fold(0.0, f64::max);
+    let trajectory = Trajectory::solve(law, end, Accuracy::Full);
+    Solution {
+        motions: times.iter().map(|t| trajectory.at(*t)).collect(),
+        failure_days: trajectory.failure_days().filter(|days| days.is_finite()),
+        transition_days: law.transition_days(),
+    }
+}
+
+/// Under a load: a failure is looked for up to the last of the times, and there is no one transition.
+fn loaded(law: &Law, load: &Load, times: &[f64]) -> anyhow::Result<Solution> {
+    let loaded = LoadedLaw::new(law, load, Accuracy::Full)?;
+    let mut order: Vec<usize> = (0..times.len()).collect();
+    order.sort_by(|a, b| times[*a].total_cmp(&times[*b]));
+    let in_order: Vec<f64> = order.iter().map(|at| times[*at]).collect();
+    let mut found = vec![None; times.len()];
+    loaded.motions(&in_order, &mut found);
+    let mut motions = found.clone();
+    for (at, motion) in order.iter().zip(found) {
+        motions[*at] = motion;
+    }
+    Ok(Solution {
+        motions,
+        failure_days: loaded.failure_days(in_order.last().copied().unwrap_or(0.0)),
+        transition_days: None,
+    })
+}
+
+fn simulate(law: &Law, load: Option<&Load>, times: &[f64]) -> anyhow::Result<Simulation> {
     if let Some(t) = times.iter().find(|t| !(t.is_finite() && **t >= 0.0)) {
         let problem = format!("--times: found {t}, expected finite numbers of days, 0 or later");
         return Err(UsageError(problem).into());
     }
-    let end = times.iter().copied().fold(0.0, f64::max);
-    let trajectory = Trajectory::solve(law, end, Accuracy::Full);
-    let failure_days = trajectory.failure_days().filter(|days| days.is_finite());
-    let rows = times.iter().map(|&t| {
-        let motion = trajectory.at(t);
+    let solution = match load {
+        None => unloaded(law, times),
+        Some(load) => loaded(law, load, times)?,
+    };
+    let failure_days = solution.failure_days;
+    let rows = times.iter().zip(&solution.motions).map(|(&t, motion)| {
         if motion.is_none() && failure_days.is_none_or(|failure| t < failure) {
             anyhow::bail!("the law could not be solved as far as day {t:?}");
         }
@@ -124,7 +169,7 @@ fn simulate(law: &Law, times: &[f64]) -> anyhow::Result<Simulation> {
     Ok(Simulation {
         regime: law.regime(),
         failure_days,
-        transition_days: law.transition_days(),
+        transition_days: solution.transition_days,
         rows: rows.collect::<anyhow::Result<_>>()?,
     })
 }

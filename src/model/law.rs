@@ -1,5 +1,7 @@
 //! The parameters of the law, in the regular form and in the paper's.
 
+use super::coefficients::Coefficients;
+use super::scalar::inverse_box_cox_ln;
 use super::tail;
 use crate::regime::Regime;
 
@@ -17,6 +19,9 @@ pub struct Law {
     pub p: f64,
     /// Healing rate a = m / `theta_i`, 1/day, kept apart because kappa = a p loses it at m = 1.
     pub a: f64,
+    /// Slip rate over `D_c` times m, b = r + a, 1/day, kept apart because that sum loses it where b is
+    /// small beside a: far from a steady state that is much faster.
+    pub b: f64,
 }
 
 /// The paper's parameters; `x_i`, T and D do not exist at m = 1, where S `theta_i` is the control.
@@ -87,12 +92,20 @@ impl Law {
         positive("scale", d)?;
         let a = m / (x_i * t_unit_days);
         let over_one = decimal_minus_one(m);
+        // S theta_i = x_i^(1-m). Powers lose nothing where the exponent is large, nor ln(1 + z) beside 1.
+        let ln_s_theta = -over_one * decimal_ln(x_i);
+        let s_theta = x_i.powf(-over_one);
         Ok(Self {
-            v_i: d * (-m * x_i.ln()).exp(),
-            r: a * (-over_one * x_i.ln()).exp_m1(),
+            v_i: d * x_i.powf(-m),
+            r: if ln_s_theta.abs() < 1.0 {
+                a * ln_s_theta.exp_m1()
+            } else {
+                a * (s_theta - 1.0)
+            },
             kappa: over_one / (x_i * t_unit_days),
             p: over_one / m,
             a,
+            b: a * s_theta,
         })
     }
 
@@ -111,6 +124,7 @@ impl Law {
             kappa: 0.0,
             p: 0.0,
             a,
+            b: a * s_theta_i,
         })
     }
 
@@ -123,25 +137,21 @@ impl Law {
             kappa,
             p,
             a,
+            b: a + r,
         }
     }
 
     /// The paper's parameters of this law.
     pub fn paper(&self) -> PaperParameters {
         let m = 1.0 / (1.0 - self.p);
-        let b = self.a + self.r;
-        let s_theta_i = (b / self.a)
-            .is_finite()
-            .then_some(b / self.a)
-            .filter(|s| *s > 0.0);
-        let d_c = (m * self.v_i / b)
-            .is_finite()
-            .then_some(m * self.v_i / b)
-            .filter(|d| *d > 0.0);
-        let x_i = s_theta_i
-            .filter(|_| self.p != 0.0)
-            .map(|_| ((self.r / self.a).ln_1p() / (1.0 - m)).exp())
-            .filter(|x| x.is_finite() && *x > 0.0);
+        let positive = |value: f64| Some(value).filter(|value| value.is_finite() && *value > 0.0);
+        let s_theta_i = positive(self.b / self.a);
+        let d_c = positive(m * self.v_i / self.b);
+        // x_i = y_s^(-1/m)
+        let x_i = self
+            .ln_y_steady()
+            .filter(|_| self.p != 0.0 && s_theta_i.is_some())
+            .and_then(|ln_y| positive((-ln_y * (1.0 - self.p)).exp()));
         let t_unit_days = x_i.map(|x| m / (self.a * x)).filter(|t| t.is_finite());
         let d = x_i
             .map(|x| self.v_i * (m * x.ln()).exp())
@@ -168,7 +178,7 @@ impl Law {
 
     /// dy/dt at inverse velocity y, 1/day.
     pub fn slope(&self, y: f64) -> f64 {
-        -self.r + self.kappa * box_cox(y, self.p)
+        Coefficients::<f64>::of(self).slope_at_ln(y.ln())
     }
 
     /// ln of the y at which dy/dt is zero, where there is one.
@@ -176,7 +186,7 @@ impl Law {
         if self.kappa == 0.0 {
             return None;
         }
-        let ln_y = inverse_box_cox_ln(self.r / self.kappa, self.p);
+        let ln_y = Coefficients::<f64>::of(self).ln_y_steady();
         ln_y.is_finite().then_some(ln_y)
     }
 
@@ -205,6 +215,11 @@ impl Law {
         let z = (2.0 * self.r / self.kappa + 1.0) / (2.0 - self.p);
         let ln_y = inverse_box_cox_ln(z, self.p);
         ln_y.is_finite().then_some(ln_y)
+    }
+
+    /// Days from t = 0 to the singularity; `None` where there is none.
+    pub fn failure_days(&self) -> Option<f64> {
+        tail::fails_from(self, 0.0).then(|| tail::remaining_days(self, 0.0))
     }
 
     /// Days from t = 0 until the velocity first reaches `velocity`; `None` when it never does.
@@ -239,6 +254,7 @@ impl Law {
             r: -self.r,
             kappa: -self.kappa,
             a: -self.a,
+            b: -self.b,
             ..*self
         }
     }
@@ -253,6 +269,7 @@ impl Law {
             kappa: self.kappa * shrink,
             p: self.p,
             a: self.a * shrink,
+            b: self.b / y,
         }
     }
 
@@ -309,19 +326,13 @@ fn decimal_minus_one(m: f64) -> f64 {
     exact.unwrap_or(m - 1.0)
 }
 
-/// (y^p - 1)/p, and ln y at p = 0.
-pub(super) fn box_cox(y: f64, p: f64) -> f64 {
-    let ln_y = y.ln();
-    if p == 0.0 {
-        ln_y
+/// ln of the decimal number that x was written as.
+fn decimal_ln(x: f64) -> f64 {
+    if (0.5..1.5).contains(&x) {
+        decimal_minus_one(x).ln_1p()
     } else {
-        (p * ln_y).exp_m1() / p
+        x.ln()
     }
-}
-
-/// ln y with (y^p - 1)/p = z; NaN where there is none.
-fn inverse_box_cox_ln(z: f64, p: f64) -> f64 {
-    if p == 0.0 { z } else { (p * z).ln_1p() / p }
 }
 
 #[cfg(test)]

@@ -3,10 +3,20 @@
 //! In the inverse velocity `y = v_i/v` and p = 1 - 1/m the law is one regular equation,
 //! `dy/dt = -r + kappa (y^p - 1)/p`, finite and smooth through m = 1.
 
+mod coefficients;
 mod law;
+mod load;
+mod loaded;
+mod path;
+mod relaxation;
+mod scalar;
+mod sensitivity;
 mod tail;
 mod taylor;
 mod trajectory;
 
 pub use law::{Law, LawError, PaperParameters, StateSense, SteadyState};
+pub use load::Load;
+pub use loaded::LoadedLaw;
+pub use sensitivity::{DaysWithGradient, Gradient, MotionWithGradients, Sensitivities};
 pub use trajectory::{Accuracy, Motion, Trajectory};

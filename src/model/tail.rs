@@ -3,7 +3,9 @@
 //! Time cannot resolve it (`t_c` - t cancels), so y is solved for from
 //! `t_c - t = integral from 0 to y of dy / (r - kappa bc(y; p))`.
 
+use super::coefficients::Coefficients;
 use super::law::Law;
+use super::scalar::{box_cox_by_p, box_cox_of_ln};
 
 /// Nodes and weights of 16-point Gauss-Legendre quadrature on [-1, 1] (positive half).
 const NODES: [(f64, f64); 8] = [
@@ -20,6 +22,9 @@ const NODES: [(f64, f64); 8] = [
 /// Beyond this many e-folds below y the rest of the integral is under the rounding of the sum.
 const DEEPEST_E_FOLD: f64 = 42.0;
 
+/// More panels than an integral within f64's range needs, which halve towards a steady state.
+const MOST_PANELS: usize = 3000;
+
 /// Whether the law runs into a finite-time singularity from inverse velocity `exp(ln_y)` on.
 pub(super) fn fails_from(law: &Law, ln_y: f64) -> bool {
     law.kappa >= 0.0 && law.p < 1.0 && slope_at_ln(law, ln_y) < 0.0
@@ -30,49 +35,100 @@ pub(super) fn remaining_days(law: &Law, ln_y: f64) -> f64 {
     days_between(law, ln_y, ln_y - DEEPEST_E_FOLD)
 }
 
+/// The derivatives of [`remaining_days`] by r, kappa and p.
+pub(super) fn remaining_days_by(law: &Law, ln_y: f64) -> [f64; 3] {
+    days_between_by(law, ln_y, ln_y - DEEPEST_E_FOLD)
+}
+
 /// Days that the law takes to accelerate from one inverse velocity to a smaller one.
 pub(super) fn days_between(law: &Law, ln_y_from: f64, ln_y_to: f64) -> f64 {
+    if law.kappa == 0.0 {
+        // m = 1: y is a straight line.
+        return ln_y_from.exp() * -(ln_y_to - ln_y_from).exp_m1() / law.r;
+    }
     // y = y_from exp(-s): days = y_from * integral of exp(-s) / (r - kappa bc(y)) ds
-    let integrand = |s: f64| (-s).exp() / -slope_at_ln(law, ln_y_from - s);
-    ln_y_from.exp() * integrate_down(law, (ln_y_from, ln_y_to), integrand)
+    let integrand = |s: f64| [(-s).exp() / -slope_at_ln(law, ln_y_from - s)];
+    let [days] = integrate_down(law, (ln_y_from, ln_y_to), integrand);
+    ln_y_from.exp() * days
+}
+
+/// The derivatives of [`days_between`] by r, kappa and p.
+pub(super) fn days_between_by(law: &Law, ln_y_from: f64, ln_y_to: f64) -> [f64; 3] {
+    let integrand = |s: f64| pace_by(law, ln_y_from - s).map(|by| (-s).exp() * by);
+    integrate_down(law, (ln_y_from, ln_y_to), integrand).map(|days| ln_y_from.exp() * days)
 }
 
 /// Slip over `v_i` between two inverse velocities of an acceleration: d slip / d ln y = 1 / slope.
 pub(super) fn slip_between(law: &Law, ln_y_from: f64, ln_y_to: f64) -> f64 {
-    integrate_down(law, (ln_y_from, ln_y_to), |s| {
-        1.0 / -slope_at_ln(law, ln_y_from - s)
-    })
+    let integrand = |s: f64| [1.0 / -slope_at_ln(law, ln_y_from - s)];
+    let [slip] = integrate_down(law, (ln_y_from, ln_y_to), integrand);
+    slip
+}
+
+/// The derivatives of [`slip_between`] by r, kappa and p.
+pub(super) fn slip_between_by(law: &Law, ln_y_from: f64, ln_y_to: f64) -> [f64; 3] {
+    integrate_down(law, (ln_y_from, ln_y_to), |s| pace_by(law, ln_y_from - s))
+}
+
+/// The derivatives of 1 / (r - kappa bc(y; p)) by r, kappa and p, at fixed y.
+fn pace_by(law: &Law, ln_y: f64) -> [f64; 3] {
+    let pace = 1.0 / slope_at_ln(law, ln_y);
+    let slopes = [
+        -1.0,
+        box_cox_of_ln(ln_y, law.p),
+        law.kappa * box_cox_by_p(ln_y, law.p),
+    ];
+    slopes.map(|slope| slope * pace * pace)
 }
 
 /// Integrates over s = `ln(y_from / y)`. Panels keep their distance from the pole of 1/slope (the steady
 /// state, behind or ahead), so that 16 nodes reach rounding on each.
-fn integrate_down(law: &Law, span: (f64, f64), integrand: impl Fn(f64) -> f64) -> f64 {
+fn integrate_down<const N: usize>(
+    law: &Law,
+    span: (f64, f64),
+    integrand: impl Fn(f64) -> [f64; N],
+) -> [f64; N] {
     let end = span.0 - span.1;
     let pole = law
         .ln_y_steady()
         .map_or(f64::INFINITY, |pole| span.0 - pole);
     let smoothest = 1.5 / law.p.abs().max(1.0);
-    let (mut from, mut sum) = (0.0, 0.0);
-    while from < end {
+    let (mut from, mut sum, mut lost) = (0.0, [0.0; N], [0.0; N]);
+    for _ in 0..MOST_PANELS {
+        if from >= end {
+            break;
+        }
         let clearance = if pole > from {
             0.5 * (pole - from)
         } else {
             from - pole
         };
-        let to = (from + clearance.clamp(1e-9, smoothest.max(0.5 * from).min(6.0))).min(end);
-        sum += panel(&integrand, from, to);
+        let least = (4.0 * f64::EPSILON * from).max(f64::MIN_POSITIVE);
+        let to = (from + clearance.clamp(least, smoothest.max(0.5 * from).min(6.0))).min(end);
+        let panel = panel(&integrand, from, to);
+        for ((sum, lost), panel) in sum.iter_mut().zip(&mut lost).zip(panel) {
+            // Kahan's summation: a time to failure is asked to its last digits just before it.
+            let term = panel - *lost;
+            let next = *sum + term;
+            *lost = (next - *sum) - term;
+            *sum = next;
+        }
         from = to;
     }
     sum
 }
 
 /// 16-point Gauss-Legendre quadrature over one panel.
-fn panel(integrand: &impl Fn(f64) -> f64, from: f64, to: f64) -> f64 {
+fn panel<const N: usize>(integrand: &impl Fn(f64) -> [f64; N], from: f64, to: f64) -> [f64; N] {
     let (middle, half) = (f64::midpoint(from, to), (to - from) / 2.0);
-    let pairs = NODES
-        .iter()
-        .map(|(x, w)| w * (integrand(middle - half * x) + integrand(middle + half * x)));
-    half * pairs.sum::<f64>()
+    let mut sum = [0.0; N];
+    for (x, w) in NODES {
+        let (below, above) = (integrand(middle - half * x), integrand(middle + half * x));
+        for (sum, (below, above)) in sum.iter_mut().zip(below.into_iter().zip(above)) {
+            *sum += w * (below + above);
+        }
+    }
+    sum.map(|sum| half * sum)
 }
 
 /// ln y with `remaining` days left, by Newton's method in logarithms from below `ln_y_start`.
@@ -91,9 +147,7 @@ pub(super) fn ln_y_with_remaining(law: &Law, remaining: f64, ln_y_start: f64) ->
     ln_y
 }
 
-fn slope_at_ln(law: &Law, ln_y: f64) -> f64 {
-    if law.p == 0.0 {
-        return law.kappa * ln_y - law.r;
-    }
-    law.kappa * ((law.p * ln_y).exp_m1() / law.p) - law.r
+/// dy/dt at ln y, 1/day.
+pub(super) fn slope_at_ln(law: &Law, ln_y: f64) -> f64 {
+    Coefficients::<f64>::of(law).slope_at_ln(ln_y)
 }

@@ -1,58 +1,75 @@
 //! One Taylor step of the law: y, its Box-Cox transform and the slip, to any order by recurrence.
 
-use super::law::{Law, box_cox};
+use super::coefficients::Coefficients;
+use super::scalar::Scalar;
 
 /// The highest order that a segment can hold.
 pub(super) const MAX_ORDER: usize = 30;
 
-/// y(t) and the slip over `v_i` from `start`, as polynomials in t - start, good up to `span`.
+/// The coefficients of one polynomial.
+pub(super) type Series<S> = [S; MAX_ORDER + 1];
+
+/// y(t) and the slip over `v_i` from `start`, as polynomials in (t - start) / `unit`, good up to `span`.
+///
+/// The unit is the law's own time there: in days the coefficients of a slope that takes 1e12 of them, or
+/// 1e-13, leave the range of f64.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Segment {
+pub(super) struct Segment<S> {
     pub(super) start: f64,
     pub(super) span: f64,
+    unit: f64,
     order: usize,
-    y: [f64; MAX_ORDER + 1],
-    slip: [f64; MAX_ORDER + 1],
+    y: Series<S>,
+    slip: Series<S>,
 }
 
-impl Segment {
+impl<S: Scalar> Segment<S> {
     /// Expands the law about `start`, where the inverse velocity is `y_0` and the slip `slip_0`.
     ///
-    /// With B = bc(y; p): y' = -r + kappa B and y B' = y' (1 + p B); with u = 1/y: y u = 1.
-    pub(super) fn expand(law: &Law, order: usize, start: f64, at: (f64, f64)) -> Self {
+    /// With B = bc(y; p) and W = y^p = 1 + p B: y' = -r + kappa B and y B' = y' W; with u = 1/y: y u = 1.
+    pub(super) fn expand(law: &Coefficients<S>, order: usize, start: f64, at: (S, S)) -> Self {
+        let zero = S::constant(0.0);
         let (y_0, slip_0) = at;
-        let mut y = [0.0; MAX_ORDER + 1];
-        let mut slip = [0.0; MAX_ORDER + 1];
-        let mut b = [0.0; MAX_ORDER + 1];
-        let mut u = [0.0; MAX_ORDER + 1];
+        let mut y = [zero; MAX_ORDER + 1];
+        let mut slip = [zero; MAX_ORDER + 1];
+        let mut u = [zero; MAX_ORDER + 1];
+        // B' and B; b[0] is never needed.
+        let (mut b, mut b_slope) = (u, u);
+        let ln_y = y_0.ln();
+        let w_0 = (law.p * ln_y).exp();
+        let slope_per_day = law.slope_at_ln(ln_y);
+        let unit = unit_days(slope_per_day / y_0, law.kappa * w_0 / y_0);
+        let slope = slope_per_day.scaled(unit);
+        let kappa = law.kappa.scaled(unit);
+        let gain = kappa * law.p;
         y[0] = y_0;
         slip[0] = slip_0;
-        b[0] = box_cox(y_0, law.p);
-        u[0] = 1.0 / y_0;
-        let power = 1.0 + law.p * b[0];
+        u[0] = S::constant(1.0) / y_0;
+        let minus_u_0 = -u[0];
         for k in 0..order {
-            let next = (k + 1) as f64;
-            y[k + 1] = if k == 0 {
-                law.kappa * b[0] - law.r
-            } else {
-                law.kappa * b[k] / next
-            };
-            slip[k + 1] = u[k] / next;
-            // Coefficient k of y' (1 + p B), less the known part of y B'.
-            let mut sum = next * y[k + 1] * power;
-            let mut product = y[k + 1] * u[0];
-            for j in 1..=k {
-                let j_f = j as f64;
-                sum += (next - j_f) * y[k + 1 - j] * law.p * b[j] - j_f * b[j] * y[k + 1 - j];
-                product += y[k + 1 - j] * u[j];
+            let over_next = 1.0 / (k + 1) as f64;
+            let y_slope = if k == 0 { slope } else { kappa * b[k] };
+            y[k + 1] = y_slope.scaled(over_next);
+            slip[k + 1] = u[k].scaled(unit * over_next);
+            // Coefficient k of y' W, less the known part of y B'.
+            let mut known = y_slope * w_0;
+            if k > 0 {
+                known = known + slope * law.p * b[k] + gain * square(&b, k);
             }
-            b[k + 1] = sum / (next * y_0);
-            u[k + 1] = -product * u[0];
+            let mut product = y[k + 1] * u[0];
+            for j in 0..k {
+                known = known - b_slope[j] * y[k - j];
+                product = product + y[j + 1] * u[k - j];
+            }
+            b_slope[k] = known * u[0];
+            b[k + 1] = b_slope[k].scaled(over_next);
+            u[k + 1] = product * minus_u_0;
         }
         let radius = radius(&y, order).min(radius(&u, order));
         Self {
             start,
-            span: radius * step_fraction(order),
+            span: radius * unit * step_fraction(order),
+            unit,
             order,
             y,
             slip,
@@ -60,31 +77,57 @@ impl Segment {
     }
 
     /// (y, `slip / v_i`) at time `t`.
-    pub(super) fn at(&self, t: f64) -> (f64, f64) {
-        let h = t - self.start;
+    pub(super) fn at(&self, t: f64) -> (S, S) {
+        let h = (t - self.start) / self.unit;
         let mut y = self.y[self.order];
         let mut slip = self.slip[self.order];
         for k in (0..self.order).rev() {
-            y = y * h + self.y[k];
-            slip = slip * h + self.slip[k];
+            y = y.scaled(h) + self.y[k];
+            slip = slip.scaled(h) + self.slip[k];
         }
         (y, slip)
     }
 }
 
+/// Days in which y, or its slope, would change by its own size; 1 where they never do.
+fn unit_days<S: Scalar>(growth: S, curvature: S) -> f64 {
+    let fastest = growth.value().abs().max(curvature.value().abs());
+    let unit = 1.0 / fastest;
+    if unit.is_finite() && unit > 0.0 {
+        unit
+    } else {
+        1.0
+    }
+}
+
+/// The sum of b_j b_(k-j) over 0 < j < k.
+fn square<S: Scalar>(b: &Series<S>, k: usize) -> S {
+    let mut half = S::constant(0.0);
+    for j in 1..k.div_ceil(2) {
+        half = half + b[j] * b[k - j];
+    }
+    let twice = half.scaled(2.0);
+    if k > 0 && k.is_multiple_of(2) {
+        twice + b[k / 2] * b[k / 2]
+    } else {
+        twice
+    }
+}
+
 /// Estimates the radius of convergence from the two last coefficients.
-fn radius(c: &[f64; MAX_ORDER + 1], order: usize) -> f64 {
+pub(super) fn radius<S: Scalar>(c: &Series<S>, order: usize) -> f64 {
     let one = |k: usize| {
-        if c[k] == 0.0 {
+        let share = (c[0].value() / c[k].value()).abs();
+        if c[k].value() == 0.0 {
             f64::INFINITY
         } else {
-            (c[0] / c[k]).abs().powf(1.0 / k as f64)
+            share.powf(1.0 / k as f64)
         }
     };
     one(order).min(one(order - 1))
 }
 
 /// The share of the radius that keeps the remainder near 1e-16 (order 28) or 1e-11 (order 16).
-fn step_fraction(order: usize) -> f64 {
+pub(super) fn step_fraction(order: usize) -> f64 {
     if order >= 24 { 0.26 } else { 0.2 }
 }

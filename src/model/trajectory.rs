@@ -1,8 +1,9 @@
-//! The solution of the law from t = 0 on: velocity, displacement, state, failure and transition time.
+//! The solution of the law from t = 0 on: velocity and displacement at any time, and the failure.
 
+use super::coefficients::Coefficients;
 use super::law::Law;
+use super::path::{Path, Place};
 use super::tail;
-use super::taylor::Segment;
 
 /// How exact a solution is to be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,7 +15,7 @@ pub enum Accuracy {
 }
 
 impl Accuracy {
-    fn order(self) -> usize {
+    pub(super) fn order(self) -> usize {
         match self {
             Self::Full => 28,
             Self::Fit => 16,
@@ -23,7 +24,7 @@ impl Accuracy {
 
     /// A bound on the work: more segments than a solution within f64's range needs, or than a fit can
     /// use (a law that needs more is about to leave its domain).
-    fn most_segments(self) -> usize {
+    pub(super) fn most_segments(self) -> usize {
         match self {
             Self::Full => 4000,
             Self::Fit => 48,
@@ -31,7 +32,7 @@ impl Accuracy {
     }
 
     /// ln y below which the last stretch before failure is solved by the time that remains.
-    fn ln_y_of_tail(self) -> f64 {
+    pub(super) fn ln_y_of_tail(self) -> f64 {
         match self {
             Self::Full => -2.0,
             Self::Fit => -5.0,
@@ -54,83 +55,57 @@ pub struct Motion {
 #[derive(Debug, Clone)]
 pub struct Trajectory {
     law: Law,
-    segments: Vec<Segment>,
-    /// Where the segments stop: (t, ln y, `slip / v_i`) at the start of the tail before failure.
-    tail: Option<(f64, f64, f64)>,
-    failure_days: Option<f64>,
+    path: Path<f64>,
 }
 
 impl Trajectory {
     /// Solves `law` over `[0, end_days]`.
     pub fn solve(law: &Law, end_days: f64, accuracy: Accuracy) -> Self {
-        let failure_days = tail::fails_from(law, 0.0).then(|| tail::remaining_days(law, 0.0));
-        let mut segments = Vec::with_capacity(16);
-        let mut tail = None;
-        let (mut t, mut y, mut slip) = (0.0, 1.0, 0.0);
-        while t <= end_days && segments.len() < accuracy.most_segments() {
-            if failure_days.is_some() && f64::ln(y) < accuracy.ln_y_of_tail() {
-                tail = Some((t, f64::ln(y), slip));
-                break;
-            }
-            let mut segment = Segment::expand(law, accuracy.order(), t, (y, slip));
-            segment.span = segment
-                .span
-                .min((end_days - t).max(0.0) * 1.01 + f64::MIN_POSITIVE);
-            let next = t + segment.span;
-            (y, slip) = segment.at(next);
-            segments.push(segment);
-            if !(next > t && y > 0.0 && y.is_finite() && slip.is_finite()) {
-                break;
-            }
-            t = next;
-        }
-        Self {
+        let mut trajectory = Self {
             law: *law,
-            segments,
-            tail,
-            failure_days,
-        }
+            path: Path::empty(),
+        };
+        trajectory.solve_again(law, end_days, accuracy);
+        trajectory
+    }
+
+    /// Solves another law in the room that this solution has taken: where that is enough, as it is from
+    /// the second of many like laws on, without allocating.
+    pub fn solve_again(&mut self, law: &Law, end_days: f64, accuracy: Accuracy) {
+        self.law = *law;
+        let coefficients = Coefficients::<f64>::of(law);
+        self.path.solve((law, &coefficients), end_days, accuracy);
     }
 
     /// Days from t = 0 to the singularity, where there is one, within the solved span or beyond.
     pub fn failure_days(&self) -> Option<f64> {
-        self.failure_days
+        match self.path.tail() {
+            Some(tail) => Some(tail.failure_days),
+            None => self.law.failure_days(),
+        }
     }
 
     /// The motion `t` days after the start; `None` from the singularity on.
     pub fn at(&self, t: f64) -> Option<Motion> {
-        if self.failure_days.is_some_and(|failure| t >= failure) {
-            return None;
+        match self.path.place(t) {
+            Place::At((y, slip)) => Some(self.motion(y, slip)),
+            Place::BeforeFailure(remaining) => self.before_failure(remaining),
+            Place::Nowhere => None,
         }
-        if let (Some((start, ..)), Some(failure)) = (self.tail, self.failure_days)
-            && t > start
-        {
-            return self.before_failure(failure - t);
-        }
-        let index = self
-            .segments
-            .partition_point(|segment| segment.start <= t)
-            .saturating_sub(1);
-        let segment = self.segments.get(index)?;
-        if t > segment.start + segment.span * (1.0 + 1e-9) {
-            return None;
-        }
-        let (y, slip) = segment.at(t);
-        (y > 0.0).then(|| self.motion(y, slip))
     }
 
     /// The motion `remaining` days before the singularity, exact however few they are.
     pub fn before_failure(&self, remaining: f64) -> Option<Motion> {
-        let (start, ln_y_start, slip_start) = self.tail?;
-        let failure = self.failure_days?;
-        if !(remaining > 0.0 && remaining <= failure) {
+        let tail = self.path.tail()?;
+        if !(remaining > 0.0 && remaining <= tail.failure_days) {
             return None;
         }
-        if remaining > failure - start {
-            return self.at(failure - remaining);
+        if remaining > tail.failure_days - tail.start {
+            return self.at(tail.failure_days - remaining);
         }
+        let ln_y_start = tail.at.0.ln();
         let ln_y = tail::ln_y_with_remaining(&self.law, remaining, ln_y_start);
-        let slip = slip_start + tail::slip_between(&self.law, ln_y_start, ln_y);
+        let slip = tail.at.1 + tail::slip_between(&self.law, ln_y_start, ln_y);
         Some(Motion {
             y: ln_y.exp(),
             velocity: self.law.v_i * (-ln_y).exp(),

@@ -1,0 +1,138 @@
+//! The solution from t = 0 on, piece by piece: beside a steady state, Taylor segments, before failure.
+
+use super::coefficients::Coefficients;
+use super::law::Law;
+use super::relaxation::Relaxation;
+use super::scalar::Scalar;
+use super::tail;
+use super::taylor::Segment;
+use super::trajectory::Accuracy;
+
+/// Where the segments stop and the last stretch before failure begins: (y, `slip / v_i`) then.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Tail<S> {
+    pub(super) start: f64,
+    pub(super) at: (S, S),
+    pub(super) failure_days: f64,
+}
+
+/// The pieces of a solution, in the order of time.
+#[derive(Debug, Clone)]
+pub(super) struct Path<S> {
+    departure: Option<Relaxation<S>>,
+    segments: Vec<Segment<S>>,
+    arrival: Option<Relaxation<S>>,
+    tail: Option<Tail<S>>,
+}
+
+/// What holds at a time asked for.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Place<S> {
+    /// (y, `slip / v_i`).
+    At((S, S)),
+    /// So many days before the failure, on the tail.
+    BeforeFailure(f64),
+    /// Past the failure, or past what was solved.
+    Nowhere,
+}
+
+impl<S: Scalar> Path<S> {
+    /// Room for a solution; what a slope needs is under 30 segments as a rule.
+    pub(super) fn empty() -> Self {
+        Self {
+            departure: None,
+            segments: Vec::with_capacity(32),
+            arrival: None,
+            tail: None,
+        }
+    }
+
+    /// Solves over `[0, end_days]`, in the room that there is.
+    pub(super) fn solve(
+        &mut self,
+        (law, coefficients): (&Law, &Coefficients<S>),
+        end_days: f64,
+        accuracy: Accuracy,
+    ) {
+        self.segments.clear();
+        (self.departure, self.arrival, self.tail) = (None, None, None);
+        let fails = tail::fails_from(law, 0.0);
+        let order = accuracy.order();
+        let (mut t, mut at) = (0.0, (S::constant(1.0), S::constant(0.0)));
+        self.departure = Relaxation::new(coefficients, order, t, at);
+        if let Some(departure) = &self.departure {
+            if departure.end > end_days {
+                return;
+            }
+            t = departure.end;
+            at = departure.at(t);
+        }
+        while t <= end_days && self.segments.len() < accuracy.most_segments() {
+            if fails && at.0.value().ln() < accuracy.ln_y_of_tail() {
+                self.tail = Some(Tail {
+                    start: t,
+                    at,
+                    failure_days: tail::remaining_days(law, 0.0),
+                });
+                return;
+            }
+            if law.kappa < 0.0 && self.departure.is_none() {
+                self.arrival = Relaxation::new(coefficients, order, t, at);
+                if self.arrival.is_some() {
+                    return;
+                }
+            }
+            let mut segment = Segment::expand(coefficients, order, t, at);
+            segment.span = segment
+                .span
+                .min((end_days - t).max(0.0) * 1.01 + f64::MIN_POSITIVE);
+            let next = t + segment.span;
+            at = segment.at(next);
+            self.segments.push(segment);
+            let (y, slip) = (at.0.value(), at.1.value());
+            if !(next > t && y > 0.0 && y.is_finite() && slip.is_finite()) {
+                return;
+            }
+            t = next;
+        }
+    }
+
+    pub(super) fn tail(&self) -> Option<&Tail<S>> {
+        self.tail.as_ref()
+    }
+
+    /// What holds `t` days after the start.
+    pub(super) fn place(&self, t: f64) -> Place<S> {
+        if let Some(tail) = &self.tail
+            && t > tail.start
+        {
+            return if t < tail.failure_days {
+                Place::BeforeFailure(tail.failure_days - t)
+            } else {
+                Place::Nowhere
+            };
+        }
+        let beside = self.departure.iter().chain(&self.arrival);
+        if let Some(beside) = beside
+            .into_iter()
+            .find(|one| t >= one.start && t <= one.end)
+        {
+            return Place::At(beside.at(t));
+        }
+        let index = self
+            .segments
+            .partition_point(|segment| segment.start <= t)
+            .saturating_sub(1);
+        match self.segments.get(index) {
+            Some(segment) if t <= segment.start + segment.span * (1.0 + 1e-9) => {
+                let at = segment.at(t);
+                if at.0.value() > 0.0 {
+                    Place::At(at)
+                } else {
+                    Place::Nowhere
+                }
+            }
+            _ => Place::Nowhere,
+        }
+    }
+}

@@ -1,0 +1,134 @@
+//! The law beside its steady state, for as long as it stays there: for ever, if the state attracts.
+//!
+//! With z = `y/y_s` and E = `E_0` exp(-lambda t), the relaxing mode carried beyond first order,
+//! z(E) solves E dz/dE = bc(z; p): a power series in E that depends on p alone. Velocity and slip follow
+//! from it at any time, and what matters beside the steady state, z - 1, is never a difference.
+
+use super::coefficients::Coefficients;
+use super::scalar::Scalar;
+use super::taylor::{MAX_ORDER, Series, radius, step_fraction};
+
+/// Beyond this |z - 1| max(1, |p - 1|) the series is not worth trying.
+const FARTHEST: f64 = 0.4;
+
+/// The law from `start` until `end`, beside its steady state.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Relaxation<S> {
+    pub(super) start: f64,
+    /// Infinite where the steady state attracts.
+    pub(super) end: f64,
+    /// Of the departure from the steady state, 1/day; negative where the state repels.
+    rate: S,
+    y_steady: S,
+    departure: S,
+    slip: S,
+    order: usize,
+    z: Series<S>,
+    u: Series<S>,
+}
+
+impl<S: Scalar> Relaxation<S> {
+    /// From `at`, (y, `slip / v_i`) at `start`; `None` where the steady state is far or is not.
+    pub(super) fn new(law: &Coefficients<S>, order: usize, start: f64, at: (S, S)) -> Option<Self> {
+        if law.kappa.value() == 0.0 {
+            return None;
+        }
+        let ln_y_steady = law.ln_y_steady();
+        let stretch = (law.p.value() - 1.0).abs().max(1.0);
+        let ln_z = at.0.ln() - ln_y_steady;
+        // NaN, where there is no steady state.
+        let distance = ln_z.value().abs() * stretch;
+        if distance.is_nan() || distance >= FARTHEST {
+            return None;
+        }
+        let (z, u) = series(law.p, order);
+        let reach = step_fraction(order) * radius(&z, order).min(radius(&u, order));
+        let departure = departure(&z, order, ln_z.exp_m1());
+        if departure.value().is_nan() || departure.value().abs() >= reach {
+            return None;
+        }
+        let minus_one = S::constant(-1.0);
+        let rate = -(law.kappa * ((law.p + minus_one) * ln_y_steady).exp());
+        let room = (reach / departure.value().abs()).ln() / -rate.value();
+        let stays = rate.value() >= 0.0 || departure.value() == 0.0;
+        Some(Self {
+            start,
+            end: if stays { f64::INFINITY } else { start + room },
+            rate,
+            y_steady: ln_y_steady.exp(),
+            departure,
+            slip: at.1,
+            order,
+            z,
+            u,
+        })
+    }
+
+    /// (y, `slip / v_i`) at time `t`.
+    pub(super) fn at(&self, t: f64) -> (S, S) {
+        let days = t - self.start;
+        let decay = (-self.rate).scaled(days);
+        let departure = self.departure * decay.exp();
+        // E_0^k - E^k from E_0 - E, without a difference of powers.
+        let first = -(self.departure * decay.exp_m1());
+        let mut lost = first;
+        let mut power = departure;
+        let mut y = self.z[0] + self.z[1] * departure;
+        let mut gained = self.u[1] * lost;
+        for k in 2..=self.order {
+            lost = self.departure * lost + power * first;
+            power = power * departure;
+            y = y + self.z[k] * power;
+            gained = gained + (self.u[k] * lost).scaled(1.0 / k as f64);
+        }
+        let slip = self.slip + (S::constant(days) + gained / self.rate) / self.y_steady;
+        (y * self.y_steady, slip)
+    }
+}
+
+/// z(E) and u = 1/z: k (k - 1) `z_k` is the sum over 0 < i < k of i (p (k - i) - i) `z_i z_(k-i)`.
+fn series<S: Scalar>(p: S, order: usize) -> (Series<S>, Series<S>) {
+    let (zero, one) = (S::constant(0.0), S::constant(1.0));
+    let mut z = [zero; MAX_ORDER + 1];
+    let mut u = [zero; MAX_ORDER + 1];
+    (z[0], z[1], u[0], u[1]) = (one, one, one, -one);
+    for k in 2..=order {
+        let (mut with_p, mut without) = (zero, zero);
+        let mut product = z[1] * u[k - 1];
+        for i in 1..k {
+            let pair = z[i] * z[k - i];
+            with_p = with_p + pair.scaled((i * (k - i)) as f64);
+            without = without + pair.scaled((i * i) as f64);
+            if i > 1 {
+                product = product + z[i] * u[k - i];
+            }
+        }
+        z[k] = (p * with_p - without).scaled(1.0 / (k * (k - 1)) as f64);
+        u[k] = -(product + z[k]);
+    }
+    (z, u)
+}
+
+/// E with z(E) - 1 = `offset`, by Newton's method; the last step carries the derivatives.
+fn departure<S: Scalar>(z: &Series<S>, order: usize, offset: S) -> S {
+    let mut e = offset.value();
+    for _ in 0..8 {
+        let (mut sum, mut slope) = (0.0, 0.0);
+        for k in (1..=order).rev() {
+            slope = slope * e + k as f64 * z[k].value();
+            sum = (sum + z[k].value()) * e;
+        }
+        let step = (offset.value() - sum) / slope;
+        e += step;
+        if step.abs() <= 1e-16 * e.abs() {
+            break;
+        }
+    }
+    let at = S::constant(e);
+    let (mut sum, mut slope) = (S::constant(0.0), 0.0);
+    for k in (1..=order).rev() {
+        slope = slope * e + k as f64 * z[k].value();
+        sum = (sum + z[k]) * at;
+    }
+    at + (offset - sum).scaled(1.0 / slope)
+}
