@@ -14,4 +14,4 @@ pub use constant_load::{ConstantLoad, Exponent, Outcome, Place, Solution};
 pub use posterior::{Curvature, Ensemble, P_PRIOR, Posterior, Sample as LawSample};
 pub use projection::PointReadings;
 pub(crate) use rates::displacement_sigma;
-pub use rates::{FINEST_DAYS, Observation, Observations, Rate, RateOptions};
+pub use rates::{FINEST_DAYS, Observation, Observations, Rate, RateOptions, ReadingError};

@@ -1,20 +1,46 @@
-//! Points that fill a cube evenly, the same every time: Halton's sequence, and normal deviates of it.
+//! Points that fill a cube evenly, the same every time: Kronecker's sequence, and normal deviates of it.
 
-const BASES: [u32; 5] = [2, 3, 5, 7, 11];
+/// Powers of the inverse of the root of x^8 = x + 1: the steps whose multiples fill seven dimensions
+/// evenly (Roberts 2018, after the golden ratio, the case of one dimension).
+const STEPS: [f64; 7] = [
+    0.911_592_353_482_054_9,
+    0.831_000_618_926_951_9,
+    0.757_533_809_952_664_3,
+    0.690_562_028_656_977,
+    0.629_511_064_928_756,
+    0.573_857_473_221_399_3,
+    0.523_124_084_577_160_8,
+];
 
-/// The `index`-th point of the Halton sequence in five dimensions, each in (0, 1).
-pub(super) fn halton(index: u32) -> [f64; 5] {
-    BASES.map(|base| radical_inverse(index + 1, base))
+/// The `index`-th point of the sequence in seven dimensions, each in (0, 1).
+pub(super) fn kronecker(index: u32) -> [f64; 7] {
+    STEPS.map(|step| {
+        (0.5 + step * f64::from(index + 1))
+            .fract()
+            .clamp(1e-9, 1.0 - 1e-9)
+    })
 }
 
-fn radical_inverse(mut index: u32, base: u32) -> f64 {
-    let (mut value, mut share) = (0.0, 1.0 / f64::from(base));
-    while index > 0 {
-        value += share * f64::from(index % base);
-        index /= base;
-        share /= f64::from(base);
-    }
-    value
+/// The probability that a standard normal number is below `z`, to 1e-7 relative in either tail
+/// (Press et al., Numerical Recipes, section 6.2).
+pub(super) fn normal_share(z: f64) -> f64 {
+    const C: [f64; 10] = [
+        0.170_872_77,
+        -0.822_152_23,
+        1.488_515_87,
+        -1.135_203_98,
+        0.278_868_07,
+        -0.186_288_06,
+        0.096_784_18,
+        0.374_091_96,
+        1.000_023_68,
+        -1.265_512_23,
+    ];
+    let x = z.abs() * std::f64::consts::FRAC_1_SQRT_2;
+    let t = 1.0 / (1.0 + 0.5 * x);
+    let series = C.iter().fold(0.0, |sum, c| sum * t + c);
+    let tail = 0.5 * t * (series - x * x).exp();
+    if z > 0.0 { 1.0 - tail } else { tail }
 }
 
 /// Quantile of the standard normal, to 1e-9 relative: Acklam's rational approximation.
@@ -68,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_normal_quantile_is_that_of_the_tables() {
+    fn the_normal_quantile_and_share_are_those_of_the_tables() {
         for (u, z) in [
             (0.5, 0.0),
             (0.975, 1.959_963_985),
@@ -76,6 +102,7 @@ mod tests {
             (0.001, -3.090_232_306),
         ] {
             assert!((normal_quantile(u) - z).abs() < 1e-8, "{u}");
+            assert!((normal_share(z) / u - 1.0).abs() < 1e-6, "{z}");
         }
     }
 }

@@ -1,0 +1,281 @@
+//! Where to draw laws from: normal approximations about the mode on either side of kappa = 0, one for each
+//! texture of the scatter, each ending where p or kappa leaves its range.
+
+use super::Draft;
+use super::mode::{Bench, KAPPA, P, Point, Problem, Sign};
+use super::prior;
+use super::scatter::Texture;
+use crate::fit::quasi_random::{kronecker, normal_quantile, normal_share};
+use crate::model::Law;
+use nalgebra::{Matrix4, Vector4};
+
+/// Widths of the proposal, over the approximation's own, and the share of each.
+const WIDTHS: [(f64, f64); 2] = [(1.1, 0.7), (2.2, 0.3)];
+/// The share of draws that go to all textures evenly, whatever their evidence.
+const EVEN: f64 = 0.1;
+/// The least probability that a range is given: far beyond it numbers end.
+const LEAST_MASS: f64 = 1e-250;
+/// ln of the square root of 2 pi.
+const LN_ROOT_2_PI: f64 = 0.918_938_533_204_672_8;
+
+/// The laws on one side of kappa = 0.
+#[derive(Debug, Clone)]
+pub(super) struct Side<'a> {
+    pub(super) problem: Problem<'a>,
+    components: Vec<Component>,
+    /// ln of the evidence, by the approximations.
+    pub(super) log_evidence: f64,
+}
+
+/// The approximation for one texture.
+#[derive(Debug, Clone, Copy)]
+struct Component {
+    centre: Point,
+    root: Matrix4<f64>,
+    log_size: f64,
+    size_spread: f64,
+    log_evidence: f64,
+    share: f64,
+}
+
+/// A range of a standard normal number, and the probability of it.
+#[derive(Debug, Clone, Copy)]
+struct Stretch {
+    low: f64,
+    high: f64,
+    mass: f64,
+}
+
+impl Stretch {
+    fn new((low, high): (f64, f64), mean: f64, spread: f64) -> Self {
+        let (low, high) = ((low - mean) / spread, (high - mean) / spread);
+        // In the tail where the numbers are small: shares near 1 have no digits left.
+        let mass = if low > 0.0 {
+            normal_share(-low) - normal_share(-high)
+        } else {
+            normal_share(high) - normal_share(low)
+        };
+        Self {
+            low,
+            high,
+            mass: mass.max(LEAST_MASS),
+        }
+    }
+
+    /// The number below which the share `u` of the stretch lies.
+    fn quantile(&self, u: f64) -> f64 {
+        let z = if self.low > 0.0 {
+            -normal_quantile((normal_share(-self.low) - u * self.mass).clamp(1e-290, 1.0))
+        } else {
+            normal_quantile((normal_share(self.low) + u * self.mass).clamp(1e-290, 1.0 - 1e-16))
+        };
+        z.clamp(self.low, self.high)
+    }
+}
+
+impl<'a> Side<'a> {
+    /// The approximations about the mode at `at`, whose residuals and derivatives the bench holds.
+    pub(super) fn new(
+        problem: Problem<'a>,
+        bench: &Bench,
+        at: Point,
+        (textures, log_size): (&[Texture], f64),
+    ) -> Option<Self> {
+        let mut size = log_size;
+        let mut components = Vec::with_capacity(textures.len());
+        for texture in textures {
+            let one = Component::new(&problem, bench, at, (texture, size))?;
+            size = one.log_size;
+            components.push(one);
+        }
+        let logs: Vec<f64> = components.iter().map(|one| one.log_evidence).collect();
+        let log_evidence = log_sum(&logs);
+        let even = EVEN / logs.len() as f64;
+        for component in &mut components {
+            component.share = even + (1.0 - EVEN) * (component.log_evidence - log_evidence).exp();
+        }
+        log_evidence.is_finite().then_some(Self {
+            problem,
+            components,
+            log_evidence,
+        })
+    }
+
+    /// The `index`-th of `count` laws, weighed.
+    pub(super) fn draw(
+        &self,
+        bench: &mut Bench,
+        textures: &[Texture],
+        (index, count): (u32, u32),
+    ) -> Option<Draft> {
+        let problem = &self.problem;
+        let u = kronecker(index);
+        let (chosen, component) = self.pick(u[1])?;
+        let (width, _) = WIDTHS[usize::from(u[6] >= WIDTHS[0].1)];
+        let z = component.deviate(problem.sign, width, &u);
+        let at = component.centre + component.root * z;
+        let size_z = width * normal_quantile(u[5]);
+        let log_size = component.log_size + component.size_spread * size_z;
+        let shape = problem.shape(&at);
+        let law = Law::from_fit(at[3].exp(), shape.r, shape.kappa, shape.p);
+        // b and m have one sign: where the law would need S < 0 there is none.
+        if shape.p != 0.0 && law.a + law.r <= 0.0 || !problem.evaluate(bench, &at) {
+            return None;
+        }
+        let texture = &textures[chosen];
+        let log_posterior =
+            texture.log_likelihood(problem.window, &bench.residuals, log_size.exp())
+                + problem.prior(&at)
+                + texture.log_prior
+                + prior::log_size(log_size)
+                - problem.log_p_range();
+        let log_proposal = component.log_density(problem.sign, &z, size_z);
+        Some(Draft {
+            law,
+            span_days: problem.span_days,
+            log_size,
+            log_weight: log_posterior - log_proposal - f64::from(count).ln(),
+        })
+    }
+
+    fn pick(&self, u: f64) -> Option<(usize, &Component)> {
+        let mut left = u;
+        let mut each = self.components.iter().enumerate();
+        each.find(|(_, component)| {
+            left -= component.share;
+            left < 0.0
+        })
+        .or_else(|| self.components.iter().enumerate().next_back())
+    }
+}
+
+impl Problem<'_> {
+    /// ln of the width of the range of p, the inverse of its prior density.
+    fn log_p_range(&self) -> f64 {
+        let (low, high) = self.sign.p_range();
+        if high > low { (high - low).ln() } else { 0.0 }
+    }
+}
+
+impl Component {
+    fn new(
+        problem: &Problem<'_>,
+        bench: &Bench,
+        at: Point,
+        (texture, log_size): (&Texture, f64),
+    ) -> Option<Self> {
+        let window = problem.window;
+        let (slope, bend) = problem.prior_slope(&at);
+        let bend = Matrix4::from_diagonal(&bend);
+        let mut residuals = bench.residuals.clone();
+        let (mut log_size, mut size_spread) = texture.size(window, &residuals, log_size, 2);
+        let mut step = Point::zeros();
+        let mut covariance = Matrix4::identity();
+        for _ in 0..2 {
+            let size = log_size.exp();
+            let normal = texture.normal(window, &residuals, &bench.columns, size);
+            covariance = (normal.information + bend).cholesky()?.inverse();
+            let more = covariance * (slope - bend * step - normal.gradient);
+            let more = more.map(|one| one.clamp(-2.0, 2.0));
+            step += more;
+            for (index, residual) in residuals.iter_mut().enumerate() {
+                for (axis, column) in bench.columns.iter().enumerate() {
+                    *residual += column[index] * more[axis];
+                }
+            }
+            (log_size, size_spread) = texture.size(window, &residuals, log_size, 2);
+        }
+        let root = covariance.cholesky()?.l();
+        let mut one = Self {
+            centre: at + step,
+            root,
+            log_size,
+            size_spread,
+            log_evidence: 0.0,
+            share: 0.0,
+        };
+        one.log_evidence = texture.log_likelihood(window, &residuals, log_size.exp())
+            + problem.prior(&at)
+            + slope.dot(&step)
+            - 0.5 * step.dot(&(bend * step))
+            + texture.log_prior
+            + prior::log_size(log_size)
+            - problem.log_p_range()
+            + one.log_volume(problem.sign)
+            + one.log_masses(problem.sign, 1.0, 0.0);
+        Some(one)
+    }
+
+    /// ln of the volume of the approximation, in units of a standard normal one's density.
+    fn log_volume(&self, sign: Sign) -> f64 {
+        let curved = match sign {
+            Sign::Zero => 0.0,
+            Sign::Positive | Sign::Negative => {
+                (self.root[(0, 0)] * self.root[(1, 1)]).ln() + 2.0 * LN_ROOT_2_PI
+            }
+        };
+        let line = (self.root[(2, 2)] * self.root[(3, 3)] * self.size_spread).ln();
+        curved + line + 3.0 * LN_ROOT_2_PI
+    }
+
+    fn p_stretch(&self, sign: Sign, width: f64) -> Stretch {
+        Stretch::new(
+            sign.p_range(),
+            self.centre[P],
+            width * self.root[(0, 0)],
+        )
+    }
+
+    /// The stretch of kappa, given the deviate of p.
+    fn kappa_stretch(&self, sign: Sign, width: f64, z_p: f64) -> Stretch {
+        let mean = self.centre[KAPPA] + self.root[(1, 0)] * z_p;
+        Stretch::new(sign.kappa_range(), mean, width * self.root[(1, 1)])
+    }
+
+    fn log_masses(&self, sign: Sign, width: f64, z_p: f64) -> f64 {
+        match sign {
+            Sign::Zero => 0.0,
+            Sign::Positive | Sign::Negative => {
+                let p = self.p_stretch(sign, width);
+                (p.mass * self.kappa_stretch(sign, width, z_p).mass).max(LEAST_MASS).ln()
+            }
+        }
+    }
+
+    /// Standard deviates of a draw whose p and kappa are in their range.
+    fn deviate(&self, sign: Sign, width: f64, u: &[f64; 7]) -> Point {
+        let (p, kappa) = match sign {
+            Sign::Zero => (0.0, 0.0),
+            Sign::Positive | Sign::Negative => {
+                let p = width * self.p_stretch(sign, width).quantile(u[0]);
+                let kappa = self.kappa_stretch(sign, width, p).quantile(u[2]);
+                (p, width * kappa)
+            }
+        };
+        let (change, ln_v) = (normal_quantile(u[3]), normal_quantile(u[4]));
+        Vector4::new(p, kappa, width * change, width * ln_v)
+    }
+
+    /// ln of the density that draws come from, the choice of texture among it.
+    fn log_density(&self, sign: Sign, z: &Point, size_z: f64) -> f64 {
+        let square = z.norm_squared() + size_z * size_z;
+        let axes = match sign {
+            Sign::Zero => 3.0,
+            Sign::Positive | Sign::Negative => 5.0,
+        };
+        let one = |(width, share): (f64, f64)| {
+            share.ln() - 0.5 * square / (width * width) - axes * width.ln()
+                - self.log_masses(sign, width, z[P])
+        };
+        log_sum(&WIDTHS.map(one)) - self.log_volume(sign) + self.share.ln()
+    }
+}
+
+/// ln of a sum of exponentials.
+pub(super) fn log_sum(logs: &[f64]) -> f64 {
+    let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if !most.is_finite() {
+        return f64::NEG_INFINITY;
+    }
+    most + logs.iter().map(|one| (one - most).exp()).sum::<f64>().ln()
+}
