@@ -21,7 +21,7 @@ pub use prior::P_PRIOR;
 use super::rates::Rate;
 use crate::model::Law;
 use mode::{Bench, Mode, Point, Problem, Sign};
-use proposal::Side;
+use proposal::{Side, Whole};
 use scatter::Texture;
 use window::Window;
 
@@ -75,13 +75,13 @@ pub struct Posterior {
 struct Draft {
     law: Law,
     span_days: f64,
-    log_size: f64,
+    whole: Whole,
+    texture: usize,
     log_weight: f64,
 }
 
-/// Laws drawn from one window, all sides together, and the fewest from one side.
-const DRAWS: u32 = 192;
-const FEWEST_DRAWS: u32 = 48;
+/// Laws drawn from one window in each round, both sides together.
+const DRAWS: [u32; 3] = [96, 96, 128];
 /// Steps of a search before and after the size of the scatter is known.
 const ROUNDS: (u32, u32) = (6, 10);
 /// Where in its range p is when a search starts.
@@ -110,7 +110,7 @@ impl Posterior {
                 sides.push(side);
             }
         }
-        let drafts = draw(&mut bench, &textures, (&sides, DRAWS));
+        let drafts = draw(&mut bench, &textures, &sides);
         Self::of(&window, summits, drafts, bench.evaluations)
     }
 
@@ -138,7 +138,7 @@ impl Posterior {
                 weight,
             });
             spans_days.push(draft.span_days);
-            log_size += weight * draft.log_size;
+            log_size += weight * draft.whole[4];
             squares += weight * weight;
         }
         Some(Self {
@@ -255,28 +255,66 @@ fn line(problem: &Problem<'_>, rates: &[Rate]) -> (f64, f64) {
     (recent.ln(), slope.asinh())
 }
 
-/// Draws `count` laws, shared among the sides by their evidence.
-fn draw(
-    bench: &mut Bench,
-    textures: &[Texture],
-    (sides, count): (&[Side<'_>], u32),
-) -> Vec<Draft> {
-    let logs: Vec<f64> = sides.iter().map(|side| side.log_evidence).collect();
-    let total = proposal::log_sum(&logs);
-    let groups = u32::try_from(sides.len().max(1)).unwrap_or(1);
-    let fewest = FEWEST_DRAWS.min(count / groups);
-    let free = count.saturating_sub(fewest * groups);
-    let mut drafts = Vec::new();
-    for side in sides {
-        let share = (side.log_evidence - total).exp();
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a share of a count"
-        )]
-        let number = fewest + (f64::from(free) * share).round() as u32;
-        let one = |index| side.draw(bench, textures, (index, number));
-        drafts.extend((0..number).filter_map(one));
+/// Draws laws from each side in rounds, every round from a proposal that the one before has taught.
+fn draw(bench: &mut Bench, textures: &[Texture], sides: &[Side<'_>]) -> Vec<Draft> {
+    let mut said: Vec<f64> = sides.iter().map(|side| side.log_evidence).collect();
+    let mut proposals: Vec<Side<'_>> = sides.to_vec();
+    let mut rounds: Vec<Vec<Vec<Draft>>> = vec![Vec::new(); sides.len()];
+    let mut first = 0;
+    for count in DRAWS {
+        for (number, index) in numbers(&said, count).into_iter().zip(0..) {
+            let proposal = &proposals[index];
+            let one = |at| proposal.draw(bench, textures, (first + at, number));
+            let drafts: Vec<Draft> = (0..number).filter_map(one).collect();
+            if let Some(better) = proposal.refitted(&drafts) {
+                proposals[index] = better;
+            }
+            let logs: Vec<f64> = drafts.iter().map(|draft| draft.log_weight).collect();
+            said[index] = proposal::log_sum(&logs);
+            rounds[index].push(drafts);
+        }
+        first += count;
     }
-    drafts
+    rounds.into_iter().flat_map(pooled).collect()
+}
+
+/// How many of `count` draws each side gets: its share of the evidence, and some whatever that is.
+fn numbers(evidences: &[f64], count: u32) -> Vec<u32> {
+    let total = proposal::log_sum(evidences);
+    let groups = u32::try_from(evidences.len().max(1)).unwrap_or(1);
+    let fewest = count / (4 * groups);
+    let free = f64::from(count - fewest * groups);
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a share of a count"
+    )]
+    let number = |log: &f64| fewest + (free * (log - total).exp()).round() as u32;
+    if total.is_finite() {
+        evidences.iter().map(number).collect()
+    } else {
+        vec![count / groups; evidences.len()]
+    }
+}
+
+/// The draws of several rounds as one sample: each round counts by what its weights are worth.
+fn pooled(rounds: Vec<Vec<Draft>>) -> Vec<Draft> {
+    let worths: Vec<f64> = rounds.iter().map(|round| worth(round)).collect();
+    let total: f64 = worths.iter().sum();
+    let scale = |(round, worth): (Vec<Draft>, f64)| {
+        let share = (worth / total).ln();
+        round.into_iter().map(move |draft| Draft {
+            log_weight: draft.log_weight + share,
+            ..draft
+        })
+    };
+    rounds.into_iter().zip(worths).flat_map(scale).collect()
+}
+
+/// How many even draws a weighted sample is worth (Kish).
+fn worth(drafts: &[Draft]) -> f64 {
+    let logs: Vec<f64> = drafts.iter().map(|draft| draft.log_weight).collect();
+    let twice: Vec<f64> = logs.iter().map(|log| 2.0 * log).collect();
+    let worth = (2.0 * proposal::log_sum(&logs) - proposal::log_sum(&twice)).exp();
+    if worth.is_finite() { worth } else { 0.0 }
 }

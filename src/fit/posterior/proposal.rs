@@ -2,17 +2,28 @@
 //! texture of the scatter, each ending where p or kappa leaves its range.
 
 use super::Draft;
-use super::mode::{Bench, KAPPA, P, Point, Problem, Sign};
+use super::mode::{Bench, CHANGE, KAPPA, LN_V, P, Point, Problem, Sign};
 use super::prior;
 use super::scatter::Texture;
 use crate::fit::quasi_random::{kronecker, normal_quantile, normal_share};
 use crate::model::Law;
-use nalgebra::{Matrix4, Vector4};
+use nalgebra::{Matrix4, SMatrix, SVector};
+
+/// A [`Point`] and ln of the size of the scatter.
+pub(super) type Whole = SVector<f64, 5>;
+type Root = SMatrix<f64, 5, 5>;
+
+/// Place of ln of the size in a [`Whole`].
+const SIZE: usize = 4;
 
 /// Widths of the proposal, over the approximation's own, and the share of each.
 const WIDTHS: [(f64, f64); 2] = [(1.1, 0.7), (2.2, 0.3)];
 /// The share of draws that go to all textures evenly, whatever their evidence.
 const EVEN: f64 = 0.1;
+/// Draws that weights must be worth for a shape to be told from them.
+const WORTH: f64 = 20.0;
+/// The share of the old shape that the new one keeps.
+const RIDGE: f64 = 0.03;
 /// The least probability that a range is given: far beyond it numbers end.
 const LEAST_MASS: f64 = 1e-250;
 /// ln of the square root of 2 pi.
@@ -30,10 +41,8 @@ pub(super) struct Side<'a> {
 /// The approximation for one texture.
 #[derive(Debug, Clone, Copy)]
 struct Component {
-    centre: Point,
-    root: Matrix4<f64>,
-    log_size: f64,
-    size_spread: f64,
+    centre: Whole,
+    root: Root,
     log_evidence: f64,
     share: f64,
 }
@@ -85,7 +94,7 @@ impl<'a> Side<'a> {
         let mut components = Vec::with_capacity(textures.len());
         for texture in textures {
             let one = Component::new(&problem, bench, at, (texture, size))?;
-            size = one.log_size;
+            size = one.centre[SIZE];
             components.push(one);
         }
         let logs: Vec<f64> = components.iter().map(|one| one.log_evidence).collect();
@@ -113,11 +122,11 @@ impl<'a> Side<'a> {
         let (chosen, component) = self.pick(u[1])?;
         let (width, _) = WIDTHS[usize::from(u[6] >= WIDTHS[0].1)];
         let z = component.deviate(problem.sign, width, &u);
-        let at = component.centre + component.root * z;
-        let size_z = width * normal_quantile(u[5]);
-        let log_size = component.log_size + component.size_spread * size_z;
+        let whole = component.centre + component.root * z;
+        let at: Point = whole.fixed_rows::<4>(0).into_owned();
+        let log_size = whole[SIZE];
         let shape = problem.shape(&at);
-        let law = Law::from_fit(at[3].exp(), shape.r, shape.kappa, shape.p);
+        let law = Law::from_fit(at[LN_V].exp(), shape.r, shape.kappa, shape.p);
         // b and m have one sign: where the law would need S < 0 there is none.
         if shape.p != 0.0 && law.a + law.r <= 0.0 || !problem.evaluate(bench, &at) {
             return None;
@@ -129,12 +138,55 @@ impl<'a> Side<'a> {
                 + texture.log_prior
                 + prior::log_size(log_size)
                 - problem.log_p_range();
-        let log_proposal = component.log_density(problem.sign, &z, size_z);
         Some(Draft {
             law,
             span_days: problem.span_days,
-            log_size,
-            log_weight: log_posterior - log_proposal - f64::from(count).ln(),
+            whole,
+            texture: chosen,
+            log_weight: log_posterior - component.log_density(problem.sign, &z) - f64::from(count).ln(),
+        })
+    }
+
+    /// The same side with its proposal drawn up anew from what was drawn so far: where the weights lie, as
+    /// one normal shape for all textures, each with its share. Weights are levelled until they are worth
+    /// enough draws to tell a shape from.
+    pub(super) fn refitted(&self, drafts: &[Draft]) -> Option<Self> {
+        let logs: Vec<f64> = drafts.iter().map(|draft| draft.log_weight).collect();
+        let weights = levelled(&logs);
+        let worth = 1.0 / weights.iter().map(|w| w * w).sum::<f64>();
+        if !(worth > 8.0) {
+            return None;
+        }
+        let mut centre = Whole::zeros();
+        for (draft, weight) in drafts.iter().zip(&weights) {
+            centre += draft.whole * *weight;
+        }
+        let mut covariance = Root::zeros();
+        for (draft, weight) in drafts.iter().zip(&weights) {
+            let off = draft.whole - centre;
+            covariance += off * off.transpose() * *weight;
+        }
+        covariance *= 1.0 + 4.0 / worth;
+        let widest = self.components.iter().max_by(|a, b| a.share.total_cmp(&b.share))?;
+        covariance += widest.root * widest.root.transpose() * RIDGE;
+        if self.problem.sign == Sign::Zero {
+            (covariance[(P, P)], covariance[(KAPPA, KAPPA)]) = (1.0, 1.0);
+        }
+        let root = covariance.cholesky()?.l();
+        let even = EVEN / self.components.len() as f64;
+        let component = |(index, old): (usize, &Component)| {
+            let of = drafts.iter().zip(&weights).filter(|(draft, _)| draft.texture == index);
+            let met: f64 = of.map(|(_, weight)| weight).sum();
+            Component {
+                centre,
+                root,
+                share: even + (1.0 - EVEN) * met,
+                ..*old
+            }
+        };
+        Some(Self {
+            components: self.components.iter().enumerate().map(component).collect(),
+            ..self.clone()
         })
     }
 
@@ -185,15 +237,18 @@ impl Component {
             }
             (log_size, size_spread) = texture.size(window, &residuals, log_size, 2);
         }
-        let root = covariance.cholesky()?.l();
+        let mut root = Root::zeros();
+        root.fixed_view_mut::<4, 4>(0, 0)
+            .copy_from(&covariance.cholesky()?.l());
+        root[(SIZE, SIZE)] = size_spread;
         let mut one = Self {
-            centre: at + step,
+            centre: Whole::zeros(),
             root,
-            log_size,
-            size_spread,
             log_evidence: 0.0,
             share: 0.0,
         };
+        one.centre.fixed_rows_mut::<4>(0).copy_from(&(at + step));
+        one.centre[SIZE] = log_size;
         one.log_evidence = texture.log_likelihood(window, &residuals, log_size.exp())
             + problem.prior(&at)
             + slope.dot(&step)
@@ -214,7 +269,7 @@ impl Component {
                 (self.root[(0, 0)] * self.root[(1, 1)]).ln() + 2.0 * LN_ROOT_2_PI
             }
         };
-        let line = (self.root[(2, 2)] * self.root[(3, 3)] * self.size_spread).ln();
+        let line = (self.root[(CHANGE, CHANGE)] * self.root[(LN_V, LN_V)] * self.root[(SIZE, SIZE)]).ln();
         curved + line + 3.0 * LN_ROOT_2_PI
     }
 
@@ -243,7 +298,7 @@ impl Component {
     }
 
     /// Standard deviates of a draw whose p and kappa are in their range.
-    fn deviate(&self, sign: Sign, width: f64, u: &[f64; 7]) -> Point {
+    fn deviate(&self, sign: Sign, width: f64, u: &[f64; 7]) -> Whole {
         let (p, kappa) = match sign {
             Sign::Zero => (0.0, 0.0),
             Sign::Positive | Sign::Negative => {
@@ -252,13 +307,13 @@ impl Component {
                 (p, width * kappa)
             }
         };
-        let (change, ln_v) = (normal_quantile(u[3]), normal_quantile(u[4]));
-        Vector4::new(p, kappa, width * change, width * ln_v)
+        let free = |u: f64| width * normal_quantile(u);
+        Whole::new(p, kappa, free(u[3]), free(u[4]), free(u[5]))
     }
 
     /// ln of the density that draws come from, the choice of texture among it.
-    fn log_density(&self, sign: Sign, z: &Point, size_z: f64) -> f64 {
-        let square = z.norm_squared() + size_z * size_z;
+    fn log_density(&self, sign: Sign, z: &Whole) -> f64 {
+        let square = z.norm_squared();
         let axes = match sign {
             Sign::Zero => 3.0,
             Sign::Positive | Sign::Negative => 5.0,
@@ -268,6 +323,21 @@ impl Component {
                 - self.log_masses(sign, width, z[P])
         };
         log_sum(&WIDTHS.map(one)) - self.log_volume(sign) + self.share.ln()
+    }
+}
+
+/// Weights that sum to 1, raised to the power below 1 that makes them worth [`WORTH`] draws.
+fn levelled(logs: &[f64]) -> Vec<f64> {
+    let mut power = 1.0;
+    loop {
+        let scaled: Vec<f64> = logs.iter().map(|log| power * log).collect();
+        let total = log_sum(&scaled);
+        let weights: Vec<f64> = scaled.iter().map(|log| (log - total).exp()).collect();
+        let worth = 1.0 / weights.iter().map(|w| w * w).sum::<f64>();
+        if worth >= WORTH.min(0.5 * logs.len() as f64) || power < 1e-3 {
+            return weights;
+        }
+        power *= 0.8;
     }
 }
 
