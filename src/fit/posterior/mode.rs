@@ -74,8 +74,8 @@ impl Sign {
     /// Where asinh of kappa L may be.
     pub(super) fn kappa_range(self) -> (f64, f64) {
         match self {
-            Self::Positive => (0.0, 12.0),
-            Self::Negative => (-12.0, 0.0),
+            Self::Positive => (1e-9, 12.0),
+            Self::Negative => (-12.0, -1e-9),
             Self::Zero => (0.0, 0.0),
         }
     }
@@ -131,9 +131,15 @@ impl Problem<'_> {
     /// Fills the bench's residuals; false outside the prior's range.
     pub(super) fn evaluate(&self, bench: &mut Bench, at: &Point) -> bool {
         bench.evaluations += 1;
-        let law = (at[LN_V], self.shape(at));
-        self.window
-            .residuals(&mut bench.past, law, self.span_days, &mut bench.residuals)
+        let shape = self.shape(at);
+        // b and m have one sign: where the law would need S < 0 there is none.
+        let exists = shape.kappa + shape.p * shape.r > 0.0 || self.sign != Sign::Positive;
+        let exists = exists && (shape.kappa + shape.p * shape.r < 0.0 || self.sign != Sign::Negative);
+        let law = (at[LN_V], shape);
+        exists
+            && self
+                .window
+                .residuals(&mut bench.past, law, self.span_days, &mut bench.residuals)
     }
 
     /// ln of the prior density at a point.

@@ -127,8 +127,7 @@ impl<'a> Side<'a> {
         let log_size = whole[SIZE];
         let shape = problem.shape(&at);
         let law = Law::from_fit(at[LN_V].exp(), shape.r, shape.kappa, shape.p);
-        // b and m have one sign: where the law would need S < 0 there is none.
-        if shape.p != 0.0 && law.a + law.r <= 0.0 || !problem.evaluate(bench, &at) {
+        if !problem.evaluate(bench, &at) {
             return None;
         }
         let texture = &textures[chosen];

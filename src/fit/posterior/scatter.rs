@@ -9,7 +9,7 @@
 //! scalar filter gives the likelihood in one pass over the rates, gaps included; innovations are Student t
 //! with [`STUDENT`] degrees of freedom, so that an outlier neither decides nor is remembered.
 
-use super::prior::{SCATTER, SLOW_SHARES, WITHOUT_MEMORY};
+use super::prior::{self, SLOW_SHARES, WITHOUT_MEMORY};
 use super::window::Window;
 use nalgebra::{Matrix4, Vector4};
 
@@ -17,6 +17,9 @@ use nalgebra::{Matrix4, Vector4};
 const STUDENT: f64 = 7.0;
 /// Squares of standardised innovations end here: beyond, all are the same outlier.
 const FARTHEST: f64 = 1e8;
+/// Step of the derivatives in ln size, and the least curvature that a step there assumes.
+const SIZE_STEP: f64 = 0.1;
+const LEAST_SIZE_BEND: f64 = 1.0;
 /// Correlation times tried for each slow share.
 const MEMORIES: u32 = 3;
 
@@ -66,8 +69,6 @@ struct Gain {
     variance: f64,
     slow: f64,
     end: f64,
-    /// The share of the innovation's variance that grows with the size of the scatter.
-    relative: f64,
 }
 
 /// The normal equations of a Gauss-Newton step, J^T W J and J^T W e.
@@ -177,38 +178,29 @@ impl Texture {
         }
     }
 
-    /// ln of the most probable size of the scatter given these residuals, and its standard error.
-    pub(super) fn size(&self, window: &Window, residuals: &[f64], start: f64, steps: u32) -> (f64, f64) {
-        let (prior, spread) = (SCATTER.0.ln(), SCATTER.1);
-        let mut log_size = start;
-        let mut curvature = 1.0;
+    /// ln of the most probable size of the scatter given these residuals, and its standard error: Newton's
+    /// method on the likelihood itself, `steps` of them.
+    pub(super) fn size(
+        &self,
+        window: &Window,
+        residuals: &[f64],
+        start: f64,
+        steps: u32,
+    ) -> (f64, f64) {
+        let value = |log_size: f64| {
+            self.log_likelihood(window, residuals, log_size.exp()) + prior::log_size(log_size)
+        };
+        let mut at = start;
+        let mut spread = SIZE_STEP;
         for _ in 0..steps {
-            let (slope, bend) = self.size_slope(window, residuals, log_size.exp());
-            curvature = bend + 1.0 / (spread * spread);
-            let step = (slope - (log_size - prior) / (spread * spread)) / curvature;
-            log_size = (log_size + step.clamp(-1.0, 1.5)).clamp(-9.0, 2.5);
+            let (less, here, more) = (value(at - SIZE_STEP), value(at), value(at + SIZE_STEP));
+            let slope = (more - less) / (2.0 * SIZE_STEP);
+            let bend = (2.0 * here - more - less) / (SIZE_STEP * SIZE_STEP);
+            let bend = bend.max(LEAST_SIZE_BEND);
+            at = (at + (slope / bend).clamp(-1.0, 1.0)).clamp(-9.0, 2.5);
+            spread = bend.sqrt().recip();
         }
-        (log_size, curvature.sqrt().recip())
-    }
-
-    /// d ln likelihood / d ln size, and the expected size of its own slope.
-    fn size_slope(&self, window: &Window, residuals: &[f64], size: f64) -> (f64, f64) {
-        let (mut slope, mut bend, mut mean) = (0.0, 0.0, [0.0; 2]);
-        let mut belief = Belief::start(size * size * self.slow);
-        for (index, (rate, step)) in window.seen.iter().zip(&self.steps).enumerate() {
-            let gain = belief.predict(rate, step, size * size, self.slow);
-            mean[0] *= step.keep;
-            let innovation = residuals[index] - step.load * mean[0] + rate.ends * mean[1];
-            let z2 = innovation * innovation / gain.variance;
-            let weight = (STUDENT + 1.0) / (STUDENT + z2);
-            slope += gain.relative * (weight * z2 - 1.0);
-            bend += gain.relative * gain.relative * 2.0 * STUDENT / (STUDENT + 3.0);
-            let weight = weight.min(1.0);
-            mean[0] += gain.slow * weight * innovation;
-            mean[1] = gain.end * weight * innovation;
-            belief.update(&gain, weight);
-        }
-        (slope, bend)
+        (at, spread)
     }
 }
 
@@ -235,7 +227,6 @@ impl Belief {
             variance,
             slow: from_slow / variance,
             end: ends / variance,
-            relative: ((step.load * step.load * self.slow + white) / variance).min(1.0),
         }
     }
 
