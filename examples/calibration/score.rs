@@ -77,12 +77,16 @@ impl Tally {
         let accelerating: f64 = samples.iter().filter(|s| s.law.r > 0.0).map(|s| s.weight).sum();
         self.say("unstable", unstable, drawn.law.kappa > 0.0);
         self.say("accelerating", accelerating, drawn.law.r > 0.0);
-        let mut place = |what, share| self.places.push(Place { what, group, share });
-        let below = |of: &dyn Fn(&slipwatch::model::Law) -> f64| {
+                let below = |of: &dyn Fn(&slipwatch::model::Law) -> f64| {
             let truth = of(&drawn.law);
             let met = samples.iter().filter(|one| of(&one.law) < truth);
             met.map(|one| one.weight).sum::<f64>()
         };
+        let mut place = |what, share| self.places.push(Place { what, group, share });
+        if std::env::var("DIAG").is_ok() {
+            let t=failure_days(&drawn.law);
+            println!("P {} {} {} {} {} {} {}", drawn.observations.values.len(), group.replace(' ',"_"), drawn.slow, drawn.scatter, below(&|law| law.v_i), below(&|law| law.r), posterior.effective_draws); let _=t; // DIAG3
+        }
         place("m", below(&|law| law.p));
         place("r", below(&|law| law.r));
         place("kappa", below(&|law| law.kappa));

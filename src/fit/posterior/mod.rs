@@ -81,7 +81,7 @@ struct Draft {
 }
 
 /// Laws drawn from one window in each round, both sides together.
-const DRAWS: [u32; 3] = [96, 96, 128];
+const DRAWS: [u32; 4] = [500, 500, 500, 2000];
 /// Steps of a search before and after the size of the scatter is known.
 const ROUNDS: (u32, u32) = (6, 10);
 /// Where in its range p is when a search starts.

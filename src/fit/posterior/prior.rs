@@ -23,7 +23,7 @@ pub(super) const SCATTER: (f64, f64) = (0.05, 0.9);
 /// Probability that the scatter has no memory.
 pub(super) const WITHOUT_MEMORY: f64 = 0.4;
 /// Shares of the variance that the correlated part may have.
-pub(super) const SLOW_SHARES: [f64; 2] = [0.4, 0.85];
+pub(super) const SLOW_SHARES: [f64; 3] = [0.25, 0.6, 0.93];
 /// Probability that the law holds from the first reading on.
 pub(super) const FROM_THE_FIRST: f64 = 0.5;
 

@@ -21,7 +21,7 @@ const FARTHEST: f64 = 1e8;
 const SIZE_STEP: f64 = 0.1;
 const LEAST_SIZE_BEND: f64 = 1.0;
 /// Correlation times tried for each slow share.
-const MEMORIES: u32 = 3;
+const MEMORIES: u32 = 4;
 
 /// The make-up of the scatter apart from its size: how much of it remembers, and for how long.
 #[derive(Debug, Clone)]

@@ -10,6 +10,11 @@ use crate::fit::rates::{Rate, ReadingError};
 /// A velocity this many of its own standard errors large is half-way from v to ln v.
 const BEND: f64 = 10.0;
 
+/// A velocity this many standard errors from its neighbours is not like them.
+const STANDS_OUT: f64 = 5.0;
+/// Neighbours on either side that say how fast it was about then.
+const NEIGHBOURS: usize = 3;
+
 /// One rate.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Seen {
@@ -62,7 +67,8 @@ impl Window {
             interval_days: newest_interval(rates),
             seen: rates
                 .iter()
-                .map(|rate| Seen::new(rate, last.to, floor))
+                .zip(about(rates))
+                .map(|(rate, about)| Seen::new(rate, last.to, (about, floor)))
                 .collect(),
             spacing_days: spacing.max(1e-6 * length),
         })
@@ -112,11 +118,14 @@ impl Window {
 }
 
 impl Seen {
-    fn new(rate: &Rate, now_days: f64, floor: f64) -> Self {
+    fn new(rate: &Rate, now_days: f64, (about, floor): (f64, f64)) -> Self {
         let sigma = rate.sigma.max(floor);
         let scale = BEND * sigma;
-        let size = rate.velocity.max(0.0).hypot(scale);
-        let load = (rate.velocity / size).max(0.0);
+        // By the neighbours, or else a reading that happens to be high would count for more.
+        let stands_out = (rate.velocity - about).abs() > STANDS_OUT * sigma;
+        let typical = if stands_out { rate.velocity } else { about };
+        let size = typical.max(0.0).hypot(scale);
+        let load = (typical / size).max(0.0);
         let own = sigma / size;
         let (own, ends) = match rate.error {
             ReadingError::Own => (own * own, 0.0),
@@ -138,6 +147,18 @@ impl Seen {
             ends,
         }
     }
+}
+
+/// The mean velocity of each rate's neighbours.
+fn about(rates: &[Rate]) -> Vec<f64> {
+    let of = |index: usize| {
+        let first = index.saturating_sub(NEIGHBOURS);
+        let near = &rates[first..(index + NEIGHBOURS + 1).min(rates.len())];
+        let sum: f64 = near.iter().map(|rate| rate.velocity).sum();
+        let others = (near.len() - 1).max(1) as f64;
+        (sum - rates[index].velocity) / others
+    };
+    (0..rates.len()).map(of).collect()
 }
 
 /// What a velocity without a stated error may be off by, mm/day: nothing, unless some of them do not
