@@ -77,11 +77,12 @@ struct Draft {
     span_days: f64,
     whole: Whole,
     texture: usize,
+    log_posterior: f64,
     log_weight: f64,
 }
 
 /// Laws drawn from one window in each round, both sides together.
-const DRAWS: [u32; 4] = [500, 500, 500, 2000];
+const DRAWS: [u32; 4] = [128, 128, 128, 256];
 /// Steps of a search before and after the size of the scatter is known.
 const ROUNDS: (u32, u32) = (6, 10);
 /// Where in its range p is when a search starts.
@@ -110,7 +111,7 @@ impl Posterior {
                 sides.push(side);
             }
         }
-        let drafts = draw(&mut bench, &textures, &sides);
+        let drafts = draw(&mut bench, &textures, sides);
         Self::of(&window, summits, drafts, bench.evaluations)
     }
 
@@ -255,27 +256,59 @@ fn line(problem: &Problem<'_>, rates: &[Rate]) -> (f64, f64) {
     (recent.ln(), slope.asinh())
 }
 
-/// Draws laws from each side in rounds, every round from a proposal that the one before has taught.
-fn draw(bench: &mut Bench, textures: &[Texture], sides: &[Side<'_>]) -> Vec<Draft> {
+/// Draws laws from each side in rounds, every round from a proposal that the ones before have taught.
+fn draw(bench: &mut Bench, textures: &[Texture], sides: Vec<Side<'_>>) -> Vec<Draft> {
     let mut said: Vec<f64> = sides.iter().map(|side| side.log_evidence).collect();
-    let mut proposals: Vec<Side<'_>> = sides.to_vec();
-    let mut rounds: Vec<Vec<Vec<Draft>>> = vec![Vec::new(); sides.len()];
+    let mut lots: Vec<Lot<'_>> = sides.into_iter().map(Lot::new).collect();
     let mut first = 0;
     for count in DRAWS {
-        for (number, index) in numbers(&said, count).into_iter().zip(0..) {
-            let proposal = &proposals[index];
-            let one = |at| proposal.draw(bench, textures, (first + at, number));
-            let drafts: Vec<Draft> = (0..number).filter_map(one).collect();
-            if let Some(better) = proposal.refitted(&drafts) {
-                proposals[index] = better;
-            }
-            let logs: Vec<f64> = drafts.iter().map(|draft| draft.log_weight).collect();
+        for (index, number) in numbers(&said, count).into_iter().enumerate() {
+            let lot = &mut lots[index];
+            lot.draw(bench, textures, (first, number));
+            let logs: Vec<f64> = lot.drafts.iter().map(|draft| draft.log_weight).collect();
             said[index] = proposal::log_sum(&logs);
-            rounds[index].push(drafts);
         }
         first += count;
     }
-    rounds.into_iter().flat_map(pooled).collect()
+    lots.into_iter().flat_map(|lot| lot.drafts).collect()
+}
+
+/// What was drawn from one side, and from which proposals.
+#[derive(Debug)]
+struct Lot<'a> {
+    next: Side<'a>,
+    /// Proposals used, each with the number drawn from it.
+    used: Vec<(Side<'a>, u32)>,
+    drafts: Vec<Draft>,
+}
+
+impl<'a> Lot<'a> {
+    fn new(side: Side<'a>) -> Self {
+        Self {
+            next: side,
+            used: Vec::new(),
+            drafts: Vec::new(),
+        }
+    }
+
+    /// Draws `number` more, weighs all anew against the mixture of the proposals that they came from
+    /// (Owen and Zhou 2000: no draw weighs more than any of them would make it), and learns from them.
+    fn draw(&mut self, bench: &mut Bench, textures: &[Texture], (first, number): (u32, u32)) {
+        let one = |at| self.next.draw(bench, textures, first + at);
+        let fresh: Vec<Draft> = (0..number).filter_map(one).collect();
+        self.drafts.extend(fresh);
+        self.used.push((self.next.clone(), number));
+        for draft in &mut self.drafts {
+            let each = self.used.iter().map(|(side, number)| {
+                f64::from((*number).max(1)).ln() + side.log_density(draft)
+            });
+            let each: Vec<f64> = each.collect();
+            draft.log_weight = draft.log_posterior - proposal::log_sum(&each);
+        }
+        if let Some(better) = self.next.refitted(&self.drafts) {
+            self.next = better;
+        }
+    }
 }
 
 /// How many of `count` draws each side gets: its share of the evidence, and some whatever that is.
@@ -295,26 +328,4 @@ fn numbers(evidences: &[f64], count: u32) -> Vec<u32> {
     } else {
         vec![count / groups; evidences.len()]
     }
-}
-
-/// The draws of several rounds as one sample: each round counts by what its weights are worth.
-fn pooled(rounds: Vec<Vec<Draft>>) -> Vec<Draft> {
-    let worths: Vec<f64> = rounds.iter().map(|round| worth(round)).collect();
-    let total: f64 = worths.iter().sum();
-    let scale = |(round, worth): (Vec<Draft>, f64)| {
-        let share = (worth / total).ln();
-        round.into_iter().map(move |draft| Draft {
-            log_weight: draft.log_weight + share,
-            ..draft
-        })
-    };
-    rounds.into_iter().zip(worths).flat_map(scale).collect()
-}
-
-/// How many even draws a weighted sample is worth (Kish).
-fn worth(drafts: &[Draft]) -> f64 {
-    let logs: Vec<f64> = drafts.iter().map(|draft| draft.log_weight).collect();
-    let twice: Vec<f64> = logs.iter().map(|log| 2.0 * log).collect();
-    let worth = (2.0 * proposal::log_sum(&logs) - proposal::log_sum(&twice)).exp();
-    if worth.is_finite() { worth } else { 0.0 }
 }

@@ -110,12 +110,12 @@ impl<'a> Side<'a> {
         })
     }
 
-    /// The `index`-th of `count` laws, weighed.
+    /// The `index`-th law; `None` where the prior has none.
     pub(super) fn draw(
         &self,
         bench: &mut Bench,
         textures: &[Texture],
-        (index, count): (u32, u32),
+        index: u32,
     ) -> Option<Draft> {
         let problem = &self.problem;
         let u = kronecker(index);
@@ -142,8 +142,21 @@ impl<'a> Side<'a> {
             span_days: problem.span_days,
             whole,
             texture: chosen,
-            log_weight: log_posterior - component.log_density(problem.sign, &z) - f64::from(count).ln(),
+            log_posterior,
+            log_weight: f64::NEG_INFINITY,
         })
+    }
+
+    /// ln of the density with which [`Self::draw`] gives this law and texture.
+    pub(super) fn log_density(&self, draft: &Draft) -> f64 {
+        let component = &self.components[draft.texture];
+        let off = draft.whole - component.centre;
+        component
+            .root
+            .solve_lower_triangular(&off)
+            .map_or(f64::NEG_INFINITY, |z| {
+                component.log_density(self.problem.sign, &z)
+            })
     }
 
     /// The same side with its proposal drawn up anew from what was drawn so far: where the weights lie, as
