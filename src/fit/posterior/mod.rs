@@ -81,8 +81,11 @@ struct Draft {
     log_weight: f64,
 }
 
-/// Laws drawn from one window in each round, both sides together.
-const DRAWS: [u32; 4] = [128, 128, 128, 256];
+/// Laws drawn from one window in each round, all sides together; rounds at least and at most, and the even
+/// draws that they must be worth to end sooner.
+const DRAWS: u32 = 128;
+const ROUNDS_OF_DRAWS: (u32, u32) = (3, 9);
+const WORTH: f64 = 110.0;
 /// Steps of a search before and after the size of the scatter is known.
 const ROUNDS: (u32, u32) = (6, 10);
 /// Where in its range p is when a search starts.
@@ -260,15 +263,17 @@ fn line(problem: &Problem<'_>, rates: &[Rate]) -> (f64, f64) {
 fn draw(bench: &mut Bench, textures: &[Texture], sides: Vec<Side<'_>>) -> Vec<Draft> {
     let mut said: Vec<f64> = sides.iter().map(|side| side.log_evidence).collect();
     let mut lots: Vec<Lot<'_>> = sides.into_iter().map(Lot::new).collect();
-    let mut first = 0;
-    for count in DRAWS {
-        for (index, number) in numbers(&said, count).into_iter().enumerate() {
+    for round in 0..ROUNDS_OF_DRAWS.1 {
+        for (index, number) in numbers(&said, DRAWS).into_iter().enumerate() {
             let lot = &mut lots[index];
-            lot.draw(bench, textures, (first, number));
+            lot.draw(bench, textures, (round * DRAWS, number));
             let logs: Vec<f64> = lot.drafts.iter().map(|draft| draft.log_weight).collect();
             said[index] = proposal::log_sum(&logs);
         }
-        first += count;
+        let enough = round + 1 >= ROUNDS_OF_DRAWS.0;
+        if enough && worth(lots.iter().flat_map(|lot| &lot.drafts)) >= WORTH {
+            break;
+        }
     }
     lots.into_iter().flat_map(|lot| lot.drafts).collect()
 }
@@ -328,4 +333,12 @@ fn numbers(evidences: &[f64], count: u32) -> Vec<u32> {
     } else {
         vec![count / groups; evidences.len()]
     }
+}
+
+/// How many even draws a weighted sample is worth (Kish).
+fn worth<'a>(drafts: impl Iterator<Item = &'a Draft>) -> f64 {
+    let logs: Vec<f64> = drafts.map(|draft| draft.log_weight).collect();
+    let twice: Vec<f64> = logs.iter().map(|log| 2.0 * log).collect();
+    let worth = (2.0 * proposal::log_sum(&logs) - proposal::log_sum(&twice)).exp();
+    if worth.is_finite() { worth } else { 0.0 }
 }

@@ -17,7 +17,7 @@ type Root = SMatrix<f64, 5, 5>;
 const SIZE: usize = 4;
 
 /// Widths of the proposal, over the approximation's own, and the share of each.
-const WIDTHS: [(f64, f64); 2] = [(1.1, 0.7), (2.2, 0.3)];
+const WIDTHS: [(f64, f64); 2] = [(1.15, 0.75), (3.0, 0.25)];
 /// The share of draws that go to all textures evenly, whatever their evidence.
 const EVEN: f64 = 0.1;
 /// Draws that weights must be worth for a shape to be told from them.
@@ -232,7 +232,7 @@ impl Component {
         let (slope, bend) = problem.prior_slope(&at);
         let bend = Matrix4::from_diagonal(&bend);
         let mut residuals = bench.residuals.clone();
-        let (mut log_size, mut size_spread) = texture.size(window, &residuals, log_size, 2);
+        let (mut log_size, mut size_spread) = texture.size(window, &residuals, log_size, 1);
         let mut step = Point::zeros();
         let mut covariance = Matrix4::identity();
         for _ in 0..2 {
@@ -247,8 +247,8 @@ impl Component {
                     *residual += column[index] * more[axis];
                 }
             }
-            (log_size, size_spread) = texture.size(window, &residuals, log_size, 2);
         }
+        (log_size, size_spread) = texture.size(window, &residuals, log_size, 1);
         let mut root = Root::zeros();
         root.fixed_view_mut::<4, 4>(0, 0)
             .copy_from(&covariance.cholesky()?.l());

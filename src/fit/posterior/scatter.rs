@@ -13,13 +13,15 @@ use super::prior::{self, SLOW_SHARES, WITHOUT_MEMORY};
 use super::window::Window;
 use nalgebra::{Matrix4, Vector4};
 
-/// Degrees of freedom of the innovations; the power below is (7 + 1).
+/// Degrees of freedom of the innovations.
 const STUDENT: f64 = 7.0;
 /// Squares of standardised innovations end here: beyond, all are the same outlier.
 const FARTHEST: f64 = 1e8;
 /// Step of the derivatives in ln size, and the least curvature that a step there assumes.
 const SIZE_STEP: f64 = 0.1;
 const LEAST_SIZE_BEND: f64 = 1.0;
+/// Rates whose densities are multiplied before the logarithm: the least is 1e-18, the most 1e8.
+const TOGETHER: usize = 8;
 /// Correlation times tried for each slow share.
 const MEMORIES: u32 = 4;
 
@@ -106,7 +108,9 @@ impl Texture {
 
     /// ln of the likelihood of the residuals, up to a constant that no parameter changes.
     pub(super) fn log_likelihood(&self, window: &Window, residuals: &[f64], size: f64) -> f64 {
-        let (mut sum, mut product, mut mean) = (0.0, 1.0, [0.0; 2]);
+        let (mut sum, mut mean) = (0.0, [0.0; 2]);
+        // Products of a few, because a logarithm costs more than all the rest.
+        let (mut variances, mut tails) = (1.0, 1.0);
         let mut belief = Belief::start(size * size * self.slow);
         for (index, (rate, step)) in window.seen.iter().zip(&self.steps).enumerate() {
             let gain = belief.predict(rate, step, size * size, self.slow);
@@ -114,18 +118,17 @@ impl Texture {
             let innovation = residuals[index] - step.load * mean[0] + rate.ends * mean[1];
             let z2 = (innovation * innovation / gain.variance).min(FARTHEST);
             let weight = ((STUDENT + 1.0) / (STUDENT + z2)).min(1.0);
-            let tail = 1.0 + z2 / STUDENT;
-            let tail_4 = (tail * tail) * (tail * tail);
-            product *= gain.variance * (tail_4 * tail_4);
-            if index % 3 == 2 {
-                sum += product.ln();
-                product = 1.0;
+            variances *= gain.variance;
+            tails *= 1.0 + z2 / STUDENT;
+            if index % TOGETHER == TOGETHER - 1 {
+                sum += variances.ln() + (STUDENT + 1.0) * tails.ln();
+                (variances, tails) = (1.0, 1.0);
             }
             mean[0] += gain.slow * weight * innovation;
             mean[1] = gain.end * weight * innovation;
             belief.update(&gain, weight);
         }
-        -0.5 * (sum + product.ln())
+        -0.5 * (sum + variances.ln() + (STUDENT + 1.0) * tails.ln())
     }
 
     /// The normal equations about these residuals, whose derivatives are `columns`.
