@@ -113,7 +113,12 @@ fn attempt(rng: &mut Pcg64, with_onset: bool) -> Option<Drawn> {
     }
     let end = times[count - 1];
     let late = with_onset && rng.random::<bool>();
-    let onset = if late { times[rng.random_range(1..count - 8)] } else { 0.0 };
+    let onset = if late {
+        let ago = log_uniform(rng, end - times[count - 9], end);
+        times.iter().copied().find(|time| *time >= end - ago)?
+    } else {
+        0.0
+    };
     let newest = times[count - 4..].windows(2).map(|w| w[1] - w[0]);
     let law = law(rng, end - onset, newest.fold(0.0, f64::max))?;
     let past = Trajectory::solve(&law.reversed(), end - onset, Accuracy::Full);

@@ -40,7 +40,7 @@ fn failure_days(law: &slipwatch::model::Law) -> Option<f64> {
 
 impl Tally {
     /// Fits one series and notes what was said of it.
-    pub(crate) fn add(&mut self, drawn: &Drawn, _with_onset: bool) {
+    pub(crate) fn add(&mut self, drawn: &Drawn, with_onset: bool) {
         self.series += 1;
         let all = 0..drawn.observations.values.len();
         let rates = drawn.observations.rates(all, RateOptions::default());
@@ -48,7 +48,11 @@ impl Tally {
             let l=drawn.law;
             unsafe { std::env::set_var("TRUTH", format!("{} {} {} {}", l.v_i, l.r, l.kappa, l.p)); }
         }
-        let posterior = Posterior::fit(&rates, Curvature::Free, None);
+        let posterior = if with_onset {
+            Posterior::over_onsets(&rates)
+        } else {
+            Posterior::fit(&rates, Curvature::Free, None)
+        };
         let Some(posterior) = posterior else {
             self.without += 1;
             return;
@@ -86,6 +90,15 @@ impl Tally {
         if std::env::var("DIAG").is_ok() {
             let t=failure_days(&drawn.law);
             println!("P {} {} {} {} {} {} {}", drawn.observations.values.len(), group.replace(' ',"_"), drawn.slow, drawn.scatter, below(&|law| law.v_i), below(&|law| law.r), posterior.effective_draws); let _=t; // DIAG3
+        }
+        if with_onset {
+            let spans = samples.iter().zip(&posterior.spans_days);
+            let truth = posterior.ensemble.now_days - drawn.onset_days;
+            let of = |later: bool| {
+                let met = spans.clone().filter(|(_, span)| if later { **span < truth * 0.95 } else { **span < truth * 1.05 });
+                met.map(|(sample, _)| sample.weight).sum::<f64>()
+            };
+            place("onset", if of(true) <= 0.95 && of(false) >= 0.05 { 0.5 } else { 0.0 });
         }
         place("m", below(&|law| law.p));
         place("r", below(&|law| law.r));
@@ -139,7 +152,7 @@ impl Tally {
         eff.sort_by(f64::total_cmp);
         let q = |s: f64| eff.get((s * eff.len() as f64) as usize).copied().unwrap_or(0.0);
         let _ = writeln!(out, "effective draws 1 5 25 50 75 %: {:.1} {:.1} {:.1} {:.1} {:.1}; evaluations {:.0}", q(0.01), q(0.05), q(0.25), q(0.5), q(0.75), self.evaluations as f64 / f64::from(self.series));
-        for what in ["failure, if any", "failure", "m", "r", "kappa", "v"] {
+        for what in ["failure, if any", "failure", "m", "r", "kappa", "v", "onset"] {
             let _ = write!(out, "{what:16}");
             for group in [None, Some("velocity"), Some("velocity, sigma stated"), Some("displacement")] {
                 let (c, n) = self.coverage(what, group);

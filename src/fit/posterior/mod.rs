@@ -13,13 +13,16 @@ mod past;
 mod prior;
 mod proposal;
 mod scatter;
+mod sensitivity;
 mod window;
 
 pub use onset::Onset;
 pub use prior::P_PRIOR;
+pub use sensitivity::OtherPrior;
 
 use super::rates::Rate;
 use crate::model::Law;
+use onset::Start;
 use mode::{Bench, Mode, Point, Problem, Sign};
 use proposal::{Side, Whole};
 use scatter::Texture;
@@ -81,11 +84,31 @@ struct Draft {
     log_weight: f64,
 }
 
-/// Laws drawn from one window in each round, all sides together; rounds at least and at most, and the even
-/// draws that they must be worth to end sooner.
-const DRAWS: u32 = 128;
-const ROUNDS_OF_DRAWS: (u32, u32) = (3, 9);
-const WORTH: f64 = 110.0;
+/// How much is drawn.
+#[derive(Debug, Clone, Copy)]
+struct Effort {
+    /// Laws drawn in each round.
+    draws: u32,
+    /// Rounds, at least and at most.
+    rounds: (u32, u32),
+    /// Even draws that they must be worth to end sooner.
+    worth: f64,
+}
+
+/// For an update of a running monitor.
+const QUICK: Effort = Effort {
+    draws: 64,
+    rounds: (2, 5),
+    worth: 40.0,
+};
+/// For one fit that is reported.
+const THOROUGH: Effort = Effort {
+    draws: 160,
+    rounds: (3, 9),
+    worth: 130.0,
+};
+/// A start this much less probable than the likeliest, in ln, is left out.
+const HOPELESS: f64 = 6.0;
 /// Steps of a search before and after the size of the scatter is known.
 const ROUNDS: (u32, u32) = (6, 10);
 /// Where in its range p is when a search starts.
@@ -94,34 +117,66 @@ const FIRST_P: f64 = 0.3;
 const FIRST_KAPPAS: [f64; 2] = [0.5, 2.5];
 
 impl Posterior {
-    /// Fits `rates`; `warm` is an earlier posterior of the same benchmark to start from.
+    /// Fits the law to all of `rates`; `warm` is an earlier posterior of the same benchmark to start from.
     /// `None` when there are too few rates or none of them moves.
     pub fn fit(rates: &[Rate], curvature: Curvature, warm: Option<&Self>) -> Option<Self> {
         let window = window_of(rates, curvature)?;
         let textures = scatter::textures(&window);
         let mut bench = Bench::new(rates.len());
+        let start = Start::first(&window);
+        let found: Vec<(Summit, Side<'_>)> = signs(curvature)
+            .iter()
+            .filter_map(|sign| {
+                let problem = start.problem(&window, *sign);
+                let starts = starts(&problem, rates, warm);
+                side(problem, &mut bench, &textures, &starts)
+            })
+            .collect();
+        let (summits, sides) = found.into_iter().unzip();
+        let drafts = draw(&mut bench, &textures, (sides, &QUICK));
+        Self::of(&window, summits, &drafts, bench.evaluations)
+    }
+
+    /// Fits the full law to `rates` from each of several starts on, and averages over them.
+    /// `None` when there are too few rates or none of them moves.
+    pub fn over_onsets(rates: &[Rate]) -> Option<Self> {
+        let window = window_of(rates, Curvature::Free)?;
+        let textures = scatter::textures(&window);
+        let few = scatter::few(&textures);
+        let mut bench = Bench::new(rates.len());
+        let mut screened: Vec<(Problem<'_>, Summit, f64)> = Vec::new();
+        for start in Start::candidates(&window) {
+            for sign in signs(Curvature::Free) {
+                let problem = start.problem(&window, *sign);
+                let starts = starts(&problem, rates, None);
+                if let Some((summit, side)) = side(problem, &mut bench, &few, &starts) {
+                    screened.push((problem, summit, side.log_evidence));
+                }
+            }
+        }
+        let best = screened.iter().map(|one| one.2).fold(f64::NEG_INFINITY, f64::max);
+        // Both signs of the likeliest start stay, so that neither is out of the question.
+        let likeliest = screened.iter().find(|one| one.2 >= best)?.0.span_days;
+        screened.retain(|one| {
+            one.2 > best - HOPELESS || one.0.span_days.to_bits() == likeliest.to_bits()
+        });
         let mut summits = Vec::new();
         let mut sides = Vec::new();
-        for sign in signs(curvature) {
-            let problem = Problem {
-                window: &window,
-                span_days: window.length_days,
-                sign: *sign,
-            };
-            let starts = starts(&problem, rates, warm);
-            if let Some((summit, side)) = side(problem, &mut bench, &textures, &starts) {
+        for (problem, summit, _) in screened {
+            let at = (vec![summit.point(&problem)], summit.log_size);
+            if let Some((summit, side)) = side(problem, &mut bench, &textures, &at) {
                 summits.push(summit);
                 sides.push(side);
             }
         }
-        let drafts = draw(&mut bench, &textures, sides);
-        Self::of(&window, summits, drafts, bench.evaluations)
+        let drafts = draw(&mut bench, &textures, (sides, &THOROUGH));
+        Self::of(&window, summits, &drafts, bench.evaluations)
     }
 
     fn of(
         window: &Window,
         summits: Vec<Summit>,
-        drafts: Vec<Draft>,
+        drafts: &[Draft],
         evaluations: usize,
     ) -> Option<Self> {
         let logs: Vec<f64> = drafts.iter().map(|draft| draft.log_weight).collect();
@@ -188,6 +243,12 @@ struct Summit {
     log_size: f64,
 }
 
+impl Summit {
+    fn point(&self, problem: &Problem<'_>) -> Point {
+        problem.point(self.p, (self.ln_v, self.r, self.kappa))
+    }
+}
+
 /// Finds the mode of one side, and draws up the proposal about it.
 fn side<'a>(
     problem: Problem<'a>,
@@ -232,8 +293,7 @@ fn starts(
     let p = low + (high - low) * FIRST_P;
     let bent = |kappa: f64| Point::new(p, kappa, change, ln_v);
     if let Some(known) = known {
-        let last = problem.point(known.p, (known.ln_v, known.r, known.kappa));
-        return (vec![last, bent(0.0)], known.log_size);
+        return (vec![known.point(problem), bent(0.0)], known.log_size);
     }
     let starts = match problem.sign {
         Sign::Positive => FIRST_KAPPAS.map(bent).to_vec(),
@@ -260,18 +320,22 @@ fn line(problem: &Problem<'_>, rates: &[Rate]) -> (f64, f64) {
 }
 
 /// Draws laws from each side in rounds, every round from a proposal that the ones before have taught.
-fn draw(bench: &mut Bench, textures: &[Texture], sides: Vec<Side<'_>>) -> Vec<Draft> {
+fn draw(
+    bench: &mut Bench,
+    textures: &[Texture],
+    (sides, effort): (Vec<Side<'_>>, &Effort),
+) -> Vec<Draft> {
     let mut said: Vec<f64> = sides.iter().map(|side| side.log_evidence).collect();
     let mut lots: Vec<Lot<'_>> = sides.into_iter().map(Lot::new).collect();
-    for round in 0..ROUNDS_OF_DRAWS.1 {
-        for (index, number) in numbers(&said, DRAWS).into_iter().enumerate() {
+    for round in 0..effort.rounds.1 {
+        for (index, number) in numbers(&said, effort.draws).into_iter().enumerate() {
             let lot = &mut lots[index];
-            lot.draw(bench, textures, (round * DRAWS, number));
+            lot.draw(bench, textures, (round * effort.draws, number));
             let logs: Vec<f64> = lot.drafts.iter().map(|draft| draft.log_weight).collect();
             said[index] = proposal::log_sum(&logs);
         }
-        let enough = round + 1 >= ROUNDS_OF_DRAWS.0;
-        if enough && worth(lots.iter().flat_map(|lot| &lot.drafts)) >= WORTH {
+        let enough = round + 1 >= effort.rounds.0;
+        if enough && worth(lots.iter().flat_map(|lot| &lot.drafts)) >= effort.worth {
             break;
         }
     }

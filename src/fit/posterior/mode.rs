@@ -32,6 +32,8 @@ pub(super) struct Problem<'a> {
     pub(super) window: &'a Window,
     pub(super) span_days: f64,
     pub(super) sign: Sign,
+    /// ln of the prior probability of this span.
+    pub(super) log_prior: f64,
 }
 
 /// Buffers that every evaluation uses again.

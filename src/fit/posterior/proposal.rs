@@ -136,7 +136,7 @@ impl<'a> Side<'a> {
                 + problem.prior(&at)
                 + texture.log_prior
                 + prior::log_size(log_size)
-                - problem.log_p_range();
+                + problem.log_prior_of_rest();
         Some(Draft {
             law,
             span_days: problem.span_days,
@@ -214,10 +214,11 @@ impl<'a> Side<'a> {
 }
 
 impl Problem<'_> {
-    /// ln of the width of the range of p, the inverse of its prior density.
-    fn log_p_range(&self) -> f64 {
+    /// ln of the prior density of p and of the span.
+    fn log_prior_of_rest(&self) -> f64 {
         let (low, high) = self.sign.p_range();
-        if high > low { (high - low).ln() } else { 0.0 }
+        let range = if high > low { high - low } else { 1.0 };
+        self.log_prior - range.ln()
     }
 }
 
@@ -267,7 +268,7 @@ impl Component {
             - 0.5 * step.dot(&(bend * step))
             + texture.log_prior
             + prior::log_size(log_size)
-            - problem.log_p_range()
+            + problem.log_prior_of_rest()
             + one.log_volume(problem.sign)
             + one.log_masses(problem.sign, 1.0, 0.0);
         Some(one)

@@ -57,6 +57,13 @@ pub(super) fn textures(window: &Window) -> Vec<Texture> {
     textures
 }
 
+/// A few of all textures, for a first look: white, and slow ones of two kinds.
+pub(super) fn few(textures: &[Texture]) -> Vec<Texture> {
+    let third = textures.len() / 3;
+    let chosen = [0, textures.len() - third, textures.len() - 1];
+    chosen.map(|index| textures[index].clone()).to_vec()
+}
+
 /// The filter's belief about the slow part and about the error of the reading between two rates.
 #[derive(Debug, Clone, Copy)]
 struct Belief {
