@@ -1,19 +1,20 @@
 //! Points that fill a cube evenly, the same every time: Kronecker's sequence, and normal deviates of it.
 
-/// Powers of the inverse of the root of x^8 = x + 1: the steps whose multiples fill seven dimensions
+/// Powers of the inverse of the root of x^9 = x + 1: the steps whose multiples fill eight dimensions
 /// evenly (Roberts 2018, after the golden ratio, the case of one dimension).
-const STEPS: [f64; 7] = [
-    0.911_592_353_482_054_9,
-    0.831_000_618_926_951_9,
-    0.757_533_809_952_664_3,
-    0.690_562_028_656_977,
-    0.629_511_064_928_756,
-    0.573_857_473_221_399_3,
-    0.523_124_084_577_160_8,
+const STEPS: [f64; 8] = [
+    0.921_599_319_633_982_9,
+    0.849_345_305_949_820_3,
+    0.782_756_056_097_671_4,
+    0.721_387_448_738_993_7,
+    0.664_830_181_950_351_4,
+    0.612_707_043_357_580_9,
+    0.564_670_394_293_295_8,
+    0.520_399_851_198_154_4,
 ];
 
-/// The `index`-th point of the sequence in seven dimensions, each in (0, 1).
-pub(super) fn kronecker(index: u32) -> [f64; 7] {
+/// The `index`-th point of the sequence in eight dimensions, each in (0, 1).
+pub(super) fn kronecker(index: u32) -> [f64; 8] {
     STEPS.map(|step| {
         (0.5 + step * f64::from(index + 1))
             .fract()

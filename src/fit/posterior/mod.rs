@@ -79,6 +79,8 @@ struct Draft {
     law: Law,
     span_days: f64,
     whole: Whole,
+    /// Where the span lies in its range, from -1 to 1.
+    along: f64,
     texture: usize,
     log_posterior: f64,
     log_weight: f64,
@@ -103,9 +105,9 @@ const QUICK: Effort = Effort {
 };
 /// For one fit that is reported.
 const THOROUGH: Effort = Effort {
-    draws: 160,
-    rounds: (3, 9),
-    worth: 130.0,
+    draws: 128,
+    rounds: (3, 8),
+    worth: 110.0,
 };
 /// A start this much less probable than the likeliest, in ln, is left out.
 const HOPELESS: f64 = 6.0;

@@ -32,7 +32,9 @@ pub(super) struct Problem<'a> {
     pub(super) window: &'a Window,
     pub(super) span_days: f64,
     pub(super) sign: Sign,
-    /// ln of the prior probability of this span.
+    /// Half the width, in ln, of the range that the span stands for.
+    pub(super) span_reach: f64,
+    /// ln of the prior probability of that range.
     pub(super) log_prior: f64,
 }
 
@@ -132,6 +134,11 @@ impl Problem<'_> {
 
     /// Fills the bench's residuals; false outside the prior's range.
     pub(super) fn evaluate(&self, bench: &mut Bench, at: &Point) -> bool {
+        self.evaluate_over(bench, at, self.span_days)
+    }
+
+    /// The same, where the law of that point has held for another span.
+    pub(super) fn evaluate_over(&self, bench: &mut Bench, at: &Point, span_days: f64) -> bool {
         bench.evaluations += 1;
         let shape = self.shape(at);
         // b and m have one sign: where the law would need S < 0 there is none.
@@ -141,19 +148,27 @@ impl Problem<'_> {
         exists
             && self
                 .window
-                .residuals(&mut bench.past, law, self.span_days, &mut bench.residuals)
+                .residuals(&mut bench.past, law, span_days, &mut bench.residuals)
     }
 
     /// ln of the prior density at a point.
     pub(super) fn prior(&self, at: &Point) -> f64 {
+        self.prior_over(at, 0.0)
+    }
+
+    /// The same, where the law of that point has held for exp(`reach`) times the span: r and kappa are what
+    /// they were, and larger in units of it.
+    pub(super) fn prior_over(&self, at: &Point, reach: f64) -> f64 {
         let kappa_length = at[KAPPA].sinh();
         let per_slope = change_per_slope(kappa_length);
         let r_length = at[CHANGE].sinh() / per_slope;
         let outrun = r_length * self.window.interval_days / (self.span_days * SLOPE_PER_INTERVAL);
-        let of_r = log_cauchy(r_length) + at[CHANGE].cosh().ln() - per_slope.ln();
+        let of_r = log_cauchy(r_length * reach.exp()) + at[CHANGE].cosh().ln() - per_slope.ln() + reach;
         let of_kappa = match self.sign {
             Sign::Zero => 0.0,
-            Sign::Positive | Sign::Negative => log_cauchy(kappa_length) + at[KAPPA].cosh().ln(),
+            Sign::Positive | Sign::Negative => {
+                log_cauchy(kappa_length * reach.exp()) + at[KAPPA].cosh().ln() + reach
+            }
         };
         of_r + of_kappa - 0.5 * outrun * outrun
     }

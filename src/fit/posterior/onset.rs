@@ -6,10 +6,11 @@
 use super::mode::{Problem, Sign};
 use super::prior::FROM_THE_FIRST;
 use super::window::Window;
-use super::{Posterior, Sample};
+use super::Posterior;
 
-/// Starts tried besides the first reading.
-const LATER: usize = 8;
+/// Ranges of starts tried besides the first reading, and the least half-width of one, in ln.
+const LATER: u32 = 8;
+const LEAST_REACH: f64 = 0.01;
 /// Fewest rates after a start.
 const FEWEST_RATES: usize = 8;
 
@@ -18,17 +19,18 @@ const FEWEST_RATES: usize = 8;
 pub struct Onset {
     /// 5 % quantile.
     pub low_days: f64,
-    /// The most probable of the starts tried.
-    pub best_days: f64,
+    /// Median: the first reading where that is the likelier.
+    pub median_days: f64,
     /// 95 % quantile.
     pub high_days: f64,
 }
 
-/// A start: how far back the law holds, and ln of its prior probability.
+/// A range of starts: how far back the law holds in its middle, and ln of its prior probability.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Start {
-    pub(super) span_days: f64,
-    pub(super) log_prior: f64,
+    span_days: f64,
+    reach: f64,
+    log_prior: f64,
 }
 
 impl Start {
@@ -36,36 +38,31 @@ impl Start {
     pub(super) fn first(window: &Window) -> Self {
         Self {
             span_days: window.length_days,
+            reach: 0.0,
             log_prior: 0.0,
         }
     }
 
-    /// The first reading, and later ones whose distances from the present fall geometrically.
+    /// The first reading, and ranges of later starts, even in the log of their distance from the present.
     pub(super) fn candidates(window: &Window) -> Vec<Self> {
-        let count = window.seen.len();
+        let first = Self::first(window);
         let longest = window.length_days;
-        let Some(newest) = count.checked_sub(FEWEST_RATES).map(|i| window.seen[i].older) else {
-            return vec![Self::first(window)];
+        let newest = window.seen.len().checked_sub(FEWEST_RATES);
+        let Some(shortest) = newest.map(|index| window.seen[index].older) else {
+            return vec![first];
         };
-        let at = |index: usize| longest * (newest / longest).powf(index as f64 / LATER as f64);
-        let snap = |wanted: f64| {
-            let later = window.seen.iter().map(|rate| rate.older);
-            later.filter(|ago| *ago <= wanted * 1.001).fold(newest, f64::max)
-        };
-        let mut spans: Vec<f64> = (1..=LATER).map(|index| snap(at(index))).collect();
-        spans.retain(|span| *span < 0.999 * longest);
-        spans.dedup();
-        if spans.is_empty() {
-            return vec![Self::first(window)];
+        let reach = 0.5 * (longest / shortest).ln() / f64::from(LATER);
+        if !(reach > LEAST_REACH) {
+            return vec![first];
         }
-        let each = ((1.0 - FROM_THE_FIRST) / spans.len() as f64).ln();
-        let later = spans.into_iter().map(|span_days| Self {
-            span_days,
-            log_prior: each,
+        let later = (0..LATER).map(|index| Self {
+            span_days: longest * (-reach * f64::from(2 * index + 1)).exp(),
+            reach,
+            log_prior: ((1.0 - FROM_THE_FIRST) / f64::from(LATER)).ln(),
         });
         let first = Self {
-            span_days: longest,
             log_prior: FROM_THE_FIRST.ln(),
+            ..first
         };
         std::iter::once(first).chain(later).collect()
     }
@@ -76,6 +73,7 @@ impl Start {
             window,
             span_days: self.span_days,
             sign,
+            span_reach: self.reach,
             log_prior: self.log_prior,
         }
     }
@@ -84,28 +82,22 @@ impl Start {
 impl Posterior {
     /// When the law began to hold; the first rate's start where no other was tried.
     pub fn onset(&self) -> Onset {
-        let mut spans: Vec<(f64, f64)> = Vec::new();
-        for (span, Sample { weight, .. }) in self.spans_days.iter().zip(&self.ensemble.samples) {
-            match spans.iter_mut().find(|known| known.0.to_bits() == span.to_bits()) {
-                Some(known) => known.1 += weight,
-                None => spans.push((*span, *weight)),
-            }
-        }
+        let spans = self.spans_days.iter().zip(&self.ensemble.samples);
+        let mut spans: Vec<(f64, f64)> = spans.map(|(span, one)| (*span, one.weight)).collect();
         // The longest span is the earliest start.
         spans.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let start = |span: f64| self.ensemble.now_days - span;
         let quantile = |share: f64| {
             let mut reached = 0.0;
             let found = spans.iter().find(|(_, weight)| {
                 reached += weight;
                 reached >= share
             });
-            found.or(spans.last()).map_or(self.from_days, |one| start(one.0))
+            let span = found.or(spans.last());
+            span.map_or(self.from_days, |(span, _)| self.ensemble.now_days - span)
         };
-        let best = spans.iter().max_by(|a, b| a.1.total_cmp(&b.1));
         Onset {
             low_days: quantile(0.05),
-            best_days: best.map_or(self.from_days, |one| start(one.0)),
+            median_days: quantile(0.5),
             high_days: quantile(0.95),
         }
     }

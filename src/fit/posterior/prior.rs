@@ -10,7 +10,7 @@
 //! | scatter of a rate about the law, relative | log-normal, median 0.05, standard deviation of the log 0.9; Student t with 7 degrees of freedom |
 //! | its correlated share of the variance | none (probability 0.4), or one of [`SLOW_SHARES`] |
 //! | its correlation time | between one sampling interval and a third of the record, even in its log |
-//! | onset | the first reading (1/2), or one of up to eight later ones, evenly |
+//! | onset | the first reading (1/2), or later, even in the log of its distance from the present, with eight rates after it |
 
 /// Scale of the prior on kappa L and on r L.
 pub(super) const CAUCHY_SCALE: f64 = 3.0;

@@ -34,6 +34,8 @@ const LN_ROOT_2_PI: f64 = 0.918_938_533_204_672_8;
 pub(super) struct Side<'a> {
     pub(super) problem: Problem<'a>,
     components: Vec<Component>,
+    /// Where in the range of the span draws are made, in units of its reach.
+    spans: (f64, f64),
     /// ln of the evidence, by the approximations.
     pub(super) log_evidence: f64,
 }
@@ -106,6 +108,7 @@ impl<'a> Side<'a> {
         log_evidence.is_finite().then_some(Self {
             problem,
             components,
+            spans: (-1.0, 1.0),
             log_evidence,
         })
     }
@@ -127,20 +130,24 @@ impl<'a> Side<'a> {
         let log_size = whole[SIZE];
         let shape = problem.shape(&at);
         let law = Law::from_fit(at[LN_V].exp(), shape.r, shape.kappa, shape.p);
-        if !problem.evaluate(bench, &at) {
+        let along = self.spans.0 + (self.spans.1 - self.spans.0) * u[7];
+        let reach = problem.span_reach * along;
+        let span_days = problem.span_days * reach.exp();
+        if !problem.evaluate_over(bench, &at, span_days) {
             return None;
         }
         let texture = &textures[chosen];
         let log_posterior =
             texture.log_likelihood(problem.window, &bench.residuals, log_size.exp())
-                + problem.prior(&at)
+                + problem.prior_over(&at, reach)
                 + texture.log_prior
                 + prior::log_size(log_size)
                 + problem.log_prior_of_rest();
         Some(Draft {
             law,
-            span_days: problem.span_days,
+            span_days,
             whole,
+            along,
             texture: chosen,
             log_posterior,
             log_weight: f64::NEG_INFINITY,
@@ -151,11 +158,15 @@ impl<'a> Side<'a> {
     pub(super) fn log_density(&self, draft: &Draft) -> f64 {
         let component = &self.components[draft.texture];
         let off = draft.whole - component.centre;
+        if !(self.spans.0..=self.spans.1).contains(&draft.along) {
+            return f64::NEG_INFINITY;
+        }
+        let narrowed = (2.0 / (self.spans.1 - self.spans.0)).ln();
         component
             .root
             .solve_lower_triangular(&off)
             .map_or(f64::NEG_INFINITY, |z| {
-                component.log_density(self.problem.sign, &z)
+                component.log_density(self.problem.sign, &z) + narrowed
             })
     }
 
@@ -196,7 +207,14 @@ impl<'a> Side<'a> {
                 ..*old
             }
         };
+        // The spans that have weight, and a little on either side.
+        let of_weight = || drafts.iter().zip(&weights).filter(|(_, weight)| **weight > 2e-3);
+        let low = of_weight().map(|(draft, _)| draft.along).fold(1.0, f64::min);
+        let high = of_weight().map(|(draft, _)| draft.along).fold(-1.0, f64::max);
+        let margin = (0.2 * (high - low)).max(0.02);
+        let spans = ((low - margin).max(-1.0), (high + margin).min(1.0));
         Some(Self {
+            spans,
             components: self.components.iter().enumerate().map(component).collect(),
             ..self.clone()
         })
@@ -311,7 +329,7 @@ impl Component {
     }
 
     /// Standard deviates of a draw whose p and kappa are in their range.
-    fn deviate(&self, sign: Sign, width: f64, u: &[f64; 7]) -> Whole {
+    fn deviate(&self, sign: Sign, width: f64, u: &[f64; 8]) -> Whole {
         let (p, kappa) = match sign {
             Sign::Zero => (0.0, 0.0),
             Sign::Positive | Sign::Negative => {
