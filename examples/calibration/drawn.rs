@@ -72,7 +72,9 @@ fn times(rng: &mut Pcg64) -> Vec<f64> {
     let count = log_uniform(rng, 15.0, 500.0).round() as usize;
     let length = log_uniform(rng, 20.0, 1000.0);
     let mut times: Vec<f64> = if rng.random::<bool>() {
-        (0..count).map(|i| length * i as f64 / (count - 1) as f64).collect()
+        (0..count)
+            .map(|i| length * i as f64 / (count - 1) as f64)
+            .collect()
     } else {
         (0..count).map(|_| uniform(rng, 0.0, length)).collect()
     };
@@ -85,7 +87,11 @@ fn times(rng: &mut Pcg64) -> Vec<f64> {
 /// A law for the last reading, from the prior; the window's length and newest interval in days.
 fn law(rng: &mut Pcg64, length: f64, interval: f64) -> Option<Law> {
     let (r, kappa) = (cauchy(rng) / length, cauchy(rng) / length);
-    let p = if kappa > 0.0 { uniform(rng, 0.0, 0.6) } else { uniform(rng, -1.0, 0.0) };
+    let p = if kappa > 0.0 {
+        uniform(rng, 0.0, 0.6)
+    } else {
+        uniform(rng, -1.0, 0.0)
+    };
     let unresolved = r * interval / SLOPE_PER_INTERVAL;
     let resolved = rng.random::<f64>() < (-0.5 * unresolved * unresolved).exp();
     let law = Law::from_fit(10.0 * normal(rng).exp(), r, kappa, p);
@@ -132,7 +138,11 @@ fn attempt(rng: &mut Pcg64, with_onset: bool) -> Option<Drawn> {
             break size;
         }
     };
-    let slow = if rng.random::<f64>() < 0.4 { 0.0 } else { uniform(rng, 0.1, 1.0) };
+    let slow = if rng.random::<f64>() < 0.4 {
+        0.0
+    } else {
+        uniform(rng, 0.1, 1.0)
+    };
     let memory = log_uniform(rng, end / count as f64, end / 3.0);
     let measured = match rng.random_range(0..20) {
         0..9 => Measured::Velocity,

@@ -44,10 +44,6 @@ impl Tally {
         self.series += 1;
         let all = 0..drawn.observations.values.len();
         let rates = drawn.observations.rates(all, RateOptions::default());
-        if std::env::var("DIAG").is_ok() {
-            let l=drawn.law;
-            unsafe { std::env::set_var("TRUTH", format!("{} {} {} {}", l.v_i, l.r, l.kappa, l.p)); }
-        }
         let posterior = if with_onset {
             Posterior::over_onsets(&rates)
         } else {
@@ -59,10 +55,6 @@ impl Tally {
         };
         self.effective.push(posterior.effective_draws);
         self.evaluations += posterior.evaluations;
-        if std::env::var("DIAG").is_ok() {
-            let l = posterior.ensemble.now_days - posterior.from_days;
-            println!("D {:.1} n {} {:?} r {:.2} k {:.2} p {:.2} size {:.3} slow {:.2}", posterior.effective_draws, rates.len(), drawn.measured, drawn.law.r*l, drawn.law.kappa*l, drawn.law.p, drawn.scatter, drawn.slow);
-        }
         let group = match drawn.measured {
             Measured::Velocity => "velocity",
             Measured::VelocityWithSigma => "velocity, sigma stated",
@@ -77,28 +69,45 @@ impl Tally {
                 came_true: drawn.law.regime() == regime,
             });
         }
-        let unstable: f64 = samples.iter().filter(|s| s.law.kappa > 0.0).map(|s| s.weight).sum();
-        let accelerating: f64 = samples.iter().filter(|s| s.law.r > 0.0).map(|s| s.weight).sum();
+        let unstable: f64 = samples
+            .iter()
+            .filter(|s| s.law.kappa > 0.0)
+            .map(|s| s.weight)
+            .sum();
+        let accelerating: f64 = samples
+            .iter()
+            .filter(|s| s.law.r > 0.0)
+            .map(|s| s.weight)
+            .sum();
         self.say("unstable", unstable, drawn.law.kappa > 0.0);
         self.say("accelerating", accelerating, drawn.law.r > 0.0);
-                let below = |of: &dyn Fn(&slipwatch::model::Law) -> f64| {
+        let below = |of: &dyn Fn(&slipwatch::model::Law) -> f64| {
             let truth = of(&drawn.law);
             let met = samples.iter().filter(|one| of(&one.law) < truth);
             met.map(|one| one.weight).sum::<f64>()
         };
         let mut place = |what, share| self.places.push(Place { what, group, share });
-        if std::env::var("DIAG").is_ok() {
-            let t=failure_days(&drawn.law);
-            println!("P {} {} {} {} {} {} {}", drawn.observations.values.len(), group.replace(' ',"_"), drawn.slow, drawn.scatter, below(&|law| law.v_i), below(&|law| law.r), posterior.effective_draws); let _=t; // DIAG3
-        }
         if with_onset {
             let spans = samples.iter().zip(&posterior.spans_days);
             let truth = posterior.ensemble.now_days - drawn.onset_days;
             let of = |later: bool| {
-                let met = spans.clone().filter(|(_, span)| if later { **span < truth * 0.95 } else { **span < truth * 1.05 });
+                let met = spans.clone().filter(|(_, span)| {
+                    if later {
+                        **span < truth * 0.95
+                    } else {
+                        **span < truth * 1.05
+                    }
+                });
                 met.map(|(sample, _)| sample.weight).sum::<f64>()
             };
-            place("onset", if of(true) <= 0.95 && of(false) >= 0.05 { 0.5 } else { 0.0 });
+            place(
+                "onset",
+                if of(true) <= 0.95 && of(false) >= 0.05 {
+                    0.5
+                } else {
+                    0.0
+                },
+            );
         }
         place("m", below(&|law| law.p));
         place("r", below(&|law| law.r));
@@ -110,19 +119,33 @@ impl Tally {
                 .filter_map(|one| Some((failure_days(&one.law)?, one.weight)))
                 .collect();
             let fails: f64 = times.iter().map(|(_, w)| w).sum();
-            let before: f64 = times.iter().filter(|(t, _)| *t < truth).map(|(_, w)| w).sum();
-            place("failure, if any", if fails > 0.0 { before / fails } else { 2.0 });
+            let before: f64 = times
+                .iter()
+                .filter(|(t, _)| *t < truth)
+                .map(|(_, w)| w)
+                .sum();
+            place(
+                "failure, if any",
+                if fails > 0.0 { before / fails } else { 2.0 },
+            );
             place("failure", before);
         }
     }
 
     fn say(&mut self, what: &'static str, probability: f64, came_true: bool) {
-        self.said.push(Said { what, probability, came_true });
+        self.said.push(Said {
+            what,
+            probability,
+            came_true,
+        });
     }
 
     /// Share of the truths within the central 90 %, and how many there were.
     pub(crate) fn coverage(&self, what: &str, group: Option<&str>) -> (f64, usize) {
-        let met = self.places.iter().filter(|p| p.what == what && group.is_none_or(|g| g == p.group));
+        let met = self
+            .places
+            .iter()
+            .filter(|p| p.what == what && group.is_none_or(|g| g == p.group));
         let shares: Vec<f64> = met.map(|place| place.share).collect();
         let inside = shares.iter().filter(|s| (0.05..=0.95).contains(*s)).count();
         (inside as f64 / shares.len().max(1) as f64, shares.len())
@@ -139,7 +162,9 @@ impl Tally {
                 gap += one.probability - f64::from(u8::from(one.came_true));
                 n += 1;
             }
-            if n > 0 { error += gap.abs(); }
+            if n > 0 {
+                error += gap.abs();
+            }
         }
         error / said.len().max(1) as f64
     }
@@ -147,18 +172,53 @@ impl Tally {
     /// The table that is printed.
     pub(crate) fn table(&self) -> String {
         let mut out = String::new();
-        let _ = writeln!(out, "{} series, {} without a posterior", self.series, self.without);
+        let _ = writeln!(
+            out,
+            "{} series, {} without a posterior",
+            self.series, self.without
+        );
         let mut eff = self.effective.clone();
         eff.sort_by(f64::total_cmp);
-        let q = |s: f64| eff.get((s * eff.len() as f64) as usize).copied().unwrap_or(0.0);
-        let _ = writeln!(out, "effective draws 1 5 25 50 75 %: {:.1} {:.1} {:.1} {:.1} {:.1}; evaluations {:.0}", q(0.01), q(0.05), q(0.25), q(0.5), q(0.75), self.evaluations as f64 / f64::from(self.series));
-        for what in ["failure, if any", "failure", "m", "r", "kappa", "v", "onset"] {
+        let q = |s: f64| {
+            eff.get((s * eff.len() as f64) as usize)
+                .copied()
+                .unwrap_or(0.0)
+        };
+        let _ = writeln!(
+            out,
+            "effective draws 1 5 25 50 75 %: {:.1} {:.1} {:.1} {:.1} {:.1}; evaluations {:.0}",
+            q(0.01),
+            q(0.05),
+            q(0.25),
+            q(0.5),
+            q(0.75),
+            self.evaluations as f64 / f64::from(self.series)
+        );
+        for what in [
+            "failure, if any",
+            "failure",
+            "m",
+            "r",
+            "kappa",
+            "v",
+            "onset",
+        ] {
             let _ = write!(out, "{what:16}");
-            for group in [None, Some("velocity"), Some("velocity, sigma stated"), Some("displacement")] {
+            for group in [
+                None,
+                Some("velocity"),
+                Some("velocity, sigma stated"),
+                Some("displacement"),
+            ] {
                 let (c, n) = self.coverage(what, group);
                 let _ = write!(out, " {:.3} ({n})", c);
             }
-            let met: Vec<f64> = self.places.iter().filter(|p| p.what == what).map(|p| p.share).collect();
+            let met: Vec<f64> = self
+                .places
+                .iter()
+                .filter(|p| p.what == what)
+                .map(|p| p.share)
+                .collect();
             let low = met.iter().filter(|s| **s < 0.05).count();
             let high = met.iter().filter(|s| **s > 0.95).count();
             let _ = writeln!(out, "   below {low} above {high}");
@@ -166,9 +226,15 @@ impl Tally {
         for what in ["regime", "unstable", "accelerating"] {
             let _ = write!(out, "{what:16} {:.4}  ", self.calibration_error(what));
             for bin in 0..10 {
-                let said: Vec<&Said> = self.said.iter().filter(|o| o.what == what && ((o.probability * 10.0) as i32).min(9) == bin).collect();
-                let mean = said.iter().map(|o| o.probability).sum::<f64>() / said.len().max(1) as f64;
-                let t = said.iter().filter(|o| o.came_true).count() as f64 / said.len().max(1) as f64;
+                let said: Vec<&Said> = self
+                    .said
+                    .iter()
+                    .filter(|o| o.what == what && ((o.probability * 10.0) as i32).min(9) == bin)
+                    .collect();
+                let mean =
+                    said.iter().map(|o| o.probability).sum::<f64>() / said.len().max(1) as f64;
+                let t =
+                    said.iter().filter(|o| o.came_true).count() as f64 / said.len().max(1) as f64;
                 let _ = write!(out, " {mean:.2}/{t:.2}({})", said.len());
             }
             let _ = writeln!(out);

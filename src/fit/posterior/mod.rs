@@ -22,8 +22,8 @@ pub use sensitivity::OtherPrior;
 
 use super::rates::Rate;
 use crate::model::Law;
-use onset::Start;
 use mode::{Bench, Mode, Point, Problem, Sign};
+use onset::Start;
 use proposal::{Side, Whole};
 use scatter::Texture;
 use window::Window;
@@ -156,7 +156,10 @@ impl Posterior {
                 }
             }
         }
-        let best = screened.iter().map(|one| one.2).fold(f64::NEG_INFINITY, f64::max);
+        let best = screened
+            .iter()
+            .map(|one| one.2)
+            .fold(f64::NEG_INFINITY, f64::max);
         // Both signs of the likeliest start stay, so that neither is out of the question.
         let likeliest = screened.iter().find(|one| one.2 >= best)?.0.span_days;
         screened.retain(|one| {
@@ -284,11 +287,7 @@ fn side<'a>(
 
 /// Where to look from, and ln of the size of the scatter there: what was found last time, or a line
 /// through the recent and the older velocity with some kappas.
-fn starts(
-    problem: &Problem<'_>,
-    rates: &[Rate],
-    warm: Option<&Posterior>,
-) -> (Vec<Point>, f64) {
+fn starts(problem: &Problem<'_>, rates: &[Rate], warm: Option<&Posterior>) -> (Vec<Point>, f64) {
     let known = warm.and_then(|warm| warm.summits.iter().find(|one| one.sign == problem.sign));
     let (low, high) = problem.sign.p_range();
     let (ln_v, change) = line(problem, rates);
@@ -370,9 +369,10 @@ impl<'a> Lot<'a> {
         self.drafts.extend(fresh);
         self.used.push((self.next.clone(), number));
         for draft in &mut self.drafts {
-            let each = self.used.iter().map(|(side, number)| {
-                f64::from((*number).max(1)).ln() + side.log_density(draft)
-            });
+            let each = self
+                .used
+                .iter()
+                .map(|(side, number)| f64::from((*number).max(1)).ln() + side.log_density(draft));
             let each: Vec<f64> = each.collect();
             draft.log_weight = draft.log_posterior - proposal::log_sum(&each);
         }

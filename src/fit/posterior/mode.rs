@@ -143,7 +143,8 @@ impl Problem<'_> {
         let shape = self.shape(at);
         // b and m have one sign: where the law would need S < 0 there is none.
         let exists = shape.kappa + shape.p * shape.r > 0.0 || self.sign != Sign::Positive;
-        let exists = exists && (shape.kappa + shape.p * shape.r < 0.0 || self.sign != Sign::Negative);
+        let exists =
+            exists && (shape.kappa + shape.p * shape.r < 0.0 || self.sign != Sign::Negative);
         let law = (at[LN_V], shape);
         exists
             && self
@@ -163,7 +164,8 @@ impl Problem<'_> {
         let per_slope = change_per_slope(kappa_length);
         let r_length = at[CHANGE].sinh() / per_slope;
         let outrun = r_length * self.window.interval_days / (self.span_days * SLOPE_PER_INTERVAL);
-        let of_r = log_cauchy(r_length * reach.exp()) + at[CHANGE].cosh().ln() - per_slope.ln() + reach;
+        let of_r =
+            log_cauchy(r_length * reach.exp()) + at[CHANGE].cosh().ln() - per_slope.ln() + reach;
         let of_kappa = match self.sign {
             Sign::Zero => 0.0,
             Sign::Positive | Sign::Negative => {

@@ -3,10 +3,10 @@
 //! Before its start a law's slope creeps at the velocity that the law starts with, with the same scatter;
 //! so every candidate explains the same readings, and their evidences compare.
 
+use super::Posterior;
 use super::mode::{Problem, Sign};
 use super::prior::FROM_THE_FIRST;
 use super::window::Window;
-use super::Posterior;
 
 /// Ranges of starts tried besides the first reading, and the least half-width of one, in ln.
 const LATER: u32 = 8;

@@ -190,7 +190,10 @@ impl<'a> Side<'a> {
             covariance += off * off.transpose() * *weight;
         }
         covariance *= 1.0 + 4.0 / worth;
-        let widest = self.components.iter().max_by(|a, b| a.share.total_cmp(&b.share))?;
+        let widest = self
+            .components
+            .iter()
+            .max_by(|a, b| a.share.total_cmp(&b.share))?;
         covariance += widest.root * widest.root.transpose() * RIDGE;
         if self.problem.sign == Sign::Zero {
             (covariance[(P, P)], covariance[(KAPPA, KAPPA)]) = (1.0, 1.0);
@@ -198,7 +201,10 @@ impl<'a> Side<'a> {
         let root = covariance.cholesky()?.l();
         let even = EVEN / self.components.len() as f64;
         let component = |(index, old): (usize, &Component)| {
-            let of = drafts.iter().zip(&weights).filter(|(draft, _)| draft.texture == index);
+            let of = drafts
+                .iter()
+                .zip(&weights)
+                .filter(|(draft, _)| draft.texture == index);
             let met: f64 = of.map(|(_, weight)| weight).sum();
             Component {
                 centre,
@@ -208,9 +214,18 @@ impl<'a> Side<'a> {
             }
         };
         // The spans that have weight, and a little on either side.
-        let of_weight = || drafts.iter().zip(&weights).filter(|(_, weight)| **weight > 2e-3);
-        let low = of_weight().map(|(draft, _)| draft.along).fold(1.0, f64::min);
-        let high = of_weight().map(|(draft, _)| draft.along).fold(-1.0, f64::max);
+        let of_weight = || {
+            drafts
+                .iter()
+                .zip(&weights)
+                .filter(|(_, weight)| **weight > 2e-3)
+        };
+        let low = of_weight()
+            .map(|(draft, _)| draft.along)
+            .fold(1.0, f64::min);
+        let high = of_weight()
+            .map(|(draft, _)| draft.along)
+            .fold(-1.0, f64::max);
         let margin = (0.2 * (high - low)).max(0.02);
         let spans = ((low - margin).max(-1.0), (high + margin).min(1.0));
         Some(Self {
@@ -300,16 +315,13 @@ impl Component {
                 (self.root[(0, 0)] * self.root[(1, 1)]).ln() + 2.0 * LN_ROOT_2_PI
             }
         };
-        let line = (self.root[(CHANGE, CHANGE)] * self.root[(LN_V, LN_V)] * self.root[(SIZE, SIZE)]).ln();
+        let line =
+            (self.root[(CHANGE, CHANGE)] * self.root[(LN_V, LN_V)] * self.root[(SIZE, SIZE)]).ln();
         curved + line + 3.0 * LN_ROOT_2_PI
     }
 
     fn p_stretch(&self, sign: Sign, width: f64) -> Stretch {
-        Stretch::new(
-            sign.p_range(),
-            self.centre[P],
-            width * self.root[(0, 0)],
-        )
+        Stretch::new(sign.p_range(), self.centre[P], width * self.root[(0, 0)])
     }
 
     /// The stretch of kappa, given the deviate of p.
@@ -323,7 +335,9 @@ impl Component {
             Sign::Zero => 0.0,
             Sign::Positive | Sign::Negative => {
                 let p = self.p_stretch(sign, width);
-                (p.mass * self.kappa_stretch(sign, width, z_p).mass).max(LEAST_MASS).ln()
+                (p.mass * self.kappa_stretch(sign, width, z_p).mass)
+                    .max(LEAST_MASS)
+                    .ln()
             }
         }
     }
@@ -350,7 +364,9 @@ impl Component {
             Sign::Positive | Sign::Negative => 5.0,
         };
         let one = |(width, share): (f64, f64)| {
-            share.ln() - 0.5 * square / (width * width) - axes * width.ln()
+            share.ln()
+                - 0.5 * square / (width * width)
+                - axes * width.ln()
                 - self.log_masses(sign, width, z[P])
         };
         log_sum(&WIDTHS.map(one)) - self.log_volume(sign) + self.share.ln()

@@ -41,7 +41,11 @@ impl OtherPrior {
             Self::WiderKappa => wider(law.kappa * span_days),
             Self::WiderSlope => wider(law.r * span_days),
             Self::EvenInM => {
-                let edge = if law.kappa > 0.0 { P_PRIOR.1 } else { P_PRIOR.0 };
+                let edge = if law.kappa > 0.0 {
+                    P_PRIOR.1
+                } else {
+                    P_PRIOR.0
+                };
                 let range_of_m = (1.0 / (1.0 - edge) - 1.0).abs();
                 edge.abs() / (range_of_m * (1.0 - law.p).powi(2))
             }
