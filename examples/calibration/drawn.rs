@@ -141,9 +141,9 @@ fn attempt(rng: &mut Pcg64, with_onset: bool) -> Option<Drawn> {
     let slow = if rng.random::<f64>() < 0.4 {
         0.0
     } else {
-        uniform(rng, 0.1, 1.0)
+        1.0 - log_uniform(rng, 0.003, 0.9)
     };
-    let memory = log_uniform(rng, end / count as f64, end / 3.0);
+    let memory = log_uniform(rng, end / count as f64, end);
     let measured = match rng.random_range(0..20) {
         0..9 => Measured::Velocity,
         9..12 => Measured::VelocityWithSigma,

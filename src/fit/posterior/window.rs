@@ -76,7 +76,7 @@ impl Window {
 
     /// The shortest and the longest correlation time that the scatter may have, days.
     pub(super) fn memories_days(&self) -> (f64, f64) {
-        let longest = self.length_days / 3.0;
+        let longest = self.length_days;
         (self.spacing_days.min(0.5 * longest), longest)
     }
 
