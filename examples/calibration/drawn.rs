@@ -1,14 +1,24 @@
 //! Series drawn from the posterior's own prior, whose truth is therefore known.
 //!
-//! The law and its scatter are drawn as `fit::posterior::prior` states them, with the paper's exact
-//! solution and a filter-free Ornstein-Uhlenbeck walk: nothing of the fit is used here.
+//! The law and its scatter are drawn as `fit::posterior::prior` states them, by the exact solution and an
+//! Ornstein-Uhlenbeck walk: nothing of the fit is used here. Only the size of the scatter is confined, to
+//! between 1 and 15 %.
 
-use rand::{Rng, RngExt, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal, StudentT};
 use rand_pcg::Pcg64;
 use slipwatch::fit::{Observation, Observations};
 use slipwatch::model::{Accuracy, Law, Trajectory};
 use slipwatch::reading::Quantity;
+
+/// Whether the law holds from the first reading on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Starts {
+    /// In every series.
+    First,
+    /// In half of them; in the others later.
+    ToBeFound,
+}
 
 /// How a series was measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,9 +40,6 @@ pub(crate) struct Drawn {
     pub(crate) law: Law,
     /// Days of the first reading that follows the law; 0 where all do.
     pub(crate) onset_days: f64,
-    /// Relative scatter, and its share with a memory.
-    pub(crate) scatter: f64,
-    pub(crate) slow: f64,
 }
 
 const CAUCHY_SCALE: f64 = 3.0;
@@ -42,10 +49,10 @@ const SCATTER: (f64, f64) = (0.05, 0.9);
 const SCATTERS: (f64, f64) = (0.01, 0.15);
 
 /// The `index`-th series of a family.
-pub(crate) fn drawn(index: u64, with_onset: bool) -> Drawn {
+pub(crate) fn drawn(index: u64, starts: Starts) -> Drawn {
     let mut rng = Pcg64::seed_from_u64(0x5eed_0000 + index);
     loop {
-        if let Some(one) = attempt(&mut rng, with_onset) {
+        if let Some(one) = attempt(&mut rng, starts) {
             return one;
         }
     }
@@ -69,11 +76,14 @@ fn cauchy(rng: &mut Pcg64) -> f64 {
 
 /// Reading times, evenly or at random, from 0 on.
 fn times(rng: &mut Pcg64) -> Vec<f64> {
-    let count = log_uniform(rng, 15.0, 500.0).round() as usize;
+    let wanted = log_uniform(rng, 15.0, 500.0).round();
+    let count = (15..500)
+        .find(|count| f64::from(*count) >= wanted)
+        .unwrap_or(500);
     let length = log_uniform(rng, 20.0, 1000.0);
     let mut times: Vec<f64> = if rng.random::<bool>() {
         (0..count)
-            .map(|i| length * i as f64 / (count - 1) as f64)
+            .map(|i| length * f64::from(i) / f64::from(count - 1))
             .collect()
     } else {
         (0..count).map(|_| uniform(rng, 0.0, length)).collect()
@@ -111,14 +121,14 @@ fn wander(rng: &mut Pcg64, times: &[f64], spread: f64, memory: f64) -> Vec<f64> 
     times.iter().map(step).collect()
 }
 
-fn attempt(rng: &mut Pcg64, with_onset: bool) -> Option<Drawn> {
+fn attempt(rng: &mut Pcg64, starts: Starts) -> Option<Drawn> {
     let times = times(rng);
     let count = times.len();
     if count < 15 {
         return None;
     }
     let end = times[count - 1];
-    let late = with_onset && rng.random::<bool>();
+    let late = starts == Starts::ToBeFound && rng.random::<bool>();
     let onset = if late {
         let ago = log_uniform(rng, end - times[count - 9], end);
         times.iter().copied().find(|time| *time >= end - ago)?
@@ -162,8 +172,6 @@ fn attempt(rng: &mut Pcg64, with_onset: bool) -> Option<Drawn> {
         measured,
         law,
         onset_days: onset,
-        scatter: size,
-        slow,
     })
 }
 
