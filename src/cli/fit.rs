@@ -4,7 +4,7 @@ use super::args::{OutputArgs, ReadingArgs};
 use super::table::{Table, number, time};
 use crate::alert::Policy;
 use crate::fit::Exponent;
-use crate::inversion::{Estimate, FitReport, Inversion, Options};
+use crate::inversion::{Estimate, FitReport, Inversion, Options, UnderPrior};
 use crate::reading::{Quantity, Series, Timestamp, Unit};
 use crate::runtime::clock::Stopwatch;
 use std::fmt::Write as _;
@@ -172,7 +172,7 @@ fn summary(report: &FitReport) -> Table {
 /// How far the chance of m > 1 and the law's own failure time hang on the prior.
 fn other_priors(report: &FitReport) -> String {
     let all = &report.prior_sensitivity;
-    let unstable: Vec<f64> = all.iter().map(|one| one.probability_unstable()).collect();
+    let unstable: Vec<f64> = all.iter().map(UnderPrior::probability_unstable).collect();
     let fails: Vec<f64> = all.iter().map(|one| one.failure_probability).collect();
     let range = |values: &[f64]| {
         let low = values.iter().copied().fold(f64::INFINITY, f64::min);

@@ -52,7 +52,7 @@ impl Start {
             return vec![first];
         };
         let reach = 0.5 * (longest / shortest).ln() / f64::from(LATER);
-        if !(reach > LEAST_REACH) {
+        if reach < LEAST_REACH || reach.is_nan() {
             return vec![first];
         }
         let later = (0..LATER).map(|index| Self {

@@ -22,6 +22,8 @@ const WIDTHS: [(f64, f64); 2] = [(1.15, 0.75), (3.0, 0.25)];
 const EVEN: f64 = 0.1;
 /// Draws that weights must be worth for a shape to be told from them.
 const WORTH: f64 = 20.0;
+/// Draws that say nothing of a shape if they are worth fewer.
+const LEAST_WORTH: f64 = 8.0;
 /// The share of the old shape that the new one keeps.
 const RIDGE: f64 = 0.03;
 /// The least probability that a range is given: far beyond it numbers end.
@@ -177,7 +179,7 @@ impl<'a> Side<'a> {
         let logs: Vec<f64> = drafts.iter().map(|draft| draft.log_weight).collect();
         let weights = levelled(&logs);
         let worth = 1.0 / weights.iter().map(|w| w * w).sum::<f64>();
-        if !(worth > 8.0) {
+        if worth < LEAST_WORTH || worth.is_nan() {
             return None;
         }
         let mut centre = Whole::zeros();
@@ -266,7 +268,7 @@ impl Component {
         let (slope, bend) = problem.prior_slope(&at);
         let bend = Matrix4::from_diagonal(&bend);
         let mut residuals = bench.residuals.clone();
-        let (mut log_size, mut size_spread) = texture.size(window, &residuals, log_size, 1);
+        let (log_size, _) = texture.size(window, &residuals, log_size, 1);
         let mut step = Point::zeros();
         let mut covariance = Matrix4::identity();
         for _ in 0..2 {
@@ -282,7 +284,7 @@ impl Component {
                 }
             }
         }
-        (log_size, size_spread) = texture.size(window, &residuals, log_size, 1);
+        let (log_size, size_spread) = texture.size(window, &residuals, log_size, 1);
         let mut root = Root::zeros();
         root.fixed_view_mut::<4, 4>(0, 0)
             .copy_from(&covariance.cholesky()?.l());
