@@ -183,7 +183,7 @@ fn measure(
     (size, slow, memory): (f64, f64, f64),
 ) -> Vec<Observation> {
     let heavy = StudentT::new(7.0).ok();
-    let mut white = |rng: &mut Pcg64| heavy.map_or(0.0, |t| t.sample(rng));
+    let white = |rng: &mut Pcg64| heavy.map_or(0.0, |t| t.sample(rng));
     let deviation = wander(rng, times, size * slow.sqrt(), memory);
     let count = times.len();
     let slip = clean[count - 1].1 - clean[0].1;

@@ -51,6 +51,9 @@ pub(crate) struct Tally {
     evaluations: usize,
 }
 
+/// Reads one number off a law.
+type Read = fn(&Law) -> f64;
+
 fn failure_days(law: &Law) -> Option<f64> {
     let fails = law.regime() == Regime::UnstableAccelerating;
     law.days_to_velocity(law.v_i * FAILED).filter(|_| fails)
@@ -106,7 +109,7 @@ impl Tally {
     }
 
     fn intervals(&mut self, drawn: &Drawn, samples: &[LawSample]) {
-        let of: [(&'static str, fn(&Law) -> f64); 4] = [
+        let of: [(&'static str, Read); 4] = [
             ("m", |law| law.p),
             ("r", |law| law.r),
             ("kappa", |law| law.kappa),
