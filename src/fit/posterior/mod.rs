@@ -99,9 +99,9 @@ struct Effort {
 
 /// For an update of a running monitor.
 const QUICK: Effort = Effort {
-    draws: 72,
-    rounds: (2, 5),
-    worth: 50.0,
+    draws: 80,
+    rounds: (3, 6),
+    worth: 70.0,
 };
 /// For one fit that is reported.
 const THOROUGH: Effort = Effort {
