@@ -8,7 +8,7 @@
 /// Largest |ln y| within a window: velocities there stay within a factor of a million. Part of the prior.
 pub(super) const MOST_LN_Y: f64 = 14.0;
 /// Longest panel in ln y, and the share of the distance to a pole ahead that a panel may take.
-const LONGEST_PANEL: f64 = 0.25;
+const LONGEST_PANEL: f64 = 0.18;
 const SHARE_AHEAD: f64 = 0.5;
 /// What is left to move, in ln y, when the motion counts as steady.
 const STEADY: f64 = 1e-6;
