@@ -82,7 +82,7 @@ fn posterior_of_67_readings(bencher: Bencher) {
 #[divan::bench]
 fn panel_update_at_67_readings(bencher: Bencher) {
     let all = observations();
-    let mut panel = Panel::new(1);
+    let mut panel = Panel::default();
     for count in 1..READINGS {
         let values = all.values[..count].to_vec();
         let seen = Observations {

@@ -9,6 +9,7 @@ mod projection;
 mod quasi_random;
 mod rates;
 mod simplex;
+mod under_load;
 
 pub use constant_load::{ConstantLoad, Exponent, Outcome, Place, Solution};
 pub use posterior::{
@@ -17,3 +18,4 @@ pub use posterior::{
 pub use projection::PointReadings;
 pub(crate) use rates::displacement_sigma;
 pub use rates::{FINEST_DAYS, Observation, Observations, Rate, RateOptions, ReadingError};
+pub use under_load::LoadPosterior;

@@ -1,4 +1,22 @@
-//! Points that fill a cube evenly, the same every time: Kronecker's sequence, and normal deviates of it.
+//! Points that fill a cube evenly, the same every time: Halton's sequence and, where dimensions are many,
+//! Kronecker's; and normal deviates of them.
+
+const BASES: [u32; 5] = [2, 3, 5, 7, 11];
+
+/// The `index`-th point of the Halton sequence in five dimensions, each in (0, 1).
+pub(super) fn halton(index: u32) -> [f64; 5] {
+    BASES.map(|base| radical_inverse(index + 1, base))
+}
+
+fn radical_inverse(mut index: u32, base: u32) -> f64 {
+    let (mut value, mut share) = (0.0, 1.0 / f64::from(base));
+    while index > 0 {
+        value += share * f64::from(index % base);
+        index /= base;
+        share /= f64::from(base);
+    }
+    value
+}
 
 /// Powers of the inverse of the root of x^9 = x + 1: the steps whose multiples fill eight dimensions
 /// evenly (Roberts 2018, after the golden ratio, the case of one dimension).

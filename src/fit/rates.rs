@@ -193,7 +193,9 @@ fn displacement_rates(values: &[Observation]) -> Vec<Rate> {
     let mut end = values.len() - 1;
     for start in (0..values.len() - 1).rev() {
         let rate = between(&values[start], &values[end]);
-        let clear = rate.velocity > CLEAR_OF_NOISE * rate.sigma;
+        // Judged over twice the readings: an interval that ended where its own noise was high would be fast.
+        let twice = between(&values[start.saturating_sub(end - start)], &values[end]);
+        let clear = twice.velocity > CLEAR_OF_NOISE * rate.sigma;
         // A step just before must not be smeared over the stillness after it.
         let breaks = start > 0 && {
             let next = between(&values[start - 1], &values[start]);

@@ -1,11 +1,13 @@
 //! When the critical velocity will be passed: the distribution, the inverse-velocity line, the panel.
 
-mod filter;
+mod life;
 mod line;
 mod panel;
 mod passage;
 mod surprise;
 
+pub use life::{Fate, Life};
 pub use line::InverseVelocityLine;
-pub use panel::{FEWEST_READINGS, HORIZON_DAYS, Outlook, Panel, seed_of};
+pub(crate) use panel::outlook;
+pub use panel::{FEWEST_READINGS, HORIZON_DAYS, Outlook, Panel};
 pub use passage::Passage;

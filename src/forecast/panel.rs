@@ -1,67 +1,20 @@
-//! The panel: the law and the inverse-velocity line over several starts, weighted by how each foretold
-//! the readings that came next, so that no one confident member silences the rest.
-//!
-//! A member need only offer an ensemble of laws in present coordinates; a filter that carries an
-//! undeclared load is one more such ensemble.
+//! What the readings foretell: the law under an undeclared load, averaged over its shapes and its starts,
+//! so that no one confident member silences the rest.
 
 use super::Passage;
-use super::filter::Filter;
 use super::surprise::Surprise;
-use crate::fit::{Curvature, Ensemble, Observation, Observations, Posterior, Rate, RateOptions};
+use crate::fit::{Ensemble, LoadPosterior, Observation, Observations, Rate, RateOptions};
 use crate::model::{Accuracy, Law, Trajectory};
 use crate::reading::Quantity;
 use crate::regime::Regime;
 use std::collections::BTreeMap;
 
-/// Which part of the record a member fits, and with what.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Role {
-    curvature: Curvature,
-    /// Share of the rates, newest last.
-    share: f64,
-    /// Fewest rates that it works with.
-    fewest: usize,
-}
-
-const fn role(curvature: Curvature, share: f64, fewest: usize) -> Role {
-    Role {
-        curvature,
-        share,
-        fewest,
-    }
-}
-
-const ROLES: [Role; 5] = [
-    role(Curvature::Free, 1.0, 8),
-    role(Curvature::Free, 0.5, 16),
-    role(Curvature::Zero, 1.0, 16),
-    role(Curvature::Zero, 0.5, 16),
-    role(Curvature::Zero, 0.25, 16),
-];
-
-/// The filter's say: the one member that knows that the load may change is never outvoted.
-const FILTER_SHARE: f64 = 0.75;
 /// Fewest readings before anything is forecast: below it the priors would speak, not the slope.
 pub const FEWEST_READINGS: usize = 8;
-/// Fewest rates before the fitted windows have a say in the forecast.
-const FEWEST_RATES: usize = 24;
 /// A slope at 50 m/day has failed by any account, mm/day.
 const FASTEST_CRITICAL: f64 = 5e4;
 /// How far the forecast looks, days.
 pub const HORIZON_DAYS: f64 = 400.0;
-/// No window's share among the windows falls below this, however it scored.
-const LEAST_SHARE: f64 = 0.05;
-/// Memory of a score: a reading this many readings ago counts 1/e.
-const SCORE_MEMORY: f64 = 12.0;
-/// A prediction is never worse than this in log score: one outlier does not decide.
-const WORST_LOG_SCORE: f64 = -6.0;
-
-#[derive(Debug, Clone)]
-struct Member {
-    role: Role,
-    posterior: Option<Posterior>,
-    score: f64,
-}
 
 /// What the panel says after its newest reading.
 #[derive(Debug, Clone, PartialEq)]
@@ -74,183 +27,88 @@ pub struct Outlook {
     pub surprise_nats: Option<f64>,
     /// Probability of each regime.
     pub regimes: BTreeMap<Regime, f64>,
-    /// The most probable law over the longest window, t = 0 now; `None` with too few rates.
+    /// The most probable law; `None` with too few rates.
     pub law: Option<Law>,
     /// Rates of the whole record, oldest first.
     pub rates: Vec<Rate>,
 }
 
-/// The members of one benchmark.
-#[derive(Debug, Clone)]
+/// What one benchmark is expected to do, and how well that was met.
+#[derive(Debug, Clone, Default)]
 pub struct Panel {
-    members: Vec<Member>,
-    scored_to_days: f64,
-    filter: Filter,
+    expected: Option<Ensemble>,
+    scored_to_days: Option<f64>,
     surprise: Surprise,
 }
 
 impl Panel {
-    /// A panel that has seen nothing; `seed` feeds the filter's generator.
-    pub fn new(seed: u64) -> Self {
-        let members = ROLES.map(|role| Member {
-            role,
-            posterior: None,
-            score: 0.0,
-        });
-        Self {
-            members: members.to_vec(),
-            scored_to_days: f64::NEG_INFINITY,
-            filter: Filter::new(seed),
-            surprise: Surprise::default(),
-        }
-    }
-
-    /// Scores every member on the newest reading, refits it, and says what they expect together of
+    /// Weighs the newest reading against what was expected, refits, and says what is to be expected now of
     /// passing `critical` mm/day; `None` with too few readings to go on.
     pub fn update(&mut self, observations: &Observations, critical: f64) -> Option<Outlook> {
-        self.score(observations);
-        let surprise = self
-            .filter
-            .update(observations)
-            .and_then(|log_density| self.surprise.of(log_density));
-        let rates = observations.rates(0..observations.values.len(), RateOptions::default());
-        for member in &mut self.members {
-            let window = window(&rates, member.role);
-            let warm = member.posterior.take();
-            member.posterior = window
-                .and_then(|window| Posterior::fit(window, member.role.curvature, warm.as_ref()));
-        }
-        if observations.spaced(FEWEST_READINGS).len() < FEWEST_READINGS {
-            return None;
-        }
-        let now_days = observations.values.last()?.t_days;
-        let weighed = self.weights();
-        let regimes = regimes(&weighed);
-        let law = self.longest_law();
-        let passage = if measurably_moves(&rates) {
-            let windows = if rates.len() >= FEWEST_RATES {
-                weighed
-            } else {
-                Vec::new()
-            };
-            let critical = critical.min(FASTEST_CRITICAL);
-            let mut parts = passages(&windows, critical, now_days);
-            let filtered = self.filter.passage(critical, HORIZON_DAYS, now_days);
-            parts.push((filtered, FILTER_SHARE));
-            Passage::mixture(&parts)
-        } else {
-            Passage::default()
-        };
+        let surprise_nats = self.surprise(observations);
+        let outlook = outlook(observations, critical);
+        let (outlook, expected) = outlook?;
+        self.expected = expected;
         Some(Outlook {
-            now_days,
-            passage,
-            surprise_nats: surprise,
-            regimes,
-            law,
-            rates,
+            surprise_nats,
+            ..outlook
         })
     }
 
-    /// The best sample of the law over the longest window that has one.
-    fn longest_law(&self) -> Option<Law> {
-        let posterior = self
-            .members
-            .iter()
-            .find_map(|member| member.posterior.as_ref())?;
-        let samples = posterior.ensemble.samples.iter();
-        samples
-            .max_by(|a, b| a.weight.total_cmp(&b.weight))
-            .map(|sample| sample.law)
-    }
-
-    /// Members and their say: scores through a softmax, with a floor.
-    fn weights(&self) -> Vec<Weighed<'_>> {
-        let present = self.members.iter().filter_map(|member| {
-            member
-                .posterior
-                .as_ref()
-                .map(|posterior| (member, posterior))
-        });
-        let present: Vec<(&Member, &Posterior)> = present.collect();
-        let best = present
-            .iter()
-            .map(|(member, _)| member.score)
-            .fold(f64::NEG_INFINITY, f64::max);
-        let total: f64 = present
-            .iter()
-            .map(|(member, _)| (member.score - best).exp())
-            .sum();
-        let free = 1.0 - LEAST_SHARE * present.len() as f64;
-        let share = |score: f64| LEAST_SHARE + free * (score - best).exp() / total;
-        let weigh = |(member, posterior): (&'_ Member, _)| Weighed {
-            curvature: member.role.curvature,
-            posterior,
-            weight: share(member.score),
-        };
-        present.into_iter().map(weigh).collect()
-    }
-
-    fn score(&mut self, observations: &Observations) {
+    fn surprise(&mut self, observations: &Observations) -> Option<f64> {
         let [.., before, newest] = observations.values.as_slice() else {
-            return;
+            return None;
         };
-        let apart = newest.t_days - self.scored_to_days;
-        if apart <= 0.0 || apart < 0.5 * observations.averaging_days * 0.999 {
-            return;
+        let apart = newest.t_days - self.scored_to_days.unwrap_or(f64::NEG_INFINITY);
+        if apart < 0.999 * observations.spacing_days() {
+            return None;
         }
-        self.scored_to_days = newest.t_days;
+        self.scored_to_days = Some(newest.t_days);
+        let expected = self.expected.as_ref()?;
         let newest = Newest::of(observations, before, newest);
-        for member in &mut self.members {
-            let Some(posterior) = &member.posterior else {
-                continue;
-            };
-            let log_score = newest.log_score(&posterior.ensemble);
-            member.score =
-                member.score * (1.0 - 1.0 / SCORE_MEMORY) + log_score.max(WORST_LOG_SCORE);
-        }
+        self.surprise.of(newest.log_score(expected))
     }
 }
 
-/// A fitted window and its say among the windows.
-struct Weighed<'a> {
-    curvature: Curvature,
-    posterior: &'a Posterior,
-    weight: f64,
-}
-
-/// The regimes' probabilities, by the windows that fit the full law.
-fn regimes(weighed: &[Weighed<'_>]) -> BTreeMap<Regime, f64> {
-    let mut regimes: BTreeMap<Regime, f64> = Regime::KNOWN.into_iter().map(|r| (r, 0.0)).collect();
-    let laws = || {
-        weighed
-            .iter()
-            .filter(|one| one.curvature == Curvature::Free)
-    };
-    let total: f64 = laws().map(|one| one.weight).sum();
-    for one in laws() {
-        for sample in &one.posterior.ensemble.samples {
-            *regimes.entry(sample.law.regime()).or_default() += sample.weight * one.weight / total;
-        }
+/// What `observations` foretell by themselves of passing `critical` mm/day, and the laws they leave open.
+pub(crate) fn outlook(
+    observations: &Observations,
+    critical: f64,
+) -> Option<(Outlook, Option<Ensemble>)> {
+    if observations.spaced(FEWEST_READINGS).len() < FEWEST_READINGS {
+        return None;
     }
-    regimes
-}
-
-/// What each window says of passing `critical` mm/day, days from `now_days`, with its say in the whole.
-fn passages(weighed: &[Weighed<'_>], critical: f64, now_days: f64) -> Vec<(Passage, f64)> {
-    let one = |one: &Weighed<'_>| {
-        let ensemble = &one.posterior.ensemble;
-        let passage = Passage::of(ensemble, critical, now_days - ensemble.now_days);
-        (passage, one.weight * (1.0 - FILTER_SHARE))
+    let now_days = observations.values.last()?.t_days;
+    let rates = observations.rates(0..observations.values.len(), RateOptions::default());
+    let posterior = LoadPosterior::fit(&rates);
+    let passage = match &posterior {
+        Some(posterior) if measurably_moves(&rates) => {
+            Passage::of(posterior, critical.min(FASTEST_CRITICAL), now_days)
+        }
+        _ => Passage::default(),
     };
-    weighed.iter().map(one).collect()
+    let expected = posterior.as_ref().map(LoadPosterior::ensemble);
+    let law = expected
+        .as_ref()
+        .and_then(|ensemble| ensemble.samples.first());
+    let outlook = Outlook {
+        now_days,
+        passage,
+        surprise_nats: None,
+        regimes: posterior
+            .as_ref()
+            .map_or_else(unknown, LoadPosterior::regimes),
+        law: law.map(|sample| sample.law),
+        rates,
+    };
+    Some((outlook, expected))
 }
 
-/// The seed of a benchmark's panel, FNV-1a of its name: every benchmark draws its own numbers, the same
-/// in every run.
-pub fn seed_of(name: &str) -> u64 {
-    name.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-    })
+fn unknown() -> BTreeMap<Regime, f64> {
+    Regime::KNOWN
+        .into_iter()
+        .map(|regime| (regime, 0.0))
+        .collect()
 }
 
 /// Whether any of the newest rates stands clear of its noise: where none does, a forecast would be the
@@ -259,20 +117,10 @@ fn measurably_moves(rates: &[Rate]) -> bool {
     let newest = &rates[rates.len().saturating_sub(6)..];
     newest
         .iter()
-        .any(|rate| rate.velocity > 2.0 * rate.sigma && rate.velocity > 0.0)
+        .any(|rate| rate.velocity > 3.0 * rate.sigma && rate.velocity > 0.0)
 }
 
-fn window(rates: &[Rate], role: Role) -> Option<&[Rate]> {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a count within the slice"
-    )]
-    let wanted = ((rates.len() as f64 * role.share).round() as usize).max(role.fewest);
-    (rates.len() >= role.fewest).then(|| &rates[rates.len().saturating_sub(wanted)..])
-}
-
-/// The newest reading as the velocity that members are scored on.
+/// The newest reading as the velocity that what was expected is scored on.
 struct Newest {
     from_days: f64,
     to_days: f64,

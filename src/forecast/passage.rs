@@ -1,6 +1,11 @@
 //! The distribution of the first passage of a critical velocity, with the chance that it never comes.
 
-use crate::fit::Ensemble;
+use super::HORIZON_DAYS;
+use crate::fit::LoadPosterior;
+
+/// How wide, in ln of the time, a forecast is to be against what the posterior says: it takes every slope to
+/// wander from the law, and simulated ones, which do not, fall into 90 % intervals too often without it.
+const SPREAD: f64 = 0.7;
 
 /// Times to first passage, days from now, each with its probability; what is missing to 1 never passes.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -10,33 +15,34 @@ pub struct Passage {
 }
 
 impl Passage {
-    /// What an ensemble says of passing `critical` mm/day, as seen `later_days` after its last reading.
-    pub fn of(ensemble: &Ensemble, critical: f64, later_days: f64) -> Self {
-        let passes = ensemble.samples.iter().filter_map(|sample| {
-            let days = sample.law.days_to_velocity(critical)?;
-            Some(((days - later_days).max(0.0), sample.weight))
-        });
-        Self::from_times(passes.collect())
+    /// What the law under an undeclared load says of passing `critical` mm/day, as seen at `now_days`.
+    pub fn of(posterior: &LoadPosterior, critical: f64, now_days: f64) -> Self {
+        let later = now_days - posterior.now_days;
+        let times = posterior.passages(critical, HORIZON_DAYS / SPREAD + later);
+        let drawn_in = Self::from_times(times).drawn_in();
+        let since = drawn_in.times.into_iter();
+        Self::from_times(
+            since
+                .map(|(days, share)| ((days - later).max(0.0), share))
+                .collect(),
+        )
+    }
+
+    /// The same with ln of every time drawn towards that of the median.
+    fn drawn_in(self) -> Self {
+        let total: f64 = self.times.iter().map(|(_, share)| share).sum();
+        let Some(median) = self.quantile(0.5 * total, f64::INFINITY) else {
+            return self;
+        };
+        let median = median.max(1e-9);
+        let draw = |(days, share): (f64, f64)| (median * (days / median).powf(SPREAD), share);
+        Self::from_times(self.times.into_iter().map(draw).collect())
     }
 
     /// From (days, probability) pairs in any order.
     pub fn from_times(mut times: Vec<(f64, f64)>) -> Self {
         times.sort_by(|a, b| a.0.total_cmp(&b.0));
         Self { times }
-    }
-
-    /// The mixture of several distributions; weights need not sum to 1.
-    pub fn mixture(parts: &[(Self, f64)]) -> Self {
-        let total: f64 = parts.iter().map(|(_, weight)| weight).sum();
-        if total <= 0.0 {
-            return Self::default();
-        }
-        let scaled = parts.iter().flat_map(|(part, weight)| {
-            part.times
-                .iter()
-                .map(move |(days, share)| (*days, share * weight / total))
-        });
-        Self::from_times(scaled.collect())
     }
 
     /// The chance of passage within `days`.

@@ -5,7 +5,6 @@
 
 mod estimate;
 mod growth;
-mod outlook;
 mod report;
 mod sweep;
 
@@ -19,7 +18,7 @@ use crate::fit::{
     ConstantLoad, Exponent, Observation, Observations, PointReadings, Posterior, Rate, RateOptions,
     Solution,
 };
-use crate::forecast::{HORIZON_DAYS, InverseVelocityLine, Outlook, Panel, seed_of};
+use crate::forecast::{HORIZON_DAYS, InverseVelocityLine, outlook};
 use crate::model::Law;
 use crate::reading::{LengthUnit, Series, TimeUnit, Timestamp, Unit, after_days, days_since};
 use jiff::SignedDuration;
@@ -113,17 +112,8 @@ impl Inversion {
 
     /// Everything there is to say; `seconds` is what [`Self::least_squares`] took, by the caller's clock.
     pub fn report(&self, least_squares: &ConstantLoad, seconds: f64) -> FitReport {
-        let count = self.observations.values.len();
-        let outlook = self.outlooks(&[count]).pop();
-        self.assemble(least_squares, seconds, outlook.flatten().as_ref())
-    }
-
-    fn assemble(
-        &self,
-        least_squares: &ConstantLoad,
-        seconds: f64,
-        outlook: Option<&Outlook>,
-    ) -> FitReport {
+        let critical = self.options.critical_velocity_mm_per_day;
+        let outlook = outlook(&self.observations, critical).map(|(outlook, _)| outlook);
         let rates = self.rates();
         let posterior = Posterior::over_onsets(&rates);
         let onset = posterior.as_ref().map(Posterior::onset);
@@ -145,7 +135,7 @@ impl Inversion {
             transition_time: best
                 .and_then(|best| best.law.transition_days())
                 .and_then(|days| self.time_at(days)),
-            failure_time: FailureTime::of(self, outlook),
+            failure_time: FailureTime::of(self, outlook.as_ref()),
             prior_sensitivity: UnderPrior::each(self, posterior.as_ref()),
             inverse_velocity: self.inverse_velocity(&rates, regime.probability_accelerating),
             regime,
@@ -154,13 +144,6 @@ impl Inversion {
             seconds,
             termination: least_squares.outcome.to_string(),
         }
-    }
-
-    /// What the monitor's panel says after each of `counts` readings (increasing).
-    fn outlooks(&self, counts: &[usize]) -> Vec<Option<Outlook>> {
-        let panel = Panel::new(seed_of(self.series.benchmark.as_str()));
-        let critical = self.options.critical_velocity_mm_per_day;
-        outlook::outlooks(panel, &self.observations, critical, counts)
     }
 
     fn rates(&self) -> Vec<Rate> {

@@ -244,7 +244,12 @@ impl UnderPrior {
         let horizon_days = options
             .horizon_days
             .clamp(0.0, crate::forecast::HORIZON_DAYS);
-        let passage = Passage::of(ensemble, options.critical_velocity_mm_per_day, 0.0);
+        let critical = options.critical_velocity_mm_per_day;
+        let passes = ensemble
+            .samples
+            .iter()
+            .filter_map(|one| Some((one.law.days_to_velocity(critical)?, one.weight)));
+        let passage = Passage::from_times(passes.collect());
         let median = passage.quantile(0.5, horizon_days);
         Self {
             prior,

@@ -77,19 +77,13 @@ pub struct SweepRow {
 pub fn sweep(series: &Series, options: &Options, steps: &SweepOptions) -> SweepReport {
     let whole = Inversion::new(series, options);
     let t_maxes = t_maxes(whole.series(), steps);
-    let used = |t_max: Timestamp| {
-        let readings = &whole.series().readings;
-        readings.partition_point(|reading| reading.time <= t_max)
-    };
-    let counts: Vec<usize> = t_maxes.iter().map(|t_max| used(*t_max)).collect();
-    let outlooks = whole.outlooks(&counts);
-    let rows = t_maxes.iter().zip(outlooks).map(|(t_max, outlook)| {
+    let rows = t_maxes.iter().map(|t_max| {
         let upto = Options {
             until: Some(*t_max),
             ..*options
         };
         let part = Inversion::new(whole.series(), &upto);
-        let report = part.assemble(&part.least_squares(), 0.0, outlook.as_ref());
+        let report = part.report(&part.least_squares(), 0.0);
         SweepRow::of(*t_max, report)
     });
     SweepReport {

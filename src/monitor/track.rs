@@ -6,7 +6,7 @@ use super::history::{History, Source, Taken};
 use super::silence::Silence;
 use crate::alert::{Entered, Evidence, Latch, Level, Policy, Transition};
 use crate::fit::Rate;
-use crate::forecast::{HORIZON_DAYS, InverseVelocityLine, Outlook, Panel, seed_of};
+use crate::forecast::{HORIZON_DAYS, InverseVelocityLine, Outlook, Panel};
 use crate::reading::{BenchmarkId, Reading, SECONDS_PER_DAY, Timestamp, after_days};
 use crate::regime::{Regime, Tracker, label};
 use jiff::SignedDuration;
@@ -42,11 +42,10 @@ pub(super) struct Track {
 
 impl Track {
     pub(super) fn new(benchmark: BenchmarkId, source: Source, epoch: Timestamp) -> Self {
-        let seed = seed_of(benchmark.as_str());
         Self {
             benchmark,
             history: History::new(source, epoch),
-            panel: Panel::new(seed),
+            panel: Panel::default(),
             regime: Tracker::default(),
             intercept: Drift::default(),
             transition: Drift::default(),

@@ -1,0 +1,201 @@
+//! The evidence of four shapes of the law at one slope, summed over every start that the law may have.
+
+use super::gains::{Gains, LEVEL_VARIANCE, Record};
+use super::shape::{Block, LANES, Place};
+
+/// Rates that a law must explain, at least.
+const FEWEST_UNDER_THE_LAW: usize = 4;
+/// Standard deviations, for one rate after another, of a velocity that follows no law.
+const WANDERS: [f64; 3] = [0.05, 0.15, 0.4];
+/// Starts this much less likely than the best, ln, are not counted.
+const NEGLIGIBLE: f64 = 10.0;
+
+/// The times of a record in units of one slope's time to failure.
+#[derive(Debug, Clone)]
+pub(super) struct Slope {
+    /// |r|, 1/day.
+    pub(super) r: f64,
+    /// ln(1 + |r| t) at the middle of each rate.
+    pub(super) u: Vec<f64>,
+    /// The same in the tables: start, middle and end.
+    places: Vec<[Place; 3]>,
+}
+
+/// Room for one evaluation, used again and again.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Room {
+    predicted: Vec<[f64; LANES]>,
+    ln_evidence: Vec<[f64; LANES]>,
+    today: Vec<[[f64; LANES]; 2]>,
+}
+
+/// What the readings say of one law.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Evidence {
+    pub(super) ln: f64,
+    /// ln v less the record's centre, and the load, of today.
+    pub(super) ln_velocity: f64,
+    pub(super) load: f64,
+    /// Their variances and their covariance.
+    pub(super) today: [f64; 3],
+    /// Days since the law began.
+    pub(super) age: f64,
+}
+
+impl Slope {
+    pub(super) fn new(r: f64, record: &Record) -> Self {
+        let u = |days: &f64| (r * days).ln_1p();
+        let places = record.from.iter().zip(&record.middle).zip(&record.to);
+        Self {
+            r,
+            u: record.middle.iter().map(u).collect(),
+            places: places
+                .map(|((from, middle), to)| [from, middle, to].map(|days| Place::of(u(days))))
+                .collect(),
+        }
+    }
+}
+
+/// ln of the mean rate that each shape of `block` predicts, in units of the velocity now.
+fn predict(block: &Block, slope: &Slope, predicted: &mut Vec<[f64; LANES]>) {
+    predicted.clear();
+    for [from, middle, to] in &slope.places {
+        let (from, middle, to) = (block.ln_y(*from), block.ln_y(*middle), block.ln_y(*to));
+        predicted.push(std::array::from_fn(|lane| {
+            // ln of the mean of e^x over an x that falls evenly: ln(sinh(h)/h) above the middle.
+            let h2 = 0.25 * (from[lane] - to[lane]).powi(2);
+            let above = if h2 < 4.0 {
+                h2 / 6.0
+            } else {
+                h2.sqrt() - (2.0 * h2.sqrt()).ln()
+            };
+            above - middle[lane]
+        }));
+    }
+}
+
+/// The evidence of each shape of `block`; `before`: that of what came before each rate, by no law.
+pub(super) fn weigh(
+    record: &Record,
+    (block, slope): (&Block, &Slope),
+    gains: &Gains,
+    before: &[f64],
+    room: &mut Room,
+) -> [Evidence; LANES] {
+    predict(block, slope, &mut room.predicted);
+    room.ln_evidence.clear();
+    room.today.clear();
+    let count = record.ln_velocity.len();
+    let [mut load, mut level, mut velocity_now, mut load_now, mut ln] = [[0.0; LANES]; 5];
+    for (step, gain) in gains.steps.iter().enumerate() {
+        let index = count - 1 - step;
+        let (read, predicted) = (record.ln_velocity[index], &room.predicted[index]);
+        let outside = gains.ln_normaliser[step] + before[index];
+        let mut total = [0.0; LANES];
+        for lane in 0..LANES {
+            load[lane] *= gain.keep;
+            let miss = read - predicted[lane] - load[lane] - level[lane];
+            ln[lane] -= 0.5 * miss * miss * gain.precision;
+            load[lane] += gain.load * miss;
+            level[lane] += gain.level * miss;
+            velocity_now[lane] += gain.velocity_now * miss;
+            load_now[lane] += gain.load_now * miss;
+            total[lane] = ln[lane] + outside;
+        }
+        room.ln_evidence.push(total);
+        room.today.push([velocity_now, load_now]);
+    }
+    std::array::from_fn(|lane| over_starts(record, gains, room, lane))
+}
+
+fn over_starts(record: &Record, gains: &Gains, room: &Room, lane: usize) -> Evidence {
+    let count = record.ln_velocity.len();
+    let least = FEWEST_UNDER_THE_LAW.min(count) - 1;
+    let starts = &room.ln_evidence[least..];
+    let best = starts
+        .iter()
+        .map(|ln| ln[lane])
+        .fold(f64::NEG_INFINITY, f64::max);
+    let mut sum = 0.0;
+    let mut mean = Evidence {
+        ln: f64::NEG_INFINITY,
+        ln_velocity: 0.0,
+        load: 0.0,
+        today: [0.0; 3],
+        age: 0.0,
+    };
+    if !best.is_finite() {
+        return mean;
+    }
+    for (offset, ln) in starts.iter().enumerate() {
+        if ln[lane] < best - NEGLIGIBLE {
+            continue;
+        }
+        let (step, weight) = (least + offset, (ln[lane] - best).exp());
+        let [velocity_now, load_now] = &room.today[step];
+        sum += weight;
+        mean.ln_velocity += weight * velocity_now[lane];
+        mean.load += weight * load_now[lane];
+        for (slot, variance) in mean.today.iter_mut().zip(&gains.today[step]) {
+            *slot += weight * variance;
+        }
+        mean.age += weight * record.from[count - 1 - step];
+    }
+    Evidence {
+        ln: best + f64::ln(sum),
+        ln_velocity: mean.ln_velocity / sum,
+        load: mean.load / sum,
+        today: mean.today.map(|variance| variance / sum),
+        age: mean.age / sum,
+    }
+}
+
+/// How far each rate misses the law of one lane, as z squared; the law over the whole record.
+pub(super) fn misses(
+    record: &Record,
+    (block, slope): (&Block, &Slope),
+    lane: usize,
+    gains: &Gains,
+    room: &mut Room,
+) -> Vec<f64> {
+    predict(block, slope, &mut room.predicted);
+    let count = record.ln_velocity.len();
+    let mut squares = vec![0.0; count];
+    let (mut load, mut level) = (0.0, 0.0);
+    for (step, gain) in gains.steps.iter().enumerate() {
+        let index = count - 1 - step;
+        load *= gain.keep;
+        let miss = record.ln_velocity[index] - room.predicted[index][lane] - load - level;
+        squares[index] = miss * miss * gain.precision;
+        load += gain.load * miss;
+        level += gain.level * miss;
+    }
+    squares
+}
+
+/// ln of the evidence of the rates before each one, by a velocity that wanders as it likes.
+pub(super) fn before_the_law(record: &Record, scatter: f64) -> Vec<f64> {
+    let count = record.ln_velocity.len();
+    let mut total = vec![0.0_f64; count];
+    let mut each = vec![[0.0_f64; WANDERS.len()]; count];
+    for (which, wander) in WANDERS.iter().enumerate() {
+        let (mut level, mut variance, mut ln) = (0.0, LEVEL_VARIANCE, 0.0);
+        for (index, slot) in each.iter_mut().enumerate() {
+            slot[which] = ln;
+            if index > 0 {
+                variance += wander * wander;
+            }
+            let s = (variance + record.variance(index, scatter)).max(1e-12);
+            let miss = record.ln_velocity[index] - level;
+            ln -= 0.5 * (miss * miss / s + s.ln());
+            level += variance / s * miss;
+            variance -= variance * variance / s;
+        }
+    }
+    for (slot, each) in total.iter_mut().zip(&each) {
+        let best = each.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let sum: f64 = each.iter().map(|ln| (ln - best).exp()).sum();
+        *slot = best + (sum / WANDERS.len() as f64).ln();
+    }
+    total
+}

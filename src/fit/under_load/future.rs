@@ -1,0 +1,89 @@
+//! When a velocity will be passed: each law run on, its load and its own wandering drawn on the way.
+
+use super::shape::Shape;
+use super::{Cell, LoadPosterior, WANDER};
+use crate::fit::quasi_random::{halton, normal_quantile};
+
+/// Draws of a cell: one for each of this share of the probability, so many at most.
+const DRAWS: (f64, usize) = (400.0, 4);
+/// How much of the wandering of an e-fold shows in the time that remains.
+const IN_TIME: f64 = 0.3;
+/// Rounds of the search for the time at which the load has let enough of the law pass.
+const ROUNDS: usize = 6;
+
+impl LoadPosterior {
+    /// (days from the present, probability) of the first passage of `velocity` mm/day, of those that come
+    /// within `horizon` days.
+    pub fn passages(&self, velocity: f64, horizon: f64) -> Vec<(f64, f64)> {
+        let mut passages = Vec::new();
+        let mut index = 0;
+        for cell in &self.cells {
+            let shape = self.shape(cell);
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "a small positive number"
+            )]
+            let draws = ((cell.weight * DRAWS.0) as usize + 1).min(DRAWS.1);
+            for _ in 0..draws {
+                index += 1;
+                let z = halton(index).map(normal_quantile);
+                if let Some(days) = cell.days_to(shape, velocity.ln(), z)
+                    && days <= horizon
+                {
+                    passages.push((days, cell.weight / draws as f64));
+                }
+            }
+        }
+        passages
+    }
+}
+
+impl Cell {
+    /// Days to a velocity under the load, the velocity and the future that `z` draws.
+    fn days_to(&self, shape: &Shape, ln_velocity: f64, z: [f64; 5]) -> Option<f64> {
+        let (of_velocity, of_load) = self.variances;
+        let now = self.ln_velocity + of_velocity.sqrt() * z[0];
+        let along = if of_velocity > 0.0 {
+            self.covariance / of_velocity
+        } else {
+            0.0
+        };
+        let left = (of_load - along * self.covariance).max(0.0);
+        let load = self.load + along * (now - self.ln_velocity) + left.sqrt() * z[1];
+        let pace = (IN_TIME * WANDER * z[4]).exp();
+        let mut days = shape.days_to(ln_velocity - (now - load)) / self.r;
+        for _ in 0..ROUNDS {
+            let memories = if days.is_finite() {
+                days / self.tau
+            } else {
+                f64::INFINITY
+            };
+            let mean = self.mean_load(load, memories, z[2]);
+            let keep = (-memories).exp();
+            let at_the_end =
+                load * keep + self.sigma * (1.0 - keep * keep).sqrt() * (0.6 * z[2] + 0.8 * z[3]);
+            let law = shape.days_to(ln_velocity - (now - load) - at_the_end) / self.r;
+            let next = law * (-mean).exp() / pace;
+            days = if days.is_finite() && next.is_finite() {
+                f64::midpoint(days, next)
+            } else {
+                next
+            };
+        }
+        days.is_finite().then_some(days)
+    }
+
+    /// The mean load over the next `memories` of its own, from `load` now.
+    fn mean_load(&self, load: f64, memories: f64, z: f64) -> f64 {
+        if memories < 1e-3 {
+            return load;
+        }
+        if memories.is_infinite() {
+            return 0.0;
+        }
+        let keep = (-memories).exp();
+        let variance = (2.0 * memories - 3.0 + 4.0 * keep - keep * keep) / (memories * memories);
+        load * (1.0 - keep) / memories + self.sigma * variance.max(0.0).sqrt() * z
+    }
+}

@@ -1,0 +1,140 @@
+//! The posterior of the law under a load that nobody declared, by quadrature: deterministic, and a
+//! function of the readings alone.
+//!
+//! The velocity is that of the law times e^f. Beside the law's parameters, three things are uncertain:
+//!
+//! - the log-load f, Ornstein-Uhlenbeck with a standard deviation and a memory of its own;
+//! - the law itself: seen from the present, ln v wanders off by [`WANDER`] for each e-fold of the time to
+//!   failure that one looks back, so that old readings cannot outvote new ones;
+//! - where the law begins: before its start, which may be any reading, the velocity wanders as it likes.
+//!
+//! The law is taken in the coordinates of the present. Its shape, p and the ratio of healing to
+//! acceleration, runs over a table (`shape`); its slope r over a grid of ln r; the velocity and the load
+//! of today are integrated exactly, by a linear filter that runs from the present into the past
+//! (`gains`), which gives the evidence of every start in one pass (`evidence`).
+//!
+//! Priors: uniform in ln r from a fiftieth of the record's length to twice the newest sampling interval,
+//! where r times that interval is also half-normal with standard deviation 1.5; accelerating and slowing
+//! down alike, m above 1 with probability [`UNSTABLE`]; ln of the velocity that a stable slope will keep
+//! half-normal above 2 mm/day with standard deviation 1 (a slope that keeps a velocity mostly keeps a low
+//! one: "very slow" ends at 4.4 mm/day, Cruden and Varnes 1996); f, its memory and the scatter of the
+//! readings over the grids below, each point alike. An outlier's error has the tails of Student's t.
+
+mod evidence;
+mod future;
+mod gains;
+mod search;
+mod shape;
+
+use super::posterior::{Ensemble, Sample};
+use super::rates::Rate;
+use crate::model::Law;
+use crate::regime::Regime;
+use shape::Shape;
+use std::collections::BTreeMap;
+
+/// Standard deviation of ln v about the law for each e-fold of the time to failure: learnt on Lanzada
+/// 2025, whose inverse velocity bends, and no narrower for simulated slopes that keep the law exactly.
+const WANDER: f64 = 0.2;
+/// Prior probability of m > 1.
+const UNSTABLE: f64 = 0.65;
+/// Prior of what a stable slope will keep: mm/day, and the standard deviation of ln v above it.
+const KEPT: (f64, f64) = (2.0, 1.0);
+/// Fewest rates.
+const FEWEST: usize = 5;
+/// Laws that stand for all of them where one by one they are asked something.
+const SPOKESMEN: usize = 64;
+
+/// A law, with what the readings say of the velocity and of the load of today.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Cell {
+    shape: usize,
+    /// |r|, 1/day.
+    r: f64,
+    /// Standard deviation of the load, and its memory in days.
+    sigma: f64,
+    tau: f64,
+    /// ln of the velocity (mm/day) and the load of today: means, variances and covariance.
+    ln_velocity: f64,
+    load: f64,
+    variances: (f64, f64),
+    covariance: f64,
+    /// Days since the law began.
+    age: f64,
+    /// Relative scatter of a reading.
+    scatter: f64,
+    weight: f64,
+}
+
+/// The law under an undeclared load, as the readings leave it open.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoadPosterior {
+    /// The present: the end of the last rate, days.
+    pub now_days: f64,
+    cells: Vec<Cell>,
+}
+
+impl LoadPosterior {
+    /// Fits `rates`, oldest first; `None` with fewer than five, or where none of them moves.
+    pub fn fit(rates: &[Rate]) -> Option<Self> {
+        let moves = rates.iter().any(|rate| rate.velocity > 0.0);
+        if rates.len() < FEWEST || !moves {
+            return None;
+        }
+        let cells = search::cells(rates)?;
+        Some(Self {
+            now_days: rates.last()?.to,
+            cells,
+        })
+    }
+
+    /// Probability of each regime.
+    pub fn regimes(&self) -> BTreeMap<Regime, f64> {
+        let mut regimes: BTreeMap<Regime, f64> =
+            Regime::KNOWN.into_iter().map(|r| (r, 0.0)).collect();
+        for cell in &self.cells {
+            *regimes.entry(self.shape(cell).regime()).or_default() += cell.weight;
+        }
+        regimes
+    }
+
+    /// Mean time since the law began, days: readings before that were left to wander.
+    pub fn age_days(&self) -> f64 {
+        self.cells.iter().map(|cell| cell.weight * cell.age).sum()
+    }
+
+    /// The heaviest laws, with their share, under today's load; t = 0 is the present.
+    pub fn ensemble(&self) -> Ensemble {
+        let mut heaviest: Vec<&Cell> = self.cells.iter().collect();
+        heaviest.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+        heaviest.truncate(SPOKESMEN);
+        let total: f64 = heaviest.iter().map(|cell| cell.weight).sum();
+        let variance = |cell: &&Cell| {
+            cell.weight * (cell.variances.0 + cell.scatter.powi(2) + 0.5 * cell.sigma.powi(2))
+        };
+        let scatter = (heaviest.iter().map(variance).sum::<f64>() / total).sqrt();
+        let samples = heaviest.iter().map(|cell| Sample {
+            law: self.law(cell),
+            weight: cell.weight / total,
+        });
+        Ensemble {
+            now_days: self.now_days,
+            samples: samples.collect(),
+            scatter,
+        }
+    }
+
+    fn law(&self, cell: &Cell) -> Law {
+        let shape = self.shape(cell);
+        let (r, kappa) = shape.slope_and_curvature(cell.r);
+        Law::from_fit(cell.ln_velocity.exp(), r, kappa, shape.p)
+    }
+
+    #[expect(
+        clippy::unused_self,
+        reason = "a cell's shape belongs to its posterior"
+    )]
+    fn shape(&self, cell: &Cell) -> &'static Shape {
+        &shape::SHAPES[cell.shape]
+    }
+}

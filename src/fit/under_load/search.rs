@@ -1,0 +1,308 @@
+//! The search over slopes, shapes and noises: coarse, then fine where the evidence is.
+
+use super::evidence::{self, Evidence, Room, Slope, weigh};
+use super::gains::{Gains, Noise, Record};
+use super::shape::{BLOCKS, SHAPES};
+use super::{Cell, KEPT};
+use crate::fit::Rate;
+
+/// Grids of the scatter of the readings, of the load's standard deviation, and of its memory over the span
+/// of the newer half of the rates.
+const SCATTERS: [f64; 2] = [0.02, 0.06];
+const SIGMAS: [f64; 3] = [0.05, 0.12, 0.3];
+const MEMORIES: [f64; 3] = [0.02, 0.08, 0.32];
+/// Slopes: from this share of 1/length to this many of 1/interval.
+const SLOPES: (f64, f64) = (0.02, 2.0);
+/// The prior of ln r falls as r to the minus this: few slopes are met in their last days.
+const RARE: f64 = 0.1;
+/// Standard deviation of r times the newest sampling interval.
+const SLOPE_PER_INTERVAL: f64 = 1.5;
+/// Steps of ln r: in the coarse pass, and how many of the fine one make one of them.
+const COARSE_STEP: f64 = 0.45;
+const FINER: usize = 2;
+/// Most slopes of the coarse and of the fine pass, and most noises of the fine one.
+const MOST: (usize, usize, usize) = (40, 32, 5);
+/// What is this much less likely than the best, ln: shapes and slopes left out of the fine pass, noises
+/// left out, and cells left out of the answer.
+const LEFT_OUT: (f64, f64, f64) = (8.0, 4.0, 9.0);
+/// Cells on which noises are compared.
+const COMPARED: usize = 4;
+/// Degrees of freedom of an outlier's error.
+const STUDENT: f64 = 4.0;
+/// Rates that say what the velocity of today is about.
+const CENTRE: usize = 9;
+
+/// The laws that the rates leave open; `None` where none has an evidence.
+pub(super) fn cells(rates: &[Rate]) -> Option<Vec<Cell>> {
+    let mut search = Search::new(rates);
+    let coarse = search.slopes(search.lowest, search.highest, search.coarse);
+    let mut noises = noises(rates);
+    let mut scored = Vec::new();
+    for _ in 0..2 {
+        scored = search.sweep(&coarse, &noises[0]);
+        let best = *scored.first()?;
+        search.doubt(&coarse, &best, &noises[0]);
+        search.compare(&coarse, &scored, &mut noises);
+    }
+    let cells = search.fine(&scored, &noises);
+    (!cells.is_empty()).then_some(cells)
+}
+
+/// A shape at a slope.
+#[derive(Debug, Clone, Copy)]
+struct Scored {
+    ln: f64,
+    block: usize,
+    lane: usize,
+    slope: usize,
+}
+
+struct Search {
+    record: Record,
+    interval: f64,
+    lowest: f64,
+    highest: f64,
+    coarse: usize,
+    room: Room,
+}
+
+impl Search {
+    fn new(rates: &[Rate]) -> Self {
+        let record = record(rates);
+        let length = record.from[0];
+        let newest = &rates[rates.len().saturating_sub(4)..];
+        let spacings = newest.windows(2).map(|pair| pair[1].to - pair[0].to);
+        let interval = spacings.fold(0.0, f64::max).max(1e-6);
+        let lowest = SLOPES.0 / length;
+        let highest = (SLOPES.1 / interval).max(2.0 * lowest);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a small positive number"
+        )]
+        let coarse = ((highest / lowest).ln() / COARSE_STEP).ceil() as usize;
+        Self {
+            record,
+            interval,
+            lowest,
+            highest,
+            coarse: coarse.clamp(4, MOST.0),
+            room: Room::default(),
+        }
+    }
+
+    /// `count` slopes at the middles of equal steps of ln r.
+    fn slopes(&self, lowest: f64, highest: f64, count: usize) -> Vec<Slope> {
+        let at = |index: usize| (index as f64 + 0.5) / count as f64;
+        (0..count)
+            .map(|index| Slope::new(lowest * (highest / lowest).powf(at(index)), &self.record))
+            .collect()
+    }
+
+    /// Prior of a shape at a slope, with the velocity that it is found to have.
+    fn ln_prior(&self, shape: usize, r: f64, evidence: &Evidence) -> f64 {
+        let shape = &SHAPES[shape];
+        let resolved = r * self.interval / SLOPE_PER_INTERVAL;
+        let kept = shape.ln_kept().map_or(0.0, |growth| {
+            let ln_kept = evidence.ln_velocity + self.record.centre + growth;
+            ((ln_kept - KEPT.0.ln()) / KEPT.1).max(0.0)
+        });
+        shape.ln_prior - RARE * r.ln() - 0.5 * (resolved * resolved + kept * kept)
+    }
+
+    /// Every shape at every slope under one noise, best first.
+    fn sweep(&mut self, slopes: &[Slope], noise: &Noise) -> Vec<Scored> {
+        let before = evidence::before_the_law(&self.record, noise.scatter);
+        let mut scored = Vec::with_capacity(slopes.len() * SHAPES.len());
+        for (index, slope) in slopes.iter().enumerate() {
+            let gains = Gains::new(&self.record, noise, &slope.u);
+            for (block, of) in BLOCKS.iter().enumerate() {
+                let found = weigh(&self.record, (of, slope), &gains, &before, &mut self.room);
+                for (lane, evidence) in found.iter().enumerate() {
+                    let ln = evidence.ln + self.ln_prior(of.first + lane, slope.r, evidence);
+                    if ln.is_finite() {
+                        scored.push(Scored {
+                            ln,
+                            block,
+                            lane,
+                            slope: index,
+                        });
+                    }
+                }
+            }
+        }
+        scored.sort_by(|a, b| b.ln.total_cmp(&a.ln));
+        scored
+    }
+
+    /// Doubts the rates that the best law cannot explain.
+    fn doubt(&mut self, slopes: &[Slope], best: &Scored, noise: &Noise) {
+        let slope = &slopes[best.slope];
+        let gains = Gains::new(&self.record, noise, &slope.u);
+        let law = (&BLOCKS[best.block], slope);
+        let squares = evidence::misses(&self.record, law, best.lane, &gains, &mut self.room);
+        for (trust, square) in self.record.trust.iter_mut().zip(squares) {
+            *trust = ((STUDENT + 1.0) / (STUDENT + square)).min(1.0);
+        }
+    }
+
+    /// Orders the noises by their evidence under the best law of each of the best few shapes.
+    fn compare(&mut self, slopes: &[Slope], scored: &[Scored], noises: &mut [Noise]) {
+        let mut chosen: Vec<Scored> = Vec::new();
+        for one in scored {
+            let new = |other: &Scored| (other.block, other.lane) != (one.block, one.lane);
+            if chosen.iter().all(new) {
+                chosen.push(*one);
+            }
+            if chosen.len() == COMPARED {
+                break;
+            }
+        }
+        for noise in noises.iter_mut() {
+            let before = evidence::before_the_law(&self.record, noise.scatter);
+            let evidence = chosen.iter().map(|one| {
+                let slope = &slopes[one.slope];
+                let gains = Gains::new(&self.record, noise, &slope.u);
+                let law = (&BLOCKS[one.block], slope);
+                let found = weigh(&self.record, law, &gains, &before, &mut self.room);
+                found[one.lane].ln + SHAPES[BLOCKS[one.block].first + one.lane].ln_prior
+            });
+            noise.ln_evidence = evidence.fold(f64::NEG_INFINITY, f64::max);
+        }
+        noises.sort_by(|a, b| b.ln_evidence.total_cmp(&a.ln_evidence));
+    }
+
+    /// The cells that count, with weights that sum to 1.
+    fn fine(&mut self, scored: &[Scored], noises: &[Noise]) -> Vec<Cell> {
+        let best = scored.first().map_or(f64::NEG_INFINITY, |one| one.ln);
+        let counts = |one: &&Scored| one.ln > best - LEFT_OUT.0;
+        let blocks: Vec<bool> = (0..BLOCKS.len())
+            .map(|block| scored.iter().filter(counts).any(|one| one.block == block))
+            .collect();
+        let slopes = || scored.iter().filter(counts).map(|one| one.slope);
+        let (first, last) = (slopes().min().unwrap_or(0), slopes().max().unwrap_or(0));
+        let at = |index: f64| {
+            let share = (index / self.coarse as f64).clamp(0.0, 1.0);
+            self.lowest * (self.highest / self.lowest).powf(share)
+        };
+        let count = ((last - first + 3) * FINER).min(MOST.1);
+        let slopes = self.slopes(at(first as f64 - 1.0), at(last as f64 + 2.0), count);
+        let likely = noises[0].ln_evidence - LEFT_OUT.1;
+        let likely = noises.iter().take_while(|noise| noise.ln_evidence > likely);
+        let mut cells = Vec::new();
+        for noise in likely.take(MOST.2) {
+            let before = evidence::before_the_law(&self.record, noise.scatter);
+            for slope in &slopes {
+                let gains = Gains::new(&self.record, noise, &slope.u);
+                for (block, of) in BLOCKS
+                    .iter()
+                    .enumerate()
+                    .filter(|(block, _)| blocks[*block])
+                {
+                    let law = (of, slope);
+                    let found = weigh(&self.record, law, &gains, &before, &mut self.room);
+                    for (lane, evidence) in found.iter().enumerate() {
+                        cells.push(self.cell(BLOCKS[block].first + lane, slope, noise, evidence));
+                    }
+                }
+            }
+        }
+        normalise(cells)
+    }
+
+    /// A cell whose weight is still the ln of what it is to be.
+    fn cell(&self, shape: usize, slope: &Slope, noise: &Noise, evidence: &Evidence) -> Cell {
+        Cell {
+            shape,
+            r: slope.r,
+            sigma: noise.sigma,
+            tau: noise.tau,
+            ln_velocity: evidence.ln_velocity + self.record.centre,
+            load: evidence.load,
+            variances: (evidence.today[0].max(0.0), evidence.today[1].max(0.0)),
+            covariance: evidence.today[2],
+            age: evidence.age,
+            scatter: noise.scatter,
+            weight: evidence.ln + self.ln_prior(shape, slope.r, evidence),
+        }
+    }
+}
+
+fn normalise(mut cells: Vec<Cell>) -> Vec<Cell> {
+    let best = cells
+        .iter()
+        .map(|cell| cell.weight)
+        .fold(f64::NEG_INFINITY, f64::max);
+    if !best.is_finite() {
+        return Vec::new();
+    }
+    cells.retain(|cell| cell.weight > best - LEFT_OUT.2);
+    let total: f64 = cells.iter().map(|cell| (cell.weight - best).exp()).sum();
+    for cell in &mut cells {
+        cell.weight = (cell.weight - best).exp() / total;
+    }
+    cells
+}
+
+/// Every point of the grids; the middle one first, to begin with.
+fn noises(rates: &[Rate]) -> Vec<Noise> {
+    let span = rates[rates.len() - 1].to - rates[rates.len() / 2].from;
+    let mut noises = Vec::new();
+    for scatter in SCATTERS {
+        for sigma in SIGMAS {
+            for memory in MEMORIES {
+                noises.push(Noise {
+                    scatter,
+                    sigma,
+                    tau: (memory * span).max(1e-9),
+                    ln_evidence: 0.0,
+                });
+            }
+        }
+    }
+    let middle = noises.len() / SCATTERS.len() + SIGMAS.len() * MEMORIES.len() / 2;
+    noises.swap(0, middle);
+    noises
+}
+
+/// Rates as logarithms. One within its noise, or backward, is read as little more than "no faster than
+/// its error": half of v + sqrt(v^2 + 4 s^2) is v where it is clear of its error s, and s at rest.
+fn record(rates: &[Rate]) -> Record {
+    let now = rates.last().map_or(0.0, |rate| rate.to);
+    let forward = |rate: &Rate| {
+        let clear = 0.5 * (rate.velocity + rate.velocity.hypot(2.0 * rate.sigma));
+        clear.max(1e-9)
+    };
+    let mut newest: Vec<f64> = rates.iter().rev().take(CENTRE).map(forward).collect();
+    newest.sort_by(f64::total_cmp);
+    let centre = newest[newest.len() / 2].ln();
+    Record {
+        ln_velocity: rates
+            .iter()
+            .map(|rate| forward(rate).ln() - centre)
+            .collect(),
+        error: rates
+            .iter()
+            .map(|rate| (rate.sigma / forward(rate)).min(1.5))
+            .collect(),
+        middle: rates.iter().map(|rate| now - rate.middle()).collect(),
+        from: rates.iter().map(|rate| now - rate.from).collect(),
+        to: rates.iter().map(|rate| now - rate.to).collect(),
+        centre,
+        trust: vec![1.0; rates.len()],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::shape::LANES;
+    use super::*;
+
+    #[test]
+    fn lanes_and_blocks_cover_every_shape_once() {
+        let firsts: Vec<usize> = BLOCKS.iter().map(|block| block.first).collect();
+        assert_eq!(firsts.len() * LANES, SHAPES.len());
+        let total: f64 = SHAPES.iter().map(|shape| shape.ln_prior.exp()).sum();
+        assert!((total - 1.0).abs() < 1e-12, "{total}");
+    }
+}
