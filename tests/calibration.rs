@@ -1,7 +1,7 @@
 //! The posterior's probabilities hold, on series drawn from its own prior.
 //!
 //! A subset of what `examples/calibration` measures on 1,000. There intervals of 90 % of the failure time hold
-//! 86 to 87 % of the truths, those of parameters 79 to 86 %: sampling and the coarse textures of slow scatter
+//! 84 to 87 % of the truths, those of parameters 80 to 86 %: sampling and the coarse textures of slow scatter
 //! make them somewhat narrow. The bounds here are three standard deviations of a binomial count around that.
 
 #[path = "../examples/calibration/drawn.rs"]
@@ -14,8 +14,8 @@ use drawn::Starts;
 use score::{PLACED, SAID, Tally};
 
 /// The coverage that 1,000 series reach.
-const LEAST_OF_FAILURES: f64 = 0.85;
-const LEAST_OF_PARAMETERS: f64 = 0.79;
+const LEAST_OF_FAILURES: f64 = 0.84;
+const LEAST_OF_PARAMETERS: f64 = 0.80;
 /// What 1,000 series stay under, and as much again for the scatter of a few hundred.
 const CALIBRATION_ERROR: f64 = 0.05 + 0.05;
 
