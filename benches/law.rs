@@ -78,20 +78,46 @@ fn posterior_of_67_readings(bencher: Bencher) {
     bencher.bench(|| Posterior::fit(black_box(&rates), Curvature::Free, None));
 }
 
-/// The newest of 67 readings, taken by a panel that has seen the others.
-#[divan::bench]
-fn panel_update_at_67_readings(bencher: Bencher) {
-    let all = observations();
-    let mut panel = Panel::default();
-    for count in 1..READINGS {
-        let values = all.values[..count].to_vec();
-        let seen = Observations {
-            values,
-            ..all.clone()
-        };
-        panel.update(&seen, CRITICAL_MM_PER_DAY);
+/// Hourly displacements of a slope that accelerates for ever more slowly, kept as a monitor keeps them.
+fn watched(count: u32) -> Observations {
+    let mut watched = Observations {
+        quantity: Quantity::Displacement,
+        averaging_days: 0.0,
+        values: Vec::new(),
+    };
+    for index in 0..count {
+        let ago = f64::from(count - index);
+        let noise = 0.3 * (f64::from(index) * 12.9898).sin();
+        watched.values.push(Observation {
+            t_days: f64::from(index) / 24.0,
+            value: -400.0 * ((ago + 300.0) / 24.0).ln() + noise,
+            sigma: None,
+        });
+        watched.compact();
     }
+    watched
+}
+
+/// One more reading: everything that the monitor computes, the forecast under an undeclared load included.
+#[divan::bench(args = [100, 10_000, 1_000_000])]
+fn one_more_reading(bencher: Bencher, count: u32) {
+    let watched = watched(count);
     bencher
-        .with_inputs(|| panel.clone())
-        .bench_values(|mut panel| panel.update(black_box(&all), CRITICAL_MM_PER_DAY));
+        .with_inputs(|| (Panel::default(), watched.clone()))
+        .bench_values(|(mut panel, mut watched)| {
+            let last = watched.values[watched.values.len() - 1];
+            watched.values.push(Observation {
+                t_days: last.t_days + 1.0 / 24.0,
+                ..last
+            });
+            watched.compact();
+            panel.update(black_box(&watched), CRITICAL_MM_PER_DAY)
+        });
+}
+
+/// The outlook of the 67 velocities, from nothing: the law under an undeclared load, and its forecast.
+#[divan::bench]
+fn outlook_of_67_readings(bencher: Bencher) {
+    let all = observations();
+    bencher.bench(|| Panel::default().update(black_box(&all), CRITICAL_MM_PER_DAY));
 }

@@ -1,6 +1,7 @@
 //! The inversion of the law: from readings to velocities with errors, the best fit, and the posterior.
 
 mod chart;
+mod compaction;
 mod constant_load;
 mod global_search;
 mod least_squares;

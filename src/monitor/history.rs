@@ -30,9 +30,6 @@ pub(super) enum Taken {
     OtherQuantity,
 }
 
-/// Readings kept; beyond it every second one of the older half is let go.
-const MOST_READINGS: usize = 4096;
-
 /// No displacement in mm, or velocity in mm/day, is larger: a thousand kilometres.
 const FARTHEST: f64 = 1e9;
 
@@ -87,7 +84,7 @@ impl History {
         match values.get_mut(at) {
             None => {
                 values.push(new);
-                self.thin();
+                self.observations.compact();
                 Taken::Newest
             }
             Some(old) if old.t_days > new.t_days => {
@@ -129,18 +126,5 @@ impl History {
         let values = &self.observations.values;
         let same = |pair: &&[Observation]| pair[0].value.to_bits() == pair[1].value.to_bits();
         values.windows(2).rev().take_while(same).count() + usize::from(!values.is_empty())
-    }
-
-    fn thin(&mut self) {
-        let values = &mut self.observations.values;
-        if values.len() <= MOST_READINGS {
-            return;
-        }
-        let half = values.len() / 2;
-        let mut index = 0;
-        values.retain(|_| {
-            index += 1;
-            index > half || index % 2 == 1
-        });
     }
 }

@@ -14,7 +14,7 @@ const MEMORIES: [f64; 3] = [0.02, 0.08, 0.32];
 /// Slopes: from this share of 1/length to this many of 1/interval.
 const SLOPES: (f64, f64) = (0.02, 2.0);
 /// The prior of ln r falls as r to the minus this: few slopes are met in their last days.
-const RARE: f64 = 0.1;
+const RARE: f64 = 0.05;
 /// Standard deviation of r times the newest sampling interval.
 const SLOPE_PER_INTERVAL: f64 = 1.5;
 /// Steps of ln r: in the coarse pass, and how many of the fine one make one of them.
