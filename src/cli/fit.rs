@@ -4,7 +4,7 @@ use super::args::{OutputArgs, ReadingArgs};
 use super::table::{Table, number, time};
 use crate::alert::Policy;
 use crate::fit::Exponent;
-use crate::inversion::{Estimate, FitReport, Inversion, Options};
+use crate::inversion::{Estimate, FitReport, Inversion, Options, UnderPrior};
 use crate::reading::{Quantity, Series, Timestamp, Unit};
 use crate::runtime::clock::Stopwatch;
 use std::fmt::Write as _;
@@ -127,6 +127,16 @@ fn summary(report: &FitReport) -> Table {
             percent(regime.probability_accelerating),
         ),
     ]);
+    table.row(["  other priors".to_owned(), other_priors(report)]);
+    table.row([
+        "onset".to_owned(),
+        format!(
+            "{} ({} to {})",
+            time(report.onset),
+            time(report.onset_low),
+            time(report.onset_high)
+        ),
+    ]);
     table.row([
         "failure".to_owned(),
         format!(
@@ -157,6 +167,26 @@ fn summary(report: &FitReport) -> Table {
     table.row(["  alpha".to_owned(), alpha]);
     table.row(["transition".to_owned(), time(report.transition_time)]);
     table
+}
+
+/// How far the chance of m > 1 and the law's own failure time hang on the prior.
+fn other_priors(report: &FitReport) -> String {
+    let all = &report.prior_sensitivity;
+    let unstable: Vec<f64> = all.iter().map(UnderPrior::probability_unstable).collect();
+    let fails: Vec<f64> = all.iter().map(|one| one.failure_probability).collect();
+    let range = |values: &[f64]| {
+        let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = values.iter().copied().fold(0.0, f64::max);
+        format!("{:.0} to {:.0} %", 100.0 * low, 100.0 * high)
+    };
+    if all.is_empty() {
+        return "-".to_owned();
+    }
+    format!(
+        "unstable {}, the law alone fails {}",
+        range(&unstable),
+        range(&fails)
+    )
 }
 
 fn parameters(report: &FitReport) -> Table {

@@ -17,9 +17,6 @@ pub(super) struct Optimum<const N: usize> {
     pub(super) at: SVector<f64, N>,
     /// Sum of squared residuals.
     pub(super) cost: f64,
-    /// J^T J at the optimum.
-    pub(super) information: SMatrix<f64, N, N>,
-    pub(super) evaluations: usize,
     pub(super) termination: Termination,
 }
 
@@ -49,11 +46,6 @@ impl<const N: usize> Limits<N> {
             most_evaluations,
             least_gain: RELATIVE_GAIN,
         }
-    }
-
-    /// The same, content with a coarser optimum.
-    pub(super) fn to_gain(self, least_gain: f64) -> Self {
-        Self { least_gain, ..self }
     }
 
     fn clamp(&self, at: &SVector<f64, N>) -> SVector<f64, N> {
@@ -88,11 +80,9 @@ pub(super) fn minimise<const N: usize>(
     let mut cost = sum_of_squares(&buffers.here);
     let (mut damping, mut evaluations) = (1e-3, 1);
     let mut termination = Termination::TooManyEvaluations;
-    let mut information = SMatrix::zeros();
     while evaluations < most_evaluations {
         let (normal, gradient) = jacobian(&at, limits.scale, &mut buffers, &mut residuals);
         evaluations += N;
-        information = normal;
         let (normal, gradient) = hold_bounds(limits, &at, normal, gradient);
         let mut gained = None;
         while damping < 1e12 && evaluations < most_evaluations {
@@ -124,8 +114,6 @@ pub(super) fn minimise<const N: usize>(
     Some(Optimum {
         at,
         cost,
-        information,
-        evaluations,
         termination,
     })
 }

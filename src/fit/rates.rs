@@ -39,6 +39,19 @@ pub struct Rate {
     pub velocity: f64,
     /// Standard error from the reading's noise, mm/day; the scatter of the motion itself is not in it.
     pub sigma: f64,
+    /// How many readings' motion it is the mean of.
+    pub readings: u32,
+    /// Where the standard error comes from.
+    pub error: ReadingError,
+}
+
+/// Where the standard error of a rate comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ReadingError {
+    /// The rate's own, independent of its neighbours'.
+    Own,
+    /// From the displacements read at its two ends, each shared with the neighbour.
+    OfEnds,
 }
 
 impl Rate {
@@ -126,6 +139,8 @@ impl Observations {
                 to: value.t_days,
                 velocity: value.value,
                 sigma: value.sigma.unwrap_or(0.0),
+                readings: 1,
+                error: ReadingError::Own,
             });
         }
         rates.reverse();
@@ -170,6 +185,8 @@ fn displacement_rates(values: &[Observation]) -> Vec<Rate> {
             to: later.t_days,
             velocity,
             sigma: noise / span,
+            readings: 1,
+            error: ReadingError::OfEnds,
         }
     };
     let mut rates = Vec::new();
@@ -186,7 +203,8 @@ fn displacement_rates(values: &[Observation]) -> Vec<Rate> {
         };
         let long_enough = rate.to - rate.from >= 0.999 * FINEST_DAYS;
         if long_enough && (clear || breaks || rate.to - rate.from >= longest) {
-            rates.push(rate);
+            let readings = u32::try_from(end - start).unwrap_or(u32::MAX);
+            rates.push(Rate { readings, ..rate });
             end = start;
         }
     }
@@ -210,11 +228,19 @@ fn merge(pair: &[Rate]) -> Rate {
     };
     let weight = |rate: &Rate| (rate.to - rate.from).max(1e-12);
     let total = weight(earlier) + weight(later);
+    let errors = (weight(earlier) * earlier.sigma).hypot(weight(later) * later.sigma);
+    // The error of the displacement between the two is in neither end of the whole.
+    let kept = match earlier.error {
+        ReadingError::Own => 1.0,
+        ReadingError::OfEnds => std::f64::consts::FRAC_1_SQRT_2,
+    };
     Rate {
         from: earlier.from,
         to: later.to,
         velocity: (weight(earlier) * earlier.velocity + weight(later) * later.velocity) / total,
-        sigma: (weight(earlier) * earlier.sigma).hypot(weight(later) * later.sigma) / total,
+        sigma: errors * kept / total,
+        readings: earlier.readings.saturating_add(later.readings),
+        error: earlier.error,
     }
 }
 

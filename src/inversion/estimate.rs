@@ -1,4 +1,5 @@
-//! The law's parameters at the first reading: the best fit's, and what the posterior leaves open.
+//! The law's parameters at its start: the best fit's, which starts at the first reading, and what the
+//! posterior leaves open, each law of it at its own onset.
 //!
 //! A bound is null where it is the prior's and not the readings': m's where more than 4 % of the
 //! probability stands in the outermost 5 % of the prior's range of p on that side, the others' where
@@ -73,7 +74,7 @@ pub(super) fn parameters(
     }
 }
 
-/// A law of the posterior, at the first reading.
+/// A law of the posterior, at its onset.
 #[derive(Debug, Clone, Copy)]
 struct Drawn {
     values: Values,
@@ -87,12 +88,11 @@ enum Side {
     High,
 }
 
-/// The posterior's laws, which start at the last rate, followed back to the first reading.
+/// The posterior's laws, which start at the last rate, followed back to where each begins to hold.
 fn at_start(inversion: &Inversion, posterior: &Posterior) -> Vec<Drawn> {
-    let span = posterior.ensemble.now_days;
-    let back = |sample: &LawSample| {
-        let past = Trajectory::solve(&sample.law.reversed(), span, Accuracy::Fit);
-        let law = sample.law.from_y(past.at(span)?.y);
+    let back = |(sample, span): (&LawSample, &f64)| {
+        let past = Trajectory::solve(&sample.law.reversed(), *span, Accuracy::Fit);
+        let law = sample.law.from_y(past.at(*span)?.y);
         let width = EDGE * (P_PRIOR.1 - P_PRIOR.0);
         Some(Drawn {
             values: values(inversion, &law),
@@ -100,7 +100,11 @@ fn at_start(inversion: &Inversion, posterior: &Posterior) -> Vec<Drawn> {
             at_edge: law.p < P_PRIOR.0 + width || law.p > P_PRIOR.1 - width,
         })
     };
-    posterior.ensemble.samples.iter().filter_map(back).collect()
+    let samples = posterior.ensemble.samples.iter();
+    samples
+        .zip(&posterior.spans_days)
+        .filter_map(back)
+        .collect()
 }
 
 /// Whether more than the share that an edge may hold has m above 1, and as much below.

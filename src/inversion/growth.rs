@@ -176,6 +176,8 @@ mod tests {
                     to: f64::from(day),
                     velocity,
                     sigma: 0.0,
+                    readings: 1,
+                    error: crate::fit::ReadingError::Own,
                 }
             })
             .collect()

@@ -10,13 +10,13 @@ mod sweep;
 
 pub use report::{
     Alternative, Alternatives, Estimate, FailureTime, FitReport, InverseVelocity, Parameters,
-    RegimeReport,
+    RegimeReport, UnderPrior,
 };
 pub use sweep::{SweepOptions, SweepReport, SweepRow, sweep};
 
 use crate::fit::{
-    ConstantLoad, Curvature, Exponent, Observation, Observations, PointReadings, Posterior, Rate,
-    RateOptions, Solution,
+    ConstantLoad, Exponent, Observation, Observations, PointReadings, Posterior, Rate, RateOptions,
+    Solution,
 };
 use crate::forecast::{HORIZON_DAYS, InverseVelocityLine, outlook};
 use crate::model::Law;
@@ -115,7 +115,8 @@ impl Inversion {
         let critical = self.options.critical_velocity_mm_per_day;
         let outlook = outlook(&self.observations, critical).map(|(outlook, _)| outlook);
         let rates = self.rates();
-        let posterior = Posterior::fit(&rates, Curvature::Free, None);
+        let posterior = Posterior::over_onsets(&rates);
+        let onset = posterior.as_ref().map(Posterior::onset);
         let regime = RegimeReport::of(posterior.as_ref());
         let best = least_squares.best();
         let first = self.series.readings.first().map(|reading| reading.time);
@@ -126,13 +127,16 @@ impl Inversion {
             readings: self.series.readings.len(),
             first,
             last: self.series.readings.last().map(|reading| reading.time),
-            onset: first,
+            onset: onset.map_or(first, |onset| self.start_at(onset.median_days)),
+            onset_low: onset.and_then(|onset| self.start_at(onset.low_days)),
+            onset_high: onset.and_then(|onset| self.start_at(onset.high_days)),
             parameters: estimate::parameters(self, best, posterior.as_ref()),
             alternatives: Alternatives::of(self, least_squares),
             transition_time: best
                 .and_then(|best| best.law.transition_days())
                 .and_then(|days| self.time_at(days)),
             failure_time: FailureTime::of(self, outlook.as_ref()),
+            prior_sensitivity: UnderPrior::each(self, posterior.as_ref()),
             inverse_velocity: self.inverse_velocity(&rates, regime.probability_accelerating),
             regime,
             rms: best.map(|best| best.rms).filter(|rms| rms.is_finite()),
@@ -181,6 +185,11 @@ impl Inversion {
     /// The instant `days` after the first reading.
     fn time_at(&self, days: f64) -> Option<Timestamp> {
         after_days(self.series.readings.first()?.time, days)
+    }
+
+    /// The same, and the first reading for what its averaging began before it.
+    fn start_at(&self, days: f64) -> Option<Timestamp> {
+        self.time_at(days.max(0.0))
     }
 
     /// Velocities of the readings' unit in one mm/day.

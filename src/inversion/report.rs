@@ -1,8 +1,8 @@
 //! The report of one inversion, key for key as scripts read it: what is unbounded or missing is null.
 
 use super::Inversion;
-use crate::fit::{ConstantLoad, Posterior};
-use crate::forecast::Outlook;
+use crate::fit::{ConstantLoad, Ensemble, OtherPrior, Posterior};
+use crate::forecast::{Outlook, Passage};
 use crate::reading::{BenchmarkId, Quantity, Timestamp, Unit};
 use crate::regime::{Regime, label};
 use serde::Serialize;
@@ -23,8 +23,12 @@ pub struct FitReport {
     pub first: Option<Timestamp>,
     /// The last one used.
     pub last: Option<Timestamp>,
-    /// Where the law starts: t = 0 of `x_i`, `v_i`, r and kappa.
+    /// Since when the law holds, by the posterior's median; before that the slope creeps.
     pub onset: Option<Timestamp>,
+    /// 5 % quantile.
+    pub onset_low: Option<Timestamp>,
+    /// 95 % quantile.
+    pub onset_high: Option<Timestamp>,
     /// Which regime, with what probability.
     pub regime: RegimeReport,
     /// The law's parameters.
@@ -35,6 +39,8 @@ pub struct FitReport {
     pub transition_time: Option<Timestamp>,
     /// When the critical velocity is passed.
     pub failure_time: FailureTime,
+    /// What the law alone would say under this prior and under others.
+    pub prior_sensitivity: Vec<UnderPrior>,
     /// The straight line through inverse velocity.
     pub inverse_velocity: InverseVelocity,
     /// Root mean square residual of the best fit, in the readings' unit.
@@ -45,6 +51,19 @@ pub struct FitReport {
     pub seconds: f64,
     /// Why it ended.
     pub termination: String,
+}
+
+/// What the constant-load law's posterior says under one prior; the panel's forecast is not in it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct UnderPrior {
+    /// The prior, in words.
+    pub prior: &'static str,
+    /// Every regime's probability.
+    pub probabilities: BTreeMap<Regime, f64>,
+    /// Chance that the critical velocity is passed within the horizon.
+    pub failure_probability: f64,
+    /// When, at an unconditional 50 %.
+    pub failure_median: Option<Timestamp>,
 }
 
 /// A best value and the bounds of 90 %.
@@ -197,6 +216,53 @@ impl RegimeReport {
             probability_accelerating: Some(share(&|one| one == unstable || one == stable)),
             probabilities: each.into_iter().map(|(r, p)| (r, Some(p))).collect(),
         }
+    }
+}
+
+impl UnderPrior {
+    /// The stated prior first, then the others.
+    pub(super) fn each(inversion: &Inversion, posterior: Option<&Posterior>) -> Vec<Self> {
+        let Some(posterior) = posterior else {
+            return Vec::new();
+        };
+        let stated = Self::of(inversion, "as stated", &posterior.ensemble);
+        let others = OtherPrior::ALL
+            .into_iter()
+            .map(|other| Self::of(inversion, other.label(), &posterior.under(other)));
+        std::iter::once(stated).chain(others).collect()
+    }
+
+    fn of(inversion: &Inversion, prior: &'static str, ensemble: &Ensemble) -> Self {
+        let mut probabilities: BTreeMap<Regime, f64> = Regime::KNOWN
+            .into_iter()
+            .map(|regime| (regime, 0.0))
+            .collect();
+        for sample in &ensemble.samples {
+            *probabilities.entry(sample.law.regime()).or_default() += sample.weight;
+        }
+        let options = &inversion.options;
+        let horizon_days = options
+            .horizon_days
+            .clamp(0.0, crate::forecast::HORIZON_DAYS);
+        let critical = options.critical_velocity_mm_per_day;
+        let passes = ensemble
+            .samples
+            .iter()
+            .filter_map(|one| Some((one.law.days_to_velocity(critical)?, one.weight)));
+        let passage = Passage::from_times(passes.collect());
+        let median = passage.quantile(0.5, horizon_days);
+        Self {
+            prior,
+            probabilities,
+            failure_probability: passage.chance_within(horizon_days) + 0.0,
+            failure_median: median.and_then(|days| inversion.time_at(ensemble.now_days + days)),
+        }
+    }
+
+    /// The chance that kappa > 0.
+    pub fn probability_unstable(&self) -> f64 {
+        let of = |regime| self.probabilities.get(&regime).copied().unwrap_or(0.0);
+        of(Regime::UnstableAccelerating) + of(Regime::UnstableDecelerating)
     }
 }
 

@@ -121,6 +121,8 @@ mod tests {
                 to: f64::from(i),
                 velocity: 1.0,
                 sigma: 0.0,
+                readings: 1,
+                error: crate::fit::ReadingError::Own,
             })
             .collect();
         let now = Trajectory::solve(&law, 9.0, Accuracy::Full).at(9.0);

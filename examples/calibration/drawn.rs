@@ -1,0 +1,234 @@
+//! Series drawn from the posterior's own prior, whose truth is therefore known.
+//!
+//! The law and its scatter are drawn as `fit::posterior::prior` states them, by the exact solution and an
+//! Ornstein-Uhlenbeck walk: nothing of the fit is used here. Only the size of the scatter is confined, to
+//! between 1 and 15 %.
+
+use rand::{RngExt, SeedableRng};
+use rand_distr::{Distribution, StandardNormal, StudentT};
+use rand_pcg::Pcg64;
+use slipwatch::fit::{Observation, Observations};
+use slipwatch::model::{Accuracy, Law, Trajectory};
+use slipwatch::reading::Quantity;
+
+/// Whether the law holds from the first reading on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Starts {
+    /// In every series.
+    First,
+    /// In half of them; in the others later.
+    ToBeFound,
+}
+
+/// How a series was measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Measured {
+    /// Velocities whose scatter is relative and unknown.
+    Velocity,
+    /// Velocities with a stated standard error, some of them therefore backwards.
+    VelocityWithSigma,
+    /// Displacements with an error that is not stated.
+    Displacement,
+}
+
+/// One series and its truth.
+#[derive(Debug, Clone)]
+pub(crate) struct Drawn {
+    pub(crate) observations: Observations,
+    pub(crate) measured: Measured,
+    /// The law at the last reading.
+    pub(crate) law: Law,
+    /// Days of the first reading that follows the law; 0 where all do.
+    pub(crate) onset_days: f64,
+}
+
+const CAUCHY_SCALE: f64 = 3.0;
+const SLOPE_PER_INTERVAL: f64 = 0.25;
+const MOST_LN_Y: f64 = 14.0;
+const SCATTER: (f64, f64) = (0.05, 0.9);
+const SCATTERS: (f64, f64) = (0.01, 0.15);
+
+/// The `index`-th series of a family.
+pub(crate) fn drawn(index: u64, starts: Starts) -> Drawn {
+    let mut rng = Pcg64::seed_from_u64(0x5eed_0000 + index);
+    loop {
+        if let Some(one) = attempt(&mut rng, starts) {
+            return one;
+        }
+    }
+}
+
+fn uniform(rng: &mut Pcg64, low: f64, high: f64) -> f64 {
+    low + (high - low) * rng.random::<f64>()
+}
+
+fn log_uniform(rng: &mut Pcg64, low: f64, high: f64) -> f64 {
+    uniform(rng, low.ln(), high.ln()).exp()
+}
+
+fn normal(rng: &mut Pcg64) -> f64 {
+    StandardNormal.sample(rng)
+}
+
+fn cauchy(rng: &mut Pcg64) -> f64 {
+    CAUCHY_SCALE * (std::f64::consts::PI * (rng.random::<f64>() - 0.5)).tan()
+}
+
+/// Reading times, evenly or at random, from 0 on.
+fn times(rng: &mut Pcg64) -> Vec<f64> {
+    let wanted = log_uniform(rng, 15.0, 500.0).round();
+    let count = (15..500)
+        .find(|count| f64::from(*count) >= wanted)
+        .unwrap_or(500);
+    let length = log_uniform(rng, 20.0, 1000.0);
+    let mut times: Vec<f64> = if rng.random::<bool>() {
+        (0..count)
+            .map(|i| length * f64::from(i) / f64::from(count - 1))
+            .collect()
+    } else {
+        (0..count).map(|_| uniform(rng, 0.0, length)).collect()
+    };
+    times.sort_by(f64::total_cmp);
+    times.dedup_by(|later, earlier| *later - *earlier < 0.022);
+    let first = times[0];
+    times.iter().map(|time| time - first).collect()
+}
+
+/// A law for the last reading, from the prior; the window's length and newest interval in days.
+fn law(rng: &mut Pcg64, length: f64, interval: f64) -> Option<Law> {
+    let (r, kappa) = (cauchy(rng) / length, cauchy(rng) / length);
+    let p = if kappa > 0.0 {
+        uniform(rng, 0.0, 0.6)
+    } else {
+        uniform(rng, -1.0, 0.0)
+    };
+    let unresolved = r * interval / SLOPE_PER_INTERVAL;
+    let resolved = rng.random::<f64>() < (-0.5 * unresolved * unresolved).exp();
+    let law = Law::from_fit(10.0 * normal(rng).exp(), r, kappa, p);
+    (resolved && law.a + law.r > 0.0).then_some(law)
+}
+
+/// The relative deviation of the motion at each time.
+fn wander(rng: &mut Pcg64, times: &[f64], spread: f64, memory: f64) -> Vec<f64> {
+    let mut value = spread * normal(rng);
+    let mut before = 0.0;
+    let step = |time: &f64| {
+        let keep = (-(time - before) / memory).exp();
+        before = *time;
+        value = keep * value + spread * (1.0 - keep * keep).sqrt() * normal(rng);
+        value
+    };
+    times.iter().map(step).collect()
+}
+
+fn attempt(rng: &mut Pcg64, starts: Starts) -> Option<Drawn> {
+    let times = times(rng);
+    let count = times.len();
+    if count < 15 {
+        return None;
+    }
+    let end = times[count - 1];
+    let late = starts == Starts::ToBeFound && rng.random::<bool>();
+    let onset = if late {
+        let ago = log_uniform(rng, end - times[count - 9], end);
+        times.iter().copied().find(|time| *time >= end - ago)?
+    } else {
+        0.0
+    };
+    let newest = times[count - 4..].windows(2).map(|w| w[1] - w[0]);
+    let law = law(rng, end - onset, newest.fold(0.0, f64::max))?;
+    let past = Trajectory::solve(&law.reversed(), end - onset, Accuracy::Full);
+    let edge = past.at(end - onset)?;
+    if edge.y.ln().abs() > MOST_LN_Y {
+        return None;
+    }
+    let size = loop {
+        let size = SCATTER.0 * (SCATTER.1 * normal(rng)).exp();
+        if (SCATTERS.0..SCATTERS.1).contains(&size) {
+            break size;
+        }
+    };
+    let slow = if rng.random::<f64>() < 0.4 {
+        0.0
+    } else {
+        1.0 - log_uniform(rng, 0.003, 0.9)
+    };
+    let memory = log_uniform(rng, end / count as f64, end);
+    let measured = match rng.random_range(0..20) {
+        0..9 => Measured::Velocity,
+        9..12 => Measured::VelocityWithSigma,
+        _ => Measured::Displacement,
+    };
+    let motion = |time: f64| {
+        let ago = end - time.max(onset);
+        let at = past.at(ago)?;
+        let before = (onset - time).max(0.0) * edge.velocity;
+        Some((at.velocity, -at.displacement - before))
+    };
+    let clean: Option<Vec<(f64, f64)>> = times.iter().map(|time| motion(*time)).collect();
+    let values = measure(rng, (&times, &clean?), measured, (size, slow, memory));
+    Some(Drawn {
+        observations: observations(measured, values),
+        measured,
+        law,
+        onset_days: onset,
+    })
+}
+
+/// The readings, with their standard errors where stated.
+fn measure(
+    rng: &mut Pcg64,
+    (times, clean): (&[f64], &[(f64, f64)]),
+    measured: Measured,
+    (size, slow, memory): (f64, f64, f64),
+) -> Vec<Observation> {
+    let heavy = StudentT::new(7.0).ok();
+    let white = |rng: &mut Pcg64| heavy.map_or(0.0, |t| t.sample(rng));
+    let deviation = wander(rng, times, size * slow.sqrt(), memory);
+    let count = times.len();
+    let slip = clean[count - 1].1 - clean[0].1;
+    let error = size * slip / (count - 1) as f64;
+    let mut velocities: Vec<f64> = clean.iter().map(|(velocity, _)| *velocity).collect();
+    velocities.sort_by(f64::total_cmp);
+    let sigma = 2.0 * size * velocities[count / 2];
+    let mut moved = clean[0].1;
+    let one = |index: usize| {
+        let (velocity, displacement) = clean[index];
+        let (value, sigma) = match measured {
+            Measured::Velocity | Measured::VelocityWithSigma => {
+                let scatter = deviation[index] + size * (1.0 - slow).sqrt() * white(rng);
+                let value = velocity * scatter.exp();
+                if measured == Measured::Velocity {
+                    (value, None)
+                } else {
+                    (value + sigma * normal(rng), Some(sigma))
+                }
+            }
+            Measured::Displacement => {
+                if index > 0 {
+                    let middle = f64::midpoint(deviation[index - 1], deviation[index]);
+                    moved += (displacement - clean[index - 1].1) * middle.exp();
+                }
+                (moved + error * normal(rng), None)
+            }
+        };
+        Observation {
+            t_days: times[index],
+            value,
+            sigma,
+        }
+    };
+    (0..count).map(one).collect()
+}
+
+fn observations(measured: Measured, values: Vec<Observation>) -> Observations {
+    let quantity = match measured {
+        Measured::Velocity | Measured::VelocityWithSigma => Quantity::Velocity,
+        Measured::Displacement => Quantity::Displacement,
+    };
+    Observations {
+        quantity,
+        averaging_days: 0.0,
+        values,
+    }
+}

@@ -1,0 +1,410 @@
+//! The posterior of the law from a window of rates, as a weighted, quasi-random sample.
+//!
+//! The coordinates are those of the present: velocity, slope r and curvature kappa of the inverse
+//! velocity at the window's last reading. The law runs backwards from there through the readings, so
+//! no sample has failed already, and a forecast starts where the slope is now. What is taken for granted
+//! stands in [`prior`], how readings scatter in [`scatter`]: size, correlated share and memory of the
+//! scatter are unknowns like the law's own, and averaged over. Normal approximations about the modes say
+//! where to draw; the weights say how probable each draw is.
+
+mod mode;
+mod onset;
+mod past;
+mod prior;
+mod proposal;
+mod scatter;
+mod sensitivity;
+mod window;
+
+pub use onset::Onset;
+pub use prior::P_PRIOR;
+pub use sensitivity::OtherPrior;
+
+use super::rates::Rate;
+use crate::model::Law;
+use mode::{Bench, Mode, Point, Problem, Sign};
+use onset::Start;
+use proposal::{Side, Whole};
+use scatter::Texture;
+use window::Window;
+
+/// Whether the curvature of the inverse velocity is fitted or held at zero (the straight line).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Curvature {
+    /// The full law.
+    Free,
+    /// kappa = 0: the line through inverse velocity.
+    Zero,
+}
+
+/// One law out of the posterior, with t = 0 at the present.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// The law.
+    pub law: Law,
+    /// Its share of the probability.
+    pub weight: f64,
+}
+
+/// A weighted sample of laws that agree with the readings.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ensemble {
+    /// The present: the time of the last reading used, days.
+    pub now_days: f64,
+    /// The laws; their weights sum to 1.
+    pub samples: Vec<Sample>,
+    /// Relative scatter of a rate about the law.
+    pub scatter: f64,
+}
+
+/// The posterior and how it came about.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Posterior {
+    /// The laws.
+    pub ensemble: Ensemble,
+    /// Start of the first rate used, days.
+    pub from_days: f64,
+    /// How far back from the present each law holds, days, in the order of the samples.
+    pub spans_days: Vec<f64>,
+    /// Solutions of the law that were computed.
+    pub evaluations: usize,
+    /// Draws that the weighted sample is worth (Kish).
+    pub effective_draws: f64,
+    summits: Vec<Summit>,
+}
+
+/// One law as it was drawn.
+#[derive(Debug, Clone, Copy)]
+struct Draft {
+    law: Law,
+    span_days: f64,
+    whole: Whole,
+    /// Where the span lies in its range, from -1 to 1.
+    along: f64,
+    texture: usize,
+    log_posterior: f64,
+    log_weight: f64,
+}
+
+/// How much is drawn.
+#[derive(Debug, Clone, Copy)]
+struct Effort {
+    /// Laws drawn in each round.
+    draws: u32,
+    /// Rounds, at least and at most.
+    rounds: (u32, u32),
+    /// Even draws that they must be worth to end sooner.
+    worth: f64,
+}
+
+/// For an update of a running monitor.
+const QUICK: Effort = Effort {
+    draws: 80,
+    rounds: (3, 6),
+    worth: 70.0,
+};
+/// For one fit that is reported.
+const THOROUGH: Effort = Effort {
+    draws: 128,
+    rounds: (3, 8),
+    worth: 110.0,
+};
+/// A start this much less probable than the likeliest, in ln, is left out.
+const HOPELESS: f64 = 6.0;
+/// Steps of a search before and after the size of the scatter is known.
+const ROUNDS: (u32, u32) = (6, 10);
+/// Where in its range p is when a search starts.
+const FIRST_P: f64 = 0.3;
+/// asinh of kappa L when a search starts.
+const FIRST_KAPPAS: [f64; 2] = [0.5, 2.5];
+
+impl Posterior {
+    /// Fits the law to all of `rates`; `warm` is an earlier posterior of the same benchmark to start from.
+    /// `None` when there are too few rates or none of them moves.
+    pub fn fit(rates: &[Rate], curvature: Curvature, warm: Option<&Self>) -> Option<Self> {
+        let window = window_of(rates, curvature)?;
+        let textures = scatter::textures(&window);
+        let mut bench = Bench::new(rates.len());
+        let start = Start::first(&window);
+        let found: Vec<(Summit, Side<'_>)> = signs(curvature)
+            .iter()
+            .filter_map(|sign| {
+                let problem = start.problem(&window, *sign);
+                let starts = starts(&problem, rates, warm);
+                side(problem, &mut bench, &textures, &starts)
+            })
+            .collect();
+        let (summits, sides) = found.into_iter().unzip();
+        let drafts = draw(&mut bench, &textures, (sides, &QUICK));
+        Self::of(&window, summits, &drafts, bench.evaluations)
+    }
+
+    /// Fits the full law to `rates` from each of several starts on, and averages over them.
+    /// `None` when there are too few rates or none of them moves.
+    pub fn over_onsets(rates: &[Rate]) -> Option<Self> {
+        let window = window_of(rates, Curvature::Free)?;
+        let textures = scatter::textures(&window);
+        let few = scatter::few(&textures);
+        let mut bench = Bench::new(rates.len());
+        let mut screened: Vec<(Problem<'_>, Summit, f64)> = Vec::new();
+        for start in Start::candidates(&window) {
+            for sign in signs(Curvature::Free) {
+                let problem = start.problem(&window, *sign);
+                let starts = starts(&problem, rates, None);
+                if let Some((summit, side)) = side(problem, &mut bench, &few, &starts) {
+                    screened.push((problem, summit, side.log_evidence));
+                }
+            }
+        }
+        let best = screened
+            .iter()
+            .map(|one| one.2)
+            .fold(f64::NEG_INFINITY, f64::max);
+        // Both signs of the likeliest start stay, so that neither is out of the question.
+        let likeliest = screened.iter().find(|one| one.2 >= best)?.0.span_days;
+        screened.retain(|one| {
+            one.2 > best - HOPELESS || one.0.span_days.to_bits() == likeliest.to_bits()
+        });
+        let mut summits = Vec::new();
+        let mut sides = Vec::new();
+        for (problem, summit, _) in screened {
+            let at = (vec![summit.point(&problem)], summit.log_size);
+            if let Some((summit, side)) = side(problem, &mut bench, &textures, &at) {
+                summits.push(summit);
+                sides.push(side);
+            }
+        }
+        let drafts = draw(&mut bench, &textures, (sides, &THOROUGH));
+        Self::of(&window, summits, &drafts, bench.evaluations)
+    }
+
+    fn of(
+        window: &Window,
+        summits: Vec<Summit>,
+        drafts: &[Draft],
+        evaluations: usize,
+    ) -> Option<Self> {
+        let logs: Vec<f64> = drafts.iter().map(|draft| draft.log_weight).collect();
+        let total = proposal::log_sum(&logs);
+        if !total.is_finite() {
+            return None;
+        }
+        let weighed = drafts
+            .iter()
+            .map(|draft| (draft, (draft.log_weight - total).exp()))
+            .filter(|(_, weight)| *weight > 1e-9);
+        let mut samples = Vec::with_capacity(drafts.len());
+        let mut spans_days = Vec::with_capacity(drafts.len());
+        let (mut log_size, mut squares) = (0.0, 0.0);
+        for (draft, weight) in weighed {
+            samples.push(Sample {
+                law: draft.law,
+                weight,
+            });
+            spans_days.push(draft.span_days);
+            log_size += weight * draft.whole[4];
+            squares += weight * weight;
+        }
+        Some(Self {
+            ensemble: Ensemble {
+                now_days: window.now_days,
+                samples,
+                scatter: log_size.exp(),
+            },
+            from_days: window.now_days - window.length_days,
+            spans_days,
+            evaluations,
+            effective_draws: 1.0 / squares,
+            summits,
+        })
+    }
+}
+
+fn signs(curvature: Curvature) -> &'static [Sign] {
+    match curvature {
+        Curvature::Free => &[Sign::Positive, Sign::Negative],
+        Curvature::Zero => &[Sign::Zero],
+    }
+}
+
+fn window_of(rates: &[Rate], curvature: Curvature) -> Option<Window> {
+    let unknowns = match curvature {
+        Curvature::Free => 3,
+        Curvature::Zero => 2,
+    };
+    (rates.len() >= unknowns + 2)
+        .then(|| Window::new(rates))
+        .flatten()
+}
+
+/// The most probable law on one side with white scatter, and ln of the size of that.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Summit {
+    sign: Sign,
+    p: f64,
+    ln_v: f64,
+    r: f64,
+    kappa: f64,
+    log_size: f64,
+}
+
+impl Summit {
+    fn point(&self, problem: &Problem<'_>) -> Point {
+        problem.point(self.p, (self.ln_v, self.r, self.kappa))
+    }
+}
+
+/// Finds the mode of one side, and draws up the proposal about it.
+fn side<'a>(
+    problem: Problem<'a>,
+    bench: &mut Bench,
+    textures: &[Texture],
+    (starts, log_size): &(Vec<Point>, f64),
+) -> Option<(Summit, Side<'a>)> {
+    let white = &textures[0];
+    let size = log_size.exp();
+    let found = starts
+        .iter()
+        .filter_map(|start| problem.search(bench, *start, (white, size), ROUNDS.0))
+        .min_by(|a: &Mode, b: &Mode| a.cost.total_cmp(&b.cost))?;
+    let mut log_size = *log_size;
+    if problem.evaluate(bench, &found.at) {
+        (log_size, _) = white.size(problem.window, &bench.residuals, log_size, 4);
+    }
+    let Mode { at, .. } = problem.search(bench, found.at, (white, log_size.exp()), ROUNDS.1)?;
+    let shape = problem.shape(&at);
+    let summit = Summit {
+        sign: problem.sign,
+        p: shape.p,
+        ln_v: at[mode::LN_V],
+        r: shape.r,
+        kappa: shape.kappa,
+        log_size,
+    };
+    let side = Side::new(problem, bench, at, (textures, log_size))?;
+    Some((summit, side))
+}
+
+/// Where to look from, and ln of the size of the scatter there: what was found last time, or a line
+/// through the recent and the older velocity with some kappas.
+fn starts(problem: &Problem<'_>, rates: &[Rate], warm: Option<&Posterior>) -> (Vec<Point>, f64) {
+    let known = warm.and_then(|warm| warm.summits.iter().find(|one| one.sign == problem.sign));
+    let (low, high) = problem.sign.p_range();
+    let (ln_v, change) = line(problem, rates);
+    let p = low + (high - low) * FIRST_P;
+    let bent = |kappa: f64| Point::new(p, kappa, change, ln_v);
+    if let Some(known) = known {
+        return (vec![known.point(problem), bent(0.0)], known.log_size);
+    }
+    let starts = match problem.sign {
+        Sign::Positive => FIRST_KAPPAS.map(bent).to_vec(),
+        Sign::Negative => FIRST_KAPPAS.map(|kappa| bent(-kappa)).to_vec(),
+        Sign::Zero => vec![bent(0.0), Point::new(0.0, 0.0, 0.0, ln_v)],
+    };
+    (starts, prior::SCATTER.0.ln() + 0.7)
+}
+
+/// ln of the recent velocity, and asinh of the slope of a line through it and the older one.
+fn line(problem: &Problem<'_>, rates: &[Rate]) -> (f64, f64) {
+    let from = problem.window.now_days - problem.span_days;
+    let count = rates.iter().filter(|rate| rate.to > from).count().max(1);
+    let rates = &rates[rates.len() - count..];
+    let mean = |rates: &[Rate]| {
+        let velocities = rates.iter().map(|rate| rate.velocity.max(0.0));
+        velocities.sum::<f64>() / rates.len().max(1) as f64
+    };
+    let all = mean(rates).max(1e-12);
+    let recent = mean(&rates[count - (count / 6).max(1)..]).max(0.05 * all);
+    let older = mean(&rates[..(count / 3).max(1)]).max(0.02 * all);
+    let slope = (recent / older - 1.0).clamp(-0.7, 50.0);
+    (recent.ln(), slope.asinh())
+}
+
+/// Draws laws from each side in rounds, every round from a proposal that the ones before have taught.
+fn draw(
+    bench: &mut Bench,
+    textures: &[Texture],
+    (sides, effort): (Vec<Side<'_>>, &Effort),
+) -> Vec<Draft> {
+    let mut said: Vec<f64> = sides.iter().map(|side| side.log_evidence).collect();
+    let mut lots: Vec<Lot<'_>> = sides.into_iter().map(Lot::new).collect();
+    for round in 0..effort.rounds.1 {
+        for (index, number) in numbers(&said, effort.draws).into_iter().enumerate() {
+            let lot = &mut lots[index];
+            lot.draw(bench, textures, (round * effort.draws, number));
+            let logs: Vec<f64> = lot.drafts.iter().map(|draft| draft.log_weight).collect();
+            said[index] = proposal::log_sum(&logs);
+        }
+        let enough = round + 1 >= effort.rounds.0;
+        if enough && worth(lots.iter().flat_map(|lot| &lot.drafts)) >= effort.worth {
+            break;
+        }
+    }
+    lots.into_iter().flat_map(|lot| lot.drafts).collect()
+}
+
+/// What was drawn from one side, and from which proposals.
+#[derive(Debug)]
+struct Lot<'a> {
+    next: Side<'a>,
+    /// Proposals used, each with the number drawn from it.
+    used: Vec<(Side<'a>, u32)>,
+    drafts: Vec<Draft>,
+}
+
+impl<'a> Lot<'a> {
+    fn new(side: Side<'a>) -> Self {
+        Self {
+            next: side,
+            used: Vec::new(),
+            drafts: Vec::new(),
+        }
+    }
+
+    /// Draws `number` more, weighs all anew against the mixture of the proposals that they came from
+    /// (Owen and Zhou 2000: no draw weighs more than any of them would make it), and learns from them.
+    fn draw(&mut self, bench: &mut Bench, textures: &[Texture], (first, number): (u32, u32)) {
+        let one = |at| self.next.draw(bench, textures, first + at);
+        let fresh: Vec<Draft> = (0..number).filter_map(one).collect();
+        self.drafts.extend(fresh);
+        self.used.push((self.next.clone(), number));
+        for draft in &mut self.drafts {
+            let each = self
+                .used
+                .iter()
+                .map(|(side, number)| f64::from((*number).max(1)).ln() + side.log_density(draft));
+            let each: Vec<f64> = each.collect();
+            draft.log_weight = draft.log_posterior - proposal::log_sum(&each);
+        }
+        if let Some(better) = self.next.refitted(&self.drafts) {
+            self.next = better;
+        }
+    }
+}
+
+/// How many of `count` draws each side gets: its share of the evidence, and some whatever that is.
+fn numbers(evidences: &[f64], count: u32) -> Vec<u32> {
+    let total = proposal::log_sum(evidences);
+    let groups = u32::try_from(evidences.len().max(1)).unwrap_or(1);
+    let fewest = count / (4 * groups);
+    let free = f64::from(count - fewest * groups);
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a share of a count"
+    )]
+    let number = |log: &f64| fewest + (free * (log - total).exp()).round() as u32;
+    if total.is_finite() {
+        evidences.iter().map(number).collect()
+    } else {
+        vec![count / groups; evidences.len()]
+    }
+}
+
+/// How many even draws a weighted sample is worth (Kish).
+fn worth<'a>(drafts: impl Iterator<Item = &'a Draft>) -> f64 {
+    let logs: Vec<f64> = drafts.map(|draft| draft.log_weight).collect();
+    let twice: Vec<f64> = logs.iter().map(|log| 2.0 * log).collect();
+    let worth = (2.0 * proposal::log_sum(&logs) - proposal::log_sum(&twice)).exp();
+    if worth.is_finite() { worth } else { 0.0 }
+}
