@@ -13,8 +13,10 @@ const SIGMAS: [f64; 3] = [0.05, 0.12, 0.3];
 const MEMORIES: [f64; 3] = [0.02, 0.08, 0.32];
 /// Slopes: from this share of 1/length to this many of 1/interval.
 const SLOPES: (f64, f64) = (0.02, 2.0);
+/// And the slowest, at most, in 1/interval.
+const SLOWEST: f64 = 2e-4;
 /// The prior of ln r falls as r to the minus this: few slopes are met in their last days.
-const RARE: f64 = 0.05;
+const RARE: f64 = 0.1;
 /// Standard deviation of r times the newest sampling interval.
 const SLOPE_PER_INTERVAL: f64 = 1.5;
 /// Steps of ln r: in the coarse pass, and how many of the fine one make one of them.
@@ -73,7 +75,8 @@ impl Search {
         let newest = &rates[rates.len().saturating_sub(4)..];
         let spacings = newest.windows(2).map(|pair| pair[1].to - pair[0].to);
         let interval = spacings.fold(0.0, f64::max).max(1e-6);
-        let lowest = SLOPES.0 / length;
+        // A short record knows as well as a long one that most slopes take thousands of readings.
+        let lowest = (SLOPES.0 / length).min(SLOWEST / interval);
         let highest = (SLOPES.1 / interval).max(2.0 * lowest);
         #[expect(
             clippy::cast_possible_truncation,
