@@ -4,7 +4,7 @@ use super::args::{OutputArgs, ReadingArgs};
 use super::table::{Table, number, time};
 use crate::alert::Policy;
 use crate::fit::Exponent;
-use crate::inversion::{Estimate, FitReport, Inversion, Options, UnderPrior};
+use crate::inversion::{Estimate, FitReport, RegimeReport, Inversion, Options, UnderPrior};
 use crate::reading::{Quantity, Series, Timestamp, Unit};
 use crate::runtime::clock::Stopwatch;
 use std::fmt::Write as _;
@@ -114,19 +114,21 @@ fn summary(report: &FitReport) -> Table {
     let percent = |share: Option<f64>| {
         share.map_or("-".to_owned(), |share| format!("{:.0} %", 100.0 * share))
     };
-    let regime = &report.regime;
-    let failure = &report.failure_time;
-    let line = &report.inverse_velocity;
-    let mut table = Table::plain();
-    table.row([
-        "regime".to_owned(),
+    let told = |regime: &RegimeReport| {
         format!(
             "{} (unstable {}, accelerating {})",
             regime.label,
             percent(regime.probability_unstable),
             percent(regime.probability_accelerating),
-        ),
-    ]);
+        )
+    };
+    let failure = &report.failure_time;
+    let line = &report.inverse_velocity;
+    let mut table = Table::plain();
+    table.row(["regime".to_owned(), told(&report.regime)]);
+    if let Some(regime) = &report.regime_under_load {
+        table.row(["  if the load changes".to_owned(), told(regime)]);
+    }
     table.row(["  other priors".to_owned(), other_priors(report)]);
     table.row([
         "onset".to_owned(),

@@ -139,6 +139,7 @@ impl Inversion {
             prior_sensitivity: UnderPrior::each(self, posterior.as_ref()),
             inverse_velocity: self.inverse_velocity(&rates, regime.probability_accelerating),
             regime,
+            regime_under_load: outlook.as_ref().map(RegimeReport::under_load),
             rms: best.map(|best| best.rms).filter(|rms| rms.is_finite()),
             evaluations: least_squares.evaluations,
             seconds,

@@ -29,8 +29,10 @@ pub struct FitReport {
     pub onset_low: Option<Timestamp>,
     /// 95 % quantile.
     pub onset_high: Option<Timestamp>,
-    /// Which regime, with what probability.
+    /// Which regime, with what probability, under a load that never changed.
     pub regime: RegimeReport,
+    /// The same where the load may change undeclared: what the monitor goes by. `None` with too few readings.
+    pub regime_under_load: Option<RegimeReport>,
     /// The law's parameters.
     pub parameters: Parameters,
     /// The distinct minima of the misfit, best first.
@@ -204,17 +206,25 @@ impl RegimeReport {
             let met = samples.iter().filter(|one| wanted(one.law.regime()));
             met.fold(0.0, |sum, one| sum + one.weight).min(1.0)
         };
-        let each: Vec<(Regime, f64)> = Regime::KNOWN
+        Self::from_each(|regime| share(&|one| one == regime))
+    }
+
+    /// By the law under an undeclared load.
+    pub(super) fn under_load(outlook: &Outlook) -> Self {
+        Self::from_each(|regime| outlook.regimes.get(&regime).copied().unwrap_or(0.0))
+    }
+
+    fn from_each(probability: impl Fn(Regime) -> f64) -> Self {
+        let known: BTreeMap<Regime, f64> = Regime::KNOWN
             .into_iter()
-            .map(|regime| (regime, share(&|one| one == regime)))
+            .map(|regime| (regime, probability(regime)))
             .collect();
-        let known: BTreeMap<Regime, f64> = each.iter().copied().collect();
-        let [unstable, stable, slowing, _] = Regime::KNOWN;
+        let [unstable, stable, slowing, _] = Regime::KNOWN.map(|regime| known[&regime]);
         Self {
             label: label(&known),
-            probability_unstable: Some(share(&|one| one == unstable || one == slowing)),
-            probability_accelerating: Some(share(&|one| one == unstable || one == stable)),
-            probabilities: each.into_iter().map(|(r, p)| (r, Some(p))).collect(),
+            probability_unstable: Some((unstable + slowing).min(1.0)),
+            probability_accelerating: Some((unstable + stable).min(1.0)),
+            probabilities: known.into_iter().map(|(r, p)| (r, Some(p))).collect(),
         }
     }
 }
