@@ -4,7 +4,7 @@ use super::args::{OutputArgs, ReadingArgs};
 use super::table::{Table, number, time};
 use crate::alert::Policy;
 use crate::fit::Exponent;
-use crate::inversion::{Estimate, FitReport, RegimeReport, Inversion, Options, UnderPrior};
+use crate::inversion::{Estimate, FitReport, Inversion, Options, RegimeReport, UnderPrior};
 use crate::reading::{Quantity, Series, Timestamp, Unit};
 use crate::runtime::clock::Stopwatch;
 use std::fmt::Write as _;

@@ -105,6 +105,8 @@ fn drift(id: &BenchmarkId, event: &Event) -> Option<String> {
             expected_days_per_day,
         } => {
             let expected = expected_days_per_day.map_or_else(String::new, |drift| {
+                // Rounded here: a minus nought reads like a mistake.
+                let drift = (10.0 * drift).round() / 10.0 + 0.0;
                 format!(", {drift:+.1} expected by the fitted law")
             });
             (
