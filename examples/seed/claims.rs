@@ -37,6 +37,8 @@ const SAME_DAY: f64 = 1.0;
 const SAME_ALPHA: f64 = 0.1;
 /// A relative difference of rms under which neither fit is preferred.
 const SLIGHT: f64 = 0.1;
+/// The share of the synthetic series in which something must be found to be recoverable.
+const FOUND: f64 = 0.9;
 /// A share of the rows that is nearly all of them.
 const NEARLY_ALL: f64 = 0.8;
 
@@ -82,7 +84,10 @@ fn each(benchmarks: &[Benchmark], of: impl Fn(&Benchmark) -> String) -> String {
 
 fn of_vaiont(benchmarks: &[Benchmark]) -> Vec<Claim> {
     let same_m = ids(benchmarks, has_the_papers_m);
-    let slight = |one: &Benchmark| excess_below_one(one).is_some_and(|excess| excess < SLIGHT);
+    let unstable = benchmarks.iter().filter(|one| one.paper_m >= 1.0);
+    let is_slight = |one: &Benchmark| {
+        excess_below_one(one).is_some_and(|excess| (0.0..SLIGHT).contains(&excess))
+    };
     vec![
         Claim {
             paper: "Vaiont: m = 1.35 (5), 1.24 (63), 0.99 (67), 1.00 (50)".to_owned(),
@@ -97,13 +102,13 @@ fn of_vaiont(benchmarks: &[Benchmark]) -> Vec<Claim> {
         Claim {
             paper: "Vaiont: laws with m < 1 fit with an rms only slightly larger".to_owned(),
             here: format!(
-                "rms of the best m < 1 against the best m ≥ 1: {}",
+                "rms of the best m < 1 against the best m ≥ 1: {} (below 0: m < 1 fits better)",
                 each(benchmarks, |one| {
                     let percent = |excess: f64| format!("{:+.0} %", 100.0 * excess);
                     excess_below_one(one).map_or("–".to_owned(), percent)
                 })
             ),
-            agrees: benchmarks.iter().all(slight),
+            agrees: unstable.into_iter().all(is_slight),
             readings: Readings::Tuned,
         },
         of_the_line(benchmarks),
@@ -247,29 +252,38 @@ fn of_growing(growing: &SweepReport) -> Result<Vec<Claim>> {
 
 fn of_velocity(growing: &SweepReport) -> Claim {
     let rows = &growing.rows;
-    let met = rows
-        .iter()
-        .filter(|row| is_below_one_from_above(row))
-        .count();
+    let met = rows.iter().filter(|row| is_below_one_from_above(row));
+    let is_doubted = |row: &&SweepRow| row.regime.probability_unstable.is_some_and(|p| p > 0.5);
+    let doubted = met.clone().filter(is_doubted).count();
+    let met = met.count();
     Claim {
         paper: "fits of the velocity: less stable, almost all with m < 1 and x_i > 1".to_owned(),
-        here: format!("m < 1 and x_i > 1 in {met} of {} refits", rows.len()),
+        here: format!(
+            "m < 1 and x_i > 1 in {met} of {} refits, in {doubted} of which P(unstable) > .5",
+            rows.len()
+        ),
         agrees: met as f64 >= NEARLY_ALL * rows.len() as f64,
         readings: Readings::Reconstructed,
     }
 }
 
-fn of_synthetic(studies: &[Study]) -> Result<[Claim; 2]> {
-    let of_displacement = studies
+/// The least share of m < 1 among the studies of `quantity` with scatter.
+fn least_share_below_one(studies: &[Study], quantity: Quantity) -> Option<f64> {
+    let met = studies
         .iter()
-        .filter(|study| study.quantity == Quantity::Displacement && study.kind.scatter > 0.0);
-    let shares = of_displacement
-        .clone()
-        .map(|study| study.share(|draw| draw.m < 1.0));
-    let least = shares.reduce(f64::min).context("no synthetics")?;
+        .filter(|study| study.quantity == quantity && study.kind.scatter > 0.0);
+    met.map(|study| study.share(|draw| draw.m < 1.0))
+        .reduce(f64::min)
+}
+
+fn of_synthetic(studies: &[Study]) -> Result<[Claim; 2]> {
+    let scattered = studies.iter().filter(|study| study.kind.scatter > 0.0);
     let near = |study: &Study| study.share(|draw| (draw.m - M).abs() <= SAME_M);
-    let most_near = of_displacement.map(near).reduce(f64::max);
+    let most_near = scattered.map(near).reduce(f64::max);
     let most_near = most_near.context("no synthetics")?;
+    let least = |quantity| least_share_below_one(studies, quantity).context("no synthetics");
+    let displacement = least(Quantity::Displacement)?;
+    let velocity = least(Quantity::Velocity)?;
     Ok([
         Claim {
             paper: "synthetic series with m = 0.98, x_i = 39: m cannot be recovered".to_owned(),
@@ -277,13 +291,17 @@ fn of_synthetic(studies: &[Study]) -> Result<[Claim; 2]> {
                 "with scatter in the slip the best m is within {SAME_M} of it in {:.0} % at most",
                 100.0 * most_near
             ),
-            agrees: most_near < 0.9,
+            agrees: most_near < FOUND,
             readings: Readings::Synthetic,
         },
         Claim {
             paper: "the same: that m < 1 can".to_owned(),
-            here: format!("m < 1 is found in {:.0} % at least", 100.0 * least),
-            agrees: least >= 0.9,
+            here: format!(
+                "m < 1 is found in {:.1} % of displacements at least, in {:.1} % of velocities",
+                100.0 * displacement,
+                100.0 * velocity
+            ),
+            agrees: displacement >= FOUND,
             readings: Readings::Synthetic,
         },
     ])

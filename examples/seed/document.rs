@@ -321,7 +321,7 @@ fn growing_section(growing: &SweepReport) -> Result<String> {
         "## La Clapière: t_max growing from two to five years\n\n\
          **Reconstruction:** the river's season and the extra load are in these readings, and what follows of them was not tuned\n\
          row by row. The minima are the distinct ones of the misfit. The transition is the inflection of the best fit's\n\
-         velocity; a law that fails or only slows down has none.\n\n{}\n\
+         velocity; a law that fails or only slows down has none, nor has one with m from -1 to 0.\n\n{}\n\
          ![Transition time, regime and minima against t_max](seed/sweep.svg)\n\n\
          Reconstruction. Top: the transition time, where there is one; below the dashed line it is past. Middle: probability of\n\
          m > 1; the regime is undetermined between the dotted lines, or where no regime has .6. Bottom: m of every minimum.\n",
@@ -454,8 +454,8 @@ fn synthetic_section(studies: &[Study]) -> String {
     format!(
         "## Synthetic series with m = {m} and x_i = {x_i}\n\n\
          No reconstruction: {count} seeded series a row, 61 monthly displacements over five years, from 1.5 m/yr at the start; readings\n\
-         err by {error:.0} mm, and each month's slip scatters about the law's. The paper states neither T nor the noise of its series: T\n\
-         here puts the inflection of the velocity before the end of the record, or after it, and the scatter is ours. Best m is\n\
+         err by {error:.0} mm, and each month's slip scatters about the law's. T and the noise are ours: T puts the\n\
+         inflection of the velocity before the end of the record, or after it. Best m is\n\
          of the least squares; P and the interval are the posterior's, whose prior spans m from {low:.1} to {high:.1}: its width is the\n\
          median one, and the last column the share of the intervals that hold {m} (of 90 %).\n\n{table}\n\
          ![Best m and its interval, synthetic series](seed/synthetic.svg)\n\n\

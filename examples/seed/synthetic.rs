@@ -53,7 +53,7 @@ pub(crate) const KINDS: [Kind; 4] = [
 ];
 
 /// What one series gave.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Draw {
     /// m of the best fit.
     pub(crate) m: f64,
@@ -78,21 +78,26 @@ pub(crate) fn studies(count: u64) -> Result<Vec<Study>> {
     let mut studies = Vec::new();
     for kind in KINDS {
         for quantity in [Quantity::Displacement, Quantity::Velocity] {
-            let draws = (0..count).map(|index| {
-                let displacements = series(SEED + index, &kind)?;
-                match quantity {
-                    Quantity::Displacement => draw(&displacements),
-                    Quantity::Velocity => draw(&velocities(&displacements)?),
-                }
-            });
-            studies.push(Study {
-                quantity,
-                kind,
-                draws: draws.collect::<Result<_>>()?,
-            });
+            studies.push(study(quantity, kind, count)?);
         }
     }
     Ok(studies)
+}
+
+/// Inverts `count` series of one kind.
+pub(crate) fn study(quantity: Quantity, kind: Kind, count: u64) -> Result<Study> {
+    let draws = (0..count).map(|index| {
+        let displacements = series(SEED + index, &kind)?;
+        match quantity {
+            Quantity::Displacement => draw(&displacements),
+            Quantity::Velocity => draw(&velocities(&displacements)?),
+        }
+    });
+    Ok(Study {
+        quantity,
+        kind,
+        draws: draws.collect::<Result<_>>()?,
+    })
 }
 
 /// The law behind every series.
