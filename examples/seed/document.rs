@@ -450,6 +450,7 @@ fn synthetic_section(studies: &[Study]) -> String {
     let prior = |p: f64| 1.0 / (1.0 - p);
     let table = table(&head, &studies.iter().map(row).collect::<Vec<_>>());
     let (low, high) = (prior(P_PRIOR.0), prior(P_PRIOR.1));
+    let edge = 100.0 * (1.0 - 1.0 / synthetic::M) / P_PRIOR.0;
     let (m, x_i, error) = (synthetic::M, synthetic::X_I, synthetic::READING_ERROR_MM);
     format!(
         "## Synthetic series with m = {m} and x_i = {x_i}\n\n\
@@ -457,8 +458,9 @@ fn synthetic_section(studies: &[Study]) -> String {
          err by {error:.0} mm, and each month's slip scatters about the law's. T and the noise are ours: T puts the\n\
          inflection of the velocity before the end of the record, or after it. Best m is\n\
          of the least squares; P and the interval are the posterior's, whose prior spans m from {low:.1} to {high:.1}: its width is the\n\
-         median one, and the last column the share of the intervals that hold {m}: where it is under\n\
-         90 %, the interval is too narrow.\n\n{table}\n\
+         median one, and the last column the share of the intervals that hold {m}.\n\
+         That share is no test of the interval: {m} stands in the outermost {edge:.0} % of the prior's part below 1, and an interval\n\
+         that leaves 5 % beyond either end leaves it out where the readings say little of m.\n\n{table}\n\
          ![Best m and its interval, synthetic series](seed/synthetic.svg)\n\n\
          The rows of displacement. Red: best m. Grey: 90 % by the posterior. Blue: the m that made the series.\n"
     )
