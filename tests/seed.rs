@@ -1,0 +1,293 @@
+//! What docs/seed.md says of the paper's studies holds, and is labelled where it was put in by hand.
+#![allow(missing_docs, reason = "the claims are the names")]
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![allow(dead_code, reason = "the document shows more than the tests claim")]
+
+#[path = "../examples/seed/claims.rs"]
+mod claims;
+#[path = "../examples/seed/document.rs"]
+mod document;
+#[path = "../examples/seed/figures.rs"]
+mod figures;
+#[path = "../examples/seed/la_clapiere.rs"]
+mod la_clapiere;
+#[path = "../examples/seed/recorded.rs"]
+mod recorded;
+#[path = "../examples/seed/regimes.rs"]
+mod regimes;
+#[path = "../examples/seed/svg.rs"]
+mod svg;
+#[path = "../examples/seed/synthetic.rs"]
+mod synthetic;
+#[path = "../examples/seed/vaiont.rs"]
+mod vaiont;
+
+use claims::{Readings, claims, excess_below_one, line_day};
+use document::Studies;
+use slipwatch::reading::Quantity;
+use slipwatch::regime::Regime;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+use vaiont::Benchmark;
+
+/// Everything, with few synthetic series.
+static STUDIES: LazyLock<Studies> = LazyLock::new(|| Studies::run(3).unwrap());
+/// Synthetic series where their shares matter.
+const SYNTHETICS: u64 = 30;
+
+fn benchmark(id: &str) -> &'static Benchmark {
+    STUDIES.vaiont.iter().find(|one| one.id == id).unwrap()
+}
+
+fn docs() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("docs")
+}
+
+fn figures() -> Vec<(&'static str, String)> {
+    let all = [
+        ("regimes", figures::regimes(&regimes::columns().unwrap())),
+        ("vaiont", figures::vaiont(&STUDIES.vaiont).unwrap()),
+        (
+            "la-clapiere",
+            figures::la_clapiere(&STUDIES.la_clapiere, &STUDIES.fits).unwrap(),
+        ),
+        (
+            "sweep",
+            figures::sweep(&STUDIES.growing, &STUDIES.growing_velocity).unwrap(),
+        ),
+        ("synthetic", figures::synthetic(&STUDIES.synthetic)),
+    ];
+    all.map(|(name, figure)| (name, figure.svg())).to_vec()
+}
+
+#[test]
+fn vaiont_5_and_63_are_fitted_alike_on_both_sides_of_m_one_and_67_below_it_only() {
+    for id in ["5", "63"] {
+        let excess = excess_below_one(benchmark(id)).unwrap();
+        assert!(excess.abs() < 0.1, "{id}: {excess}");
+    }
+    let bent = benchmark("67");
+    assert!(excess_below_one(bent).unwrap() < -0.5);
+    assert!(claims::has_the_papers_m(bent));
+    assert!(bent.free.regime.probability_unstable.unwrap() < 0.05);
+}
+
+#[test]
+fn the_line_through_5_63_and_50_meets_zero_within_a_day_of_the_papers_and_that_of_67_later() {
+    for id in ["5", "63", "50"] {
+        let day = line_day(benchmark(id)).unwrap();
+        assert!((day - vaiont::PAPER_LINE_DAY).abs() <= 1.0, "{id}: {day}");
+    }
+    assert!(line_day(benchmark("67")).unwrap() > vaiont::PAPER_LINE_DAY + 1.0);
+}
+
+#[test]
+fn alpha_is_two_where_inverse_velocity_is_straight_and_less_where_it_bends_upwards() {
+    let best = |id| benchmark(id).free.inverse_velocity.alpha.unwrap();
+    for id in ["5", "63", "50"] {
+        let alpha = best(id).best.unwrap();
+        assert!((alpha - 2.0).abs() <= 0.1, "{id}: {alpha}");
+    }
+    assert!(best("67").high.unwrap() < 1.9, "{:?}", best("67"));
+}
+
+#[test]
+fn benchmarks_5_63_and_50_pass_a_metre_a_day_within_a_day_of_the_collapse() {
+    for id in ["5", "63", "50"] {
+        let passage = benchmark(id).free.failure_time;
+        let day = recorded::vaiont_day(passage.median.unwrap()).unwrap();
+        assert!((day - vaiont::COLLAPSE_DAY).abs() < 1.0, "{id}: {day}");
+        assert!(passage.probability.unwrap() > 0.9, "{id}: {passage:?}");
+    }
+}
+
+#[test]
+fn la_clapiere_to_1987_is_stable_and_an_imposed_m_of_one_and_a_half_only_the_straight_line() {
+    let [free, _, unit, imposed] = STUDIES.fits.as_slice() else {
+        panic!("{} fits", STUDIES.fits.len());
+    };
+    assert_eq!(free.report.regime.label, Regime::StableAccelerating);
+    let rms = |fit: &la_clapiere::Fit| fit.report.rms.unwrap();
+    assert!(rms(imposed) > 1.5 * rms(free));
+    assert!((rms(imposed) / rms(unit) - 1.0).abs() < 1e-3);
+    assert!(imposed.report.parameters.x_i.best.unwrap() < 1e-3);
+}
+
+#[test]
+fn a_law_without_load_does_not_find_the_m_that_made_la_clapiere_under_one() {
+    let [free, paper, ..] = STUDIES.fits.as_slice() else {
+        panic!("{} fits", STUDIES.fits.len());
+    };
+    let m = free.report.parameters.m.best.unwrap();
+    assert!(m < 1.0 && (m - la_clapiere::PAPER_M).abs() > 0.05, "{m}");
+    assert!(paper.report.rms.unwrap() > 1.1 * free.report.rms.unwrap());
+}
+
+#[test]
+fn before_the_end_of_1986_minima_span_both_sides_and_by_1987_9_the_best_is_below_one() {
+    let rows = &STUDIES.growing.rows;
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    let mut sides = Vec::new();
+    for row in rows {
+        if la_clapiere::is_before_the_end_of_1986(row.t_max).unwrap() {
+            let range = row.alternatives.range_of_m().unwrap();
+            (low, high) = (low.min(range.0), high.max(range.1));
+            sides.push(row.m.unwrap() < 1.0);
+        }
+    }
+    assert!(low < -5.0 && high > 20.0, "{low} to {high}");
+    assert!(sides.contains(&true) && sides.contains(&false), "{sides:?}");
+    for row in &rows[rows.len() - 2..] {
+        assert!(claims::has_m_of_a_stable_law(row), "{row:?}");
+        assert!(row.regime.probability_unstable.unwrap() < 0.5, "{row:?}");
+    }
+}
+
+#[test]
+fn almost_all_fits_of_la_clapieres_velocity_have_m_below_one_and_x_i_above() {
+    let rows = &STUDIES.growing_velocity.rows;
+    let met = rows
+        .iter()
+        .filter(|row| claims::is_below_one_from_above(row));
+    assert!(met.count() >= 10, "{rows:#?}");
+}
+
+#[test]
+fn displacement_and_velocity_give_another_best_m_of_63_and_one_regime_of_67() {
+    let both = |id| {
+        let one = benchmark(id);
+        (&one.free, &one.from_displacement)
+    };
+    let (velocity, displacement) = both("63");
+    let m = |report: &slipwatch::inversion::FitReport| report.parameters.m.best.unwrap();
+    assert!((m(velocity) - m(displacement)).abs() > 1.0);
+    let (velocity, displacement) = both("67");
+    assert_eq!(velocity.regime.label, Regime::StableAccelerating);
+    assert_eq!(displacement.regime.label, Regime::StableAccelerating);
+    assert!(m(velocity) < 1.0 && m(displacement) < 1.0);
+}
+
+#[test]
+fn of_synthetic_displacements_m_below_one_is_recovered_and_m_is_not() {
+    let kind = synthetic::KINDS[2];
+    let study = synthetic::study(Quantity::Displacement, kind, SYNTHETICS).unwrap();
+    assert!(study.share(|draw| draw.m < 1.0) >= 0.9);
+    assert!(study.share(|draw| draw.probability_below_one > 0.5) >= 0.9);
+    assert!(study.share(|draw| (draw.m - synthetic::M).abs() <= 0.05) <= 0.7);
+    let spread = study.quantile(0.95, |draw| draw.m) - study.quantile(0.05, |draw| draw.m);
+    assert!(spread > 0.3, "{spread}");
+}
+
+#[test]
+fn the_more_the_slip_scatters_the_wider_the_interval_of_m() {
+    let width = |kind: synthetic::Kind| {
+        let study = synthetic::study(Quantity::Displacement, kind, SYNTHETICS).unwrap();
+        study.quantile(0.5, |draw| draw.interval.1 - draw.interval.0)
+    };
+    let [still, .., wild] = synthetic::KINDS;
+    let (narrow, wide) = (width(still), width(wild));
+    assert!(
+        narrow < 0.15 && wide > 0.5 && wide > 4.0 * narrow,
+        "{narrow} {wide}"
+    );
+}
+
+#[test]
+fn the_synthetic_series_inflect_when_they_are_said_to_and_are_the_same_each_time() {
+    for kind in synthetic::KINDS {
+        let law = synthetic::law(kind.inflection_years).unwrap();
+        let years = law.transition_days().unwrap() / 365.25;
+        assert!((years - kind.inflection_years).abs() < 1e-9, "{years}");
+        let paper = law.paper();
+        assert!((paper.m - synthetic::M).abs() < 1e-12);
+        assert!((paper.x_i.unwrap() - synthetic::X_I).abs() < 1e-9);
+    }
+    let twice = || synthetic::study(Quantity::Velocity, synthetic::KINDS[3], 2).unwrap();
+    assert_eq!(twice().draws, twice().draws);
+    assert_ne!(twice().draws[0], twice().draws[1]);
+}
+
+#[test]
+fn the_regimes_fail_slow_down_or_settle_as_their_curves_are_named() {
+    for column in regimes::columns().unwrap() {
+        for curve in &column.curves {
+            let at = |index: usize| curve.instants[index];
+            let (first, last) = (at(0), at(curve.instants.len() - 1));
+            let name = format!("{}, {}", column.title, curve.name);
+            if name.ends_with("fails") {
+                assert!(last.velocity > 1e3 * first.velocity, "{name}");
+                assert!(last.state < 0.01 * first.state, "{name}");
+            } else if name.ends_with("slows on") {
+                assert!(last.velocity < 0.8 * first.velocity, "{name}");
+            } else {
+                let rises = first.velocity < 1.0;
+                assert_eq!(rises, name.ends_with("rises to D"), "{name}");
+                assert!((last.velocity - 1.0).abs() < 0.05, "{name}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_figure_is_whole_on_white_with_its_axes_named_and_no_number_missing() {
+    for (name, svg) in figures() {
+        assert!(
+            svg.starts_with("<svg ") && svg.ends_with("</svg>\n"),
+            "{name}"
+        );
+        assert!(svg.contains(r##"fill="#ffffff"/>"##), "{name}");
+        assert!(!svg.contains("NaN") && !svg.contains("inf"), "{name}");
+        let is_plot_of_time = ["time / T", "days from", "year", "series, in"];
+        assert!(
+            is_plot_of_time.iter().any(|label| svg.contains(label)),
+            "{name}"
+        );
+        if !["regimes", "synthetic"].contains(&name) {
+            assert!(svg.contains("(reconstruction)"), "{name}");
+        }
+    }
+    assert_eq!(figures(), figures());
+}
+
+#[test]
+fn every_table_and_figure_of_a_reconstruction_says_so() {
+    let text = document::text(&STUDIES).unwrap();
+    assert!(!text.contains("NaN"));
+    for section in text.split("\n## ").skip(1) {
+        let title = section.lines().next().unwrap();
+        let tables = section.matches("|---|").count();
+        let pictures = section.matches("](seed/").count();
+        let labels = section.matches("Reconstruction").count();
+        let is_of_recordings = title.contains("Vaiont")
+            || title.contains("La Clapière")
+            || title.starts_with("Displacement against");
+        if is_of_recordings {
+            let tables = section
+                .lines()
+                .filter(|line| line.starts_with("|---"))
+                .count();
+            assert!(tables > 0 && labels >= tables + pictures, "{title}");
+        } else {
+            assert!(tables == 0 || section.contains("reconstruction"), "{title}");
+        }
+    }
+}
+
+#[test]
+fn the_document_gives_the_verdicts_that_its_studies_give_and_shows_figures_that_are_there() {
+    let text = std::fs::read_to_string(docs().join("seed.md")).unwrap();
+    for claim in claims(&STUDIES).unwrap() {
+        let start = format!("| {} |", claim.paper);
+        let row = text.lines().find(|line| line.starts_with(&start));
+        let row = row.unwrap_or_else(|| panic!("no row: {}", claim.paper));
+        let said = row.ends_with("| agrees |");
+        assert!(
+            claim.readings == Readings::Synthetic || said == claim.agrees,
+            "run `cargo run --release --example seed` again: {row}"
+        );
+    }
+    for (name, _) in figures() {
+        assert!(text.contains(&format!("](seed/{name}.svg)")), "{name}");
+        assert!(docs().join("seed").join(format!("{name}.svg")).exists());
+    }
+}
