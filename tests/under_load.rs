@@ -202,3 +202,48 @@ fn simulated_failures_are_foretold_without_bias_and_within_their_intervals() {
         );
     }
 }
+
+#[test]
+fn a_compacted_record_foretells_what_the_whole_one_does() {
+    let long = (0..400)
+        .map(|seed| Life::draw(Fate::Failing, 30_000 + seed))
+        .filter(|life| life.readings.len() > 2500)
+        .take(8);
+    let mut compared = 0;
+    for life in long {
+        let failure = life.failure_days.unwrap();
+        let mut kept = Observations {
+            quantity: Quantity::Displacement,
+            averaging_days: 0.0,
+            values: Vec::new(),
+        };
+        let mut whole = kept.clone();
+        for (t_days, value) in life
+            .readings
+            .iter()
+            .filter(|(days, _)| *days < failure - 10.0)
+        {
+            let value = Observation {
+                t_days: *t_days,
+                value: *value,
+                sigma: None,
+            };
+            whole.values.push(value);
+            kept.values.push(value);
+            kept.compact();
+        }
+        assert!(kept.values.len() <= Observations::MOST && whole.values.len() > 2400);
+        let median = |observations: &Observations| {
+            let outlook = Panel::default().update(observations, CRITICAL).unwrap();
+            outlook.passage.quantile(0.5, HORIZON_DAYS).unwrap()
+        };
+        let (whole, kept) = (median(&whole), median(&kept));
+        println!("{whole:.2} {kept:.2}");
+        assert!(
+            (kept / whole - 1.0).abs() < 0.1,
+            "{kept} against {whole} days"
+        );
+        compared += 1;
+    }
+    assert!(compared >= 4, "{compared}");
+}
