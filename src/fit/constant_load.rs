@@ -1,13 +1,12 @@
 //! The inversion of the constant-load law by unweighted least squares: global, over every branch of m.
 //!
-//! Velocity and zero are projected out; what is left, on each of the eight charts that hold the laws
-//! with m other than 1, is searched on a fixed grid, polished by Levenberg-Marquardt from the best
-//! points of each m of the grid, and polished again from the best of those. Nothing is random.
+//! Velocity and zero are projected out; what is left is three numbers, and for each m the laws are one
+//! curve, stretched and shifted in time. Nothing is random.
 
 use super::chart::{Branch, HIGHEST_M, LEAST_LN_M, LOWEST_M};
 use super::global_search::{Found, Search};
-use super::least_squares::Termination;
-use super::projection::PointReadings;
+use super::lattice::Lattice;
+use super::point_readings::PointReadings;
 use crate::model::Law;
 use std::fmt;
 
@@ -99,7 +98,7 @@ pub struct ConstantLoad {
 /// Minima kept beside the best with m > 1, m = 1 and m < 1.
 const MOST_MINIMA: usize = 8;
 /// Relative difference of rms under which two results are one minimum.
-pub(super) const SAME_RMS: f64 = 1e-3;
+const SAME_RMS: f64 = 1e-3;
 /// A branch that gains less than this on m = 1, relative to its rms, has run into m = 1.
 const GAIN_OVER_UNIT_M: f64 = 1e-7;
 /// A minimum must leave less than this share of the rms about a constant velocity.
@@ -110,6 +109,11 @@ const WORST: f64 = 3.0;
 impl ConstantLoad {
     /// Inverts the readings.
     pub fn fit(readings: &PointReadings, exponent: Exponent) -> Self {
+        Self::fit_on(readings, exponent, Lattice::Regular)
+    }
+
+    /// The same, begun at other places.
+    pub fn fit_on(readings: &PointReadings, exponent: Exponent, lattice: Lattice) -> Self {
         if let Some(outcome) = refuse(readings, exponent) {
             return Self {
                 minima: Vec::new(),
@@ -117,9 +121,9 @@ impl ConstantLoad {
                 outcome,
             };
         }
-        let mut search = Search::new(readings);
-        let found = search.run(exponent);
-        conclude(&search, found, exponent)
+        let mut search = Search::new(readings, exponent, lattice);
+        let found = search.run();
+        conclude(&search, readings, found, exponent)
     }
 
     /// The best of all.
@@ -145,21 +149,26 @@ fn refuse(readings: &PointReadings, exponent: Exponent) -> Option<Outcome> {
 }
 
 /// Ranks what was found.
-fn conclude(search: &Search, mut found: Vec<Found>, exponent: Exponent) -> ConstantLoad {
+fn conclude(
+    search: &Search,
+    readings: &PointReadings,
+    mut found: Vec<Found>,
+    exponent: Exponent,
+) -> ConstantLoad {
     found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     prefer_unit_m(&mut found);
     let outcome = match found.first() {
         None => Outcome::NoForwardMotion,
-        Some(best) if best.termination != Termination::Converged => Outcome::Stopped,
+        Some(best) if !best.converged => Outcome::Stopped,
         Some(best) if best.solution.place == Place::AtBoundOfM => {
             Outcome::AtBoundOfM(m_of(&best.solution))
         }
         Some(_) => Outcome::Converged,
     };
-    let flat = search.readings.rms(search.readings.cost_of_no_change());
+    let flat = readings.rms(search.cost_of_no_change());
     ConstantLoad {
         minima: distinct(&found, flat, exponent),
-        evaluations: search.evaluations,
+        evaluations: search.evaluations(),
         outcome,
     }
 }
