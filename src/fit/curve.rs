@@ -74,7 +74,7 @@ impl Fineness {
     pub(super) const EXACT: Self = Self(0.25);
 }
 
-/// More nodes than a curve within the charts needs.
+/// More nodes than a curve within the charts needs; one bit each in [`Curve::known`].
 const MOST_NODES: usize = 128;
 /// ln y is followed no further than this, where velocities have left every instrument's range.
 const FARTHEST_LN_Y: f64 = 300.0;
@@ -119,7 +119,9 @@ struct Approach {
 pub(super) struct Curve {
     quantity: Quantity,
     nodes: Vec<Node>,
-    pieces: Vec<Option<Piece>>,
+    /// From each node to the next, where `known` has its bit.
+    pieces: Vec<Piece>,
+    known: u128,
     approach: Option<Approach>,
 }
 
@@ -204,7 +206,8 @@ impl Curve {
         Self {
             quantity,
             nodes: Vec::with_capacity(MOST_NODES),
-            pieces: Vec::with_capacity(MOST_NODES),
+            pieces: vec![Piece::NONE; MOST_NODES],
+            known: 0,
             approach: None,
         }
     }
@@ -222,7 +225,7 @@ impl Curve {
         };
         let longest = fineness.0 / changes_over;
         self.nodes.clear();
-        self.pieces.clear();
+        self.known = 0;
         self.approach = None;
         let (mut ln_y, mut t, mut slip, mut h) = (0.0_f64, 0.0, 0.0, 0.0);
         let mut before: Option<Local> = None;
@@ -246,7 +249,6 @@ impl Curve {
                 ln_excess,
                 growth: f / y,
             });
-            self.pieces.push(None);
             if t >= end {
                 return true;
             }
@@ -313,30 +315,64 @@ impl Curve {
         window: &Window,
         times: &[f64],
         out: &mut [f64],
-        mut rates: Option<&mut [f64]>,
+        rates: Option<&mut [f64]>,
     ) {
+        match (self.quantity, rates) {
+            (Quantity::Velocity, None) => self.walk::<true, false>(window, times, out, &mut []),
+            (Quantity::Displacement, None) => {
+                self.walk::<false, false>(window, times, out, &mut []);
+            }
+            (Quantity::Velocity, Some(rates)) => self.walk::<true, true>(window, times, out, rates),
+            (Quantity::Displacement, Some(rates)) => {
+                self.walk::<false, true>(window, times, out, rates);
+            }
+        }
+    }
+
+    /// One loop a case, because nearly all the time of a search is spent here.
+    fn walk<const IS_VELOCITY: bool, const WITH_RATES: bool>(
+        &mut self,
+        window: &Window,
+        times: &[f64],
+        out: &mut [f64],
+        rates: &mut [f64],
+    ) {
+        let mut put = |index: usize, (value, rate): (f64, f64)| {
+            let (value, rate) = if IS_VELOCITY {
+                let u = 1.0 / value;
+                (u, -rate * u * u)
+            } else {
+                (value, rate)
+            };
+            out[index] = value;
+            if WITH_RATES {
+                rates[index] = rate;
+            }
+        };
         let (mut node, last) = (window.first_node, self.nodes.len() - 1);
-        for (index, (time, slot)) in times.iter().zip(out).enumerate() {
-            let t = window.start + window.span * time;
+        let mut index = 0;
+        while index < times.len() {
+            let mut t = window.start + window.span * times[index];
             while node < last && t > self.nodes[node + 1].t {
                 node += 1;
             }
-            let wants_rate = rates.is_some();
-            let (value, rate) = if node < last {
-                self.piece(node).at(t - self.nodes[node].t, wants_rate)
-            } else {
-                self.approaching(t)
-            };
-            let (value, rate) = match self.quantity {
-                Quantity::Velocity => {
-                    let u = 1.0 / value;
-                    (u, -rate * u * u)
+            if node == last {
+                put(index, self.approaching(t));
+                index += 1;
+                continue;
+            }
+            let (begin, end) = (self.nodes[node].t, self.nodes[node + 1].t);
+            let piece = self.piece(node);
+            loop {
+                put(index, piece.at::<WITH_RATES>(t - begin));
+                index += 1;
+                if index == times.len() {
+                    return;
                 }
-                Quantity::Displacement => (value, rate),
-            };
-            *slot = value;
-            if let Some(rates) = rates.as_deref_mut() {
-                rates[index] = rate;
+                t = window.start + window.span * times[index];
+                if t > end {
+                    break;
+                }
             }
         }
     }
@@ -363,13 +399,13 @@ impl Curve {
         }
     }
 
-    fn piece(&mut self, node: usize) -> Piece {
-        if let Some(piece) = self.pieces[node] {
-            return piece;
+    fn piece(&mut self, node: usize) -> &Piece {
+        let bit = 1 << node;
+        if self.known & bit == 0 {
+            self.pieces[node] = Piece::new(&self.nodes[node], &self.nodes[node + 1]);
+            self.known |= bit;
         }
-        let piece = Piece::new(&self.nodes[node], &self.nodes[node + 1]);
-        self.pieces[node] = Some(piece);
-        piece
+        &self.pieces[node]
     }
 
     /// ln y at the end of the record.
@@ -389,6 +425,12 @@ impl Curve {
 }
 
 impl Piece {
+    const NONE: Self = Self {
+        over_span: 0.0,
+        low: [0.0; 4],
+        high: [0.0; 4],
+    };
+
     fn new(from: &Node, to: &Node) -> Self {
         let h = to.t - from.t;
         let scaled = |v: &[f64; 4]| [v[0], v[1] * h, v[2] * h * h / 2.0, v[3] * h * h * h / 6.0];
@@ -411,14 +453,14 @@ impl Piece {
     }
 
     /// Value and derivative so long after the first end; the derivative only where wanted.
-    fn at(&self, since: f64, wants_rate: bool) -> (f64, f64) {
+    fn at<const WITH_RATE: bool>(&self, since: f64) -> (f64, f64) {
         let (c, e) = (&self.low, &self.high);
         let x = since * self.over_span;
         let u = x - 1.0;
         let fourth = (x * x) * (x * x);
-        let upper = e[0] + u * (e[1] + u * (e[2] + u * e[3]));
-        let value = c[0] + x * (c[1] + x * (c[2] + x * c[3])) + fourth * upper;
-        if !wants_rate {
+        let upper = (e[0] + u * e[1]) + (u * u) * (e[2] + u * e[3]);
+        let value = (c[0] + x * c[1]) + (x * x) * (c[2] + x * c[3]) + fourth * upper;
+        if !WITH_RATE {
             return (value, 0.0);
         }
         let lower_rate = c[1] + x * (2.0 * c[2] + x * (3.0 * c[3]));

@@ -16,7 +16,7 @@ const MOST_DAMPING: f64 = 1e10;
 /// A step that promises less than this share of the least gain is not taken.
 const NO_PROMISE: f64 = 0.1;
 const EASE: f64 = 0.1;
-const TIGHTEN: f64 = 8.0;
+const TIGHTEN: f64 = 2.0;
 
 /// How far a descent goes.
 #[derive(Debug, Clone, Copy)]
@@ -109,10 +109,11 @@ impl Descent {
             let Some(normal) = self.linearise(record, &place, effort.fineness, holds_m) else {
                 break;
             };
-            let before = place.cost;
+            let (before, mut tighten) = (place.cost, TIGHTEN);
             while damping < MOST_DAMPING && self.evaluations < last {
                 let step = damped_step(&normal, damping);
-                if promised(&normal, &step) <= NO_PROMISE * effort.least_gain * place.cost {
+                let promise = promised(&normal, &step, damping);
+                if promise <= NO_PROMISE * effort.least_gain * place.cost {
                     place.converged = true;
                     break;
                 }
@@ -120,11 +121,14 @@ impl Descent {
                 let there = inside(place.chart, &there, holds_m);
                 let cost = self.cost(record, place.chart, &there, effort.fineness);
                 if cost < place.cost {
+                    // Nielsen's rule: a step that kept its promise is taken longer next time.
+                    let kept = 2.0 * (place.cost - cost) / promise - 1.0;
+                    damping *= (1.0 - kept * kept * kept).clamp(EASE, TIGHTEN);
                     (place.at, place.cost) = (there, cost);
-                    damping *= EASE;
                     break;
                 }
-                damping *= TIGHTEN;
+                damping *= tighten;
+                tighten *= TIGHTEN;
             }
             if before - place.cost <= effort.least_gain * place.cost {
                 place.converged |= before > place.cost || damping >= MOST_DAMPING;
@@ -223,9 +227,10 @@ impl Descent {
     }
 }
 
-/// What the linear model gains by a damped step, at least.
-fn promised((_, gradient): &Normal, step: &[f64; 3]) -> f64 {
-    -gradient.iter().zip(step).map(|(g, s)| g * s).sum::<f64>()
+/// What the linear model gains by a damped step.
+fn promised((normal, gradient): &Normal, step: &[f64; 3], damping: f64) -> f64 {
+    let each = (0..3).map(|i| step[i] * (damping * normal[i][i] * step[i] - gradient[i]));
+    each.sum()
 }
 
 /// Whether a coordinate stands at a bound that descent would cross.

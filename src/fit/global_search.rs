@@ -13,24 +13,24 @@ use crate::reading::Quantity;
 
 /// On the merged readings: from the lattice to the floor of a basin, nearly.
 const NEARLY: Effort = Effort {
-    most_evaluations: 24,
-    least_gain: 1e-2,
+    most_evaluations: 36,
+    least_gain: 2e-3,
     fineness: Fineness::MIDDLE,
 };
 /// On all readings: enough to know which basins may hold the best.
 const CLOSELY: Effort = Effort {
-    most_evaluations: 30,
-    least_gain: 1e-5,
+    most_evaluations: 40,
+    least_gain: 3e-6,
     fineness: Fineness::FINE,
 };
 /// To the floor.
 const WHOLLY: Effort = Effort {
     most_evaluations: 200,
-    least_gain: 1e-10,
+    least_gain: 1e-8,
     fineness: Fineness::FINE,
 };
 /// A descent to the floor is begun afresh while it gained more than this, relative, and at most so often.
-const RESTART_GAIN: f64 = 1e-7;
+const RESTART_GAIN: f64 = 1e-6;
 const MOST_RESTARTS: usize = 6;
 
 /// A direction whose best place on the first lattice costs more times the best is not looked at again.
@@ -42,23 +42,27 @@ const HARD: f64 = 0.1;
 struct Breadth {
     nearly: usize,
     closely: usize,
+    /// Of one branch and direction, these many go to the floor.
     wholly: usize,
+    /// Costs within so many times the best go to the floor.
+    floor_within: f64,
 }
 const EASY_BREADTH: Breadth = Breadth {
     nearly: 2,
     closely: 6,
-    wholly: 3,
+    wholly: 1,
+    floor_within: 1.02,
 };
 const HARD_BREADTH: Breadth = Breadth {
     nearly: 4,
     closely: 9,
     wholly: 6,
+    floor_within: 1.06,
 };
 /// A second place of a branch and direction is followed on all readings within so many times the best
-/// cost, a first within so many times, and to the floor within so many times.
+/// cost, a first within so many times.
 const SECOND_WITHIN: f64 = 3.0;
 const FIRST_WITHIN: f64 = 9.0;
-const FLOOR_WITHIN: f64 = 1.06;
 /// Costs within this of each other, on one branch in one direction, are those of one basin.
 const ONE_BASIN: f64 = 2e-4;
 
@@ -168,10 +172,18 @@ impl<'a> Search<'a> {
         }
         sort(&mut close);
         close.dedup_by(|a, b| is_same_group(a, b) && a.cost - b.cost <= ONE_BASIN * b.cost);
-        let floor = FLOOR_WITHIN * self::lowest(&close, None);
-        let contenders = close.iter_mut().filter(|place| place.cost <= floor);
-        for place in contenders.take(breadth.wholly) {
-            settle(&mut self.descent, &self.full, place, holds_m);
+        let floor = breadth.floor_within * self::lowest(&close, None);
+        let mut settled: Vec<Place> = Vec::new();
+        for place in close.iter_mut().filter(|place| place.cost <= floor) {
+            if settled
+                .iter()
+                .filter(|one| is_same_group(one, place))
+                .count()
+                < breadth.wholly
+            {
+                settle(&mut self.descent, &self.full, place, holds_m);
+                settled.push(*place);
+            }
         }
         close
     }

@@ -18,6 +18,8 @@ pub(super) struct Record {
     sides: [Side; 2],
     /// From either end.
     weights: [Vec<f64>; 2],
+    /// Their roots, which residuals are scaled by.
+    roots: [Vec<f64>; 2],
     total: f64,
 }
 
@@ -61,12 +63,17 @@ impl Record {
             values: readings.iter().rev().map(|one| one.1).collect(),
         };
         let weights: Vec<f64> = readings.iter().map(|one| one.2).collect();
-        let reversed = weights.iter().rev().copied().collect();
+        let roots: Vec<f64> = weights.iter().map(|weight| weight.sqrt()).collect();
+        let both_ways = |list: Vec<f64>| {
+            let reversed = list.iter().rev().copied().collect();
+            [list, reversed]
+        };
         Self {
             quantity,
             sides: [forwards, backwards],
             total: weights.iter().sum(),
-            weights: [weights, reversed],
+            weights: both_ways(weights),
+            roots: both_ways(roots),
         }
     }
 
@@ -152,10 +159,10 @@ impl Record {
         out: &mut [f64],
     ) {
         let values = &self.sides[anchor as usize].values;
-        let weights = &self.weights[anchor as usize];
-        for (((slot, b), v), w) in out.iter_mut().zip(basis).zip(values).zip(weights) {
+        let roots = &self.roots[anchor as usize];
+        for (((slot, b), v), root) in out.iter_mut().zip(basis).zip(values).zip(roots) {
             let left = (v - projected.mean_value) - projected.velocity * (b - projected.mean_basis);
-            *slot = left * w.sqrt();
+            *slot = left * root;
         }
     }
 
@@ -180,9 +187,10 @@ impl Record {
             change += w * (d - mean) * (value - 2.0 * projected.velocity * basis);
         }
         change /= projected.squares;
-        for ((d, b), w) in column.iter_mut().zip(basis).zip(weights) {
+        let roots = &self.roots[anchor as usize];
+        for ((d, b), root) in column.iter_mut().zip(basis).zip(roots) {
             let moved = projected.velocity * (*d - mean) + change * (b - projected.mean_basis);
-            *d = -moved * w.sqrt();
+            *d = -moved * root;
         }
     }
 
