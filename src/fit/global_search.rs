@@ -26,22 +26,24 @@ const CLOSELY: Effort = Effort {
 /// To the floor.
 const WHOLLY: Effort = Effort {
     most_evaluations: 200,
-    least_gain: 1e-8,
+    least_gain: 1e-9,
     fineness: Fineness::FINE,
 };
 /// A descent to the floor is begun afresh while it gained more than this, relative, and at most so often.
-const RESTART_GAIN: f64 = 1e-6;
+const RESTART_GAIN: f64 = 1e-7;
 const MOST_RESTARTS: usize = 6;
 
 /// A direction whose best place on the first lattice costs more times the best is not looked at again.
 const PROMISING: f64 = 4.0;
 /// Readings of which the law explains less than all but this share have many basins of like depth.
-const HARD: f64 = 0.1;
+const HARD: f64 = 0.015;
 /// How many places of each branch and direction go on to a descent, to all readings, to the floor.
 #[derive(Debug, Clone, Copy)]
 struct Breadth {
     nearly: usize,
     closely: usize,
+    /// Costs within so many times the best go on to a descent on all readings.
+    closely_within: f64,
     /// Of one branch and direction, these many go to the floor.
     wholly: usize,
     /// Costs within so many times the best go to the floor.
@@ -50,18 +52,19 @@ struct Breadth {
 const EASY_BREADTH: Breadth = Breadth {
     nearly: 2,
     closely: 6,
+    closely_within: 3.0,
     wholly: 1,
     floor_within: 1.02,
 };
 const HARD_BREADTH: Breadth = Breadth {
     nearly: 4,
-    closely: 9,
+    closely: 12,
+    closely_within: 100.0,
     wholly: 6,
     floor_within: 1.06,
 };
-/// A second place of a branch and direction is followed on all readings within so many times the best
-/// cost, a first within so many times.
-const SECOND_WITHIN: f64 = 3.0;
+/// The first place of each branch and direction goes on to a descent on all readings within this, at
+/// least, of the best cost.
 const FIRST_WITHIN: f64 = 9.0;
 /// Costs within this of each other, on one branch in one direction, are those of one basin.
 const ONE_BASIN: f64 = 2e-4;
@@ -163,11 +166,17 @@ impl<'a> Search<'a> {
         let chosen: Vec<Place> = places.iter().copied().filter(is_promising).collect();
         let mut near = Vec::new();
         for place in of_each(&chosen, breadth.nearly) {
-            near.push(self.descent.descend(merged, &place, &NEARLY, holds_m));
+            let mut place = self.descent.descend(merged, &place, &NEARLY, holds_m);
+            // What was merged may hold the very readings that tell basins apart.
+            let fineness = CLOSELY.fineness;
+            place.cost = self
+                .descent
+                .cost(&self.full, place.chart, &place.at, fineness);
+            near.push(place);
         }
         sort(&mut near);
         let mut close = Vec::new();
-        for place in worth_all_readings(&near, breadth.closely) {
+        for place in worth_all_readings(&near, breadth) {
             close.push(self.descent.descend(&self.full, &place, &CLOSELY, holds_m));
         }
         sort(&mut close);
@@ -364,7 +373,7 @@ fn of_each(places: &[Place], most: usize) -> Vec<Place> {
 }
 
 /// The places that may turn out best when all readings count, and the best on each side of m = 1.
-fn worth_all_readings(near: &[Place], most: usize) -> Vec<Place> {
+fn worth_all_readings(near: &[Place], breadth: Breadth) -> Vec<Place> {
     let lowest = lowest(near, None);
     let is_above_one = |place: &Place| place.chart.branch == Branch::AboveOne;
     let mut taken: Vec<Place> = Vec::new();
@@ -374,11 +383,12 @@ fn worth_all_readings(near: &[Place], most: usize) -> Vec<Place> {
             .any(|one| is_above_one(one) == is_above_one(place));
         let is_first = !taken.iter().any(|one| is_same_group(one, place));
         let within = if is_first {
-            FIRST_WITHIN
+            FIRST_WITHIN.max(breadth.closely_within)
         } else {
-            SECOND_WITHIN
+            breadth.closely_within
         };
-        if !has_side || (taken.len() < most && place.cost <= within * lowest) {
+        let is_near = place.cost <= within * lowest;
+        if !has_side || (taken.len() < breadth.closely && is_near) {
             taken.push(*place);
         }
     }
