@@ -67,6 +67,56 @@ fn two_hundred_searches_from_other_places_end_in_the_same_minimum() {
     }
 }
 
+/// Readings of laws that lie at the ends of the range, exact but for the last digits.
+fn extremes() -> Vec<(&'static str, PointReadings)> {
+    let made = |quantity, of: &dyn Fn(f64) -> f64| {
+        let digits = |value: f64| (value * 1e4).round() / 1e4;
+        let pairs = (0..60).map(|day| (f64::from(day), digits(of(f64::from(day)))));
+        PointReadings::new(quantity, pairs)
+    };
+    let velocity = |of: &dyn Fn(f64) -> f64| made(Quantity::Velocity, of);
+    let displacement = |of: &dyn Fn(f64) -> f64| made(Quantity::Displacement, of);
+    vec![
+        ("exponential", velocity(&|t| (0.1 * t).exp())),
+        ("slow exponential", velocity(&|t| (0.02 * t).exp())),
+        ("exponential decay", velocity(&|t| 50.0 * (-0.07 * t).exp())),
+        ("power law", velocity(&|t| 90.0 / (1.0 + t))),
+        ("near failure", velocity(&|t| 90.0 / (59.5 - t))),
+        (
+            "logistic",
+            velocity(&|t| 40.0 / (1.0 + (0.2 * (30.0 - t)).exp())),
+        ),
+        (
+            "knee",
+            velocity(&|t| if t < 40.0 { 90.0 / (45.0 - t) } else { 18.0 }),
+        ),
+        ("exponential slip", displacement(&|t| (0.1 * t).exp())),
+        (
+            "relaxing slip",
+            displacement(&|t| 50.0 * (1.0 - (-0.1 * t).exp()) + t),
+        ),
+        ("logarithmic slip", displacement(&|t| 30.0 * (1.0 + t).ln())),
+        (
+            "step",
+            displacement(&|t| {
+                if t < 50.0 {
+                    0.1 * t
+                } else {
+                    5.0 + 20.0 * (t - 49.0)
+                }
+            }),
+        ),
+    ]
+}
+
+#[test]
+fn two_hundred_searches_end_in_the_same_minimum_at_the_ends_of_the_range_too() {
+    for (name, readings) in extremes() {
+        let spread = spread(&readings, 200);
+        assert!(spread < SAME, "{name}: {spread:e}");
+    }
+}
+
 #[test]
 fn searches_of_measured_series_from_other_places_end_in_the_same_minimum() {
     for (name, benchmark, quantity, restarts) in [

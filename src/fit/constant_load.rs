@@ -222,6 +222,11 @@ fn side(law: &Law) -> i8 {
     }
 }
 
+/// The branch of m on which a law stands; none at m = 1.
+fn branch(law: &Law) -> Option<Branch> {
+    Branch::of(1.0 / (1.0 - law.p))
+}
+
 /// The minima that differ, best first, and the best of m > 1, m = 1 and m < 1 whatever their worth.
 fn distinct(found: &[Found], flat: f64, exponent: Exponent) -> Vec<Solution> {
     let best = found.first().map_or(0.0, |best| best.solution.rms);
@@ -232,7 +237,7 @@ fn distinct(found: &[Found], flat: f64, exponent: Exponent) -> Vec<Solution> {
             let bound = solution.place == Place::AtBoundOfM && one.place == solution.place;
             let close = (one.rms - solution.rms).abs() <= SAME_RMS * solution.rms;
             (close || bound)
-                && side(&one.law) == side(&solution.law)
+                && branch(&one.law) == branch(&solution.law)
                 && (one.law.r > 0.0) == (solution.law.r > 0.0)
         };
         let worthy = solution.rms < WORTH_MENTION * flat && solution.rms <= WORST * best;

@@ -41,6 +41,7 @@ const HARD: f64 = 0.015;
 #[derive(Debug, Clone, Copy)]
 struct Breadth {
     nearly: usize,
+    nearly_of_one_m: usize,
     closely: usize,
     /// Costs within so many times the best go on to a descent on all readings.
     closely_within: f64,
@@ -50,14 +51,16 @@ struct Breadth {
     floor_within: f64,
 }
 const EASY_BREADTH: Breadth = Breadth {
-    nearly: 2,
+    nearly: 3,
+    nearly_of_one_m: 1,
     closely: 6,
     closely_within: 3.0,
     wholly: 1,
     floor_within: 1.02,
 };
 const HARD_BREADTH: Breadth = Breadth {
-    nearly: 4,
+    nearly: 5,
+    nearly_of_one_m: 2,
     closely: 12,
     closely_within: 100.0,
     wholly: 6,
@@ -66,6 +69,8 @@ const HARD_BREADTH: Breadth = Breadth {
 /// The first place of each branch and direction goes on to a descent on all readings within this, at
 /// least, of the best cost.
 const FIRST_WITHIN: f64 = 9.0;
+/// A descent that did not end goes on from within so many times the best cost.
+const UNFINISHED_WITHIN: f64 = 30.0;
 /// Costs within this of each other, on one branch in one direction, are those of one basin.
 const ONE_BASIN: f64 = 2e-4;
 
@@ -165,7 +170,7 @@ impl<'a> Search<'a> {
         };
         let chosen: Vec<Place> = places.iter().copied().filter(is_promising).collect();
         let mut near = Vec::new();
-        for place in of_each(&chosen, breadth.nearly) {
+        for place in of_each(&chosen, breadth) {
             let mut place = self.descent.descend(merged, &place, &NEARLY, holds_m);
             // What was merged may hold the very readings that tell basins apart.
             let fineness = CLOSELY.fineness;
@@ -182,8 +187,13 @@ impl<'a> Search<'a> {
         sort(&mut close);
         close.dedup_by(|a, b| is_same_group(a, b) && a.cost - b.cost <= ONE_BASIN * b.cost);
         let floor = breadth.floor_within * self::lowest(&close, None);
+        let may_fall_from = UNFINISHED_WITHIN * self::lowest(&close, None);
         let mut settled: Vec<Place> = Vec::new();
-        for place in close.iter_mut().filter(|place| place.cost <= floor) {
+        let may_fall = |place: &&mut Place| !place.converged && place.cost <= may_fall_from;
+        for place in close
+            .iter_mut()
+            .filter(|place| place.cost <= floor || may_fall(place))
+        {
             if settled
                 .iter()
                 .filter(|one| is_same_group(one, place))
@@ -361,11 +371,14 @@ fn is_same_group(a: &Place, b: &Place) -> bool {
     (a.chart.branch, a.chart.direction) == (b.chart.branch, b.chart.direction)
 }
 
-/// The first `most` places of each branch and direction.
-fn of_each(places: &[Place], most: usize) -> Vec<Place> {
+/// The first places of each branch and direction, few of them from the same m: one bad valley must not
+/// take them all.
+fn of_each(places: &[Place], breadth: Breadth) -> Vec<Place> {
     let mut taken: Vec<Place> = Vec::new();
     for place in places {
-        if taken.iter().filter(|one| is_same_group(one, place)).count() < most {
+        let group = || taken.iter().filter(|one| is_same_group(one, place));
+        let same_m = group().filter(|one| one.at[2].total_cmp(&place.at[2]).is_eq());
+        if same_m.count() < breadth.nearly_of_one_m && group().count() < breadth.nearly {
             taken.push(*place);
         }
     }
