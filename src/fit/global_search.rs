@@ -77,12 +77,19 @@ const ONE_BASIN: f64 = 2e-4;
 /// Small m beside a line in inverse velocity: m, and ln y_s beyond the line's end.
 const BEYOND_LINE: [f64; 4] = [-0.25, 0.05, 0.4, 1.2];
 const LEAST_EXCESS: f64 = 0.05;
-/// The m's of the laws that are a straight line in inverse velocity far from the steady state.
-const LINE_LIKE: [(Direction, Branch, f64); 6] = [
+/// Far from the steady state such a law is an exponential, which gains as much over the record as the line.
+const NEARLY_EXPONENTIAL: f64 = -18.0;
+/// The m's of the laws that are a straight line in inverse velocity far from the steady state, and that one.
+const LINE_LIKE: [(Direction, Branch, f64); 7] = [
     (Direction::Accelerating, Branch::AboveOne, 1.15),
     (Direction::Accelerating, Branch::AboveOne, 5.0),
     (Direction::Accelerating, Branch::BelowOne, 0.03),
     (Direction::Accelerating, Branch::BelowOne, 0.4),
+    (
+        Direction::Accelerating,
+        Branch::BelowZero,
+        NEARLY_EXPONENTIAL,
+    ),
     (Direction::Decelerating, Branch::BelowZero, -0.03),
     (Direction::Decelerating, Branch::BelowZero, -0.4),
 ];
@@ -258,7 +265,11 @@ impl<'a> Search<'a> {
                 continue;
             }
             let falls = branch == Branch::BelowOne;
-            let slope = if falls { slope / (1.0 + slope) } else { slope };
+            let slope = match branch {
+                Branch::BelowZero if direction == Direction::Accelerating => fall,
+                _ if falls => slope / (1.0 + slope),
+                _ => slope,
+            };
             for beyond in BEYOND_LINE {
                 let excess = (fall + beyond).max(LEAST_EXCESS);
                 let (chart, at) = Chart::locate(branch, direction, (slope, excess, m.abs().ln()));
@@ -341,15 +352,30 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Goes to the floor, afresh as long as it gains: a curved valley stalls a descent before its floor.
+/// Goes to the floor, and where m has run to its bound from the corner without a steady state too: an
+/// exponential lies there, at the end of a valley that hardly falls.
 fn settle(descent: &mut Descent, record: &Record, place: &mut Place, holds_m: bool) {
+    go_down(descent, record, place, holds_m);
+    if !holds_m && is_at_bound_of_m(place) {
+        let mut corner = *place;
+        corner.at[1] = place.chart.corners().1[1];
+        corner.cost = f64::INFINITY;
+        go_down(descent, record, &mut corner, holds_m);
+        if corner.cost < place.cost {
+            *place = corner;
+        }
+    }
+}
+
+/// Goes down, afresh as long as it gains: a curved valley stalls a descent before its floor.
+fn go_down(descent: &mut Descent, record: &Record, place: &mut Place, holds_m: bool) {
     for _ in 0..MOST_RESTARTS {
         let next = descent.descend(record, place, &WHOLLY, holds_m);
         let gain = place.cost - next.cost;
         if next.cost <= place.cost {
             *place = next;
         }
-        if gain <= RESTART_GAIN * next.cost {
+        if gain <= RESTART_GAIN * next.cost || !gain.is_finite() && !next.cost.is_finite() {
             break;
         }
     }

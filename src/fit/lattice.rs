@@ -13,11 +13,12 @@ const FIRST: [(Branch, f64); 3] = [
     (Branch::BelowOne, 0.25),
     (Branch::BelowZero, -1.2),
 ];
-const MORE: [(Branch, f64); 6] = [
+const MORE: [(Branch, f64); 7] = [
     (Branch::AboveOne, 1.05),
     (Branch::AboveOne, 6.0),
     (Branch::BelowOne, 0.8),
     (Branch::BelowOne, 0.03),
+    (Branch::BelowZero, -8.0),
     (Branch::BelowZero, -0.12),
     (Branch::BelowZero, -0.012),
 ];
@@ -26,7 +27,7 @@ const EXCESS: [f64; 7] = [12.0, 6.0, 3.6, 2.2, 1.2, 0.5, 0.1];
 /// A curve is solved from here on.
 const FARTHEST: f64 = 14.0;
 /// Far from the steady state: the knee, as shares of the record.
-const KNEES: [f64; 8] = [0.15, 0.4, 0.6, 0.76, 0.88, 0.97, 1.15, 2.2];
+const KNEES: [f64; 9] = [0.15, 0.4, 0.6, 0.76, 0.88, 0.97, 1.15, 1.8, 4.0];
 /// Beyond the knee: the record's length in relaxation times.
 const RELAXATIONS: [f64; 3] = [0.7, 3.0, 12.0];
 /// A stretch begins before the knee when it begins so many times farther from the steady state.
