@@ -264,11 +264,12 @@ impl<'a> Search<'a> {
             if direction != line.direction || Branch::of(m) != Some(branch) {
                 continue;
             }
-            let falls = branch == Branch::BelowOne;
-            let slope = match branch {
-                Branch::BelowZero if direction == Direction::Accelerating => fall,
-                _ if falls => slope / (1.0 + slope),
-                _ => slope,
+            let slope = if branch == Branch::BelowOne {
+                slope / (1.0 + slope)
+            } else if m < NEARLY_EXPONENTIAL + 1.0 {
+                fall
+            } else {
+                slope
             };
             for beyond in BEYOND_LINE {
                 let excess = (fall + beyond).max(LEAST_EXCESS);
