@@ -256,6 +256,7 @@ fn the_report_has_the_documented_keys_in_their_order() {
             "onset_low",
             "onset_high",
             "regime",
+            "regime_under_load",
             "parameters",
             "alternatives",
             "transition_time",

@@ -65,6 +65,16 @@ pub enum Outcome {
     NotAnExponent(f64),
 }
 
+impl Outcome {
+    /// Whether the readings hold no motion that any law, or any regime, could be told from.
+    pub fn says_nothing(&self) -> bool {
+        match self {
+            Self::TooFew { .. } | Self::AllEqual | Self::NoForwardMotion => true,
+            Self::Converged | Self::AtBoundOfM(_) | Self::Stopped | Self::NotAnExponent(_) => false,
+        }
+    }
+}
+
 impl fmt::Display for Outcome {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
