@@ -1,13 +1,14 @@
 //! Coordinates in which every point is a law: unbounded but for a box, and regular over the record.
 //!
 //! With constant load the velocity only rises or only falls. Anchored at one end of the record, with
-//! the direction and the branch of m fixed, the law is free in ln |r|, in ln |ln `y_s`| (`y_s` the steady
-//! state, on the side where a and b have one sign) and in ln |m|. A branch with m < 1 relaxes forwards in
-//! time and one with m > 1 backwards, so each is anchored where it starts to relax; where the velocity is
-//! greatest at the other end, that end makes a second chart.
+//! the direction and the branch of m fixed, the law is free in the initial slope, in ln |ln `y_s`| (`y_s`
+//! the steady state, on the side where a and b have one sign) and in ln |m|. A branch with m < 1 relaxes
+//! forwards in time and one with m > 1 backwards, so each is anchored where it starts to relax. Where m
+//! is small the velocity has a knee, and the slope is given by the time of the knee: in the slope itself
+//! the misfit is a narrow, curved valley.
 
+use super::curve::Shape;
 use crate::model::Law;
-use nalgebra::Vector3;
 
 /// The largest m that is looked for; beyond it m > 1 is an exponential for any record.
 pub(super) const HIGHEST_M: f64 = 29.0;
@@ -17,16 +18,19 @@ pub(super) const LOWEST_M: f64 = -20.0;
 const LEAST_SIZE_OF_M: f64 = 1e-3;
 /// m is no nearer to 1 than exp(1e-8) within a branch: m = 1 is a law by itself.
 pub(super) const LEAST_LN_M: f64 = 1e-8;
+/// |ln `x_i`| stays under this, so that `x_i` and kappa are numbers: a smaller |m| needs a nearer steady state.
+const MOST_LN_X: f64 = 690.0;
+/// But no |m| above this is kept away for that; a steady state so far off is none.
+const SMALL_M: f64 = 0.5;
 
 /// Bounds of ln(|r| L), L the record's length.
 const LN_SLOPE: (f64, f64) = (-14.0, 16.0);
-/// Bounds of ln |ln `y_s|`: from a steady state that is all but reached to none.
+/// Bounds of ln |ln `y_s`|: from a steady state that is all but reached to none.
 const LN_STEADY: (f64, f64) = (-12.0, 20.0);
-
-/// Where the search looks first: |r| L.
-const SLOPES: [f64; 8] = [0.03, 0.2, 0.7, 2.0, 6.0, 20.0, 80.0, 400.0];
-/// Where the search looks first: |ln `y_s`|.
-const STEADY: [f64; 7] = [0.05, 0.3, 1.0, 3.0, 8.0, 25.0, 100.0];
+/// Bounds of ln(time of the knee / L).
+const LN_KNEE: (f64, f64) = (-16.0, 14.0);
+/// A rising y has a knee worth the name under this ln |m| and this ln `y_s`.
+const KNEE_ON_RISE: (f64, f64) = (-1.0, 15.0);
 
 /// The ranges of m that hold different laws.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,33 +61,33 @@ pub(super) enum Anchor {
     End,
 }
 
-/// One set of coordinates (ln |r| L, ln |ln `y_s`|, ln |m|).
+/// What the first coordinate is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Abscissa {
+    /// ln(|r| L).
+    Slope,
+    /// ln of the time at which y, were it a straight line, would reach the steady state.
+    Knee,
+}
+
+/// (slope or knee, ln |ln `y_s`|, ln |m|).
+pub(super) type Point = [f64; 3];
+
+/// One set of coordinates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Chart {
     pub(super) branch: Branch,
     pub(super) direction: Direction,
-    pub(super) anchor: Anchor,
+    abscissa: Abscissa,
 }
 
-const fn chart(branch: Branch, direction: Direction, anchor: Anchor) -> Chart {
-    Chart {
-        branch,
-        direction,
-        anchor,
-    }
+/// How ln |slope| and ln(y over steady y) at the anchor change with the first two coordinates.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Chain {
+    pub(super) slope_by_first: f64,
+    pub(super) slope_by_second: f64,
+    pub(super) excess_by_second: f64,
 }
-
-/// Every law with m other than 1 stands on one of these.
-pub(super) const CHARTS: [Chart; 8] = [
-    chart(Branch::AboveOne, Direction::Accelerating, Anchor::End),
-    chart(Branch::AboveOne, Direction::Decelerating, Anchor::End),
-    chart(Branch::AboveOne, Direction::Decelerating, Anchor::Start),
-    chart(Branch::BelowOne, Direction::Accelerating, Anchor::Start),
-    chart(Branch::BelowOne, Direction::Accelerating, Anchor::End),
-    chart(Branch::BelowOne, Direction::Decelerating, Anchor::Start),
-    chart(Branch::BelowZero, Direction::Accelerating, Anchor::Start),
-    chart(Branch::BelowZero, Direction::Decelerating, Anchor::Start),
-];
 
 impl Branch {
     /// The branch of m; `None` where m is 0 or 1.
@@ -105,17 +109,16 @@ impl Branch {
         }
     }
 
-    /// The m's where the search looks first.
-    pub(super) fn grid(self) -> [f64; 5] {
+    /// The end of the record from which its laws relax.
+    pub(super) fn anchor(self) -> Anchor {
         match self {
-            Self::AboveOne => [1.05, 1.35, 2.0, 5.0, 20.0],
-            Self::BelowOne => [0.95, 0.6, 0.25, 0.08, 0.02],
-            Self::BelowZero => [-12.0, -2.0, -0.6, -0.15, -0.02],
+            Self::AboveOne => Anchor::End,
+            Self::BelowOne | Self::BelowZero => Anchor::Start,
         }
     }
 
     /// p = 1 - 1/m, without the cancellation near m = 1.
-    fn p(self, ln_m: f64) -> f64 {
+    pub(super) fn p(self, ln_m: f64) -> f64 {
         match self {
             Self::AboveOne | Self::BelowOne => -(-ln_m).exp_m1(),
             Self::BelowZero => 1.0 + (-ln_m).exp(),
@@ -123,63 +126,133 @@ impl Branch {
     }
 }
 
+impl Direction {
+    /// Both.
+    pub(super) const BOTH: [Self; 2] = [Self::Accelerating, Self::Decelerating];
+}
+
 impl Chart {
-    /// The law at a point, y = 1 and velocity 1 at the anchor; `length` is the record's, days.
-    pub(super) fn law(self, at: &Vector3<f64>, length: f64) -> Law {
-        let p = self.branch.p(at[2]);
-        let r = self.direction.signed(at[0].exp() / length);
-        // b/a = y_s^p and r = b - a; whatever y_s, a and b come out with the sign of m.
-        let kappa = r * p / (p * self.steady_side() * at[1].exp()).exp_m1();
-        Law::from_fit(1.0, r, kappa, p)
+    /// The chart of a law with that slope, |ln `y_s`| and ln |m| at its anchor, and its point there.
+    pub(super) fn locate(
+        branch: Branch,
+        direction: Direction,
+        (slope, steady, ln_m): (f64, f64, f64),
+    ) -> (Self, Point) {
+        let has_knee = match (branch, direction) {
+            (Branch::BelowOne, Direction::Accelerating) => true,
+            (Branch::BelowZero, Direction::Decelerating) => {
+                ln_m < KNEE_ON_RISE.0 && steady < KNEE_ON_RISE.1
+            }
+            _ => false,
+        };
+        let mut chart = Self {
+            branch,
+            direction,
+            abscissa: Abscissa::Slope,
+        };
+        let mut first = slope.abs().ln();
+        if has_knee {
+            chart.abscissa = Abscissa::Knee;
+            first = chart.rise(steady).ln() - first;
+        }
+        (chart, [first, steady.ln(), ln_m])
     }
 
-    /// The sign of ln `y_s`: m < 1 goes to the steady velocity, m > 1 comes from it.
-    fn steady_side(self) -> f64 {
-        let comes_from_it = self.branch == Branch::AboveOne;
-        if comes_from_it == (self.direction == Direction::Accelerating) {
-            1.0
+    pub(super) fn anchor(self) -> Anchor {
+        self.branch.anchor()
+    }
+
+    /// Whether y falls away from the anchor.
+    fn y_falls(self) -> bool {
+        (self.direction == Direction::Accelerating) == (self.anchor() == Anchor::Start)
+    }
+
+    /// How far y is from its steady state at the anchor.
+    fn rise(self, steady: f64) -> f64 {
+        if self.y_falls() {
+            -(-steady).exp_m1()
         } else {
-            -1.0
+            steady.exp_m1()
+        }
+    }
+
+    /// The law at a point, y = 1 at the anchor.
+    pub(super) fn shape(self, at: &Point) -> Shape {
+        let steady = at[1].exp();
+        let size = match self.abscissa {
+            Abscissa::Slope => at[0].exp(),
+            Abscissa::Knee => self.rise(steady) * (-at[0]).exp(),
+        };
+        // Away from the anchor the law relaxes.
+        let sign = if self.y_falls() { -1.0 } else { 1.0 };
+        Shape {
+            slope: sign * size,
+            ln_steady: sign * steady,
+            p: self.branch.p(at[2]),
+        }
+    }
+
+    pub(super) fn chain(self, at: &Point) -> Chain {
+        let steady = at[1].exp();
+        let sign = if self.y_falls() { -1.0 } else { 1.0 };
+        let excess_by_second = -sign * steady;
+        match self.abscissa {
+            Abscissa::Slope => Chain {
+                slope_by_first: 1.0,
+                slope_by_second: 0.0,
+                excess_by_second,
+            },
+            Abscissa::Knee => {
+                let rise = if self.y_falls() {
+                    steady.exp_m1()
+                } else {
+                    -(-steady).exp_m1()
+                };
+                Chain {
+                    slope_by_first: -1.0,
+                    slope_by_second: steady / rise,
+                    excess_by_second,
+                }
+            }
         }
     }
 
     /// Lowest and highest corner of the chart.
-    pub(super) fn corners(self) -> (Vector3<f64>, Vector3<f64>) {
+    pub(super) fn corners(self) -> (Point, Point) {
         let ln_m = self.branch.ln_m();
-        (
-            Vector3::new(LN_SLOPE.0, LN_STEADY.0, ln_m.0),
-            Vector3::new(LN_SLOPE.1, LN_STEADY.1, ln_m.1),
-        )
+        let (first, steady) = match self.abscissa {
+            Abscissa::Slope => (LN_SLOPE, LN_STEADY),
+            Abscissa::Knee if self.y_falls() => (LN_KNEE, LN_STEADY),
+            Abscissa::Knee => (LN_KNEE, (LN_STEADY.0, KNEE_ON_RISE.1.ln())),
+        };
+        ([first.0, steady.0, ln_m.0], [first.1, steady.1, ln_m.1])
     }
 
-    /// The points of one m where the search looks first.
-    pub(super) fn points(ln_m: f64) -> impl Iterator<Item = Vector3<f64>> {
-        SLOPES.into_iter().flat_map(move |slope| {
-            STEADY
-                .into_iter()
-                .map(move |steady| Vector3::new(slope.ln(), steady.ln(), ln_m))
-        })
-    }
-}
-
-impl Direction {
-    /// r of that size in this direction.
-    pub(super) fn signed(self, slope: f64) -> f64 {
-        match self {
-            Self::Accelerating => slope,
-            Self::Decelerating => -slope,
+    /// The least ln |m| beside such a steady state.
+    pub(super) fn least_ln_m(self, ln_steady: f64) -> f64 {
+        let bound = (ln_steady - MOST_LN_X.ln()).min(SMALL_M.ln());
+        match self.branch {
+            Branch::AboveOne => self.branch.ln_m().0,
+            Branch::BelowOne | Branch::BelowZero => self.branch.ln_m().0.max(bound),
         }
     }
-}
 
-/// The law at m = 1, velocity 1 at the anchor, from ln(|r| L).
-pub(super) fn law_at_unit_m(direction: Direction, ln_slope: f64, length: f64) -> Law {
-    Law::from_fit(1.0, direction.signed(ln_slope.exp() / length), 0.0, 0.0)
-}
-
-/// Where the search for m = 1 starts, and its bounds: ln(|r| L).
-pub(super) fn unit_m_starts() -> impl Iterator<Item = f64> {
-    SLOPES.into_iter().map(f64::ln)
+    /// The law of a shape on this chart, moved along to `ln_y`, with the velocity at its own anchor.
+    pub(super) fn law(self, shape: &Shape, velocity: f64, length_days: f64) -> Law {
+        let forwards = if self.anchor() == Anchor::Start {
+            -1.0
+        } else {
+            1.0
+        };
+        let r = forwards * shape.slope / length_days;
+        // b/a = y_s^p and r = b - a; whatever y_s, a and b come out with the sign of m.
+        let kappa = r * shape.p / (shape.p * shape.ln_steady).exp_m1();
+        let kappa = match self.branch {
+            Branch::AboveOne => kappa.max(f64::MIN_POSITIVE),
+            Branch::BelowOne | Branch::BelowZero => kappa.min(-f64::MIN_POSITIVE),
+        };
+        Law::from_fit(velocity, r, kappa, shape.p)
+    }
 }
 
 /// Bounds of ln(|r| L).

@@ -1,13 +1,12 @@
 //! The inversion of the constant-load law by unweighted least squares: global, over every branch of m.
 //!
-//! Velocity and zero are projected out; what is left, on each of the eight charts that hold the laws
-//! with m other than 1, is searched on a fixed grid, polished by Levenberg-Marquardt from the best
-//! points of each m of the grid, and polished again from the best of those. Nothing is random.
+//! Velocity and zero are projected out; what is left is three numbers, and for each m the laws are one
+//! curve, stretched and shifted in time. Nothing is random.
 
 use super::chart::{Branch, HIGHEST_M, LEAST_LN_M, LOWEST_M};
 use super::global_search::{Found, Search};
-use super::least_squares::Termination;
-use super::projection::PointReadings;
+use super::lattice::Lattice;
+use super::point_readings::PointReadings;
 use crate::model::Law;
 use std::fmt;
 
@@ -66,6 +65,16 @@ pub enum Outcome {
     NotAnExponent(f64),
 }
 
+impl Outcome {
+    /// Whether the readings hold no motion that any law, or any regime, could be told from.
+    pub fn says_nothing(&self) -> bool {
+        match self {
+            Self::TooFew { .. } | Self::AllEqual | Self::NoForwardMotion => true,
+            Self::Converged | Self::AtBoundOfM(_) | Self::Stopped | Self::NotAnExponent(_) => false,
+        }
+    }
+}
+
 impl fmt::Display for Outcome {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -99,7 +108,7 @@ pub struct ConstantLoad {
 /// Minima kept beside the best with m > 1, m = 1 and m < 1.
 const MOST_MINIMA: usize = 8;
 /// Relative difference of rms under which two results are one minimum.
-pub(super) const SAME_RMS: f64 = 1e-3;
+const SAME_RMS: f64 = 1e-3;
 /// A branch that gains less than this on m = 1, relative to its rms, has run into m = 1.
 const GAIN_OVER_UNIT_M: f64 = 1e-7;
 /// A minimum must leave less than this share of the rms about a constant velocity.
@@ -110,6 +119,11 @@ const WORST: f64 = 3.0;
 impl ConstantLoad {
     /// Inverts the readings.
     pub fn fit(readings: &PointReadings, exponent: Exponent) -> Self {
+        Self::fit_on(readings, exponent, Lattice::Regular)
+    }
+
+    /// The same, begun at other places.
+    pub fn fit_on(readings: &PointReadings, exponent: Exponent, lattice: Lattice) -> Self {
         if let Some(outcome) = refuse(readings, exponent) {
             return Self {
                 minima: Vec::new(),
@@ -117,9 +131,9 @@ impl ConstantLoad {
                 outcome,
             };
         }
-        let mut search = Search::new(readings);
-        let found = search.run(exponent);
-        conclude(&search, found, exponent)
+        let mut search = Search::new(readings, exponent, lattice);
+        let found = search.run();
+        conclude(&search, readings, found, exponent)
     }
 
     /// The best of all.
@@ -145,21 +159,26 @@ fn refuse(readings: &PointReadings, exponent: Exponent) -> Option<Outcome> {
 }
 
 /// Ranks what was found.
-fn conclude(search: &Search, mut found: Vec<Found>, exponent: Exponent) -> ConstantLoad {
+fn conclude(
+    search: &Search,
+    readings: &PointReadings,
+    mut found: Vec<Found>,
+    exponent: Exponent,
+) -> ConstantLoad {
     found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     prefer_unit_m(&mut found);
     let outcome = match found.first() {
         None => Outcome::NoForwardMotion,
-        Some(best) if best.termination != Termination::Converged => Outcome::Stopped,
+        Some(best) if !best.converged => Outcome::Stopped,
         Some(best) if best.solution.place == Place::AtBoundOfM => {
             Outcome::AtBoundOfM(m_of(&best.solution))
         }
         Some(_) => Outcome::Converged,
     };
-    let flat = search.readings.rms(search.readings.cost_of_no_change());
+    let flat = readings.rms(search.cost_of_no_change());
     ConstantLoad {
         minima: distinct(&found, flat, exponent),
-        evaluations: search.evaluations,
+        evaluations: search.evaluations(),
         outcome,
     }
 }
@@ -213,6 +232,11 @@ fn side(law: &Law) -> i8 {
     }
 }
 
+/// The branch of m on which a law stands; none at m = 1.
+fn branch(law: &Law) -> Option<Branch> {
+    Branch::of(1.0 / (1.0 - law.p))
+}
+
 /// The minima that differ, best first, and the best of m > 1, m = 1 and m < 1 whatever their worth.
 fn distinct(found: &[Found], flat: f64, exponent: Exponent) -> Vec<Solution> {
     let best = found.first().map_or(0.0, |best| best.solution.rms);
@@ -223,7 +247,7 @@ fn distinct(found: &[Found], flat: f64, exponent: Exponent) -> Vec<Solution> {
             let bound = solution.place == Place::AtBoundOfM && one.place == solution.place;
             let close = (one.rms - solution.rms).abs() <= SAME_RMS * solution.rms;
             (close || bound)
-                && side(&one.law) == side(&solution.law)
+                && branch(&one.law) == branch(&solution.law)
                 && (one.law.r > 0.0) == (solution.law.r > 0.0)
         };
         let worthy = solution.rms < WORTH_MENTION * flat && solution.rms <= WORST * best;

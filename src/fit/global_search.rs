@@ -1,349 +1,443 @@
-//! The search: on every chart a fixed grid, Levenberg-Marquardt from its best points, and last what
-//! follows valleys that derivatives lose: a profile over m, a simplex.
+//! The search: a lattice over the readings merged to a few, descents from its best places there, from
+//! the best of those on all readings, and last from whatever may still be the best of all.
 
-use super::chart::{
-    Anchor, Branch, CHARTS, Chart, Direction, law_at_unit_m, slope_bounds, unit_m_starts,
+use super::chart::{Anchor, Branch, Chart, Direction};
+use super::constant_load::{Exponent, Place as Side, Solution};
+use super::curve::{Curve, Fineness, Window};
+use super::descent::{Descent, Effort, Place};
+use super::lattice::{self, Family, Lattice};
+use super::point_readings::PointReadings;
+use super::record::Record;
+use super::unit_m::{Line, Lines};
+use crate::reading::Quantity;
+
+/// On the merged readings: from the lattice to the floor of a basin, nearly.
+const NEARLY: Effort = Effort {
+    most_evaluations: 36,
+    least_gain: 2e-3,
+    fineness: Fineness::MIDDLE,
 };
-use super::constant_load::{Exponent, Place, SAME_RMS, Solution};
-use super::least_squares::{self, Limits, Optimum};
-use super::projection::PointReadings;
-use super::simplex;
-use crate::model::{Accuracy, Law, Trajectory};
-use nalgebra::{SVector, Vector1, Vector3};
-
-/// Evaluations of a first and of a last polish.
-const POLISH: (usize, usize) = (60, 1500);
-/// Starts for each m of the grid, and last polishes for each chart.
-const STARTS: (usize, usize) = (2, 3);
-/// A last polish is begun afresh while it gained more than this, relative, and at most so often.
+/// On all readings: enough to know which basins may hold the best.
+const CLOSELY: Effort = Effort {
+    most_evaluations: 40,
+    least_gain: 3e-6,
+    fineness: Fineness::FINE,
+};
+/// To the floor.
+const WHOLLY: Effort = Effort {
+    most_evaluations: 200,
+    least_gain: 1e-9,
+    fineness: Fineness::FINE,
+};
+/// A descent to the floor is begun afresh while it gained more than this, relative, and at most so often.
 const RESTART_GAIN: f64 = 1e-7;
 const MOST_RESTARTS: usize = 6;
-/// First step and evaluations of the simplex; it is tried where the cost is within this of the best.
-const SIMPLEX: (f64, usize) = (0.3, 400);
-const NEAR_BEST: f64 = 1.5;
-/// Charts whose best end is followed over m, in how many steps, with how many evaluations each.
-const PROFILED: usize = 2;
-const PROFILE_STEPS: f64 = 24.0;
-const PROFILE_EVALUATIONS: usize = 24;
+
+/// A direction whose best place on the first lattice costs more times the best is not looked at again.
+const PROMISING: f64 = 4.0;
+/// Readings of which the law explains less than all but this share have many basins of like depth.
+const HARD: f64 = 0.015;
+/// How many places of each branch and direction go on to a descent, to all readings, to the floor.
+#[derive(Debug, Clone, Copy)]
+struct Breadth {
+    nearly: usize,
+    nearly_of_one_m: usize,
+    closely: usize,
+    /// Costs within so many times the best go on to a descent on all readings.
+    closely_within: f64,
+    /// Of one branch and direction, these many go to the floor.
+    wholly: usize,
+    /// Costs within so many times the best go to the floor.
+    floor_within: f64,
+}
+const EASY_BREADTH: Breadth = Breadth {
+    nearly: 3,
+    nearly_of_one_m: 1,
+    closely: 6,
+    closely_within: 3.0,
+    wholly: 1,
+    floor_within: 1.02,
+};
+const HARD_BREADTH: Breadth = Breadth {
+    nearly: 5,
+    nearly_of_one_m: 2,
+    closely: 12,
+    closely_within: 100.0,
+    wholly: 6,
+    floor_within: 1.06,
+};
+/// The first place of each branch and direction goes on to a descent on all readings within this, at
+/// least, of the best cost.
+const FIRST_WITHIN: f64 = 9.0;
+/// A descent that did not end goes on from within so many times the best cost.
+const UNFINISHED_WITHIN: f64 = 30.0;
+/// Costs within this of each other, on one branch in one direction, are those of one basin.
+const ONE_BASIN: f64 = 2e-4;
+
+/// Small m beside a line in inverse velocity: m, and ln y_s beyond the line's end.
+const BEYOND_LINE: [f64; 4] = [-0.25, 0.05, 0.4, 1.2];
+const LEAST_EXCESS: f64 = 0.05;
+/// Far from the steady state such a law is an exponential, which gains as much over the record as the line.
+const NEARLY_EXPONENTIAL: f64 = -18.0;
+/// The m's of the laws that are a straight line in inverse velocity far from the steady state, and that one.
+const LINE_LIKE: [(Direction, Branch, f64); 7] = [
+    (Direction::Accelerating, Branch::AboveOne, 1.15),
+    (Direction::Accelerating, Branch::AboveOne, 5.0),
+    (Direction::Accelerating, Branch::BelowOne, 0.03),
+    (Direction::Accelerating, Branch::BelowOne, 0.4),
+    (
+        Direction::Accelerating,
+        Branch::BelowZero,
+        NEARLY_EXPONENTIAL,
+    ),
+    (Direction::Decelerating, Branch::BelowZero, -0.03),
+    (Direction::Decelerating, Branch::BelowZero, -0.4),
+];
+
 /// A search that ends this near to a bound of ln m has run into it.
 const AT_BOUND: f64 = 1e-3;
 
-/// A polished point.
+/// The end of a search.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Found {
     pub(super) solution: Solution,
     pub(super) cost: f64,
-    pub(super) termination: least_squares::Termination,
+    pub(super) converged: bool,
 }
 
 /// One search over one record.
 pub(super) struct Search<'a> {
-    pub(super) readings: &'a PointReadings,
-    basis: Vec<f64>,
-    residuals: Vec<f64>,
-    pub(super) evaluations: usize,
+    readings: &'a PointReadings,
+    exponent: Exponent,
+    lattice: Lattice,
+    full: Record,
+    descent: Descent,
+    lines: Lines,
 }
 
 impl<'a> Search<'a> {
-    pub(super) fn new(readings: &'a PointReadings) -> Self {
+    pub(super) fn new(readings: &'a PointReadings, exponent: Exponent, lattice: Lattice) -> Self {
+        let full = readings.record();
         Self {
             readings,
-            basis: Vec::with_capacity(readings.count()),
-            residuals: vec![0.0; readings.count()],
-            evaluations: 0,
+            exponent,
+            lattice,
+            descent: Descent::new(full.quantity, full.count()),
+            lines: Lines::new(full.count()),
+            full,
         }
     }
 
-    /// The ends of all searches, in no order.
-    pub(super) fn run(&mut self, exponent: Exponent) -> Vec<Found> {
+    /// Laws solved so far.
+    pub(super) fn evaluations(&self) -> usize {
+        self.descent.evaluations + self.lines.evaluations
+    }
+
+    /// Sum of squares that a law without any curvature of its own leaves.
+    pub(super) fn cost_of_no_change(&self) -> f64 {
+        self.full.cost_of_no_change()
+    }
+
+    /// The ends of all descents, in no order.
+    pub(super) fn run(&mut self) -> Vec<Found> {
+        let merged = self.full.merged();
+        let shift = self.lattice.shifts(usize::MAX)[0];
+        let lines = Direction::BOTH.map(|direction| self.lines.minima(&merged, direction, shift));
         let mut found = Vec::new();
-        if exponent != Exponent::Fixed(1.0) {
-            let region = |chart: Chart| Region::new(chart, exponent);
-            let mut ends: Vec<(Region, Optimum<3>)> = Vec::new();
-            for region in CHARTS.into_iter().filter_map(region) {
-                let minima = self.minima(&region);
-                ends.extend(minima.into_iter().map(|end| (region, end)));
-            }
-            self.sharpen(&mut ends);
-            found.extend(
-                ends.iter()
-                    .filter_map(|(region, end)| self.law_of(region, end)),
-            );
+        if self.exponent != Exponent::Fixed(1.0) {
+            let ends = self.curved(&merged, &lines);
+            found.extend(ends.iter().filter_map(|end| self.found(end)));
         }
-        if matches!(exponent, Exponent::Free | Exponent::Fixed(1.0)) {
-            found.extend(self.unit_m());
+        if matches!(self.exponent, Exponent::Free | Exponent::Fixed(1.0)) {
+            for minima in &lines {
+                let line = self.lines.best(&self.full, minima);
+                found.extend(line.and_then(|line| self.found_line(&line)));
+            }
         }
         found
     }
 
-    fn cost(&mut self, law: &Law, anchor: Anchor) -> f64 {
-        self.evaluations += 1;
-        let (basis, residuals) = (&mut self.basis, &mut self.residuals);
-        match self.readings.residuals(law, anchor, basis, residuals) {
-            Some(_) => residuals.iter().map(|residual| residual * residual).sum(),
-            None => f64::INFINITY,
-        }
+    fn holds_m(&self) -> bool {
+        self.exponent != Exponent::Free
     }
 
-    /// The best minima on one chart.
-    fn minima(&mut self, region: &Region) -> Vec<Optimum<3>> {
-        let (chart, length) = (region.chart, self.readings.length_days());
-        let law = |at: &Vector3<f64>| chart.law(at, length);
-        let first = limits((region.low, region.high), POLISH.0);
-        let mut polished = Vec::new();
-        for ln_m in region.grid() {
-            let scored = Chart::points(ln_m).map(|at| (at, self.cost(&law(&at), chart.anchor)));
-            let scored: Vec<(Vector3<f64>, f64)> = scored.collect();
-            for start in lowest_apart(scored) {
-                polished.extend(self.polish(start, chart.anchor, &first, law));
+    /// The minima with m other than 1.
+    fn curved(&mut self, merged: &Record, lines: &[Vec<Line>; 2]) -> Vec<Place> {
+        let places = self.places(merged, lines);
+        let lowest = lowest(&places, None);
+        let breadth = if lowest > HARD * merged.cost_of_no_change() {
+            HARD_BREADTH
+        } else {
+            EASY_BREADTH
+        };
+        let holds_m = self.holds_m();
+        let is_promising = |place: &Place| {
+            let direction = Some(place.chart.direction);
+            self::lowest(&places, direction) <= PROMISING * lowest
+        };
+        let chosen: Vec<Place> = places.iter().copied().filter(is_promising).collect();
+        let mut near = Vec::new();
+        for place in of_each(&chosen, breadth) {
+            let mut place = self.descent.descend(merged, &place, &NEARLY, holds_m);
+            // What was merged may hold the very readings that tell basins apart.
+            let fineness = CLOSELY.fineness;
+            place.cost = self
+                .descent
+                .cost(&self.full, place.chart, &place.at, fineness);
+            near.push(place);
+        }
+        sort(&mut near);
+        let mut close = Vec::new();
+        for place in worth_all_readings(&near, breadth) {
+            close.push(self.descent.descend(&self.full, &place, &CLOSELY, holds_m));
+        }
+        sort(&mut close);
+        close.dedup_by(|a, b| is_same_group(a, b) && a.cost - b.cost <= ONE_BASIN * b.cost);
+        let floor = breadth.floor_within * self::lowest(&close, None);
+        let may_fall_from = UNFINISHED_WITHIN * self::lowest(&close, None);
+        let mut settled: Vec<Place> = Vec::new();
+        let may_fall = |place: &&mut Place| !place.converged && place.cost <= may_fall_from;
+        for place in close
+            .iter_mut()
+            .filter(|place| place.cost <= floor || may_fall(place))
+        {
+            if settled
+                .iter()
+                .filter(|one| is_same_group(one, place))
+                .count()
+                < breadth.wholly
+            {
+                settle(&mut self.descent, &self.full, place, holds_m);
+                settled.push(*place);
             }
         }
-        polished.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-        polished.dedup_by(|a, b| (a.cost - b.cost).abs() <= SAME_RMS * b.cost);
-        polished.truncate(STARTS.1);
-        polished
-            .into_iter()
-            .filter_map(|start| self.settle(start, region))
-            .collect()
+        close
     }
 
-    /// Polishes to the end, afresh as long as it gains: a curved valley stalls a search before its floor.
-    fn settle(&mut self, start: Optimum<3>, region: &Region) -> Option<Optimum<3>> {
-        let (chart, length) = (region.chart, self.readings.length_days());
-        let limits = limits((region.low, region.high), POLISH.1);
-        let mut best = start;
-        for _ in 0..MOST_RESTARTS {
-            let law = |at: &Vector3<f64>| chart.law(at, length);
-            let next = self.polish(best.at, chart.anchor, &limits, law)?;
-            let gain = best.cost - next.cost;
-            best = next;
-            if gain <= RESTART_GAIN * best.cost {
-                break;
+    /// The best places of the lattice, best first.
+    fn places(&mut self, merged: &Record, lines: &[Vec<Line>; 2]) -> Vec<Place> {
+        let mut places = Vec::new();
+        match self.exponent {
+            Exponent::Free => {
+                self.scan(merged, lattice::first(), &mut places);
+                let best = lowest(&places, None);
+                for direction in Direction::BOTH {
+                    if lowest(&places, Some(direction)) <= PROMISING * best {
+                        self.scan(merged, lattice::more(direction), &mut places);
+                    }
+                }
+            }
+            Exponent::Fixed(m) => {
+                let branch = Branch::of(m).into_iter();
+                let families = branch.flat_map(|branch| lattice::fixed(branch, m));
+                self.scan(merged, families, &mut places);
             }
         }
-        Some(best)
+        for line in lines.iter().flatten() {
+            self.beside(merged, line, &mut places);
+        }
+        sort(&mut places);
+        places
     }
 
-    /// Takes the best end of every chart that comes near the best of all through a simplex.
-    fn sharpen(&mut self, ends: &mut [(Region, Optimum<3>)]) {
-        ends.sort_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
-        let lowest = ends.first().map_or(0.0, |(_, end)| end.cost);
-        let mut done: Vec<Chart> = Vec::new();
-        for (region, end) in ends {
-            let (chart, length) = (region.chart, self.readings.length_days());
-            if end.cost > NEAR_BEST * lowest || done.contains(&chart) {
+    fn scan(
+        &mut self,
+        merged: &Record,
+        families: impl Iterator<Item = Family>,
+        places: &mut Vec<Place>,
+    ) {
+        let holds_m = self.holds_m();
+        for family in families {
+            places.extend(family.scan(&mut self.descent, merged, self.lattice, holds_m));
+        }
+    }
+
+    /// The laws that follow a straight line in inverse velocity until near its end.
+    fn beside(&mut self, merged: &Record, line: &Line, places: &mut Vec<Place>) {
+        let slope = line.ln_slope.exp();
+        let fall = slope.ln_1p();
+        for (direction, branch, m) in LINE_LIKE {
+            let m = match self.exponent {
+                Exponent::Free => m,
+                Exponent::Fixed(m) => m,
+            };
+            if direction != line.direction || Branch::of(m) != Some(branch) {
                 continue;
             }
-            done.push(chart);
-            if done.len() <= PROFILED && !region.is_fixed() {
-                self.profile(region, end);
-            }
-            let (at, cost) = simplex::descend(end.at, SIMPLEX.0, SIMPLEX.1, |at| {
-                let at = region.inside(at);
-                self.cost(&chart.law(&at, length), chart.anchor)
-            });
-            if cost < end.cost {
-                (end.at, end.cost) = (region.inside(&at), cost);
-                if let Some(settled) = self.settle(end.clone(), region) {
-                    *end = settled;
+            let slope = if branch == Branch::BelowOne {
+                slope / (1.0 + slope)
+            } else if m < NEARLY_EXPONENTIAL + 1.0 {
+                fall
+            } else {
+                slope
+            };
+            for beyond in BEYOND_LINE {
+                let excess = (fall + beyond).max(LEAST_EXCESS);
+                let (chart, at) = Chart::locate(branch, direction, (slope, excess, m.abs().ln()));
+                let at = super::descent::inside(chart, &at, self.holds_m());
+                let cost = self.descent.cost(merged, chart, &at, Fineness::MIDDLE);
+                if cost.is_finite() {
+                    places.push(Place {
+                        chart,
+                        at,
+                        cost,
+                        converged: false,
+                    });
                 }
             }
         }
     }
 
-    /// Follows the minimum over ln |m| either way, the rest refitted, and goes on from the lowest point.
-    fn profile(&mut self, region: &Region, end: &mut Optimum<3>) {
-        let (chart, length) = (region.chart, self.readings.length_days());
-        let law = |at: &Vector3<f64>| chart.law(at, length);
-        let step = (region.high[2] - region.low[2]) / PROFILE_STEPS;
-        let mut lowest = end.clone();
-        for sign in [-1.0, 1.0] {
-            let mut here = end.at;
-            loop {
-                here[2] += sign * step;
-                if here[2] < region.low[2] || here[2] > region.high[2] {
-                    break;
-                }
-                let (mut low, mut high) = (region.low, region.high);
-                (low[2], high[2]) = (here[2], here[2]);
-                let limits = limits((low, high), PROFILE_EVALUATIONS);
-                let Some(held) = self.polish(here, chart.anchor, &limits, law) else {
-                    break;
-                };
-                here = held.at;
-                if held.cost < lowest.cost {
-                    lowest = held;
-                }
-            }
+    /// The law of the end of a descent, at the first reading.
+    fn found(&mut self, end: &Place) -> Option<Found> {
+        let (record, length) = (&self.full, self.readings.length_days());
+        let (chart, shape) = (end.chart, end.chart.shape(&end.at));
+        let curve = &mut self.descent.curve;
+        if !curve.solve(&shape, 1.0, Fineness::EXACT) && !curve.solve(&shape, 1.0, Fineness::FINE) {
+            return None;
         }
-        if lowest.cost < end.cost
-            && let Some(settled) = self.settle(lowest, region)
-        {
-            *end = settled;
-        }
-    }
-
-    fn law_of(&mut self, region: &Region, end: &Optimum<3>) -> Option<Found> {
-        let law = region.chart.law(&end.at, self.readings.length_days());
-        self.found(&law, region.chart.anchor, (end, region.place(&end.at)))
-    }
-
-    /// The best laws with m = 1, one in each direction: y is a straight line.
-    fn unit_m(&mut self) -> Vec<Found> {
-        let length = self.readings.length_days();
-        let mut found = Vec::new();
-        for (direction, anchor) in [
-            (Direction::Accelerating, Anchor::End),
-            (Direction::Decelerating, Anchor::Start),
-        ] {
-            let law = |at: &Vector1<f64>| law_at_unit_m(direction, at[0], length);
-            let bounds = slope_bounds();
-            let limits = limits((Vector1::new(bounds.0), Vector1::new(bounds.1)), POLISH.1);
-            let starts: Vec<_> = unit_m_starts()
-                .filter_map(|start| self.polish(Vector1::new(start), anchor, &limits, law))
-                .collect();
-            let best = starts.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
-            found.extend(best.and_then(|optimum| {
-                self.found(&law(&optimum.at), anchor, (&optimum, Place::Inside))
-            }));
-        }
-        found
-    }
-
-    fn polish<const N: usize>(
-        &mut self,
-        start: SVector<f64, N>,
-        anchor: Anchor,
-        limits: &Limits<N>,
-        law: impl Fn(&SVector<f64, N>) -> Law,
-    ) -> Option<Optimum<N>> {
-        let (readings, basis) = (self.readings, &mut self.basis);
-        let mut solved = 0;
-        let optimum = least_squares::minimise(start, readings.count(), limits, |at, out| {
-            solved += 1;
-            readings.residuals(&law(at), anchor, basis, out).is_some()
-        });
-        self.evaluations += solved;
-        optimum
-    }
-
-    /// The law of an optimum, moved to the first reading.
-    fn found<const N: usize>(
-        &mut self,
-        law: &Law,
-        anchor: Anchor,
-        end: (&Optimum<N>, Place),
-    ) -> Option<Found> {
-        let linear = self
-            .readings
-            .residuals(law, anchor, &mut self.basis, &mut self.residuals)?;
-        let scaled = Law {
-            v_i: linear.velocity,
-            ..*law
+        let anchor = chart.anchor();
+        let mut basis = vec![0.0; record.count()];
+        curve.follow(&Window::WHOLE, record.times(anchor), &mut basis, None);
+        let projected = record.project(anchor, &basis)?;
+        let velocity = match record.quantity {
+            Quantity::Velocity => projected.velocity,
+            // Displacement from the end was counted backwards.
+            Quantity::Displacement => projected.velocity.abs() / length,
         };
-        let (law, displacement_at_start) = match anchor {
-            Anchor::Start => (scaled, linear.displacement),
+        let (law, slip) = match anchor {
+            Anchor::Start => (chart.law(&shape, velocity, length), 0.0),
             Anchor::End => {
-                let length = self.readings.length_days();
-                let past = Trajectory::solve(&scaled.reversed(), length, Accuracy::Full);
-                let motion = past.at(length)?;
-                let start = same_direction(scaled.from_y(motion.y), &scaled);
-                (start, linear.displacement - motion.displacement)
+                let mut rates = Curve::new(Quantity::Velocity);
+                if !rates.solve(&shape, 1.0, Fineness::FINE) {
+                    return None;
+                }
+                let ln_y = rates.last_ln_y(&shape);
+                let law = chart.law(&shape.moved(ln_y), velocity * (-ln_y).exp(), length);
+                (
+                    law,
+                    basis.last().map_or(0.0, |last| last * projected.velocity),
+                )
             }
         };
+        let at_start = match record.quantity {
+            Quantity::Velocity => 0.0,
+            Quantity::Displacement => projected.offset + slip,
+        };
+        let place = if self.holds_m() || !is_at_bound_of_m(end) {
+            Side::Inside
+        } else {
+            Side::AtBoundOfM
+        };
+        let solution = self
+            .readings
+            .solution(&law, at_start, projected.cost, place);
         Some(Found {
-            solution: Solution {
-                law,
-                displacement_at_start,
-                rms: self.readings.rms(end.0.cost),
-                place: end.1,
-            },
-            cost: end.0.cost,
-            termination: end.0.termination,
+            solution,
+            cost: projected.cost,
+            converged: end.converged,
+        })
+    }
+
+    fn found_line(&mut self, line: &Line) -> Option<Found> {
+        let length = self.readings.length_days();
+        let (law, at_start) = self.lines.law(&self.full, line, length)?;
+        let solution = self
+            .readings
+            .solution(&law, at_start, line.cost, Side::Inside);
+        Some(Found {
+            solution,
+            cost: line.cost,
+            converged: true,
         })
     }
 }
 
-/// A chart and the part of it that is searched.
-#[derive(Debug, Clone, Copy)]
-struct Region {
-    chart: Chart,
-    low: Vector3<f64>,
-    high: Vector3<f64>,
-}
-
-impl Region {
-    /// `None` where a fixed m does not stand on the chart.
-    fn new(chart: Chart, exponent: Exponent) -> Option<Self> {
-        let (mut low, mut high) = chart.corners();
-        if let Exponent::Fixed(m) = exponent {
-            if Branch::of(m) != Some(chart.branch) {
-                return None;
-            }
-            (low[2], high[2]) = (m.abs().ln(), m.abs().ln());
-        }
-        Some(Self { chart, low, high })
-    }
-
-    fn is_fixed(&self) -> bool {
-        self.low[2] >= self.high[2]
-    }
-
-    /// ln |m| where the search looks first.
-    fn grid(&self) -> Vec<f64> {
-        if self.is_fixed() {
-            return vec![self.low[2]];
-        }
-        let grid = self.chart.branch.grid();
-        grid.iter().map(|m| m.abs().ln()).collect()
-    }
-
-    fn inside(&self, at: &Vector3<f64>) -> Vector3<f64> {
-        Vector3::from_fn(|i, _| at[i].clamp(self.low[i], self.high[i]))
-    }
-
-    fn place(&self, at: &Vector3<f64>) -> Place {
-        let side = at[2] <= self.low[2] + AT_BOUND || at[2] >= self.high[2] - AT_BOUND;
-        if side && !self.is_fixed() && at[2].abs() > AT_BOUND {
-            Place::AtBoundOfM
-        } else {
-            Place::Inside
+/// Goes to the floor, and where m has run to its bound from the corner without a steady state too: an
+/// exponential lies there, at the end of a valley that hardly falls.
+fn settle(descent: &mut Descent, record: &Record, place: &mut Place, holds_m: bool) {
+    go_down(descent, record, place, holds_m);
+    if !holds_m && is_at_bound_of_m(place) {
+        let mut corner = *place;
+        corner.at[1] = place.chart.corners().1[1];
+        corner.cost = f64::INFINITY;
+        go_down(descent, record, &mut corner, holds_m);
+        if corner.cost < place.cost {
+            *place = corner;
         }
     }
 }
 
-fn limits<const N: usize>(
-    corners: (SVector<f64, N>, SVector<f64, N>),
-    most_evaluations: usize,
-) -> Limits<N> {
-    Limits {
-        lowest: corners.0,
-        highest: corners.1,
-        scale: 1.0,
-        ..Limits::evaluations(most_evaluations)
+/// Goes down, afresh as long as it gains: a curved valley stalls a descent before its floor.
+fn go_down(descent: &mut Descent, record: &Record, place: &mut Place, holds_m: bool) {
+    for _ in 0..MOST_RESTARTS {
+        let next = descent.descend(record, place, &WHOLLY, holds_m);
+        let gain = place.cost - next.cost;
+        if next.cost <= place.cost {
+            *place = next;
+        }
+        if gain <= RESTART_GAIN * next.cost || !gain.is_finite() && !next.cost.is_finite() {
+            break;
+        }
     }
 }
 
-/// Near the steady state the slope is the difference of two equal numbers; its sign is known.
-fn same_direction(start: Law, end: &Law) -> Law {
-    let least = f64::EPSILON * start.kappa.abs().max(f64::MIN_POSITIVE);
-    let r = if end.r > 0.0 {
-        start.r.max(least)
-    } else {
-        start.r.min(-least)
-    };
-    Law { r, ..start }
+/// The lowest cost of all places, or of those in one direction.
+fn lowest(places: &[Place], direction: Option<Direction>) -> f64 {
+    let of = |place: &&Place| direction.is_none_or(|wanted| place.chart.direction == wanted);
+    let costs = places.iter().filter(of).map(|place| place.cost);
+    costs.fold(f64::INFINITY, f64::min)
 }
 
-/// The lowest points of a grid of one m that do not stand beside one another.
-fn lowest_apart(mut scored: Vec<(Vector3<f64>, f64)>) -> Vec<Vector3<f64>> {
-    scored.retain(|(_, cost)| cost.is_finite());
-    scored.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let mut taken: Vec<Vector3<f64>> = Vec::new();
-    for (at, _) in scored {
-        if taken.len() < STARTS.0 && taken.iter().all(|other| (at - other).amax() > 2.0) {
-            taken.push(at);
+fn sort(places: &mut Vec<Place>) {
+    places.retain(|place| place.cost.is_finite());
+    places.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+}
+
+fn is_same_group(a: &Place, b: &Place) -> bool {
+    (a.chart.branch, a.chart.direction) == (b.chart.branch, b.chart.direction)
+}
+
+/// The first places of each branch and direction, few of them from the same m: one bad valley must not
+/// take them all.
+fn of_each(places: &[Place], breadth: Breadth) -> Vec<Place> {
+    let mut taken: Vec<Place> = Vec::new();
+    for place in places {
+        let group = || taken.iter().filter(|one| is_same_group(one, place));
+        let same_m = group().filter(|one| one.at[2].total_cmp(&place.at[2]).is_eq());
+        if same_m.count() < breadth.nearly_of_one_m && group().count() < breadth.nearly {
+            taken.push(*place);
         }
     }
     taken
+}
+
+/// The places that may turn out best when all readings count, and the best on each side of m = 1.
+fn worth_all_readings(near: &[Place], breadth: Breadth) -> Vec<Place> {
+    let lowest = lowest(near, None);
+    let is_above_one = |place: &Place| place.chart.branch == Branch::AboveOne;
+    let mut taken: Vec<Place> = Vec::new();
+    for place in near {
+        let has_side = taken
+            .iter()
+            .any(|one| is_above_one(one) == is_above_one(place));
+        let is_first = !taken.iter().any(|one| is_same_group(one, place));
+        let within = if is_first {
+            FIRST_WITHIN.max(breadth.closely_within)
+        } else {
+            breadth.closely_within
+        };
+        let is_near = place.cost <= within * lowest;
+        if !has_side || (taken.len() < breadth.closely && is_near) {
+            taken.push(*place);
+        }
+    }
+    taken
+}
+
+fn is_at_bound_of_m(end: &Place) -> bool {
+    let (mut low, high) = end.chart.corners();
+    low[2] = low[2].max(end.chart.least_ln_m(end.at[1]));
+    let side = end.at[2] <= low[2] + AT_BOUND || end.at[2] >= high[2] - AT_BOUND;
+    side && end.at[2].abs() > AT_BOUND
 }

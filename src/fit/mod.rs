@@ -3,20 +3,24 @@
 mod chart;
 mod compaction;
 mod constant_load;
+mod curve;
+mod descent;
 mod global_search;
-mod least_squares;
+mod lattice;
+mod point_readings;
 mod posterior;
-mod projection;
 mod quasi_random;
 mod rates;
-mod simplex;
+mod record;
 mod under_load;
+mod unit_m;
 
 pub use constant_load::{ConstantLoad, Exponent, Outcome, Place, Solution};
+pub use lattice::Lattice;
+pub use point_readings::PointReadings;
 pub use posterior::{
     Curvature, Ensemble, Onset, OtherPrior, P_PRIOR, Posterior, Sample as LawSample,
 };
-pub use projection::PointReadings;
 pub(crate) use rates::displacement_sigma;
 pub use rates::{FINEST_DAYS, Observation, Observations, Rate, RateOptions, ReadingError};
 pub use under_load::LoadPosterior;

@@ -115,7 +115,9 @@ impl Inversion {
         let critical = self.options.critical_velocity_mm_per_day;
         let outlook = outlook(&self.observations, critical).map(|(outlook, _)| outlook);
         let rates = self.rates();
-        let posterior = Posterior::over_onsets(&rates);
+        // A stuck instrument's readings have a posterior too, and it would name a regime.
+        let tells = !least_squares.outcome.says_nothing();
+        let posterior = tells.then(|| Posterior::over_onsets(&rates)).flatten();
         let onset = posterior.as_ref().map(Posterior::onset);
         let regime = RegimeReport::of(posterior.as_ref());
         let best = least_squares.best();
@@ -139,7 +141,10 @@ impl Inversion {
             prior_sensitivity: UnderPrior::each(self, posterior.as_ref()),
             inverse_velocity: self.inverse_velocity(&rates, regime.probability_accelerating),
             regime,
-            regime_under_load: outlook.as_ref().map(RegimeReport::under_load),
+            regime_under_load: outlook
+                .as_ref()
+                .filter(|_| tells)
+                .map(RegimeReport::under_load),
             rms: best.map(|best| best.rms).filter(|rms| rms.is_finite()),
             evaluations: least_squares.evaluations,
             seconds,

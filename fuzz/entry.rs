@@ -1,0 +1,95 @@
+//! Any bytes through the readers of files: as a whole file, and as the daemon takes a growing one.
+//!
+//! Both must come to an end, and a value that they let through must be a number. The fuzz targets and
+//! `tests/mutated_files.rs` share this file.
+
+use slipwatch::reading::Recording;
+use slipwatch::runtime::ingest::{CsvRows, Item, ReadOptions, decode_message, read_files};
+use slipwatch::runtime::tail::lines::Lines;
+use slipwatch::runtime::tail::records::{Channels, Frame, HEADER_BYTES, MAGIC, frame};
+use std::path::Path;
+
+/// Bytes as a CSV file.
+pub(crate) fn csv(bytes: &[u8]) {
+    whole(bytes, "csv");
+    let mut lines = Lines::default();
+    let (first, second) = bytes.split_at(bytes.len() / 2);
+    let mut fed = lines.feed(first);
+    fed.extend(lines.feed(second));
+    let mut texts = fed
+        .into_iter()
+        .filter_map(|line| Some((line.number, line.text.ok()?)));
+    let Some((_, header)) = texts.next() else {
+        return;
+    };
+    let file = Path::new("fuzzed.csv");
+    let Ok(mut rows) = CsvRows::new(file, &header, &ReadOptions::default()) else {
+        return;
+    };
+    for (number, text) in texts {
+        for item in rows.row(number, &text).into_iter().flatten() {
+            check(&item);
+        }
+    }
+}
+
+/// Bytes as an MCAP file.
+pub(crate) fn mcap(bytes: &[u8]) {
+    whole(bytes, "mcap");
+    let mut rest = bytes.strip_prefix(MAGIC).unwrap_or(bytes);
+    let mut channels = Channels::default();
+    while let Some((header, after)) = rest.split_first_chunk::<HEADER_BYTES>() {
+        let (opcode, length) = match frame(*header, after.len() as u64) {
+            Frame::Read { opcode, length } => (Some(opcode), length),
+            Frame::Skip { length } => (None, length),
+            Frame::Wait | Frame::End | Frame::Damaged { .. } => return,
+        };
+        let (body, next) = after.split_at(usize::try_from(length).expect("it fits the file"));
+        rest = next;
+        let messages = opcode.map(|opcode| channels.decode(opcode, body));
+        for message in messages.into_iter().flatten().flatten() {
+            let payload = &message.payload;
+            let decoded = decode_message(
+                &message.topic,
+                &message.metadata,
+                message.publish_time,
+                payload,
+            );
+            if let Ok(Some(item)) = decoded {
+                check(&item);
+            }
+        }
+    }
+}
+
+/// Reads the bytes as a file with that extension.
+fn whole(bytes: &[u8], extension: &str) {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join(format!("fuzzed.{extension}"));
+    std::fs::write(&file, bytes).expect("a temporary file");
+    if let Ok((recording, _)) = read_files(&[file], &ReadOptions::default()) {
+        check_recording(&recording);
+    }
+}
+
+fn check_recording(recording: &Recording) {
+    for series in &recording.series {
+        assert!(series.readings.iter().all(|one| one.value.is_finite()));
+        let times = series
+            .readings
+            .windows(2)
+            .all(|pair| pair[0].time < pair[1].time);
+        assert!(times, "readings out of order");
+    }
+    for channel in &recording.channels {
+        assert!(channel.samples.iter().all(|one| one.value.is_finite()));
+    }
+}
+
+fn check(item: &Item) {
+    let value = match item {
+        Item::Reading { reading, .. } => reading.value,
+        Item::Sample { sample, .. } => sample.value,
+    };
+    assert!(value.is_finite(), "{item:?}");
+}
