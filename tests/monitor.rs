@@ -290,6 +290,6 @@ fn a_value_beyond_any_slope_is_refused_by_name() {
             .iter()
             .filter(|e| matches!(e.kind, EventKind::Refit { .. }))
             .count(),
-        22
+        20
     );
 }

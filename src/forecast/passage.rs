@@ -1,13 +1,15 @@
 //! The distribution of the first passage of a critical velocity, with the chance that it never comes.
 
 use super::HORIZON_DAYS;
-use crate::fit::LoadPosterior;
+use crate::fit::{FINEST_DAYS, LoadPosterior};
 
 /// How wide, in ln of the time, a forecast is to be against what the posterior says: it takes every slope to
 /// wander from the law, and simulated ones, which do not, fall into 90 % intervals too often without it.
 const SPREAD: f64 = 0.7;
 /// And how much earlier: the median over simulated slopes then errs to neither side.
 const EARLIER: f64 = 0.98;
+/// And no time moves by more than this factor: laws that fail much sooner than most are a warning of their own.
+const FARTHEST: f64 = 1.5;
 
 /// Times to first passage, days from now, each with its probability; what is missing to 1 never passes.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -36,9 +38,14 @@ impl Passage {
         let Some(median) = self.quantile(0.5 * total, f64::INFINITY) else {
             return self;
         };
-        let median = median.max(1e-9);
-        let draw =
-            |(days, share): (f64, f64)| (EARLIER * median * (days / median).powf(SPREAD), share);
+        let median = median.max(FINEST_DAYS);
+        let draw = |(days, share): (f64, f64)| {
+            let drawn = median * (days / median).powf(SPREAD);
+            (
+                EARLIER * drawn.clamp(days / FARTHEST, days * FARTHEST),
+                share,
+            )
+        };
         Self::from_times(self.times.into_iter().map(draw).collect())
     }
 

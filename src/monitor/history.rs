@@ -38,7 +38,6 @@ const FARTHEST: f64 = 1e9;
 pub(super) struct History {
     pub(super) epoch: Timestamp,
     pub(super) observations: Observations,
-    first_displacement_mm: f64,
 }
 
 impl History {
@@ -54,7 +53,6 @@ impl History {
         Self {
             epoch,
             observations,
-            first_displacement_mm: 0.0,
         }
     }
 
@@ -77,9 +75,6 @@ impl History {
             return Taken::OutOfRange(new.value);
         }
         let values = &mut self.observations.values;
-        if values.is_empty() {
-            self.first_displacement_mm = new.value;
-        }
         let at = values.partition_point(|old| old.t_days < new.t_days);
         match values.get_mut(at) {
             None => {
@@ -89,6 +84,7 @@ impl History {
             }
             Some(old) if old.t_days > new.t_days => {
                 values.insert(at, new);
+                self.observations.compact();
                 Taken::Late
             }
             Some(old) if *old == new => Taken::Known,
@@ -102,9 +98,10 @@ impl History {
 
     /// Displacement since the first reading, mm, where displacement is what is measured.
     pub(super) fn displacement_mm(&self) -> Option<f64> {
-        let newest = self.observations.values.last()?;
-        (self.observations.quantity == Quantity::Displacement)
-            .then_some(newest.value - self.first_displacement_mm)
+        let [first, .., newest] = self.observations.values.as_slice() else {
+            return Some(0.0).filter(|_| self.observations.quantity == Quantity::Displacement);
+        };
+        (self.observations.quantity == Quantity::Displacement).then_some(newest.value - first.value)
     }
 
     /// The velocity that the newest readings show by themselves, mm/day.

@@ -150,11 +150,12 @@ fn over_starts(record: &Record, gains: &Gains, room: &Room, lane: usize) -> Evid
     }
 }
 
-/// How far each rate misses the law of one lane, as z squared; the law over the whole record.
+/// How far each rate misses the law of one lane, as z squared of its error as it was before any doubt; the
+/// law over the whole record.
 pub(super) fn misses(
     record: &Record,
     (block, slope): (&Block, &Slope),
-    lane: usize,
+    (lane, scatter): (usize, f64),
     gains: &Gains,
     room: &mut Room,
 ) -> Vec<f64> {
@@ -166,7 +167,8 @@ pub(super) fn misses(
         let index = count - 1 - step;
         load *= gain.keep;
         let miss = record.ln_velocity[index] - room.predicted[index][lane] - load - level;
-        squares[index] = miss * miss * gain.precision;
+        let doubted = record.variance(index, scatter) * (1.0 - record.trust[index]);
+        squares[index] = miss * miss / (1.0 / gain.precision - doubted).max(1e-12);
         load += gain.load * miss;
         level += gain.level * miss;
     }

@@ -5,7 +5,7 @@ use super::{Cell, LoadPosterior, WANDER};
 use crate::fit::quasi_random::{halton, normal_quantile};
 
 /// Draws of a cell: one for each of this share of the probability, so many at most.
-const DRAWS: (f64, usize) = (400.0, 4);
+const DRAWS: (f64, usize) = (400.0, 64);
 /// How much of the wandering of an e-fold shows in the time that remains.
 const IN_TIME: f64 = 0.3;
 /// Rounds of the search for the time at which the load has let enough of the law pass.
@@ -44,6 +44,9 @@ impl Cell {
     fn days_to(&self, shape: &Shape, ln_velocity: f64, z: [f64; 5]) -> Option<f64> {
         let (of_velocity, of_load) = self.variances;
         let now = self.ln_velocity + of_velocity.sqrt() * z[0];
+        if now >= ln_velocity {
+            return Some(0.0);
+        }
         let along = if of_velocity > 0.0 {
             self.covariance / of_velocity
         } else {

@@ -13,8 +13,9 @@
 //! of today are integrated exactly, by a linear filter that runs from the present into the past
 //! (`gains`), which gives the evidence of every start in one pass (`evidence`).
 //!
-//! Priors: uniform in ln r from a fiftieth of the record's length to twice the newest sampling interval,
-//! where r times that interval is also half-normal with standard deviation 1.5; accelerating and slowing
+//! Priors: nearly uniform in ln r (falling as r^-0.1), from 1/(50 lengths of the record), and no more than
+//! 1/5000 of one over the newest sampling interval, to twice that, where r times the interval is also
+//! half-normal with standard deviation 1.5; accelerating and slowing
 //! down alike, m above 1 with probability [`UNSTABLE`]; ln of the velocity that a stable slope will keep
 //! half-normal above 2 mm/day with standard deviation 1 (a slope that keeps a velocity mostly keeps a low
 //! one: "very slow" ends at 4.4 mm/day, Cruden and Varnes 1996); f, its memory and the scatter of the

@@ -31,6 +31,8 @@ const LEFT_OUT: (f64, f64, f64) = (8.0, 4.0, 9.0);
 const COMPARED: usize = 4;
 /// Degrees of freedom of an outlier's error.
 const STUDENT: f64 = 4.0;
+/// The error of ln v where nothing moves.
+const AT_REST: f64 = 1.5;
 /// Rates that say what the velocity of today is about.
 const CENTRE: usize = 9;
 
@@ -74,7 +76,11 @@ impl Search {
         let length = record.from[0];
         let newest = &rates[rates.len().saturating_sub(4)..];
         let spacings = newest.windows(2).map(|pair| pair[1].to - pair[0].to);
-        let interval = spacings.fold(0.0, f64::max).max(1e-6);
+        // The middle one: a logger that was out before a collapse must not rule the collapse out.
+        let mut spacings: Vec<f64> = spacings.collect();
+        spacings.sort_by(f64::total_cmp);
+        let middle = spacings.get(spacings.len() / 2).copied();
+        let interval = middle.unwrap_or(length).max(1e-6);
         // A short record knows as well as a long one that most slopes take thousands of readings.
         let lowest = (SLOPES.0 / length).min(SLOWEST / interval);
         let highest = (SLOPES.1 / interval).max(2.0 * lowest);
@@ -143,7 +149,13 @@ impl Search {
         let slope = &slopes[best.slope];
         let gains = Gains::new(&self.record, noise, &slope.u);
         let law = (&BLOCKS[best.block], slope);
-        let squares = evidence::misses(&self.record, law, best.lane, &gains, &mut self.room);
+        let squares = evidence::misses(
+            &self.record,
+            law,
+            (best.lane, noise.scatter),
+            &gains,
+            &mut self.room,
+        );
         for (trust, square) in self.record.trust.iter_mut().zip(squares) {
             *trust = ((STUDENT + 1.0) / (STUDENT + square)).min(1.0);
         }
@@ -268,13 +280,23 @@ fn noises(rates: &[Rate]) -> Vec<Noise> {
     noises
 }
 
-/// Rates as logarithms. One within its noise, or backward, is read as little more than "no faster than
-/// its error": half of v + sqrt(v^2 + 4 s^2) is v where it is clear of its error s, and s at rest.
+/// Rates as logarithms. One within its noise is read as little more than "no faster than its error": half
+/// of v + sqrt(v^2 + 4 s^2) is v where it is clear of its error s, and s at rest. One at rest or backward
+/// whose error is not known is read as half of the slowest that moved, give or take e^1.5.
 fn record(rates: &[Rate]) -> Record {
     let now = rates.last().map_or(0.0, |rate| rate.to);
+    let moving = rates.iter().map(|rate| rate.velocity).filter(|v| *v > 0.0);
+    let at_rest = 0.5 * moving.fold(f64::INFINITY, f64::min);
     let forward = |rate: &Rate| {
         let clear = 0.5 * (rate.velocity + rate.velocity.hypot(2.0 * rate.sigma));
-        clear.max(1e-9)
+        clear.max(if rate.velocity > 0.0 { 1e-9 } else { at_rest })
+    };
+    let error = |rate: &Rate| {
+        if rate.velocity > 0.0 {
+            (rate.sigma / forward(rate)).min(AT_REST)
+        } else {
+            AT_REST
+        }
     };
     let mut newest: Vec<f64> = rates.iter().rev().take(CENTRE).map(forward).collect();
     newest.sort_by(f64::total_cmp);
@@ -284,10 +306,7 @@ fn record(rates: &[Rate]) -> Record {
             .iter()
             .map(|rate| forward(rate).ln() - centre)
             .collect(),
-        error: rates
-            .iter()
-            .map(|rate| (rate.sigma / forward(rate)).min(1.5))
-            .collect(),
+        error: rates.iter().map(error).collect(),
         middle: rates.iter().map(|rate| now - rate.middle()).collect(),
         from: rates.iter().map(|rate| now - rate.from).collect(),
         to: rates.iter().map(|rate| now - rate.to).collect(),
