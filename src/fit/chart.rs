@@ -18,9 +18,9 @@ pub(super) const LOWEST_M: f64 = -20.0;
 const LEAST_SIZE_OF_M: f64 = 1e-3;
 /// m is no nearer to 1 than exp(1e-8) within a branch: m = 1 is a law by itself.
 pub(super) const LEAST_LN_M: f64 = 1e-8;
-/// |ln `x_i`| stays under this, so that `x_i` and kappa are numbers: a smaller |m| needs a nearer steady state.
+/// |ln `x_i`| = |ln `y_s` / m| stays under this, so that `x_i` and kappa are numbers.
 const MOST_LN_X: f64 = 690.0;
-/// But no |m| above this is kept away for that; a steady state so far off is none.
+/// Under m = 1 it is |m| that gives way to a far steady state, but only up to here: one so far off is none.
 const SMALL_M: f64 = 0.5;
 
 /// Bounds of ln(|r| L), L the record's length.
@@ -228,13 +228,19 @@ impl Chart {
         ([first.0, steady.0, ln_m.0], [first.1, steady.1, ln_m.1])
     }
 
-    /// The least ln |m| beside such a steady state.
-    pub(super) fn least_ln_m(self, ln_steady: f64) -> f64 {
-        let bound = (ln_steady - MOST_LN_X.ln()).min(SMALL_M.ln());
+    /// The corners of the chart beside a point, where it ends because `x_i` does.
+    pub(super) fn corners_beside(self, at: &Point) -> (Point, Point) {
+        let (mut low, mut high) = self.corners();
         match self.branch {
-            Branch::AboveOne => self.branch.ln_m().0,
-            Branch::BelowOne | Branch::BelowZero => self.branch.ln_m().0.max(bound),
+            Branch::AboveOne => {
+                let ln_m = at[2].clamp(low[2], high[2]);
+                high[1] = high[1].min(MOST_LN_X.ln() + ln_m);
+            }
+            Branch::BelowOne | Branch::BelowZero => {
+                low[2] = low[2].max((at[1] - MOST_LN_X.ln()).min(SMALL_M.ln()));
+            }
         }
+        (low, high)
     }
 
     /// The law of a shape on this chart, moved along to `ln_y`, with the velocity at its own anchor.

@@ -238,20 +238,17 @@ fn is_held(place: &Place, i: usize, gradient: f64, holds_m: bool) -> bool {
     if i == 2 && holds_m {
         return true;
     }
-    let (mut low, high) = place.chart.corners();
-    low[2] = low[2].max(place.chart.least_ln_m(place.at[1]));
+    let (low, high) = place.chart.corners_beside(&place.at);
     (place.at[i] <= low[i] && gradient >= 0.0) || (place.at[i] >= high[i] && gradient <= 0.0)
 }
 
 /// The nearest point of the chart.
 pub(super) fn inside(chart: Chart, at: &Point, holds_m: bool) -> Point {
-    let (low, high) = chart.corners();
+    let (low, high) = chart.corners_beside(at);
     let mut inside = [0, 1, 2].map(|i| at[i].clamp(low[i], high[i]));
-    inside[2] = if holds_m {
-        at[2]
-    } else {
-        inside[2].max(chart.least_ln_m(inside[1]))
-    };
+    if holds_m {
+        inside[2] = at[2];
+    }
     inside
 }
 

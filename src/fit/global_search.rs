@@ -436,8 +436,7 @@ fn worth_all_readings(near: &[Place], breadth: Breadth) -> Vec<Place> {
 }
 
 fn is_at_bound_of_m(end: &Place) -> bool {
-    let (mut low, high) = end.chart.corners();
-    low[2] = low[2].max(end.chart.least_ln_m(end.at[1]));
+    let (low, high) = end.chart.corners_beside(&end.at);
     let side = end.at[2] <= low[2] + AT_BOUND || end.at[2] >= high[2] - AT_BOUND;
     side && end.at[2].abs() > AT_BOUND
 }
