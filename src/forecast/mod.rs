@@ -5,9 +5,11 @@ mod line;
 mod panel;
 mod passage;
 mod surprise;
+mod together;
 
 pub use life::{Fate, Life};
 pub use line::InverseVelocityLine;
-pub(crate) use panel::outlook;
+pub(crate) use panel::{measurably_moves, outlook};
 pub use panel::{FEWEST_READINGS, HORIZON_DAYS, Outlook, Panel};
 pub use passage::Passage;
+pub use together::{Group, Opinion, groups};

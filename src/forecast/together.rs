@@ -1,0 +1,296 @@
+//! Benchmarks that fail together: one failure time for those that share it, and which of them do.
+//!
+//! Given the time at which a mass fails, its benchmarks are independent but for the load that they share:
+//! each has its own m and D. What benchmark i says alone, `p_i`, is a density over ln of the remaining time
+//! with a cell for "never", under the prior `p0`, flat in ln of the time and even between a failure and
+//! none. A group then says `p0 * product (p_i / p0)^w`, and it is a group as far as its parts agree better
+//! about one failure time than each about its own: the Bayes factor of two parts is the sum of `p_a p_b / p0`.
+//!
+//! The shared load moves all forecasts alike. With a correlation rho of their errors, n equally sharp
+//! forecasts are worth `n / (1 + (n - 1) rho)` independent ones, hence `w = 1 / (1 + (n - 1) rho)`, where n
+//! counts forecasts by their sharpness, so that one that says little takes nothing from one that says much.
+//!
+//! The best partition is found by agglomeration from single benchmarks. A forecast wavers from one reading
+//! to the next, and membership does not: the ln of a Bayes factor is its mean over the newest looks.
+
+use super::{HORIZON_DAYS, Passage};
+use crate::fit::FINEST_DAYS;
+
+/// Correlation of the ln errors of benchmarks that share their load wholly: .51, .43, .30, .25 and .17 at
+/// 40, 20, 10, 5 and 2 days before the end of 150 simulated masses of four.
+const SHARED: f64 = 0.4;
+/// How far apart, in ln of the remaining time, the members of one mass may fail: standard deviation, and
+/// the bandwidth of the densities.
+const SCATTER: f64 = 0.06;
+/// Chance that a benchmark's forecast says nothing of its failure.
+const DOUBT: f64 = 0.03;
+/// Prior chance of no failure within the horizon.
+const NEVER: f64 = 0.5;
+/// Prior odds that two benchmarks of one site fail together.
+const ODDS: f64 = 3.0;
+/// Looks over which an agreement is judged.
+const JUDGED: usize = 4;
+/// The grid: its first time, days, the width of a cell in ln of the time, and as many cells as reach the
+/// horizon.
+const SOONEST: f64 = FINEST_DAYS / 8.0;
+const CELL: f64 = 0.025;
+const CELLS: usize = 478;
+/// Reach of the kernel, cells.
+const REACH: usize = 10;
+/// With less than this chance that it has not failed yet, a forecast that is overtaken says nothing.
+const OVERTAKEN: f64 = 0.02;
+
+/// What one benchmark foretells: how likely its readings are for each failure time, the last for none.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Opinion {
+    likelihood: Vec<f64>,
+}
+
+/// Benchmarks that fail together, or one alone.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Group {
+    /// Places of its benchmarks in a look, in order.
+    pub members: Vec<usize>,
+    /// Probability of each that it belongs there; of one alone, that it belongs to no other group.
+    pub probabilities: Vec<f64>,
+    /// The first look from which on it has been just this group.
+    pub since: usize,
+    /// When it fails, from the last look.
+    pub passage: Passage,
+}
+
+/// Probabilities of the cells, the last that of no failure.
+type Density = Vec<f64>;
+
+impl Opinion {
+    /// That of `passage`, seen `later_days` after it was made without a failure.
+    pub fn of(passage: &Passage, later_days: f64) -> Self {
+        let mut density = vec![0.0; CELLS + 1];
+        let to_come = passage.times().iter();
+        let to_come = to_come.map(|(days, share)| (days - later_days, share));
+        for (days, share) in to_come.filter(|(days, _)| *days > 0.0) {
+            density[cell(days)] += share;
+        }
+        let left = 1.0 - passage.chance_within(later_days.max(0.0));
+        if left < OVERTAKEN {
+            return Self::nothing();
+        }
+        let within: f64 = density[..CELLS].iter().sum();
+        density[CELLS] += (left - within).max(0.0);
+        smooth(&mut density[..CELLS]);
+        let total: f64 = density.iter().sum();
+        let likelihood = density.iter().enumerate().map(|(index, share)| {
+            DOUBT + (1.0 - DOUBT) * share / total.max(f64::MIN_POSITIVE) / prior(index)
+        });
+        Self {
+            likelihood: likelihood.collect(),
+        }
+    }
+
+    /// One that says nothing.
+    fn nothing() -> Self {
+        Self {
+            likelihood: vec![1.0; CELLS + 1],
+        }
+    }
+}
+
+/// The groups that the looks speak for, oldest look first, each with an opinion of every benchmark where it
+/// has one. Groups stand in the order of their first benchmarks.
+pub fn groups(looks: &[Vec<Option<Opinion>>]) -> Vec<Group> {
+    let Some(count) = looks.iter().map(Vec::len).min() else {
+        return Vec::new();
+    };
+    let last = looks.len() - 1;
+    let found = partition(window(looks, last), count);
+    let mut groups: Vec<Group> = found
+        .iter()
+        .map(|part| Group {
+            members: part.members.clone(),
+            probabilities: belonging(window(looks, last), part, &found),
+            since: last,
+            passage: part.passage(),
+        })
+        .collect();
+    let mut open = vec![true; groups.len()];
+    for look in (0..last).rev() {
+        if open.iter().all(|open| !open) {
+            break;
+        }
+        let before = partition(window(looks, look), count);
+        for (group, open) in groups.iter_mut().zip(&mut open) {
+            *open &= before.iter().any(|part| part.members == group.members);
+            if *open {
+                group.since = look;
+            }
+        }
+    }
+    groups.sort_by(|a, b| a.members.cmp(&b.members));
+    groups
+}
+
+/// The newest looks up to one of them.
+fn window(looks: &[Vec<Option<Opinion>>], last: usize) -> &[Vec<Option<Opinion>>] {
+    &looks[(last + 1).saturating_sub(JUDGED)..=last]
+}
+
+/// Benchmarks taken as one, with what they say at each look.
+#[derive(Debug, Clone)]
+struct Part {
+    members: Vec<usize>,
+    looks: Vec<Density>,
+}
+
+impl Part {
+    fn of(window: &[Vec<Option<Opinion>>], mut members: Vec<usize>) -> Self {
+        members.sort_unstable();
+        let look = |look: &Vec<Option<Opinion>>| {
+            let opinions = members.iter().filter_map(|member| look[*member].as_ref());
+            combined(&opinions.collect::<Vec<_>>())
+        };
+        Self {
+            looks: window.iter().map(look).collect(),
+            members,
+        }
+    }
+
+    /// ln of the odds that these two are one.
+    fn ln_odds(&self, other: &Self) -> f64 {
+        let each = self.looks.iter().zip(&other.looks).map(|(a, b)| {
+            let agreement = a.iter().zip(b).enumerate();
+            let sum: f64 = agreement.map(|(i, (a, b))| a * b / prior(i)).sum();
+            sum.max(f64::MIN_POSITIVE).ln()
+        });
+        ODDS.ln() + each.sum::<f64>() / self.looks.len() as f64
+    }
+
+    fn passage(&self) -> Passage {
+        let cells = self.looks.iter().rev().take(1).flatten().take(CELLS);
+        let times = cells
+            .enumerate()
+            .map(|(index, share)| (SOONEST * ((index as f64 + 0.5) * CELL).exp(), *share));
+        Passage::from_times(times.collect())
+    }
+}
+
+/// Parts that no merging makes more probable.
+fn partition(window: &[Vec<Option<Opinion>>], count: usize) -> Vec<Part> {
+    let mut parts: Vec<Part> = (0..count)
+        .map(|member| Part::of(window, vec![member]))
+        .collect();
+    let mut ln_odds: Vec<Vec<f64>> = (0..count)
+        .map(|i| (0..i).map(|j| parts[i].ln_odds(&parts[j])).collect())
+        .collect();
+    loop {
+        let pairs = (0..parts.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
+        let best = pairs.max_by(|a, b| ln_odds[a.0][a.1].total_cmp(&ln_odds[b.0][b.1]));
+        let Some((i, j)) = best.filter(|(i, j)| ln_odds[*i][*j] > 0.0) else {
+            return parts;
+        };
+        let gone = parts.remove(i);
+        ln_odds.remove(i);
+        for row in &mut ln_odds[i..] {
+            row.remove(i);
+        }
+        let members = [parts[j].members.as_slice(), &gone.members].concat();
+        parts[j] = Part::of(window, members);
+        for other in (0..parts.len()).filter(|other| *other != j) {
+            ln_odds[other.max(j)][other.min(j)] = parts[j].ln_odds(&parts[other]);
+        }
+    }
+}
+
+/// How probably each member belongs where it is.
+fn belonging(window: &[Vec<Option<Opinion>>], part: &Part, all: &[Part]) -> Vec<f64> {
+    let probability = |ln_odds: f64| 1.0 / (1.0 + (-ln_odds).exp());
+    if part.members.len() == 1 {
+        let others = all.iter().filter(|other| other.members != part.members);
+        let nearest = others.map(|other| part.ln_odds(other));
+        return vec![1.0 - nearest.map(probability).fold(0.0, f64::max)];
+    }
+    let members = part.members.iter().map(|member| {
+        let rest = part.members.iter().filter(|other| *other != member);
+        let rest = Part::of(window, rest.copied().collect());
+        probability(Part::of(window, vec![*member]).ln_odds(&rest))
+    });
+    members.collect()
+}
+
+/// What all of `opinions` say under one failure time.
+fn combined(opinions: &[&Opinion]) -> Density {
+    let sharpness = opinions
+        .iter()
+        .map(|opinion| information(&posterior(&[opinion], 1.0)).exp());
+    let (sum, squares) = sharpness.fold((0.0, 0.0), |(sum, squares), s: f64| {
+        (sum + s, squares + s * s)
+    });
+    let count = if squares > 0.0 {
+        sum * sum / squares
+    } else {
+        1.0
+    };
+    posterior(opinions, 1.0 / (1.0 + (count - 1.0) * SHARED))
+}
+
+/// The prior times all likelihoods to the power `weight`, normalised.
+fn posterior(opinions: &[&Opinion], weight: f64) -> Density {
+    let ln = |index: usize| {
+        let each = opinions.iter().map(|opinion| opinion.likelihood[index].ln());
+        prior(index).ln() + weight * each.sum::<f64>()
+    };
+    let ln: Vec<f64> = (0..=CELLS).map(ln).collect();
+    let best = ln.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let total: f64 = ln.iter().map(|ln| (ln - best).exp()).sum();
+    ln.iter().map(|ln| (ln - best).exp() / total).collect()
+}
+
+/// What a density says that the prior does not, nats; of a narrow one, e to this grows as one over its width.
+fn information(density: &Density) -> f64 {
+    let cells = density.iter().enumerate().filter(|(_, share)| **share > 0.0);
+    cells
+        .map(|(index, share)| share * (share / prior(index)).ln())
+        .sum()
+}
+
+fn prior(index: usize) -> f64 {
+    if index == CELLS {
+        NEVER
+    } else {
+        (1.0 - NEVER) / CELLS as f64
+    }
+}
+
+/// Where a time falls; beyond the horizon into the cell of "never".
+fn cell(days: f64) -> usize {
+    let place = ((days / SOONEST).ln() / CELL).max(0.0);
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "not negative, and bounded"
+    )]
+    let index = place as usize;
+    if days > HORIZON_DAYS {
+        CELLS
+    } else {
+        index.min(CELLS - 1)
+    }
+}
+
+/// Spreads every cell by [`SCATTER`]; what would leave the grid stays at its end.
+fn smooth(cells: &mut [f64]) {
+    let kernel: Vec<f64> = (0..=2 * REACH)
+        .map(|step| {
+            let off = (step as f64 - REACH as f64) * CELL / SCATTER;
+            (-0.5 * off * off).exp()
+        })
+        .collect();
+    let total: f64 = kernel.iter().sum();
+    let sharp = cells.to_vec();
+    cells.fill(0.0);
+    for (index, share) in sharp.iter().enumerate() {
+        for (step, weight) in kernel.iter().enumerate() {
+            let to = (index + step).saturating_sub(REACH).min(sharp.len() - 1);
+            cells[to] += share * weight / total;
+        }
+    }
+}

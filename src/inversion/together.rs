@@ -1,0 +1,142 @@
+//! Which benchmarks of one site fail together, since when it is seen, and when they fail.
+
+use super::report::FailureTime;
+use super::{Inversion, Options};
+use crate::forecast::{FEWEST_READINGS, Opinion, groups, measurably_moves, outlook};
+use crate::reading::{BenchmarkId, SECONDS_PER_DAY, Series, Timestamp, after_days, days_since};
+use serde::Serialize;
+
+/// Looks back over the time in which all benchmarks were read, evenly, by which "since" is told.
+const LOOKS: usize = 16;
+/// A benchmark not read for more than this share of its own record says nothing of today.
+const SILENT: f64 = 1.0 / 3.0;
+
+/// What the benchmarks of one site say together.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TogetherReport {
+    /// Benchmarks that share one failure time.
+    pub groups: Vec<GroupReport>,
+    /// Benchmarks that share it with no other.
+    pub apart: Vec<ApartReport>,
+    /// Benchmarks without a forecast of today, which are not judged.
+    pub silent: Vec<BenchmarkId>,
+    /// The first of the looks back.
+    pub judged_from: Timestamp,
+    /// How far they lie apart, days.
+    pub judged_every_days: f64,
+}
+
+/// Benchmarks that share one failure time.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GroupReport {
+    /// Which.
+    pub benchmarks: Vec<BenchmarkId>,
+    /// How probably each fails with the others, in the same order.
+    pub probabilities: Vec<f64>,
+    /// The look from which on they have been a group; [`TogetherReport::judged_from`]: from the first.
+    pub since: Timestamp,
+    /// When their common failure comes.
+    pub failure_time: FailureTime,
+}
+
+/// A benchmark on its own.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ApartReport {
+    /// Which.
+    pub benchmark: BenchmarkId,
+    /// How probably it fails with no group and no other benchmark.
+    pub probability: f64,
+    /// The look from which on it has stood apart.
+    pub since: Timestamp,
+}
+
+/// Judges the benchmarks of `series`, by the first series of each, with what `options` let be used; `None`
+/// where fewer than two have a forecast.
+pub fn together(series: &[Series], options: &Options) -> Option<TogetherReport> {
+    let mut each: Vec<Inversion> = Vec::new();
+    for one in series {
+        if each.iter().all(|known| known.series.benchmark != one.benchmark) {
+            each.push(Inversion::new(one, options));
+        }
+    }
+    let ends = each.iter().filter_map(|one| one.series.readings.last());
+    let now = ends.map(|reading| reading.time).max()?;
+    let (heard, silent): (Vec<Inversion>, Vec<Inversion>) = each
+        .into_iter()
+        .partition(|one| is_heard(one, now) && opinion(one, now).is_some());
+    if heard.len() < 2 {
+        return None;
+    }
+    let times = looks(&heard, now)?;
+    let looks: Vec<Vec<Option<Opinion>>> = times
+        .iter()
+        .map(|time| heard.iter().map(|one| opinion(one, *time)).collect())
+        .collect();
+    let name = |member: &usize| heard[*member].series.benchmark.clone();
+    let (alone, together): (Vec<_>, Vec<_>) = groups(&looks)
+        .into_iter()
+        .partition(|group| group.members.len() == 1);
+    let groups = together.iter().map(|group| GroupReport {
+        benchmarks: group.members.iter().map(name).collect(),
+        probabilities: group.probabilities.clone(),
+        since: times[group.since],
+        failure_time: FailureTime::from_passage(options, Some((now, &group.passage))),
+    });
+    let apart = alone.iter().flat_map(|group| {
+        let members = group.members.iter().zip(&group.probabilities);
+        members.map(|(member, probability)| ApartReport {
+            benchmark: name(member),
+            probability: *probability,
+            since: times[group.since],
+        })
+    });
+    Some(TogetherReport {
+        groups: groups.collect(),
+        apart: apart.collect(),
+        silent: silent.into_iter().map(|one| one.series.benchmark).collect(),
+        judged_from: times[0],
+        judged_every_days: days_since(times[0], now) / (times.len().max(2) - 1) as f64,
+    })
+}
+
+/// Whether the newest reading is no further back than is usual.
+fn is_heard(inversion: &Inversion, now: Timestamp) -> bool {
+    let readings = &inversion.series.readings;
+    let (Some(first), Some(last)) = (readings.first(), readings.last()) else {
+        return false;
+    };
+    days_since(last.time, now) <= SILENT * days_since(first.time, last.time)
+}
+
+/// What the readings up to `time` foretell from there; `None` where too few do, or none that moves.
+fn opinion(inversion: &Inversion, time: Timestamp) -> Option<Opinion> {
+    let mut observations = inversion.observations.clone();
+    let first = inversion.series.readings.first()?.time;
+    let days = days_since(first, time);
+    observations.values.retain(|value| value.t_days <= days);
+    let (outlook, _) = outlook(
+        &observations,
+        inversion.options.critical_velocity_mm_per_day,
+    )?;
+    let moves = measurably_moves(&outlook.rates);
+    moves.then(|| Opinion::of(&outlook.passage, days - outlook.now_days))
+}
+
+/// The looks back: all benchmarks have readings enough by the first, and the last is now.
+fn looks(inversions: &[Inversion], now: Timestamp) -> Option<Vec<Timestamp>> {
+    let ready = inversions.iter().filter_map(|one| {
+        let spaced = one.observations.spaced(FEWEST_READINGS);
+        let days = spaced.last()?.t_days;
+        after_days(one.series.readings.first()?.time, days)
+    });
+    let first = ready.max()?;
+    let step = days_since(first, now) / (LOOKS - 1) as f64;
+    let at = |index: usize| {
+        let seconds = (step * index as f64 * SECONDS_PER_DAY).ceil();
+        after_days(first, seconds / SECONDS_PER_DAY).map(|time| time.min(now))
+    };
+    let mut times: Vec<Timestamp> = (0..LOOKS - 1).filter_map(at).collect();
+    times.push(now);
+    times.dedup();
+    Some(times)
+}
