@@ -70,8 +70,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let Some(report) = together(&recording.series, &options) else {
         return Ok(());
     };
-    args.output
-        .print(&Site { together: report }, |site| neighbours(&site.together))
+    args.output.print(&Site { together: report }, |site| {
+        neighbours(&site.together)
+    })
 }
 
 /// What is said after the benchmarks one by one.
@@ -316,8 +317,8 @@ fn neighbours(report: &TogetherReport) -> String {
     }
     let _ = writeln!(
         out,
-        "looked at every {} days from {}",
-        number(Some(report.judged_every_days)),
+        "judged by {} looks from {} on",
+        report.looks,
         time(Some(report.judged_from)),
     );
     out

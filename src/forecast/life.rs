@@ -70,7 +70,13 @@ impl Life {
             let together: Option<Vec<Self>> = (0..count)
                 .map(|_| {
                     let law = law(Fate::Failing, duration, &mut generator);
-                    Self::of(Fate::Failing, law, (onset, duration), &knots, &mut generator)
+                    Self::of(
+                        Fate::Failing,
+                        law,
+                        (onset, duration),
+                        &knots,
+                        &mut generator,
+                    )
                 })
                 .collect();
             if let Some(together) = together {

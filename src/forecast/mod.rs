@@ -9,7 +9,7 @@ mod together;
 
 pub use life::{Fate, Life};
 pub use line::InverseVelocityLine;
-pub(crate) use panel::{measurably_moves, outlook};
 pub use panel::{FEWEST_READINGS, HORIZON_DAYS, Outlook, Panel};
+pub(crate) use panel::{measurably_moves, outlook};
 pub use passage::Passage;
-pub use together::{Group, Opinion, groups};
+pub use together::{Group, Look, Opinion, groups};

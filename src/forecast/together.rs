@@ -11,7 +11,8 @@
 //! counts forecasts by their sharpness, so that one that says little takes nothing from one that says much.
 //!
 //! The best partition is found by agglomeration from single benchmarks. A forecast wavers from one reading
-//! to the next, and membership does not: the ln of a Bayes factor is its mean over the newest looks.
+//! to the next, and membership does not: the ln of a Bayes factor is its mean over looks of late, late being
+//! measured by the time that is left.
 
 use super::{HORIZON_DAYS, Passage};
 use crate::fit::FINEST_DAYS;
@@ -27,9 +28,9 @@ const DOUBT: f64 = 0.03;
 /// Prior chance of no failure within the horizon.
 const NEVER: f64 = 0.5;
 /// Prior odds that two benchmarks of one site fail together.
-const ODDS: f64 = 3.0;
-/// Looks over which an agreement is judged.
-const JUDGED: usize = 4;
+const ODDS: f64 = 4.0;
+/// An agreement is judged over the looks at which this many times as long was left, at most.
+const LATE: f64 = 1.6;
 /// The grid: its first time, days, the width of a cell in ln of the time, and as many cells as reach the
 /// horizon.
 const SOONEST: f64 = FINEST_DAYS / 8.0;
@@ -44,6 +45,15 @@ const OVERTAKEN: f64 = 0.02;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Opinion {
     likelihood: Vec<f64>,
+}
+
+/// What all benchmarks of a site foretell at one time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Look {
+    /// From then to the failure that is expected by now, days.
+    pub left_days: f64,
+    /// One of every benchmark, where it has one.
+    pub opinions: Vec<Option<Opinion>>,
 }
 
 /// Benchmarks that fail together, or one alone.
@@ -87,6 +97,16 @@ impl Opinion {
         }
     }
 
+    /// The same where it counts only with a probability.
+    fn believed(&self, probability: f64) -> Self {
+        let likelihood = self.likelihood.iter();
+        Self {
+            likelihood: likelihood
+                .map(|one| 1.0 - probability + probability * one)
+                .collect(),
+        }
+    }
+
     /// One that says nothing.
     fn nothing() -> Self {
         Self {
@@ -95,10 +115,9 @@ impl Opinion {
     }
 }
 
-/// The groups that the looks speak for, oldest look first, each with an opinion of every benchmark where it
-/// has one. Groups stand in the order of their first benchmarks.
-pub fn groups(looks: &[Vec<Option<Opinion>>]) -> Vec<Group> {
-    let Some(count) = looks.iter().map(Vec::len).min() else {
+/// The groups that the looks speak for, oldest look first, in the order of their first benchmarks.
+pub fn groups(looks: &[Look]) -> Vec<Group> {
+    let Some(count) = looks.iter().map(|look| look.opinions.len()).min() else {
         return Vec::new();
     };
     let last = looks.len() - 1;
@@ -109,7 +128,7 @@ pub fn groups(looks: &[Vec<Option<Opinion>>]) -> Vec<Group> {
             members: part.members.clone(),
             probabilities: belonging(window(looks, last), part, &found),
             since: last,
-            passage: part.passage(),
+            passage: common_passage(&looks[last].opinions, &part.members),
         })
         .collect();
     let mut open = vec![true; groups.len()];
@@ -129,9 +148,11 @@ pub fn groups(looks: &[Vec<Option<Opinion>>]) -> Vec<Group> {
     groups
 }
 
-/// The newest looks up to one of them.
-fn window(looks: &[Vec<Option<Opinion>>], last: usize) -> &[Vec<Option<Opinion>>] {
-    &looks[(last + 1).saturating_sub(JUDGED)..=last]
+/// The late looks as seen at one of them.
+fn window(looks: &[Look], last: usize) -> &[Look] {
+    let is_early = |look: &Look| look.left_days > LATE * looks[last].left_days;
+    let early = looks[..last].iter().take_while(|look| is_early(look));
+    &looks[early.count()..=last]
 }
 
 /// Benchmarks taken as one, with what they say at each look.
@@ -142,10 +163,12 @@ struct Part {
 }
 
 impl Part {
-    fn of(window: &[Vec<Option<Opinion>>], mut members: Vec<usize>) -> Self {
+    fn of(window: &[Look], mut members: Vec<usize>) -> Self {
         members.sort_unstable();
-        let look = |look: &Vec<Option<Opinion>>| {
-            let opinions = members.iter().filter_map(|member| look[*member].as_ref());
+        let look = |look: &Look| {
+            let opinions = members
+                .iter()
+                .filter_map(|member| look.opinions[*member].as_ref());
             combined(&opinions.collect::<Vec<_>>())
         };
         Self {
@@ -156,25 +179,48 @@ impl Part {
 
     /// ln of the odds that these two are one.
     fn ln_odds(&self, other: &Self) -> f64 {
-        let each = self.looks.iter().zip(&other.looks).map(|(a, b)| {
-            let agreement = a.iter().zip(b).enumerate();
-            let sum: f64 = agreement.map(|(i, (a, b))| a * b / prior(i)).sum();
-            sum.max(f64::MIN_POSITIVE).ln()
-        });
-        ODDS.ln() + each.sum::<f64>() / self.looks.len() as f64
-    }
-
-    fn passage(&self) -> Passage {
-        let cells = self.looks.iter().rev().take(1).flatten().take(CELLS);
-        let times = cells
-            .enumerate()
-            .map(|(index, share)| (SOONEST * ((index as f64 + 0.5) * CELL).exp(), *share));
-        Passage::from_times(times.collect())
+        let each = self.looks.iter().zip(&other.looks);
+        let ln: f64 = each.map(|(a, b)| agreement(a, b).ln()).sum();
+        ODDS.ln() + ln / self.looks.len() as f64
     }
 }
 
+/// When the benchmarks of `members` fail by what they say now. The sharpest is believed as it stands, each
+/// other as far as it is likely by now to share the failure of the rest: one that halts for a moment is not
+/// to talk the mass out of its failure.
+fn common_passage(now: &[Option<Opinion>], members: &[usize]) -> Passage {
+    let known: Vec<&Opinion> = members
+        .iter()
+        .filter_map(|one| now[*one].as_ref())
+        .collect();
+    let alone: Vec<Density> = known.iter().map(|one| posterior(&[*one], 1.0)).collect();
+    let sharpest =
+        (0..known.len()).max_by(|a, b| information(&alone[*a]).total_cmp(&information(&alone[*b])));
+    let believed = (0..known.len()).map(|index| {
+        if Some(index) == sharpest {
+            return known[index].clone();
+        }
+        let rest = (0..known.len()).filter(|other| *other != index);
+        let rest: Vec<&Opinion> = rest.map(|other| known[other]).collect();
+        let odds = ODDS * agreement(&alone[index], &combined(&rest));
+        known[index].believed(odds / (1.0 + odds))
+    });
+    let believed: Vec<Opinion> = believed.collect();
+    let common = combined(&believed.iter().collect::<Vec<_>>());
+    let times = common[..CELLS].iter().enumerate();
+    let times = times.map(|(index, share)| (SOONEST * ((index as f64 + 0.5) * CELL).exp(), *share));
+    Passage::from_times(times.collect())
+}
+
+/// The Bayes factor of one failure time against two.
+fn agreement(a: &Density, b: &Density) -> f64 {
+    let cells = a.iter().zip(b).enumerate();
+    let sum: f64 = cells.map(|(index, (a, b))| a * b / prior(index)).sum();
+    sum.max(f64::MIN_POSITIVE)
+}
+
 /// Parts that no merging makes more probable.
-fn partition(window: &[Vec<Option<Opinion>>], count: usize) -> Vec<Part> {
+fn partition(window: &[Look], count: usize) -> Vec<Part> {
     let mut parts: Vec<Part> = (0..count)
         .map(|member| Part::of(window, vec![member]))
         .collect();
@@ -201,7 +247,7 @@ fn partition(window: &[Vec<Option<Opinion>>], count: usize) -> Vec<Part> {
 }
 
 /// How probably each member belongs where it is.
-fn belonging(window: &[Vec<Option<Opinion>>], part: &Part, all: &[Part]) -> Vec<f64> {
+fn belonging(window: &[Look], part: &Part, all: &[Part]) -> Vec<f64> {
     let probability = |ln_odds: f64| 1.0 / (1.0 + (-ln_odds).exp());
     if part.members.len() == 1 {
         let others = all.iter().filter(|other| other.members != part.members);
@@ -235,7 +281,9 @@ fn combined(opinions: &[&Opinion]) -> Density {
 /// The prior times all likelihoods to the power `weight`, normalised.
 fn posterior(opinions: &[&Opinion], weight: f64) -> Density {
     let ln = |index: usize| {
-        let each = opinions.iter().map(|opinion| opinion.likelihood[index].ln());
+        let each = opinions
+            .iter()
+            .map(|opinion| opinion.likelihood[index].ln());
         prior(index).ln() + weight * each.sum::<f64>()
     };
     let ln: Vec<f64> = (0..=CELLS).map(ln).collect();
@@ -246,7 +294,10 @@ fn posterior(opinions: &[&Opinion], weight: f64) -> Density {
 
 /// What a density says that the prior does not, nats; of a narrow one, e to this grows as one over its width.
 fn information(density: &Density) -> f64 {
-    let cells = density.iter().enumerate().filter(|(_, share)| **share > 0.0);
+    let cells = density
+        .iter()
+        .enumerate()
+        .filter(|(_, share)| **share > 0.0);
     cells
         .map(|(index, share)| share * (share / prior(index)).ln())
         .sum()
@@ -292,5 +343,73 @@ fn smooth(cells: &mut [f64]) {
             let to = (index + step).saturating_sub(REACH).min(sharp.len() - 1);
             cells[to] += share * weight / total;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A forecast whose ln is spread evenly over `width` about that of `days`.
+    fn about(days: f64, width: f64) -> Passage {
+        let at = |step: i32| days * (width * f64::from(step) / 50.0).exp();
+        Passage::from_times((-50..=50).map(|step| (at(step), 1.0 / 101.0)).collect())
+    }
+
+    fn of_one_look(passages: &[Passage]) -> Vec<Group> {
+        let opinions = passages.iter().map(|one| Some(Opinion::of(one, 0.0)));
+        groups(&[Look {
+            left_days: 10.0,
+            opinions: opinions.collect(),
+        }])
+    }
+
+    fn width(passage: &Passage) -> f64 {
+        let at = |share| passage.quantile(share, HORIZON_DAYS).unwrap();
+        (at(0.95) / at(0.05)).ln()
+    }
+
+    #[test]
+    fn the_grid_ends_with_the_horizon() {
+        let end = SOONEST * (CELLS as f64 * CELL).exp();
+        assert!((HORIZON_DAYS..HORIZON_DAYS * 1.02).contains(&end), "{end}");
+    }
+
+    #[test]
+    fn two_that_agree_are_one_narrower_forecast_in_whatever_order() {
+        let (a, b) = (about(10.0, 0.8), about(12.0, 0.8));
+        let one = of_one_look(&[a.clone(), b.clone()]);
+        assert_eq!(one[0].members, [0, 1]);
+        assert!(width(&one[0].passage) < 0.9 * width(&a));
+        let other = of_one_look(&[b, a]);
+        let median = |groups: &[Group]| groups[0].passage.quantile(0.5, HORIZON_DAYS);
+        assert_eq!(median(&one), median(&other));
+    }
+
+    #[test]
+    fn a_hundred_that_share_their_load_are_not_a_hundred_opinions() {
+        let many = of_one_look(&vec![about(10.0, 0.8); 100]);
+        let two = of_one_look(&vec![about(10.0, 0.8); 2]);
+        // Worth 2.5 independent ones at the most.
+        let ratio = width(&many[0].passage) / width(&two[0].passage);
+        assert!((0.6..0.95).contains(&ratio), "{ratio}");
+    }
+
+    #[test]
+    fn a_neighbour_that_halts_does_not_talk_a_mass_out_of_its_failure() {
+        let halts = Passage::from_times(vec![(300.0, 1e-3)]);
+        for group in of_one_look(&[about(2.0, 0.5), halts.clone(), halts]) {
+            if group.members.contains(&0) {
+                assert!(group.passage.chance_within(5.0) > 0.9);
+            } else {
+                assert!(group.passage.chance_within(5.0) < 0.1);
+            }
+        }
+    }
+
+    #[test]
+    fn what_has_been_overtaken_says_nothing() {
+        assert_eq!(Opinion::of(&about(2.0, 0.5), 9.0), Opinion::nothing());
+        assert_ne!(Opinion::of(&about(2.0, 0.5), 1.0), Opinion::nothing());
     }
 }

@@ -2,12 +2,15 @@
 
 use super::report::FailureTime;
 use super::{Inversion, Options};
-use crate::forecast::{FEWEST_READINGS, Opinion, groups, measurably_moves, outlook};
+use crate::forecast::{FEWEST_READINGS, Look, Opinion, Passage, groups, measurably_moves, outlook};
 use crate::reading::{BenchmarkId, SECONDS_PER_DAY, Series, Timestamp, after_days, days_since};
 use serde::Serialize;
 
-/// Looks back over the time in which all benchmarks were read, evenly, by which "since" is told.
-const LOOKS: usize = 16;
+/// Looks back over the time in which all benchmarks were read, by which "since" is told: evenly in ln of the
+/// time to the failure that is expected now, as forecasts change.
+const LOOKS: usize = 24;
+/// That time over the time looked back on, within bounds that leave no step too coarse or too fine.
+const LEFT: (f64, f64) = (0.02, 1.0);
 /// A benchmark not read for more than this share of its own record says nothing of today.
 const SILENT: f64 = 1.0 / 3.0;
 
@@ -22,8 +25,8 @@ pub struct TogetherReport {
     pub silent: Vec<BenchmarkId>,
     /// The first of the looks back.
     pub judged_from: Timestamp,
-    /// How far they lie apart, days.
-    pub judged_every_days: f64,
+    /// How many there are; they lie closer as the failure comes closer.
+    pub looks: usize,
 }
 
 /// Benchmarks that share one failure time.
@@ -55,7 +58,10 @@ pub struct ApartReport {
 pub fn together(series: &[Series], options: &Options) -> Option<TogetherReport> {
     let mut each: Vec<Inversion> = Vec::new();
     for one in series {
-        if each.iter().all(|known| known.series.benchmark != one.benchmark) {
+        if each
+            .iter()
+            .all(|known| known.series.benchmark != one.benchmark)
+        {
             each.push(Inversion::new(one, options));
         }
     }
@@ -67,11 +73,7 @@ pub fn together(series: &[Series], options: &Options) -> Option<TogetherReport> 
     if heard.len() < 2 {
         return None;
     }
-    let times = looks(&heard, now)?;
-    let looks: Vec<Vec<Option<Opinion>>> = times
-        .iter()
-        .map(|time| heard.iter().map(|one| opinion(one, *time)).collect())
-        .collect();
+    let (times, looks) = looks(&heard, now)?;
     let name = |member: &usize| heard[*member].series.benchmark.clone();
     let (alone, together): (Vec<_>, Vec<_>) = groups(&looks)
         .into_iter()
@@ -95,7 +97,7 @@ pub fn together(series: &[Series], options: &Options) -> Option<TogetherReport> 
         apart: apart.collect(),
         silent: silent.into_iter().map(|one| one.series.benchmark).collect(),
         judged_from: times[0],
-        judged_every_days: days_since(times[0], now) / (times.len().max(2) - 1) as f64,
+        looks: times.len(),
     })
 }
 
@@ -108,35 +110,52 @@ fn is_heard(inversion: &Inversion, now: Timestamp) -> bool {
     days_since(last.time, now) <= SILENT * days_since(first.time, last.time)
 }
 
-/// What the readings up to `time` foretell from there; `None` where too few do, or none that moves.
-fn opinion(inversion: &Inversion, time: Timestamp) -> Option<Opinion> {
+/// What the readings up to `time` foretell; `None` where too few do, or none that moves.
+fn foretold(inversion: &Inversion, time: Timestamp) -> Option<(Passage, f64)> {
     let mut observations = inversion.observations.clone();
     let first = inversion.series.readings.first()?.time;
     let days = days_since(first, time);
     observations.values.retain(|value| value.t_days <= days);
-    let (outlook, _) = outlook(
-        &observations,
-        inversion.options.critical_velocity_mm_per_day,
-    )?;
+    let critical = inversion.options.critical_velocity_mm_per_day;
+    let (outlook, _) = outlook(&observations, critical)?;
     let moves = measurably_moves(&outlook.rates);
-    moves.then(|| Opinion::of(&outlook.passage, days - outlook.now_days))
+    moves.then_some((outlook.passage, days - outlook.now_days))
 }
 
-/// The looks back: all benchmarks have readings enough by the first, and the last is now.
-fn looks(inversions: &[Inversion], now: Timestamp) -> Option<Vec<Timestamp>> {
+/// The looks back and their times: all benchmarks have readings enough by the first, and the last is now.
+fn looks(inversions: &[Inversion], now: Timestamp) -> Option<(Vec<Timestamp>, Vec<Look>)> {
     let ready = inversions.iter().filter_map(|one| {
         let spaced = one.observations.spaced(FEWEST_READINGS);
         let days = spaced.last()?.t_days;
         after_days(one.series.readings.first()?.time, days)
     });
     let first = ready.max()?;
-    let step = days_since(first, now) / (LOOKS - 1) as f64;
-    let at = |index: usize| {
-        let seconds = (step * index as f64 * SECONDS_PER_DAY).ceil();
-        after_days(first, seconds / SECONDS_PER_DAY).map(|time| time.min(now))
+    let span = days_since(first, now);
+    let medians = inversions.iter().filter_map(|one| {
+        let (passage, later) = foretold(one, now)?;
+        Some(passage.quantile(0.5, f64::INFINITY)? - later)
+    });
+    let soonest = medians.fold(f64::INFINITY, f64::min);
+    let left = soonest.clamp(LEFT.0 * span, LEFT.1 * span);
+    let back = |index: usize| {
+        let share = index as f64 / (LOOKS - 1) as f64;
+        left * (((left + span) / left.max(f64::MIN_POSITIVE)).powf(share) - 1.0)
     };
-    let mut times: Vec<Timestamp> = (0..LOOKS - 1).filter_map(at).collect();
-    times.push(now);
+    let at = |index: usize| {
+        let seconds = (back(index) * SECONDS_PER_DAY).floor();
+        after_days(now, -seconds / SECONDS_PER_DAY)
+    };
+    let mut times: Vec<Timestamp> = (0..LOOKS).rev().filter_map(at).collect();
     times.dedup();
-    Some(times)
+    let looks = times.iter().map(|time| Look {
+        left_days: left + days_since(*time, now),
+        opinions: inversions.iter().map(|one| opinion(one, *time)).collect(),
+    });
+    let looks = looks.collect();
+    Some((times, looks))
+}
+
+fn opinion(inversion: &Inversion, time: Timestamp) -> Option<Opinion> {
+    let (passage, later) = foretold(inversion, time)?;
+    Some(Opinion::of(&passage, later))
 }
