@@ -30,7 +30,7 @@ const NEVER: f64 = 0.5;
 /// Prior odds that two benchmarks of one site fail together.
 const ODDS: f64 = 4.0;
 /// An agreement is judged over the looks at which this many times as long was left, at most.
-const LATE: f64 = 1.6;
+const LATE: f64 = 1.4;
 /// The grid: its first time, days, the width of a cell in ln of the time, and as many cells as reach the
 /// horizon.
 const SOONEST: f64 = FINEST_DAYS / 8.0;
