@@ -6,8 +6,10 @@
 
 #![expect(clippy::print_stdout, reason = "a table is what it is for")]
 
-use slipwatch::fit::{Observation, Observations};
-use slipwatch::forecast::{Fate, Group, HORIZON_DAYS, Life, Look, Opinion, Panel, Passage, groups};
+use slipwatch::fit::{Observation, Observations, Rate};
+use slipwatch::forecast::{
+    Dependence, Fate, Group, HORIZON_DAYS, Life, Look, Opinion, Panel, Passage, groups,
+};
 use slipwatch::reading::Quantity;
 
 const LEADS: [f64; 5] = [40.0, 20.0, 10.0, 5.0, 2.0];
@@ -32,8 +34,15 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
+/// What the readings up to a time foretell from then.
+struct Seen {
+    passage: Passage,
+    rates: Vec<Rate>,
+    now: f64,
+}
+
 /// What the readings up to `now` days foretell, from then.
-fn passage(life: &Life, now: f64) -> Option<Passage> {
+fn passage(life: &Life, now: f64) -> Option<Seen> {
     let known = life.readings.iter().filter(|(days, _)| *days <= now);
     let values = known.map(|(t_days, value)| Observation {
         t_days: *t_days,
@@ -49,15 +58,21 @@ fn passage(life: &Life, now: f64) -> Option<Passage> {
     let later = now - outlook.now_days;
     let times = outlook.passage.times().iter();
     let times = times.map(|(days, share)| (days - later, *share));
-    Some(Passage::from_times(times.collect()))
+    Some(Seen {
+        passage: Passage::from_times(times.collect()),
+        rates: outlook.rates,
+        now,
+    })
 }
 
-fn one_look(passages: &[Passage]) -> Vec<Group> {
-    let opinions = passages.iter().map(|one| Some(Opinion::of(one, 0.0)));
-    groups(&[Look {
+fn one_look(seen: &[Seen]) -> Vec<Group> {
+    let opinions = seen.iter().map(|one| Some(Opinion::of(&one.passage, 0.0)));
+    let look = Look {
         left_days: 1.0,
         opinions: opinions.collect(),
-    }])
+    };
+    let rates: Vec<(&[Rate], f64)> = seen.iter().map(|one| (&*one.rates, one.now)).collect();
+    groups(&[look], &Dependence::measured(&rates))
 }
 
 /// Errors and widths in ln of the remaining time.
@@ -95,14 +110,14 @@ fn at_lead(masses: u64, lead: f64) {
         let lives = Life::draw_together(MEMBERS, 90_000 + seed);
         let ends: Vec<f64> = lives.iter().filter_map(|life| life.failure_days).collect();
         let now = ends.iter().copied().fold(f64::INFINITY, f64::min) - lead;
-        let passages: Option<Vec<Passage>> = lives.iter().map(|life| passage(life, now)).collect();
-        let Some(passages) = passages else {
+        let seen: Option<Vec<Seen>> = lives.iter().map(|life| passage(life, now)).collect();
+        let Some(seen) = seen else {
             continue;
         };
         let mut sorted = ends.clone();
         sorted.sort_by(f64::total_cmp);
         let truth = f64::midpoint(sorted[MEMBERS / 2 - 1], sorted[MEMBERS / 2]) - now;
-        let largest = one_look(&passages)
+        let largest = one_look(&seen)
             .into_iter()
             .max_by_key(|group| group.members.len());
         let Some(largest) = largest else {
@@ -110,15 +125,15 @@ fn at_lead(masses: u64, lead: f64) {
         };
         count += 1;
         joint.add(&largest.passage, truth);
-        for (passage, end) in passages.iter().zip(&ends) {
-            single.add(passage, end - now);
+        for (one, end) in seen.iter().zip(&ends) {
+            single.add(&one.passage, end - now);
         }
     }
     println!("{lead:6} {count:7} {} {}", joint.row(), single.row());
 }
 
 fn pairs(masses: u64, lead: f64) {
-    let share = |pairs: &dyn Fn(u64) -> Option<[Passage; 2]>| {
+    let share = |pairs: &dyn Fn(u64) -> Option<[Seen; 2]>| {
         let found: Vec<bool> = (0..masses)
             .filter_map(pairs)
             .map(|pair| one_look(&pair).len() == 1)

@@ -1,5 +1,6 @@
 //! When the critical velocity will be passed: the distribution, the inverse-velocity line, the panel.
 
+mod dependence;
 mod life;
 mod line;
 mod panel;
@@ -7,6 +8,7 @@ mod passage;
 mod surprise;
 mod together;
 
+pub use dependence::Dependence;
 pub use life::{Fate, Life};
 pub use line::InverseVelocityLine;
 pub use panel::{FEWEST_READINGS, HORIZON_DAYS, Outlook, Panel};

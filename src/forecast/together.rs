@@ -6,7 +6,7 @@
 //! none. A group then says `p0 * product (p_i / p0)^w`, and it is a group as far as its parts agree better
 //! about one failure time than each about its own: the Bayes factor of two parts is the sum of `p_a p_b / p0`.
 //!
-//! The shared load moves all forecasts alike. With a correlation rho of their errors, n equally sharp
+//! The shared load moves all forecasts alike. With a correlation rho of their errors (`dependence`), n equally sharp
 //! forecasts are worth `n / (1 + (n - 1) rho)` independent ones, hence `w = 1 / (1 + (n - 1) rho)`, where n
 //! counts forecasts by their sharpness, so that one that says little takes nothing from one that says much.
 //!
@@ -14,12 +14,9 @@
 //! to the next, and membership does not: the ln of a Bayes factor is its mean over looks of late, late being
 //! measured by the time that is left.
 
-use super::{HORIZON_DAYS, Passage};
+use super::{Dependence, HORIZON_DAYS, Passage};
 use crate::fit::FINEST_DAYS;
 
-/// Correlation of the ln errors of benchmarks that share their load wholly: .51, .43, .30, .25 and .17 at
-/// 40, 20, 10, 5 and 2 days before the end of 150 simulated masses of four.
-const SHARED: f64 = 0.4;
 /// How far apart, in ln of the remaining time, the members of one mass may fail: standard deviation, and
 /// the bandwidth of the densities.
 const SCATTER: f64 = 0.06;
@@ -116,19 +113,19 @@ impl Opinion {
 }
 
 /// The groups that the looks speak for, oldest look first, in the order of their first benchmarks.
-pub fn groups(looks: &[Look]) -> Vec<Group> {
+pub fn groups(looks: &[Look], dependence: &Dependence) -> Vec<Group> {
     let Some(count) = looks.iter().map(|look| look.opinions.len()).min() else {
         return Vec::new();
     };
     let last = looks.len() - 1;
-    let found = partition(window(looks, last), count);
+    let found = partition(window(looks, last), dependence, count);
     let mut groups: Vec<Group> = found
         .iter()
         .map(|part| Group {
             members: part.members.clone(),
-            probabilities: belonging(window(looks, last), part, &found),
+            probabilities: belonging(window(looks, last), dependence, part, &found),
             since: last,
-            passage: common_passage(&looks[last].opinions, &part.members),
+            passage: common_passage(&looks[last].opinions, dependence, &part.members),
         })
         .collect();
     let mut open = vec![true; groups.len()];
@@ -136,7 +133,7 @@ pub fn groups(looks: &[Look]) -> Vec<Group> {
         if open.iter().all(|open| !open) {
             break;
         }
-        let before = partition(window(looks, look), count);
+        let before = partition(window(looks, look), dependence, count);
         for (group, open) in groups.iter_mut().zip(&mut open) {
             *open &= before.iter().any(|part| part.members == group.members);
             if *open {
@@ -163,13 +160,14 @@ struct Part {
 }
 
 impl Part {
-    fn of(window: &[Look], mut members: Vec<usize>) -> Self {
+    fn of(window: &[Look], dependence: &Dependence, mut members: Vec<usize>) -> Self {
         members.sort_unstable();
+        let shared = dependence.among(&members);
         let look = |look: &Look| {
             let opinions = members
                 .iter()
                 .filter_map(|member| look.opinions[*member].as_ref());
-            combined(&opinions.collect::<Vec<_>>())
+            combined(&opinions.collect::<Vec<_>>(), shared)
         };
         Self {
             looks: window.iter().map(look).collect(),
@@ -188,7 +186,8 @@ impl Part {
 /// When the benchmarks of `members` fail by what they say now. The sharpest is believed as it stands, each
 /// other as far as it is likely by now to share the failure of the rest: one that halts for a moment is not
 /// to talk the mass out of its failure.
-fn common_passage(now: &[Option<Opinion>], members: &[usize]) -> Passage {
+fn common_passage(now: &[Option<Opinion>], dependence: &Dependence, members: &[usize]) -> Passage {
+    let shared = dependence.among(members);
     let known: Vec<&Opinion> = members
         .iter()
         .filter_map(|one| now[*one].as_ref())
@@ -202,11 +201,11 @@ fn common_passage(now: &[Option<Opinion>], members: &[usize]) -> Passage {
         }
         let rest = (0..known.len()).filter(|other| *other != index);
         let rest: Vec<&Opinion> = rest.map(|other| known[other]).collect();
-        let odds = ODDS * agreement(&alone[index], &combined(&rest));
+        let odds = ODDS * agreement(&alone[index], &combined(&rest, shared));
         known[index].believed(odds / (1.0 + odds))
     });
     let believed: Vec<Opinion> = believed.collect();
-    let common = combined(&believed.iter().collect::<Vec<_>>());
+    let common = combined(&believed.iter().collect::<Vec<_>>(), shared);
     let times = common[..CELLS].iter().enumerate();
     let times = times.map(|(index, share)| (SOONEST * ((index as f64 + 0.5) * CELL).exp(), *share));
     Passage::from_times(times.collect())
@@ -220,9 +219,9 @@ fn agreement(a: &Density, b: &Density) -> f64 {
 }
 
 /// Parts that no merging makes more probable.
-fn partition(window: &[Look], count: usize) -> Vec<Part> {
+fn partition(window: &[Look], dependence: &Dependence, count: usize) -> Vec<Part> {
     let mut parts: Vec<Part> = (0..count)
-        .map(|member| Part::of(window, vec![member]))
+        .map(|member| Part::of(window, dependence, vec![member]))
         .collect();
     let mut ln_odds: Vec<Vec<f64>> = (0..count)
         .map(|i| (0..i).map(|j| parts[i].ln_odds(&parts[j])).collect())
@@ -239,7 +238,7 @@ fn partition(window: &[Look], count: usize) -> Vec<Part> {
             row.remove(i);
         }
         let members = [parts[j].members.as_slice(), &gone.members].concat();
-        parts[j] = Part::of(window, members);
+        parts[j] = Part::of(window, dependence, members);
         for other in (0..parts.len()).filter(|other| *other != j) {
             ln_odds[other.max(j)][other.min(j)] = parts[j].ln_odds(&parts[other]);
         }
@@ -247,7 +246,7 @@ fn partition(window: &[Look], count: usize) -> Vec<Part> {
 }
 
 /// How probably each member belongs where it is.
-fn belonging(window: &[Look], part: &Part, all: &[Part]) -> Vec<f64> {
+fn belonging(window: &[Look], dependence: &Dependence, part: &Part, all: &[Part]) -> Vec<f64> {
     let probability = |ln_odds: f64| 1.0 / (1.0 + (-ln_odds).exp());
     if part.members.len() == 1 {
         let others = all.iter().filter(|other| other.members != part.members);
@@ -256,14 +255,14 @@ fn belonging(window: &[Look], part: &Part, all: &[Part]) -> Vec<f64> {
     }
     let members = part.members.iter().map(|member| {
         let rest = part.members.iter().filter(|other| *other != member);
-        let rest = Part::of(window, rest.copied().collect());
-        probability(Part::of(window, vec![*member]).ln_odds(&rest))
+        let rest = Part::of(window, dependence, rest.copied().collect());
+        probability(Part::of(window, dependence, vec![*member]).ln_odds(&rest))
     });
     members.collect()
 }
 
-/// What all of `opinions` say under one failure time.
-fn combined(opinions: &[&Opinion]) -> Density {
+/// What all of `opinions` say under one failure time; `shared`: the correlation of their errors.
+fn combined(opinions: &[&Opinion], shared: f64) -> Density {
     let sharpness = opinions
         .iter()
         .map(|opinion| information(&posterior(&[opinion], 1.0)).exp());
@@ -275,7 +274,7 @@ fn combined(opinions: &[&Opinion]) -> Density {
     } else {
         1.0
     };
-    posterior(opinions, 1.0 / (1.0 + (count - 1.0) * SHARED))
+    posterior(opinions, 1.0 / (1.0 + (count - 1.0) * shared))
 }
 
 /// The prior times all likelihoods to the power `weight`, normalised.
@@ -358,10 +357,11 @@ mod tests {
 
     fn of_one_look(passages: &[Passage]) -> Vec<Group> {
         let opinions = passages.iter().map(|one| Some(Opinion::of(one, 0.0)));
-        groups(&[Look {
+        let look = Look {
             left_days: 10.0,
             opinions: opinions.collect(),
-        }])
+        };
+        groups(&[look], &Dependence::unknown(passages.len()))
     }
 
     fn width(passage: &Passage) -> f64 {
@@ -390,7 +390,7 @@ mod tests {
     fn a_hundred_that_share_their_load_are_not_a_hundred_opinions() {
         let many = of_one_look(&vec![about(10.0, 0.8); 100]);
         let two = of_one_look(&vec![about(10.0, 0.8); 2]);
-        // Worth 2.5 independent ones at the most.
+        // Worth 1.67 independent ones at the most, and two are worth 1.25.
         let ratio = width(&many[0].passage) / width(&two[0].passage);
         assert!((0.6..0.95).contains(&ratio), "{ratio}");
     }

@@ -2,8 +2,11 @@
 
 use super::report::FailureTime;
 use super::{Inversion, Options};
-use crate::forecast::{FEWEST_READINGS, Look, Opinion, Passage, groups, measurably_moves, outlook};
-use crate::reading::{BenchmarkId, SECONDS_PER_DAY, Series, Timestamp, after_days, days_since};
+use crate::fit::Rate;
+use crate::forecast::{
+    Dependence, FEWEST_READINGS, Look, Opinion, Passage, groups, measurably_moves, outlook,
+};
+use crate::reading::{BenchmarkId, Series, Timestamp, after_days, days_since};
 use serde::Serialize;
 
 /// Looks back over the time in which all benchmarks were read, by which "since" is told: evenly in ln of the
@@ -74,8 +77,14 @@ pub fn together(series: &[Series], options: &Options) -> Option<TogetherReport> 
         return None;
     }
     let (times, looks) = looks(&heard, now)?;
+    let rates: Vec<(Vec<Rate>, f64)> = heard
+        .iter()
+        .map(|one| (one.rates(), one.days_at(now)))
+        .collect();
+    let rates: Vec<(&[Rate], f64)> = rates.iter().map(|one| (&*one.0, one.1)).collect();
+    let dependence = Dependence::measured(&rates);
     let name = |member: &usize| heard[*member].series.benchmark.clone();
-    let (alone, together): (Vec<_>, Vec<_>) = groups(&looks)
+    let (alone, together): (Vec<_>, Vec<_>) = groups(&looks, &dependence)
         .into_iter()
         .partition(|group| group.members.len() == 1);
     let groups = together.iter().map(|group| GroupReport {
@@ -101,6 +110,14 @@ pub fn together(series: &[Series], options: &Options) -> Option<TogetherReport> 
     })
 }
 
+impl Inversion {
+    /// Days from the first reading to `time`.
+    fn days_at(&self, time: Timestamp) -> f64 {
+        let first = self.series.readings.first();
+        first.map_or(0.0, |first| days_since(first.time, time))
+    }
+}
+
 /// Whether the newest reading is no further back than is usual.
 fn is_heard(inversion: &Inversion, now: Timestamp) -> bool {
     let readings = &inversion.series.readings;
@@ -113,8 +130,7 @@ fn is_heard(inversion: &Inversion, now: Timestamp) -> bool {
 /// What the readings up to `time` foretell; `None` where too few do, or none that moves.
 fn foretold(inversion: &Inversion, time: Timestamp) -> Option<(Passage, f64)> {
     let mut observations = inversion.observations.clone();
-    let first = inversion.series.readings.first()?.time;
-    let days = days_since(first, time);
+    let days = inversion.days_at(time);
     observations.values.retain(|value| value.t_days <= days);
     let critical = inversion.options.critical_velocity_mm_per_day;
     let (outlook, _) = outlook(&observations, critical)?;
@@ -142,8 +158,10 @@ fn looks(inversions: &[Inversion], now: Timestamp) -> Option<(Vec<Timestamp>, Ve
         left * (((left + span) / left.max(f64::MIN_POSITIVE)).powf(share) - 1.0)
     };
     let at = |index: usize| {
-        let seconds = (back(index) * SECONDS_PER_DAY).floor();
-        after_days(now, -seconds / SECONDS_PER_DAY)
+        if index == LOOKS - 1 {
+            return Some(first);
+        }
+        after_days(now, -back(index))
     };
     let mut times: Vec<Timestamp> = (0..LOOKS).rev().filter_map(at).collect();
     times.dedup();
