@@ -349,10 +349,16 @@ fn smooth(cells: &mut [f64]) {
 mod tests {
     use super::*;
 
-    /// A forecast whose ln is spread evenly over `width` about that of `days`.
+    /// A forecast whose ln is normal about that of `days`, two standard deviations being `width`.
     fn about(days: f64, width: f64) -> Passage {
-        let at = |step: i32| days * (width * f64::from(step) / 50.0).exp();
-        Passage::from_times((-50..=50).map(|step| (at(step), 1.0 / 101.0)).collect())
+        let of_step = |step: i32| f64::from(step) / 20.0;
+        let share = |z: f64| (-0.5 * z * z).exp();
+        let total: f64 = (-60..=60).map(|step| share(of_step(step))).sum();
+        let times = (-60..=60).map(|step| {
+            let z = of_step(step);
+            (days * (0.5 * width * z).exp(), share(z) / total)
+        });
+        Passage::from_times(times.collect())
     }
 
     fn of_one_look(passages: &[Passage]) -> Vec<Group> {
