@@ -197,7 +197,7 @@ fn a_mass_that_parts_is_one_until_then_and_two_groups_when_their_ends_differ() {
         let report = at(days);
         assert_eq!(grouped(&report), [["a", "b"], ["c", "d"]], "{days}");
         let since = days_since(start, report.groups[0].since);
-        assert!((parted..days).contains(&since), "{days}: {since}");
+        assert!((parted..=days).contains(&since), "{days}: {since}");
     }
 }
 

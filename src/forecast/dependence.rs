@@ -124,6 +124,7 @@ fn residuals(places: &[f64], values: &[f64]) -> Option<Vec<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fit::ReadingError;
 
     fn rates(wobble: impl Fn(f64) -> f64) -> Vec<Rate> {
         let rate = |day: u32| Rate {
@@ -131,6 +132,8 @@ mod tests {
             to: f64::from(day) + 1.0,
             velocity: 300.0 / (70.0 - f64::from(day)) * wobble(f64::from(day)).exp(),
             sigma: 0.0,
+            readings: 1,
+            error: ReadingError::Own,
         };
         (0..60).map(rate).collect()
     }

@@ -386,7 +386,7 @@ mod tests {
         let (a, b) = (about(10.0, 0.8), about(12.0, 0.8));
         let one = of_one_look(&[a.clone(), b.clone()]);
         assert_eq!(one[0].members, [0, 1]);
-        assert!(width(&one[0].passage) < 0.9 * width(&a));
+        assert!(width(&one[0].passage) < 0.95 * width(&a));
         let other = of_one_look(&[b, a]);
         let median = |groups: &[Group]| groups[0].passage.quantile(0.5, HORIZON_DAYS);
         assert_eq!(median(&one), median(&other));
