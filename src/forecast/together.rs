@@ -19,7 +19,7 @@ use crate::fit::FINEST_DAYS;
 
 /// How far apart, in ln of the remaining time, the members of one mass may fail: standard deviation, and
 /// the bandwidth of the densities.
-const SCATTER: f64 = 0.06;
+const SCATTER: f64 = 0.05;
 /// Chance that a benchmark's forecast says nothing of its failure.
 const DOUBT: f64 = 0.03;
 /// Prior chance of no failure within the horizon.
@@ -33,6 +33,8 @@ const LATE: f64 = 1.4;
 const SOONEST: f64 = FINEST_DAYS / 8.0;
 const CELL: f64 = 0.025;
 const CELLS: usize = 478;
+/// Times in a cell by which it is said.
+const WITHIN: u32 = 8;
 /// Reach of the kernel, cells.
 const REACH: usize = 10;
 /// With less than this chance that it has not failed yet, a forecast that is overtaken says nothing.
@@ -206,8 +208,16 @@ fn common_passage(now: &[Option<Opinion>], dependence: &Dependence, members: &[u
     });
     let believed: Vec<Opinion> = believed.collect();
     let common = combined(&believed.iter().collect::<Vec<_>>(), shared);
-    let times = common[..CELLS].iter().enumerate();
-    let times = times.map(|(index, share)| (SOONEST * ((index as f64 + 0.5) * CELL).exp(), *share));
+    // A cell's share is spread over it: a quantile is to be finer than the grid.
+    let times = common[..CELLS]
+        .iter()
+        .enumerate()
+        .flat_map(|(index, share)| {
+            (0..WITHIN).map(move |step| {
+                let place = index as f64 + (f64::from(step) + 0.5) / f64::from(WITHIN);
+                (SOONEST * (place * CELL).exp(), share / f64::from(WITHIN))
+            })
+        });
     Passage::from_times(times.collect())
 }
 
