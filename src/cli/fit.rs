@@ -4,13 +4,17 @@ use super::args::{OutputArgs, ReadingArgs};
 use super::table::{Table, number, time};
 use crate::alert::Policy;
 use crate::fit::Exponent;
-use crate::inversion::{Estimate, FitReport, Inversion, Options, RegimeReport, UnderPrior};
-use crate::reading::{Quantity, Series, Timestamp, Unit};
+use crate::inversion::{
+    Estimate, FitReport, Inversion, Options, RegimeReport, TogetherReport, UnderPrior, together,
+};
+use crate::reading::{BenchmarkId, Quantity, Series, Timestamp, Unit};
 use crate::runtime::clock::Stopwatch;
+use serde::Serialize;
 use std::fmt::Write as _;
 
-/// Invert one benchmark's readings: the law's parameters, the regime, the failure time
+/// Invert a benchmark's readings: the law's parameters, the regime, the failure time
 ///
+/// Several benchmarks are inverted one by one, and then asked which of them fail together, and when.
 /// The best fit and its rms are those of the constant-load law by unweighted least squares. Intervals
 /// bound 90 %. Failure is the first passage of --critical-velocity.
 #[derive(Debug, clap::Args)]
@@ -54,11 +58,27 @@ impl InversionArgs {
 
 /// Reads the files, inverts the series and prints the result.
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
-    let loaded = args.readings.load()?;
-    let series = args.readings.series(&loaded.recording)?;
+    let mut recording = args.readings.load()?.recording;
+    args.readings.narrow(&mut recording)?;
     let options = args.inversion.options(&args.readings);
-    let report = report(series, &options);
-    args.output.print(&report, text)
+    for (index, series) in recording.series.iter().enumerate() {
+        let report = report(series, &options);
+        let blank = if index == 0 { "" } else { "\n" };
+        args.output
+            .print(&report, |report| format!("{blank}{}", text(report)))?;
+    }
+    let Some(report) = together(&recording.series, &options) else {
+        return Ok(());
+    };
+    args.output.print(&Site { together: report }, |site| {
+        neighbours(&site.together)
+    })
+}
+
+/// What is said after the benchmarks one by one.
+#[derive(Debug, Serialize)]
+struct Site {
+    together: TogetherReport,
 }
 
 /// Inverts a series; `seconds` is what the least squares took.
@@ -249,4 +269,57 @@ fn alternatives(report: &FitReport) -> Table {
         ]);
     }
     table
+}
+
+fn neighbours(report: &TogetherReport) -> String {
+    let percent = |share: f64| format!("{:.0} %", 100.0 * share);
+    let since = |since: Timestamp| {
+        if since <= report.judged_from {
+            "from the first look on".to_owned()
+        } else {
+            format!("since {}", time(Some(since)))
+        }
+    };
+    let mut out = String::from("\n");
+    for group in &report.groups {
+        let named = group.benchmarks.iter().zip(&group.probabilities);
+        let named: Vec<String> = named
+            .map(|(benchmark, probability)| format!("{benchmark} ({})", percent(*probability)))
+            .collect();
+        let failure = &group.failure_time;
+        let _ = writeln!(
+            out,
+            "together {}, {}: failure {} within {:.0} days, {} within the evacuation time\n  5, 50, 95 %     {}",
+            named.join(", "),
+            since(group.since),
+            failure.probability.map_or("-".to_owned(), percent),
+            failure.horizon_days,
+            failure
+                .chance_within_evacuation_time
+                .map_or("-".to_owned(), percent),
+            [failure.low, failure.median, failure.high]
+                .map(time)
+                .join("  "),
+        );
+    }
+    for one in &report.apart {
+        let _ = writeln!(
+            out,
+            "apart {} ({}), {}",
+            one.benchmark,
+            percent(one.probability),
+            since(one.since),
+        );
+    }
+    if !report.silent.is_empty() {
+        let silent: Vec<&str> = report.silent.iter().map(BenchmarkId::as_str).collect();
+        let _ = writeln!(out, "without a forecast {}", silent.join(", "));
+    }
+    let _ = writeln!(
+        out,
+        "judged by {} looks from {} on",
+        report.looks,
+        time(Some(report.judged_from)),
+    );
+    out
 }

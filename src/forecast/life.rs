@@ -59,16 +59,50 @@ impl Life {
         }
     }
 
+    /// `count` benchmarks of one failing mass: one onset, one time to failure and one load, but each its own
+    /// m, slip and readings. Under the load their failure times come to lie apart by what their m make of it.
+    pub fn draw_together(count: usize, seed: u64) -> Vec<Self> {
+        let mut generator = Pcg64::seed_from_u64(seed);
+        loop {
+            let duration = log_uniform(&mut generator, 60.0, 700.0);
+            let onset = duration * generator.random_range(0.0..2.0);
+            let knots = load(onset + 1.5 * duration, &mut generator);
+            let together: Option<Vec<Self>> = (0..count)
+                .map(|_| {
+                    let law = law(Fate::Failing, duration, &mut generator);
+                    Self::of(
+                        Fate::Failing,
+                        law,
+                        (onset, duration),
+                        &knots,
+                        &mut generator,
+                    )
+                })
+                .collect();
+            if let Some(together) = together {
+                return together;
+            }
+        }
+    }
+
     fn attempt(fate: Fate, generator: &mut impl Rng) -> Option<Self> {
         let duration = log_uniform(generator, 60.0, 700.0);
         let onset = duration * generator.random_range(0.0..2.0);
-        let slope = Slope {
-            law: law(fate, duration, generator),
-            onset,
-            end: onset + 1.5 * duration,
-        };
-        let knots = load(slope.end, generator);
-        let (path, failure_days) = slope.path(&knots)?;
+        let law = law(fate, duration, generator);
+        let knots = load(onset + 1.5 * duration, generator);
+        Self::of(fate, law, (onset, duration), &knots, generator)
+    }
+
+    fn of(
+        fate: Fate,
+        law: Law,
+        (onset, duration): (f64, f64),
+        knots: &[(f64, f64)],
+        generator: &mut impl Rng,
+    ) -> Option<Self> {
+        let end = onset + 1.5 * duration;
+        let slope = Slope { law, onset, end };
+        let (path, failure_days) = slope.path(knots)?;
         let ends_as_it_should = match (fate, failure_days) {
             (Fate::Failing, Some(days)) => days > onset + 0.4 * duration,
             (Fate::Failing, None) => false,

@@ -113,7 +113,7 @@ fn unknown() -> BTreeMap<Regime, f64> {
 
 /// Whether any of the newest rates stands clear of its noise: where none does, a forecast would be the
 /// prior's and not the slope's.
-fn measurably_moves(rates: &[Rate]) -> bool {
+pub(crate) fn measurably_moves(rates: &[Rate]) -> bool {
     let newest = &rates[rates.len().saturating_sub(6)..];
     newest
         .iter()

@@ -55,6 +55,11 @@ impl Passage {
         Self { times }
     }
 
+    /// (days from now, probability), in increasing time; what is missing to 1 never passes.
+    pub fn times(&self) -> &[(f64, f64)] {
+        &self.times
+    }
+
     /// The chance of passage within `days`.
     pub fn chance_within(&self, days: f64) -> f64 {
         let within = self.times.iter().take_while(|(time, _)| *time <= days);

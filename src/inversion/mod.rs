@@ -7,12 +7,14 @@ mod estimate;
 mod growth;
 mod report;
 mod sweep;
+mod together;
 
 pub use report::{
     Alternative, Alternatives, Estimate, FailureTime, FitReport, InverseVelocity, Parameters,
     RegimeReport, UnderPrior,
 };
 pub use sweep::{SweepOptions, SweepReport, SweepRow, sweep};
+pub use together::{ApartReport, GroupReport, TogetherReport, together};
 
 use crate::fit::{
     ConstantLoad, Exponent, Observation, Observations, PointReadings, Posterior, Rate, RateOptions,

@@ -1,9 +1,9 @@
 //! The report of one inversion, key for key as scripts read it: what is unbounded or missing is null.
 
-use super::Inversion;
+use super::{Inversion, Options};
 use crate::fit::{ConstantLoad, Ensemble, OtherPrior, Posterior};
-use crate::forecast::{Outlook, Passage};
-use crate::reading::{BenchmarkId, Quantity, Timestamp, Unit};
+use crate::forecast::{HORIZON_DAYS, Outlook, Passage};
+use crate::reading::{BenchmarkId, Quantity, SECONDS_PER_DAY, Timestamp, Unit, after_days};
 use crate::regime::{Regime, label};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -278,27 +278,30 @@ impl UnderPrior {
 
 impl FailureTime {
     pub(super) fn of(inversion: &Inversion, outlook: Option<&Outlook>) -> Self {
-        let horizon_days = inversion
-            .options
-            .horizon_days
-            .clamp(0.0, crate::forecast::HORIZON_DAYS);
+        let now = inversion.series.readings.last().map(|reading| reading.time);
+        let passage = outlook.map(|outlook| &outlook.passage);
+        Self::from_passage(&inversion.options, now.zip(passage))
+    }
+
+    /// What a passage says as seen at a time; `None`: there is no forecast.
+    pub(super) fn from_passage(options: &Options, seen: Option<(Timestamp, &Passage)>) -> Self {
+        let horizon_days = options.horizon_days.clamp(0.0, HORIZON_DAYS);
         let at = |share: f64| {
-            let outlook = outlook?;
-            let days = outlook.passage.quantile(share, horizon_days)?;
-            inversion.time_at(outlook.now_days + days)
+            let (now, passage) = seen?;
+            after_days(now, passage.quantile(share, horizon_days)?)
         };
         let chance = |days: f64| {
             // An empty sum is -0.
-            outlook.map(|outlook| outlook.passage.chance_within(days) + 0.0)
+            seen.map(|(_, passage)| passage.chance_within(days) + 0.0)
         };
-        let evacuation = inversion.options.evacuation_time.as_secs_f64();
+        let evacuation = options.evacuation_time.as_secs_f64();
         Self {
             low: at(0.05),
             median: at(0.5),
             high: at(0.95),
             probability: chance(horizon_days),
             horizon_days,
-            chance_within_evacuation_time: chance(evacuation / crate::reading::SECONDS_PER_DAY),
+            chance_within_evacuation_time: chance(evacuation / SECONDS_PER_DAY),
         }
     }
 }
