@@ -13,9 +13,7 @@ mod simplex;
 mod under_load;
 
 pub use constant_load::{ConstantLoad, Exponent, Outcome, Place, Solution};
-pub use posterior::{
-    Curvature, Ensemble, Onset, OtherPrior, P_PRIOR, Posterior, Sample as LawSample,
-};
+pub use posterior::{Ensemble, Onset, OtherPrior, P_PRIOR, Posterior, Sample as LawSample};
 pub use projection::PointReadings;
 pub(crate) use rates::displacement_sigma;
 pub use rates::{FINEST_DAYS, Observation, Observations, Rate, RateOptions, ReadingError};
