@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a bench fails by panicking")]
 
 use divan::{Bencher, black_box};
-use slipwatch::fit::{Curvature, Observation, Observations, Posterior, RateOptions};
+use slipwatch::fit::{Observation, Observations, Posterior, RateOptions};
 use slipwatch::forecast::Panel;
 use slipwatch::model::{Accuracy, Law, Load, LoadedLaw, Motion, Sensitivities, Trajectory};
 use slipwatch::reading::{BenchmarkId, Quantity, days_since};
@@ -75,7 +75,7 @@ fn a_year_under_daily_loads(bencher: Bencher, accuracy: Accuracy) {
 #[divan::bench]
 fn posterior_of_67_readings(bencher: Bencher) {
     let rates = observations().rates(0..READINGS, RateOptions::default());
-    bencher.bench(|| Posterior::fit(black_box(&rates), Curvature::Free, None));
+    bencher.bench(|| Posterior::fit(black_box(&rates)));
 }
 
 /// Hourly displacements of a slope that accelerates for ever more slowly, kept as a monitor keeps them.

@@ -1,7 +1,7 @@
 //! How often intervals hold the truth, and how often what was said to be probable was so.
 
 use super::drawn::{Drawn, Measured, Starts};
-use slipwatch::fit::{Curvature, LawSample, Posterior, RateOptions};
+use slipwatch::fit::{LawSample, Posterior, RateOptions};
 use slipwatch::model::Law;
 use slipwatch::regime::Regime;
 use std::fmt::Write as _;
@@ -75,7 +75,7 @@ impl Tally {
         let all = 0..drawn.observations.values.len();
         let rates = drawn.observations.rates(all, RateOptions::default());
         let posterior = match starts {
-            Starts::First => Posterior::fit(&rates, Curvature::Free, None),
+            Starts::First => Posterior::fit(&rates),
             Starts::ToBeFound => Posterior::over_onsets(&rates),
         };
         let Some(posterior) = posterior else {

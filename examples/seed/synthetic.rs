@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
-use slipwatch::fit::{ConstantLoad, Curvature, Observation, Observations, Posterior, RateOptions};
+use slipwatch::fit::{ConstantLoad, Observation, Observations, Posterior, RateOptions};
 use slipwatch::inversion::{Inversion, Options};
 use slipwatch::model::{Accuracy, Law, Trajectory};
 use slipwatch::reading::{
@@ -173,7 +173,7 @@ fn posterior(series: &Series) -> Option<Posterior> {
         values: values.collect(),
     };
     let rates = observations.rates(0..observations.values.len(), RateOptions::default());
-    Posterior::fit(&rates, Curvature::Free, None)
+    Posterior::fit(&rates)
 }
 
 /// Of (value, weight) pairs in increasing order.

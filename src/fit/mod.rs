@@ -18,9 +18,7 @@ mod unit_m;
 pub use constant_load::{ConstantLoad, Exponent, Outcome, Place, Solution};
 pub use lattice::Lattice;
 pub use point_readings::PointReadings;
-pub use posterior::{
-    Curvature, Ensemble, Onset, OtherPrior, P_PRIOR, Posterior, Sample as LawSample,
-};
+pub use posterior::{Ensemble, Onset, OtherPrior, P_PRIOR, Posterior, Sample as LawSample};
 pub(crate) use rates::displacement_sigma;
 pub use rates::{FINEST_DAYS, Observation, Observations, Rate, RateOptions, ReadingError};
 pub use under_load::LoadPosterior;

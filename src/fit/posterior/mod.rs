@@ -22,20 +22,12 @@ pub use sensitivity::OtherPrior;
 
 use super::rates::Rate;
 use crate::model::Law;
-use mode::{Bench, Mode, Point, Problem, Sign};
+use mode::{Bench, LN_V, Mode, Point, Problem, Sign};
 use onset::Start;
+use past::Shape;
 use proposal::{Side, Whole};
 use scatter::Texture;
 use window::Window;
-
-/// Whether the curvature of the inverse velocity is fitted or held at zero (the straight line).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Curvature {
-    /// The full law.
-    Free,
-    /// kappa = 0: the line through inverse velocity.
-    Zero,
-}
 
 /// One law out of the posterior, with t = 0 at the present.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -70,7 +62,6 @@ pub struct Posterior {
     pub evaluations: usize,
     /// Draws that the weighted sample is worth (Kish).
     pub effective_draws: f64,
-    summits: Vec<Summit>,
 }
 
 /// One law as it was drawn.
@@ -117,40 +108,42 @@ const ROUNDS: (u32, u32) = (6, 10);
 const FIRST_P: f64 = 0.3;
 /// asinh of kappa L when a search starts.
 const FIRST_KAPPAS: [f64; 2] = [0.5, 2.5];
+/// Fewer rates than this leave nothing over to tell the scatter from.
+const FEWEST_RATES: usize = 5;
 
 impl Posterior {
-    /// Fits the law to all of `rates`; `warm` is an earlier posterior of the same benchmark to start from.
+    /// Fits the law to all of `rates`, as if it held from the first on.
     /// `None` when there are too few rates or none of them moves.
-    pub fn fit(rates: &[Rate], curvature: Curvature, warm: Option<&Self>) -> Option<Self> {
-        let window = window_of(rates, curvature)?;
+    pub fn fit(rates: &[Rate]) -> Option<Self> {
+        let window = window_of(rates)?;
         let textures = scatter::textures(&window);
         let mut bench = Bench::new(rates.len());
         let start = Start::first(&window);
-        let found: Vec<(Summit, Side<'_>)> = signs(curvature)
-            .iter()
+        let sides = Sign::BOTH
+            .into_iter()
             .filter_map(|sign| {
-                let problem = start.problem(&window, *sign);
-                let starts = starts(&problem, rates, warm);
-                side(problem, &mut bench, &textures, &starts)
+                let problem = start.problem(&window, sign);
+                let starts = starts(&problem, rates);
+                let found = side(problem, &mut bench, &textures, &starts);
+                found.map(|(_, side)| side)
             })
             .collect();
-        let (summits, sides) = found.into_iter().unzip();
         let drafts = draw(&mut bench, &textures, (sides, &QUICK));
-        Self::of(&window, summits, &drafts, bench.evaluations)
+        Self::of(&window, &drafts, bench.evaluations)
     }
 
-    /// Fits the full law to `rates` from each of several starts on, and averages over them.
+    /// Fits the law to `rates` from each of several starts on, and averages over them.
     /// `None` when there are too few rates or none of them moves.
     pub fn over_onsets(rates: &[Rate]) -> Option<Self> {
-        let window = window_of(rates, Curvature::Free)?;
+        let window = window_of(rates)?;
         let textures = scatter::textures(&window);
         let few = scatter::few(&textures);
         let mut bench = Bench::new(rates.len());
         let mut screened: Vec<(Problem<'_>, Summit, f64)> = Vec::new();
         for start in Start::candidates(&window) {
-            for sign in signs(Curvature::Free) {
-                let problem = start.problem(&window, *sign);
-                let starts = starts(&problem, rates, None);
+            for sign in Sign::BOTH {
+                let problem = start.problem(&window, sign);
+                let starts = starts(&problem, rates);
                 if let Some((summit, side)) = side(problem, &mut bench, &few, &starts) {
                     screened.push((problem, summit, side.log_evidence));
                 }
@@ -165,25 +158,20 @@ impl Posterior {
         screened.retain(|one| {
             one.2 > best - HOPELESS || one.0.span_days.to_bits() == likeliest.to_bits()
         });
-        let mut summits = Vec::new();
-        let mut sides = Vec::new();
-        for (problem, summit, _) in screened {
-            let at = (vec![summit.point(&problem)], summit.log_size);
-            if let Some((summit, side)) = side(problem, &mut bench, &textures, &at) {
-                summits.push(summit);
-                sides.push(side);
-            }
-        }
+        let sides = screened
+            .iter()
+            .filter_map(|(problem, summit, _)| {
+                let start = problem.point(summit.shape, summit.ln_v);
+                let starts = (vec![start], summit.log_size);
+                let found = side(*problem, &mut bench, &textures, &starts);
+                found.map(|(_, side)| side)
+            })
+            .collect();
         let drafts = draw(&mut bench, &textures, (sides, &THOROUGH));
-        Self::of(&window, summits, &drafts, bench.evaluations)
+        Self::of(&window, &drafts, bench.evaluations)
     }
 
-    fn of(
-        window: &Window,
-        summits: Vec<Summit>,
-        drafts: &[Draft],
-        evaluations: usize,
-    ) -> Option<Self> {
+    fn of(window: &Window, drafts: &[Draft], evaluations: usize) -> Option<Self> {
         let logs: Vec<f64> = drafts.iter().map(|draft| draft.log_weight).collect();
         let total = proposal::log_sum(&logs);
         if !total.is_finite() {
@@ -215,43 +203,22 @@ impl Posterior {
             spans_days,
             evaluations,
             effective_draws: 1.0 / squares,
-            summits,
         })
     }
 }
 
-fn signs(curvature: Curvature) -> &'static [Sign] {
-    match curvature {
-        Curvature::Free => &[Sign::Positive, Sign::Negative],
-        Curvature::Zero => &[Sign::Zero],
-    }
-}
-
-fn window_of(rates: &[Rate], curvature: Curvature) -> Option<Window> {
-    let unknowns = match curvature {
-        Curvature::Free => 3,
-        Curvature::Zero => 2,
-    };
-    (rates.len() >= unknowns + 2)
+fn window_of(rates: &[Rate]) -> Option<Window> {
+    (rates.len() >= FEWEST_RATES)
         .then(|| Window::new(rates))
         .flatten()
 }
 
 /// The most probable law on one side with white scatter, and ln of the size of that.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 struct Summit {
-    sign: Sign,
-    p: f64,
+    shape: Shape,
     ln_v: f64,
-    r: f64,
-    kappa: f64,
     log_size: f64,
-}
-
-impl Summit {
-    fn point(&self, problem: &Problem<'_>) -> Point {
-        problem.point(self.p, (self.ln_v, self.r, self.kappa))
-    }
 }
 
 /// Finds the mode of one side, and draws up the proposal about it.
@@ -272,36 +239,27 @@ fn side<'a>(
         (log_size, _) = white.size(problem.window, &bench.residuals, log_size, 4);
     }
     let Mode { at, .. } = problem.search(bench, found.at, (white, log_size.exp()), ROUNDS.1)?;
-    let shape = problem.shape(&at);
     let summit = Summit {
-        sign: problem.sign,
-        p: shape.p,
-        ln_v: at[mode::LN_V],
-        r: shape.r,
-        kappa: shape.kappa,
+        shape: problem.shape(&at),
+        ln_v: at[LN_V],
         log_size,
     };
     let side = Side::new(problem, bench, at, (textures, log_size))?;
     Some((summit, side))
 }
 
-/// Where to look from, and ln of the size of the scatter there: what was found last time, or a line
-/// through the recent and the older velocity with some kappas.
-fn starts(problem: &Problem<'_>, rates: &[Rate], warm: Option<&Posterior>) -> (Vec<Point>, f64) {
-    let known = warm.and_then(|warm| warm.summits.iter().find(|one| one.sign == problem.sign));
+/// Where to look from, and ln of the size of the scatter there: a line through the recent and the older
+/// velocity with some kappas.
+fn starts(problem: &Problem<'_>, rates: &[Rate]) -> (Vec<Point>, f64) {
     let (low, high) = problem.sign.p_range();
     let (ln_v, change) = line(problem, rates);
     let p = low + (high - low) * FIRST_P;
     let bent = |kappa: f64| Point::new(p, kappa, change, ln_v);
-    if let Some(known) = known {
-        return (vec![known.point(problem), bent(0.0)], known.log_size);
-    }
     let starts = match problem.sign {
-        Sign::Positive => FIRST_KAPPAS.map(bent).to_vec(),
-        Sign::Negative => FIRST_KAPPAS.map(|kappa| bent(-kappa)).to_vec(),
-        Sign::Zero => vec![bent(0.0), Point::new(0.0, 0.0, 0.0, ln_v)],
+        Sign::Positive => FIRST_KAPPAS.map(bent),
+        Sign::Negative => FIRST_KAPPAS.map(|kappa| bent(-kappa)),
     };
-    (starts, prior::SCATTER.0.ln() + 0.7)
+    (starts.to_vec(), prior::SCATTER.0.ln() + 0.7)
 }
 
 /// ln of the recent velocity, and asinh of the slope of a line through it and the older one.

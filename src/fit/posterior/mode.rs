@@ -22,8 +22,6 @@ pub(super) const LN_V: usize = 3;
 pub(super) enum Sign {
     Positive,
     Negative,
-    /// kappa = 0: the line through inverse velocity.
-    Zero,
 }
 
 /// The laws with one sign of kappa that hold for `span_days` back from the present of a window.
@@ -66,12 +64,13 @@ const LEAST_CORRECTED: f64 = -2.0;
 const LEAST_BEND: f64 = 0.05;
 
 impl Sign {
+    pub(super) const BOTH: [Self; 2] = [Self::Positive, Self::Negative];
+
     /// Where p may be.
     pub(super) fn p_range(self) -> (f64, f64) {
         match self {
             Self::Positive => (0.0, P_PRIOR.1),
             Self::Negative => (P_PRIOR.0, 0.0),
-            Self::Zero => (0.0, 0.0),
         }
     }
 
@@ -80,14 +79,6 @@ impl Sign {
         match self {
             Self::Positive => (1e-9, 12.0),
             Self::Negative => (-12.0, -1e-9),
-            Self::Zero => (0.0, 0.0),
-        }
-    }
-
-    fn first_axis(self) -> usize {
-        match self {
-            Self::Positive | Self::Negative => P,
-            Self::Zero => CHANGE,
         }
     }
 }
@@ -115,11 +106,11 @@ fn change_per_slope(kappa_length: f64) -> f64 {
 }
 
 impl Problem<'_> {
-    /// The point of a law with these r and kappa (1/day) and velocity now.
-    pub(super) fn point(&self, p: f64, (ln_v, r, kappa): (f64, f64, f64)) -> Point {
-        let kappa_length = kappa * self.span_days;
-        let change = r * self.span_days * change_per_slope(kappa_length);
-        Point::new(p, kappa_length.asinh(), change.asinh(), ln_v)
+    /// The point of a law of this shape and velocity now.
+    pub(super) fn point(&self, shape: Shape, ln_v: f64) -> Point {
+        let kappa_length = shape.kappa * self.span_days;
+        let change = shape.r * self.span_days * change_per_slope(kappa_length);
+        Point::new(shape.p, kappa_length.asinh(), change.asinh(), ln_v)
     }
 
     pub(super) fn shape(&self, at: &Point) -> Shape {
@@ -142,9 +133,11 @@ impl Problem<'_> {
         bench.evaluations += 1;
         let shape = self.shape(at);
         // b and m have one sign: where the law would need S < 0 there is none.
-        let exists = shape.kappa + shape.p * shape.r > 0.0 || self.sign != Sign::Positive;
-        let exists =
-            exists && (shape.kappa + shape.p * shape.r < 0.0 || self.sign != Sign::Negative);
+        let b_over_m = shape.kappa + shape.p * shape.r;
+        let exists = match self.sign {
+            Sign::Positive => b_over_m > 0.0,
+            Sign::Negative => b_over_m < 0.0,
+        };
         let law = (at[LN_V], shape);
         exists
             && self
@@ -166,12 +159,7 @@ impl Problem<'_> {
         let outrun = r_length * self.window.interval_days / (self.span_days * SLOPE_PER_INTERVAL);
         let of_r =
             log_cauchy(r_length * reach.exp()) + at[CHANGE].cosh().ln() - per_slope.ln() + reach;
-        let of_kappa = match self.sign {
-            Sign::Zero => 0.0,
-            Sign::Positive | Sign::Negative => {
-                log_cauchy(kappa_length * reach.exp()) + at[KAPPA].cosh().ln() + reach
-            }
-        };
+        let of_kappa = log_cauchy(kappa_length * reach.exp()) + at[KAPPA].cosh().ln() + reach;
         of_r + of_kappa - 0.5 * outrun * outrun
     }
 
@@ -192,15 +180,12 @@ impl Problem<'_> {
         }
         bend[P] = 1.0;
         bend[LN_V] = 0.0;
-        if self.sign == Sign::Zero {
-            (slope[KAPPA], bend[KAPPA]) = (0.0, 1.0);
-        }
         (slope, bend)
     }
 
     /// Derivatives of the residuals, which the bench holds for `at`.
     fn differentiate(&self, bench: &mut Bench, at: &Point) {
-        for axis in self.sign.first_axis()..4 {
+        for axis in 0..4 {
             let mut taken = 0.0;
             for step in [JACOBIAN_STEP, -JACOBIAN_STEP] {
                 let mut moved = *at;

@@ -197,9 +197,6 @@ impl<'a> Side<'a> {
             .iter()
             .max_by(|a, b| a.share.total_cmp(&b.share))?;
         covariance += widest.root * widest.root.transpose() * RIDGE;
-        if self.problem.sign == Sign::Zero {
-            (covariance[(P, P)], covariance[(KAPPA, KAPPA)]) = (1.0, 1.0);
-        }
         let root = covariance.cholesky()?.l();
         let even = EVEN / self.components.len() as f64;
         let component = |(index, old): (usize, &Component)| {
@@ -252,8 +249,7 @@ impl Problem<'_> {
     /// ln of the prior density of p and of the span.
     fn log_prior_of_rest(&self) -> f64 {
         let (low, high) = self.sign.p_range();
-        let range = if high > low { high - low } else { 1.0 };
-        self.log_prior - range.ln()
+        self.log_prior - (high - low).ln()
     }
 }
 
@@ -304,19 +300,14 @@ impl Component {
             + texture.log_prior
             + prior::log_size(log_size)
             + problem.log_prior_of_rest()
-            + one.log_volume(problem.sign)
+            + one.log_volume()
             + one.log_masses(problem.sign, 1.0, 0.0);
         Some(one)
     }
 
     /// ln of the volume of the approximation, in units of a standard normal one's density.
-    fn log_volume(&self, sign: Sign) -> f64 {
-        let curved = match sign {
-            Sign::Zero => 0.0,
-            Sign::Positive | Sign::Negative => {
-                (self.root[(0, 0)] * self.root[(1, 1)]).ln() + 2.0 * LN_ROOT_2_PI
-            }
-        };
+    fn log_volume(&self) -> f64 {
+        let curved = (self.root[(0, 0)] * self.root[(1, 1)]).ln() + 2.0 * LN_ROOT_2_PI;
         let line =
             (self.root[(CHANGE, CHANGE)] * self.root[(LN_V, LN_V)] * self.root[(SIZE, SIZE)]).ln();
         curved + line + 3.0 * LN_ROOT_2_PI
@@ -333,27 +324,15 @@ impl Component {
     }
 
     fn log_masses(&self, sign: Sign, width: f64, z_p: f64) -> f64 {
-        match sign {
-            Sign::Zero => 0.0,
-            Sign::Positive | Sign::Negative => {
-                let p = self.p_stretch(sign, width);
-                (p.mass * self.kappa_stretch(sign, width, z_p).mass)
-                    .max(LEAST_MASS)
-                    .ln()
-            }
-        }
+        let p = self.p_stretch(sign, width);
+        let kappa = self.kappa_stretch(sign, width, z_p);
+        (p.mass * kappa.mass).max(LEAST_MASS).ln()
     }
 
     /// Standard deviates of a draw whose p and kappa are in their range.
     fn deviate(&self, sign: Sign, width: f64, u: &[f64; 8]) -> Whole {
-        let (p, kappa) = match sign {
-            Sign::Zero => (0.0, 0.0),
-            Sign::Positive | Sign::Negative => {
-                let p = width * self.p_stretch(sign, width).quantile(u[0]);
-                let kappa = self.kappa_stretch(sign, width, p).quantile(u[2]);
-                (p, width * kappa)
-            }
-        };
+        let p = width * self.p_stretch(sign, width).quantile(u[0]);
+        let kappa = width * self.kappa_stretch(sign, width, p).quantile(u[2]);
         let free = |u: f64| width * normal_quantile(u);
         Whole::new(p, kappa, free(u[3]), free(u[4]), free(u[5]))
     }
@@ -361,17 +340,13 @@ impl Component {
     /// ln of the density that draws come from, the choice of texture among it.
     fn log_density(&self, sign: Sign, z: &Whole) -> f64 {
         let square = z.norm_squared();
-        let axes = match sign {
-            Sign::Zero => 3.0,
-            Sign::Positive | Sign::Negative => 5.0,
-        };
         let one = |(width, share): (f64, f64)| {
             share.ln()
                 - 0.5 * square / (width * width)
-                - axes * width.ln()
+                - 5.0 * width.ln()
                 - self.log_masses(sign, width, z[P])
         };
-        log_sum(&WIDTHS.map(one)) - self.log_volume(sign) + self.share.ln()
+        log_sum(&WIDTHS.map(one)) - self.log_volume() + self.share.ln()
     }
 }
 

@@ -2,7 +2,9 @@
 //!
 //! In the scale of [`super::window`] the residual of rate k is
 //!
-//!     e_k = l_k u_k + white + g_k (d_k - d_(k-1))
+//! ```text
+//! e_k = l_k u_k + white + g_k (d_k - d_(k-1))
+//! ```
 //!
 //! with u an Ornstein-Uhlenbeck process of the motion, a white relative scatter and the reading's own
 //! error; rates that are differences of displacement share the error d of the reading between them. A
