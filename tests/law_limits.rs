@@ -31,6 +31,43 @@ fn a_hardening_block_slides_a_finite_distance() {
     }
 }
 
+/// Fitted to five years of a rock mass that was about to steady: y^p grows to 1e148 on the way there.
+#[test]
+fn a_block_with_hardly_any_state_effect_is_solved_up_to_its_steady_velocity() {
+    let law = Law::from_paper(0.008_918, 3.87e149, 0.727_3, 73.86).unwrap();
+    for accuracy in [Accuracy::Full, Accuracy::Fit] {
+        let tolerance = match accuracy {
+            Accuracy::Full => 1e-11,
+            Accuracy::Fit => 1e-8,
+        };
+        let solution = Trajectory::solve(&law, 2000.0, accuracy);
+        for day in 1..=2000 {
+            let t = f64::from(day);
+            let Some(motion) = solution.at(t) else {
+                panic!("{accuracy:?}: no motion on day {day}");
+            };
+            if relative(motion.velocity, 73.86) < 1e-3 {
+                // The time hardly depends on the velocity any more.
+                continue;
+            }
+            let days = law.days_to_velocity(motion.velocity).unwrap();
+            assert!(
+                relative(days, t) < tolerance,
+                "{accuracy:?}: day {days} not {day}"
+            );
+            let slowed = (law.slope(motion.y) / -law.r).ln() - law.p * motion.y.ln();
+            let slip = law.v_i * slowed / (law.p * law.b);
+            assert!(
+                relative(motion.displacement, slip) < tolerance,
+                "{accuracy:?}: {} not {slip} on day {day}",
+                motion.displacement
+            );
+        }
+        let last = solution.at(2000.0).unwrap();
+        assert!(relative(last.velocity, 73.86) < 1e-11, "{last:?}");
+    }
+}
+
 #[test]
 fn a_stable_block_forgets_its_start_within_t_star() {
     for (m, x_i) in [

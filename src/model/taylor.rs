@@ -26,43 +26,46 @@ pub(super) struct Segment<S> {
 impl<S: Scalar> Segment<S> {
     /// Expands the law about `start`, where the inverse velocity is `y_0` and the slip `slip_0`.
     ///
-    /// With B = bc(y; p) and W = y^p = 1 + p B: y' = -r + kappa B and y B' = y' W; with u = 1/y: y u = 1.
+    /// With G = kappa bc(y; p) and K = kappa y^p = kappa + p G: y' = -r + G and y G' = y' K; with u = 1/y:
+    /// y u = 1. G and K are of the size of the law's own rates, where bc and y^p alone leave the range of f64.
     pub(super) fn expand(law: &Coefficients<S>, order: usize, start: f64, at: (S, S)) -> Self {
         let zero = S::constant(0.0);
         let (y_0, slip_0) = at;
         let mut y = [zero; MAX_ORDER + 1];
         let mut slip = [zero; MAX_ORDER + 1];
         let mut u = [zero; MAX_ORDER + 1];
-        // B' and B; b[0] is never needed.
-        let (mut b, mut b_slope) = (u, u);
+        // G and G'; g[0] is never needed.
+        let (mut g, mut g_slope) = (u, u);
         let ln_y = y_0.ln();
-        let w_0 = (law.p * ln_y).exp();
         let slope_per_day = law.slope_at_ln(ln_y);
-        let unit = unit_days(slope_per_day / y_0, law.kappa * w_0 / y_0);
+        let k_per_day = law.kappa * (law.p * ln_y).exp();
+        let unit = unit_days(slope_per_day / y_0, k_per_day / y_0);
         let slope = slope_per_day.scaled(unit);
-        let kappa = law.kappa.scaled(unit);
-        let gain = kappa * law.p;
+        let k_0 = k_per_day.scaled(unit);
+        // Of slope p G + G K_0.
+        let gain = slope * law.p + k_0;
         y[0] = y_0;
         slip[0] = slip_0;
         u[0] = S::constant(1.0) / y_0;
         let minus_u_0 = -u[0];
         for k in 0..order {
             let over_next = 1.0 / (k + 1) as f64;
-            let y_slope = if k == 0 { slope } else { kappa * b[k] };
+            let y_slope = if k == 0 { slope } else { g[k] };
             y[k + 1] = y_slope.scaled(over_next);
             slip[k + 1] = u[k].scaled(unit * over_next);
-            // Coefficient k of y' W, less the known part of y B'.
-            let mut known = y_slope * w_0;
-            if k > 0 {
-                known = known + slope * law.p * b[k] + gain * square(&b, k);
-            }
+            // Coefficient k of y' K, less the known part of y G'.
+            let mut known = if k == 0 {
+                slope * k_0
+            } else {
+                gain * g[k] + law.p * square(&g, k)
+            };
             let mut product = y[k + 1] * u[0];
             for j in 0..k {
-                known = known - b_slope[j] * y[k - j];
+                known = known - g_slope[j] * y[k - j];
                 product = product + y[j + 1] * u[k - j];
             }
-            b_slope[k] = known * u[0];
-            b[k + 1] = b_slope[k].scaled(over_next);
+            g_slope[k] = known * u[0];
+            g[k + 1] = g_slope[k].scaled(over_next);
             u[k + 1] = product * minus_u_0;
         }
         let radius = radius(&y, order).min(radius(&u, order));
@@ -100,15 +103,15 @@ fn unit_days<S: Scalar>(growth: S, curvature: S) -> f64 {
     }
 }
 
-/// The sum of b_j b_(k-j) over 0 < j < k.
-fn square<S: Scalar>(b: &Series<S>, k: usize) -> S {
+/// The sum of g_j g_(k-j) over 0 < j < k.
+fn square<S: Scalar>(g: &Series<S>, k: usize) -> S {
     let mut half = S::constant(0.0);
     for j in 1..k.div_ceil(2) {
-        half = half + b[j] * b[k - j];
+        half = half + g[j] * g[k - j];
     }
     let twice = half.scaled(2.0);
     if k > 0 && k.is_multiple_of(2) {
-        twice + b[k / 2] * b[k / 2]
+        twice + g[k / 2] * g[k / 2]
     } else {
         twice
     }
