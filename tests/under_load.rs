@@ -247,3 +247,75 @@ fn a_compacted_record_foretells_what_the_whole_one_does() {
     }
     assert!(compared >= 4, "{compared}");
 }
+
+/// Hourly velocities 100/(30 - t), mm/day, to twelve hours before their asymptote.
+fn hourly_failure() -> Observations {
+    let values = (0_u32..=708).map(|hour| {
+        let t_days = f64::from(hour) / 24.0;
+        Observation {
+            t_days,
+            value: 100.0 / (30.0 - t_days),
+            sigma: None,
+        }
+    });
+    Observations {
+        quantity: Quantity::Velocity,
+        averaging_days: 0.0,
+        values: values.collect(),
+    }
+}
+
+fn chance_within_a_day(observations: &Observations) -> f64 {
+    let outlook = Panel::default().update(observations, CRITICAL).unwrap();
+    outlook.passage.chance_within(1.0)
+}
+
+#[test]
+fn one_reading_of_nothing_or_backwards_hides_no_failure() {
+    for (from_the_end, value) in [(1, 0.0), (3, 0.0), (3, -5.0)] {
+        let mut observations = hourly_failure();
+        let at = observations.values.len() - from_the_end;
+        observations.values[at].value = value;
+        let chance = chance_within_a_day(&observations);
+        assert!(
+            chance > 0.8,
+            "{value} {from_the_end} from the end: {chance}"
+        );
+    }
+}
+
+#[test]
+fn a_logger_that_was_out_before_the_end_does_not_rule_the_end_out() {
+    for left in [1.0, 2.0, 3.0, 6.0] {
+        let mut observations = hourly_failure();
+        let end = 29.5 - (left - 0.5) / 24.0;
+        let out = |t_days: f64| t_days > end - 3.0 && t_days < end;
+        observations.values.retain(|value| !out(value.t_days));
+        let chance = chance_within_a_day(&observations);
+        assert!(chance > 0.8, "{left} readings after the gap: {chance}");
+    }
+}
+
+#[test]
+fn readings_by_the_second_crowd_out_neither_the_record_nor_the_forecast() {
+    let mut kept = hourly_failure();
+    let start = kept.values.len();
+    for second in 0_u32..30_000 {
+        let t_days = 29.5 + f64::from(second + 1) / 86_400.0;
+        kept.values.push(Observation {
+            t_days,
+            value: 100.0 / (30.0 - t_days),
+            sigma: None,
+        });
+        kept.compact();
+    }
+    assert!(kept.values.len() <= Observations::MOST + 1 && start < Observations::MOST);
+    assert!(
+        kept.values
+            .iter()
+            .filter(|value| value.t_days < 29.0)
+            .count()
+            > 200
+    );
+    assert!(chance_within_a_day(&kept) > 0.8);
+}
