@@ -5,9 +5,7 @@
 
 #![expect(clippy::print_stdout, reason = "a table is what it is for")]
 
-use slipwatch::fit::{Observation, Observations};
 use slipwatch::forecast::{Fate, HORIZON_DAYS, Life, Outlook, Panel};
-use slipwatch::reading::Quantity;
 
 const LEADS: [f64; 5] = [40.0, 20.0, 10.0, 5.0, 2.0];
 /// Looks at each standing slope, evenly over its readings.
@@ -31,18 +29,10 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
-fn outlook(readings: &[(f64, f64)]) -> Option<Outlook> {
-    let values = readings.iter().map(|(t_days, value)| Observation {
-        t_days: *t_days,
-        value: *value,
-        sigma: None,
-    });
-    let observations = Observations {
-        quantity: Quantity::Displacement,
-        averaging_days: 0.0,
-        values: values.collect(),
-    };
-    Panel::default().update(&observations, Life::CRITICAL_MM_PER_DAY)
+/// The outlook after the first `count` readings.
+fn outlook(life: &Life, count: usize) -> Option<Outlook> {
+    let (now_days, _) = life.readings[count.checked_sub(1)?];
+    Panel::default().update(&life.known(now_days), Life::CRITICAL_MM_PER_DAY)
 }
 
 fn at_lead(lives: &[Life], lead: f64) {
@@ -65,7 +55,7 @@ fn at_lead(lives: &[Life], lead: f64) {
         if remaining > 2.0 * lead {
             continue;
         }
-        let Some(outlook) = outlook(&life.readings[..known]) else {
+        let Some(outlook) = outlook(life, known) else {
             continue;
         };
         let quantile = |share| outlook.passage.quantile(share, HORIZON_DAYS);
@@ -95,7 +85,7 @@ fn standing_slopes(count: u64) {
         let mut was_red = false;
         for look in 1..=LOOKS {
             let known = life.readings.len() * look / LOOKS;
-            let Some(outlook) = outlook(&life.readings[..known]) else {
+            let Some(outlook) = outlook(&life, known) else {
                 continue;
             };
             looks += 1;

@@ -6,11 +6,10 @@
 
 #![expect(clippy::print_stdout, reason = "a table is what it is for")]
 
-use slipwatch::fit::{Observation, Observations, Rate};
+use slipwatch::fit::Rate;
 use slipwatch::forecast::{
     Dependence, Fate, Group, HORIZON_DAYS, Life, Look, Opinion, Panel, Passage, groups,
 };
-use slipwatch::reading::Quantity;
 
 const LEADS: [f64; 5] = [40.0, 20.0, 10.0, 5.0, 2.0];
 const MEMBERS: usize = 4;
@@ -43,18 +42,7 @@ struct Seen {
 
 /// What the readings up to `now` days foretell, from then.
 fn passage(life: &Life, now: f64) -> Option<Seen> {
-    let known = life.readings.iter().filter(|(days, _)| *days <= now);
-    let values = known.map(|(t_days, value)| Observation {
-        t_days: *t_days,
-        value: *value,
-        sigma: None,
-    });
-    let observations = Observations {
-        quantity: Quantity::Displacement,
-        averaging_days: 0.0,
-        values: values.collect(),
-    };
-    let outlook = Panel::default().update(&observations, Life::CRITICAL_MM_PER_DAY)?;
+    let outlook = Panel::default().update(&life.known(now), Life::CRITICAL_MM_PER_DAY)?;
     let later = now - outlook.now_days;
     let times = outlook.passage.times().iter();
     let times = times.map(|(days, share)| (days - later, *share));

@@ -59,6 +59,21 @@ fn rms(readings: &PointReadings, lattice: Lattice) -> f64 {
     fit.best().unwrap().rms
 }
 
+const VAIONT: &str = "recordings/vaiont-1963-reconstruction.mcap";
+const CENTURY: &str = "recordings/century-mine-2013.mcap";
+const LA_CLAPIERE: &str = "recordings/la-clapiere-1982-1995-reconstruction.mcap";
+
+/// The recorded series that every claim is held to.
+const RECORDED: [(&str, &str, Quantity); 7] = [
+    (VAIONT, "5", Quantity::Velocity),
+    (VAIONT, "50", Quantity::Velocity),
+    (VAIONT, "63", Quantity::Velocity),
+    (VAIONT, "67", Quantity::Velocity),
+    (CENTURY, "31-1931", Quantity::Displacement),
+    (CENTURY, "40-1938", Quantity::Displacement),
+    (LA_CLAPIERE, "10", Quantity::Displacement),
+];
+
 /// How far the worst of `restarts` searches stands above the best, relative.
 fn spread(readings: &PointReadings, restarts: u32) -> f64 {
     let regular = rms(readings, Lattice::Regular);
@@ -71,21 +86,7 @@ fn spread(readings: &PointReadings, restarts: u32) -> f64 {
 
 #[test]
 fn two_hundred_searches_from_other_places_end_in_the_same_minimum() {
-    let vaiont = "recordings/vaiont-1963-reconstruction.mcap";
-    let century = "recordings/century-mine-2013.mcap";
-    for (file, benchmark, quantity) in [
-        (vaiont, "5", Quantity::Velocity),
-        (vaiont, "50", Quantity::Velocity),
-        (vaiont, "63", Quantity::Velocity),
-        (vaiont, "67", Quantity::Velocity),
-        (century, "31-1931", Quantity::Displacement),
-        (century, "40-1938", Quantity::Displacement),
-        (
-            "recordings/la-clapiere-1982-1995-reconstruction.mcap",
-            "10",
-            Quantity::Displacement,
-        ),
-    ] {
+    for (file, benchmark, quantity) in RECORDED {
         let spread = spread(&readings(here(file), benchmark, quantity, usize::MAX), 200);
         assert!(spread < SAME, "{file} {benchmark}: {spread:e}");
     }
@@ -170,18 +171,7 @@ fn searches_of_measured_series_from_other_places_end_in_the_same_minimum() {
 
 #[test]
 fn the_rms_of_every_minimum_is_that_of_its_law() {
-    let vaiont = "recordings/vaiont-1963-reconstruction.mcap";
-    let century = "recordings/century-mine-2013.mcap";
-    let la_clapiere = "recordings/la-clapiere-1982-1995-reconstruction.mcap";
-    for (file, benchmark, quantity) in [
-        (vaiont, "5", Quantity::Velocity),
-        (vaiont, "50", Quantity::Velocity),
-        (vaiont, "63", Quantity::Velocity),
-        (vaiont, "67", Quantity::Velocity),
-        (century, "31-1931", Quantity::Displacement),
-        (century, "40-1938", Quantity::Displacement),
-        (la_clapiere, "10", Quantity::Displacement),
-    ] {
+    for (file, benchmark, quantity) in RECORDED {
         let pairs = pairs(here(file), benchmark, quantity, usize::MAX);
         let readings = PointReadings::new(quantity, pairs.iter().copied());
         let fit = ConstantLoad::fit(&readings, Exponent::Free);

@@ -147,22 +147,12 @@ fn slopes_that_stood_never_have_their_5_percent_quantile_within_the_evacuation_t
 /// The outlook of a simulated slope at the last reading that leaves at least `lead` days, and what remained.
 fn before_the_end(life: &Life, lead: f64) -> Option<(Outlook, f64)> {
     let failure = life.failure_days?;
-    let values = life.readings.iter().map(|(t_days, value)| Observation {
-        t_days: *t_days,
-        value: *value,
-        sigma: None,
-    });
-    let observations = Observations {
-        quantity: Quantity::Displacement,
-        averaging_days: 0.0,
-        values: values.collect(),
-    };
     let last = life
         .readings
         .iter()
         .rfind(|(days, _)| *days <= failure - lead)?;
     let remaining = failure - last.0;
-    (remaining < 2.0 * lead).then_some((at(&observations, last.0)?, remaining))
+    (remaining < 2.0 * lead).then_some((at(&life.known(failure), last.0)?, remaining))
 }
 
 /// `examples/lives.rs` measures the same on a thousand; the bounds here leave room for the scatter of 120.
@@ -212,24 +202,14 @@ fn a_compacted_record_foretells_what_the_whole_one_does() {
     let mut compared = 0;
     for life in long {
         let failure = life.failure_days.unwrap();
+        // The readings end before the failure: what is later than this is not known yet.
+        let whole = life.known((failure - 10.0).next_down());
         let mut kept = Observations {
-            quantity: Quantity::Displacement,
-            averaging_days: 0.0,
             values: Vec::new(),
+            ..whole.clone()
         };
-        let mut whole = kept.clone();
-        for (t_days, value) in life
-            .readings
-            .iter()
-            .filter(|(days, _)| *days < failure - 10.0)
-        {
-            let value = Observation {
-                t_days: *t_days,
-                value: *value,
-                sigma: None,
-            };
-            whole.values.push(value);
-            kept.values.push(value);
+        for value in &whole.values {
+            kept.values.push(*value);
             kept.compact();
         }
         assert!(kept.values.len() <= Observations::MOST && whole.values.len() > 2400);

@@ -4,7 +4,9 @@
 //! (Ornstein-Uhlenbeck, and a season on every second slope); its displacement is read with noise, gaps and
 //! now and then a reset.
 
+use crate::fit::{Observation, Observations};
 use crate::model::{Accuracy, Law, Load, LoadedLaw};
+use crate::reading::Quantity;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
@@ -47,6 +49,21 @@ struct Slope {
 impl Life {
     /// Passing this velocity is failure, mm/day.
     pub const CRITICAL_MM_PER_DAY: f64 = 1000.0;
+
+    /// What a monitor has of this slope by `now_days`.
+    pub fn known(&self, now_days: f64) -> Observations {
+        let known = self.readings.iter().filter(|(days, _)| *days <= now_days);
+        let values = known.map(|(t_days, value)| Observation {
+            t_days: *t_days,
+            value: *value,
+            sigma: None,
+        });
+        Observations {
+            quantity: Quantity::Displacement,
+            averaging_days: 0.0,
+            values: values.collect(),
+        }
+    }
 
     /// The life that `seed` gives; a slope that its load brings to another end, or down in less than 0.4 of
     /// its time, is drawn anew.

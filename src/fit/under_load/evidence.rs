@@ -38,8 +38,6 @@ pub(super) struct Evidence {
     pub(super) load: f64,
     /// Their variances and their covariance.
     pub(super) today: [f64; 3],
-    /// Days since the law began.
-    pub(super) age: f64,
 }
 
 impl Slope {
@@ -122,7 +120,6 @@ fn over_starts(record: &Record, gains: &Gains, room: &Room, lane: usize) -> Evid
         ln_velocity: 0.0,
         load: 0.0,
         today: [0.0; 3],
-        age: 0.0,
     };
     if !best.is_finite() {
         return mean;
@@ -139,14 +136,12 @@ fn over_starts(record: &Record, gains: &Gains, room: &Room, lane: usize) -> Evid
         for (slot, variance) in mean.today.iter_mut().zip(&gains.today[step]) {
             *slot += weight * variance;
         }
-        mean.age += weight * record.from[count - 1 - step];
     }
     Evidence {
         ln: best + f64::ln(sum),
         ln_velocity: mean.ln_velocity / sum,
         load: mean.load / sum,
         today: mean.today.map(|variance| variance / sum),
-        age: mean.age / sum,
     }
 }
 

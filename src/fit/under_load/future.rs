@@ -1,6 +1,5 @@
 //! When a velocity will be passed: each law run on, its load and its own wandering drawn on the way.
 
-use super::shape::Shape;
 use super::{Cell, LoadPosterior, WANDER};
 use crate::fit::quasi_random::{halton, normal_quantile};
 
@@ -18,7 +17,6 @@ impl LoadPosterior {
         let mut passages = Vec::new();
         let mut index = 0;
         for cell in &self.cells {
-            let shape = self.shape(cell);
             #[expect(
                 clippy::cast_possible_truncation,
                 clippy::cast_sign_loss,
@@ -28,7 +26,7 @@ impl LoadPosterior {
             for _ in 0..draws {
                 index += 1;
                 let z = halton(index).map(normal_quantile);
-                if let Some(days) = cell.days_to(shape, velocity.ln(), z)
+                if let Some(days) = cell.days_to(velocity.ln(), z)
                     && days <= horizon
                 {
                     passages.push((days, cell.weight / draws as f64));
@@ -41,7 +39,8 @@ impl LoadPosterior {
 
 impl Cell {
     /// Days to a velocity under the load, the velocity and the future that `z` draws.
-    fn days_to(&self, shape: &Shape, ln_velocity: f64, z: [f64; 5]) -> Option<f64> {
+    fn days_to(&self, ln_velocity: f64, z: [f64; 5]) -> Option<f64> {
+        let shape = self.shape();
         let (of_velocity, of_load) = self.variances;
         let now = self.ln_velocity + of_velocity.sqrt() * z[0];
         if now >= ln_velocity {

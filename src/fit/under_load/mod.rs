@@ -60,11 +60,22 @@ struct Cell {
     load: f64,
     variances: (f64, f64),
     covariance: f64,
-    /// Days since the law began.
-    age: f64,
     /// Relative scatter of a reading.
     scatter: f64,
     weight: f64,
+}
+
+impl Cell {
+    fn shape(&self) -> &'static Shape {
+        &shape::SHAPES[self.shape]
+    }
+
+    /// Under today's load.
+    fn law(&self) -> Law {
+        let shape = self.shape();
+        let (r, kappa) = shape.slope_and_curvature(self.r);
+        Law::from_fit(self.ln_velocity.exp(), r, kappa, shape.p)
+    }
 }
 
 /// The law under an undeclared load, as the readings leave it open.
@@ -94,14 +105,9 @@ impl LoadPosterior {
         let mut regimes: BTreeMap<Regime, f64> =
             Regime::KNOWN.into_iter().map(|r| (r, 0.0)).collect();
         for cell in &self.cells {
-            *regimes.entry(self.shape(cell).regime()).or_default() += cell.weight;
+            *regimes.entry(cell.shape().regime()).or_default() += cell.weight;
         }
         regimes
-    }
-
-    /// Mean time since the law began, days: readings before that were left to wander.
-    pub fn age_days(&self) -> f64 {
-        self.cells.iter().map(|cell| cell.weight * cell.age).sum()
     }
 
     /// The heaviest laws, with their share, under today's load; t = 0 is the present.
@@ -115,7 +121,7 @@ impl LoadPosterior {
         };
         let scatter = (heaviest.iter().map(variance).sum::<f64>() / total).sqrt();
         let samples = heaviest.iter().map(|cell| Sample {
-            law: self.law(cell),
+            law: cell.law(),
             weight: cell.weight / total,
         });
         Ensemble {
@@ -123,19 +129,5 @@ impl LoadPosterior {
             samples: samples.collect(),
             scatter,
         }
-    }
-
-    fn law(&self, cell: &Cell) -> Law {
-        let shape = self.shape(cell);
-        let (r, kappa) = shape.slope_and_curvature(cell.r);
-        Law::from_fit(cell.ln_velocity.exp(), r, kappa, shape.p)
-    }
-
-    #[expect(
-        clippy::unused_self,
-        reason = "a cell's shape belongs to its posterior"
-    )]
-    fn shape(&self, cell: &Cell) -> &'static Shape {
-        &shape::SHAPES[cell.shape]
     }
 }

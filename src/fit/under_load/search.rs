@@ -5,6 +5,7 @@ use super::gains::{Gains, Noise, Record};
 use super::shape::{BLOCKS, SHAPES};
 use super::{Cell, KEPT};
 use crate::fit::Rate;
+use std::collections::BTreeMap;
 
 /// Grids of the scatter of the readings, of the load's standard deviation, and of its memory over the span
 /// of the newer half of the rates.
@@ -119,6 +120,16 @@ impl Search {
         shape.ln_prior - RARE * r.ln() - 0.5 * (resolved * resolved + kept * kept)
     }
 
+    /// The evidence of what came before each rate, by no law, for each scatter of the readings.
+    fn befores(&self) -> BTreeMap<u64, Vec<f64>> {
+        SCATTERS
+            .map(|scatter| {
+                let before = evidence::before_the_law(&self.record, scatter);
+                (scatter.to_bits(), before)
+            })
+            .into()
+    }
+
     /// Every shape at every slope under one noise, best first.
     fn sweep(&mut self, slopes: &[Slope], noise: &Noise) -> Vec<Scored> {
         let before = evidence::before_the_law(&self.record, noise.scatter);
@@ -173,13 +184,14 @@ impl Search {
                 break;
             }
         }
+        let befores = self.befores();
         for noise in noises.iter_mut() {
-            let before = evidence::before_the_law(&self.record, noise.scatter);
+            let before = &befores[&noise.scatter.to_bits()];
             let evidence = chosen.iter().map(|one| {
                 let slope = &slopes[one.slope];
                 let gains = Gains::new(&self.record, noise, &slope.u);
                 let law = (&BLOCKS[one.block], slope);
-                let found = weigh(&self.record, law, &gains, &before, &mut self.room);
+                let found = weigh(&self.record, law, &gains, before, &mut self.room);
                 found[one.lane].ln + SHAPES[BLOCKS[one.block].first + one.lane].ln_prior
             });
             noise.ln_evidence = evidence.fold(f64::NEG_INFINITY, f64::max);
@@ -205,8 +217,9 @@ impl Search {
         let likely = noises[0].ln_evidence - LEFT_OUT.1;
         let likely = noises.iter().take_while(|noise| noise.ln_evidence > likely);
         let mut cells = Vec::new();
+        let befores = self.befores();
         for noise in likely.take(MOST.2) {
-            let before = evidence::before_the_law(&self.record, noise.scatter);
+            let before = &befores[&noise.scatter.to_bits()];
             for slope in &slopes {
                 let gains = Gains::new(&self.record, noise, &slope.u);
                 for (block, of) in BLOCKS
@@ -215,7 +228,7 @@ impl Search {
                     .filter(|(block, _)| blocks[*block])
                 {
                     let law = (of, slope);
-                    let found = weigh(&self.record, law, &gains, &before, &mut self.room);
+                    let found = weigh(&self.record, law, &gains, before, &mut self.room);
                     for (lane, evidence) in found.iter().enumerate() {
                         cells.push(self.cell(BLOCKS[block].first + lane, slope, noise, evidence));
                     }
@@ -236,7 +249,6 @@ impl Search {
             load: evidence.load,
             variances: (evidence.today[0].max(0.0), evidence.today[1].max(0.0)),
             covariance: evidence.today[2],
-            age: evidence.age,
             scatter: noise.scatter,
             weight: evidence.ln + self.ln_prior(shape, slope.r, evidence),
         }
