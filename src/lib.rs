@@ -5,6 +5,8 @@
 //! ```text
 //! main -> cli -> runtime, config -> monitor -> alert, regime, forecast -> fit -> model -> reading
 //!         cli -> inversion -> regime, forecast, fit
+//!         cli -> effects -> forecast, fit, model
+//!         cli -> figures -> effects, plot
 //! ```
 //!
 //! Everything from `monitor` down is pure: no clock, no files, no network, no ambient randomness.
@@ -12,11 +14,14 @@
 pub mod alert;
 pub mod cli;
 pub mod config;
+pub mod effects;
+pub mod figures;
 pub mod fit;
 pub mod forecast;
 pub mod inversion;
 pub mod model;
 pub mod monitor;
+pub mod plot;
 pub mod reading;
 pub mod regime;
 pub mod runtime;

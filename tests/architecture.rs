@@ -9,16 +9,24 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Which modules a module may name. A new module gets a row here, and a place in ARCHITECTURE.md.
-const ARROWS: [(&str, &[&str]); 11] = [
+const ARROWS: [(&str, &[&str]); 14] = [
     ("reading", &[]),
     ("regime", &[]),
+    ("plot", &[]),
     ("model", &["reading", "regime"]),
     ("fit", &["model", "reading", "regime"]),
     ("forecast", &["fit", "model", "reading", "regime"]),
+    (
+        "effects",
+        &["fit", "forecast", "model", "reading", "regime"],
+    ),
+    ("figures", &["effects", "plot", "reading"]),
     ("alert", &["reading"]),
     (
         "monitor",
-        &["alert", "fit", "forecast", "model", "reading", "regime"],
+        &[
+            "alert", "effects", "fit", "forecast", "model", "reading", "regime",
+        ],
     ),
     (
         "inversion",
@@ -30,6 +38,7 @@ const ARROWS: [(&str, &[&str]); 11] = [
         &[
             "alert",
             "config",
+            "effects",
             "fit",
             "forecast",
             "inversion",
@@ -44,11 +53,14 @@ const ARROWS: [(&str, &[&str]); 11] = [
         &[
             "alert",
             "config",
+            "effects",
+            "figures",
             "fit",
             "forecast",
             "inversion",
             "model",
             "monitor",
+            "plot",
             "reading",
             "regime",
             "runtime",
@@ -57,12 +69,15 @@ const ARROWS: [(&str, &[&str]); 11] = [
 ];
 
 /// Modules that know no clock, no files, no network and no ambient randomness.
-const PURE: [&str; 8] = [
+const PURE: [&str; 11] = [
     "reading",
     "regime",
+    "plot",
     "model",
     "fit",
     "forecast",
+    "effects",
+    "figures",
     "alert",
     "monitor",
     "inversion",

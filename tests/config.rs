@@ -2,6 +2,7 @@
 
 use slipwatch::alert::Level;
 use slipwatch::config::{self, ConfigError, SourceKind};
+use slipwatch::monitor::Explain;
 use slipwatch::reading::BenchmarkId;
 use std::path::Path;
 
@@ -65,6 +66,32 @@ fn the_least_config_is_taken_with_the_defaults() {
 }
 
 #[test]
+fn what_is_done_about_the_unexplained_is_read_and_wrong_words_are_refused() {
+    let explain = |addition: &str| {
+        let text = format!("{RIGHT}[explain]\n{addition}");
+        let config = config::parse(&text, Path::new("site.toml")).unwrap();
+        (config.settings.explain, config.warnings.len())
+    };
+    assert_eq!(explain(""), (Explain::Adopt, 0));
+    assert_eq!(explain("adopt = false\n"), (Explain::Tell, 0));
+    assert_eq!(explain("search = false\n"), (Explain::Off, 0));
+    assert_eq!(
+        explain("search = false\nadopt = true\n"),
+        (Explain::Off, 1),
+        "adopting without a search is doubtful"
+    );
+    assert_eq!(
+        problem("[explain]\nadopts = true\n"),
+        "site.toml:11:1: error: unknown key explain.adopts; known here: search, adopt"
+    );
+    assert_eq!(
+        problem("[explain]\nsearch = \"no\"\n"),
+        "site.toml:11:10: error: explain.search is of type string, not true or false; \
+         write search = true"
+    );
+}
+
+#[test]
 fn a_column_that_does_not_say_its_unit_needs_one() {
     assert_eq!(
         problem("[[benchmark]]\nid = \"5\"\ncolumn = \"ext_1\"\n"),
@@ -93,8 +120,8 @@ fn an_unknown_key_is_refused_with_the_known_ones() {
     );
     assert_eq!(
         problem("[allert]\n"),
-        "site.toml:10:2: error: unknown key allert; known here: site, source, alert, benchmark, \
-         event, hook"
+        "site.toml:10:2: error: unknown key allert; known here: site, source, alert, explain, \
+         benchmark, event, hook"
     );
 }
 

@@ -59,8 +59,10 @@ impl Bench {
                 Input::Reading {
                     benchmark, reading, ..
                 } => format!("{benchmark}:{}", reading.value),
-                Input::Sample { channel, sample } => format!("{channel}:{}", sample.value),
-                Input::Tick => panic!("a file has no ticks"),
+                Input::Sample {
+                    channel, sample, ..
+                } => format!("{channel}:{}", sample.value),
+                Input::Found(_) | Input::Tick => panic!("not in a file"),
             }));
             if caught_up {
                 return news;

@@ -15,8 +15,6 @@ mod la_clapiere;
 mod recorded;
 #[path = "../examples/seed/regimes.rs"]
 mod regimes;
-#[path = "../examples/seed/svg.rs"]
-mod svg;
 #[path = "../examples/seed/synthetic.rs"]
 mod synthetic;
 #[path = "../examples/seed/vaiont.rs"]

@@ -4,13 +4,13 @@ use crate::document::m_text;
 use crate::la_clapiere::Fit;
 use crate::recorded::{decimal_year, vaiont_day, velocities};
 use crate::regimes::{Column, Instant};
-use crate::svg::{Axis, BLACK, BLUE, Corner, Figure, GREEN, GREY, Mark, PURPLE, Panel, RED};
 use crate::synthetic::{self, Study};
 use crate::vaiont::Benchmark;
 use anyhow::{Context, Result};
 use slipwatch::fit::{ConstantLoad, Exponent};
 use slipwatch::inversion::{SweepReport, SweepRow};
 use slipwatch::model::{Accuracy, Trajectory};
+use slipwatch::plot::{Axis, BLACK, BLUE, Figure, GREEN, GREY, Legend, Mark, PURPLE, Panel, RED};
 use slipwatch::reading::{Quantity, Series, days_since};
 use slipwatch::regime::Regime;
 
@@ -89,7 +89,7 @@ fn regime_panel(column: &Column, row: usize, of: fn(&Instant) -> f64) -> Panel {
         x: Axis::linear(units.time, 0.0, end),
         y,
         marks: marks.collect(),
-        legend: Corner::BottomLeft,
+        legend: Legend::BottomLeft,
     }
 }
 
@@ -148,14 +148,14 @@ fn vaiont_panels(benchmark: &Benchmark) -> Result<[Panel; 2]> {
                 line(&best_name, best, BLUE, ""),
                 line(&paper_name, at_paper_m, RED, DASHED),
             ],
-            legend: Corner::TopLeft,
+            legend: Legend::TopLeft,
         },
         Panel {
             title: title("inverse velocity"),
             x: Axis::linear("days from 2 August 1963", 0.0, 76.0),
             y: Axis::linear("1/velocity, day/mm", -0.05 / slowest, 1.3 / slowest),
             marks: inverse_marks,
-            legend: Corner::TopRight,
+            legend: Legend::TopRight,
         },
     ])
 }
@@ -228,14 +228,14 @@ pub(crate) fn la_clapiere(series: &Series, fits: &[Fit]) -> Result<Figure> {
                 x: time(),
                 y: Axis::linear("displacement, m", -2.0, 34.0),
                 marks: slip,
-                legend: Corner::TopLeft,
+                legend: Legend::TopLeft,
             },
             Panel {
                 title: "Velocity".to_owned(),
                 x: time(),
                 y: Axis::linear("velocity, mm/day", 0.0, 110.0),
                 marks: speed,
-                legend: Corner::TopLeft,
+                legend: Legend::TopLeft,
             },
         ],
     })
@@ -288,7 +288,7 @@ fn transition_panel(report: &SweepReport) -> Result<Panel> {
         x: t_max_axis(),
         y: Axis::linear("transition time, year", 1982.5, 1990.0),
         marks,
-        legend: Corner::TopLeft,
+        legend: Legend::TopLeft,
     })
 }
 
@@ -305,7 +305,7 @@ fn probability_panel(report: &SweepReport) -> Result<Panel> {
         x: t_max_axis(),
         y: Axis::linear("P(unstable)", -0.05, 1.05),
         marks,
-        legend: Corner::BottomLeft,
+        legend: Legend::BottomLeft,
     })
 }
 
@@ -356,7 +356,7 @@ fn minima_panel(report: &SweepReport) -> Result<Panel> {
             dots("local minimum", others, GREY, 2.5),
             dots("best fit", best, RED, 4.0),
         ],
-        legend: Corner::TopLeft,
+        legend: Legend::TopLeft,
     })
 }
 
@@ -402,6 +402,6 @@ fn synthetic_panel(study: &Study) -> Panel {
         x: Axis::linear("series, in the order of their best m", 0.0, count + 1.0),
         y: Axis::linear("m", -0.1, 3.4),
         marks,
-        legend: Corner::TopRight,
+        legend: Legend::TopRight,
     }
 }

@@ -8,7 +8,6 @@ mod figures;
 mod la_clapiere;
 mod recorded;
 mod regimes;
-mod svg;
 mod synthetic;
 mod vaiont;
 

@@ -5,6 +5,7 @@ mod check;
 mod convert;
 mod demo;
 mod exit;
+mod explain;
 mod fit;
 mod load;
 mod replay;
@@ -33,6 +34,7 @@ enum Command {
     Replay(replay::Args),
     Fit(fit::Args),
     Sweep(sweep::Args),
+    Explain(explain::Args),
     Simulate(simulate::Args),
     Convert(convert::Args),
 }
@@ -47,6 +49,7 @@ pub fn main() -> ExitCode {
             Command::Replay(args) => replay::run(&args),
             Command::Fit(args) => fit::run(&args),
             Command::Sweep(args) => sweep::run(&args),
+            Command::Explain(args) => explain::run(&args),
             Command::Simulate(args) => simulate::run(&args),
             Command::Convert(args) => convert::run(&args),
         },

@@ -1,12 +1,14 @@
 //! Aligned columns for people.
 
+use crate::plot::escaped;
 use crate::reading::Timestamp;
-use std::fmt;
+use std::fmt::{self, Write as _};
 
 /// Rows of cells, each column as wide as its widest cell.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Table {
     rows: Vec<Vec<String>>,
+    is_headed: bool,
 }
 
 impl Table {
@@ -17,7 +19,10 @@ impl Table {
 
     /// The first row names the columns.
     pub(super) fn headed<S: Into<String>>(names: impl IntoIterator<Item = S>) -> Self {
-        let mut table = Self::default();
+        let mut table = Self {
+            is_headed: true,
+            ..Self::default()
+        };
         table.row(names);
         table
     }
@@ -25,6 +30,26 @@ impl Table {
     /// Adds a row.
     pub(super) fn row<S: Into<String>>(&mut self, cells: impl IntoIterator<Item = S>) {
         self.rows.push(cells.into_iter().map(Into::into).collect());
+    }
+
+    /// The same as an element of a page.
+    pub(super) fn html(&self) -> String {
+        let mut out = String::from("<table>\n");
+        for (index, row) in self.rows.iter().enumerate() {
+            let tag = if self.is_headed && index == 0 {
+                "th"
+            } else {
+                "td"
+            };
+            out.push_str("<tr>");
+            for cell in row {
+                // Writing to a string cannot fail.
+                let _ = write!(out, "<{tag}>{}</{tag}>", escaped(cell));
+            }
+            out.push_str("</tr>\n");
+        }
+        out.push_str("</table>");
+        out
     }
 }
 

@@ -1,6 +1,7 @@
 //! Events as lines for people.
 
-use crate::monitor::{AlertState, Event, EventKind, FailureTime, Summary};
+use crate::effects::Kind;
+use crate::monitor::{AlertState, Event, EventKind, FailureTime, Summary, Unexplained};
 use crate::reading::Timestamp;
 
 /// One event on one line: when, where, what.
@@ -50,16 +51,12 @@ fn what(kind: &EventKind) -> String {
             to,
             drift_days_per_day,
         } => drift("transition time", (*from, *to), *drift_days_per_day),
-        EventKind::UnexplainedResidual {
-            surprise_nats,
-            velocity_mm_per_day,
-        } => {
-            let velocity =
-                velocity_mm_per_day.map_or_else(String::new, |v| format!(", {v:.3} mm/day"));
-            format!(
-                "unexplained residual: e^{surprise_nats:.0} times less likely than the usual reading{velocity}"
-            )
-        }
+        EventKind::UnexplainedResidual(what) => unexplained(what),
+        EventKind::EffectFound { .. } => effect_found(kind),
+        EventKind::EffectDropped { effect, channel } => format!(
+            "effect dropped: {}; forecasts go without it",
+            through(*effect, channel.as_deref())
+        ),
         EventKind::Alert {
             level, state, text, ..
         } => {
@@ -76,6 +73,75 @@ fn what(kind: &EventKind) -> String {
             alerts,
         }) => format!("summary: {readings} readings, {refits} refits, {alerts} alerts"),
     }
+}
+
+fn unexplained(what: &Unexplained) -> String {
+    match what {
+        Unexplained::Reading {
+            surprise_nats,
+            velocity_mm_per_day,
+        } => {
+            let velocity =
+                velocity_mm_per_day.map_or_else(String::new, |v| format!(", {v:.3} mm/day"));
+            format!(
+                "unexplained residual: e^{surprise_nats:.0} times less likely than the usual reading{velocity}"
+            )
+        }
+        Unexplained::Structure {
+            bic_gain,
+            load_sd,
+            since,
+        } => format!(
+            "unexplained residual since {}: as under a load of {load_sd:.2} e-folds of velocity (BIC {bic_gain:.0})",
+            minute(*since)
+        ),
+    }
+}
+
+fn through(effect: Kind, channel: Option<&str>) -> String {
+    channel.map_or_else(
+        || effect.to_string(),
+        |channel| format!("{effect} {channel}"),
+    )
+}
+
+fn effect_found(kind: &EventKind) -> String {
+    let EventKind::EffectFound {
+        effect,
+        channel,
+        form,
+        at,
+        lag_days,
+        bic_gain,
+        p_value,
+        cannot_separate_from,
+        adopted,
+        ..
+    } = kind
+    else {
+        return String::new();
+    };
+    let form = form.map_or_else(String::new, |form| format!(" by its {}", form.name()));
+    let at = at.map_or_else(String::new, |at| format!(" at {}", minute(at)));
+    let lag = lag_days.map_or_else(String::new, |lag| format!(", {lag:.1} days later"));
+    let p = p_value.map_or_else(String::new, |p| format!(", p {p:.3}"));
+    let rivals = if cannot_separate_from.is_empty() {
+        String::new()
+    } else {
+        format!(
+            ", cannot be separated from {}",
+            cannot_separate_from.join(", ")
+        )
+    };
+    let use_of = if *adopted {
+        "forecasts go by it"
+    } else {
+        "forecasts go without it"
+    };
+    let name = through(*effect, channel.as_deref());
+    format!(
+        "effect found: consistent with {name}{form}{at}{lag} (BIC {bic_gain:.0}{p}{rivals}); {use_of}"
+    )
 }
 
 fn drift(name: &str, (from, to): (Timestamp, Timestamp), days_per_day: f64) -> String {

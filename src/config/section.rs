@@ -6,7 +6,7 @@ use super::{
     alert, value,
 };
 use crate::alert::{Level, Policy};
-use crate::monitor::Settings;
+use crate::monitor::{Explain, Settings};
 use crate::reading::{BenchmarkId, Quantity, Timestamp, Unit};
 use jiff::tz::TimeZone;
 use std::collections::{BTreeMap, BTreeSet};
@@ -21,6 +21,7 @@ pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
     let site = site(root.table("site", "site"), base);
     let sources = sources(root, base);
     let policy = alert::policy(root.table("alert", "alert"), &Policy::default());
+    let explain = explain(root.table("explain", "explain"));
     let (benchmarks, own) = benchmarks(root, &sources, &policy);
     let declared = declared(root, &benchmarks);
     let hooks: Vec<HookConfig> = root
@@ -43,6 +44,7 @@ pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
         settings: Settings {
             policy,
             benchmarks: own,
+            explain,
         },
         declared,
         hooks,
@@ -67,6 +69,25 @@ fn site(mut section: Section<'_>, base: &Path) -> Option<SiteConfig> {
         listen: listen.map(|given| given.value),
         time_zone: time_zone.map_or(TimeZone::UTC, |given| given.value),
     })
+}
+
+/// With no search there is nothing to adopt.
+fn explain(mut section: Section<'_>) -> Explain {
+    let searches = section.switch("search").unwrap_or(true);
+    let adopts = section.switch("adopt");
+    if adopts == Some(true) && !searches {
+        section.warning(
+            section.at(),
+            "explain.adopt = true without a search adopts nothing".to_owned(),
+            "write search = true, or leave adopt out",
+        );
+    }
+    section.finish();
+    match (searches, adopts) {
+        (false, _) => Explain::Off,
+        (true, Some(false)) => Explain::Tell,
+        (true, Some(true) | None) => Explain::Adopt,
+    }
 }
 
 fn sources(root: &mut Section<'_>, base: &Path) -> Vec<Source> {

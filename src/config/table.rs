@@ -134,6 +134,16 @@ impl<'t> Section<'t> {
         }
     }
 
+    /// true or false.
+    pub(super) fn switch(&mut self, key: &'static str) -> Option<bool> {
+        let value = self.get(key)?;
+        let DeValue::Boolean(switch) = value.get_ref() else {
+            self.wrong_type(key, value, "true or false", &format!("{key} = true"));
+            return None;
+        };
+        Some(*switch)
+    }
+
     /// A number strictly between 0 and 1.
     pub(super) fn chance(&mut self, key: &'static str) -> Option<f64> {
         let value = self.get(key)?;

@@ -3,7 +3,7 @@
 //! Displacement differences over short intervals are noise; intervals are merged, newest first,
 //! until the slip in them stands clear of it, so that slow creep and fast sliding are both resolved.
 
-use crate::reading::Quantity;
+use crate::reading::{Quantity, SECONDS_PER_DAY, Series, days_since};
 use std::ops::Range;
 
 /// One reading in the science's units: days and mm, or mm/day.
@@ -88,6 +88,23 @@ const LONGEST_SHARE: f64 = 1.0 / 16.0;
 const LEAST_DISPLACEMENT_SIGMA_MM: f64 = 1e-3;
 
 impl Observations {
+    /// The readings of a series, in days from its first.
+    pub fn of(series: &Series) -> Self {
+        let factor = series.unit.factor();
+        let epoch = series.readings.first().map(|reading| reading.time);
+        let values = series.readings.iter().map(|reading| Observation {
+            t_days: epoch.map_or(0.0, |epoch| days_since(epoch, reading.time)),
+            value: reading.value * factor,
+            sigma: reading.sigma.map(|sigma| sigma * factor),
+        });
+        let seconds = series.averaging.map_or(0.0, |span| span.as_secs_f64());
+        Self {
+            quantity: series.quantity(),
+            averaging_days: seconds / SECONDS_PER_DAY,
+            values: values.collect(),
+        }
+    }
+
     /// The rates in the readings of `range`, oldest first.
     pub fn rates(&self, range: Range<usize>, options: RateOptions) -> Vec<Rate> {
         let Some(values) = self.values.get(range) else {

@@ -55,6 +55,16 @@ impl Panel {
         })
     }
 
+    /// By how many standard deviations the newest reading is faster than what was expected of it; `None` where
+    /// nothing was. To be asked before [`Panel::update`] takes that reading.
+    pub fn excess(&self, observations: &Observations) -> Option<f64> {
+        let [.., before, newest] = observations.values.as_slice() else {
+            return None;
+        };
+        let newest = Newest::of(observations, before, newest);
+        newest.excess(self.expected.as_ref()?)
+    }
+
     fn surprise(&mut self, observations: &Observations) -> Option<f64> {
         let [.., before, newest] = observations.values.as_slice() else {
             return None;
@@ -154,6 +164,28 @@ impl Newest {
             velocity,
             sigma,
         }
+    }
+
+    /// Standard deviations above the mean of what the laws expect; a law past its failure expects anything.
+    fn excess(&self, ensemble: &Ensemble) -> Option<f64> {
+        let from = self.from_days - ensemble.now_days;
+        let to = self.to_days - ensemble.now_days;
+        let (mut weight, mut mean, mut square) = (0.0, 0.0, 0.0);
+        for sample in &ensemble.samples {
+            let Some(predicted) = mean_velocity(&sample.law, from, to) else {
+                continue;
+            };
+            weight += sample.weight;
+            mean += sample.weight * predicted;
+            let spread = ensemble.scatter * predicted;
+            square += sample.weight * (predicted * predicted + spread * spread);
+        }
+        if weight <= 0.0 {
+            return None;
+        }
+        let (mean, square) = (mean / weight, square / weight);
+        let spread = (square - mean * mean).max(0.0) + self.sigma * self.sigma;
+        Some((self.velocity - mean) / spread.sqrt().max(1e-12))
     }
 
     /// ln of the predictive density of this velocity, relative to its size.

@@ -55,6 +55,13 @@ impl Passage {
         Self { times }
     }
 
+    /// The same, every time `pace` times as soon.
+    #[must_use]
+    pub fn sooner(&self, pace: f64) -> Self {
+        let times = self.times.iter().map(|(days, share)| (days / pace, *share));
+        Self::from_times(times.collect())
+    }
+
     /// (days from now, probability), in increasing time; what is missing to 1 never passes.
     pub fn times(&self) -> &[(f64, f64)] {
         &self.times

@@ -17,12 +17,11 @@ pub use sweep::{SweepOptions, SweepReport, SweepRow, sweep};
 pub use together::{ApartReport, GroupReport, TogetherReport, together};
 
 use crate::fit::{
-    ConstantLoad, Exponent, Observation, Observations, PointReadings, Posterior, Rate, RateOptions,
-    Solution,
+    ConstantLoad, Exponent, Observations, PointReadings, Posterior, Rate, RateOptions, Solution,
 };
 use crate::forecast::{HORIZON_DAYS, InverseVelocityLine, outlook};
 use crate::model::Law;
-use crate::reading::{LengthUnit, Series, TimeUnit, Timestamp, Unit, after_days, days_since};
+use crate::reading::{LengthUnit, Series, TimeUnit, Timestamp, Unit, after_days};
 use jiff::SignedDuration;
 
 /// What is asked of an inversion.
@@ -87,7 +86,7 @@ impl Inversion {
             .copied()
             .collect();
         chosen.settle();
-        let observations = observations(&chosen);
+        let observations = Observations::of(&chosen);
         Self {
             series: chosen,
             observations,
@@ -226,22 +225,5 @@ fn law_in_mm_per_day(inversion: &Inversion, solution: &Solution) -> Law {
     Law {
         v_i: solution.law.v_i / inversion.velocity_per_mm_per_day(),
         ..solution.law
-    }
-}
-
-/// Readings in mm (or mm/day) and days from the first.
-fn observations(series: &Series) -> Observations {
-    let factor = series.unit.factor();
-    let epoch = series.readings.first().map(|reading| reading.time);
-    let values = series.readings.iter().map(|reading| Observation {
-        t_days: epoch.map_or(0.0, |epoch| days_since(epoch, reading.time)),
-        value: reading.value * factor,
-        sigma: reading.sigma.map(|sigma| sigma * factor),
-    });
-    let seconds = series.averaging.map_or(0.0, |span| span.as_secs_f64());
-    Observations {
-        quantity: series.quantity(),
-        averaging_days: seconds / crate::reading::SECONDS_PER_DAY,
-        values: values.collect(),
     }
 }

@@ -4,6 +4,7 @@
 //! `dy/dt = -r + kappa (y^p - 1)/p`, finite and smooth through m = 1.
 
 mod coefficients;
+mod driven;
 mod law;
 mod load;
 mod loaded;
@@ -15,6 +16,7 @@ mod tail;
 mod taylor;
 mod trajectory;
 
+pub use driven::{Drive, Driven, Event};
 pub use law::{Law, LawError, PaperParameters, StateSense, SteadyState};
 pub use load::Load;
 pub use loaded::LoadedLaw;

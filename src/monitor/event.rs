@@ -1,6 +1,7 @@
 //! What the monitor says: one JSON object a line, in data time, nothing from the wall clock.
 
 use crate::alert::Level;
+use crate::effects::{Explained, Form, Kind};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::regime::Regime;
 use serde::{Deserialize, Serialize};
@@ -41,6 +42,9 @@ pub enum EventKind {
         chance_within_evacuation_time: f64,
         /// Chance of failure within the outlook.
         chance_within_outlook: f64,
+        /// What the law under a constant load says by itself, where an effect is adopted.
+        #[serde(skip_serializing_if = "Option::is_none", default)]
+        plain: Option<Box<Plain>>,
     },
     /// The probability of instability crossed over.
     RegimeFlip {
@@ -71,12 +75,37 @@ pub enum EventKind {
         /// How fast it moves, days a day of new readings.
         drift_days_per_day: f64,
     },
-    /// The newest reading is one that nobody expected: a step, a load that was not declared, a fault.
-    UnexplainedResidual {
-        /// How much less likely it was than the usual reading, ln.
-        surprise_nats: f64,
-        /// The velocity that it implies, mm/day.
-        velocity_mm_per_day: Option<f64>,
+    /// What the readings show and the law in force does not explain.
+    UnexplainedResidual(Unexplained),
+    /// A search found what the law lacks; one event for each effect.
+    EffectFound {
+        /// Its kind.
+        effect: Kind,
+        /// The covariate that it works through.
+        channel: Option<String>,
+        /// By the covariate's value or by its rate.
+        form: Option<Form>,
+        /// When it happened, for what happened once.
+        at: Option<Timestamp>,
+        /// Mean delay of the response, days.
+        lag_days: Option<f64>,
+        /// By how much the BIC fell.
+        bic_gain: f64,
+        /// Chance that the search finds as much in nothing.
+        p_value: Option<f64>,
+        /// How much of the structure all effects together account for.
+        explained: Explained,
+        /// What would explain the same.
+        cannot_separate_from: Vec<String>,
+        /// Whether forecasts and levels go by it from here on.
+        adopted: bool,
+    },
+    /// A later search no longer finds an effect that forecasts went by.
+    EffectDropped {
+        /// Its kind.
+        effect: Kind,
+        /// The covariate that it worked through.
+        channel: Option<String>,
     },
     /// A level was entered or left.
     Alert {
@@ -100,6 +129,40 @@ pub enum EventKind {
     },
     /// The end of a replay.
     Summary(Summary),
+}
+
+/// What is not explained.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Unexplained {
+    /// The newest reading is one that nobody expected: a step, a load that was not declared, a fault.
+    Reading {
+        /// How much less likely it was than the usual reading, ln.
+        surprise_nats: f64,
+        /// The velocity that it implies, mm/day.
+        velocity_mm_per_day: Option<f64>,
+    },
+    /// The residual of the whole record has structure, as a load would bring it.
+    Structure {
+        /// Fall of the BIC if a random load is let into the noise.
+        bic_gain: f64,
+        /// Standard deviation of that load, e-folds of velocity.
+        load_sd: f64,
+        /// From when it stands out.
+        since: Timestamp,
+    },
+}
+
+/// The forecast of the law under a constant load, beside that of the fuller law.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Plain {
+    /// Which regime, with what probability.
+    pub regime: RegimeReport,
+    /// When the critical velocity is passed.
+    pub failure_time: FailureTime,
+    /// Whether the fuller law explains the present velocity. While it does not, the larger of both chances
+    /// decides the level.
+    pub is_explained: bool,
 }
 
 /// Where an alert is in its life.
@@ -173,7 +236,9 @@ impl Summary {
             | EventKind::RegimeFlip { .. }
             | EventKind::InterceptDrift { .. }
             | EventKind::TransitionDrift { .. }
-            | EventKind::UnexplainedResidual { .. }
+            | EventKind::UnexplainedResidual(_)
+            | EventKind::EffectFound { .. }
+            | EventKind::EffectDropped { .. }
             | EventKind::Fault { .. }
             | EventKind::Summary(_) => {}
         }

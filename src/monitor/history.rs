@@ -1,7 +1,9 @@
 //! The readings of one benchmark, in the science's units and in time order, bounded by count.
 
-use crate::fit::{Observation, Observations};
-use crate::reading::{Quantity, Reading, SECONDS_PER_DAY, Timestamp, Unit, days_since};
+use crate::fit::{Observation, Observations, Rate, RateOptions};
+use crate::reading::{
+    BenchmarkId, Quantity, Reading, SECONDS_PER_DAY, Series, Timestamp, Unit, days_since,
+};
 use jiff::SignedDuration;
 
 /// Where readings come from, as far as their meaning goes.
@@ -38,6 +40,7 @@ const FARTHEST: f64 = 1e9;
 pub(super) struct History {
     pub(super) epoch: Timestamp,
     pub(super) observations: Observations,
+    averaging: Option<SignedDuration>,
 }
 
 impl History {
@@ -53,12 +56,67 @@ impl History {
         Self {
             epoch,
             observations,
+            averaging: source.averaging,
         }
     }
 
     /// Days since the epoch.
     pub(super) fn days(&self, time: Timestamp) -> f64 {
         days_since(self.epoch, time)
+    }
+
+    /// The instant so many days after the epoch; `None` outside the calendar.
+    pub(super) fn time(&self, days: f64) -> Option<Timestamp> {
+        let nanoseconds = (days * SECONDS_PER_DAY * 1e9).round();
+        if !nanoseconds.is_finite() {
+            return None;
+        }
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "a float fits, or is cut off far outside the calendar"
+        )]
+        let since = nanoseconds as i128;
+        let whole = self.epoch.as_nanosecond().checked_add(since)?;
+        Timestamp::from_nanosecond(whole).ok()
+    }
+
+    /// When the newest reading was taken.
+    pub(super) fn newest(&self) -> Option<Timestamp> {
+        self.time(self.observations.values.last()?.t_days)
+    }
+
+    /// `observations` of this benchmark as a series, in mm or mm/day: no more than `most`, each the mean of as
+    /// many in a row.
+    pub(super) fn series(
+        &self,
+        benchmark: &BenchmarkId,
+        observations: &Observations,
+        most: usize,
+    ) -> Series {
+        let values = &observations.values;
+        let block = |values: &[Observation]| {
+            let n = values.len() as f64;
+            let mean =
+                |of: fn(&Observation) -> Option<f64>| values.iter().map(of).sum::<Option<f64>>();
+            Some(Reading {
+                time: self.time(mean(|one| Some(one.t_days))? / n)?,
+                value: mean(|one| Some(one.value))? / n,
+                sigma: mean(|one| one.sigma).map(|sum| sum / n),
+            })
+        };
+        let (unit, averaging) = match observations.quantity {
+            Quantity::Displacement => (Unit::MM, None),
+            Quantity::Velocity => (Unit::MM_PER_DAY, self.averaging),
+        };
+        let size = values.len().div_ceil(most).max(1);
+        let mut series = Series {
+            benchmark: benchmark.clone(),
+            unit,
+            averaging,
+            readings: values.chunks(size).filter_map(block).collect(),
+        };
+        series.settle();
+        series
     }
 
     pub(super) fn take(&mut self, source: Source, reading: &Reading) -> Taken {
@@ -94,6 +152,12 @@ impl History {
                 Taken::Corrected(before)
             }
         }
+    }
+
+    /// The velocities that the readings show.
+    pub(super) fn rates(&self) -> Vec<Rate> {
+        let all = 0..self.observations.values.len();
+        self.observations.rates(all, RateOptions::default())
     }
 
     /// Displacement since the first reading, mm, where displacement is what is measured.

@@ -1,20 +1,25 @@
 //! The state machine that owns every benchmark: readings in, events out, no clock and no files.
 
+mod covariates;
 mod drift;
 mod event;
 mod history;
+mod search;
 mod silence;
 mod track;
 
 pub use event::{
-    AlertState, Event, EventKind, FailureTime, InverseVelocity, RegimeReport, Summary,
+    AlertState, Event, EventKind, FailureTime, InverseVelocity, Plain, RegimeReport, Summary,
+    Unexplained,
 };
+pub use search::{Finding, SearchJob};
 
 use crate::alert::{Level, Policy};
 use crate::reading::{BenchmarkId, Reading, Sample, Timestamp, Unit};
+use covariates::Covariates;
 use jiff::SignedDuration;
 use std::collections::BTreeMap;
-use track::Track;
+use track::{Beside, Track};
 
 /// What the monitor is told.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,9 +39,13 @@ pub enum Input {
     Sample {
         /// The channel's full name.
         channel: String,
+        /// The unit at the name's end, where it is one that is known.
+        unit: Option<String>,
         /// The value.
         sample: Sample,
     },
+    /// What a search came to; to be handed in before the first reading that is no earlier than it was due.
+    Found(Finding),
     /// Time has passed and nothing came.
     Tick,
 }
@@ -48,6 +57,20 @@ pub struct Settings {
     pub policy: Policy,
     /// Policies of single benchmarks, where they differ from the site's.
     pub benchmarks: BTreeMap<BenchmarkId, Policy>,
+    /// What is done about a residual that the law does not explain.
+    pub explain: Explain,
+}
+
+/// What is done about a residual that the law does not explain; it is watched and told in any case.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Explain {
+    /// The effect is searched for, told, and taken into the law that forecasts and levels go by.
+    #[default]
+    Adopt,
+    /// It is searched for and told.
+    Tell,
+    /// Nothing.
+    Off,
 }
 
 impl Settings {
@@ -62,6 +85,8 @@ impl Settings {
 pub struct Monitor {
     settings: Settings,
     tracks: BTreeMap<BenchmarkId, Track>,
+    covariates: Covariates,
+    searches: Vec<SearchJob>,
     summary: Summary,
     last_time: Option<Timestamp>,
 }
@@ -72,6 +97,8 @@ impl Monitor {
         Self {
             settings,
             tracks: BTreeMap::new(),
+            covariates: Covariates::default(),
+            searches: Vec::new(),
             summary: Summary::default(),
             last_time: None,
         }
@@ -88,6 +115,10 @@ impl Monitor {
                 reading,
             } => {
                 self.summary.readings += 1;
+                let beside = Beside {
+                    covariates: &self.covariates,
+                    explain: self.settings.explain,
+                };
                 let policy = self.settings.policy(benchmark);
                 let source = history::Source {
                     unit: *unit,
@@ -97,10 +128,20 @@ impl Monitor {
                     .tracks
                     .entry(benchmark.clone())
                     .or_insert_with(|| Track::new(benchmark.clone(), source, reading.time));
-                track.take(policy, source, reading)
+                let events = track.take(policy, source, reading, &beside);
+                let critical = policy.critical_velocity_mm_per_day;
+                self.searches.extend(track.search(critical, &beside));
+                events
             }
-            // Covariates are kept for the search of missing effects; no rule looks at them yet.
-            Input::Sample { .. } => Vec::new(),
+            Input::Found(finding) => self.found(now, finding),
+            Input::Sample {
+                channel,
+                unit,
+                sample,
+            } => {
+                self.covariates.take(channel, unit.as_deref(), *sample);
+                Vec::new()
+            }
             Input::Tick => self
                 .tracks
                 .values_mut()
@@ -111,6 +152,25 @@ impl Monitor {
             self.summary.count(&event.kind);
         }
         events
+    }
+
+    fn found(&mut self, now: Timestamp, finding: &Finding) -> Vec<Event> {
+        let beside = Beside {
+            covariates: &self.covariates,
+            explain: self.settings.explain,
+        };
+        let policy = self.settings.policy(&finding.benchmark);
+        let critical = policy.critical_velocity_mm_per_day;
+        let track = self.tracks.get_mut(&finding.benchmark);
+        track.map_or_else(Vec::new, |track| {
+            track.found(critical, now, finding, &beside)
+        })
+    }
+
+    /// The searches asked for since the last call, one a benchmark at most; each is to be answered by an
+    /// [`Input::Found`], and the benchmark asks for no other one until then.
+    pub fn searches(&mut self) -> Vec<SearchJob> {
+        std::mem::take(&mut self.searches)
     }
 
     /// When the monitor wants a [`Input::Tick`] if nothing else comes before.

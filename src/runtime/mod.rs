@@ -12,6 +12,7 @@ pub mod journal;
 pub mod log;
 pub mod replay;
 pub mod run;
+mod searches;
 mod seen;
 pub mod shutdown;
 pub mod site;

@@ -73,6 +73,7 @@ pub fn arrivals(recording: &Recording) -> Vec<Arrival> {
             time: sample.time,
             input: Input::Sample {
                 channel: channel.name.clone(),
+                unit: channel.unit.clone(),
                 sample: *sample,
             },
         })
@@ -208,7 +209,7 @@ mod tests {
         let name = |arrival: &Arrival| match &arrival.input {
             Input::Reading { benchmark, .. } => benchmark.as_str().to_owned(),
             Input::Sample { channel, .. } => channel.clone(),
-            Input::Tick => String::new(),
+            Input::Found(_) | Input::Tick => String::new(),
         };
         let names: Vec<String> = arrivals(&recording).iter().map(name).collect();
         assert_eq!(names, ["a", "b", "b", "rain_mm", "a", "b"]);

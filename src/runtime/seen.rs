@@ -44,8 +44,10 @@ impl Seen {
                 (benchmark.as_str().to_owned(), Some(unit.quantity())),
                 reading.value * unit.factor(),
             ),
-            Input::Sample { channel, sample } => ((channel.clone(), None), sample.value),
-            Input::Tick => return Novelty::New,
+            Input::Sample {
+                channel, sample, ..
+            } => ((channel.clone(), None), sample.value),
+            Input::Found(_) | Input::Tick => return Novelty::New,
         };
         self.0
             .entry(name)

@@ -7,6 +7,7 @@
 use super::deliver::Dispatcher;
 use super::event_log::EventLog;
 use super::hook::{Alert, Status};
+use super::searches::Searches;
 use super::seen::{Novelty, Seen};
 use super::tail::Arrival;
 use crate::alert::{Level, Policy};
@@ -69,6 +70,7 @@ pub struct Site {
     name: String,
     settings: Settings,
     monitor: Monitor,
+    searches: Searches,
     sinks: Sinks,
     seen: Seen,
     /// The latest data time stepped to; it never goes back.
@@ -89,6 +91,7 @@ impl Site {
             name: name.to_owned(),
             monitor: Monitor::new(settings.clone()),
             settings,
+            searches: Searches::default(),
             sinks,
             seen: Seen::default(),
             now: None,
@@ -101,6 +104,7 @@ impl Site {
     }
 
     /// Takes one value. What was taken before, or lies ahead of the wall clock, changes nothing.
+    /// A reading by which the answer of a search is due waits for that.
     pub fn take(&mut self, arrival: &Arrival, wall: Timestamp) -> Vec<Event> {
         let ahead = arrival.time.duration_since(wall);
         if ahead > CLOCK_TOLERANCE {
@@ -118,12 +122,18 @@ impl Site {
         }
         self.counts.taken += 1;
         let mut events = self.pass(arrival.time);
+        let now = self.now.map_or(arrival.time, |now| now.max(arrival.time));
         if let Input::Reading { benchmark, .. } = &arrival.input {
             let newest = self.newest.entry(benchmark.clone()).or_insert(arrival.time);
             *newest = arrival.time.max(*newest);
+            if let Some(finding) = self.searches.due(benchmark, arrival.time) {
+                events.extend(self.step(now, &Input::Found(finding)));
+            }
         }
-        let now = self.now.map_or(arrival.time, |now| now.max(arrival.time));
         events.extend(self.step(now, &arrival.input));
+        for job in self.monitor.searches() {
+            self.searches.start(job);
+        }
         events
     }
 

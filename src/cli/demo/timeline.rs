@@ -2,7 +2,7 @@
 
 use super::crisis::Crisis;
 use crate::alert::Level;
-use crate::monitor::{AlertState, Event, EventKind, FailureTime};
+use crate::monitor::{AlertState, Event, EventKind, FailureTime, Unexplained};
 use crate::reading::{BenchmarkId, Timestamp, days_since};
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -80,19 +80,43 @@ impl Timeline {
             EventKind::InterceptDrift { .. } | EventKind::TransitionDrift { .. } => {
                 drift(id, event)
             }
-            EventKind::UnexplainedResidual {
-                velocity_mm_per_day,
-                ..
-            } => Some(format!(
-                "{}  {id:<8}   a reading that nobody expected: {:.1} mm/day",
+            EventKind::UnexplainedResidual(what) => Some(format!(
+                "{}  {id:<8}   {}",
                 day(event.time),
-                velocity_mm_per_day.unwrap_or(f64::NAN)
+                unexplained(what)
+            )),
+            EventKind::EffectFound {
+                effect, channel, ..
+            } => Some(format!(
+                "{}  {id:<8}   consistent with {effect} {}",
+                day(event.time),
+                channel.as_deref().unwrap_or("")
+            )),
+            EventKind::EffectDropped { effect, .. } => Some(format!(
+                "{}  {id:<8}   no longer consistent with {effect}",
+                day(event.time)
             )),
             EventKind::Fault { kind, .. } => {
                 Some(format!("{}  {id:<8}   fault: {kind}", day(event.time)))
             }
             EventKind::Summary(_) => None,
         }
+    }
+}
+
+fn unexplained(what: &Unexplained) -> String {
+    match what {
+        Unexplained::Reading {
+            velocity_mm_per_day,
+            ..
+        } => format!(
+            "a reading that nobody expected: {:.1} mm/day",
+            velocity_mm_per_day.unwrap_or(f64::NAN)
+        ),
+        Unexplained::Structure { load_sd, since, .. } => format!(
+            "its velocity wanders by {load_sd:.1} e-folds about the law since {}",
+            day(*since)
+        ),
     }
 }
 
@@ -119,7 +143,9 @@ fn drift(id: &BenchmarkId, event: &Event) -> Option<String> {
         EventKind::TransitionDrift { from, to, .. } => ("transition time", from, to, String::new()),
         EventKind::Refit { .. }
         | EventKind::RegimeFlip { .. }
-        | EventKind::UnexplainedResidual { .. }
+        | EventKind::UnexplainedResidual(_)
+        | EventKind::EffectFound { .. }
+        | EventKind::EffectDropped { .. }
         | EventKind::Alert { .. }
         | EventKind::Fault { .. }
         | EventKind::Summary(_) => return None,

@@ -74,10 +74,16 @@ impl Decoder {
                 },
             }),
             Item::Sample {
-                channel, sample, ..
+                channel,
+                unit,
+                sample,
             } => Some(Arrival {
                 time: sample.time,
-                input: Input::Sample { channel, sample },
+                input: Input::Sample {
+                    channel,
+                    unit,
+                    sample,
+                },
             }),
         }
     }

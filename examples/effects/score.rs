@@ -1,0 +1,178 @@
+//! One explanation beside the truth: what was named rightly, and by how much its figures are off.
+
+use crate::drawn::Drawn;
+use crate::family::Family;
+use crate::truth::{TrueEffect, Truth};
+use slipwatch::effects::{Effect, Explained, Explanation, Kind};
+use slipwatch::reading::{Timestamp, days_since};
+use std::collections::BTreeSet;
+
+/// How near the first effect named is to the truth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Grade {
+    /// The right kind, through the right channel where it has one.
+    Right,
+    WrongChannel,
+    /// Another kind, but the right one stands under `cannot_separate_from`.
+    LeftOpen,
+    Wrong,
+}
+
+/// How one series went.
+#[derive(Debug, Clone)]
+pub(crate) struct Outcome {
+    pub(crate) family: Family,
+    pub(crate) name: String,
+    /// The first effect named, or `none` or `unexplained`.
+    pub(crate) called: Kind,
+    /// Every effect named.
+    pub(crate) said: BTreeSet<Kind>,
+    /// Every effect there is.
+    pub(crate) there: BTreeSet<Kind>,
+    pub(crate) grade: Grade,
+    /// |t0 said - t0 true| of the effects rightly named, in intervals of the sampling.
+    pub(crate) at_errors: Vec<f64>,
+    /// |said / true - 1| of their gains or sizes.
+    pub(crate) size_errors: Vec<f64>,
+    /// Held-out error after, over [`reference_error`].
+    pub(crate) held_out: Option<f64>,
+    pub(crate) seconds: f64,
+}
+
+impl Outcome {
+    pub(crate) fn of(
+        family: Family,
+        name: &str,
+        (drawn, explanation): (&Drawn, &Explanation),
+        seconds: f64,
+    ) -> Self {
+        let truth = &drawn.truth;
+        let named = named(explanation, truth);
+        let said: BTreeSet<Kind> = named.iter().map(|one| one.effect).collect();
+        let there = there(truth);
+        let called = named
+            .first()
+            .map_or_else(|| left(explanation), |one| one.effect);
+        let right_kind = is_right(family, called, &said, &there);
+        let pairs = matched(&named, truth);
+        let through_channel = |(said, there): &(&Effect, &TrueEffect)| {
+            there.channel.is_none() || said.channel == there.channel
+        };
+        let separable = |kind: &Kind| {
+            let named = |text: &String| text.split([' ', ':', '(']).next() == Some(kind.name());
+            explanation.cannot_separate_from.iter().any(named)
+        };
+        let grade = match right_kind {
+            true if pairs.iter().all(through_channel) => Grade::Right,
+            true => Grade::WrongChannel,
+            false if there.iter().any(separable) => Grade::LeftOpen,
+            false => Grade::Wrong,
+        };
+        Self {
+            family,
+            name: name.to_owned(),
+            called,
+            grade,
+            at_errors: pairs
+                .iter()
+                .filter_map(|pair| at_error(*pair, truth))
+                .collect(),
+            size_errors: pairs.iter().filter_map(|pair| size_error(*pair)).collect(),
+            held_out: held_out(drawn, explanation),
+            said,
+            there,
+            seconds,
+        }
+    }
+
+    /// Whether the kind is right.
+    pub(crate) fn right_kind(&self) -> bool {
+        matches!(self.grade, Grade::Right | Grade::WrongChannel)
+    }
+
+    /// All that is there is named and nothing else.
+    pub(crate) fn exactly(&self) -> bool {
+        self.right_kind() && self.said == self.there
+    }
+}
+
+/// What was accepted; noise that remembers is no discovery where it was put beside the family's effect.
+fn named<'a>(explanation: &'a Explanation, truth: &Truth) -> Vec<&'a Effect> {
+    std::iter::once(&explanation.verdict)
+        .chain(&explanation.also)
+        .filter(|one| !matches!(one.effect, Kind::None | Kind::Unexplained))
+        .filter(|one| !(truth.background_noise_remembers && one.effect == Kind::CorrelatedNoise))
+        .collect()
+}
+
+/// The honest end of an explanation that names nothing of the family.
+fn left(explanation: &Explanation) -> Kind {
+    match (explanation.verdict.effect, explanation.explained) {
+        (Kind::None, _) | (Kind::CorrelatedNoise, Explained::Full) => Kind::None,
+        _ => Kind::Unexplained,
+    }
+}
+
+fn there(truth: &Truth) -> BTreeSet<Kind> {
+    let kinds = truth.effects.iter().map(|one| one.effect);
+    kinds.filter(|kind| *kind != Kind::Unexplained).collect()
+}
+
+fn is_right(family: Family, called: Kind, said: &BTreeSet<Kind>, there: &BTreeSet<Kind>) -> bool {
+    match family {
+        Family::Of(Kind::None) => said.is_empty() && called == Kind::None,
+        Family::Outside => said.is_empty() && called == Kind::Unexplained,
+        Family::Mixed => there.contains(&called),
+        Family::Of(kind) => there.contains(&called) && said.contains(&kind),
+    }
+}
+
+/// Each true effect with the one of its kind that was named, the nearest in time where there are several.
+fn matched<'a>(named: &[&'a Effect], truth: &'a Truth) -> Vec<(&'a Effect, &'a TrueEffect)> {
+    let far = |one: &Effect, there: &TrueEffect| match (one.at, there.at) {
+        (Some(said), Some(at)) => apart(said, at),
+        _ => 0.0,
+    };
+    let nearest = |there: &'a TrueEffect| {
+        let same = named
+            .iter()
+            .copied()
+            .filter(|one| one.effect == there.effect);
+        same.min_by(|one, other| far(one, there).total_cmp(&far(other, there)))
+            .map(|said| (said, there))
+    };
+    truth.effects.iter().filter_map(nearest).collect()
+}
+
+fn apart(one: Timestamp, other: Timestamp) -> f64 {
+    days_since(one, other).abs()
+}
+
+fn at_error((said, there): (&Effect, &TrueEffect), truth: &Truth) -> Option<f64> {
+    Some(apart(said.at?, there.at?) / truth.interval_days)
+}
+
+fn size_error((said, there): (&Effect, &TrueEffect)) -> Option<f64> {
+    let gains = said.gain_per_sd.zip(there.gain_per_sd);
+    let (said, there) = gains.or_else(|| said.size.zip(there.size))?;
+    Some((said / there - 1.0).abs())
+}
+
+fn held_out(drawn: &Drawn, explanation: &Explanation) -> Option<f64> {
+    let after = explanation.error.held_out.after?;
+    let from = explanation.error.held_out_from?;
+    Some(after / reference_error(drawn, from)?)
+}
+
+/// What the held-out error is measured by: the rms of the readings from `from` on about the true prediction,
+/// noise alone, which no fit can be under but by chance. A refit of the law given the true effect would be
+/// fairer, and goes here.
+fn reference_error(drawn: &Drawn, from: Timestamp) -> Option<f64> {
+    let pairs = drawn.series.readings.iter().zip(&drawn.truth.prediction);
+    let errors: Vec<f64> = pairs
+        .filter(|(reading, _)| reading.time >= from)
+        .map(|(reading, prediction)| (reading.value - prediction).powi(2))
+        .collect();
+    let count = errors.len() as f64;
+    (count > 0.0).then(|| (errors.iter().sum::<f64>() / count).sqrt())
+}

@@ -1,0 +1,177 @@
+//! `explain FILE`: from a benchmark's residual to the effect that its law lacks.
+
+mod page;
+mod sections;
+mod sentence;
+mod text;
+
+use super::args::{OutputArgs, ReadingArgs};
+use super::exit;
+use crate::alert::Policy;
+use crate::effects::{self, Explanation, Options};
+use crate::reading::{Channel, Recording, SelectError, Series, Timestamp};
+use anyhow::Context;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::path::PathBuf;
+
+/// Fewer surrogates cannot give a p-value that an effect is accepted for.
+const FEWEST_SURROGATES: usize = 99;
+/// More tell nothing and take for ever.
+const MOST_SURROGATES: usize = 9999;
+/// Steps of the progress bar.
+const STEPS: f64 = 1000.0;
+
+/// Trace a benchmark's residual to the effect that the law lacks, with the error before and after
+///
+/// Nothing is declared beforehand: every known effect is tried inside the law, with every covariate
+/// there is, and accepted only if it also foretells a later block that the fit has not seen. An
+/// effect is what the readings are consistent with, never what is proved to cause them.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    #[command(flatten)]
+    readings: ReadingArgs,
+    /// Use no reading before this
+    #[arg(long, value_name = "TIME")]
+    from: Option<Timestamp>,
+    /// Use no reading and no covariate after this
+    #[arg(long, value_name = "TIME")]
+    until: Option<Timestamp>,
+    /// Write a page with plots to this file, which needs no other
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+    /// Of the surrogates behind the p-values
+    #[arg(long, value_name = "N", default_value_t = Options::default().seed)]
+    seed: u64,
+    /// How many surrogates judge a gain
+    #[arg(long, value_name = "N", default_value_t = Options::default().surrogates, value_parser = surrogates)]
+    surrogates: usize,
+    #[command(flatten)]
+    output: OutputArgs,
+}
+
+/// Reads the files, explains the series, prints the result and writes the page.
+pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    let mut recording = args.readings.load()?.recording;
+    // Which series is meant is settled before any is cut, so that the answer does not hang on it.
+    let one = args.readings.series(&recording);
+    let several =
+        matches!(one, Err(SelectError::Several { .. })) && args.readings.benchmark.is_none();
+    if !several {
+        one?;
+    }
+    cut(&mut recording, args.from, args.until);
+    if several {
+        return together(args, &mut recording);
+    }
+    let series = args.readings.series(&recording)?;
+    let mut explanation = search(series, &recording, &options(args));
+    if let Some(remark) = remark_on_origin(&recording) {
+        explanation.remarks.insert(0, remark);
+    }
+    // A page that cannot be written is no reason to lose what took so long to find.
+    let written = args.html.as_ref().map_or(Ok(()), |file| {
+        std::fs::write(file, page::page(&explanation))
+            .with_context(|| format!("cannot write {}", file.display()))
+    });
+    args.output.print(&explanation, text::text)?;
+    written
+}
+
+/// Explains every series that the flags allow: whether they part, and what each shows.
+fn together(args: &Args, recording: &mut Recording) -> anyhow::Result<()> {
+    args.readings.narrow(recording)?;
+    if args.html.is_some() {
+        anyhow::bail!(exit::UsageError(
+            "--html shows one benchmark: choose it with --benchmark".to_owned()
+        ));
+    }
+    let all: Vec<&Series> = recording.series.iter().collect();
+    let bar = bar();
+    let mut progress = |share: f64| move_to(&bar, share);
+    let channels = &recording.channels;
+    let mut found = effects::explain_together(&all, channels, &options(args), &mut progress);
+    bar.finish_and_clear();
+    if let Some(remark) = remark_on_origin(recording) {
+        for explanation in &mut found.each {
+            explanation.remarks.insert(0, remark.clone());
+        }
+    }
+    args.output.print(&found, text::together)
+}
+
+fn options(args: &Args) -> Options {
+    let policy = args.readings.policy(&Policy::default());
+    Options {
+        critical_velocity_mm_per_day: policy.critical_velocity_mm_per_day,
+        seed: args.seed,
+        surrogates: args.surrogates,
+        ..Options::default()
+    }
+}
+
+fn search(series: &Series, recording: &Recording, options: &Options) -> Explanation {
+    let others = recording.series.iter();
+    let neighbours: Vec<&Series> = others
+        .filter(|other| other.benchmark != series.benchmark)
+        .collect();
+    let bar = bar();
+    let mut progress = |share: f64| move_to(&bar, share);
+    let channels = &recording.channels;
+    let explanation = effects::explain(series, channels, &neighbours, options, &mut progress);
+    bar.finish_and_clear();
+    explanation
+}
+
+fn move_to(bar: &ProgressBar, share: f64) {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "clamped to the bar"
+    )]
+    bar.set_position((share * STEPS).clamp(0.0, STEPS) as u64);
+}
+
+/// The bar hides itself where stderr is no terminal.
+fn bar() -> ProgressBar {
+    let style = ProgressStyle::with_template("{bar:40} {percent} %, {elapsed}").ok();
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a small constant"
+    )]
+    let bar = ProgressBar::new(STEPS as u64);
+    style.map_or(bar.clone(), |style| bar.with_style(style))
+}
+
+/// Leaves out what is not asked for. A covariate from before the first reading still acts after it.
+fn cut(recording: &mut Recording, from: Option<Timestamp>, until: Option<Timestamp>) {
+    let early = |time: Timestamp| from.is_some_and(|from| time < from);
+    let late = |time: Timestamp| until.is_some_and(|until| time > until);
+    for series in &mut recording.series {
+        let out = |time| early(time) || late(time);
+        series.readings.retain(|reading| !out(reading.time));
+    }
+    for channel in &mut recording.channels {
+        let Channel { samples, .. } = channel;
+        samples.retain(|sample| !late(sample.time));
+    }
+}
+
+/// What a recording that was never measured must have said of it.
+fn remark_on_origin(recording: &Recording) -> Option<String> {
+    let said = |key: &str| recording.provenance.get(key).map(String::as_str);
+    if !said("kind")?.contains("reconstruction") {
+        return None;
+    }
+    let title = said("title").map_or(String::new(), |title| format!(" ({title})"));
+    Some(format!(
+        "These readings are a reconstruction, not measured{title}."
+    ))
+}
+
+fn surrogates(text: &str) -> Result<usize, String> {
+    let count = text.parse().ok();
+    count
+        .filter(|count| (FEWEST_SURROGATES..=MOST_SURROGATES).contains(count))
+        .ok_or_else(|| format!("expected {FEWEST_SURROGATES} to {MOST_SURROGATES}"))
+}

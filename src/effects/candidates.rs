@@ -1,0 +1,253 @@
+//! Everything that may be missing, as terms to be tried.
+
+use super::frame::dot;
+use super::kind::{Form, Kind};
+use super::problem::{Problem, median};
+use super::response::{Driver, Response};
+use super::term::{Act, Term};
+use crate::reading::Quantity;
+
+/// One year, days.
+const YEAR: f64 = 365.25;
+/// A year and half a year, days.
+pub(super) const SEASON: [f64; 2] = [YEAR, 0.5 * YEAR];
+/// The tide's strongest periods, days: M2, S2, K1, O1.
+pub(super) const TIDE: [f64; 4] = [
+    12.420_6 / 24.0,
+    12.0 / 24.0,
+    23.934_5 / 24.0,
+    25.819_3 / 24.0,
+];
+/// A covariate follows the year if its harmonics hold this share of its variance.
+const SEASONAL_SHARE: f64 = 0.5;
+/// Times tried for what happens once.
+const EVENT_TIMES: usize = 64;
+/// Jumps of the reading tried, the largest first.
+const JUMPS: usize = 24;
+/// No event within so many readings of either end: what happens there cannot be told from noise.
+const EVENT_MARGIN: usize = 5;
+
+/// A term without covariate, response or time.
+fn plain(kind: Kind, act: Act) -> Term {
+    Term {
+        kind,
+        channel: None,
+        response: None,
+        at: None,
+        act,
+    }
+}
+
+/// The responses tried for each covariate: their mean delays, days.
+pub(super) fn delays(problem: &Problem, driver: &Driver) -> Vec<f64> {
+    // No shorter than what the sampling of both resolves, no longer than a memory of half the record.
+    let shortest = driver.step().max(0.25 * problem.spacing);
+    let longest = problem.span() / 6.0;
+    let mut delays = vec![0.0];
+    let mut delay = shortest;
+    let ratio = (longest / shortest).max(1.0).powf(1.0 / 7.0).max(1.5);
+    while delay <= longest * 1.001 {
+        delays.push(delay);
+        delay *= ratio;
+    }
+    delays
+}
+
+/// A covariate's term for one response; `None` where it stands still.
+pub(super) fn of_channel(
+    problem: &Problem,
+    (index, driver): (usize, &Driver),
+    response: Response,
+) -> Option<Term> {
+    let column = driver.respond(response, &problem.nodes)?;
+    Some(Term {
+        kind: Kind::Hydrological,
+        channel: Some(index),
+        response: Some(response),
+        at: None,
+        act: Act::Load(vec![column]),
+    })
+}
+
+/// The responses of one form that a search goes through.
+pub(super) fn responses(form: Form, delays: &[f64]) -> Vec<Response> {
+    let mut responses = Vec::new();
+    for &mean_days in delays {
+        for stages in [1, 2] {
+            // Two stages of no delay are one, and a rate needs its own scale.
+            if stages == 2 && mean_days == 0.0 {
+                continue;
+            }
+            responses.push(Response {
+                form,
+                stages,
+                mean_days,
+            });
+        }
+    }
+    responses
+}
+
+/// Sines and cosines of these periods, days, at `times`.
+fn harmonics(times: &[f64], periods: &[f64]) -> Vec<Vec<f64>> {
+    let mut columns = Vec::new();
+    for period in periods {
+        let phase = |t: &f64| std::f64::consts::TAU * t / period;
+        let root = std::f64::consts::SQRT_2;
+        columns.push(times.iter().map(|t| root * phase(t).cos()).collect());
+        columns.push(times.iter().map(|t| root * phase(t).sin()).collect());
+    }
+    columns
+}
+
+/// The load's harmonics of these periods.
+pub(super) fn of_periods(problem: &Problem, kind: Kind, periods: &[f64]) -> Term {
+    plain(kind, Act::Load(harmonics(&problem.nodes, periods)))
+}
+
+/// A year's harmonics, where two cycles have been seen.
+pub(super) fn seasonal(problem: &Problem) -> Vec<Term> {
+    if problem.span() < 1.95 * YEAR || problem.spacing > 0.2 * YEAR {
+        return Vec::new();
+    }
+    [&SEASON[..1], &SEASON[..]]
+        .into_iter()
+        .map(|periods| of_periods(problem, Kind::Seasonal, periods))
+        .collect()
+}
+
+/// The tide, where the sampling tells its periods and the record tells them from each other.
+pub(super) fn tides(problem: &Problem) -> Vec<Term> {
+    if problem.spacing > 0.2 || problem.span() < 2.0 {
+        return Vec::new();
+    }
+    let mut sets = vec![&TIDE[..1]];
+    if problem.span() > 14.0 {
+        sets.push(&TIDE[..]);
+    }
+    let term = |periods: &&[f64]| of_periods(problem, Kind::Tide, periods);
+    sets.iter().map(term).collect()
+}
+
+/// Whether a covariate's response mostly repeats itself from year to year: a year's harmonics hold this share of it.
+pub(super) fn follows_season(problem: &Problem, term: &Term) -> bool {
+    let (Act::Load(columns), Some(_)) = (&term.act, term.channel) else {
+        return false;
+    };
+    if seasonal(problem).is_empty() {
+        return false;
+    }
+    let Some(column) = columns.first() else {
+        return false;
+    };
+    let mut left = column.clone();
+    let whole = dot(&left, &left);
+    let mut directions: Vec<Vec<f64>> = Vec::new();
+    for harmonic in harmonics(&problem.nodes, &SEASON) {
+        let mut unit = harmonic;
+        for known in &directions {
+            let share = dot(known, &unit);
+            unit.iter_mut()
+                .zip(known)
+                .for_each(|(u, k)| *u -= share * k);
+        }
+        let length = dot(&unit, &unit).sqrt();
+        for u in &mut unit {
+            *u /= length;
+        }
+        let share = dot(&unit, &left);
+        left.iter_mut()
+            .zip(&unit)
+            .for_each(|(l, u)| *l -= share * u);
+        directions.push(unit);
+    }
+    dot(&left, &left) < (1.0 - SEASONAL_SHARE) * whole
+}
+
+/// What acts all along and needs no covariate.
+pub(super) fn feedbacks(problem: &Problem) -> Vec<Term> {
+    let mut terms = vec![
+        plain(Kind::RateLimit, Act::PerVelocity),
+        plain(Kind::Geometry, Act::PerSlip),
+    ];
+    if problem.quantity == Quantity::Velocity && problem.averaging_days <= 0.0 {
+        terms.push(plain(Kind::IntervalMean, Act::Averaging));
+    }
+    terms
+}
+
+/// What happened once, before reading `at`, in each way that it may.
+pub(super) fn events(at: usize) -> [Term; 3] {
+    [
+        (Kind::LoadStep, Act::Step),
+        (Kind::StateReset, Act::Reset),
+        (Kind::FrictionChange, Act::Friction),
+    ]
+    .map(|(kind, act)| Term {
+        at: Some(at),
+        ..plain(kind, act)
+    })
+}
+
+/// The readings at which an event is tried, evenly over the record.
+pub(super) fn event_times(problem: &Problem) -> Vec<usize> {
+    let (first, end) = (EVENT_MARGIN, problem.used.saturating_sub(EVENT_MARGIN));
+    let stride = end.saturating_sub(first).div_ceil(EVENT_TIMES).max(1);
+    (first..end).step_by(stride).collect()
+}
+
+/// A jump of the reading before reading `at`.
+pub(super) fn offset(problem: &Problem, at: usize) -> Term {
+    let column = (0..problem.t.len()).map(|i| f64::from(u8::from(i >= at)));
+    Term {
+        at: Some(at),
+        ..plain(Kind::Offset, Act::Reading(vec![column.collect()]))
+    }
+}
+
+/// The largest jumps of the residual: where the medians on both sides differ most.
+pub(super) fn jumps(problem: &Problem, residual: &[f64]) -> Vec<usize> {
+    if problem.quantity == Quantity::Velocity {
+        return Vec::new();
+    }
+    let beside = 4;
+    let level = |range: &[f64]| median(range.to_vec());
+    let mut sizes: Vec<(usize, f64)> = (2..residual.len().saturating_sub(1))
+        .map(|i| {
+            let before = &residual[i.saturating_sub(beside)..i];
+            let after = &residual[i..(i + beside).min(residual.len())];
+            let jump = (level(after) - level(before)).abs();
+            // The step between the two readings themselves, so that the sharpest place wins.
+            (i, jump.min((residual[i] - residual[i - 1]).abs()))
+        })
+        .collect();
+    sizes.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    sizes.truncate(JUMPS);
+    sizes.into_iter().map(|(i, _)| i).collect()
+}
+
+/// Temperature in the reading: of a displacement its delayed value, of a velocity the rate of that.
+pub(super) fn thermal(
+    problem: &Problem,
+    (index, driver): (usize, &Driver),
+    stages: u8,
+    mean_days: f64,
+) -> Option<Term> {
+    let form = match problem.quantity {
+        Quantity::Displacement => Form::Level,
+        Quantity::Velocity => Form::Rate,
+    };
+    let response = Response {
+        form,
+        stages,
+        mean_days,
+    };
+    let column = driver.respond(response, &problem.t)?;
+    Some(Term {
+        kind: Kind::Thermal,
+        channel: Some(index),
+        response: Some(response),
+        at: None,
+        act: Act::Reading(vec![column]),
+    })
+}

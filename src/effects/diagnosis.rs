@@ -1,0 +1,168 @@
+//! Whether a residual passes for noise: runs, autocorrelation with gaps, and the undeclared load that is left in it.
+
+use super::noise::{Memory, Whitener};
+use super::problem::Problem;
+use super::refit::Fitted;
+use crate::reading::Quantity;
+
+/// Lags of the autocorrelation.
+pub(super) const LAGS: usize = 20;
+
+/// p-value of the runs test of signs about the median (Wald and Wolfowitz); `None` with too few of either sign.
+pub(super) fn runs(innovations: &[f64]) -> Option<f64> {
+    let middle = super::problem::median(innovations.to_vec());
+    let signs: Vec<bool> = innovations
+        .iter()
+        .filter(|u| (**u - middle).abs() > 0.0)
+        .map(|u| *u > middle)
+        .collect();
+    let above = signs.iter().filter(|up| **up).count() as f64;
+    let below = signs.len() as f64 - above;
+    let n = above + below;
+    if above < 8.0 || below < 8.0 {
+        return None;
+    }
+    let runs = 1.0 + signs.windows(2).filter(|pair| pair[0] != pair[1]).count() as f64;
+    let mean = 1.0 + 2.0 * above * below / n;
+    let variance = (mean - 1.0) * (mean - 2.0) / (n - 1.0);
+    Some(two_sided((runs - mean) / variance.sqrt()))
+}
+
+/// Autocorrelation by lags of the median spacing, from 0; pairs of readings count where they are that far apart.
+pub(super) fn autocorrelation(problem: &Problem, innovations: &[f64]) -> Vec<f64> {
+    products(problem, innovations)
+        .into_iter()
+        .map(|(r, _)| r)
+        .collect()
+}
+
+/// p-value of the test of Stoffer and Toloi (1992): Ljung and Box's with each lag weighed by the pairs there are.
+pub(super) fn stoffer_toloi(problem: &Problem, innovations: &[f64]) -> Option<f64> {
+    if innovations.len() < 3 * LAGS {
+        return None;
+    }
+    let n = innovations.len() as f64;
+    let each = products(problem, innovations);
+    let sum: f64 = each[1..]
+        .iter()
+        .map(|(r, pairs)| {
+            if *pairs > 0.0 {
+                r * r * (n + 2.0) * n / pairs.max(1.0) * (pairs / n).powi(2)
+            } else {
+                0.0
+            }
+        })
+        .sum();
+    Some(chi_square_tail(sum, LAGS as f64))
+}
+
+/// (correlation, pairs) by lag.
+fn products(problem: &Problem, innovations: &[f64]) -> Vec<(f64, f64)> {
+    let n = innovations.len();
+    let mean = innovations.iter().sum::<f64>() / n as f64;
+    let variance = innovations.iter().map(|u| (u - mean).powi(2)).sum::<f64>() / n as f64;
+    let mut sums = vec![(0.0, 0.0); LAGS + 1];
+    for i in 0..n {
+        for j in i..n.min(i + LAGS + 1) {
+            let lag = (problem.t[j] - problem.t[i]) / problem.spacing;
+            let whole = lag.round();
+            if whole > LAGS as f64 || (lag - whole).abs() > 0.35 {
+                continue;
+            }
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "between 0 and LAGS"
+            )]
+            let slot = &mut sums[whole as usize];
+            slot.0 += (innovations[i] - mean) * (innovations[j] - mean) / variance.max(1e-300);
+            slot.1 += 1.0;
+        }
+    }
+    let correlation = |(sum, pairs): (f64, f64)| (sum / pairs.max(1.0), pairs);
+    sums.into_iter().map(correlation).collect()
+}
+
+fn two_sided(z: f64) -> f64 {
+    let t = 1.0 / (1.0 + 0.231_641_9 * z.abs());
+    // Abramowitz and Stegun 26.2.17.
+    let poly = t
+        * (0.319_381_530
+            + t * (-0.356_563_782
+                + t * (1.781_477_937 + t * (-1.821_255_978 + t * 1.330_274_429))));
+    (2.0 * poly * (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt()).min(1.0)
+}
+
+/// P(chi-square of k degrees > x), by Wilson and Hilferty's cube root.
+fn chi_square_tail(x: f64, k: f64) -> f64 {
+    let spread = 2.0 / (9.0 * k);
+    let z = ((x / k).cbrt() - (1.0 - spread)) / spread.sqrt();
+    let tail = 0.5 * two_sided(z);
+    if z > 0.0 { tail } else { 1.0 - tail }
+}
+
+/// The likeliest noise models of a fit, with and without a load in them.
+pub(super) struct Judged<'a> {
+    /// Without an undeclared load: white, or remembered by the reading.
+    pub(super) plain: &'a Whitener,
+    /// White alone.
+    pub(super) white_bic: f64,
+    pub(super) plain_bic: f64,
+    /// With one; `None` where the sampling leaves it no room.
+    pub(super) load: Option<(&'a Whitener, f64)>,
+}
+
+impl<'a> Judged<'a> {
+    /// Of a fit's own residual, its parameters as they are.
+    pub(super) fn of(bank: &'a [Whitener], surprise: impl Fn(&Whitener) -> f64) -> Option<Self> {
+        let best = |of: &dyn Fn(Memory) -> bool| {
+            let own = bank.iter().filter(|whitener| of(whitener.noise.memory));
+            own.map(|whitener| (whitener, surprise(whitener)))
+                .min_by(|a, b| a.1.total_cmp(&b.1))
+        };
+        let (plain, plain_bic) = best(&|memory| memory != Memory::Load)?;
+        Some(Self {
+            plain,
+            plain_bic,
+            white_bic: best(&|memory| memory == Memory::None)?.1,
+            load: best(&|memory| memory == Memory::Load),
+        })
+    }
+
+    /// How much of the BIC an undeclared load still takes.
+    pub(super) fn load_gain(&self) -> f64 {
+        self.load.map_or(0.0, |(_, bic)| self.plain_bic - bic)
+    }
+}
+
+/// Posterior mean and standard deviation of the undeclared log-load at each fitted reading: the filter forwards,
+/// then Rauch, Tung and Striebel's smoother backwards.
+pub(super) fn undeclared_load(
+    problem: &Problem,
+    fitted: &Fitted,
+    whitener: &Whitener,
+) -> Vec<(f64, f64)> {
+    let residual = fitted.residual(problem);
+    let misfit: f64 = whitener.innovations(&residual).iter().map(|u| u * u).sum();
+    let sigma = (misfit / problem.used as f64).sqrt();
+    // From units of the state to e-folds.
+    let typical = problem.typical_velocity();
+    let e_folds = match problem.quantity {
+        Quantity::Displacement => whitener.noise.ratio * sigma / (typical * whitener.noise.days),
+        Quantity::Velocity => whitener.noise.ratio * sigma / typical,
+    };
+    let scaled: Vec<f64> = residual.iter().map(|e| e / sigma).collect();
+    let smoothed = whitener.smooth(problem, &scaled);
+    smoothed
+        .into_iter()
+        .map(|(mean, variance)| (mean * e_folds, variance.max(0.0).sqrt() * e_folds))
+        .collect()
+}
+
+/// Innovations of a fit under one noise model.
+pub(super) fn innovations(problem: &Problem, fitted: &Fitted, whitener: &Whitener) -> Vec<f64> {
+    whitener.innovations(&fitted.residual(problem))
+}
+
+#[cfg(test)]
+mod tests;

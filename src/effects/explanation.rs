@@ -1,0 +1,291 @@
+//! What an explanation says, key for key as scripts read it: what is unbounded or missing is null.
+
+use super::fuller::Fuller;
+use super::kind::{FaultKind, Form, Kind};
+use crate::reading::{BenchmarkId, Quantity, Timestamp, Unit};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// From a benchmark's residual to the effect that its law lacks.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Explanation {
+    /// Whose readings.
+    pub benchmark: BenchmarkId,
+    /// Displacement or velocity.
+    pub quantity: Quantity,
+    /// The readings' unit.
+    pub unit: Unit,
+    /// How many there are.
+    pub readings: usize,
+    /// The first one.
+    pub first: Option<Timestamp>,
+    /// The last one.
+    pub last: Option<Timestamp>,
+    /// The first effect accepted, or one of the two honest ends.
+    pub verdict: Effect,
+    /// How much of the residual's structure the effects account for.
+    pub explained: Explained,
+    /// The effects accepted after the verdict, in that order.
+    pub also: Vec<Effect>,
+    /// What explains the same within the margin: kinds, with the channel where there is one.
+    pub cannot_separate_from: Vec<String>,
+    /// What is wrong with the data themselves.
+    pub faults: Vec<Fault>,
+    /// Misfit before and after, on the same data and under the same noise model.
+    pub error: ErrorChange,
+    /// What the effects change in the forecast.
+    pub forecast: ForecastChange,
+    /// Everything tried, best first, with why it was refused.
+    pub candidates: Vec<Candidate>,
+    /// In short, what is wrong with the data: `interpolated`, `repeated-rows`, `stuck`, `covariate-reset`.
+    pub flags: Vec<String>,
+    /// What a person should know, a sentence each.
+    pub remarks: Vec<String>,
+    /// The tests of the residual, before and after.
+    pub residual: ResidualTests,
+    /// The noise under which all was judged.
+    pub noise: NoiseReport,
+    /// What makes this run repeatable.
+    pub settings: SettingsReport,
+    /// The series behind the figures.
+    #[serde(skip)]
+    pub curves: Curves,
+    /// The effects as a forecast uses them.
+    #[serde(skip)]
+    pub fuller: Fuller,
+}
+
+/// One effect inside the law.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Effect {
+    /// Its kind.
+    pub effect: Kind,
+    /// The covariate it works through.
+    pub channel: Option<String>,
+    /// Whether by the covariate's value or its rate of change.
+    pub form: Option<Form>,
+    /// Chance that the search finds as much where there is nothing, everything tried counted.
+    pub p_value: Option<f64>,
+    /// Mean of the response, days.
+    pub lag_days: Option<f64>,
+    /// By when 95 % of the response has passed (t95), days.
+    pub memory_days: Option<f64>,
+    /// Log-load for one standard deviation of what enters.
+    pub gain_per_sd: Option<f64>,
+    /// 5 and 95 % of the gain.
+    pub gain_interval: Option<[f64; 2]>,
+    /// The strongest period, days.
+    pub period_days: Option<f64>,
+    /// When it happened.
+    pub at: Option<Timestamp>,
+    /// Between when and when it may have happened, 90 %.
+    pub at_interval: Option<[Timestamp; 2]>,
+    /// How large: of an offset in `unit`, of a step the log-load, of a reset the state's factor, and so on.
+    pub size: Option<f64>,
+    /// The unit of `size`; null for a pure number.
+    pub unit: Option<String>,
+    /// The groups into which the benchmarks parted.
+    pub groups: Option<Vec<Vec<BenchmarkId>>>,
+    /// Fall of the BIC when it was added to what stood before.
+    pub bic_gain: f64,
+    /// rms of its own contribution over the readings, in the readings' unit.
+    pub contribution_rms: Option<f64>,
+}
+
+impl Effect {
+    /// An effect of that kind of which nothing more is known yet.
+    pub fn of(kind: Kind) -> Self {
+        Self {
+            effect: kind,
+            channel: None,
+            form: None,
+            p_value: None,
+            lag_days: None,
+            memory_days: None,
+            gain_per_sd: None,
+            gain_interval: None,
+            period_days: None,
+            at: None,
+            at_interval: None,
+            size: None,
+            unit: None,
+            groups: None,
+            bic_gain: 0.0,
+            contribution_rms: None,
+        }
+    }
+}
+
+/// How much of the structure is accounted for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Explained {
+    /// The residual after it passes for noise.
+    Full,
+    /// Structure is left.
+    Partly,
+    /// No effect was accepted.
+    None,
+}
+
+/// A fault of the data.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Fault {
+    /// Its kind.
+    pub kind: FaultKind,
+    /// The covariate; null where it is the benchmark's own readings.
+    pub channel: Option<String>,
+    /// Where it begins.
+    pub at: Timestamp,
+    /// Where it ends, where it is no instant.
+    pub until: Option<Timestamp>,
+    /// The value, in `unit`; of a reset what has to be added to all that follows.
+    pub size: Option<f64>,
+    /// The unit of `size`.
+    pub unit: Option<String>,
+    /// How many values it touches.
+    pub values: usize,
+    /// Where the values were copied from.
+    pub copy_of: Option<Timestamp>,
+}
+
+/// A figure of the plain law and of the fuller one.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Change<T = Option<f64>> {
+    /// Under the law with a constant load.
+    pub before: T,
+    /// With the effects.
+    pub after: T,
+}
+
+/// Root mean square errors.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ErrorChange {
+    /// The readings' unit.
+    pub unit: Unit,
+    /// Over all readings.
+    pub fit: Change,
+    /// Over a later block that the fit did not see.
+    pub held_out: Change,
+    /// The first reading of that block.
+    pub held_out_from: Option<Timestamp>,
+    /// Why the held-out figure means little, where it does.
+    pub caveat: Option<String>,
+}
+
+/// What the effects change in the regime and in the time of failure.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct ForecastChange {
+    /// Probability of m > 1, the load free; null with too few readings.
+    pub probability_unstable: Change,
+    /// Chance of passing the critical velocity within the horizon.
+    pub probability_of_failure: Change,
+    /// Median of the time of passage, unconditional.
+    pub failure_time: Change<Option<Timestamp>>,
+}
+
+/// One thing tried.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Candidate {
+    /// Its kind.
+    pub effect: Kind,
+    /// The covariate.
+    pub channel: Option<String>,
+    /// Level or rate.
+    pub form: Option<Form>,
+    /// When, for what has a time.
+    pub at: Option<Timestamp>,
+    /// Mean of the response, days.
+    pub lag_days: Option<f64>,
+    /// Fall of the BIC, against what stood when it was tried.
+    pub bic_gain: f64,
+    /// As in [`Effect`]; null where it was not reached.
+    pub p_value: Option<f64>,
+    /// Held-out error with it over that without.
+    pub held_out: Option<f64>,
+    /// Why not; null for what was accepted.
+    pub rejected_because: Option<String>,
+}
+
+/// Whether the residual passes for noise.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ResidualTests {
+    /// p-value of the runs test of the innovations.
+    pub runs: Change,
+    /// p-value of the Stoffer-Toloi test (Ljung-Box that knows gaps).
+    pub stoffer_toloi: Change,
+    /// Fall of the BIC that an undeclared random load still brings.
+    pub undeclared_load_bic_gain: Change,
+    /// Standard deviation of that load, e-folds of velocity.
+    pub undeclared_load_sd: Change,
+    /// Where what is left stands out most.
+    pub structure: Vec<Structure>,
+}
+
+/// A stretch in which the undeclared load stands clear of its error.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Structure {
+    /// From when.
+    pub from: Timestamp,
+    /// To when.
+    pub until: Timestamp,
+    /// Its most extreme log-load there.
+    pub log_load: f64,
+    /// The same in standard errors.
+    pub z: f64,
+}
+
+/// The noise model.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NoiseReport {
+    /// White noise of a reading, in its unit (for velocities read with a relative error, of the typical one).
+    pub white: f64,
+    /// Correlated noise of a reading, in its unit.
+    pub correlated: f64,
+    /// Its memory, days.
+    pub memory_days: Option<f64>,
+}
+
+/// What makes a run repeatable.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SettingsReport {
+    /// Of slipwatch.
+    pub version: String,
+    /// Of the generators.
+    pub seed: u64,
+    /// Surrogates behind the p-values.
+    pub surrogates: usize,
+    /// Fall of the BIC that is asked for.
+    pub bic_margin: f64,
+    /// FNV-1a of the readings and channels.
+    pub data_hash: String,
+}
+
+/// The series behind the figures, all at `times`, in the readings' unit where nothing else is said.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Curves {
+    /// When the readings were taken.
+    pub times: Vec<Timestamp>,
+    /// The readings, faults taken out.
+    pub readings: Vec<f64>,
+    /// The plain law.
+    pub before: Vec<f64>,
+    /// The fuller law.
+    pub after: Vec<f64>,
+    /// The plain law fitted without the held-out block, over all times.
+    pub before_held_out: Vec<f64>,
+    /// The fuller law fitted without it.
+    pub after_held_out: Vec<f64>,
+    /// Posterior mean and standard deviation of the undeclared log-load before.
+    pub load_before: Vec<(f64, f64)>,
+    /// The same after.
+    pub load_after: Vec<(f64, f64)>,
+    /// Autocorrelation of the innovations, by lag 0, 1, ... of the median spacing.
+    pub autocorrelation: Change<Vec<f64>>,
+    /// Days of one lag.
+    pub lag_days: f64,
+    /// What each effect, by its title, adds to the prediction.
+    pub contributions: BTreeMap<String, Vec<f64>>,
+    /// What each effect adds to the log-load, where it acts there.
+    pub log_loads: BTreeMap<String, Vec<f64>>,
+}

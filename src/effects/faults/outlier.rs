@@ -1,0 +1,179 @@
+//! One or two readings far from their neighbours that come back: a mistake, not a motion.
+
+use super::nature::Nature;
+use super::trace::{Trace, median, resolution, robust_deviation};
+use crate::reading::Quantity;
+use std::ops::Range;
+
+/// Fewer readings show no neighbourhood.
+const FEWEST: usize = 20;
+/// Neighbours looked at on either side.
+const BESIDE: usize = 5;
+/// Readings that must follow: what the newest means nobody can know yet.
+const AFTER: usize = 2;
+/// Standard deviations about the line through the neighbours.
+const FAR: f64 = 8.0;
+/// The same for covariates, which have fast changes of their own.
+const FAR_IN_CHANNEL: f64 = 15.0;
+/// The nearest neighbours' share of the deviation, at most: what comes back in steps is a motion.
+const COMES_BACK: f64 = 0.3;
+/// Between gaps of more usual intervals than this on both sides a value may be a motion not seen.
+const GAP: f64 = 3.0;
+/// Outliers are few; where there are more, the noise has heavy tails and none is a mistake.
+const FEW: f64 = 0.02;
+
+/// Which readings of a benchmark are mistakes. At most 2 % of them (but one among 20 to 50).
+///
+/// The error of a velocity grows with it, so velocities must stand out by their logarithms too.
+pub(super) fn outlying_readings(trace: &Trace, quantity: Quantity) -> Vec<bool> {
+    let mut wrong = outlying(trace, FAR);
+    if quantity == Quantity::Velocity && trace.values.iter().all(|value| *value > 0.0) {
+        let mut logarithms = trace.clone();
+        for value in &mut logarithms.values {
+            *value = value.ln();
+        }
+        let by_factor = outlying(&logarithms, FAR);
+        for (wrong, by_factor) in wrong.iter_mut().zip(by_factor) {
+            *wrong &= by_factor;
+        }
+    }
+    wrong
+}
+
+/// Which values of a covariate are mistakes: dips out of the scatter, and peaks that
+/// leave the range of all others by more than that range's width; smaller peaks may be weather, and
+/// those of rain and of rivers always are.
+pub(super) fn outlying_samples(trace: &Trace, nature: Nature) -> Vec<bool> {
+    let mut wrong = outlying(trace, FAR_IN_CHANNEL);
+    if nature.has_peaks() {
+        wrong.fill(false);
+        return wrong;
+    }
+    let rest = trace
+        .values
+        .iter()
+        .zip(&wrong)
+        .filter(|(_, wrong)| !**wrong);
+    let (low, high) = rest.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (v, _)| {
+        (low.min(*v), high.max(*v))
+    });
+    let width = high - low;
+    for (index, wrong) in wrong.iter_mut().enumerate().skip(1) {
+        let value = trace.values[index];
+        let is_dip = value < trace.values[index - 1];
+        *wrong &= is_dip || value > high + width;
+    }
+    wrong
+}
+
+fn outlying(trace: &Trace, far: f64) -> Vec<bool> {
+    let count = trace.len();
+    let mut wrong = vec![false; count];
+    if count < FEWEST {
+        return wrong;
+    }
+    let usual = usual_deviation(trace);
+    let gap = GAP * median(&trace.intervals());
+    for width in [1, 2] {
+        for start in 1..count.saturating_sub(width + AFTER - 1) {
+            let end = start + width;
+            let before = trace.days[start] - trace.days[start - 1];
+            let after = trace.days[end] - trace.days[end - 1];
+            let is_seen = before.min(after) <= gap && !wrong[start];
+            if is_seen && stands_out(trace, start..end, far, usual) {
+                wrong[start..end].fill(true);
+            }
+        }
+    }
+    let marked = wrong.iter().filter(|wrong| **wrong).count();
+    let most = (FEW * count as f64).max(1.0);
+    if marked as f64 > most {
+        wrong.fill(false);
+    }
+    wrong
+}
+
+/// The scatter of readings about the line through their neighbours, over the whole series.
+fn usual_deviation(trace: &Trace) -> f64 {
+    let (days, values) = (&trace.days, &trace.values);
+    let off = |at: usize| {
+        let share = (days[at] - days[at - 1]) / (days[at + 1] - days[at - 1]);
+        values[at] - values[at - 1] - share * (values[at + 1] - values[at - 1])
+    };
+    let offs: Vec<f64> = (1..trace.len() - 1).map(off).collect();
+    // The middle of three adds half as much again to a reading's own variance.
+    let own = (2.0_f64 / 3.0).sqrt();
+    (own * robust_deviation(&offs)).max(0.5 * resolution(values))
+}
+
+/// Whether the readings `inside` leave the line of their neighbours, which hold it.
+fn stands_out(trace: &Trace, inside: Range<usize>, far: f64, usual: f64) -> bool {
+    let values = &trace.values;
+    let (start, after) = (inside.start, inside.end);
+    let before = start - 1;
+    // Nothing monotone stands out: neither a step nor an acceleration.
+    let sides = |index: usize| {
+        (
+            values[index] - values[before],
+            values[index] - values[after],
+        )
+    };
+    let is_peak = inside
+        .clone()
+        .all(|index| sides(index).0 * sides(index).1 > 0.0);
+    let least = inside
+        .clone()
+        .map(|index| sides(index).0.abs().min(sides(index).1.abs()))
+        .fold(f64::INFINITY, f64::min);
+    if !is_peak || least <= far * usual {
+        return false;
+    }
+    let low = start.saturating_sub(BESIDE);
+    let high = (after + BESIDE).min(trace.len());
+    let neighbours: Vec<usize> = (low..start).chain(after..high).collect();
+    let line = Line::through(trace, &neighbours);
+    let off = |index: usize| values[index] - line.at(trace.days[index]);
+    let offs: Vec<f64> = neighbours.iter().map(|&index| off(index)).collect();
+    let deviation = usual.max(1.4826 * median(&absolute(&offs)));
+    inside.into_iter().all(|index| {
+        let own = off(index).abs();
+        let beside = off(before).abs().max(off(after).abs());
+        own > far * deviation && beside < COMES_BACK * own
+    })
+}
+
+fn absolute(values: &[f64]) -> Vec<f64> {
+    values.iter().map(|value| value.abs()).collect()
+}
+
+/// A line that outliers do not turn: the median of all slopes (Theil and Sen).
+struct Line {
+    day: f64,
+    value: f64,
+    slope: f64,
+}
+
+impl Line {
+    fn through(trace: &Trace, indices: &[usize]) -> Self {
+        let day = indices.first().map_or(0.0, |&index| trace.days[index]);
+        let mut slopes = Vec::with_capacity(indices.len() * indices.len() / 2);
+        for (place, &a) in indices.iter().enumerate() {
+            for &b in &indices[place + 1..] {
+                let rise = trace.values[b] - trace.values[a];
+                slopes.push(rise / (trace.days[b] - trace.days[a]));
+            }
+        }
+        let slope = median(&slopes);
+        let level = |&index: &usize| trace.values[index] - slope * (trace.days[index] - day);
+        let levels: Vec<f64> = indices.iter().map(level).collect();
+        Self {
+            day,
+            value: median(&levels),
+            slope,
+        }
+    }
+
+    fn at(&self, day: f64) -> f64 {
+        self.value + self.slope * (day - self.day)
+    }
+}

@@ -1,0 +1,220 @@
+//! One instrument's values in time, and what the detectors ask of them alike: order, scale, resolution.
+
+use crate::reading::{Channel, SECONDS_PER_DAY, Series, Timestamp};
+use std::cmp::Ordering;
+
+/// Values that agree to this share of the largest are the same number written twice.
+const SAME_NUMBER: f64 = 1e-12;
+/// Shares of the largest value under which a step between values is rounding of the arithmetic.
+const FINEST_STEP: f64 = 1e-11;
+/// Fewer values do not show a common step.
+const FEWEST_ON_STEP: usize = 8;
+/// Values with this many decimals or more were computed, and say nothing of the instrument's step.
+const COMPUTED_DECIMALS: i32 = 6;
+
+/// The values of a benchmark or a channel, in time order.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Trace {
+    /// When each was measured.
+    pub times: Vec<Timestamp>,
+    /// The same in days since the first.
+    pub days: Vec<f64>,
+    /// The values, in the unit of their source.
+    pub values: Vec<f64>,
+}
+
+impl Trace {
+    pub(super) fn of_series(series: &Series) -> Self {
+        let rows = series.readings.iter();
+        Self::of_rows(rows.map(|reading| (reading.time, reading.value)))
+    }
+
+    pub(super) fn of_channel(channel: &Channel) -> Self {
+        let rows = channel.samples.iter();
+        Self::of_rows(rows.map(|sample| (sample.time, sample.value)))
+    }
+
+    fn of_rows(rows: impl Iterator<Item = (Timestamp, f64)>) -> Self {
+        let (times, values): (Vec<Timestamp>, Vec<f64>) = rows.unzip();
+        let seconds = |time: &Timestamp| time.as_microsecond() as f64 / 1e6;
+        let first = times.first().map_or(0.0, seconds);
+        let day = |time| (seconds(time) - first) / SECONDS_PER_DAY;
+        Self {
+            days: times.iter().map(day).collect(),
+            times,
+            values,
+        }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.values.len()
+    }
+
+    /// From each value to the next.
+    pub(super) fn increments(&self) -> Vec<f64> {
+        self.values
+            .windows(2)
+            .map(|pair| pair[1] - pair[0])
+            .collect()
+    }
+
+    /// Days from each value to the next.
+    pub(super) fn intervals(&self) -> Vec<f64> {
+        self.days.windows(2).map(|pair| pair[1] - pair[0]).collect()
+    }
+}
+
+/// The middle of `values`; 0 where there are none.
+pub(super) fn median(values: &[f64]) -> f64 {
+    quantile(values, 0.5)
+}
+
+/// The value under which `share` of them lie, between the two nearest; 0 where there are none.
+pub(super) fn quantile(values: &[f64], share: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let Some(last) = sorted.len().checked_sub(1) else {
+        return 0.0;
+    };
+    let place = share * last as f64;
+    let below = place.floor();
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a share of the length"
+    )]
+    let index = (below as usize).min(last);
+    let above = sorted[(index + 1).min(last)];
+    sorted[index] + (place - below) * (above - sorted[index])
+}
+
+/// Standard deviation of the middle of `values`, heavy tails left out: 1.4826 times their median
+/// distance from their median.
+pub(super) fn robust_deviation(values: &[f64]) -> f64 {
+    let middle = median(values);
+    let distances: Vec<f64> = values.iter().map(|value| (value - middle).abs()).collect();
+    1.4826 * median(&distances)
+}
+
+/// The largest distance from zero.
+pub(super) fn extreme(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |most, value| most.max(value.abs()))
+}
+
+/// A number for each value, the same for the same value, however the last digits were written.
+pub(super) fn symbols(values: &[f64], scale: f64) -> Vec<u32> {
+    let tolerance = SAME_NUMBER * scale;
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+    let mut symbols = vec![0; values.len()];
+    let mut symbol = 0;
+    for pair in order.windows(2) {
+        symbol += u32::from(values[pair[1]] - values[pair[0]] > tolerance);
+        symbols[pair[1]] = symbol;
+    }
+    symbols
+}
+
+/// The resolution of each value: one in its last decimal, or the step on which all values with
+/// about as many decimals stand, where that is coarser (a converted unit has decimals without end).
+pub(super) fn resolutions(values: &[f64]) -> Vec<f64> {
+    let decimals: Vec<i32> = values.iter().map(|&value| decimals(value)).collect();
+    let class = |computed: bool| {
+        let of_class = values.iter().zip(&decimals);
+        let members =
+            of_class.filter(|(_, decimals)| (**decimals >= COMPUTED_DECIMALS) == computed);
+        common_step(&members.map(|(value, _)| *value).collect::<Vec<f64>>())
+    };
+    let steps = [class(false), class(true)];
+    let of = |decimals: &i32| {
+        let step = steps[usize::from(*decimals >= COMPUTED_DECIMALS)];
+        step.max(0.1_f64.powi(*decimals))
+    };
+    decimals.iter().map(of).collect()
+}
+
+/// The resolution of most values.
+pub(super) fn resolution(values: &[f64]) -> f64 {
+    median(&resolutions(values))
+}
+
+fn decimals(value: f64) -> i32 {
+    let text = value.to_string();
+    let fraction = text.split_once('.').map_or(0, |(_, digits)| digits.len());
+    i32::try_from(fraction.min(17)).unwrap_or(17)
+}
+
+/// The largest step of which all differences are multiples; the arithmetic's own where there is none.
+fn common_step(values: &[f64]) -> f64 {
+    let finest = FINEST_STEP * extreme(values);
+    let Some(&first) = values.first() else {
+        return finest;
+    };
+    if values.len() < FEWEST_ON_STEP {
+        return finest;
+    }
+    let mut step = 0.0;
+    for value in values {
+        step = common_divisor(step, (value - first).abs(), finest);
+        if step > 0.0 && step <= 4.0 * finest {
+            return finest;
+        }
+    }
+    step
+}
+
+/// Euclid's algorithm on numbers known to `tolerance`.
+fn common_divisor(a: f64, b: f64, tolerance: f64) -> f64 {
+    let (mut large, mut small) = if a.partial_cmp(&b) == Some(Ordering::Less) {
+        (b, a)
+    } else {
+        (a, b)
+    };
+    while small > tolerance {
+        let rest = large % small;
+        let rest = if small - rest < tolerance { 0.0 } else { rest };
+        (large, small) = (small, rest);
+    }
+    large
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_converted_unit_keeps_the_step_of_the_instrument() {
+        let hundredths_of_a_foot: Vec<f64> = (0..50_u32)
+            .map(|index| f64::from(300 + (index * 7) % 23) * 0.01 * 0.3048)
+            .collect();
+        let step = resolution(&hundredths_of_a_foot);
+        assert!((step - 0.003_048).abs() < 1e-9, "{step}");
+    }
+
+    #[test]
+    fn a_number_with_many_digits_is_finer_than_its_neighbours() {
+        let steps = resolutions(&[
+            1436.1,
+            1_437.783_015_618_142_6,
+            1_428.522_663_453_401_5,
+            1492.0,
+        ]);
+        assert!((steps[0] - 0.1).abs() < 1e-12, "{steps:?}");
+        assert!(steps[1] < 1e-7, "{steps:?}");
+    }
+
+    #[test]
+    fn the_same_number_with_fewer_digits_is_the_same() {
+        let values = [1_437.783_015_618_142_6, 1428.5, 1_437.783_015_618_14];
+        let symbols = symbols(&values, 1437.0);
+        assert_eq!(symbols[0], symbols[2]);
+        assert_ne!(symbols[0], symbols[1]);
+    }
+
+    #[test]
+    fn quantiles_of_little_are_what_there_is() {
+        assert!((median(&[3.0, 1.0, 2.0]) - 2.0).abs() < 1e-12);
+        assert!((quantile(&[1.0, 2.0], 0.5) - 1.5).abs() < 1e-12);
+        assert!(median(&[]).abs() < 1e-12);
+    }
+}

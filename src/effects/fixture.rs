@@ -1,0 +1,91 @@
+//! Series made up for the tests of the engine's parts.
+
+use super::problem::Problem;
+use crate::reading::{
+    BenchmarkId, Channel, LengthUnit, Quantity, Reading, Sample, Series, TimeUnit, Timestamp, Unit,
+    after_days,
+};
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64;
+
+pub(super) fn generator(seed: u64) -> Pcg64 {
+    Pcg64::seed_from_u64(seed)
+}
+
+/// Independent, standard deviation 1.
+pub(super) fn normals(generator: &mut Pcg64, count: usize) -> Vec<f64> {
+    let one = |_| generator.sample(StandardNormal);
+    (0..count).map(one).collect()
+}
+
+pub(super) fn epoch() -> Timestamp {
+    "2001-01-01T00:00:00Z".parse().unwrap()
+}
+
+/// 0, 1, 2 ... days.
+pub(super) fn daily(count: usize) -> Vec<f64> {
+    (0..count).map(|day| day as f64).collect()
+}
+
+/// Whole days with gaps: of every `keep` days and `gap` more only the first `keep`.
+pub(super) fn with_gaps(count: usize, keep: usize, gap: usize) -> Vec<f64> {
+    let days = (0..).filter(|day| day % (keep + gap) < keep);
+    days.take(count).map(|day: usize| day as f64).collect()
+}
+
+/// Readings in mm, or in mm/day, `days` after the epoch.
+pub(super) fn series(quantity: Quantity, days: &[f64], values: &[f64]) -> Series {
+    let unit = match quantity {
+        Quantity::Displacement => Unit::Length(LengthUnit::Millimetre),
+        Quantity::Velocity => Unit::Rate(LengthUnit::Millimetre, TimeUnit::Day),
+    };
+    let readings = days.iter().zip(values).map(|(day, value)| Reading {
+        time: after_days(epoch(), *day).unwrap(),
+        value: *value,
+        sigma: None,
+    });
+    Series {
+        benchmark: BenchmarkId::new("made up"),
+        unit,
+        averaging: None,
+        readings: readings.collect(),
+    }
+}
+
+pub(super) fn channel(name: &str, days: &[f64], values: &[f64]) -> Channel {
+    let samples = days.iter().zip(values).map(|(day, value)| Sample {
+        time: after_days(epoch(), *day).unwrap(),
+        value: *value,
+    });
+    Channel {
+        name: name.to_owned(),
+        unit: None,
+        samples: samples.collect(),
+    }
+}
+
+/// Readings of a slope that moves by 1 mm/day at these days, with noise of 1 mm or of 0.1 mm/day.
+pub(super) fn steady(quantity: Quantity, days: &[f64], seed: u64) -> Problem {
+    let noise = normals(&mut generator(seed), days.len());
+    let each = days.iter().zip(noise);
+    let values: Vec<f64> = match quantity {
+        Quantity::Displacement => each.map(|(day, noise)| day + noise).collect(),
+        Quantity::Velocity => each.map(|(_, noise)| 1.0 + 0.1 * noise).collect(),
+    };
+    let mut problem = Problem::new(&series(quantity, days, &values), &[]).unwrap();
+    let typical = problem.typical_velocity();
+    problem.see(&vec![typical; days.len()]);
+    problem
+}
+
+/// Pearson's.
+pub(super) fn correlation(a: &[f64], b: &[f64]) -> f64 {
+    let n = a.len() as f64;
+    let means = (a.iter().sum::<f64>() / n, b.iter().sum::<f64>() / n);
+    let sum = |of: &dyn Fn(f64, f64) -> f64| {
+        let each = a.iter().zip(b);
+        each.map(|(x, y)| of(x - means.0, y - means.1)).sum::<f64>()
+    };
+    sum(&|x, y| x * y) / (sum(&|x, _| x * x) * sum(&|_, y| y * y)).sqrt()
+}

@@ -1,0 +1,162 @@
+//! Linear algebra of the refits: what a few more columns take off the misfit, under one noise model or the best of several.
+
+use super::noise::Whitener;
+
+/// A column that keeps less than this of its length beside the others adds nothing that rounding would not.
+const LEAST_LEFT: f64 = 1e-5;
+
+/// The residual and the model's own directions, as innovations under one noise model.
+#[derive(Debug, Clone)]
+pub(super) struct Frame {
+    pub(super) whitener: Whitener,
+    /// Orthonormal directions that the model can already take.
+    directions: Vec<Vec<f64>>,
+    /// What they leave of the residual.
+    pub(super) residual: Vec<f64>,
+    pub(super) misfit: f64,
+}
+
+impl Frame {
+    pub(super) fn new(whitener: Whitener, residual: &[f64], jacobian: &[Vec<f64>]) -> Self {
+        let mut directions: Vec<Vec<f64>> = Vec::with_capacity(jacobian.len());
+        for column in jacobian {
+            if let Some(unit) = orthonormal(whitener.whiten(column), &directions) {
+                directions.push(unit);
+            }
+        }
+        let mut residual = whitener.whiten(residual);
+        clear(&mut residual, &directions);
+        let misfit = dot(&residual, &residual);
+        Self {
+            whitener,
+            directions,
+            residual,
+            misfit,
+        }
+    }
+
+    /// -2 ln likelihood, the size of the noise profiled out, were the misfit `misfit`.
+    pub(super) fn surprise(&self, misfit: f64) -> f64 {
+        let n = self.readings();
+        n * (misfit.max(1e-300) / n).ln() + self.whitener.log_determinant
+    }
+
+    /// What the noise model's parameters cost in the BIC.
+    pub(super) fn cost(&self) -> f64 {
+        self.whitener.noise.parameters() * self.readings().ln()
+    }
+
+    /// How many readings there are; the residual holds the whole motion besides.
+    fn readings(&self) -> f64 {
+        (self.residual.len() - 1) as f64
+    }
+
+    /// Orthonormal directions that `columns` add to the model's.
+    pub(super) fn new_directions(&self, columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let mut added: Vec<Vec<f64>> = Vec::with_capacity(columns.len());
+        for column in columns {
+            let whitened = self.whitener.whiten(column);
+            if let Some(mut unit) = orthonormal(whitened, &self.directions) {
+                clear(&mut unit, &added);
+                if let Some(unit) = normal(unit, LEAST_LEFT) {
+                    added.push(unit);
+                }
+            }
+        }
+        added
+    }
+
+    /// What these directions take off the misfit of an orthogonalised residual.
+    pub(super) fn taken(directions: &[Vec<f64>], residual: &[f64]) -> f64 {
+        directions
+            .iter()
+            .map(|unit| dot(unit, residual).powi(2))
+            .sum()
+    }
+
+    /// The innovations of noise in the readings, without what the model can take; noise has no motion.
+    pub(super) fn project_noise(&self, readings: &[f64]) -> Vec<f64> {
+        let mut residual = self.whitener.innovations(readings);
+        residual.push(0.0);
+        clear(&mut residual, &self.directions);
+        residual
+    }
+}
+
+/// The same residual under several noise models.
+#[derive(Debug, Clone)]
+pub(super) struct Frames {
+    pub(super) each: Vec<Frame>,
+}
+
+impl Frames {
+    pub(super) fn new(bank: &[Whitener], residual: &[f64], jacobian: &[Vec<f64>]) -> Self {
+        let frame = |whitener: &Whitener| Frame::new(whitener.clone(), residual, jacobian);
+        Self {
+            each: bank.iter().map(frame).collect(),
+        }
+    }
+
+    /// The least -2 ln likelihood over the noise models, with what their own parameters cost.
+    pub(super) fn surprise(&self) -> f64 {
+        let each = self.each.iter();
+        each.map(|frame| frame.surprise(frame.misfit) + frame.cost())
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// The same with `columns` added.
+    pub(super) fn surprise_with(&self, columns: &[Vec<f64>]) -> f64 {
+        let each = self.each.iter().map(|frame| {
+            let taken = Frame::taken(&frame.new_directions(columns), &frame.residual);
+            frame.surprise(frame.misfit - taken) + frame.cost()
+        });
+        each.fold(f64::INFINITY, f64::min)
+    }
+
+    /// Which of the noise models makes the residual likeliest.
+    pub(super) fn best(&self) -> usize {
+        let surprise = |frame: &Frame| frame.surprise(frame.misfit) + frame.cost();
+        let order =
+            |a: &usize, b: &usize| surprise(&self.each[*a]).total_cmp(&surprise(&self.each[*b]));
+        (0..self.each.len()).min_by(order).unwrap_or_default()
+    }
+}
+
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+/// Takes the directions' share out of `column`.
+fn clear(column: &mut [f64], directions: &[Vec<f64>]) {
+    for unit in directions {
+        let share = dot(unit, column);
+        for (value, by) in column.iter_mut().zip(unit) {
+            *value -= share * by;
+        }
+    }
+}
+
+fn orthonormal(mut column: Vec<f64>, directions: &[Vec<f64>]) -> Option<Vec<f64>> {
+    let length = dot(&column, &column).sqrt();
+    if !(length.is_finite() && length > 0.0) {
+        return None;
+    }
+    for value in &mut column {
+        *value /= length;
+    }
+    clear(&mut column, directions);
+    // Once more: the first pass leaves rounding where columns are nearly alike.
+    clear(&mut column, directions);
+    normal(column, LEAST_LEFT)
+}
+
+fn normal(mut column: Vec<f64>, least: f64) -> Option<Vec<f64>> {
+    let length = dot(&column, &column).sqrt();
+    if !(length.is_finite() && length > least) {
+        return None;
+    }
+    for value in &mut column {
+        *value /= length;
+    }
+    Some(column)
+}

@@ -1,0 +1,240 @@
+//! What an effect must show before it is believed: sign, memory, bounds, and a later block that it helps to foretell.
+
+use super::kind::{Form, Kind};
+use super::noise::{Noise, Whitener};
+use super::problem::{Problem, median};
+use super::refit::{Fitted, Start, plain_starts, refit, refit_from};
+use super::response::Driver;
+use super::term::{Act, Scratch, Term, law_parameters};
+
+/// The later block has at least so many readings.
+const FEWEST_HELD_OUT: usize = 5;
+
+/// A jump that took longer than this, days, may be slip.
+const LONGEST_JUMP_DAYS: f64 = 3.0;
+
+/// Names of what only ever loosens a slope: more of it, more motion.
+const LOOSENING: [&str; 9] = [
+    "rain",
+    "precip",
+    "flow",
+    "discharge",
+    "pore",
+    "piez",
+    "groundwater",
+    "melt",
+    "snowmelt",
+];
+
+/// Why `fitted` (the last of its terms being new) is not what the physics allow; `None` if it is.
+pub(super) fn objection(
+    problem: &Problem,
+    fitted: &Fitted,
+    drivers: &[(usize, Driver)],
+) -> Option<String> {
+    let term = fitted.terms.last()?;
+    let own = &fitted.parameters[fitted.parameters.len() - term.coefficients()..];
+    if let Some(response) = term.response
+        && response.memory_days() > 0.5 * problem.span()
+    {
+        return Some(format!(
+            "its memory of {:.0} days is over half the record",
+            response.memory_days()
+        ));
+    }
+    let channel = term
+        .channel
+        .and_then(|index| drivers.iter().find(|(own, _)| *own == index));
+    let loosening = channel.is_some_and(|(_, driver)| is_loosening(&driver.name));
+    let level = term.response.is_some_and(|r| r.form == Form::Level);
+    match term.act {
+        Act::Load(_) if loosening && level && own[0] < 0.0 => {
+            Some("its sign is not physical: more water would slow the slope".to_owned())
+        }
+        Act::PerVelocity if own[0] <= 0.0 => {
+            Some("its sign is not physical: the load would grow with the velocity".to_owned())
+        }
+        Act::PerSlip if own[0] <= 0.0 => {
+            Some("its sign is not physical: the slope would steepen under the block".to_owned())
+        }
+        Act::Reading(_) if term.kind == Kind::Offset && own[0] > 0.0 => {
+            slip_instead(problem, term.at?, own[0], drivers)
+        }
+        Act::Averaging if own[0] < 0.5 => {
+            Some("the readings are means over no more than their own spacing".to_owned())
+        }
+        Act::Load(_) if own.iter().any(|gain| gain.abs() > 4.5) => {
+            Some("its gain lies on its bound".to_owned())
+        }
+        Act::Load(_)
+        | Act::PerVelocity
+        | Act::PerSlip
+        | Act::Averaging
+        | Act::Step
+        | Act::Reset
+        | Act::Friction
+        | Act::Reading(_) => None,
+    }
+}
+
+/// Why a jump in the sense of the motion may be slip and no offset; `None` where a jump back speaks for the instrument, or
+/// nothing speaks for slip.
+fn slip_instead(
+    problem: &Problem,
+    at: usize,
+    size: f64,
+    drivers: &[(usize, Driver)],
+) -> Option<String> {
+    let level = |range: std::ops::Range<usize>| median(problem.y[range].to_vec());
+    let beside = 5;
+    let comes_back = (beside..problem.t.len() - beside).any(|i| {
+        let fall = level(i - beside..i) - level(i..i + beside);
+        fall > 0.5 * size
+    });
+    if comes_back {
+        return None;
+    }
+    let gap = problem.t[at] - problem.t[at - 1];
+    if gap > LONGEST_JUMP_DAYS {
+        return Some(format!("in {gap:.0} days fast creep would look the same"));
+    }
+    let wet = drivers.iter().find(|(_, driver)| {
+        is_loosening(&driver.name)
+            && driver.is_high(problem.t[at] - LONGEST_JUMP_DAYS, problem.t[at])
+    });
+    wet.map(|(_, driver)| {
+        format!(
+            "{} is among its highest just before: slip would look the same",
+            driver.name
+        )
+    })
+}
+
+fn is_loosening(name: &str) -> bool {
+    let name = name.to_lowercase();
+    let parts = || name.split(|c: char| !c.is_alphanumeric());
+    // A strain, a drain and a terrain are no rain.
+    LOOSENING.iter().any(|word| match *word {
+        "rain" => parts().any(|part| part.starts_with(word)),
+        _ => name.contains(word),
+    })
+}
+
+/// Errors over the later block without and with the new terms.
+#[derive(Debug, Clone)]
+pub(super) struct HeldOut {
+    /// Index of the first reading of the block.
+    pub(super) from: usize,
+    pub(super) before: Fitted,
+    pub(super) after: Fitted,
+}
+
+impl HeldOut {
+    /// Root mean square errors over the block, mm or mm/day.
+    pub(super) fn errors(&self, problem: &Problem) -> (f64, f64) {
+        let range = self.from..problem.t.len();
+        (
+            self.before.rms(problem, range.clone()),
+            self.after.rms(problem, range),
+        )
+    }
+}
+
+/// The block: the last `share` of the readings, or less where an event stands late: half of what follows it.
+pub(super) fn block(problem: &Problem, terms: &[Term], share: f64) -> Option<usize> {
+    let n = problem.t.len();
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a share of a count"
+    )]
+    let usual = ((1.0 - share) * n as f64).ceil() as usize;
+    let latest = terms.iter().filter_map(|term| term.at).max().unwrap_or(0);
+    let from = usual.max(latest + (n - latest) / 2);
+    (from + FEWEST_HELD_OUT <= n && from >= 2 * FEWEST_HELD_OUT).then_some(from)
+}
+
+/// Fits both models without the block, by least squares from fresh starts: nothing of it is known to them but the
+/// covariates and the shape of the response.
+pub(super) fn held_out(
+    problem: &Problem,
+    (before, after): (&[Term], &Fitted),
+    share: f64,
+    scratch: &mut Scratch,
+) -> Option<HeldOut> {
+    let from = block(problem, &after.terms, share)?;
+    let part = problem.trained_on(from);
+    let bank = [Whitener::new(&part, Noise::WHITE)];
+    let mut fit = |terms: &[Term]| {
+        let starts = plain_starts(&part).into_iter();
+        let starts: Vec<Start> = starts.map(|start| start.joined(terms)).collect();
+        refit_from(&part, &starts, &bank, scratch)
+    };
+    Some(HeldOut {
+        from,
+        before: fit(before)?,
+        after: fit(&after.terms)?,
+    })
+}
+
+/// How much worse the later block is foretold, reading after reading, with the newest term as it was learned before the
+/// block than without it, in -2 ln likelihood. The law itself is fitted to all readings on both sides: its own
+/// extrapolation is not what is in question.
+pub(super) fn foretelling(
+    problem: &Problem,
+    (before, after): (&Fitted, &Fitted),
+    from: usize,
+    scratch: &mut Scratch,
+) -> Option<f64> {
+    let part = problem.trained_on(from);
+    let known = [Whitener::new(&part, after.noise)];
+    let learned = refit(&part, &Start::at(after), &known, scratch)?;
+    let whole = [Whitener::new(problem, after.noise)];
+    let newest = after.terms.last()?.coefficients();
+    let start = Start {
+        parameters: [
+            &after.parameters[..after.parameters.len() - newest],
+            &learned.parameters[learned.parameters.len() - newest..],
+        ]
+        .concat(),
+        frozen: newest,
+        ..Start::at(after)
+    };
+    let frozen = refit(problem, &start, &whole, scratch)?;
+    let surprise = |fitted: &Fitted, whitener: &Whitener| {
+        whitener.surprise_from(&fitted.residual(problem), from, fitted.sigma)
+    };
+    let own = Whitener::new(problem, before.noise);
+    Some(surprise(&frozen, &whole[0]) - surprise(before, &own))
+}
+
+/// The plain-language name of a term: its kind, and its channel where there is one.
+pub(super) fn title(term: &Term, drivers: &[(usize, Driver)]) -> String {
+    let channel = term
+        .channel
+        .and_then(|index| drivers.iter().find(|(own, _)| *own == index));
+    match channel {
+        Some((_, driver)) => format!("{} {}", term.kind, driver.name),
+        None => term.kind.name().to_owned(),
+    }
+}
+
+/// Where the coefficients of the term of that index stand among the parameters.
+pub(super) fn coefficients<'a>(problem: &Problem, fitted: &'a Fitted, index: usize) -> &'a [f64] {
+    let first = law_parameters(problem);
+    let earlier: usize = fitted.terms[..index].iter().map(Term::coefficients).sum();
+    let from = first + earlier;
+    &fitted.parameters[from..from + fitted.terms[index].coefficients()]
+}
+
+/// Whether a kind is called by what the readings themselves look like, with no outside witness: then it must
+/// account for everything, or it is but the nearest label.
+pub(super) fn is_label(kind: Kind) -> bool {
+    matches!(
+        kind,
+        Kind::LoadStep | Kind::StateReset | Kind::FrictionChange | Kind::RateLimit | Kind::Geometry
+    )
+}
+
+#[cfg(test)]
+mod tests;

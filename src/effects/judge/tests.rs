@@ -1,0 +1,162 @@
+//! What the physics do not allow is objected to, and what they do allow is not.
+
+use super::*;
+use crate::effects::fixture::{channel, daily, epoch, generator, normals, steady};
+use crate::effects::response::Response;
+use crate::reading::Quantity;
+
+const COUNT: usize = 300;
+
+fn term(kind: Kind, act: Act) -> Term {
+    Term {
+        kind,
+        channel: None,
+        response: None,
+        at: None,
+        act,
+    }
+}
+
+fn fitted(term: Term, own: &[f64]) -> Fitted {
+    Fitted {
+        parameters: [&[0.0, 0.0, -1.0, 0.0, 0.0], own].concat(),
+        terms: vec![term],
+        noise: Noise::WHITE,
+        prediction: Vec::new(),
+        velocity: Vec::new(),
+        surprise: 0.0,
+        sigma: 1.0,
+    }
+}
+
+fn driver(name: &str, values: &[f64]) -> Driver {
+    Driver::new(&channel(name, &daily(values.len()), values), epoch()).unwrap()
+}
+
+/// What is said of a channel's response with this gain and mean delay.
+fn of_channel(name: &str, form: Form, mean_days: f64, gain: f64) -> Option<String> {
+    let problem = steady(Quantity::Displacement, &daily(COUNT), 1);
+    let drivers = [(0, driver(name, &normals(&mut generator(2), COUNT)))];
+    let response = Response {
+        form,
+        stages: 1,
+        mean_days,
+    };
+    let load = Act::Load(vec![vec![0.0; problem.nodes.len()]]);
+    let term = Term {
+        channel: Some(0),
+        response: Some(response),
+        ..term(Kind::Hydrological, load)
+    };
+    objection(&problem, &fitted(term, &[gain]), &drivers)
+}
+
+#[test]
+fn more_water_may_not_slow_a_slope_but_a_reservoir_or_its_rate_may() {
+    for name in [
+        "rain_mm",
+        "river_flow_m3_s",
+        "streamflow_m3_s",
+        "pore_pressure_kpa",
+        "Snowmelt_mm",
+    ] {
+        let said = of_channel(name, Form::Level, 5.0, -0.5).unwrap();
+        assert!(said.contains("sign"), "{name}: {said}");
+        assert_eq!(of_channel(name, Form::Level, 5.0, 0.5), None, "{name}");
+        assert_eq!(of_channel(name, Form::Rate, 5.0, -0.5), None, "{name}");
+    }
+    assert_eq!(
+        of_channel("reservoir_level_m", Form::Level, 5.0, -0.5),
+        None
+    );
+}
+
+#[test]
+fn a_strain_or_a_terrain_is_no_rain() {
+    for name in [
+        "strain_ue",
+        "fibre_strain",
+        "terrain_height_m",
+        "drain_temperature_c",
+    ] {
+        assert_eq!(of_channel(name, Form::Level, 5.0, -0.5), None, "{name}");
+    }
+}
+
+#[test]
+fn a_memory_of_over_half_the_record_and_a_gain_on_its_bound_are_objected_to() {
+    let said = of_channel("reservoir_level_m", Form::Level, 51.0, 0.5).unwrap();
+    assert!(said.contains("memory of 153 days"), "{said}");
+    assert_eq!(
+        of_channel("reservoir_level_m", Form::Level, 49.0, 0.5),
+        None
+    );
+    let said = of_channel("reservoir_level_m", Form::Level, 5.0, -4.6).unwrap();
+    assert!(said.contains("bound"), "{said}");
+}
+
+#[test]
+fn a_load_may_not_grow_with_the_motion_and_a_mean_is_over_more_than_its_spacing() {
+    let problem = steady(Quantity::Displacement, &daily(COUNT), 1);
+    let said =
+        |kind: Kind, act: Act, own: f64| objection(&problem, &fitted(term(kind, act), &[own]), &[]);
+    for own in [0.0, -0.2] {
+        assert!(said(Kind::RateLimit, Act::PerVelocity, own).is_some());
+        assert!(said(Kind::Geometry, Act::PerSlip, own).is_some());
+    }
+    assert!(said(Kind::IntervalMean, Act::Averaging, 0.4).is_some());
+    assert_eq!(said(Kind::RateLimit, Act::PerVelocity, 0.2), None);
+    assert_eq!(said(Kind::Geometry, Act::PerSlip, 0.2), None);
+    assert_eq!(said(Kind::IntervalMean, Act::Averaging, 2.0), None);
+}
+
+/// What is said of a jump by `size` at reading 100, `days` after the reading before, with these covariates.
+fn of_jump(size: f64, days: f64, back: f64, drivers: &[(usize, Driver)]) -> Option<String> {
+    let mut problem = steady(Quantity::Displacement, &daily(COUNT), 1);
+    for i in 100..COUNT {
+        problem.t[i] += days - 1.0;
+        problem.y[i] += size - if i >= 200 { back } else { 0.0 };
+    }
+    let offset = Term {
+        at: Some(100),
+        ..term(Kind::Offset, Act::Reading(vec![vec![0.0; COUNT]]))
+    };
+    objection(&problem, &fitted(offset, &[size]), drivers)
+}
+
+#[test]
+fn a_jump_forwards_in_a_long_gap_may_be_slip_unless_it_comes_back() {
+    let said = of_jump(60.0, 10.0, 0.0, &[]).unwrap();
+    assert!(said.contains("10 days"), "{said}");
+    assert_eq!(of_jump(60.0, 10.0, 60.0, &[]), None);
+    assert_eq!(of_jump(-60.0, 10.0, 0.0, &[]), None);
+    assert_eq!(of_jump(60.0, 1.0, 0.0, &[]), None);
+}
+
+#[test]
+fn a_jump_forwards_just_after_the_wettest_days_may_be_slip() {
+    let wet_on = |day: usize| {
+        let mut values = vec![0.0; COUNT];
+        for (k, value) in values.iter_mut().enumerate().skip(day).take(3) {
+            *value = 10.0 + k as f64;
+        }
+        [(0, driver("rain_mm", &values))]
+    };
+    let said = of_jump(60.0, 1.0, 0.0, &wet_on(98)).unwrap();
+    assert!(said.contains("rain_mm"), "{said}");
+    assert_eq!(of_jump(60.0, 1.0, 0.0, &wet_on(150)), None);
+    assert_eq!(of_jump(60.0, 1.0, 60.0, &wet_on(98)), None);
+}
+
+#[test]
+fn the_later_block_is_the_last_share_or_what_follows_a_late_event() {
+    let problem = steady(Quantity::Displacement, &daily(COUNT), 1);
+    let event = |at: usize| Term {
+        at: Some(at),
+        ..term(Kind::LoadStep, Act::Step)
+    };
+    assert_eq!(block(&problem, &[], 0.25), Some(225));
+    assert_eq!(block(&problem, &[event(100)], 0.25), Some(225));
+    assert_eq!(block(&problem, &[event(260)], 0.25), Some(280));
+    assert_eq!(block(&problem, &[event(295)], 0.25), None);
+}

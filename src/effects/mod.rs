@@ -1,0 +1,47 @@
+//! From the residual to the effect that the law lacks: the search, the joint refit, before and after.
+
+mod candidates;
+mod clock;
+mod diagnosis;
+mod explain;
+mod explanation;
+mod faults;
+mod frame;
+mod fuller;
+mod judge;
+mod kind;
+mod outlook;
+mod partition;
+pub mod remarks;
+mod together;
+
+mod linear;
+mod noise;
+mod problem;
+mod refit;
+mod refits;
+mod response;
+mod search;
+mod surrogate;
+mod tell;
+mod term;
+mod trials;
+mod verdict;
+mod watch;
+mod witnesses;
+
+pub use clock::Clock;
+pub use explain::{Options, explain};
+pub use explanation::{
+    Candidate, Change, Curves, Effect, ErrorChange, Explained, Explanation, Fault, ForecastChange,
+    NoiseReport, ResidualTests, SettingsReport, Structure,
+};
+pub use faults::{Inspected, inspect};
+pub use fuller::{Filtered, Fuller, Part, Wave};
+pub use kind::{FaultKind, Form, Kind};
+pub use partition::{Partition, partition, partition_candidate};
+pub use together::{Together, explain_together};
+pub use watch::{Residual, residual_structure};
+
+#[cfg(test)]
+mod fixture;

@@ -1,0 +1,419 @@
+//! The noise of the readings as a state-space model, and the innovations under it: exact for any sampling.
+//!
+//! A reading is off by white noise, and besides either by correlated noise of its own (Ornstein-Uhlenbeck, in
+//! the limit a random walk), or by an undeclared Ornstein-Uhlenbeck log-load on the block, which a
+//! displacement sums up over time. Kalman's filter turns any column into innovations, and the likelihood
+//! follows from them; scaled by the white noise, of which the size is profiled out.
+
+use super::problem::Problem;
+use crate::reading::Quantity;
+
+/// An undeclared load that remembered longer than this part of the record would stand for any effect.
+const LONGEST_LOAD: f64 = 24.0;
+
+/// The undeclared load has no mean over the record: the model's whole motion is the readings', give or take this
+/// share. Without it a noise that sums up would take the motion over, and leave the law none.
+const WHOLE_MOTION: f64 = 0.1;
+
+/// What remembers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Memory {
+    /// Nothing: white noise.
+    None,
+    /// The reading.
+    Reading,
+    /// The load.
+    Load,
+}
+
+/// One noise model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Noise {
+    pub(super) memory: Memory,
+    /// Days over which it forgets; infinite: a random walk.
+    pub(super) days: f64,
+    /// Of the reading: standard deviation over that of the white noise (of a walk: of its step over the
+    /// median spacing). Of the load: e-folds times 'what one e-fold would change a reading by, over the white
+    /// noise', namely by v (velocity) or v times `days` (displacement), v typical.
+    pub(super) ratio: f64,
+}
+
+impl Noise {
+    pub(super) const WHITE: Self = Self {
+        memory: Memory::None,
+        days: 0.0,
+        ratio: 0.0,
+    };
+
+    /// Parameters that it adds to a model.
+    pub(super) fn parameters(&self) -> f64 {
+        if self.memory == Memory::None {
+            0.0
+        } else {
+            2.0
+        }
+    }
+
+    /// The noise models tried, for the readings that are fitted: a coarse grid over memory and size.
+    pub(super) fn bank(problem: &Problem) -> Vec<Whitener> {
+        let each = Self::grid(problem).into_iter();
+        each.map(|noise| Whitener::new(problem, noise)).collect()
+    }
+
+    fn grid(problem: &Problem) -> Vec<Self> {
+        let (spacing, span) = (problem.spacing, problem.span());
+        let mut grid = vec![Self::WHITE];
+        let memories = [3.0, 10.0, 30.0, 100.0].map(|k| k * spacing);
+        let ratios = [0.3, 1.0, 3.0, 10.0];
+        for days in memories.into_iter().filter(|days| *days < 0.34 * span) {
+            let reading = |ratio| Self {
+                memory: Memory::Reading,
+                days,
+                ratio,
+            };
+            grid.extend(ratios.map(reading));
+        }
+        let walk = |ratio| Self {
+            memory: Memory::Reading,
+            days: f64::INFINITY,
+            ratio,
+        };
+        grid.extend([0.03, 0.1, 0.3, 1.0, 3.0].map(walk));
+        let v = problem.typical_velocity() / problem.scatter;
+        let mut days = span / LONGEST_LOAD;
+        while days > 2.0 * spacing && days > span / 300.0 {
+            let reach = match problem.quantity {
+                Quantity::Displacement => v * days,
+                Quantity::Velocity => v,
+            };
+            let load = |e_folds: f64| Self {
+                memory: Memory::Load,
+                days,
+                ratio: e_folds * reach,
+            };
+            grid.extend([0.03, 0.1, 0.25, 0.6].map(load));
+            days /= 3.0;
+        }
+        grid
+    }
+}
+
+/// One reading's share of the filter; the state is what displacement has gathered, and what remembers.
+#[derive(Debug, Clone, Copy)]
+struct Gate {
+    /// What is gathered until here for one unit of the state before.
+    gather: f64,
+    /// What is left of the state.
+    decay: f64,
+    /// How the two enter the reading.
+    reads: [f64; 2],
+    gain: [f64; 2],
+    /// 1 / standard deviation of the innovation.
+    scale: f64,
+    /// 1 / weight of the reading.
+    weight: f64,
+}
+
+/// Turns columns over the fitted readings into innovations of variance 1 (times that of the white noise).
+#[derive(Debug, Clone)]
+pub(super) struct Whitener {
+    pub(super) noise: Noise,
+    gates: Vec<Gate>,
+    /// Sum of ln variance.
+    pub(super) log_determinant: f64,
+    /// Scale of one more reading, that of the whole motion.
+    whole: f64,
+    quantity: Quantity,
+}
+
+/// State covariance: (gathered, gathered), (gathered, remembered), (remembered, remembered).
+type Covariance = [f64; 3];
+
+impl Whitener {
+    /// For the first `problem.used` readings.
+    pub(super) fn new(problem: &Problem, noise: Noise) -> Self {
+        let used = problem.used;
+        let mut gates = Vec::with_capacity(used);
+        let mut log_determinant = 0.0;
+        let typical = problem.typical_velocity();
+        let stationary = if noise.days.is_finite() { 1.0 } else { 0.0 };
+        let mut p: Covariance = [0.0, 0.0, stationary];
+        for (i, &speed) in problem.seen.iter().enumerate().take(used) {
+            let dt = if i > 0 {
+                problem.t[i] - problem.t[i - 1]
+            } else {
+                0.0
+            };
+            let (gather, decay, q) = transition(problem, noise, dt, speed / typical);
+            p = advance(p, gather, decay, q);
+            let weight = problem.weight[i];
+            let reads = match (noise.memory, problem.quantity) {
+                (Memory::None, _) => [0.0, 0.0],
+                (Memory::Reading, _) => [0.0, noise.ratio],
+                (Memory::Load, Quantity::Displacement) => [noise.ratio / weight, 0.0],
+                (Memory::Load, Quantity::Velocity) => [0.0, noise.ratio * speed / typical / weight],
+            };
+            let (gain, variance, after) = update(p, reads);
+            p = after;
+            log_determinant += variance.ln() + 2.0 * weight.ln();
+            gates.push(Gate {
+                gather,
+                decay,
+                reads,
+                gain,
+                scale: 1.0 / variance.sqrt(),
+                weight: 1.0 / weight,
+            });
+        }
+        let motion = match problem.quantity {
+            Quantity::Displacement => problem.typical_velocity() * problem.span(),
+            Quantity::Velocity => problem.typical_velocity(),
+        };
+        // In units of the white noise.
+        let whole = 1.0 / (WHOLE_MOTION * motion).max(problem.scatter);
+        Self {
+            noise,
+            gates,
+            log_determinant,
+            whole,
+            quantity: problem.quantity,
+        }
+    }
+
+    /// The innovations of `column`, and last the change of the whole motion.
+    pub(super) fn whiten(&self, column: &[f64]) -> Vec<f64> {
+        let mut white = self.innovations(column);
+        let used = &column[..self.gates.len()];
+        let motion = match self.quantity {
+            Quantity::Displacement => used[used.len() - 1] - used[0],
+            Quantity::Velocity => used.iter().sum::<f64>() / used.len() as f64,
+        };
+        white.push(motion * self.whole);
+        white
+    }
+
+    /// The same without the whole motion.
+    pub(super) fn innovations(&self, column: &[f64]) -> Vec<f64> {
+        if self.noise.memory == Memory::None {
+            let scaled = self
+                .gates
+                .iter()
+                .zip(column)
+                .map(|(gate, value)| value * gate.weight);
+            return scaled.collect();
+        }
+        let (mut gathered, mut state) = (0.0, 0.0);
+        let each = self.gates.iter().zip(column).map(|(gate, value)| {
+            gathered += gate.gather * state;
+            state *= gate.decay;
+            let innovation = value * gate.weight - gate.reads[0] * gathered - gate.reads[1] * state;
+            gathered += gate.gain[0] * innovation;
+            state += gate.gain[1] * innovation;
+            innovation * gate.scale
+        });
+        each.collect()
+    }
+
+    /// -2 ln likelihood of the readings from `from` on, given those before, with white noise of `sigma`.
+    pub(super) fn surprise_from(&self, errors: &[f64], from: usize, sigma: f64) -> f64 {
+        let innovations = self.innovations(errors);
+        let each = innovations.iter().zip(&self.gates).skip(from);
+        each.map(|(u, gate)| {
+            let deviation = sigma / (gate.scale * gate.weight);
+            (u / sigma).powi(2) + 2.0 * deviation.ln()
+        })
+        .sum()
+    }
+
+    /// The column whose innovations these are.
+    pub(super) fn colour(&self, innovations: &[f64]) -> Vec<f64> {
+        let (mut gathered, mut state) = (0.0, 0.0);
+        let each = self.gates.iter().zip(innovations).map(|(gate, u)| {
+            gathered += gate.gather * state;
+            state *= gate.decay;
+            let innovation = u / gate.scale;
+            let value =
+                (innovation + gate.reads[0] * gathered + gate.reads[1] * state) / gate.weight;
+            gathered += gate.gain[0] * innovation;
+            state += gate.gain[1] * innovation;
+            value
+        });
+        each.collect()
+    }
+}
+
+/// What the state does over `dt` days at a velocity `relative` to the typical one: (gather, decay, noise).
+fn transition(problem: &Problem, noise: Noise, dt: f64, relative: f64) -> (f64, f64, Covariance) {
+    match noise.memory {
+        Memory::None => (0.0, 1.0, [0.0; 3]),
+        _ if noise.days.is_infinite() => (0.0, 1.0, [0.0, 0.0, dt / problem.spacing]),
+        Memory::Reading => {
+            let decay = (-dt / noise.days).exp();
+            (0.0, decay, [0.0, 0.0, 1.0 - decay * decay])
+        }
+        Memory::Load => {
+            let d = dt / noise.days;
+            let decay = (-d).exp();
+            if problem.quantity == Quantity::Velocity {
+                return (0.0, decay, [0.0, 0.0, 1.0 - decay * decay]);
+            }
+            let gather = 1.0 - decay;
+            // Of the sum of an Ornstein-Uhlenbeck process, by its series where it would cancel.
+            let sum = if d < 0.01 {
+                2.0 / 3.0 * d * d * d * (1.0 - 0.75 * d)
+            } else {
+                2.0 * d - 3.0 + 4.0 * decay - decay * decay
+            };
+            let noise = [
+                relative * relative * sum,
+                relative * gather * gather,
+                1.0 - decay * decay,
+            ];
+            (relative * gather, decay, noise)
+        }
+    }
+}
+
+fn advance(p: Covariance, gather: f64, decay: f64, q: Covariance) -> Covariance {
+    [
+        p[0] + 2.0 * gather * p[1] + gather * gather * p[2] + q[0],
+        decay * (p[1] + gather * p[2]) + q[1],
+        decay * decay * p[2] + q[2],
+    ]
+}
+
+/// (gain, variance of the innovation, covariance after), the white noise's variance being 1.
+fn update(p: Covariance, reads: [f64; 2]) -> ([f64; 2], f64, Covariance) {
+    let cross = [
+        p[0] * reads[0] + p[1] * reads[1],
+        p[1] * reads[0] + p[2] * reads[1],
+    ];
+    let variance = 1.0 + reads[0] * cross[0] + reads[1] * cross[1];
+    let gain = cross.map(|c| c / variance);
+    let after = [
+        (p[0] - gain[0] * cross[0]).max(0.0),
+        p[1] - gain[0] * cross[1],
+        (p[2] - gain[1] * cross[1]).max(0.0),
+    ];
+    (gain, variance, after)
+}
+
+impl Whitener {
+    /// Posterior (mean, variance) of what remembers, at every fitted reading, for a column in units of the white noise.
+    pub(super) fn smooth(&self, problem: &Problem, column: &[f64]) -> Vec<(f64, f64)> {
+        let stationary = if self.noise.days.is_finite() {
+            1.0
+        } else {
+            0.0
+        };
+        let (mut mean, mut p): ([f64; 2], Covariance) = ([0.0; 2], [0.0, 0.0, stationary]);
+        let mut path = Vec::with_capacity(self.gates.len());
+        let typical = problem.typical_velocity();
+        for (i, gate) in self.gates.iter().enumerate() {
+            let dt = if i > 0 {
+                problem.t[i] - problem.t[i - 1]
+            } else {
+                0.0
+            };
+            let (gather, decay, q) = transition(problem, self.noise, dt, problem.seen[i] / typical);
+            let ahead = [mean[0] + gather * mean[1], decay * mean[1]];
+            let p_ahead = advance(p, gather, decay, q);
+            let (gain, _, after) = update(p_ahead, gate.reads);
+            let off = column[i] * gate.weight - gate.reads[0] * ahead[0] - gate.reads[1] * ahead[1];
+            mean = [ahead[0] + gain[0] * off, ahead[1] + gain[1] * off];
+            p = after;
+            path.push((gather, decay, ahead, p_ahead, mean, p));
+        }
+        backwards(&path)
+    }
+}
+
+/// (gather, decay, mean and covariance ahead, mean and covariance after) of one reading.
+type Passed = (f64, f64, [f64; 2], Covariance, [f64; 2], Covariance);
+
+/// The smoother's way back, from the filter's way forth.
+fn backwards(path: &[Passed]) -> Vec<(f64, f64)> {
+    let mut smoothed = vec![(0.0, 0.0); path.len()];
+    let mut later: Option<([f64; 2], Covariance)> = None;
+    for i in (0..path.len()).rev() {
+        let (_, _, _, _, mean, p) = path[i];
+        let (m, v) = match later {
+            None => (mean, p),
+            Some((m_later, v_later)) => {
+                let (gather, decay, ahead, p_ahead, _, _) = path[i + 1];
+                let determinant = p_ahead[0] * p_ahead[2] - p_ahead[1] * p_ahead[1];
+                if determinant <= 1e-12 * p_ahead[0].max(1e-12) * p_ahead[2] {
+                    // Only what remembers is there to be smoothed.
+                    let gain = if p_ahead[2] > 0.0 {
+                        decay * p[2] / p_ahead[2]
+                    } else {
+                        0.0
+                    };
+                    let m = [mean[0], mean[1] + gain * (m_later[1] - ahead[1])];
+                    let v = [p[0], p[1], p[2] + gain * gain * (v_later[2] - p_ahead[2])];
+                    (m, v)
+                } else {
+                    smooth_pair(
+                        (gather, decay),
+                        (mean, p),
+                        (ahead, p_ahead),
+                        (m_later, v_later),
+                    )
+                }
+            }
+        };
+        smoothed[i] = (m[1], v[2]);
+        later = Some((m, v));
+    }
+    smoothed
+}
+
+/// One step back with both states: C = P F' (P ahead)^-1.
+fn smooth_pair(
+    (gather, decay): (f64, f64),
+    (mean, p): ([f64; 2], Covariance),
+    (ahead, p_ahead): ([f64; 2], Covariance),
+    (m_later, v_later): ([f64; 2], Covariance),
+) -> ([f64; 2], Covariance) {
+    let determinant = p_ahead[0] * p_ahead[2] - p_ahead[1] * p_ahead[1];
+    let inverse = [
+        p_ahead[2] / determinant,
+        -p_ahead[1] / determinant,
+        p_ahead[0] / determinant,
+    ];
+    // P F', F = [[1, gather], [0, decay]].
+    let pf = [
+        [p[0] + gather * p[1], decay * p[1]],
+        [p[1] + gather * p[2], decay * p[2]],
+    ];
+    let row = |r: [f64; 2]| {
+        [
+            r[0] * inverse[0] + r[1] * inverse[1],
+            r[0] * inverse[1] + r[1] * inverse[2],
+        ]
+    };
+    let c = [row(pf[0]), row(pf[1])];
+    let off = [m_later[0] - ahead[0], m_later[1] - ahead[1]];
+    let fall = [
+        v_later[0] - p_ahead[0],
+        v_later[1] - p_ahead[1],
+        v_later[2] - p_ahead[2],
+    ];
+    let add = |a: [f64; 2], b: [f64; 2]| {
+        a[0] * (fall[0] * b[0] + fall[1] * b[1]) + a[1] * (fall[1] * b[0] + fall[2] * b[1])
+    };
+    (
+        [
+            mean[0] + c[0][0] * off[0] + c[0][1] * off[1],
+            mean[1] + c[1][0] * off[0] + c[1][1] * off[1],
+        ],
+        [
+            p[0] + add(c[0], c[0]),
+            p[1] + add(c[0], c[1]),
+            p[2] + add(c[1], c[1]),
+        ],
+    )
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,249 @@
+//! The readings of one benchmark as the refits see them: days and mm, weights, and the nodes of the law's solution.
+
+use crate::fit::Observations;
+use crate::reading::{Channel, Quantity, SECONDS_PER_DAY, Series, Timestamp, days_since};
+
+/// More readings than this are averaged in blocks.
+pub(super) const MOST_READINGS: usize = 3000;
+/// The law is solved on about this many nodes at least, where channels are as fine.
+const NODES: f64 = 1500.0;
+/// No more nodes than this between two readings, where they stand evenly: a response smooths what is finer.
+const NODES_A_READING: f64 = 4.0;
+/// Readings about which the local line is drawn.
+const NEIGHBOURS: usize = 4;
+/// Share of the usual velocity under which a load has no hold on the noise: there the readings tell no velocity.
+const LEAST_SEEN: f64 = 0.1;
+
+/// One benchmark's readings.
+#[derive(Debug, Clone)]
+pub(super) struct Problem {
+    pub(super) quantity: Quantity,
+    /// For velocities, days over which each is the mean; 0: of the moment.
+    pub(super) averaging_days: f64,
+    /// Day 0.
+    pub(super) epoch: Timestamp,
+    /// Days, increasing.
+    pub(super) t: Vec<f64>,
+    /// mm or mm/day.
+    pub(super) y: Vec<f64>,
+    /// Standard deviation of a reading's white noise, up to a common factor; its median is 1.
+    pub(super) weight: Vec<f64>,
+    /// Days on which the law is solved; every reading stands on one.
+    pub(super) nodes: Vec<f64>,
+    /// Which node each reading stands on.
+    pub(super) node_of: Vec<usize>,
+    /// The first readings, which are fitted; the others are held out.
+    pub(super) used: usize,
+    /// Median days between readings.
+    pub(super) spacing: f64,
+    /// Rough white noise of a reading, in mm or mm/day.
+    pub(super) scatter: f64,
+    /// The velocity that an undeclared load multiplies, at each reading, mm/day: the plain law's by least
+    /// squares, so that every model is judged under the same noise.
+    pub(super) seen: Vec<f64>,
+}
+
+impl Problem {
+    /// From cleaned readings; `channels` say how fine the load may change. `None` with fewer than eight.
+    pub(super) fn new(series: &Series, channels: &[Channel]) -> Option<Self> {
+        let mut observations = Observations::of(series);
+        if observations.averaging_days > 0.0 {
+            // Means that overlap repeat each other.
+            observations.values = observations.spaced(usize::MAX);
+        }
+        let epoch = series.readings.first()?.time;
+        let (t, y, sigma) = blocks(&observations);
+        if t.len() < 8 {
+            return None;
+        }
+        let spacing = median(t.windows(2).map(|pair| pair[1] - pair[0]).collect());
+        let misfits = local_misfits(&t, &y);
+        let weight = match &sigma {
+            Some(sigma) => unit_median(sigma.clone()),
+            None => weights(observations.quantity, &y, &misfits),
+        };
+        let relative = misfits.iter().zip(&weight).map(|(m, w)| (m / w).abs());
+        let least = 1e-9 * y.iter().fold(1e-3_f64, |most, y| most.max(y.abs()));
+        let scatter = (median(relative.collect()) / 0.6745).max(least);
+        let fine = channels
+            .iter()
+            .filter_map(channel_spacing)
+            .fold(spacing, f64::min);
+        let (nodes, node_of) = nodes(&t, observations.averaging_days, fine);
+        let seen = vec![1.0; t.len()];
+        Some(Self {
+            seen,
+            quantity: observations.quantity,
+            averaging_days: observations.averaging_days,
+            epoch,
+            used: t.len(),
+            t,
+            y,
+            weight,
+            nodes,
+            node_of,
+            spacing,
+            scatter,
+        })
+    }
+
+    /// Takes the plain law's velocities for those that an undeclared load multiplies.
+    pub(super) fn see(&mut self, velocity: &[f64]) {
+        let usual = median(velocity.to_vec());
+        let seen = velocity.iter().map(|v| v.max(LEAST_SEEN * usual));
+        self.seen = seen.collect();
+    }
+
+    /// The same with only the first `used` readings fitted.
+    pub(super) fn trained_on(&self, used: usize) -> Self {
+        Self {
+            used,
+            ..self.clone()
+        }
+    }
+
+    /// Days from the first reading to the last that is fitted.
+    pub(super) fn span(&self) -> f64 {
+        self.t[self.used - 1] - self.t[0]
+    }
+
+    /// Mean velocity over the fitted readings, mm/day, positive.
+    pub(super) fn typical_velocity(&self) -> f64 {
+        let used = &self.y[..self.used];
+        let v = match self.quantity {
+            Quantity::Displacement => (used[used.len() - 1] - used[0]) / self.span(),
+            Quantity::Velocity => used.iter().sum::<f64>() / used.len() as f64,
+        };
+        let least = match self.quantity {
+            Quantity::Displacement => self.scatter / self.span(),
+            Quantity::Velocity => 0.1 * self.scatter,
+        };
+        v.max(least)
+    }
+}
+
+/// Readings as (days, value, stated sigma where all have one), averaged where there are too many.
+fn blocks(observations: &Observations) -> (Vec<f64>, Vec<f64>, Option<Vec<f64>>) {
+    let values = &observations.values;
+    let size = values.len().div_ceil(MOST_READINGS).max(1);
+    let mean = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        let starts = (0..values.len()).step_by(size);
+        starts
+            .map(|start| {
+                let end = (start + size).min(values.len());
+                (start..end).map(of).sum::<f64>() / (end - start) as f64
+            })
+            .collect()
+    };
+    let stated = values.iter().all(|value| value.sigma.is_some());
+    let sigma = stated.then(|| mean(&|i| values[i].sigma.unwrap_or(1.0)));
+    (
+        mean(&|i| values[i].t_days),
+        mean(&|i| values[i].value),
+        sigma,
+    )
+}
+
+fn channel_spacing(channel: &Channel) -> Option<f64> {
+    let gaps = channel.samples.windows(2);
+    let gaps: Vec<f64> = gaps
+        .map(|pair| days_since(pair[0].time, pair[1].time))
+        .collect();
+    (!gaps.is_empty()).then(|| median(gaps).max(1.0 / SECONDS_PER_DAY))
+}
+
+/// Reading times, and between them as many more as `fine` days ask for, within bounds.
+fn nodes(t: &[f64], averaging_days: f64, fine: f64) -> (Vec<f64>, Vec<usize>) {
+    let span = t[t.len() - 1] - t[0];
+    let usual = median(t.windows(2).map(|pair| pair[1] - pair[0]).collect());
+    let step = fine.max(span / NODES).max(usual / NODES_A_READING);
+    let (mut nodes, mut node_of) = (Vec::new(), Vec::new());
+    if averaging_days > 0.0 {
+        nodes.push(t[0] - averaging_days);
+    }
+    for &reading in t {
+        if let Some(&before) = nodes.last() {
+            let parts = ((reading - before) / step * 0.999).ceil().max(1.0);
+            let mut part = 1.0;
+            while part < parts {
+                nodes.push(before + (reading - before) * part / parts);
+                part += 1.0;
+            }
+        }
+        node_of.push(nodes.len());
+        nodes.push(reading);
+    }
+    (nodes, node_of)
+}
+
+/// How far each reading stands from the line through its neighbours, scaled to one reading's own error.
+fn local_misfits(t: &[f64], y: &[f64]) -> Vec<f64> {
+    let inner = t.windows(3).zip(y.windows(3)).map(|(t, y)| {
+        let share = (t[1] - t[0]) / (t[2] - t[0]);
+        let line = y[0] + share * (y[2] - y[0]);
+        (y[1] - line) / (1.0 + share * share + (1.0 - share) * (1.0 - share)).sqrt()
+    });
+    let inner: Vec<f64> = inner.collect();
+    let first = inner.first().copied().unwrap_or(0.0);
+    let last = inner.last().copied().unwrap_or(0.0);
+    std::iter::once(first)
+        .chain(inner)
+        .chain(std::iter::once(last))
+        .collect()
+}
+
+/// Displacements are read with one error; of velocities, whichever of an absolute and a relative error
+/// makes their scatter likelier.
+fn weights(quantity: Quantity, y: &[f64], misfits: &[f64]) -> Vec<f64> {
+    let ones = vec![1.0; y.len()];
+    if quantity == Quantity::Displacement {
+        return ones;
+    }
+    let level: Vec<f64> = (0..y.len())
+        .map(|i| {
+            let from = i.saturating_sub(NEIGHBOURS);
+            let until = (i + NEIGHBOURS + 1).min(y.len());
+            median(y[from..until].iter().map(|y| y.abs()).collect())
+        })
+        .collect();
+    let floor = 0.05 * median(level.clone());
+    if floor <= 0.0 {
+        return ones;
+    }
+    let level = unit_median(level.iter().map(|v| v.max(floor)).collect());
+    let surprise = |weight: &[f64]| {
+        let scaled = misfits.iter().zip(weight).map(|(m, w)| (m / w).abs());
+        let size = median(scaled.collect()).max(1e-300);
+        let logs = weight.iter().map(|w| w.ln()).sum::<f64>();
+        let tails = misfits
+            .iter()
+            .zip(weight)
+            .map(|(m, w)| 2.0 * (m / w / size / 2.0).powi(2).ln_1p());
+        weight.len() as f64 * size.ln() + logs + tails.sum::<f64>()
+    };
+    if surprise(&level) < surprise(&ones) {
+        level
+    } else {
+        ones
+    }
+}
+
+fn unit_median(mut values: Vec<f64>) -> Vec<f64> {
+    let middle = median(values.clone());
+    for value in &mut values {
+        *value /= middle;
+    }
+    values
+}
+
+/// The middle value; 0 of none.
+pub(super) fn median(mut values: Vec<f64>) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,486 @@
+//! The joint fit of the law and its effects under one noise model, and under the best of several.
+
+use super::frame::{Frame, Frames};
+use super::linear::Linear;
+use super::noise::{Memory, Noise, Whitener};
+use super::problem::Problem;
+use super::term::{Act, Scratch, Term, law_parameters};
+use crate::reading::Quantity;
+use nalgebra::{DMatrix, DVector};
+
+/// Most steps of Gauss and Newton for one fit.
+const MOST_STEPS: usize = 20;
+/// A step that lowers the misfit by less than this share ends the fit.
+const CONVERGED: f64 = 1e-5;
+/// Rounds of 'which noise, then which law': the third no longer changes the choice.
+const NOISE_ROUNDS: usize = 4;
+
+/// Deviation of kappa times the span, where kappa > 0.
+const MOST_GROWTH: f64 = 1.0;
+
+/// The law with its effects, fitted.
+#[derive(Debug, Clone)]
+pub(super) struct Fitted {
+    pub(super) terms: Vec<Term>,
+    pub(super) parameters: Vec<f64>,
+    pub(super) noise: Noise,
+    /// Of every reading, also of those held out.
+    pub(super) prediction: Vec<f64>,
+    /// The model's velocity at every reading, mm/day.
+    pub(super) velocity: Vec<f64>,
+    /// -2 ln likelihood of the fitted readings.
+    pub(super) surprise: f64,
+    /// Standard deviation of the white noise (of weight 1).
+    pub(super) sigma: f64,
+}
+
+impl Fitted {
+    /// BIC: the likelihood, and what parameters of law, effects and noise cost.
+    pub(super) fn bic(&self, problem: &Problem) -> f64 {
+        let terms: f64 = self.terms.iter().map(Term::parameters).sum();
+        let count = law_parameters(problem) as f64 + terms + self.noise.parameters();
+        self.surprise + count * (problem.used as f64).ln()
+    }
+
+    /// Readings less prediction, of the fitted ones.
+    pub(super) fn residual(&self, problem: &Problem) -> Vec<f64> {
+        let both = problem.y.iter().zip(&self.prediction).take(problem.used);
+        both.map(|(y, prediction)| y - prediction).collect()
+    }
+
+    /// Root mean square of readings less prediction over a range of readings.
+    pub(super) fn rms(&self, problem: &Problem, range: std::ops::Range<usize>) -> f64 {
+        let n = range.len() as f64;
+        let squares = range.map(|i| (problem.y[i] - self.prediction[i]).powi(2));
+        (squares.sum::<f64>() / n).sqrt()
+    }
+}
+
+/// Where fits start.
+#[derive(Debug, Clone)]
+pub(super) struct Start {
+    pub(super) terms: Vec<Term>,
+    pub(super) parameters: Vec<f64>,
+    /// The noise of the first round.
+    pub(super) noise: Noise,
+    /// So many parameters at the end stay as they are.
+    pub(super) frozen: usize,
+}
+
+impl Start {
+    /// This start with these terms besides, their coefficients at the first of their starts.
+    pub(super) fn joined(mut self, terms: &[Term]) -> Self {
+        for term in terms {
+            self = self.with_size(term, term.starts()[0]);
+        }
+        self
+    }
+
+    /// This start with one more term, its coefficients all `size`.
+    pub(super) fn with_size(mut self, term: &Term, size: f64) -> Self {
+        self.parameters.extend(vec![size; term.coefficients()]);
+        self.terms.push(term.clone());
+        self
+    }
+
+    /// `fitted` as it is.
+    pub(super) fn at(fitted: &Fitted) -> Self {
+        Self {
+            terms: fitted.terms.clone(),
+            parameters: fitted.parameters.clone(),
+            noise: fitted.noise,
+            frozen: 0,
+        }
+    }
+}
+
+/// Starts of the law alone: steady, accelerating, relaxing from above and from below.
+pub(super) fn plain_starts(problem: &Problem) -> Vec<Start> {
+    let shapes = [
+        (0.0, -2.0, 0.0),
+        (0.8, -1.0, 0.3),
+        (0.95, -3.0, 0.0),
+        (-3.0, 1.0, -0.5),
+        (1.0, 2.0, -0.5),
+    ];
+    let used = problem.used;
+    let ends = (used / 5).max(2);
+    let early = match problem.quantity {
+        Quantity::Displacement => {
+            (problem.y[ends] - problem.y[0]) / (problem.t[ends] - problem.t[0])
+        }
+        Quantity::Velocity => problem.y[..ends].iter().sum::<f64>() / ends as f64,
+    };
+    let typical = problem.typical_velocity();
+    let early = early.clamp(0.01 * typical, 100.0 * typical);
+    let start = |(r, ln_a, p): (f64, f64, f64)| {
+        let velocity = if r == 0.0 { typical } else { early };
+        let mut parameters = vec![velocity.ln(), r, ln_a, p];
+        if problem.quantity == Quantity::Displacement {
+            parameters.push(problem.y[0]);
+        }
+        Start {
+            terms: Vec::new(),
+            parameters,
+            noise: Noise::WHITE,
+            frozen: 0,
+        }
+    };
+    shapes.into_iter().map(start).collect()
+}
+
+/// The best of several starts under the noise models of `noises`; `None` where none leads to a motion.
+pub(super) fn refit_from(
+    problem: &Problem,
+    starts: &[Start],
+    bank: &[Whitener],
+    scratch: &mut Scratch,
+) -> Option<Fitted> {
+    let fits = starts
+        .iter()
+        .filter_map(|start| refit(problem, start, bank, scratch));
+    likeliest(problem, fits)
+}
+
+/// The best of the fits from one start with noise of each memory: where a load may hide in the noise, a fit that
+/// began with the one seldom finds the other.
+pub(super) fn refit_every_memory(
+    problem: &Problem,
+    start: &Start,
+    bank: &[Whitener],
+    scratch: &mut Scratch,
+) -> Option<Fitted> {
+    let memories = [Memory::None, Memory::Reading, Memory::Load];
+    let fits = memories.iter().filter_map(|memory| {
+        let own = bank.iter().filter(|w| w.noise.memory == *memory);
+        let own: Vec<Whitener> = own.cloned().collect();
+        let noise = if start.noise.memory == *memory {
+            start.noise
+        } else {
+            own.get(own.len() / 2)?.noise
+        };
+        let start = Start {
+            noise,
+            ..start.clone()
+        };
+        refit(problem, &start, &own, scratch)
+    });
+    likeliest(problem, fits)
+}
+
+fn likeliest(problem: &Problem, fits: impl Iterator<Item = Fitted>) -> Option<Fitted> {
+    fits.min_by(|a, b| a.bic(problem).total_cmp(&b.bic(problem)))
+}
+
+/// The joint fit from one start, the noise model being the likeliest of `noises`.
+pub(super) fn refit(
+    problem: &Problem,
+    start: &Start,
+    bank: &[Whitener],
+    scratch: &mut Scratch,
+) -> Option<Fitted> {
+    let mut point = Point::at(problem, &start.terms, start.parameters.clone(), scratch)?;
+    let mut whitener = bank
+        .iter()
+        .find(|w| w.noise == start.noise)
+        .or(bank.first())?;
+    let mut best: Option<Fitted> = None;
+    for _ in 0..NOISE_ROUNDS {
+        point = point.descend(problem, start, whitener, scratch);
+        let fitted = point.fitted(problem, &start.terms, whitener);
+        if best
+            .as_ref()
+            .is_none_or(|best| fitted.bic(problem) < best.bic(problem))
+        {
+            best = Some(fitted);
+        }
+        if bank.len() == 1 {
+            break;
+        }
+        let jacobian = point.jacobian(problem, &start.terms, scratch);
+        let frames = Frames::new(bank, &point.residual(problem), &jacobian);
+        let likeliest = frames.best();
+        if bank[likeliest].noise == whitener.noise {
+            break;
+        }
+        whitener = &bank[likeliest];
+    }
+    best
+}
+
+/// A start at `fitted` under the noise that makes its residual likeliest.
+pub(super) fn under_likeliest(
+    problem: &Problem,
+    fitted: &Fitted,
+    bank: &[Whitener],
+    scratch: &mut Scratch,
+) -> Start {
+    let columns = jacobian(problem, fitted, scratch);
+    let frames = Frames::new(bank, &fitted.residual(problem), &columns);
+    Start {
+        noise: bank[frames.best()].noise,
+        ..Start::at(fitted)
+    }
+}
+
+/// Columns of the prediction by each parameter, at the fitted readings.
+pub(super) fn jacobian(problem: &Problem, fitted: &Fitted, scratch: &mut Scratch) -> Vec<Vec<f64>> {
+    let point = Point {
+        parameters: fitted.parameters.clone(),
+        prediction: fitted.prediction.clone(),
+        velocity: fitted.velocity.clone(),
+    };
+    point.jacobian(problem, &fitted.terms, scratch)
+}
+
+/// Parameters and what they predict.
+#[derive(Debug, Clone)]
+struct Point {
+    parameters: Vec<f64>,
+    prediction: Vec<f64>,
+    velocity: Vec<f64>,
+}
+
+impl Point {
+    fn at(
+        problem: &Problem,
+        terms: &[Term],
+        parameters: Vec<f64>,
+        scratch: &mut Scratch,
+    ) -> Option<Self> {
+        let sound = scratch.predict(problem, terms, &parameters)
+            && scratch.prediction.iter().all(|value| value.is_finite());
+        sound.then(|| Self {
+            parameters,
+            prediction: scratch.prediction.clone(),
+            velocity: problem
+                .node_of
+                .iter()
+                .map(|&node| scratch.driven.velocity[node])
+                .collect(),
+        })
+    }
+
+    fn residual(&self, problem: &Problem) -> Vec<f64> {
+        let both = problem.y.iter().zip(&self.prediction).take(problem.used);
+        both.map(|(y, prediction)| y - prediction).collect()
+    }
+
+    fn fitted(&self, problem: &Problem, terms: &[Term], whitener: &Whitener) -> Fitted {
+        let frame = Frame::new(whitener.clone(), &self.residual(problem), &[]);
+        Fitted {
+            terms: terms.to_vec(),
+            surprise: frame.surprise(frame.misfit),
+            sigma: (frame.misfit / problem.used as f64).sqrt(),
+            noise: whitener.noise,
+            parameters: self.parameters.clone(),
+            prediction: self.prediction.clone(),
+            velocity: self.velocity.clone(),
+        }
+    }
+
+    /// Columns of the prediction by each parameter: by the law linearised, and where the load answers to the motion, or
+    /// the parameter is no coefficient, by differences.
+    fn jacobian(&self, problem: &Problem, terms: &[Term], scratch: &mut Scratch) -> Vec<Vec<f64>> {
+        let feeds_back = |term: &Term| matches!(term.act, Act::PerVelocity | Act::PerSlip);
+        let motion = scratch.predict(problem, terms, &self.parameters);
+        let linear = (motion && !terms.iter().any(feeds_back))
+            .then(|| Linear::of(problem, (terms, &self.parameters), &scratch.driven));
+        let mut columns = Vec::with_capacity(self.parameters.len());
+        let Some(linear) = linear else {
+            let each = 0..self.parameters.len();
+            return each
+                .map(|k| self.difference(problem, terms, k, scratch))
+                .collect();
+        };
+        columns.extend(linear.of_law(problem));
+        for term in terms {
+            if matches!(term.act, Act::Averaging) {
+                columns.push(self.difference(problem, terms, columns.len(), scratch));
+            } else {
+                columns.extend(linear.columns(problem, term));
+            }
+        }
+        for column in &mut columns {
+            column.truncate(problem.used);
+        }
+        columns
+    }
+
+    fn difference(
+        &self,
+        problem: &Problem,
+        terms: &[Term],
+        k: usize,
+        scratch: &mut Scratch,
+    ) -> Vec<f64> {
+        let mut column = vec![0.0; problem.used];
+        for size in [1e-4, -1e-4] {
+            let mut parameters = self.parameters.clone();
+            let by = size * self.parameters[k].abs().max(1.0);
+            parameters[k] += by;
+            if scratch.predict(problem, terms, &parameters)
+                && scratch.prediction.iter().all(|value| value.is_finite())
+            {
+                let both = scratch.prediction.iter().zip(&self.prediction);
+                for (slot, (there, here)) in column.iter_mut().zip(both) {
+                    *slot = (there - here) / by;
+                }
+                break;
+            }
+        }
+        column
+    }
+
+    /// Damped steps of Gauss and Newton under `noise`, its shape held at the start's velocity.
+    fn descend(
+        mut self,
+        problem: &Problem,
+        start: &Start,
+        whitener: &Whitener,
+        scratch: &mut Scratch,
+    ) -> Self {
+        let terms = start.terms.as_slice();
+        let prior = Prior::of(problem, terms);
+        let mut innovations = whitener.whiten(&self.residual(problem));
+        let mut damping = 1e-3;
+        for _ in 0..MOST_STEPS {
+            let columns = self.jacobian(problem, terms, scratch);
+            let mut white: Vec<Vec<f64>> = columns.iter().map(|c| whitener.whiten(c)).collect();
+            for column in white.iter_mut().rev().take(start.frozen) {
+                column.fill(0.0);
+            }
+            let misfit: f64 = innovations.iter().map(|u| u * u).sum();
+            let variance = (misfit / problem.used as f64).max(1e-300);
+            let objective = misfit / variance + prior.misfit(&self.parameters);
+            let (normal, mut slope) =
+                normal_equations(&white, &innovations, variance, &prior, &self.parameters);
+            for k in self.parameters.len() - start.frozen..self.parameters.len() {
+                slope[k] = 0.0;
+            }
+            let mut moved = None;
+            for _ in 0..8 {
+                let Some(step) = solve(&normal, &slope, damping) else {
+                    damping *= 10.0;
+                    continue;
+                };
+                let parameters = self.parameters.iter().zip(step.iter()).map(|(p, s)| p + s);
+                let there = parameters.collect();
+                if let Some(point) = Self::at(problem, terms, there, scratch) {
+                    let trial = whitener.whiten(&point.residual(problem));
+                    let sum: f64 = trial.iter().map(|u| u * u).sum();
+                    let value = sum / variance + prior.misfit(&point.parameters);
+                    if value < objective {
+                        moved = Some((point, trial, objective - value));
+                        break;
+                    }
+                }
+                damping *= 6.0;
+            }
+            let Some((point, trial, fall)) = moved else {
+                break;
+            };
+            (self, innovations) = (point, trial);
+            damping = (damping * 0.2).max(1e-9);
+            if fall < CONVERGED * problem.used as f64 {
+                break;
+            }
+        }
+        self
+    }
+}
+
+/// Normal priors, weak, that keep what the readings cannot tell from wandering off.
+struct Prior {
+    centre: Vec<f64>,
+    deviation: Vec<f64>,
+}
+
+impl Prior {
+    fn of(problem: &Problem, terms: &[Term]) -> Self {
+        // ln v: within a few e-folds of the mean velocity, or a noise that sums up would take the motion over. r: an acceleration by e over the record is nothing rare. a: the contacts age over some third
+        // of the record, give or take e^2. p: m between some .6 and 3.
+        let mut centre = vec![problem.typical_velocity().ln(), 0.0, -1.0, 0.0];
+        let mut deviation = vec![2.0, 3.0, 2.0, 0.6];
+        if law_parameters(problem) == 5 {
+            centre.push(0.0);
+            deviation.push(f64::INFINITY);
+        }
+        for term in terms {
+            for index in 0..term.coefficients() {
+                centre.push(0.0);
+                deviation.push(term.prior(index));
+            }
+        }
+        Self { centre, deviation }
+    }
+
+    /// kappa times the span over its prior's deviation, where it lets small departures grow: a block balanced on an
+    /// unstable steady state for a whole record is no slope's.
+    fn balance(parameters: &[f64]) -> f64 {
+        parameters[2].exp() * parameters[3].max(0.0) / MOST_GROWTH
+    }
+
+    fn misfit(&self, parameters: &[f64]) -> f64 {
+        let balance = Self::balance(parameters).powi(2);
+        let each = parameters
+            .iter()
+            .zip(self.centre.iter().zip(&self.deviation));
+        each.map(|(p, (centre, deviation))| ((p - centre) / deviation).powi(2))
+            .sum::<f64>()
+            + balance
+    }
+}
+
+fn normal_equations(
+    columns: &[Vec<f64>],
+    innovations: &[f64],
+    variance: f64,
+    prior: &Prior,
+    parameters: &[f64],
+) -> (DMatrix<f64>, DVector<f64>) {
+    let k = columns.len();
+    let mut normal = DMatrix::zeros(k, k);
+    let mut slope = DVector::zeros(k);
+    for i in 0..k {
+        for j in 0..=i {
+            let value = super::frame::dot(&columns[i], &columns[j]) / variance;
+            normal[(i, j)] = value;
+            normal[(j, i)] = value;
+        }
+        slope[i] = super::frame::dot(&columns[i], innovations) / variance;
+        let weight = prior.deviation[i].powi(-2);
+        normal[(i, i)] += weight;
+        slope[i] -= weight * (parameters[i] - prior.centre[i]);
+    }
+    let balance = Prior::balance(parameters);
+    let by_p = if parameters[3] > 0.0 {
+        parameters[2].exp() / MOST_GROWTH
+    } else {
+        0.0
+    };
+    for (i, di) in [(2, balance), (3, by_p)] {
+        for (j, dj) in [(2, balance), (3, by_p)] {
+            normal[(i, j)] += di * dj;
+        }
+        slope[i] -= di * balance;
+    }
+    (normal, slope)
+}
+
+fn solve(normal: &DMatrix<f64>, slope: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
+    let mut damped = normal.clone();
+    for i in 0..slope.len() {
+        damped[(i, i)] += damping * normal[(i, i)].max(1e-12);
+    }
+    let step = damped.cholesky()?.solve(slope);
+    // No parameter moves by more than its own order at once.
+    let most = step.iter().fold(0.0_f64, |most, s| most.max(s.abs()));
+    step.iter().all(|s| s.is_finite()).then(|| {
+        if most > 1e6 {
+            step * (1e6 / most)
+        } else {
+            step
+        }
+    })
+}

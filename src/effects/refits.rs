@@ -1,0 +1,239 @@
+//! One round of the search: the most promising trials refitted with the law, each with the p-value of its search.
+
+use super::candidates;
+use super::frame::Frames;
+use super::kind::Kind;
+use super::linear::Linear;
+use super::noise::{Noise, Whitener};
+use super::refit::{Fitted, Start, jacobian, refit, under_likeliest};
+use super::response::Response;
+use super::search::{Refitted, SIGNIFICANT, Search};
+use super::surrogate::Vain;
+use super::term::{Act, Term};
+use super::trials::{Ground, Trial, shortlist};
+
+/// Most candidates refitted for one place: the best of each covariate, and of the kinds that need none.
+const MOST_COVARIATES: usize = 8;
+const MOST_OTHERS: usize = 6;
+/// A covariate that follows the year may fit as well shifted by whole years, but no better than this at any shift.
+const AT_RANDOM: f64 = 0.3;
+
+impl Search<'_> {
+    /// The most promising trials refitted, each with the p-value of the search that found it.
+    pub(super) fn refits(&mut self, base: &Fitted, round: usize) -> Option<Vec<Refitted>> {
+        let linear = Linear::about(self.problem, base, &mut self.scratch)?;
+        let columns = jacobian(self.problem, base, &mut self.scratch);
+        let residual = base.residual(self.problem);
+        let bank = shortlist(&Frames::new(self.bank, &residual, &columns));
+        let ground = Ground {
+            problem: self.problem,
+            drivers: self.drivers,
+            temperatures: self.temperatures,
+            frames: Frames::new(&bank, &residual, &columns),
+            linear,
+            residual,
+            present: &base.terms,
+        };
+        let (count, seed) = (
+            self.options.surrogates,
+            self.options.seed + 2 * round as u64,
+        );
+        let mut covariates = ground.of_covariates();
+        covariates.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        covariates.truncate(MOST_COVARIATES);
+        let covariates = self.refit_each(base, covariates);
+        let (others, tried) = ground.of_itself();
+        let alone = ground.itself_in_vain(&tried, count, seed + 1);
+        let mut all = Vec::new();
+        if covariates
+            .iter()
+            .any(|one| one.gain > self.options.bic_margin)
+        {
+            let vain = self.amplified(base, ground.covariates_in_vain(count, seed));
+            // The finds in vain have paid for nothing.
+            let paid = |one: &Refitted| one.gain + ground.cost(&one.term);
+            all.extend(covariates.into_iter().map(|one| {
+                let (gain, net) = (paid(&one), one.gain);
+                let follows = one.follows_season;
+                let one = one.judged_by(&vain, gain);
+                // Shifted by years, what follows the year is the same again: shifts cannot tell its time, and that noise
+                // does not do as much has to be enough. The season stays a rival.
+                if follows && one.p_value >= SIGNIFICANT && one.p_value < AT_RANDOM {
+                    return one.judged_by(&alone, net);
+                }
+                one
+            }));
+        } else {
+            all.extend(covariates);
+        }
+        let mut best = best_of_each_kind(others);
+        best.truncate(MOST_OTHERS);
+        let others = self.refit_each(base, best);
+        if others.iter().any(|one| one.gain > self.options.bic_margin) {
+            all.extend(others.into_iter().map(|one| {
+                let gain = one.gain;
+                one.judged_by(&alone, gain)
+            }));
+        } else {
+            all.extend(others);
+        }
+        Some(all)
+    }
+
+    fn refit_each(&mut self, base: &Fitted, trials: Vec<Trial>) -> Vec<Refitted> {
+        let each = trials.into_iter();
+        each.filter_map(|trial| self.refitted(base, &trial.term))
+            .collect()
+    }
+
+    /// The finds in vain by the law linearised, made as much larger as full refits of the largest of them are.
+    fn amplified(&mut self, base: &Fitted, mut vain: Vain) -> Vain {
+        let mut most = 1.0_f64;
+        for (term, gain) in std::mem::take(&mut vain.largest) {
+            let start = Start::at(base).joined(std::slice::from_ref(&term));
+            let own = self.bank.iter();
+            let own: Vec<Whitener> = own
+                .filter(|whitener| whitener.noise.memory == base.noise.memory)
+                .cloned()
+                .collect();
+            if let Some(fitted) = refit(self.problem, &start, &own, &mut self.scratch) {
+                let cost = term.parameters() * (self.problem.used as f64).ln();
+                let full = base.bic(self.problem) - fitted.bic(self.problem) + cost;
+                most = most.max(full / gain.max(1.0));
+            }
+        }
+        vain.amplified(most)
+    }
+
+    /// The joint fit with one more term; its shape is refined where it promises something.
+    fn refitted(&mut self, base: &Fitted, term: &Term) -> Option<Refitted> {
+        let white = [Whitener::new(self.problem, Noise::WHITE)];
+        let (problem, bank) = (self.problem, self.bank);
+        let mut rms = f64::INFINITY;
+        let mut best: Option<Fitted> = None;
+        let mut keep = |fit: Option<Fitted>| {
+            let Some(fit) = fit else { return };
+            if best
+                .as_ref()
+                .is_none_or(|best| fit.bic(problem) < best.bic(problem))
+            {
+                best = Some(fit);
+            }
+        };
+        for size in term.starts() {
+            let start = Start::at(base).with_size(term, *size);
+            keep(refit(problem, &start, bank, &mut self.scratch));
+            // By least squares first as well: from there the fit finds what a noise that remembers would hide.
+            let level = refit(problem, &start, &white, &mut self.scratch);
+            if let Some(level) = level {
+                rms = rms.min(level.rms(problem, 0..problem.used));
+                let start = under_likeliest(problem, &level, bank, &mut self.scratch);
+                keep(refit(problem, &start, bank, &mut self.scratch));
+            }
+        }
+        let mut fitted = best?;
+        if base.bic(problem) - fitted.bic(problem) > 0.0 {
+            for neighbours in [[1.6, 1.0 / 1.6], [1.25, 0.8]] {
+                self.refine(&mut fitted, neighbours);
+            }
+            let last = refit(problem, &Start::at(&fitted), bank, &mut self.scratch);
+            if let Some(last) = last.filter(|last| last.bic(problem) < fitted.bic(problem)) {
+                fitted = last;
+            }
+        }
+        Some(Refitted {
+            gain: base.bic(problem) - fitted.bic(problem),
+            follows_season: candidates::follows_season(problem, fitted.terms.last()?),
+            term: fitted.terms.last()?.clone(),
+            rms,
+            fitted,
+            p_value: 1.0,
+        })
+    }
+
+    /// Moves the newest term's delay, or its time, while that helps.
+    fn refine(&mut self, fitted: &mut Fitted, factors: [f64; 2]) {
+        for factor in factors {
+            while let Some(term) = fitted
+                .terms
+                .last()
+                .and_then(|term| self.moved(term, factor))
+            {
+                let mut start = Start::at(fitted);
+                start.terms.pop();
+                start.terms.push(term);
+                let own = self.bank.iter();
+                let bank: Vec<Whitener> = own
+                    .filter(|whitener| whitener.noise == fitted.noise)
+                    .cloned()
+                    .collect();
+                match refit(self.problem, &start, &bank, &mut self.scratch) {
+                    Some(next) if next.bic(self.problem) < fitted.bic(self.problem) - 0.05 => {
+                        *fitted = next;
+                    }
+                    _ => break,
+                }
+            }
+        }
+    }
+
+    /// The term with another delay, or at another time; `None` where it has neither, or would leave its range.
+    fn moved(&self, term: &Term, factor: f64) -> Option<Term> {
+        if let (Some(response), Some(channel)) = (term.response, term.channel) {
+            let (_, driver) = self.drivers.iter().find(|(index, _)| *index == channel)?;
+            if response.mean_days <= 0.0 {
+                return None;
+            }
+            let response = Response {
+                mean_days: response.mean_days * factor,
+                ..response
+            };
+            let shortest = 0.3 * driver.step();
+            if response.memory_days() > 0.5 * self.problem.span() || response.mean_days < shortest {
+                return None;
+            }
+            let own = (channel, driver);
+            if matches!(term.act, Act::Reading(_)) {
+                let Response {
+                    stages, mean_days, ..
+                } = response;
+                return candidates::thermal(self.problem, own, stages, mean_days);
+            }
+            return candidates::of_channel(self.problem, own, response);
+        }
+        let at = term.at?;
+        // Coarse steps first, then fine ones, in readings.
+        let stride = (self.problem.used / 128).max(1);
+        let by = if (factor - 1.0).abs() > 0.3 {
+            stride
+        } else {
+            1
+        };
+        let to = if factor > 1.0 {
+            at + by
+        } else {
+            at.checked_sub(by)?
+        };
+        let inside = to >= 2 && to + 2 < self.problem.used;
+        inside.then(|| {
+            if term.kind == Kind::Offset {
+                return candidates::offset(self.problem, to);
+            }
+            Term {
+                at: Some(to),
+                ..term.clone()
+            }
+        })
+    }
+}
+
+fn best_of_each_kind(mut trials: Vec<Trial>) -> Vec<Trial> {
+    trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let mut best: Vec<Trial> = Vec::new();
+    for trial in trials {
+        if !best.iter().any(|known| known.term.kind == trial.term.kind) {
+            best.push(trial);
+        }
+    }
+    best
+}

@@ -1,0 +1,217 @@
+//! What a covariate does to the slope after a while: its exponential or gamma response, by level or by rate.
+
+use super::kind::Form;
+use crate::reading::{Channel, Timestamp, days_since};
+
+/// A covariate's values on an even grid of days, standardised by nothing: in its own unit.
+#[derive(Debug, Clone)]
+pub(super) struct Driver {
+    pub(super) name: String,
+    /// Day of the first value.
+    start: f64,
+    /// Days from one to the next.
+    step: f64,
+    values: Vec<f64>,
+}
+
+/// The covariate's values are kept on this many points at most.
+const MOST_VALUES: usize = 8192;
+
+/// A response: the mean of an exponential distribution, or of a gamma distribution of shape 2.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Response {
+    pub(super) form: Form,
+    /// Exponentials one after another: 1 or 2.
+    pub(super) stages: u8,
+    /// Mean delay, days.
+    pub(super) mean_days: f64,
+}
+
+impl Response {
+    /// By when 95 % of the response has passed, days.
+    pub(super) fn memory_days(&self) -> f64 {
+        // -ln .05, and the same quantile of a gamma distribution of shape 2 and mean 1.
+        let quantile = if self.stages == 1 { 2.9957 } else { 2.3719 };
+        quantile * self.mean_days
+    }
+}
+
+impl Driver {
+    /// The channel in days since `epoch`, linear between its samples; `None` where it holds no change.
+    pub(super) fn new(channel: &Channel, epoch: Timestamp) -> Option<Self> {
+        let samples: Vec<(f64, f64)> = channel
+            .samples
+            .iter()
+            .map(|sample| (days_since(epoch, sample.time), sample.value))
+            .collect();
+        let (first, last) = (samples.first()?, samples.last()?);
+        if samples.len() < 4
+            || samples
+                .iter()
+                .all(|(_, value)| value.total_cmp(&first.1).is_eq())
+        {
+            return None;
+        }
+        let span = last.0 - first.0;
+        let gaps = samples.windows(2).map(|pair| pair[1].0 - pair[0].0);
+        let spacing = super::problem::median(gaps.collect()).max(span / (MOST_VALUES - 1) as f64);
+        let count = (span / spacing).round().max(3.0);
+        let step = span / count;
+        let mut later = 1;
+        let mut values = Vec::new();
+        let mut k = 0.0;
+        while k <= count {
+            let t = first.0 + k * step;
+            while later + 1 < samples.len() && samples[later].0 < t {
+                later += 1;
+            }
+            let ((t_0, u_0), (t_1, u_1)) = (samples[later - 1], samples[later]);
+            values.push(u_0 + (u_1 - u_0) * ((t - t_0) / (t_1 - t_0)).clamp(0.0, 1.0));
+            k += 1.0;
+        }
+        Some(Self {
+            name: channel.name.clone(),
+            start: first.0,
+            step,
+            values,
+        })
+    }
+
+    /// The share of `nodes` that the channel covers.
+    pub(super) fn coverage(&self, nodes: &[f64]) -> f64 {
+        let end = self.start + self.step * (self.values.len() - 1) as f64;
+        let slack = self.step;
+        let inside = nodes
+            .iter()
+            .filter(|t| **t >= self.start - slack && **t <= end + slack);
+        inside.count() as f64 / nodes.len() as f64
+    }
+
+    /// Whether it reaches the top hundredth of its values between two days.
+    pub(super) fn is_high(&self, from: f64, until: f64) -> bool {
+        let mut sorted = self.values.clone();
+        sorted.sort_by(f64::total_cmp);
+        let top = sorted[sorted.len() - 1 - sorted.len() / 100];
+        let day = |k: usize| self.start + k as f64 * self.step;
+        let mut each = self.values.iter().enumerate();
+        // Of rain that seldom falls the top hundredth holds dry days: they are not high.
+        let is_high = |value: f64| value >= top && value > sorted[0];
+        each.any(|(k, value)| is_high(*value) && (from..=until).contains(&day(k)))
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.values.len()
+    }
+
+    /// Days from one value to the next.
+    pub(super) fn step(&self) -> f64 {
+        self.step
+    }
+
+    /// The same covariate at another time: shifted round its own ends, and backwards if `mirrored`.
+    pub(super) fn shifted(&self, by: usize, mirrored: bool) -> Self {
+        let mut values = self.values.clone();
+        if mirrored {
+            values.reverse();
+        }
+        let by = by % values.len();
+        values.rotate_left(by);
+        Self {
+            values,
+            name: String::new(),
+            ..*self
+        }
+    }
+
+    /// Its response at `nodes`, mean 0 and standard deviation 1 there; `None` where it does not move.
+    pub(super) fn respond(&self, response: Response, nodes: &[f64]) -> Option<Vec<f64>> {
+        standardise(self.respond_in_unit(response, nodes))
+    }
+
+    /// The same in the channel's own unit (per day, for a rate).
+    pub(super) fn respond_in_unit(&self, response: Response, nodes: &[f64]) -> Vec<f64> {
+        let mut level = self.values.clone();
+        for _ in 0..response.stages {
+            if response.form == Form::Rate && response.mean_days < 0.5 * self.step {
+                break;
+            }
+            filter(
+                &mut level,
+                self.step,
+                response.mean_days / f64::from(response.stages),
+            );
+        }
+        if response.form == Form::Rate {
+            level = self.rate(&level, response);
+        }
+        self.read(&level, nodes)
+    }
+
+    /// d/dt of the response: by the exponential's own equation, or from one value to the next.
+    fn rate(&self, filtered: &[f64], response: Response) -> Vec<f64> {
+        let changes = filtered.windows(2).map(|w| (w[1] - w[0]) / self.step);
+        let mut slopes: Vec<f64> = changes.collect();
+        let before = if response.mean_days < 0.5 * self.step {
+            slopes.first().copied().unwrap_or(0.0)
+        } else {
+            0.0
+        };
+        slopes.insert(0, before);
+        slopes
+    }
+
+    fn read(&self, values: &[f64], nodes: &[f64]) -> Vec<f64> {
+        let last = values.len() - 1;
+        let value = |t: &f64| {
+            let place = ((t - self.start) / self.step).clamp(0.0, last as f64);
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "between 0 and the number of values"
+            )]
+            let before = (place.floor() as usize).min(last.saturating_sub(1));
+            let share = place - before as f64;
+            values[before] + share * (values[before + 1] - values[before])
+        };
+        nodes.iter().map(value).collect()
+    }
+}
+
+/// The exponential response of mean `mean` to values `step` apart, linear between them; settled at the first.
+fn filter(values: &mut [f64], step: f64, mean: f64) {
+    if mean < 1e-3 * step {
+        return;
+    }
+    let ratio = step / mean;
+    let decay = (-ratio).exp();
+    // Of a linear input: the mean of the step's start and end under the exponential.
+    let late = 1.0 - (1.0 - decay) / ratio;
+    let early = 1.0 - decay - late;
+    let mut state = values[0];
+    let mut before = values[0];
+    for value in values.iter_mut() {
+        let now = *value;
+        state = decay * state + early * before + late * now;
+        before = now;
+        *value = state;
+    }
+}
+
+/// Mean 0, standard deviation 1.
+pub(super) fn standardise(mut values: Vec<f64>) -> Option<Vec<f64>> {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let variance = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / n;
+    let size = values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    let deviation = variance.sqrt();
+    if !(deviation.is_finite() && deviation > 1e-9 * size) {
+        return None;
+    }
+    for value in &mut values {
+        *value = (*value - mean) / deviation;
+    }
+    Some(values)
+}
+
+#[cfg(test)]
+mod tests;

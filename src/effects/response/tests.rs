@@ -1,0 +1,135 @@
+//! Responses have the delay and the memory that they are called by.
+
+use super::*;
+use crate::effects::fixture::{channel, correlation, epoch, generator, normals};
+
+/// Values a day.
+const A_DAY: f64 = 10.0;
+const START: f64 = 50.0;
+const DAYS: f64 = 300.0;
+
+/// A covariate that goes from 0 to 1 on day `START`, and its days.
+fn step() -> (Driver, Vec<f64>) {
+    let count = (1..).take_while(|k| f64::from(*k) <= DAYS * A_DAY);
+    let days: Vec<f64> = count.map(|k| f64::from(k) / A_DAY).collect();
+    let values: Vec<f64> = days
+        .iter()
+        .map(|day| f64::from(u8::from(*day >= START)))
+        .collect();
+    let driver = Driver::new(&channel("step", &days, &values), epoch()).unwrap();
+    (driver, days)
+}
+
+/// The response to the step, from 0 to 1.
+fn response_to_step(response: Response) -> Vec<(f64, f64)> {
+    let (driver, days) = step();
+    let column = driver.respond(response, &days).unwrap();
+    let (first, last) = (column[0], column[column.len() - 1]);
+    let scaled = column.iter().map(|value| (value - first) / (last - first));
+    days.iter().copied().zip(scaled).collect()
+}
+
+fn of(form: Form, stages: u8, mean_days: f64) -> Response {
+    Response {
+        form,
+        stages,
+        mean_days,
+    }
+}
+
+fn noise(count: usize) -> Driver {
+    let days: Vec<f64> = (0..count).map(|day| day as f64).collect();
+    let values = normals(&mut generator(4), count);
+    Driver::new(&channel("noise", &days, &values), epoch()).unwrap()
+}
+
+#[test]
+fn a_step_comes_through_with_the_mean_delay_of_its_response() {
+    for stages in [1, 2] {
+        for mean in [0.0, 2.0, 12.0] {
+            let passed = response_to_step(of(Form::Level, stages, mean));
+            let missing = passed.iter().filter(|(day, _)| *day >= START);
+            let delay = missing.map(|(_, value)| 1.0 - value).sum::<f64>() / A_DAY;
+            // Half a value's spacing: the covariate goes linearly.
+            assert!(
+                (delay - mean).abs() < 0.06 + 0.005 * mean,
+                "{stages} {mean} {delay}"
+            );
+        }
+    }
+}
+
+#[test]
+fn ninety_five_percent_of_a_step_have_come_through_within_the_memory() {
+    for stages in [1, 2] {
+        let response = of(Form::Level, stages, 12.0);
+        let passed = response_to_step(response);
+        let (day, _) = passed
+            .into_iter()
+            .find(|(_, value)| *value >= 0.95)
+            .unwrap();
+        let memory = day - START;
+        assert!(
+            (memory - response.memory_days()).abs() < 0.15,
+            "{stages} {memory}"
+        );
+    }
+}
+
+#[test]
+fn two_stages_answer_later_at_first_than_one() {
+    let early = |stages| {
+        let passed = response_to_step(of(Form::Level, stages, 12.0));
+        let at = passed.into_iter().find(|(day, _)| *day >= START + 2.0);
+        at.unwrap().1
+    };
+    assert!(early(2) < 0.4 * early(1), "{} {}", early(2), early(1));
+}
+
+#[test]
+fn the_response_by_rate_sums_up_to_the_response_by_level() {
+    let driver = noise(800);
+    let days: Vec<f64> = (0..800).map(f64::from).collect();
+    for (stages, mean) in [(1, 0.0), (1, 8.0), (2, 8.0)] {
+        let level = driver
+            .respond(of(Form::Level, stages, mean), &days)
+            .unwrap();
+        let rate = driver.respond(of(Form::Rate, stages, mean), &days).unwrap();
+        let slopes: Vec<f64> = level.windows(2).map(|w| w[1] - w[0]).collect();
+        let alike = correlation(&slopes, &rate[1..]);
+        assert!(alike > 0.999_999, "{stages} {mean} {alike}");
+    }
+}
+
+#[test]
+fn a_response_has_mean_zero_and_deviation_one_at_the_nodes_and_needs_some_movement() {
+    let driver = noise(500);
+    let nodes: Vec<f64> = (0..300).map(|k| 100.3 + f64::from(k)).collect();
+    let column = driver.respond(of(Form::Level, 1, 5.0), &nodes).unwrap();
+    let n = column.len() as f64;
+    assert!(column.iter().sum::<f64>().abs() < 1e-9 * n);
+    assert!((column.iter().map(|u| u * u).sum::<f64>() / n - 1.0).abs() < 1e-9);
+    let still = step().0.respond(of(Form::Level, 1, 5.0), &[1.0, 5.0, 20.0]);
+    assert!(still.is_none());
+}
+
+#[test]
+fn shifted_to_its_whole_length_or_twice_backwards_a_covariate_is_itself() {
+    let driver = noise(137);
+    for by in [0, 1, 60, 136] {
+        let round = driver.shifted(by, false).shifted(driver.len() - by, false);
+        assert_eq!(round.values, driver.values);
+        let twice = driver.shifted(by, true).shifted(by, true);
+        assert_eq!(twice.values, driver.values);
+        let moved = driver.shifted(by, true);
+        assert!(correlation(&moved.values, &driver.values).abs() < 0.3);
+    }
+}
+
+#[test]
+fn the_share_of_the_readings_time_that_a_channel_covers_is_counted() {
+    let driver = noise(101);
+    let nodes: Vec<f64> = (0..200).map(f64::from).collect();
+    let covered = driver.coverage(&nodes);
+    assert!((covered - 0.51).abs() < 0.011, "{covered}");
+}

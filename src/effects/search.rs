@@ -1,0 +1,286 @@
+//! The search: one effect after another, each refitted with the law and judged, while any earns its place.
+
+use super::candidates;
+use super::explain::Options;
+use super::explanation::Candidate;
+use super::judge::{foretelling, held_out, objection, title};
+use super::kind::Kind;
+use super::noise::{Noise, Whitener};
+use super::problem::Problem;
+use super::refit::{Fitted, Start, plain_starts, refit_every_memory, refit_from};
+use super::response::Driver;
+use super::surrogate::Vain;
+use super::term::{Scratch, Term, event_node};
+use crate::reading::{Timestamp, after_days};
+
+/// Most effects in one law.
+const MOST_EFFECTS: usize = 10;
+/// A search's p-value must lie under this.
+pub(super) const SIGNIFICANT: f64 = 0.01;
+/// The held-out error, which carries the law's own extrapolation, may grow if reading after reading the later
+/// block is foretold no worse than by this, in -2 ln likelihood.
+const WORSE: f64 = 2.0;
+
+/// One effect that was believed.
+#[derive(Debug, Clone)]
+pub(super) struct Accepted {
+    pub(super) bic_gain: f64,
+    pub(super) p_value: f64,
+    /// What would have done as well, by title.
+    pub(super) ties: Vec<String>,
+}
+
+/// What a search came to.
+pub(super) struct Found {
+    /// The plain law by least squares, and under its likeliest noise.
+    pub(super) plain: Fitted,
+    pub(super) null: Fitted,
+    /// The law with every effect accepted, under the likeliest noise.
+    pub(super) full: Fitted,
+    /// By term of `full`.
+    pub(super) accepted: Vec<Accepted>,
+    pub(super) candidates: Vec<Candidate>,
+}
+
+/// A search at work.
+pub(super) struct Search<'a> {
+    pub(super) problem: &'a Problem,
+    pub(super) drivers: &'a [(usize, Driver)],
+    pub(super) temperatures: &'a [bool],
+    pub(super) bank: &'a [Whitener],
+    pub(super) options: &'a Options,
+    pub(super) scratch: Scratch,
+    pub(super) candidates: Vec<Candidate>,
+}
+
+/// A refitted candidate.
+pub(super) struct Refitted {
+    pub(super) term: Term,
+    pub(super) fitted: Fitted,
+    /// By least squares, mm or mm/day.
+    pub(super) rms: f64,
+    /// Whether it is a covariate that mostly repeats itself from year to year.
+    pub(super) follows_season: bool,
+    pub(super) gain: f64,
+    pub(super) p_value: f64,
+}
+
+impl Refitted {
+    /// What follows the year cannot be told from the season.
+    fn with_season(&self, mut how: Accepted, problem: &Problem) -> Accepted {
+        let season = Kind::Seasonal.name().to_owned();
+        let seen = !candidates::seasonal(problem).is_empty();
+        if self.follows_season && seen && !how.ties.contains(&season) {
+            how.ties.push(season);
+        }
+        how
+    }
+
+    /// Two searches were made, and either could have spoken.
+    pub(super) fn judged_by(self, vain: &Vain, gain: f64) -> Self {
+        Self {
+            p_value: (2.0 * vain.p_value(gain)).min(1.0),
+            ..self
+        }
+    }
+}
+
+/// The plain law by least squares; `None` where no start leads to a motion.
+pub(super) fn plain(problem: &Problem, scratch: &mut Scratch) -> Option<Fitted> {
+    let white = [Whitener::new(problem, Noise::WHITE)];
+    refit_from(problem, &plain_starts(problem), &white, scratch)
+}
+
+impl Search<'_> {
+    /// The plain law under its likeliest noise.
+    pub(super) fn null(&mut self, plain: &Fitted) -> Option<Fitted> {
+        let mut starts = plain_starts(self.problem);
+        starts.truncate(2);
+        starts.push(Start::at(plain));
+        let fits = starts.iter().filter_map(|start| {
+            refit_every_memory(self.problem, start, self.bank, &mut self.scratch)
+        });
+        fits.min_by(|a, b| a.bic(self.problem).total_cmp(&b.bic(self.problem)))
+    }
+
+    /// Adds effects to the plain law until none earns its place.
+    pub(super) fn run(mut self, plain: Fitted, progress: &mut dyn FnMut(f64)) -> Option<Found> {
+        let null = self.null(&plain)?;
+        let mut full = null.clone();
+        let mut accepted = Vec::new();
+        while accepted.len() < MOST_EFFECTS {
+            progress(0.1 + 0.8 * accepted.len() as f64 / MOST_EFFECTS as f64);
+            let Some((next, how)) = self.one_more(&full, accepted.len()) else {
+                break;
+            };
+            full = next;
+            accepted.push(how);
+        }
+        Some(Found {
+            plain,
+            null,
+            full,
+            accepted,
+            candidates: self.candidates,
+        })
+    }
+
+    /// The best effect that may be added to `base`, refitted with it.
+    fn one_more(&mut self, base: &Fitted, round: usize) -> Option<(Fitted, Accepted)> {
+        let mut refitted = self.refits(base, round)?;
+        refitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        prefer_witnesses(&mut refitted, self.options.bic_margin);
+        let mut chosen: Option<(usize, Vec<String>)> = None;
+        for (k, one) in refitted.iter().enumerate() {
+            let (held, reason) = self.judged(base, one);
+            let term = one.fitted.terms.last()?;
+            if let (Some((first, ties)), None) = (&mut chosen, &reason) {
+                let best = &refitted[*first];
+                let same = best.term.kind == one.term.kind && best.term.channel == one.term.channel;
+                if one.gain > best.gain - self.options.bic_margin && !same {
+                    ties.push(title(term, self.drivers));
+                }
+            }
+            let taken = chosen.is_none() && reason.is_none();
+            let reason = match (&chosen, reason) {
+                (Some((first, _)), None) => Some(self.beaten_by(&refitted[*first], one)),
+                (_, reason) => reason,
+            };
+            self.note(term, one, held, reason);
+            if taken {
+                chosen = Some((k, Vec::new()));
+            }
+        }
+        let (k, ties) = chosen?;
+        let one = refitted.swap_remove(k);
+        let how = Accepted {
+            bic_gain: one.gain,
+            p_value: one.p_value,
+            ties,
+        };
+        let how = one.with_season(how, self.problem);
+        Some((one.fitted, how))
+    }
+
+    fn beaten_by(&self, best: &Refitted, one: &Refitted) -> String {
+        let name = best
+            .fitted
+            .terms
+            .last()
+            .map(|term| title(term, self.drivers));
+        let name = name.unwrap_or_default();
+        let behind = best.gain - one.gain;
+        if behind < self.options.bic_margin {
+            format!("cannot be separated from {name}: the BIC differs by {behind:.0}")
+        } else {
+            format!("{name} explains the same by {behind:.0} more of the BIC")
+        }
+    }
+
+    /// Why not; `None` for what may be believed. The held-out error with it over that without comes first.
+    fn judged(&mut self, base: &Fitted, one: &Refitted) -> (Option<f64>, Option<String>) {
+        let margin = self.options.bic_margin;
+        if one.gain < margin {
+            let reason = format!(
+                "the BIC falls by {:.1} only, {margin} is asked for",
+                one.gain
+            );
+            return (None, Some(reason));
+        }
+        if one.p_value >= SIGNIFICANT {
+            let reason = format!(
+                "a search in vain gains as much in {:.0} % of cases",
+                100.0 * one.p_value
+            );
+            return (None, Some(reason));
+        }
+        if let Some(reason) = objection(self.problem, &one.fitted, self.drivers) {
+            return (None, Some(reason));
+        }
+        // A jump, or the blur of a mean, says nothing of what comes.
+        if matches!(one.term.kind, Kind::Offset | Kind::IntervalMean) {
+            return (None, None);
+        }
+        let share = self.options.held_out_share;
+        let held = held_out(
+            self.problem,
+            (&base.terms, &one.fitted),
+            share,
+            &mut self.scratch,
+        );
+        let Some(held) = held else {
+            return (None, None);
+        };
+        let (before, after) = held.errors(self.problem);
+        let ratio = after / before.max(1e-300);
+        let worse = foretelling(
+            self.problem,
+            (base, &one.fitted),
+            held.from,
+            &mut self.scratch,
+        );
+        let refused = ratio > 1.0 && worse.is_none_or(|worse| worse > WORSE);
+        let reason = refused.then(|| format!("the held-out error grows to {:.0} %", 100.0 * ratio));
+        (Some(ratio), reason)
+    }
+
+    fn note(&mut self, term: &Term, one: &Refitted, held: Option<f64>, reason: Option<String>) {
+        let channel = term
+            .channel
+            .and_then(|index| self.drivers.iter().find(|(own, _)| *own == index))
+            .map(|(_, driver)| driver.name.clone());
+        let candidate = Candidate {
+            effect: term.kind,
+            channel,
+            form: term.response.map(|response| response.form),
+            at: term.at.and_then(|at| time_of(self.problem, at)),
+            lag_days: term.response.map(|response| response.mean_days),
+            bic_gain: one.gain,
+            p_value: Some(one.p_value),
+            held_out: held,
+            rejected_because: reason,
+        };
+        // The latest word on one thing stands, unless it had been accepted.
+        self.candidates.retain(|old| {
+            let same = old.effect == candidate.effect
+                && old.channel == candidate.channel
+                && old.form == candidate.form;
+            !same || old.rejected_because.is_none()
+        });
+        self.candidates.push(candidate);
+    }
+}
+
+/// When an event before reading `at` happened.
+pub(super) fn time_of(problem: &Problem, at: usize) -> Option<Timestamp> {
+    after_days(problem.epoch, problem.nodes[event_node(problem, at)])
+}
+
+/// Among what the BIC cannot separate from the best, an effect that a covariate bears witness to goes first, and then
+/// the simplest. A covariate that follows the year goes before the bare season if it leaves the smaller error.
+fn prefer_witnesses(refitted: &mut [Refitted], margin: f64) {
+    let Some(best) = refitted.first().map(|one| one.gain) else {
+        return;
+    };
+    let near = refitted.partition_point(|one| one.gain > best - margin);
+    refitted[..near].sort_by(|a, b| {
+        let witnessed = |one: &Refitted| one.term.channel.is_some();
+        let simpler = a.term.parameters().total_cmp(&b.term.parameters());
+        witnessed(b)
+            .cmp(&witnessed(a))
+            .then(simpler)
+            .then(b.gain.total_cmp(&a.gain))
+    });
+    let season = refitted
+        .iter()
+        .position(|one| one.term.kind == Kind::Seasonal);
+    let follower = refitted
+        .iter()
+        .position(|one| one.follows_season && one.p_value < SIGNIFICANT);
+    if let (Some(season), Some(follower)) = (season, follower)
+        && season < follower
+        && refitted[follower].rms < refitted[season].rms
+    {
+        refitted[season..=follower].rotate_right(1);
+    }
+}

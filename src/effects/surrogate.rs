@@ -1,0 +1,179 @@
+//! How much a search finds where there is nothing: covariates at the wrong time, and readings made of noise alone.
+
+use super::candidates::{delays, of_channel, responses};
+use super::frame::{Frame, Frames};
+use super::kind::Form;
+use super::linear::Linear;
+use super::problem::Problem;
+use super::response::Driver;
+use super::term::Term;
+use rand::RngExt as _;
+use rand::SeedableRng as _;
+use rand::seq::SliceRandom as _;
+use rand_pcg::Pcg64Mcg;
+
+/// A covariate is never shifted by less than this share of its record: it would still be at its right time.
+const LEAST_SHIFT: f64 = 0.06;
+/// Fewest exceedances from which a p-value is read off; below, the tail is Gumbel's.
+const FEWEST_EXCEEDANCES: usize = 5;
+/// No p-value is claimed below it.
+const LEAST_P: f64 = 1e-6;
+
+/// The best gains of many searches in vain.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Vain {
+    gains: Vec<f64>,
+    /// The terms behind the largest of them, with their gains, where covariates were searched.
+    pub(super) largest: Vec<(Term, f64)>,
+}
+
+/// How many of the best finds in vain are refitted in full.
+const REFITTED: usize = 4;
+
+impl Vain {
+    /// The same gains `times` as large.
+    pub(super) fn amplified(mut self, times: f64) -> Self {
+        for gain in &mut self.gains {
+            *gain *= times;
+        }
+        self
+    }
+
+    /// The chance that a search in vain gains as much: by rank, and beyond the largest by Gumbel's law for maxima.
+    pub(super) fn p_value(&self, gain: f64) -> f64 {
+        let n = self.gains.len() as f64;
+        if self.gains.is_empty() {
+            return 1.0;
+        }
+        let above = self.gains.iter().filter(|vain| **vain >= gain).count();
+        if above >= FEWEST_EXCEEDANCES {
+            return (above as f64 + 1.0) / (n + 1.0);
+        }
+        let mean = self.gains.iter().sum::<f64>() / n;
+        let variance = self.gains.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / n;
+        let scale = (variance * 6.0).sqrt() / std::f64::consts::PI;
+        // Euler's constant places the mean of Gumbel's law.
+        let place = mean - 0.577_215_664_9 * scale;
+        let tail = -(-(-(gain - place) / scale.max(1e-9)).exp()).exp_m1();
+        let rank = (above as f64 + 1.0) / (n + 1.0);
+        tail.clamp(LEAST_P, 1.0).min(rank.max(LEAST_P))
+    }
+}
+
+/// The whole search over every covariate, on covariates shifted round in time (and in every other one run
+/// backwards): all by the same share, so that what they have in common stays.
+pub(super) fn shifted_covariates(
+    problem: &Problem,
+    drivers: &[(usize, Driver)],
+    (linear, frames): (&Linear, &Frames),
+    (count, seed): (usize, u64),
+) -> Vain {
+    let mut random = Pcg64Mcg::seed_from_u64(seed);
+    let before = frames.surprise();
+    let finds = (0..count).filter_map(|k| {
+        let share = random.random_range(LEAST_SHIFT..1.0 - LEAST_SHIFT);
+        let each = drivers.iter().filter_map(|(index, driver)| {
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "a share of a length"
+            )]
+            let by = (share * driver.len() as f64) as usize;
+            let other = driver.shifted(by, k % 2 == 1);
+            best_response(problem, (*index, &other), (linear, frames))
+        });
+        let best = each.min_by(|a, b| a.1.total_cmp(&b.1))?;
+        Some((best.0, before - best.1))
+    });
+    let mut finds: Vec<(Term, f64)> = finds.collect();
+    finds.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let gains = finds.iter().map(|(_, gain)| *gain).collect();
+    finds.truncate(REFITTED);
+    Vain {
+        gains,
+        largest: finds,
+    }
+}
+
+/// The likeliest response of one covariate with its -2 ln likelihood: a coarser search than that for the covariate
+/// itself, which gains less for it.
+fn best_response(
+    problem: &Problem,
+    driver: (usize, &Driver),
+    (linear, frames): (&Linear, &Frames),
+) -> Option<(Term, f64)> {
+    let delays = delays(problem, driver.1);
+    let coarse: Vec<f64> = delays.into_iter().step_by(2).collect();
+    let each = [Form::Level, Form::Rate]
+        .into_iter()
+        .flat_map(|form| responses(form, &coarse))
+        .filter(|response| response.stages == 2 || response.mean_days == 0.0)
+        .filter_map(|response| of_channel(problem, driver, response))
+        .map(|term| {
+            let surprise = frames.surprise_with(&linear.columns(problem, &term));
+            (term, surprise)
+        });
+    each.min_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// What one thing that was tried adds to each frame's directions, and what it costs.
+#[derive(Debug, Clone)]
+pub(super) struct Tried {
+    /// By frame.
+    pub(super) directions: Vec<Vec<Vec<f64>>>,
+    pub(super) cost: f64,
+}
+
+impl Tried {
+    pub(super) fn new(frames: &Frames, columns: &[Vec<f64>], cost: f64) -> Self {
+        let each = frames.each.iter();
+        Self {
+            directions: each.map(|frame| frame.new_directions(columns)).collect(),
+            cost,
+        }
+    }
+
+    /// The least -2 ln likelihood with it, and its cost, for what is left of readings in each frame.
+    pub(super) fn surprise(&self, frames: &Frames, left: &[(Vec<f64>, f64)]) -> f64 {
+        let each = frames.each.iter().zip(&self.directions).zip(left);
+        each.map(|((frame, directions), (residual, misfit))| {
+            frame.surprise(misfit - Frame::taken(directions, residual)) + frame.cost()
+        })
+        .fold(f64::INFINITY, f64::min)
+            + self.cost
+    }
+}
+
+/// The whole search over what needs no covariate, on readings made of the likeliest noise: its own innovations in
+/// another order.
+pub(super) fn noise_alone(frames: &Frames, tried: &[Tried], (count, seed): (usize, u64)) -> Vain {
+    let mut random = Pcg64Mcg::seed_from_u64(seed);
+    let best = &frames.each[frames.best()];
+    let mut innovations = best.residual[..best.residual.len() - 1].to_vec();
+    let gains = (0..count).map(|_| {
+        innovations.shuffle(&mut random);
+        let readings = best.whitener.colour(&innovations);
+        let left: Vec<(Vec<f64>, f64)> = frames
+            .each
+            .iter()
+            .map(|frame| {
+                let residual = frame.project_noise(&readings);
+                let misfit = super::frame::dot(&residual, &residual);
+                (residual, misfit)
+            })
+            .collect();
+        let each = frames.each.iter().zip(&left);
+        let before = each
+            .map(|(frame, (_, misfit))| frame.surprise(*misfit) + frame.cost())
+            .fold(f64::INFINITY, f64::min);
+        let with = tried.iter().map(|one| one.surprise(frames, &left));
+        before - with.fold(f64::INFINITY, f64::min)
+    });
+    Vain {
+        gains: gains.collect(),
+        largest: Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests;

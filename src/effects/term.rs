@@ -1,0 +1,260 @@
+//! Effects as terms of the law and of the reading, and the prediction that they make together.
+
+use super::kind::Kind;
+use super::problem::Problem;
+use super::response::Response;
+use crate::model::{Drive, Driven, Event, Law};
+use crate::reading::Quantity;
+
+/// One effect with its shape; its coefficients stand among the parameters.
+#[derive(Debug, Clone)]
+pub(super) struct Term {
+    pub(super) kind: Kind,
+    /// Index of the covariate.
+    pub(super) channel: Option<usize>,
+    pub(super) response: Option<Response>,
+    /// Index of the reading before which it happens.
+    pub(super) at: Option<usize>,
+    pub(super) act: Act,
+}
+
+/// How it acts.
+#[derive(Debug, Clone)]
+pub(super) enum Act {
+    /// On the log-load: columns at the nodes, each with standard deviation 1.
+    Load(Vec<Vec<f64>>),
+    /// The log-load steps.
+    Step,
+    /// ln y jumps.
+    Reset,
+    /// b, a and p change.
+    Friction,
+    /// The load falls with the velocity.
+    PerVelocity,
+    /// The load falls with the slip.
+    PerSlip,
+    /// On the reading: columns at the readings.
+    Reading(Vec<Vec<f64>>),
+    /// Velocities are means over so many median spacings.
+    Averaging,
+}
+
+impl Term {
+    /// How many coefficients it has.
+    pub(super) fn coefficients(&self) -> usize {
+        match &self.act {
+            Act::Load(columns) | Act::Reading(columns) => columns.len(),
+            Act::Friction => 3,
+            Act::Step | Act::Reset | Act::PerVelocity | Act::PerSlip | Act::Averaging => 1,
+        }
+    }
+
+    /// Where its coefficients may start a fit: next to nothing, or, where nothing is the edge of what they may be, at
+    /// several sizes.
+    pub(super) fn starts(&self) -> &'static [f64] {
+        match self.act {
+            Act::PerVelocity => &[0.1, 1.0, 5.0],
+            Act::PerSlip => &[0.3, 2.0],
+            Act::Averaging => &[2.0, 8.0],
+            Act::Load(_) | Act::Step | Act::Reset | Act::Friction | Act::Reading(_) => &[1e-3],
+        }
+    }
+
+    /// What it costs in the BIC: coefficients, and the shape that was searched for.
+    pub(super) fn parameters(&self) -> f64 {
+        let shape =
+            f64::from(u8::from(self.at.is_some())) + f64::from(u8::from(self.response.is_some()));
+        self.coefficients() as f64 + shape
+    }
+
+    /// Standard deviation of the prior of its coefficient of that index; infinite for those of the reading.
+    pub(super) fn prior(&self, index: usize) -> f64 {
+        match &self.act {
+            Act::Load(_) | Act::Step | Act::Reset => 1.5,
+            Act::Friction if index == 2 => 0.6,
+            Act::Friction => 10.0,
+            Act::PerVelocity | Act::PerSlip => 5.0,
+            Act::Reading(_) => f64::INFINITY,
+            Act::Averaging => 30.0,
+        }
+    }
+}
+
+/// Parameters of the law, before those of the terms: ln of the first velocity (mm/day); r times the span; ln of
+/// a times the span; p; and for displacements where the first reading's zero is.
+pub(super) fn law_parameters(problem: &Problem) -> usize {
+    match problem.quantity {
+        Quantity::Displacement => 5,
+        Quantity::Velocity => 4,
+    }
+}
+
+/// Bounds of ln(a span) and of p: beyond them nothing changes that readings could tell.
+const LN_A_SPAN: (f64, f64) = (-7.0, 6.0);
+const P: (f64, f64) = (-3.0, 0.95);
+
+/// Room for solutions, and the newest of them.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Scratch {
+    pub(super) driven: Driven,
+    pub(super) prediction: Vec<f64>,
+    pub(super) log_load: Vec<f64>,
+    events: Vec<Event>,
+}
+
+/// The law that the parameters stand for; mm and days, t = 0 at the first node.
+pub(super) fn law(span: f64, parameters: &[f64]) -> Law {
+    let a = parameters[2].clamp(LN_A_SPAN.0, LN_A_SPAN.1).exp() / span;
+    let r = parameters[1] / span;
+    let p = parameters[3].clamp(P.0, P.1);
+    Law {
+        v_i: parameters[0].exp(),
+        r,
+        kappa: a * p,
+        p,
+        a,
+        b: a + r,
+    }
+}
+
+impl Scratch {
+    /// The prediction of every reading; `false` where the block runs away before the last.
+    pub(super) fn predict(
+        &mut self,
+        problem: &Problem,
+        terms: &[Term],
+        parameters: &[f64],
+    ) -> bool {
+        // The scales are those of the whole record, so that parameters mean the same on a part of it.
+        let span = problem.t[problem.t.len() - 1] - problem.t[0];
+        let law = law(span, parameters);
+        let first = law_parameters(problem);
+        self.load(problem, terms, &parameters[first..], span);
+        let (mut per_velocity, mut per_slip, mut averaging) = (0.0, 0.0, problem.averaging_days);
+        let mut at = first;
+        let typical = problem.typical_velocity();
+        for term in terms {
+            match term.act {
+                Act::PerVelocity => per_velocity = parameters[at].max(0.0) / typical,
+                Act::PerSlip => per_slip = parameters[at] / (typical * span),
+                Act::Averaging => averaging += parameters[at].max(0.0) * problem.spacing,
+                Act::Load(_) | Act::Step | Act::Reset | Act::Friction | Act::Reading(_) => {}
+            }
+            at += term.coefficients();
+        }
+        let drive = Drive {
+            nodes: &problem.nodes,
+            log_load: &self.log_load,
+            events: &self.events,
+            per_velocity,
+            per_slip,
+        };
+        if !self.driven.solve(&law, &drive) {
+            return false;
+        }
+        self.read(problem, averaging);
+        if problem.quantity == Quantity::Displacement {
+            for value in &mut self.prediction {
+                *value += parameters[4];
+            }
+        }
+        let mut at = first;
+        for term in terms {
+            if let Act::Reading(columns) = &term.act {
+                for (column, size) in columns.iter().zip(&parameters[at..]) {
+                    for (value, by) in self.prediction.iter_mut().zip(column) {
+                        *value += size * by;
+                    }
+                }
+            }
+            at += term.coefficients();
+        }
+        true
+    }
+
+    /// Gathers f(t) at the nodes, and what happens at them.
+    fn load(&mut self, problem: &Problem, terms: &[Term], coefficients: &[f64], span: f64) {
+        self.log_load.clear();
+        self.log_load.resize(problem.nodes.len(), 0.0);
+        self.events.clear();
+        let mut at = 0;
+        for term in terms {
+            let own = &coefficients[at..at + term.coefficients()];
+            at += own.len();
+            if let Act::Load(columns) = &term.act {
+                for (column, gain) in columns.iter().zip(own) {
+                    for (f, by) in self.log_load.iter_mut().zip(column) {
+                        *f += gain * by;
+                    }
+                }
+            }
+            let Some(reading) = term.at else { continue };
+            let mut event = Event {
+                node: event_node(problem, reading),
+                log_load: 0.0,
+                ln_y: 0.0,
+                a: 0.0,
+                b: 0.0,
+                p: 0.0,
+            };
+            match term.act {
+                Act::Step => event.log_load = own[0],
+                Act::Reset => event.ln_y = own[0],
+                Act::Friction => {
+                    (event.b, event.a) = (own[0] / span, own[1] / span);
+                    event.p = own[2];
+                }
+                Act::Load(_)
+                | Act::PerVelocity
+                | Act::PerSlip
+                | Act::Reading(_)
+                | Act::Averaging => continue,
+            }
+            self.events.push(event);
+        }
+        self.events.sort_by_key(|event| event.node);
+    }
+
+    /// From the motion to what would be read of it.
+    fn read(&mut self, problem: &Problem, averaging: f64) {
+        self.prediction.clear();
+        let driven = &self.driven;
+        let value = |&node: &usize| match problem.quantity {
+            Quantity::Displacement => driven.slip[node],
+            Quantity::Velocity if averaging <= 0.0 => driven.velocity[node],
+            Quantity::Velocity => {
+                let from = problem.nodes[node] - averaging;
+                (driven.slip[node] - slip_at(problem, driven, from)) / averaging
+            }
+        };
+        self.prediction.extend(problem.node_of.iter().map(value));
+    }
+}
+
+/// The node in the middle between a reading and the one before it.
+pub(super) fn event_node(problem: &Problem, reading: usize) -> usize {
+    let after = problem.node_of[reading];
+    let before = reading
+        .checked_sub(1)
+        .map_or(0, |before| problem.node_of[before]);
+    (before + after).div_ceil(2)
+}
+
+/// Slip at `t`, between nodes by the velocities at both; before the first node at its velocity.
+pub(super) fn slip_at(problem: &Problem, driven: &Driven, t: f64) -> f64 {
+    let k = problem.nodes.partition_point(|node| *node <= t);
+    let Some(before) = k.checked_sub(1) else {
+        return driven.slip[0] + driven.velocity[0] * (t - problem.nodes[0]);
+    };
+    let (h, v) = (t - problem.nodes[before], driven.velocity[before]);
+    let Some(&next) = problem.nodes.get(k) else {
+        return driven.slip[before] + v * h;
+    };
+    let whole = next - problem.nodes[before];
+    // Cubic: slips and velocities of both ends.
+    let s = h / whole;
+    let rise = driven.slip[k] - driven.slip[before];
+    let (m_0, m_1) = (v * whole, driven.velocity[k] * whole);
+    let cubic = s * s * (3.0 - 2.0 * s) * rise + s * (1.0 - s) * ((1.0 - s) * m_0 - s * m_1);
+    driven.slip[before] + cubic
+}

@@ -1,0 +1,278 @@
+//! From what a search accepted to what is said: the verdict, what stands beside it, and how much is explained.
+
+use super::diagnosis::Judged;
+use super::explanation::{Candidate, Effect, Explained};
+use super::judge::{coefficients, is_label, title};
+use super::kind::Kind;
+use super::noise::{Memory, Whitener};
+use super::problem::Problem;
+use super::refit::{Fitted, jacobian};
+use super::response::Driver;
+use super::search::{Accepted, Found, time_of};
+use super::term::{Act, Scratch, Term};
+use crate::reading::Unit;
+
+/// What the search is concluded to mean.
+pub(super) struct Verdict {
+    pub(super) effects: Vec<Effect>,
+    pub(super) explained: Explained,
+    pub(super) cannot_separate_from: Vec<String>,
+    /// The law with the effects that stand.
+    pub(super) full: Fitted,
+}
+
+/// 5 and 95 % of a normal distribution, in standard deviations.
+const NINETY: f64 = 1.645;
+
+/// Concludes: a kind with no outside witness stands as the verdict only if nothing is left unexplained after it.
+pub(super) fn conclude(
+    (problem, bank, drivers): (&Problem, &[Whitener], &[(usize, Driver)]),
+    unit: Unit,
+    found: &mut Found,
+    (margin, scratch): (f64, &mut Scratch),
+) -> Verdict {
+    let mut full = found.full.clone();
+    let mut accepted = found.accepted.clone();
+    let left = structure_left(problem, bank, &full, scratch) > margin;
+    let only_labels = !accepted.is_empty() && full.terms.iter().all(|term| is_label(term.kind));
+    let mut cannot_separate_from = Vec::new();
+    if left && only_labels {
+        for term in &full.terms {
+            cannot_separate_from.push(title(term, drivers));
+            refuse(&mut found.candidates, term.kind);
+        }
+        full = found.null.clone();
+        accepted.clear();
+    }
+    let mut effects: Vec<Effect> = (0..full.terms.len())
+        .map(|index| {
+            let how = &accepted[index];
+            cannot_separate_from.extend(how.ties.iter().cloned());
+            effect((problem, bank, drivers), unit, (&full, index), how, scratch)
+        })
+        .collect();
+    // What bears a witness speaks first.
+    effects.sort_by_key(|effect| is_label(effect.effect));
+    let remembers = full.noise.memory == Memory::Reading
+        && correlated_gain(problem, bank, &full, scratch) > margin;
+    let explained = match (effects.is_empty(), left) {
+        (false, false) => Explained::Full,
+        (false, true) => Explained::Partly,
+        (true, _) => Explained::None,
+    };
+    let explained = if remembers && effects.is_empty() && !left {
+        Explained::Full
+    } else {
+        explained
+    };
+    if remembers && !left {
+        effects.push(correlated(problem, unit, &full, bank, scratch));
+    }
+    if effects.is_empty() {
+        effects.push(Effect::of(if left {
+            Kind::Unexplained
+        } else {
+            Kind::None
+        }));
+    }
+    cannot_separate_from.dedup();
+    Verdict {
+        effects,
+        explained,
+        cannot_separate_from,
+        full,
+    }
+}
+
+fn refuse(candidates: &mut [Candidate], kind: Kind) {
+    let own = candidates
+        .iter_mut()
+        .filter(|one| one.effect == kind && one.rejected_because.is_none());
+    for one in own {
+        one.rejected_because =
+            Some("structure is left after it: it is the nearest label, no explanation".to_owned());
+    }
+}
+
+/// -2 ln likelihood and price of each noise model, the fit's directions projected out.
+fn surprise(
+    problem: &Problem,
+    fitted: &Fitted,
+    scratch: &mut Scratch,
+) -> impl Fn(&Whitener) -> f64 + use<> {
+    let columns = jacobian(problem, fitted, scratch);
+    let residual = fitted.residual(problem);
+    move |whitener: &Whitener| {
+        let frame = super::frame::Frame::new(whitener.clone(), &residual, &columns);
+        frame.surprise(frame.misfit) + frame.cost()
+    }
+}
+
+/// How much of the BIC an undeclared load still takes after a fit.
+pub(super) fn structure_left(
+    problem: &Problem,
+    bank: &[Whitener],
+    fitted: &Fitted,
+    scratch: &mut Scratch,
+) -> f64 {
+    Judged::of(bank, surprise(problem, fitted, scratch)).map_or(0.0, |judged| judged.load_gain())
+}
+
+fn correlated_gain(
+    problem: &Problem,
+    bank: &[Whitener],
+    fitted: &Fitted,
+    scratch: &mut Scratch,
+) -> f64 {
+    Judged::of(bank, surprise(problem, fitted, scratch))
+        .map_or(0.0, |judged| judged.white_bic - judged.plain_bic)
+}
+
+/// Refits without the term of that index, for what it adds by itself.
+fn correlated(
+    problem: &Problem,
+    unit: Unit,
+    full: &Fitted,
+    bank: &[Whitener],
+    scratch: &mut Scratch,
+) -> Effect {
+    let noise = full.noise;
+    Effect {
+        memory_days: noise.days.is_finite().then_some(noise.days),
+        size: Some(noise.ratio * full.sigma / unit.factor()),
+        unit: Some(unit.to_string()),
+        bic_gain: correlated_gain(problem, bank, full, scratch),
+        ..Effect::of(Kind::CorrelatedNoise)
+    }
+}
+
+/// Everything known of one accepted term.
+fn effect(
+    (problem, bank, drivers): (&Problem, &[Whitener], &[(usize, Driver)]),
+    unit: Unit,
+    (full, index): (&Fitted, usize),
+    how: &Accepted,
+    scratch: &mut Scratch,
+) -> Effect {
+    let term = &full.terms[index];
+    let own = coefficients(problem, full, index);
+    let channel = term
+        .channel
+        .and_then(|channel| drivers.iter().find(|(known, _)| *known == channel))
+        .map(|(_, driver)| driver.name.clone());
+    let factor = unit.factor();
+    let mut said = Effect {
+        channel,
+        form: term.response.map(|response| response.form),
+        p_value: Some(how.p_value),
+        lag_days: term.response.map(|response| response.mean_days),
+        memory_days: term.response.map(|response| response.memory_days()),
+        at: term.at.and_then(|at| time_of(problem, at)),
+        bic_gain: how.bic_gain,
+        contribution_rms: rms(&contribution(problem, full, index, scratch)).map(|c| c / factor),
+        ..Effect::of(term.kind)
+    };
+    size(&mut said, term, own, (problem, unit));
+    if said.gain_per_sd.is_some() {
+        let deviation = deviation(problem, bank, (full, index), scratch);
+        let scale = if matches!(term.act, Act::Reading(_)) {
+            factor
+        } else {
+            1.0
+        };
+        said.gain_interval =
+            deviation.map(|d| [(own[0] - NINETY * d) / scale, (own[0] + NINETY * d) / scale]);
+    }
+    said
+}
+
+/// Gain, size, period, as the kind has them.
+fn size(said: &mut Effect, term: &Term, own: &[f64], (problem, unit): (&Problem, Unit)) {
+    let span = problem.t[problem.t.len() - 1] - problem.t[0];
+    let typical = problem.typical_velocity();
+    let pairs = own.chunks(2).map(|pair| {
+        let sine = pair.get(1).copied().unwrap_or(0.0);
+        pair[0].hypot(sine) * std::f64::consts::SQRT_2
+    });
+    match term.kind {
+        Kind::Hydrological => said.gain_per_sd = Some(own[0]),
+        Kind::Thermal => {
+            said.gain_per_sd = Some(own[0] / unit.factor());
+            said.unit = Some(unit.to_string());
+        }
+        Kind::Seasonal | Kind::Tide => {
+            let strongest = pairs.enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
+            said.size = strongest.map(|(_, size)| size);
+            let periods: &[f64] = if term.kind == Kind::Tide {
+                &super::candidates::TIDE
+            } else {
+                &super::candidates::SEASON
+            };
+            said.period_days = strongest.and_then(|(k, _)| periods.get(k).copied());
+        }
+        Kind::LoadStep => said.size = Some(own[0]),
+        Kind::StateReset => said.size = Some(own[0].exp()),
+        Kind::RateLimit => {
+            said.size = Some(own[0].max(0.0) / typical);
+            said.unit = Some("day/mm".to_owned());
+        }
+        Kind::Geometry => {
+            said.size = Some(own[0] / (typical * span));
+            said.unit = Some("1/mm".to_owned());
+        }
+        Kind::Offset => {
+            said.size = Some(own[0] / unit.factor());
+            said.unit = Some(unit.to_string());
+        }
+        Kind::IntervalMean => {
+            said.size = Some(own[0] * problem.spacing);
+            said.unit = Some("day".to_owned());
+        }
+        Kind::FrictionChange
+        | Kind::Partition
+        | Kind::CorrelatedNoise
+        | Kind::Unexplained
+        | Kind::None => {}
+    }
+}
+
+/// Standard deviation of a term's first coefficient, all others free.
+fn deviation(
+    problem: &Problem,
+    bank: &[Whitener],
+    (full, index): (&Fitted, usize),
+    scratch: &mut Scratch,
+) -> Option<f64> {
+    let whitener = bank.iter().find(|whitener| whitener.noise == full.noise)?;
+    let mut columns = jacobian(problem, full, scratch);
+    let earlier: usize = full.terms[..index].iter().map(Term::coefficients).sum();
+    let own = columns.remove(super::term::law_parameters(problem) + earlier);
+    let frame = super::frame::Frame::new(whitener.clone(), &own, &columns);
+    Some(full.sigma / frame.misfit.sqrt())
+}
+
+/// What a term adds to the prediction of every reading: with it, less without.
+pub(super) fn contribution(
+    problem: &Problem,
+    full: &Fitted,
+    index: usize,
+    scratch: &mut Scratch,
+) -> Vec<f64> {
+    let first = super::term::law_parameters(problem);
+    let earlier: usize = full.terms[..index].iter().map(Term::coefficients).sum();
+    let mut without = full.parameters.clone();
+    for k in 0..full.terms[index].coefficients() {
+        without[first + earlier + k] = 0.0;
+    }
+    if !scratch.predict(problem, &full.terms, &without) {
+        return vec![f64::NAN; problem.t.len()];
+    }
+    let both = full.prediction.iter().zip(&scratch.prediction);
+    both.map(|(with, without)| with - without).collect()
+}
+
+fn rms(values: &[f64]) -> Option<f64> {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let square = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64;
+    square.is_finite().then(|| square.sqrt())
+}

@@ -1,0 +1,120 @@
+//! From a refit to the level in force, and the words for it.
+
+use super::forecast::Forecast;
+use super::motion::{acceleration, moves_backwards, settled};
+use super::{Track, days};
+use crate::alert::{Entered, Evidence, Policy, Transition};
+use crate::monitor::event::{AlertState, Event, EventKind};
+use crate::reading::Timestamp;
+use jiff::SignedDuration;
+
+impl Track {
+    pub(super) fn alert(
+        &mut self,
+        policy: &Policy,
+        time: Timestamp,
+        forecast: Option<&Forecast>,
+    ) -> Vec<Event> {
+        let within = |span| forecast.map(|forecast| forecast.chance_within(days(span)));
+        let rates = forecast.map_or(&[][..], |forecast| &forecast.plain.rates);
+        let mut evidence = Evidence {
+            now: time,
+            chance_within_evacuation_time: within(policy.evacuation_time),
+            chance_within_outlook: within(policy.outlook),
+            velocity_mm_per_day: rates.last().map_or_else(
+                || self.history.newest_velocity(),
+                |rate| Some(rate.velocity),
+            ),
+            settled_velocity_mm_per_day: settled(rates),
+            displacement_mm: self.history.displacement_mm(),
+            acceleration_mm_per_day2: acceleration(rates),
+            causes: self
+                .look
+                .filter(|(until, _)| time < *until)
+                .map(|(_, cause)| cause)
+                .into_iter()
+                .collect(),
+        };
+        let mut events: Vec<Event> = Vec::new();
+        // Until it moves forward again: one reading more or less does not change the matter.
+        let still = self.backwards && settled(rates).is_some_and(|velocity| velocity < 0.0);
+        let was_backwards = std::mem::replace(&mut self.backwards, still || moves_backwards(rates));
+        if self.backwards && !was_backwards {
+            let text = format!(
+                "benchmark {} moves upslope: is the sign of its readings right?",
+                self.benchmark
+            );
+            events.push(self.fault(time, "moves-backwards", text));
+        }
+        if self.backwards {
+            self.look_until(policy, time, "moves-backwards");
+            evidence.causes.push("moves-backwards");
+        }
+        let transitions = self.latch.update(policy, &evidence);
+        let told = transitions
+            .iter()
+            .map(|change| self.alert_event(time, policy, &evidence, change));
+        events.extend(told);
+        events
+    }
+
+    fn alert_event(
+        &self,
+        time: Timestamp,
+        policy: &Policy,
+        evidence: &Evidence,
+        change: &Transition,
+    ) -> Event {
+        let state = match change.entered {
+            Entered::Yes => AlertState::Firing,
+            Entered::No => AlertState::Resolved,
+        };
+        let key = format!("{}/{}/{}", self.benchmark, change.level, change.since);
+        let text = self.text(policy, evidence, change);
+        self.event(
+            time,
+            EventKind::Alert {
+                level: change.level,
+                state,
+                key,
+                rule: change.rule.to_owned(),
+                text,
+            },
+        )
+    }
+
+    fn text(&self, policy: &Policy, evidence: &Evidence, change: &Transition) -> String {
+        let verb = match change.entered {
+            Entered::Yes => "",
+            Entered::No => " ends",
+        };
+        let velocity = evidence
+            .velocity_mm_per_day
+            .map_or_else(String::new, |velocity| {
+                format!("; velocity {velocity:.3} mm/day")
+            });
+        let chance = |name: &str, chance: Option<f64>, span: SignedDuration| {
+            chance.map_or_else(String::new, |chance| {
+                let hours = span.as_secs() / 3600;
+                format!("; chance {chance:.2} within {name} ({hours} h)")
+            })
+        };
+        format!(
+            "benchmark {}: {}{verb} ({}){}{}{velocity}; failure is {} mm/day",
+            self.benchmark,
+            change.level,
+            change.rule,
+            chance(
+                "the evacuation time",
+                evidence.chance_within_evacuation_time,
+                policy.evacuation_time
+            ),
+            chance(
+                "the outlook",
+                evidence.chance_within_outlook,
+                policy.outlook
+            ),
+            policy.critical_velocity_mm_per_day,
+        )
+    }
+}

@@ -1,0 +1,64 @@
+//! What one benchmark is forecast to do: by the law under a constant load, and by the fuller one beside it.
+
+use crate::forecast::{Outlook, Passage};
+
+/// The forecasts after one reading.
+#[derive(Debug)]
+pub(super) struct Forecast {
+    pub(super) plain: Outlook,
+    /// Where an effect is adopted.
+    pub(super) fuller: Option<Fuller>,
+}
+
+/// The fuller law's forecast.
+#[derive(Debug)]
+pub(super) struct Fuller {
+    pub(super) outlook: Outlook,
+    /// Whether it explains how fast the slope is now.
+    pub(super) is_explained: bool,
+}
+
+impl Forecast {
+    /// The forecast that people are told: the fuller law's where it explains the present, else that of whichever
+    /// gives failure the larger chance within `days`.
+    pub(super) fn in_force(&self, days: f64) -> &Outlook {
+        match &self.fuller {
+            Some(fuller) if fuller.is_explained => &fuller.outlook,
+            Some(fuller) => {
+                let chance = |passage: &Passage| passage.chance_within(days);
+                if chance(&self.plain.passage) > chance(&fuller.outlook.passage) {
+                    &self.plain
+                } else {
+                    &fuller.outlook
+                }
+            }
+            None => &self.plain,
+        }
+    }
+
+    /// Chance of failure within `days`, as the level takes it: what the fuller law does not explain, it cannot
+    /// talk away either.
+    pub(super) fn chance_within(&self, days: f64) -> f64 {
+        let plain = self.plain.passage.chance_within(days);
+        match &self.fuller {
+            Some(fuller) => {
+                let chance = fuller.outlook.passage.chance_within(days);
+                if fuller.is_explained {
+                    chance
+                } else {
+                    chance.max(plain)
+                }
+            }
+            None => plain,
+        }
+    }
+
+    /// How unexpected the newest reading was to the law that knows most, ln.
+    pub(super) fn surprise_nats(&self) -> Option<f64> {
+        self.fuller
+            .as_ref()
+            .map_or(self.plain.surprise_nats, |fuller| {
+                fuller.outlook.surprise_nats
+            })
+    }
+}

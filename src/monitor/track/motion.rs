@@ -1,0 +1,69 @@
+//! What the newest rates show by themselves.
+
+use crate::fit::Rate;
+
+/// The line goes through this share of the rates, newest last, and no fewer than [`FEWEST_IN_LINE`].
+const LINE_SHARE: f64 = 0.25;
+const FEWEST_IN_LINE: usize = 8;
+/// Rates whose median is the settled velocity.
+const SETTLED: usize = 5;
+/// A settled velocity is a new highest from this factor on.
+const HIGHER: f64 = 1.25;
+
+/// The newest rates, through which the line goes.
+pub(super) fn recent(rates: &[Rate]) -> &[Rate] {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a count within the slice"
+    )]
+    let share = (rates.len() as f64 * LINE_SHARE).round() as usize;
+    &rates[rates.len().saturating_sub(share.max(FEWEST_IN_LINE))..]
+}
+
+/// Whether all of the latest rates stand clear of their noise on the wrong side of zero.
+pub(super) fn moves_backwards(rates: &[Rate]) -> bool {
+    let latest = &rates[rates.len().saturating_sub(SETTLED)..];
+    latest.len() == SETTLED
+        && latest
+            .iter()
+            .all(|rate| rate.velocity < -3.0 * rate.sigma && rate.velocity < 0.0)
+}
+
+/// The median of the latest rates, mm/day.
+pub(super) fn settled(rates: &[Rate]) -> Option<f64> {
+    let mut latest: Vec<f64> = rates
+        .iter()
+        .rev()
+        .take(SETTLED)
+        .map(|rate| rate.velocity)
+        .collect();
+    latest.sort_by(f64::total_cmp);
+    latest.get(latest.len() / 2).copied()
+}
+
+/// The highest settled velocity, mm/day.
+pub(super) fn fastest(rates: &[Rate]) -> Option<f64> {
+    let windows = rates.windows(SETTLED);
+    windows.filter_map(settled).reduce(f64::max)
+}
+
+/// Whether the settled velocity is higher than ever before by more than chance would have it; so it is, too,
+/// with too few rates to know.
+pub(super) fn is_new_highest(rates: &[Rate]) -> bool {
+    let Some(earlier) = rates.len().checked_sub(SETTLED) else {
+        return true;
+    };
+    match (fastest(&rates[..earlier]), settled(rates)) {
+        (Some(highest), Some(now)) => now > HIGHER * highest,
+        (None, _) | (_, None) => true,
+    }
+}
+
+pub(super) fn acceleration(rates: &[Rate]) -> Option<f64> {
+    let [.., before, newest] = rates else {
+        return None;
+    };
+    let span = newest.middle() - before.middle();
+    (span > 0.0).then(|| (newest.velocity - before.velocity) / span)
+}

@@ -1,0 +1,278 @@
+//! The watch over the residual: looks at it now and then, says when it has structure, and asks for a search.
+
+use super::adopted::Adopted;
+use super::forecast::Forecast;
+use super::{Beside, Track};
+use crate::alert::Policy;
+use crate::effects::{Effect, Fuller, Kind, residual_structure};
+use crate::forecast::measurably_moves;
+use crate::monitor::event::{Event, EventKind, Unexplained};
+use crate::monitor::search::{Finding, MOST_READINGS, SearchJob};
+use crate::monitor::{Explain, search};
+use crate::reading::{Series, Timestamp, days_since};
+
+/// Nothing is looked at before so many readings.
+const FEWEST: u64 = 40;
+/// Readings that a look goes over.
+const MOST_LOOKED_AT: usize = 400;
+/// Fall of the BIC from which on the residual has structure.
+const STRUCTURE: f64 = 20.0;
+/// A load of less than this, e-folds of velocity, is worth a search but nobody's attention: a third more or less
+/// of a slope's velocity is what slopes do.
+const WORTH_TELLING: f64 = 0.3;
+/// Two finds of one event lie no further apart than this share of the record.
+const SAME_TIME: f64 = 0.05;
+
+/// When was looked, what was said, what was asked for.
+#[derive(Debug, Default)]
+pub(super) struct Watch {
+    taken: u64,
+    looked: u64,
+    searched: u64,
+    /// A search has been asked for and has not come back.
+    is_searching: bool,
+    /// As of the last look.
+    has_structure: bool,
+    /// The structure last told.
+    told: Option<f64>,
+    known: Vec<Known>,
+}
+
+/// An effect that has been told.
+#[derive(Debug, Clone, PartialEq)]
+struct Known {
+    kind: Kind,
+    channel: Option<String>,
+    at: Option<Timestamp>,
+    is_adopted: bool,
+}
+
+impl Watch {
+    /// One more reading; says whether it is time to look: an eighth more than the last time.
+    fn is_due(&mut self) -> bool {
+        let due = self.taken >= FEWEST && 8 * self.taken >= 9 * self.looked;
+        if due {
+            self.looked = self.taken;
+        }
+        due
+    }
+
+    pub(super) fn count(&mut self) {
+        self.taken += 1;
+    }
+
+    /// Whether structure of this size is to be told: when it is new, or has doubled since.
+    fn tells(&mut self, structure: Option<f64>) -> bool {
+        let Some(gain) = structure else {
+            self.told = None;
+            return false;
+        };
+        let tells = self.told.is_none_or(|told| gain >= 2.0 * told);
+        if tells {
+            self.told = Some(gain);
+        }
+        tells
+    }
+}
+
+impl Track {
+    /// Looks at the residual of the law in force, where it is time to.
+    pub(super) fn watch(
+        &mut self,
+        policy: &Policy,
+        time: Timestamp,
+        forecast: &Forecast,
+        beside: &Beside<'_>,
+    ) -> Option<Event> {
+        if !self.watch.is_due() {
+            return None;
+        }
+        let moves = measurably_moves(&forecast.plain.rates);
+        let found = if moves {
+            residual_structure(&self.in_force(beside))
+        } else {
+            None
+        };
+        let found = found.filter(|found| found.bic_gain >= STRUCTURE);
+        self.watch.has_structure = found.is_some();
+        let worth = found.filter(|found| found.load_sd >= WORTH_TELLING);
+        if !self.watch.tells(worth.map(|found| found.bic_gain)) {
+            return None;
+        }
+        let found = worth?;
+        self.look_until(policy, time, "unexplained-residual");
+        let kind = Unexplained::Structure {
+            bic_gain: found.bic_gain,
+            load_sd: found.load_sd,
+            since: self.by_calendar(found.since, beside),
+        };
+        Some(self.event(time, EventKind::UnexplainedResidual(kind)))
+    }
+
+    /// The readings as the law in force sees them: by the load's clock, where one is adopted.
+    fn in_force(&self, beside: &Beside<'_>) -> Series {
+        let told = self.adopted.as_ref().map(|adopted| {
+            let channels = beside.covariates.list();
+            adopted.readings(&self.history, &channels)
+        });
+        let observations = told.as_ref().unwrap_or(&self.history.observations);
+        self.history
+            .series(&self.benchmark, observations, MOST_LOOKED_AT)
+    }
+
+    /// When that was, of a time by the clock of the law in force.
+    fn by_calendar(&self, time: Timestamp, beside: &Beside<'_>) -> Timestamp {
+        let channels = beside.covariates.list();
+        let adopted = self.adopted.as_ref();
+        adopted
+            .and_then(|adopted| adopted.by_calendar(&self.history, &channels, time))
+            .unwrap_or(time)
+    }
+
+    /// Whether there is something to explain, or an effect to keep up with the readings, and a third more of
+    /// these than at the last search.
+    fn wants_search(&self, explain: Explain) -> bool {
+        let watch = &self.watch;
+        let grown = watch.searched == 0 || 3 * watch.taken >= 4 * watch.searched;
+        let wanted = watch.has_structure || self.adopted.is_some();
+        explain != Explain::Off && wanted && grown && !watch.is_searching
+    }
+
+    /// The search that is to be made after this reading, where one is.
+    pub(in crate::monitor) fn search(
+        &mut self,
+        critical: f64,
+        beside: &Beside<'_>,
+    ) -> Option<SearchJob> {
+        if !self.wants_search(beside.explain) {
+            return None;
+        }
+        let observations = &self.history.observations;
+        let series = self
+            .history
+            .series(&self.benchmark, observations, MOST_READINGS);
+        let first = series.readings.first()?.time;
+        let last = series.readings.last()?.time;
+        let channels = beside.covariates.beside(first, last, search::MOST_CHANNELS);
+        let asked = self.newest.unwrap_or(last);
+        self.watch.is_searching = true;
+        self.watch.searched = self.watch.taken;
+        Some(SearchJob::new(series, channels, asked, critical))
+    }
+
+    /// Takes what a search came to: tells the effects, and goes by them where the site wants that.
+    pub(in crate::monitor) fn found(
+        &mut self,
+        critical: f64,
+        time: Timestamp,
+        finding: &Finding,
+        beside: &Beside<'_>,
+    ) -> Vec<Event> {
+        self.watch.is_searching = false;
+        let before = self.adopted.take();
+        let fuller = witnessed(finding);
+        if beside.explain == Explain::Adopt && !fuller.parts.is_empty() && is_separable(finding) {
+            let channels = beside.covariates.list();
+            self.adopted = Some(Adopted::new(fuller, &self.history, &channels, critical));
+        }
+        let mut events = self.dropped(time, before.as_ref().map(Adopted::law));
+        let known: Vec<Known> = finding
+            .effects
+            .iter()
+            .map(|effect| self.known(effect))
+            .collect();
+        for (effect, known) in finding.effects.iter().zip(&known) {
+            if !self.is_told(known) {
+                events.push(self.effect_event(time, effect, (finding, known.is_adopted)));
+            }
+        }
+        self.watch.known = known;
+        events
+    }
+
+    fn known(&self, effect: &Effect) -> Known {
+        let law = self.adopted.as_ref().map(Adopted::law);
+        let channel = effect.channel.as_deref();
+        Known {
+            kind: effect.effect,
+            channel: effect.channel.clone(),
+            at: effect.at,
+            is_adopted: law.is_some_and(|law| law.has(effect.effect, channel)),
+        }
+    }
+
+    fn is_told(&self, new: &Known) -> bool {
+        let record = self
+            .newest
+            .map_or(0.0, |newest| days_since(self.history.epoch, newest));
+        self.watch.known.iter().any(|old| {
+            let apart = match (old.at, new.at) {
+                (Some(old), Some(new)) => days_since(old, new).abs(),
+                (None, None) => 0.0,
+                (Some(_), None) | (None, Some(_)) => f64::INFINITY,
+            };
+            let at = new.at;
+            apart <= SAME_TIME * record && *new == Known { at, ..old.clone() }
+        })
+    }
+
+    fn dropped(&self, time: Timestamp, before: Option<&Fuller>) -> Vec<Event> {
+        let law = self.adopted.as_ref().map(Adopted::law);
+        let parts = before.map_or(&[][..], |law| &law.parts);
+        let gone = parts
+            .iter()
+            .filter(|part| law.is_none_or(|law| !law.has(part.kind(), part.channel())));
+        gone.map(|part| {
+            let kind = EventKind::EffectDropped {
+                effect: part.kind(),
+                channel: part.channel().map(str::to_owned),
+            };
+            self.event(time, kind)
+        })
+        .collect()
+    }
+
+    fn effect_event(
+        &self,
+        time: Timestamp,
+        effect: &Effect,
+        (finding, adopted): (&Finding, bool),
+    ) -> Event {
+        let kind = EventKind::EffectFound {
+            effect: effect.effect,
+            channel: effect.channel.clone(),
+            form: effect.form,
+            at: effect.at,
+            lag_days: effect.lag_days,
+            bic_gain: effect.bic_gain,
+            p_value: effect.p_value,
+            explained: finding.explained,
+            cannot_separate_from: finding.cannot_separate_from.clone(),
+            adopted,
+        };
+        self.event(time, kind)
+    }
+}
+
+/// The effects that something besides the motion bears witness to: a covariate, the calendar, the instrument. A
+/// step of the load that only the motion shows may as well be the failure's own beginning.
+fn witnessed(finding: &Finding) -> Fuller {
+    let parts = finding.fuller.parts.iter();
+    Fuller {
+        parts: parts
+            .filter(|part| part.kind() != Kind::LoadStep)
+            .cloned()
+            .collect(),
+    }
+}
+
+/// Whether the readings tell the effects from everything else: another covariate of the same kind that does as
+/// well means the same load so far, another kind does not.
+fn is_separable(finding: &Finding) -> bool {
+    let same_kind = |rival: &String| {
+        let kind = rival.split(' ').next().unwrap_or_default();
+        let mut effects = finding.effects.iter();
+        effects.any(|effect| effect.effect.name() == kind)
+    };
+    finding.cannot_separate_from.iter().all(same_kind)
+}

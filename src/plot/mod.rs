@@ -1,0 +1,67 @@
+//! Panels of lines, points, bands and bars as SVG text: the same numbers give the same bytes.
+
+mod axis;
+mod bars;
+mod calendar;
+mod figure;
+mod panel;
+
+pub use axis::{Axis, Scale};
+pub use bars::{Bar, Bars};
+pub use figure::Figure;
+pub use panel::{Legend, Mark, Panel};
+
+/// Blue. All colours are distinct for every kind of colour vision (Okabe and Ito, 2008).
+pub const BLUE: &str = "#0072b2";
+/// Vermilion.
+pub const RED: &str = "#d55e00";
+/// Bluish green.
+pub const GREEN: &str = "#009e73";
+/// Reddish purple.
+pub const PURPLE: &str = "#aa4499";
+/// Grey, for what stands behind.
+pub const GREY: &str = "#777777";
+/// Of text and frames.
+pub const BLACK: &str = "#111111";
+
+const FONT: f64 = 12.0;
+/// The mean width of a character of the font, over its size: for the room of a legend.
+const CHARACTER: f64 = 0.56;
+
+/// The room that a text takes, in the sheet's units.
+fn width_of(text: &str) -> f64 {
+    CHARACTER * FONT * text.chars().count() as f64
+}
+
+/// `text` as it may stand between tags.
+pub fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+}
+
+/// The opening of a sheet: its size, its title for those who hear it, and a white ground.
+fn opened(width: f64, height: f64, description: &str) -> String {
+    format!(
+        r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}" font-family="DejaVu Sans, Verdana, sans-serif" font-size="{FONT}" fill="{BLACK}">
+<title>{}</title>
+<rect width="{width}" height="{height}" fill="#ffffff"/>
+"##,
+        escaped(description)
+    )
+}
+
+/// As much of a text as has room.
+fn shortened(text: &str, room: f64) -> String {
+    if width_of(text) <= room {
+        return text.to_owned();
+    }
+    let mut short = String::new();
+    for letter in text.chars() {
+        if width_of(&short) + width_of("x…") > room {
+            break;
+        }
+        short.push(letter);
+    }
+    format!("{}…", short.trim_end())
+}

@@ -1,0 +1,81 @@
+//! Searches for missing effects beside the monitor: threads of their own, answers at a time the data decide.
+
+use crate::monitor::{Finding, SearchJob};
+use crate::reading::{BenchmarkId, Timestamp};
+use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Most threads; one core is left to the monitor where there are several.
+const MOST_WORKERS: usize = 4;
+
+/// The searches under way, one a benchmark.
+#[derive(Debug, Default)]
+pub(super) struct Searches {
+    asked: BTreeMap<BenchmarkId, Asked>,
+    /// `None` until the first search.
+    queue: Option<Sender<Order>>,
+}
+
+#[derive(Debug)]
+struct Asked {
+    job: SearchJob,
+    /// Nothing comes from it if the search broke off.
+    answer: Receiver<Finding>,
+}
+
+/// A search and where its answer goes.
+type Order = (SearchJob, Sender<Finding>);
+
+impl Searches {
+    /// Has the search made as soon as a thread is free.
+    pub(super) fn start(&mut self, job: SearchJob) {
+        let (sender, answer) = channel();
+        let queue = self.queue.get_or_insert_with(workers);
+        // With no thread to take it, the answer is in vain.
+        let _ = queue.send((job.clone(), sender));
+        self.asked
+            .insert(job.benchmark.clone(), Asked { job, answer });
+    }
+
+    /// The answer that is due at a reading of `time`; waits for it where the search is still at work.
+    pub(super) fn due(&mut self, benchmark: &BenchmarkId, time: Timestamp) -> Option<Finding> {
+        if self.asked.get(benchmark)?.job.due > time {
+            return None;
+        }
+        let Asked { job, answer } = self.asked.remove(benchmark)?;
+        Some(answer.recv().unwrap_or_else(|_| job.in_vain()))
+    }
+}
+
+/// Threads that make searches until the queue is gone. They are not joined: whoever drops the queue no longer
+/// wants the answers, and a stop must not wait for seconds of work that is thrown away.
+fn workers() -> Sender<Order> {
+    let (queue, orders) = channel();
+    let orders = Arc::new(Mutex::new(orders));
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    for _ in 0..(cores - 1).clamp(1, MOST_WORKERS) {
+        let orders = Arc::clone(&orders);
+        let worker = std::thread::Builder::new().name("search".to_owned());
+        let started = worker.spawn(move || work(&orders));
+        if let Err(error) = started {
+            tracing::error!(%error, "no thread to search on");
+        }
+    }
+    queue
+}
+
+fn work(orders: &Mutex<Receiver<Order>>) {
+    loop {
+        let order = orders.lock().unwrap_or_else(PoisonError::into_inner).recv();
+        let Ok((job, answer)) = order else { return };
+        // A fault of the search must not take the daemon's eyes.
+        if let Ok(finding) = catch_unwind(AssertUnwindSafe(|| job.run())) {
+            // Nobody waits any more when the site is closed.
+            let _ = answer.send(finding);
+        } else {
+            tracing::error!(benchmark = %job.benchmark, "the search broke off");
+        }
+    }
+}
