@@ -1,10 +1,14 @@
 //! Whether a residual passes for noise: runs, autocorrelation with gaps, and the undeclared load that is left in it.
 
+use super::frame::Frame;
 use super::noise::{Memory, Whitener};
 use super::problem::Problem;
-use super::refit::Fitted;
+use super::refit::{Fitted, jacobian};
+use super::term::Scratch;
 use crate::reading::Quantity;
 
+/// An undeclared load this many of its standard errors from nothing is structure.
+const CLEAR: f64 = 3.0;
 /// Lags of the autocorrelation.
 pub(super) const LAGS: usize = 20;
 
@@ -113,8 +117,18 @@ pub(super) struct Judged<'a> {
 }
 
 impl<'a> Judged<'a> {
-    /// Of a fit's own residual, its parameters as they are.
-    pub(super) fn of(bank: &'a [Whitener], surprise: impl Fn(&Whitener) -> f64) -> Option<Self> {
+    /// Of a fit's own residual, what its parameters can still take projected out.
+    pub(super) fn of(
+        (problem, fitted): (&Problem, &Fitted),
+        bank: &'a [Whitener],
+        scratch: &mut Scratch,
+    ) -> Option<Self> {
+        let columns = jacobian(problem, fitted, scratch);
+        let residual = fitted.residual(problem);
+        let surprise = |whitener: &Whitener| {
+            let frame = Frame::new(whitener.clone(), &residual, &columns);
+            frame.surprise(frame.misfit) + frame.cost()
+        };
         let best = |of: &dyn Fn(Memory) -> bool| {
             let own = bank.iter().filter(|whitener| of(whitener.noise.memory));
             own.map(|whitener| (whitener, surprise(whitener)))
@@ -132,6 +146,11 @@ impl<'a> Judged<'a> {
     /// How much of the BIC an undeclared load still takes.
     pub(super) fn load_gain(&self) -> f64 {
         self.load.map_or(0.0, |(_, bic)| self.plain_bic - bic)
+    }
+
+    /// How much of it noise that the reading remembers takes over white noise.
+    pub(super) fn memory_gain(&self) -> f64 {
+        self.white_bic - self.plain_bic
     }
 }
 
@@ -157,6 +176,17 @@ pub(super) fn undeclared_load(
         .into_iter()
         .map(|(mean, variance)| (mean * e_folds, variance.max(0.0).sqrt() * e_folds))
         .collect()
+}
+
+/// Whether an undeclared load, (mean, standard deviation), stands clear of nothing.
+pub(super) fn is_clear((f, s): (f64, f64)) -> bool {
+    f.abs() > CLEAR * s && s > 0.0
+}
+
+/// Standard deviation of an undeclared load over the readings, its own uncertainty counted.
+pub(super) fn load_sd(load: &[(f64, f64)]) -> f64 {
+    let squares = load.iter().map(|(f, s)| f * f + s * s).sum::<f64>();
+    (squares / load.len().max(1) as f64).sqrt()
 }
 
 /// Innovations of a fit under one noise model.

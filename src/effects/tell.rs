@@ -1,7 +1,7 @@
 //! What a search found, written into the explanation: figures before and after, tests, and the curves behind them.
 
 use super::diagnosis::{
-    Judged, autocorrelation, innovations, runs, stoffer_toloi, undeclared_load,
+    Judged, autocorrelation, innovations, is_clear, load_sd, runs, stoffer_toloi, undeclared_load,
 };
 use super::explain::Options;
 use super::explanation::{Change, Curves, Explained, Explanation, NoiseReport, Structure};
@@ -16,8 +16,6 @@ use super::term::{Act, Scratch, Term};
 use super::verdict::{Verdict, contribution};
 use crate::reading::after_days;
 
-/// An undeclared load this many of its standard errors from nothing is structure.
-const CLEAR: f64 = 3.0;
 /// Explained in full, the residual is at most this many times the white noise.
 const LARGEST_REST: f64 = 2.0;
 /// Most stretches of structure that are told.
@@ -171,13 +169,7 @@ fn residual_tests(
     scratch: &mut Scratch,
 ) {
     let mut each = [null, full].map(|fitted| {
-        let columns = super::refit::jacobian(problem, fitted, scratch);
-        let residual = fitted.residual(problem);
-        let surprise = |whitener: &Whitener| {
-            let frame = super::frame::Frame::new(whitener.clone(), &residual, &columns);
-            frame.surprise(frame.misfit) + frame.cost()
-        };
-        let judged = Judged::of(bank, surprise)?;
+        let judged = Judged::of((problem, fitted), bank, scratch)?;
         let innovations = innovations(problem, fitted, judged.plain);
         let load = judged
             .load
@@ -187,15 +179,11 @@ fn residual_tests(
     let tests = &mut explanation.residual;
     let curves = &mut explanation.curves;
     curves.lag_days = problem.spacing;
-    let sd = |load: &[(f64, f64)]| {
-        let n = load.len().max(1) as f64;
-        (load.iter().map(|(f, s)| f * f + s * s).sum::<f64>() / n).sqrt()
-    };
     if let Some((gain, innovations, load)) = each[0].take() {
         tests.runs.before = runs(&innovations);
         tests.stoffer_toloi.before = stoffer_toloi(problem, &innovations);
         tests.undeclared_load_bic_gain.before = Some(gain);
-        tests.undeclared_load_sd.before = Some(sd(&load));
+        tests.undeclared_load_sd.before = Some(load_sd(&load));
         curves.autocorrelation.before = autocorrelation(problem, &innovations);
         curves.load_before = load;
     }
@@ -203,7 +191,7 @@ fn residual_tests(
         tests.runs.after = runs(&innovations);
         tests.stoffer_toloi.after = stoffer_toloi(problem, &innovations);
         tests.undeclared_load_bic_gain.after = Some(gain);
-        tests.undeclared_load_sd.after = Some(sd(&load));
+        tests.undeclared_load_sd.after = Some(load_sd(&load));
         curves.autocorrelation.after = autocorrelation(problem, &innovations);
         if gain > 0.0 {
             tests.structure = structure(problem, &load);
@@ -214,18 +202,17 @@ fn residual_tests(
 
 /// Where the undeclared load stands clear of nothing, the clearest stretches first.
 fn structure(problem: &Problem, load: &[(f64, f64)]) -> Vec<Structure> {
-    let clear = |(f, s): (f64, f64)| f.abs() > CLEAR * s && s > 0.0;
     let mut stretches: Vec<Structure> = Vec::new();
     let mut i = 0;
     while i < load.len() {
-        if !clear(load[i]) {
+        if !is_clear(load[i]) {
             i += 1;
             continue;
         }
         let from = i;
         let sign = load[i].0.signum();
         let mut peak = i;
-        while i < load.len() && clear(load[i]) && load[i].0 * sign > 0.0 {
+        while i < load.len() && is_clear(load[i]) && load[i].0 * sign > 0.0 {
             if load[i].0.abs() > load[peak].0.abs() {
                 peak = i;
             }

@@ -33,7 +33,8 @@ pub(super) fn conclude(
 ) -> Verdict {
     let mut full = found.full.clone();
     let mut accepted = found.accepted.clone();
-    let left = structure_left(problem, bank, &full, scratch) > margin;
+    let mut judged = Judged::of((problem, &full), bank, scratch);
+    let left = judged.as_ref().map_or(0.0, Judged::load_gain) > margin;
     let only_labels = !accepted.is_empty() && full.terms.iter().all(|term| is_label(term.kind));
     let mut cannot_separate_from = Vec::new();
     if left && only_labels {
@@ -42,6 +43,7 @@ pub(super) fn conclude(
             refuse(&mut found.candidates, term.kind);
         }
         full = found.null.clone();
+        judged = Judged::of((problem, &full), bank, scratch);
         accepted.clear();
     }
     let mut effects: Vec<Effect> = (0..full.terms.len())
@@ -53,8 +55,8 @@ pub(super) fn conclude(
         .collect();
     // What bears a witness speaks first.
     effects.sort_by_key(|effect| is_label(effect.effect));
-    let remembers = full.noise.memory == Memory::Reading
-        && correlated_gain(problem, bank, &full, scratch) > margin;
+    let memory_gain = judged.as_ref().map_or(0.0, Judged::memory_gain);
+    let remembers = full.noise.memory == Memory::Reading && memory_gain > margin;
     let explained = match (effects.is_empty(), left) {
         (false, false) => Explained::Full,
         (false, true) => Explained::Partly,
@@ -66,7 +68,7 @@ pub(super) fn conclude(
         explained
     };
     if remembers && !left {
-        effects.push(correlated(problem, unit, &full, bank, scratch));
+        effects.push(correlated(unit, &full, memory_gain));
     }
     if effects.is_empty() {
         effects.push(Effect::of(if left {
@@ -94,54 +96,14 @@ fn refuse(candidates: &mut [Candidate], kind: Kind) {
     }
 }
 
-/// -2 ln likelihood and price of each noise model, the fit's directions projected out.
-fn surprise(
-    problem: &Problem,
-    fitted: &Fitted,
-    scratch: &mut Scratch,
-) -> impl Fn(&Whitener) -> f64 + use<> {
-    let columns = jacobian(problem, fitted, scratch);
-    let residual = fitted.residual(problem);
-    move |whitener: &Whitener| {
-        let frame = super::frame::Frame::new(whitener.clone(), &residual, &columns);
-        frame.surprise(frame.misfit) + frame.cost()
-    }
-}
-
-/// How much of the BIC an undeclared load still takes after a fit.
-pub(super) fn structure_left(
-    problem: &Problem,
-    bank: &[Whitener],
-    fitted: &Fitted,
-    scratch: &mut Scratch,
-) -> f64 {
-    Judged::of(bank, surprise(problem, fitted, scratch)).map_or(0.0, |judged| judged.load_gain())
-}
-
-fn correlated_gain(
-    problem: &Problem,
-    bank: &[Whitener],
-    fitted: &Fitted,
-    scratch: &mut Scratch,
-) -> f64 {
-    Judged::of(bank, surprise(problem, fitted, scratch))
-        .map_or(0.0, |judged| judged.white_bic - judged.plain_bic)
-}
-
-/// Refits without the term of that index, for what it adds by itself.
-fn correlated(
-    problem: &Problem,
-    unit: Unit,
-    full: &Fitted,
-    bank: &[Whitener],
-    scratch: &mut Scratch,
-) -> Effect {
+/// Noise that the reading remembers, as an effect that brings `bic_gain`.
+fn correlated(unit: Unit, full: &Fitted, bic_gain: f64) -> Effect {
     let noise = full.noise;
     Effect {
         memory_days: noise.days.is_finite().then_some(noise.days),
         size: Some(noise.ratio * full.sigma / unit.factor()),
         unit: Some(unit.to_string()),
-        bic_gain: correlated_gain(problem, bank, full, scratch),
+        bic_gain,
         ..Effect::of(Kind::CorrelatedNoise)
     }
 }

@@ -1,15 +1,11 @@
 //! Whether the plain law's residual has structure that a load could bring: the cheap look before a search.
 
-use super::diagnosis::{Judged, undeclared_load};
+use super::diagnosis::{Judged, is_clear, load_sd, undeclared_load};
 use super::noise::Noise;
 use super::problem::Problem;
 use super::search::plain;
 use super::term::Scratch;
-use super::{frame::Frame, refit::jacobian};
 use crate::reading::{Series, Timestamp, after_days};
-
-/// An undeclared load this many of its standard errors from nothing stands out.
-const CLEAR: f64 = 3.0;
 
 /// What the residual of the law under a constant load holds.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,22 +28,13 @@ pub fn residual_structure(series: &Series) -> Option<Residual> {
     let fitted = plain(&problem, &mut scratch)?;
     problem.see(&fitted.velocity);
     let bank = Noise::bank(&problem);
-    let columns = jacobian(&problem, &fitted, &mut scratch);
-    let residual = fitted.residual(&problem);
-    let judged = Judged::of(&bank, |whitener| {
-        let frame = Frame::new(whitener.clone(), &residual, &columns);
-        frame.surprise(frame.misfit) + frame.cost()
-    })?;
+    let judged = Judged::of((&problem, &fitted), &bank, &mut scratch)?;
     let (whitener, _) = judged.load?;
     let load = undeclared_load(&problem, &fitted, whitener);
-    let squares = load.iter().map(|(f, s)| f * f + s * s).sum::<f64>();
-    let first = load
-        .iter()
-        .position(|(f, s)| f.abs() > CLEAR * s && *s > 0.0)
-        .unwrap_or(0);
+    let first = load.iter().position(|one| is_clear(*one)).unwrap_or(0);
     Some(Residual {
         bic_gain: judged.load_gain(),
-        load_sd: (squares / load.len() as f64).sqrt(),
+        load_sd: load_sd(&load),
         since: after_days(problem.epoch, problem.t[first])?,
     })
 }
