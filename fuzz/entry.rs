@@ -4,7 +4,9 @@
 //! `tests/mutated_files.rs` share this file.
 
 use slipwatch::reading::Recording;
-use slipwatch::runtime::ingest::{CsvRows, Item, ReadOptions, decode_message, read_files};
+use slipwatch::runtime::ingest::{
+    Item, ReadOptions, TextFormat, TextRows, decode_message, read_files,
+};
 use slipwatch::runtime::tail::lines::Lines;
 use slipwatch::runtime::tail::records::{Channels, Frame, HEADER_BYTES, MAGIC, frame};
 use std::path::Path;
@@ -12,23 +14,36 @@ use std::path::Path;
 /// Bytes as a CSV file.
 pub(crate) fn csv(bytes: &[u8]) {
     whole(bytes, "csv");
+    grown(bytes, TextFormat::Csv, "csv");
+}
+
+/// Bytes as an NDJSON file.
+pub(crate) fn ndjson(bytes: &[u8]) {
+    whole(bytes, "ndjson");
+    grown(bytes, TextFormat::Ndjson, "ndjson");
+}
+
+/// Bytes as a Campbell TOA5 file.
+pub(crate) fn toa5(bytes: &[u8]) {
+    whole(bytes, "dat");
+    grown(bytes, TextFormat::Toa5, "dat");
+}
+
+/// Reads the bytes as the daemon does a file that grows.
+fn grown(bytes: &[u8], format: TextFormat, extension: &str) {
     let mut lines = Lines::default();
     let (first, second) = bytes.split_at(bytes.len() / 2);
     let mut fed = lines.feed(first);
     fed.extend(lines.feed(second));
-    let mut texts = fed
-        .into_iter()
-        .filter_map(|line| Some((line.number, line.text.ok()?)));
-    let Some((_, header)) = texts.next() else {
-        return;
-    };
-    let file = Path::new("fuzzed.csv");
-    let Ok(mut rows) = CsvRows::new(file, &header, &ReadOptions::default()) else {
-        return;
-    };
-    for (number, text) in texts {
-        for item in rows.row(number, &text).into_iter().flatten() {
-            check(&item);
+    let file = format!("fuzzed.{extension}");
+    let mut rows = TextRows::new(format, Path::new(&file), &ReadOptions::default());
+    for line in fed {
+        let Ok(text) = line.text else { continue };
+        for item in &rows.take(line.number, &text).items {
+            check(item);
+        }
+        if rows.is_lost() && format == TextFormat::Csv {
+            return;
         }
     }
 }
@@ -90,6 +105,7 @@ fn check(item: &Item) {
     let value = match item {
         Item::Reading { reading, .. } => reading.value,
         Item::Sample { sample, .. } => sample.value,
+        Item::Missing { .. } => return,
     };
     assert!(value.is_finite(), "{item:?}");
 }

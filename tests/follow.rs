@@ -62,6 +62,9 @@ impl Bench {
                 Input::Sample {
                     channel, sample, ..
                 } => format!("{channel}:{}", sample.value),
+                Input::Missing {
+                    benchmark, what, ..
+                } => format!("{benchmark} gives {what}"),
                 Input::Found(_) | Input::Tick => panic!("not in a file"),
             }));
             if caught_up {

@@ -78,15 +78,29 @@ fn recordings() -> Vec<std::path::PathBuf> {
 
 #[test]
 fn no_damage_to_a_csv_file_brings_its_readers_down() {
+    damage_text("csv", 11, entry::csv);
+}
+
+#[test]
+fn no_damage_to_an_ndjson_file_brings_its_readers_down() {
+    damage_text("ndjson", 14, entry::ndjson);
+}
+
+#[test]
+fn no_damage_to_a_toa5_file_brings_its_readers_down() {
+    damage_text("dat", 15, entry::toa5);
+}
+
+fn damage_text(extension: &str, seed: u64, read: fn(&[u8])) {
     let folder = tempfile::tempdir().unwrap();
-    let mut generator = Pcg64::seed_from_u64(11);
+    let mut generator = Pcg64::seed_from_u64(seed);
     for recording in recordings() {
-        let file = folder.path().join("whole.csv");
+        let file = folder.path().join(format!("whole.{extension}"));
         convert(&recording, &file, &ReadOptions::default()).unwrap();
         let mut bytes = fs::read(&file).unwrap();
         bytes.truncate(LONGEST);
         for _ in 0..COPIES {
-            entry::csv(&damage(&bytes, &mut generator));
+            read(&damage(&bytes, &mut generator));
         }
     }
 }
@@ -109,6 +123,8 @@ fn bytes_of_no_kind_bring_no_reader_down() {
         let count = generator.random_range(0..400);
         let bytes: Vec<u8> = (0..count).map(|_| generator.random()).collect();
         entry::csv(&bytes);
+        entry::ndjson(&bytes);
+        entry::toa5(&bytes);
         entry::mcap(&bytes);
     }
 }

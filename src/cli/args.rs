@@ -3,9 +3,13 @@
 use super::exit;
 use crate::alert::Policy;
 use crate::config::value;
-use crate::reading::{BenchmarkId, Disorder, Quantity, Recording, SelectError, Series, Timestamp};
+use crate::reading::{
+    BenchmarkId, Conventions, Disorder, LocalClock, MissingValues, Quantity, Recording,
+    SelectError, Series, SummerTime, Timestamp,
+};
 use crate::runtime::ingest::{ColumnMap, IngestError, ReadOptions, read_channels, read_files};
 use jiff::SignedDuration;
+use jiff::tz::TimeZone;
 use serde::Serialize;
 use std::io::{self, Write};
 use std::path::PathBuf;
@@ -60,15 +64,33 @@ pub struct FileArgs {
     /// Day 0 of a column `t_days`
     #[arg(long, value_name = "TIME", default_value = "2000-01-01T00:00:00Z")]
     pub epoch: Timestamp,
+    /// The zone of times that state no offset, such as Europe/Rome
+    #[arg(long, value_name = "ZONE", value_parser = value::time_zone)]
+    pub time_zone: Option<TimeZone>,
+    /// What a local time means that came twice or never: reject, earlier, later, or standard for a
+    /// clock that is never changed
+    #[arg(long, value_name = "POLICY", default_value = "reject", value_parser = SummerTime::parse)]
+    pub dst: SummerTime,
+    /// A further mark for a missing value, such as -7999
+    #[arg(long, value_name = "VALUE", allow_hyphen_values = true)]
+    pub missing: Vec<String>,
 }
 
 impl FileArgs {
     /// The same for the readers.
     pub fn options(&self) -> ReadOptions {
+        let mut missing = MissingValues::default();
+        self.missing.iter().for_each(|mark| missing.add(mark));
+        let clock = LocalClock {
+            zone: self.time_zone.clone(),
+            summer_time: self.dst,
+        };
         ReadOptions {
             epoch: self.epoch,
             columns: self.columns.clone(),
             averaging: self.averaging,
+            conventions: Conventions { clock, missing },
+            ..ReadOptions::default()
         }
     }
 }
@@ -76,7 +98,7 @@ impl FileArgs {
 /// Which readings, and what they mean: common to all commands that read some.
 #[derive(Debug, Clone, clap::Args)]
 pub struct ReadingArgs {
-    /// Readings, CSV or MCAP; a later file stands over an earlier one
+    /// Readings, CSV, NDJSON, TOA5 or MCAP by the name's ending; a later file stands over an earlier one
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
     /// Take this benchmark only
@@ -186,6 +208,11 @@ pub(super) fn warn_of(disorder: Disorder) {
             "stood before an earlier time",
             disorder.out_of_order,
             "put in order",
+        ),
+        (
+            "hold a mark for a missing value where a reading should be",
+            disorder.missing,
+            "left out",
         ),
     ];
     for (what, rows, remedy) in kinds {

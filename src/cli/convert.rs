@@ -6,7 +6,7 @@ use crate::runtime::ingest;
 use std::io::Write;
 use std::path::PathBuf;
 
-/// Convert readings between CSV and MCAP, by the names' endings
+/// Convert readings between CSV, NDJSON, TOA5 and MCAP, by the names' endings
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// The file to read

@@ -24,6 +24,7 @@ pub(super) fn read_load(file: &Path) -> anyhow::Result<Load> {
     if found.iter().ne(COLUMNS) {
         return Err(IngestError::BadHeader {
             file: file.into(),
+            line: 1,
             found: format!("{:?}, not days,log_load", text.lines().next().unwrap_or("")),
         }
         .into());

@@ -5,6 +5,7 @@ mod check;
 mod pattern;
 mod problem;
 mod section;
+mod source;
 mod table;
 pub(crate) mod value;
 
@@ -14,7 +15,7 @@ pub use problem::{ConfigError, Problem, Severity};
 
 use crate::alert::Level;
 use crate::monitor::Settings;
-use crate::reading::{BenchmarkId, Quantity, Timestamp, Unit};
+use crate::reading::{BenchmarkId, Conventions, Quantity, Timestamp, Unit};
 use jiff::SignedDuration;
 use problem::Notebook;
 use std::cell::RefCell;
@@ -62,6 +63,10 @@ pub struct SiteConfig {
 pub enum SourceKind {
     /// Comma-separated text with a header.
     Csv,
+    /// A JSON object a line.
+    Ndjson,
+    /// Tables of a Campbell logger.
+    Toa5,
     /// MCAP recordings.
     Mcap,
 }
@@ -71,6 +76,8 @@ impl SourceKind {
     pub fn name(self) -> &'static str {
         match self {
             Self::Csv => "csv",
+            Self::Ndjson => "ndjson",
+            Self::Toa5 => "toa5",
             Self::Mcap => "mcap",
         }
     }
@@ -85,6 +92,8 @@ pub struct Source {
     pub kind: SourceKind,
     /// Which files.
     pub pattern: FilePattern,
+    /// How times and missing values are written in them.
+    pub conventions: Conventions,
 }
 
 /// `[[benchmark]]`: one measured point.

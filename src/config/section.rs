@@ -2,8 +2,7 @@
 
 use super::table::{Placed, Section};
 use super::{
-    Benchmark, Config, DeclaredEvent, FilePattern, HookConfig, SiteConfig, Source, SourceKind,
-    alert, value,
+    Benchmark, Config, DeclaredEvent, HookConfig, SiteConfig, Source, alert, source, value,
 };
 use crate::alert::{Level, Policy};
 use crate::monitor::{Explain, Settings};
@@ -19,7 +18,7 @@ const HOOK_TIMEOUT: Duration = Duration::from_secs(10);
 pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
     let base = file.parent().unwrap_or(Path::new(""));
     let site = site(root.table("site", "site"), base);
-    let sources = sources(root, base);
+    let sources = source::sources(root, base);
     let policy = alert::policy(root.table("alert", "alert"), &Policy::default());
     let explain = explain(root.table("explain", "explain"));
     let (benchmarks, own) = benchmarks(root, &sources, &policy);
@@ -59,9 +58,7 @@ fn site(mut section: Section<'_>, base: &Path) -> Option<SiteConfig> {
         text.parse()
             .map_err(|_| "write an address and a port: \"127.0.0.1:8642\"".to_owned())
     });
-    let time_zone = section.parsed("time_zone", |text| {
-        TimeZone::get(text).map_err(|_| "write an IANA name, such as \"Europe/Rome\"".to_owned())
-    });
+    let time_zone = section.parsed("time_zone", value::time_zone);
     section.finish();
     Some(SiteConfig {
         name: name?.value,
@@ -90,51 +87,11 @@ fn explain(mut section: Section<'_>) -> Explain {
     }
 }
 
-fn sources(root: &mut Section<'_>, base: &Path) -> Vec<Source> {
-    let sections = root.tables("source", "source");
-    if sections.is_empty() {
-        root.error(
-            root.at(),
-            "there is no [[source]]".to_owned(),
-            "add [[source]] with id, kind and path",
-        );
-    }
-    let mut taken = BTreeSet::new();
-    sections
-        .into_iter()
-        .filter_map(|section| source(section, base, &mut taken))
-        .collect()
-}
-
-fn source(mut section: Section<'_>, base: &Path, taken: &mut BTreeSet<String>) -> Option<Source> {
-    let id = section.required("id", "\"logger\"");
-    unique(&section, id.as_ref(), taken);
-    let kind = section
-        .required("kind", "\"csv\"")
-        .and_then(|_| section.parsed("kind", source_kind));
-    let pattern = section
-        .required("path", "\"incoming/*.csv\"")
-        .and_then(|_| section.parsed("path", |text| FilePattern::parse(text, base)));
-    section.finish();
-    Some(Source {
-        id: id?.value,
-        kind: kind?.value,
-        pattern: pattern?.value,
-    })
-}
-
-fn source_kind(text: &str) -> Result<SourceKind, String> {
-    match text {
-        "csv" => Ok(SourceKind::Csv),
-        "mcap" => Ok(SourceKind::Mcap),
-        "ndjson" | "toa5" | "mqtt" | "nats" => {
-            Err("not yet supported; supported: csv, mcap".to_owned())
-        }
-        _ => Err("supported: csv, mcap".to_owned()),
-    }
-}
-
-fn unique(section: &Section<'_>, id: Option<&Placed<String>>, taken: &mut BTreeSet<String>) {
+pub(super) fn unique(
+    section: &Section<'_>,
+    id: Option<&Placed<String>>,
+    taken: &mut BTreeSet<String>,
+) {
     let Some(id) = id else { return };
     if !taken.insert(id.value.clone()) {
         section.error(

@@ -147,16 +147,7 @@ impl<'t> Section<'t> {
     /// A number strictly between 0 and 1.
     pub(super) fn chance(&mut self, key: &'static str) -> Option<f64> {
         let value = self.get(key)?;
-        let number: Option<f64> = match value.get_ref() {
-            DeValue::Float(float) => float.as_str().replace('_', "").parse().ok(),
-            DeValue::Integer(integer) => integer.as_str().parse().ok(),
-            DeValue::String(_)
-            | DeValue::Boolean(_)
-            | DeValue::Datetime(_)
-            | DeValue::Array(_)
-            | DeValue::Table(_) => None,
-        };
-        match number {
+        match number(value.get_ref()) {
             Some(number) if number > 0.0 && number < 1.0 => Some(number),
             Some(_) | None => {
                 self.error(
@@ -167,6 +158,27 @@ impl<'t> Section<'t> {
                 None
             }
         }
+    }
+
+    /// A list of numbers and strings, each as its text.
+    pub(super) fn marks(&mut self, key: &'static str) -> Vec<String> {
+        let Some(value) = self.get(key) else {
+            return Vec::new();
+        };
+        let example = format!("{key} = [-7999, \"NAN\"]");
+        let Some(array) = value.get_ref().as_array() else {
+            self.wrong_type(key, value, "a list of numbers and strings", &example);
+            return Vec::new();
+        };
+        let mut marks = Vec::new();
+        for item in array {
+            let text = item.get_ref().as_str().map(str::to_owned);
+            match text.or_else(|| number(item.get_ref()).map(|number| number.to_string())) {
+                Some(mark) => marks.push(mark),
+                None => self.wrong_type(key, item, "a number or a string", &example),
+            }
+        }
+        marks
     }
 
     /// A list of strings.
@@ -256,5 +268,18 @@ impl<'t> Section<'t> {
                 );
             }
         }
+    }
+}
+
+/// The number that a value is.
+fn number(value: &DeValue<'_>) -> Option<f64> {
+    match value {
+        DeValue::Float(float) => float.as_str().replace('_', "").parse().ok(),
+        DeValue::Integer(integer) => integer.as_str().parse().ok(),
+        DeValue::String(_)
+        | DeValue::Boolean(_)
+        | DeValue::Datetime(_)
+        | DeValue::Array(_)
+        | DeValue::Table(_) => None,
     }
 }

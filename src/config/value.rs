@@ -3,6 +3,7 @@
 use crate::alert::Level;
 use crate::reading::{Quantity, Unit};
 use jiff::SignedDuration;
+use jiff::tz::TimeZone;
 
 /// A duration longer than zero: `12h`, `30d`, `1h 30min`.
 pub(crate) fn duration(text: &str) -> Result<SignedDuration, String> {
@@ -12,6 +13,11 @@ pub(crate) fn duration(text: &str) -> Result<SignedDuration, String> {
         return Err("write a duration longer than zero, such as \"12h\"".to_owned());
     }
     SignedDuration::try_from(parsed).map_err(|_| "write a shorter duration".to_owned())
+}
+
+/// A time zone by its IANA name: `Europe/Rome`.
+pub(crate) fn time_zone(text: &str) -> Result<TimeZone, String> {
+    TimeZone::get(text).map_err(|_| "write an IANA name, such as \"Europe/Rome\"".to_owned())
 }
 
 /// A speed in mm/day: `1 m/day`, `50 mm/day`.

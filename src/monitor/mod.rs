@@ -5,6 +5,7 @@ mod drift;
 mod event;
 mod history;
 mod search;
+mod sensor;
 mod silence;
 mod track;
 
@@ -18,6 +19,7 @@ use crate::alert::{Level, Policy};
 use crate::reading::{BenchmarkId, Reading, Sample, Timestamp, Unit};
 use covariates::Covariates;
 use jiff::SignedDuration;
+use sensor::Sensors;
 use std::collections::BTreeMap;
 use track::{Beside, Track};
 
@@ -34,6 +36,15 @@ pub enum Input {
         averaging: Option<SignedDuration>,
         /// The reading itself.
         reading: Reading,
+    },
+    /// A reading that should be there and is not.
+    Missing {
+        /// Whose.
+        benchmark: BenchmarkId,
+        /// When it should have been measured.
+        time: Timestamp,
+        /// What the sensor gave instead.
+        what: String,
     },
     /// A value of a covariate.
     Sample {
@@ -86,6 +97,7 @@ pub struct Monitor {
     settings: Settings,
     tracks: BTreeMap<BenchmarkId, Track>,
     covariates: Covariates,
+    sensors: Sensors,
     searches: Vec<SearchJob>,
     summary: Summary,
     last_time: Option<Timestamp>,
@@ -98,6 +110,7 @@ impl Monitor {
             settings,
             tracks: BTreeMap::new(),
             covariates: Covariates::default(),
+            sensors: Sensors::default(),
             searches: Vec::new(),
             summary: Summary::default(),
             last_time: None,
@@ -115,6 +128,7 @@ impl Monitor {
                 reading,
             } => {
                 self.summary.readings += 1;
+                self.sensors.reads(benchmark, reading.time);
                 let beside = Beside {
                     covariates: &self.covariates,
                     explain: self.settings.explain,
@@ -133,6 +147,11 @@ impl Monitor {
                 self.searches.extend(track.search(critical, &beside));
                 events
             }
+            Input::Missing {
+                benchmark,
+                time,
+                what,
+            } => self.missing(now, benchmark, (*time, what)),
             Input::Found(finding) => self.found(now, finding),
             Input::Sample {
                 channel,
@@ -144,14 +163,34 @@ impl Monitor {
             }
             Input::Tick => self
                 .tracks
-                .values_mut()
-                .flat_map(|track| track.pass(now))
+                .iter_mut()
+                .flat_map(|(benchmark, track)| track.pass(now, self.sensors.fault(benchmark)))
                 .collect(),
         };
         for event in &events {
             self.summary.count(&event.kind);
         }
         events
+    }
+
+    fn missing(
+        &mut self,
+        now: Timestamp,
+        benchmark: &BenchmarkId,
+        (time, what): (Timestamp, &str),
+    ) -> Vec<Event> {
+        if !self.sensors.fails(benchmark, time, what) {
+            return Vec::new();
+        }
+        let kind = EventKind::Fault {
+            kind: "sensor-fault".to_owned(),
+            text: format!("benchmark {benchmark}: no reading at {time}; the sensor gives {what}"),
+        };
+        vec![Event {
+            time: now,
+            kind,
+            benchmark: Some(benchmark.clone()),
+        }]
     }
 
     fn found(&mut self, now: Timestamp, finding: &Finding) -> Vec<Event> {

@@ -3,10 +3,12 @@
 //! Values keep the unit in which they were measured, so that a recording converted there and back
 //! is the same readings; the science converts to millimetres and days at its own door.
 
+mod conventions;
 mod recording;
 mod series;
 mod unit;
 
+pub use conventions::{Conventions, LocalClock, MissingValues, SummerTime, TimeFault};
 pub use jiff::Timestamp;
 pub use recording::{MergeError, Recording, SelectError};
 pub use series::{Channel, Disorder, Reading, Sample, Series};

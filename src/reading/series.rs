@@ -87,6 +87,8 @@ pub struct Disorder {
     pub corrected: usize,
     /// Rows that stood before an earlier time.
     pub out_of_order: usize,
+    /// Readings that were a mark for no value, such as NAN; they are left out.
+    pub missing: usize,
 }
 
 impl AddAssign for Disorder {
@@ -94,6 +96,7 @@ impl AddAssign for Disorder {
         self.repeated += other.repeated;
         self.corrected += other.corrected;
         self.out_of_order += other.out_of_order;
+        self.missing += other.missing;
     }
 }
 

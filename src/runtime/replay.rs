@@ -209,7 +209,7 @@ mod tests {
         let name = |arrival: &Arrival| match &arrival.input {
             Input::Reading { benchmark, .. } => benchmark.as_str().to_owned(),
             Input::Sample { channel, .. } => channel.clone(),
-            Input::Found(_) | Input::Tick => String::new(),
+            Input::Missing { .. } | Input::Found(_) | Input::Tick => String::new(),
         };
         let names: Vec<String> = arrivals(&recording).iter().map(name).collect();
         assert_eq!(names, ["a", "b", "b", "rain_mm", "a", "b"]);

@@ -47,6 +47,8 @@ impl Seen {
             Input::Sample {
                 channel, sample, ..
             } => ((channel.clone(), None), sample.value),
+            // Beside the readings: a value that comes for the same time later is none of these.
+            Input::Missing { benchmark, .. } => ((format!("missing at {benchmark}"), None), 0.0),
             Input::Found(_) | Input::Tick => return Novelty::New,
         };
         self.0

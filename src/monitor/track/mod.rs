@@ -171,8 +171,8 @@ impl Track {
         ))
     }
 
-    /// Data time has come to `now` without a reading.
-    pub(super) fn pass(&mut self, now: Timestamp) -> Vec<Event> {
+    /// Data time has come to `now` without a reading; `fault` is what the sensor gives instead.
+    pub(super) fn pass(&mut self, now: Timestamp, fault: Option<&str>) -> Vec<Event> {
         let Some(newest) = self.silence.begins(now) else {
             return Vec::new();
         };
@@ -182,8 +182,9 @@ impl Track {
                 format!("; {level} stays in force")
             }
         };
+        let fault = fault.map_or_else(String::new, |what| format!("; the sensor gives {what}"));
         let text = format!(
-            "benchmark {}: no reading since {newest}{latched}",
+            "benchmark {}: no reading since {newest}{fault}{latched}",
             self.benchmark
         );
         vec![

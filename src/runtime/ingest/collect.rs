@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 pub(super) struct Collector {
     series: BTreeMap<(BenchmarkId, Quantity), Series>,
     channels: BTreeMap<String, Channel>,
+    missing: usize,
 }
 
 /// A value in another unit, or of another averaging, than those before it.
@@ -42,7 +43,7 @@ impl Collector {
                 if series.averaging != averaging {
                     return Err(Inconsistent {
                         found: averaging.map_or("none".to_owned(), |span| span.to_string()),
-                        expected: "the same averaging as in the benchmark's first message",
+                        expected: "the same averaging as in the first value",
                     });
                 }
                 series.readings.push(reading);
@@ -65,6 +66,7 @@ impl Collector {
                 }
                 channel.samples.push(sample);
             }
+            Item::Missing { .. } => self.missing += 1,
         }
         Ok(())
     }
@@ -75,7 +77,8 @@ impl Collector {
             channels: self.channels.into_values().collect(),
             provenance,
         };
-        let disorder = recording.settle();
+        let mut disorder = recording.settle();
+        disorder.missing = self.missing;
         (recording, disorder)
     }
 }
@@ -83,6 +86,6 @@ impl Collector {
 fn one_unit(found: String) -> Inconsistent {
     Inconsistent {
         found,
-        expected: "the same unit as in the topic's first message",
+        expected: "the same unit as in the first value",
     }
 }

@@ -89,6 +89,8 @@ pub(super) enum Column {
     Channel {
         unit: Option<String>,
     },
+    /// Neither: a logger's record number.
+    Ignored,
 }
 
 /// Where a reading's standard error stands.
@@ -191,13 +193,16 @@ struct Sigma {
 }
 
 impl Layout {
+    /// `line` is the header's.
     pub(super) fn new(
         file: &Path,
+        line: u64,
         names: Vec<String>,
         maps: &[ColumnMap],
     ) -> Result<Self, IngestError> {
         let fail = |column: &str, problem, expected| IngestError::Header {
             file: file.into(),
+            line,
             column: column.to_owned(),
             problem,
             expected,

@@ -1,7 +1,10 @@
 //! Turns a file of readings into another format.
 
 use super::atomic::write_atomically;
-use super::{Format, ReadOptions, encode_mcap, read_files, write_csv};
+use super::text::TextFormat;
+use super::{
+    Format, ReadOptions, encode_mcap, is_packed, read_files, write_csv, write_ndjson, write_toa5,
+};
 use crate::reading::{BenchmarkId, Disorder, Quantity, Recording, Unit};
 use anyhow::Context;
 use serde::Serialize;
@@ -43,7 +46,7 @@ pub struct ChannelCount {
     pub samples: usize,
 }
 
-/// Reads `input` and writes it as `output`, each CSV or MCAP by its extension. The output is wholly
+/// Reads `input` and writes it as `output`, each in the format of its extension. The output is wholly
 /// there afterwards or untouched.
 ///
 /// # Errors
@@ -54,9 +57,16 @@ pub fn convert(
     options: &ReadOptions,
 ) -> anyhow::Result<ConvertReport> {
     let format = Format::of(output)?;
+    anyhow::ensure!(
+        !is_packed(output),
+        "{}: packed files are read and not written, expected a name without .gz",
+        output.display()
+    );
     let (recording, disorder) = read_files(&[input.to_owned()], options)?;
     write_atomically(output, |out| match format {
-        Format::Csv => write_csv(&recording, BufWriter::new(out)),
+        Format::Text(TextFormat::Csv) => write_csv(&recording, BufWriter::new(out)),
+        Format::Text(TextFormat::Ndjson) => write_ndjson(&recording, BufWriter::new(out)),
+        Format::Text(TextFormat::Toa5) => write_toa5(&recording, BufWriter::new(out)),
         Format::Mcap => encode_mcap(&recording, out),
     })
     .with_context(|| format!("converting {} to {}", input.display(), output.display()))?;
@@ -75,9 +85,9 @@ fn report(recording: &Recording, disorder: Disorder, format: Format) -> ConvertR
         samples: channel.samples.len(),
     });
     let mut left_out = Vec::new();
-    if format == Format::Csv {
+    if let Format::Text(format) = format {
         for series in &recording.series {
-            if let Some(span) = series.averaging {
+            if let Some(span) = series.averaging.filter(|_| format != TextFormat::Ndjson) {
                 left_out.push(format!(
                     "averaging of {} {}: {span}",
                     series.benchmark,

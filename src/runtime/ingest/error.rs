@@ -25,16 +25,18 @@ pub enum IngestError {
         source: io::Error,
     },
     /// The extension is none that is known.
-    #[error("{}: unknown kind of file, expected a name that ends in .csv or .mcap", file.display())]
+    #[error("{}: unknown kind of file, expected a name that ends in .csv, .ndjson, .jsonl, .dat (TOA5), one of these with .gz, or .mcap", file.display())]
     UnknownFormat {
         /// The file.
         file: PathBuf,
     },
     /// A column of the header cannot be what it is.
-    #[error("{}, line 1, column {column:?}: {problem}, expected {expected}", file.display())]
+    #[error("{}, line {line}, column {column:?}: {problem}, expected {expected}", file.display())]
     Header {
         /// The file.
         file: PathBuf,
+        /// The header's line.
+        line: u64,
         /// The column's name.
         column: String,
         /// What is wrong with it.
@@ -43,12 +45,54 @@ pub enum IngestError {
         expected: &'static str,
     },
     /// The header cannot be split into names.
-    #[error("{}, line 1: found {found}, expected a header of comma-separated names", file.display())]
+    #[error("{}, line {line}: found {found}, expected a header of comma-separated names", file.display())]
     BadHeader {
         /// The file.
         file: PathBuf,
+        /// The header's line.
+        line: u64,
         /// What stands there.
         found: String,
+    },
+    /// A row with no header above it that is understood.
+    #[error("{}, line {line}: found a row under no header, expected a header that is understood", file.display())]
+    NoHeader {
+        /// The file.
+        file: PathBuf,
+        /// The line.
+        line: u64,
+    },
+    /// A piece of a line that is no JSON object.
+    #[error("{}, line {line}: found {found:?}, expected one JSON object on each line", file.display())]
+    Torn {
+        /// The file.
+        file: PathBuf,
+        /// The line.
+        line: u64,
+        /// The piece.
+        found: String,
+    },
+    /// A message of NDJSON that cannot be a reading.
+    #[error("{}, line {line}: {problem}", file.display())]
+    Record {
+        /// The file.
+        file: PathBuf,
+        /// The line.
+        line: u64,
+        /// What is wrong with it.
+        problem: Box<MessageError>,
+    },
+    /// A value in another unit, or of another averaging, than those before it.
+    #[error("{}, line {line}: found {found}, expected {expected}", file.display())]
+    Inconsistent {
+        /// The file.
+        file: PathBuf,
+        /// The line.
+        line: u64,
+        /// What stands there.
+        found: String,
+        /// What would be right.
+        expected: &'static str,
     },
     /// A line has more or fewer fields than the header, or cannot be split.
     #[error("{}, line {line}: found {found}, expected {expected} fields as in the header", file.display())]

@@ -12,7 +12,7 @@ use super::columns::channel_unit;
 use crate::reading::{BenchmarkId, Quantity, Reading, Sample, Timestamp, Unit};
 use jiff::SignedDuration;
 use serde::Serialize;
-use serde_json::Value;
+use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 
 /// The metadata key for the span of which a velocity is the mean, in seconds.
@@ -127,60 +127,78 @@ pub fn decode_message(
     let Some(meant) = Topic::parse(topic) else {
         return Ok(None);
     };
-    let fields = Fields {
-        topic,
-        message: serde_json::from_slice(payload).unwrap_or(Value::Null),
+    let message: Value = serde_json::from_slice(payload).unwrap_or(Value::Null);
+    let Value::Object(message) = message else {
+        return Err(MessageError {
+            topic: topic.to_owned(),
+            field: "message",
+            value: String::from_utf8_lossy(payload).into_owned(),
+            expected: "a JSON object {time, value, unit, sigma?}",
+        });
     };
-    if !fields.message.is_object() {
-        let text = String::from_utf8_lossy(payload).into_owned();
-        return Err(fields.fail("message", text, "a JSON object {time, value, unit, sigma?}"));
-    }
+    let fields = Fields::new(topic.to_owned(), &message);
     let time = fields.time(metadata, publish_time)?;
-    let value = fields.number("value")?;
-    let value = value.ok_or_else(|| fields.fail("value", "nothing", "a finite number"))?;
-    Ok(Some(match meant {
-        Topic::Benchmark(benchmark, quantity) => Item::Reading {
-            benchmark,
-            unit: fields.unit(quantity)?,
-            averaging: fields.averaging(metadata)?,
-            reading: Reading {
-                time,
-                value,
-                sigma: fields.sigma()?,
+    fields.item(meant, time, metadata).map(Some)
+}
+
+/// The fields of one message.
+pub(super) struct Fields<'a> {
+    topic: String,
+    message: &'a Map<String, Value>,
+}
+
+impl<'a> Fields<'a> {
+    /// `topic` is for the errors.
+    pub(super) fn new(topic: String, message: &'a Map<String, Value>) -> Self {
+        Self { topic, message }
+    }
+
+    /// What the message says of `meant`, measured at `time`.
+    pub(super) fn item(
+        &self,
+        meant: Topic,
+        time: Timestamp,
+        metadata: &BTreeMap<String, String>,
+    ) -> Result<Item, MessageError> {
+        let value = self.number("value")?;
+        let value = value.ok_or_else(|| self.fail("value", "nothing", "a finite number"))?;
+        Ok(match meant {
+            Topic::Benchmark(benchmark, quantity) => Item::Reading {
+                benchmark,
+                unit: self.unit(quantity)?,
+                averaging: self.averaging(metadata)?,
+                reading: Reading {
+                    time,
+                    value,
+                    sigma: self.sigma()?,
+                },
             },
-        },
-        Topic::Channel(channel) => Item::Sample {
-            unit: fields
-                .text("unit")?
-                .or_else(|| channel_unit(&channel))
-                .map(str::to_owned),
-            channel,
-            sample: Sample { time, value },
-        },
-    }))
-}
+            Topic::Channel(channel) => Item::Sample {
+                unit: self
+                    .text("unit")?
+                    .or_else(|| channel_unit(&channel))
+                    .map(str::to_owned),
+                channel,
+                sample: Sample { time, value },
+            },
+        })
+    }
 
-struct Fields<'a> {
-    topic: &'a str,
-    message: Value,
-}
-
-impl Fields<'_> {
-    fn fail(
+    pub(super) fn fail(
         &self,
         field: &'static str,
         value: impl Into<String>,
         expected: &'static str,
     ) -> MessageError {
         MessageError {
-            topic: self.topic.to_owned(),
+            topic: self.topic.clone(),
             field,
             value: value.into(),
             expected,
         }
     }
 
-    fn text(&self, field: &'static str) -> Result<Option<&str>, MessageError> {
+    pub(super) fn text(&self, field: &'static str) -> Result<Option<&str>, MessageError> {
         match self.message.get(field) {
             None | Some(Value::Null) => Ok(None),
             Some(Value::String(text)) => Ok(Some(text)),

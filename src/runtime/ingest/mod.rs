@@ -1,6 +1,7 @@
-//! Files of readings in and out: CSV and MCAP become one [`Recording`], and back.
+//! Files of readings in and out: CSV, NDJSON, TOA5 and MCAP become one [`Recording`], and back.
 
 mod atomic;
+mod bytes;
 mod collect;
 mod columns;
 mod convert;
@@ -9,16 +10,30 @@ mod error;
 mod mcap;
 mod mcap_write;
 mod message;
+mod ndjson;
+mod ndjson_write;
 mod split;
+mod table;
+mod table_write;
+mod text;
+mod toa5;
+mod units;
 
+pub use bytes::{is_packed, unpack, unpacked_name};
 pub use columns::{ColumnMap, ColumnMapError, Measure};
 pub use convert::{ChannelCount, ConvertReport, SeriesCount, convert};
-pub use csv::{CsvRows, write_csv};
+pub use csv::CsvRows;
 pub use error::IngestError;
 pub use mcap_write::{encode_mcap, write_mcap};
 pub use message::{MessageError, decode_message};
+pub use ndjson_write::write_ndjson;
+pub use table_write::{write_csv, write_toa5};
+pub use text::{Taken, TextFormat, TextRows};
+pub use units::FileUnits;
 
-use crate::reading::{BenchmarkId, Channel, Disorder, Quantity, Reading, Recording, Sample, Unit};
+use crate::reading::{
+    BenchmarkId, Channel, Conventions, Disorder, Quantity, Reading, Recording, Sample, Unit,
+};
 use jiff::{SignedDuration, Timestamp};
 use std::path::{Path, PathBuf};
 
@@ -31,6 +46,8 @@ pub struct ReadOptions {
     pub columns: Vec<ColumnMap>,
     /// The span over which velocities are means, for series that state none.
     pub averaging: Option<SignedDuration>,
+    /// How times and missing values are written.
+    pub conventions: Conventions,
 }
 
 impl Default for ReadOptions {
@@ -39,6 +56,7 @@ impl Default for ReadOptions {
             epoch: Timestamp::constant(946_684_800, 0),
             columns: Vec::new(),
             averaging: None,
+            conventions: Conventions::default(),
         }
     }
 }
@@ -75,26 +93,39 @@ pub enum Item {
         /// The value itself.
         sample: Sample,
     },
+    /// A reading that should be there and is not: the sensor gave a mark for no value, or the column
+    /// is no longer in its unit.
+    Missing {
+        /// Whose.
+        benchmark: BenchmarkId,
+        /// When it should have been measured.
+        time: Timestamp,
+        /// What stands there instead.
+        what: String,
+    },
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Format {
-    Csv,
+    Text(TextFormat),
     Mcap,
 }
 
 impl Format {
     fn of(file: &Path) -> Result<Self, IngestError> {
-        let extension = file.extension().unwrap_or_default().to_string_lossy();
+        let name = bytes::unpacked_name(file);
+        let extension = name.extension().unwrap_or_default().to_string_lossy();
         match extension.to_ascii_lowercase().as_str() {
-            "csv" => Ok(Self::Csv),
-            "mcap" => Ok(Self::Mcap),
+            "csv" => Ok(Self::Text(TextFormat::Csv)),
+            "ndjson" | "jsonl" => Ok(Self::Text(TextFormat::Ndjson)),
+            "dat" => Ok(Self::Text(TextFormat::Toa5)),
+            "mcap" if !is_packed(file) => Ok(Self::Mcap),
             _ => Err(IngestError::UnknownFormat { file: file.into() }),
         }
     }
 }
 
-/// Reads and joins files, CSV or MCAP by extension; a later file stands over an earlier one.
+/// Reads and joins files, each in the format of its extension; a later file stands over an earlier one.
 ///
 /// # Errors
 /// [`IngestError`] names the first thing found wrong; nothing is silently left out but MCAP
@@ -108,8 +139,8 @@ pub fn read_files(
     let mut columns = Vec::new();
     for path in paths {
         let (recording, met) = match Format::of(path)? {
-            Format::Csv => {
-                let table = csv::read_csv(path, options)?;
+            Format::Text(format) => {
+                let table = text::read_text(format, path, options)?;
                 columns.extend(table.columns);
                 (table.recording, table.disorder)
             }

@@ -2,8 +2,10 @@
 
 use crate::config::{Benchmark, Source, SourceKind};
 use crate::monitor::Input;
-use crate::reading::{BenchmarkId, Quantity, Timestamp, Unit};
-use crate::runtime::ingest::{ColumnMap, Item, Measure, ReadOptions};
+use crate::reading::{BenchmarkId, Conventions, Quantity, Timestamp, Unit};
+use crate::runtime::ingest::{
+    ColumnMap, Item, Measure, ReadOptions, TextFormat, TextRows, unpacked_name,
+};
 use jiff::SignedDuration;
 use std::path::Path;
 
@@ -19,7 +21,8 @@ pub struct Arrival {
 /// What one source's files mean.
 #[derive(Debug, Clone)]
 pub(super) struct Decoder {
-    pub(super) kind: SourceKind,
+    kind: SourceKind,
+    conventions: Conventions,
     /// With none, whatever benchmarks the files name are taken.
     wanted: Vec<Benchmark>,
 }
@@ -29,13 +32,26 @@ impl Decoder {
         let of_source = |benchmark: &&Benchmark| benchmark.source == source.id;
         Self {
             kind: source.kind,
+            conventions: source.conventions.clone(),
             wanted: benchmarks.iter().filter(of_source).cloned().collect(),
         }
     }
 
+    /// The reader of the lines of `file`; `None` for recordings.
+    pub(super) fn text_rows(&self, file: &Path) -> Option<TextRows> {
+        let format = match self.kind {
+            SourceKind::Csv => TextFormat::Csv,
+            SourceKind::Ndjson => TextFormat::Ndjson,
+            SourceKind::Toa5 => TextFormat::Toa5,
+            SourceKind::Mcap => return None,
+        };
+        let name = file.with_file_name(unpacked_name(file));
+        Some(TextRows::new(format, &name, &self.options(&name)))
+    }
+
     /// How to read `file`. A column that several benchmarks claim is, in each file, that of the
     /// benchmark that the file is named after.
-    pub(super) fn options(&self, file: &Path) -> ReadOptions {
+    fn options(&self, file: &Path) -> ReadOptions {
         let stem = file.file_stem().unwrap_or_default().to_string_lossy();
         let claims = |name: &str| {
             let column = |one: &&Benchmark| one.column.as_deref() == Some(name);
@@ -52,8 +68,14 @@ impl Decoder {
         });
         ReadOptions {
             columns: columns.collect(),
+            conventions: self.conventions.clone(),
             ..ReadOptions::default()
         }
+    }
+
+    /// Whether files that are packed belong to the source too.
+    pub(super) fn takes_packed(&self) -> bool {
+        self.kind != SourceKind::Mcap
     }
 
     /// The item as the monitor takes it; `None` when nobody asked for it.
@@ -73,6 +95,18 @@ impl Decoder {
                     reading,
                 },
             }),
+            Item::Missing {
+                benchmark,
+                time,
+                what,
+            } => self.knows(&benchmark).then_some(Arrival {
+                time,
+                input: Input::Missing {
+                    benchmark,
+                    time,
+                    what,
+                },
+            }),
             Item::Sample {
                 channel,
                 unit,
@@ -86,6 +120,10 @@ impl Decoder {
                 },
             }),
         }
+    }
+
+    fn knows(&self, benchmark: &BenchmarkId) -> bool {
+        self.wanted.is_empty() || self.wanted(benchmark).is_some()
     }
 
     fn wants(&self, benchmark: &BenchmarkId, unit: Unit) -> bool {

@@ -1,15 +1,14 @@
 //! Follows one file: where we are in it, whether it is still the same, and what came.
 
 use super::decode::{Arrival, Decoder};
-use super::lines::{Line, Lines};
 use super::records::{self, Channels, Frame, HEADER_BYTES, MAGIC, RawMessage};
-use crate::config::SourceKind;
-use crate::runtime::ingest::{CsvRows, decode_message};
+use super::text::{BadLine, Fed, TextReader, Unpacking};
+use crate::runtime::ingest::{decode_message, is_packed};
 use std::collections::VecDeque;
 use std::fs::{File, Metadata};
 use std::io;
 use std::os::unix::fs::{FileExt, MetadataExt};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Bytes of text that are read at once.
@@ -42,10 +41,9 @@ pub(super) struct FileTail {
 
 #[derive(Debug)]
 enum Content {
-    Csv {
-        lines: Lines,
-        rows: Option<Box<CsvRows>>,
-    },
+    Text(Box<TextReader>),
+    /// A packed file, that is read once.
+    Packed(Box<Unpacking>),
     Mcap {
         channels: Channels,
         /// A damaged last record may be one that is still being written: it gets a second look.
@@ -58,13 +56,11 @@ enum Content {
 }
 
 impl Content {
-    fn of(kind: SourceKind) -> Self {
-        match kind {
-            SourceKind::Csv => Self::Csv {
-                lines: Lines::default(),
-                rows: None,
-            },
-            SourceKind::Mcap => Self::Mcap {
+    fn of(decoder: &Decoder, path: &Path) -> Self {
+        match decoder.text_rows(path) {
+            Some(rows) if is_packed(path) => Self::Packed(Box::new(Unpacking::new(rows))),
+            Some(rows) => Self::Text(Box::new(TextReader::new(rows))),
+            None => Self::Mcap {
                 channels: Channels::default(),
                 suspect: None,
             },
@@ -108,7 +104,7 @@ impl Glance {
 impl FileTail {
     pub(super) fn new(path: PathBuf, decoder: Arc<Decoder>) -> Self {
         Self {
-            content: Content::of(decoder.kind),
+            content: Content::of(&decoder, &path),
             path,
             decoder,
             at: 0,
@@ -173,13 +169,14 @@ impl FileTail {
         let glance = Glance::at(&file.metadata()?);
         if !self.is_same(&file, glance)? {
             tracing::info!(file = %self.path.display(), at = self.at, "another file: read from its start");
-            self.content = Content::of(self.decoder.kind);
+            self.content = Content::of(&self.decoder, &self.path);
             self.at = 0;
         }
         self.place = Some(glance.place);
         let before = self.at;
         match &self.content {
-            Content::Csv { .. } => self.read_text(&file)?,
+            Content::Text(_) => self.read_text(&file)?,
+            Content::Packed(_) => return self.read_packed(glance),
             Content::Mcap { .. } => self.read_record(&file, glance.size)?,
             Content::Refused | Content::Complete => {}
         }
@@ -212,45 +209,63 @@ impl FileTail {
         let mut buffer = vec![0; READ_BYTES];
         let count = file.read_at(&mut buffer, self.at)?;
         self.at += count as u64;
-        let Content::Csv { lines, .. } = &mut self.content else {
-            return Ok(());
-        };
-        for line in lines.feed(&buffer[..count]) {
-            self.take_line(line);
+        if let Content::Text(text) = &mut self.content {
+            let fed = text.feed(&buffer[..count]);
+            self.take(fed);
         }
         Ok(())
     }
 
-    fn take_line(&mut self, line: Line) {
-        let Content::Csv { rows, .. } = &mut self.content else {
-            return;
+    /// One piece of a packed file; `false` when it has all been read.
+    fn read_packed(&mut self, glance: Glance) -> io::Result<bool> {
+        let Content::Packed(unpacking) = &mut self.content else {
+            return Ok(false);
         };
-        let text = match line.text {
-            Ok(text) => text,
-            Err(fault) => return self.quarantine_line(line.number, "", &fault),
-        };
-        let Some(rows) = rows else {
-            let options = self.decoder.options(&self.path);
-            match CsvRows::new(&self.path, &text, &options) {
-                Ok(understood) => *rows = Some(Box::new(understood)),
-                Err(error) => self.refuse(&error),
+        match unpacking.next(&self.path) {
+            Ok(Some(fed)) => {
+                self.take(fed);
+                Ok(true)
             }
-            return;
-        };
-        match rows.row(line.number, &text) {
-            Ok(items) => {
-                let arrivals = items
-                    .into_iter()
-                    .filter_map(|one| self.decoder.arrival(one));
-                self.pending.extend(arrivals);
+            Ok(None) => {
+                let fed = unpacking.end();
+                self.take(fed);
+                self.content = Content::Complete;
+                self.at = glance.size;
+                let file = File::open(&self.path)?;
+                self.mark = read_at(&file, self.mark_start(), self.at - self.mark_start())?;
+                Ok(true)
             }
-            Err(error) => self.quarantine_line(line.number, &text, &error),
+            Err(error) => {
+                // Perhaps it is still being packed: from its start again when it has changed.
+                self.content = Content::of(&self.decoder, &self.path);
+                self.idle = Some(glance);
+                Err(error)
+            }
         }
     }
 
-    fn quarantine_line(&mut self, number: u64, text: &str, error: &dyn std::error::Error) {
+    fn take(&mut self, fed: Fed) {
+        let items = fed.items.into_iter();
+        self.pending
+            .extend(items.filter_map(|one| self.decoder.arrival(one)));
+        let mut bad = fed.bad.into_iter();
+        let last = fed.is_lost.then(|| bad.next_back()).flatten();
+        for line in bad {
+            self.quarantine_line(&line);
+        }
+        if let Some(last) = last {
+            self.refuse(&*last.error);
+        }
+    }
+
+    fn quarantine_line(&mut self, line: &BadLine) {
         self.quarantined += 1;
         let (file, total) = (self.path.display(), self.quarantined);
+        let BadLine {
+            number,
+            text,
+            error,
+        } = line;
         let text: String = text.chars().take(SHOWN).collect();
         tracing::warn!(%file, line = number, text, %error, total, "line quarantined");
     }

@@ -131,8 +131,8 @@ impl Follower {
 
     fn list(&mut self) -> BTreeMap<Key, Place> {
         let mut present = BTreeMap::new();
-        for (index, (pattern, _)) in self.sources.iter().enumerate() {
-            match list(pattern) {
+        for (index, (pattern, decoder)) in self.sources.iter().enumerate() {
+            match list(pattern, decoder) {
                 Ok(files) => {
                     self.missing.remove(pattern.folder());
                     let keyed = files
@@ -153,12 +153,17 @@ impl Follower {
     }
 }
 
-fn list(pattern: &FilePattern) -> io::Result<Vec<(PathBuf, Place)>> {
+/// The files of the pattern, packed ones among them where the source has text.
+fn list(pattern: &FilePattern, decoder: &Decoder) -> io::Result<Vec<(PathBuf, Place)>> {
+    let is_ours = |name: &str| {
+        let packed = name.strip_suffix(".gz").filter(|_| decoder.takes_packed());
+        pattern.matches(name) || packed.is_some_and(|name| pattern.matches(name))
+    };
     let mut files = Vec::new();
     for entry in std::fs::read_dir(pattern.folder())? {
         let entry = entry?;
         let name = entry.file_name();
-        if !name.to_str().is_some_and(|name| pattern.matches(name)) {
+        if !name.to_str().is_some_and(is_ours) {
             continue;
         }
         // Not the entry's own: a link counts as the file that it leads to.

@@ -1,4 +1,4 @@
-//! Follows growing files: CSV line by line, MCAP record by record.
+//! Follows growing files: text line by line, MCAP record by record; packed ones are read once.
 //!
 //! [`lines`] and [`records`] are pure; [`Follower`] reads files when asked; [`follow`] is the
 //! asynchronous shell that asks: when a watched folder changes, and every two seconds in any case,
@@ -12,6 +12,7 @@ mod file;
 mod follow;
 pub mod lines;
 pub mod records;
+mod text;
 
 pub use decode::Arrival;
 pub use follow::{Batch, Follower};

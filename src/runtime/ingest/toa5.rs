@@ -1,0 +1,208 @@
+//! Campbell TOA5 tables, one line at a time: four lines of header, then the rows of a logger.
+//!
+//! A column is what its name says by the rules of CSV; where the name has no unit, the units line
+//! gives it (`5_displacement` in `mm` is `5_displacement_mm`, `Rain_Tot` in `mm` is `Rain_Tot_mm`). Record
+//! numbers and the times of extremes are not read. A logger that starts again writes its header
+//! again, in the middle of the file.
+
+use super::columns::{Column, ColumnMap, Layout, Measure, Name, channel_unit, name_of};
+use super::split::Splitter;
+use super::table::TableRows;
+use super::{IngestError, Item, ReadOptions};
+use crate::reading::Unit;
+use ::csv::StringRecord;
+use std::path::{Path, PathBuf};
+
+/// Lines of a header: environment, names, units, processing.
+const HEADER_LINES: usize = 4;
+/// How an environment line begins.
+const MARK: &str = "\"TOA5\"";
+/// What a column of times of extremes says of its processing.
+const TIMES_OF_EXTREMES: [&str; 2] = ["TMx", "TMn"];
+
+/// Reads one file line by line.
+#[derive(Debug)]
+pub(super) struct Toa5Rows {
+    file: PathBuf,
+    options: ReadOptions,
+    /// The header in force, or as much of it as has come.
+    header: Vec<String>,
+    table: Option<TableRows>,
+    /// Before the first header that is understood.
+    is_new: bool,
+    splitter: Splitter,
+    cells: StringRecord,
+}
+
+impl Toa5Rows {
+    pub(super) fn new(file: &Path, options: &ReadOptions) -> Self {
+        let conventions = options.conventions.clone().of_a_logger();
+        Self {
+            file: file.into(),
+            options: ReadOptions {
+                conventions,
+                ..options.clone()
+            },
+            header: Vec::new(),
+            table: None,
+            is_new: true,
+            splitter: Splitter::new(),
+            cells: StringRecord::new(),
+        }
+    }
+
+    /// The four lines in force; none before they have come.
+    pub(super) fn header(&self) -> &[String] {
+        match self.table {
+            Some(_) => &self.header,
+            None => &[],
+        }
+    }
+
+    /// Whether the file began with something else than a header.
+    pub(super) fn is_lost(&self) -> bool {
+        self.is_new && self.header.is_empty()
+    }
+
+    pub(super) fn columns(&self) -> &[String] {
+        self.table.as_ref().map_or(&[], TableRows::names)
+    }
+
+    pub(super) fn row(&mut self, line: u64, text: &str) -> Result<Vec<Item>, IngestError> {
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        let plain = text.trim_start();
+        if plain.starts_with(MARK) || plain.starts_with("TOA5,") {
+            self.table = None;
+            self.header = vec![plain.to_owned()];
+            return Ok(Vec::new());
+        }
+        if let Some(at) = text.find(MARK) {
+            // The power failed within a row, and the logger began anew behind it.
+            self.table = None;
+            self.header = vec![text[at..].to_owned()];
+            return Err(self.line_fault(line, "a header within the line".to_owned()));
+        }
+        if self.table.is_none() && !self.header.is_empty() {
+            self.header.push(text.to_owned());
+            if self.header.len() == HEADER_LINES {
+                self.understand(line)?;
+            }
+            return Ok(Vec::new());
+        }
+        if text.trim().is_empty() {
+            return Ok(Vec::new());
+        }
+        let Some(table) = &mut self.table else {
+            return Err(IngestError::NoHeader {
+                file: self.file.clone(),
+                line,
+            });
+        };
+        match self.splitter.split(text, &mut self.cells) {
+            Ok(()) => table.items(line, &self.cells),
+            Err(found) => Err(self.line_fault(line, found)),
+        }
+    }
+
+    fn line_fault(&self, line: u64, found: String) -> IngestError {
+        IngestError::Line {
+            file: self.file.clone(),
+            line,
+            found,
+            expected: self.columns().len(),
+        }
+    }
+
+    /// Takes the header that has just become complete at `line`; none is in force where it is bad.
+    fn understand(&mut self, line: u64) -> Result<(), IngestError> {
+        let understood = self.layout(line);
+        match understood {
+            Ok(layout) => {
+                self.is_new = false;
+                self.table = Some(TableRows::new(&self.file, layout, &self.options));
+                Ok(())
+            }
+            Err(error) => {
+                self.header.clear();
+                Err(error)
+            }
+        }
+    }
+
+    fn layout(&mut self, line: u64) -> Result<Layout, IngestError> {
+        let [names, units, processing] = [1, 2, 3].map(|row: usize| {
+            let split = self.splitter.split(&self.header[row], &mut self.cells);
+            split.map(|()| self.cells.clone())
+        });
+        let bad = |found: String| IngestError::BadHeader {
+            file: self.file.clone(),
+            line: line - 2,
+            found,
+        };
+        let (names, units) = (names.map_err(bad)?, units.map_err(bad)?);
+        let processing = processing.map_err(bad)?;
+        if names.len() != units.len() || names.len() != processing.len() {
+            let counts = [names.len(), units.len(), processing.len()];
+            return Err(bad(format!(
+                "{counts:?} names, units and kinds of processing"
+            )));
+        }
+        if names.get(0) != Some("TIMESTAMP") {
+            return Err(bad(format!("{:?} and no TIMESTAMP", names.get(0))));
+        }
+        let columns = names.iter().zip(&units);
+        let meant = columns.map(|(name, unit)| self.full_name(line - 2, name, unit));
+        let meant = meant.collect::<Result<Vec<String>, IngestError>>()?;
+        let mut layout = Layout::new(&self.file, line - 2, meant, &self.options.columns)?;
+        for (column, (name, kind)) in layout.columns.iter_mut().zip(names.iter().zip(&processing)) {
+            if name == "RECORD" || TIMES_OF_EXTREMES.contains(&kind) {
+                *column = Column::Ignored;
+            }
+        }
+        Ok(layout)
+    }
+
+    /// The name with its unit, as a CSV file would have it.
+    fn full_name(&self, line: u64, name: &str, unit: &str) -> Result<String, IngestError> {
+        let stated = Unit::parse(unit).ok();
+        let map = |map: &&ColumnMap| map.column == name;
+        let (full, meant) = match (self.options.columns.iter().find(map), name_of(name)) {
+            _ if name == "TIMESTAMP" => return Ok("time".to_owned()),
+            (Some(map), _) => (name.to_owned(), Some(map.measure)),
+            (None, Name::Measure(_, measure)) => (name.to_owned(), Some(measure)),
+            (None, _) => (with_unit(name, unit, stated), None),
+        };
+        let meant = meant.map(|(Measure::Reading(unit) | Measure::Sigma(unit))| unit);
+        match (meant, stated) {
+            (Some(meant), Some(stated)) if meant != stated => Err(IngestError::Header {
+                file: self.file.clone(),
+                line,
+                column: name.to_owned(),
+                problem: "the units line gives it another unit",
+                expected: "one unit, in the name or the config and in the units line",
+            }),
+            _ => Ok(full),
+        }
+    }
+}
+
+/// The name of a column whose own has no unit, with that of the units line where it is a known one.
+fn with_unit(name: &str, unit: &str, stated: Option<Unit>) -> String {
+    if let Some(stated) = stated {
+        let full = format!("{name}_{}", stated.column_suffix());
+        if matches!(name_of(&full), Name::Measure(..)) {
+            return full;
+        }
+    }
+    let suffix = unit.trim().to_ascii_lowercase();
+    let suffix = suffix
+        .replace('/', "_per_")
+        .replace(' ', "_")
+        .replace('%', "percent");
+    let full = format!("{name}_{suffix}");
+    if channel_unit(name).is_none() && channel_unit(&full).is_some() {
+        full
+    } else {
+        name.to_owned()
+    }
+}

@@ -1,0 +1,110 @@
+//! The text of one file on its way in: bytes to lines, lines to values and faults.
+
+use super::lines::Lines;
+use crate::runtime::ingest::{FileUnits, Item, TextRows, unpack};
+use std::error::Error;
+use std::fmt::Debug;
+use std::io::{self, Read};
+use std::path::Path;
+
+/// Unpacked bytes that are taken at once.
+const PIECE_BYTES: usize = 16 * 1024;
+
+/// A line that cannot be used, or a part of one.
+#[derive(Debug)]
+pub(super) struct BadLine {
+    pub(super) number: u64,
+    pub(super) text: String,
+    pub(super) error: Box<dyn Error + Send + Sync>,
+}
+
+/// What came of some bytes.
+#[derive(Debug, Default)]
+pub(super) struct Fed {
+    pub(super) items: Vec<Item>,
+    pub(super) bad: Vec<BadLine>,
+    /// The file does not begin as it should: the last of `bad` says why, and nothing follows.
+    pub(super) is_lost: bool,
+}
+
+/// Where we are in a text.
+#[derive(Debug)]
+pub(super) struct TextReader {
+    lines: Lines,
+    rows: TextRows,
+    units: FileUnits,
+}
+
+impl TextReader {
+    pub(super) fn new(rows: TextRows) -> Self {
+        Self {
+            lines: Lines::default(),
+            rows,
+            units: FileUnits::default(),
+        }
+    }
+
+    /// Takes the next bytes.
+    pub(super) fn feed(&mut self, bytes: &[u8]) -> Fed {
+        let mut fed = Fed::default();
+        for line in self.lines.feed(bytes) {
+            let number = line.number;
+            let (text, error) = match line.text {
+                Err(fault) => (String::new(), Some(fault.into())),
+                Ok(text) => {
+                    let taken = self.rows.take(number, &text);
+                    let items = taken.items.into_iter();
+                    fed.items.extend(items.map(|item| self.units.guard(item)));
+                    (text, taken.fault.map(Into::into))
+                }
+            };
+            let Some(error) = error else { continue };
+            fed.is_lost = !text.is_empty() && self.rows.is_lost();
+            fed.bad.push(BadLine {
+                number,
+                text,
+                error,
+            });
+            if fed.is_lost {
+                break;
+            }
+        }
+        fed
+    }
+}
+
+/// A packed file while it is being read, whole and once.
+#[derive(Debug)]
+pub(super) struct Unpacking {
+    packed: Option<Box<dyn Packed>>,
+    text: TextReader,
+}
+
+trait Packed: Read + Send + Debug {}
+
+impl<T: Read + Send + Debug> Packed for T {}
+
+impl Unpacking {
+    pub(super) fn new(rows: TextRows) -> Self {
+        Self {
+            packed: None,
+            text: TextReader::new(rows),
+        }
+    }
+
+    /// The next piece of `file`; `None` when it has all been read.
+    pub(super) fn next(&mut self, file: &Path) -> io::Result<Option<Fed>> {
+        let packed = match &mut self.packed {
+            Some(packed) => packed,
+            packed => packed.insert(Box::new(unpack(file)?)),
+        };
+        let mut piece = vec![0; PIECE_BYTES];
+        let count = packed.read(&mut piece)?;
+        Ok((count > 0).then(|| self.text.feed(&piece[..count])))
+    }
+
+    /// What is left when all has been read: a packed file has no more to come behind its last line.
+    pub(super) fn end(&mut self) -> Fed {
+        self.text.feed(b"\n")
+    }
+}
