@@ -3,7 +3,7 @@
 use slipwatch::alert::Level;
 use slipwatch::config::{self, ConfigError, SourceKind};
 use slipwatch::monitor::Explain;
-use slipwatch::reading::BenchmarkId;
+use slipwatch::reading::{BenchmarkId, SummerTime};
 use std::path::Path;
 
 const RIGHT: &str = r#"[site]
@@ -39,8 +39,16 @@ fn the_example_config_is_right_and_says_what_it_means() {
     assert!(config.warnings.is_empty(), "{:?}", config.warnings);
     assert_eq!(config.site.name, "Monte Toc");
     assert_eq!(config.site.state_dir, file.parent().unwrap().join("state"));
-    assert_eq!(config.sources[1].kind, SourceKind::Mcap);
-    assert_eq!(config.benchmarks.len(), 3);
+    let kinds: Vec<SourceKind> = config.sources.iter().map(|source| source.kind).collect();
+    assert_eq!(kinds, [SourceKind::Csv, SourceKind::Toa5, SourceKind::Mcap]);
+    let campbell = &config.sources[1].conventions;
+    assert_eq!(campbell.clock.summer_time, SummerTime::Standard);
+    assert_eq!(campbell.clock.zone, Some(config.site.time_zone.clone()));
+    assert!(campbell.missing.has("9999.0") && campbell.missing.has("BAD"));
+    assert_eq!(config.benchmarks.len(), 4);
+    let gnss = config.benchmarks[3].vector.as_ref().unwrap();
+    let length: f64 = gnss.direction.iter().map(|part| part * part).sum();
+    assert!((length - 1.0).abs() < 1e-12 && gnss.direction[2] < 0.0);
     let policy = &config.settings.policy;
     assert_eq!(policy.evacuation_time.as_hours(), 12);
     assert!((policy.critical_velocity_mm_per_day - 1000.0).abs() < 1e-9);
@@ -159,9 +167,9 @@ fn a_duration_of_zero_is_refused() {
 #[test]
 fn a_kind_that_is_not_built_yet_says_so() {
     assert_eq!(
-        problem("[[source]]\nid = \"b\"\nkind = \"mqtt\"\npath = \"x\"\n"),
-        "site.toml:12:8: error: source.kind = \"mqtt\" cannot be used; \
-         not yet supported; supported: csv, mcap"
+        problem("[[source]]\nid = \"b\"\nkind = \"nats\"\npath = \"x\"\n"),
+        "site.toml:12:8: error: source.kind = \"nats\" cannot be used; \
+         not yet supported; supported: csv, ndjson, toa5, mcap, mqtt"
     );
 }
 
@@ -223,4 +231,53 @@ fn check_warns_when_the_sampling_cannot_protect_and_when_the_hook_is_missing() {
     );
     assert!(warnings.contains("there is no program"), "{warnings}");
     assert!(warnings.contains("there is no folder"), "{warnings}");
+}
+
+#[test]
+fn how_a_source_writes_times_and_missing_values_is_checked() {
+    let source = |lines: &str| format!("[[source]]\nid = \"b\"\nkind = \"toa5\"\npath = \"b.dat\"\n{lines}");
+    let cases = [
+        ("time_zone = \"Roma\"\n", "14:13: error: source.time_zone = \"Roma\" cannot be used; write an IANA name"),
+        ("dst = \"standard\"\n", "14:7: error: source.dst is given without source.time_zone"),
+        ("time_zone = \"Europe/Rome\"\ndst = \"winter\"\n", "15:7: error: source.dst = \"winter\" cannot be used; write reject"),
+        ("missing = -7999\n", "14:11: error: source.missing is of type integer, not a list; write missing = [-7999"),
+        ("missing = [true]\n", "14:12: error: source.missing is of type boolean, not a number or a string"),
+    ];
+    for (lines, expected) in cases {
+        let found = problem(&source(lines));
+        assert!(found.starts_with(&format!("site.toml:{expected}")), "{found}");
+    }
+}
+
+#[test]
+fn a_vector_without_a_direction_or_a_unit_is_refused() {
+    let cases = [
+        ("components = [\"east_mm\", \"north_mm\"]\n", "are not both given"),
+        ("components = [\"east_mm\", \"north_mm\"]\ndirection = [1]\n", "1 numbers for 2 components"),
+        ("components = [\"east_mm\", \"north_mm\"]\ndirection = [0, 0.0]\n", "is no direction"),
+        ("components = [\"east_mm\", \"north_cm\"]\ndirection = [1, 1]\n", "do not all say one unit"),
+        ("column = \"x_mm\"\nunit = \"mm\"\ncomponents = [\"east\", \"north\"]\ndirection = [1, 1]\n", "do not go with"),
+    ];
+    for (lines, expected) in cases {
+        let found = problem(&format!("[[benchmark]]\nid = \"5\"\n{lines}"));
+        assert!(found.contains(expected), "{found}");
+    }
+}
+
+#[test]
+fn a_broker_is_read_where_the_build_has_mqtt_and_refused_with_the_remedy_where_not() {
+    let source = "[[source]]\nid = \"radio\"\nkind = \"mqtt\"\nurl = \"mqtt://toc:secret@broker.local\"\n\
+                  topic = \"site/+/displacement\"\n[[benchmark]]\nid = \"5\"\nsource = \"radio\"\n";
+    if cfg!(feature = "mqtt") {
+        let config = config::parse(&format!("{RIGHT}{source}"), Path::new("site.toml")).unwrap();
+        let address = &config.brokers[0].address;
+        assert_eq!((address.host.as_str(), address.port), ("broker.local", 1883));
+        assert!(!format!("{config:?}").contains("secret"), "a password in a log");
+        for (right, wrong) in [("mqtt://", "mqtts://"), ("local\"", "local:99999\""), ("site/+", "site/a+")] {
+            let found = problem(&source.replace(right, wrong));
+            assert!(found.contains("cannot be used; write"), "{found}");
+        }
+    } else {
+        assert!(problem(source).contains("build with --features mqtt"));
+    }
 }

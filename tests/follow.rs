@@ -157,7 +157,7 @@ fn what_was_written_before_a_rotation_is_read_from_the_old_file() {
             bench.append("5.csv.1", &row(3, 3.0));
             assert_eq!(bench.news(), ["5:3"]);
             bench.write("5.csv", &new);
-            assert_eq!(bench.news(), ["5:4"]);
+            assert_eq!(bench.news(), ["5 gives NaN", "5:4"]);
         }
     }
 }
@@ -184,7 +184,9 @@ fn a_bad_line_is_quarantined_and_following_goes_on() {
     assert_eq!(bench.follower.quarantined(), 1);
     bench.append("5.csv", "2017-06-03T00:00:00Z,NaN\n");
     bench.append("5.csv", &row(4, 4.0));
-    assert_eq!(bench.news(), ["5:4"]);
+    assert_eq!(bench.news(), ["5 gives NaN", "5:4"]);
+    bench.append("5.csv", "2017-06-05T00:00:00Z,1e999\n");
+    assert!(bench.news().is_empty());
     assert_eq!(bench.follower.quarantined(), 2);
 }
 
@@ -417,4 +419,128 @@ fn following_a_finished_file_gives_what_reading_it_whole_gives() {
         .map(|reading| format!("5:{}", reading.value))
         .collect();
     assert_eq!(bench.news(), whole);
+}
+
+#[test]
+fn a_header_in_the_middle_is_taken_and_a_unit_that_changed_is_a_fault_and_no_scale() {
+    let mut bench = Bench::new("csv");
+    let at = |day: u32| format!("2017-06-{day:02}T00:00:00Z");
+    bench.write("x.csv", "time,5_displacement_mm,6_displacement_mm\n");
+    bench.append("x.csv", &format!("{},1,10\n", at(1)));
+    assert_eq!(bench.news(), ["5:1", "6:10"]);
+    bench.append("x.csv", "time,6_displacement_mm,5_displacement_cm\n");
+    bench.append("x.csv", &format!("{},11,0.2\n", at(2)));
+    assert_eq!(bench.news(), ["6:11", "5 gives its unit was mm and is cm"]);
+    bench.append("x.csv", "time,5_displacement_mm\n");
+    bench.append("x.csv", &format!("{},3\n", at(3)));
+    assert_eq!(bench.news(), ["5:3"]);
+}
+
+#[test]
+fn under_a_header_that_is_not_understood_no_row_is_taken() {
+    let mut bench = Bench::new("csv");
+    bench.write("5.csv", &format!("{HEADER}{}", row(1, 1.0)));
+    assert_eq!(bench.news(), ["5:1"]);
+    bench.append("5.csv", &format!("time,displacement_furlong\n{}", row(2, 2.0)));
+    assert!(bench.news().is_empty());
+    assert_eq!(bench.follower.quarantined(), 2);
+    bench.append("5.csv", &format!("{HEADER}{}", row(3, 3.0)));
+    assert_eq!(bench.news(), ["5:3"]);
+}
+
+#[test]
+fn ndjson_is_followed_and_a_torn_object_costs_itself_alone() {
+    let mut bench = Bench::new("ndjson");
+    let message = |day: u32| {
+        format!(r#"{{"benchmark":"5","time":"2017-06-{day:02}T00:00:00Z","value":{day},"unit":"mm"}}"#)
+    };
+    bench.write("x.ndjson", &format!("{}\n{}", message(1), &message(2)[..40]));
+    assert_eq!(bench.news(), ["5:1"]);
+    // The writer was killed and started again.
+    bench.append("x.ndjson", &format!("{}\n", message(3)));
+    assert_eq!(bench.news(), ["5:3"]);
+    assert_eq!(bench.follower.quarantined(), 1);
+}
+
+const TOA5: &str = "\"TOA5\",\"Toc\",\"CR6\",\"1\",\"\",\"\",\"\",\"Hourly\"\n\
+                    \"TIMESTAMP\",\"RECORD\",\"east\",\"north\",\"height\"\n\
+                    \"TS\",\"RN\",\"mm\",\"mm\",\"mm\"\n\"\",\"\",\"Smp\",\"Smp\",\"Smp\"\n";
+
+#[test]
+fn a_vector_is_projected_on_the_slope_and_missing_where_a_component_is() {
+    let mut bench = Bench::with(
+        "toa5",
+        "[[benchmark]]\nid = \"gnss\"\ncomponents = [\"east_mm\", \"north_mm\", \"height_mm\"]\n\
+         direction = [0, 3, -4]\n",
+    );
+    bench.write("x.toa5", TOA5);
+    assert!(bench.news().is_empty());
+    bench.append("x.toa5", "\"2017-06-06 17:00:00\",0,100,5,-5\n");
+    assert_eq!(bench.news(), ["gnss:7"], "3/5 of 5 north and 4/5 of 5 down");
+    bench.append("x.toa5", "\"2017-06-06 18:00:00\",1,100,\"NAN\",-5\n");
+    assert_eq!(bench.news(), ["gnss gives NAN in north_mm"]);
+    bench.append("x.toa5", "\"2017-06-06 19:00:00\",2,100,5,-7999\n");
+    assert_eq!(bench.news(), ["gnss gives -7999 in height_mm"]);
+}
+
+#[test]
+fn what_is_no_toa5_is_refused_until_it_is_replaced() {
+    let mut bench = Bench::new("toa5");
+    bench.write("x.toa5", &format!("{HEADER}{}", row(1, 1.0)));
+    assert!(bench.news().is_empty());
+    assert_eq!(bench.follower.quarantined(), 1);
+    let other = TOA5.replace("east", "5_displacement");
+    bench.write("y.toa5", &format!("{other}\"2017-06-06 17:00:00\",0,1,2,3\n"));
+    fs::rename(bench.path("y.toa5"), bench.path("x.toa5")).unwrap();
+    assert_eq!(bench.news(), ["5:1", "north_mm:2", "height_mm:3"]);
+}
+
+fn pack(file: &Path, text: &str) -> Vec<u8> {
+    let mut packer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+    packer.write_all(text.as_bytes()).unwrap();
+    let bytes = packer.finish().unwrap();
+    fs::write(file, &bytes).unwrap();
+    bytes
+}
+
+#[test]
+fn a_packed_file_is_read_once_whole_and_its_last_line_needs_no_newline() {
+    let mut bench = Bench::new("csv");
+    let rows: String = (1..=28).map(|day| row(day, f64::from(day))).collect();
+    let text = format!("{HEADER}{}", rows.trim_end());
+    pack(&bench.path("5.csv.gz"), &text);
+    let news = bench.news();
+    assert_eq!((news.len(), news[0].as_str(), news[27].as_str()), (28, "5:1", "5:28"));
+    assert!(bench.news().is_empty());
+    let file = bench.path("5.csv.gz");
+    let (packed, _) = read_files(&[file], &ReadOptions::default()).unwrap();
+    assert_eq!(packed.series[0].readings.len(), 28);
+    assert_eq!(packed.series[0].benchmark.as_str(), "5");
+}
+
+#[test]
+fn a_packed_file_that_is_still_being_packed_is_read_when_it_is_whole() {
+    let mut bench = Bench::new("csv");
+    let text = format!("{HEADER}{}{}", row(1, 1.0), row(2, 2.0));
+    let file = bench.path("5.csv.gz");
+    let bytes = pack(&file, &text);
+    fs::write(&file, &bytes[..bytes.len() - 10]).unwrap();
+    let early = bench.news();
+    assert!(bench.news().is_empty(), "not again and again");
+    fs::write(&file, &bytes).unwrap();
+    let all = bench.news();
+    assert_eq!(all, ["5:1", "5:2"], "after {early:?}");
+}
+
+#[test]
+fn a_packed_file_that_is_damaged_leaves_the_others_alone() {
+    let mut bench = Bench::new("csv");
+    let file = bench.path("5.csv.gz");
+    let mut bytes = pack(&file, &format!("{HEADER}{}", row(1, 1.0)));
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 0xff;
+    fs::write(&file, bytes).unwrap();
+    bench.write("6.csv", &format!("{HEADER}{}", row(2, 2.0)));
+    assert!(bench.news().contains(&"6:2".to_owned()));
+    assert!(bench.news().is_empty());
 }

@@ -131,6 +131,54 @@ fn a_sensor_that_dies_while_accelerating_leaves_its_level_latched() {
     assert_eq!(monitor.next_deadline(), None, "said once");
 }
 
+fn missing(time: Timestamp) -> Input {
+    Input::Missing {
+        benchmark: BenchmarkId::new("a"),
+        time,
+        what: "NAN".to_owned(),
+    }
+}
+
+fn faults(events: &[Event]) -> Vec<&str> {
+    let names = events.iter().filter_map(|event| match &event.kind {
+        EventKind::Fault { kind, .. } => Some(kind.as_str()),
+        _ => None,
+    });
+    names.collect()
+}
+
+#[test]
+fn a_sensor_that_gives_nan_is_a_fault_told_once_a_run_and_becomes_unknown_like_silence() {
+    let mut monitor = monitor(Policy::default());
+    let day = |day: i64| start() + (24 * day).hours();
+    let readings: Vec<(Timestamp, f64)> = (0..20).map(|one| (day(one), one as f64)).collect();
+    play(&mut monitor, &readings);
+    let due = monitor.next_deadline().unwrap();
+    let mut events = Vec::new();
+    for one in 20..23 {
+        events.extend(monitor.step(day(one), &missing(day(one))));
+    }
+    assert_eq!(faults(&events), ["sensor-fault"]);
+    assert_eq!(monitor.next_deadline(), Some(due), "a fault is no reading");
+    let silent = monitor.step(due, &Input::Tick);
+    assert_eq!(levels(&silent), [(Level::Unknown, AlertState::Firing)]);
+    assert!(matches!(&silent[0].kind, EventKind::Fault { text, .. } if text.contains("gives NAN")));
+    // What was read again is over; a reading ends the run, and the next one is told anew.
+    assert!(monitor.step(due, &missing(day(3))).is_empty());
+    let back = monitor.step(day(30), &input(day(30), 30.0, Unit::MM));
+    assert_eq!(levels(&back), [(Level::Unknown, AlertState::Resolved)]);
+    assert!(monitor.step(day(30), &missing(day(29))).is_empty());
+    let again = monitor.step(day(31), &missing(day(31)));
+    assert_eq!(faults(&again), ["sensor-fault"]);
+}
+
+#[test]
+fn a_sensor_that_never_gave_a_reading_is_a_fault_too() {
+    let mut monitor = monitor(Policy::default());
+    let events = monitor.step(start(), &missing(start()));
+    assert_eq!(faults(&events), ["sensor-fault"]);
+}
+
 #[test]
 fn every_silence_has_a_key_of_its_own() {
     let mut monitor = monitor(Policy::default());

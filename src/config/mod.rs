@@ -1,6 +1,7 @@
 //! The site file: TOML with units, unknown keys refused, all problems reported together.
 
 mod alert;
+mod broker;
 mod check;
 mod pattern;
 mod problem;
@@ -8,10 +9,13 @@ mod section;
 mod source;
 mod table;
 pub(crate) mod value;
+mod vector;
 
+pub use broker::{Broker, BrokerAddress};
 pub use check::{Summary, check};
 pub use pattern::FilePattern;
 pub use problem::{ConfigError, Problem, Severity};
+pub use vector::Vector;
 
 use crate::alert::Level;
 use crate::monitor::Settings;
@@ -31,8 +35,10 @@ pub struct Config {
     pub file: PathBuf,
     /// `[site]`.
     pub site: SiteConfig,
-    /// `[[source]]`, at least one.
+    /// `[[source]]`s that are files; there is at least one of these or of the brokers.
     pub sources: Vec<Source>,
+    /// `[[source]]`s that are topics of an MQTT broker.
+    pub brokers: Vec<Broker>,
     /// `[[benchmark]]`; with none, whatever benchmarks the files name are taken.
     pub benchmarks: Vec<Benchmark>,
     /// `[alert]` and the benchmarks' own, as the monitor takes them.
@@ -109,6 +115,8 @@ pub struct Benchmark {
     pub quantity: Option<Quantity>,
     /// The column's unit, where the column's name does not say it.
     pub unit: Option<Unit>,
+    /// The columns that hold its components, where it moves in space.
+    pub vector: Option<Vector>,
     /// The span over which each velocity is the mean.
     pub averaging: Option<SignedDuration>,
 }

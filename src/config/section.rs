@@ -2,7 +2,7 @@
 
 use super::table::{Placed, Section};
 use super::{
-    Benchmark, Config, DeclaredEvent, HookConfig, SiteConfig, Source, alert, source, value,
+    Benchmark, Config, DeclaredEvent, HookConfig, SiteConfig, alert, source, value, vector,
 };
 use crate::alert::{Level, Policy};
 use crate::monitor::{Explain, Settings};
@@ -18,10 +18,13 @@ const HOOK_TIMEOUT: Duration = Duration::from_secs(10);
 pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
     let base = file.parent().unwrap_or(Path::new(""));
     let site = site(root.table("site", "site"), base);
-    let sources = source::sources(root, base);
+    let (sources, brokers) = source::sources(root, base);
     let policy = alert::policy(root.table("alert", "alert"), &Policy::default());
     let explain = explain(root.table("explain", "explain"));
-    let (benchmarks, own) = benchmarks(root, &sources, &policy);
+    let known: Vec<&str> = (sources.iter().map(|source| source.id.as_str()))
+        .chain(brokers.iter().map(|broker| broker.id.as_str()))
+        .collect();
+    let (benchmarks, own) = benchmarks(root, &known, &policy);
     let declared = declared(root, &benchmarks);
     let hooks: Vec<HookConfig> = root
         .tables("hook", "hook")
@@ -39,6 +42,7 @@ pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
         file: file.to_owned(),
         site: site?,
         sources,
+        brokers,
         benchmarks,
         settings: Settings {
             policy,
@@ -106,7 +110,7 @@ type Own = BTreeMap<BenchmarkId, Policy>;
 
 fn benchmarks(
     root: &mut Section<'_>,
-    sources: &[Source],
+    sources: &[&str],
     policy: &Policy,
 ) -> (Vec<Benchmark>, Own) {
     let (mut taken, mut own, mut benchmarks) = (BTreeSet::new(), Own::new(), Vec::new());
@@ -130,7 +134,7 @@ fn benchmarks(
 fn benchmark(
     mut section: Section<'_>,
     id: Option<Placed<String>>,
-    sources: &[Source],
+    sources: &[&str],
 ) -> Option<Benchmark> {
     let source = benchmark_source(&mut section, sources);
     let column = section.text("column");
@@ -143,6 +147,7 @@ fn benchmark(
         Unit::parse(text).map_err(|error| error.to_string())
     });
     let averaging = section.parsed("averaging", value::duration);
+    let vector = vector::vector(&mut section, unit.as_ref().map(|given| given.value));
     if let (Some(unit), Some(quantity)) = (&unit, &quantity)
         && unit.value.quantity() != quantity.value
     {
@@ -154,6 +159,7 @@ fn benchmark(
     }
     let unit = unit
         .map(|given| given.value)
+        .or(vector.as_ref().map(|vector| vector.unit))
         .or_else(|| column_unit(&section, column.as_ref()?));
     section.finish();
     Some(Benchmark {
@@ -163,6 +169,7 @@ fn benchmark(
         quantity: quantity.map(|given| given.value),
         unit,
         averaging: averaging.map(|given| given.value),
+        vector,
     })
 }
 
@@ -187,9 +194,8 @@ fn column_unit(section: &Section<'_>, column: &Placed<String>) -> Option<Unit> {
     unit
 }
 
-fn benchmark_source(section: &mut Section<'_>, sources: &[Source]) -> Option<String> {
-    let known: Vec<&str> = sources.iter().map(|source| source.id.as_str()).collect();
-    match (section.text("source"), known.as_slice()) {
+fn benchmark_source(section: &mut Section<'_>, known: &[&str]) -> Option<String> {
+    match (section.text("source"), known) {
         (None, [only]) => Some((*only).to_owned()),
         (None, []) => None,
         (None, _) => {

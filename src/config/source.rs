@@ -2,15 +2,15 @@
 
 use super::section::unique;
 use super::table::Section;
-use super::{FilePattern, Source, SourceKind, value};
+use super::{Broker, FilePattern, Source, SourceKind, broker, value};
 use crate::reading::{Conventions, LocalClock, MissingValues, SummerTime};
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// What may stand as `kind`.
-const KINDS: &str = "supported: csv, ndjson, toa5, mcap";
+/// The words for the kinds.
+const KINDS: &str = "supported: csv, ndjson, toa5, mcap, mqtt";
 
-pub(super) fn sources(root: &mut Section<'_>, base: &Path) -> Vec<Source> {
+pub(super) fn sources(root: &mut Section<'_>, base: &Path) -> (Vec<Source>, Vec<Broker>) {
     let sections = root.tables("source", "source");
     if sections.is_empty() {
         root.error(
@@ -20,51 +20,81 @@ pub(super) fn sources(root: &mut Section<'_>, base: &Path) -> Vec<Source> {
         );
     }
     let mut taken = BTreeSet::new();
-    sections
-        .into_iter()
-        .filter_map(|section| source(section, base, &mut taken))
-        .collect()
+    let (mut sources, mut brokers) = (Vec::new(), Vec::new());
+    for section in sections {
+        match source(section, base, &mut taken) {
+            Some(Origin::Files(source)) => sources.push(source),
+            Some(Origin::Topics(broker)) => brokers.push(broker),
+            None => {}
+        }
+    }
+    (sources, brokers)
 }
 
-fn source(mut section: Section<'_>, base: &Path, taken: &mut BTreeSet<String>) -> Option<Source> {
+/// What a `[[source]]` is.
+enum Origin {
+    Files(Source),
+    Topics(Broker),
+}
+
+/// What may stand as `kind`.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Files(SourceKind),
+    Mqtt,
+}
+
+fn source(mut section: Section<'_>, base: &Path, taken: &mut BTreeSet<String>) -> Option<Origin> {
     let id = section.required("id", "\"logger\"");
     unique(&section, id.as_ref(), taken);
+    let id = id.map(|given| given.value);
     let kind = section
         .required("kind", "\"csv\"")
-        .and_then(|_| section.parsed("kind", source_kind));
+        .and_then(|_| section.parsed("kind", source_kind))
+        .map(|given| given.value);
+    if kind == Some(Kind::Mqtt) {
+        let conventions = conventions(&mut section, kind);
+        let broker = broker::broker(&mut section, id, conventions);
+        section.finish();
+        return broker.map(Origin::Topics);
+    }
     let pattern = section
         .required("path", "\"incoming/*.csv\"")
         .and_then(|_| section.parsed("path", |text| FilePattern::parse(text, base)));
-    let kind = kind.map(|given| given.value);
     let conventions = conventions(&mut section, kind);
     section.finish();
-    Some(Source {
-        id: id?.value,
-        kind: kind?,
+    let Kind::Files(kind) = kind? else {
+        return None;
+    };
+    Some(Origin::Files(Source {
+        id: id?,
+        kind,
         pattern: pattern?.value,
         conventions,
-    })
+    }))
 }
 
-fn source_kind(text: &str) -> Result<SourceKind, String> {
+fn source_kind(text: &str) -> Result<Kind, String> {
     match text {
-        "csv" => Ok(SourceKind::Csv),
-        "ndjson" => Ok(SourceKind::Ndjson),
-        "toa5" => Ok(SourceKind::Toa5),
-        "mcap" => Ok(SourceKind::Mcap),
+        "csv" => Ok(Kind::Files(SourceKind::Csv)),
+        "ndjson" => Ok(Kind::Files(SourceKind::Ndjson)),
+        "toa5" => Ok(Kind::Files(SourceKind::Toa5)),
+        "mcap" => Ok(Kind::Files(SourceKind::Mcap)),
+        "mqtt" => Ok(Kind::Mqtt),
         "nats" => Err(format!("not yet supported; {KINDS}")),
         _ => Err(KINDS.to_owned()),
     }
 }
 
 /// How the source writes times and missing values.
-fn conventions(section: &mut Section<'_>, kind: Option<SourceKind>) -> Conventions {
+fn conventions(section: &mut Section<'_>, kind: Option<Kind>) -> Conventions {
     let zone = section.parsed("time_zone", value::time_zone);
     let dst = section.parsed("dst", SummerTime::parse);
     let mut missing = MissingValues::default();
     let marks = section.marks("missing");
-    let has_marks = !marks.is_empty();
-    marks.iter().for_each(|mark| missing.add(mark));
+    let has_marks = marks.is_some();
+    let marks = marks.into_iter().flat_map(|marks| marks.value);
+    marks.for_each(|mark| missing.add(&mark));
     if let (Some(dst), None) = (&dst, &zone) {
         section.error(
             &dst.at,
@@ -72,7 +102,7 @@ fn conventions(section: &mut Section<'_>, kind: Option<SourceKind>) -> Conventio
             "add time_zone = \"Europe/Rome\", or leave dst out",
         );
     }
-    if kind == Some(SourceKind::Mcap) && (zone.is_some() || has_marks) {
+    if kind == Some(Kind::Files(SourceKind::Mcap)) && (zone.is_some() || has_marks) {
         section.warning(
             section.at(),
             "source.time_zone and source.missing do nothing for mcap".to_owned(),

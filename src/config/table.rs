@@ -161,24 +161,43 @@ impl<'t> Section<'t> {
     }
 
     /// A list of numbers and strings, each as its text.
-    pub(super) fn marks(&mut self, key: &'static str) -> Vec<String> {
-        let Some(value) = self.get(key) else {
-            return Vec::new();
+    pub(super) fn marks(&mut self, key: &'static str) -> Option<Placed<Vec<String>>> {
+        let mark = |value: &DeValue<'_>| {
+            let text = value.as_str().map(str::to_owned);
+            text.or_else(|| number(value).map(|number| number.to_string()))
         };
         let example = format!("{key} = [-7999, \"NAN\"]");
+        self.list(key, ("a number or a string", &example), mark)
+    }
+
+    /// A list of numbers.
+    pub(super) fn numbers(&mut self, key: &'static str) -> Option<Placed<Vec<f64>>> {
+        let example = format!("{key} = [0.7, 0.6, -0.4]");
+        self.list(key, ("a number", &example), number)
+    }
+
+    fn list<T>(
+        &mut self,
+        key: &'static str,
+        (wanted, example): (&str, &str),
+        read: impl Fn(&DeValue<'_>) -> Option<T>,
+    ) -> Option<Placed<Vec<T>>> {
+        let value = self.get(key)?;
         let Some(array) = value.get_ref().as_array() else {
-            self.wrong_type(key, value, "a list of numbers and strings", &example);
-            return Vec::new();
+            self.wrong_type(key, value, "a list", example);
+            return None;
         };
-        let mut marks = Vec::new();
+        let mut read_ones = Vec::new();
         for item in array {
-            let text = item.get_ref().as_str().map(str::to_owned);
-            match text.or_else(|| number(item.get_ref()).map(|number| number.to_string())) {
-                Some(mark) => marks.push(mark),
-                None => self.wrong_type(key, item, "a number or a string", &example),
+            match read(item.get_ref()) {
+                Some(one) => read_ones.push(one),
+                None => self.wrong_type(key, item, wanted, example),
             }
         }
-        marks
+        Some(Placed {
+            value: read_ones,
+            at: value.span(),
+        })
     }
 
     /// A list of strings.

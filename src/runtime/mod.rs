@@ -10,6 +10,8 @@ mod in_hand;
 pub mod ingest;
 pub mod journal;
 pub mod log;
+#[cfg(feature = "mqtt")]
+pub mod mqtt;
 pub mod replay;
 pub mod run;
 mod searches;

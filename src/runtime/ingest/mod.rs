@@ -18,6 +18,7 @@ mod table_write;
 mod text;
 mod toa5;
 mod units;
+mod vector;
 
 pub use bytes::{is_packed, unpack, unpacked_name};
 pub use columns::{ColumnMap, ColumnMapError, Measure};
@@ -30,6 +31,7 @@ pub use ndjson_write::write_ndjson;
 pub use table_write::{write_csv, write_toa5};
 pub use text::{Taken, TextFormat, TextRows};
 pub use units::FileUnits;
+pub use vector::VectorMap;
 
 use crate::reading::{
     BenchmarkId, Channel, Conventions, Disorder, Quantity, Reading, Recording, Sample, Unit,
@@ -48,6 +50,8 @@ pub struct ReadOptions {
     pub averaging: Option<SignedDuration>,
     /// How times and missing values are written.
     pub conventions: Conventions,
+    /// Readings that are given by their components.
+    pub vectors: Vec<VectorMap>,
 }
 
 impl Default for ReadOptions {
@@ -57,6 +61,7 @@ impl Default for ReadOptions {
             columns: Vec::new(),
             averaging: None,
             conventions: Conventions::default(),
+            vectors: Vec::new(),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Rows of a table whose columns are understood: cells in, readings and covariates out.
 
 use super::columns::{Column, Layout, SigmaColumn};
+use super::vector::{self, Vector};
 use super::{IngestError, Item, ReadOptions};
 use crate::reading::{BenchmarkId, Reading, Sample, Timestamp, Unit, after_days};
 use ::csv::StringRecord;
@@ -11,15 +12,17 @@ use std::path::{Path, PathBuf};
 pub(super) struct TableRows {
     file: PathBuf,
     layout: Layout,
+    vectors: Vec<Vector>,
     options: ReadOptions,
     filled: Vec<bool>,
 }
 
 impl TableRows {
-    pub(super) fn new(file: &Path, layout: Layout, options: &ReadOptions) -> Self {
+    pub(super) fn new(file: &Path, mut layout: Layout, options: &ReadOptions) -> Self {
         Self {
             file: file.into(),
             filled: vec![false; layout.names.len()],
+            vectors: vector::claim(&mut layout, &options.vectors),
             layout,
             options: options.clone(),
         }
@@ -107,7 +110,50 @@ impl Row<'_> {
                 Column::Time | Column::Days | Column::Sigma | Column::Ignored => {}
             }
         }
+        for vector in &self.rows.vectors {
+            items.extend(self.vector(time, vector)?);
+        }
         Ok(items)
+    }
+
+    /// The projection of a vector; with a component missing it is missing as a whole.
+    fn vector(&self, time: Timestamp, vector: &Vector) -> Result<Option<Item>, IngestError> {
+        let names = &self.rows.layout.names;
+        let missing = |what| {
+            Some(Item::Missing {
+                benchmark: vector.benchmark.clone(),
+                time,
+                what,
+            })
+        };
+        let (mut value, mut absent) = (0.0, Vec::new());
+        for &(index, part) in &vector.components {
+            match self.cell(index)? {
+                Cell::Number(component) => value += part * component,
+                Cell::Empty => absent.push(&names[index]),
+                Cell::Missing => {
+                    let what = format!("{} in {}", &self.cells[index], names[index]);
+                    return Ok(missing(what));
+                }
+            }
+        }
+        if absent.len() == vector.components.len() {
+            return Ok(None);
+        }
+        if let Some(name) = absent.first() {
+            return Ok(missing(format!("nothing in {name}")));
+        }
+        if !value.is_finite() {
+            let (index, _) = vector.components[0];
+            return Err(self.fail(index, "components whose sum is a finite number"));
+        }
+        let (unit, sigma) = (vector.unit, None);
+        Ok(Some(Item::Reading {
+            benchmark: vector.benchmark.clone(),
+            unit,
+            averaging: self.rows.options.averaging_of(unit, None),
+            reading: Reading { time, value, sigma },
+        }))
     }
 
     fn reading(

@@ -1,10 +1,12 @@
 //! From a source's lines and messages to what the monitor takes: which benchmarks, which columns.
 
+#[cfg(feature = "mqtt")]
+use crate::config::Broker;
 use crate::config::{Benchmark, Source, SourceKind};
 use crate::monitor::Input;
 use crate::reading::{BenchmarkId, Conventions, Quantity, Timestamp, Unit};
 use crate::runtime::ingest::{
-    ColumnMap, Item, Measure, ReadOptions, TextFormat, TextRows, unpacked_name,
+    ColumnMap, Item, Measure, ReadOptions, TextFormat, TextRows, VectorMap, unpacked_name,
 };
 use jiff::SignedDuration;
 use std::path::Path;
@@ -20,7 +22,7 @@ pub struct Arrival {
 
 /// What one source's files mean.
 #[derive(Debug, Clone)]
-pub(super) struct Decoder {
+pub(in crate::runtime) struct Decoder {
     kind: SourceKind,
     conventions: Conventions,
     /// With none, whatever benchmarks the files name are taken.
@@ -29,16 +31,26 @@ pub(super) struct Decoder {
 
 impl Decoder {
     pub(super) fn new(source: &Source, benchmarks: &[Benchmark]) -> Self {
-        let of_source = |benchmark: &&Benchmark| benchmark.source == source.id;
+        let conventions = source.conventions.clone();
         Self {
             kind: source.kind,
-            conventions: source.conventions.clone(),
-            wanted: benchmarks.iter().filter(of_source).cloned().collect(),
+            conventions,
+            wanted: of_source(&source.id, benchmarks),
+        }
+    }
+
+    /// For messages, each of which is a text of NDJSON.
+    #[cfg(feature = "mqtt")]
+    pub(in crate::runtime) fn of_messages(broker: &Broker, benchmarks: &[Benchmark]) -> Self {
+        Self {
+            kind: SourceKind::Ndjson,
+            conventions: broker.conventions.clone(),
+            wanted: of_source(&broker.id, benchmarks),
         }
     }
 
     /// The reader of the lines of `file`; `None` for recordings.
-    pub(super) fn text_rows(&self, file: &Path) -> Option<TextRows> {
+    pub(in crate::runtime) fn text_rows(&self, file: &Path) -> Option<TextRows> {
         let format = match self.kind {
             SourceKind::Csv => TextFormat::Csv,
             SourceKind::Ndjson => TextFormat::Ndjson,
@@ -57,6 +69,20 @@ impl Decoder {
             let column = |one: &&Benchmark| one.column.as_deref() == Some(name);
             self.wanted.iter().filter(column).count()
         };
+        let vectors = self.wanted.iter().filter_map(|benchmark| {
+            let vector = benchmark.vector.as_ref()?;
+            let same = |one: &&Benchmark| {
+                let columns = one.vector.as_ref().map(|vector| &vector.components);
+                columns == Some(&vector.components)
+            };
+            let is_alone = self.wanted.iter().filter(same).count() == 1;
+            let components = vector.components.iter().cloned();
+            (is_alone || benchmark.id.as_str() == stem).then(|| VectorMap {
+                benchmark: benchmark.id.clone(),
+                unit: vector.unit,
+                components: components.zip(vector.direction.iter().copied()).collect(),
+            })
+        });
         let columns = self.wanted.iter().filter_map(|benchmark| {
             let (column, unit) = (benchmark.column.as_ref()?, benchmark.unit?);
             let ours = claims(column) == 1 || benchmark.id.as_str() == stem;
@@ -68,6 +94,7 @@ impl Decoder {
         });
         ReadOptions {
             columns: columns.collect(),
+            vectors: vectors.collect(),
             conventions: self.conventions.clone(),
             ..ReadOptions::default()
         }
@@ -79,7 +106,7 @@ impl Decoder {
     }
 
     /// The item as the monitor takes it; `None` when nobody asked for it.
-    pub(super) fn arrival(&self, item: Item) -> Option<Arrival> {
+    pub(in crate::runtime) fn arrival(&self, item: Item) -> Option<Arrival> {
         match item {
             Item::Reading {
                 benchmark,
@@ -149,4 +176,9 @@ impl Decoder {
     fn wanted(&self, benchmark: &BenchmarkId) -> Option<&Benchmark> {
         self.wanted.iter().find(|one| one.id == *benchmark)
     }
+}
+
+fn of_source(id: &str, benchmarks: &[Benchmark]) -> Vec<Benchmark> {
+    let ours = |benchmark: &&Benchmark| benchmark.source == id;
+    benchmarks.iter().filter(ours).cloned().collect()
 }

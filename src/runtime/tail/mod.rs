@@ -15,6 +15,8 @@ pub mod records;
 mod text;
 
 pub use decode::Arrival;
+#[cfg(feature = "mqtt")]
+pub(super) use decode::Decoder;
 pub use follow::{Batch, Follower};
 
 use super::shutdown::Shutdown;

@@ -1,0 +1,182 @@
+//! Readings from an MQTT broker, each message acknowledged by whoever has made it durable.
+//!
+//! The session is kept under a stable name and acknowledgements are ours to give: what was not
+//! acknowledged when the process or the connection ended comes again.
+
+use super::ingest::FileUnits;
+use super::shutdown::Shutdown;
+use super::tail::{Arrival, Decoder};
+use crate::config::{Benchmark, Broker};
+use rumqttc::{
+    AsyncClient, ClientError, Event, EventLoop, MqttOptions, Packet, Publish, QoS,
+};
+use std::path::Path;
+use std::time::Duration;
+use tokio::sync::mpsc;
+
+/// Longest message whose lines are read, bytes.
+const LONGEST_MESSAGE: usize = 1 << 20;
+/// Longest packet that is taken from the broker at all, bytes.
+const LONGEST_PACKET: usize = 16 << 20;
+/// Requests that may wait for the connection.
+const REQUESTS: usize = 64;
+/// How often we tell the broker that we live.
+const KEEP_ALIVE: Duration = Duration::from_secs(30);
+/// First and longest wait before connecting again.
+const RECONNECT: (Duration, Duration) = (Duration::from_secs(1), Duration::from_secs(60));
+
+/// One message, on its way to be made durable.
+#[derive(Debug)]
+pub struct Delivery {
+    /// What it holds; nothing where it cannot be used.
+    pub arrivals: Vec<Arrival>,
+    /// Lines in it that cannot be used.
+    pub quarantined: u64,
+    /// To be given back once that is durable.
+    pub receipt: Receipt,
+}
+
+/// The acknowledgement that a message waits for.
+#[derive(Debug)]
+pub struct Receipt {
+    client: AsyncClient,
+    message: Publish,
+}
+
+impl Receipt {
+    /// Tells the broker that the message need not come again. Not to be called by the task that runs
+    /// [`follow`].
+    ///
+    /// # Errors
+    /// When that task has ended; the message comes again.
+    pub async fn acknowledge(self) -> Result<(), ClientError> {
+        self.client.ack(&self.message).await
+    }
+}
+
+/// Takes the broker's messages until `shutdown` is asked for or nobody takes the deliveries any
+/// more; a connection that breaks is made again. `client_id` names the session: one for each daemon
+/// and source, and always the same.
+pub async fn follow(
+    broker: Broker,
+    benchmarks: Vec<Benchmark>,
+    client_id: String,
+    deliveries: mpsc::Sender<Delivery>,
+    mut shutdown: Shutdown,
+) {
+    let (client, mut connection) = AsyncClient::new(options(&broker, client_id), REQUESTS);
+    let mut reader = Reader {
+        decoder: Decoder::of_messages(&broker, &benchmarks),
+        units: FileUnits::default(),
+        client,
+    };
+    let mut wait = RECONNECT.0;
+    loop {
+        tokio::select! {
+            biased;
+            () = shutdown.requested() => return,
+            came = next(&mut connection) => match came {
+                Ok(Some(Packet::ConnAck(_))) => {
+                    tracing::info!(source = broker.id, ?broker.address, "connected");
+                    wait = RECONNECT.0;
+                    // Again each time: a broker that lost its sessions has forgotten it.
+                    if let Err(error) = reader.client.try_subscribe(&broker.topic, QoS::AtLeastOnce) {
+                        tracing::error!(source = broker.id, %error, "cannot subscribe");
+                    }
+                }
+                Ok(Some(Packet::Publish(message))) => {
+                    let delivery = reader.read(message);
+                    tokio::select! {
+                        sent = deliveries.send(delivery) => if sent.is_err() { return },
+                        () = shutdown.requested() => return,
+                    }
+                }
+                Ok(Some(_) | None) => {}
+                Err(error) => {
+                    tracing::warn!(source = broker.id, %error, ?wait, "no connection; will connect again");
+                    tokio::select! {
+                        () = tokio::time::sleep(wait) => {}
+                        () = shutdown.requested() => return,
+                    }
+                    wait = (2 * wait).min(RECONNECT.1);
+                }
+            }
+        }
+    }
+}
+
+async fn next(connection: &mut EventLoop) -> Result<Option<Packet>, rumqttc::ConnectionError> {
+    Ok(match connection.poll().await? {
+        Event::Incoming(packet) => Some(packet),
+        Event::Outgoing(_) => None,
+    })
+}
+
+fn options(broker: &Broker, client_id: String) -> MqttOptions {
+    let address = &broker.address;
+    let mut options = MqttOptions::new(client_id, &address.host, address.port);
+    options
+        .set_clean_session(false)
+        .set_manual_acks(true)
+        .set_keep_alive(KEEP_ALIVE)
+        .set_max_packet_size(LONGEST_PACKET, LONGEST_PACKET);
+    if let Some((user, password)) = &address.login {
+        options.set_credentials(user, password);
+    }
+    options
+}
+
+struct Reader {
+    decoder: Decoder,
+    units: FileUnits,
+    client: AsyncClient,
+}
+
+impl Reader {
+    fn read(&mut self, message: Publish) -> Delivery {
+        let (mut arrivals, mut quarantined) = (Vec::new(), 0);
+        let mut complain = |error: &dyn std::error::Error| {
+            quarantined += 1;
+            tracing::warn!(topic = message.topic, %error, "line of a message quarantined");
+        };
+        let rows = self.decoder.text_rows(Path::new(&message.topic));
+        match (rows, text(&message.payload)) {
+            (Some(mut rows), Ok(text)) => {
+                for (line, number) in text.lines().zip(1..) {
+                    let taken = rows.take(number, line);
+                    let items = taken.items.into_iter().map(|item| self.units.guard(item));
+                    arrivals.extend(items.filter_map(|item| self.decoder.arrival(item)));
+                    if let Some(fault) = taken.fault {
+                        complain(&fault);
+                    }
+                }
+            }
+            (_, Err(error)) => complain(&error),
+            (None, Ok(_)) => {}
+        }
+        Delivery {
+            arrivals,
+            quarantined,
+            receipt: Receipt {
+                client: self.client.clone(),
+                message,
+            },
+        }
+    }
+}
+
+/// Why a message is no text.
+#[derive(Debug, thiserror::Error)]
+enum NoText {
+    #[error("longer than {LONGEST_MESSAGE} bytes")]
+    TooLong,
+    #[error(transparent)]
+    NotUtf8(#[from] std::str::Utf8Error),
+}
+
+fn text(payload: &[u8]) -> Result<&str, NoText> {
+    if payload.len() > LONGEST_MESSAGE {
+        return Err(NoText::TooLong);
+    }
+    Ok(std::str::from_utf8(payload)?)
+}

@@ -1,0 +1,210 @@
+//! Readings from a real Mosquitto: none is lost that was not acknowledged.
+#![cfg(feature = "mqtt")]
+#![allow(missing_docs, reason = "the claims are the names")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::print_stdout,
+    reason = "a test fails by panicking; a skipped one must say so"
+)]
+
+use rumqttc::{AsyncClient, Event, MqttOptions, Packet, QoS};
+use slipwatch::config::{self, Config};
+use slipwatch::monitor::Input;
+use slipwatch::runtime::mqtt::{Delivery, follow};
+use slipwatch::runtime::shutdown::{self, Trigger};
+use std::net::TcpListener;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+use tempfile::TempDir;
+use tokio::sync::mpsc::{self, Receiver};
+use tokio::task::JoinHandle;
+
+const LIMIT: Duration = Duration::from_secs(30);
+
+/// A broker of our own, on a port of its own.
+struct Mosquitto {
+    program: &'static str,
+    folder: TempDir,
+    port: u16,
+    process: Child,
+}
+
+impl Mosquitto {
+    fn start() -> Option<Self> {
+        let programs = ["/usr/sbin/mosquitto", "/usr/bin/mosquitto", "/usr/local/sbin/mosquitto"];
+        let Some(program) = programs.into_iter().find(|one| Path::new(one).exists()) else {
+            println!("skipped: Mosquitto is not installed (apt-get install mosquitto)");
+            return None;
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let free = TcpListener::bind("127.0.0.1:0").unwrap();
+        let port = free.local_addr().unwrap().port();
+        drop(free);
+        let conf = folder.path().join("mosquitto.conf");
+        let text = format!(
+            "listener {port} 127.0.0.1\nallow_anonymous true\npersistence true\n\
+             persistence_location {}/\nuser root\n",
+            folder.path().display()
+        );
+        std::fs::write(conf, text).unwrap();
+        let process = spawn(program, &folder);
+        Some(Self {
+            program,
+            folder,
+            port,
+            process,
+        })
+    }
+
+    /// Ends it as a reboot would, and starts it again.
+    fn restart(&mut self) {
+        let id = self.process.id().to_string();
+        assert!(Command::new("kill").arg(id).status().unwrap().success());
+        self.process.wait().unwrap();
+        self.process = spawn(self.program, &self.folder);
+    }
+
+    fn config(&self) -> Config {
+        let text = format!(
+            "[site]\nname = \"Toc\"\nstate_dir = \"state\"\n[[source]]\nid = \"radio\"\n\
+             kind = \"mqtt\"\nurl = \"mqtt://127.0.0.1:{}\"\ntopic = \"site/+/displacement\"\n",
+            self.port
+        );
+        config::parse(&text, Path::new("site.toml")).unwrap()
+    }
+
+    /// Publishes and waits until the broker has it all.
+    async fn publish(&self, payloads: &[String]) {
+        let options = MqttOptions::new("writer", "127.0.0.1", self.port);
+        let (client, mut connection) = AsyncClient::new(options, 100);
+        for payload in payloads {
+            client
+                .publish("site/5/displacement", QoS::AtLeastOnce, false, payload.as_bytes())
+                .await
+                .unwrap();
+        }
+        let mut taken = 0;
+        while taken < payloads.len() {
+            match tokio::time::timeout(LIMIT, connection.poll()).await.unwrap() {
+                Ok(Event::Incoming(Packet::PubAck(_))) => taken += 1,
+                Ok(_) => {}
+                // The broker is not up yet.
+                Err(_) => tokio::time::sleep(Duration::from_millis(50)).await,
+            }
+        }
+    }
+}
+
+fn spawn(program: &str, folder: &TempDir) -> Child {
+    Command::new(program)
+        .arg("-c")
+        .arg(folder.path().join("mosquitto.conf"))
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap()
+}
+
+impl Drop for Mosquitto {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+/// A daemon's source at work.
+struct Source {
+    deliveries: Receiver<Delivery>,
+    stop: Trigger,
+    task: JoinHandle<()>,
+}
+
+impl Source {
+    fn start(broker: &Mosquitto) -> Self {
+        let config = broker.config();
+        let (sender, deliveries) = mpsc::channel(8);
+        let (stop, stopped) = shutdown::pair();
+        let radio = config.brokers[0].clone();
+        let id = "slipwatch-toc-radio".to_owned();
+        let task = tokio::spawn(follow(radio, config.benchmarks, id, sender, stopped));
+        Self {
+            deliveries,
+            stop,
+            task,
+        }
+    }
+
+    async fn next(&mut self) -> Delivery {
+        let came = tokio::time::timeout(LIMIT, self.deliveries.recv()).await;
+        came.expect("in time").expect("a delivery")
+    }
+
+    async fn end(self) {
+        self.stop.pull();
+        self.task.await.unwrap();
+    }
+}
+
+fn message(day: usize) -> String {
+    format!(r#"{{"benchmark":"5","time":"2017-06-{day:02}T00:00:00Z","value":{day},"unit":"mm"}}"#)
+}
+
+fn values(delivery: &Delivery) -> Vec<f64> {
+    let value = |input: &Input| match input {
+        Input::Reading { reading, .. } => reading.value,
+        Input::Sample { .. } | Input::Missing { .. } | Input::Found(_) | Input::Tick => f64::NAN,
+    };
+    delivery.arrivals.iter().map(|one| value(&one.input)).collect()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_was_acknowledged_does_not_come_again_and_what_was_not_does() {
+    let Some(broker) = Mosquitto::start() else { return };
+    // The session must be there before anything is written.
+    let mut first = Source::start(&broker);
+    tokio::time::sleep(Duration::from_millis(1500)).await;
+    broker.publish(&(1..=5).map(message).collect::<Vec<_>>()).await;
+    for day in [1.0, 2.0] {
+        let delivery = first.next().await;
+        assert_eq!(values(&delivery), [day]);
+        delivery.receipt.acknowledge().await.unwrap();
+    }
+    // Taken, and the daemon ends before it is durable.
+    assert_eq!(values(&first.next().await), [3.0]);
+    tokio::time::sleep(Duration::from_millis(500)).await;
+    first.end().await;
+    broker.publish(&[message(6)]).await;
+    let mut second = Source::start(&broker);
+    let mut came = Vec::new();
+    while came.len() < 4 {
+        let delivery = second.next().await;
+        came.extend(values(&delivery));
+        delivery.receipt.acknowledge().await.unwrap();
+    }
+    assert_eq!(came, [3.0, 4.0, 5.0, 6.0]);
+    second.end().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_broker_that_restarts_is_found_again_and_a_bad_line_stops_nothing() {
+    let Some(mut broker) = Mosquitto::start() else { return };
+    let mut source = Source::start(&broker);
+    tokio::time::sleep(Duration::from_millis(1500)).await;
+    let two = format!("{}\n{{\"torn\": {}\n\n", message(1), message(2));
+    broker.publish(&[two, "\u{0}".to_owned()]).await;
+    let delivery = source.next().await;
+    assert_eq!((values(&delivery), delivery.quarantined), (vec![1.0, 2.0], 1));
+    delivery.receipt.acknowledge().await.unwrap();
+    let delivery = source.next().await;
+    assert_eq!((values(&delivery), delivery.quarantined), (vec![], 1));
+    delivery.receipt.acknowledge().await.unwrap();
+    tokio::time::sleep(Duration::from_millis(300)).await;
+    broker.restart();
+    broker.publish(&[message(3)]).await;
+    let delivery = source.next().await;
+    assert_eq!(values(&delivery), [3.0]);
+    delivery.receipt.acknowledge().await.unwrap();
+    source.end().await;
+}
