@@ -235,28 +235,62 @@ fn check_warns_when_the_sampling_cannot_protect_and_when_the_hook_is_missing() {
 
 #[test]
 fn how_a_source_writes_times_and_missing_values_is_checked() {
-    let source = |lines: &str| format!("[[source]]\nid = \"b\"\nkind = \"toa5\"\npath = \"b.dat\"\n{lines}");
+    let source =
+        |lines: &str| format!("[[source]]\nid = \"b\"\nkind = \"toa5\"\npath = \"b.dat\"\n{lines}");
     let cases = [
-        ("time_zone = \"Roma\"\n", "14:13: error: source.time_zone = \"Roma\" cannot be used; write an IANA name"),
-        ("dst = \"standard\"\n", "14:7: error: source.dst is given without source.time_zone"),
-        ("time_zone = \"Europe/Rome\"\ndst = \"winter\"\n", "15:7: error: source.dst = \"winter\" cannot be used; write reject"),
-        ("missing = -7999\n", "14:11: error: source.missing is of type integer, not a list; write missing = [-7999"),
-        ("missing = [true]\n", "14:12: error: source.missing is of type boolean, not a number or a string"),
+        (
+            "time_zone = \"Roma\"\n",
+            "14:13: error: source.time_zone = \"Roma\" cannot be used; write an IANA name",
+        ),
+        (
+            "dst = \"standard\"\n",
+            "14:7: error: source.dst is given without source.time_zone",
+        ),
+        (
+            "time_zone = \"Europe/Rome\"\ndst = \"winter\"\n",
+            "15:7: error: source.dst = \"winter\" cannot be used; write reject",
+        ),
+        (
+            "missing = -7999\n",
+            "14:11: error: source.missing is of type integer, not a list; write missing = [-7999",
+        ),
+        (
+            "missing = [true]\n",
+            "14:12: error: source.missing is of type boolean, not a number or a string",
+        ),
     ];
     for (lines, expected) in cases {
         let found = problem(&source(lines));
-        assert!(found.starts_with(&format!("site.toml:{expected}")), "{found}");
+        assert!(
+            found.starts_with(&format!("site.toml:{expected}")),
+            "{found}"
+        );
     }
 }
 
 #[test]
 fn a_vector_without_a_direction_or_a_unit_is_refused() {
     let cases = [
-        ("components = [\"east_mm\", \"north_mm\"]\n", "are not both given"),
-        ("components = [\"east_mm\", \"north_mm\"]\ndirection = [1]\n", "1 numbers for 2 components"),
-        ("components = [\"east_mm\", \"north_mm\"]\ndirection = [0, 0.0]\n", "is no direction"),
-        ("components = [\"east_mm\", \"north_cm\"]\ndirection = [1, 1]\n", "do not all say one unit"),
-        ("column = \"x_mm\"\nunit = \"mm\"\ncomponents = [\"east\", \"north\"]\ndirection = [1, 1]\n", "do not go with"),
+        (
+            "components = [\"east_mm\", \"north_mm\"]\n",
+            "are not both given",
+        ),
+        (
+            "components = [\"east_mm\", \"north_mm\"]\ndirection = [1]\n",
+            "1 numbers for 2 components",
+        ),
+        (
+            "components = [\"east_mm\", \"north_mm\"]\ndirection = [0, 0.0]\n",
+            "is no direction",
+        ),
+        (
+            "components = [\"east_mm\", \"north_cm\"]\ndirection = [1, 1]\n",
+            "do not all say one unit",
+        ),
+        (
+            "column = \"x_mm\"\nunit = \"mm\"\ncomponents = [\"east\", \"north\"]\ndirection = [1, 1]\n",
+            "do not go with",
+        ),
     ];
     for (lines, expected) in cases {
         let found = problem(&format!("[[benchmark]]\nid = \"5\"\n{lines}"));
@@ -271,11 +305,21 @@ fn a_broker_is_read_where_the_build_has_mqtt_and_refused_with_the_remedy_where_n
     if cfg!(feature = "mqtt") {
         let config = config::parse(&format!("{RIGHT}{source}"), Path::new("site.toml")).unwrap();
         let address = &config.brokers[0].address;
-        assert_eq!((address.host.as_str(), address.port), ("broker.local", 1883));
-        assert!(!format!("{config:?}").contains("secret"), "a password in a log");
-        for (right, wrong) in [("mqtt://", "mqtts://"), ("local\"", "local:99999\""), ("site/+", "site/a+")] {
-            let found = problem(&source.replace(right, wrong));
-            assert!(found.contains("cannot be used; write"), "{found}");
+        assert_eq!(
+            (address.host.as_str(), address.port),
+            ("broker.local", 1883)
+        );
+        assert!(
+            !format!("{config:?}").contains("secret"),
+            "a password in a log"
+        );
+        for (right, wrong) in [
+            ("mqtt://", "mqtts://"),
+            ("local\"", "local:99999\""),
+            ("site/+", "site/a+"),
+        ] {
+            let found = problems(&format!("{RIGHT}{}", source.replace(right, wrong)));
+            assert!(found[0].contains("cannot be used; write"), "{found:?}");
         }
     } else {
         assert!(problem(source).contains("build with --features mqtt"));

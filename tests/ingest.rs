@@ -425,3 +425,41 @@ proptest! {
         assert_identical(&recording, &read(&table).unwrap().0);
     }
 }
+
+#[test]
+fn a_local_time_needs_a_zone_and_its_error_says_so() {
+    let folder = TempDir::new().unwrap();
+    let text = "time,a_displacement_mm\n2017-06-06 17:00:00,1\n2017-06-06T18:00:00Z,2\n";
+    let file = write(&folder, "a.csv", text);
+    let error = read(&file).unwrap_err().to_string();
+    for part in ["line 2", "2017-06-06 17:00:00", "time_zone", "--time-zone"] {
+        assert!(error.contains(part), "{part} is not in: {error}");
+    }
+    let mut options = ReadOptions::default();
+    options.conventions.clock.zone = Some(jiff::tz::TimeZone::get("Europe/Rome").unwrap());
+    let (recording, _) = read_files(&[file], &options).unwrap();
+    let times: Vec<String> = (recording.series[0].readings.iter())
+        .map(|reading| reading.time.to_string())
+        .collect();
+    assert_eq!(times, ["2017-06-06T15:00:00Z", "2017-06-06T18:00:00Z"]);
+}
+
+#[test]
+fn marks_for_missing_values_are_left_out_and_counted_and_the_file_is_read_on() {
+    let text = "time,a_displacement_mm,rain_mm\n2020-01-01T00:00:00Z,NAN,1\n\
+                2020-01-02T00:00:00Z,-inf,inf\n2020-01-03T00:00:00Z,-7999,\n\
+                2020-01-04T00:00:00Z,,2\n";
+    let (recording, disorder) = read_text(text).unwrap();
+    let values = |recording: &Recording| -> Vec<f64> {
+        let readings = recording.series[0].readings.iter();
+        readings.map(|reading| reading.value).collect()
+    };
+    assert_eq!((values(&recording), disorder.missing), (vec![-7999.0], 2));
+    assert_eq!(recording.channels[0].samples.len(), 2);
+    let folder = TempDir::new().unwrap();
+    let mut options = ReadOptions::default();
+    options.conventions.missing.add("-7999");
+    let file = write(&folder, "x.csv", text);
+    let (recording, disorder) = read_files(&[file], &options).unwrap();
+    assert_eq!((recording.series.len(), disorder.missing), (0, 3));
+}

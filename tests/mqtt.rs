@@ -33,7 +33,11 @@ struct Mosquitto {
 
 impl Mosquitto {
     fn start() -> Option<Self> {
-        let programs = ["/usr/sbin/mosquitto", "/usr/bin/mosquitto", "/usr/local/sbin/mosquitto"];
+        let programs = [
+            "/usr/sbin/mosquitto",
+            "/usr/bin/mosquitto",
+            "/usr/local/sbin/mosquitto",
+        ];
         let Some(program) = programs.into_iter().find(|one| Path::new(one).exists()) else {
             println!("skipped: Mosquitto is not installed (apt-get install mosquitto)");
             return None;
@@ -81,13 +85,21 @@ impl Mosquitto {
         let (client, mut connection) = AsyncClient::new(options, 100);
         for payload in payloads {
             client
-                .publish("site/5/displacement", QoS::AtLeastOnce, false, payload.as_bytes())
+                .publish(
+                    "site/5/displacement",
+                    QoS::AtLeastOnce,
+                    false,
+                    payload.as_bytes(),
+                )
                 .await
                 .unwrap();
         }
         let mut taken = 0;
         while taken < payloads.len() {
-            match tokio::time::timeout(LIMIT, connection.poll()).await.unwrap() {
+            match tokio::time::timeout(LIMIT, connection.poll())
+                .await
+                .unwrap()
+            {
                 Ok(Event::Incoming(Packet::PubAck(_))) => taken += 1,
                 Ok(_) => {}
                 // The broker is not up yet.
@@ -156,16 +168,24 @@ fn values(delivery: &Delivery) -> Vec<f64> {
         Input::Reading { reading, .. } => reading.value,
         Input::Sample { .. } | Input::Missing { .. } | Input::Found(_) | Input::Tick => f64::NAN,
     };
-    delivery.arrivals.iter().map(|one| value(&one.input)).collect()
+    delivery
+        .arrivals
+        .iter()
+        .map(|one| value(&one.input))
+        .collect()
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn what_was_acknowledged_does_not_come_again_and_what_was_not_does() {
-    let Some(broker) = Mosquitto::start() else { return };
+    let Some(broker) = Mosquitto::start() else {
+        return;
+    };
     // The session must be there before anything is written.
     let mut first = Source::start(&broker);
     tokio::time::sleep(Duration::from_millis(1500)).await;
-    broker.publish(&(1..=5).map(message).collect::<Vec<_>>()).await;
+    broker
+        .publish(&(1..=5).map(message).collect::<Vec<_>>())
+        .await;
     for day in [1.0, 2.0] {
         let delivery = first.next().await;
         assert_eq!(values(&delivery), [day]);
@@ -189,13 +209,18 @@ async fn what_was_acknowledged_does_not_come_again_and_what_was_not_does() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_broker_that_restarts_is_found_again_and_a_bad_line_stops_nothing() {
-    let Some(mut broker) = Mosquitto::start() else { return };
+    let Some(mut broker) = Mosquitto::start() else {
+        return;
+    };
     let mut source = Source::start(&broker);
     tokio::time::sleep(Duration::from_millis(1500)).await;
     let two = format!("{}\n{{\"torn\": {}\n\n", message(1), message(2));
     broker.publish(&[two, "\u{0}".to_owned()]).await;
     let delivery = source.next().await;
-    assert_eq!((values(&delivery), delivery.quarantined), (vec![1.0, 2.0], 1));
+    assert_eq!(
+        (values(&delivery), delivery.quarantined),
+        (vec![1.0, 2.0], 1)
+    );
     delivery.receipt.acknowledge().await.unwrap();
     let delivery = source.next().await;
     assert_eq!((values(&delivery), delivery.quarantined), (vec![], 1));

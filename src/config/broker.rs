@@ -95,6 +95,9 @@ fn topic(text: &str) -> Result<String, String> {
     if before.iter().all(|level| plain(level)) && (plain(last) || *last == "#") {
         Ok(text.to_owned())
     } else {
-        Err("write + for one whole level, and # only as the last one: \"site/+/displacement\"".to_owned())
+        Err(
+            "write + for one whole level, and # only as the last one: \"site/+/displacement\""
+                .to_owned(),
+        )
     }
 }

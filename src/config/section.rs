@@ -108,11 +108,7 @@ pub(super) fn unique(
 
 type Own = BTreeMap<BenchmarkId, Policy>;
 
-fn benchmarks(
-    root: &mut Section<'_>,
-    sources: &[&str],
-    policy: &Policy,
-) -> (Vec<Benchmark>, Own) {
+fn benchmarks(root: &mut Section<'_>, sources: &[&str], policy: &Policy) -> (Vec<Benchmark>, Own) {
     let (mut taken, mut own, mut benchmarks) = (BTreeSet::new(), Own::new(), Vec::new());
     for mut section in root.tables("benchmark", "benchmark") {
         let id = section.required("id", "\"5\"");

@@ -34,7 +34,12 @@ pub(super) fn vector(section: &mut Section<'_>, unit: Option<Unit>) -> Option<Ve
         let what = "benchmark.column and benchmark.quantity do not go with benchmark.components";
         section.error(&components.at, what.to_owned(), "leave them out");
     }
-    let length = direction.value.iter().map(|part| part * part).sum::<f64>().sqrt();
+    let length = direction
+        .value
+        .iter()
+        .map(|part| part * part)
+        .sum::<f64>()
+        .sqrt();
     let counts = (components.value.len(), direction.value.len());
     if counts.0 != counts.1 || !(2..=3).contains(&counts.0) || !(length > 0.0 && length.is_finite())
     {
@@ -45,7 +50,11 @@ pub(super) fn vector(section: &mut Section<'_>, unit: Option<Unit>) -> Option<Ve
         section.error(&direction.at, what, format!("write {EXAMPLE}"));
         return None;
     }
-    let names: Vec<String> = components.value.into_iter().map(|name| name.value).collect();
+    let names: Vec<String> = components
+        .value
+        .into_iter()
+        .map(|name| name.value)
+        .collect();
     let mut units = names.iter().map(|name| unit.or_else(|| unit_of(name)));
     let first = units.next().flatten();
     let Some(unit) = first.filter(|_| units.all(|unit| unit == first)) else {

@@ -106,10 +106,11 @@ impl LocalClock {
     /// [`TimeFault`] says why there is no such instant, or no single one.
     pub fn instant(&self, text: &str) -> Result<Timestamp, TimeFault> {
         // A date has two dashes in its first ten places; a sign or a Z after them is an offset.
-        let states_offset = text
-            .get(10..)
-            .is_some_and(|time| time.contains(['Z', 'z', '+', '-']));
-        let Some(zone) = self.zone.as_ref().filter(|_| !states_offset) else {
+        let states_offset = || {
+            let time = text.get(10..);
+            time.is_some_and(|time| time.contains(['Z', 'z', '+', '-']))
+        };
+        let Some(zone) = self.zone.as_ref().filter(|_| !states_offset()) else {
             return text.parse().map_err(|_| TimeFault::NotATime);
         };
         if !text.contains(':') {
@@ -179,8 +180,7 @@ impl MissingValues {
 
     /// Whether a number is such a mark.
     pub fn has_number(&self, number: f64) -> bool {
-        #[expect(clippy::float_cmp, reason = "a mark is that very number")]
-        self.numbers.iter().any(|mark| *mark == number)
+        self.numbers.contains(&number)
     }
 }
 

@@ -7,9 +7,7 @@ use super::ingest::FileUnits;
 use super::shutdown::Shutdown;
 use super::tail::{Arrival, Decoder};
 use crate::config::{Benchmark, Broker};
-use rumqttc::{
-    AsyncClient, ClientError, Event, EventLoop, MqttOptions, Packet, Publish, QoS,
-};
+use rumqttc::{AsyncClient, ClientError, Event, EventLoop, MqttOptions, Packet, Publish, QoS};
 use std::path::Path;
 use std::time::Duration;
 use tokio::sync::mpsc;

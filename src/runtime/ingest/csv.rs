@@ -4,7 +4,7 @@
 //! Every other cell holds one finite number, or a mark that the sensor gave none. Times are kept as
 //! instants: the offset in which they were written is not.
 
-use super::columns::{Layout, Name, name_of};
+use super::columns::Layout;
 use super::split::Splitter;
 use super::table::TableRows;
 use super::{IngestError, Item, ReadOptions};
@@ -101,8 +101,12 @@ impl CsvRows {
 
     /// A logger that starts again writes its header again; no other row has `time` for a time.
     fn is_header(&self) -> bool {
-        let mut names = self.cells.iter().map(name_of);
-        names.any(|name| matches!(name, Name::Time | Name::Days))
+        let is_name = |cell: &str| {
+            ["time", "t_days"]
+                .iter()
+                .any(|name| cell.eq_ignore_ascii_case(name))
+        };
+        self.cells.iter().any(is_name)
     }
 
     fn understand(&mut self, line: u64, text: &str) -> Result<(), IngestError> {

@@ -109,7 +109,11 @@ impl NdjsonRows {
         let name = match name {
             Value::String(name) if !name.trim().is_empty() => name.clone(),
             Value::Number(number) => number.to_string(),
-            _ => return Err(fields.fail("name", name.to_string(), "a name")),
+            Value::Null
+            | Value::Bool(_)
+            | Value::String(_)
+            | Value::Array(_)
+            | Value::Object(_) => return Err(fields.fail("name", name.to_string(), "a name")),
         };
         let conventions = &self.options.conventions;
         let text = fields.text("time")?.unwrap_or_default();

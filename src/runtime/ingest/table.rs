@@ -201,11 +201,11 @@ impl Row<'_> {
         if cell.is_empty() {
             return Ok(Cell::Empty);
         }
-        if self.rows.options.conventions.missing.has(cell) {
-            return Ok(Cell::Missing);
-        }
+        let marks = &self.rows.options.conventions.missing;
         match cell.parse::<f64>() {
+            Ok(value) if value.is_finite() && marks.has_number(value) => Ok(Cell::Missing),
             Ok(value) if value.is_finite() => Ok(Cell::Number(value)),
+            _ if marks.has(cell) => Ok(Cell::Missing),
             _ => Err(self.fail(
                 index,
                 "a finite number, or an empty cell where it is missing",
