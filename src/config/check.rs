@@ -125,7 +125,13 @@ impl Config {
         let listen = self.site.listen.map(|address| {
             format!("site.listen = \"{address}\": nothing listens there yet; leave it out")
         });
-        listen.into_iter().chain(events).collect()
+        let brokers = self.brokers.iter().map(|broker| {
+            let id = &broker.id;
+            format!(
+                "source {id:?}: the daemon does not listen to brokers yet; no reading comes from it"
+            )
+        });
+        listen.into_iter().chain(brokers).chain(events).collect()
     }
 }
 
