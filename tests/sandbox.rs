@@ -110,3 +110,22 @@ async fn a_hook_within_walls_that_is_missing_fails_and_one_that_hangs_is_killed(
     hanging.timeout = Duration::from_millis(500);
     assert_eq!(hook::run(&hanging, &alert(), 1).await, Outcome::TimedOut);
 }
+
+#[tokio::test]
+async fn a_hook_of_a_config_under_a_relative_path_is_found() {
+    let folder = folder();
+    let here = std::env::current_dir().unwrap();
+    // The tests run in the repository, and the folder lies below it.
+    let relative = folder.path().strip_prefix(&here).unwrap();
+    fs::write(folder.path().join("hook.sh"), "#!/bin/sh\ntouch ran\n").unwrap();
+    let mode = std::os::unix::fs::PermissionsExt::from_mode(0o755);
+    fs::set_permissions(folder.path().join("hook.sh"), mode).unwrap();
+    for launcher in [true, false] {
+        let mut hook = walled(relative, &["./hook.sh"]);
+        if !launcher {
+            hook.launcher = None;
+        }
+        assert_eq!(hook::run(&hook, &alert(), 1).await, Outcome::Done);
+        fs::remove_file(folder.path().join("ran")).unwrap();
+    }
+}

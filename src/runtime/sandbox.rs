@@ -75,19 +75,29 @@ pub fn probe() -> Walls {
 
 /// The command that runs `hook`, walled in where it has a launcher.
 pub(super) fn command(hook: &HookConfig) -> tokio::process::Command {
-    let arguments = hook.run.iter().skip(1);
+    let (program, arguments) = (from_anywhere(&hook.program()), hook.run.iter().skip(1));
     let Some(launcher) = &hook.launcher else {
-        let mut command = tokio::process::Command::new(hook.program());
+        let mut command = tokio::process::Command::new(program);
         command.args(arguments);
         return command;
     };
     let mut command = tokio::process::Command::new(launcher);
     command.args(["hook", "exec", "--writable", "."]);
     for path in &hook.writable {
-        command.arg("--writable").arg(path);
+        command.arg("--writable").arg(from_anywhere(path));
     }
-    command.arg("--").arg(hook.program()).args(arguments);
+    command.arg("--").arg(program).args(arguments);
     command
+}
+
+/// The path as it can be used from the hook's folder too, where the hook is started; a bare name
+/// is looked up in `PATH`.
+fn from_anywhere(path: &Path) -> PathBuf {
+    if path.components().count() > 1 {
+        std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
+    } else {
+        path.to_owned()
+    }
 }
 
 /// Becomes `program`, which may write below `writable`, in `/tmp` and to `/dev/null`; without
