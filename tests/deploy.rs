@@ -28,7 +28,7 @@ fn tool(name: &str, arguments: &[&str]) -> Option<Output> {
     command.args(arguments).current_dir(root());
     let output = command.stdin(Stdio::null()).output();
     if output.is_err() {
-        eprintln!("skipped: {name} is not installed");
+        let _ = writeln!(std::io::stderr(), "skipped: {name} is not installed");
     }
     output.ok()
 }

@@ -4,12 +4,10 @@ use super::args::{Format, OutputArgs};
 use crate::config;
 use crate::runtime::log::{self, LogFormat};
 use crate::runtime::run as daemon;
+use crate::runtime::sandbox::OURSELVES;
 use crate::runtime::shutdown::Shutdown;
 use anyhow::Context;
 use std::path::{Path, PathBuf};
-
-/// This program, even after an upgrade has put another one in its place.
-const OURSELVES: &str = "/proc/self/exe";
 
 /// Watch a site: follow its files, write events to its state folder, run its hooks
 #[derive(Debug, clap::Args)]

@@ -6,11 +6,11 @@ use super::delivered::Delivered;
 use super::event_log::EventLog;
 use super::hook::Status;
 use super::pulse::{Pulse, PulseError};
-use super::sandbox::{self, Walls};
+use super::sandbox;
 use super::shutdown::{self, Shutdown};
 use super::site::{Counts, Sinks, Site};
 use super::tail::{self, Arrival, Batch, Follower};
-use crate::config::{Config, HookConfig};
+use crate::config::Config;
 use crate::monitor::Input;
 use std::fs::{File, TryLockError};
 use std::io;
@@ -85,7 +85,7 @@ pub async fn run(
     for what in config.without_effect() {
         tracing::warn!("{what}");
     }
-    say_walls(&config.hooks);
+    sandbox::announce(&config.hooks);
     let mut pulse = Pulse::start(&config.site, None).await?;
     let dispatcher = Dispatcher::start(&config.hooks, &Retry::default(), delivered);
     let sinks = Sinks {
@@ -150,17 +150,22 @@ async fn work(
                 progress.send_replace(Progress { counts, is_caught_up });
             }
             // Data time is the clock's only once the past has been read.
-            _ = tick.tick() => if is_caught_up { tokio::task::block_in_place(|| {
-                let now = clock::now();
-                pulse.vitals.note(&site.pass(now));
-                site.commit(now)?;
-                if is_up_to_date {
-                    site.caught_up(now);
-                }
-                Ok::<(), io::Error>(())
-            })? },
+            _ = tick.tick() => if is_caught_up {
+                tokio::task::block_in_place(|| pass(site, pulse, is_up_to_date))?;
+            },
         }
     }
+}
+
+/// Lets time go by to the present.
+fn pass(site: &mut Site, pulse: &Pulse, is_up_to_date: bool) -> io::Result<()> {
+    let now = clock::now();
+    pulse.vitals.note(&site.pass(now));
+    site.commit(now)?;
+    if is_up_to_date {
+        site.caught_up(now);
+    }
+    Ok(())
 }
 
 /// Steps the monitor through a batch; a stop that is asked for half-way ends it after a value.
@@ -200,22 +205,6 @@ fn take(site: &mut Site, arrival: &Arrival, pulse: &Pulse) {
         }
         Input::Reading { .. } | Input::Sample { .. } | Input::Tick | Input::Found(_) => {
             pulse.vitals.note(&events);
-        }
-    }
-}
-
-/// Says how far hooks are kept from writing elsewhere.
-fn say_walls(hooks: &[HookConfig]) {
-    if hooks.iter().all(|hook| hook.launcher.is_none()) {
-        return;
-    }
-    match sandbox::probe() {
-        Walls::Whole => tracing::info!("hooks can write only where they are allowed to"),
-        Walls::Partial => {
-            tracing::warn!("an old kernel: hooks are kept from most writes elsewhere")
-        }
-        Walls::Missing => {
-            tracing::warn!("no landlock in this kernel: hooks can write wherever the daemon can");
         }
     }
 }

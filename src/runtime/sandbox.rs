@@ -17,6 +17,8 @@ use std::process::Command;
 
 /// Linux 6.2: files can be kept from being truncated. Later ones would also bind devices' controls.
 const KERNEL: ABI = ABI::V3;
+/// This program, even after an upgrade has put another one in its place.
+pub const OURSELVES: &str = "/proc/self/exe";
 /// Where every hook may write.
 const ALWAYS_WRITABLE: [&str; 2] = ["/tmp", "/dev/null"];
 
@@ -71,6 +73,24 @@ fn wall_in(writable: &[PathBuf]) -> Result<Walls, RulesetError> {
 pub fn probe() -> Walls {
     let tried = std::thread::spawn(|| wall_in(&[])).join();
     tried.ok().and_then(Result::ok).unwrap_or(Walls::Missing)
+}
+
+/// Says in the log how far `hooks` are kept from writing elsewhere.
+pub fn announce(hooks: &[HookConfig]) {
+    if hooks.iter().all(|hook| hook.launcher.is_none()) {
+        return;
+    }
+    match probe() {
+        Walls::Whole => tracing::info!("hooks can write only where they are allowed to"),
+        Walls::Partial => {
+            tracing::warn!(
+                "an old kernel: hooks are kept from most writes elsewhere, not from all"
+            );
+        }
+        Walls::Missing => {
+            tracing::warn!("no landlock in this kernel: hooks can write wherever the daemon can");
+        }
+    }
 }
 
 /// The command that runs `hook`, walled in where it has a launcher.

@@ -109,7 +109,7 @@ fn kind(folder: &Path) -> nix::Result<(String, Kind)> {
     let there = there.filter(|path| !path.as_os_str().is_empty());
     let magic = statfs(there.unwrap_or(Path::new(".")))?.filesystem_type().0;
     // 32-bit numbers, which some machines sign-extend.
-    let magic = i64::try_from(magic).unwrap_or(-1) & 0xFFFF_FFFF;
+    let magic = magic & 0xFFFF_FFFF;
     let known = FILE_SYSTEMS.iter().find(|(number, ..)| *number == magic);
     Ok(match known {
         Some((_, name, kind)) => ((*name).to_owned(), *kind),
