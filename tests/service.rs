@@ -1,7 +1,5 @@
 //! What the daemon tells a service manager, on a real socket.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use std::fs;
