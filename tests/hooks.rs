@@ -48,6 +48,9 @@ fn hook(script: &str) -> (TempDir, HookConfig) {
         levels: vec![Level::Orange, Level::Red],
         timeout: Duration::from_secs(30),
         folder: folder.path().to_owned(),
+        sandbox: false,
+        writable: Vec::new(),
+        launcher: None,
     };
     (folder, config)
 }

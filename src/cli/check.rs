@@ -3,8 +3,9 @@
 use super::args::{Format, OutputArgs};
 use super::exit;
 use crate::config::{self, ConfigError};
+use crate::runtime::sampling;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Check a site's config and say everything that is wrong with it
 #[derive(Debug, clap::Args)]
@@ -22,7 +23,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let json = args.output.format == Format::Json;
     let mut stdout = std::io::stdout().lock();
     match config::check(&args.config) {
-        Ok(summary) => {
+        Ok(mut summary) => {
+            summary.warnings.extend(slow_sampling(&args.config)?);
             for warning in &summary.warnings {
                 exit::complain(&warning);
             }
@@ -41,4 +43,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             Err(error.into())
         }
     }
+}
+
+/// By what lies in the sources' files now.
+fn slow_sampling(file: &Path) -> Result<Vec<String>, ConfigError> {
+    let config = config::load(file)?;
+    let lines = sampling::too_slow(&config).into_iter();
+    let place = file.display();
+    Ok(lines
+        .map(|line| format!("{place}: warning: {line}"))
+        .collect())
 }

@@ -4,8 +4,10 @@ use crate::config::ConfigError;
 use crate::model::LawError;
 use crate::reading::{MergeError, SelectError};
 use crate::runtime::ingest::IngestError;
+use crate::runtime::pulse::PulseError;
 use crate::runtime::replay::ReplayError;
 use crate::runtime::run::RunError;
+use crate::runtime::sandbox::SandboxError;
 use std::error::Error;
 use std::fmt::Display;
 use std::io::{self, Write};
@@ -17,10 +19,14 @@ const TROUBLE: u8 = 1;
 const USAGE: u8 = 2;
 /// The data are bad.
 const DATA: u8 = 65;
+/// A service is missing.
+const UNAVAILABLE: u8 = 69;
 /// Input or output failed.
 const IO: u8 = 74;
 /// The config is wrong.
 const CONFIG: u8 = 78;
+/// A hook cannot be run; the shell's code for it.
+const NOT_RUN: u8 = 126;
 
 /// A command line that parses and cannot be meant.
 #[derive(Debug, thiserror::Error)]
@@ -57,6 +63,8 @@ fn code_of(error: &(dyn Error + 'static)) -> Option<u8> {
         return Some(match error {
             RunError::State { .. } | RunError::InUse { .. } => IO,
             RunError::Follow(_) => TROUBLE,
+            RunError::Pulse(PulseError::Token(_)) => CONFIG,
+            RunError::Pulse(PulseError::Listen(_)) => UNAVAILABLE,
         });
     }
     if let Some(error) = error.downcast_ref::<ReplayError>() {
@@ -70,6 +78,7 @@ fn code_of(error: &(dyn Error + 'static)) -> Option<u8> {
         (error.is::<UsageError>() || error.is::<LawError>(), USAGE),
         (error.is::<SelectError>() || error.is::<MergeError>(), DATA),
         (error.is::<ConfigError>(), CONFIG),
+        (error.is::<SandboxError>(), NOT_RUN),
         (error.is::<io::Error>(), IO),
     ];
     table.into_iter().find_map(|(is, code)| is.then_some(code))

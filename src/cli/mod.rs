@@ -2,12 +2,16 @@
 
 pub mod args;
 mod check;
+mod completions;
 mod convert;
 mod demo;
+mod doctor;
 mod exit;
 mod explain;
 mod fit;
+mod hook;
 mod load;
+mod man;
 mod replay;
 mod run;
 mod simulate;
@@ -31,12 +35,17 @@ enum Command {
     Demo(demo::Args),
     Run(run::Args),
     Check(check::Args),
+    Doctor(doctor::Args),
     Replay(replay::Args),
     Fit(fit::Args),
     Sweep(sweep::Args),
     Explain(explain::Args),
     Simulate(simulate::Args),
     Convert(convert::Args),
+    #[command(subcommand)]
+    Hook(hook::Command),
+    Completions(completions::Args),
+    Man(man::Args),
 }
 
 /// Parses the command line, runs the command, and turns the outcome into an exit code.
@@ -46,12 +55,16 @@ pub fn main() -> ExitCode {
             Command::Demo(args) => demo::run(&args),
             Command::Run(args) => run::run(&args),
             Command::Check(args) => check::run(&args),
+            Command::Doctor(args) => doctor::run(&args),
             Command::Replay(args) => replay::run(&args),
             Command::Fit(args) => fit::run(&args),
             Command::Sweep(args) => sweep::run(&args),
             Command::Explain(args) => explain::run(&args),
             Command::Simulate(args) => simulate::run(&args),
             Command::Convert(args) => convert::run(&args),
+            Command::Hook(command) => hook::run(&command),
+            Command::Completions(args) => completions::run(&args),
+            Command::Man(args) => man::run(&args),
         },
         Err(error) => return exit::of_parser(&error),
     };

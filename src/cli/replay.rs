@@ -8,10 +8,11 @@ use crate::monitor::{Event, Settings};
 use crate::reading::{Quantity, Recording, Timestamp};
 use crate::runtime::log::{self, LogFormat};
 use crate::runtime::replay::{self, Pace, Plan};
+use crate::runtime::sandbox::OURSELVES;
 use crate::runtime::shutdown::Shutdown;
 use anyhow::Context;
 use std::io::{self, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// What a site without a config is called.
 const NAMELESS: &str = "replay";
@@ -42,7 +43,10 @@ pub(super) struct Args {
 /// Replays the files and prints the events.
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     log::init(LogFormat::Text);
-    let config = args.config.as_deref().map(config::load).transpose()?;
+    let mut config = args.config.as_deref().map(config::load).transpose()?;
+    if let Some(config) = &mut config {
+        config.wall_in_hooks(Path::new(OURSELVES));
+    }
     for warning in config.iter().flat_map(|config| &config.warnings) {
         exit::complain(warning);
     }

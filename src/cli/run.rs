@@ -4,9 +4,10 @@ use super::args::{Format, OutputArgs};
 use crate::config;
 use crate::runtime::log::{self, LogFormat};
 use crate::runtime::run as daemon;
+use crate::runtime::sandbox::OURSELVES;
 use crate::runtime::shutdown::Shutdown;
 use anyhow::Context;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Watch a site: follow its files, write events to its state folder, run its hooks
 #[derive(Debug, clap::Args)]
@@ -27,7 +28,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         Format::Text => LogFormat::Text,
         Format::Json => LogFormat::Json,
     }));
-    let config = config::load(&args.config)?;
+    let mut config = config::load(&args.config)?;
+    config.wall_in_hooks(Path::new(OURSELVES));
     for warning in &config.warnings {
         tracing::warn!(%warning, "doubtful config");
     }

@@ -1,10 +1,11 @@
 //! `check`: the site file and what it names on this machine, without starting anything.
 
-use super::{Config, ConfigError, HookConfig, Source, load};
+use super::{Config, ConfigError, HookConfig, SiteConfig, Source, Token, TokenError, load};
 use crate::reading::Quantity;
 use jiff::SignedDuration;
 use serde::Serialize;
 use std::fmt;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
 /// What a right config amounts to.
@@ -44,11 +45,13 @@ impl fmt::Display for Summary {
 /// [`ConfigError`] as from [`load`].
 pub fn check(file: &Path) -> Result<Summary, ConfigError> {
     let config = load(file)?;
+    config.site.token()?;
     let mut warnings: Vec<String> = config.warnings.iter().map(ToString::to_string).collect();
     let place = file.display();
     warnings.extend(
         (config.sources.iter().filter_map(missing_folder))
             .chain(config.hooks.iter().filter_map(missing_program))
+            .chain(config.site.token_file.as_deref().and_then(open_token))
             .chain(slow_sampling(&config))
             .chain(config.without_effect())
             .map(|what| format!("{place}: warning: {what}")),
@@ -85,6 +88,16 @@ fn missing_program(hook: &HookConfig) -> Option<String> {
     })
 }
 
+fn open_token(file: &Path) -> Option<String> {
+    let mode = std::fs::metadata(file).ok()?.permissions().mode();
+    (mode & 0o007 != 0).then(|| {
+        format!(
+            "site.token_file: everyone on this machine can read {}; chmod o= it",
+            file.display()
+        )
+    })
+}
+
 /// A mean over longer than the evacuation takes shows the danger when it is too late.
 fn slow_sampling(config: &Config) -> impl Iterator<Item = String> {
     config.benchmarks.iter().filter_map(|benchmark| {
@@ -109,6 +122,13 @@ fn slow_sampling(config: &Config) -> impl Iterator<Item = String> {
 }
 
 impl Config {
+    /// Has the hooks walled in by `program`, which must be this one, but for those that ask not to be.
+    pub fn wall_in_hooks(&mut self, program: &Path) {
+        for hook in self.hooks.iter_mut().filter(|hook| hook.sandbox) {
+            hook.launcher = Some(program.to_owned());
+        }
+    }
+
     /// What is accepted and does nothing yet, one line each.
     pub fn without_effect(&self) -> Vec<String> {
         let events = self.declared.iter().map(|event| {
@@ -122,16 +142,23 @@ impl Config {
                 event.kind, event.time
             )
         });
-        let listen = self.site.listen.map(|address| {
-            format!("site.listen = \"{address}\": nothing listens there yet; leave it out")
-        });
         let brokers = self.brokers.iter().map(|broker| {
             let id = &broker.id;
             format!(
                 "source {id:?}: the daemon does not listen to brokers yet; no reading comes from it"
             )
         });
-        listen.into_iter().chain(brokers).chain(events).collect()
+        brokers.chain(events).collect()
+    }
+}
+
+impl SiteConfig {
+    /// What callers must know, where they must.
+    ///
+    /// # Errors
+    /// [`TokenError`].
+    pub fn token(&self) -> Result<Option<Token>, TokenError> {
+        self.token_file.as_deref().map(Token::read).transpose()
     }
 }
 

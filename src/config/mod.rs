@@ -8,6 +8,7 @@ mod problem;
 mod section;
 mod source;
 mod table;
+mod token;
 pub(crate) mod value;
 mod vector;
 
@@ -15,6 +16,7 @@ pub use broker::{Broker, BrokerAddress};
 pub use check::{Summary, check};
 pub use pattern::FilePattern;
 pub use problem::{ConfigError, Problem, Severity};
+pub use token::{Token, TokenError};
 pub use vector::Vector;
 
 use crate::alert::Level;
@@ -58,8 +60,11 @@ pub struct SiteConfig {
     pub name: String,
     /// Where the daemon keeps what it writes.
     pub state_dir: PathBuf,
-    /// Where the daemon would answer questions.
+    /// Where the daemon answers questions.
     pub listen: Option<SocketAddr>,
+    /// The file with the secret that whoever asks must know; never absent where others than this
+    /// machine can reach `listen`.
+    pub token_file: Option<PathBuf>,
     /// The zone that people there live in.
     pub time_zone: jiff::tz::TimeZone,
 }
@@ -143,6 +148,12 @@ pub struct HookConfig {
     pub timeout: Duration,
     /// Where it runs: the config's folder.
     pub folder: PathBuf,
+    /// Whether it may write only below its folder, `writable` and `/tmp`, where the kernel can see to that.
+    pub sandbox: bool,
+    /// Where else it may write.
+    pub writable: Vec<PathBuf>,
+    /// This program, which walls itself in and then becomes the hook; without it there are no walls.
+    pub launcher: Option<PathBuf>,
 }
 
 /// Reads the site file at `file`.

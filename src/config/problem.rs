@@ -61,6 +61,9 @@ pub enum ConfigError {
         /// Why not.
         source: std::io::Error,
     },
+    /// The token that it asks callers for.
+    #[error(transparent)]
+    Token(#[from] super::TokenError),
     /// It was read and has errors; warnings stand among them.
     #[error("{}", lines(.problems))]
     Invalid {

@@ -9,6 +9,7 @@ use crate::monitor::{Explain, Settings};
 use crate::reading::{BenchmarkId, Quantity, Timestamp, Unit};
 use jiff::tz::TimeZone;
 use std::collections::{BTreeMap, BTreeSet};
+use std::net::SocketAddr;
 use std::path::Path;
 use std::time::Duration;
 
@@ -62,14 +63,34 @@ fn site(mut section: Section<'_>, base: &Path) -> Option<SiteConfig> {
         text.parse()
             .map_err(|_| "write an address and a port: \"127.0.0.1:8642\"".to_owned())
     });
+    let token_file = section.text("token_file");
+    refuse_open_door(&section, listen.as_ref(), token_file.is_some());
     let time_zone = section.parsed("time_zone", value::time_zone);
     section.finish();
     Some(SiteConfig {
         name: name?.value,
         state_dir: base.join(state_dir?.value),
         listen: listen.map(|given| given.value),
+        token_file: token_file.map(|given| base.join(given.value)),
         time_zone: time_zone.map_or(TimeZone::UTC, |given| given.value),
     })
+}
+
+/// Whoever can reach the daemon over a network must know a secret.
+fn refuse_open_door(section: &Section<'_>, listen: Option<&Placed<SocketAddr>>, has_token: bool) {
+    if let Some(listen) = listen
+        && !listen.value.ip().is_loopback()
+        && !has_token
+    {
+        section.error(
+            &listen.at,
+            format!(
+                "site.listen = \"{}\" opens to other machines without a token",
+                listen.value
+            ),
+            "add token_file = \"token\", or listen on 127.0.0.1",
+        );
+    }
 }
 
 /// With no search there is nothing to adopt.
@@ -269,12 +290,25 @@ fn hook(mut section: Section<'_>, base: &Path) -> Option<HookConfig> {
     }
     let levels = hook_levels(&mut section);
     let timeout = section.parsed("timeout", value::duration);
+    let sandbox = section.switch("sandbox").unwrap_or(true);
+    let writable = section.texts("writable");
+    if let Some(paths) = writable.as_ref().filter(|_| !sandbox) {
+        section.warning(
+            &paths.at,
+            "hook.writable without a sandbox allows nothing more".to_owned(),
+            "leave it out, or write sandbox = true",
+        );
+    }
+    let writable = writable.map_or_else(Vec::new, |paths| paths.value);
     section.finish();
     Some(HookConfig {
         run: run?.value.into_iter().map(|word| word.value).collect(),
         levels,
         timeout: timeout.map_or(HOOK_TIMEOUT, |given| given.value.unsigned_abs()),
         folder: base.to_owned(),
+        sandbox,
+        writable: (writable.iter().map(|path| base.join(&path.value))).collect(),
+        launcher: None,
     })
 }
 

@@ -1,5 +1,6 @@
 //! Runs one hook once: cleaned environment, alert on stdin, own process group, killed at its timeout.
 
+use super::sandbox;
 use crate::alert::Level;
 use crate::config::HookConfig;
 use crate::monitor::{AlertState, Event, EventKind};
@@ -12,7 +13,7 @@ use std::process::{ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWriteExt};
-use tokio::process::{Child, Command};
+use tokio::process::Child;
 use tokio::task::JoinHandle;
 
 /// What of our own environment a hook sees.
@@ -211,9 +212,8 @@ pub async fn run(hook: &HookConfig, alert: &Alert, attempt: u32) -> Outcome {
 
 fn start(hook: &HookConfig, alert: &Alert, attempt: u32) -> Result<Child, String> {
     let program = hook.program();
-    let mut command = Command::new(&program);
+    let mut command = sandbox::command(hook);
     command
-        .args(hook.run.iter().skip(1))
         .env_clear()
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())

@@ -1,14 +1,17 @@
 //! The daemon: files to the monitor, events to the state folder, alerts to the hooks.
 
-use super::clock;
+use super::clock::{self, Stopwatch};
 use super::deliver::{Dispatcher, Retry};
 use super::delivered::Delivered;
 use super::event_log::EventLog;
 use super::hook::Status;
+use super::pulse::{Pulse, PulseError};
+use super::sandbox;
 use super::shutdown::{self, Shutdown};
 use super::site::{Counts, Sinks, Site};
-use super::tail::{self, Batch, Follower};
+use super::tail::{self, Arrival, Batch, Follower};
 use crate::config::Config;
+use crate::monitor::Input;
 use std::fs::{File, TryLockError};
 use std::io;
 use std::path::PathBuf;
@@ -49,6 +52,9 @@ pub enum RunError {
         /// The folder.
         folder: PathBuf,
     },
+    /// Nobody could be let in to ask.
+    #[error(transparent)]
+    Pulse(#[from] PulseError),
     /// The part that follows the files broke off.
     #[error("following the files broke off: {0}")]
     Follow(#[from] tokio::task::JoinError),
@@ -79,6 +85,8 @@ pub async fn run(
     for what in config.without_effect() {
         tracing::warn!("{what}");
     }
+    sandbox::announce(&config.hooks);
+    let mut pulse = Pulse::start(&config.site, None).await?;
     let dispatcher = Dispatcher::start(&config.hooks, &Retry::default(), delivered);
     let sinks = Sinks {
         events,
@@ -92,8 +100,9 @@ pub async fn run(
     let (sender, receiver) = mpsc::channel(BATCHES);
     let source = tokio::spawn(tail::follow(follower, sender, stopped));
     tracing::info!(site = config.site.name, state = %config.site.state_dir.display(), "started");
-    let worked = work(&mut site, receiver, shutdown, progress).await;
+    let worked = work(&mut site, receiver, shutdown, progress, &mut pulse).await;
     stop.pull();
+    pulse.stop().await;
     let counts = site.counts();
     let closed = site.close(clock::now(), DRAIN_LIMIT).await;
     tracing::info!(?counts, "stopped");
@@ -113,19 +122,21 @@ async fn work(
     mut batches: mpsc::Receiver<Batch>,
     mut shutdown: Shutdown,
     progress: &watch::Sender<Progress>,
+    pulse: &mut Pulse,
 ) -> io::Result<()> {
     // Once, and as of the last batch: a logger that was away hands in its backlog in several.
     let (mut is_caught_up, mut is_up_to_date) = (false, false);
     let mut tick = tokio::time::interval(TICK);
     tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
     loop {
+        pulse.turn();
         tokio::select! {
             biased;
             () = shutdown.requested() => return Ok(()),
             batch = batches.recv() => {
                 let Some(batch) = batch else { return Ok(()) };
                 let still = shutdown.clone();
-                tokio::task::block_in_place(|| take_batch(site, &batch, &still))?;
+                tokio::task::block_in_place(|| take_batch(site, &batch, &still, pulse))?;
                 is_up_to_date = batch.caught_up;
                 if is_up_to_date {
                     site.caught_up(clock::now());
@@ -133,33 +144,73 @@ async fn work(
                 let counts = site.counts();
                 if is_up_to_date && !is_caught_up {
                     is_caught_up = true;
+                    pulse.caught_up();
                     tracing::info!(?counts, "caught up");
                 }
                 progress.send_replace(Progress { counts, is_caught_up });
             }
             // Data time is the clock's only once the past has been read.
-            _ = tick.tick(), if is_caught_up => tokio::task::block_in_place(|| {
-                let now = clock::now();
-                site.pass(now);
-                site.commit(now)?;
-                if is_up_to_date {
-                    site.caught_up(now);
-                }
-                Ok::<(), io::Error>(())
-            })?,
+            _ = tick.tick() => if is_caught_up {
+                tokio::task::block_in_place(|| pass(site, pulse, is_up_to_date))?;
+            },
         }
     }
 }
 
+/// Lets time go by to the present.
+fn pass(site: &mut Site, pulse: &Pulse, is_up_to_date: bool) -> io::Result<()> {
+    let now = clock::now();
+    pulse.vitals.note(&site.pass(now));
+    site.commit(now)?;
+    if is_up_to_date {
+        site.caught_up(now);
+    }
+    Ok(())
+}
+
 /// Steps the monitor through a batch; a stop that is asked for half-way ends it after a value.
-fn take_batch(site: &mut Site, batch: &Batch, shutdown: &Shutdown) -> io::Result<()> {
+fn take_batch(
+    site: &mut Site,
+    batch: &Batch,
+    shutdown: &Shutdown,
+    pulse: &mut Pulse,
+) -> io::Result<()> {
     for arrival in &batch.arrivals {
         if shutdown.is_requested() {
             break;
         }
-        site.take(arrival, clock::now());
+        take(site, arrival, pulse);
+        pulse.turn();
     }
-    site.commit(clock::now())
+    let committed = site.commit(clock::now());
+    let counts = site.counts();
+    pulse.vitals.update(|health| {
+        health.is_store_writable = committed.is_ok();
+        health.readings = counts.taken;
+        health.repeated = counts.repeated;
+        health.from_the_future = counts.from_the_future;
+        health.unwritten = counts.unwritten;
+    });
+    committed
+}
+
+fn take(site: &mut Site, arrival: &Arrival, pulse: &Pulse) {
+    let stopwatch = Stopwatch::start();
+    let taken = site.counts().taken;
+    let events = site.take(arrival, clock::now());
+    match &arrival.input {
+        Input::Reading { benchmark, .. } if site.counts().taken > taken => {
+            let took = stopwatch.elapsed();
+            pulse.vitals.read(benchmark, arrival.time, &events, took);
+        }
+        Input::Reading { .. }
+        | Input::Sample { .. }
+        | Input::Missing { .. }
+        | Input::Tick
+        | Input::Found(_) => {
+            pulse.vitals.note(&events);
+        }
+    }
 }
 
 #[derive(Debug)]

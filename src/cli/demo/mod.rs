@@ -175,6 +175,9 @@ fn sample_hook(folder: &Path) -> anyhow::Result<HookConfig> {
         levels: vec![Level::Orange, Level::Red, Level::Unknown],
         timeout: Duration::from_secs(10),
         folder: folder.to_owned(),
+        sandbox: false,
+        writable: Vec::new(),
+        launcher: None,
     })
 }
 

@@ -16,6 +16,9 @@ pub const HEADER_BYTES: usize = 9;
 /// Longest record that is read into memory, and longest content of a chunk, bytes.
 pub const LONGEST_RECORD: u64 = 64 * 1024 * 1024;
 
+/// The header of a chunk that is still being written.
+pub const OPEN_CHUNK: [u8; HEADER_BYTES] = [op::CHUNK, 255, 255, 255, 255, 255, 255, 255, 255];
+
 /// What stands at an offset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Frame {
@@ -48,7 +51,7 @@ pub fn frame(header: [u8; HEADER_BYTES], available: u64) -> Frame {
     let [opcode, length @ ..] = header;
     let length = u64::from_le_bytes(length);
     let needed = matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE | op::CHUNK);
-    if opcode == op::CHUNK && length == u64::MAX {
+    if header == OPEN_CHUNK {
         Frame::Wait
     } else if needed && length > LONGEST_RECORD {
         Frame::Damaged { length }

@@ -1,0 +1,161 @@
+//! Which file systems the state and the sources are on, and how long the state's takes to sync.
+
+use super::{Finding, Verdict};
+use crate::config::Config;
+use crate::runtime::clock::Stopwatch;
+use nix::sys::statfs::statfs;
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::Path;
+use std::time::Duration;
+
+const FILE_SYSTEM: &str = "file-system";
+const FSYNC: &str = "fsync";
+/// Syncs that are measured.
+const SYNCS: usize = 20;
+/// A batch of readings costs one sync or more; a slower disk falls behind in a catch-up.
+const SLOW: Duration = Duration::from_millis(100);
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Local,
+    /// Changes made elsewhere raise no event, and locks may not hold.
+    Network,
+    /// Gone after the next start of the machine.
+    Memory,
+    /// Some are local, some are not.
+    Unsure,
+}
+
+/// The numbers of `statfs(2)` and of the kernel's `magic.h`.
+const FILE_SYSTEMS: [(i64, &str, Kind); 19] = [
+    (0xEF53, "ext4", Kind::Local),
+    (0x5846_5342, "xfs", Kind::Local),
+    (0x9123_683E, "btrfs", Kind::Local),
+    (0xF2F5_2010, "f2fs", Kind::Local),
+    (0x2FC1_2FC1, "zfs", Kind::Local),
+    (0x4D44, "vfat", Kind::Local),
+    (0x2011_BAB0, "exfat", Kind::Local),
+    (0x794C_7630, "overlayfs", Kind::Local),
+    (0x0102_1994, "tmpfs", Kind::Memory),
+    (0x8584_58F6, "ramfs", Kind::Memory),
+    (0x6969, "nfs", Kind::Network),
+    (0xFF53_4D42, "cifs", Kind::Network),
+    (0xFE53_4D42, "smb2", Kind::Network),
+    (0x517B, "smb", Kind::Network),
+    (0x0102_1997, "9p", Kind::Network),
+    (0x00C3_6400, "ceph", Kind::Network),
+    (0x5346_414F, "afs", Kind::Network),
+    (0x0BD0_0BD0, "lustre", Kind::Network),
+    (0x6573_5546, "fuse", Kind::Unsure),
+];
+
+/// A finding for the state folder and one for each source.
+pub(super) fn file_systems(config: &Config) -> Vec<Finding> {
+    let mut findings = vec![state(&config.site.state_dir)];
+    for source in &config.sources {
+        let place = format!("source {:?}, ", source.id);
+        findings.push(of_source(&place, source.pattern.folder()));
+    }
+    findings
+}
+
+fn state(folder: &Path) -> Finding {
+    let place = format!("state folder {}", folder.display());
+    let (verdict, text) = match kind(folder) {
+        Err(error) => (Verdict::Unknown, error.to_string()),
+        Ok((name, Kind::Local)) => (Verdict::Good, format!("on {name}")),
+        Ok((name, Kind::Memory)) => (
+            Verdict::Doubtful,
+            format!("on {name}, lost when the machine restarts; move it to a disk"),
+        ),
+        Ok((name, Kind::Network)) => (
+            Verdict::Wrong,
+            format!(
+                "on {name}, a network file system, whose locks and syncs cannot be relied on; \
+                     move it to a local disk"
+            ),
+        ),
+        Ok((name, Kind::Unsure)) => (
+            Verdict::Unknown,
+            format!("on {name}; see that it is a local disk"),
+        ),
+    };
+    Finding::new(FILE_SYSTEM, verdict, format!("{place}: {text}"))
+}
+
+fn of_source(place: &str, folder: &Path) -> Finding {
+    let (verdict, text) = match kind(folder) {
+        Err(error) => (Verdict::Unknown, error.to_string()),
+        Ok((name, Kind::Local | Kind::Memory)) => (Verdict::Good, format!("on {name}")),
+        Ok((name, Kind::Network | Kind::Unsure)) => (
+            Verdict::Doubtful,
+            format!(
+                "on {name}: what others write there raises no event, so the files are looked \
+                     at every two seconds"
+            ),
+        ),
+    };
+    Finding::new(
+        FILE_SYSTEM,
+        verdict,
+        format!("{place}{}: {text}", folder.display()),
+    )
+}
+
+/// Of `folder`, or where it would be created.
+fn kind(folder: &Path) -> nix::Result<(String, Kind)> {
+    let there = folder.ancestors().find(|path| path.exists());
+    let there = there.filter(|path| !path.as_os_str().is_empty());
+    let magic = statfs(there.unwrap_or(Path::new(".")))?.filesystem_type().0;
+    // 32-bit numbers, which some machines sign-extend.
+    let magic = magic & 0xFFFF_FFFF;
+    let known = FILE_SYSTEMS.iter().find(|(number, ..)| *number == magic);
+    Ok(match known {
+        Some((_, name, kind)) => ((*name).to_owned(), *kind),
+        None => (
+            format!("a file system unknown to us ({magic:#x})"),
+            Kind::Unsure,
+        ),
+    })
+}
+
+/// The median time to make 4 KiB durable in the state folder.
+pub(super) fn fsync(folder: &Path) -> Finding {
+    let place = folder.display();
+    if !folder.is_dir() {
+        let text = format!("{place} is not there yet; it is created at the first start");
+        return Finding::new(FSYNC, Verdict::Unknown, text);
+    }
+    match syncs(folder) {
+        Err(error) => Finding::new(
+            FSYNC,
+            Verdict::Wrong,
+            format!("nothing can be written to {place}: {error}"),
+        ),
+        Ok(mut times) => {
+            times.sort();
+            let median = times[times.len() / 2];
+            let milliseconds = median.as_secs_f64() * 1e3;
+            let text = format!("median of {SYNCS} in {place}: {milliseconds:.2} ms");
+            if median > SLOW {
+                let text = format!("{text}; a catch-up on history will be slow");
+                Finding::new(FSYNC, Verdict::Doubtful, text)
+            } else {
+                Finding::new(FSYNC, Verdict::Good, text)
+            }
+        }
+    }
+}
+
+fn syncs(folder: &Path) -> io::Result<Vec<Duration>> {
+    let mut file: File = tempfile::tempfile_in(folder)?;
+    let mut times = Vec::with_capacity(SYNCS);
+    for _ in 0..SYNCS {
+        let stopwatch = Stopwatch::start();
+        file.write_all(&[0; 4096])?;
+        file.sync_data()?;
+        times.push(stopwatch.elapsed());
+    }
+    Ok(times)
+}

@@ -1,0 +1,91 @@
+//! Whether the hooks could be run; none is.
+
+use super::{Finding, Verdict};
+use crate::config::HookConfig;
+use crate::runtime::sandbox::{self, Walls};
+use nix::unistd::{AccessFlags, access};
+use std::ffi::OsStr;
+use std::fs::File;
+use std::io::Read;
+use std::os::unix::ffi::OsStrExt;
+use std::path::{Path, PathBuf};
+
+/// The kernel reads no more of a script's first line.
+const FIRST_LINE_BYTES: u64 = 256;
+
+/// Is it there, can it be executed, is its interpreter there.
+pub(super) fn finding(hook: &HookConfig) -> Finding {
+    let (verdict, text) = match runnable(&hook.program()) {
+        Ok(text) => (Verdict::Good, text),
+        Err(text) => (Verdict::Wrong, format!("{text}: alerts would go nowhere")),
+    };
+    Finding::new("hook", verdict, text)
+}
+
+fn runnable(program: &Path) -> Result<String, String> {
+    let found = find(program).ok_or_else(|| format!("there is no {}", program.display()))?;
+    let name = found.display();
+    access(&found, AccessFlags::X_OK)
+        .map_err(|error| format!("{name} cannot be executed ({error}); chmod +x it"))?;
+    let interpreter = interpreter(&found).map_err(|error| format!("{name}: {error}"))?;
+    let Some(words) = interpreter else {
+        return Ok(format!("{name} can be run"));
+    };
+    for word in &words {
+        let there = find(word).filter(|path| access(path, AccessFlags::X_OK).is_ok());
+        there.ok_or_else(|| format!("{name}: its interpreter {} is not there", word.display()))?;
+    }
+    Ok(format!("{name} can be run"))
+}
+
+/// A bare name is looked up in `PATH`.
+fn find(program: &Path) -> Option<PathBuf> {
+    if program.components().count() > 1 {
+        return program.is_file().then(|| program.to_owned());
+    }
+    let path = std::env::var_os("PATH")?;
+    std::env::split_paths(&path)
+        .map(|folder| folder.join(program))
+        .find(|path| path.is_file())
+}
+
+/// What the script's first line names, and for `env` what that would start; `None` for a binary.
+fn interpreter(program: &Path) -> std::io::Result<Option<Vec<PathBuf>>> {
+    let mut start = Vec::new();
+    File::open(program)?
+        .take(FIRST_LINE_BYTES)
+        .read_to_end(&mut start)?;
+    let Some(line) = start.strip_prefix(b"#!") else {
+        return Ok(None);
+    };
+    let line = line.split(|byte| *byte == b'\n').next().unwrap_or(line);
+    let mut words = line
+        .split(u8::is_ascii_whitespace)
+        .filter(|word| !word.is_empty())
+        .map(|word| PathBuf::from(OsStr::from_bytes(word)));
+    let first: Vec<PathBuf> = words.by_ref().take(1).collect();
+    let is_env = first.iter().any(|path| path.ends_with("env"));
+    let options = |word: &PathBuf| word.as_os_str().as_bytes().starts_with(b"-");
+    let second = words.find(|word| is_env && !options(word));
+    Ok(Some(first.into_iter().chain(second).collect()))
+}
+
+/// Whether the kernel would hold the walls, where a hook is to have some.
+pub(super) fn walls(hooks: &[HookConfig]) -> Option<Finding> {
+    let is_needed = hooks.iter().any(|hook| hook.sandbox);
+    let finding = |verdict, text: &str| Finding::new("sandbox", verdict, text);
+    is_needed.then(|| match sandbox::probe() {
+        Walls::Whole => finding(
+            Verdict::Good,
+            "hooks can write only where they are allowed to",
+        ),
+        Walls::Partial => finding(
+            Verdict::Doubtful,
+            "an old kernel keeps hooks from most writes elsewhere, not from all",
+        ),
+        Walls::Missing => finding(
+            Verdict::Doubtful,
+            "the kernel has no landlock: hooks can write wherever the daemon can",
+        ),
+    })
+}

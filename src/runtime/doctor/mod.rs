@@ -1,0 +1,69 @@
+//! Whether this machine can carry a site.
+
+mod clock_sync;
+mod disk;
+mod hooks;
+mod recordings;
+mod watches;
+
+use crate::config::Config;
+use serde::Serialize;
+
+/// How something stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// As it should be.
+    Good,
+    /// The daemon copes, at a price.
+    Doubtful,
+    /// Alerts or readings would be lost.
+    Wrong,
+    /// It cannot be told from here.
+    Unknown,
+}
+
+impl Verdict {
+    /// The word in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Good => "good",
+            Self::Doubtful => "doubtful",
+            Self::Wrong => "wrong",
+            Self::Unknown => "unknown",
+        }
+    }
+}
+
+/// One thing that was looked at.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Finding {
+    /// What: `inotify`, `file-system`, `clock`, `fsync`, `hook`, `sandbox`, `recording`.
+    pub check: &'static str,
+    /// How it stands.
+    pub verdict: Verdict,
+    /// One line for a person, with what to do about it.
+    pub text: String,
+}
+
+impl Finding {
+    fn new(check: &'static str, verdict: Verdict, text: impl Into<String>) -> Self {
+        Self {
+            check,
+            verdict,
+            text: text.into(),
+        }
+    }
+}
+
+/// Looks at everything that `config` needs; runs no hook and leaves nothing behind.
+pub fn examine(config: &Config) -> Vec<Finding> {
+    let mut findings = vec![watches::finding(config)];
+    findings.extend(disk::file_systems(config));
+    findings.push(disk::fsync(&config.site.state_dir));
+    findings.push(clock_sync::finding());
+    findings.extend(config.hooks.iter().map(hooks::finding));
+    findings.extend(hooks::walls(&config.hooks));
+    findings.extend(recordings::findings(&config.sources));
+    findings
+}

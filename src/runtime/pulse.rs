@@ -1,0 +1,79 @@
+//! What the work loop shows of itself to those outside: its vitals, the server, the service manager.
+
+use super::serve::{Archive, Door, Limits, ListenError, Server};
+use super::service::Service;
+use super::vitals::Vitals;
+use crate::config::{SiteConfig, TokenError};
+use std::sync::Arc;
+
+/// Nobody could be let in.
+#[derive(Debug, thiserror::Error)]
+pub enum PulseError {
+    /// The token that callers are asked for.
+    #[error(transparent)]
+    Token(#[from] TokenError),
+    /// The address cannot be listened on.
+    #[error(transparent)]
+    Listen(#[from] ListenError),
+}
+
+/// Held by the work loop.
+#[derive(Debug)]
+pub struct Pulse {
+    /// What it knows of its health.
+    pub vitals: Arc<Vitals>,
+    /// The service manager.
+    pub service: Service,
+    server: Option<Server>,
+}
+
+impl Pulse {
+    /// Starts to listen, where the site does, and tells the service manager that we are up.
+    ///
+    /// # Errors
+    /// [`PulseError`].
+    pub async fn start(
+        site: &SiteConfig,
+        archive: Option<Arc<dyn Archive>>,
+    ) -> Result<Self, PulseError> {
+        let vitals = Arc::new(Vitals::default());
+        let server = match site.listen {
+            None => None,
+            Some(listen) => {
+                let door = Door {
+                    listen,
+                    token: site.token()?,
+                    limits: Limits::default(),
+                };
+                Some(Server::start(door, Arc::clone(&vitals), archive).await?)
+            }
+        };
+        let service = Service::of_environment();
+        service.ready("reading the past");
+        Ok(Self {
+            vitals,
+            service,
+            server,
+        })
+    }
+
+    /// The work loop has turned; also called between two values, because a batch may take long.
+    pub fn turn(&mut self) {
+        self.vitals.turned();
+        self.service.beat();
+    }
+
+    /// The past has been read.
+    pub fn caught_up(&self) {
+        self.vitals.update(|health| health.is_caught_up = true);
+        self.service.status("watching");
+    }
+
+    /// The end of the work.
+    pub async fn stop(self) {
+        self.service.stopping();
+        if let Some(server) = self.server {
+            server.stop().await;
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! Walls around a hook: it reads everything, and writes where it is allowed to.
+//!
+//! Landlock binds the process that asks for it and its children, so the daemon does not start a
+//! hook itself: it starts this program again, which walls itself in and then becomes the hook.
+
+use crate::config::HookConfig;
+use landlock::{
+    ABI, Access, AccessFs, Ruleset, RulesetAttr, RulesetCreatedAttr, RulesetError, RulesetStatus,
+    path_beneath_rules,
+};
+use std::convert::Infallible;
+use std::ffi::{OsStr, OsString};
+use std::io;
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Linux 6.2: files can be kept from being truncated. Later ones would also bind devices' controls.
+const KERNEL: ABI = ABI::V3;
+/// This program, even after an upgrade has put another one in its place.
+pub const OURSELVES: &str = "/proc/self/exe";
+/// Where every hook may write.
+const ALWAYS_WRITABLE: [&str; 2] = ["/tmp", "/dev/null"];
+
+/// Whether the kernel holds the walls.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Walls {
+    /// All of them.
+    Whole,
+    /// Some: an old kernel knows not every kind of write.
+    Partial,
+    /// None: the kernel has no landlock, or it is switched off.
+    Missing,
+}
+
+/// Why a hook could not be walled in or started.
+#[derive(Debug, thiserror::Error)]
+pub enum SandboxError {
+    /// The kernel refused.
+    #[error("the hook cannot be walled in: {0}")]
+    Refused(#[from] RulesetError),
+    /// The program cannot be run.
+    #[error("{}: {source}", .program.display())]
+    NotStarted {
+        /// The program.
+        program: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+}
+
+/// Walls in this thread and its children; a writable path that is not there is passed over.
+///
+/// # Errors
+/// When a kernel that has landlock refuses.
+fn wall_in(writable: &[PathBuf]) -> Result<Walls, RulesetError> {
+    let always = ALWAYS_WRITABLE.iter().map(Path::new);
+    let writable = always.chain(writable.iter().map(PathBuf::as_path));
+    let status = Ruleset::default()
+        .handle_access(AccessFs::from_all(KERNEL))?
+        .create()?
+        .add_rules(path_beneath_rules(["/"], AccessFs::from_read(KERNEL)))?
+        .add_rules(path_beneath_rules(writable, AccessFs::from_all(KERNEL)))?
+        .restrict_self()?;
+    Ok(match status.ruleset {
+        RulesetStatus::FullyEnforced => Walls::Whole,
+        RulesetStatus::PartiallyEnforced => Walls::Partial,
+        RulesetStatus::NotEnforced => Walls::Missing,
+    })
+}
+
+/// Whether this kernel would hold the walls; tried on a thread that then ends.
+pub fn probe() -> Walls {
+    let tried = std::thread::spawn(|| wall_in(&[])).join();
+    tried.ok().and_then(Result::ok).unwrap_or(Walls::Missing)
+}
+
+/// Says in the log how far `hooks` are kept from writing elsewhere.
+pub fn announce(hooks: &[HookConfig]) {
+    if hooks.iter().all(|hook| hook.launcher.is_none()) {
+        return;
+    }
+    match probe() {
+        Walls::Whole => tracing::info!("hooks can write only where they are allowed to"),
+        Walls::Partial => {
+            tracing::warn!(
+                "an old kernel: hooks are kept from most writes elsewhere, not from all"
+            );
+        }
+        Walls::Missing => {
+            tracing::warn!("no landlock in this kernel: hooks can write wherever the daemon can");
+        }
+    }
+}
+
+/// The command that runs `hook`, walled in where it has a launcher.
+pub(super) fn command(hook: &HookConfig) -> tokio::process::Command {
+    let (program, arguments) = (from_anywhere(&hook.program()), hook.run.iter().skip(1));
+    let Some(launcher) = &hook.launcher else {
+        let mut command = tokio::process::Command::new(program);
+        command.args(arguments);
+        return command;
+    };
+    let mut command = tokio::process::Command::new(launcher);
+    command.args(["hook", "exec", "--writable", "."]);
+    for path in &hook.writable {
+        command.arg("--writable").arg(from_anywhere(path));
+    }
+    command.arg("--").arg(program).args(arguments);
+    command
+}
+
+/// The path as it can be used from the hook's folder too, where the hook is started; a bare name
+/// is looked up in `PATH`.
+fn from_anywhere(path: &Path) -> PathBuf {
+    if path.components().count() > 1 {
+        std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
+    } else {
+        path.to_owned()
+    }
+}
+
+/// Becomes `program`, which may write below `writable`, in `/tmp` and to `/dev/null`; without
+/// walls where the kernel has none.
+///
+/// # Errors
+/// [`SandboxError`]; on success this does not return.
+pub fn become_hook(
+    writable: &[PathBuf],
+    program: &OsStr,
+    arguments: &[OsString],
+) -> Result<Infallible, SandboxError> {
+    wall_in(writable)?;
+    let source = Command::new(program).args(arguments).exec();
+    Err(SandboxError::NotStarted {
+        program: program.into(),
+        source,
+    })
+}

@@ -1,0 +1,73 @@
+//! Takes connections, a bounded number for a bounded time, one request each.
+
+use super::Limits;
+use crate::runtime::shutdown::Shutdown;
+use axum::Router;
+use hyper::server::conn::http1;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::service::TowerToHyperService;
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::Semaphore;
+use tokio::task::JoinSet;
+
+/// Longest request line with its headers, bytes.
+const LONGEST_HEAD: usize = 16 * 1024;
+/// Most headers of a request.
+const MOST_HEADERS: usize = 64;
+/// After a connection could not be taken, as when there are no more file descriptors.
+const BREATH: Duration = Duration::from_millis(200);
+
+/// Serves until `stopped`; open connections are then dropped.
+pub(super) async fn serve(
+    listener: TcpListener,
+    router: Router,
+    limits: Limits,
+    mut stopped: Shutdown,
+) {
+    let slots = Arc::new(Semaphore::new(limits.connections));
+    let mut open = JoinSet::new();
+    loop {
+        // Whatever has ended is let go of, or the set would grow for ever.
+        while open.try_join_next().is_some() {}
+        let next = async {
+            let slot = Arc::clone(&slots).acquire_owned().await;
+            (slot, listener.accept().await)
+        };
+        let (slot, accepted) = tokio::select! {
+            () = stopped.requested() => return,
+            next = next => next,
+        };
+        match (slot, accepted) {
+            (Ok(slot), Ok((stream, _))) => {
+                let router = router.clone();
+                open.spawn(async move {
+                    answer(stream, router, limits).await;
+                    drop(slot);
+                });
+            }
+            (Err(_closed), _) => return,
+            (_, Err(error)) => {
+                tracing::warn!(%error, "a connection could not be taken");
+                tokio::time::sleep(BREATH).await;
+            }
+        }
+    }
+}
+
+async fn answer(stream: TcpStream, router: Router, limits: Limits) {
+    let connection = http1::Builder::new()
+        .timer(TokioTimer::new())
+        .header_read_timeout(limits.head_time)
+        .max_buf_size(LONGEST_HEAD)
+        .max_headers(MOST_HEADERS)
+        // A caller that keeps its connection would keep a slot.
+        .keep_alive(false)
+        .serve_connection(TokioIo::new(stream), TowerToHyperService::new(router));
+    match tokio::time::timeout(limits.request_time, connection).await {
+        Ok(Ok(())) => {}
+        Ok(Err(error)) => tracing::debug!(%error, "a request broke off"),
+        Err(_elapsed) => tracing::debug!("a request took too long"),
+    }
+}

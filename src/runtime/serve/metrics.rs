@@ -1,0 +1,222 @@
+//! The metrics, as OpenMetrics 1.0 text. Names are part of the interface: `deploy/` queries them.
+
+use crate::alert::Level;
+use crate::reading::{BenchmarkId, Timestamp};
+use crate::runtime::vitals::{Health, Point, Vitals};
+use prometheus_client::collector::Collector;
+use prometheus_client::encoding::{DescriptorEncoder, EncodeMetric, text};
+use prometheus_client::metrics::MetricType;
+use prometheus_client::metrics::counter::ConstCounter;
+use prometheus_client::metrics::gauge::ConstGauge;
+use prometheus_client::registry::Registry;
+use std::fmt;
+use std::sync::Arc;
+
+/// Of an answer at `/metrics`.
+pub const CONTENT_TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
+
+/// All metrics as they stand.
+pub(super) fn text(vitals: Arc<Vitals>) -> Result<String, fmt::Error> {
+    let mut registry = Registry::with_prefix("slipwatch");
+    registry.register_collector(Box::new(vitals));
+    let mut text = String::new();
+    text::encode(&mut text, &registry)?;
+    Ok(text)
+}
+
+impl Collector for Vitals {
+    fn encode(&self, encoder: DescriptorEncoder) -> fmt::Result {
+        let mut sheet = Sheet(encoder);
+        let health = self.health();
+        let uptime = self.uptime().as_secs_f64();
+        sheet.gauge("uptime_seconds", "Time since the start", uptime)?;
+        let turn = self.since_turn().as_secs_f64();
+        sheet.gauge(
+            "work_loop_idle_seconds",
+            "Time since the work loop turned",
+            turn,
+        )?;
+        state(&mut sheet, &health)?;
+        counts(&mut sheet, &health)?;
+        let about = "Time to work in a reading that led to a refit";
+        sheet.whole("refit_seconds", about, self.refits())?;
+        let levels = self
+            .levels()
+            .map(|(level, count)| (level.name(), count as f64));
+        let about = "Benchmarks at each level, all of them; unknown stands beside another level";
+        sheet.gauges("benchmarks", about, "level", levels)?;
+        benchmarks(&mut sheet, &self.points().into_iter().collect::<Vec<_>>())
+    }
+}
+
+fn state(sheet: &mut Sheet<'_>, health: &Health) -> fmt::Result {
+    let flag = |is: bool| f64::from(u8::from(is));
+    let gauges = [
+        (
+            "caught_up",
+            "1 when the past has been read",
+            flag(health.is_caught_up),
+        ),
+        (
+            "store_writable",
+            "1 when the last write to the state folder went well",
+            flag(health.is_store_writable),
+        ),
+        (
+            "ingest_paused",
+            "1 while nothing is taken in because the disk is full",
+            flag(health.is_paused),
+        ),
+        (
+            "lag_seconds",
+            "How long the oldest value that was found has waited to be taken",
+            health.lag_seconds,
+        ),
+        (
+            "queue_batches",
+            "Batches of values that wait for the monitor",
+            health.queue as f64,
+        ),
+        (
+            "outbox_alerts",
+            "Alerts that a hook has not taken yet",
+            health.outbox as f64,
+        ),
+        (
+            "searches",
+            "Searches for an effect that are at work",
+            health.searches as f64,
+        ),
+    ];
+    for (name, about, value) in gauges {
+        sheet.gauge(name, about, value)?;
+    }
+    if let Some(time) = health.outbox_oldest {
+        let about = "Since when the oldest alert waits, Unix time";
+        sheet.gauge("outbox_oldest_timestamp_seconds", about, seconds(time))?;
+    }
+    if let Some(bytes) = health.database_bytes {
+        sheet.gauge("database_bytes", "Size of the database", bytes as f64)?;
+    }
+    Ok(())
+}
+
+fn counts(sheet: &mut Sheet<'_>, health: &Health) -> fmt::Result {
+    let counters = [
+        ("readings", "Values that the monitor took", health.readings),
+        (
+            "repeated",
+            "Values that had been taken before",
+            health.repeated,
+        ),
+        (
+            "from_the_future",
+            "Values measured in the future, set aside",
+            health.from_the_future,
+        ),
+        (
+            "events_unwritten",
+            "Events lost from the log on a full disk",
+            health.unwritten,
+        ),
+    ];
+    for (name, about, count) in counters {
+        sheet.whole(name, about, &ConstCounter::new(count))?;
+    }
+    let about = "Lines, records and files that could not be used";
+    let mut family = sheet
+        .0
+        .encode_descriptor("quarantined", about, None, MetricType::Counter)?;
+    for (source, count) in &health.quarantined {
+        let labels = [("source", source.as_str())];
+        ConstCounter::new(*count).encode(family.encode_family(&labels)?)?;
+    }
+    Ok(())
+}
+
+fn benchmarks(sheet: &mut Sheet<'_>, points: &[(BenchmarkId, Point)]) -> fmt::Result {
+    type Figure = fn(&Point) -> Option<f64>;
+    let figures: [(&str, &str, Figure); 6] = [
+        (
+            "last_reading_timestamp_seconds",
+            "When the newest reading was measured, Unix time",
+            |point| point.newest.map(seconds),
+        ),
+        (
+            "level",
+            "The level in force: 0 green, 1 yellow, 2 orange, 3 red",
+            |point| Some(rank(point.level)),
+        ),
+        (
+            "unknown",
+            "1 while the monitor cannot tell: no data, a sensor fault, a stale model",
+            |point| Some(f64::from(u8::from(point.is_unknown))),
+        ),
+        (
+            "last_refit_seconds",
+            "Time to work in the last reading that led to a refit",
+            |point| point.refit_seconds,
+        ),
+        (
+            "residual_surprise_nats",
+            "How much less likely the newest reading was than the usual one; 0 where it does not stand out",
+            |point| Some(point.surprise_nats),
+        ),
+        (
+            "velocity_mm_per_day",
+            "The velocity of the last refit",
+            |point| point.velocity_mm_per_day,
+        ),
+    ];
+    for (name, about, figure) in figures {
+        let values = points
+            .iter()
+            .filter_map(|(id, point)| Some((id.as_str(), figure(point)?)));
+        sheet.gauges(&format!("benchmark_{name}"), about, "benchmark", values)?;
+    }
+    Ok(())
+}
+
+fn rank(level: Level) -> f64 {
+    match level {
+        Level::Green | Level::Unknown => 0.0,
+        Level::Yellow => 1.0,
+        Level::Orange => 2.0,
+        Level::Red => 3.0,
+    }
+}
+
+fn seconds(time: Timestamp) -> f64 {
+    time.as_millisecond() as f64 / 1e3
+}
+
+struct Sheet<'a>(DescriptorEncoder<'a>);
+
+impl Sheet<'_> {
+    fn gauge(&mut self, name: &str, about: &str, value: f64) -> fmt::Result {
+        self.whole(name, about, &ConstGauge::new(value))
+    }
+
+    fn whole(&mut self, name: &str, about: &str, metric: &impl EncodeMetric) -> fmt::Result {
+        let encoder = self
+            .0
+            .encode_descriptor(name, about, None, metric.metric_type())?;
+        metric.encode(encoder)
+    }
+
+    fn gauges<'v>(
+        &mut self,
+        name: &str,
+        about: &str,
+        label: &str,
+        values: impl IntoIterator<Item = (&'v str, f64)>,
+    ) -> fmt::Result {
+        let mut family = self
+            .0
+            .encode_descriptor(name, about, None, MetricType::Gauge)?;
+        for (of, value) in values {
+            ConstGauge::new(value).encode(family.encode_family(&[(label, of)])?)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,113 @@
+//! Answers over HTTP: whether the daemon lives and is ready, its metrics, its status, its events.
+
+mod connections;
+mod metrics;
+mod routes;
+
+pub use metrics::CONTENT_TYPE;
+pub use routes::{Archive, ArchiveError, Page};
+
+use super::shutdown::{self, Trigger};
+use super::vitals::Vitals;
+use crate::config::Token;
+use std::io;
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::net::TcpListener;
+use tokio::task::JoinHandle;
+
+/// What one caller may take up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limits {
+    /// Connections at once; one more waits until one of them ends.
+    pub connections: usize,
+    /// By when the head of a request must be there.
+    pub head_time: Duration,
+    /// By when a request must be answered.
+    pub request_time: Duration,
+    /// A work loop that has not turned for so long is stuck, and `/healthz` says so.
+    pub turn_time: Duration,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            connections: 64,
+            head_time: Duration::from_secs(10),
+            request_time: Duration::from_secs(30),
+            turn_time: Duration::from_secs(30),
+        }
+    }
+}
+
+/// Where to listen, and to whom to open.
+#[derive(Debug, Clone)]
+pub struct Door {
+    /// The address; port 0 takes a free one.
+    pub listen: SocketAddr,
+    /// What a caller must know; `None` opens to everyone who can reach the address.
+    pub token: Option<Token>,
+    /// What one caller may take up.
+    pub limits: Limits,
+}
+
+/// The address cannot be listened on.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot listen on {address}: {source}")]
+pub struct ListenError {
+    /// The address.
+    pub address: SocketAddr,
+    /// What the system said.
+    pub source: io::Error,
+}
+
+/// The server at work.
+#[derive(Debug)]
+pub struct Server {
+    address: SocketAddr,
+    stop: Trigger,
+    task: JoinHandle<()>,
+}
+
+impl Server {
+    /// Starts to listen; needs a tokio runtime. `archive` answers for past events, where there is one.
+    ///
+    /// # Errors
+    /// [`ListenError`].
+    pub async fn start(
+        door: Door,
+        vitals: Arc<Vitals>,
+        archive: Option<Arc<dyn Archive>>,
+    ) -> Result<Self, ListenError> {
+        let fail = |source| ListenError {
+            address: door.listen,
+            source,
+        };
+        let listener = TcpListener::bind(door.listen).await.map_err(fail)?;
+        let address = listener.local_addr().map_err(fail)?;
+        let (stop, stopped) = shutdown::pair();
+        let limits = door.limits;
+        let router = routes::router(door, vitals, archive);
+        let task = tokio::spawn(connections::serve(listener, router, limits, stopped));
+        tracing::info!(%address, "listening");
+        Ok(Self {
+            address,
+            stop,
+            task,
+        })
+    }
+
+    /// Where it listens.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Ends it; what is being answered is broken off.
+    pub async fn stop(self) {
+        self.stop.pull();
+        if let Err(error) = self.task.await {
+            tracing::error!(%error, "the server broke off");
+        }
+    }
+}

@@ -1,0 +1,218 @@
+//! What is answered to which request, and to whom.
+
+use super::{Door, metrics};
+use crate::config::Token;
+use crate::runtime::vitals::{Health, Point, Vitals};
+use axum::extract::{DefaultBodyLimit, Query, Request, State};
+use axum::http::{HeaderValue, StatusCode, header};
+use axum::middleware::{Next, from_fn, from_fn_with_state};
+use axum::response::{IntoResponse, Response};
+use axum::routing::get;
+use axum::{Json, Router};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fmt::Debug;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Longest body of a request, bytes.
+const LONGEST_BODY: usize = 64 * 1024;
+/// Most events in one answer, and how many there are where nothing is asked for.
+const MOST_EVENTS: usize = 1000;
+/// The header that says where the next page starts.
+const NEXT: &str = "slipwatch-next";
+
+/// Past events, oldest first.
+pub trait Archive: Debug + Send + Sync {
+    /// At most `limit` events after the place that `since` names, which an earlier page gave; from
+    /// the beginning without one. May block.
+    ///
+    /// # Errors
+    /// [`ArchiveError`].
+    fn events(&self, since: Option<&str>, limit: usize) -> Result<Page, ArchiveError>;
+}
+
+/// Some events.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Page {
+    /// One JSON object a line, each with its newline.
+    pub lines: String,
+    /// What to ask for as `since` next.
+    pub next: String,
+}
+
+/// Why no events could be given.
+#[derive(Debug, thiserror::Error)]
+pub enum ArchiveError {
+    /// `since` is none that we gave.
+    #[error("since={0} names no place in the log")]
+    NoSuchPlace(String),
+    /// The log cannot be read.
+    #[error("the events cannot be read: {0}")]
+    Unreadable(String),
+}
+
+impl IntoResponse for ArchiveError {
+    fn into_response(self) -> Response {
+        let status = match self {
+            Self::NoSuchPlace(_) => StatusCode::BAD_REQUEST,
+            Self::Unreadable(_) => StatusCode::SERVICE_UNAVAILABLE,
+        };
+        (status, format!("{self}\n")).into_response()
+    }
+}
+
+/// All routes; every one but `/healthz` asks for the token, where there is one.
+pub(super) fn router(door: Door, vitals: Arc<Vitals>, archive: Option<Arc<dyn Archive>>) -> Router {
+    let mut guarded = Router::new()
+        .route("/readyz", get(ready))
+        .route("/metrics", get(expose))
+        .route("/api/status", get(status))
+        .with_state(Arc::clone(&vitals));
+    if let Some(archive) = archive {
+        guarded = guarded.merge(
+            Router::new()
+                .route("/api/events", get(events))
+                .with_state(archive),
+        );
+    }
+    guarded
+        .fallback(|| async { (StatusCode::NOT_FOUND, "no such page\n") })
+        .layer(from_fn_with_state(door.token.map(Arc::new), admit))
+        .merge(
+            Router::new()
+                .route("/healthz", get(healthy))
+                .with_state((vitals, door.limits.turn_time)),
+        )
+        .layer(DefaultBodyLimit::max(LONGEST_BODY))
+        .layer(from_fn(refuse_long_bodies))
+}
+
+async fn admit(State(token): State<Option<Arc<Token>>>, request: Request, next: Next) -> Response {
+    let is_admitted = match &token {
+        Some(token) => bearer(&request).is_some_and(|given| token.is(given)),
+        None => is_named_as_this_machine(&request),
+    };
+    match (is_admitted, token) {
+        (true, _) => next.run(request).await,
+        (false, Some(_)) => {
+            let challenge = [(header::WWW_AUTHENTICATE, "Bearer")];
+            (StatusCode::UNAUTHORIZED, challenge, "a token is needed\n").into_response()
+        }
+        (false, None) => (StatusCode::FORBIDDEN, "ask for localhost\n").into_response(),
+    }
+}
+
+fn bearer(request: &Request) -> Option<&[u8]> {
+    let value = request.headers().get(header::AUTHORIZATION)?.as_bytes();
+    let (scheme, given) = value.split_at_checked(7)?;
+    scheme.eq_ignore_ascii_case(b"bearer ").then_some(given)
+}
+
+/// Without a token only loopback is listened on, and a page in a browser there that had its own
+/// name point to it would ask under that name.
+fn is_named_as_this_machine(request: &Request) -> bool {
+    let Some(host) = request.headers().get(header::HOST) else {
+        return true;
+    };
+    let host = host.to_str().unwrap_or_default();
+    let name = host.rsplit_once(':').map_or(
+        host,
+        |(name, port)| {
+            if port.ends_with(']') { host } else { name }
+        },
+    );
+    let bare = name.trim_start_matches('[').trim_end_matches(']');
+    let is_loopback = |ip: std::net::IpAddr| ip.is_loopback();
+    bare.eq_ignore_ascii_case("localhost") || bare.parse().is_ok_and(is_loopback)
+}
+
+async fn refuse_long_bodies(request: Request, next: Next) -> Response {
+    let length = request.headers().get(header::CONTENT_LENGTH);
+    let length = length.and_then(|length| length.to_str().ok()?.parse::<usize>().ok());
+    if length.is_some_and(|length| length > LONGEST_BODY) {
+        return (StatusCode::PAYLOAD_TOO_LARGE, "the body is too long\n").into_response();
+    }
+    next.run(request).await
+}
+
+async fn healthy(State((vitals, longest)): State<(Arc<Vitals>, Duration)>) -> (StatusCode, String) {
+    let since = vitals.since_turn();
+    if since <= longest {
+        (StatusCode::OK, "ok\n".to_owned())
+    } else {
+        let text = format!("the work loop has not turned for {since:.0?}\n");
+        (StatusCode::SERVICE_UNAVAILABLE, text)
+    }
+}
+
+async fn ready(State(vitals): State<Arc<Vitals>>) -> (StatusCode, &'static str) {
+    let health = vitals.health();
+    if !health.is_caught_up {
+        (StatusCode::SERVICE_UNAVAILABLE, "still reading the past\n")
+    } else if health.is_paused || !health.is_store_writable {
+        (
+            StatusCode::SERVICE_UNAVAILABLE,
+            "the state folder cannot be written to\n",
+        )
+    } else {
+        (StatusCode::OK, "ready\n")
+    }
+}
+
+async fn expose(State(vitals): State<Arc<Vitals>>) -> Response {
+    match metrics::text(vitals) {
+        Ok(text) => ([(header::CONTENT_TYPE, metrics::CONTENT_TYPE)], text).into_response(),
+        Err(error) => {
+            tracing::error!(%error, "metrics cannot be written");
+            StatusCode::INTERNAL_SERVER_ERROR.into_response()
+        }
+    }
+}
+
+#[derive(Debug, Serialize)]
+struct Status {
+    version: &'static str,
+    uptime_seconds: u64,
+    #[serde(flatten)]
+    health: Health,
+    /// How many benchmarks stand at each level.
+    levels: BTreeMap<&'static str, usize>,
+    benchmarks: BTreeMap<String, Point>,
+}
+
+async fn status(State(vitals): State<Arc<Vitals>>) -> Json<Status> {
+    let levels = vitals.levels().map(|(level, count)| (level.name(), count));
+    let points = vitals.points().into_iter();
+    Json(Status {
+        version: env!("CARGO_PKG_VERSION"),
+        uptime_seconds: vitals.uptime().as_secs(),
+        health: vitals.health(),
+        levels: levels.into(),
+        benchmarks: points.map(|(id, point)| (id.to_string(), point)).collect(),
+    })
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Range {
+    since: Option<String>,
+    limit: Option<usize>,
+}
+
+async fn events(
+    State(archive): State<Arc<dyn Archive>>,
+    Query(range): Query<Range>,
+) -> Result<Response, ArchiveError> {
+    let limit = range.limit.unwrap_or(MOST_EVENTS).min(MOST_EVENTS);
+    let page = tokio::task::spawn_blocking(move || archive.events(range.since.as_deref(), limit))
+        .await
+        .map_err(|error| ArchiveError::Unreadable(error.to_string()))??;
+    let mut response = page.lines.into_response();
+    let kind = HeaderValue::from_static("application/x-ndjson");
+    response.headers_mut().insert(header::CONTENT_TYPE, kind);
+    if let Ok(next) = HeaderValue::from_str(&page.next) {
+        response.headers_mut().insert(NEXT, next);
+    }
+    Ok(response)
+}

@@ -1,0 +1,304 @@
+//! What the daemon knows of its own health; the work loop writes it, whoever asks reads it.
+
+use super::clock::Stopwatch;
+use crate::alert::Level;
+use crate::monitor::{AlertState, Event, EventKind, Unexplained};
+use crate::reading::{BenchmarkId, Timestamp};
+use prometheus_client::metrics::histogram::Histogram;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+/// Benchmarks of which single figures are given; of the others only how many stand at each level.
+pub const MOST_SHOWN: usize = 2000;
+/// Upper ends of the refit times' bins, seconds.
+const REFIT_SECONDS: [f64; 10] = [0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0];
+
+/// The site as a whole.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Health {
+    /// Whether the past has been read.
+    pub is_caught_up: bool,
+    /// Whether the last write to the state folder went well.
+    pub is_store_writable: bool,
+    /// Whether nothing is taken in because the disk is full.
+    pub is_paused: bool,
+    /// Values that the monitor took.
+    pub readings: u64,
+    /// Values dropped because they had been taken before.
+    pub repeated: u64,
+    /// Values dropped because they are from the future.
+    pub from_the_future: u64,
+    /// Events that are not in the log because the disk was full for too long.
+    pub unwritten: u64,
+    /// Lines, records and files that could not be used, a source.
+    pub quarantined: BTreeMap<String, u64>,
+    /// How long the oldest value that was found has waited to be taken; zero when none waits.
+    pub lag_seconds: f64,
+    /// Batches of values between the sources and the work loop.
+    pub queue: usize,
+    /// Alerts that a hook has not taken yet.
+    pub outbox: usize,
+    /// Since when the oldest of them waits.
+    pub outbox_oldest: Option<Timestamp>,
+    /// Searches for an effect that are at work.
+    pub searches: usize,
+    /// Size of the database, bytes.
+    pub database_bytes: Option<u64>,
+}
+
+/// One benchmark.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Point {
+    /// When its newest reading was measured.
+    pub newest: Option<Timestamp>,
+    /// The level in force.
+    pub level: Level,
+    /// Whether the monitor cannot tell: beside the level, never instead of it.
+    pub is_unknown: bool,
+    /// How long the last reading that led to a refit took to be worked in, seconds.
+    pub refit_seconds: Option<f64>,
+    /// How much less likely the newest reading was than the usual one, ln; zero where it does not stand out.
+    pub surprise_nats: f64,
+    /// The velocity of the last refit, mm/day.
+    pub velocity_mm_per_day: Option<f64>,
+}
+
+impl Default for Point {
+    fn default() -> Self {
+        Self {
+            newest: None,
+            level: Level::Green,
+            is_unknown: false,
+            refit_seconds: None,
+            surprise_nats: 0.0,
+            velocity_mm_per_day: None,
+        }
+    }
+}
+
+impl Point {
+    fn note(&mut self, kind: &EventKind) {
+        match kind {
+            EventKind::Refit {
+                velocity_mm_per_day,
+                ..
+            } => self.velocity_mm_per_day = *velocity_mm_per_day,
+            EventKind::UnexplainedResidual(Unexplained::Reading { surprise_nats, .. }) => {
+                self.surprise_nats = *surprise_nats;
+            }
+            EventKind::Alert { level, state, .. } => self.call(*level, *state),
+            EventKind::UnexplainedResidual(Unexplained::Structure { .. })
+            | EventKind::RegimeFlip { .. }
+            | EventKind::InterceptDrift { .. }
+            | EventKind::TransitionDrift { .. }
+            | EventKind::EffectFound { .. }
+            | EventKind::EffectDropped { .. }
+            | EventKind::Fault { .. }
+            | EventKind::Summary(_) => {}
+        }
+    }
+
+    fn call(&mut self, level: Level, state: AlertState) {
+        match (level, state) {
+            (Level::Unknown, _) => self.is_unknown = state == AlertState::Firing,
+            (_, AlertState::Firing) => self.level = level,
+            // The end of a level that another one has superseded says nothing of that one.
+            (_, AlertState::Resolved) if self.level == level => self.level = Level::Green,
+            (_, AlertState::Resolved) => {}
+        }
+    }
+}
+
+/// The daemon's own health, shared between the work loop and those who ask.
+#[derive(Debug)]
+pub struct Vitals {
+    since_start: Stopwatch,
+    /// When the work loop last turned, milliseconds after the start, by a clock that no one sets.
+    last_turn_ms: AtomicU64,
+    health: Mutex<Health>,
+    points: Mutex<BTreeMap<BenchmarkId, Point>>,
+    refits: Histogram,
+}
+
+impl Default for Vitals {
+    fn default() -> Self {
+        Self {
+            since_start: Stopwatch::start(),
+            last_turn_ms: AtomicU64::new(0),
+            health: Mutex::default(),
+            points: Mutex::default(),
+            refits: Histogram::new(REFIT_SECONDS),
+        }
+    }
+}
+
+impl Vitals {
+    /// The work loop has turned once more.
+    pub fn turned(&self) {
+        let now = u64::try_from(self.uptime().as_millis()).unwrap_or(u64::MAX);
+        self.last_turn_ms.store(now, Ordering::Relaxed);
+    }
+
+    /// How long ago the work loop last turned, or the daemon started.
+    pub fn since_turn(&self) -> Duration {
+        let turned = Duration::from_millis(self.last_turn_ms.load(Ordering::Relaxed));
+        self.uptime().saturating_sub(turned)
+    }
+
+    /// How long the daemon has been up.
+    pub fn uptime(&self) -> Duration {
+        self.since_start.elapsed()
+    }
+
+    /// The site as a whole.
+    pub fn health(&self) -> Health {
+        locked(&self.health).clone()
+    }
+
+    /// Changes what is known of the site as a whole.
+    pub fn update(&self, change: impl FnOnce(&mut Health)) {
+        change(&mut locked(&self.health));
+    }
+
+    /// A reading of `benchmark` was worked in within `took` and led to `events`.
+    pub fn read(&self, benchmark: &BenchmarkId, time: Timestamp, events: &[Event], took: Duration) {
+        let mut points = locked(&self.points);
+        let point = points.entry(benchmark.clone()).or_default();
+        point.newest = point.newest.max(Some(time));
+        point.surprise_nats = 0.0;
+        let is_refit = |event: &Event| {
+            matches!(event.kind, EventKind::Refit { .. })
+                && event.benchmark.as_ref() == Some(benchmark)
+        };
+        if events.iter().any(is_refit) {
+            point.refit_seconds = Some(took.as_secs_f64());
+            self.refits.observe(took.as_secs_f64());
+        }
+        note_all(&mut points, events);
+    }
+
+    /// Events that came of something else than a reading.
+    pub fn note(&self, events: &[Event]) {
+        if !events.is_empty() {
+            note_all(&mut locked(&self.points), events);
+        }
+    }
+
+    /// The first [`MOST_SHOWN`] benchmarks by name.
+    pub fn points(&self) -> BTreeMap<BenchmarkId, Point> {
+        let points = locked(&self.points);
+        let shown = points.iter().take(MOST_SHOWN);
+        shown
+            .map(|(id, point)| (id.clone(), point.clone()))
+            .collect()
+    }
+
+    /// How many benchmarks stand at each level, all of them; those at `unknown` count there as well.
+    pub fn levels(&self) -> [(Level, usize); 5] {
+        let points = locked(&self.points);
+        [
+            Level::Green,
+            Level::Yellow,
+            Level::Orange,
+            Level::Red,
+            Level::Unknown,
+        ]
+        .map(|level| {
+            let stands = |point: &&Point| match level {
+                Level::Unknown => point.is_unknown,
+                Level::Green | Level::Yellow | Level::Orange | Level::Red => point.level == level,
+            };
+            (level, points.values().filter(stands).count())
+        })
+    }
+
+    /// How long readings that led to a refit took.
+    pub(super) fn refits(&self) -> &Histogram {
+        &self.refits
+    }
+}
+
+fn note_all(points: &mut BTreeMap<BenchmarkId, Point>, events: &[Event]) {
+    for event in events {
+        if let Some(benchmark) = &event.benchmark {
+            points
+                .entry(benchmark.clone())
+                .or_default()
+                .note(&event.kind);
+        }
+    }
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn alert(level: Level, state: AlertState) -> Event {
+        Event {
+            time: Timestamp::UNIX_EPOCH,
+            benchmark: Some(BenchmarkId::new("5")),
+            kind: EventKind::Alert {
+                level,
+                state,
+                key: String::new(),
+                rule: String::new(),
+                text: String::new(),
+            },
+        }
+    }
+
+    #[test]
+    fn unknown_stands_beside_a_level_and_a_superseded_level_takes_nothing_back() {
+        let vitals = Vitals::default();
+        let point = || vitals.points()[&BenchmarkId::new("5")].clone();
+        vitals.note(&[alert(Level::Orange, AlertState::Firing)]);
+        vitals.note(&[alert(Level::Unknown, AlertState::Firing)]);
+        assert_eq!((point().level, point().is_unknown), (Level::Orange, true));
+        vitals.note(&[
+            alert(Level::Red, AlertState::Firing),
+            alert(Level::Orange, AlertState::Resolved),
+        ]);
+        assert_eq!(point().level, Level::Red);
+        vitals.note(&[
+            alert(Level::Red, AlertState::Resolved),
+            alert(Level::Unknown, AlertState::Resolved),
+        ]);
+        assert_eq!((point().level, point().is_unknown), (Level::Green, false));
+    }
+
+    #[test]
+    fn a_reading_that_does_not_stand_out_ends_the_surprise_of_the_one_before() {
+        let vitals = Vitals::default();
+        let five = BenchmarkId::new("5");
+        let event = Event {
+            time: Timestamp::UNIX_EPOCH,
+            benchmark: Some(five.clone()),
+            kind: EventKind::UnexplainedResidual(Unexplained::Reading {
+                surprise_nats: 9.0,
+                velocity_mm_per_day: None,
+            }),
+        };
+        vitals.read(&five, Timestamp::UNIX_EPOCH, &[event], Duration::ZERO);
+        assert!((vitals.points()[&five].surprise_nats - 9.0).abs() < 1e-12);
+        vitals.read(&five, Timestamp::UNIX_EPOCH, &[], Duration::ZERO);
+        assert!(vitals.points()[&five].surprise_nats.abs() < 1e-12);
+    }
+
+    #[test]
+    fn more_benchmarks_than_are_shown_are_still_counted_by_level() {
+        let vitals = Vitals::default();
+        for number in 0..MOST_SHOWN + 5 {
+            let id = BenchmarkId::new(format!("{number:05}"));
+            vitals.read(&id, Timestamp::UNIX_EPOCH, &[], Duration::ZERO);
+        }
+        assert_eq!(vitals.points().len(), MOST_SHOWN);
+        assert_eq!(vitals.levels()[0], (Level::Green, MOST_SHOWN + 5));
+    }
+}
