@@ -25,3 +25,4 @@ pub mod plot;
 pub mod reading;
 pub mod regime;
 pub mod runtime;
+pub mod store;

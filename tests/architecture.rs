@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Which modules a module may name. A new module gets a row here, and a place in ARCHITECTURE.md.
-const ARROWS: [(&str, &[&str]); 14] = [
+const ARROWS: [(&str, &[&str]); 15] = [
     ("reading", &[]),
     ("regime", &[]),
     ("plot", &[]),
@@ -33,6 +33,7 @@ const ARROWS: [(&str, &[&str]); 14] = [
         &["fit", "forecast", "model", "monitor", "reading", "regime"],
     ),
     ("config", &["alert", "monitor", "reading"]),
+    ("store", &["monitor", "reading"]),
     (
         "runtime",
         &[
@@ -46,6 +47,7 @@ const ARROWS: [(&str, &[&str]); 14] = [
             "monitor",
             "reading",
             "regime",
+            "store",
         ],
     ),
     (
@@ -64,6 +66,7 @@ const ARROWS: [(&str, &[&str]); 14] = [
             "reading",
             "regime",
             "runtime",
+            "store",
         ],
     ),
 ];

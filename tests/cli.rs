@@ -453,7 +453,15 @@ fn sigterm_ends_a_daemon_that_follows_a_growing_file_and_its_events_are_those_of
     let stopped = daemon.until("\"stopped\"");
     assert_eq!(daemon.child.wait().unwrap().code(), Some(0));
     assert!(stopped.contains("taken: 31"), "{stopped}");
-    let events = fs::read_to_string(folder.path().join("state/events.ndjson")).unwrap();
+    let asked = slipwatch(&[
+        "events",
+        "--config",
+        config.to_str().unwrap(),
+        "--format",
+        "json",
+    ])
+    .success();
+    let events = String::from_utf8(asked.get_output().stdout.clone()).unwrap();
     let (said, _summary) = before.trim_end().rsplit_once('\n').unwrap_or_default();
     assert!(
         events.starts_with(said),

@@ -19,6 +19,7 @@ use slipwatch::reading::{BenchmarkId, Channel, Recording, Series, Timestamp, Uni
 use slipwatch::runtime::replay::{Pace, Plan, replay};
 use slipwatch::runtime::run::{Progress, run};
 use slipwatch::runtime::shutdown;
+use slipwatch::store::Store;
 use std::fmt::Write;
 use std::time::Duration;
 use tokio::sync::{OnceCell, watch};
@@ -102,7 +103,8 @@ async fn said_by_a_daemon() -> Vec<String> {
     let config = config::load(&file).unwrap();
     let (trigger, shutdown) = shutdown::pair();
     let (sender, mut progress) = watch::channel(Progress::default());
-    let task = tokio::spawn(async move { run(&config, shutdown, &sender).await });
+    let own = config.clone();
+    let task = tokio::spawn(async move { run(&own, shutdown, &sender).await });
     let caught_up = progress.wait_for(|progress| progress.is_caught_up);
     tokio::time::timeout(Duration::from_secs(120), caught_up)
         .await
@@ -110,13 +112,23 @@ async fn said_by_a_daemon() -> Vec<String> {
         .unwrap();
     trigger.pull();
     task.await.unwrap().unwrap();
-    let events = std::fs::read_to_string(folder.path().join("state/events.ndjson")).unwrap();
+    let store = Store::look(&config.site.state_dir).unwrap();
+    let mut events = Vec::new();
+    while let Some(some) = Some(
+        store
+            .events(events.last().map_or(0, |(seq, _)| *seq), None, None)
+            .unwrap(),
+    )
+    .filter(|some| !some.is_empty())
+    {
+        events.extend(some);
+    }
     let last = measured.readings.last().unwrap().time;
-    let events = events.lines().filter(|line| {
+    let events = events.into_iter().map(|(_, line)| line).filter(|line| {
         let event: Event = serde_json::from_str(line).unwrap();
         event.time <= last
     });
-    events.map(str::to_owned).collect()
+    events.collect()
 }
 
 /// (day, kind, channel, adopted) of every effect found.

@@ -27,7 +27,7 @@ impl Bench {
     fn with(kind: &str, benchmarks: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let config = config_in(folder.path(), kind, benchmarks);
-        let follower = Follower::new(&config.sources, &config.benchmarks);
+        let follower = Follower::new(&config.sources, &config.benchmarks, &[]);
         Self { folder, follower }
     }
 
@@ -54,6 +54,7 @@ impl Bench {
             let Batch {
                 arrivals,
                 caught_up,
+                ..
             } = self.follower.poll();
             news.extend(arrivals.into_iter().map(|arrival| match arrival.input {
                 Input::Reading {
@@ -65,7 +66,9 @@ impl Bench {
                 Input::Missing {
                     benchmark, what, ..
                 } => format!("{benchmark} gives {what}"),
-                Input::Found(_) | Input::Tick => panic!("not in a file"),
+                Input::Settings(_) | Input::Order(_) | Input::Found(_) | Input::Tick => {
+                    panic!("not in a file")
+                }
             }));
             if caught_up {
                 return news;

@@ -13,7 +13,9 @@ use slipwatch::reading::BenchmarkId;
 use slipwatch::runtime::deliver::{Dispatcher, Retry};
 use slipwatch::runtime::delivered::Delivered;
 use slipwatch::runtime::hook::{self, Alert, Outcome, Status};
+use slipwatch::store::{Fate, Store};
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 use tempfile::TempDir;
 
@@ -259,7 +261,8 @@ async fn an_orange_a_red_and_an_unknown_are_tried_until_the_hook_takes_them() {
     let (folder, mut config) = hook(BROKEN);
     config.levels = vec![Level::Yellow, Level::Orange, Level::Red, Level::Unknown];
     for level in [Level::Orange, Level::Red, Level::Unknown] {
-        let delivered = Delivered::open(&folder.path().join("receipts")).unwrap();
+        let store = Arc::new(Store::open(&folder.path().join("state")).unwrap());
+        let delivered = Delivered::of(Arc::clone(&store));
         let dispatcher =
             Dispatcher::start(std::slice::from_ref(&config), &tireless_retry(), delivered);
         let alert = alert_of(level, level.name(), "");
@@ -268,9 +271,11 @@ async fn an_orange_a_red_and_an_unknown_are_tried_until_the_hook_takes_them() {
         // What is in hand is not taken twice, what has been taken not again.
         assert!(dispatcher.offer(&alert));
         std::fs::write(folder.path().join("fixed"), "").unwrap();
-        let receipt = format!("\"key\":\"{level}\"");
+        let identity = (level.name(), level.name(), "firing");
         eventually("its receipt", || {
-            read(&folder, "receipts").contains(&receipt)
+            store
+                .is_noted(identity, None, Some(Fate::Delivered))
+                .unwrap()
         })
         .await;
         assert_eq!(dispatcher.close(LIMIT).await, Some(0), "{level}");
@@ -342,8 +347,8 @@ async fn only_the_levels_that_a_hook_asks_for_reach_it() {
     assert_eq!(read(&folder, "calls"), "orange\nred\n");
 }
 
-async fn deliver_once(config: &HookConfig, receipts: &Path) {
-    let delivered = Delivered::open(receipts).unwrap();
+async fn deliver_once(config: &HookConfig, state: &Path) {
+    let delivered = Delivered::of(Arc::new(Store::open(state).unwrap()));
     let dispatcher = Dispatcher::start(std::slice::from_ref(config), &quick_retry(), delivered);
     dispatcher.offer(&alert());
     assert_eq!(dispatcher.close(LIMIT).await, Some(0));
@@ -352,14 +357,14 @@ async fn deliver_once(config: &HookConfig, receipts: &Path) {
 #[tokio::test]
 async fn what_a_hook_has_taken_is_not_sent_again_after_a_restart() {
     let (folder, config) = hook("echo call >> calls");
-    let receipts = folder.path().join("delivered.ndjson");
-    deliver_once(&config, &receipts).await;
-    deliver_once(&config, &receipts).await;
+    let state = folder.path().join("state");
+    deliver_once(&config, &state).await;
+    deliver_once(&config, &state).await;
     assert_eq!(read(&folder, "calls"), "call\n");
     // The same alert at another hook is another delivery.
     let mut other = config.clone();
     other.run.push("--other".to_owned());
-    deliver_once(&other, &receipts).await;
+    deliver_once(&other, &state).await;
     assert_eq!(read(&folder, "calls"), "call\ncall\n");
 }
 

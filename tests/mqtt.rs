@@ -1,5 +1,4 @@
 //! Readings from a real Mosquitto: none is lost that was not acknowledged.
-#![cfg(feature = "mqtt")]
 #![allow(missing_docs, reason = "the claims are the names")]
 #![allow(
     clippy::unwrap_used,
@@ -166,7 +165,12 @@ fn message(day: usize) -> String {
 fn values(delivery: &Delivery) -> Vec<f64> {
     let value = |input: &Input| match input {
         Input::Reading { reading, .. } => reading.value,
-        Input::Sample { .. } | Input::Missing { .. } | Input::Found(_) | Input::Tick => f64::NAN,
+        Input::Sample { .. }
+        | Input::Missing { .. }
+        | Input::Settings(_)
+        | Input::Order(_)
+        | Input::Found(_)
+        | Input::Tick => f64::NAN,
     };
     delivery
         .arrivals

@@ -8,6 +8,7 @@ use super::policy::{Level, Policy};
 use super::rules::{Call, Evidence};
 use crate::reading::Timestamp;
 use jiff::SignedDuration;
+use serde::{Deserialize, Serialize};
 
 /// A change of the level in force.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -32,7 +33,7 @@ pub enum Entered {
 }
 
 /// The level in force for one benchmark.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Latch {
     level: Level,
     since: Option<Timestamp>,
@@ -45,7 +46,7 @@ pub struct Latch {
 }
 
 /// A stretch of motion that does not gain.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Stretch {
     since: Timestamp,
     velocity: f64,
@@ -115,6 +116,11 @@ impl Latch {
     /// The level in force.
     pub fn level(&self) -> Level {
         self.level
+    }
+
+    /// The level above green that is in force, and since when.
+    pub fn in_force(&self) -> Option<(Level, Timestamp)> {
+        (self.level > Level::Green).then_some((self.level, self.since?))
     }
 
     /// Takes the evidence of one reading and says how the level changes.

@@ -8,4 +8,4 @@ mod rules;
 
 pub use latch::{Entered, Latch, Transition};
 pub use policy::{Level, Policy, Threshold};
-pub use rules::{Call, Evidence};
+pub use rules::{Call, Cause, Evidence};

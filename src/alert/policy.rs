@@ -40,7 +40,7 @@ impl fmt::Display for Level {
 }
 
 /// Plain thresholds, a floor beside the model: the level is at least `level` while one is exceeded.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Threshold {
     /// The level that it calls.
     pub level: Level,
@@ -53,7 +53,7 @@ pub struct Threshold {
 }
 
 /// The figures in the level rules.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Policy {
     /// How long it takes to bring everyone out.
     pub evacuation_time: SignedDuration,

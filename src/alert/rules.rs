@@ -2,6 +2,7 @@
 
 use super::policy::{Level, Policy, Threshold};
 use crate::reading::Timestamp;
+use serde::{Deserialize, Serialize};
 
 /// What is known of one benchmark after a reading.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,7 +22,36 @@ pub struct Evidence {
     /// Latest observed acceleration, mm/day per day.
     pub acceleration_mm_per_day2: Option<f64>,
     /// What else asks for a look: a flip to instability, an intercept drifting in.
-    pub causes: Vec<&'static str>,
+    pub causes: Vec<Cause>,
+}
+
+/// What asks for a look although no chance is large.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Cause {
+    /// The regime turned unstable.
+    RegimeFlip,
+    /// The inverse-velocity intercept comes nearer.
+    InterceptDriftingIn,
+    /// The transition time comes nearer.
+    TransitionDriftingIn,
+    /// Readings that the law in force does not explain.
+    UnexplainedResidual,
+    /// The slope moves upslope: its sign may be wrong.
+    MovesBackwards,
+}
+
+impl Cause {
+    /// The rule's name in an alert.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::RegimeFlip => "regime-flip",
+            Self::InterceptDriftingIn => "intercept-drifting-in",
+            Self::TransitionDriftingIn => "transition-drifting-in",
+            Self::UnexplainedResidual => "unexplained-residual",
+            Self::MovesBackwards => "moves-backwards",
+        }
+    }
 }
 
 /// The level that the evidence calls for, and why.
@@ -56,7 +86,7 @@ impl Policy {
         } else if let Some(cause) = evidence.causes.first() {
             Call {
                 level: Level::Yellow,
-                rule: cause,
+                rule: cause.name(),
             }
         } else {
             Call {

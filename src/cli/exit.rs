@@ -8,6 +8,7 @@ use crate::runtime::pulse::PulseError;
 use crate::runtime::replay::ReplayError;
 use crate::runtime::run::RunError;
 use crate::runtime::sandbox::SandboxError;
+use crate::store::StoreError;
 use std::error::Error;
 use std::fmt::Display;
 use std::io::{self, Write};
@@ -61,7 +62,7 @@ fn code_of(error: &(dyn Error + 'static)) -> Option<u8> {
     }
     if let Some(error) = error.downcast_ref::<RunError>() {
         return Some(match error {
-            RunError::State { .. } | RunError::InUse { .. } => IO,
+            RunError::State { .. } => IO,
             RunError::Follow(_) => TROUBLE,
             RunError::Pulse(PulseError::Token(_)) => CONFIG,
             RunError::Pulse(PulseError::Listen(_)) => UNAVAILABLE,
@@ -70,7 +71,7 @@ fn code_of(error: &(dyn Error + 'static)) -> Option<u8> {
     if let Some(error) = error.downcast_ref::<ReplayError>() {
         return Some(match error {
             ReplayError::NothingUntil { .. } => DATA,
-            ReplayError::Output(_) => IO,
+            ReplayError::Output(_) | ReplayError::State(_) => IO,
             ReplayError::Interrupted | ReplayError::Undelivered => TROUBLE,
         });
     }
@@ -79,7 +80,7 @@ fn code_of(error: &(dyn Error + 'static)) -> Option<u8> {
         (error.is::<SelectError>() || error.is::<MergeError>(), DATA),
         (error.is::<ConfigError>(), CONFIG),
         (error.is::<SandboxError>(), NOT_RUN),
-        (error.is::<io::Error>(), IO),
+        (error.is::<io::Error>() || error.is::<StoreError>(), IO),
     ];
     table.into_iter().find_map(|(is, code)| is.then_some(code))
 }

@@ -15,6 +15,7 @@ mod man;
 mod replay;
 mod run;
 mod simulate;
+mod state;
 mod sweep;
 mod table;
 mod text;
@@ -36,7 +37,12 @@ enum Command {
     Run(run::Args),
     Check(check::Args),
     Doctor(doctor::Args),
+    #[command(mut_arg("files", |files| files.required_unless_present("state").required(false)))]
     Replay(replay::Args),
+    Status(state::StatusArgs),
+    Events(state::EventsArgs),
+    Alerts(state::AlertsArgs),
+    Backup(state::BackupArgs),
     Fit(fit::Args),
     Sweep(sweep::Args),
     Explain(explain::Args),
@@ -57,6 +63,10 @@ pub fn main() -> ExitCode {
             Command::Check(args) => check::run(&args),
             Command::Doctor(args) => doctor::run(&args),
             Command::Replay(args) => replay::run(&args),
+            Command::Status(args) => state::status(&args),
+            Command::Events(args) => state::events(&args),
+            Command::Alerts(args) => state::alerts(&args),
+            Command::Backup(args) => state::backup(&args),
             Command::Fit(args) => fit::run(&args),
             Command::Sweep(args) => sweep::run(&args),
             Command::Explain(args) => explain::run(&args),

@@ -10,6 +10,7 @@ use crate::runtime::log::{self, LogFormat};
 use crate::runtime::replay::{self, Pace, Plan};
 use crate::runtime::sandbox::OURSELVES;
 use crate::runtime::shutdown::Shutdown;
+use crate::store::Store;
 use anyhow::Context;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -30,6 +31,9 @@ pub(super) struct Args {
     /// max, or how many seconds of data go by in a second
     #[arg(long, value_name = "max|N", default_value = "max", value_parser = pace)]
     speed: Pace,
+    /// Play what the daemon of this state folder took in, in the order in which it did, instead of files
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["config", "hooks"])]
+    state: Option<PathBuf>,
     /// Stop at this time of the data
     #[arg(long, value_name = "TIME")]
     until: Option<Timestamp>,
@@ -43,6 +47,9 @@ pub(super) struct Args {
 /// Replays the files and prints the events.
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     log::init(LogFormat::Text);
+    if let Some(folder) = &args.state {
+        return run_state(args, folder);
+    }
     let mut config = args.config.as_deref().map(config::load).transpose()?;
     if let Some(config) = &mut config {
         config.wall_in_hooks(Path::new(OURSELVES));
@@ -71,6 +78,19 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         let shutdown = Shutdown::on_signals().context("cannot listen for signals")?;
         let mut print = |event: &Event| print(&mut stdout, event, args.output.format);
         replay::replay(&recording, &plan, shutdown, &mut print).await?;
+        Ok(())
+    })
+}
+
+/// Prints the events of the stored input.
+fn run_state(args: &Args, folder: &Path) -> anyhow::Result<()> {
+    let store = Store::look(folder)
+        .with_context(|| format!("cannot read the state in {}", folder.display()))?;
+    let mut stdout = io::stdout().lock();
+    asynchronous()?.block_on(async {
+        let shutdown = Shutdown::on_signals().context("cannot listen for signals")?;
+        let mut print = |event: &Event| print(&mut stdout, event, args.output.format);
+        replay::replay_state(&store, args.until, &shutdown, &mut print)?;
         Ok(())
     })
 }

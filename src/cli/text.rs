@@ -67,6 +67,13 @@ fn what(kind: &EventKind) -> String {
             format!("ALERT {level} {state}: {text}")
         }
         EventKind::Fault { kind, text } => format!("fault {kind}: {text}"),
+        EventKind::Order { order, until, by } => {
+            let until = until.map_or_else(String::new, |until| format!(" until {}", minute(until)));
+            let by = by
+                .as_ref()
+                .map_or_else(String::new, |by| format!(" by {by}"));
+            format!("{order}{by}{until}")
+        }
         EventKind::Summary(Summary {
             readings,
             refits,
@@ -165,6 +172,6 @@ fn forecast(failure: &FailureTime) -> String {
 }
 
 /// To the minute: people read this, and no forecast is finer.
-fn minute(time: Timestamp) -> String {
+pub(super) fn minute(time: Timestamp) -> String {
     time.strftime("%Y-%m-%d %H:%MZ").to_string()
 }

@@ -66,13 +66,6 @@ pub(super) fn broker(
     id: Option<String>,
     conventions: Conventions,
 ) -> Option<Broker> {
-    if !cfg!(feature = "mqtt") {
-        section.error(
-            section.at(),
-            "source.kind = \"mqtt\" is not in this build".to_owned(),
-            "build with --features mqtt",
-        );
-    }
     let address = section
         .required("url", "\"mqtt://127.0.0.1:1883\"")
         .and_then(|_| section.parsed("url", BrokerAddress::parse));

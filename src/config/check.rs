@@ -142,13 +142,7 @@ impl Config {
                 event.kind, event.time
             )
         });
-        let brokers = self.brokers.iter().map(|broker| {
-            let id = &broker.id;
-            format!(
-                "source {id:?}: the daemon does not listen to brokers yet; no reading comes from it"
-            )
-        });
-        brokers.chain(events).collect()
+        events.collect()
     }
 }
 

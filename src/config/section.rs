@@ -27,6 +27,7 @@ pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
         .collect();
     let (benchmarks, own) = benchmarks(root, &known, &policy);
     let declared = declared(root, &benchmarks);
+    let watched = watched(&known, &benchmarks);
     let hooks: Vec<HookConfig> = root
         .tables("hook", "hook")
         .into_iter()
@@ -49,6 +50,7 @@ pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
             policy,
             benchmarks: own,
             explain,
+            watched,
         },
         declared,
         hooks,
@@ -125,6 +127,13 @@ pub(super) fn unique(
             "give each its own id",
         );
     }
+}
+
+/// Where every source has benchmarks of its own, no others are watched.
+fn watched(sources: &[&str], benchmarks: &[Benchmark]) -> Option<BTreeSet<BenchmarkId>> {
+    let is_named = |source: &&str| benchmarks.iter().any(|one| one.source == **source);
+    let ids = benchmarks.iter().map(|benchmark| benchmark.id.clone());
+    (sources.iter().all(is_named)).then(|| ids.collect())
 }
 
 type Own = BTreeMap<BenchmarkId, Policy>;

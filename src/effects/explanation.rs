@@ -56,7 +56,7 @@ pub struct Explanation {
 }
 
 /// One effect inside the law.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Effect {
     /// Its kind.
     pub effect: Kind,

@@ -9,6 +9,7 @@ use super::search::time_of;
 use super::term::Term;
 use super::{candidates, term::Act};
 use crate::reading::{Channel, Timestamp, days_since};
+use serde::{Deserialize, Serialize};
 
 /// A channel may be silent for so many of its usual spacings before it says nothing of the present.
 const MAY_SKIP: f64 = 4.0;
@@ -17,14 +18,14 @@ const LATEST: usize = 32;
 
 /// What is known besides the law under a constant load. Only what can be said of times to come is in it: a
 /// covariate's response, harmonics, a step of the load; a jump of the reading, temperature in it.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Fuller {
     /// In the order in which the search accepted them.
     pub parts: Vec<Part>,
 }
 
 /// One effect with its size.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Part {
     /// A covariate's response in the log-load: `gain` for one standard deviation.
     Load {
@@ -66,7 +67,7 @@ pub enum Part {
 }
 
 /// A covariate's response, standardised as it was over the record that it was found in.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Filtered {
     /// The channel's full name.
     pub channel: String,
@@ -83,7 +84,7 @@ pub struct Filtered {
 }
 
 /// One period.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Wave {
     /// Days.
     pub period_days: f64,

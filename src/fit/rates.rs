@@ -4,10 +4,11 @@
 //! until the slip in them stands clear of it, so that slow creep and fast sliding are both resolved.
 
 use crate::reading::{Quantity, SECONDS_PER_DAY, Series, days_since};
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// One reading in the science's units: days and mm, or mm/day.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Observation {
     /// Days since the epoch of the series.
     pub t_days: f64,
@@ -18,7 +19,7 @@ pub struct Observation {
 }
 
 /// The readings of one benchmark, in the science's units, time strictly increasing.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Observations {
     /// Displacement or velocity.
     pub quantity: Quantity,

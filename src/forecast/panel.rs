@@ -7,6 +7,7 @@ use crate::fit::{Ensemble, LoadPosterior, Observation, Observations, Rate, RateO
 use crate::model::{Accuracy, Law, Trajectory};
 use crate::reading::Quantity;
 use crate::regime::Regime;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Fewest readings before anything is forecast: below it the priors would speak, not the slope.
@@ -34,7 +35,7 @@ pub struct Outlook {
 }
 
 /// What one benchmark is expected to do, and how well that was met.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Panel {
     expected: Option<Ensemble>,
     scored_to_days: Option<f64>,

@@ -1,5 +1,6 @@
 //! Whether a reading is one that nobody expected: structure, or a fault, that the law does not know.
 
+use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
 /// Readings that say what is usual.
@@ -9,7 +10,7 @@ const FEWEST: usize = 8;
 const STANDS_OUT_NATS: f64 = 7.0;
 
 /// Remembers how likely the latest readings were.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Surprise {
     log_densities: VecDeque<f64>,
 }

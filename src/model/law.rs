@@ -4,10 +4,11 @@ use super::coefficients::Coefficients;
 use super::scalar::inverse_box_cox_ln;
 use super::tail;
 use crate::regime::Regime;
+use serde::{Deserialize, Serialize};
 
 /// The law under constant load, in its regular coordinates. Times are in days, velocities in any
 /// unit per day; displacement comes out in that unit.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Law {
     /// Velocity at t = 0.
     pub v_i: f64,

@@ -1,6 +1,7 @@
 //! The covariates of a site as the searches and the fuller laws see them, bounded by count.
 
 use crate::reading::{Channel, Sample, Timestamp};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Samples kept of one channel.
@@ -9,7 +10,7 @@ const MOST_SAMPLES: usize = 4096;
 const MOST_CHANNELS: usize = 64;
 
 /// What lies beside the readings.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Covariates {
     channels: BTreeMap<String, Channel>,
 }

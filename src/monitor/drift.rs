@@ -3,6 +3,7 @@
 use crate::fit::Rate;
 use crate::forecast::InverseVelocityLine;
 use crate::model::{Accuracy, Law, Trajectory};
+use serde::{Deserialize, Serialize};
 
 /// Refits before anything is announced.
 const FEWEST: usize = 5;
@@ -24,7 +25,7 @@ pub(super) struct Moved {
 }
 
 /// Follows one predicted time over successive refits.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Drift {
     refits: usize,
     /// Refits in a row at which it stood later (positive) or earlier (negative) by enough.

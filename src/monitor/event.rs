@@ -127,8 +127,36 @@ pub enum EventKind {
         /// One line for a person.
         text: String,
     },
+    /// People asked for something.
+    Order {
+        /// `acknowledge`, `shelve` or `silence`.
+        order: String,
+        /// Until when, by the wall clock.
+        until: Option<Timestamp>,
+        /// Who.
+        by: Option<String>,
+    },
     /// The end of a replay.
     Summary(Summary),
+}
+
+impl EventKind {
+    /// The word in its JSON.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Refit { .. } => "refit",
+            Self::RegimeFlip { .. } => "regime-flip",
+            Self::InterceptDrift { .. } => "intercept-drift",
+            Self::TransitionDrift { .. } => "transition-drift",
+            Self::UnexplainedResidual(_) => "unexplained-residual",
+            Self::EffectFound { .. } => "effect-found",
+            Self::EffectDropped { .. } => "effect-dropped",
+            Self::Alert { .. } => "alert",
+            Self::Fault { .. } => "fault",
+            Self::Order { .. } => "order",
+            Self::Summary(_) => "summary",
+        }
+    }
 }
 
 /// What is not explained.
@@ -240,6 +268,7 @@ impl Summary {
             | EventKind::EffectFound { .. }
             | EventKind::EffectDropped { .. }
             | EventKind::Fault { .. }
+            | EventKind::Order { .. }
             | EventKind::Summary(_) => {}
         }
     }

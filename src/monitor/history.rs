@@ -5,6 +5,7 @@ use crate::reading::{
     BenchmarkId, Quantity, Reading, SECONDS_PER_DAY, Series, Timestamp, Unit, days_since,
 };
 use jiff::SignedDuration;
+use serde::{Deserialize, Serialize};
 
 /// Where readings come from, as far as their meaning goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,7 +37,7 @@ pub(super) enum Taken {
 const FARTHEST: f64 = 1e9;
 
 /// The readings of one benchmark.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct History {
     pub(super) epoch: Timestamp,
     pub(super) observations: Observations,

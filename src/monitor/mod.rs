@@ -4,6 +4,8 @@ mod covariates;
 mod drift;
 mod event;
 mod history;
+mod order;
+mod saved;
 mod search;
 mod sensor;
 mod silence;
@@ -13,6 +15,8 @@ pub use event::{
     AlertState, Event, EventKind, FailureTime, InverseVelocity, Plain, RegimeReport, Summary,
     Unexplained,
 };
+pub use order::Order;
+pub use saved::{Part, SavedError};
 pub use search::{Finding, SearchJob};
 
 use crate::alert::{Level, Policy};
@@ -20,7 +24,8 @@ use crate::reading::{BenchmarkId, Reading, Sample, Timestamp, Unit};
 use covariates::Covariates;
 use jiff::SignedDuration;
 use sensor::Sensors;
-use std::collections::BTreeMap;
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
 use track::{Beside, Track};
 
 /// What the monitor is told.
@@ -55,6 +60,10 @@ pub enum Input {
         /// The value.
         sample: Sample,
     },
+    /// The site's settings, when they are others than before.
+    Settings(Box<Settings>),
+    /// What people ask for.
+    Order(Order),
     /// What a search came to; to be handed in before the first reading that is no earlier than it was due.
     Found(Finding),
     /// Time has passed and nothing came.
@@ -62,7 +71,7 @@ pub enum Input {
 }
 
 /// What a monitor needs to know of its site.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// The alert policy.
     pub policy: Policy,
@@ -70,10 +79,13 @@ pub struct Settings {
     pub benchmarks: BTreeMap<BenchmarkId, Policy>,
     /// What is done about a residual that the law does not explain.
     pub explain: Explain,
+    /// The benchmarks that are watched; `None`: whatever comes.
+    #[serde(default)]
+    pub watched: Option<BTreeSet<BenchmarkId>>,
 }
 
 /// What is done about a residual that the law does not explain; it is watched and told in any case.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Explain {
     /// The effect is searched for, told, and taken into the law that forecasts and levels go by.
     #[default]
@@ -96,6 +108,10 @@ impl Settings {
 pub struct Monitor {
     settings: Settings,
     tracks: BTreeMap<BenchmarkId, Track>,
+    /// Whose memory is another than when it was last saved.
+    changed: BTreeSet<BenchmarkId>,
+    /// When each becomes silent, of those that are not yet.
+    deadlines: BTreeSet<(Timestamp, BenchmarkId)>,
     covariates: Covariates,
     sensors: Sensors,
     searches: Vec<SearchJob>,
@@ -109,6 +125,8 @@ impl Monitor {
         Self {
             settings,
             tracks: BTreeMap::new(),
+            changed: BTreeSet::new(),
+            deadlines: BTreeSet::new(),
             covariates: Covariates::default(),
             sensors: Sensors::default(),
             searches: Vec::new(),
@@ -127,25 +145,11 @@ impl Monitor {
                 averaging,
                 reading,
             } => {
-                self.summary.readings += 1;
-                self.sensors.reads(benchmark, reading.time);
-                let beside = Beside {
-                    covariates: &self.covariates,
-                    explain: self.settings.explain,
-                };
-                let policy = self.settings.policy(benchmark);
                 let source = history::Source {
                     unit: *unit,
                     averaging: *averaging,
                 };
-                let track = self
-                    .tracks
-                    .entry(benchmark.clone())
-                    .or_insert_with(|| Track::new(benchmark.clone(), source, reading.time));
-                let events = track.take(policy, source, reading, &beside);
-                let critical = policy.critical_velocity_mm_per_day;
-                self.searches.extend(track.search(critical, &beside));
-                events
+                self.read(benchmark, source, reading)
             }
             Input::Missing {
                 benchmark,
@@ -161,14 +165,91 @@ impl Monitor {
                 self.covariates.take(channel, unit.as_deref(), *sample);
                 Vec::new()
             }
-            Input::Tick => self
-                .tracks
-                .iter_mut()
-                .flat_map(|(benchmark, track)| track.pass(now, self.sensors.fault(benchmark)))
-                .collect(),
+            Input::Settings(settings) => self.resettle(now, settings),
+            Input::Order(order) => vec![order.event(now)],
+            Input::Tick => self.pass(now),
         };
         for event in &events {
             self.summary.count(&event.kind);
+        }
+        events
+    }
+
+    fn read(
+        &mut self,
+        benchmark: &BenchmarkId,
+        source: history::Source,
+        reading: &Reading,
+    ) -> Vec<Event> {
+        self.summary.readings += 1;
+        self.sensors.reads(benchmark, reading.time);
+        self.changed.insert(benchmark.clone());
+        let beside = Beside {
+            covariates: &self.covariates,
+            explain: self.settings.explain,
+        };
+        let policy = self.settings.policy(benchmark);
+        let track = self
+            .tracks
+            .entry(benchmark.clone())
+            .or_insert_with(|| Track::new(benchmark.clone(), source, reading.time));
+        let before = track.deadline();
+        let events = track.take(policy, source, reading, &beside);
+        let critical = policy.critical_velocity_mm_per_day;
+        self.searches.extend(track.search(critical, &beside));
+        let after = track.deadline();
+        self.expect((before, after), benchmark.clone());
+        events
+    }
+
+    fn pass(&mut self, now: Timestamp) -> Vec<Event> {
+        let due = self.deadlines.iter().take_while(|(due, _)| *due <= now);
+        let mut due: Vec<BenchmarkId> = due.map(|(_, id)| id.clone()).collect();
+        due.sort();
+        let mut events = Vec::new();
+        for id in due {
+            if let Some(track) = self.tracks.get_mut(&id) {
+                let before = track.deadline();
+                events.extend(track.pass(now, self.sensors.fault(&id)));
+                let after = track.deadline();
+                self.changed.insert(id.clone());
+                self.expect((before, after), id);
+            }
+        }
+        events
+    }
+
+    /// Notes when a benchmark becomes silent, which was expected for another time before.
+    fn expect(&mut self, (before, after): (Option<Timestamp>, Option<Timestamp>), id: BenchmarkId) {
+        if before == after {
+            return;
+        }
+        if let Some(before) = before {
+            self.deadlines.remove(&(before, id.clone()));
+        }
+        if let Some(after) = after {
+            self.deadlines.insert((after, id));
+        }
+    }
+
+    /// Goes by other settings from here on. What was in force at a benchmark that is no longer watched ends.
+    fn resettle(&mut self, now: Timestamp, settings: &Settings) -> Vec<Event> {
+        self.settings = settings.clone();
+        let Some(watched) = &self.settings.watched else {
+            return Vec::new();
+        };
+        let gone: Vec<BenchmarkId> = (self.tracks.keys())
+            .filter(|id| !watched.contains(*id))
+            .cloned()
+            .collect();
+        let mut events = Vec::new();
+        for id in gone {
+            if let Some(mut track) = self.tracks.remove(&id) {
+                self.expect((track.deadline(), None), id.clone());
+                events.extend(track.close(now));
+            }
+            self.searches.retain(|job| job.benchmark != id);
+            self.changed.insert(id);
         }
         events
     }
@@ -201,6 +282,7 @@ impl Monitor {
         let policy = self.settings.policy(&finding.benchmark);
         let critical = policy.critical_velocity_mm_per_day;
         let track = self.tracks.get_mut(&finding.benchmark);
+        self.changed.insert(finding.benchmark.clone());
         track.map_or_else(Vec::new, |track| {
             track.found(critical, now, finding, &beside)
         })
@@ -212,9 +294,14 @@ impl Monitor {
         std::mem::take(&mut self.searches)
     }
 
+    /// What it goes by.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
     /// When the monitor wants a [`Input::Tick`] if nothing else comes before.
     pub fn next_deadline(&self) -> Option<Timestamp> {
-        self.tracks.values().filter_map(Track::deadline).min()
+        self.deadlines.first().map(|(due, _)| *due)
     }
 
     /// The level in force for a benchmark that has given readings.

@@ -8,6 +8,7 @@
 use crate::effects::{Effect, Explained, Fuller, Kind, Options, explain};
 use crate::reading::{BenchmarkId, Channel, Series, Timestamp};
 use jiff::SignedDuration;
+use serde::{Deserialize, Serialize};
 
 /// Readings that a search looks at.
 pub(super) const MOST_READINGS: usize = 600;
@@ -19,7 +20,7 @@ const SURROGATES: usize = 199;
 const GRACE: SignedDuration = SignedDuration::from_hours(1);
 
 /// A search that is to be made.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SearchJob {
     /// Whose readings.
     pub benchmark: BenchmarkId,
@@ -31,7 +32,7 @@ pub struct SearchJob {
 }
 
 /// What a search came to.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
     /// Whose readings.
     pub benchmark: BenchmarkId,

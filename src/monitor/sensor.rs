@@ -1,10 +1,11 @@
 //! Sensors that say they have no value: each run of that is told once, and ends with a reading.
 
 use crate::reading::{BenchmarkId, Timestamp};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// The benchmarks whose sensors are at fault, and what they give instead of readings.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Sensors {
     faulty: BTreeMap<BenchmarkId, String>,
     newest: BTreeMap<BenchmarkId, Timestamp>,

@@ -2,6 +2,7 @@
 
 use crate::reading::Timestamp;
 use jiff::SignedDuration;
+use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
 /// Spacings remembered.
@@ -12,7 +13,7 @@ const MAY_SKIP: i32 = 4;
 const LEAST: SignedDuration = SignedDuration::from_mins(30);
 
 /// Watches the spacing of one benchmark's readings.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Silence {
     newest: Option<Timestamp>,
     spacings: VecDeque<SignedDuration>,
@@ -45,6 +46,11 @@ impl Silence {
         let allowed = sorted[sorted.len() / 2].checked_mul(MAY_SKIP)?.max(LEAST);
         // The longest gap seen lately is no silence either.
         self.newest?.checked_add(allowed.max(*sorted.last()?)).ok()
+    }
+
+    /// Ends the silence that there is; the reading before which it began.
+    pub(super) fn end(&mut self) -> Option<Timestamp> {
+        self.newest.filter(|_| std::mem::take(&mut self.silent))
     }
 
     /// The time of the last reading when `now` has reached the deadline; from then on it is silent.

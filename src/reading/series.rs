@@ -26,7 +26,7 @@ impl Reading {
 }
 
 /// All readings of one quantity of one benchmark.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Series {
     /// Whose readings.
     pub benchmark: BenchmarkId,
@@ -61,7 +61,7 @@ pub struct Sample {
 }
 
 /// A covariate: rain, a reservoir level, a river's flow, a temperature.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Channel {
     /// The full column name, unit included: `lake_level_m`.
     pub name: String,

@@ -1,6 +1,7 @@
 //! The regime in force: entered at a high probability, kept until another one has it.
 
 use super::Regime;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// A regime must be at least this probable to be entered.
@@ -20,7 +21,7 @@ pub struct Flip {
 }
 
 /// Remembers the regime in force.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Tracker {
     in_force: Option<Regime>,
     candidate: Option<(Regime, usize)>,

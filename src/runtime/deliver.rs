@@ -7,7 +7,9 @@ use super::clock;
 use super::delivered::Delivered;
 use super::hook::{self, Alert, Outcome};
 use super::in_hand::InHand;
+use crate::alert::Level;
 use crate::config::HookConfig;
+use crate::store::Fate;
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -121,6 +123,16 @@ impl Dispatcher {
         is_taken
     }
 
+    /// The names of the hooks that ask for `level`.
+    pub(super) fn asking(&self, level: Level) -> Vec<String> {
+        let asks = |way: &&Way| way.hook.levels.contains(&level);
+        self.hooks
+            .iter()
+            .filter(asks)
+            .map(|way| way.hook.name())
+            .collect()
+    }
+
     /// Makes the receipts durable that found no room on the disk before.
     pub fn commit(&self) {
         if let Err(error) = locked(&self.delivered).commit() {
@@ -132,6 +144,13 @@ impl Dispatcher {
     pub fn supersede(&self, alert: &Alert) {
         for way in &self.hooks {
             locked(&way.in_hand).supersede(alert);
+        }
+    }
+
+    /// Somebody has seen `alert`: it is not tried again.
+    pub fn end(&self, alert: &Alert) {
+        for way in &self.hooks {
+            locked(&way.in_hand).end(alert);
         }
     }
 
@@ -258,10 +277,7 @@ impl Worker {
         let attempt = waiting.attempt;
         let goes_on = waiting.alert.must_arrive() || attempt < self.retry.attempts;
         if outcome == Some(&Outcome::Done) {
-            if let Err(error) = locked(&self.delivered).note(&waiting.alert, &hook) {
-                tracing::warn!(hook, key, %error, "no receipt: a restart may send it again");
-            }
-            locked(&self.in_hand).release(&waiting.alert);
+            self.let_go(&waiting.alert, Fate::Delivered);
         } else if self.is_over(&waiting.alert) {
             self.drop_over(&waiting.alert);
         } else if open && goes_on {
@@ -283,8 +299,23 @@ impl Worker {
         } else {
             tracing::error!(hook, key, attempt, ?outcome, "alert not delivered");
             self.lost += 1;
-            locked(&self.in_hand).release(&waiting.alert);
+            if open {
+                self.let_go(&waiting.alert, Fate::Dead);
+            } else {
+                // The next start tries again.
+                locked(&self.in_hand).release(&waiting.alert);
+            }
         }
+    }
+
+    /// Notes what became of an alert, then lets go of it.
+    fn let_go(&self, alert: &Alert, fate: Fate) {
+        let hook = self.hook.name();
+        if let Err(error) = locked(&self.delivered).note(alert, &hook, fate) {
+            let key = &alert.key;
+            tracing::warn!(hook, key, %error, "no receipt: a restart may send it again");
+        }
+        locked(&self.in_hand).release(alert);
     }
 
     fn is_over(&self, alert: &Alert) -> bool {
@@ -295,7 +326,7 @@ impl Worker {
         let (hook, key) = (self.hook.name(), &alert.key);
         tracing::error!(hook, key, "alert not delivered before it was over");
         self.lost += 1;
-        locked(&self.in_hand).release(alert);
+        self.let_go(alert, Fate::Over);
     }
 
     fn wait(&mut self, waiting: Waiting, due: Instant) {

@@ -1,81 +1,82 @@
-//! Which alerts have reached which hook: an append-only NDJSON file, synced before it counts.
+//! Which alerts have reached which hook: as it stands in the state, and what found no room there yet.
 
 use super::hook::{Alert, state_name};
-use serde::{Deserialize, Serialize};
+use crate::store::{Delivery, Fate, Store, StoreError};
 use std::collections::BTreeSet;
-use std::io;
-use std::path::Path;
+use std::sync::Arc;
 
-use super::backlog::{Backlog, Worth};
-use super::journal::Journal;
+/// Receipts that may wait for room on the disk.
+const MOST_UNWRITTEN: usize = 20_000;
 
-/// One alert that a hook has taken.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-struct Receipt {
-    key: String,
-    level: String,
-    state: String,
-    hook: String,
-}
+/// Key, level, state and hook.
+type Receipt = (String, &'static str, &'static str, String);
 
-impl Receipt {
-    fn of(alert: &Alert, hook: &str) -> Self {
-        Self {
-            key: alert.key.clone(),
-            level: alert.level.name().to_owned(),
-            state: state_name(alert.state).to_owned(),
-            hook: hook.to_owned(),
-        }
-    }
-}
-
-/// The receipts of all hooks, as they stand in a file or, for a replay, only in memory.
+/// The receipts of all hooks: in the state or, for a replay, only in memory.
 #[derive(Debug, Default)]
 pub struct Delivered {
-    receipts: BTreeSet<Receipt>,
-    pending: Backlog,
-    journal: Option<Journal>,
+    /// What was taken while this program ran.
+    taken: BTreeSet<Receipt>,
+    unwritten: Vec<(Delivery, Fate)>,
+    store: Option<Arc<Store>>,
+}
+
+/// The alert as the outbox keeps it for a hook.
+///
+/// # Errors
+/// [`StoreError::Unreadable`] when it cannot be written as bytes.
+pub(super) fn delivery(alert: &Alert, hook: &str) -> Result<Delivery, StoreError> {
+    let body = rmp_serde::to_vec_named(alert);
+    Ok(Delivery {
+        key: alert.key.clone(),
+        level: alert.level.name().to_owned(),
+        state: state_name(alert.state).to_owned(),
+        hook: hook.to_owned(),
+        body: body.map_err(|error| StoreError::Unreadable(error.to_string()))?,
+    })
 }
 
 impl Delivered {
-    /// Reads the receipts in `file`, which need not exist yet.
-    ///
-    /// # Errors
-    /// When the file cannot be read or opened for appending.
-    pub fn open(file: &Path) -> io::Result<Self> {
-        let mut receipts = BTreeSet::new();
-        let journal = Journal::open(file, |line| match serde_json::from_str::<Receipt>(line) {
-            Ok(receipt) => {
-                receipts.insert(receipt);
-            }
-            Err(error) => {
-                tracing::warn!(file = %file.display(), line, %error, "unreadable receipt");
-            }
-        })?;
-        Ok(Self {
-            receipts,
-            pending: Backlog::default(),
-            journal: Some(journal),
-        })
+    /// The receipts in `store`.
+    pub fn of(store: Arc<Store>) -> Self {
+        Self {
+            store: Some(store),
+            ..Self::default()
+        }
     }
 
     /// Whether `hook` has taken this alert.
     pub fn has(&self, alert: &Alert, hook: &str) -> bool {
-        self.receipts.contains(&Receipt::of(alert, hook))
+        let (level, state) = (alert.level.name(), state_name(alert.state));
+        if self
+            .taken
+            .contains(&(alert.key.clone(), level, state, hook.to_owned()))
+        {
+            return true;
+        }
+        let stored = self.store.as_ref().map(|store| {
+            store.is_noted(
+                (&alert.key, level, state),
+                Some(hook),
+                Some(Fate::Delivered),
+            )
+        });
+        // Twice is better than never.
+        stored.is_some_and(|stored| stored.unwrap_or(false))
     }
 
-    /// Notes that `hook` has taken this alert: in any case until the daemon stops, and on a full
-    /// disk no longer than that unless [`Delivered::commit`] finds room.
+    /// Notes what became of this alert at `hook`: in any case until the daemon stops, and on a full disk no longer
+    /// than that unless [`Delivered::commit`] finds room.
     ///
     /// # Errors
-    /// When the receipt cannot be made durable; the alert may then be sent once more, after a
-    /// restart, with the same key.
-    pub fn note(&mut self, alert: &Alert, hook: &str) -> io::Result<()> {
-        let receipt = Receipt::of(alert, hook);
-        let line = serde_json::to_string(&receipt)?;
-        self.receipts.insert(receipt);
-        if self.journal.is_some() {
-            self.pending.add(Worth::Much, line);
+    /// When that cannot be made durable; the alert may then be sent once more, after a restart, with the same key.
+    pub fn note(&mut self, alert: &Alert, hook: &str, fate: Fate) -> Result<(), StoreError> {
+        if fate == Fate::Delivered {
+            let (level, state) = (alert.level.name(), state_name(alert.state));
+            self.taken
+                .insert((alert.key.clone(), level, state, hook.to_owned()));
+        }
+        if self.store.is_some() && self.unwritten.len() < MOST_UNWRITTEN {
+            self.unwritten.push((delivery(alert, hook)?, fate));
         }
         self.commit()
     }
@@ -83,11 +84,14 @@ impl Delivered {
     /// Makes durable what found no room before.
     ///
     /// # Errors
-    /// When that fails for another reason than a full disk.
-    pub fn commit(&mut self) -> io::Result<()> {
-        match &mut self.journal {
-            Some(journal) => self.pending.append_to(journal, "receipts").map(drop),
-            None => Ok(()),
+    /// When that fails.
+    pub fn commit(&mut self) -> Result<(), StoreError> {
+        if let Some(store) = &self.store
+            && !self.unwritten.is_empty()
+        {
+            store.settle(&self.unwritten)?;
+            self.unwritten.clear();
         }
+        Ok(())
     }
 }

@@ -7,7 +7,7 @@ use crate::monitor::{AlertState, Event, EventKind};
 use crate::reading::Timestamp;
 use nix::sys::signal::{Signal, killpg};
 use nix::unistd::Pid;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::os::unix::process::ExitStatusExt;
 use std::process::{ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -28,7 +28,7 @@ const OUTPUT_GRACE: Duration = Duration::from_millis(200);
 const KILL_GRACE: Duration = Duration::from_secs(5);
 
 /// Whether a message means what it says; CAP 1.2's words.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Status {
     /// The daemon's own.
     Actual,
@@ -50,7 +50,7 @@ impl Status {
 }
 
 /// An alert on its way to people.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Alert {
     /// The monitor's event.
     pub event: Event,

@@ -41,6 +41,13 @@ impl InHand {
         self.0.remove(&token(alert));
     }
 
+    /// It is not worth another attempt.
+    pub(super) fn end(&mut self, alert: &Alert) {
+        if let Some(entry) = self.0.get_mut(&token(alert)) {
+            entry.is_over = true;
+        }
+    }
+
     pub(super) fn is_over(&self, alert: &Alert) -> bool {
         self.0.get(&token(alert)).is_some_and(|entry| entry.is_over)
     }

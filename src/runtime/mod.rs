@@ -1,17 +1,15 @@
 //! The thin shell around the monitor: clock, files, signals, hooks.
 
-mod backlog;
+mod archive;
 pub mod clock;
+mod daemon;
 pub mod deliver;
 pub mod delivered;
 pub mod doctor;
-pub mod event_log;
 pub mod hook;
 mod in_hand;
 pub mod ingest;
-pub mod journal;
 pub mod log;
-#[cfg(feature = "mqtt")]
 pub mod mqtt;
 pub mod pulse;
 pub mod replay;
@@ -19,10 +17,10 @@ pub mod run;
 pub mod sampling;
 pub mod sandbox;
 mod searches;
-mod seen;
 pub mod serve;
 pub mod service;
 pub mod shutdown;
 pub mod site;
+mod sources;
 pub mod tail;
 pub mod vitals;

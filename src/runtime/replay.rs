@@ -3,14 +3,14 @@
 use super::clock;
 use super::deliver::{Dispatcher, Retry};
 use super::delivered::Delivered;
-use super::event_log::EventLog;
 use super::hook::Status;
 use super::shutdown::Shutdown;
 use super::site::{Counts, Sinks, Site};
 use super::tail::Arrival;
 use crate::config::HookConfig;
-use crate::monitor::{Event, Input, Settings};
+use crate::monitor::{Event, Input, Monitor, Settings};
 use crate::reading::{Recording, Timestamp};
+use crate::store::{Store, StoreError};
 use std::io;
 use std::time::Duration;
 
@@ -57,6 +57,9 @@ pub enum ReplayError {
     /// The events could not be written.
     #[error("cannot write the events: {0}")]
     Output(#[from] io::Error),
+    /// The state could not be read.
+    #[error("{0}")]
+    State(#[from] StoreError),
     /// It was asked to stop.
     #[error("interrupted")]
     Interrupted,
@@ -128,7 +131,7 @@ pub async fn replay(
         if shutdown.is_requested() {
             return Err(ReplayError::Interrupted);
         }
-        told(&site.take(arrival, arrival.time), each)?;
+        told(&site.take(arrival, arrival.time)?, each)?;
         site.commit(arrival.time)?;
     }
     told(&site.pass(end), each)?;
@@ -142,6 +145,38 @@ pub async fn replay(
     }
 }
 
+/// Plays what a daemon took in, in the order in which it did: every value, every passage of time, every finding of
+/// a search and every change of its settings. The events are the daemon's own, the summary last.
+///
+/// # Errors
+/// [`ReplayError`].
+pub fn replay_state(
+    store: &Store,
+    until: Option<Timestamp>,
+    shutdown: &Shutdown,
+    each: &mut (dyn FnMut(&Event) -> io::Result<()> + '_),
+) -> Result<(), ReplayError> {
+    let mut monitor = Monitor::new(Settings::default());
+    let mut after = 0;
+    'all: loop {
+        let rows = store.steps(after)?;
+        let Some(last) = rows.last() else { break };
+        after = last.seq;
+        for row in &rows {
+            if until.is_some_and(|until| row.now > until) {
+                break 'all;
+            }
+            if shutdown.is_requested() {
+                return Err(ReplayError::Interrupted);
+            }
+            told(&monitor.step(row.now, &row.input), each)?;
+            // Their findings are among the steps.
+            monitor.searches();
+        }
+    }
+    told(monitor.summary().as_slice(), each)
+}
+
 fn told(
     events: &[Event],
     each: &mut (dyn FnMut(&Event) -> io::Result<()> + '_),
@@ -153,7 +188,7 @@ fn told(
 fn sinks(hooks: &[HookConfig]) -> Sinks {
     let start = || Dispatcher::start(hooks, &Retry::default(), Delivered::default());
     Sinks {
-        events: EventLog::default(),
+        store: None,
         alerts: (!hooks.is_empty()).then(start),
         status: Status::Exercise,
     }
@@ -209,7 +244,11 @@ mod tests {
         let name = |arrival: &Arrival| match &arrival.input {
             Input::Reading { benchmark, .. } => benchmark.as_str().to_owned(),
             Input::Sample { channel, .. } => channel.clone(),
-            Input::Missing { .. } | Input::Found(_) | Input::Tick => String::new(),
+            Input::Missing { .. }
+            | Input::Settings(_)
+            | Input::Order(_)
+            | Input::Found(_)
+            | Input::Tick => String::new(),
         };
         let names: Vec<String> = arrivals(&recording).iter().map(name).collect();
         assert_eq!(names, ["a", "b", "b", "rain_mm", "a", "b"]);

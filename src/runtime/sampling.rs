@@ -17,7 +17,7 @@ const READINGS_AN_EVACUATION: i32 = 4;
 
 /// The median time between the latest readings of each benchmark.
 pub fn spacings(config: &Config) -> BTreeMap<BenchmarkId, SignedDuration> {
-    let mut follower = Follower::new(&config.sources, &config.benchmarks);
+    let mut follower = Follower::new(&config.sources, &config.benchmarks, &[]);
     let mut times: BTreeMap<BenchmarkId, BTreeSet<Timestamp>> = BTreeMap::new();
     let mut values = 0;
     loop {

@@ -29,6 +29,31 @@ struct Asked {
 type Order = (SearchJob, Sender<Finding>);
 
 impl Searches {
+    /// Notes a search that a restart has still to make.
+    pub(super) fn note(&mut self, job: SearchJob) {
+        let (_, answer) = channel();
+        self.asked
+            .insert(job.benchmark.clone(), Asked { job, answer });
+    }
+
+    /// Has the searches made that were only noted.
+    pub(super) fn resume(&mut self) {
+        let jobs: Vec<SearchJob> = self.jobs().cloned().collect();
+        for job in jobs {
+            self.start(job);
+        }
+    }
+
+    /// What has been asked for and not been answered.
+    pub(super) fn jobs(&self) -> impl Iterator<Item = &SearchJob> {
+        self.asked.values().map(|asked| &asked.job)
+    }
+
+    /// The answer is known already.
+    pub(super) fn forget(&mut self, benchmark: &BenchmarkId) {
+        self.asked.remove(benchmark);
+    }
+
     /// Has the search made as soon as a thread is free.
     pub(super) fn start(&mut self, job: SearchJob) {
         let (sender, answer) = channel();

@@ -31,7 +31,7 @@ pub struct Health {
     pub repeated: u64,
     /// Values dropped because they are from the future.
     pub from_the_future: u64,
-    /// Events that are not in the log because the disk was full for too long.
+    /// Inputs that wait, unacknowledged, for room on the disk.
     pub unwritten: u64,
     /// Lines, records and files that could not be used, a source.
     pub quarantined: BTreeMap<String, u64>,
@@ -97,6 +97,7 @@ impl Point {
             | EventKind::EffectFound { .. }
             | EventKind::EffectDropped { .. }
             | EventKind::Fault { .. }
+            | EventKind::Order { .. }
             | EventKind::Summary(_) => {}
         }
     }
@@ -178,6 +179,13 @@ impl Vitals {
             self.refits.observe(took.as_secs_f64());
         }
         note_all(&mut points, events);
+    }
+
+    /// How a benchmark stood when the daemon last stopped.
+    pub fn resume(&self, benchmark: &BenchmarkId, newest: Timestamp, level: Level) {
+        let mut points = locked(&self.points);
+        let point = points.entry(benchmark.clone()).or_default();
+        (point.newest, point.level) = (Some(newest), level);
     }
 
     /// Events that came of something else than a reading.

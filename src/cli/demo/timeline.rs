@@ -99,7 +99,7 @@ impl Timeline {
             EventKind::Fault { kind, .. } => {
                 Some(format!("{}  {id:<8}   fault: {kind}", day(event.time)))
             }
-            EventKind::Summary(_) => None,
+            EventKind::Order { .. } | EventKind::Summary(_) => None,
         }
     }
 }
@@ -148,6 +148,7 @@ fn drift(id: &BenchmarkId, event: &Event) -> Option<String> {
         | EventKind::EffectDropped { .. }
         | EventKind::Alert { .. }
         | EventKind::Fault { .. }
+        | EventKind::Order { .. }
         | EventKind::Summary(_) => return None,
     };
     let (from, to) = (day(*from), day(*to));

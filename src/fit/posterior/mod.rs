@@ -27,10 +27,11 @@ use onset::Start;
 use past::Shape;
 use proposal::{Side, Whole};
 use scatter::Texture;
+use serde::{Deserialize, Serialize};
 use window::Window;
 
 /// One law out of the posterior, with t = 0 at the present.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Sample {
     /// The law.
     pub law: Law,
@@ -39,7 +40,7 @@ pub struct Sample {
 }
 
 /// A weighted sample of laws that agree with the readings.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Ensemble {
     /// The present: the time of the last reading used, days.
     pub now_days: f64,

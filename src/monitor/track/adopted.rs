@@ -12,6 +12,7 @@ use crate::fit::{Observations, Rate};
 use crate::forecast::{Outlook, Panel};
 use crate::monitor::history::History;
 use crate::reading::{Channel, Timestamp, after_days};
+use serde::{Deserialize, Serialize};
 
 /// A load beyond its range over the record by more than this share of it explains nothing: nobody has seen it.
 const BEYOND_RANGE: f64 = 0.25;
@@ -25,7 +26,7 @@ const IN_A_ROW: u32 = 2;
 const TOO_FAST: f64 = 0.1;
 
 /// A fuller law in use.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Adopted {
     fuller: effects::Fuller,
     /// ln of the mean pace over the record in which it was found: the log-load that counts as none.

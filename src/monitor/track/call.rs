@@ -3,7 +3,7 @@
 use super::forecast::Forecast;
 use super::motion::{acceleration, moves_backwards, settled};
 use super::{Track, days};
-use crate::alert::{Entered, Evidence, Policy, Transition};
+use crate::alert::{Cause, Entered, Evidence, Policy, Transition};
 use crate::monitor::event::{AlertState, Event, EventKind};
 use crate::reading::Timestamp;
 use jiff::SignedDuration;
@@ -47,8 +47,8 @@ impl Track {
             events.push(self.fault(time, "moves-backwards", text));
         }
         if self.backwards {
-            self.look_until(policy, time, "moves-backwards");
-            evidence.causes.push("moves-backwards");
+            self.look_until(policy, time, Cause::MovesBackwards);
+            evidence.causes.push(Cause::MovesBackwards);
         }
         let transitions = self.latch.update(policy, &evidence);
         let told = transitions

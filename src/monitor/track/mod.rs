@@ -13,13 +13,14 @@ use super::drift::Drift;
 use super::event::{AlertState, Event, EventKind};
 use super::history::{History, Source, Taken};
 use super::silence::Silence;
-use crate::alert::{Latch, Level, Policy};
+use crate::alert::{Cause, Latch, Level, Policy};
 use crate::forecast::Panel;
 use crate::reading::{BenchmarkId, Reading, SECONDS_PER_DAY, Timestamp};
 use crate::regime::Tracker;
 use adopted::Adopted;
 use forecast::Forecast;
 use jiff::SignedDuration;
+use serde::{Deserialize, Serialize};
 use watch::Watch;
 
 /// So many readings in a row with one value are a stuck sensor, or a resolution too coarse to tell.
@@ -33,7 +34,7 @@ pub(super) struct Beside<'a> {
 }
 
 /// Everything the monitor knows of one benchmark.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Track {
     benchmark: BenchmarkId,
     history: History,
@@ -44,7 +45,7 @@ pub(super) struct Track {
     latch: Latch,
     silence: Silence,
     /// Until when something that happened asks for a look, and what.
-    look: Option<(Timestamp, &'static str)>,
+    look: Option<(Timestamp, Cause)>,
     faulted: bool,
     backwards: bool,
     newest: Option<Timestamp>,
@@ -193,7 +194,27 @@ impl Track {
         ]
     }
 
-    fn look_until(&mut self, policy: &Policy, time: Timestamp, cause: &'static str) {
+    /// The benchmark is no longer watched: what is in force at it ends.
+    pub(super) fn close(&mut self, now: Timestamp) -> Vec<Event> {
+        let text = format!("benchmark {} is no longer watched", self.benchmark);
+        let mut events = Vec::new();
+        if let Some(since) = self.silence.end() {
+            events.push(self.unknown((now, since), AlertState::Resolved, text.clone()));
+        }
+        if let Some((level, since)) = self.latch.in_force() {
+            let kind = EventKind::Alert {
+                level,
+                state: AlertState::Resolved,
+                key: format!("{}/{level}/{since}", self.benchmark),
+                rule: "removed".to_owned(),
+                text,
+            };
+            events.push(self.event(now, kind));
+        }
+        events
+    }
+
+    fn look_until(&mut self, policy: &Policy, time: Timestamp, cause: Cause) {
         self.look = time
             .checked_add(policy.steady_for)
             .ok()

@@ -3,7 +3,7 @@
 use super::forecast::Forecast;
 use super::motion::recent;
 use super::{Track, days};
-use crate::alert::Policy;
+use crate::alert::{Cause, Policy};
 use crate::forecast::{HORIZON_DAYS, InverseVelocityLine, Outlook};
 use crate::monitor::drift;
 use crate::monitor::event::{
@@ -50,7 +50,7 @@ impl Track {
     /// A reading that the law in force did not expect.
     fn surprise(&mut self, policy: &Policy, time: Timestamp, forecast: &Forecast) -> Option<Event> {
         let surprise_nats = forecast.surprise_nats()?;
-        self.look_until(policy, time, "unexplained-residual");
+        self.look_until(policy, time, Cause::UnexplainedResidual);
         let unexplained = Unexplained::Reading {
             surprise_nats,
             velocity_mm_per_day: forecast.plain.rates.last().map(|rate| rate.velocity),
@@ -73,7 +73,7 @@ impl Track {
                 .law
                 .and_then(|law| drift::expected_by_the_law(&law, recent(&outlook.rates), now));
             if moved.to_days < moved.from_days {
-                self.look_until(policy, time, "intercept-drifting-in");
+                self.look_until(policy, time, Cause::InterceptDriftingIn);
             }
             events.extend(
                 self.drift_event(time, moved, |from, to| EventKind::InterceptDrift {
@@ -86,7 +86,7 @@ impl Track {
         }
         if let Some(moved) = self.transition.update(now, transition, 2.0 * least) {
             if moved.to_days < moved.from_days {
-                self.look_until(policy, time, "transition-drifting-in");
+                self.look_until(policy, time, Cause::TransitionDriftingIn);
             }
             events.extend(
                 self.drift_event(time, moved, |from, to| EventKind::TransitionDrift {
@@ -151,7 +151,7 @@ impl Track {
     fn flip(&mut self, policy: &Policy, time: Timestamp, outlook: &Outlook) -> Option<Event> {
         let flip = self.regime.update(&outlook.regimes)?;
         if flip.to == Regime::UnstableAccelerating && flip.from != Regime::Undetermined {
-            self.look_until(policy, time, "regime-flip");
+            self.look_until(policy, time, Cause::RegimeFlip);
         }
         let kind = EventKind::RegimeFlip {
             from: flip.from,

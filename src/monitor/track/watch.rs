@@ -3,13 +3,14 @@
 use super::adopted::Adopted;
 use super::forecast::Forecast;
 use super::{Beside, Track};
-use crate::alert::Policy;
+use crate::alert::{Cause, Policy};
 use crate::effects::{Effect, Fuller, Kind, residual_structure};
 use crate::forecast::measurably_moves;
 use crate::monitor::event::{Event, EventKind, Unexplained};
 use crate::monitor::search::{Finding, MOST_READINGS, SearchJob};
 use crate::monitor::{Explain, search};
 use crate::reading::{Series, Timestamp, days_since};
+use serde::{Deserialize, Serialize};
 
 /// Nothing is looked at before so many readings.
 const FEWEST: u64 = 40;
@@ -24,7 +25,7 @@ const WORTH_TELLING: f64 = 0.3;
 const SAME_TIME: f64 = 0.05;
 
 /// When was looked, what was said, what was asked for.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct Watch {
     taken: u64,
     looked: u64,
@@ -39,7 +40,7 @@ pub(super) struct Watch {
 }
 
 /// An effect that has been told.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Known {
     kind: Kind,
     channel: Option<String>,
@@ -100,7 +101,7 @@ impl Track {
             return None;
         }
         let found = worth?;
-        self.look_until(policy, time, "unexplained-residual");
+        self.look_until(policy, time, Cause::UnexplainedResidual);
         let kind = Unexplained::Structure {
             bic_gain: found.bic_gain,
             load_sd: found.load_sd,

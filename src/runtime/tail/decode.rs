@@ -1,8 +1,6 @@
 //! From a source's lines and messages to what the monitor takes: which benchmarks, which columns.
 
-#[cfg(feature = "mqtt")]
-use crate::config::Broker;
-use crate::config::{Benchmark, Source, SourceKind};
+use crate::config::{Benchmark, Broker, Source, SourceKind};
 use crate::monitor::Input;
 use crate::reading::{BenchmarkId, Conventions, Quantity, Timestamp, Unit};
 use crate::runtime::ingest::{
@@ -40,7 +38,6 @@ impl Decoder {
     }
 
     /// For messages, each of which is a text of NDJSON.
-    #[cfg(feature = "mqtt")]
     pub(in crate::runtime) fn of_messages(broker: &Broker, benchmarks: &[Benchmark]) -> Self {
         Self {
             kind: SourceKind::Ndjson,

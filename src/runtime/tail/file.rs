@@ -2,8 +2,10 @@
 
 use super::decode::{Arrival, Decoder};
 use super::records::{self, Channels, Frame, HEADER_BYTES, MAGIC, RawMessage};
+use super::saved::Saved;
 use super::text::{BadLine, Fed, TextReader, Unpacking};
 use crate::runtime::ingest::{decode_message, is_packed};
+use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use std::fs::{File, Metadata};
 use std::io;
@@ -23,12 +25,12 @@ const SHOWN: usize = 200;
 pub(super) struct FileTail {
     path: PathBuf,
     decoder: Arc<Decoder>,
-    content: Content,
+    pub(super) content: Content,
     /// Everything before this has been read.
-    at: u64,
-    place: Option<Place>,
+    pub(super) at: u64,
+    pub(super) place: Option<Place>,
     /// The last bytes before `at`: another file of the same number and size has others.
-    mark: Vec<u8>,
+    pub(super) mark: Vec<u8>,
     /// As of the last look that found nothing more; the file is opened only when it differs.
     idle: Option<Glance>,
     pub(super) pending: VecDeque<Arrival>,
@@ -37,10 +39,14 @@ pub(super) struct FileTail {
     trouble: Option<String>,
     /// Where we were when the file was last found under another name.
     left_at: Option<u64>,
+    /// From where a restart goes on.
+    pub(super) safe: Saved,
+    /// As [`FileTail::moved`] last told it.
+    pub(super) told: Saved,
 }
 
 #[derive(Debug)]
-enum Content {
+pub(super) enum Content {
     Text(Box<TextReader>),
     /// A packed file, that is read once.
     Packed(Box<Unpacking>),
@@ -69,7 +75,7 @@ impl Content {
 }
 
 /// Which file it is, as the file system counts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Place {
     device: u64,
     inode: u64,
@@ -115,6 +121,8 @@ impl FileTail {
             quarantined: 0,
             trouble: None,
             left_at: None,
+            safe: Saved::default(),
+            told: Saved::default(),
         }
     }
 
@@ -143,6 +151,7 @@ impl FileTail {
     /// Reads until something is pending or there is no more for now.
     pub(super) fn refill(&mut self) {
         while self.pending.is_empty() {
+            self.settle();
             match self.advance() {
                 Ok(true) => self.trouble = None,
                 Ok(false) => return,

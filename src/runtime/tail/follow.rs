@@ -4,6 +4,7 @@ use super::decode::{Arrival, Decoder};
 use super::file::{FileTail, Place};
 use crate::config::{Benchmark, FilePattern, Source};
 use crate::reading::Timestamp;
+use crate::store::Position;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -17,6 +18,8 @@ const BATCH: usize = 1000;
 pub struct Batch {
     /// The values.
     pub arrivals: Vec<Arrival>,
+    /// How far files have been read once all of these, and those before, are taken: what has changed.
+    pub positions: Vec<Position>,
     /// Whether the files hold no more for now.
     pub caught_up: bool,
 }
@@ -24,36 +27,52 @@ pub struct Batch {
 /// A source's number and a path.
 type Key = (usize, PathBuf);
 
+/// One source.
+#[derive(Debug)]
+struct Followed {
+    id: String,
+    pattern: FilePattern,
+    decoder: Arc<Decoder>,
+}
+
 /// Every followed file, and which folders to look for more.
 #[derive(Debug)]
 pub struct Follower {
-    sources: Vec<(FilePattern, Arc<Decoder>)>,
+    sources: Vec<Followed>,
     files: BTreeMap<Key, FileTail>,
     /// The earliest pending value of each file; between two rounds there is none.
     heads: BTreeSet<(Timestamp, Key)>,
     missing: BTreeSet<PathBuf>,
     quarantined_in_gone: u64,
+    /// Positions that nobody needs any more.
+    gone: Vec<Position>,
 }
 
 impl Follower {
-    /// Follows nothing yet.
-    pub fn new(sources: &[Source], benchmarks: &[Benchmark]) -> Self {
-        let sources = sources.iter().map(|source| {
-            let decoder = Arc::new(Decoder::new(source, benchmarks));
-            (source.pattern.clone(), decoder)
-        });
+    /// Follows nothing yet; files go on from where `saved`, by name, has left them.
+    pub fn new(sources: &[Source], benchmarks: &[Benchmark], saved: &[(String, Vec<u8>)]) -> Self {
+        let of = |source: &Source| Followed {
+            id: source.id.clone(),
+            pattern: source.pattern.clone(),
+            decoder: Arc::new(Decoder::new(source, benchmarks)),
+        };
+        let sources: Vec<Followed> = sources.iter().map(of).collect();
+        let files = saved
+            .iter()
+            .filter_map(|(name, body)| restored(&sources, name, body));
         Self {
-            sources: sources.collect(),
-            files: BTreeMap::new(),
+            files: files.collect(),
+            sources,
             heads: BTreeSet::new(),
             missing: BTreeSet::new(),
             quarantined_in_gone: 0,
+            gone: Vec::new(),
         }
     }
 
     /// The folders to watch.
     pub fn folders(&self) -> BTreeSet<PathBuf> {
-        let folders = self.sources.iter().map(|(pattern, _)| pattern.folder());
+        let folders = self.sources.iter().map(|source| source.pattern.folder());
         folders.map(Path::to_owned).collect()
     }
 
@@ -75,6 +94,7 @@ impl Follower {
                     .extend(file.pending.front().map(|head| (head.time, key.clone())));
             }
         }
+        let mut positions = std::mem::take(&mut self.gone);
         let mut arrivals = Vec::new();
         while arrivals.len() < BATCH
             && let Some((_, key)) = self.heads.pop_first()
@@ -87,7 +107,14 @@ impl Follower {
             self.heads
                 .extend(file.pending.front().map(|head| (head.time, key)));
         }
+        for ((source, path), file) in &mut self.files {
+            positions.extend(file.moved().map(|body| Position {
+                name: name(&self.sources[*source].id, path),
+                body: Some(body),
+            }));
+        }
         Batch {
+            positions,
             caught_up: self.heads.is_empty(),
             arrivals,
         }
@@ -110,6 +137,8 @@ impl Follower {
             let Some(mut file) = self.files.remove(&key) else {
                 continue;
             };
+            let name = name(&self.sources[key.0].id, &key.1);
+            self.gone.push(Position { name, body: None });
             let moved = file.leave().map(|path| (key.0, path));
             if let Some(moved) = moved.filter(|moved| !present.contains_key(moved)) {
                 tracing::info!(file = %key.1.display(), now = %moved.1.display(), "renamed");
@@ -122,7 +151,8 @@ impl Follower {
         for key in present.into_keys() {
             if !self.files.contains_key(&key) {
                 tracing::info!(file = %key.1.display(), "followed");
-                let decoder = Arc::clone(&self.sources[key.0].1);
+                let source = &self.sources[key.0];
+                let decoder = Arc::clone(&source.decoder);
                 let file = FileTail::new(key.1.clone(), decoder);
                 self.files.insert(key, file);
             }
@@ -131,8 +161,9 @@ impl Follower {
 
     fn list(&mut self) -> BTreeMap<Key, Place> {
         let mut present = BTreeMap::new();
-        for (index, (pattern, decoder)) in self.sources.iter().enumerate() {
-            match list(pattern, decoder) {
+        for (index, source) in self.sources.iter().enumerate() {
+            let pattern = &source.pattern;
+            match list(pattern, &source.decoder) {
                 Ok(files) => {
                     self.missing.remove(pattern.folder());
                     let keyed = files
@@ -151,6 +182,26 @@ impl Follower {
         }
         present
     }
+}
+
+/// The file as it was left, unless its source is no longer there or its bytes mean nothing to this version: it is then
+/// read from its start, and what is known of it dropped.
+fn restored(sources: &[Followed], name: &str, body: &[u8]) -> Option<(Key, FileTail)> {
+    let (id, path) = name.split_once(':')?;
+    let index = sources.iter().position(|source| source.id == id)?;
+    let path = PathBuf::from(path);
+    match FileTail::restored(path.clone(), Arc::clone(&sources[index].decoder), body) {
+        Ok(file) => Some(((index, path), file)),
+        Err(error) => {
+            tracing::warn!(file = %path.display(), %error, "no position: read from its start");
+            None
+        }
+    }
+}
+
+/// What a position is kept under: its source and its path.
+fn name(source: &str, path: &Path) -> String {
+    format!("{source}:{}", path.display())
 }
 
 /// The files of the pattern, packed ones among them where the source has text.

@@ -1,5 +1,7 @@
 //! Cuts a growing text into lines: bytes in, whole lines out, a partial last one held.
 
+use serde::{Deserialize, Serialize};
+
 /// Longest line that is read, bytes.
 pub const LONGEST_LINE: usize = 64 * 1024;
 
@@ -30,7 +32,7 @@ pub enum LineFault {
 }
 
 /// The state between two reads; memory is bounded by [`LONGEST_LINE`].
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Lines {
     partial: Vec<u8>,
     too_long: bool,

@@ -12,10 +12,10 @@ mod file;
 mod follow;
 pub mod lines;
 pub mod records;
+mod saved;
 mod text;
 
 pub use decode::Arrival;
-#[cfg(feature = "mqtt")]
 pub(super) use decode::Decoder;
 pub use follow::{Batch, Follower};
 

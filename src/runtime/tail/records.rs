@@ -7,7 +7,9 @@
 use mcap::records::{ChunkHeader, Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, parse_record};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// What every MCAP file begins and ends with.
 pub const MAGIC: &[u8; 8] = b"\x89MCAP0\r\n";
@@ -112,10 +114,14 @@ pub enum RecordFault {
     },
 }
 
+/// A channel's topic and metadata.
+type Described = (String, BTreeMap<String, String>);
+
 /// The channels that the file has described so far.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Channels {
-    by_id: BTreeMap<u16, (String, BTreeMap<String, String>)>,
+    /// Shared with the position that the file goes on from.
+    by_id: Arc<BTreeMap<u16, Described>>,
 }
 
 impl Channels {
@@ -154,7 +160,7 @@ impl Channels {
                 });
             }
             let meaning = (channel.topic, channel.metadata);
-            self.by_id.insert(channel.id, meaning);
+            Arc::make_mut(&mut self.by_id).insert(channel.id, meaning);
         } else if opcode == op::MESSAGE
             && let Record::Message { header, data } = parse_record(opcode, body)?
         {

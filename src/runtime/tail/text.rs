@@ -1,7 +1,8 @@
 //! The text of one file on its way in: bytes to lines, lines to values and faults.
 
 use super::lines::Lines;
-use crate::runtime::ingest::{FileUnits, Item, TextRows, unpack};
+use crate::runtime::ingest::{FileUnits, IngestError, Item, TextRows, unpack};
+use serde::{Deserialize, Serialize};
 use std::error::Error;
 use std::fmt::Debug;
 use std::io::{self, Read};
@@ -44,6 +45,31 @@ impl TextReader {
         }
     }
 
+    pub(super) fn saved(&self) -> SavedText {
+        SavedText {
+            lines: self.lines.clone(),
+            header: self.rows.header().to_vec(),
+            units: self.units.clone(),
+        }
+    }
+
+    /// Goes on where another one was; `rows` are new.
+    ///
+    /// # Errors
+    /// When the header is no longer understood: the config is another.
+    pub(super) fn restored(mut rows: TextRows, saved: SavedText) -> Result<Self, IngestError> {
+        for (number, line) in (1..).zip(&saved.header) {
+            if let Some(fault) = rows.take(number, line).fault {
+                return Err(fault);
+            }
+        }
+        Ok(Self {
+            lines: saved.lines,
+            rows,
+            units: saved.units,
+        })
+    }
+
     /// Takes the next bytes.
     pub(super) fn feed(&mut self, bytes: &[u8]) -> Fed {
         let mut fed = Fed::default();
@@ -71,6 +97,14 @@ impl TextReader {
         }
         fed
     }
+}
+
+/// What of a [`TextReader`] a restart needs.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct SavedText {
+    lines: Lines,
+    header: Vec<String>,
+    units: FileUnits,
 }
 
 /// A packed file while it is being read, whole and once.

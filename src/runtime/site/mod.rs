@@ -4,18 +4,23 @@
 //! [`Site::commit`] after each batch, [`Site::pass`] when time goes by, [`Site::close`] at the end.
 //! The wall clock comes in as an argument; whoever replays hands in the data's own time.
 
-use super::deliver::Dispatcher;
-use super::event_log::EventLog;
-use super::hook::{Alert, Status};
-use super::searches::Searches;
-use super::seen::{Novelty, Seen};
-use super::tail::Arrival;
-use crate::alert::{Level, Policy};
-use crate::monitor::{AlertState, Event, EventKind, Input, Monitor, Settings};
+mod alerts;
+mod memory;
+mod mute;
+
+use mute::Mute;
+
+use crate::monitor::{Event, EventKind, Input, Monitor, Order, Settings};
 use crate::reading::{BenchmarkId, Timestamp};
+use crate::runtime::deliver::Dispatcher;
+use crate::runtime::hook::{Alert, Status};
+use crate::runtime::searches::Searches;
+use crate::runtime::tail::Arrival;
+use crate::store::{Batch, Position, Store, StoreError};
 use jiff::SignedDuration;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::io;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// Ticks for one passage of time at most; a monitor that asks for more is broken.
@@ -27,11 +32,21 @@ const LEAST_FRESHNESS: SignedDuration = SignedDuration::from_hours(1);
 /// A benchmark that gave a reading within this time is still watched, whatever its policy says.
 const LEAST_WATCHED: SignedDuration = SignedDuration::from_hours(30 * 24);
 
+/// Steps that may wait for room on the disk; then nothing more is taken in.
+const MOST_UNWRITTEN: usize = 20_000;
+/// After so many steps the monitor's memory is saved, or after so many for each benchmark if that is more.
+const STEPS_A_MEMORY: usize = 2_000;
+const STEPS_A_BENCHMARK: usize = 20;
+/// The site's own part of the memory, beside those of the monitor.
+const OWN: &str = "\0site";
+/// Before all readings.
+const DAWN: Timestamp = Timestamp::constant(-9_223_372_036, 0);
+
 /// Where a site's events go.
 #[derive(Debug)]
 pub struct Sinks {
-    /// All of them.
-    pub events: EventLog,
+    /// What is kept; `None`: nothing.
+    pub store: Option<Arc<Store>>,
     /// The alerts; `None` tells nobody.
     pub alerts: Option<Dispatcher>,
     /// What the hooks are told of the alerts' meaning.
@@ -39,7 +54,7 @@ pub struct Sinks {
 }
 
 /// What has been counted.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counts {
     /// Values that the monitor took.
     pub taken: u64,
@@ -49,15 +64,13 @@ pub struct Counts {
     pub from_the_future: u64,
     /// Alerts that fired no hook because they are long past.
     pub long_past: u64,
-    /// Events that are not in the log because the disk was full for too long.
-    pub unwritten: u64,
 }
 
 /// Where an alert stands: one level is in force at a benchmark, and beside it perhaps `unknown`.
 type Place = (Option<BenchmarkId>, bool);
 
 /// An alert in force.
-#[derive(Debug)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 struct Standing {
     alert: Alert,
     /// Whether it has been offered to the hooks.
@@ -72,7 +85,11 @@ pub struct Site {
     monitor: Monitor,
     searches: Searches,
     sinks: Sinks,
-    seen: Seen,
+    /// Since the last commit.
+    batch: Batch,
+    /// Whether the last commit found no room.
+    is_full: bool,
+    steps_since_memory: usize,
     /// The latest data time stepped to; it never goes back.
     now: Option<Timestamp>,
     newest: BTreeMap<BenchmarkId, Timestamp>,
@@ -81,6 +98,8 @@ pub struct Site {
     fresh: Vec<Alert>,
     /// What is in force: neither resolved nor superseded.
     standing: BTreeMap<Place, Standing>,
+    /// Who asked not to be told.
+    mutes: Vec<Mute>,
     counts: Counts,
 }
 
@@ -93,48 +112,63 @@ impl Site {
             settings,
             searches: Searches::default(),
             sinks,
-            seen: Seen::default(),
+            batch: Batch::default(),
+            is_full: false,
+            steps_since_memory: 0,
             now: None,
             newest: BTreeMap::new(),
             failure_times: BTreeMap::new(),
             fresh: Vec::new(),
             standing: BTreeMap::new(),
+            mutes: Vec::new(),
             counts: Counts::default(),
         }
     }
 
     /// Takes one value. What was taken before, or lies ahead of the wall clock, changes nothing.
     /// A reading by which the answer of a search is due waits for that.
-    pub fn take(&mut self, arrival: &Arrival, wall: Timestamp) -> Vec<Event> {
+    ///
+    /// # Errors
+    /// When the state cannot be asked whether the value is known.
+    pub fn take(&mut self, arrival: &Arrival, wall: Timestamp) -> Result<Vec<Event>, StoreError> {
         let ahead = arrival.time.duration_since(wall);
         if ahead > CLOCK_TOLERANCE {
             self.counts.from_the_future += 1;
             let (time, total) = (arrival.time, self.counts.from_the_future);
             tracing::warn!(%time, ?arrival.input, total, "measured in the future: quarantined");
-            return Vec::new();
+            return Ok(Vec::new());
         }
-        match self.seen.look(arrival) {
-            Novelty::New => {}
-            Novelty::Repeated => {
+        if let Some(store) = &self.sinks.store {
+            if arrival.time < DAWN {
+                let time = arrival.time;
+                tracing::warn!(%time, ?arrival.input, "measured before 1678: quarantined");
+                return Ok(Vec::new());
+            }
+            if store.has(&self.batch, &arrival.input)? {
                 self.counts.repeated += 1;
-                return Vec::new();
+                return Ok(Vec::new());
             }
         }
         self.counts.taken += 1;
         let mut events = self.pass(arrival.time);
         let now = self.now.map_or(arrival.time, |now| now.max(arrival.time));
-        if let Input::Reading { benchmark, .. } = &arrival.input {
-            let newest = self.newest.entry(benchmark.clone()).or_insert(arrival.time);
-            *newest = arrival.time.max(*newest);
-            if let Some(finding) = self.searches.due(benchmark, arrival.time) {
-                events.extend(self.step(now, &Input::Found(finding)));
-            }
+        if let Input::Reading { benchmark, .. } = &arrival.input
+            && let Some(finding) = self.searches.due(benchmark, arrival.time)
+        {
+            events.extend(self.step(now, &Input::Found(finding)));
         }
         events.extend(self.step(now, &arrival.input));
         for job in self.monitor.searches() {
             self.searches.start(job);
         }
-        events
+        Ok(events)
+    }
+
+    /// Goes by other settings from here on.
+    pub fn resettle(&mut self, settings: Settings) -> Vec<Event> {
+        self.settings = settings.clone();
+        let now = self.now.unwrap_or(DAWN);
+        self.step(now, &Input::Settings(Box::new(settings)))
     }
 
     /// Lets data time pass up to `until`: every deadline of the monitor on the way is kept.
@@ -156,13 +190,49 @@ impl Site {
         events
     }
 
+    /// Takes an order of people, which stands under this number in the state.
+    pub fn order(&mut self, number: i64, order: Order) -> Vec<Event> {
+        self.batch.taken(number);
+        let now = self.now.unwrap_or(DAWN);
+        self.step(now, &Input::Order(order))
+    }
+
+    /// How far the files had been read when the values taken since the last commit were all handed over.
+    pub fn note_positions(&mut self, positions: Vec<Position>) {
+        if self.sinks.store.is_some() {
+            for one in positions {
+                self.batch.position(one);
+            }
+        }
+    }
+
     /// When the monitor wants to be woken.
     pub fn next_deadline(&self) -> Option<Timestamp> {
         self.monitor.next_deadline()
     }
 
     fn step(&mut self, now: Timestamp, input: &Input) -> Vec<Event> {
+        let events = self.follow(now, input);
+        if self.sinks.store.is_some() {
+            self.batch.step(now, input, &events);
+            self.steps_since_memory += 1;
+        }
+        events
+    }
+
+    /// The monitor's step, and what the site itself remembers of it.
+    fn follow(&mut self, now: Timestamp, input: &Input) -> Vec<Event> {
         self.now = Some(now);
+        if let Input::Reading {
+            benchmark, reading, ..
+        } = input
+        {
+            let newest = self.newest.entry(benchmark.clone()).or_insert(reading.time);
+            *newest = reading.time.max(*newest);
+        }
+        if let Input::Order(order) = input {
+            self.obey(order);
+        }
         let events = self.monitor.step(now, input);
         for event in &events {
             self.handle(event);
@@ -172,7 +242,6 @@ impl Site {
 
     /// Puts an event on its way; nothing leaves before [`Site::commit`].
     pub fn handle(&mut self, event: &Event) {
-        self.sinks.events.add(event);
         if let EventKind::Refit { failure_time, .. } = &event.kind {
             match failure_time.median {
                 Some(median) => self.failure_times.insert(event.benchmark.clone(), median),
@@ -188,105 +257,6 @@ impl Site {
         ));
     }
 
-    /// Makes the events durable (on a full disk they wait for the next time), then hands the
-    /// alerts to the hooks, but for what began longer
-    /// before `wall` than twice the evacuation time: of that, [`Site::caught_up`] sends what is
-    /// still in force.
-    ///
-    /// # Errors
-    /// When the events cannot be made durable; the alerts go out all the same.
-    pub fn commit(&mut self, wall: Timestamp) -> io::Result<()> {
-        let recorded = self.sinks.events.commit();
-        self.counts.unwritten = self.sinks.events.dropped();
-        if let Some(alerts) = &self.sinks.alerts {
-            alerts.commit();
-        }
-        for alert in std::mem::take(&mut self.fresh) {
-            let age = wall.duration_since(alert.event.time);
-            let is_sent = age <= self.freshness(alert.event.benchmark.as_ref());
-            if is_sent {
-                self.send(&alert);
-            } else {
-                self.counts.long_past += 1;
-                if let Some(alerts) = &self.sinks.alerts {
-                    alerts.supersede(&alert);
-                }
-            }
-            self.stand(alert, is_sent);
-        }
-        recorded
-    }
-
-    /// Notes what is in force: a level supersedes the lower ones of its benchmark, and its end
-    /// ends them too.
-    fn stand(&mut self, alert: Alert, is_sent: bool) {
-        let is_unknown = alert.level == Level::Unknown;
-        let place = (alert.event.benchmark.clone(), is_unknown);
-        let had = self.standing.get(&place);
-        if had.is_some_and(|had| had.alert.level > alert.level) {
-            return;
-        }
-        match alert.state {
-            AlertState::Firing if alert.level != Level::Green => {
-                self.standing.insert(place, Standing { alert, is_sent });
-            }
-            AlertState::Firing | AlertState::Resolved => {
-                self.standing.remove(&place);
-            }
-        }
-    }
-
-    /// Everything there is has been read: what is in force and was not sent because it began long
-    /// ago goes out, however long ago that was.
-    ///
-    /// Only a benchmark that nobody watches any more is spared. Its newest reading is older than
-    /// 30 days, the outlook and twice the evacuation time, whichever is the longest: an archive.
-    /// Readings that merely stop do not make an alert past; silence is not safety.
-    pub fn caught_up(&mut self, wall: Timestamp) {
-        let mut standing = std::mem::take(&mut self.standing);
-        for one in standing.values_mut() {
-            if one.is_sent {
-                // Again: there may have been no room for it. The hooks that have it ignore it.
-                if one.alert.must_arrive() {
-                    self.send(&one.alert);
-                }
-            } else if self.is_watched(one.alert.event.benchmark.as_ref(), wall) {
-                self.send(&one.alert);
-                one.is_sent = true;
-                self.counts.long_past = self.counts.long_past.saturating_sub(1);
-            }
-        }
-        self.standing = standing;
-    }
-
-    fn is_watched(&self, benchmark: Option<&BenchmarkId>, wall: Timestamp) -> bool {
-        let newest = match benchmark {
-            Some(benchmark) => self.newest.get(benchmark),
-            None => self.newest.values().max(),
-        };
-        let limit = (self.freshness(benchmark))
-            .max(self.policy(benchmark).outlook)
-            .max(LEAST_WATCHED);
-        newest.is_some_and(|newest| wall.duration_since(*newest) <= limit)
-    }
-
-    fn send(&self, alert: &Alert) {
-        if let Some(alerts) = &self.sinks.alerts {
-            alerts.offer(alert);
-        }
-    }
-
-    fn freshness(&self, benchmark: Option<&BenchmarkId>) -> SignedDuration {
-        (self.policy(benchmark).evacuation_time)
-            .checked_mul(2)
-            .unwrap_or(SignedDuration::MAX)
-            .max(LEAST_FRESHNESS)
-    }
-
-    fn policy(&self, benchmark: Option<&BenchmarkId>) -> &Policy {
-        benchmark.map_or(&self.settings.policy, |one| self.settings.policy(one))
-    }
-
     /// What has been counted.
     pub fn counts(&self) -> Counts {
         self.counts
@@ -297,12 +267,17 @@ impl Site {
         self.monitor.summary()
     }
 
-    /// Makes everything durable and gives the hooks up to `limit` to finish. Returns how many
-    /// alerts no hook has taken; `None` when the limit was reached.
+    /// Makes everything durable, the monitor's memory with it, and gives the hooks up to `limit` to finish. Returns
+    /// how many alerts no hook has taken; `None` when the limit was reached.
     ///
     /// # Errors
-    /// When the events cannot be made durable.
-    pub async fn close(mut self, wall: Timestamp, limit: Duration) -> io::Result<Option<usize>> {
+    /// When it cannot be made durable.
+    pub async fn close(
+        mut self,
+        wall: Timestamp,
+        limit: Duration,
+    ) -> Result<Option<usize>, StoreError> {
+        self.steps_since_memory = usize::MAX;
         let recorded = self.commit(wall);
         let lost = match self.sinks.alerts.take() {
             Some(alerts) => alerts.close(limit).await,

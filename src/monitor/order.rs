@@ -1,0 +1,62 @@
+//! What people tell the monitor: it keeps them as it keeps readings, so that a replay hears them too.
+
+use super::event::{Event, EventKind};
+use crate::reading::{BenchmarkId, Timestamp};
+use serde::{Deserialize, Serialize};
+
+/// An order from people. It changes who is told, never what is found.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "order", rename_all = "kebab-case")]
+pub enum Order {
+    /// Somebody has seen what is in force: it is not tried any further.
+    Acknowledge {
+        /// Where; `None`: everywhere.
+        benchmark: Option<BenchmarkId>,
+        /// Who.
+        by: Option<String>,
+    },
+    /// The level in force at a benchmark, and lower ones, are not told until then; a higher one is, at once.
+    Shelve {
+        /// Where.
+        benchmark: BenchmarkId,
+        /// Until when, by the wall clock.
+        until: Timestamp,
+    },
+    /// Nothing is told until then; what is in force at its end is told at its end.
+    Silence {
+        /// Where; `None`: everywhere.
+        benchmark: Option<BenchmarkId>,
+        /// Until when, by the wall clock.
+        until: Timestamp,
+    },
+}
+
+impl Order {
+    /// That it was given.
+    pub(super) fn event(&self, time: Timestamp) -> Event {
+        let (order, until, by) = match self {
+            Self::Acknowledge { by, .. } => ("acknowledge", None, by.clone()),
+            Self::Shelve { until, .. } => ("shelve", Some(*until), None),
+            Self::Silence { until, .. } => ("silence", Some(*until), None),
+        };
+        Event {
+            time,
+            benchmark: self.benchmark().cloned(),
+            kind: EventKind::Order {
+                order: order.to_owned(),
+                until,
+                by,
+            },
+        }
+    }
+
+    /// Whom it concerns; `None`: the whole site.
+    pub fn benchmark(&self) -> Option<&BenchmarkId> {
+        match self {
+            Self::Acknowledge { benchmark, .. } | Self::Silence { benchmark, .. } => {
+                benchmark.as_ref()
+            }
+            Self::Shelve { benchmark, .. } => Some(benchmark),
+        }
+    }
+}

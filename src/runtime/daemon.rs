@@ -1,0 +1,243 @@
+//! The daemon's work loop: takes what comes, lets time go by, obeys people, goes by another config when told.
+
+use super::clock::{self, Stopwatch};
+use super::deliver::{Dispatcher, Retry};
+use super::delivered::Delivered;
+use super::mqtt;
+use super::pulse::Pulse;
+use super::run::Progress;
+use super::sandbox::{self, OURSELVES};
+use super::shutdown::Shutdown;
+use super::site::Site;
+use super::sources::Sources;
+use super::tail::{Arrival, Batch};
+use crate::config::{self, Config};
+use crate::monitor::Input;
+use crate::store::{Store, StoreError};
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::signal::unix::{SignalKind, signal};
+use tokio::sync::watch;
+
+/// How long the hooks of a former config may take to finish.
+const DRAIN_LIMIT: Duration = Duration::from_secs(20);
+/// How often time is let pass when nothing arrives.
+const TICK: Duration = Duration::from_secs(1);
+
+/// A site with what feeds it and what shows how it is.
+#[derive(Debug)]
+pub(super) struct Daemon {
+    pub(super) config: Config,
+    pub(super) store: Arc<Store>,
+    pub(super) site: Site,
+    pub(super) sources: Sources,
+    pub(super) pulse: Pulse,
+    /// Once, and as of the last batch: a logger that was away hands in its backlog in several.
+    is_caught_up: bool,
+    is_up_to_date: bool,
+}
+
+/// The way to the hooks of `config`.
+pub(super) fn dispatcher(config: &Config, store: &Arc<Store>) -> Dispatcher {
+    for what in config.without_effect() {
+        tracing::warn!("{what}");
+    }
+    sandbox::announce(&config.hooks);
+    let delivered = Delivered::of(Arc::clone(store));
+    Dispatcher::start(&config.hooks, &Retry::default(), delivered)
+}
+
+impl Daemon {
+    pub(super) fn new(
+        config: &Config,
+        store: Arc<Store>,
+        site: Site,
+        (sources, pulse): (Sources, Pulse),
+    ) -> Self {
+        Self {
+            config: config.clone(),
+            store,
+            site,
+            sources,
+            pulse,
+            is_caught_up: false,
+            is_up_to_date: false,
+        }
+    }
+
+    /// Works until the stop is asked for or the source has ended.
+    pub(super) async fn work(
+        &mut self,
+        mut shutdown: Shutdown,
+        progress: &watch::Sender<Progress>,
+    ) -> Result<(), StoreError> {
+        let mut hangup = signal(SignalKind::hangup())?;
+        let mut tick = tokio::time::interval(TICK);
+        tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+        loop {
+            self.pulse.turn();
+            tokio::select! {
+                biased;
+                () = shutdown.requested() => return Ok(()),
+                _ = hangup.recv() => self.reload(&shutdown).await?,
+                batch = self.sources.batches.recv(), if !self.site.is_stalled() => {
+                    let Some(batch) = batch else { return Ok(()) };
+                    tokio::task::block_in_place(|| self.take_batch(batch, &shutdown))?;
+                }
+                Some(delivery) = self.sources.deliveries.recv(), if !self.site.is_stalled() => {
+                    tokio::task::block_in_place(|| self.take_messages(delivery))?;
+                }
+                _ = tick.tick() => tokio::task::block_in_place(|| self.tick())?,
+            }
+            let (counts, is_caught_up) = (self.site.counts(), self.is_caught_up);
+            progress.send_replace(Progress {
+                counts,
+                is_caught_up,
+            });
+        }
+    }
+
+    /// Steps the monitor through a batch; a stop that is asked for half-way ends it after a value, and the rest of
+    /// the batch is read again by the next start.
+    fn take_batch(&mut self, batch: Batch, shutdown: &Shutdown) -> Result<(), StoreError> {
+        for arrival in &batch.arrivals {
+            if shutdown.is_requested() {
+                return self.commit();
+            }
+            self.take(arrival)?;
+        }
+        self.site.note_positions(batch.positions);
+        self.commit()?;
+        self.is_up_to_date = batch.caught_up;
+        if self.is_up_to_date {
+            self.site.caught_up(clock::now())?;
+        }
+        if self.is_up_to_date && !self.is_caught_up {
+            self.is_caught_up = true;
+            self.pulse.caught_up();
+            tracing::info!(counts = ?self.site.counts(), "caught up");
+        }
+        Ok(())
+    }
+
+    /// Takes a broker's message, and whatever else has come from there by now, in one commit.
+    fn take_messages(&mut self, first: mqtt::Delivery) -> Result<(), StoreError> {
+        let mut next = Some(first);
+        while let Some(delivery) = next {
+            for arrival in &delivery.arrivals {
+                self.take(arrival)?;
+            }
+            let has_room = self.sources.hold(delivery.receipt);
+            next = has_room
+                .then(|| self.sources.deliveries.try_recv().ok())
+                .flatten();
+        }
+        self.commit()
+    }
+
+    fn take(&mut self, arrival: &Arrival) -> Result<(), StoreError> {
+        let stopwatch = Stopwatch::start();
+        let taken = self.site.counts().taken;
+        let events = self.site.take(arrival, clock::now())?;
+        let vitals = &self.pulse.vitals;
+        match &arrival.input {
+            Input::Reading { benchmark, .. } if self.site.counts().taken > taken => {
+                vitals.read(benchmark, arrival.time, &events, stopwatch.elapsed());
+            }
+            Input::Reading { .. }
+            | Input::Sample { .. }
+            | Input::Missing { .. }
+            | Input::Settings(_)
+            | Input::Order(_)
+            | Input::Tick
+            | Input::Found(_) => vitals.note(&events),
+        }
+        self.pulse.turn();
+        Ok(())
+    }
+
+    fn commit(&mut self) -> Result<(), StoreError> {
+        let committed = self.site.commit(clock::now());
+        let is_waiting = self.site.is_waiting();
+        if committed.is_ok() && !is_waiting {
+            self.sources.acknowledge();
+        }
+        let (counts, queue) = (self.site.counts(), self.sources.batches.len());
+        let (is_paused, searches) = (self.site.is_stalled(), self.site.searching());
+        self.pulse.vitals.update(|health| {
+            health.is_store_writable = committed.is_ok() && !is_waiting;
+            health.is_paused = is_paused;
+            health.readings = counts.taken;
+            health.repeated = counts.repeated;
+            health.from_the_future = counts.from_the_future;
+            health.unwritten = self.site.unwritten();
+            health.queue = queue;
+            health.searches = searches;
+        });
+        committed
+    }
+
+    /// What is due whether anything comes or not.
+    fn tick(&mut self) -> Result<(), StoreError> {
+        let now = clock::now();
+        if !self.site.is_waiting() {
+            for (number, order) in self.store.orders()? {
+                self.site.order(number, order);
+            }
+        }
+        // Data time is the clock's only once the past has been read.
+        if self.is_caught_up {
+            let events = self.site.pass(now);
+            self.pulse.vitals.note(&events);
+        }
+        self.commit()?;
+        if self.is_up_to_date {
+            self.site.caught_up(now)?;
+        }
+        let (outbox, bytes) = (self.store.waiting_count()?, self.store.bytes()?);
+        self.pulse.vitals.update(|health| {
+            health.outbox = outbox;
+            health.database_bytes = Some(bytes);
+        });
+        Ok(())
+    }
+
+    /// Goes by the config file as it is now, all of it or nothing.
+    async fn reload(&mut self, shutdown: &Shutdown) -> Result<(), StoreError> {
+        let fresh = match config::load(&self.config.file) {
+            Ok(mut fresh) => {
+                fresh.wall_in_hooks(Path::new(OURSELVES));
+                fresh
+            }
+            Err(error) => {
+                tracing::error!(%error, "the config is not taken: the old one stays in force");
+                return Ok(());
+            }
+        };
+        if fresh.site.state_dir != self.config.site.state_dir
+            || fresh.site.listen != self.config.site.listen
+        {
+            tracing::error!("the config is not taken: another state_dir or listen needs a restart");
+            return Ok(());
+        }
+        self.pulse.service.reloading();
+        // What has been read already is taken under the old config.
+        self.sources.stop();
+        while let Some(batch) = self.sources.batches.recv().await {
+            tokio::task::block_in_place(|| self.take_batch(batch, shutdown))?;
+        }
+        let events = self.site.resettle(fresh.settings.clone());
+        self.pulse.vitals.note(&events);
+        self.commit()?;
+        let former = self.site.rehook(dispatcher(&fresh, &self.store))?;
+        if let Some(former) = former {
+            tokio::spawn(former.close(DRAIN_LIMIT));
+        }
+        self.sources = Sources::start(&fresh, &self.store)?;
+        (self.is_up_to_date, self.config) = (false, fresh);
+        self.pulse.service.ready("watching");
+        tracing::info!(file = %self.config.file.display(), "the config is taken");
+        Ok(())
+    }
+}

@@ -1,0 +1,213 @@
+//! The commit: what has happened is made durable, then told.
+
+use super::{LEAST_FRESHNESS, LEAST_WATCHED, MOST_UNWRITTEN, Site, Standing};
+use crate::alert::{Level, Policy};
+use crate::monitor::AlertState;
+use crate::reading::{BenchmarkId, Timestamp};
+use crate::runtime::deliver::Dispatcher;
+use crate::runtime::delivered::delivery;
+use crate::runtime::hook::Alert;
+use crate::store::StoreError;
+use jiff::SignedDuration;
+
+impl Site {
+    /// Makes everything since the last commit durable in one transaction, then hands the alerts to the hooks, but
+    /// for what began longer before `wall` than twice the evacuation time: of that, [`Site::caught_up`] sends what
+    /// is still in force.
+    ///
+    /// On a full disk everything waits for the next commit, and the hooks hear all the same: an alert may then
+    /// come twice after a crash, with the same key.
+    ///
+    /// # Errors
+    /// When it cannot be made durable for another reason; the alerts have gone out all the same.
+    pub fn commit(&mut self, wall: Timestamp) -> Result<(), StoreError> {
+        let mut to_send = Vec::new();
+        for alert in std::mem::take(&mut self.fresh) {
+            let age = wall.duration_since(alert.event.time);
+            let is_fresh = age <= self.freshness(alert.event.benchmark.as_ref());
+            let is_sent = is_fresh && !self.is_muted(&alert, wall);
+            if is_sent {
+                to_send.push(alert.clone());
+            } else {
+                self.counts.long_past += 1;
+                if let Some(alerts) = &self.sinks.alerts {
+                    alerts.supersede(&alert);
+                }
+            }
+            self.stand(alert, is_sent);
+        }
+        self.record_and_send(&to_send)
+    }
+
+    fn record_and_send(&mut self, alerts: &[Alert]) -> Result<(), StoreError> {
+        for alert in alerts {
+            self.note(alert)?;
+        }
+        let recorded = self.record();
+        for alert in alerts {
+            self.send(alert);
+        }
+        if let Some(alerts) = &self.sinks.alerts {
+            alerts.commit();
+        }
+        recorded
+    }
+
+    /// Puts an alert into the outbox, for each hook that asks for its level.
+    fn note(&mut self, alert: &Alert) -> Result<(), StoreError> {
+        if self.sinks.store.is_some()
+            && let Some(dispatcher) = &self.sinks.alerts
+        {
+            for hook in dispatcher.asking(alert.level) {
+                self.batch.deliver(delivery(alert, &hook)?);
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes the batch; where there is no room it is kept for the next time.
+    fn record(&mut self) -> Result<(), StoreError> {
+        let Some(store) = self.sinks.store.clone() else {
+            return Ok(());
+        };
+        let memory = self.memory();
+        let saves = memory.is_some();
+        self.batch.memory(memory);
+        match store.commit(&self.batch) {
+            Ok(()) => {
+                if std::mem::take(&mut self.is_full) {
+                    let steps = self.batch.steps();
+                    tracing::info!(steps, "there is room on the disk again");
+                }
+                self.batch.clear();
+                if saves {
+                    self.monitor.is_saved();
+                    self.steps_since_memory = 0;
+                }
+                Ok(())
+            }
+            Err(error) if error.is_full() => {
+                if !std::mem::replace(&mut self.is_full, true) {
+                    let waiting = self.batch.steps();
+                    tracing::error!(%error, waiting, "no room on the disk: what was taken in waits unacknowledged");
+                }
+                Ok(())
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Steps that wait for room on the disk.
+    pub fn unwritten(&self) -> u64 {
+        if self.is_full {
+            self.batch.steps() as u64
+        } else {
+            0
+        }
+    }
+
+    /// Searches that are at work.
+    pub fn searching(&self) -> usize {
+        self.searches.jobs().count()
+    }
+
+    /// Whether anything waits for room on the disk.
+    pub fn is_waiting(&self) -> bool {
+        self.is_full
+    }
+
+    /// Tells other hooks from here on; returns the way to those before.
+    ///
+    /// # Errors
+    /// When the state cannot be read.
+    pub fn rehook(&mut self, alerts: Dispatcher) -> Result<Option<Dispatcher>, StoreError> {
+        let former = self.sinks.alerts.replace(alerts);
+        self.wait_for_hooks()?;
+        Ok(former)
+    }
+
+    /// Whether so much waits for room on the disk that nothing more is to be taken in.
+    pub fn is_stalled(&self) -> bool {
+        self.is_full && self.batch.steps() >= MOST_UNWRITTEN
+    }
+
+    /// Notes what is in force: a level supersedes the lower ones of its benchmark, and its end
+    /// ends them too.
+    pub(super) fn stand(&mut self, alert: Alert, is_sent: bool) {
+        let is_unknown = alert.level == Level::Unknown;
+        let place = (alert.event.benchmark.clone(), is_unknown);
+        let had = self.standing.get(&place);
+        if had.is_some_and(|had| had.alert.level > alert.level) {
+            return;
+        }
+        match alert.state {
+            AlertState::Firing if alert.level != Level::Green => {
+                self.standing.insert(place, Standing { alert, is_sent });
+            }
+            AlertState::Firing | AlertState::Resolved => {
+                self.standing.remove(&place);
+            }
+        }
+    }
+
+    /// Everything there is has been read: what is in force and was not sent because it began long
+    /// ago goes out, however long ago that was.
+    ///
+    /// Only a benchmark that nobody watches any more is spared. Its newest reading is older than
+    /// 30 days, the outlook and twice the evacuation time, whichever is the longest: an archive.
+    /// Readings that merely stop do not make an alert past; silence is not safety.
+    ///
+    /// # Errors
+    /// As [`Site::commit`].
+    pub fn caught_up(&mut self, wall: Timestamp) -> Result<(), StoreError> {
+        let mut standing = std::mem::take(&mut self.standing);
+        let mut to_send = Vec::new();
+        for one in standing.values_mut() {
+            if one.is_sent {
+                // Again: there may have been no room for it. The hooks that have it ignore it.
+                if one.alert.must_arrive() {
+                    self.send(&one.alert);
+                }
+            } else if self.is_watched(one.alert.event.benchmark.as_ref(), wall)
+                && !self.is_muted(&one.alert, wall)
+            {
+                to_send.push(one.alert.clone());
+                one.is_sent = true;
+                self.counts.long_past = self.counts.long_past.saturating_sub(1);
+            }
+        }
+        self.standing = standing;
+        if to_send.is_empty() {
+            return Ok(());
+        }
+        self.record_and_send(&to_send)
+    }
+
+    fn is_watched(&self, benchmark: Option<&BenchmarkId>, wall: Timestamp) -> bool {
+        let newest = match benchmark {
+            Some(benchmark) => self.newest.get(benchmark),
+            None => self.newest.values().max(),
+        };
+        let limit = (self.freshness(benchmark))
+            .max(self.policy(benchmark).outlook)
+            .max(LEAST_WATCHED);
+        newest.is_some_and(|newest| wall.duration_since(*newest) <= limit)
+    }
+
+    pub(super) fn send(&self, alert: &Alert) {
+        if let Some(alerts) = &self.sinks.alerts {
+            alerts.offer(alert);
+        }
+    }
+
+    fn freshness(&self, benchmark: Option<&BenchmarkId>) -> SignedDuration {
+        (self.policy(benchmark).evacuation_time)
+            .checked_mul(2)
+            .unwrap_or(SignedDuration::MAX)
+            .max(LEAST_FRESHNESS)
+    }
+
+    fn policy(&self, benchmark: Option<&BenchmarkId>) -> &Policy {
+        benchmark.map_or(&self.settings.policy, |one| self.settings.policy(one))
+    }
+}

@@ -1,0 +1,189 @@
+//! What a restart goes on from: the memory last saved, and the steps since.
+
+use super::mute::Mute;
+use super::{Counts, OWN, Place, STEPS_A_BENCHMARK, STEPS_A_MEMORY, Sinks, Site, Standing};
+use crate::alert::Level;
+use crate::monitor::{Input, Monitor, Part, SavedError, SearchJob, Settings};
+use crate::reading::{BenchmarkId, Timestamp};
+use crate::runtime::hook::{Alert, state_name};
+use crate::runtime::vitals::Vitals;
+use crate::store::{Recorded, Store, StoreError};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// What the site remembers beside the monitor.
+#[derive(Debug, Serialize, Deserialize)]
+struct Own {
+    asked: Vec<SearchJob>,
+    now: Option<Timestamp>,
+    newest: BTreeMap<BenchmarkId, Timestamp>,
+    failure_times: BTreeMap<Option<BenchmarkId>, Timestamp>,
+    standing: Vec<(Place, Standing)>,
+    mutes: Vec<Mute>,
+    counts: Counts,
+}
+
+impl Site {
+    /// The site as its state has it: as if it had never stopped, but for settings that are others now. `turn` is called
+    /// now and then on the way.
+    ///
+    /// # Errors
+    /// When the state cannot be read.
+    pub fn resume(
+        name: &str,
+        settings: Settings,
+        sinks: Sinks,
+        turn: &mut dyn FnMut(),
+    ) -> Result<Self, StoreError> {
+        let Some(store) = sinks.store.clone() else {
+            return Ok(Self::new(name, settings, sinks));
+        };
+        let mut site = Self::new(name, Settings::default(), sinks);
+        let recorded = store.memory()?;
+        let mut step = recorded.step;
+        if step > 0
+            && let Err(error) = site.remember(&recorded)
+        {
+            tracing::warn!(%error, "the memory cannot be used: everything that was taken in is gone through again");
+            step = 0;
+        }
+        site.catch_up(&store, step, turn)?;
+        site.wait_for_hooks()?;
+        if *site.monitor.settings() != settings || store.last_step() == 0 {
+            site.resettle(settings);
+        }
+        Ok(site)
+    }
+
+    /// Shows how the benchmarks stand.
+    pub fn show(&self, vitals: &Vitals) {
+        for (benchmark, newest) in &self.newest {
+            let level = self.monitor.level(benchmark).unwrap_or(Level::Green);
+            vitals.resume(benchmark, *newest, level);
+        }
+    }
+
+    fn remember(&mut self, recorded: &Recorded) -> Result<(), SavedError> {
+        let (own, parts): (Vec<Part>, Vec<Part>) = recorded
+            .parts
+            .iter()
+            .cloned()
+            .partition(|part| part.name == OWN);
+        let body = own
+            .into_iter()
+            .find_map(|part| part.body)
+            .ok_or(SavedError::Incomplete)?;
+        let own: Own = rmp_serde::from_slice(&body).map_err(|source| SavedError::Unreadable {
+            name: "site".to_owned(),
+            source,
+        })?;
+        self.monitor = Monitor::restore(&parts)?;
+        own.asked
+            .into_iter()
+            .for_each(|job| self.searches.note(job));
+        self.now = own.now;
+        self.newest = own.newest;
+        self.failure_times = own.failure_times;
+        self.standing = own.standing.into_iter().collect();
+        self.mutes = own.mutes;
+        self.counts = own.counts;
+        Ok(())
+    }
+
+    /// Takes the steps after number `after` again; all of it stands in the state already.
+    fn catch_up(
+        &mut self,
+        store: &Arc<Store>,
+        mut after: i64,
+        turn: &mut dyn FnMut(),
+    ) -> Result<(), StoreError> {
+        let from = after;
+        loop {
+            let rows = store.steps(after)?;
+            let Some(last) = rows.last() else { break };
+            after = last.seq;
+            for row in &rows {
+                turn();
+                if let Input::Found(finding) = &row.input {
+                    self.searches.forget(&finding.benchmark);
+                }
+                self.counts.taken += u64::from(matches!(
+                    row.input,
+                    Input::Reading { .. } | Input::Sample { .. }
+                ));
+                self.follow(row.now, &row.input);
+                for job in self.monitor.searches() {
+                    self.searches.note(job);
+                }
+                self.steps_since_memory += 1;
+            }
+            for alert in std::mem::take(&mut self.fresh) {
+                self.stand(alert, false);
+            }
+        }
+        tracing::info!(steps = after - from, of = after, "the past is there");
+        self.settings = self.monitor.settings().clone();
+        self.searches.resume();
+        Ok(())
+    }
+
+    /// What some hook has not taken yet goes out again.
+    pub(super) fn wait_for_hooks(&mut self) -> Result<(), StoreError> {
+        let Some(store) = self.sinks.store.clone() else {
+            return Ok(());
+        };
+        for one in self.standing.values_mut() {
+            let Alert {
+                key, level, state, ..
+            } = &one.alert;
+            let identity = (key.as_str(), level.name(), state_name(*state));
+            one.is_sent |= store.is_noted(identity, None, None)?;
+        }
+        for body in store.waiting()? {
+            match rmp_serde::from_slice::<Alert>(&body) {
+                Ok(alert) => self.send(&alert),
+                Err(error) => tracing::error!(%error, "an alert that waited cannot be read"),
+            }
+        }
+        Ok(())
+    }
+
+    /// The memory as of the last step, where it is time to save it.
+    pub(super) fn memory(&self) -> Option<Vec<Part>> {
+        let many = STEPS_A_MEMORY.max(STEPS_A_BENCHMARK * self.newest.len());
+        if self.steps_since_memory < many {
+            return None;
+        }
+        let own = Own {
+            asked: self.searches.jobs().cloned().collect(),
+            now: self.now,
+            newest: self.newest.clone(),
+            failure_times: self.failure_times.clone(),
+            standing: self
+                .standing
+                .iter()
+                .map(|(place, one)| (place.clone(), one.clone()))
+                .collect(),
+            mutes: self.mutes.clone(),
+            counts: self.counts,
+        };
+        let saved = self.monitor.save().map_err(|error| error.to_string());
+        let own = rmp_serde::to_vec_named(&own).map_err(|error| error.to_string());
+        match saved.and_then(|parts| Ok((parts, own?))) {
+            Ok((mut parts, own)) => {
+                let body = Some(own);
+                let name = OWN.to_owned();
+                parts.push(Part { name, body });
+                Some(parts)
+            }
+            Err(error) => {
+                tracing::error!(
+                    error,
+                    "no memory saved: a restart goes through more of the past again"
+                );
+                None
+            }
+        }
+    }
+}

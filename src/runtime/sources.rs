@@ -1,0 +1,99 @@
+//! Where a daemon's values come from: files that are followed, brokers that are listened to.
+
+use super::mqtt::{self, Delivery, Receipt};
+use super::shutdown::{self, Shutdown, Trigger};
+use super::tail::{self, Batch, Follower};
+use crate::config::Config;
+use crate::store::{Store, StoreError};
+use tokio::sync::mpsc;
+use tokio::task::{JoinError, JoinHandle};
+
+/// Batches between the files and the monitor.
+const BATCHES: usize = 4;
+/// Messages that may wait to be taken, or to be acknowledged.
+pub(super) const MESSAGES: usize = 64;
+
+/// The sources at work.
+#[derive(Debug)]
+pub(super) struct Sources {
+    /// What files hold.
+    pub(super) batches: mpsc::Receiver<Batch>,
+    /// What brokers send.
+    pub(super) deliveries: mpsc::Receiver<Delivery>,
+    /// What has been taken and is not durable yet.
+    unacknowledged: Vec<Receipt>,
+    /// Held, so that without a broker the other end waits.
+    _messages: mpsc::Sender<Delivery>,
+    /// Stops them, also when it is dropped.
+    stop: Trigger,
+    task: JoinHandle<Result<(), JoinError>>,
+}
+
+impl Sources {
+    /// Goes on where `store` says that the files had been read to.
+    pub(super) fn start(config: &Config, store: &Store) -> Result<Self, StoreError> {
+        let (messages, deliveries) = mpsc::channel(MESSAGES);
+        let (stop, stopped) = shutdown::pair();
+        listen(config, &messages, &stopped);
+        let follower = Follower::new(&config.sources, &config.benchmarks, &store.positions()?);
+        let (sender, batches) = mpsc::channel(BATCHES);
+        let task = tokio::spawn(tail::follow(follower, sender, stopped));
+        Ok(Self {
+            batches,
+            deliveries,
+            unacknowledged: Vec::new(),
+            _messages: messages,
+            stop,
+            task,
+        })
+    }
+
+    /// Asks them to stop; what they have read already can still be taken.
+    pub(super) fn stop(&self) {
+        self.stop.pull();
+    }
+
+    /// Waits for their end.
+    pub(super) async fn join(self) -> Result<(), JoinError> {
+        self.stop();
+        drop(self.batches);
+        self.task.await?
+    }
+
+    /// Keeps the acknowledgement until what it is for is durable; says whether there is room for more.
+    pub(super) fn hold(&mut self, receipt: Receipt) -> bool {
+        self.unacknowledged.push(receipt);
+        self.unacknowledged.len() < MESSAGES
+    }
+
+    /// Everything that was taken is durable: tells the brokers.
+    pub(super) fn acknowledge(&mut self) {
+        if self.unacknowledged.is_empty() {
+            return;
+        }
+        let receipts = std::mem::take(&mut self.unacknowledged);
+        tokio::spawn(async move {
+            for receipt in receipts {
+                if receipt.acknowledge().await.is_err() {
+                    tracing::debug!("the connection has gone: its messages come again");
+                    return;
+                }
+            }
+        });
+    }
+}
+
+/// Listens to the brokers.
+fn listen(config: &Config, messages: &mpsc::Sender<Delivery>, stopped: &Shutdown) {
+    for broker in &config.brokers {
+        // One session for each site and source, found again after a restart.
+        let client = format!("slipwatch-{}-{}", config.site.name, broker.id);
+        tokio::spawn(mqtt::follow(
+            broker.clone(),
+            config.benchmarks.clone(),
+            client,
+            messages.clone(),
+            stopped.clone(),
+        ));
+    }
+}

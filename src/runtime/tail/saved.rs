@@ -1,0 +1,97 @@
+//! Where a restart goes on in a file.
+
+use super::decode::Decoder;
+use super::file::{Content, FileTail, Place};
+use super::records::Channels;
+use super::text::{SavedText, TextReader};
+use serde::{Deserialize, Serialize};
+use std::error::Error;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// What a restart goes on from: everything before has been handed out.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Saved {
+    at: u64,
+    place: Option<Place>,
+    mark: Vec<u8>,
+    content: SavedContent,
+}
+
+/// What of [`Content`] a restart needs.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+enum SavedContent {
+    Text(SavedText),
+    Mcap(Channels),
+    Complete,
+    /// From its start.
+    #[default]
+    Anew,
+}
+
+impl FileTail {
+    /// The file as [`FileTail::moved`] told of it, perhaps to another process.
+    ///
+    /// # Errors
+    /// When this version, or this config, cannot go on from there.
+    pub(super) fn restored(
+        path: PathBuf,
+        decoder: Arc<Decoder>,
+        body: &[u8],
+    ) -> Result<Self, Box<dyn Error>> {
+        let saved: Saved = rmp_serde::from_slice(body)?;
+        let rows = decoder.text_rows(&path);
+        let mut file = Self::new(path, decoder);
+        file.content = match (saved.content.clone(), rows) {
+            (SavedContent::Text(text), Some(rows)) => {
+                Content::Text(Box::new(TextReader::restored(rows, text)?))
+            }
+            (SavedContent::Mcap(channels), None) => Content::Mcap {
+                channels,
+                suspect: None,
+            },
+            (SavedContent::Complete, _) => Content::Complete,
+            (SavedContent::Anew | SavedContent::Text(_) | SavedContent::Mcap(_), _) => {
+                return Ok(file);
+            }
+        };
+        file.at = saved.at;
+        file.place = saved.place;
+        file.mark.clone_from(&saved.mark);
+        file.safe = saved.clone();
+        file.told = saved;
+        Ok(file)
+    }
+
+    /// From where a restart is to go on, if that is another place than when last asked.
+    pub(super) fn moved(&mut self) -> Option<Vec<u8>> {
+        if self.told == self.safe {
+            return None;
+        }
+        let body = rmp_serde::to_vec_named(&self.safe)
+            .inspect_err(|error| tracing::error!(%error, "no position to go on from"))
+            .ok()?;
+        self.told = self.safe.clone();
+        Some(body)
+    }
+
+    /// Everything up to here has been handed out.
+    pub(super) fn settle(&mut self) {
+        if self.safe.at == self.at && self.safe.place == self.place && self.safe.mark == self.mark {
+            return;
+        }
+        let content = match &self.content {
+            Content::Text(text) => SavedContent::Text(text.saved()),
+            Content::Mcap { channels, .. } => SavedContent::Mcap(channels.clone()),
+            Content::Complete => SavedContent::Complete,
+            // A packed file is read whole or not at all.
+            Content::Packed(_) | Content::Refused => SavedContent::Anew,
+        };
+        self.safe = Saved {
+            at: self.at,
+            place: self.place,
+            mark: self.mark.clone(),
+            content,
+        };
+    }
+}

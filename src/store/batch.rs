@@ -1,0 +1,306 @@
+//! One commit: the steps, what follows from them, and how far the files have been read.
+
+use super::series::{self, Series};
+use super::{Inner, Store, StoreError, nanoseconds};
+use crate::monitor::{Event, Input, Part};
+use crate::reading::Timestamp;
+use rusqlite::{Connection, params};
+use std::collections::BTreeMap;
+
+/// How far one file has been read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Position {
+    /// The source and the file.
+    pub name: String,
+    /// What its reader goes on from; `None`: it is gone.
+    pub body: Option<Vec<u8>>,
+}
+
+/// What is written together.
+#[derive(Debug, Default)]
+pub struct Batch {
+    /// Data time and what the monitor was told.
+    steps: Vec<(Timestamp, Input)>,
+    /// Each with the number of its step in this batch.
+    events: Vec<(usize, Event)>,
+    /// The values of the steps: what is known although it is not written yet.
+    values: BTreeMap<(Series, Timestamp), f64>,
+    positions: BTreeMap<String, Option<Vec<u8>>>,
+    memory: Option<Vec<Part>>,
+    outbox: Vec<super::Delivery>,
+    commands: Vec<i64>,
+}
+
+impl Batch {
+    /// Notes a step and the events that followed from it.
+    pub fn step(&mut self, now: Timestamp, input: &Input, events: &[Event]) {
+        if let (Some(series), Some((time, value))) = (Series::of(input), value(input)) {
+            self.values.insert((series, time), value);
+        }
+        self.steps.push((now, input.clone()));
+        let step = self.steps.len() - 1;
+        self.events
+            .extend(events.iter().map(|event| (step, event.clone())));
+    }
+
+    /// Notes how far a file has been read.
+    pub fn position(&mut self, position: Position) {
+        self.positions.insert(position.name, position.body);
+    }
+
+    /// Notes the monitor's memory as of the last step, where it is to be saved.
+    pub fn memory(&mut self, parts: Option<Vec<Part>>) {
+        self.memory = parts;
+    }
+
+    /// Everything is written: the next one begins.
+    pub fn clear(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Notes what a hook is to be told.
+    pub fn deliver(&mut self, delivery: super::Delivery) {
+        self.outbox.push(delivery);
+    }
+
+    /// Notes that a command has been taken.
+    pub fn taken(&mut self, command: i64) {
+        self.commands.push(command);
+    }
+
+    /// How many steps are in it.
+    pub fn steps(&self) -> usize {
+        self.steps.len()
+    }
+
+    /// Whether there is nothing to write.
+    pub fn is_empty(&self) -> bool {
+        self.steps.is_empty()
+            && self.events.is_empty()
+            && self.positions.is_empty()
+            && self.memory.is_none()
+            && self.outbox.is_empty()
+            && self.commands.is_empty()
+    }
+
+    /// The value that this batch has for the same series and time.
+    fn known(&self, series: &Series, time: Timestamp) -> Option<f64> {
+        self.values.get(&(series.clone(), time)).copied()
+    }
+}
+
+impl Store {
+    /// Writes the batch, all of it or nothing, and returns when it is on the disk.
+    ///
+    /// # Errors
+    /// [`StoreError`]; where [`StoreError::is_full`], the same batch may be tried again.
+    pub fn commit(&self, batch: &Batch) -> Result<(), StoreError> {
+        if batch.is_empty() {
+            return Ok(());
+        }
+        let mut inner = self.inner();
+        let Inner {
+            connection,
+            catalogue,
+            steps,
+            events,
+        } = &mut *inner;
+        let transaction =
+            connection.transaction_with_behavior(rusqlite::TransactionBehavior::Immediate)?;
+        let mut fresh: BTreeMap<Series, i64> = BTreeMap::new();
+        for series in batch
+            .steps
+            .iter()
+            .filter_map(|(_, input)| Series::of(input))
+        {
+            if catalogue.number(&series).is_none() && !fresh.contains_key(&series) {
+                let number = catalogue.next() + i64::try_from(fresh.len()).unwrap_or(i64::MAX);
+                series::insert(&transaction, number, &series)?;
+                fresh.insert(series, number);
+            }
+        }
+        let number = |series: &Series| {
+            catalogue
+                .number(series)
+                .or_else(|| fresh.get(series).copied())
+        };
+        let (mut last_step, mut last_event) = (*steps, *events);
+        for (now, input) in &batch.steps {
+            last_step += 1;
+            insert_step(&transaction, (last_step, *now), input, &number)?;
+        }
+        let mut latest = BTreeMap::new();
+        for (step, event) in &batch.events {
+            last_event += 1;
+            let step = *steps + 1 + i64::try_from(*step).unwrap_or(0);
+            let body = insert_event(&transaction, (last_event, step), event)?;
+            if let Some(benchmark) = &event.benchmark {
+                latest.insert((benchmark, event.kind.name()), body);
+            }
+        }
+        for ((benchmark, kind), body) in latest {
+            transaction
+                .prepare_cached(
+                    "INSERT OR REPLACE INTO latest (benchmark, kind, body) VALUES (?1, ?2, ?3)",
+                )?
+                .execute(params![benchmark.as_str(), kind, body])?;
+        }
+        write_positions(&transaction, batch)?;
+        if let Some(parts) = &batch.memory {
+            write_memory(&transaction, parts, last_step)?;
+        }
+        for delivery in &batch.outbox {
+            delivery.insert(&transaction)?;
+        }
+        for command in &batch.commands {
+            transaction.execute("DELETE FROM command WHERE id = ?1", [command])?;
+        }
+        transaction.commit()?;
+        (*steps, *events) = (last_step, last_event);
+        for (series, number) in fresh {
+            catalogue.note(number, series);
+        }
+        Ok(())
+    }
+
+    /// Whether the value has been taken before: in `batch`, or in what is written.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn has(&self, batch: &Batch, input: &Input) -> Result<bool, StoreError> {
+        let (Some(series), Some((time, value))) = (Series::of(input), value(input)) else {
+            return Ok(false);
+        };
+        if let Some(known) = batch.known(&series, time) {
+            return Ok(known.to_bits() == value.to_bits());
+        }
+        let inner = self.inner();
+        let factor = match &series {
+            Series::Benchmark(_, unit, _) => unit.factor(),
+            Series::Channel(..) => 1.0,
+        };
+        let mut newest: Option<(i64, f64)> = None;
+        for (number, own) in inner.catalogue.alike(&series) {
+            let mut query = inner.connection.prepare_cached(
+                "SELECT seq, value FROM step WHERE series = ?1 AND time = ?2 ORDER BY seq DESC LIMIT 1",
+            )?;
+            let mut rows = query.query(params![number, nanoseconds(time)?])?;
+            if let Some(row) = rows.next()? {
+                let (seq, value): (i64, f64) = (row.get(0)?, row.get(1)?);
+                if newest.is_none_or(|(before, _)| seq > before) {
+                    newest = Some((seq, value * own));
+                }
+            }
+        }
+        Ok(newest.is_some_and(|(_, known)| known.to_bits() == (value * factor).to_bits()))
+    }
+}
+
+/// When a value was measured, and what it is.
+fn value(input: &Input) -> Option<(Timestamp, f64)> {
+    match input {
+        Input::Reading { reading, .. } => Some((reading.time, reading.value)),
+        Input::Sample { sample, .. } => Some((sample.time, sample.value)),
+        Input::Missing { .. }
+        | Input::Settings(_)
+        | Input::Order(_)
+        | Input::Found(_)
+        | Input::Tick => None,
+    }
+}
+
+fn insert_step(
+    connection: &Connection,
+    (seq, now): (i64, Timestamp),
+    input: &Input,
+    number: &dyn Fn(&Series) -> Option<i64>,
+) -> Result<(), StoreError> {
+    let mut insert = connection.prepare_cached(
+        "INSERT INTO step (seq, now, series, time, value, sigma, body) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
+    )?;
+    if let (Some(series), Some((time, value))) = (Series::of(input), value(input)) {
+        let sigma = match input {
+            Input::Reading { reading, .. } => reading.sigma,
+            Input::Sample { .. }
+            | Input::Missing { .. }
+            | Input::Settings(_)
+            | Input::Order(_)
+            | Input::Found(_)
+            | Input::Tick => None,
+        };
+        let own = (now != time).then(|| nanoseconds(now)).transpose()?;
+        let (number, time) = (number(&series), nanoseconds(time)?);
+        insert.execute(params![
+            seq,
+            own,
+            number,
+            time,
+            value,
+            sigma,
+            None::<Vec<u8>>
+        ])?;
+    } else {
+        let body = super::read::encode(input)?;
+        let none = None::<f64>;
+        insert.execute(params![
+            seq,
+            nanoseconds(now)?,
+            None::<i64>,
+            None::<i64>,
+            none,
+            none,
+            body
+        ])?;
+    }
+    Ok(())
+}
+
+/// Returns the event's JSON.
+fn insert_event(
+    connection: &Connection,
+    (seq, step): (i64, i64),
+    event: &Event,
+) -> Result<String, StoreError> {
+    let body =
+        serde_json::to_string(event).map_err(|error| StoreError::Unreadable(error.to_string()))?;
+    let benchmark = event.benchmark.as_ref().map(ToString::to_string);
+    let (time, kind) = (nanoseconds(event.time)?, event.kind.name());
+    connection
+        .prepare_cached(
+            "INSERT INTO event (seq, step, time, kind, benchmark, body) VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
+        )?
+        .execute(params![seq, step, time, kind, benchmark, body])?;
+    Ok(body)
+}
+
+fn write_positions(connection: &Connection, batch: &Batch) -> Result<(), StoreError> {
+    for (name, body) in &batch.positions {
+        match body {
+            Some(body) => connection
+                .prepare_cached("INSERT OR REPLACE INTO position (name, body) VALUES (?1, ?2)")?
+                .execute(params![name, body])?,
+            None => connection
+                .prepare_cached("DELETE FROM position WHERE name = ?1")?
+                .execute([name])?,
+        };
+    }
+    Ok(())
+}
+
+fn write_memory(connection: &Connection, parts: &[Part], step: i64) -> Result<(), StoreError> {
+    for Part { name, body } in parts {
+        match body {
+            Some(body) => connection
+                .prepare_cached("INSERT OR REPLACE INTO memory (name, body) VALUES (?1, ?2)")?
+                .execute(params![name, body])?,
+            None => connection
+                .prepare_cached("DELETE FROM memory WHERE name = ?1")?
+                .execute([name])?,
+        };
+    }
+    connection.execute(
+        "INSERT OR REPLACE INTO meta (name, value) VALUES ('memory_step', ?1)",
+        [step],
+    )?;
+    Ok(())
+}

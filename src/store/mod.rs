@@ -1,0 +1,267 @@
+//! The site's memory on disk: SQLite, one transaction for each batch.
+//!
+//! The steps are the truth: every input that the monitor was given, in its order. Events, the monitor's memory and
+//! the outbox follow from them and are written with them, and so is how far each file has been read: nothing is
+//! acknowledged before it, and a restart goes on exactly where the last commit left off.
+
+mod batch;
+mod outbox;
+mod read;
+mod schema;
+mod series;
+
+pub use batch::{Batch, Position};
+pub use outbox::{Delivery, Fate};
+pub use read::{Recorded, StepRow};
+
+use crate::reading::Timestamp;
+use rusqlite::{Connection, ErrorCode, OpenFlags, ffi};
+use series::Catalogue;
+use std::fs::{File, TryLockError};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+/// The database in the state folder.
+const FILE: &str = "slipwatch.db";
+/// A reader, or a command from beside, may hold the file for so long.
+const PATIENCE: Duration = Duration::from_secs(10);
+/// How often, and after what waits, the folder's lock is tried.
+const LOCK_ATTEMPTS: usize = 10;
+const LOCK_WAIT: Duration = Duration::from_millis(50);
+
+/// Why the state cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// There is no state in the folder.
+    #[error("state folder {}: nothing there yet; `slipwatch run` makes it", .folder.display())]
+    Missing {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// Another daemon works on it.
+    #[error("state folder {}: another slipwatch is at work on it", .folder.display())]
+    InUse {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// Written by a later version.
+    #[error(
+        "the state has schema {version}, from a later slipwatch: this one knows {}; install that version, or restore a backup",
+        schema::VERSION
+    )]
+    Newer {
+        /// Its version.
+        version: usize,
+    },
+    /// A database, but not ours.
+    #[error("{FILE} is another program's database: move it away, or set another state_dir")]
+    Foreign,
+    /// What is in the file contradicts itself.
+    #[error(
+        "the state is damaged ({detail}): restore a backup of {FILE}, or move it away and let the files be read again"
+    )]
+    Damaged {
+        /// What was found.
+        detail: String,
+    },
+    /// The database failed.
+    #[error("{0}")]
+    Sqlite(#[source] rusqlite::Error),
+    /// The folder cannot be used.
+    #[error("{0}")]
+    Io(#[from] io::Error),
+    /// Something kept cannot be read back.
+    #[error("the state holds what this version cannot read: {0}")]
+    Unreadable(String),
+}
+
+impl From<rusqlite::Error> for StoreError {
+    fn from(error: rusqlite::Error) -> Self {
+        match error.sqlite_error_code() {
+            Some(ErrorCode::DatabaseCorrupt | ErrorCode::NotADatabase) => {
+                let detail = error.to_string();
+                Self::Damaged { detail }
+            }
+            Some(_) | None => Self::Sqlite(error),
+        }
+    }
+}
+
+impl StoreError {
+    /// Whether there was no room, or the write failed before anything was acknowledged: the same commit may be
+    /// tried again later. A failed sync is something else: what the system has thrown away it would not report
+    /// twice, so that is never retried.
+    pub fn is_full(&self) -> bool {
+        let Self::Sqlite(error) = self else {
+            return false;
+        };
+        error.sqlite_error().is_some_and(|error| {
+            error.code == ErrorCode::DiskFull
+                || error.code == ErrorCode::DatabaseBusy
+                || error.extended_code == ffi::SQLITE_IOERR_WRITE
+                || error.extended_code == ffi::SQLITE_IOERR_SHMSIZE
+        })
+    }
+}
+
+/// The open state of a site.
+#[derive(Debug)]
+pub struct Store {
+    inner: Mutex<Inner>,
+    /// Held as long as the daemon runs.
+    _lock: Option<File>,
+}
+
+#[derive(Debug)]
+struct Inner {
+    connection: Connection,
+    catalogue: Catalogue,
+    /// The number of the last step.
+    steps: i64,
+    /// The number of the last event.
+    events: i64,
+}
+
+impl Store {
+    /// Opens the state in `folder` to work on it, and makes it where there is none.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn open(folder: &Path) -> Result<Self, StoreError> {
+        std::fs::create_dir_all(folder)?;
+        let lock = lock(folder)?;
+        let mut connection = Connection::open(folder.join(FILE))?;
+        connection.busy_timeout(PATIENCE)?;
+        schema::version(&connection)?;
+        sound(&connection)?;
+        connection.pragma_update(None, "journal_mode", "WAL")?;
+        connection.pragma_update(None, "synchronous", "FULL")?;
+        schema::migrate(&mut connection)?;
+        // Makes the file's own name durable.
+        File::open(folder)?.sync_all()?;
+        Self::of(connection, Some(lock))
+    }
+
+    /// Opens the state in `folder` to look at it, beside a daemon or without one.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn look(folder: &Path) -> Result<Self, StoreError> {
+        let file = folder.join(FILE);
+        if !file.exists() {
+            let folder = folder.to_owned();
+            return Err(StoreError::Missing { folder });
+        }
+        // Not read-only: a log that a crash has left behind must be gone through first.
+        let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+        let connection = Connection::open_with_flags(file, flags)?;
+        connection.busy_timeout(PATIENCE)?;
+        if schema::version(&connection)? < schema::VERSION {
+            return Err(StoreError::Unreadable(
+                "an older version's tables; `slipwatch run` brings them up".to_owned(),
+            ));
+        }
+        Self::of(connection, None)
+    }
+
+    fn of(connection: Connection, lock: Option<File>) -> Result<Self, StoreError> {
+        let last = |table: &str| {
+            let query = format!("SELECT coalesce(max(seq), 0) FROM {table}");
+            connection.query_row(&query, [], |row| row.get(0))
+        };
+        let (steps, events) = (last("step")?, last("event")?);
+        let catalogue = Catalogue::load(&connection)?;
+        let inner = Inner {
+            connection,
+            catalogue,
+            steps,
+            events,
+        };
+        Ok(Self {
+            inner: Mutex::new(inner),
+            _lock: lock,
+        })
+    }
+
+    /// Writes a copy of the whole state to `file`, while a daemon works on it or not.
+    ///
+    /// # Errors
+    /// [`StoreError`], also where `file` exists already.
+    pub fn backup(&self, file: &Path) -> Result<(), StoreError> {
+        if file.exists() {
+            let exists =
+                io::Error::new(io::ErrorKind::AlreadyExists, "there is a file of that name");
+            return Err(exists.into());
+        }
+        let path = file.to_string_lossy();
+        self.inner()
+            .connection
+            .execute("VACUUM INTO ?1", [path.as_ref()])?;
+        File::open(file)?.sync_all()?;
+        Ok(())
+    }
+
+    /// Bytes of the database.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn bytes(&self) -> Result<u64, StoreError> {
+        let inner = self.inner();
+        let pragma = |name| {
+            inner
+                .connection
+                .pragma_query_value(None, name, |row| row.get::<_, i64>(0))
+        };
+        let bytes = pragma("page_count")? * pragma("page_size")?;
+        Ok(u64::try_from(bytes).unwrap_or(0))
+    }
+
+    fn inner(&self) -> MutexGuard<'_, Inner> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The folder for ourselves. A daemon that has just ended may hold it for a moment more: a hook that it was starting
+/// has its files until the hook's own program begins.
+fn lock(folder: &Path) -> Result<File, StoreError> {
+    let lock = File::create(folder.join("lock"))?;
+    for attempt in 0..LOCK_ATTEMPTS {
+        if attempt > 0 {
+            std::thread::sleep(LOCK_WAIT);
+        }
+        match lock.try_lock() {
+            Ok(()) => return Ok(lock),
+            Err(TryLockError::WouldBlock) => {}
+            Err(TryLockError::Error(error)) => return Err(error.into()),
+        }
+    }
+    let folder = folder.to_owned();
+    Err(StoreError::InUse { folder })
+}
+
+/// Whether the file is whole, as far as its own structure tells.
+fn sound(connection: &Connection) -> Result<(), StoreError> {
+    let said: String = connection.pragma_query_value(None, "quick_check", |row| row.get(0))?;
+    if said == "ok" {
+        Ok(())
+    } else {
+        Err(StoreError::Damaged { detail: said })
+    }
+}
+
+/// As the tables hold a time: nanoseconds since 1970, from 1678 to 2261.
+///
+/// # Errors
+/// [`StoreError::Unreadable`] outside of that.
+fn nanoseconds(time: Timestamp) -> Result<i64, StoreError> {
+    i64::try_from(time.as_nanosecond()).map_err(|_| {
+        StoreError::Unreadable(format!("the time {time}: from 1678 to 2261 can be kept"))
+    })
+}
+
+fn timestamp(nanoseconds: i64) -> Result<Timestamp, StoreError> {
+    Timestamp::from_nanosecond(i128::from(nanoseconds))
+        .map_err(|error| StoreError::Unreadable(error.to_string()))
+}

@@ -1,0 +1,131 @@
+//! What the hooks are to be told: written with the events that say so, ticked off when a hook has taken it.
+
+use super::{Store, StoreError};
+use rusqlite::{Connection, params};
+
+/// One alert for one hook.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Delivery {
+    /// The alert's idempotency key.
+    pub key: String,
+    /// Its level.
+    pub level: String,
+    /// Firing or resolved.
+    pub state: String,
+    /// The hook.
+    pub hook: String,
+    /// The alert itself.
+    pub body: Vec<u8>,
+}
+
+/// What became of a delivery.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fate {
+    /// The hook took it.
+    Delivered,
+    /// It was superseded or resolved before the hook took it.
+    Over,
+    /// It was given up.
+    Dead,
+}
+
+impl Fate {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Delivered => "delivered",
+            Self::Over => "over",
+            Self::Dead => "dead",
+        }
+    }
+}
+
+impl Delivery {
+    pub(super) fn insert(&self, connection: &Connection) -> Result<(), StoreError> {
+        let mut insert = connection.prepare_cached(
+            "INSERT OR IGNORE INTO outbox (key, level, state, hook, status, body)
+             VALUES (?1, ?2, ?3, ?4, 'waiting', ?5)",
+        )?;
+        let Self {
+            key,
+            level,
+            state,
+            hook,
+            body,
+        } = self;
+        insert.execute(params![key, level, state, hook, body])?;
+        Ok(())
+    }
+}
+
+impl Store {
+    /// The bodies of the alerts that some hook has not taken yet, the oldest first.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn waiting(&self) -> Result<Vec<Vec<u8>>, StoreError> {
+        let inner = self.inner();
+        let mut query = inner.connection.prepare(
+            "SELECT body FROM outbox WHERE status = 'waiting' GROUP BY key, level, state ORDER BY min(id)",
+        )?;
+        let rows = query.query_map([], |row| row.get(0))?;
+        Ok(rows.collect::<Result<_, _>>()?)
+    }
+
+    /// How many deliveries wait.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn waiting_count(&self) -> Result<usize, StoreError> {
+        let inner = self.inner();
+        let mut query = inner
+            .connection
+            .prepare_cached("SELECT count(*) FROM outbox WHERE status = 'waiting'")?;
+        let count: i64 = query.query_row([], |row| row.get(0))?;
+        Ok(usize::try_from(count).unwrap_or(0))
+    }
+
+    /// Whether a hook's delivery with this key, level and state was ever noted; with `status`, stands so.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn is_noted(
+        &self,
+        (key, level, state): (&str, &str, &str),
+        hook: Option<&str>,
+        fate: Option<Fate>,
+    ) -> Result<bool, StoreError> {
+        let inner = self.inner();
+        let mut query = inner.connection.prepare_cached(
+            "SELECT 1 FROM outbox WHERE key = ?1 AND level = ?2 AND state = ?3
+             AND (?4 IS NULL OR hook = ?4) AND (?5 IS NULL OR status = ?5) LIMIT 1",
+        )?;
+        Ok(query.exists(params![key, level, state, hook, fate.map(Fate::name)])?)
+    }
+
+    /// Notes what became of deliveries; with those that were not noted before.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn settle(&self, settled: &[(Delivery, Fate)]) -> Result<(), StoreError> {
+        let mut inner = self.inner();
+        let transaction = inner.connection.transaction()?;
+        for (delivery, fate) in settled {
+            delivery.insert(&transaction)?;
+            let Delivery {
+                key,
+                level,
+                state,
+                hook,
+                ..
+            } = delivery;
+            transaction
+                .prepare_cached(
+                    "UPDATE outbox SET status = ?5, attempts = attempts + 1
+                     WHERE key = ?1 AND level = ?2 AND state = ?3 AND hook = ?4 AND status != 'delivered'",
+                )?
+                .execute(params![key, level, state, hook, fate.name()])?;
+        }
+        transaction.commit()?;
+        Ok(())
+    }
+}

@@ -1,0 +1,266 @@
+//! What a restart, a replay of the stored input, and people who ask read back.
+
+use super::series::Series;
+use super::{Store, StoreError, timestamp};
+use crate::monitor::{Finding, Input, Order, Part, Settings};
+use crate::reading::{BenchmarkId, Reading, Sample, Timestamp};
+use rusqlite::{Connection, params};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Steps read at once.
+const CHUNK: i64 = 4096;
+
+/// One step as it stands in the state.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StepRow {
+    /// Its number.
+    pub seq: i64,
+    /// Data time.
+    pub now: Timestamp,
+    /// What the monitor was told.
+    pub input: Input,
+}
+
+/// What a restart goes on from.
+#[derive(Debug, Default)]
+pub struct Recorded {
+    /// The monitor's memory; empty where there is none.
+    pub parts: Vec<Part>,
+    /// As of which step.
+    pub step: i64,
+}
+
+/// A step that is no value.
+#[derive(Serialize, Deserialize)]
+enum Told {
+    Settings(Box<Settings>),
+    Found(Box<Finding>),
+    Order(Order),
+    Missing(BenchmarkId, Timestamp, String),
+}
+
+/// `None` where only time has passed.
+pub(super) fn encode(input: &Input) -> Result<Option<Vec<u8>>, StoreError> {
+    let told = match input {
+        Input::Settings(settings) => Told::Settings(settings.clone()),
+        Input::Found(finding) => Told::Found(Box::new(finding.clone())),
+        Input::Order(order) => Told::Order(order.clone()),
+        Input::Missing {
+            benchmark,
+            time,
+            what,
+        } => Told::Missing(benchmark.clone(), *time, what.clone()),
+        Input::Tick | Input::Reading { .. } | Input::Sample { .. } => return Ok(None),
+    };
+    let body = rmp_serde::to_vec_named(&told);
+    body.map(Some)
+        .map_err(|error| StoreError::Unreadable(error.to_string()))
+}
+
+fn decode(body: Option<Vec<u8>>) -> Result<Input, StoreError> {
+    let Some(body) = body else {
+        return Ok(Input::Tick);
+    };
+    let told = rmp_serde::from_slice(&body);
+    Ok(
+        match told.map_err(|error| StoreError::Unreadable(error.to_string()))? {
+            Told::Settings(settings) => Input::Settings(settings),
+            Told::Found(finding) => Input::Found(*finding),
+            Told::Order(order) => Input::Order(order),
+            Told::Missing(benchmark, time, what) => Input::Missing {
+                benchmark,
+                time,
+                what,
+            },
+        },
+    )
+}
+
+impl Store {
+    /// The memory last saved.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn memory(&self) -> Result<Recorded, StoreError> {
+        let inner = self.inner();
+        let mut query = inner
+            .connection
+            .prepare("SELECT name, body FROM memory ORDER BY name")?;
+        let part = |row: &rusqlite::Row<'_>| {
+            Ok(Part {
+                name: row.get(0)?,
+                body: row.get(1)?,
+            })
+        };
+        let parts = query.query_map([], part)?.collect::<Result<_, _>>()?;
+        let step = meta(&inner.connection, "memory_step")?.unwrap_or(0);
+        Ok(Recorded { parts, step })
+    }
+
+    /// The positions of the files.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn positions(&self) -> Result<Vec<(String, Vec<u8>)>, StoreError> {
+        let inner = self.inner();
+        let mut query = inner
+            .connection
+            .prepare("SELECT name, body FROM position")?;
+        let rows = query.query_map([], |row| Ok((row.get(0)?, row.get(1)?)))?;
+        Ok(rows.collect::<Result<_, _>>()?)
+    }
+
+    /// The next few steps after number `after`, in their order; none at the end.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn steps(&self, after: i64) -> Result<Vec<StepRow>, StoreError> {
+        let inner = self.inner();
+        let mut query = inner.connection.prepare_cached(
+            "SELECT seq, now, series, time, value, sigma, body FROM step WHERE seq > ?1 ORDER BY seq LIMIT ?2",
+        )?;
+        let mut rows = query.query(params![after, CHUNK])?;
+        let mut steps = Vec::new();
+        while let Some(row) = rows.next()? {
+            let (seq, now): (i64, Option<i64>) = (row.get(0)?, row.get(1)?);
+            let (now, input) = match row.get::<_, Option<i64>>(2)? {
+                None => {
+                    let now = now.ok_or_else(|| lost(seq))?;
+                    (timestamp(now)?, decode(row.get(6)?)?)
+                }
+                Some(number) => {
+                    let series = inner.catalogue.get(number).ok_or_else(|| lost(seq))?;
+                    let time = timestamp(row.get(3)?)?;
+                    let input = input(series, time, row.get(4)?, row.get(5)?);
+                    (now.map_or(Ok(time), timestamp)?, input)
+                }
+            };
+            steps.push(StepRow { seq, now, input });
+        }
+        Ok(steps)
+    }
+
+    /// The JSON of the newest event of `kind` at each benchmark.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn latest(&self, kind: &str) -> Result<Vec<String>, StoreError> {
+        let inner = self.inner();
+        let mut query = inner
+            .connection
+            .prepare_cached("SELECT body FROM latest WHERE kind = ?1 ORDER BY benchmark")?;
+        let rows = query.query_map([kind], |row| row.get(0))?;
+        Ok(rows.collect::<Result<_, _>>()?)
+    }
+
+    /// Every benchmark that has given readings, with the time of its newest one.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn benchmarks(&self) -> Result<BTreeMap<BenchmarkId, Timestamp>, StoreError> {
+        let inner = self.inner();
+        let mut query = inner.connection.prepare_cached(
+            "SELECT name, (SELECT max(time) FROM step WHERE series = series.id) FROM series WHERE is_reading",
+        )?;
+        let mut rows = query.query([])?;
+        let mut newest = BTreeMap::new();
+        while let Some(row) = rows.next()? {
+            let (name, time): (String, Option<i64>) = (row.get(0)?, row.get(1)?);
+            if let Some(time) = time.map(timestamp).transpose()? {
+                let known = newest.entry(BenchmarkId::new(name)).or_insert(time);
+                *known = time.max(*known);
+            }
+        }
+        Ok(newest)
+    }
+
+    /// What people have asked for and the daemon has not taken yet, as (number, order).
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn orders(&self) -> Result<Vec<(i64, Order)>, StoreError> {
+        let inner = self.inner();
+        let mut query = inner
+            .connection
+            .prepare_cached("SELECT id, body FROM command ORDER BY id LIMIT ?1")?;
+        let rows = query.query_map([CHUNK], |row| Ok((row.get(0)?, row.get::<_, String>(1)?)))?;
+        let mut orders = Vec::new();
+        for row in rows {
+            let (id, body) = row?;
+            let order = serde_json::from_str(&body);
+            orders.push((
+                id,
+                order.map_err(|error| StoreError::Unreadable(error.to_string()))?,
+            ));
+        }
+        Ok(orders)
+    }
+
+    /// Leaves an order for the daemon, which takes it within a second, or at its next start.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn ask(&self, order: &Order) -> Result<(), StoreError> {
+        let body = serde_json::to_string(order);
+        let body = body.map_err(|error| StoreError::Unreadable(error.to_string()))?;
+        self.inner()
+            .connection
+            .execute("INSERT INTO command (body) VALUES (?1)", [body])?;
+        Ok(())
+    }
+
+    /// The number of the last step.
+    pub fn last_step(&self) -> i64 {
+        self.inner().steps
+    }
+
+    /// Events after number `after`, of `kind` and `benchmark` where these are given, as (number, JSON): the next few.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn events(
+        &self,
+        after: i64,
+        kind: Option<&str>,
+        benchmark: Option<&str>,
+    ) -> Result<Vec<(i64, String)>, StoreError> {
+        let inner = self.inner();
+        let mut query = inner.connection.prepare_cached(
+            "SELECT seq, body FROM event WHERE seq > ?1 AND (?2 IS NULL OR kind = ?2)
+             AND (?3 IS NULL OR benchmark = ?3) ORDER BY seq LIMIT ?4",
+        )?;
+        let rows = query.query_map(params![after, kind, benchmark, CHUNK], |row| {
+            Ok((row.get(0)?, row.get(1)?))
+        })?;
+        Ok(rows.collect::<Result<_, _>>()?)
+    }
+}
+
+fn lost(seq: i64) -> StoreError {
+    StoreError::Damaged {
+        detail: format!("step {seq} is incomplete"),
+    }
+}
+
+fn input(series: &Series, time: Timestamp, value: f64, sigma: Option<f64>) -> Input {
+    match series {
+        Series::Channel(channel, unit) => Input::Sample {
+            channel: channel.clone(),
+            unit: unit.clone(),
+            sample: Sample { time, value },
+        },
+        Series::Benchmark(benchmark, unit, averaging) => Input::Reading {
+            benchmark: benchmark.clone(),
+            unit: *unit,
+            averaging: *averaging,
+            reading: Reading { time, value, sigma },
+        },
+    }
+}
+
+fn meta(connection: &Connection, name: &str) -> Result<Option<i64>, StoreError> {
+    let mut query = connection.prepare_cached("SELECT value FROM meta WHERE name = ?1")?;
+    let mut rows = query.query([name])?;
+    Ok(rows.next()?.map(|row| row.get(0)).transpose()?)
+}
