@@ -302,3 +302,40 @@ fn nothing_is_the_right_answer_to_noise_and_unexplained_to_what_no_label_fits() 
     let step = saying(&unknown, vec![Effect::of(Kind::LoadStep)]);
     assert!(!score(outside, &unknown, &step).right_kind());
 }
+
+/// What `explain` calls the `index`-th slope for development, and whether that is right.
+fn called(family: Family, index: u64) -> Outcome {
+    let one = drawn(family, Range::Dev, index).unwrap();
+    let neighbours: Vec<_> = one.neighbours.iter().collect();
+    let options = Options::default();
+    let said = explain(
+        &one.series,
+        &one.channels,
+        &neighbours,
+        &options,
+        &mut |_| {},
+    );
+    score(family, &one, &said)
+}
+
+/// A load step of two per cent explains the same readings, by the pace that it changes and not by its jump.
+#[test]
+fn a_changed_pace_without_a_jump_is_a_change_of_friction() {
+    let friction = called(Family::Of(Kind::FrictionChange), 3);
+    assert_eq!(friction.called, Kind::FrictionChange);
+    assert!(friction.at_errors[0] < 20.0, "{:?}", friction.at_errors);
+}
+
+#[test]
+fn a_group_that_relaxes_after_it_parted_is_a_partition() {
+    let parted = called(Family::Of(Kind::Partition), 2);
+    assert_eq!(parted.called, Kind::Partition);
+    assert!(parted.at_errors[0] < 20.0, "{:?}", parted.at_errors);
+}
+
+/// A change of friction would be accepted, and leaves three times the noise.
+#[test]
+fn a_pulse_of_the_load_that_no_label_accounts_for_is_unexplained() {
+    let outside = called(Family::Outside, 0);
+    assert!(outside.right_kind(), "{:?}", outside.said);
+}

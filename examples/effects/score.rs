@@ -3,7 +3,7 @@
 use crate::drawn::Drawn;
 use crate::family::Family;
 use crate::truth::{TrueEffect, Truth};
-use slipwatch::effects::{Effect, Explained, Explanation, Kind};
+use slipwatch::effects::{Cause, Effect, Explained, Explanation, Kind, Options, error_given};
 use slipwatch::reading::{Timestamp, days_since};
 use std::collections::BTreeSet;
 
@@ -164,15 +164,23 @@ fn held_out(drawn: &Drawn, explanation: &Explanation) -> Option<f64> {
     Some(after / reference_error(drawn, from)?)
 }
 
-/// What the held-out error is measured by: the rms of the readings from `from` on about the true prediction,
-/// noise alone, which no fit can be under but by chance. A refit of the law given the true effect would be
-/// fairer, and goes here.
+/// What the held-out error is measured by: that of the law given the true effects, fitted to the same readings; none where
+/// no label fits the truth.
 fn reference_error(drawn: &Drawn, from: Timestamp) -> Option<f64> {
-    let pairs = drawn.series.readings.iter().zip(&drawn.truth.prediction);
-    let errors: Vec<f64> = pairs
-        .filter(|(reading, _)| reading.time >= from)
-        .map(|(reading, prediction)| (reading.value - prediction).powi(2))
-        .collect();
-    let count = errors.len() as f64;
-    (count > 0.0).then(|| (errors.iter().sum::<f64>() / count).sqrt())
+    let truth = &drawn.truth;
+    let label = |one: &TrueEffect| one.effect != Kind::Unexplained;
+    if !truth.effects.iter().all(label) {
+        return None;
+    }
+    let causes = truth.effects.iter().map(|one| Cause {
+        kind: one.effect,
+        channel: one.channel.clone(),
+        at: one.at,
+    });
+    let causes: Vec<Cause> = causes.collect();
+    let (series, channels) = (&drawn.series, &drawn.channels);
+    let options = Options::default();
+    error_given(series, channels, &causes, Some(from), &options)?
+        .held_out
+        .after
 }

@@ -177,11 +177,12 @@ pub(super) fn feedbacks(problem: &Problem) -> Vec<Term> {
 }
 
 /// What happened once, before reading `at`, in each way that it may.
-pub(super) fn events(at: usize) -> [Term; 3] {
+pub(super) fn events(at: usize) -> [Term; 4] {
     [
         (Kind::LoadStep, Act::Step),
         (Kind::StateReset, Act::Reset),
-        (Kind::FrictionChange, Act::Friction),
+        (Kind::FrictionChange, Act::Friction(1)),
+        (Kind::FrictionChange, Act::Friction(3)),
     ]
     .map(|(kind, act)| Term {
         at: Some(at),

@@ -8,16 +8,14 @@ use super::faults::{Inspected, inspect};
 use super::fuller::Fuller;
 use super::judge::is_label;
 use super::kind::Kind;
-use super::noise::Noise;
 use super::outlook::forecast_change;
 use super::partition::partition_candidate;
-use super::problem::Problem;
+use super::ready::Ready;
 use super::remarks;
-use super::search::{Search, plain};
 use super::tell::tell;
 use super::term::Scratch;
 use super::verdict::conclude;
-use super::witnesses::{distinct, drivers, is_temperature};
+use super::witnesses::distinct;
 use crate::reading::{Channel, Series};
 
 /// What is asked of a search.
@@ -109,37 +107,19 @@ fn look(
     progress: &mut dyn FnMut(f64),
 ) {
     let mut scratch = Scratch::default();
-    let drivers = Problem::new(series, channels).and_then(|mut problem| {
-        let plain = plain(&problem, &mut scratch)?;
-        problem.see(&plain.velocity);
-        Some((
-            drivers(&problem, channels, &mut explanation.remarks),
-            problem,
-            plain,
-        ))
-    });
-    let Some((drivers, problem, plain)) = drivers else {
+    let Some(ready) = Ready::of(series, channels, &mut explanation.remarks) else {
         let few = "There are too few readings to tell anything from noise.";
         explanation.remarks.push(few.to_owned());
         return;
     };
     progress(0.05);
-    let bank = Noise::bank(&problem);
-    let temperatures: Vec<bool> = drivers
-        .iter()
-        .map(|(index, _)| is_temperature(&channels[*index]))
-        .collect();
-    let search = Search {
-        problem: &problem,
-        drivers: &drivers,
-        temperatures: &temperatures,
-        bank: &bank,
-        options,
-        scratch: Scratch::default(),
-        candidates: Vec::new(),
-    };
-    if let Some(mut found) = search.run(plain, progress) {
-        let ground = (&problem, bank.as_slice(), drivers.as_slice());
+    let search = ready.search(options);
+    if let Some(mut found) = search.run(ready.plain.clone(), progress) {
+        let ground = (
+            &ready.problem,
+            ready.bank.as_slice(),
+            ready.drivers.as_slice(),
+        );
         let verdict = conclude(
             ground,
             series.unit,

@@ -19,8 +19,8 @@ pub(super) struct Frame {
 impl Frame {
     pub(super) fn new(whitener: Whitener, residual: &[f64], jacobian: &[Vec<f64>]) -> Self {
         let mut directions: Vec<Vec<f64>> = Vec::with_capacity(jacobian.len());
-        for column in jacobian {
-            if let Some(unit) = orthonormal(whitener.whiten(column), &directions) {
+        for column in whitener.whiten_all(&slices(jacobian)) {
+            if let Some(unit) = orthonormal(column, &directions) {
                 directions.push(unit);
             }
         }
@@ -37,18 +37,12 @@ impl Frame {
 
     /// -2 ln likelihood, the size of the noise profiled out, were the misfit `misfit`.
     pub(super) fn surprise(&self, misfit: f64) -> f64 {
-        let n = self.readings();
-        n * (misfit.max(1e-300) / n).ln() + self.whitener.log_determinant
+        self.whitener.surprise(misfit)
     }
 
     /// What the noise model's parameters cost in the BIC.
     pub(super) fn cost(&self) -> f64 {
-        self.whitener.noise.parameters() * self.readings().ln()
-    }
-
-    /// How many readings there are; the residual holds the whole motion besides.
-    fn readings(&self) -> f64 {
-        (self.residual.len() - 1) as f64
+        self.whitener.cost()
     }
 
     /// Orthonormal directions that `columns` add to the model's.
@@ -122,8 +116,72 @@ impl Frames {
     }
 }
 
+/// Which of the noise models makes the residual likeliest where the model may go along its own directions: as
+/// [`Frames::best`], by the normal equations and without the directions themselves.
+pub(super) fn likeliest(bank: &[Whitener], residual: &[f64], jacobian: &[Vec<f64>]) -> usize {
+    let mut columns = slices(jacobian);
+    columns.push(residual);
+    let surprise = |whitener: &Whitener| {
+        let misfit = left_of_last(&whitener.whiten_all(&columns));
+        whitener.surprise(misfit) + whitener.cost()
+    };
+    let each = bank.iter().map(surprise).enumerate();
+    let best = each.min_by(|a, b| a.1.total_cmp(&b.1));
+    best.map_or(0, |(index, _)| index)
+}
+
+/// Square of what the other columns leave of the last: Cholesky's factor of their products, columns that add nothing
+/// passed over.
+fn left_of_last(columns: &[Vec<f64>]) -> f64 {
+    let Some((last, others)) = columns.split_last() else {
+        return 0.0;
+    };
+    // Rows of the factor by column kept, each with the length of its column.
+    let mut kept: Vec<(&[f64], f64, Vec<f64>)> = Vec::with_capacity(others.len());
+    let shares = |column: &[f64], kept: &[(&[f64], f64, Vec<f64>)]| {
+        let mut row: Vec<f64> = Vec::with_capacity(kept.len() + 1);
+        for (other, length, factor) in kept {
+            let known: f64 = row.iter().zip(factor).map(|(a, b)| a * b).sum();
+            row.push((dot(column, other) / length - known) / factor[row.len()]);
+        }
+        row
+    };
+    for column in others {
+        let length = dot(column, column).sqrt();
+        if !(length.is_finite() && length > 0.0) {
+            continue;
+        }
+        let mut row = shares(column, &kept);
+        for share in &mut row {
+            *share /= length;
+        }
+        let left = 1.0 - row.iter().map(|share| share * share).sum::<f64>();
+        if left > LEAST_LEFT * LEAST_LEFT {
+            row.push(left.sqrt());
+            kept.push((column, length, row));
+        }
+    }
+    let taken = shares(last, &kept);
+    dot(last, last) - taken.iter().map(|share| share * share).sum::<f64>()
+}
+
+fn slices(columns: &[Vec<f64>]) -> Vec<&[f64]> {
+    columns.iter().map(Vec::as_slice).collect()
+}
+
+/// In partial sums abreast, which need not wait for one another.
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
+    const ABREAST: usize = 8;
+    let (a_whole, a_rest) = a.as_chunks::<ABREAST>();
+    let (b_whole, b_rest) = b.as_chunks::<ABREAST>();
+    let mut sums = [0.0; ABREAST];
+    for (x, y) in a_whole.iter().zip(b_whole) {
+        for lane in 0..ABREAST {
+            sums[lane] += x[lane] * y[lane];
+        }
+    }
+    let rest: f64 = a_rest.iter().zip(b_rest).map(|(x, y)| x * y).sum();
+    sums.iter().sum::<f64>() + rest
 }
 
 /// Takes the directions' share out of `column`.
@@ -160,3 +218,6 @@ fn normal(mut column: Vec<f64>, least: f64) -> Option<Vec<f64>> {
     }
     Some(column)
 }
+
+#[cfg(test)]
+mod tests;

@@ -72,7 +72,7 @@ pub(super) fn objection(
         | Act::Averaging
         | Act::Step
         | Act::Reset
-        | Act::Friction
+        | Act::Friction(_)
         | Act::Reading(_) => None,
     }
 }
@@ -163,18 +163,25 @@ pub(super) fn held_out(
     scratch: &mut Scratch,
 ) -> Option<HeldOut> {
     let from = block(problem, &after.terms, share)?;
-    let part = problem.trained_on(from);
-    let bank = [Whitener::new(&part, Noise::WHITE)];
-    let mut fit = |terms: &[Term]| {
-        let starts = plain_starts(&part).into_iter();
-        let starts: Vec<Start> = starts.map(|start| start.joined(terms)).collect();
-        refit_from(&part, &starts, &bank, scratch)
-    };
     Some(HeldOut {
         from,
-        before: fit(before)?,
-        after: fit(&after.terms)?,
+        before: without_block(problem, before, from, scratch)?,
+        after: without_block(problem, &after.terms, from, scratch)?,
     })
+}
+
+/// The law with these terms by least squares from fresh starts, without the readings from `from` on.
+pub(super) fn without_block(
+    problem: &Problem,
+    terms: &[Term],
+    from: usize,
+    scratch: &mut Scratch,
+) -> Option<Fitted> {
+    let part = problem.trained_on(from);
+    let bank = [Whitener::new(&part, Noise::WHITE)];
+    let starts = plain_starts(&part).into_iter();
+    let starts: Vec<Start> = starts.map(|start| start.joined(terms)).collect();
+    refit_from(&part, &starts, &bank, scratch)
 }
 
 /// How much worse the later block is foretold, reading after reading, with the newest term as it was learned before the

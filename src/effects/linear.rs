@@ -2,7 +2,7 @@
 
 use super::problem::Problem;
 use super::refit::Fitted;
-use super::term::{Act, Scratch, Term, event_node, law, law_parameters};
+use super::term::{Act, Feedback, Scratch, Term, event_node, law, law_parameters};
 use crate::model::Driven;
 use crate::reading::Quantity;
 
@@ -21,10 +21,12 @@ pub(super) struct Linear {
     healing: Vec<f64>,
     /// v / `v_i`.
     relative: Vec<f64>,
-    /// ln y at the nodes, and the law's a, 1/day.
+    /// ln y at the nodes, and a there, 1/day.
     ln_y: Vec<f64>,
-    a: f64,
+    a: Vec<f64>,
     span: f64,
+    /// Days over which velocities are read as means; 0: of the moment.
+    averaging: f64,
 }
 
 impl Linear {
@@ -43,15 +45,16 @@ impl Linear {
         (terms, parameters): (&[Term], &[f64]),
         driven: &Driven,
     ) -> Self {
-        let span = problem.t[problem.t.len() - 1] - problem.t[0];
+        let span = problem.whole_span();
         let law = law(span, parameters);
         let (mut a, mut b, mut p) = (law.a, law.b, law.p);
         let changes = friction_changes(problem, (terms, parameters), span);
         let count = problem.nodes.len();
         let (mut wear, mut healing, mut growth) = (Vec::new(), Vec::new(), Vec::new());
+        let mut each_a = Vec::with_capacity(count);
         for k in 0..count {
             for (_, by) in changes.iter().filter(|(node, _)| *node == k) {
-                (b, a) = (b + by[0], (a + by[1]).max(0.0));
+                (b, a) = (b + by[0], a * by[1].exp());
                 p = (p + by[2]).min(0.99);
             }
             let rest = ((p - 1.0) * driven.ln_y[k]).exp();
@@ -59,6 +62,7 @@ impl Linear {
             growth.push((p - 1.0) * a * rest + gone);
             wear.push(gone);
             healing.push(rest);
+            each_a.push(a);
         }
         let (mut left, mut added) = (vec![1.0], vec![0.0]);
         for k in 1..count {
@@ -73,7 +77,7 @@ impl Linear {
             added.push(mean * dt);
         }
         Self {
-            a: law.a,
+            a: each_a,
             ln_y: driven.ln_y.clone(),
             relative: driven.velocity.iter().map(|v| v / law.v_i).collect(),
             velocity: driven.velocity.clone(),
@@ -83,20 +87,21 @@ impl Linear {
             wear,
             healing,
             span,
+            averaging: Feedback::of(problem, terms, parameters).averaging,
         }
     }
 
     /// The change of every reading for one unit of each of the law's own parameters.
     pub(super) fn of_law(&self, problem: &Problem) -> Vec<Vec<f64>> {
-        let a = self.a;
+        let a = self.a[0];
         let mut columns = vec![
             self.run(problem, (0, 1.0, 0.0), &|_| 0.0),
             self.run(problem, (0, 0.0, 0.0), &|k| -self.relative[k] / self.span),
             self.run(problem, (0, 0.0, 0.0), &|k| {
-                a * (self.healing[k] - self.relative[k])
+                self.a[k] * self.healing[k] - a * self.relative[k]
             }),
             self.run(problem, (0, 0.0, 0.0), &|k| {
-                a * self.ln_y[k] * self.healing[k]
+                self.a[k] * self.ln_y[k] * self.healing[k]
             }),
         ];
         if problem.quantity == Quantity::Displacement {
@@ -129,7 +134,7 @@ impl Linear {
         match &term.act {
             Act::Reading(columns) => columns.clone(),
             Act::Load(columns) => columns.iter().map(|f| self.of_load(problem, f)).collect(),
-            Act::Step | Act::Reset | Act::Friction => self.of_event(problem, term),
+            Act::Step | Act::Reset | Act::Friction(_) => self.of_event(problem, term),
             Act::PerVelocity => {
                 let typical = problem.typical_velocity();
                 let f: Vec<f64> = self.velocity.iter().map(|v| -v / typical).collect();
@@ -168,11 +173,13 @@ impl Linear {
         if matches!(term.act, Act::Reset) {
             return vec![run(0.0, 1.0, &|_| 0.0)];
         }
-        vec![
-            run(0.0, 0.0, &|k| -self.relative[k] / self.span),
-            run(0.0, 0.0, &|k| self.healing[k] / self.span),
-            run(0.0, 0.0, &|k| self.a * self.ln_y[k] * self.healing[k]),
-        ]
+        let forcings: [&dyn Fn(usize) -> f64; 3] = [
+            &|k| -self.relative[k] / self.span,
+            &|k| self.a[k] * self.healing[k],
+            &|k| self.a[k] * self.ln_y[k] * self.healing[k],
+        ];
+        let changing = forcings.iter().take(term.coefficients());
+        changing.map(|forcing| run(0.0, 0.0, forcing)).collect()
     }
 
     /// A mean over one median spacing more: half a spacing's delay.
@@ -198,7 +205,7 @@ impl Linear {
     /// From changes of ln v at the nodes, none before node `from`, to changes of readings.
     fn read_from(&self, problem: &Problem, ln_v: &[f64], from: usize) -> Vec<f64> {
         let velocity = |k: usize| self.velocity[k] * ln_v[k];
-        if problem.quantity == Quantity::Velocity && problem.averaging_days <= 0.0 {
+        if problem.quantity == Quantity::Velocity && self.averaging <= 0.0 {
             return problem.node_of.iter().map(|&node| velocity(node)).collect();
         }
         let mut slip = vec![0.0; ln_v.len()];
@@ -216,24 +223,24 @@ impl Linear {
         let value = |&node: &usize| match problem.quantity {
             Quantity::Displacement => slip[node],
             Quantity::Velocity => {
-                let t = problem.nodes[node] - problem.averaging_days;
+                let t = problem.nodes[node] - self.averaging;
                 let k = problem.nodes.partition_point(|n| *n <= t);
                 let early = match k.checked_sub(1) {
-                    None => 0.0,
+                    None => velocity(0) * (t - problem.nodes[0]),
                     Some(j) if k < slip.len() => {
                         let share = (t - problem.nodes[j]) / (problem.nodes[k] - problem.nodes[j]);
                         slip[j] + share * (slip[k] - slip[j])
                     }
                     Some(j) => slip[j],
                 };
-                (slip[node] - early) / problem.averaging_days
+                (slip[node] - early) / self.averaging
             }
         };
         problem.node_of.iter().map(value).collect()
     }
 }
 
-/// (node, changes of b, a and p) of the changes of friction already in the law.
+/// (node, changes of b, ln a and p) of the changes of friction already in the law.
 fn friction_changes(
     problem: &Problem,
     (terms, parameters): (&[Term], &[f64]),
@@ -242,9 +249,10 @@ fn friction_changes(
     let mut at = law_parameters(problem);
     let mut changes = Vec::new();
     for term in terms {
-        if let (Act::Friction, Some(reading)) = (&term.act, term.at) {
-            let own = &parameters[at..at + 3];
-            let by = [own[0] / span, own[1] / span, own[2]];
+        if let (Act::Friction(_), Some(reading)) = (&term.act, term.at) {
+            let own = &parameters[at..at + term.coefficients()];
+            let change = |index: usize| own.get(index).copied().unwrap_or(0.0);
+            let by = [change(0) / span, change(1), change(2)];
             changes.push((event_node(problem, reading), by));
         }
         at += term.coefficients();

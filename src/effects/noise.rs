@@ -15,6 +15,9 @@ const LONGEST_LOAD: f64 = 24.0;
 /// share. Without it a noise that sums up would take the motion over, and leave the law none.
 const WHOLE_MOTION: f64 = 0.1;
 
+/// Columns that go through the filter abreast.
+const SIDE_BY_SIDE: usize = 4;
+
 /// What remembers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Memory {
@@ -183,13 +186,42 @@ impl Whitener {
     /// The innovations of `column`, and last the change of the whole motion.
     pub(super) fn whiten(&self, column: &[f64]) -> Vec<f64> {
         let mut white = self.innovations(column);
+        white.push(self.whole_motion(column));
+        white
+    }
+
+    /// The same of several columns.
+    pub(super) fn whiten_all(&self, columns: &[&[f64]]) -> Vec<Vec<f64>> {
+        let mut all = Vec::with_capacity(columns.len());
+        for some in columns.chunks(SIDE_BY_SIDE) {
+            let lanes = std::array::from_fn(|lane| some[lane.min(some.len() - 1)]);
+            let innovations = self.innovations_side_by_side(lanes);
+            for (mut white, column) in innovations.into_iter().zip(some) {
+                white.push(self.whole_motion(column));
+                all.push(white);
+            }
+        }
+        all
+    }
+
+    fn whole_motion(&self, column: &[f64]) -> f64 {
         let used = &column[..self.gates.len()];
         let motion = match self.quantity {
             Quantity::Displacement => used[used.len() - 1] - used[0],
             Quantity::Velocity => used.iter().sum::<f64>() / used.len() as f64,
         };
-        white.push(motion * self.whole);
-        white
+        motion * self.whole
+    }
+
+    /// -2 ln likelihood of innovations whose squares sum up to `misfit`, the size of the noise profiled out.
+    pub(super) fn surprise(&self, misfit: f64) -> f64 {
+        let n = self.gates.len() as f64;
+        n * (misfit.max(1e-300) / n).ln() + self.log_determinant
+    }
+
+    /// What the noise's own parameters cost in the BIC.
+    pub(super) fn cost(&self) -> f64 {
+        self.noise.parameters() * (self.gates.len() as f64).ln()
     }
 
     /// The same without the whole motion.
@@ -212,6 +244,34 @@ impl Whitener {
             innovation * gate.scale
         });
         each.collect()
+    }
+
+    /// Columns abreast in one pass: in each every value waits for the one before it, but not for those of the others.
+    fn innovations_side_by_side(
+        &self,
+        columns: [&[f64]; SIDE_BY_SIDE],
+    ) -> [Vec<f64>; SIDE_BY_SIDE] {
+        if self.noise.memory == Memory::None {
+            return columns.map(|column| self.innovations(column));
+        }
+        let used = self.gates.len();
+        let columns = columns.map(|column| &column[..used]);
+        // Room for the whole motion, which comes last.
+        let mut white = columns.map(|_| Vec::with_capacity(used + 1));
+        let (mut gathered, mut state) = ([0.0; SIDE_BY_SIDE], [0.0; SIDE_BY_SIDE]);
+        for (i, gate) in self.gates.iter().enumerate() {
+            for lane in 0..SIDE_BY_SIDE {
+                gathered[lane] += gate.gather * state[lane];
+                state[lane] *= gate.decay;
+                let innovation = columns[lane][i] * gate.weight
+                    - gate.reads[0] * gathered[lane]
+                    - gate.reads[1] * state[lane];
+                gathered[lane] += gate.gain[0] * innovation;
+                state[lane] += gate.gain[1] * innovation;
+                white[lane].push(innovation * gate.scale);
+            }
+        }
+        white
     }
 
     /// -2 ln likelihood of the readings from `from` on, given those before, with white noise of `sigma`.

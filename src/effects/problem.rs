@@ -107,6 +107,11 @@ impl Problem {
         self.t[self.used - 1] - self.t[0]
     }
 
+    /// Days from the first reading to the last, also where that is held out.
+    pub(super) fn whole_span(&self) -> f64 {
+        self.t[self.t.len() - 1] - self.t[0]
+    }
+
     /// Mean velocity over the fitted readings, mm/day, positive.
     pub(super) fn typical_velocity(&self) -> f64 {
         let used = &self.y[..self.used];

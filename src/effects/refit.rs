@@ -1,10 +1,11 @@
 //! The joint fit of the law and its effects under one noise model, and under the best of several.
 
-use super::frame::{Frame, Frames};
+use super::frame::{dot, likeliest as likeliest_noise};
 use super::linear::Linear;
 use super::noise::{Memory, Noise, Whitener};
 use super::problem::Problem;
-use super::term::{Act, Scratch, Term, law_parameters};
+use super::term::{Act, Scratch, Term, law_parameters, read};
+use crate::model::Driven;
 use crate::reading::Quantity;
 use nalgebra::{DMatrix, DVector};
 
@@ -198,8 +199,7 @@ pub(super) fn refit(
             break;
         }
         let jacobian = point.jacobian(problem, &start.terms, scratch);
-        let frames = Frames::new(bank, &point.residual(problem), &jacobian);
-        let likeliest = frames.best();
+        let likeliest = likeliest_noise(bank, &point.residual(problem), &jacobian);
         if bank[likeliest].noise == whitener.noise {
             break;
         }
@@ -216,21 +216,21 @@ pub(super) fn under_likeliest(
     scratch: &mut Scratch,
 ) -> Start {
     let columns = jacobian(problem, fitted, scratch);
-    let frames = Frames::new(bank, &fitted.residual(problem), &columns);
+    let likeliest = likeliest_noise(bank, &fitted.residual(problem), &columns);
     Start {
-        noise: bank[frames.best()].noise,
+        noise: bank[likeliest].noise,
         ..Start::at(fitted)
     }
 }
 
 /// Columns of the prediction by each parameter, at the fitted readings.
 pub(super) fn jacobian(problem: &Problem, fitted: &Fitted, scratch: &mut Scratch) -> Vec<Vec<f64>> {
-    let point = Point {
-        parameters: fitted.parameters.clone(),
-        prediction: fitted.prediction.clone(),
-        velocity: fitted.velocity.clone(),
-    };
-    point.jacobian(problem, &fitted.terms, scratch)
+    let parameters = fitted.parameters.clone();
+    let point = Point::at(problem, &fitted.terms, parameters, scratch);
+    // A fit has a motion.
+    point.map_or_else(Vec::new, |point| {
+        point.jacobian(problem, &fitted.terms, scratch)
+    })
 }
 
 /// Parameters and what they predict.
@@ -238,7 +238,7 @@ pub(super) fn jacobian(problem: &Problem, fitted: &Fitted, scratch: &mut Scratch
 struct Point {
     parameters: Vec<f64>,
     prediction: Vec<f64>,
-    velocity: Vec<f64>,
+    driven: Driven,
 }
 
 impl Point {
@@ -253,11 +253,7 @@ impl Point {
         sound.then(|| Self {
             parameters,
             prediction: scratch.prediction.clone(),
-            velocity: problem
-                .node_of
-                .iter()
-                .map(|&node| scratch.driven.velocity[node])
-                .collect(),
+            driven: scratch.driven.clone(),
         })
     }
 
@@ -267,36 +263,37 @@ impl Point {
     }
 
     fn fitted(&self, problem: &Problem, terms: &[Term], whitener: &Whitener) -> Fitted {
-        let frame = Frame::new(whitener.clone(), &self.residual(problem), &[]);
+        let innovations = whitener.whiten(&self.residual(problem));
+        let misfit = dot(&innovations, &innovations);
+        let velocity = |&node: &usize| self.driven.velocity[node];
         Fitted {
             terms: terms.to_vec(),
-            surprise: frame.surprise(frame.misfit),
-            sigma: (frame.misfit / problem.used as f64).sqrt(),
+            surprise: whitener.surprise(misfit),
+            sigma: (misfit / problem.used as f64).sqrt(),
             noise: whitener.noise,
             parameters: self.parameters.clone(),
             prediction: self.prediction.clone(),
-            velocity: self.velocity.clone(),
+            velocity: problem.node_of.iter().map(velocity).collect(),
         }
     }
 
-    /// Columns of the prediction by each parameter: by the law linearised, and where the load answers to the motion, or
-    /// the parameter is no coefficient, by differences.
+    /// Columns of the prediction by each parameter: the law linearised, and for a mean's length reading the same motion
+    /// again. Where the load answers to the motion by differences: there the law linearised from node to node is too
+    /// rough to find the way.
     fn jacobian(&self, problem: &Problem, terms: &[Term], scratch: &mut Scratch) -> Vec<Vec<f64>> {
         let feeds_back = |term: &Term| matches!(term.act, Act::PerVelocity | Act::PerSlip);
-        let motion = scratch.predict(problem, terms, &self.parameters);
-        let linear = (motion && !terms.iter().any(feeds_back))
-            .then(|| Linear::of(problem, (terms, &self.parameters), &scratch.driven));
-        let mut columns = Vec::with_capacity(self.parameters.len());
-        let Some(linear) = linear else {
+        if terms.iter().any(feeds_back) {
             let each = 0..self.parameters.len();
             return each
                 .map(|k| self.difference(problem, terms, k, scratch))
                 .collect();
-        };
-        columns.extend(linear.of_law(problem));
+        }
+        let linear = Linear::of(problem, (terms, &self.parameters), &self.driven);
+        let mut columns = linear.of_law(problem);
         for term in terms {
             if matches!(term.act, Act::Averaging) {
-                columns.push(self.difference(problem, terms, columns.len(), scratch));
+                let own = self.parameters[columns.len()];
+                columns.push(self.by_averaging(problem, own));
             } else {
                 columns.extend(linear.columns(problem, term));
             }
@@ -332,6 +329,22 @@ impl Point {
         column
     }
 
+    /// The change of the readings by a mean longer than `own` spacings, per spacing.
+    fn by_averaging(&self, problem: &Problem, own: f64) -> Vec<f64> {
+        let by = 1e-4 * own.max(1.0);
+        if own + by <= 0.0 {
+            // Below nothing it stays nothing.
+            return vec![0.0; problem.used];
+        }
+        let [mut here, mut there] = [Vec::new(), Vec::new()];
+        let mean = own.max(0.0) * problem.spacing;
+        read(problem, &self.driven, mean, &mut here);
+        let longer = (own + by) * problem.spacing;
+        read(problem, &self.driven, longer, &mut there);
+        let both = there.iter().zip(&here);
+        both.map(|(there, here)| (there - here) / by).collect()
+    }
+
     /// Damped steps of Gauss and Newton under `noise`, its shape held at the start's velocity.
     fn descend(
         mut self,
@@ -346,11 +359,12 @@ impl Point {
         let mut damping = 1e-3;
         for _ in 0..MOST_STEPS {
             let columns = self.jacobian(problem, terms, scratch);
-            let mut white: Vec<Vec<f64>> = columns.iter().map(|c| whitener.whiten(c)).collect();
+            let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+            let mut white = whitener.whiten_all(&columns);
             for column in white.iter_mut().rev().take(start.frozen) {
                 column.fill(0.0);
             }
-            let misfit: f64 = innovations.iter().map(|u| u * u).sum();
+            let misfit = dot(&innovations, &innovations);
             let variance = (misfit / problem.used as f64).max(1e-300);
             let objective = misfit / variance + prior.misfit(&self.parameters);
             let (normal, mut slope) =
@@ -368,7 +382,7 @@ impl Point {
                 let there = parameters.collect();
                 if let Some(point) = Self::at(problem, terms, there, scratch) {
                     let trial = whitener.whiten(&point.residual(problem));
-                    let sum: f64 = trial.iter().map(|u| u * u).sum();
+                    let sum = dot(&trial, &trial);
                     let value = sum / variance + prior.misfit(&point.parameters);
                     if value < objective {
                         moved = Some((point, trial, objective - value));
@@ -444,11 +458,11 @@ fn normal_equations(
     let mut slope = DVector::zeros(k);
     for i in 0..k {
         for j in 0..=i {
-            let value = super::frame::dot(&columns[i], &columns[j]) / variance;
+            let value = dot(&columns[i], &columns[j]) / variance;
             normal[(i, j)] = value;
             normal[(j, i)] = value;
         }
-        slope[i] = super::frame::dot(&columns[i], innovations) / variance;
+        slope[i] = dot(&columns[i], innovations) / variance;
         let weight = prior.deviation[i].powi(-2);
         normal[(i, i)] += weight;
         slope[i] -= weight * (parameters[i] - prior.centre[i]);

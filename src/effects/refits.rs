@@ -15,17 +15,22 @@ use super::trials::{Ground, Trial, shortlist};
 /// Most candidates refitted for one place: the best of each covariate, and of the kinds that need none.
 const MOST_COVARIATES: usize = 8;
 const MOST_OTHERS: usize = 6;
+/// Parameters of the friction: b, a and p.
+const MOST_FRICTION: usize = 3;
 /// A covariate that follows the year may fit as well shifted by whole years, but no better than this at any shift.
 const AT_RANDOM: f64 = 0.3;
 
-impl Search<'_> {
-    /// The most promising trials refitted, each with the p-value of the search that found it.
-    pub(super) fn refits(&mut self, base: &Fitted, round: usize) -> Option<Vec<Refitted>> {
+impl<'a> Search<'a> {
+    /// What stands before a search for one more effect than `base` has.
+    pub(super) fn ground<'b>(&mut self, base: &'b Fitted) -> Option<Ground<'b>>
+    where
+        'a: 'b,
+    {
         let linear = Linear::about(self.problem, base, &mut self.scratch)?;
         let columns = jacobian(self.problem, base, &mut self.scratch);
         let residual = base.residual(self.problem);
         let bank = shortlist(&Frames::new(self.bank, &residual, &columns));
-        let ground = Ground {
+        Some(Ground {
             problem: self.problem,
             drivers: self.drivers,
             temperatures: self.temperatures,
@@ -33,7 +38,12 @@ impl Search<'_> {
             linear,
             residual,
             present: &base.terms,
-        };
+        })
+    }
+
+    /// The most promising trials refitted, each with the p-value of the search that found it.
+    pub(super) fn refits(&mut self, base: &Fitted, round: usize) -> Option<Vec<Refitted>> {
+        let ground = self.ground(base)?;
         let (count, seed) = (
             self.options.surrogates,
             self.options.seed + 2 * round as u64,
@@ -106,7 +116,7 @@ impl Search<'_> {
     }
 
     /// The joint fit with one more term; its shape is refined where it promises something.
-    fn refitted(&mut self, base: &Fitted, term: &Term) -> Option<Refitted> {
+    pub(super) fn refitted(&mut self, base: &Fitted, term: &Term) -> Option<Refitted> {
         let white = [Whitener::new(self.problem, Noise::WHITE)];
         let (problem, bank) = (self.problem, self.bank);
         let mut rms = f64::INFINITY;
@@ -133,13 +143,10 @@ impl Search<'_> {
         }
         let mut fitted = best?;
         if base.bic(problem) - fitted.bic(problem) > 0.0 {
-            for neighbours in [[1.6, 1.0 / 1.6], [1.25, 0.8]] {
-                self.refine(&mut fitted, neighbours);
-            }
-            let last = refit(problem, &Start::at(&fitted), bank, &mut self.scratch);
-            if let Some(last) = last.filter(|last| last.bic(problem) < fitted.bic(problem)) {
-                fitted = last;
-            }
+            self.sharpen(&mut fitted);
+        }
+        if matches!(term.act, Act::Friction(_)) {
+            fitted = self.fewer_or_more(base, fitted);
         }
         Some(Refitted {
             gain: base.bic(problem) - fitted.bic(problem),
@@ -149,6 +156,59 @@ impl Search<'_> {
             fitted,
             p_value: 1.0,
         })
+    }
+
+    /// Refines the newest term's shape, and fits once more under every noise model.
+    fn sharpen(&mut self, fitted: &mut Fitted) {
+        for neighbours in [[1.6, 1.0 / 1.6], [1.25, 0.8]] {
+            self.refine(fitted, neighbours);
+        }
+        let last = refit(
+            self.problem,
+            &Start::at(fitted),
+            self.bank,
+            &mut self.scratch,
+        );
+        if let Some(last) = last.filter(|last| last.bic(self.problem) < fitted.bic(self.problem)) {
+            *fitted = last;
+        }
+    }
+
+    /// A change of the friction with as many changing parameters as pay for themselves: from the pace alone, each
+    /// fit starts where the one with fewer ended, for all three at once seldom find their way from nothing.
+    fn fewer_or_more(&mut self, base: &Fitted, found: Fitted) -> Fitted {
+        let (problem, bank) = (self.problem, self.bank);
+        let Some(term) = found.terms.last().cloned() else {
+            return found;
+        };
+        let mut best = found;
+        let mut known: Vec<f64> = Vec::new();
+        let mut at = term.at;
+        for count in 1..=MOST_FRICTION {
+            let act = Act::Friction(count);
+            let mut start = Start::at(base).with_size(
+                &Term {
+                    at,
+                    act,
+                    ..term.clone()
+                },
+                1e-3,
+            );
+            let first = start.parameters.len() - count;
+            start.parameters[first..first + known.len()].copy_from_slice(&known);
+            let Some(mut fitted) = refit(problem, &start, bank, &mut self.scratch) else {
+                continue;
+            };
+            if base.bic(problem) - fitted.bic(problem) > 0.0 {
+                self.sharpen(&mut fitted);
+            }
+            known = fitted.parameters[first..].to_vec();
+            at = fitted.terms.last().and_then(|term| term.at);
+            if fitted.bic(problem) < best.bic(problem) {
+                best = fitted;
+            }
+        }
+        best
     }
 
     /// Moves the newest term's delay, or its time, while that helps.

@@ -10,7 +10,7 @@ use super::problem::Problem;
 use super::refit::{Fitted, Start, plain_starts, refit_every_memory, refit_from};
 use super::response::Driver;
 use super::surrogate::Vain;
-use super::term::{Scratch, Term, event_node};
+use super::term::{Act, Scratch, Term, event_node};
 use crate::reading::{Timestamp, after_days};
 
 /// Most effects in one law.
@@ -20,6 +20,9 @@ pub(super) const SIGNIFICANT: f64 = 0.01;
 /// The held-out error, which carries the law's own extrapolation, may grow if reading after reading the later
 /// block is foretold no worse than by this, in -2 ln likelihood.
 const WORSE: f64 = 2.0;
+
+/// The load steps by less than this where the velocity's own jump goes unseen, e-folds.
+const LEAST_JUMP: f64 = 0.1;
 
 /// One effect that was believed.
 #[derive(Debug, Clone)]
@@ -74,6 +77,13 @@ impl Refitted {
             how.ties.push(season);
         }
         how
+    }
+
+    /// Whether it is a step of the load by which the velocity itself hardly jumps: all that it does is to change the pace
+    /// at which the slope ages, which is a change of its friction.
+    fn hardly_jumps(&self) -> bool {
+        let size = self.fitted.parameters.last();
+        matches!(self.term.act, Act::Step) && size.is_some_and(|size| size.abs() < LEAST_JUMP)
     }
 
     /// Two searches were made, and either could have spoken.
@@ -257,7 +267,7 @@ pub(super) fn time_of(problem: &Problem, at: usize) -> Option<Timestamp> {
 }
 
 /// Among what the BIC cannot separate from the best, an effect that a covariate bears witness to goes first, and then
-/// the simplest. A covariate that follows the year goes before the bare season if it leaves the smaller error.
+/// the simplest; a change of friction goes before a step of the load that hardly jumps. A covariate that follows the year goes before the bare season if it leaves the smaller error.
 fn prefer_witnesses(refitted: &mut [Refitted], margin: f64) {
     let Some(best) = refitted.first().map(|one| one.gain) else {
         return;
@@ -271,6 +281,14 @@ fn prefer_witnesses(refitted: &mut [Refitted], margin: f64) {
             .then(simpler)
             .then(b.gain.total_cmp(&a.gain))
     });
+    let place = |kind: Kind| refitted.iter().position(|one| one.term.kind == kind);
+    if let (Some(step), Some(friction)) = (place(Kind::LoadStep), place(Kind::FrictionChange))
+        && step < friction
+        && friction < near
+        && refitted[step].hardly_jumps()
+    {
+        refitted[step..=friction].rotate_right(1);
+    }
     let season = refitted
         .iter()
         .position(|one| one.term.kind == Kind::Seasonal);

@@ -13,11 +13,9 @@ use super::refit::{Fitted, Start, plain_starts, refit_from};
 use super::response::Driver;
 use super::search::Found;
 use super::term::{Act, Scratch, Term};
-use super::verdict::{Verdict, contribution};
+use super::verdict::{LARGEST_REST, Verdict, contribution};
 use crate::reading::after_days;
 
-/// Explained in full, the residual is at most this many times the white noise.
-const LARGEST_REST: f64 = 2.0;
 /// Most stretches of structure that are told.
 const MOST_STRETCHES: usize = 8;
 
@@ -96,7 +94,11 @@ pub(super) fn tell(
 }
 
 /// The law with the effects of `full`, by least squares over all readings.
-fn least_squares(problem: &Problem, full: &Fitted, scratch: &mut Scratch) -> Option<Fitted> {
+pub(super) fn least_squares(
+    problem: &Problem,
+    full: &Fitted,
+    scratch: &mut Scratch,
+) -> Option<Fitted> {
     let white = [Whitener::new(problem, Noise::WHITE)];
     let starts = plain_starts(problem).into_iter();
     let mut starts: Vec<Start> = starts.map(|start| start.joined(&full.terms)).collect();
@@ -131,7 +133,7 @@ fn log_load(problem: &Problem, full: &Fitted, index: usize) -> Option<Vec<f64>> 
             Some(if node >= from { own[0] } else { 0.0 })
         }
         Act::Reset
-        | Act::Friction
+        | Act::Friction(_)
         | Act::PerVelocity
         | Act::PerSlip
         | Act::Reading(_)

@@ -27,8 +27,8 @@ pub(super) enum Act {
     Step,
     /// ln y jumps.
     Reset,
-    /// b, a and p change.
-    Friction,
+    /// So many of b, ln a and p change, 1 to 3: b alone is the pace.
+    Friction(usize),
     /// The load falls with the velocity.
     PerVelocity,
     /// The load falls with the slip.
@@ -44,7 +44,7 @@ impl Term {
     pub(super) fn coefficients(&self) -> usize {
         match &self.act {
             Act::Load(columns) | Act::Reading(columns) => columns.len(),
-            Act::Friction => 3,
+            Act::Friction(count) => *count,
             Act::Step | Act::Reset | Act::PerVelocity | Act::PerSlip | Act::Averaging => 1,
         }
     }
@@ -56,7 +56,7 @@ impl Term {
             Act::PerVelocity => &[0.1, 1.0, 5.0],
             Act::PerSlip => &[0.3, 2.0],
             Act::Averaging => &[2.0, 8.0],
-            Act::Load(_) | Act::Step | Act::Reset | Act::Friction | Act::Reading(_) => &[1e-3],
+            Act::Load(_) | Act::Step | Act::Reset | Act::Friction(_) | Act::Reading(_) => &[1e-3],
         }
     }
 
@@ -71,8 +71,9 @@ impl Term {
     pub(super) fn prior(&self, index: usize) -> f64 {
         match &self.act {
             Act::Load(_) | Act::Step | Act::Reset => 1.5,
-            Act::Friction if index == 2 => 0.6,
-            Act::Friction => 10.0,
+            Act::Friction(_) if index == 2 => 0.6,
+            Act::Friction(_) if index == 1 => 2.0,
+            Act::Friction(_) => 10.0,
             Act::PerVelocity | Act::PerSlip => 5.0,
             Act::Reading(_) => f64::INFINITY,
             Act::Averaging => 30.0,
@@ -86,6 +87,39 @@ pub(super) fn law_parameters(problem: &Problem) -> usize {
     match problem.quantity {
         Quantity::Displacement => 5,
         Quantity::Velocity => 4,
+    }
+}
+
+/// How the load answers to the motion, and over how long the motion is read.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Feedback {
+    /// eta: the log-load lost per mm/day of velocity.
+    pub(super) per_velocity: f64,
+    /// k: the log-load lost per mm of slip.
+    pub(super) per_slip: f64,
+    /// Days over which velocities are means; 0: of the moment.
+    pub(super) averaging: f64,
+}
+
+impl Feedback {
+    pub(super) fn of(problem: &Problem, terms: &[Term], parameters: &[f64]) -> Self {
+        let (typical, span) = (problem.typical_velocity(), problem.whole_span());
+        let mut feedback = Self {
+            per_velocity: 0.0,
+            per_slip: 0.0,
+            averaging: problem.averaging_days,
+        };
+        let mut at = law_parameters(problem);
+        for term in terms {
+            match term.act {
+                Act::PerVelocity => feedback.per_velocity = parameters[at].max(0.0) / typical,
+                Act::PerSlip => feedback.per_slip = parameters[at] / (typical * span),
+                Act::Averaging => feedback.averaging += parameters[at].max(0.0) * problem.spacing,
+                Act::Load(_) | Act::Step | Act::Reset | Act::Friction(_) | Act::Reading(_) => {}
+            }
+            at += term.coefficients();
+        }
+        feedback
     }
 }
 
@@ -126,33 +160,27 @@ impl Scratch {
         parameters: &[f64],
     ) -> bool {
         // The scales are those of the whole record, so that parameters mean the same on a part of it.
-        let span = problem.t[problem.t.len() - 1] - problem.t[0];
+        let span = problem.whole_span();
         let law = law(span, parameters);
         let first = law_parameters(problem);
         self.load(problem, terms, &parameters[first..], span);
-        let (mut per_velocity, mut per_slip, mut averaging) = (0.0, 0.0, problem.averaging_days);
-        let mut at = first;
-        let typical = problem.typical_velocity();
-        for term in terms {
-            match term.act {
-                Act::PerVelocity => per_velocity = parameters[at].max(0.0) / typical,
-                Act::PerSlip => per_slip = parameters[at] / (typical * span),
-                Act::Averaging => averaging += parameters[at].max(0.0) * problem.spacing,
-                Act::Load(_) | Act::Step | Act::Reset | Act::Friction | Act::Reading(_) => {}
-            }
-            at += term.coefficients();
-        }
+        let feedback = Feedback::of(problem, terms, parameters);
         let drive = Drive {
             nodes: &problem.nodes,
             log_load: &self.log_load,
             events: &self.events,
-            per_velocity,
-            per_slip,
+            per_velocity: feedback.per_velocity,
+            per_slip: feedback.per_slip,
         };
         if !self.driven.solve(&law, &drive) {
             return false;
         }
-        self.read(problem, averaging);
+        read(
+            problem,
+            &self.driven,
+            feedback.averaging,
+            &mut self.prediction,
+        );
         if problem.quantity == Quantity::Displacement {
             for value in &mut self.prediction {
                 *value += parameters[4];
@@ -193,16 +221,17 @@ impl Scratch {
                 node: event_node(problem, reading),
                 log_load: 0.0,
                 ln_y: 0.0,
-                a: 0.0,
+                ln_a: 0.0,
                 b: 0.0,
                 p: 0.0,
             };
             match term.act {
                 Act::Step => event.log_load = own[0],
                 Act::Reset => event.ln_y = own[0],
-                Act::Friction => {
-                    (event.b, event.a) = (own[0] / span, own[1] / span);
-                    event.p = own[2];
+                Act::Friction(_) => {
+                    let change = |index: usize| own.get(index).copied().unwrap_or(0.0);
+                    (event.b, event.ln_a) = (change(0) / span, change(1));
+                    event.p = change(2);
                 }
                 Act::Load(_)
                 | Act::PerVelocity
@@ -214,21 +243,20 @@ impl Scratch {
         }
         self.events.sort_by_key(|event| event.node);
     }
+}
 
-    /// From the motion to what would be read of it.
-    fn read(&mut self, problem: &Problem, averaging: f64) {
-        self.prediction.clear();
-        let driven = &self.driven;
-        let value = |&node: &usize| match problem.quantity {
-            Quantity::Displacement => driven.slip[node],
-            Quantity::Velocity if averaging <= 0.0 => driven.velocity[node],
-            Quantity::Velocity => {
-                let from = problem.nodes[node] - averaging;
-                (driven.slip[node] - slip_at(problem, driven, from)) / averaging
-            }
-        };
-        self.prediction.extend(problem.node_of.iter().map(value));
-    }
+/// From the motion to what would be read of it, velocities as means over `averaging` days.
+pub(super) fn read(problem: &Problem, driven: &Driven, averaging: f64, readings: &mut Vec<f64>) {
+    readings.clear();
+    let value = |&node: &usize| match problem.quantity {
+        Quantity::Displacement => driven.slip[node],
+        Quantity::Velocity if averaging <= 0.0 => driven.velocity[node],
+        Quantity::Velocity => {
+            let from = problem.nodes[node] - averaging;
+            (driven.slip[node] - slip_at(problem, driven, from)) / averaging
+        }
+    };
+    readings.extend(problem.node_of.iter().map(value));
 }
 
 /// The node in the middle between a reading and the one before it.

@@ -66,7 +66,7 @@ impl Ground<'_> {
         term.parameters() * (self.problem.used as f64).ln()
     }
 
-    fn trial(&self, term: Term) -> Trial {
+    pub(super) fn trial(&self, term: Term) -> Trial {
         let columns = self.linear.columns(self.problem, &term);
         let gain = self.frames.surprise() - self.frames.surprise_with(&columns) - self.cost(&term);
         Trial { term, gain }

@@ -10,7 +10,7 @@ use super::refit::{Fitted, jacobian};
 use super::response::Driver;
 use super::search::{Accepted, Found, time_of};
 use super::term::{Act, Scratch, Term};
-use crate::reading::Unit;
+use crate::reading::{Quantity, Unit};
 
 /// What the search is concluded to mean.
 pub(super) struct Verdict {
@@ -21,6 +21,10 @@ pub(super) struct Verdict {
     pub(super) full: Fitted,
 }
 
+/// Explained in full, the residual is at most this many times the white noise.
+pub(super) const LARGEST_REST: f64 = 2.0;
+/// Most kinds without a witness that are believed together.
+const MOST_LABELS: usize = 2;
 /// 5 and 95 % of a normal distribution, in standard deviations.
 const NINETY: f64 = 1.645;
 
@@ -34,10 +38,11 @@ pub(super) fn conclude(
     let mut full = found.full.clone();
     let mut accepted = found.accepted.clone();
     let mut judged = Judged::of((problem, &full), bank, scratch);
-    let left = judged.as_ref().map_or(0.0, Judged::load_gain) > margin;
+    let mut left = judged.as_ref().map_or(0.0, Judged::load_gain) > margin;
     let only_labels = !accepted.is_empty() && full.terms.iter().all(|term| is_label(term.kind));
     let mut cannot_separate_from = Vec::new();
-    if left && only_labels {
+    if only_labels && (left || !accounts_for_all(problem, &full)) {
+        left = true;
         for term in &full.terms {
             cannot_separate_from.push(title(term, drivers));
             refuse(&mut found.candidates, term.kind);
@@ -55,6 +60,15 @@ pub(super) fn conclude(
         .collect();
     // What bears a witness speaks first.
     effects.sort_by_key(|effect| is_label(effect.effect));
+    // A slow load that nothing declares leaves what remembers as well.
+    let as_a_load = judged
+        .as_ref()
+        .is_some_and(|judged| judged.load.is_some() && judged.load_gain() > -margin);
+    let remembers_alone = effects.is_empty() && full.noise.memory == Memory::Reading;
+    if remembers_alone && !left && as_a_load {
+        left = true;
+        cannot_separate_from.push(Kind::CorrelatedNoise.name().to_owned());
+    }
     let memory_gain = judged.as_ref().map_or(0.0, Judged::memory_gain);
     let remembers = full.noise.memory == Memory::Reading && memory_gain > margin;
     let explained = match (effects.is_empty(), left) {
@@ -84,6 +98,23 @@ pub(super) fn conclude(
         cannot_separate_from,
         full,
     }
+}
+
+/// Whether kinds without a witness leave no more than noise, and are few: enough events, one after the other, follow
+/// any load there is.
+fn accounts_for_all(problem: &Problem, full: &Fitted) -> bool {
+    let rest = full.rms(problem, 0..problem.used);
+    let small = match problem.quantity {
+        Quantity::Displacement => rest <= LARGEST_REST * full.sigma,
+        // Velocities have noise of several sizes.
+        Quantity::Velocity => true,
+    };
+    let most = if full.noise.memory == Memory::None {
+        MOST_LABELS
+    } else {
+        1
+    };
+    small && full.terms.len() <= most
 }
 
 fn refuse(candidates: &mut [Candidate], kind: Kind) {

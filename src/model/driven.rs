@@ -15,8 +15,12 @@ const LARGEST_CHANGE: f64 = 0.25;
 const LARGEST_P: f64 = 0.99;
 /// More steps than this between two nodes, and the block runs away there.
 const MOST_STEPS: usize = 400;
-/// Newton steps for v under a load that falls with it; each squares the error.
+/// Most Newton steps for v under a load that falls with it; each squares the error.
 const NEWTON_STEPS: usize = 8;
+/// A Newton step of ln v this small leaves an error of its square.
+const CONVERGED: f64 = 1e-6;
+/// Where the balance moves by no more than this at once, the last velocity is a start for the next.
+const NEAR: f64 = 1.0;
 
 /// What drives the block, on nodes of increasing time.
 #[derive(Debug, Clone, Copy)]
@@ -42,8 +46,8 @@ pub struct Event {
     pub log_load: f64,
     /// Added to ln y here.
     pub ln_y: f64,
-    /// Added to a from here on, 1/day.
-    pub a: f64,
+    /// Added to ln a from here on.
+    pub ln_a: f64,
     /// Added to b from here on, 1/day.
     pub b: f64,
     /// Added to p from here on; it stays under 1.
@@ -65,7 +69,15 @@ pub struct Driven {
 struct State {
     ln_y: f64,
     slip: f64,
-    velocity: f64,
+    speed: Speed,
+    /// a y^(p-1), 1/day.
+    healing: f64,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Speed {
+    ln_v: f64,
+    v: f64,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -95,11 +107,12 @@ impl Driven {
             per_velocity: drive.per_velocity,
             per_slip: drive.per_slip,
         };
-        let mut state = State {
-            ln_y: 0.0,
-            slip: 0.0,
-            velocity: law.v_i,
+        let first = drive.log_load.first().copied().unwrap_or(0.0);
+        let still = Speed {
+            ln_v: friction.ln_v_i,
+            v: law.v_i,
         };
+        let mut state = friction.state((0.0, 0.0), first, still);
         let (mut extra, mut events) = (0.0, drive.events.iter().peekable());
         for (k, (&t, &f)) in drive.nodes.iter().zip(drive.log_load).enumerate() {
             if k > 0 {
@@ -110,16 +123,20 @@ impl Driven {
                 };
                 state = next;
             }
+            let mut changes = false;
             while let Some(event) = events.next_if(|event| event.node <= k) {
                 extra += event.log_load;
                 state.ln_y += event.ln_y;
-                friction.a = (friction.a + event.a).max(0.0);
+                friction.a *= event.ln_a.exp();
                 friction.b += event.b;
                 friction.p = (friction.p + event.p).min(LARGEST_P);
+                changes = true;
             }
-            state.velocity = friction.velocity(state.ln_y, state.slip, f + extra);
+            if changes {
+                state = friction.state((state.ln_y, state.slip), f + extra, state.speed);
+            }
             self.ln_y.push(state.ln_y);
-            self.velocity.push(state.velocity);
+            self.velocity.push(state.speed.v);
             self.slip.push(state.slip);
         }
         true
@@ -127,68 +144,102 @@ impl Driven {
 }
 
 impl Friction {
-    /// v from ln v + eta v = `ln v_i` + f - ln y - k X.
-    fn velocity(&self, ln_y: f64, slip: f64, log_load: f64) -> f64 {
-        let target = self.ln_v_i + log_load - ln_y - self.per_slip * slip;
-        if self.per_velocity <= 0.0 {
-            return target.exp();
+    /// The block under a log-load, its velocity somewhere near `last`.
+    fn state(&self, (ln_y, slip): (f64, f64), log_load: f64, last: Speed) -> State {
+        State {
+            ln_y,
+            slip,
+            speed: self.speed((ln_y, slip), log_load, last),
+            healing: self.healing(ln_y),
         }
-        // From above eta v = target and below ln v = target, whichever is less: Newton's steps stay below.
-        let mut ln_v = target.min((target.max(1.0) / self.per_velocity).ln());
-        for _ in 0..NEWTON_STEPS {
-            let v = ln_v.exp();
-            ln_v -= (ln_v + self.per_velocity * v - target) / (1.0 + self.per_velocity * v);
-        }
-        ln_v.exp()
     }
 
-    /// d ln y / dt at velocity v.
-    fn slope(&self, ln_y: f64, velocity: f64) -> f64 {
-        let healing = if self.a == 0.0 {
+    /// v from ln v + eta v = `ln v_i` + f - ln y - k X; `last` is what it was before.
+    fn speed(&self, (ln_y, slip): (f64, f64), log_load: f64, last: Speed) -> Speed {
+        let target = self.ln_v_i + log_load - ln_y - self.per_slip * slip;
+        if self.per_velocity <= 0.0 {
+            return Speed {
+                ln_v: target,
+                v: target.exp(),
+            };
+        }
+        let moved = target - last.ln_v - self.per_velocity * last.v;
+        let mut ln_v = if moved.abs() < NEAR {
+            last.ln_v + moved / (1.0 + self.per_velocity * last.v)
+        } else {
+            // Below ln v = target and eta v = target, whichever is less.
+            target.min((target.max(1.0) / self.per_velocity).ln())
+        };
+        for _ in 0..NEWTON_STEPS {
+            let v = ln_v.exp();
+            let by = (target - ln_v - self.per_velocity * v) / (1.0 + self.per_velocity * v);
+            ln_v += by;
+            if by.abs() < CONVERGED {
+                let v = v * (1.0 + by * (1.0 + 0.5 * by));
+                return Speed { ln_v, v };
+            }
+        }
+        let v = ln_v.exp();
+        Speed { ln_v, v }
+    }
+
+    /// What the contacts' healing adds to ln y, 1/day.
+    fn healing(&self, ln_y: f64) -> f64 {
+        if self.a == 0.0 {
             0.0
         } else {
             self.a * ((self.p - 1.0) * ln_y).exp()
-        };
-        healing - self.b / self.v_i * velocity
+        }
+    }
+
+    /// What slip takes from ln y at velocity v, 1/day.
+    fn wear(&self, velocity: f64) -> f64 {
+        self.b / self.v_i * velocity
     }
 
     /// From node to node, the load going linearly; `None` where the block runs away.
     fn cross(&self, mut state: State, span: f64, (from, to): (f64, f64)) -> Option<State> {
         let per_day = (to - from) / span;
-        state.velocity = self.velocity(state.ln_y, state.slip, from);
         let (mut t, mut steps) = (0.0, 0);
         while t < span {
-            let slope = self.slope(state.ln_y, state.velocity);
-            let wear = self.b / self.v_i * state.velocity;
+            let velocity = state.speed.v;
+            let wear = self.wear(velocity);
+            let slope = state.healing - wear;
             // The rate at which a small departure grows: beside an unstable steady state it outruns the slope.
             let growth = ((self.p - 1.0) * (slope + wear) + wear).max(0.0);
-            let feedback = self.per_slip.abs() * state.velocity;
+            let feedback = self.per_slip.abs() * velocity;
             let pace = slope.abs() + per_day.abs() + feedback + 0.3 * growth;
             let mut h = (LARGEST_CHANGE / pace).min(span - t);
             // No sliver at the end.
             if span - t < 1.5 * h {
                 h = span - t;
             }
-            state = self.step(state, slope, h, (from + per_day * t, per_day));
+            state = self.step(state, h, (from + per_day * t, per_day));
             t += h;
             steps += 1;
-            let sound = state.ln_y.is_finite() && state.velocity.is_finite();
+            let sound = state.ln_y.is_finite() && state.speed.v.is_finite();
             if steps > MOST_STEPS || !sound || state.slip.abs() > 1e12 {
                 return None;
             }
         }
+        if self.per_slip != 0.0 {
+            // The step's own velocity is that of the slip as foreseen.
+            state.speed = self.speed((state.ln_y, state.slip), to, state.speed);
+        }
         Some(state)
     }
 
-    fn step(&self, state: State, slope: f64, h: f64, (f, per_day): (f64, f64)) -> State {
+    fn step(&self, state: State, h: f64, (f, per_day): (f64, f64)) -> State {
         let State {
             ln_y,
             slip,
-            velocity,
+            speed,
+            healing,
         } = state;
+        let velocity = speed.v;
         let shed = 1.0 / (1.0 + self.per_velocity * velocity);
-        let wear = self.b / self.v_i * velocity;
-        let healing = slope + wear;
+        let wear = self.wear(velocity);
+        let slope = healing - wear;
         let jacobian = (self.p - 1.0) * healing + wear * shed;
         // What the load does to the slope by itself within the step.
         let drift = -wear * shed * (per_day - self.per_slip * velocity);
@@ -202,21 +253,23 @@ impl Friction {
         }
         let k_1 = (slope + GAMMA * h * drift) / denominator;
         let f_end = f + per_day * h;
-        let slip_end = slip + h * velocity;
-        let v_trial = self.velocity(ln_y + h * k_1, slip_end, f_end);
-        let trial = self.slope(ln_y + h * k_1, v_trial);
-        let k_2 = (trial - 2.0 * k_1 - GAMMA * h * drift) / denominator;
+        let ln_y_trial = ln_y + h * k_1;
+        let trial = self.speed((ln_y_trial, slip + h * velocity), f_end, speed);
+        let slope_trial = self.healing(ln_y_trial) - self.wear(trial.v);
+        let k_2 = (slope_trial - 2.0 * k_1 - GAMMA * h * drift) / denominator;
         let next = ln_y + h * (1.5 * k_1 + 0.5 * k_2);
-        let v_next = self.velocity(next, slip + 0.5 * h * (velocity + v_trial), f_end);
+        let slip_next = slip + h * 0.5 * (velocity + trial.v);
+        let last = self.state((next, slip_next), f_end, trial);
+        let v_next = last.speed.v;
         // Hermite's rule with the slopes of v at both ends.
         let growth = |v: f64, slope: f64| {
             v * (per_day - slope - self.per_slip * v) / (1.0 + self.per_velocity * v)
         };
-        let bend = growth(velocity, slope) - growth(v_next, self.slope(next, v_next));
+        let slope_next = last.healing - self.wear(v_next);
+        let bend = growth(velocity, slope) - growth(v_next, slope_next);
         State {
-            ln_y: next,
             slip: slip + h * (0.5 * (velocity + v_next) + h * bend / 12.0),
-            velocity: v_next,
+            ..last
         }
     }
 }

@@ -137,7 +137,7 @@ fn a_small_step_reset_and_change_of_friction_do_what_solving_again_shows() {
         for (kind, act) in [
             (Kind::LoadStep, Act::Step),
             (Kind::StateReset, Act::Reset),
-            (Kind::FrictionChange, Act::Friction),
+            (Kind::FrictionChange, Act::Friction(3)),
         ] {
             let happened = Term {
                 at: Some(COUNT / 3),
@@ -188,5 +188,21 @@ fn a_mean_over_one_more_spacing_does_what_reading_again_shows() {
         let want = difference(&problem, (&joined, &longer), parameters.len(), (0.0, 1.0));
         let off = off(&columns[0][1..], &want[1..]);
         assert!(off < 0.03, "{off}");
+    }
+}
+
+#[test]
+fn where_velocities_are_means_a_change_of_the_law_does_what_reading_again_shows() {
+    let problem = problem(Quantity::Velocity);
+    for law in LAWS {
+        let (mut terms, mut parameters) = base(&problem, &law);
+        terms.push(term(Kind::IntervalMean, Act::Averaging));
+        parameters.push(12.0);
+        let columns = linear(&problem, (&terms, &parameters)).of_law(&problem);
+        for (k, column) in columns.iter().enumerate() {
+            let want = difference(&problem, (&terms, &parameters), k, BOTH);
+            let off = off(column, &want);
+            assert!(off < 0.02, "{k}: {off}");
+        }
     }
 }

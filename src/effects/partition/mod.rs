@@ -142,7 +142,7 @@ fn search(
         .ok_or("the proportions stay constant")?;
     let (pair, is_turned) = Pair::of(&scan, &aligned.days, &aligned.rows, &found, (0, furthest));
     let course = pair.course()?;
-    if apart(course.size) < LEAST_CHANGE {
+    if apart(course.most) < LEAST_CHANGE {
         return Err("the ratio of the velocities hardly changes".to_owned());
     }
     let time = |days| after_days(aligned.epoch, days).ok_or("outside the calendar");

@@ -1,6 +1,6 @@
 //! How the velocity of one group against another's runs in time: constant, a break, or a drift.
 
-use super::scan::{Break, Noise, SHORTEST, Scan};
+use super::scan::{Break, Noise, SHORTEST, Scan, apart};
 use nalgebra::{DMatrix, DVector};
 
 /// Fall of the BIC by which a break must beat a drift without one.
@@ -13,6 +13,11 @@ const WANDERING: f64 = 3.5;
 const LEFT: f64 = 2.0;
 /// A drift before the break of less than this share of the change is none.
 const DRIFT_SHARE: f64 = 0.2;
+/// A relaxing ratio jumps by as much at least, in ln.
+const LEAST_JUMP: f64 = 0.25;
+/// Days of a relaxation, over what is left of the record, and how far from the best plain break it is looked for.
+const RELAXATIONS: [f64; 4] = [0.03, 0.1, 0.3, 1.0];
+const NEAR: usize = 12;
 /// Twice the fall of the log-likelihood that bounds 90 % of a time.
 const NINETY: f64 = 2.71;
 
@@ -32,6 +37,9 @@ enum Shape {
     Step,
     /// It begins to drift.
     Hinge,
+    /// It takes another value and goes on to a third, in so many days: what the law does after a load step, a jump of
+    /// the state or a change of friction in one group.
+    Relaxing(f64),
 }
 
 /// The break as the ratio shows it.
@@ -43,6 +51,8 @@ pub(super) struct Course {
     pub(super) interval: (f64, f64),
     /// Ratio of the velocities at the end over that before.
     pub(super) size: f64,
+    /// Of the same ratio where it has changed most.
+    pub(super) most: f64,
     /// Whether what is left runs on from one innovation to the next.
     pub(super) is_left: bool,
 }
@@ -106,21 +116,19 @@ impl<'a> Pair<'a> {
                 }
             }
         }
-        let best = scores
-            .iter()
-            .copied()
-            .min_by(|a, b| a.0.total_cmp(&b.0))
-            .ok_or("the ratio of the velocities is not determined")?;
+        let least = |scores: &[(f64, Shape, usize)]| {
+            let each = scores.iter().copied();
+            each.min_by(|a, b| a.0.total_cmp(&b.0))
+                .ok_or("the ratio of the velocities is not determined")
+        };
+        let near = least(&scores)?.2;
+        scores.extend(self.relaxing(near));
+        let best = least(&scores)?;
         let fitted = self
             .broken(best.1, best.2, &[])
             .ok_or("the ratio of the velocities is not determined")?;
-        let drifts = [self.drift(1), self.drift(2)];
-        for powers in [&drifts[..1], &drifts[..]] {
-            let price = powers.len() as f64 * count.ln();
-            let drift = self.fit(&powers.iter().collect::<Vec<_>>());
-            if drift.is_some_and(|drift| drift.score + price < best.0 + BREAK_OVER_DRIFT) {
-                return Err("the ratio of the velocities drifts without a break");
-            }
+        if self.drifts(best.0, best.1) {
+            return Err("the ratio of the velocities drifts without a break");
         }
         if self.had_changed(best.1, best.2, fitted.score) {
             return Err("the ratio of the velocities had been changing before");
@@ -138,16 +146,23 @@ impl<'a> Pair<'a> {
             (low.min(one), high.max(one))
         });
         let at = match best.1 {
-            Shape::Step => f64::midpoint(self.days[best.2 - 1], self.days[best.2]),
+            Shape::Step | Shape::Relaxing(_) => {
+                f64::midpoint(self.days[best.2 - 1], self.days[best.2])
+            }
             Shape::Hinge => self.days[best.2],
         };
         let ratio = fitted.coefficients[1];
-        let change = match best.1 {
-            Shape::Step => fitted.coefficients[2],
-            Shape::Hinge => {
-                fitted.coefficients[2] * (self.days[self.days.len() - 1] - self.days[best.2])
-            }
-        };
+        let (first_change, change) = self.changes(best.1, best.2, &fitted.coefficients);
+        // What wanders bends anywhere, but jumps nowhere.
+        if matches!(best.1, Shape::Relaxing(_))
+            && apart((ratio + first_change) / ratio) < LEAST_JUMP
+        {
+            return Err("the ratio of the velocities wanders, break or not");
+        }
+        let most = [first_change, change]
+            .map(|change| (ratio + change) / ratio)
+            .into_iter()
+            .max_by(|a, b| apart(*a).total_cmp(&apart(*b)));
         Ok(Course {
             at,
             interval: (
@@ -155,8 +170,57 @@ impl<'a> Pair<'a> {
                 self.days[(last + 1).min(self.days.len() - 1)],
             ),
             size: (ratio + change) / ratio,
+            most: most.unwrap_or(1.0),
             is_left: memory * count.sqrt() > LEFT,
         })
+    }
+
+    /// Relaxing breaks about the time `near`, each with its score.
+    fn relaxing(&self, near: usize) -> Vec<(f64, Shape, usize)> {
+        let count = (self.days.len() - 1) as f64;
+        let first = near.saturating_sub(NEAR).max(SHORTEST);
+        let end = (near + NEAR + 1).min(self.days.len() - SHORTEST);
+        let mut scores = Vec::new();
+        for index in first..end {
+            let left = self.days[self.days.len() - 1] - self.days[index];
+            for share in RELAXATIONS {
+                let shape = Shape::Relaxing(share * left);
+                if let Some(fitted) = self.broken(shape, index, &[]) {
+                    scores.push((fitted.score + Self::price(shape) * count.ln(), shape, index));
+                }
+            }
+        }
+        scores
+    }
+
+    /// Whether a drift that goes on all along does as well as a break of that score; against one that relaxes, it
+    /// may bend as often as that has parameters.
+    fn drifts(&self, score: f64, shape: Shape) -> bool {
+        let count = (self.days.len() - 1) as f64;
+        let most = match shape {
+            Shape::Step | Shape::Hinge => 2,
+            Shape::Relaxing(_) => 5,
+        };
+        let drifts: Vec<Vec<f64>> = (1..=most).map(|power| self.drift(power)).collect();
+        (1..=drifts.len()).any(|powers| {
+            let price = powers as f64 * count.ln();
+            let drift = self.fit(&drifts[..powers].iter().collect::<Vec<_>>());
+            drift.is_some_and(|drift| drift.score + price < score + BREAK_OVER_DRIFT)
+        })
+    }
+
+    /// What a break adds to the ratio at once, and by the end of the record.
+    fn changes(&self, shape: Shape, index: usize, coefficients: &DVector<f64>) -> (f64, f64) {
+        let left = self.days[self.days.len() - 1] - self.days[index];
+        let step = coefficients[2];
+        match shape {
+            Shape::Step => (step, step),
+            Shape::Hinge => (0.0, step * left),
+            Shape::Relaxing(days) => {
+                let passing = coefficients[4];
+                (step + passing, step + passing * (-left / days).exp())
+            }
+        }
     }
 
     /// Parameters of a break, with its time; that of a step lies anywhere in its interval, which is one more.
@@ -164,6 +228,7 @@ impl<'a> Pair<'a> {
         match shape {
             Shape::Step => 3.0,
             Shape::Hinge => 2.0,
+            Shape::Relaxing(_) => 5.0,
         }
     }
 
@@ -179,9 +244,11 @@ impl<'a> Pair<'a> {
             }
         });
         let mut shapes = vec![&course];
-        if shape == Shape::Step {
+        if shape != Shape::Hinge {
             shapes.push(&within);
         }
+        let passing = self.passing(shape, index);
+        shapes.extend(passing.iter());
         shapes.extend(more);
         self.fit(&shapes)
     }
@@ -190,7 +257,7 @@ impl<'a> Pair<'a> {
     fn course_of(&self, shape: Shape, index: usize) -> Vec<f64> {
         let at = self.days[index];
         match shape {
-            Shape::Step => self.course_of_days(|day| {
+            Shape::Step | Shape::Relaxing(_) => self.course_of_days(|day| {
                 if day > f64::midpoint(self.days[index - 1], at) {
                     1.0
                 } else {
@@ -199,6 +266,21 @@ impl<'a> Pair<'a> {
             }),
             Shape::Hinge => self.course_of_days(|day| (day - at).max(0.0)),
         }
+    }
+
+    /// What passes after a relaxing break; `None` where nothing does.
+    fn passing(&self, shape: Shape, index: usize) -> Option<Vec<f64>> {
+        let Shape::Relaxing(days) = shape else {
+            return None;
+        };
+        let from = f64::midpoint(self.days[index - 1], self.days[index]);
+        Some(self.course_of_days(|day| {
+            if day > from {
+                (-(day - from) / days).exp()
+            } else {
+                0.0
+            }
+        }))
     }
 
     /// Of the days, in the record's length.
@@ -216,12 +298,9 @@ impl<'a> Pair<'a> {
         };
         let count = (self.days.len() - 1) as f64;
         let drift = more.coefficients[more.coefficients.len() - 1] * (at - self.days[0]);
-        let change = more.coefficients[2]
-            * match shape {
-                Shape::Step => 1.0,
-                Shape::Hinge => self.days[self.days.len() - 1] - at,
-            };
-        more.score + count.ln() + CHANGED_BEFORE < score && drift.abs() > DRIFT_SHARE * change.abs()
+        let (at_once, by_the_end) = self.changes(shape, index, &more.coefficients);
+        let change = at_once.abs().max(by_the_end.abs());
+        more.score + count.ln() + CHANGED_BEFORE < score && drift.abs() > DRIFT_SHARE * change
     }
 
     fn course_of_days(&self, shape: impl Fn(f64) -> f64) -> Vec<f64> {

@@ -51,7 +51,7 @@ fn event(node: usize) -> Event {
         node,
         log_load: 0.0,
         ln_y: 0.0,
-        a: 0.0,
+        ln_a: 0.0,
         b: 0.0,
         p: 0.0,
     }
@@ -161,7 +161,7 @@ fn after_a_reset_and_a_change_of_friction_the_block_is_the_precise_laws_with_the
     let at = 120;
     let change = Event {
         ln_y: 0.5,
-        a: 0.5 * law.a,
+        ln_a: 1.5_f64.ln(),
         b: 0.3 * law.b,
         p: 0.2,
         ..event(at)

@@ -1,0 +1,58 @@
+//! A series made ready for a search: its readings, its covariates, the plain law, and the noise models.
+
+use super::explain::Options;
+use super::noise::{Noise, Whitener};
+use super::problem::Problem;
+use super::refit::Fitted;
+use super::response::Driver;
+use super::search::{Search, plain};
+use super::term::Scratch;
+use super::witnesses::{drivers, is_temperature};
+use crate::reading::{Channel, Series};
+
+/// All that a search rests on.
+#[derive(Debug)]
+pub(super) struct Ready {
+    pub(super) problem: Problem,
+    pub(super) drivers: Vec<(usize, Driver)>,
+    temperatures: Vec<bool>,
+    pub(super) bank: Vec<Whitener>,
+    /// The plain law by least squares.
+    pub(super) plain: Fitted,
+}
+
+impl Ready {
+    /// Of cleaned readings and covariates; `None` where they are too few, or show no motion. Says in `remarks` which
+    /// covariates were left out.
+    pub(super) fn of(
+        series: &Series,
+        channels: &[Channel],
+        remarks: &mut Vec<String>,
+    ) -> Option<Self> {
+        let mut problem = Problem::new(series, channels)?;
+        let plain = plain(&problem, &mut Scratch::default())?;
+        problem.see(&plain.velocity);
+        let drivers = drivers(&problem, channels, remarks);
+        let temperature = |(index, _): &(usize, Driver)| is_temperature(&channels[*index]);
+        Some(Self {
+            temperatures: drivers.iter().map(temperature).collect(),
+            bank: Noise::bank(&problem),
+            drivers,
+            problem,
+            plain,
+        })
+    }
+
+    /// The search, before anything was tried.
+    pub(super) fn search<'a>(&'a self, options: &'a Options) -> Search<'a> {
+        Search {
+            problem: &self.problem,
+            drivers: &self.drivers,
+            temperatures: &self.temperatures,
+            bank: &self.bank,
+            options,
+            scratch: Scratch::default(),
+            candidates: Vec::new(),
+        }
+    }
+}
