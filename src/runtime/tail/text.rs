@@ -79,8 +79,10 @@ impl TextReader {
                 Err(fault) => (String::new(), Some(fault.into())),
                 Ok(text) => {
                     let taken = self.rows.take(number, &text);
-                    let items = taken.items.into_iter();
-                    fed.items.extend(items.map(|item| self.units.guard(item)));
+                    let mut items = taken.items;
+                    items.sort_by(|a, b| order(a).cmp(&order(b)));
+                    let guarded = items.into_iter().map(|item| self.units.guard(item));
+                    fed.items.extend(guarded);
                     (text, taken.fault.map(Into::into))
                 }
             };
@@ -105,6 +107,14 @@ pub(super) struct SavedText {
     lines: Lines,
     header: Vec<String>,
     units: FileUnits,
+}
+
+/// What was measured at one time comes as a replay has it: covariates first, each by name.
+fn order(item: &Item) -> (bool, &str) {
+    match item {
+        Item::Sample { channel, .. } => (false, channel),
+        Item::Reading { benchmark, .. } | Item::Missing { benchmark, .. } => (true, benchmark.as_str()),
+    }
 }
 
 /// A packed file while it is being read, whole and once.
