@@ -127,13 +127,19 @@ impl Latch {
     pub fn update(&mut self, policy: &Policy, evidence: &Evidence) -> Vec<Transition> {
         let call = policy.call(evidence);
         if call.level > self.level {
-            return self.enter(evidence, &call);
+            return vec![self.enter(evidence, &call)];
         }
         self.observe(policy, evidence, &call);
         match self.reason_to_fall(policy, evidence, &call) {
             Some(rule) => self.fall(evidence, &call, rule),
             None => Vec::new(),
         }
+    }
+
+    /// Takes evidence without a forecast, by which the level may rise and nothing else.
+    pub fn raise(&mut self, policy: &Policy, evidence: &Evidence) -> Option<Transition> {
+        let call = policy.call(evidence);
+        (call.level > self.level).then(|| self.enter(evidence, &call))
     }
 
     fn observe(&mut self, policy: &Policy, evidence: &Evidence, call: &Call) {
@@ -165,14 +171,14 @@ impl Latch {
             .then_some("steady")
     }
 
-    fn enter(&mut self, evidence: &Evidence, call: &Call) -> Vec<Transition> {
+    fn enter(&mut self, evidence: &Evidence, call: &Call) -> Transition {
         self.begin(evidence, call.level);
-        vec![Transition {
+        Transition {
             level: call.level,
             entered: Entered::Yes,
             since: evidence.now,
             rule: call.rule,
-        }]
+        }
     }
 
     fn fall(&mut self, evidence: &Evidence, call: &Call, rule: &'static str) -> Vec<Transition> {
@@ -187,9 +193,7 @@ impl Latch {
             self.begin(evidence, Level::Green);
             return vec![left];
         }
-        let mut transitions = vec![left];
-        transitions.extend(self.enter(evidence, call));
-        transitions
+        vec![left, self.enter(evidence, call)]
     }
 
     fn begin(&mut self, evidence: &Evidence, level: Level) {

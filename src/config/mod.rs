@@ -67,6 +67,8 @@ pub struct SiteConfig {
     pub token_file: Option<PathBuf>,
     /// The zone that people there live in.
     pub time_zone: jiff::tz::TimeZone,
+    /// Data time for which every refit is kept; of older ones the first of each UTC day and benchmark is.
+    pub keep_refits: SignedDuration,
 }
 
 /// What a source's files hold.

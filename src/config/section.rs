@@ -7,11 +7,15 @@ use super::{
 use crate::alert::{Level, Policy};
 use crate::monitor::{Explain, Settings};
 use crate::reading::{BenchmarkId, Quantity, Timestamp, Unit};
+use jiff::SignedDuration;
 use jiff::tz::TimeZone;
 use std::collections::{BTreeMap, BTreeSet};
 use std::net::SocketAddr;
 use std::path::Path;
 use std::time::Duration;
+
+/// Refits of the last three months are all kept.
+const KEEP_REFITS: SignedDuration = SignedDuration::from_hours(90 * 24);
 
 const HOOK_TIMEOUT: Duration = Duration::from_secs(10);
 
@@ -68,6 +72,7 @@ fn site(mut section: Section<'_>, base: &Path) -> Option<SiteConfig> {
     let token_file = section.text("token_file");
     refuse_open_door(&section, listen.as_ref(), token_file.is_some());
     let time_zone = section.parsed("time_zone", value::time_zone);
+    let keep_refits = section.parsed("keep_refits", value::duration);
     section.finish();
     Some(SiteConfig {
         name: name?.value,
@@ -75,6 +80,7 @@ fn site(mut section: Section<'_>, base: &Path) -> Option<SiteConfig> {
         listen: listen.map(|given| given.value),
         token_file: token_file.map(|given| base.join(given.value)),
         time_zone: time_zone.map_or(TimeZone::UTC, |given| given.value),
+        keep_refits: keep_refits.map_or(KEEP_REFITS, |given| given.value),
     })
 }
 

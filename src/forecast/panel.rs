@@ -14,6 +14,8 @@ use std::collections::BTreeMap;
 pub const FEWEST_READINGS: usize = 10;
 /// A slope at 50 m/day has failed by any account, mm/day.
 const FASTEST_CRITICAL: f64 = 5e4;
+/// A reading is foreseen within so many standard deviations of where the law puts it.
+const FORESEEN: f64 = 4.0;
 /// How far the forecast looks, days.
 pub const HORIZON_DAYS: f64 = 400.0;
 
@@ -40,6 +42,18 @@ pub struct Panel {
     expected: Option<Ensemble>,
     scored_to_days: Option<f64>,
     surprise: Surprise,
+    #[serde(default)]
+    seen: Option<Seen>,
+}
+
+/// The newest reading as of the last update.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+struct Seen {
+    t_days: f64,
+    /// mm or mm/day.
+    value: f64,
+    /// Standard deviation of its noise and the next one's: of a difference of displacements, or of a velocity.
+    noise: f64,
 }
 
 impl Panel {
@@ -50,6 +64,7 @@ impl Panel {
         let outlook = outlook(observations, critical);
         let (outlook, expected) = outlook?;
         self.expected = expected;
+        self.seen = Seen::of(observations, &outlook.rates);
         Some(Outlook {
             surprise_nats,
             ..outlook
@@ -64,6 +79,34 @@ impl Panel {
         };
         let newest = Newest::of(observations, before, newest);
         newest.excess(self.expected.as_ref()?)
+    }
+
+    /// Whether the newest reading lies where the most probable law of the last update puts it, within the noise and
+    /// the law's own scatter. Without a law the slope is expected to stand still, without an update nothing is.
+    pub fn foresees(&self, observations: &Observations) -> bool {
+        let (Some(seen), Some(newest)) = (self.seen, observations.values.last()) else {
+            return false;
+        };
+        let (mut velocity, mut scatter) = (0.0, 0.0);
+        if let Some(ensemble) = &self.expected
+            && let Some(sample) = ensemble.samples.first()
+        {
+            let from = match observations.quantity {
+                Quantity::Displacement => seen.t_days,
+                Quantity::Velocity => newest.t_days - observations.averaging_days,
+            };
+            let (from, to) = (from - ensemble.now_days, newest.t_days - ensemble.now_days);
+            let Some(predicted) = mean_velocity(&sample.law, from, to) else {
+                return false;
+            };
+            (velocity, scatter) = (predicted, ensemble.scatter);
+        }
+        let (from, motion) = match observations.quantity {
+            Quantity::Displacement => (seen.value, velocity * (newest.t_days - seen.t_days)),
+            Quantity::Velocity => (0.0, velocity),
+        };
+        let spread = seen.noise.hypot(scatter * motion);
+        (newest.value - from - motion).abs() <= FORESEEN * spread
     }
 
     fn surprise(&mut self, observations: &Observations) -> Option<f64> {
@@ -113,6 +156,23 @@ pub(crate) fn outlook(
         rates,
     };
     Some((outlook, expected))
+}
+
+impl Seen {
+    fn of(observations: &Observations, rates: &[Rate]) -> Option<Self> {
+        let newest = observations.values.last()?;
+        let noise = rates
+            .last()
+            .map_or(0.0, |rate| match observations.quantity {
+                Quantity::Displacement => rate.sigma * (rate.to - rate.from),
+                Quantity::Velocity => rate.sigma,
+            });
+        Some(Self {
+            t_days: newest.t_days,
+            value: newest.value,
+            noise,
+        })
+    }
 }
 
 fn unknown() -> BTreeMap<Regime, f64> {

@@ -109,6 +109,8 @@ impl Daemon {
         }
         self.site.note_positions(batch.positions);
         self.commit()?;
+        // Also while years of backlog come in: the state is not to hold all of their refits at once.
+        self.thin()?;
         self.is_up_to_date = batch.caught_up;
         if self.is_up_to_date {
             self.site.caught_up(clock::now())?;
@@ -178,6 +180,14 @@ impl Daemon {
         committed
     }
 
+    /// On a full disk it waits, as everything does.
+    fn thin(&self) -> Result<(), StoreError> {
+        match self.site.thin(self.config.site.keep_refits) {
+            Err(error) if !error.is_full() => Err(error),
+            Ok(_) | Err(_) => Ok(()),
+        }
+    }
+
     /// What is due whether anything comes or not.
     fn tick(&mut self) -> Result<(), StoreError> {
         let now = clock::now();
@@ -195,6 +205,7 @@ impl Daemon {
         if self.is_up_to_date {
             self.site.caught_up(now)?;
         }
+        self.thin()?;
         let (outbox, bytes) = (self.store.waiting_count()?, self.store.bytes()?);
         self.pulse.vitals.update(|health| {
             health.outbox = outbox;

@@ -31,6 +31,7 @@ pub(super) fn delivery(alert: &Alert, hook: &str) -> Result<Delivery, StoreError
         level: alert.level.name().to_owned(),
         state: state_name(alert.state).to_owned(),
         hook: hook.to_owned(),
+        time: alert.event.time,
         body: body.map_err(|error| StoreError::Unreadable(error.to_string()))?,
     })
 }

@@ -7,6 +7,7 @@
 mod batch;
 mod outbox;
 mod read;
+mod retention;
 mod schema;
 mod series;
 

@@ -1,6 +1,7 @@
 //! What the hooks are to be told: written with the events that say so, ticked off when a hook has taken it.
 
-use super::{Store, StoreError};
+use super::{Store, StoreError, nanoseconds};
+use crate::reading::Timestamp;
 use rusqlite::{Connection, params};
 
 /// One alert for one hook.
@@ -14,6 +15,8 @@ pub struct Delivery {
     pub state: String,
     /// The hook.
     pub hook: String,
+    /// When it was called, data time.
+    pub time: Timestamp,
     /// The alert itself.
     pub body: Vec<u8>,
 }
@@ -42,17 +45,18 @@ impl Fate {
 impl Delivery {
     pub(super) fn insert(&self, connection: &Connection) -> Result<(), StoreError> {
         let mut insert = connection.prepare_cached(
-            "INSERT OR IGNORE INTO outbox (key, level, state, hook, status, body)
-             VALUES (?1, ?2, ?3, ?4, 'waiting', ?5)",
+            "INSERT OR IGNORE INTO outbox (key, level, state, hook, status, time, body)
+             VALUES (?1, ?2, ?3, ?4, 'waiting', ?5, ?6)",
         )?;
         let Self {
             key,
             level,
             state,
             hook,
+            time,
             body,
         } = self;
-        insert.execute(params![key, level, state, hook, body])?;
+        insert.execute(params![key, level, state, hook, nanoseconds(*time)?, body])?;
         Ok(())
     }
 }

@@ -259,7 +259,7 @@ fn input(series: &Series, time: Timestamp, value: f64, sigma: Option<f64>) -> In
     }
 }
 
-fn meta(connection: &Connection, name: &str) -> Result<Option<i64>, StoreError> {
+pub(super) fn meta(connection: &Connection, name: &str) -> Result<Option<i64>, StoreError> {
     let mut query = connection.prepare_cached("SELECT value FROM meta WHERE name = ?1")?;
     let mut rows = query.query([name])?;
     Ok(rows.next()?.map(|row| row.get(0)).transpose()?)

@@ -66,10 +66,17 @@ const MIGRATIONS: [&str; 1] = ["
         -- waiting, delivered, over, dead
         status TEXT NOT NULL,
         attempts INTEGER NOT NULL DEFAULT 0,
+        -- of the alert
+        time INTEGER NOT NULL,
         body BLOB NOT NULL,
         UNIQUE (key, level, state, hook)
     ) STRICT;
     CREATE INDEX outbox_waiting ON outbox (id) WHERE status = 'waiting';
+    -- The day, since 1970, of each benchmark's last refit that was kept where older ones are thinned.
+    CREATE TABLE thinned (
+        benchmark TEXT PRIMARY KEY,
+        day INTEGER NOT NULL
+    ) STRICT, WITHOUT ROWID;
     -- What people asked for beside the daemon; it takes them as steps.
     CREATE TABLE command (
         id INTEGER PRIMARY KEY,

@@ -4,6 +4,7 @@ use super::forecast::Forecast;
 use super::motion::{acceleration, moves_backwards, settled};
 use super::{Track, days};
 use crate::alert::{Cause, Entered, Evidence, Policy, Transition};
+use crate::fit::Rate;
 use crate::monitor::event::{AlertState, Event, EventKind};
 use crate::reading::Timestamp;
 use jiff::SignedDuration;
@@ -17,23 +18,12 @@ impl Track {
     ) -> Vec<Event> {
         let within = |span| forecast.map(|forecast| forecast.chance_within(days(span)));
         let rates = forecast.map_or(&[][..], |forecast| &forecast.plain.rates);
+        let look = self.look.filter(|(until, _)| time < *until);
         let mut evidence = Evidence {
-            now: time,
             chance_within_evacuation_time: within(policy.evacuation_time),
             chance_within_outlook: within(policy.outlook),
-            velocity_mm_per_day: rates.last().map_or_else(
-                || self.history.newest_velocity(),
-                |rate| Some(rate.velocity),
-            ),
-            settled_velocity_mm_per_day: settled(rates),
-            displacement_mm: self.history.displacement_mm(),
-            acceleration_mm_per_day2: acceleration(rates),
-            causes: self
-                .look
-                .filter(|(until, _)| time < *until)
-                .map(|(_, cause)| cause)
-                .into_iter()
-                .collect(),
+            causes: look.map(|(_, cause)| cause).into_iter().collect(),
+            ..self.observed(time, rates)
         };
         let mut events: Vec<Event> = Vec::new();
         // Until it moves forward again: one reading more or less does not change the matter.
@@ -56,6 +46,34 @@ impl Track {
             .map(|change| self.alert_event(time, policy, &evidence, change));
         events.extend(told);
         events
+    }
+
+    /// Between two refits: the plain thresholds act at every reading. They may raise the level; it falls only where
+    /// there is a forecast too.
+    pub(super) fn raise(&mut self, policy: &Policy, time: Timestamp) -> Option<Event> {
+        if policy.thresholds.is_empty() {
+            return None;
+        }
+        let evidence = self.observed(time, &self.history.rates());
+        let change = self.latch.raise(policy, &evidence)?;
+        Some(self.alert_event(time, policy, &evidence, &change))
+    }
+
+    /// What the readings show by themselves.
+    fn observed(&self, time: Timestamp, rates: &[Rate]) -> Evidence {
+        Evidence {
+            now: time,
+            chance_within_evacuation_time: None,
+            chance_within_outlook: None,
+            velocity_mm_per_day: rates.last().map_or_else(
+                || self.history.newest_velocity(),
+                |rate| Some(rate.velocity),
+            ),
+            settled_velocity_mm_per_day: settled(rates),
+            displacement_mm: self.history.displacement_mm(),
+            acceleration_mm_per_day2: acceleration(rates),
+            causes: Vec::new(),
+        }
     }
 
     fn alert_event(

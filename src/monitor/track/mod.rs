@@ -4,6 +4,7 @@ mod adopted;
 mod call;
 mod forecast;
 mod motion;
+mod pace;
 mod refit;
 mod watch;
 
@@ -20,6 +21,7 @@ use crate::regime::Tracker;
 use adopted::Adopted;
 use forecast::Forecast;
 use jiff::SignedDuration;
+use pace::Pace;
 use serde::{Deserialize, Serialize};
 use watch::Watch;
 
@@ -49,6 +51,8 @@ pub(super) struct Track {
     faulted: bool,
     backwards: bool,
     newest: Option<Timestamp>,
+    #[serde(default)]
+    pace: Pace,
     watch: Watch,
     /// The fuller law that forecasts and levels go by.
     adopted: Option<Adopted>,
@@ -69,6 +73,7 @@ impl Track {
             faulted: false,
             backwards: false,
             newest: None,
+            pace: Pace::default(),
             watch: Watch::default(),
             adopted: None,
         }
@@ -105,6 +110,10 @@ impl Track {
         if let Some(since) = self.silence.broken_by(reading.time) {
             let text = format!("benchmark {} reads again", self.benchmark);
             events.push(self.unknown((time, since), AlertState::Resolved, text));
+        }
+        if !self.is_refit_due(policy, taken, reading.time) {
+            events.extend(self.raise(policy, time));
+            return events;
         }
         let forecast = self.forecast(policy.critical_velocity_mm_per_day, beside);
         if let Some(forecast) = &forecast {

@@ -62,6 +62,11 @@ impl Watch {
         self.taken += 1;
     }
 
+    /// How many readings there were.
+    pub(super) fn taken(&self) -> u64 {
+        self.taken
+    }
+
     /// Whether structure of this size is to be told: when it is new, or has doubled since.
     fn tells(&mut self, structure: Option<f64>) -> bool {
         let Some(gain) = structure else {

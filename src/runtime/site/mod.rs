@@ -144,7 +144,7 @@ impl Site {
                 tracing::warn!(%time, ?arrival.input, "measured before 1678: quarantined");
                 return Ok(Vec::new());
             }
-            if store.has(&self.batch, &arrival.input)? {
+            if !self.is_newest(arrival) && store.has(&self.batch, &arrival.input)? {
                 self.counts.repeated += 1;
                 return Ok(Vec::new());
             }
@@ -162,6 +162,30 @@ impl Site {
             self.searches.start(job);
         }
         Ok(events)
+    }
+
+    /// Whether the benchmark has given no reading as late as this one: it cannot be known then.
+    fn is_newest(&self, arrival: &Arrival) -> bool {
+        let Input::Reading { benchmark, .. } = &arrival.input else {
+            return false;
+        };
+        self.newest
+            .get(benchmark)
+            .is_none_or(|newest| *newest < arrival.time)
+    }
+
+    /// Thins a piece of what is older than `keep` by data time; whether there may be more.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn thin(&self, keep: SignedDuration) -> Result<bool, StoreError> {
+        let (Some(store), Some(now)) = (&self.sinks.store, self.now) else {
+            return Ok(false);
+        };
+        match now.checked_sub(keep) {
+            Ok(before) if !self.is_full => store.thin(before),
+            Ok(_) | Err(_) => Ok(false),
+        }
     }
 
     /// Goes by other settings from here on.

@@ -19,6 +19,7 @@ pub use decode::Arrival;
 pub(super) use decode::Decoder;
 pub use follow::{Batch, Follower};
 
+use super::clock::{self, Stopwatch};
 use super::shutdown::Shutdown;
 use notify::{RecommendedWatcher, RecursiveMode, Watcher};
 use std::collections::BTreeSet;
@@ -31,8 +32,11 @@ use tokio::time::MissedTickBehavior;
 /// How often the files are looked at when nothing wakes us.
 const RESCAN: Duration = Duration::from_secs(2);
 
-/// After a change: how long the next ones are waited for, so that a busy writer costs one look.
-const SETTLE: Duration = Duration::from_millis(50);
+/// Between two looks: so many times as long as the last one took, so that following a busy writer costs a fifth of a
+/// core at most, and a change after a quiet time is read at once.
+const REST: u32 = 4;
+const SHORTEST_REST: Duration = Duration::from_millis(5);
+const LONGEST_REST: Duration = Duration::from_millis(200);
 
 /// Follows until `shutdown` is asked for or nobody takes the batches any more.
 ///
@@ -50,12 +54,15 @@ pub async fn follow(
     rescan.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
         watch.renew();
+        let looking = Stopwatch::start();
         let batch;
         (follower, batch) = tokio::task::spawn_blocking(move || {
             let batch = follower.poll();
             (follower, batch)
         })
         .await?;
+        let rest = (REST * looking.elapsed()).clamp(SHORTEST_REST, LONGEST_REST);
+        let rested = clock::later(rest);
         let caught_up = batch.caught_up;
         tokio::select! {
             sent = batches.send(batch) => if sent.is_err() { return Ok(()) },
@@ -63,7 +70,7 @@ pub async fn follow(
         }
         if caught_up {
             tokio::select! {
-                () = watch.wake.notified() => tokio::time::sleep(SETTLE).await,
+                () = watch.wake.notified() => tokio::time::sleep_until(rested).await,
                 _ = rescan.tick() => {}
                 () = shutdown.requested() => return Ok(()),
             }

@@ -1,0 +1,46 @@
+//! Which readings lead to a refit: by data time and the readings alone, so that a replay refits where the daemon did.
+
+use super::super::history::Taken;
+use super::Track;
+use crate::alert::Policy;
+use crate::reading::Timestamp;
+use serde::{Deserialize, Serialize};
+
+/// A record of no more readings than this is young: each of them leads to a refit.
+const YOUNG: u64 = 1000;
+/// An older one is refitted so many times an evacuation time, and in between where a reading was not foreseen.
+const REFITS_AN_EVACUATION: i32 = 96;
+
+/// Where the last refits were.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub(super) struct Pace {
+    /// The newest reading as of the last refit.
+    newest: Option<Timestamp>,
+    /// Since then: the reading in the past that last led to one.
+    past: Option<Timestamp>,
+}
+
+impl Track {
+    /// Whether this reading leads to a refit; if not, it is part of the record that the next one rests on.
+    pub(super) fn is_refit_due(&mut self, policy: &Policy, taken: Taken, time: Timestamp) -> bool {
+        let least = policy.evacuation_time / REFITS_AN_EVACUATION;
+        let is_far_from = |last: Option<Timestamp>| {
+            last.is_none_or(|last| time.duration_since(last).abs() >= least)
+        };
+        let is_young = self.watch.taken() <= YOUNG;
+        if taken == Taken::Newest {
+            let is_due = is_young
+                || is_far_from(self.pace.newest)
+                || !self.panel.foresees(&self.history.observations);
+            if is_due {
+                (self.pace.newest, self.pace.past) = (Some(time), None);
+            }
+            return is_due;
+        }
+        let is_due = is_young || is_far_from(self.pace.past);
+        if is_due {
+            self.pace.past = Some(time);
+        }
+        is_due
+    }
+}
