@@ -38,13 +38,13 @@ fn main() {
     if let Some(folder) = after("--hook") {
         return note_alert(Path::new(folder));
     }
-    let number = |flag, default| after(flag).map_or(default, |text| text.parse().unwrap());
+    let number = |flag, default: usize| after(flag).map_or(default, |text| text.parse().unwrap());
     let all = !args
         .iter()
         .any(|arg| ["load", "catchup", "memory"].contains(&arg.as_str()));
     let wants = |name: &str| all || args.iter().any(|arg| arg == name);
     if wants("load") {
-        held_load(number("--seconds", 60));
+        held_load(u32::try_from(number("--seconds", 60)).unwrap());
     }
     if wants("catchup") {
         let readings = number("--readings", 100_000);
@@ -240,7 +240,7 @@ fn catch_up(what: &str, benchmarks: usize, each: usize, seconds: i64) {
     let config = config::load(&folder.path().join("site.toml")).unwrap();
     let pass = |store: Option<&Store>| {
         let began = Instant::now();
-        let mut follower = Follower::new(&config.sources, &config.benchmarks, Vec::new());
+        let mut follower = Follower::new(&config.sources, &config.benchmarks, &[]);
         let mut batch = Batch::default();
         loop {
             let found = follower.poll();

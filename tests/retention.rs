@@ -147,6 +147,13 @@ fn of_old_refits_the_first_of_each_day_and_benchmark_stays_and_of_the_rest_every
 }
 
 #[test]
+fn before_any_value_there_is_nothing_to_thin() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).unwrap();
+    assert!(!store.thin(Timestamp::MIN).unwrap());
+}
+
+#[test]
 fn what_follows_thinned_events_gets_a_number_of_its_own() {
     let folder = tempfile::tempdir().unwrap();
     let benchmarks = ["5"].map(BenchmarkId::new);

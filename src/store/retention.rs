@@ -29,7 +29,10 @@ impl Store {
     /// # Errors
     /// [`StoreError`].
     pub fn thin(&self, before: Timestamp) -> Result<bool, StoreError> {
-        let before = nanoseconds(before)?;
+        // Before the first value, data time is at the beginning of all that can be kept.
+        let Ok(before) = nanoseconds(before) else {
+            return Ok(false);
+        };
         let mut inner = self.inner();
         let newest = inner.events;
         let refits = old_refits(&inner.connection, before, newest)?;
