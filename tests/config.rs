@@ -66,8 +66,11 @@ fn the_least_config_is_taken_with_the_defaults() {
     let config = config::parse(RIGHT, Path::new("site.toml")).unwrap();
     assert_eq!(
         config.settings,
-        slipwatch::monitor::Settings::default(),
-        "nothing given, nothing changed"
+        slipwatch::monitor::Settings {
+            site: Some(slipwatch::monitor::SiteLevel::Worst),
+            ..slipwatch::monitor::Settings::default()
+        },
+        "nothing given, nothing changed but that there is a site"
     );
     assert_eq!(config.hooks[0].timeout.as_secs(), 10);
     assert!(config.benchmarks.is_empty());
@@ -319,5 +322,47 @@ fn a_broker_is_read_its_password_never_logged_and_a_wrong_address_refused() {
     ] {
         let found = problems(&format!("{RIGHT}{}", source.replace(right, wrong)));
         assert!(found[0].contains("cannot be used; write"), "{found:?}");
+    }
+}
+
+#[test]
+fn declared_events_are_read_and_what_means_nothing_is_refused() {
+    use slipwatch::monitor::{Declaration, SiteLevel};
+    let least = |addition: &str| {
+        format!(
+            "[site]\nname = \"S\"\nstate_dir = \"state\"\nlevel = \"2 of 5\"\n\
+             [[source]]\nid = \"s\"\nkind = \"csv\"\npath = \"*.csv\"\nreorder = \"10m\"\n{addition}"
+        )
+    };
+    let file = std::path::Path::new("site.toml");
+    let event = "[[event]]\ntime = \"2020-01-01T00:00:00Z\"\n";
+    let text = format!(
+        "{event}kind = \"reset\"\nsize = -7.4\nunit = \"cm\"\n{event}kind = \"maintenance\"\n{event}kind = \"blast\"\n"
+    );
+    let taken = slipwatch::config::parse(&least(&text), file).unwrap();
+    let kinds: Vec<Declaration> = taken.settings.declared.iter().map(|one| one.kind).collect();
+    let until = "2020-01-01T01:00:00Z".parse().unwrap();
+    assert_eq!(
+        kinds,
+        [
+            Declaration::Reset {
+                size_mm: Some(-74.0)
+            },
+            Declaration::Maintenance { until },
+            Declaration::Blast
+        ]
+    );
+    assert_eq!(taken.settings.site, Some(SiteLevel::AtLeast(2)));
+    assert_eq!(taken.sources[0].reorder.as_secs(), 600);
+    for wrong in [
+        "kind = \"reset\"\nsize = 7\n",
+        "kind = \"reset\"\nunit = \"mm\"\n",
+        "kind = \"blast\"\nsize = 7\nunit = \"mm\"\n",
+        "kind = \"blast\"\nuntil = \"2020-01-01T02:00:00Z\"\n",
+        "kind = \"maintenance\"\nuntil = \"2019-01-01T02:00:00Z\"\n",
+        "kind = \"party\"\n",
+    ] {
+        let text = least(&format!("{event}{wrong}"));
+        assert!(slipwatch::config::parse(&text, file).is_err(), "{wrong}");
     }
 }

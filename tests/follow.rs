@@ -4,6 +4,7 @@
 
 use slipwatch::config::{self, Config};
 use slipwatch::monitor::Input;
+use slipwatch::reading::Timestamp;
 use slipwatch::runtime::ingest::{ReadOptions, read_files};
 use slipwatch::runtime::tail::{Batch, Follower};
 use std::collections::BTreeMap;
@@ -17,6 +18,8 @@ const HEADER: &str = "time,displacement_mm\n";
 struct Bench {
     folder: TempDir,
     follower: Follower,
+    /// The wall clock's time.
+    wall: Timestamp,
 }
 
 impl Bench {
@@ -28,7 +31,12 @@ impl Bench {
         let folder = tempfile::tempdir().unwrap();
         let config = config_in(folder.path(), kind, benchmarks);
         let follower = Follower::new(&config.sources, &config.benchmarks, &[]);
-        Self { folder, follower }
+        let wall = "2030-01-01T00:00:00Z".parse().unwrap();
+        Self {
+            folder,
+            follower,
+            wall,
+        }
     }
 
     fn path(&self, name: &str) -> PathBuf {
@@ -55,7 +63,7 @@ impl Bench {
                 arrivals,
                 caught_up,
                 ..
-            } = self.follower.poll();
+            } = self.follower.poll(self.wall);
             news.extend(arrivals.into_iter().map(|arrival| match arrival.input {
                 Input::Reading {
                     benchmark, reading, ..

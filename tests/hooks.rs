@@ -46,6 +46,7 @@ fn hook(script: &str) -> (TempDir, HookConfig) {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("hook.sh"), script).unwrap();
     let config = HookConfig {
+        site: false,
         run: vec!["/bin/sh".to_owned(), "hook.sh".to_owned()],
         levels: vec![Level::Orange, Level::Red],
         timeout: Duration::from_secs(30),

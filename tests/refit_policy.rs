@@ -114,7 +114,11 @@ fn plain_thresholds_act_at_readings_that_are_not_refitted() {
     let mut settings = Settings::default();
     // No forecast calls a level.
     let policy = &mut settings.policy;
-    (policy.red_chance, policy.orange_chance, policy.yellow_chance) = (2.0, 2.0, 2.0);
+    (
+        policy.red_chance,
+        policy.orange_chance,
+        policy.yellow_chance,
+    ) = (2.0, 2.0, 2.0);
     settings.policy.thresholds.push(Threshold {
         level: Level::Red,
         velocity_mm_per_day: None,

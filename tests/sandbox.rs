@@ -35,6 +35,7 @@ fn folder() -> TempDir {
 
 fn walled(folder: &Path, run: &[&str]) -> HookConfig {
     HookConfig {
+        site: false,
         run: run.iter().map(|word| (*word).to_owned()).collect(),
         levels: vec![Level::Red],
         timeout: Duration::from_secs(30),

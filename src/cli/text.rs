@@ -67,19 +67,21 @@ fn what(kind: &EventKind) -> String {
             format!("ALERT {level} {state}: {text}")
         }
         EventKind::Fault { kind, text } => format!("fault {kind}: {text}"),
-        EventKind::Order { order, until, by } => {
-            let until = until.map_or_else(String::new, |until| format!(" until {}", minute(until)));
-            let by = by
-                .as_ref()
-                .map_or_else(String::new, |by| format!(" by {by}"));
-            format!("{order}{by}{until}")
-        }
+        EventKind::Declared { text, .. } => format!("declared: {text}"),
+        EventKind::Correction { text, .. } => format!("correction: {text}"),
+        EventKind::Order { order, until, by } => ordered(order, *until, by.as_deref()),
         EventKind::Summary(Summary {
             readings,
             refits,
             alerts,
         }) => format!("summary: {readings} readings, {refits} refits, {alerts} alerts"),
     }
+}
+
+fn ordered(order: &str, until: Option<Timestamp>, by: Option<&str>) -> String {
+    let until = until.map_or_else(String::new, |until| format!(" until {}", minute(until)));
+    let by = by.map_or_else(String::new, |by| format!(" by {by}"));
+    format!("{order}{by}{until}")
 }
 
 fn unexplained(what: &Unexplained) -> String {

@@ -53,7 +53,6 @@ pub fn check(file: &Path) -> Result<Summary, ConfigError> {
             .chain(config.hooks.iter().filter_map(missing_program))
             .chain(config.site.token_file.as_deref().and_then(open_token))
             .chain(slow_sampling(&config))
-            .chain(config.without_effect())
             .map(|what| format!("{place}: warning: {what}")),
     );
     Ok(Summary {
@@ -127,22 +126,6 @@ impl Config {
         for hook in self.hooks.iter_mut().filter(|hook| hook.sandbox) {
             hook.launcher = Some(program.to_owned());
         }
-    }
-
-    /// What is accepted and does nothing yet, one line each.
-    pub fn without_effect(&self) -> Vec<String> {
-        let events = self.declared.iter().map(|event| {
-            let place = match &event.benchmark {
-                Some(benchmark) => format!("benchmark {:?}", benchmark.as_str()),
-                None => "the whole site".to_owned(),
-            };
-            format!(
-                "event: {} of {} at {place}: declared events have no effect yet; \
-                 expect what it does to the readings to be taken for motion",
-                event.kind, event.time
-            )
-        });
-        events.collect()
     }
 }
 

@@ -3,6 +3,7 @@
 mod alert;
 mod broker;
 mod check;
+mod declared;
 mod pattern;
 mod problem;
 mod section;
@@ -21,7 +22,7 @@ pub use vector::Vector;
 
 use crate::alert::Level;
 use crate::monitor::Settings;
-use crate::reading::{BenchmarkId, Conventions, Quantity, Timestamp, Unit};
+use crate::reading::{BenchmarkId, Conventions, Quantity, Unit};
 use jiff::SignedDuration;
 use problem::Notebook;
 use std::cell::RefCell;
@@ -43,10 +44,8 @@ pub struct Config {
     pub brokers: Vec<Broker>,
     /// `[[benchmark]]`; with none, whatever benchmarks the files name are taken.
     pub benchmarks: Vec<Benchmark>,
-    /// `[alert]` and the benchmarks' own, as the monitor takes them.
+    /// `[alert]` and the benchmarks' own, `[explain]` and `[[event]]`, as the monitor takes them.
     pub settings: Settings,
-    /// `[[event]]`.
-    pub declared: Vec<DeclaredEvent>,
     /// `[[hook]]`.
     pub hooks: Vec<HookConfig>,
     /// What is doubtful, but not refused.
@@ -107,6 +106,8 @@ pub struct Source {
     pub pattern: FilePattern,
     /// How times and missing values are written in them.
     pub conventions: Conventions,
+    /// Values wait this long for earlier ones; zero: not at all.
+    pub reorder: SignedDuration,
 }
 
 /// `[[benchmark]]`: one measured point.
@@ -128,17 +129,6 @@ pub struct Benchmark {
     pub averaging: Option<SignedDuration>,
 }
 
-/// `[[event]]`: something people did to the site or its instruments.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct DeclaredEvent {
-    /// When.
-    pub time: Timestamp,
-    /// To which benchmark; `None` for the whole site.
-    pub benchmark: Option<BenchmarkId>,
-    /// `reset`, `maintenance` or `blast`.
-    pub kind: String,
-}
-
 /// `[[hook]]`: a program to run when a level is entered or left.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct HookConfig {
@@ -146,6 +136,8 @@ pub struct HookConfig {
     pub run: Vec<String>,
     /// Which levels it is run for.
     pub levels: Vec<Level>,
+    /// Whether it is told of the whole site's level, and of nothing else; of its benchmarks' else.
+    pub site: bool,
     /// After this it is killed.
     pub timeout: Duration,
     /// Where it runs: the config's folder.

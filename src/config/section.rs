@@ -1,12 +1,10 @@
 //! The tables of the site file, one function each.
 
 use super::table::{Placed, Section};
-use super::{
-    Benchmark, Config, DeclaredEvent, HookConfig, SiteConfig, alert, source, value, vector,
-};
+use super::{Benchmark, Config, HookConfig, SiteConfig, alert, declared, source, value, vector};
 use crate::alert::{Level, Policy};
-use crate::monitor::{Explain, Settings};
-use crate::reading::{BenchmarkId, Quantity, Timestamp, Unit};
+use crate::monitor::{Explain, Settings, SiteLevel};
+use crate::reading::{BenchmarkId, Quantity, Unit};
 use jiff::SignedDuration;
 use jiff::tz::TimeZone;
 use std::collections::{BTreeMap, BTreeSet};
@@ -22,7 +20,9 @@ const HOOK_TIMEOUT: Duration = Duration::from_secs(10);
 /// The whole file; `None` where something without which there is no config is missing.
 pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
     let base = file.parent().unwrap_or(Path::new(""));
-    let site = site(root.table("site", "site"), base);
+    let mut site_section = root.table("site", "site");
+    let site_level = site_level(&mut site_section);
+    let site = site(site_section, base);
     let (sources, brokers) = source::sources(root, base);
     let policy = alert::policy(root.table("alert", "alert"), &Policy::default());
     let explain = explain(root.table("explain", "explain"));
@@ -30,7 +30,7 @@ pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
         .chain(brokers.iter().map(|broker| broker.id.as_str()))
         .collect();
     let (benchmarks, own) = benchmarks(root, &known, &policy);
-    let declared = declared(root, &benchmarks);
+    let declared = declared::events(root, &benchmarks);
     let watched = watched(&known, &benchmarks);
     let hooks: Vec<HookConfig> = root
         .tables("hook", "hook")
@@ -55,8 +55,9 @@ pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
             benchmarks: own,
             explain,
             watched,
+            declared,
+            site: Some(site_level),
         },
-        declared,
         hooks,
         warnings: Vec::new(),
     })
@@ -82,6 +83,22 @@ fn site(mut section: Section<'_>, base: &Path) -> Option<SiteConfig> {
         time_zone: time_zone.map_or(TimeZone::UTC, |given| given.value),
         keep_refits: keep_refits.map_or(KEEP_REFITS, |given| given.value),
     })
+}
+
+/// `worst`, or `2 of 5`: so many of the benchmarks.
+fn site_level(section: &mut Section<'_>) -> SiteLevel {
+    let level = section.parsed("level", |text| {
+        let fix = || "write \"worst\", or as in \"2 of 5\" how many benchmarks".to_owned();
+        if text == "worst" {
+            return Ok(SiteLevel::Worst);
+        }
+        let (count, of) = text.split_once(" of ").ok_or_else(fix)?;
+        match (count.trim().parse(), of.trim().parse::<usize>()) {
+            (Ok(count), Ok(of)) if (1..=of).contains(&count) => Ok(SiteLevel::AtLeast(count)),
+            (Ok(_) | Err(_), _) => Err(fix()),
+        }
+    });
+    level.map_or(SiteLevel::Worst, |given| given.value)
 }
 
 /// Whoever can reach the daemon over a network must know a secret.
@@ -250,49 +267,6 @@ fn benchmark_source(section: &mut Section<'_>, known: &[&str]) -> Option<String>
     }
 }
 
-fn declared(root: &mut Section<'_>, benchmarks: &[Benchmark]) -> Vec<DeclaredEvent> {
-    root.tables("event", "event")
-        .into_iter()
-        .filter_map(|section| declared_event(section, benchmarks))
-        .collect()
-}
-
-fn declared_event(mut section: Section<'_>, benchmarks: &[Benchmark]) -> Option<DeclaredEvent> {
-    let time = section
-        .required("time", "\"2017-06-06T17:00:00Z\"")
-        .and_then(|_| {
-            section.parsed("time", |text| {
-                text.parse::<Timestamp>()
-                    .map_err(|_| "write it as in \"2017-06-06T17:00:00Z\"".to_owned())
-            })
-        });
-    let kind = section.required("kind", "\"reset\"").and_then(|_| {
-        section.parsed("kind", |text| match text {
-            "maintenance" | "reset" | "blast" => Ok(text.to_owned()),
-            _ => Err("write maintenance, reset or blast".to_owned()),
-        })
-    });
-    let benchmark = section.text("benchmark");
-    if let Some(given) = &benchmark
-        && !benchmarks.is_empty()
-        && benchmarks
-            .iter()
-            .all(|known| known.id.as_str() != given.value)
-    {
-        section.error(
-            &given.at,
-            format!("event.benchmark = {:?} is no [[benchmark]]", given.value),
-            "name one that is declared, or leave it out for the whole site",
-        );
-    }
-    section.finish();
-    Some(DeclaredEvent {
-        time: time?.value,
-        benchmark: benchmark.map(|given| BenchmarkId::new(given.value)),
-        kind: kind?.value,
-    })
-}
-
 fn hook(mut section: Section<'_>, base: &Path) -> Option<HookConfig> {
     let run = section.texts("run");
     if run.as_ref().is_none_or(|run| run.value.is_empty()) {
@@ -306,6 +280,7 @@ fn hook(mut section: Section<'_>, base: &Path) -> Option<HookConfig> {
     let levels = hook_levels(&mut section);
     let timeout = section.parsed("timeout", value::duration);
     let sandbox = section.switch("sandbox").unwrap_or(true);
+    let site = section.switch("site").unwrap_or(false);
     let writable = section.texts("writable");
     if let Some(paths) = writable.as_ref().filter(|_| !sandbox) {
         section.warning(
@@ -319,6 +294,7 @@ fn hook(mut section: Section<'_>, base: &Path) -> Option<HookConfig> {
     Some(HookConfig {
         run: run?.value.into_iter().map(|word| word.value).collect(),
         levels,
+        site,
         timeout: timeout.map_or(HOOK_TIMEOUT, |given| given.value.unsigned_abs()),
         folder: base.to_owned(),
         sandbox,

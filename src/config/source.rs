@@ -4,6 +4,7 @@ use super::section::unique;
 use super::table::Section;
 use super::{Broker, FilePattern, Source, SourceKind, broker, value};
 use crate::reading::{Conventions, LocalClock, MissingValues, SummerTime};
+use jiff::SignedDuration;
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -62,6 +63,7 @@ fn source(mut section: Section<'_>, base: &Path, taken: &mut BTreeSet<String>) -
         .required("path", "\"incoming/*.csv\"")
         .and_then(|_| section.parsed("path", |text| FilePattern::parse(text, base)));
     let conventions = conventions(&mut section, kind);
+    let reorder = section.parsed("reorder", value::duration_or_none);
     section.finish();
     let Kind::Files(kind) = kind? else {
         return None;
@@ -71,6 +73,7 @@ fn source(mut section: Section<'_>, base: &Path, taken: &mut BTreeSet<String>) -
         kind,
         pattern: pattern?.value,
         conventions,
+        reorder: reorder.map_or(SignedDuration::ZERO, |given| given.value),
     }))
 }
 

@@ -144,6 +144,19 @@ impl<'t> Section<'t> {
         Some(*switch)
     }
 
+    /// Any number that is finite.
+    pub(super) fn number(&mut self, key: &'static str) -> Option<Placed<f64>> {
+        let value = self.get(key)?;
+        let Some(number) = number(value.get_ref()).filter(|number| number.is_finite()) else {
+            self.wrong_type(key, value, "a number", &format!("{key} = 74.0"));
+            return None;
+        };
+        Some(Placed {
+            value: number,
+            at: value.span(),
+        })
+    }
+
     /// A number strictly between 0 and 1.
     pub(super) fn chance(&mut self, key: &'static str) -> Option<f64> {
         let value = self.get(key)?;

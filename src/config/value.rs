@@ -1,7 +1,7 @@
 //! Values with units: durations, speeds, accelerations, levels. `Err` says what to write instead.
 
 use crate::alert::Level;
-use crate::reading::{Quantity, Unit};
+use crate::reading::{Quantity, Timestamp, Unit};
 use jiff::SignedDuration;
 use jiff::tz::TimeZone;
 
@@ -13,6 +13,20 @@ pub(crate) fn duration(text: &str) -> Result<SignedDuration, String> {
         return Err("write a duration longer than zero, such as \"12h\"".to_owned());
     }
     SignedDuration::try_from(parsed).map_err(|_| "write a shorter duration".to_owned())
+}
+
+/// A duration of zero or more: `0s`, `10m`.
+pub(super) fn duration_or_none(text: &str) -> Result<SignedDuration, String> {
+    humantime::parse_duration(text)
+        .ok()
+        .and_then(|parsed| SignedDuration::try_from(parsed).ok())
+        .ok_or_else(|| "write a number and a unit: \"0s\", \"10m\"".to_owned())
+}
+
+/// An instant: `2017-06-06T17:00:00Z`.
+pub(super) fn instant(text: &str) -> Result<Timestamp, String> {
+    text.parse()
+        .map_err(|_| "write it as in \"2017-06-06T17:00:00Z\"".to_owned())
 }
 
 /// A time zone by its IANA name: `Europe/Rome`.

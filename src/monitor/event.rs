@@ -127,6 +127,32 @@ pub enum EventKind {
         /// One line for a person.
         text: String,
     },
+    /// Something that people declared takes effect at a benchmark.
+    Declared {
+        /// `reset`, `maintenance` or `blast`.
+        kind: String,
+        /// When it was, or began.
+        at: Timestamp,
+        /// The end of maintenance.
+        #[serde(skip_serializing_if = "Option::is_none", default)]
+        until: Option<Timestamp>,
+        /// What a reset made the readings jump by, mm.
+        #[serde(skip_serializing_if = "Option::is_none", default)]
+        size_mm: Option<f64>,
+        /// One line for a person.
+        text: String,
+    },
+    /// Readings that came late, or were corrected, would have called another level in the past.
+    Correction {
+        /// The earliest of them.
+        since: Timestamp,
+        /// The highest level that was in force from then on.
+        level_then: Level,
+        /// The highest level that would have been called.
+        level_now: Level,
+        /// One line for a person.
+        text: String,
+    },
     /// People asked for something.
     Order {
         /// `acknowledge`, `shelve` or `silence`.
@@ -153,6 +179,8 @@ impl EventKind {
             Self::EffectDropped { .. } => "effect-dropped",
             Self::Alert { .. } => "alert",
             Self::Fault { .. } => "fault",
+            Self::Declared { .. } => "declared",
+            Self::Correction { .. } => "correction",
             Self::Order { .. } => "order",
             Self::Summary(_) => "summary",
         }
@@ -252,14 +280,14 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// Counts one event.
-    pub(super) fn count(&mut self, kind: &EventKind) {
-        match kind {
+    /// Counts one event; an alert of the whole site repeats what its benchmarks called.
+    pub(super) fn count(&mut self, event: &Event) {
+        match &event.kind {
             EventKind::Refit { .. } => self.refits += 1,
             EventKind::Alert {
                 state: AlertState::Firing,
                 ..
-            } => self.alerts += 1,
+            } if event.benchmark.is_some() => self.alerts += 1,
             EventKind::Alert { .. }
             | EventKind::RegimeFlip { .. }
             | EventKind::InterceptDrift { .. }
@@ -268,6 +296,8 @@ impl Summary {
             | EventKind::EffectFound { .. }
             | EventKind::EffectDropped { .. }
             | EventKind::Fault { .. }
+            | EventKind::Declared { .. }
+            | EventKind::Correction { .. }
             | EventKind::Order { .. }
             | EventKind::Summary(_) => {}
         }

@@ -1,5 +1,7 @@
 //! The readings of one benchmark, in the science's units and in time order, bounded by count.
 
+use super::declared::Declarations;
+use super::track::settled;
 use crate::fit::{Observation, Observations, Rate, RateOptions};
 use crate::reading::{
     BenchmarkId, Quantity, Reading, SECONDS_PER_DAY, Series, Timestamp, Unit, days_since,
@@ -33,6 +35,9 @@ pub(super) enum Taken {
     OtherQuantity,
 }
 
+/// Readings set aside that are remembered.
+const MOST_ASIDE: usize = 4096;
+
 /// No displacement in mm, or velocity in mm/day, is larger: a thousand kilometres.
 const FARTHEST: f64 = 1e9;
 
@@ -42,6 +47,22 @@ pub(super) struct History {
     pub(super) epoch: Timestamp,
     pub(super) observations: Observations,
     averaging: Option<SignedDuration>,
+    /// What declared resets have taken off the readings from their times on, by time.
+    #[serde(default)]
+    resets: Vec<Reset>,
+    /// Readings that declared events leave out, by time, as they were read.
+    #[serde(default)]
+    aside: Vec<Observation>,
+}
+
+/// A declared reset that has taken effect.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct Reset {
+    t_days: f64,
+    /// What was declared of its size, mm.
+    declared: Option<f64>,
+    /// What the readings jump by, mm.
+    jump: f64,
 }
 
 impl History {
@@ -58,6 +79,128 @@ impl History {
             epoch,
             observations,
             averaging: source.averaging,
+            resets: Vec::new(),
+            aside: Vec::new(),
+        }
+    }
+
+    /// What resets have taken off a reading of that day.
+    fn taken_off(&self, t_days: f64) -> f64 {
+        let before = self.resets.iter().filter(|reset| reset.t_days <= t_days);
+        before.map(|reset| reset.jump).sum()
+    }
+
+    /// The first and the last time over which a reading is the mean.
+    pub(super) fn span(&self, time: Timestamp) -> (Timestamp, Timestamp) {
+        let averaging = self.averaging.unwrap_or(SignedDuration::ZERO);
+        (time.checked_sub(averaging).unwrap_or(time), time)
+    }
+
+    /// Keeps a reading without letting it count; says whether it is of the quantity that is monitored and may be
+    /// true.
+    pub(super) fn set_aside(&mut self, source: Source, reading: &Reading) -> bool {
+        let new = self.observation(source, reading);
+        let is_ours = source.unit.quantity() == self.observations.quantity;
+        let is_used = is_ours && new.value.is_finite() && new.value.abs() <= FARTHEST;
+        if is_used {
+            insert(&mut self.aside, new);
+            let excess = self.aside.len().saturating_sub(MOST_ASIDE);
+            self.aside.drain(..excess);
+        }
+        is_used
+    }
+
+    /// Counts what is to count now that other events are declared; says whether anything changed.
+    pub(super) fn sort_out(&mut self, declared: &Declarations) -> bool {
+        let before = self.observations.values.clone();
+        let mut all = std::mem::take(&mut self.observations.values);
+        for one in &mut all {
+            one.value += self.taken_off(one.t_days);
+        }
+        for one in std::mem::take(&mut self.aside) {
+            insert(&mut all, one);
+        }
+        let wanted: Vec<(f64, Option<f64>)> = declared
+            .resets()
+            .map(|(time, size)| (self.days(time), size))
+            .collect();
+        self.resets
+            .retain(|reset| wanted.contains(&(reset.t_days, reset.declared)));
+        for mut one in all {
+            let time = self.time(one.t_days);
+            if time.is_some_and(|time| self.is_left_out(declared, time)) {
+                self.aside.push(one);
+            } else {
+                one.value -= self.taken_off(one.t_days);
+                self.observations.values.push(one);
+            }
+        }
+        self.observations.compact();
+        before != self.observations.values
+    }
+
+    /// Whether what is declared leaves a reading of that time out.
+    pub(super) fn is_left_out(&self, declared: &Declarations, time: Timestamp) -> bool {
+        let (from, to) = self.span(time);
+        declared.is_maintained(time)
+            || self.observations.quantity == Quantity::Velocity
+                && declared.is_reset_within(from, to)
+    }
+
+    /// Takes off what the readings jump by at each reset that has readings before and after it by now; the times of
+    /// these resets, and their jumps in mm.
+    pub(super) fn reset(&mut self, declared: &Declarations) -> Vec<(Timestamp, f64)> {
+        if self.observations.quantity != Quantity::Displacement {
+            return Vec::new();
+        }
+        let mut pending: Vec<(Timestamp, Option<f64>)> = declared
+            .resets()
+            .filter(|(time, _)| {
+                let t_days = self.days(*time);
+                !self
+                    .resets
+                    .iter()
+                    .any(|done| done.t_days.to_bits() == t_days.to_bits())
+            })
+            .collect();
+        // Where one of a known size and one of an unknown size lie between two readings, the rest is the latter's.
+        pending.sort_by_key(|(_, size)| size.is_none());
+        let mut done = Vec::new();
+        for (time, declared) in pending {
+            let t_days = self.days(time);
+            let values = &self.observations.values;
+            let at = values.partition_point(|one| one.t_days < t_days);
+            if at == 0 || at == values.len() {
+                continue;
+            }
+            let jump = declared.unwrap_or_else(|| self.jump(at));
+            for one in &mut self.observations.values[at..] {
+                one.value -= jump;
+            }
+            self.resets.push(Reset {
+                t_days,
+                declared,
+                jump,
+            });
+            done.push((time, jump));
+        }
+        done
+    }
+
+    /// What the reading of this number lies off the one before it, less the motion at the velocity so far, mm.
+    fn jump(&self, at: usize) -> f64 {
+        let [before, after] = [at - 1, at].map(|index| self.observations.values[index]);
+        let rates = self.observations.rates(0..at, RateOptions::default());
+        let velocity = settled(&rates).unwrap_or(0.0);
+        after.value - before.value - velocity * (after.t_days - before.t_days)
+    }
+
+    fn observation(&self, source: Source, reading: &Reading) -> Observation {
+        let factor = source.unit.factor();
+        Observation {
+            t_days: self.days(reading.time),
+            value: reading.value * factor,
+            sigma: reading.sigma.map(|sigma| sigma * factor),
         }
     }
 
@@ -124,15 +267,12 @@ impl History {
         if source.unit.quantity() != self.observations.quantity {
             return Taken::OtherQuantity;
         }
-        let factor = source.unit.factor();
-        let new = Observation {
-            t_days: self.days(reading.time),
-            value: reading.value * factor,
-            sigma: reading.sigma.map(|sigma| sigma * factor),
-        };
+        let mut new = self.observation(source, reading);
         if !new.value.is_finite() || new.value.abs() > FARTHEST {
             return Taken::OutOfRange(new.value);
         }
+        let taken_off = self.taken_off(new.t_days);
+        new.value -= taken_off;
         let values = &mut self.observations.values;
         let at = values.partition_point(|old| old.t_days < new.t_days);
         match values.get_mut(at) {
@@ -148,7 +288,7 @@ impl History {
             }
             Some(old) if *old == new => Taken::Known,
             Some(old) => {
-                let before = old.value;
+                let before = old.value + taken_off;
                 *old = new;
                 Taken::Corrected(before)
             }
@@ -161,32 +301,19 @@ impl History {
         self.observations.rates(all, RateOptions::default())
     }
 
-    /// Displacement since the first reading, mm, where displacement is what is measured.
-    pub(super) fn displacement_mm(&self) -> Option<f64> {
-        let [first, .., newest] = self.observations.values.as_slice() else {
-            return Some(0.0).filter(|_| self.observations.quantity == Quantity::Displacement);
-        };
-        (self.observations.quantity == Quantity::Displacement).then_some(newest.value - first.value)
-    }
-
-    /// The velocity that the newest readings show by themselves, mm/day.
-    pub(super) fn newest_velocity(&self) -> Option<f64> {
-        let values = &self.observations.values;
-        match self.observations.quantity {
-            Quantity::Velocity => values.last().map(|newest| newest.value),
-            Quantity::Displacement => {
-                let [.., before, newest] = values.as_slice() else {
-                    return None;
-                };
-                Some((newest.value - before.value) / (newest.t_days - before.t_days))
-            }
-        }
-    }
-
     /// How many of the newest readings have one and the same value.
     pub(super) fn identical(&self) -> usize {
         let values = &self.observations.values;
         let same = |pair: &&[Observation]| pair[0].value.to_bits() == pair[1].value.to_bits();
         values.windows(2).rev().take_while(same).count() + usize::from(!values.is_empty())
+    }
+}
+
+/// Puts a reading in its place; of two of one time the later to come stands.
+fn insert(values: &mut Vec<Observation>, new: Observation) {
+    let at = values.partition_point(|old| old.t_days < new.t_days);
+    match values.get_mut(at) {
+        Some(old) if old.t_days <= new.t_days => *old = new,
+        Some(_) | None => values.insert(at, new),
     }
 }

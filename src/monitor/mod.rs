@@ -1,6 +1,7 @@
 //! The state machine that owns every benchmark: readings in, events out, no clock and no files.
 
 mod covariates;
+mod declared;
 mod drift;
 mod event;
 mod history;
@@ -9,8 +10,10 @@ mod saved;
 mod search;
 mod sensor;
 mod silence;
+mod site;
 mod track;
 
+pub use declared::{Declaration, Declared};
 pub use event::{
     AlertState, Event, EventKind, FailureTime, InverseVelocity, Plain, RegimeReport, Summary,
     Unexplained,
@@ -18,13 +21,16 @@ pub use event::{
 pub use order::Order;
 pub use saved::{Part, SavedError};
 pub use search::{Finding, SearchJob};
+pub use site::SiteLevel;
 
 use crate::alert::{Level, Policy};
 use crate::reading::{BenchmarkId, Reading, Sample, Timestamp, Unit};
 use covariates::Covariates;
+use declared::Declarations;
 use jiff::SignedDuration;
 use sensor::Sensors;
 use serde::{Deserialize, Serialize};
+use site::SiteAlert;
 use std::collections::{BTreeMap, BTreeSet};
 use track::{Beside, Track};
 
@@ -82,6 +88,12 @@ pub struct Settings {
     /// The benchmarks that are watched; `None`: whatever comes.
     #[serde(default)]
     pub watched: Option<BTreeSet<BenchmarkId>>,
+    /// What people declare to have done.
+    #[serde(default)]
+    pub declared: Vec<Declared>,
+    /// How the benchmarks' levels make one of the whole site; `None`: there is none.
+    #[serde(default)]
+    pub site: Option<SiteLevel>,
 }
 
 /// What is done about a residual that the law does not explain; it is watched and told in any case.
@@ -115,6 +127,7 @@ pub struct Monitor {
     covariates: Covariates,
     sensors: Sensors,
     searches: Vec<SearchJob>,
+    site: SiteAlert,
     summary: Summary,
     last_time: Option<Timestamp>,
 }
@@ -130,6 +143,7 @@ impl Monitor {
             covariates: Covariates::default(),
             sensors: Sensors::default(),
             searches: Vec::new(),
+            site: SiteAlert::default(),
             summary: Summary::default(),
             last_time: None,
         }
@@ -138,7 +152,7 @@ impl Monitor {
     /// Takes one input at `now` (data time, never going back) and says what follows from it.
     pub fn step(&mut self, now: Timestamp, input: &Input) -> Vec<Event> {
         self.last_time = Some(now);
-        let events = match input {
+        let mut events = match input {
             Input::Reading {
                 benchmark,
                 unit,
@@ -169,8 +183,13 @@ impl Monitor {
             Input::Order(order) => vec![order.event(now)],
             Input::Tick => self.pass(now),
         };
+        let is_called = |event: &Event| matches!(event.kind, EventKind::Alert { .. });
+        if events.iter().any(is_called) || matches!(input, Input::Settings(_)) {
+            let levels = self.tracks.iter().map(|(id, track)| (id, track.level()));
+            events.extend(self.site.update(self.settings.site, now, levels));
+        }
         for event in &events {
-            self.summary.count(&event.kind);
+            self.summary.count(event);
         }
         events
     }
@@ -189,10 +208,10 @@ impl Monitor {
             explain: self.settings.explain,
         };
         let policy = self.settings.policy(benchmark);
-        let track = self
-            .tracks
-            .entry(benchmark.clone())
-            .or_insert_with(|| Track::new(benchmark.clone(), source, reading.time));
+        let track = self.tracks.entry(benchmark.clone()).or_insert_with(|| {
+            let declared = Declarations::of(&self.settings.declared, benchmark);
+            Track::new(benchmark.clone(), source, reading.time, declared)
+        });
         let before = track.deadline();
         let events = track.take(policy, source, reading, &beside);
         let critical = policy.critical_velocity_mm_per_day;
@@ -235,6 +254,26 @@ impl Monitor {
     /// Goes by other settings from here on. What was in force at a benchmark that is no longer watched ends.
     fn resettle(&mut self, now: Timestamp, settings: &Settings) -> Vec<Event> {
         self.settings = settings.clone();
+        let mut events = self.unwatch(now);
+        let beside = Beside {
+            covariates: &self.covariates,
+            explain: self.settings.explain,
+        };
+        let mut moved = Vec::new();
+        for (id, track) in &mut self.tracks {
+            let declared = Declarations::of(&self.settings.declared, id);
+            let before = track.deadline();
+            events.extend(track.redeclare(self.settings.policy(id), declared, &beside));
+            moved.push(((before, track.deadline()), id.clone()));
+        }
+        for (deadlines, id) in moved {
+            self.changed.insert(id.clone());
+            self.expect(deadlines, id);
+        }
+        events
+    }
+
+    fn unwatch(&mut self, now: Timestamp) -> Vec<Event> {
         let Some(watched) = &self.settings.watched else {
             return Vec::new();
         };
@@ -260,7 +299,8 @@ impl Monitor {
         benchmark: &BenchmarkId,
         (time, what): (Timestamp, &str),
     ) -> Vec<Event> {
-        if !self.sensors.fails(benchmark, time, what) {
+        let declared = Declarations::of(&self.settings.declared, benchmark);
+        if declared.is_maintained(time) || !self.sensors.fails(benchmark, time, what) {
             return Vec::new();
         }
         let kind = EventKind::Fault {

@@ -7,6 +7,7 @@ use super::covariates::Covariates;
 use super::event::Summary;
 use super::search::SearchJob;
 use super::sensor::Sensors;
+use super::site::SiteAlert;
 use super::track::Track;
 use super::{Monitor, Settings};
 use crate::reading::{BenchmarkId, Timestamp};
@@ -55,6 +56,8 @@ struct Rest {
     covariates: Covariates,
     sensors: Sensors,
     searches: Vec<SearchJob>,
+    #[serde(default)]
+    site: SiteAlert,
     summary: Summary,
     last_time: Option<Timestamp>,
 }
@@ -78,6 +81,7 @@ impl Monitor {
             covariates: self.covariates.clone(),
             sensors: self.sensors.clone(),
             searches: self.searches.clone(),
+            site: self.site.clone(),
             summary: self.summary,
             last_time: self.last_time,
         };
@@ -117,6 +121,7 @@ impl Monitor {
             covariates: rest.covariates,
             sensors: rest.sensors,
             searches: rest.searches,
+            site: rest.site,
             summary: rest.summary,
             last_time: rest.last_time,
         })

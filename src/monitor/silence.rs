@@ -23,17 +23,36 @@ pub(super) struct Silence {
 impl Silence {
     /// Notes a reading; when it ends a silence, the reading before which that one began.
     pub(super) fn broken_by(&mut self, time: Timestamp) -> Option<Timestamp> {
-        if let Some(newest) = self.newest {
-            if time <= newest {
-                return None;
-            }
+        if let Some(newest) = self.newest
+            && time > newest
+        {
             self.spacings.push_back(time.duration_since(newest));
             if self.spacings.len() > REMEMBERED {
                 self.spacings.pop_front();
             }
         }
+        self.broken_after_maintenance_by(time)
+    }
+
+    /// As [`Silence::broken_by`]; how long that took says nothing of the usual spacing.
+    pub(super) fn broken_after_maintenance_by(&mut self, time: Timestamp) -> Option<Timestamp> {
+        if self.newest.is_some_and(|newest| time <= newest) {
+            return None;
+        }
         let before = self.newest.replace(time);
         before.filter(|_| std::mem::take(&mut self.silent))
+    }
+
+    /// Notes a reading during maintenance: it ends no silence.
+    pub(super) fn goes_on(&mut self, time: Timestamp) {
+        if !self.silent {
+            self.newest = self.newest.max(Some(time));
+        }
+    }
+
+    /// When the last reading was.
+    pub(super) fn newest(&self) -> Option<Timestamp> {
+        self.newest
     }
 
     /// When silence becomes a fault; `None` while the usual spacing is unknown, or when it already is one.
@@ -53,11 +72,8 @@ impl Silence {
         self.newest.filter(|_| std::mem::take(&mut self.silent))
     }
 
-    /// The time of the last reading when `now` has reached the deadline; from then on it is silent.
-    pub(super) fn begins(&mut self, now: Timestamp) -> Option<Timestamp> {
-        if self.deadline().is_none_or(|deadline| now < deadline) {
-            return None;
-        }
+    /// It is silent from now on; the time of the last reading.
+    pub(super) fn begins(&mut self) -> Option<Timestamp> {
         self.silent = true;
         self.newest
     }

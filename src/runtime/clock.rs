@@ -4,8 +4,11 @@
     reason = "the one module that may read the clock"
 )]
 
-use jiff::Timestamp;
+use jiff::{SignedDuration, Timestamp};
 use std::time::{Duration, Instant};
+
+/// So far ahead of the wall clock a measurement may be: clocks differ, days do not.
+pub(crate) const TOLERANCE: SignedDuration = SignedDuration::from_hours(1);
 
 /// The wall clock's time.
 pub fn now() -> Timestamp {

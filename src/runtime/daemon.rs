@@ -40,9 +40,6 @@ pub(super) struct Daemon {
 
 /// The way to the hooks of `config`.
 pub(super) fn dispatcher(config: &Config, store: &Arc<Store>) -> Dispatcher {
-    for what in config.without_effect() {
-        tracing::warn!("{what}");
-    }
     sandbox::announce(&config.hooks);
     let delivered = Delivered::of(Arc::clone(store));
     Dispatcher::start(&config.hooks, &Retry::default(), delivered)

@@ -7,7 +7,6 @@ use super::clock;
 use super::delivered::Delivered;
 use super::hook::{self, Alert, Outcome};
 use super::in_hand::InHand;
-use crate::alert::Level;
 use crate::config::HookConfig;
 use crate::store::Fate;
 use std::collections::BTreeMap;
@@ -109,23 +108,23 @@ impl Dispatcher {
         }
     }
 
-    /// Hands `alert` to every hook that asks for its level, has not taken it before and does not
+    /// Hands `alert` to every hook that asks for it, has not taken it before and does not
     /// have it in hand. Never waits: what finds a queue full is not taken in hand, and said to be;
     /// `false` then.
     pub fn offer(&self, alert: &Alert) -> bool {
         self.supersede(alert);
         let mut is_taken = true;
         for way in &self.hooks {
-            if way.hook.levels.contains(&alert.level) {
+            if way.hook.asks_for(alert) {
                 is_taken &= self.offer_to(way, alert);
             }
         }
         is_taken
     }
 
-    /// The names of the hooks that ask for `level`.
-    pub(super) fn asking(&self, level: Level) -> Vec<String> {
-        let asks = |way: &&Way| way.hook.levels.contains(&level);
+    /// The names of the hooks that ask for such an alert.
+    pub(super) fn asking(&self, alert: &Alert) -> Vec<String> {
+        let asks = |way: &&Way| way.hook.asks_for(alert);
         self.hooks
             .iter()
             .filter(asks)
@@ -196,6 +195,11 @@ impl HookConfig {
     /// What logs and receipts call it: its command line.
     pub fn name(&self) -> String {
         self.run.join(" ")
+    }
+
+    /// Whether it is told of an alert of this level, at a benchmark or the whole site.
+    fn asks_for(&self, alert: &Alert) -> bool {
+        self.levels.contains(&alert.level) && self.site == alert.event.benchmark.is_none()
     }
 }
 

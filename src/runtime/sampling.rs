@@ -1,5 +1,6 @@
 //! How often the benchmarks of a site are measured, by what lies in its files now.
 
+use super::clock;
 use super::tail::Follower;
 use crate::config::Config;
 use crate::monitor::Input;
@@ -21,7 +22,7 @@ pub fn spacings(config: &Config) -> BTreeMap<BenchmarkId, SignedDuration> {
     let mut times: BTreeMap<BenchmarkId, BTreeSet<Timestamp>> = BTreeMap::new();
     let mut values = 0;
     loop {
-        let batch = follower.poll();
+        let batch = follower.poll(clock::now());
         values += batch.arrivals.len();
         for arrival in &batch.arrivals {
             if let Input::Reading { benchmark, .. } = &arrival.input {

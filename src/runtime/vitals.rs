@@ -97,6 +97,8 @@ impl Point {
             | EventKind::EffectFound { .. }
             | EventKind::EffectDropped { .. }
             | EventKind::Fault { .. }
+            | EventKind::Declared { .. }
+            | EventKind::Correction { .. }
             | EventKind::Order { .. }
             | EventKind::Summary(_) => {}
         }

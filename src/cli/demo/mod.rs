@@ -171,6 +171,7 @@ fn sample_hook(folder: &Path) -> anyhow::Result<HookConfig> {
         .and_then(|()| std::fs::set_permissions(&script, std::fs::Permissions::from_mode(0o755)))
         .with_context(|| format!("cannot write {}", script.display()))?;
     Ok(HookConfig {
+        site: false,
         run: vec![script.display().to_string(), TOLD.to_owned()],
         levels: vec![Level::Orange, Level::Red, Level::Unknown],
         timeout: Duration::from_secs(10),

@@ -99,6 +99,9 @@ impl Timeline {
             EventKind::Fault { kind, .. } => {
                 Some(format!("{}  {id:<8}   fault: {kind}", day(event.time)))
             }
+            EventKind::Declared { text, .. } | EventKind::Correction { text, .. } => {
+                Some(format!("{}  {text}", day(event.time)))
+            }
             EventKind::Order { .. } | EventKind::Summary(_) => None,
         }
     }
@@ -148,6 +151,8 @@ fn drift(id: &BenchmarkId, event: &Event) -> Option<String> {
         | EventKind::EffectDropped { .. }
         | EventKind::Alert { .. }
         | EventKind::Fault { .. }
+        | EventKind::Declared { .. }
+        | EventKind::Correction { .. }
         | EventKind::Order { .. }
         | EventKind::Summary(_) => return None,
     };

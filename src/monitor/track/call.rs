@@ -1,7 +1,7 @@
 //! From a refit to the level in force, and the words for it.
 
 use super::forecast::Forecast;
-use super::motion::{acceleration, moves_backwards, settled};
+use super::motion::{acceleration, displacement_mm, moves_backwards, newest_velocity, settled};
 use super::{Track, days};
 use crate::alert::{Cause, Entered, Evidence, Policy, Transition};
 use crate::fit::Rate;
@@ -41,6 +41,7 @@ impl Track {
             evidence.causes.push(Cause::MovesBackwards);
         }
         let transitions = self.latch.update(policy, &evidence);
+        self.levels.note(time, self.latch.level());
         let told = transitions
             .iter()
             .map(|change| self.alert_event(time, policy, &evidence, change));
@@ -61,16 +62,16 @@ impl Track {
 
     /// What the readings show by themselves.
     fn observed(&self, time: Timestamp, rates: &[Rate]) -> Evidence {
+        let shown = &self.history.observations;
         Evidence {
             now: time,
             chance_within_evacuation_time: None,
             chance_within_outlook: None,
-            velocity_mm_per_day: rates.last().map_or_else(
-                || self.history.newest_velocity(),
-                |rate| Some(rate.velocity),
-            ),
+            velocity_mm_per_day: rates
+                .last()
+                .map_or_else(|| newest_velocity(shown), |rate| Some(rate.velocity)),
             settled_velocity_mm_per_day: settled(rates),
-            displacement_mm: self.history.displacement_mm(),
+            displacement_mm: displacement_mm(shown),
             acceleration_mm_per_day2: acceleration(rates),
             causes: Vec::new(),
         }

@@ -2,7 +2,9 @@
 
 mod adopted;
 mod call;
+mod declared;
 mod forecast;
+mod lookback;
 mod motion;
 mod pace;
 mod refit;
@@ -10,6 +12,7 @@ mod watch;
 
 use super::Explain;
 use super::covariates::Covariates;
+use super::declared::Declarations;
 use super::drift::Drift;
 use super::event::{AlertState, Event, EventKind};
 use super::history::{History, Source, Taken};
@@ -21,9 +24,12 @@ use crate::regime::Tracker;
 use adopted::Adopted;
 use forecast::Forecast;
 use jiff::SignedDuration;
+use lookback::{Levels, Lookback};
 use pace::Pace;
 use serde::{Deserialize, Serialize};
 use watch::Watch;
+
+pub(super) use motion::settled;
 
 /// So many readings in a row with one value are a stuck sensor, or a resolution too coarse to tell.
 const STUCK: usize = 24;
@@ -56,11 +62,27 @@ pub(super) struct Track {
     watch: Watch,
     /// The fuller law that forecasts and levels go by.
     adopted: Option<Adopted>,
+    /// What people declare for it.
+    #[serde(default)]
+    declared: Declarations,
+    #[serde(default)]
+    levels: Levels,
+    /// What came late and is to be looked back on with the next newest reading.
+    #[serde(default)]
+    lookback: Option<Lookback>,
 }
 
 impl Track {
-    pub(super) fn new(benchmark: BenchmarkId, source: Source, epoch: Timestamp) -> Self {
+    pub(super) fn new(
+        benchmark: BenchmarkId,
+        source: Source,
+        epoch: Timestamp,
+        declared: Declarations,
+    ) -> Self {
         Self {
+            declared,
+            levels: Levels::default(),
+            lookback: None,
             benchmark,
             history: History::new(source, epoch),
             panel: Panel::default(),
@@ -84,7 +106,8 @@ impl Track {
     }
 
     pub(super) fn deadline(&self) -> Option<Timestamp> {
-        self.silence.deadline()
+        let (newest, due) = (self.silence.newest()?, self.silence.deadline()?);
+        Some(self.declared.put_off(newest, due))
     }
 
     /// Takes one reading.
@@ -95,8 +118,17 @@ impl Track {
         reading: &Reading,
         beside: &Beside<'_>,
     ) -> Vec<Event> {
+        let mut events = self.declared_with(reading.time);
+        if self.history.is_left_out(&self.declared, reading.time) {
+            events.extend(self.leave_out(source, reading));
+            return events;
+        }
+        // For the look back, which begins with the first that comes late.
+        let is_late = self.newest.is_some_and(|newest| reading.time <= newest);
+        let before =
+            (is_late && self.lookback.is_none()).then(|| self.history.observations.clone());
         let taken = self.history.take(source, reading);
-        let mut events: Vec<Event> = self.complaint(taken, reading.time).into_iter().collect();
+        events.extend(self.complaint(taken, reading.time));
         match taken {
             Taken::Known | Taken::OtherQuantity | Taken::OutOfRange(_) => return events,
             Taken::Newest => {
@@ -104,12 +136,13 @@ impl Track {
                 self.watch.count();
             }
             // What came late or was corrected is judged at once, as of the newest reading.
-            Taken::Late | Taken::Corrected(_) => {}
+            Taken::Late | Taken::Corrected(_) => self.note_late(reading.time, before),
         }
         let time = self.newest.unwrap_or(reading.time);
-        if let Some(since) = self.silence.broken_by(reading.time) {
-            let text = format!("benchmark {} reads again", self.benchmark);
-            events.push(self.unknown((time, since), AlertState::Resolved, text));
+        events.extend(self.reset(time));
+        events.extend(self.reads_again(time, reading.time));
+        if taken == Taken::Newest {
+            events.extend(self.look_back(policy, time));
         }
         if !self.is_refit_due(policy, taken, reading.time) {
             events.extend(self.raise(policy, time));
@@ -183,7 +216,10 @@ impl Track {
 
     /// Data time has come to `now` without a reading; `fault` is what the sensor gives instead.
     pub(super) fn pass(&mut self, now: Timestamp, fault: Option<&str>) -> Vec<Event> {
-        let Some(newest) = self.silence.begins(now) else {
+        if self.deadline().is_none_or(|deadline| now < deadline) {
+            return Vec::new();
+        }
+        let Some(newest) = self.silence.begins() else {
             return Vec::new();
         };
         let latched = match self.latch.level() {

@@ -1,6 +1,7 @@
 //! What the newest rates show by themselves.
 
-use crate::fit::Rate;
+use crate::fit::{Observations, Rate};
+use crate::reading::Quantity;
 
 /// The line goes through this share of the rates, newest last, and no fewer than [`FEWEST_IN_LINE`].
 const LINE_SHARE: f64 = 0.25;
@@ -31,7 +32,7 @@ pub(super) fn moves_backwards(rates: &[Rate]) -> bool {
 }
 
 /// The median of the latest rates, mm/day.
-pub(super) fn settled(rates: &[Rate]) -> Option<f64> {
+pub(in crate::monitor) fn settled(rates: &[Rate]) -> Option<f64> {
     let mut latest: Vec<f64> = rates
         .iter()
         .rev()
@@ -66,4 +67,26 @@ pub(super) fn acceleration(rates: &[Rate]) -> Option<f64> {
     };
     let span = newest.middle() - before.middle();
     (span > 0.0).then(|| (newest.velocity - before.velocity) / span)
+}
+
+/// Displacement since the first reading, mm, where displacement is what is measured.
+pub(super) fn displacement_mm(observations: &Observations) -> Option<f64> {
+    let [first, .., newest] = observations.values.as_slice() else {
+        return Some(0.0).filter(|_| observations.quantity == Quantity::Displacement);
+    };
+    (observations.quantity == Quantity::Displacement).then_some(newest.value - first.value)
+}
+
+/// The velocity that the newest readings show by themselves, mm/day.
+pub(super) fn newest_velocity(observations: &Observations) -> Option<f64> {
+    let values = &observations.values;
+    match observations.quantity {
+        Quantity::Velocity => values.last().map(|newest| newest.value),
+        Quantity::Displacement => {
+            let [.., before, newest] = values.as_slice() else {
+                return None;
+            };
+            Some((newest.value - before.value) / (newest.t_days - before.t_days))
+        }
+    }
 }

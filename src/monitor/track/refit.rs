@@ -50,6 +50,9 @@ impl Track {
     /// A reading that the law in force did not expect.
     fn surprise(&mut self, policy: &Policy, time: Timestamp, forecast: &Forecast) -> Option<Event> {
         let surprise_nats = forecast.surprise_nats()?;
+        if self.declared.is_shaken(time) {
+            return None;
+        }
         self.look_until(policy, time, Cause::UnexplainedResidual);
         let unexplained = Unexplained::Reading {
             surprise_nats,

@@ -90,7 +90,7 @@ impl Track {
         forecast: &Forecast,
         beside: &Beside<'_>,
     ) -> Option<Event> {
-        if !self.watch.is_due() {
+        if self.declared.is_shaken(time) || !self.watch.is_due() {
             return None;
         }
         let moves = measurably_moves(&forecast.plain.rates);

@@ -29,7 +29,8 @@ impl Site {
             if is_sent {
                 to_send.push(alert.clone());
             } else {
-                self.counts.long_past += 1;
+                // The whole site's repeats those of its benchmarks.
+                self.counts.long_past += u64::from(alert.event.benchmark.is_some());
                 if let Some(alerts) = &self.sinks.alerts {
                     alerts.supersede(&alert);
                 }
@@ -53,12 +54,12 @@ impl Site {
         recorded
     }
 
-    /// Puts an alert into the outbox, for each hook that asks for its level.
+    /// Puts an alert into the outbox, for each hook that asks for it.
     fn note(&mut self, alert: &Alert) -> Result<(), StoreError> {
         if self.sinks.store.is_some()
             && let Some(dispatcher) = &self.sinks.alerts
         {
-            for hook in dispatcher.asking(alert.level) {
+            for hook in dispatcher.asking(alert) {
                 self.batch.deliver(delivery(alert, &hook)?);
             }
         }
@@ -173,7 +174,8 @@ impl Site {
             {
                 to_send.push(one.alert.clone());
                 one.is_sent = true;
-                self.counts.long_past = self.counts.long_past.saturating_sub(1);
+                let counted = u64::from(one.alert.event.benchmark.is_some());
+                self.counts.long_past = self.counts.long_past.saturating_sub(counted);
             }
         }
         self.standing = standing;

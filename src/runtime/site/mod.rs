@@ -12,6 +12,7 @@ use mute::Mute;
 
 use crate::monitor::{Event, EventKind, Input, Monitor, Order, Settings};
 use crate::reading::{BenchmarkId, Timestamp};
+use crate::runtime::clock;
 use crate::runtime::deliver::Dispatcher;
 use crate::runtime::hook::{Alert, Status};
 use crate::runtime::searches::Searches;
@@ -25,8 +26,6 @@ use std::time::Duration;
 
 /// Ticks for one passage of time at most; a monitor that asks for more is broken.
 const MOST_TICKS: usize = 1_000_000;
-/// So far ahead of the wall clock a measurement may be: clocks differ, days do not.
-const CLOCK_TOLERANCE: SignedDuration = SignedDuration::from_hours(1);
 /// An alert younger than this is never long past.
 const LEAST_FRESHNESS: SignedDuration = SignedDuration::from_hours(1);
 /// A benchmark that gave a reading within this time is still watched, whatever its policy says.
@@ -132,7 +131,7 @@ impl Site {
     /// When the state cannot be asked whether the value is known.
     pub fn take(&mut self, arrival: &Arrival, wall: Timestamp) -> Result<Vec<Event>, StoreError> {
         let ahead = arrival.time.duration_since(wall);
-        if ahead > CLOCK_TOLERANCE {
+        if ahead > clock::TOLERANCE {
             self.counts.from_the_future += 1;
             let (time, total) = (arrival.time, self.counts.from_the_future);
             tracing::warn!(%time, ?arrival.input, total, "measured in the future: quarantined");

@@ -2,9 +2,11 @@
 
 use super::decode::{Arrival, Decoder};
 use super::file::{FileTail, Place};
+use super::reorder::Reorder;
 use crate::config::{Benchmark, FilePattern, Source};
 use crate::reading::Timestamp;
 use crate::store::Position;
+use jiff::SignedDuration;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -33,6 +35,8 @@ struct Followed {
     id: String,
     pattern: FilePattern,
     decoder: Arc<Decoder>,
+    /// Where values wait for earlier ones.
+    reorder: Option<Reorder>,
 }
 
 /// Every followed file, and which folders to look for more.
@@ -45,7 +49,7 @@ pub struct Follower {
     missing: BTreeSet<PathBuf>,
     quarantined_in_gone: u64,
     /// Positions that nobody needs any more.
-    gone: Vec<Position>,
+    gone: Vec<(usize, Position)>,
 }
 
 impl Follower {
@@ -55,6 +59,7 @@ impl Follower {
             id: source.id.clone(),
             pattern: source.pattern.clone(),
             decoder: Arc::new(Decoder::new(source, benchmarks)),
+            reorder: (source.reorder > SignedDuration::ZERO).then(|| Reorder::new(source.reorder)),
         };
         let sources: Vec<Followed> = sources.iter().map(of).collect();
         let files = saved
@@ -84,8 +89,9 @@ impl Follower {
 
     /// Reads the next values. What the files held when a round began is merged by time over all
     /// files before the next round looks at them again: years of history in many files arrive as
-    /// if they had come in live.
-    pub fn poll(&mut self) -> Batch {
+    /// if they had come in live. Values of a source that waits for earlier ones go out when they have waited for long
+    /// enough, also by the wall clock's time, `wall`.
+    pub fn poll(&mut self, wall: Timestamp) -> Batch {
         if self.heads.is_empty() {
             self.rescan();
             for (key, file) in &mut self.files {
@@ -94,30 +100,66 @@ impl Follower {
                     .extend(file.pending.front().map(|head| (head.time, key.clone())));
             }
         }
-        let mut positions = std::mem::take(&mut self.gone);
-        let mut arrivals = Vec::new();
-        while arrivals.len() < BATCH
+        let (mut direct, mut read) = (Vec::new(), 0);
+        while read < BATCH
             && let Some((_, key)) = self.heads.pop_first()
         {
             let Some(file) = self.files.get_mut(&key) else {
                 continue;
             };
-            arrivals.extend(file.pending.pop_front());
+            read += 1;
+            match (&mut self.sources[key.0].reorder, file.pending.pop_front()) {
+                (Some(reorder), Some(arrival)) => reorder.take(arrival, wall),
+                (None, arrival) => direct.extend(arrival),
+                (Some(_), None) => {}
+            }
             file.refill();
             self.heads
                 .extend(file.pending.front().map(|head| (head.time, key)));
         }
-        for ((source, path), file) in &mut self.files {
-            positions.extend(file.moved().map(|body| Position {
-                name: name(&self.sources[*source].id, path),
-                body: Some(body),
-            }));
-        }
+        let mut arrivals = self.release(wall);
+        arrivals.extend(direct);
+        let is_due = |source: &Followed| source.reorder.as_ref().is_some_and(Reorder::is_due);
         Batch {
-            positions,
-            caught_up: self.heads.is_empty(),
+            positions: self.positions(),
+            caught_up: self.heads.is_empty() && !self.sources.iter().any(is_due),
             arrivals,
         }
+    }
+
+    /// What has waited for long enough.
+    fn release(&mut self, wall: Timestamp) -> Vec<Arrival> {
+        let mut arrivals = Vec::new();
+        for source in &mut self.sources {
+            if let Some(reorder) = &mut source.reorder {
+                arrivals.extend(reorder.release(wall, BATCH));
+            }
+        }
+        arrivals.sort_by_key(|arrival| arrival.time);
+        arrivals
+    }
+
+    /// What has changed of how far the files may be acknowledged: not past what still waits.
+    fn positions(&mut self) -> Vec<Position> {
+        let mut positions = std::mem::take(&mut self.gone);
+        for ((source, path), file) in &mut self.files {
+            let moved = file.moved().map(|body| Position {
+                name: name(&self.sources[*source].id, path),
+                body: Some(body),
+            });
+            positions.extend(moved.map(|position| (*source, position)));
+        }
+        let mut free = Vec::new();
+        for (source, position) in positions {
+            match &mut self.sources[source].reorder {
+                Some(reorder) => reorder.note(position),
+                None => free.push(position),
+            }
+        }
+        let reorders = self.sources.iter_mut();
+        let reorders = reorders.filter_map(|source| source.reorder.as_mut());
+        free.extend(reorders.flat_map(Reorder::positions));
+        free
     }
 
     /// Looks for files that have come or gone.
@@ -138,7 +180,7 @@ impl Follower {
                 continue;
             };
             let name = name(&self.sources[key.0].id, &key.1);
-            self.gone.push(Position { name, body: None });
+            self.gone.push((key.0, Position { name, body: None }));
             let moved = file.leave().map(|path| (key.0, path));
             if let Some(moved) = moved.filter(|moved| !present.contains_key(moved)) {
                 tracing::info!(file = %key.1.display(), now = %moved.1.display(), "renamed");

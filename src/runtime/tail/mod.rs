@@ -4,14 +4,15 @@
 //! asynchronous shell that asks: when a watched folder changes, and every two seconds in any case,
 //! because a watch can be lost, overflow, or never work on a network's file system.
 //!
-//! There are no saved offsets: a follower reads every file from its start, and whoever takes the
-//! values drops what it has seen.
+//! A follower goes on from the positions that it told before and that were kept together with the values before
+//! them; whoever takes the values drops what it has seen.
 
 mod decode;
 mod file;
 mod follow;
 pub mod lines;
 pub mod records;
+mod reorder;
 mod saved;
 mod text;
 
@@ -57,7 +58,7 @@ pub async fn follow(
         let looking = Stopwatch::start();
         let batch;
         (follower, batch) = tokio::task::spawn_blocking(move || {
-            let batch = follower.poll();
+            let batch = follower.poll(clock::now());
             (follower, batch)
         })
         .await?;

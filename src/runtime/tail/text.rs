@@ -113,7 +113,9 @@ pub(super) struct SavedText {
 fn order(item: &Item) -> (bool, &str) {
     match item {
         Item::Sample { channel, .. } => (false, channel),
-        Item::Reading { benchmark, .. } | Item::Missing { benchmark, .. } => (true, benchmark.as_str()),
+        Item::Reading { benchmark, .. } | Item::Missing { benchmark, .. } => {
+            (true, benchmark.as_str())
+        }
     }
 }
 

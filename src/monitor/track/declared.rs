@@ -1,0 +1,93 @@
+//! What people declare, as it acts on one benchmark.
+
+use super::{Beside, Track};
+use crate::alert::Policy;
+use crate::monitor::declared::Declarations;
+use crate::monitor::event::{AlertState, Event};
+use crate::monitor::history::Source;
+use crate::reading::{Reading, Timestamp};
+
+impl Track {
+    /// What takes effect with the reading of `time`.
+    pub(super) fn declared_with(&mut self, time: Timestamp) -> Vec<Event> {
+        let before = self.silence.newest();
+        let told = self.declared.tell(before, time);
+        let now = self.newest.map_or(time, |newest| newest.max(time));
+        told.iter()
+            .map(|one| one.event(now, &self.benchmark, None))
+            .collect()
+    }
+
+    /// Keeps a reading that is not to count: one during maintenance, or a velocity that is a mean over a reset.
+    pub(super) fn leave_out(&mut self, source: Source, reading: &Reading) -> Vec<Event> {
+        if !self.history.set_aside(source, reading) {
+            return Vec::new();
+        }
+        if self.declared.is_maintained(reading.time) {
+            self.silence.goes_on(reading.time);
+            return Vec::new();
+        }
+        let now = self
+            .newest
+            .map_or(reading.time, |newest| newest.max(reading.time));
+        let (from, to) = self.history.span(reading.time);
+        let told = self.declared.tell_reset(from, to);
+        let mut events: Vec<Event> = told
+            .iter()
+            .map(|one| one.event(now, &self.benchmark, None))
+            .collect();
+        events.extend(self.reads_again(now, reading.time));
+        events
+    }
+
+    /// Takes what the readings jump by at declared resets off them.
+    pub(super) fn reset(&mut self, now: Timestamp) -> Vec<Event> {
+        let mut events = Vec::new();
+        for (time, jump) in self.history.reset(&self.declared) {
+            let told = self.declared.tell_reset(time, time);
+            let told = told
+                .iter()
+                .map(|one| one.event(now, &self.benchmark, Some(jump)));
+            events.extend(told);
+        }
+        events
+    }
+
+    /// The end of a silence, where the reading of `time` is one.
+    pub(super) fn reads_again(&mut self, now: Timestamp, time: Timestamp) -> Option<Event> {
+        let maintained = (self.silence.newest())
+            .is_some_and(|newest| self.declared.is_maintained_between(newest, time));
+        let since = if maintained {
+            self.silence.broken_after_maintenance_by(time)
+        } else {
+            self.silence.broken_by(time)
+        }?;
+        let text = format!("benchmark {} reads again", self.benchmark);
+        Some(self.unknown((now, since), AlertState::Resolved, text))
+    }
+
+    /// Goes by other declarations from here on, and looks anew at the readings that it has where they concern some.
+    pub(in crate::monitor) fn redeclare(
+        &mut self,
+        policy: &Policy,
+        declared: Declarations,
+        beside: &Beside<'_>,
+    ) -> Vec<Event> {
+        if self.declared.replace(declared).is_none() {
+            return Vec::new();
+        }
+        let is_sorted_out = self.history.sort_out(&self.declared);
+        let Some(time) = self.newest else {
+            return Vec::new();
+        };
+        let mut events = self.reset(time);
+        if !is_sorted_out && events.is_empty() {
+            return events;
+        }
+        if let Some(forecast) = self.forecast(policy.critical_velocity_mm_per_day, beside) {
+            events.extend(self.refit(policy, time, &forecast));
+            events.extend(self.alert(policy, time, Some(&forecast)));
+        }
+        events
+    }
+}

@@ -1,0 +1,151 @@
+//! Looking back after late readings: would another level have been called?
+
+use super::motion::{acceleration, displacement_mm, newest_velocity, settled};
+use super::{Track, days};
+use crate::alert::{Evidence, Latch, Level, Policy};
+use crate::fit::Observations;
+use crate::forecast::Panel;
+use crate::monitor::event::{Event, EventKind};
+use crate::monitor::history::History;
+use crate::reading::Timestamp;
+use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
+
+/// Forecasts of one look back, over the readings as they were and as they are.
+const MOST_FORECASTS: usize = 64;
+/// Changes of level that are remembered.
+const MOST_LEVELS: usize = 64;
+
+/// Which levels were in force, and from when on.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub(super) struct Levels {
+    changes: VecDeque<(Timestamp, Level)>,
+}
+
+impl Levels {
+    /// This level is in force at `time`.
+    pub(super) fn note(&mut self, time: Timestamp, level: Level) {
+        let last = self.changes.back().map_or(Level::Green, |(_, last)| *last);
+        if level != last {
+            self.changes.push_back((time, level));
+        }
+        if self.changes.len() > MOST_LEVELS {
+            self.changes.pop_front();
+        }
+    }
+
+    /// The highest level in force at `since` or later.
+    fn highest_since(&self, since: Timestamp) -> Level {
+        let at = self.changes.partition_point(|(time, _)| *time <= since);
+        let from = at.saturating_sub(1);
+        let from = self.changes.iter().skip(from).map(|(_, level)| *level);
+        from.max().unwrap_or(Level::Green)
+    }
+}
+
+/// What came late since the last newest reading.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Lookback {
+    /// The earliest of it.
+    since: Timestamp,
+    /// The readings before any of it came.
+    before: Observations,
+    /// As they were before any of it came.
+    levels: Levels,
+}
+
+impl Track {
+    /// A reading of `time` came late, or was corrected; `before` are the readings without it, where it is the first.
+    pub(super) fn note_late(&mut self, time: Timestamp, before: Option<Observations>) {
+        if let Some(lookback) = &mut self.lookback {
+            lookback.since = lookback.since.min(time);
+        } else if let Some(before) = before {
+            self.lookback = Some(Lookback {
+                since: time,
+                before,
+                levels: self.levels.clone(),
+            });
+        }
+    }
+
+    /// Whether the level in force would have been another one, had everything come in time.
+    ///
+    /// The same rules go over the readings as they were known and as they are now, each by a scratch latch: what
+    /// these leave out (an adopted effect, a regime's flip) is left out of both, and makes no difference.
+    pub(super) fn look_back(&mut self, policy: &Policy, time: Timestamp) -> Option<Event> {
+        let Lookback {
+            since,
+            before,
+            levels,
+        } = self.lookback.take()?;
+        let level_then = levels.highest_since(since);
+        let known_then = highest(policy, &self.history, &before, since);
+        // Without the newest reading: that is judged by itself.
+        let mut now = self.history.observations.clone();
+        let newest = before.values.last()?.t_days;
+        now.values.retain(|one| one.t_days <= newest);
+        let level_now = highest(policy, &self.history, &now, since);
+        if level_now == known_then || level_now == level_then {
+            return None;
+        }
+        let text = format!(
+            "benchmark {}: with the readings since {since} that came late or were corrected, {level_now} would have \
+             been called; {level_then} was in force",
+            self.benchmark
+        );
+        let kind = EventKind::Correction {
+            since,
+            level_then,
+            level_now,
+            text,
+        };
+        Some(self.event(time, kind))
+    }
+}
+
+/// The highest level that forecasts after readings from `since` on would have called.
+fn highest(
+    policy: &Policy,
+    history: &History,
+    observations: &Observations,
+    since: Timestamp,
+) -> Level {
+    let values = &observations.values;
+    let since = history.days(since);
+    let first = values.partition_point(|one| one.t_days < since);
+    let all: Vec<usize> = (first..values.len()).collect();
+    let every = all.len().div_ceil(MOST_FORECASTS).max(1);
+    let mut latch = Latch::default();
+    let mut highest = Level::Green;
+    // Counted from the newest on, which has the most to say.
+    for index in all.iter().rev().step_by(every).rev() {
+        let known = Observations {
+            values: values[..=*index].to_vec(),
+            ..observations.clone()
+        };
+        let Some(now) = history.time(values[*index].t_days) else {
+            continue;
+        };
+        latch.update(policy, &evidence(policy, &known, now));
+        highest = highest.max(latch.level());
+    }
+    highest
+}
+
+fn evidence(policy: &Policy, observations: &Observations, now: Timestamp) -> Evidence {
+    let outlook = Panel::default().update(observations, policy.critical_velocity_mm_per_day);
+    let rates = outlook.as_ref().map_or(&[][..], |outlook| &outlook.rates);
+    let within = |span| Some(outlook.as_ref()?.passage.chance_within(days(span)));
+    Evidence {
+        now,
+        chance_within_evacuation_time: within(policy.evacuation_time),
+        chance_within_outlook: within(policy.outlook),
+        velocity_mm_per_day: rates
+            .last()
+            .map_or_else(|| newest_velocity(observations), |rate| Some(rate.velocity)),
+        settled_velocity_mm_per_day: settled(rates),
+        displacement_mm: displacement_mm(observations),
+        acceleration_mm_per_day2: acceleration(rates),
+        causes: Vec::new(),
+    }
+}

@@ -1,0 +1,138 @@
+//! A source's values wait for earlier ones, for a bounded time, and go out in the order of their measurement.
+
+use super::decode::Arrival;
+use crate::reading::Timestamp;
+use crate::runtime::clock;
+use crate::store::Position;
+use jiff::SignedDuration;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+
+/// Values that one source may hold; beyond, the oldest goes out.
+const MOST_HELD: usize = 100_000;
+/// Positions that wait; beyond, of each file only the newest is left.
+const MOST_POSITIONS: usize = 1024;
+
+/// By time, and where that is the same in the order in which they came.
+type Key = (Timestamp, u64);
+
+/// The values of one source that wait.
+#[derive(Debug)]
+pub(super) struct Reorder {
+    window: SignedDuration,
+    /// How many have come.
+    came: u64,
+    held: BTreeMap<Key, Arrival>,
+    /// The numbers of the held.
+    numbers: BTreeSet<u64>,
+    /// When the held ones came, and some that have gone out, in that order.
+    arrivals: VecDeque<(Timestamp, Key)>,
+    /// The newest time measured, as far as it is not ahead of the wall clock.
+    newest: Option<Timestamp>,
+    /// Everything up to here is to go out.
+    due: Option<Key>,
+    /// Each may be acknowledged once everything below its number has gone out.
+    positions: VecDeque<(u64, Position)>,
+}
+
+impl Reorder {
+    /// Values wait for `window`.
+    pub(super) fn new(window: SignedDuration) -> Self {
+        Self {
+            window,
+            came: 0,
+            held: BTreeMap::new(),
+            numbers: BTreeSet::new(),
+            arrivals: VecDeque::new(),
+            newest: None,
+            due: None,
+            positions: VecDeque::new(),
+        }
+    }
+
+    /// Holds a value that came at `wall`.
+    pub(super) fn take(&mut self, arrival: Arrival, wall: Timestamp) {
+        let key = (arrival.time, self.came);
+        self.came += 1;
+        // A clock that is wrong by years must not send everything out that waits.
+        if arrival.time.duration_since(wall) <= clock::TOLERANCE {
+            self.newest = self.newest.max(Some(arrival.time));
+        }
+        self.numbers.insert(key.1);
+        self.arrivals.push_back((wall, key));
+        self.held.insert(key, arrival);
+        if self.held.len() > MOST_HELD {
+            self.due = self.due.max(self.held.keys().next().copied());
+        }
+    }
+
+    /// A file has been read so far; what that means may be acknowledged when all that has come by now has gone out.
+    pub(super) fn note(&mut self, position: Position) {
+        self.positions.push_back((self.came, position));
+        if self.positions.len() > MOST_POSITIONS {
+            let mut seen = BTreeSet::new();
+            let mut kept: Vec<(u64, Position)> = Vec::new();
+            for one in self.positions.drain(..).rev() {
+                if seen.insert(one.1.name.clone()) {
+                    kept.push(one);
+                }
+            }
+            self.positions.extend(kept.into_iter().rev());
+        }
+    }
+
+    /// The values that need not wait any longer at `wall`, in the order of their measurement, `most` of them.
+    pub(super) fn release(&mut self, wall: Timestamp, most: usize) -> Vec<Arrival> {
+        if let Some(until) = self
+            .newest
+            .and_then(|newest| newest.checked_sub(self.window).ok())
+        {
+            self.due = self.due.max(Some((until, u64::MAX)));
+        }
+        while let Some((came, key)) = self.arrivals.front().copied() {
+            // Whether the wall clock was set back in between nobody knows: then it counts from now on.
+            let waited = wall.duration_since(came);
+            if waited < SignedDuration::ZERO {
+                for (came, _) in &mut self.arrivals {
+                    *came = wall.min(*came);
+                }
+            }
+            if waited < self.window && self.held.contains_key(&key) {
+                break;
+            }
+            if waited >= self.window {
+                self.due = self.due.max(Some(key));
+            }
+            self.arrivals.pop_front();
+        }
+        let mut out = Vec::new();
+        while out.len() < most && self.is_due() {
+            let Some((key, arrival)) = self.held.pop_first() else {
+                break;
+            };
+            self.numbers.remove(&key.1);
+            out.push(arrival);
+        }
+        if !self.is_due() {
+            self.due = None;
+        }
+        out
+    }
+
+    /// Whether there is more that need not wait.
+    pub(super) fn is_due(&self) -> bool {
+        let first = self.held.keys().next();
+        first.is_some_and(|first| Some(*first) <= self.due)
+    }
+
+    /// How far files may be acknowledged.
+    pub(super) fn positions(&mut self) -> Vec<Position> {
+        let reached = self.numbers.first().copied().unwrap_or(self.came);
+        let many = self
+            .positions
+            .partition_point(|(number, _)| *number <= reached);
+        self.positions
+            .drain(..many)
+            .map(|(_, position)| position)
+            .collect()
+    }
+}

@@ -1,0 +1,112 @@
+//! One level for the whole site, from those of its benchmarks.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::wildcard_enum_match_arm,
+    reason = "a helper that fails is a test that fails; a test looks for the kinds it names"
+)]
+
+use jiff::ToSpan;
+use slipwatch::alert::{Level, Policy, Threshold};
+use slipwatch::monitor::{AlertState, Event, EventKind, Input, Monitor, Settings, SiteLevel};
+use slipwatch::reading::{BenchmarkId, Reading, Timestamp, Unit};
+use std::collections::BTreeSet;
+
+fn start() -> Timestamp {
+    "2020-01-01T00:00:00Z".parse().unwrap()
+}
+
+/// The benchmarks are called by their displacement alone: orange from 10 mm on, red from 20 mm on.
+fn settings(site: Option<SiteLevel>) -> Settings {
+    let threshold = |level, mm| Threshold {
+        level,
+        velocity_mm_per_day: None,
+        displacement_mm: Some(mm),
+        acceleration_mm_per_day2: None,
+    };
+    Settings {
+        policy: Policy {
+            thresholds: vec![threshold(Level::Orange, 10.0), threshold(Level::Red, 20.0)],
+            ..Policy::default()
+        },
+        site,
+        ..Settings::default()
+    }
+}
+
+fn read(monitor: &mut Monitor, benchmark: &str, hour: i64, value: f64) -> Vec<Event> {
+    let time = start() + hour.hours();
+    let input = Input::Reading {
+        benchmark: BenchmarkId::new(benchmark),
+        unit: Unit::MM,
+        averaging: None,
+        reading: Reading {
+            time,
+            value,
+            sigma: None,
+        },
+    };
+    monitor.step(time, &input)
+}
+
+fn of_the_site(events: &[Event]) -> Vec<(Level, AlertState, String)> {
+    let one = |event: &Event| match &event.kind {
+        EventKind::Alert {
+            level, state, key, ..
+        } if event.benchmark.is_none() => Some((*level, *state, key.clone())),
+        _ => None,
+    };
+    events.iter().filter_map(one).collect()
+}
+
+fn begin(site: Option<SiteLevel>) -> Monitor {
+    let mut monitor = Monitor::new(settings(site));
+    for id in ["a", "b", "c"] {
+        assert!(of_the_site(&read(&mut monitor, id, 0, 0.0)).is_empty());
+    }
+    monitor
+}
+
+#[test]
+fn the_worst_benchmark_makes_the_site() {
+    let mut monitor = begin(Some(SiteLevel::Worst));
+    let said = of_the_site(&read(&mut monitor, "a", 1, 12.0));
+    let key = format!("site/orange/{}", start() + 1.hour());
+    assert_eq!(said, [(Level::Orange, AlertState::Firing, key)]);
+    assert!(of_the_site(&read(&mut monitor, "b", 2, 12.0)).is_empty());
+    let said = of_the_site(&read(&mut monitor, "c", 3, 30.0));
+    assert_eq!((said[0].0, said[0].1), (Level::Red, AlertState::Firing));
+    let EventKind::Summary(summary) = monitor.summary().unwrap().kind else {
+        panic!("no summary");
+    };
+    assert_eq!(summary.alerts, 3, "the site's own are not counted again");
+}
+
+#[test]
+fn two_of_three_make_the_site_and_one_that_is_removed_no_longer_does() {
+    let mut monitor = begin(Some(SiteLevel::AtLeast(2)));
+    assert!(of_the_site(&read(&mut monitor, "a", 1, 30.0)).is_empty());
+    let said = of_the_site(&read(&mut monitor, "b", 2, 12.0));
+    assert_eq!((said[0].0, said[0].1), (Level::Orange, AlertState::Firing));
+    let mut restarted = Monitor::restore(&monitor.save().unwrap()).unwrap();
+    let watched: BTreeSet<BenchmarkId> = ["a", "c"].map(BenchmarkId::new).into();
+    let without = Settings {
+        watched: Some(watched),
+        ..settings(Some(SiteLevel::AtLeast(2)))
+    };
+    let input = Input::Settings(Box::new(without));
+    let told = monitor.step(start() + 3.hours(), &input);
+    let said = of_the_site(&told);
+    assert_eq!(said.len(), 1);
+    assert_eq!(
+        (said[0].0, said[0].1),
+        (Level::Orange, AlertState::Resolved)
+    );
+    assert_eq!(restarted.step(start() + 3.hours(), &input), told);
+}
+
+#[test]
+fn without_a_rule_the_site_has_no_level() {
+    let mut monitor = begin(None);
+    assert!(of_the_site(&read(&mut monitor, "a", 1, 30.0)).is_empty());
+}
