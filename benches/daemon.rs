@@ -243,7 +243,7 @@ fn catch_up(what: &str, benchmarks: usize, each: usize, seconds: i64) {
         let mut follower = Follower::new(&config.sources, &config.benchmarks, &[]);
         let mut batch = Batch::default();
         loop {
-            let found = follower.poll();
+            let found = follower.poll(slipwatch::runtime::clock::now());
             if let Some(store) = store {
                 for arrival in &found.arrivals {
                     batch.step(arrival.time, &arrival.input, &[]);

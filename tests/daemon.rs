@@ -235,6 +235,7 @@ async fn a_value_counts_once_a_correction_counts_and_the_future_never() {
         taken: 2,
         repeated: 2,
         from_the_future: 1,
+        without_clock: 0,
         long_past: 0,
     };
     assert_eq!(site.counts(), expected);

@@ -167,6 +167,7 @@ fn values(delivery: &Delivery) -> Vec<f64> {
         Input::Reading { reading, .. } => reading.value,
         Input::Sample { .. }
         | Input::Missing { .. }
+        | Input::Trouble { .. }
         | Input::Settings(_)
         | Input::Order(_)
         | Input::Found(_)

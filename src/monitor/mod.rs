@@ -57,6 +57,13 @@ pub enum Input {
         /// What the sensor gave instead.
         what: String,
     },
+    /// What went wrong on the way from the sensors: which readings it concerns is not known.
+    Trouble {
+        /// The fault's kind, such as `possible-gap`.
+        kind: String,
+        /// One line for a person.
+        text: String,
+    },
     /// A value of a covariate.
     Sample {
         /// The channel's full name.
@@ -181,6 +188,7 @@ impl Monitor {
             }
             Input::Settings(settings) => self.resettle(now, settings),
             Input::Order(order) => vec![order.event(now)],
+            Input::Trouble { kind, text } => vec![trouble(now, kind, text)],
             Input::Tick => self.pass(now),
         };
         let is_called = |event: &Event| matches!(event.kind, EventKind::Alert { .. });
@@ -356,5 +364,14 @@ impl Monitor {
             benchmark: None,
             kind: EventKind::Summary(self.summary),
         })
+    }
+}
+
+fn trouble(time: Timestamp, kind: &str, text: &str) -> Event {
+    let (kind, text) = (kind.to_owned(), text.to_owned());
+    Event {
+        time,
+        benchmark: None,
+        kind: EventKind::Fault { kind, text },
     }
 }

@@ -147,6 +147,7 @@ impl Daemon {
             Input::Reading { .. }
             | Input::Sample { .. }
             | Input::Missing { .. }
+            | Input::Trouble { .. }
             | Input::Settings(_)
             | Input::Order(_)
             | Input::Tick
@@ -234,6 +235,10 @@ impl Daemon {
         self.sources.stop();
         while let Some(batch) = self.sources.batches.recv().await {
             tokio::task::block_in_place(|| self.take_batch(batch, shutdown))?;
+            // Cut short half-way: what lies behind must not move the files' positions beyond it.
+            if shutdown.is_requested() {
+                return Ok(());
+            }
         }
         let events = self.site.resettle(fresh.settings.clone());
         self.pulse.vitals.note(&events);

@@ -27,6 +27,9 @@ const OUTPUT_GRACE: Duration = Duration::from_millis(200);
 /// After the kill: how long the kernel may take to report the end.
 const KILL_GRACE: Duration = Duration::from_secs(5);
 
+/// The rule of an alert that tells of many benchmarks at once.
+pub(super) const FLOOD: &str = "flood";
+
 /// Whether a message means what it says; CAP 1.2's words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Status {
@@ -99,6 +102,11 @@ impl Alert {
             Level::Orange | Level::Red | Level::Unknown => self.state == AlertState::Firing,
             Level::Green | Level::Yellow => false,
         }
+    }
+
+    /// Whether it tells of many benchmarks at once, each of which it stands for.
+    pub fn is_flood(&self) -> bool {
+        matches!(&self.event.kind, EventKind::Alert { rule, .. } if rule == FLOOD)
     }
 
     fn variables(&self, attempt: u32) -> [(&'static str, String); 10] {

@@ -13,6 +13,8 @@ type Token = (String, Level, &'static str);
 struct Entry {
     benchmark: Option<BenchmarkId>,
     state: AlertState,
+    /// No other alert tells what it tells.
+    stands_alone: bool,
     /// Superseded, or resolved: not worth another attempt.
     is_over: bool,
 }
@@ -31,6 +33,7 @@ impl InHand {
         let entry = Entry {
             benchmark: alert.event.benchmark.clone(),
             state: alert.state,
+            stands_alone: alert.is_flood(),
             is_over: false,
         };
         self.0.insert(token, entry);
@@ -56,7 +59,10 @@ impl InHand {
     /// itself and the lower ones; `unknown` stands for itself.
     pub(super) fn supersede(&mut self, alert: &Alert) {
         let own = token(alert);
-        for (token, entry) in &mut self.0 {
+        if alert.is_flood() {
+            return;
+        }
+        for (token, entry) in self.0.iter_mut().filter(|(_, entry)| !entry.stands_alone) {
             let same_place = entry.benchmark == alert.event.benchmark
                 && (token.1 == Level::Unknown) == (alert.level == Level::Unknown);
             // An end does not make an earlier end untrue; a new beginning does.

@@ -245,6 +245,7 @@ mod tests {
             Input::Reading { benchmark, .. } => benchmark.as_str().to_owned(),
             Input::Sample { channel, .. } => channel.clone(),
             Input::Missing { .. }
+            | Input::Trouble { .. }
             | Input::Settings(_)
             | Input::Order(_)
             | Input::Found(_)

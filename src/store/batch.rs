@@ -1,5 +1,6 @@
 //! One commit: the steps, what follows from them, and how far the files have been read.
 
+use super::outbox::{Fate, WAITING};
 use super::series::{self, Series};
 use super::{Inner, Store, StoreError, nanoseconds};
 use crate::monitor::{Event, Input, Part};
@@ -28,6 +29,8 @@ pub struct Batch {
     positions: BTreeMap<String, Option<Vec<u8>>>,
     memory: Option<Vec<Part>>,
     outbox: Vec<super::Delivery>,
+    /// What a hook is told by another alert.
+    told: Vec<super::Delivery>,
     commands: Vec<i64>,
 }
 
@@ -63,6 +66,11 @@ impl Batch {
         self.outbox.push(delivery);
     }
 
+    /// Notes that a hook is told of this by another alert.
+    pub fn tell_together(&mut self, delivery: super::Delivery) {
+        self.told.push(delivery);
+    }
+
     /// Notes that a command has been taken.
     pub fn taken(&mut self, command: i64) {
         self.commands.push(command);
@@ -80,6 +88,7 @@ impl Batch {
             && self.positions.is_empty()
             && self.memory.is_none()
             && self.outbox.is_empty()
+            && self.told.is_empty()
             && self.commands.is_empty()
     }
 
@@ -95,16 +104,58 @@ impl Store {
     /// # Errors
     /// [`StoreError`]; where [`StoreError::is_full`], the same batch may be tried again.
     pub fn commit(&self, batch: &Batch) -> Result<(), StoreError> {
+        let mut inner = self.inner();
+        inner.trusted()?;
         if batch.is_empty() {
             return Ok(());
         }
-        let mut inner = self.inner();
-        let Inner {
+        let written = inner.write(batch);
+        inner.committed(batch.steps.len() + batch.events.len(), written)
+    }
+
+    /// Whether the value has been taken before: in `batch`, or in what is written.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn has(&self, batch: &Batch, input: &Input) -> Result<bool, StoreError> {
+        let (Some(series), Some((time, value))) = (Series::of(input), value(input)) else {
+            return Ok(false);
+        };
+        if let Some(known) = batch.known(&series, time) {
+            return Ok(known.to_bits() == value.to_bits());
+        }
+        let inner = self.inner();
+        let factor = match &series {
+            Series::Benchmark(_, unit, _) => unit.factor(),
+            Series::Channel(..) => 1.0,
+        };
+        let mut newest: Option<(i64, f64)> = None;
+        for (number, own) in inner.catalogue.alike(&series) {
+            let mut query = inner.connection.prepare_cached(
+                "SELECT seq, value FROM step WHERE series = ?1 AND time = ?2 ORDER BY seq DESC LIMIT 1",
+            )?;
+            let mut rows = query.query(params![number, nanoseconds(time)?])?;
+            if let Some(row) = rows.next()? {
+                let (seq, value): (i64, f64) = (row.get(0)?, row.get(1)?);
+                if newest.is_none_or(|(before, _)| seq > before) {
+                    newest = Some((seq, value * own));
+                }
+            }
+        }
+        Ok(newest.is_some_and(|(_, known)| known.to_bits() == (value * factor).to_bits()))
+    }
+}
+
+impl Inner {
+    /// All of the batch in one transaction.
+    fn write(&mut self, batch: &Batch) -> Result<(), StoreError> {
+        let Self {
             connection,
             catalogue,
             steps,
             events,
-        } = &mut *inner;
+            ..
+        } = self;
         let transaction =
             connection.transaction_with_behavior(rusqlite::TransactionBehavior::Immediate)?;
         let mut fresh: BTreeMap<Series, i64> = BTreeMap::new();
@@ -150,7 +201,10 @@ impl Store {
             write_memory(&transaction, parts, last_step)?;
         }
         for delivery in &batch.outbox {
-            delivery.insert(&transaction)?;
+            delivery.insert(&transaction, WAITING)?;
+        }
+        for delivery in &batch.told {
+            delivery.insert(&transaction, Fate::Over.name())?;
         }
         for command in &batch.commands {
             transaction.execute("DELETE FROM command WHERE id = ?1", [command])?;
@@ -162,38 +216,6 @@ impl Store {
         }
         Ok(())
     }
-
-    /// Whether the value has been taken before: in `batch`, or in what is written.
-    ///
-    /// # Errors
-    /// [`StoreError`].
-    pub fn has(&self, batch: &Batch, input: &Input) -> Result<bool, StoreError> {
-        let (Some(series), Some((time, value))) = (Series::of(input), value(input)) else {
-            return Ok(false);
-        };
-        if let Some(known) = batch.known(&series, time) {
-            return Ok(known.to_bits() == value.to_bits());
-        }
-        let inner = self.inner();
-        let factor = match &series {
-            Series::Benchmark(_, unit, _) => unit.factor(),
-            Series::Channel(..) => 1.0,
-        };
-        let mut newest: Option<(i64, f64)> = None;
-        for (number, own) in inner.catalogue.alike(&series) {
-            let mut query = inner.connection.prepare_cached(
-                "SELECT seq, value FROM step WHERE series = ?1 AND time = ?2 ORDER BY seq DESC LIMIT 1",
-            )?;
-            let mut rows = query.query(params![number, nanoseconds(time)?])?;
-            if let Some(row) = rows.next()? {
-                let (seq, value): (i64, f64) = (row.get(0)?, row.get(1)?);
-                if newest.is_none_or(|(before, _)| seq > before) {
-                    newest = Some((seq, value * own));
-                }
-            }
-        }
-        Ok(newest.is_some_and(|(_, known)| known.to_bits() == (value * factor).to_bits()))
-    }
 }
 
 /// When a value was measured, and what it is.
@@ -202,6 +224,7 @@ fn value(input: &Input) -> Option<(Timestamp, f64)> {
         Input::Reading { reading, .. } => Some((reading.time, reading.value)),
         Input::Sample { sample, .. } => Some((sample.time, sample.value)),
         Input::Missing { .. }
+        | Input::Trouble { .. }
         | Input::Settings(_)
         | Input::Order(_)
         | Input::Found(_)
@@ -223,6 +246,7 @@ fn insert_step(
             Input::Reading { reading, .. } => reading.sigma,
             Input::Sample { .. }
             | Input::Missing { .. }
+            | Input::Trouble { .. }
             | Input::Settings(_)
             | Input::Order(_)
             | Input::Found(_)

@@ -5,6 +5,7 @@
 //! acknowledged before it, and a restart goes on exactly where the last commit left off.
 
 mod batch;
+mod checkpoint;
 mod outbox;
 mod read;
 mod retention;
@@ -67,6 +68,14 @@ pub enum StoreError {
         /// What was found.
         detail: String,
     },
+    /// What was written may not be on the disk, and trying again would not tell.
+    #[error(
+        "the disk failed to sync ({detail}): nothing more is written; look at the disk, then start again: that goes on from the last good commit"
+    )]
+    Unsynced {
+        /// What the database said.
+        detail: String,
+    },
     /// The database failed.
     #[error("{0}")]
     Sqlite(#[source] rusqlite::Error),
@@ -80,6 +89,14 @@ pub enum StoreError {
 
 impl From<rusqlite::Error> for StoreError {
     fn from(error: rusqlite::Error) -> Self {
+        let extended = error.sqlite_error().map(|error| error.extended_code);
+        if matches!(
+            extended,
+            Some(ffi::SQLITE_IOERR_FSYNC | ffi::SQLITE_IOERR_DIR_FSYNC)
+        ) {
+            let detail = error.to_string();
+            return Self::Unsynced { detail };
+        }
         match error.sqlite_error_code() {
             Some(ErrorCode::DatabaseCorrupt | ErrorCode::NotADatabase) => {
                 let detail = error.to_string();
@@ -123,6 +140,7 @@ struct Inner {
     steps: i64,
     /// The number of the last event.
     events: i64,
+    log: checkpoint::Log,
 }
 
 impl Store {
@@ -137,7 +155,7 @@ impl Store {
         connection.busy_timeout(PATIENCE)?;
         schema::version(&connection)?;
         sound(&connection)?;
-        connection.pragma_update(None, "journal_mode", "WAL")?;
+        logs_ahead(&connection)?;
         connection.pragma_update(None, "synchronous", "FULL")?;
         schema::migrate(&mut connection)?;
         // Makes the file's own name durable.
@@ -172,6 +190,7 @@ impl Store {
             let query = format!("SELECT coalesce(max(seq), 0) FROM {table}");
             connection.query_row(&query, [], |row| row.get(0))
         };
+        connection.pragma_update(None, "wal_autocheckpoint", 0)?;
         let (steps, events) = (last("step")?, last("event")?);
         let catalogue = Catalogue::load(&connection)?;
         let inner = Inner {
@@ -179,6 +198,7 @@ impl Store {
             catalogue,
             steps,
             events,
+            log: checkpoint::Log::default(),
         };
         Ok(Self {
             inner: Mutex::new(inner),
@@ -240,6 +260,17 @@ fn lock(folder: &Path) -> Result<File, StoreError> {
     }
     let folder = folder.to_owned();
     Err(StoreError::InUse { folder })
+}
+
+/// Writes to a log from here on. Where that fails, SQLite keeps to its old ways and says no more than their name.
+fn logs_ahead(connection: &Connection) -> Result<(), StoreError> {
+    let mode: String = connection.query_row("PRAGMA journal_mode = WAL", [], |row| row.get(0))?;
+    if mode == "wal" {
+        Ok(())
+    } else {
+        let detail = format!("no write-ahead log could be begun, the mode stays {mode}");
+        Err(StoreError::Unsynced { detail })
+    }
 }
 
 /// Whether the file is whole, as far as its own structure tells.

@@ -1,8 +1,11 @@
 //! What the hooks are to be told: written with the events that say so, ticked off when a hook has taken it.
 
-use super::{Store, StoreError, nanoseconds};
+use super::{Inner, Store, StoreError, nanoseconds};
 use crate::reading::Timestamp;
 use rusqlite::{Connection, params};
+
+/// A delivery that no hook has taken yet.
+pub(super) const WAITING: &str = "waiting";
 
 /// One alert for one hook.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -33,7 +36,7 @@ pub enum Fate {
 }
 
 impl Fate {
-    fn name(self) -> &'static str {
+    pub(super) fn name(self) -> &'static str {
         match self {
             Self::Delivered => "delivered",
             Self::Over => "over",
@@ -43,10 +46,10 @@ impl Fate {
 }
 
 impl Delivery {
-    pub(super) fn insert(&self, connection: &Connection) -> Result<(), StoreError> {
+    pub(super) fn insert(&self, connection: &Connection, status: &str) -> Result<(), StoreError> {
         let mut insert = connection.prepare_cached(
             "INSERT OR IGNORE INTO outbox (key, level, state, hook, status, time, body)
-             VALUES (?1, ?2, ?3, ?4, 'waiting', ?5, ?6)",
+             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
         )?;
         let Self {
             key,
@@ -56,7 +59,15 @@ impl Delivery {
             time,
             body,
         } = self;
-        insert.execute(params![key, level, state, hook, nanoseconds(*time)?, body])?;
+        insert.execute(params![
+            key,
+            level,
+            state,
+            hook,
+            status,
+            nanoseconds(*time)?,
+            body
+        ])?;
         Ok(())
     }
 }
@@ -112,9 +123,17 @@ impl Store {
     /// [`StoreError`].
     pub fn settle(&self, settled: &[(Delivery, Fate)]) -> Result<(), StoreError> {
         let mut inner = self.inner();
-        let transaction = inner.connection.transaction()?;
+        inner.trusted()?;
+        let written = inner.settle(settled);
+        inner.committed(settled.len(), written)
+    }
+}
+
+impl Inner {
+    fn settle(&mut self, settled: &[(Delivery, Fate)]) -> Result<(), StoreError> {
+        let transaction = self.connection.transaction()?;
         for (delivery, fate) in settled {
-            delivery.insert(&transaction)?;
+            delivery.insert(&transaction, WAITING)?;
             let Delivery {
                 key,
                 level,

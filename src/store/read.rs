@@ -38,6 +38,7 @@ enum Told {
     Found(Box<Finding>),
     Order(Order),
     Missing(BenchmarkId, Timestamp, String),
+    Trouble(String, String),
 }
 
 /// `None` where only time has passed.
@@ -51,6 +52,7 @@ pub(super) fn encode(input: &Input) -> Result<Option<Vec<u8>>, StoreError> {
             time,
             what,
         } => Told::Missing(benchmark.clone(), *time, what.clone()),
+        Input::Trouble { kind, text } => Told::Trouble(kind.clone(), text.clone()),
         Input::Tick | Input::Reading { .. } | Input::Sample { .. } => return Ok(None),
     };
     let body = rmp_serde::to_vec_named(&told);
@@ -73,6 +75,7 @@ fn decode(body: Option<Vec<u8>>) -> Result<Input, StoreError> {
                 time,
                 what,
             },
+            Told::Trouble(kind, text) => Input::Trouble { kind, text },
         },
     )
 }

@@ -39,6 +39,7 @@ impl Series {
                 Some(Self::Channel(channel.clone(), unit.clone()))
             }
             Input::Missing { .. }
+            | Input::Trouble { .. }
             | Input::Settings(_)
             | Input::Order(_)
             | Input::Found(_)

@@ -1,5 +1,6 @@
 //! The commit: what has happened is made durable, then told.
 
+use super::flood::Outgoing;
 use super::{LEAST_FRESHNESS, LEAST_WATCHED, MOST_UNWRITTEN, Site, Standing};
 use crate::alert::{Level, Policy};
 use crate::monitor::AlertState;
@@ -41,11 +42,18 @@ impl Site {
     }
 
     fn record_and_send(&mut self, alerts: &[Alert]) -> Result<(), StoreError> {
-        for alert in alerts {
+        let Outgoing {
+            sent,
+            told_together,
+        } = Outgoing::of(alerts);
+        for alert in &sent {
             self.note(alert)?;
         }
+        for alert in &told_together {
+            self.note_told_together(alert)?;
+        }
         let recorded = self.record();
-        for alert in alerts {
+        for alert in &sent {
             self.send(alert);
         }
         if let Some(alerts) = &self.sinks.alerts {
@@ -61,6 +69,24 @@ impl Site {
         {
             for hook in dispatcher.asking(alert) {
                 self.batch.deliver(delivery(alert, &hook)?);
+            }
+        }
+        Ok(())
+    }
+
+    /// Notes that an alert of many benchmarks tells of this one too.
+    fn note_told_together(&mut self, alert: &Alert) -> Result<(), StoreError> {
+        let place = (alert.event.benchmark.clone(), alert.level == Level::Unknown);
+        if let Some(standing) = self.standing.get_mut(&place) {
+            standing.is_told_together |= standing.alert.key == alert.key;
+        }
+        let Some(dispatcher) = &self.sinks.alerts else {
+            return Ok(());
+        };
+        dispatcher.supersede(alert);
+        if self.sinks.store.is_some() {
+            for hook in dispatcher.asking(alert) {
+                self.batch.tell_together(delivery(alert, &hook)?);
             }
         }
         Ok(())
@@ -143,7 +169,12 @@ impl Site {
         }
         match alert.state {
             AlertState::Firing if alert.level != Level::Green => {
-                self.standing.insert(place, Standing { alert, is_sent });
+                let standing = Standing {
+                    alert,
+                    is_sent,
+                    is_told_together: false,
+                };
+                self.standing.insert(place, standing);
             }
             AlertState::Firing | AlertState::Resolved => {
                 self.standing.remove(&place);
@@ -166,7 +197,7 @@ impl Site {
         for one in standing.values_mut() {
             if one.is_sent {
                 // Again: there may have been no room for it. The hooks that have it ignore it.
-                if one.alert.must_arrive() {
+                if one.alert.must_arrive() && !one.is_told_together {
                     self.send(&one.alert);
                 }
             } else if self.is_watched(one.alert.event.benchmark.as_ref(), wall)

@@ -7,7 +7,7 @@ use crate::monitor::{Input, Monitor, Part, SavedError, SearchJob, Settings};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::hook::{Alert, state_name};
 use crate::runtime::vitals::Vitals;
-use crate::store::{Recorded, Store, StoreError};
+use crate::store::{Fate, Recorded, Store, StoreError};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -139,6 +139,7 @@ impl Site {
             } = &one.alert;
             let identity = (key.as_str(), level.name(), state_name(*state));
             one.is_sent |= store.is_noted(identity, None, None)?;
+            one.is_told_together |= store.is_noted(identity, None, Some(Fate::Over))?;
         }
         for body in store.waiting()? {
             match rmp_serde::from_slice::<Alert>(&body) {

@@ -5,6 +5,7 @@
 //! The wall clock comes in as an argument; whoever replays hands in the data's own time.
 
 mod alerts;
+mod flood;
 mod memory;
 mod mute;
 
@@ -38,6 +39,10 @@ const STEPS_A_MEMORY: usize = 2_000;
 const STEPS_A_BENCHMARK: usize = 20;
 /// The site's own part of the memory, beside those of the monitor.
 const OWN: &str = "\0site";
+/// The first day of 1970, UTC: where a logger starts whose clock is not set. No reading of a site that is watched now
+/// was measured then; a replay of an archive takes it.
+const CLOCKLESS: std::ops::Range<Timestamp> =
+    Timestamp::UNIX_EPOCH..Timestamp::constant(24 * 60 * 60, 0);
 /// Before all readings.
 const DAWN: Timestamp = Timestamp::constant(-9_223_372_036, 0);
 
@@ -61,6 +66,9 @@ pub struct Counts {
     pub repeated: u64,
     /// Values dropped because they are from the future.
     pub from_the_future: u64,
+    /// Values dropped because they are from the first day of 1970.
+    #[serde(default)]
+    pub without_clock: u64,
     /// Alerts that fired no hook because they are long past.
     pub long_past: u64,
 }
@@ -74,6 +82,9 @@ struct Standing {
     alert: Alert,
     /// Whether it has been offered to the hooks.
     is_sent: bool,
+    /// Whether an alert of many benchmarks has told of it.
+    #[serde(default)]
+    is_told_together: bool,
 }
 
 /// One site at work.
@@ -130,6 +141,9 @@ impl Site {
     /// # Errors
     /// When the state cannot be asked whether the value is known.
     pub fn take(&mut self, arrival: &Arrival, wall: Timestamp) -> Result<Vec<Event>, StoreError> {
+        if matches!(arrival.input, Input::Trouble { .. }) {
+            return Ok(self.step(self.now.unwrap_or(DAWN), &arrival.input));
+        }
         let ahead = arrival.time.duration_since(wall);
         if ahead > clock::TOLERANCE {
             self.counts.from_the_future += 1;
@@ -141,6 +155,12 @@ impl Site {
             if arrival.time < DAWN {
                 let time = arrival.time;
                 tracing::warn!(%time, ?arrival.input, "measured before 1678: quarantined");
+                return Ok(Vec::new());
+            }
+            if CLOCKLESS.contains(&arrival.time) {
+                self.counts.without_clock += 1;
+                let (time, total) = (arrival.time, self.counts.without_clock);
+                tracing::warn!(%time, ?arrival.input, total, "measured on the first day of 1970, as by a logger whose clock is not set: quarantined");
                 return Ok(Vec::new());
             }
             if !self.is_newest(arrival) && store.has(&self.batch, &arrival.input)? {

@@ -4,7 +4,9 @@ use super::decode::{Arrival, Decoder};
 use super::records::{self, Channels, Frame, HEADER_BYTES, MAGIC, RawMessage};
 use super::saved::Saved;
 use super::text::{BadLine, Fed, TextReader, Unpacking};
-use crate::runtime::ingest::{decode_message, is_packed};
+use crate::monitor::Input;
+use crate::reading::Timestamp;
+use crate::runtime::ingest::{Item, decode_message, is_packed};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use std::fs::{File, Metadata};
@@ -39,6 +41,8 @@ pub(super) struct FileTail {
     trouble: Option<String>,
     /// Where we were when the file was last found under another name.
     left_at: Option<u64>,
+    /// When the newest value was measured that it has given.
+    newest: Option<Timestamp>,
     /// From where a restart goes on.
     pub(super) safe: Saved,
     /// As [`FileTail::moved`] last told it.
@@ -121,6 +125,7 @@ impl FileTail {
             quarantined: 0,
             trouble: None,
             left_at: None,
+            newest: None,
             safe: Saved::default(),
             told: Saved::default(),
         }
@@ -177,7 +182,13 @@ impl FileTail {
         let file = File::open(&self.path)?;
         let glance = Glance::at(&file.metadata()?);
         if !self.is_same(&file, glance)? {
-            tracing::info!(file = %self.path.display(), at = self.at, "another file: read from its start");
+            let is_read =
+                self.at > 0 && !matches!(self.content, Content::Refused | Content::Complete);
+            if is_read && self.place == Some(glance.place) {
+                self.tell_gap(glance.size);
+            } else {
+                tracing::info!(file = %self.path.display(), at = self.at, "another file: read from its start");
+            }
             self.content = Content::of(&self.decoder, &self.path);
             self.at = 0;
         }
@@ -198,6 +209,21 @@ impl FileTail {
             matches!(self.content, Content::Mcap { suspect: Some(at), .. } if at == self.at);
         self.idle = (!moved && !suspect).then_some(glance);
         Ok(moved)
+    }
+
+    /// The same file, and what we have read of it is no longer there: what was written after our last look and cut
+    /// off before this one cannot be known.
+    fn tell_gap(&mut self, size: u64) {
+        let (file, at) = (self.path.display(), self.at);
+        tracing::warn!(%file, at, size, "cut off while it was followed: read from its start, readings may be missing");
+        let name = self.path.file_name().unwrap_or_default().to_string_lossy();
+        let text = format!(
+            "{name}: cut off at {size} bytes after {at} had been read; what was written just before may be missing"
+        );
+        let time = self.newest.unwrap_or(Timestamp::MIN);
+        let kind = "possible-gap".to_owned();
+        let input = Input::Trouble { kind, text };
+        self.pending.push_back(Arrival { time, input });
     }
 
     fn mark_start(&self) -> u64 {
@@ -254,9 +280,9 @@ impl FileTail {
     }
 
     fn take(&mut self, fed: Fed) {
-        let items = fed.items.into_iter();
-        self.pending
-            .extend(items.filter_map(|one| self.decoder.arrival(one)));
+        for item in fed.items {
+            self.expect(item);
+        }
         let mut bad = fed.bad.into_iter();
         let last = fed.is_lost.then(|| bad.next_back()).flatten();
         for line in bad {
@@ -264,6 +290,13 @@ impl FileTail {
         }
         if let Some(last) = last {
             self.refuse(&*last.error);
+        }
+    }
+
+    fn expect(&mut self, item: Item) {
+        if let Some(arrival) = self.decoder.arrival(item) {
+            self.newest = self.newest.max(Some(arrival.time));
+            self.pending.push_back(arrival);
         }
     }
 
@@ -356,9 +389,7 @@ impl FileTail {
             payload,
         } = message;
         match decode_message(topic, metadata, *publish_time, payload) {
-            Ok(item) => self
-                .pending
-                .extend(item.and_then(|one| self.decoder.arrival(one))),
+            Ok(item) => item.into_iter().for_each(|item| self.expect(item)),
             Err(error) => {
                 self.quarantined += 1;
                 let (file, total) = (self.path.display(), self.quarantined);

@@ -84,6 +84,8 @@ pub async fn follow(
 struct Watch {
     watcher: Option<RecommendedWatcher>,
     unwatched: BTreeSet<PathBuf>,
+    /// Of which it has been said that they cannot be watched.
+    told: BTreeSet<PathBuf>,
     wake: Arc<Notify>,
 }
 
@@ -102,6 +104,7 @@ impl Watch {
         Self {
             watcher,
             unwatched: folders,
+            told: BTreeSet::new(),
             wake,
         }
     }
@@ -113,11 +116,12 @@ impl Watch {
         };
         self.unwatched.retain(|folder| {
             let watched = watcher.watch(folder, RecursiveMode::NonRecursive);
-            watched
-                .inspect_err(
-                    |error| tracing::debug!(folder = %folder.display(), %error, "not watched"),
-                )
-                .is_err()
+            let Err(error) = watched else { return false };
+            // A folder that is not there is told by whoever lists it.
+            if !matches!(error.kind, notify::ErrorKind::PathNotFound) && folder.is_dir() && self.told.insert(folder.clone()) {
+                tracing::warn!(folder = %folder.display(), %error, "no watch: files are looked at in turn");
+            }
+            true
         });
     }
 }

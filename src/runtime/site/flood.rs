@@ -1,0 +1,93 @@
+//! Many alerts at once: the gravest are told singly, of the others one message tells.
+//!
+//! EEMUA 191 calls ten alarms in ten minutes a flood: beyond that nobody can act on them one by one.
+
+use crate::alert::Level;
+use crate::monitor::{AlertState, Event, EventKind};
+use crate::runtime::hook::{Alert, FLOOD, state_name};
+use std::collections::BTreeMap;
+
+/// Alerts of one level and state that go out singly in one commit.
+const MOST_AT_ONCE: usize = 10;
+/// Benchmarks that one message names.
+const NAMED: usize = 20;
+
+/// What becomes of the alerts of one commit.
+#[derive(Debug, Default)]
+pub(super) struct Outgoing {
+    /// The hooks are given these.
+    pub(super) sent: Vec<Alert>,
+    /// One of those tells of these.
+    pub(super) told_together: Vec<Alert>,
+}
+
+impl Outgoing {
+    /// All of `alerts`, in their order, or of each level and state the first ten by forecast time of failure and one
+    /// that stands for the others.
+    pub(super) fn of(alerts: &[Alert]) -> Self {
+        let mut outgoing = Self::default();
+        let mut groups: BTreeMap<(Level, &str), Vec<&Alert>> = BTreeMap::new();
+        for alert in alerts {
+            let group = (alert.level, state_name(alert.state));
+            groups.entry(group).or_default().push(alert);
+        }
+        if groups.values().all(|group| group.len() <= MOST_AT_ONCE + 1) {
+            alerts.clone_into(&mut outgoing.sent);
+            return outgoing;
+        }
+        // The gravest level first.
+        for mut group in groups.into_values().rev() {
+            if group.len() > MOST_AT_ONCE + 1 {
+                group.sort_by_key(|alert| (alert.failure_time.is_none(), alert.failure_time));
+                let others = group.split_off(MOST_AT_ONCE);
+                outgoing.sent.extend(group.into_iter().cloned());
+                outgoing.sent.extend(together(&others));
+                outgoing.told_together.extend(others.into_iter().cloned());
+            } else {
+                outgoing.sent.extend(group.into_iter().cloned());
+            }
+        }
+        outgoing
+    }
+}
+
+/// The alert that stands for `others`, which are of one level and state; `None` where there are none.
+fn together(others: &[&Alert]) -> Option<Alert> {
+    let first = *others.first()?;
+    let time = others.iter().map(|alert| alert.event.time).max()?;
+    let named: Vec<&str> = (others.iter().take(NAMED))
+        .filter_map(|alert| Some(alert.event.benchmark.as_ref()?.as_str()))
+        .collect();
+    let rest = match others.len().saturating_sub(named.len()) {
+        0 => String::new(),
+        rest => format!(" and {rest} more"),
+    };
+    let what = match first.state {
+        AlertState::Firing => "at",
+        AlertState::Resolved => "no longer at",
+    };
+    let text = format!(
+        "{} more benchmarks {what} {}: {}{rest}",
+        others.len(),
+        first.level,
+        named.join(", ")
+    );
+    // That of the first is no other's.
+    let key = format!("{FLOOD}/{}", first.key);
+    Some(Alert {
+        event: Event {
+            time,
+            benchmark: None,
+            kind: EventKind::Alert {
+                level: first.level,
+                state: first.state,
+                key: key.clone(),
+                rule: FLOOD.to_owned(),
+                text,
+            },
+        },
+        key,
+        failure_time: others.iter().filter_map(|alert| alert.failure_time).min(),
+        ..first.clone()
+    })
+}

@@ -1,0 +1,140 @@
+//! What happens to files while they are followed.
+
+use crate::site::{Site, eventually};
+use std::fs::{self, OpenOptions};
+
+fn row(day: u32) -> String {
+    format!("2020-01-{day:02}T00:00:00Z,{day}\n")
+}
+
+fn rows(days: std::ops::Range<u32>) -> String {
+    days.map(row).collect()
+}
+
+const HEADER: &str = "time,displacement_mm\n";
+
+fn gaps(site: &Site) -> usize {
+    site.events().matches("\"kind\":\"possible-gap\"").count()
+}
+
+/// 1. While it runs, and while it does not.
+#[test]
+fn a_file_copied_and_truncated_is_read_again_and_a_possible_gap_is_said_once_each() {
+    let site = Site::new("");
+    site.append("incoming/5.csv", &format!("{HEADER}{}", rows(1..6)));
+    let program = site.caught_up();
+    let cut = |text: &str| {
+        fs::copy(site.path("incoming/5.csv"), site.path("incoming/5.csv.1")).unwrap();
+        let file = OpenOptions::new()
+            .write(true)
+            .open(site.path("incoming/5.csv"))
+            .unwrap();
+        file.set_len(0).unwrap();
+        drop(file);
+        site.append("incoming/5.csv", text);
+    };
+    cut(&format!("{HEADER}{}", rows(6..8)));
+    eventually("what came after", || site.values().len() == 7);
+    program.stop();
+    assert_eq!(gaps(&site), 1);
+    // Grown beyond the place where it was left, and with what is known already.
+    cut(&format!("{HEADER}{}", rows(3..20)));
+    site.caught_up().stop();
+    assert_eq!((gaps(&site), site.values().len()), (2, 19));
+    site.caught_up().stop();
+    assert_eq!((gaps(&site), site.values().len()), (2, 19), "said again");
+    let events = site.proven_events();
+    assert!(events.contains("5.csv: cut off at"), "{events}");
+}
+
+/// 4.
+#[test]
+fn a_link_that_turns_and_a_folder_that_goes_and_comes_back_are_followed() {
+    let site = Site::new("");
+    site.append("one", &format!("{HEADER}{}", rows(1..4)));
+    site.append("two", &format!("{HEADER}{}", rows(4..7)));
+    let link = site.path("incoming/5.csv");
+    std::os::unix::fs::symlink(site.path("one"), &link).unwrap();
+    let program = site.caught_up();
+    std::os::unix::fs::symlink(site.path("two"), site.path("new")).unwrap();
+    fs::rename(site.path("new"), &link).unwrap();
+    eventually("the other file", || site.values().len() == 6);
+    fs::remove_dir_all(site.path("incoming")).unwrap();
+    eventually("that it is gone", || site.log().contains("cannot list"));
+    fs::create_dir(site.path("incoming")).unwrap();
+    site.append("incoming/5.csv", &format!("{HEADER}{}", rows(6..9)));
+    eventually("the new folder", || site.values().len() == 8);
+    program.stop();
+    assert_eq!(gaps(&site), 0);
+    site.proven_events();
+}
+
+/// 10.
+#[test]
+fn readings_of_the_first_day_of_1970_are_set_aside_and_time_does_not_go_by_them() {
+    let site = Site::new("");
+    let first = "1970-01-01T00:00:00Z,9\n1970-01-01T23:59:59Z,9\n";
+    site.append(
+        "incoming/5.csv",
+        &format!("{HEADER}{first}{}{first}", rows(1..6)),
+    );
+    site.caught_up().stop();
+    let times: Vec<String> = (site.values().iter().map(|(_, time, _)| time.to_string())).collect();
+    assert_eq!(times.len(), 5, "{times:?}");
+    assert!(
+        times.iter().all(|time| time.starts_with("2020")),
+        "{times:?}"
+    );
+    let log = site.log();
+    assert_eq!(
+        log.matches("a logger whose clock is not set").count(),
+        4,
+        "{log}"
+    );
+    assert!(log.contains("without_clock: 4"), "{log}");
+}
+
+/// 13. Root may read everything, so a folder stands in the place of a file, and a link that leads nowhere.
+#[test]
+fn what_cannot_be_read_stops_no_other_source() {
+    let site = Site::new("");
+    fs::create_dir(site.path("incoming/4.csv")).unwrap();
+    std::os::unix::fs::symlink("nowhere", site.path("incoming/3.csv")).unwrap();
+    std::os::unix::fs::symlink("6.csv", site.path("incoming/6.csv")).unwrap();
+    site.append("incoming/5.csv", &format!("{HEADER}{}", rows(1..4)));
+    let program = site.caught_up();
+    site.append("incoming/5.csv", &rows(4..5));
+    eventually("the others", || site.values().len() == 4);
+    // What could not be read is, once it can.
+    fs::remove_dir(site.path("incoming/4.csv")).unwrap();
+    site.append("incoming/4.csv", &format!("{HEADER}{}", rows(1..3)));
+    eventually("the file in its place", || site.values().len() == 6);
+    program.stop();
+}
+
+/// 12. The kernel refuses every watch, as when the user has none left.
+#[test]
+fn without_any_watch_files_are_looked_at_in_turn() {
+    if !crate::site::has_strace() {
+        return;
+    }
+    let site = Site::new("");
+    site.append("incoming/5.csv", &format!("{HEADER}{}", rows(1..4)));
+    let program = site.start(&[
+        "strace",
+        "-f",
+        "-qq",
+        "-D",
+        "-o",
+        "/dev/null",
+        "-e",
+        "trace=inotify_add_watch",
+        "-e",
+        "inject=inotify_add_watch:error=ENOSPC",
+    ]);
+    eventually("caught up", || site.log().contains("caught up"));
+    site.append("incoming/5.csv", &rows(4..9));
+    eventually("what was added", || site.values().len() == 8);
+    eventually("a warning", || site.log().contains("looked at in turn"));
+    program.stop();
+}
