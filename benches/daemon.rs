@@ -187,7 +187,7 @@ fn held_load(seconds: u32) {
         let due = Duration::from_secs(1) * number / READINGS_A_SECOND;
         std::thread::sleep(due.saturating_sub(began.elapsed()));
         let benchmark = number as usize % BENCHMARKS;
-        let value = if benchmark % ALERTS == 0 {
+        let value = if benchmark.is_multiple_of(ALERTS) {
             6000.0
         } else {
             30.0
@@ -277,8 +277,8 @@ fn catch_up(what: &str, benchmarks: usize, each: usize, seconds: i64) {
     let refits = refits
         .unwrap()
         .stdout
-        .iter()
-        .filter(|byte| **byte == b'\n')
+        .split(|byte| *byte == b'\n')
+        .filter(|line| !line.is_empty())
         .count();
     println!(
         "catch-up: {what}, {readings} readings\n  parsing alone {parsed:.0} readings/s; parsing and SQLite {stored:.0}/s; \

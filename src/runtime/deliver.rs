@@ -197,9 +197,11 @@ impl HookConfig {
         self.run.join(" ")
     }
 
-    /// Whether it is told of an alert of this level, at a benchmark or the whole site.
+    /// Whether it is told of an alert of this level, at a benchmark or the whole site. What tells of many benchmarks
+    /// at once stands for theirs.
     fn asks_for(&self, alert: &Alert) -> bool {
-        self.levels.contains(&alert.level) && self.site == alert.event.benchmark.is_none()
+        let is_of_the_site = alert.event.benchmark.is_none() && !alert.is_flood();
+        self.levels.contains(&alert.level) && self.site == is_of_the_site
     }
 }
 

@@ -25,7 +25,6 @@ fn run_away() -> String {
 
 /// 19.
 #[test]
-#[ignore = "the one message for many does not come since sites have a level of their own: open"]
 fn alerts_of_very_many_benchmarks_at_once_are_told_in_few_messages_and_none_again_after_a_restart()
 {
     let policy = "[alert]\nevacuation_time = \"1h\"\n\

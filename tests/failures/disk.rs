@@ -76,7 +76,8 @@ fn a_sync_that_fails_ends_the_daemon_and_a_restart_goes_on_from_the_last_commit(
     if !has_strace() {
         return;
     }
-    for (only, when) in [(None::<&str>, 4)] {
+    {
+        let (only, when) = (None::<&str>, 4);
         let site = Site::new("");
         site.append("incoming/5.csv", "time,displacement_mm\n");
         if only.is_some() {
