@@ -13,7 +13,7 @@
 //! | 11 | marks for no value | tests/ingest_toa5.rs, tests/follow.rs, tests/monitor.rs |
 //! | 12 | no watches | `files`: none left to the user |
 //! | 13 | a file that cannot be read | `files`; root may read all, so what stands for EACCES is a folder in a file's place |
-//! | 14 | the disk is full | tests/daemon/crisis.rs (a limit on the length of files); on a full tmpfs (`disk`): open |
+//! | 14 | the disk is full | tests/daemon/crisis.rs (a limit on the length of files); on a full tmpfs it was tried by hand (`disk` does not see the mount yet) |
 //! | 15 | killed at any moment, at any system call | `killed` |
 //! | 16 | a sync fails | open (`disk`) |
 //! | 17 | a database that is damaged, newer, foreign, in use | `database` |
