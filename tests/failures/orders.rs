@@ -21,7 +21,7 @@ fn failing(name: &str) -> String {
 }
 
 #[test]
-#[ignore = "the end of a benchmark that is taken out does not reach the hook: not looked into yet"]
+#[ignore = "what is taken out ends only where every source names its benchmarks, and the recorder here names none: open"]
 fn a_wrong_config_on_sighup_is_not_taken_and_a_benchmark_taken_out_is_closed_and_told() {
     let site = Site::new(&format!("{BENCHMARKS}{POLICY}"));
     for name in ["4", "5"] {
