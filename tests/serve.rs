@@ -322,17 +322,23 @@ fn site(listen: &str, more: &str) -> (TempDir, String) {
     (folder, file)
 }
 
+/// What `command` says of a config that it refuses.
+fn refused(command: &str, file: &str) -> String {
+    let ended = Command::new(PROGRAM)
+        .args([command, file])
+        .timeout(LIMIT)
+        .assert();
+    let said = String::from_utf8_lossy(&ended.get_output().stderr).into_owned();
+    ended.code(78);
+    said
+}
+
 #[test]
 fn listening_to_other_machines_without_a_token_is_refused_by_check_and_run() {
     for listen in ["0.0.0.0:0", "[::]:0", "192.0.2.1:8642"] {
         let (_folder, file) = site(listen, "");
         for command in ["check", "run"] {
-            let ended = Command::new(PROGRAM)
-                .args([command, &file])
-                .timeout(LIMIT)
-                .assert();
-            let said = String::from_utf8_lossy(&ended.get_output().stderr).into_owned();
-            ended.code(78);
+            let said = refused(command, &file);
             assert!(said.contains("without a token"), "{command}: {said}");
         }
     }
@@ -353,12 +359,7 @@ fn a_token_that_can_be_guessed_or_is_not_there_is_refused_by_check_and_run() {
             None => fs::remove_file(token).unwrap(),
         }
         for command in ["check", "run"] {
-            let ended = Command::new(PROGRAM)
-                .args([command, &file])
-                .timeout(LIMIT)
-                .assert();
-            let said = String::from_utf8_lossy(&ended.get_output().stderr).into_owned();
-            ended.code(78);
+            let said = refused(command, &file);
             assert!(said.contains("token file"), "{command} {text:?}: {said}");
         }
     }

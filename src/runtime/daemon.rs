@@ -20,8 +20,8 @@ use std::time::Duration;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::watch;
 
-/// How long the hooks of a former config may take to finish.
-const DRAIN_LIMIT: Duration = Duration::from_secs(20);
+/// How long the hooks may take to finish when the daemon stops, and those of a former config.
+pub(super) const DRAIN_LIMIT: Duration = Duration::from_secs(20);
 /// How often time is let pass when nothing arrives.
 const TICK: Duration = Duration::from_secs(1);
 

@@ -1,7 +1,7 @@
 //! The daemon: files to the monitor, everything to the state folder, alerts to the hooks.
 
 use super::clock;
-use super::daemon::{Daemon, dispatcher};
+use super::daemon::{DRAIN_LIMIT, Daemon, dispatcher};
 use super::hook::Status;
 use super::pulse::{Pulse, PulseError};
 use super::shutdown::{self, Shutdown};
@@ -11,11 +11,7 @@ use crate::config::Config;
 use crate::store::{Store, StoreError};
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Duration;
 use tokio::sync::watch;
-
-/// How long the hooks may take to finish when the daemon stops.
-const DRAIN_LIMIT: Duration = Duration::from_secs(20);
 
 /// How far the daemon has come.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

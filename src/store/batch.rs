@@ -37,7 +37,7 @@ pub struct Batch {
 impl Batch {
     /// Notes a step and the events that followed from it.
     pub fn step(&mut self, now: Timestamp, input: &Input, events: &[Event]) {
-        if let (Some(series), Some((time, value))) = (Series::of(input), value(input)) {
+        if let (Some(series), Some((time, value, _))) = (Series::of(input), value(input)) {
             self.values.insert((series, time), value);
         }
         self.steps.push((now, input.clone()));
@@ -118,7 +118,7 @@ impl Store {
     /// # Errors
     /// [`StoreError`].
     pub fn has(&self, batch: &Batch, input: &Input) -> Result<bool, StoreError> {
-        let (Some(series), Some((time, value))) = (Series::of(input), value(input)) else {
+        let (Some(series), Some((time, value, _))) = (Series::of(input), value(input)) else {
             return Ok(false);
         };
         if let Some(known) = batch.known(&series, time) {
@@ -196,7 +196,9 @@ impl Inner {
                 )?
                 .execute(params![benchmark.as_str(), kind, body])?;
         }
-        write_positions(&transaction, batch)?;
+        for (name, body) in &batch.positions {
+            keep(&transaction, "position", name, body.as_deref())?;
+        }
         if let Some(parts) = &batch.memory {
             write_memory(&transaction, parts, last_step)?;
         }
@@ -218,11 +220,11 @@ impl Inner {
     }
 }
 
-/// When a value was measured, and what it is.
-fn value(input: &Input) -> Option<(Timestamp, f64)> {
+/// When a value was measured, what it is, and its standard error.
+fn value(input: &Input) -> Option<(Timestamp, f64, Option<f64>)> {
     match input {
-        Input::Reading { reading, .. } => Some((reading.time, reading.value)),
-        Input::Sample { sample, .. } => Some((sample.time, sample.value)),
+        Input::Reading { reading, .. } => Some((reading.time, reading.value, reading.sigma)),
+        Input::Sample { sample, .. } => Some((sample.time, sample.value, None)),
         Input::Missing { .. }
         | Input::Trouble { .. }
         | Input::Settings(_)
@@ -241,17 +243,7 @@ fn insert_step(
     let mut insert = connection.prepare_cached(
         "INSERT INTO step (seq, now, series, time, value, sigma, body) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
     )?;
-    if let (Some(series), Some((time, value))) = (Series::of(input), value(input)) {
-        let sigma = match input {
-            Input::Reading { reading, .. } => reading.sigma,
-            Input::Sample { .. }
-            | Input::Missing { .. }
-            | Input::Trouble { .. }
-            | Input::Settings(_)
-            | Input::Order(_)
-            | Input::Found(_)
-            | Input::Tick => None,
-        };
+    if let (Some(series), Some((time, value, sigma))) = (Series::of(input), value(input)) {
         let own = (now != time).then(|| nanoseconds(now)).transpose()?;
         let (number, time) = (number(&series), nanoseconds(time)?);
         insert.execute(params![
@@ -297,34 +289,31 @@ fn insert_event(
     Ok(body)
 }
 
-fn write_positions(connection: &Connection, batch: &Batch) -> Result<(), StoreError> {
-    for (name, body) in &batch.positions {
-        match body {
-            Some(body) => connection
-                .prepare_cached("INSERT OR REPLACE INTO position (name, body) VALUES (?1, ?2)")?
-                .execute(params![name, body])?,
-            None => connection
-                .prepare_cached("DELETE FROM position WHERE name = ?1")?
-                .execute([name])?,
-        };
-    }
-    Ok(())
-}
-
 fn write_memory(connection: &Connection, parts: &[Part], step: i64) -> Result<(), StoreError> {
     for Part { name, body } in parts {
-        match body {
-            Some(body) => connection
-                .prepare_cached("INSERT OR REPLACE INTO memory (name, body) VALUES (?1, ?2)")?
-                .execute(params![name, body])?,
-            None => connection
-                .prepare_cached("DELETE FROM memory WHERE name = ?1")?
-                .execute([name])?,
-        };
+        keep(connection, "memory", name, body.as_deref())?;
     }
     connection.execute(
         "INSERT OR REPLACE INTO meta (name, value) VALUES ('memory_step', ?1)",
         [step],
     )?;
+    Ok(())
+}
+
+/// Keeps `body` under its name in `table`, or nothing.
+fn keep(
+    connection: &Connection,
+    table: &str,
+    name: &str,
+    body: Option<&[u8]>,
+) -> Result<(), StoreError> {
+    let insert = format!("INSERT OR REPLACE INTO {table} (name, body) VALUES (?1, ?2)");
+    let delete = format!("DELETE FROM {table} WHERE name = ?1");
+    match body {
+        Some(body) => connection
+            .prepare_cached(&insert)?
+            .execute(params![name, body])?,
+        None => connection.prepare_cached(&delete)?.execute([name])?,
+    };
     Ok(())
 }
