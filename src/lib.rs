@@ -7,6 +7,7 @@
 //!         cli -> inversion -> regime, forecast, fit
 //!         cli -> effects -> forecast, fit, model
 //!         cli -> figures -> effects, plot
+//!         cli -> score -> forecast, fit
 //! ```
 //!
 //! Everything from `monitor` down is pure: no clock, no files, no network, no ambient randomness.
@@ -25,4 +26,5 @@ pub mod plot;
 pub mod reading;
 pub mod regime;
 pub mod runtime;
+pub mod score;
 pub mod store;

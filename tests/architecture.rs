@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Which modules a module may name. A new module gets a row here, and a place in ARCHITECTURE.md.
-const ARROWS: [(&str, &[&str]); 15] = [
+const ARROWS: [(&str, &[&str]); 16] = [
     ("reading", &[]),
     ("regime", &[]),
     ("plot", &[]),
@@ -32,6 +32,7 @@ const ARROWS: [(&str, &[&str]); 15] = [
         "inversion",
         &["fit", "forecast", "model", "monitor", "reading", "regime"],
     ),
+    ("score", &["fit", "forecast", "model", "reading", "regime"]),
     ("config", &["alert", "monitor", "reading"]),
     ("store", &["monitor", "reading"]),
     (
@@ -66,13 +67,14 @@ const ARROWS: [(&str, &[&str]); 15] = [
             "reading",
             "regime",
             "runtime",
+            "score",
             "store",
         ],
     ),
 ];
 
 /// Modules that know no clock, no files, no network and no ambient randomness.
-const PURE: [&str; 11] = [
+const PURE: [&str; 12] = [
     "reading",
     "regime",
     "plot",
@@ -84,6 +86,7 @@ const PURE: [&str; 11] = [
     "alert",
     "monitor",
     "inversion",
+    "score",
 ];
 
 /// Beginnings of paths that a pure module may not have.
