@@ -1,8 +1,15 @@
 //! Forecasts of the time of failure scored as they were made: what was known at the time, against what came.
 
+mod compare;
 mod known;
+mod measure;
 mod method;
 mod rivals;
 
+pub use compare::{Interval, Sum, mean, ratio};
 pub use known::{History, Known};
+pub use measure::{
+    LONGEST_SCORED_DAYS, Outcome, RECORDS_SCORED, crps_days, is_covered, log_score, pit,
+    scored_days,
+};
 pub use method::{METHODS, Method};
