@@ -9,6 +9,9 @@ pub struct InverseVelocityLine {
     pub intercept_days: Option<f64>,
     /// Its coefficient of determination.
     pub r_squared: f64,
+    /// The mean time of its points (days) and inverse velocity (days/mm) there, and its slope (1/mm).
+    middle: (f64, f64),
+    slope: f64,
 }
 
 /// Fewer points than this make no line.
@@ -17,13 +20,21 @@ const FEWEST: usize = 4;
 impl InverseVelocityLine {
     /// The line through the rates that move forward and stand clear of their noise; `None` under four.
     pub fn fit(rates: &[Rate]) -> Option<Self> {
-        let usable = rates
-            .iter()
-            .filter(|rate| rate.velocity > 2.0 * rate.sigma && rate.velocity > 0.0);
+        let usable = rates.iter().filter(|rate| Self::takes(rate));
         let points: Vec<(f64, f64)> = usable
             .map(|rate| (rate.middle(), 1.0 / rate.velocity))
             .collect();
         Self::through(&points)
+    }
+
+    /// Whether a rate moves forward and stands clear of its noise.
+    pub(super) fn takes(rate: &Rate) -> bool {
+        rate.velocity > 2.0 * rate.sigma && rate.velocity > 0.0
+    }
+
+    /// Inverse velocity on the line at a time, days/mm; negative past where it meets zero.
+    pub(super) fn at(&self, days: f64) -> f64 {
+        self.middle.1 + self.slope * (days - self.middle.0)
     }
 
     /// The line through (days, inverse velocity) points; `None` under four.
@@ -49,6 +60,8 @@ impl InverseVelocityLine {
         Some(Self {
             intercept_days,
             r_squared,
+            middle: (mean_t, mean_y),
+            slope,
         })
     }
 }

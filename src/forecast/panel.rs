@@ -2,6 +2,8 @@
 //! so that no one confident member silences the rest.
 
 use super::Passage;
+use super::learned::LEARNED;
+use super::members::Members;
 use super::surprise::Surprise;
 use crate::fit::{Ensemble, LoadPosterior, Observation, Observations, Rate, RateOptions};
 use crate::model::{Accuracy, Law, Trajectory};
@@ -135,12 +137,11 @@ pub(crate) fn outlook(
     let now_days = observations.values.last()?.t_days;
     let rates = observations.rates(0..observations.values.len(), RateOptions::default());
     let posterior = LoadPosterior::fit(&rates);
-    let passage = match &posterior {
-        Some(posterior) if measurably_moves(&rates) => {
-            Passage::of(posterior, critical.min(FASTEST_CRITICAL), now_days)
-        }
-        _ => Passage::default(),
-    };
+    let critical = critical.min(FASTEST_CRITICAL);
+    let members = Members::of(&rates, posterior.as_ref(), critical, now_days);
+    let passage = members.map_or_else(Passage::default, |members| {
+        Passage::from_times(LEARNED.forecast(&members))
+    });
     let expected = posterior.as_ref().map(LoadPosterior::ensemble);
     let law = expected
         .as_ref()
@@ -180,6 +181,23 @@ fn unknown() -> BTreeMap<Regime, f64> {
         .into_iter()
         .map(|regime| (regime, 0.0))
         .collect()
+}
+
+/// What each member of the panel says of passing `critical` mm/day; `None` with too few readings, or where the
+/// slope does not measurably move.
+pub fn members(observations: &Observations, critical: f64) -> Option<Members> {
+    if observations.spaced(FEWEST_READINGS).len() < FEWEST_READINGS {
+        return None;
+    }
+    let rates = observations.rates(0..observations.values.len(), RateOptions::default());
+    let posterior = LoadPosterior::fit(&rates);
+    let now_days = observations.values.last()?.t_days;
+    Members::of(
+        &rates,
+        posterior.as_ref(),
+        critical.min(FASTEST_CRITICAL),
+        now_days,
+    )
 }
 
 /// Whether any of the newest rates stands clear of its noise: where none does, a forecast would be the

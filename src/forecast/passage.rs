@@ -1,16 +1,5 @@
 //! The distribution of the first passage of a critical velocity, with the chance that it never comes.
 
-use super::HORIZON_DAYS;
-use crate::fit::{FINEST_DAYS, LoadPosterior};
-
-/// How wide, in ln of the time, a forecast is to be against what the posterior says: it takes every slope to
-/// wander from the law, and simulated ones, which do not, fall into 90 % intervals too often without it.
-const SPREAD: f64 = 0.7;
-/// And how much earlier: the median over simulated slopes then errs to neither side.
-const EARLIER: f64 = 0.98;
-/// And no time moves by more than this factor: laws that fail much sooner than most are a warning of their own.
-const FARTHEST: f64 = 1.5;
-
 /// Times to first passage, days from now, each with its probability; what is missing to 1 never passes.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Passage {
@@ -19,36 +8,6 @@ pub struct Passage {
 }
 
 impl Passage {
-    /// What the law under an undeclared load says of passing `critical` mm/day, as seen at `now_days`.
-    pub fn of(posterior: &LoadPosterior, critical: f64, now_days: f64) -> Self {
-        let later = now_days - posterior.now_days;
-        let times = posterior.passages(critical, HORIZON_DAYS / SPREAD + later);
-        let drawn_in = Self::from_times(times).drawn_in();
-        let since = drawn_in.times.into_iter();
-        Self::from_times(
-            since
-                .map(|(days, share)| ((days - later).max(0.0), share))
-                .collect(),
-        )
-    }
-
-    /// The same with ln of every time drawn towards that of the median.
-    fn drawn_in(self) -> Self {
-        let total: f64 = self.times.iter().map(|(_, share)| share).sum();
-        let Some(median) = self.quantile(0.5 * total, f64::INFINITY) else {
-            return self;
-        };
-        let median = median.max(FINEST_DAYS);
-        let draw = |(days, share): (f64, f64)| {
-            let drawn = median * (days / median).powf(SPREAD);
-            (
-                EARLIER * drawn.clamp(days / FARTHEST, days * FARTHEST),
-                share,
-            )
-        };
-        Self::from_times(self.times.into_iter().map(draw).collect())
-    }
-
     /// From (days, probability) pairs in any order.
     pub fn from_times(mut times: Vec<(f64, f64)>) -> Self {
         times.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -1,0 +1,114 @@
+//! Learns how the panel weighs its members, on simulated slopes alone: `learn [FAILING] [STANDING]` writes
+//! src/forecast/learned.rs.
+//!
+//! Lives are drawn from seeds that no scorecard uses. Each is looked at at the scored leads and evenly over its
+//! record; the weights are those of least CRPS, each taken over the time that was left, and the recalibration is the
+//! distribution of where in the mixture the failures came.
+
+#![expect(clippy::print_stderr, reason = "progress is what it prints")]
+
+mod descent;
+mod looks;
+
+use descent::Batch;
+use looks::Look;
+use slipwatch::forecast::{LEVELS, SITUATIONS, Weighing, situation};
+use std::fmt::Write as _;
+
+/// A failure is forecast with this probability at least where it teaches when.
+const LEAST_CHANCE: f64 = 0.3;
+/// Forecasts that each situation starts with, spread evenly, so that few cannot decide.
+const EVEN: f64 = 10.0;
+
+fn main() -> anyhow::Result<()> {
+    let mut arguments = std::env::args().skip(1);
+    let mut count = |default: u64| -> anyhow::Result<u64> {
+        Ok(arguments.next().map_or(Ok(default), |text| text.parse())?)
+    };
+    let (failing, standing) = (count(2000)?, count(800)?);
+    let looks = looks::all(failing, standing);
+    eprintln!(
+        "{} looks at {failing} failing and {standing} standing slopes",
+        looks.len()
+    );
+    let batch = Batch::of(&looks);
+    let (gates, harshness) = batch.least_crps();
+    let mut weighing = Weighing {
+        gates,
+        harshness,
+        recalibration: [std::array::from_fn(even); SITUATIONS],
+    };
+    weighing.recalibration = recalibration(&looks, &weighing);
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/src/forecast/learned.rs");
+    std::fs::write(file, source(&weighing, failing, standing)?)?;
+    eprintln!("wrote {file}");
+    Ok(())
+}
+
+fn even(level: usize) -> f64 {
+    level as f64 / (LEVELS - 1) as f64
+}
+
+/// The share of failures by each level of the mixture, in each situation; a look counts for the two nearest.
+fn recalibration(looks: &[Look], weighing: &Weighing) -> [[f64; LEVELS]; SITUATIONS] {
+    let mut counts = [[0.0; LEVELS]; SITUATIONS];
+    let mut totals = [0.0; SITUATIONS];
+    for look in looks.iter().filter(|look| look.failed) {
+        let times = weighing.mixture(&look.members);
+        let total: f64 = times.iter().map(|(_, share)| share).sum();
+        if total < LEAST_CHANCE {
+            continue;
+        }
+        let within = times.iter().take_while(|(days, _)| *days <= look.remaining);
+        let level = within.map(|(_, share)| share).sum::<f64>() / total;
+        let at = situation(&times, total, look.members.interval_days);
+        for knot in 0..SITUATIONS {
+            let weight = total * (1.0 - (at - knot as f64).abs()).max(0.0);
+            totals[knot] += weight;
+            for (index, count) in counts[knot].iter_mut().enumerate() {
+                *count += if level <= even(index) { weight } else { 0.0 };
+            }
+        }
+    }
+    for (levels, total) in counts.iter_mut().zip(totals) {
+        for (index, count) in levels.iter_mut().enumerate() {
+            *count = (*count + EVEN * even(index)) / (total + EVEN);
+        }
+        (levels[0], levels[LEVELS - 1]) = (0.0, 1.0);
+    }
+    counts
+}
+
+/// The file that holds what was learnt.
+fn source(weighing: &Weighing, failing: u64, standing: u64) -> anyhow::Result<String> {
+    let mut text = format!(
+        "//! What the panel has learnt on {failing} failing and {standing} standing simulated slopes: written by\n\
+         //! `cargo run --release --example learn`.\n\n\
+         use super::members::{{FEATURES, MEMBERS}};\n\
+         use super::weighing::{{LEVELS, SITUATIONS, Weighing}};\n\n\
+         /// Of each member but the law: its window's line, and last the one that says the slope will stand.\n\
+         const GATES: [[f64; FEATURES]; MEMBERS - 1] = [\n"
+    );
+    for gate in &weighing.gates {
+        writeln!(text, "    {},", row(gate))?;
+    }
+    text.push_str(
+        "];\n\n/// The share of failures by each level, a row for each situation.\n\
+         const RECALIBRATION: [[f64; LEVELS]; SITUATIONS] = [\n",
+    );
+    for levels in &weighing.recalibration {
+        writeln!(text, "    {},", row(levels))?;
+    }
+    write!(
+        text,
+        "];\n\n/// The weighing in force.\npub const LEARNED: Weighing = Weighing {{\n    gates: GATES,\n    \
+         harshness: {:.3},\n    recalibration: RECALIBRATION,\n}};\n",
+        weighing.harshness
+    )?;
+    Ok(text)
+}
+
+fn row(values: &[f64]) -> String {
+    let values: Vec<String> = values.iter().map(|value| format!("{value:.4}")).collect();
+    format!("[{}]", values.join(", "))
+}
