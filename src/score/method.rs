@@ -28,4 +28,59 @@ pub const METHODS: &[Method] = &[
         source: "Fukuzono 1985",
         forecast: rivals::line::raw,
     },
+    Method {
+        name: "inverse-velocity-short",
+        source: "Carlà et al. 2017, average of 3",
+        forecast: rivals::line::short,
+    },
+    Method {
+        name: "inverse-velocity-long",
+        source: "Carlà et al. 2017, average of 7",
+        forecast: rivals::line::long,
+    },
+    Method {
+        name: "voight",
+        source: "Voight 1988, fitted as Crosta and Agliardi 2003",
+        forecast: rivals::voight::forecast,
+    },
+    Method {
+        name: "saito",
+        source: "Saito 1969",
+        forecast: rivals::saito::forecast,
+    },
+    Method {
+        name: "exponential-threshold",
+        source: "Vibert et al. 1988",
+        forecast: rivals::exponential::forecast,
+    },
+    Method {
+        name: "river-weighted-line",
+        source: "Vibert et al. 1988, the weights ours",
+        forecast: rivals::river::weighted_line,
+    },
+    Method {
+        name: "river-removed-line",
+        source: "Rat 1988, the fit of the share ours",
+        forecast: rivals::river::removed_line,
+    },
+    Method {
+        name: "tangent-angle",
+        source: "Xu et al. 2009 and 2011, drawn on to 85 degrees by us",
+        forecast: rivals::tangent::forecast,
+    },
+    Method {
+        name: "lppls",
+        source: "Filimonov and Sornette 2013; Lei and Sornette 2025",
+        forecast: rivals::lppls::forecast,
+    },
+    Method {
+        name: "constant-load",
+        source: "Helmstetter et al. 2004",
+        forecast: rivals::constant_load::forecast,
+    },
+    Method {
+        name: "persistence",
+        source: "none: the newest velocity goes on",
+        forecast: rivals::persistence::forecast,
+    },
 ];

@@ -1,17 +1,73 @@
 //! The rival methods, each as it was published, each knowing the past alone.
 
+pub(super) mod constant_load;
+pub(super) mod exponential;
 pub(super) mod line;
+pub(super) mod lppls;
+mod onset;
+pub(super) mod persistence;
+pub(super) mod river;
+pub(super) mod saito;
+mod simplex;
+mod straight;
+pub(super) mod tangent;
+pub(super) mod voight;
 
 use super::Known;
+use crate::fit::{Rate, RateOptions};
 use crate::forecast::{Panel, Passage};
-
-/// A point forecast, `days` from now; `None` where it lies in the past.
-fn point(days: f64) -> Passage {
-    Passage::from_times(vec![(days.max(0.0), 1.0)])
-}
 
 /// The law under an undeclared load, alone.
 pub(super) fn slider_block(known: &Known) -> Option<Passage> {
     let outlook = Panel::default().update(&known.observations, known.critical_mm_per_day)?;
     Some(outlook.passage)
 }
+
+/// A point forecast, `days` from now: a time already past is now, one without end is never, and what is no
+/// number says nothing.
+fn point(days: f64) -> Option<Passage> {
+    if days.is_nan() {
+        return None;
+    }
+    if days.is_infinite() && days > 0.0 {
+        return Some(Passage::default());
+    }
+    Some(Passage::from_times(vec![(days.max(0.0), 1.0)]))
+}
+
+/// The velocities in the record, oldest first.
+fn rates(known: &Known) -> Vec<Rate> {
+    let observations = &known.observations;
+    observations.rates(0..observations.values.len(), RateOptions::default())
+}
+
+/// Whether a velocity is forward and stands clear of its noise: the others have no logarithm or inverse that
+/// says anything.
+fn moves(rate: &Rate) -> bool {
+    rate.velocity > 0.0 && rate.velocity > 2.0 * rate.sigma
+}
+
+/// (days, mm) at the start of the first rate and at the end of each.
+fn displacements(rates: &[Rate]) -> Vec<(f64, f64)> {
+    let Some(first) = rates.first() else {
+        return Vec::new();
+    };
+    let mut path = vec![(first.from, 0.0)];
+    let (mut at, mut slip) = (first.from, 0.0);
+    let mut before = first.velocity;
+    for rate in rates {
+        let is_point = rate.to <= rate.from;
+        let mean = if is_point {
+            f64::midpoint(before, rate.velocity)
+        } else {
+            rate.velocity
+        };
+        slip += mean * (rate.to - at);
+        (at, before) = (rate.to, rate.velocity);
+        path.push((at, slip));
+    }
+    path
+}
+
+#[cfg(test)]
+mod drawn;
