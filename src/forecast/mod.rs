@@ -13,7 +13,7 @@ mod weighing;
 
 pub use dependence::Dependence;
 pub use learned::LEARNED;
-pub use life::{Fate, Life};
+pub use life::{Corpus, Fate, Life};
 pub use line::InverseVelocityLine;
 pub use members::{FEATURES, LINES, MEMBERS, Members};
 pub use panel::{FEWEST_READINGS, HORIZON_DAYS, Outlook, Panel, members};

@@ -1,0 +1,79 @@
+//! Scores every method's forecasts of the time of failure as they would have been made: `skill`.
+//!
+//!     cargo run --release --example skill                        on the training lives, and the recordings
+//!     cargo run --release --example skill -- --judged            on the lives that nothing was tuned on
+//!     cargo run --release --example skill -- --simulated 70 --records records.ndjson
+//!
+//! At each lead before a failure, and at looks spread over a record that ended without one, each method is given
+//! what had been measured until then, and what it says is scored against what came.
+#![expect(
+    clippy::print_stderr,
+    reason = "what is left out is told to who runs it"
+)]
+
+mod corpus;
+#[path = "../../tests/measured/mod.rs"]
+mod measured;
+mod record;
+mod recorded;
+mod run;
+mod table;
+
+use anyhow::{Context, Result, bail};
+use clap::Parser;
+use corpus::Subjects;
+use slipwatch::forecast::Corpus;
+use slipwatch::score::METHODS;
+use std::io::Write as _;
+use std::path::PathBuf;
+
+/// Scores forecasts of the time of failure.
+#[derive(Debug, Parser)]
+struct Arguments {
+    /// Simulated lives, beside the recordings.
+    #[arg(long, default_value_t = Corpus::LIVES)]
+    simulated: u64,
+    /// On the lives that are kept for judgement; without it, on those for training.
+    #[arg(long)]
+    judged: bool,
+    /// Only these methods; all where none is named.
+    #[arg(long, value_delimiter = ',')]
+    only: Vec<String>,
+    /// Writes every forecast into this file, a line each.
+    #[arg(long, value_name = "FILE")]
+    records: Option<PathBuf>,
+    /// Threads.
+    #[arg(long, default_value_t = 2)]
+    threads: usize,
+}
+
+fn main() -> Result<()> {
+    let arguments = Arguments::parse();
+    let methods: Vec<_> = METHODS
+        .iter()
+        .filter(|method| {
+            arguments.only.is_empty() || arguments.only.iter().any(|name| name == method.name)
+        })
+        .collect();
+    if methods.is_empty() {
+        let known: Vec<&str> = METHODS.iter().map(|method| method.name).collect();
+        bail!("no such method: expected one of {}", known.join(", "));
+    }
+    if arguments.simulated > Corpus::LIVES {
+        bail!("at most {} simulated lives", Corpus::LIVES);
+    }
+    let recorded = recorded::load(|heading| eprintln!("left out: {heading} (no measured data)"))?;
+    let corpus = if arguments.judged {
+        Corpus::JUDGED
+    } else {
+        Corpus::TRAINING
+    };
+    let subjects = Subjects::new(recorded, corpus, arguments.simulated);
+    let told = run::run(&subjects, &methods, arguments.threads)?;
+    if let Some(file) = &arguments.records {
+        let lines = record::lines(&told)?;
+        std::fs::write(file, lines).with_context(|| file.display().to_string())?;
+    }
+    write!(std::io::stdout(), "{}", table::text(&told, &methods))?;
+    Ok(())
+}
