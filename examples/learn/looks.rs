@@ -1,6 +1,6 @@
 //! What the members said at each look at each slope, and what came.
 
-use slipwatch::forecast::{Fate, Life, Members, members};
+use slipwatch::forecast::{Corpus, Life, Members, members};
 
 const LEADS: [f64; 7] = [40.0, 20.0, 10.0, 5.0, 2.0, 1.0, 0.5];
 /// Looks evenly over the record of a slope that fails, and of one that stands.
@@ -16,31 +16,21 @@ pub(crate) struct Look {
     pub(crate) length: f64,
 }
 
-/// All looks at so many slopes, drawn from the seeds for learning.
-pub(crate) fn all(failing: u64, standing: u64) -> Vec<Look> {
-    let lives: Vec<(Fate, u64)> = (0..failing)
-        .map(|seed| (Fate::Failing, 900_000 + seed))
-        .chain((0..standing).map(|seed| {
-            let fates = [Fate::Saturating, Fate::Steady, Fate::Settling];
-            (fates[seed as usize % fates.len()], 950_000 + seed)
-        }))
-        .collect();
-    let half = lives.len().div_ceil(2);
+/// All looks at the first `count` slopes of the corpus for learning, in the order of their seeds.
+pub(crate) fn all(count: u64) -> Vec<Look> {
+    let seeds: Vec<u64> = (0..count.min(Corpus::LIVES)).collect();
+    let half = seeds.len().div_ceil(2).max(1);
+    let looks = |seeds: &[u64]| -> Vec<Look> {
+        let lives = seeds.iter().map(|seed| Corpus::TRAINING.life(*seed));
+        lives.flat_map(|life| of(&life)).collect()
+    };
     std::thread::scope(|scope| {
-        let parts: Vec<_> = lives
+        let parts: Vec<_> = seeds
             .chunks(half)
-            .map(|part| {
-                scope.spawn(|| {
-                    part.iter()
-                        .flat_map(|(fate, seed)| of(&Life::draw(*fate, *seed)))
-                        .collect::<Vec<Look>>()
-                })
-            })
+            .map(|part| scope.spawn(move || looks(part)))
             .collect();
-        parts
-            .into_iter()
-            .flat_map(|part| part.join().unwrap_or_default())
-            .collect()
+        let done = parts.into_iter().filter_map(|part| part.join().ok());
+        done.flatten().collect()
     })
 }
 

@@ -1,7 +1,7 @@
-//! Learns how the panel weighs its members, on simulated slopes alone: `learn [FAILING] [STANDING]` writes
+//! Learns how the panel weighs its members, on simulated slopes alone: `learn [SLOPES]` writes
 //! src/forecast/learned.rs.
 //!
-//! Lives are drawn from seeds that no scorecard uses. Each is looked at at the scored leads and evenly over its
+//! Lives are those of `Corpus::TRAINING`, which no scorecard uses. Each is looked at at the scored leads and evenly over its
 //! record; the weights are those of least CRPS, each taken over the time that was left, and the recalibration is the
 //! distribution of where in the mixture the failures came.
 
@@ -12,7 +12,7 @@ mod looks;
 
 use descent::Batch;
 use looks::Look;
-use slipwatch::forecast::{LEVELS, SITUATIONS, Weighing, situation};
+use slipwatch::forecast::{Corpus, LEVELS, SITUATIONS, Weighing, situation};
 use std::fmt::Write as _;
 
 /// A failure is forecast with this probability at least where it teaches when.
@@ -21,16 +21,10 @@ const LEAST_CHANCE: f64 = 0.3;
 const EVEN: f64 = 10.0;
 
 fn main() -> anyhow::Result<()> {
-    let mut arguments = std::env::args().skip(1);
-    let mut count = |default: u64| -> anyhow::Result<u64> {
-        Ok(arguments.next().map_or(Ok(default), |text| text.parse())?)
-    };
-    let (failing, standing) = (count(2000)?, count(800)?);
-    let looks = looks::all(failing, standing);
-    eprintln!(
-        "{} looks at {failing} failing and {standing} standing slopes",
-        looks.len()
-    );
+    let count = std::env::args().nth(1);
+    let count = count.map_or(Ok(Corpus::LIVES), |text| text.parse())?;
+    let looks = looks::all(count);
+    eprintln!("{} looks at {count} simulated slopes", looks.len());
     let batch = Batch::of(&looks);
     let (gates, harshness) = batch.least_crps();
     let mut weighing = Weighing {
@@ -40,7 +34,7 @@ fn main() -> anyhow::Result<()> {
     };
     weighing.recalibration = recalibration(&looks, &weighing);
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/src/forecast/learned.rs");
-    std::fs::write(file, source(&weighing, failing, standing)?)?;
+    std::fs::write(file, source(&weighing, count)?)?;
     eprintln!("wrote {file}");
     Ok(())
 }
@@ -80,10 +74,9 @@ fn recalibration(looks: &[Look], weighing: &Weighing) -> [[f64; LEVELS]; SITUATI
 }
 
 /// The file that holds what was learnt.
-fn source(weighing: &Weighing, failing: u64, standing: u64) -> anyhow::Result<String> {
+fn source(weighing: &Weighing, count: u64) -> anyhow::Result<String> {
     let mut text = format!(
-        "//! What the panel has learnt on {failing} failing and {standing} standing simulated slopes: written by\n\
-         //! `cargo run --release --example learn`.\n\n\
+        "//! What the panel has learnt on {count} simulated slopes: written by `cargo run --release --example learn`.\n\n\
          use super::members::{{FEATURES, MEMBERS}};\n\
          use super::weighing::{{LEVELS, SITUATIONS, Weighing}};\n\n\
          /// Of each member but the law: its window's line, and last the one that says the slope will stand.\n\

@@ -19,6 +19,11 @@ pub struct Method {
 /// Every method, the program's own first.
 pub const METHODS: &[Method] = &[
     Method {
+        name: "panel",
+        source: "this program: what the monitor goes by",
+        forecast: rivals::panel,
+    },
+    Method {
         name: "slider-block",
         source: "this program: the law under an undeclared load",
         forecast: rivals::slider_block,

@@ -15,12 +15,21 @@ pub(super) mod voight;
 
 use super::Known;
 use crate::fit::{Rate, RateOptions};
-use crate::forecast::{Panel, Passage};
+use crate::forecast::{FEWEST_READINGS, Panel, Passage, members};
 
-/// The law under an undeclared load, alone.
-pub(super) fn slider_block(known: &Known) -> Option<Passage> {
+/// What the monitor goes by.
+pub(super) fn panel(known: &Known) -> Option<Passage> {
     let outlook = Panel::default().update(&known.observations, known.critical_mm_per_day)?;
     Some(outlook.passage)
+}
+
+/// The panel's first member, the law under an undeclared load, alone and as it comes.
+pub(super) fn slider_block(known: &Known) -> Option<Passage> {
+    let spaced = known.observations.spaced(FEWEST_READINGS);
+    (spaced.len() >= FEWEST_READINGS).then(|| {
+        let members = members(&known.observations, known.critical_mm_per_day);
+        members.map_or_else(Passage::default, |members| Passage::from_times(members.law))
+    })
 }
 
 /// A point forecast, `days` from now: a time already past is now, one without end is never, and what is no
