@@ -189,6 +189,31 @@ async fn an_old_alert_still_in_force_is_told_when_its_readings_are_recent() {
 }
 
 #[tokio::test]
+async fn the_end_of_what_was_told_is_told_however_late_it_comes_and_after_a_restart_too() {
+    let (folder, config) = site_folder();
+    let mut first = site(&config);
+    first.handle(&alert(noon(), Level::Orange, AlertState::Firing));
+    first.commit(noon()).unwrap();
+    close(first, noon()).await;
+    let wall = noon() + hours(24 * 30);
+    let mut second = site(&config);
+    // Long past, and so not told; the orange that it supersedes was.
+    second.handle(&alert(noon() + hours(1), Level::Red, AlertState::Firing));
+    let end = noon() + hours(2);
+    second.handle(&alert(end, Level::Red, AlertState::Resolved));
+    // Of these nobody has heard.
+    second.handle(&alert(noon() + hours(3), Level::Red, AlertState::Firing));
+    second.handle(&alert(noon() + hours(4), Level::Red, AlertState::Resolved));
+    second.commit(wall).unwrap();
+    close(second, wall).await;
+    let expected = [
+        format!("5/orange/{} Actual", noon().as_second()),
+        format!("5/red/{} Actual", end.as_second()),
+    ];
+    assert_eq!(lines(&folder, "told"), expected);
+}
+
+#[tokio::test]
 async fn an_old_alert_in_force_is_told_in_whatever_batch_it_comes_and_once() {
     let (folder, config) = site_folder();
     let wall = noon() + hours(24 * 3);

@@ -8,7 +8,9 @@
 
 use jiff::ToSpan;
 use slipwatch::alert::{Level, Policy, Threshold};
-use slipwatch::monitor::{AlertState, Event, EventKind, Input, Monitor, Settings, SiteLevel};
+use slipwatch::monitor::{
+    AlertState, Event, EventKind, Input, Monitor, Settings, SiteLevel, Watched,
+};
 use slipwatch::reading::{BenchmarkId, Reading, Timestamp, Unit};
 use std::collections::BTreeSet;
 
@@ -91,7 +93,10 @@ fn two_of_three_make_the_site_and_one_that_is_removed_no_longer_does() {
     let mut restarted = Monitor::restore(&monitor.save().unwrap()).unwrap();
     let watched: BTreeSet<BenchmarkId> = ["a", "c"].map(BenchmarkId::new).into();
     let without = Settings {
-        watched: Some(watched),
+        watched: Watched {
+            named: watched,
+            is_open: false,
+        },
         ..settings(Some(SiteLevel::AtLeast(2)))
     };
     let input = Input::Settings(Box::new(without));

@@ -3,7 +3,7 @@
 use super::table::{Placed, Section};
 use super::{Benchmark, Config, HookConfig, SiteConfig, alert, declared, source, value, vector};
 use crate::alert::{Level, Policy};
-use crate::monitor::{Explain, Settings, SiteLevel};
+use crate::monitor::{Explain, Settings, SiteLevel, Watched};
 use crate::reading::{BenchmarkId, Quantity, Unit};
 use jiff::SignedDuration;
 use jiff::tz::TimeZone;
@@ -153,10 +153,13 @@ pub(super) fn unique(
 }
 
 /// Where every source has benchmarks of its own, no others are watched.
-fn watched(sources: &[&str], benchmarks: &[Benchmark]) -> Option<BTreeSet<BenchmarkId>> {
-    let is_named = |source: &&str| benchmarks.iter().any(|one| one.source == **source);
+fn watched(sources: &[&str], benchmarks: &[Benchmark]) -> Watched {
+    let names_its_own = |source: &&str| benchmarks.iter().any(|one| one.source == **source);
     let ids = benchmarks.iter().map(|benchmark| benchmark.id.clone());
-    (sources.iter().all(is_named)).then(|| ids.collect())
+    Watched {
+        named: ids.collect(),
+        is_open: !sources.iter().all(names_its_own),
+    }
 }
 
 type Own = BTreeMap<BenchmarkId, Policy>;

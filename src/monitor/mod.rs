@@ -92,15 +92,43 @@ pub struct Settings {
     pub benchmarks: BTreeMap<BenchmarkId, Policy>,
     /// What is done about a residual that the law does not explain.
     pub explain: Explain,
-    /// The benchmarks that are watched; `None`: whatever comes.
+    /// The benchmarks that are watched.
     #[serde(default)]
-    pub watched: Option<BTreeSet<BenchmarkId>>,
+    pub watched: Watched,
     /// What people declare to have done.
     #[serde(default)]
     pub declared: Vec<Declared>,
     /// How the benchmarks' levels make one of the whole site; `None`: there is none.
     #[serde(default)]
     pub site: Option<SiteLevel>,
+}
+
+/// The benchmarks that are watched.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Watched {
+    /// Those that have a name in the config.
+    pub named: BTreeSet<BenchmarkId>,
+    /// Whether whatever else comes is watched too.
+    pub is_open: bool,
+}
+
+/// Whatever comes.
+impl Default for Watched {
+    fn default() -> Self {
+        Self {
+            named: BTreeSet::new(),
+            is_open: true,
+        }
+    }
+}
+
+impl Watched {
+    /// Whether `benchmark`, watched under `former`, no longer is: it was named and is not any more, or was not and
+    /// nothing else than what is named is watched from now on.
+    fn drops(&self, benchmark: &BenchmarkId, former: &Self) -> bool {
+        let was_named = former.named.contains(benchmark);
+        !self.named.contains(benchmark) && (was_named || !self.is_open)
+    }
 }
 
 /// What is done about a residual that the law does not explain; it is watched and told in any case.
@@ -261,8 +289,8 @@ impl Monitor {
 
     /// Goes by other settings from here on. What was in force at a benchmark that is no longer watched ends.
     fn resettle(&mut self, now: Timestamp, settings: &Settings) -> Vec<Event> {
-        self.settings = settings.clone();
-        let mut events = self.unwatch(now);
+        let former = std::mem::replace(&mut self.settings, settings.clone());
+        let mut events = self.unwatch(now, &former.watched);
         let beside = Beside {
             covariates: &self.covariates,
             explain: self.settings.explain,
@@ -281,12 +309,9 @@ impl Monitor {
         events
     }
 
-    fn unwatch(&mut self, now: Timestamp) -> Vec<Event> {
-        let Some(watched) = &self.settings.watched else {
-            return Vec::new();
-        };
+    fn unwatch(&mut self, now: Timestamp, former: &Watched) -> Vec<Event> {
         let gone: Vec<BenchmarkId> = (self.tracks.keys())
-            .filter(|id| !watched.contains(*id))
+            .filter(|id| self.settings.watched.drops(id, former))
             .cloned()
             .collect();
         let mut events = Vec::new();
@@ -373,5 +398,29 @@ fn trouble(time: Timestamp, kind: &str, text: &str) -> Event {
         time,
         benchmark: None,
         kind: EventKind::Fault { kind, text },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_loses_its_name_is_dropped_and_what_never_had_one_only_where_nothing_else_is_watched() {
+        let five = BenchmarkId::new("5");
+        let watched = |named: &[&str], is_open| Watched {
+            named: named.iter().copied().map(BenchmarkId::new).collect(),
+            is_open,
+        };
+        for (former, now, is_dropped) in [
+            (watched(&["4", "5"], true), watched(&["4"], true), true),
+            (watched(&["4"], true), watched(&["4"], true), false),
+            (watched(&["4"], true), watched(&[], true), false),
+            (watched(&["4"], true), watched(&["4"], false), true),
+            (watched(&["4"], true), watched(&["5"], false), false),
+            (Watched::default(), watched(&[], false), true),
+        ] {
+            assert_eq!(now.drops(&five, &former), is_dropped, "{former:?} {now:?}");
+        }
     }
 }

@@ -212,6 +212,21 @@ impl Daemon {
         Ok(())
     }
 
+    /// Waits for the hooks to finish. Were others told of the same meanwhile, people would hear it twice.
+    async fn close_hooks(&mut self) {
+        let Some(former) = self.site.unhook() else {
+            return;
+        };
+        let mut closing = std::pin::pin!(former.close(DRAIN_LIMIT));
+        loop {
+            tokio::select! {
+                _ = &mut closing => return,
+                // Bounded, so it is no way of keeping a daemon that stands still alive.
+                () = tokio::time::sleep(TICK) => self.pulse.turn(),
+            }
+        }
+    }
+
     /// Goes by the config file as it is now, all of it or nothing.
     async fn reload(&mut self, shutdown: &Shutdown) -> Result<(), StoreError> {
         let fresh = match config::load(&self.config.file) {
@@ -243,10 +258,8 @@ impl Daemon {
         let events = self.site.resettle(fresh.settings.clone());
         self.pulse.vitals.note(&events);
         self.commit()?;
-        let former = self.site.rehook(dispatcher(&fresh, &self.store))?;
-        if let Some(former) = former {
-            tokio::spawn(former.close(DRAIN_LIMIT));
-        }
+        self.close_hooks().await;
+        self.site.rehook(dispatcher(&fresh, &self.store))?;
         self.sources = Sources::start(&fresh, &self.store)?;
         (self.is_up_to_date, self.config) = (false, fresh);
         self.pulse.service.ready("watching");

@@ -20,8 +20,8 @@ fn failing(name: &str) -> String {
     format!("time,{name}_displacement_mm\n{}", rows.collect::<String>())
 }
 
+/// 21.
 #[test]
-#[ignore = "what is taken out ends only where every source names its benchmarks, and the recorder here names none: open"]
 fn a_wrong_config_on_sighup_is_not_taken_and_a_benchmark_taken_out_is_closed_and_told() {
     let site = Site::new(&format!("{BENCHMARKS}{POLICY}"));
     for name in ["4", "5"] {
@@ -60,6 +60,30 @@ fn a_wrong_config_on_sighup_is_not_taken_and_a_benchmark_taken_out_is_closed_and
     assert!(!is_told("5/red", "resolved"), "5 is still watched");
     program.stop();
     site.proven_events();
+}
+
+/// 21. A hook that is at work while the config changes is waited for.
+#[test]
+fn what_a_hook_is_being_told_while_the_config_changes_is_told_once() {
+    let site = Site::new(POLICY);
+    let script = "echo $SLIPWATCH_KEY >> begun\nsleep 1\necho $SLIPWATCH_KEY >> told\n";
+    std::fs::write(site.path("hook.sh"), script).unwrap();
+    site.append("incoming/5.csv", &failing("5"));
+    let program = site.caught_up();
+    let is_red = |name: &str| {
+        let lines = site.lines(name);
+        lines
+            .iter()
+            .filter(|line| line.starts_with("5/red/"))
+            .count()
+    };
+    eventually("a hook at work", || is_red("begun") == 1);
+    program.signal(Signal::SIGHUP);
+    eventually("that it is taken", || {
+        site.log().contains("the config is taken")
+    });
+    program.stop();
+    assert_eq!((is_red("begun"), is_red("told")), (1, 1), "{}", site.log());
 }
 
 /// 20. Whoever sets the clock back, data time stays: a reading of the future waits for nobody.

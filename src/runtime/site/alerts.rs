@@ -14,7 +14,7 @@ use jiff::SignedDuration;
 impl Site {
     /// Makes everything since the last commit durable in one transaction, then hands the alerts to the hooks, but
     /// for what began longer before `wall` than twice the evacuation time: of that, [`Site::caught_up`] sends what
-    /// is still in force.
+    /// is still in force. The end of what was told is told however long ago it was.
     ///
     /// On a full disk everything waits for the next commit, and the hooks hear all the same: an alert may then
     /// come twice after a crash, with the same key.
@@ -26,7 +26,8 @@ impl Site {
         for alert in std::mem::take(&mut self.fresh) {
             let age = wall.duration_since(alert.event.time);
             let is_fresh = age <= self.freshness(alert.event.benchmark.as_ref());
-            let is_sent = is_fresh && !self.is_muted(&alert, wall);
+            let is_due = is_fresh || self.is_waited_for(&alert);
+            let is_sent = is_due && !self.is_muted(&alert, wall);
             if is_sent {
                 to_send.push(alert.clone());
             } else {
@@ -143,14 +144,19 @@ impl Site {
         self.is_full
     }
 
-    /// Tells other hooks from here on; returns the way to those before.
+    /// Tells no hook from here on; returns the way to those that were told. It is to be closed before
+    /// [`Site::rehook`], or what waits is told by both.
+    pub fn unhook(&mut self) -> Option<Dispatcher> {
+        self.sinks.alerts.take()
+    }
+
+    /// Tells these hooks from here on, first what some hook has not taken yet.
     ///
     /// # Errors
     /// When the state cannot be read.
-    pub fn rehook(&mut self, alerts: Dispatcher) -> Result<Option<Dispatcher>, StoreError> {
-        let former = self.sinks.alerts.replace(alerts);
-        self.wait_for_hooks()?;
-        Ok(former)
+    pub fn rehook(&mut self, alerts: Dispatcher) -> Result<(), StoreError> {
+        self.sinks.alerts = Some(alerts);
+        self.wait_for_hooks()
     }
 
     /// Whether so much waits for room on the disk that nothing more is to be taken in.
@@ -167,11 +173,13 @@ impl Site {
         if had.is_some_and(|had| had.alert.level > alert.level) {
             return;
         }
+        let was_told = is_sent || had.is_some_and(|had| had.was_told);
         match alert.state {
             AlertState::Firing if alert.level != Level::Green => {
                 let standing = Standing {
                     alert,
                     is_sent,
+                    was_told,
                     is_told_together: false,
                 };
                 self.standing.insert(place, standing);
@@ -180,6 +188,14 @@ impl Site {
                 self.standing.remove(&place);
             }
         }
+    }
+
+    /// Whether it is the end of what people have been told of.
+    fn is_waited_for(&self, alert: &Alert) -> bool {
+        let place = (alert.event.benchmark.clone(), alert.level == Level::Unknown);
+        let had = self.standing.get(&place);
+        alert.state == AlertState::Resolved
+            && had.is_some_and(|had| had.was_told && had.alert.level <= alert.level)
     }
 
     /// Everything there is has been read: what is in force and was not sent because it began long
@@ -204,7 +220,7 @@ impl Site {
                 && !self.is_muted(&one.alert, wall)
             {
                 to_send.push(one.alert.clone());
-                one.is_sent = true;
+                (one.is_sent, one.was_told) = (true, true);
                 let counted = u64::from(one.alert.event.benchmark.is_some());
                 self.counts.long_past = self.counts.long_past.saturating_sub(counted);
             }

@@ -119,7 +119,8 @@ impl Site {
                 self.steps_since_memory += 1;
             }
             for alert in std::mem::take(&mut self.fresh) {
-                self.stand(alert, false);
+                let is_sent = store.is_noted(identity(&alert), None, None)?;
+                self.stand(alert, is_sent);
             }
         }
         tracing::info!(steps = after - from, of = after, "the past is there");
@@ -134,11 +135,9 @@ impl Site {
             return Ok(());
         };
         for one in self.standing.values_mut() {
-            let Alert {
-                key, level, state, ..
-            } = &one.alert;
-            let identity = (key.as_str(), level.name(), state_name(*state));
+            let identity = identity(&one.alert);
             one.is_sent |= store.is_noted(identity, None, None)?;
+            one.was_told |= one.is_sent;
             one.is_told_together |= store.is_noted(identity, None, Some(Fate::Over))?;
         }
         for body in store.waiting()? {
@@ -187,4 +186,12 @@ impl Site {
             }
         }
     }
+}
+
+/// What the outbox knows an alert by.
+fn identity(alert: &Alert) -> (&str, &str, &str) {
+    let Alert {
+        key, level, state, ..
+    } = alert;
+    (key, level.name(), state_name(*state))
 }

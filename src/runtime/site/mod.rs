@@ -82,6 +82,9 @@ struct Standing {
     alert: Alert,
     /// Whether it has been offered to the hooks.
     is_sent: bool,
+    /// Whether this one, or a lower one that it superseded, has been offered to them: people wait for its end.
+    #[serde(default)]
+    was_told: bool,
     /// Whether an alert of many benchmarks has told of it.
     #[serde(default)]
     is_told_together: bool,
@@ -247,11 +250,6 @@ impl Site {
                 self.batch.position(one);
             }
         }
-    }
-
-    /// When the monitor wants to be woken.
-    pub fn next_deadline(&self) -> Option<Timestamp> {
-        self.monitor.next_deadline()
     }
 
     fn step(&mut self, now: Timestamp, input: &Input) -> Vec<Event> {

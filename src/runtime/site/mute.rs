@@ -30,7 +30,7 @@ impl Site {
                     .iter_mut()
                     .filter(|((place, _), _)| benchmark.is_none() || place == benchmark);
                 for (_, one) in seen {
-                    one.is_sent = true;
+                    (one.is_sent, one.was_told) = (true, true);
                     if let Some(alerts) = &self.sinks.alerts {
                         alerts.end(&one.alert);
                     }
