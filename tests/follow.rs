@@ -2,11 +2,13 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+use jiff::SignedDuration;
 use slipwatch::config::{self, Config};
 use slipwatch::monitor::Input;
 use slipwatch::reading::Timestamp;
 use slipwatch::runtime::ingest::{ReadOptions, read_files};
-use slipwatch::runtime::tail::{Batch, Follower};
+use slipwatch::runtime::replay::arrivals;
+use slipwatch::runtime::tail::{Arrival, Batch, Follower};
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
 use std::io::{Seek, SeekFrom, Write};
@@ -224,6 +226,35 @@ fn the_history_of_many_files_comes_in_the_order_of_its_measurement() {
     }
     let order: String = bench.news().iter().map(|news| &news[..1]).collect();
     assert_eq!(order, "abc".repeat(9));
+}
+
+#[test]
+fn what_was_measured_at_one_time_comes_as_a_replay_has_it_whatever_the_files_are_called() {
+    let rows: String = (1..4).map(|day| row(day, f64::from(day))).collect();
+    let tables = [
+        ("1.csv", "time,b_displacement_mm\n"),
+        ("2.csv", "time,rain_mm\n"),
+        ("3.csv", "time,a_displacement_mm\n"),
+        ("4.csv", "time,level_m\n"),
+    ];
+    for reorder in ["", "reorder = \"1h\"\n"] {
+        let mut bench = Bench::with("csv", reorder);
+        for (name, header) in tables {
+            bench.write(name, &format!("{header}{rows}"));
+        }
+        let files = tables.map(|(name, _)| bench.path(name));
+        let (recording, _) = read_files(&files, &ReadOptions::default()).unwrap();
+        let expected: Vec<Arrival> = arrivals(&recording);
+        assert_eq!(expected.len(), 12);
+        let mut followed = bench.follower.poll(bench.wall).arrivals;
+        followed.extend(
+            bench
+                .follower
+                .poll(bench.wall + SignedDuration::from_hours(2))
+                .arrivals,
+        );
+        assert_eq!(followed, expected, "{reorder}");
+    }
 }
 
 #[test]

@@ -68,8 +68,7 @@ pub enum ReplayError {
     Undelivered,
 }
 
-/// Everything in `recording` as it would have arrived: by time, and at one time the covariates
-/// before the readings, each by name.
+/// Everything in `recording` as it would have arrived: by [`Arrival::rank`].
 pub fn arrivals(recording: &Recording) -> Vec<Arrival> {
     let samples = recording.channels.iter().flat_map(|channel| {
         channel.samples.iter().map(|sample| Arrival {
@@ -93,8 +92,7 @@ pub fn arrivals(recording: &Recording) -> Vec<Arrival> {
         })
     });
     let mut arrivals: Vec<Arrival> = samples.chain(readings).collect();
-    // Stable: what has one time keeps the order above.
-    arrivals.sort_by_key(|arrival| arrival.time);
+    arrivals.sort_by(|one, other| one.rank().cmp(&other.rank()));
     arrivals
 }
 

@@ -18,6 +18,24 @@ pub struct Arrival {
     pub input: Input,
 }
 
+impl Arrival {
+    /// Where it stands among others: by time, and at one time the covariates before the readings, each by name.
+    pub fn rank(&self) -> (Timestamp, bool, &str) {
+        let (is_reading, name) = match &self.input {
+            Input::Sample { channel, .. } => (false, channel.as_str()),
+            Input::Reading { benchmark, .. } | Input::Missing { benchmark, .. } => {
+                (true, benchmark.as_str())
+            }
+            Input::Trouble { .. }
+            | Input::Settings(_)
+            | Input::Order(_)
+            | Input::Found(_)
+            | Input::Tick => (false, ""),
+        };
+        (self.time, is_reading, name)
+    }
+}
+
 /// What one source's files mean.
 #[derive(Debug, Clone)]
 pub(in crate::runtime) struct Decoder {

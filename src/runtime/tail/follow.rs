@@ -29,6 +29,9 @@ pub struct Batch {
 /// A source's number and a path.
 type Key = (usize, PathBuf);
 
+/// The [`Arrival::rank`] of a file's next value, and the file.
+type Head = (Timestamp, bool, String, Key);
+
 /// One source.
 #[derive(Debug)]
 struct Followed {
@@ -45,7 +48,7 @@ pub struct Follower {
     sources: Vec<Followed>,
     files: BTreeMap<Key, FileTail>,
     /// The earliest pending value of each file; between two rounds there is none.
-    heads: BTreeSet<(Timestamp, Key)>,
+    heads: BTreeSet<Head>,
     missing: BTreeSet<PathBuf>,
     quarantined_in_gone: u64,
     /// Positions that nobody needs any more.
@@ -87,7 +90,7 @@ impl Follower {
         in_files + self.quarantined_in_gone
     }
 
-    /// Reads the next values. What the files held when a round began is merged by time over all
+    /// Reads the next values. What the files held when a round began is merged by [`Arrival::rank`] over all
     /// files before the next round looks at them again: years of history in many files arrive as
     /// if they had come in live. Values of a source that waits for earlier ones go out when they have waited for long
     /// enough, also by the wall clock's time, `wall`.
@@ -96,13 +99,12 @@ impl Follower {
             self.rescan();
             for (key, file) in &mut self.files {
                 file.refill();
-                self.heads
-                    .extend(file.pending.front().map(|head| (head.time, key.clone())));
+                self.heads.extend(head(key.clone(), file));
             }
         }
         let (mut direct, mut read) = (Vec::new(), 0);
         while read < BATCH
-            && let Some((_, key)) = self.heads.pop_first()
+            && let Some((.., key)) = self.heads.pop_first()
         {
             let Some(file) = self.files.get_mut(&key) else {
                 continue;
@@ -114,8 +116,7 @@ impl Follower {
                 (Some(_), None) => {}
             }
             file.refill();
-            self.heads
-                .extend(file.pending.front().map(|head| (head.time, key)));
+            self.heads.extend(head(key, file));
         }
         let mut arrivals = self.release(wall);
         arrivals.extend(direct);
@@ -135,7 +136,7 @@ impl Follower {
                 arrivals.extend(reorder.release(wall, BATCH));
             }
         }
-        arrivals.sort_by_key(|arrival| arrival.time);
+        arrivals.sort_by(|one, other| one.rank().cmp(&other.rank()));
         arrivals
     }
 
@@ -239,6 +240,11 @@ fn restored(sources: &[Followed], name: &str, body: &[u8]) -> Option<(Key, FileT
             None
         }
     }
+}
+
+fn head(key: Key, file: &FileTail) -> Option<Head> {
+    let (time, is_reading, name) = file.pending.front()?.rank();
+    Some((time, is_reading, name.to_owned(), key))
 }
 
 /// What a position is kept under: its source and its path.

@@ -12,8 +12,8 @@ const MOST_HELD: usize = 100_000;
 /// Positions that wait; beyond, of each file only the newest is left.
 const MOST_POSITIONS: usize = 1024;
 
-/// By time, and where that is the same in the order in which they came.
-type Key = (Timestamp, u64);
+/// By time, where that is the same covariates first, and then in the order in which they came.
+type Key = (Timestamp, bool, u64);
 
 /// The values of one source that wait.
 #[derive(Debug)]
@@ -51,13 +51,14 @@ impl Reorder {
 
     /// Holds a value that came at `wall`.
     pub(super) fn take(&mut self, arrival: Arrival, wall: Timestamp) {
-        let key = (arrival.time, self.came);
+        let (_, is_reading, _) = arrival.rank();
+        let key = (arrival.time, is_reading, self.came);
         self.came += 1;
         // A clock that is wrong by years must not send everything out that waits.
         if arrival.time.duration_since(wall) <= clock::TOLERANCE {
             self.newest = self.newest.max(Some(arrival.time));
         }
-        self.numbers.insert(key.1);
+        self.numbers.insert(key.2);
         self.arrivals.push_back((wall, key));
         self.held.insert(key, arrival);
         if self.held.len() > MOST_HELD {
@@ -86,7 +87,7 @@ impl Reorder {
             .newest
             .and_then(|newest| newest.checked_sub(self.window).ok())
         {
-            self.due = self.due.max(Some((until, u64::MAX)));
+            self.due = self.due.max(Some((until, true, u64::MAX)));
         }
         while let Some((came, key)) = self.arrivals.front().copied() {
             // Whether the wall clock was set back in between nobody knows: then it counts from now on.
@@ -109,7 +110,7 @@ impl Reorder {
             let Some((key, arrival)) = self.held.pop_first() else {
                 break;
             };
-            self.numbers.remove(&key.1);
+            self.numbers.remove(&key.2);
             out.push(arrival);
         }
         if !self.is_due() {
