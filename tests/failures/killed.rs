@@ -229,7 +229,7 @@ fn a_daemon_killed_as_it_calls_the_system_loses_nothing() {
         .flat_map(|call| [1, 2, 3, 5, 8, 13, 21].map(|when| (*call, when)))
         .collect();
     let mut loggers = Loggers::start(&site, 2 * rounds.len());
-    let mut killed = 0;
+    let mut killed = BTreeMap::new();
     for (call, when) in rounds {
         loggers.grow(&site, 0);
         let inject = format!("inject={call}:signal=KILL:when={when}");
@@ -248,12 +248,15 @@ fn a_daemon_killed_as_it_calls_the_system_loses_nothing() {
         // What it does until it stands still may be too little for the call to come.
         for _ in 0..40 {
             if program.ended().is_some() {
-                killed += 1;
+                *killed.entry(call).or_insert(0) += 1;
                 break;
             }
             std::thread::sleep(Duration::from_millis(10));
         }
     }
-    assert!(killed > 10, "only {killed} were killed");
+    assert!(
+        calls.iter().all(|call| killed.contains_key(call)),
+        "{killed:?}"
+    );
     settle(&site, &mut loggers);
 }

@@ -5,26 +5,27 @@
 //! | 1 | a file is truncated, or copied and truncated | `files` here; `a_truncated_file...`, `a_file_that_was_truncated...` in tests/follow.rs |
 //! | 2 | inodes used again, files that begin alike | tests/follow.rs (`an_atomically_replaced...`, `a_deleted_file...`, `..._named_after`) |
 //! | 3 | rotation | tests/follow.rs (`what_was_written_before_a_rotation...`, the packed files); the model in `model` |
-//! | 4 | replaced, deleted, links that turn, folders that go | `files`, `model`; tests/daemon.rs |
+//! | 4 | replaced, deleted, links that turn, folders and mounts that go | `files`, `machine`, `model`; tests/daemon.rs |
 //! | 5 6 7 | partial, spoilt and endless lines | src/runtime/tail/lines.rs, tests/follow.rs |
 //! | 8 | torn JSON | tests/ingest_ndjson.rs, tests/follow.rs |
 //! | 9 | twice, corrected, late | tests/daemon.rs, tests/monitor.rs |
 //! | 10 | clocks of loggers | `files` (1970); tests/cli.rs (the future), tests/ingest_toa5.rs (summer time) |
 //! | 11 | marks for no value | tests/ingest_toa5.rs, tests/follow.rs, tests/monitor.rs |
 //! | 12 | no watches | `files`: none left to the user |
-//! | 13 | a file that cannot be read | `files`; root may read all, so what stands for EACCES is a folder in a file's place |
-//! | 14 | the disk is full | tests/daemon/crisis.rs (a limit on the length of files); on a full tmpfs it was tried by hand (`disk` does not see the mount yet) |
+//! | 13 | a file that cannot be read, no file descriptors | `files`, `machine` (ESTALE, EIO, EACCES through strace; EMFILE) |
+//! | 14 | the disk is full | `disk` (a full tmpfs); tests/daemon/crisis.rs (a limit on the length of files) |
 //! | 15 | killed at any moment, at any system call | `killed` |
-//! | 16 | a sync fails | open (`disk`) |
+//! | 16 | a sync fails: at the start, of a commit, of the database | `disk` |
 //! | 17 | a database that is damaged, newer, foreign, in use | `database` |
 //! | 18 | hooks | tests/hooks.rs, tests/sandbox.rs |
 //! | 19 | all benchmarks at once | `crowd`; flapping: src/alert/latch.rs |
-//! | 20 | clocks that step | `orders`: data time never goes back; the watchdog is in tests/service.rs |
-//! | 21 | a config that is wrong, a benchmark that is taken out | open (`orders`) |
+//! | 20 | clocks that step, a machine that sleeps | `machine`, `orders`; the watchdog is in tests/service.rs |
+//! | 21 | a config that is wrong, a benchmark that is taken out | `orders` |
 //! | 22 | recordings | tests/follow.rs, tests/ingest_mcap.rs, tests/mutated_files.rs |
 //!
-//! Not covered: a loss of power (a killed process leaves what the kernel has; whether a disk keeps what it said was
-//! synced only pulling its plug tells), EMFILE, ESTALE, a mount that goes away, and a suspended machine.
+//! What the machine must have for it (strace, mounts of one's own, libfaketime) a test asks for, and says where it was
+//! skipped. Not covered: a loss of power (a killed process leaves what the kernel has; whether a disk keeps what it said
+//! was synced only pulling its plug tells), and a server whose files are gone (ESTALE is an answer that strace gives).
 
 #![allow(
     clippy::unwrap_used,
@@ -43,6 +44,7 @@ mod database;
 mod disk;
 mod files;
 mod killed;
+mod machine;
 mod model;
 mod orders;
 mod site;

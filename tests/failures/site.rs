@@ -182,9 +182,10 @@ impl Program {
         assert_eq!(self.0.wait().unwrap().code(), Some(0));
     }
 
-    /// How it ends by itself.
-    pub(crate) fn end(mut self) -> Option<i32> {
-        self.0.wait().unwrap().code()
+    /// Asks it to end, however it does.
+    pub(crate) fn let_go(mut self) {
+        self.signal(Signal::SIGTERM);
+        self.0.wait().unwrap();
     }
 }
 
@@ -198,6 +199,63 @@ impl Drop for Program {
 /// Whether `strace` is there and may trace.
 pub(crate) fn has_strace() -> bool {
     has(&["strace", "-o", "/dev/null", "true"])
+}
+
+/// Has `strace` change what the system answers to `program` from now on, until it is stopped. `None` where it may not,
+/// which it says.
+pub(crate) fn tamper(site: &Site, program: &Program, words: &[&str]) -> Option<Program> {
+    let said = site.path("strace");
+    let id = program.0.id().to_string();
+    let child = Command::new("strace")
+        .args(["-f", "-o", "/dev/null", "-p", &id])
+        .args(words)
+        .current_dir(site.0.path())
+        .stderr(File::create(&said).unwrap())
+        .spawn();
+    let mut tracer = child.ok().map(Program);
+    let mut is_attached = false;
+    eventually("strace's answer", || {
+        is_attached = fs::read_to_string(&said).unwrap().contains("attached");
+        is_attached
+            || tracer
+                .as_mut()
+                .is_none_or(|tracer| tracer.ended().is_some())
+    });
+    if !is_attached {
+        let _ = writeln!(std::io::stderr(), "skipped: strace may not attach here");
+    }
+    tracer.filter(|_| is_attached)
+}
+
+/// Whether this is a run that has mounts of its own. Where it is not, makes such a run of `test`.
+pub(crate) fn has_own_mounts(test: &str) -> bool {
+    const INSIDE: &str = "SLIPWATCH_OWN_MOUNTS";
+    if std::env::var_os(INSIDE).is_some() {
+        return true;
+    }
+    let (root, user): (&[&str], &[&str]) = (&["unshare", "-m"], &["unshare", "-Urm"]);
+    let mount = ["mount", "-t", "tmpfs", "tmpfs", "/mnt"];
+    let Some(how) = [root, user]
+        .into_iter()
+        .find(|how| has(&[*how, &mount[..]].concat()))
+    else {
+        return false;
+    };
+    let run = Command::new(how[0])
+        .args(&how[1..])
+        .arg(std::env::current_exe().unwrap())
+        .args([test, "--exact", "--nocapture"])
+        .env(INSIDE, "1")
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&run.stdout) + String::from_utf8_lossy(&run.stderr);
+    assert!(run.status.success() && said.contains("1 passed"), "{said}");
+    false
+}
+
+/// Runs a command that must go well.
+pub(crate) fn command(words: &[&str]) {
+    assert!(has(words), "{words:?}");
 }
 
 /// Whether a command goes well; says so where not.
