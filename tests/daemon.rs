@@ -151,6 +151,51 @@ async fn an_alert_is_told_and_after_a_restart_not_again() {
 }
 
 #[tokio::test]
+async fn attempts_are_counted_over_restarts() {
+    let (folder, config) = site_folder();
+    let script = "echo $SLIPWATCH_ATTEMPT >> told\nexit 1\n";
+    fs::write(folder.path().join("hook.sh"), script).unwrap();
+    for start in 0..3 {
+        let mut site = site(&config);
+        if start == 0 {
+            site.handle(&alert(noon(), Level::Red, AlertState::Firing));
+        }
+        site.commit(noon()).unwrap();
+        assert_eq!(site.close(noon(), LIMIT).await.unwrap(), Some(1));
+    }
+    let told = lines(&folder, "told");
+    assert!(told.len() >= 3, "{told:?}");
+    let counted = (1..).map(|attempt: u32| attempt.to_string());
+    assert!(
+        told.iter().cloned().eq(counted.take(told.len())),
+        "{told:?}"
+    );
+}
+
+#[tokio::test]
+async fn what_was_given_up_is_made_to_wait_again_and_told_at_the_next_start() {
+    let (folder, config) = site_folder();
+    let (key, told) = (format!("5/red/{}", noon().as_second()), "told");
+    let mut first = site(&config);
+    first.handle(&alert(noon(), Level::Red, AlertState::Firing));
+    first.commit(noon()).unwrap();
+    close(first, noon()).await;
+    let database = rusqlite::Connection::open(config.site.state_dir.join("slipwatch.db")).unwrap();
+    database
+        .execute("UPDATE outbox SET status = 'dead'", [])
+        .unwrap();
+    drop(database);
+    close(site(&config), noon()).await;
+    assert_eq!(lines(&folder, told).len(), 1, "it had been given up");
+    let store = Store::look(&config.site.state_dir).unwrap();
+    assert_eq!(store.redeliver().unwrap(), 1);
+    drop(store);
+    close(site(&config), noon()).await;
+    let line = format!("{key} Actual");
+    assert_eq!(lines(&folder, told), [line.clone(), line]);
+}
+
+#[tokio::test]
 async fn what_is_long_past_fires_no_hook() {
     let (folder, config) = site_folder();
     let mut site = site(&config);

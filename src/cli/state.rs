@@ -96,6 +96,11 @@ enum Action {
         #[command(flatten)]
         site: SiteArgs,
     },
+    /// Have hooks tried again with the alerts that were given up: at the daemon's next start or reload
+    Redeliver {
+        #[command(flatten)]
+        site: SiteArgs,
+    },
     /// Tell of nothing, red neither; what is in force at the end is told then
     Silence {
         /// Where; default is everywhere
@@ -322,6 +327,7 @@ pub(super) fn alerts(args: &AlertsArgs) -> anyhow::Result<()> {
     let until = |span: SignedDuration| clock::now().checked_add(span).context("that is too long");
     let (site, order) = match &args.action {
         Action::List { site } => return list(site),
+        Action::Redeliver { site } => return redeliver(site),
         Action::Ack {
             benchmark,
             by,
@@ -356,6 +362,17 @@ pub(super) fn alerts(args: &AlertsArgs) -> anyhow::Result<()> {
     store.ask(&order)?;
     site.output.print(&order, |_| {
         "noted; the daemon takes it within a second, or at its next start\n".to_owned()
+    })
+}
+
+fn redeliver(site: &SiteArgs) -> anyhow::Result<()> {
+    let (_, store) = site.open()?;
+    let said = serde_json::json!({ "deliveries": store.redeliver()? });
+    site.output.print(&said, |said| {
+        let count = &said["deliveries"];
+        format!(
+            "{count} deliveries wait again; the daemon makes them at its next start or reload\n"
+        )
     })
 }
 

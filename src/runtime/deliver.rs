@@ -212,7 +212,10 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 #[derive(Debug)]
 struct Waiting {
     alert: Alert,
+    /// Counts from 1, over restarts.
     attempt: u32,
+    /// Not tried since the start.
+    is_new: bool,
 }
 
 #[derive(Debug)]
@@ -244,7 +247,7 @@ impl Worker {
             let due = self.waiting.keys().next().map(|(due, _)| *due);
             tokio::select! {
                 alert = queue.recv(), if open && self.untried < QUEUE => match alert {
-                    Some(alert) => self.wait(Waiting { alert, attempt: 1 }, clock::later(Duration::ZERO)),
+                    Some(alert) => self.begin(alert),
                     None => open = false,
                 },
                 outcome = finished(&mut running), if running.is_some() => {
@@ -265,7 +268,7 @@ impl Worker {
                 return None;
             }
             let (_, waiting) = self.waiting.pop_first()?;
-            if waiting.attempt == 1 {
+            if waiting.is_new {
                 self.untried -= 1;
             } else if self.is_over(&waiting.alert) {
                 self.drop_over(&waiting.alert);
@@ -297,31 +300,34 @@ impl Worker {
                 delay_s,
                 "hook will be retried"
             );
+            self.note(&waiting.alert, Fate::Waiting);
             let again = Waiting {
                 alert: waiting.alert.clone(),
                 attempt: attempt.saturating_add(1),
+                is_new: false,
             };
             self.wait(again, clock::later(delay));
         } else {
             tracing::error!(hook, key, attempt, ?outcome, "alert not delivered");
             self.lost += 1;
-            if open {
-                self.let_go(&waiting.alert, Fate::Dead);
-            } else {
-                // The next start tries again.
-                locked(&self.in_hand).release(&waiting.alert);
-            }
+            // What is given up only because the daemon stops, the next start tries again.
+            let fate = if open { Fate::Dead } else { Fate::Waiting };
+            self.let_go(&waiting.alert, fate);
         }
     }
 
     /// Notes what became of an alert, then lets go of it.
     fn let_go(&self, alert: &Alert, fate: Fate) {
+        self.note(alert, fate);
+        locked(&self.in_hand).release(alert);
+    }
+
+    fn note(&self, alert: &Alert, fate: Fate) {
         let hook = self.hook.name();
         if let Err(error) = locked(&self.delivered).note(alert, &hook, fate) {
             let key = &alert.key;
             tracing::warn!(hook, key, %error, "no receipt: a restart may send it again");
         }
-        locked(&self.in_hand).release(alert);
     }
 
     fn is_over(&self, alert: &Alert) -> bool {
@@ -335,9 +341,19 @@ impl Worker {
         self.let_go(alert, Fate::Over);
     }
 
+    fn begin(&mut self, alert: Alert) {
+        let before = locked(&self.delivered).attempts(&alert, &self.hook.name());
+        let waiting = Waiting {
+            alert,
+            attempt: before.saturating_add(1),
+            is_new: true,
+        };
+        self.wait(waiting, clock::later(Duration::ZERO));
+    }
+
     fn wait(&mut self, waiting: Waiting, due: Instant) {
         self.taken += 1;
-        self.untried += usize::from(waiting.attempt == 1);
+        self.untried += usize::from(waiting.is_new);
         self.waiting.insert((due, self.taken), waiting);
     }
 }

@@ -65,6 +65,18 @@ impl Delivered {
         stored.is_some_and(|stored| stored.unwrap_or(false))
     }
 
+    /// How often `hook` has been tried with this alert before this program ran.
+    pub(super) fn attempts(&self, alert: &Alert, hook: &str) -> u32 {
+        let identity = (
+            alert.key.as_str(),
+            alert.level.name(),
+            state_name(alert.state),
+        );
+        let stored = (self.store.as_ref()).map(|store| store.attempts(identity, hook));
+        // It only numbers the attempts, and bounds them for what need not arrive.
+        stored.map_or(0, |stored| stored.unwrap_or(0))
+    }
+
     /// Notes what became of this alert at `hook`: in any case until the daemon stops, and on a full disk no longer
     /// than that unless [`Delivered::commit`] finds room.
     ///

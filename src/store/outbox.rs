@@ -27,6 +27,8 @@ pub struct Delivery {
 /// What became of a delivery.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fate {
+    /// The hook did not take it: it is tried again.
+    Waiting,
     /// The hook took it.
     Delivered,
     /// It was superseded or resolved before the hook took it.
@@ -38,6 +40,7 @@ pub enum Fate {
 impl Fate {
     pub(super) fn name(self) -> &'static str {
         match self {
+            Self::Waiting => WAITING,
             Self::Delivered => "delivered",
             Self::Over => "over",
             Self::Dead => "dead",
@@ -115,6 +118,33 @@ impl Store {
              AND (?4 IS NULL OR hook = ?4) AND (?5 IS NULL OR status = ?5) LIMIT 1",
         )?;
         Ok(query.exists(params![key, level, state, hook, fate.map(Fate::name)])?)
+    }
+
+    /// How often a hook has been tried with this key, level and state, over restarts too.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn attempts(
+        &self,
+        (key, level, state): (&str, &str, &str),
+        hook: &str,
+    ) -> Result<u32, StoreError> {
+        let inner = self.inner();
+        let mut query = inner.connection.prepare_cached(
+            "SELECT attempts FROM outbox WHERE key = ?1 AND level = ?2 AND state = ?3 AND hook = ?4",
+        )?;
+        let mut rows = query.query(params![key, level, state, hook])?;
+        Ok(rows.next()?.map_or(Ok(0), |row| row.get(0))?)
+    }
+
+    /// Has what was given up wait again, as if it had never been tried; says how many deliveries that are. The daemon
+    /// takes them at its next start, or when it takes its config again.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn redeliver(&self) -> Result<usize, StoreError> {
+        let again = "UPDATE outbox SET status = 'waiting', attempts = 0 WHERE status = 'dead'";
+        Ok(self.inner().connection.execute(again, [])?)
     }
 
     /// Notes what became of deliveries; with those that were not noted before.
