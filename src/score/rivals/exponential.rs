@@ -40,6 +40,6 @@ mod tests {
     fn a_slope_that_slows_down_never_fails_and_a_short_record_says_nothing() {
         let slowing = velocities(1.0, 30.0, |t| 50.0 * (-0.1 * t).exp());
         assert!(never(forecast(&slowing).as_ref()));
-        assert_eq!(forecast(&velocities(1.0, 2.0, |t| t.exp())), None);
+        assert_eq!(forecast(&velocities(1.0, 2.0, f64::exp)), None);
     }
 }

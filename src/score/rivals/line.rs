@@ -51,20 +51,20 @@ mod tests {
 
     #[test]
     fn the_line_finds_its_own_law_and_the_averages_lag_by_their_windows() {
-        let known = velocities(0.25, 26.0, failing);
+        let known = velocities(0.3, 26.0, failing);
         let days = |passage: Option<Passage>| when(&known, passage.as_ref());
         assert!((days(raw(&known)) - 30.0).abs() < 1e-6);
-        // Half the windows: (3 - 1) / 2 and (7 - 1) / 2 readings of 0.25 days.
+        // Half the windows: (3 - 1) / 2 and (7 - 1) / 2 readings of 0.3 days.
         let (short, long) = (days(short(&known)), days(long(&known)));
-        assert!((short - 30.25).abs() < 0.05, "{short}");
-        assert!((long - 30.75).abs() < 0.1, "{long}");
+        assert!((short - 30.3).abs() < 0.05, "{short}");
+        assert!((long - 30.9).abs() < 0.1, "{long}");
     }
 
     #[test]
     fn what_came_before_the_onset_does_not_bend_the_averaged_line() {
-        let crept = velocities(0.25, 26.0, |t| failing(t.max(15.0)));
+        let crept = velocities(0.3, 26.0, |t| failing(t.max(15.0)));
         let days = when(&crept, short(&crept).as_ref());
-        assert!((days - 30.25).abs() < 0.1, "{days}");
+        assert!((days - 30.3).abs() < 0.1, "{days}");
         let days = when(&crept, raw(&crept).as_ref());
         assert!(days > 33.0, "{days}");
     }

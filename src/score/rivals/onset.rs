@@ -20,7 +20,9 @@ pub(super) fn trailing_mean(rates: &[Rate], newest: usize, count: usize) -> f64 
 }
 
 /// What `forecast` says of the rates from the onset on, given their first index: `None` with too few for the
-/// long average, never while the slope does not accelerate.
+/// long average, never while the short average is not above the long one. Noise makes them cross again and again, and
+/// each crossing is an onset: whoever looks at the plot would overlook some, a program that judged which would no
+/// longer be the published method.
 pub(super) fn from_onset(
     rates: &[Rate],
     forecast: impl FnOnce(usize) -> Option<Passage>,
