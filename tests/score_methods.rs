@@ -9,8 +9,8 @@ use slipwatch::runtime::ingest::{ReadOptions, read_files};
 use slipwatch::score::{History, METHODS};
 use std::path::Path;
 
-/// Where a record is looked at, as shares of its readings.
-const LOOKS: [f64; 3] = [0.15, 0.6, 0.9];
+/// Where a record is looked at, tenths of its readings.
+const LOOKS: [usize; 3] = [2, 6, 9];
 /// Readings kept of a recording: what is shown does not need more.
 const MOST: usize = 240;
 
@@ -98,8 +98,8 @@ fn nothing_that_is_read_later_changes_a_forecast_made_before() {
     let mut made = 0;
     for (index, history) in histories().iter().enumerate() {
         let values = &history.observations.values;
-        for share in LOOKS {
-            let days = values[(share * values.len() as f64) as usize].t_days;
+        for tenths in LOOKS {
+            let days = values[values.len() * tenths / 10].t_days;
             let before = forecasts(history, days);
             made += before.iter().filter(|(_, said)| said.is_some()).count();
             let futures: [fn(f64) -> f64; 4] = [
@@ -148,7 +148,10 @@ fn scatter(index: u32) -> f64 {
     f64::from(mixed.wrapping_mul(2_246_822_519)) / f64::from(u32::MAX) * 2.0 - 1.0
 }
 
-const HOSTILE: [(&str, fn(u32) -> f64); 12] = [
+/// A name and the value of each reading.
+type Hostile = (&'static str, fn(u32) -> f64);
+
+const HOSTILE: [Hostile; 12] = [
     ("constant", |_| 7.0),
     ("zero", |_| 0.0),
     ("noise", scatter),

@@ -12,6 +12,8 @@ use crate::forecast::Passage;
 /// Velocities in the short average and in the long one.
 pub(super) const SHORT: usize = 3;
 pub(super) const LONG: usize = 7;
+/// Averages of one velocity differ by as much.
+const ROUNDING: f64 = 1e-12;
 
 /// The mean of the `count` velocities that end with the one at `newest`, which must have that many.
 pub(super) fn trailing_mean(rates: &[Rate], newest: usize, count: usize) -> f64 {
@@ -30,8 +32,10 @@ pub(super) fn from_onset(
     if rates.len() < LONG {
         return None;
     }
-    let rises =
-        |index: &usize| trailing_mean(rates, *index, SHORT) > trailing_mean(rates, *index, LONG);
+    let rises = |index: &usize| {
+        let long = trailing_mean(rates, *index, LONG);
+        trailing_mean(rates, *index, SHORT) > long + ROUNDING * long.abs()
+    };
     match (LONG - 1..rates.len()).rev().take_while(rises).last() {
         Some(onset) => forecast(onset),
         None => Some(Passage::default()),
@@ -54,7 +58,7 @@ mod tests {
 
     #[test]
     fn the_onset_is_where_the_short_average_last_crossed_the_long_one() {
-        assert_eq!(onset(|t| if t > 20.0 { t - 18.0 } else { 2.0 }), Some(21));
+        assert_eq!(onset(|t| if t > 20.0 { t - 19.9 } else { 0.1 }), Some(21));
         // A burst that ended is no onset.
         let burst = |t: f64| if (5.0..9.0).contains(&t) { 9.0 } else { 1.0 };
         assert_eq!(
