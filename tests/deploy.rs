@@ -119,7 +119,6 @@ async fn rules_and_dashboard_ask_only_for_metrics_that_there_are_and_the_dashboa
         "slipwatch_refit_seconds_count",
         "slipwatch_refit_seconds_sum",
         "slipwatch_uptime_seconds",
-        "slipwatch_events_unwritten_total",
         "slipwatch_benchmark_last_refit_seconds",
     ];
     let unasked = exposed.difference(&dashboard).map(String::as_str);

@@ -10,6 +10,7 @@ use slipwatch::monitor::{AlertState, Event, EventKind};
 use slipwatch::reading::BenchmarkId;
 use slipwatch::runtime::serve::{Archive, ArchiveError, CONTENT_TYPE, Door, Limits, Page, Server};
 use slipwatch::runtime::vitals::Vitals;
+use std::fmt::Write as _;
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpStream};
@@ -448,4 +449,56 @@ fn a_running_daemon_tells_of_its_readings_to_whoever_has_the_token() {
         .find_map(|line| line.strip_prefix("slipwatch_refit_seconds_count "));
     let refits: u32 = refits.expect("a histogram").parse().unwrap();
     assert!((1..=12).contains(&refits), "{refits}");
+}
+
+/// A figure of the daemon's metrics.
+fn figure(metrics: &str, name: &str) -> f64 {
+    let line = metrics.lines().find_map(|line| {
+        let (had, value) = line.rsplit_once(' ')?;
+        (had == name).then(|| value.parse().unwrap())
+    });
+    line.unwrap_or_else(|| panic!("{name} not in\n{metrics}"))
+}
+
+#[test]
+fn a_running_daemon_tells_how_long_values_wait_what_it_cannot_use_and_what_no_hook_takes() {
+    let (folder, file) = site("127.0.0.1:0", "");
+    let refused = fs::read_to_string(&file).unwrap().replace("true", "false");
+    let threshold = "[[alert.threshold]]\nlevel = \"red\"\ndisplacement = \"50 mm\"\n";
+    fs::write(&file, refused + threshold).unwrap();
+    let mut text =
+        "time,5_displacement_mm\n1970-01-01T00:00:05Z,1\nno time,1\nnor here,2\n".to_owned();
+    let first = slipwatch::runtime::clock::now().as_second() - 600 * 60;
+    for minute in 0..600 {
+        let time = Timestamp::from_second(first + 60 * minute).unwrap();
+        writeln!(text, "{time},{}", minute as f64 / 10.0).unwrap();
+    }
+    fs::write(folder.path().join("incoming/a.csv"), text).unwrap();
+    let daemon = Daemon::start(&file);
+    let (mut lag, mut metrics) = (0.0_f64, String::new());
+    for _ in 0..1000 {
+        metrics = get(daemon.address, "/metrics", "").body;
+        lag = lag.max(figure(&metrics, "slipwatch_lag_seconds"));
+        if figure(&metrics, "slipwatch_caught_up") > 0.0
+            && figure(&metrics, "slipwatch_outbox_alerts") > 0.0
+        {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    // The batch is worked in for long enough to be seen waiting, and when it is done nothing waits.
+    assert!(lag > 0.0);
+    for (name, value) in [
+        ("slipwatch_readings_total", 600.0),
+        ("slipwatch_lag_seconds", 0.0),
+        ("slipwatch_quarantined_total{source=\"logger\"}", 2.0),
+        ("slipwatch_without_clock_total", 1.0),
+        ("slipwatch_unwritten_inputs", 0.0),
+    ] {
+        let had = figure(&metrics, name);
+        assert!((had - value).abs() < 1e-9, "{name} {had}");
+    }
+    let called = figure(&metrics, "slipwatch_outbox_oldest_timestamp_seconds");
+    let range = first as f64..(first + 36_000) as f64;
+    assert!(range.contains(&called), "{called}");
 }

@@ -16,7 +16,7 @@ pub fn now() -> Timestamp {
 }
 
 /// A running stopwatch, for figures such as `seconds` in a fit's report.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stopwatch(Instant);
 
 impl Stopwatch {

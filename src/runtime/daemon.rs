@@ -98,6 +98,14 @@ impl Daemon {
     /// Steps the monitor through a batch; a stop that is asked for half-way ends it after a value, and the rest of
     /// the batch is read again by the next start.
     fn take_batch(&mut self, batch: Batch, shutdown: &Shutdown) -> Result<(), StoreError> {
+        let vitals = &self.pulse.vitals;
+        batch
+            .found
+            .into_iter()
+            .for_each(|found| vitals.takes(found));
+        for (source, more) in &batch.quarantined {
+            vitals.quarantined(source, *more);
+        }
         for arrival in &batch.arrivals {
             if shutdown.is_requested() {
                 return self.commit();
@@ -124,6 +132,9 @@ impl Daemon {
     fn take_messages(&mut self, first: mqtt::Delivery) -> Result<(), StoreError> {
         let mut next = Some(first);
         while let Some(delivery) = next {
+            let vitals = &self.pulse.vitals;
+            vitals.takes(delivery.found);
+            vitals.quarantined(&delivery.source, delivery.quarantined);
             for arrival in &delivery.arrivals {
                 self.take(arrival)?;
             }
@@ -161,6 +172,7 @@ impl Daemon {
         let committed = self.site.commit(clock::now());
         let is_waiting = self.site.is_waiting();
         if committed.is_ok() && !is_waiting {
+            self.pulse.vitals.has_taken();
             self.sources.acknowledge();
         }
         let (counts, queue) = (self.site.counts(), self.sources.batches.len());
@@ -171,6 +183,7 @@ impl Daemon {
             health.readings = counts.taken;
             health.repeated = counts.repeated;
             health.from_the_future = counts.from_the_future;
+            health.without_clock = counts.without_clock;
             health.unwritten = self.site.unwritten();
             health.queue = queue;
             health.searches = searches;
@@ -204,9 +217,9 @@ impl Daemon {
             self.site.caught_up(now)?;
         }
         self.thin()?;
-        let (outbox, bytes) = (self.store.waiting_count()?, self.store.bytes()?);
+        let ((outbox, oldest), bytes) = (self.store.outbox()?, self.store.bytes()?);
         self.pulse.vitals.update(|health| {
-            health.outbox = outbox;
+            (health.outbox, health.outbox_oldest) = (outbox, oldest);
             health.database_bytes = Some(bytes);
         });
         Ok(())

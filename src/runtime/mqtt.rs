@@ -3,6 +3,7 @@
 //! The session is kept under a stable name and acknowledgements are ours to give: what was not
 //! acknowledged when the process or the connection ended comes again.
 
+use super::clock::Stopwatch;
 use super::ingest::FileUnits;
 use super::shutdown::Shutdown;
 use super::tail::{Arrival, Decoder};
@@ -28,6 +29,10 @@ const RECONNECT: (Duration, Duration) = (Duration::from_secs(1), Duration::from_
 pub struct Delivery {
     /// What it holds; nothing where it cannot be used.
     pub arrivals: Vec<Arrival>,
+    /// The source that it is from.
+    pub source: String,
+    /// Runs since it came.
+    pub found: Stopwatch,
     /// Lines in it that cannot be used.
     pub quarantined: u64,
     /// To be given back once that is durable.
@@ -64,6 +69,7 @@ pub async fn follow(
 ) {
     let (client, mut connection) = AsyncClient::new(options(&broker, client_id), REQUESTS);
     let mut reader = Reader {
+        source: broker.id.clone(),
         decoder: Decoder::of_messages(&broker, &benchmarks),
         units: FileUnits::default(),
         client,
@@ -125,6 +131,7 @@ fn options(broker: &Broker, client_id: String) -> MqttOptions {
 }
 
 struct Reader {
+    source: String,
     decoder: Decoder,
     units: FileUnits,
     client: AsyncClient,
@@ -132,6 +139,7 @@ struct Reader {
 
 impl Reader {
     fn read(&mut self, message: Publish) -> Delivery {
+        let found = Stopwatch::start();
         let (mut arrivals, mut quarantined) = (Vec::new(), 0);
         let mut complain = |error: &dyn std::error::Error| {
             quarantined += 1;
@@ -154,6 +162,8 @@ impl Reader {
         }
         Delivery {
             arrivals,
+            source: self.source.clone(),
+            found,
             quarantined,
             receipt: Receipt {
                 client: self.client.clone(),

@@ -31,17 +31,19 @@ pub struct Health {
     pub repeated: u64,
     /// Values dropped because they are from the future.
     pub from_the_future: u64,
+    /// Values dropped because no clock that is set gives their time.
+    pub without_clock: u64,
     /// Inputs that wait, unacknowledged, for room on the disk.
     pub unwritten: u64,
     /// Lines, records and files that could not be used, a source.
     pub quarantined: BTreeMap<String, u64>,
-    /// How long the oldest value that was found has waited to be taken; zero when none waits.
+    /// How long the oldest value that was found and is not durable yet has waited; zero when none waits.
     pub lag_seconds: f64,
     /// Batches of values between the sources and the work loop.
     pub queue: usize,
     /// Alerts that a hook has not taken yet.
     pub outbox: usize,
-    /// Since when the oldest of them waits.
+    /// When the oldest of them was called, data time.
     pub outbox_oldest: Option<Timestamp>,
     /// Searches for an effect that are at work.
     pub searches: usize,
@@ -122,6 +124,8 @@ pub struct Vitals {
     /// When the work loop last turned, milliseconds after the start, by a clock that no one sets.
     last_turn_ms: AtomicU64,
     health: Mutex<Health>,
+    /// Runs since the oldest value that is not durable yet was found.
+    oldest: Mutex<Option<Stopwatch>>,
     points: Mutex<BTreeMap<BenchmarkId, Point>>,
     refits: Histogram,
 }
@@ -132,6 +136,7 @@ impl Default for Vitals {
             since_start: Stopwatch::start(),
             last_turn_ms: AtomicU64::new(0),
             health: Mutex::default(),
+            oldest: Mutex::default(),
             points: Mutex::default(),
             refits: Histogram::new(REFIT_SECONDS),
         }
@@ -158,7 +163,28 @@ impl Vitals {
 
     /// The site as a whole.
     pub fn health(&self) -> Health {
-        locked(&self.health).clone()
+        let oldest = *locked(&self.oldest);
+        Health {
+            lag_seconds: oldest.map_or(0.0, |found| found.elapsed().as_secs_f64()),
+            ..locked(&self.health).clone()
+        }
+    }
+
+    /// Values found then are being taken; those before them may not be durable yet either.
+    pub fn takes(&self, found: Stopwatch) {
+        locked(&self.oldest).get_or_insert(found);
+    }
+
+    /// All that was taken is durable.
+    pub fn has_taken(&self) {
+        *locked(&self.oldest) = None;
+    }
+
+    /// So many more lines, records and files of a source could not be used.
+    pub fn quarantined(&self, source: &str, more: u64) {
+        if more > 0 {
+            self.update(|health| *health.quarantined.entry(source.to_owned()).or_default() += more);
+        }
     }
 
     /// Changes what is known of the site as a whole.

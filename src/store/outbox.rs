@@ -1,6 +1,6 @@
 //! What the hooks are to be told: written with the events that say so, ticked off when a hook has taken it.
 
-use super::{Inner, Store, StoreError, nanoseconds};
+use super::{Inner, Store, StoreError, nanoseconds, timestamp};
 use crate::reading::Timestamp;
 use rusqlite::{Connection, params};
 
@@ -89,17 +89,19 @@ impl Store {
         Ok(rows.collect::<Result<_, _>>()?)
     }
 
-    /// How many deliveries wait.
+    /// How many deliveries wait, and when the oldest of their alerts was called.
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn waiting_count(&self) -> Result<usize, StoreError> {
+    pub fn outbox(&self) -> Result<(usize, Option<Timestamp>), StoreError> {
         let inner = self.inner();
         let mut query = inner
             .connection
-            .prepare_cached("SELECT count(*) FROM outbox WHERE status = 'waiting'")?;
-        let count: i64 = query.query_row([], |row| row.get(0))?;
-        Ok(usize::try_from(count).unwrap_or(0))
+            .prepare_cached("SELECT count(*), min(time) FROM outbox WHERE status = 'waiting'")?;
+        let (count, oldest): (i64, Option<i64>) =
+            query.query_row([], |row| Ok((row.get(0)?, row.get(1)?)))?;
+        let oldest = oldest.map(timestamp).transpose()?;
+        Ok((usize::try_from(count).unwrap_or(0), oldest))
     }
 
     /// Whether a hook's delivery with this key, level and state was ever noted; with `status`, stands so.

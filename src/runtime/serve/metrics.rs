@@ -69,7 +69,7 @@ fn state(sheet: &mut Sheet<'_>, health: &Health) -> fmt::Result {
         ),
         (
             "lag_seconds",
-            "How long the oldest value that was found has waited to be taken",
+            "How long the oldest value that was found and is not durable yet has waited",
             health.lag_seconds,
         ),
         (
@@ -83,6 +83,11 @@ fn state(sheet: &mut Sheet<'_>, health: &Health) -> fmt::Result {
             health.outbox as f64,
         ),
         (
+            "unwritten_inputs",
+            "Inputs that wait, unacknowledged, for room on the disk",
+            health.unwritten as f64,
+        ),
+        (
             "searches",
             "Searches for an effect that are at work",
             health.searches as f64,
@@ -92,7 +97,7 @@ fn state(sheet: &mut Sheet<'_>, health: &Health) -> fmt::Result {
         sheet.gauge(name, about, value)?;
     }
     if let Some(time) = health.outbox_oldest {
-        let about = "Since when the oldest alert waits, Unix time";
+        let about = "When the oldest alert that waits was called, data time, Unix time";
         sheet.gauge("outbox_oldest_timestamp_seconds", about, seconds(time))?;
     }
     if let Some(bytes) = health.database_bytes {
@@ -115,9 +120,9 @@ fn counts(sheet: &mut Sheet<'_>, health: &Health) -> fmt::Result {
             health.from_the_future,
         ),
         (
-            "events_unwritten",
-            "Events lost from the log on a full disk",
-            health.unwritten,
+            "without_clock",
+            "Values of a time that no clock gives that is set, set aside",
+            health.without_clock,
         ),
     ];
     for (name, about, count) in counters {

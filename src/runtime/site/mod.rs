@@ -66,7 +66,7 @@ pub struct Counts {
     pub repeated: u64,
     /// Values dropped because they are from the future.
     pub from_the_future: u64,
-    /// Values dropped because they are from the first day of 1970.
+    /// Values dropped because they are from the first day of 1970, or from before 1678.
     #[serde(default)]
     pub without_clock: u64,
     /// Alerts that fired no hook because they are long past.
@@ -156,6 +156,7 @@ impl Site {
         }
         if let Some(store) = &self.sinks.store {
             if arrival.time < DAWN {
+                self.counts.without_clock += 1;
                 let time = arrival.time;
                 tracing::warn!(%time, ?arrival.input, "measured before 1678: quarantined");
                 return Ok(Vec::new());

@@ -5,6 +5,7 @@ use super::file::{FileTail, Place};
 use super::reorder::Reorder;
 use crate::config::{Benchmark, FilePattern, Source};
 use crate::reading::Timestamp;
+use crate::runtime::clock::Stopwatch;
 use crate::store::Position;
 use jiff::SignedDuration;
 use std::collections::{BTreeMap, BTreeSet};
@@ -24,6 +25,10 @@ pub struct Batch {
     pub positions: Vec<Position>,
     /// Whether the files hold no more for now.
     pub caught_up: bool,
+    /// Runs since the look that found the first of these values; also where the files held more than one batch.
+    pub found: Option<Stopwatch>,
+    /// Lines, records and files that could not be used, a source: what is new.
+    pub quarantined: BTreeMap<String, u64>,
 }
 
 /// A source's number and a path.
@@ -40,6 +45,9 @@ struct Followed {
     decoder: Arc<Decoder>,
     /// Where values wait for earlier ones.
     reorder: Option<Reorder>,
+    /// What could not be used in files that are gone, and of all its files what has been told.
+    quarantined_in_gone: u64,
+    quarantined_told: u64,
 }
 
 /// Every followed file, and which folders to look for more.
@@ -50,7 +58,8 @@ pub struct Follower {
     /// The earliest pending value of each file; between two rounds there is none.
     heads: BTreeSet<Head>,
     missing: BTreeSet<PathBuf>,
-    quarantined_in_gone: u64,
+    /// Runs since the last look at the files.
+    looked: Option<Stopwatch>,
     /// Positions that nobody needs any more.
     gone: Vec<(usize, Position)>,
 }
@@ -63,6 +72,8 @@ impl Follower {
             pattern: source.pattern.clone(),
             decoder: Arc::new(Decoder::new(source, benchmarks)),
             reorder: (source.reorder > SignedDuration::ZERO).then(|| Reorder::new(source.reorder)),
+            quarantined_in_gone: 0,
+            quarantined_told: 0,
         };
         let sources: Vec<Followed> = sources.iter().map(of).collect();
         let files = saved
@@ -73,7 +84,7 @@ impl Follower {
             sources,
             heads: BTreeSet::new(),
             missing: BTreeSet::new(),
-            quarantined_in_gone: 0,
+            looked: None,
             gone: Vec::new(),
         }
     }
@@ -86,8 +97,28 @@ impl Follower {
 
     /// Lines, records and files that could not be used so far.
     pub fn quarantined(&self) -> u64 {
-        let in_files: u64 = self.files.values().map(|file| file.quarantined).sum();
-        in_files + self.quarantined_in_gone
+        (0..self.sources.len())
+            .map(|source| self.quarantined_of(source))
+            .sum()
+    }
+
+    fn quarantined_of(&self, source: usize) -> u64 {
+        let files = self.files.iter().filter(|((of, _), _)| *of == source);
+        let in_files: u64 = files.map(|(_, file)| file.quarantined).sum();
+        in_files + self.sources[source].quarantined_in_gone
+    }
+
+    fn newly_quarantined(&mut self) -> BTreeMap<String, u64> {
+        let mut new = BTreeMap::new();
+        for index in 0..self.sources.len() {
+            let total = self.quarantined_of(index);
+            let source = &mut self.sources[index];
+            let more = total - std::mem::replace(&mut source.quarantined_told, total);
+            if more > 0 {
+                new.insert(source.id.clone(), more);
+            }
+        }
+        new
     }
 
     /// Reads the next values. What the files held when a round began is merged by [`Arrival::rank`] over all
@@ -96,6 +127,7 @@ impl Follower {
     /// enough, also by the wall clock's time, `wall`.
     pub fn poll(&mut self, wall: Timestamp) -> Batch {
         if self.heads.is_empty() {
+            self.looked = Some(Stopwatch::start());
             self.rescan();
             for (key, file) in &mut self.files {
                 file.refill();
@@ -124,6 +156,8 @@ impl Follower {
         Batch {
             positions: self.positions(),
             caught_up: self.heads.is_empty() && !self.sources.iter().any(is_due),
+            found: self.looked.filter(|_| !arrivals.is_empty()),
+            quarantined: self.newly_quarantined(),
             arrivals,
         }
     }
@@ -188,7 +222,7 @@ impl Follower {
                 self.files.insert(moved, file);
             } else {
                 tracing::info!(file = %key.1.display(), "gone");
-                self.quarantined_in_gone += file.quarantined;
+                self.sources[key.0].quarantined_in_gone += file.quarantined;
             }
         }
         for key in present.into_keys() {
