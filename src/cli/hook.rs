@@ -1,15 +1,40 @@
-//! `hook exec`: what the daemon starts to run a hook within walls.
+//! `hook test`: a drill for a site's hooks. `hook exec`: what the daemon starts to run a hook within walls.
 
-use crate::runtime::sandbox;
+use super::args::{Format, OutputArgs};
+use super::run::asynchronous;
+use crate::alert::Level;
+use crate::config::{self, Config, HookConfig};
+use crate::monitor::{AlertState, Event, EventKind};
+use crate::reading::Timestamp;
+use crate::runtime::clock;
+use crate::runtime::hook::{self, Alert, Outcome, Status};
+use crate::runtime::log::{self, LogFormat};
+use crate::runtime::sandbox::{self, OURSELVES};
+use serde::Serialize;
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
 
-/// About hooks
+/// Try a site's hooks
 #[derive(Debug, clap::Subcommand)]
-#[command(hide = true)]
 pub(super) enum Command {
+    /// Run a site's hooks once, as the daemon would, with an alert that is marked as a test
+    Test(Test),
     /// Become a program that can write only where it is allowed to
+    #[command(hide = true)]
     Exec(Exec),
+}
+
+#[derive(Debug, clap::Args)]
+pub(super) struct Test {
+    /// The site whose hooks are run
+    #[arg(long, value_name = "CONFIG")]
+    config: PathBuf,
+    /// Only the hooks for this level, of which they are told; default is every hook, told of its gravest
+    #[arg(long, value_name = "LEVEL", value_parser = level)]
+    level: Option<Level>,
+    #[command(flatten)]
+    output: OutputArgs,
 }
 
 #[derive(Debug, clap::Args)]
@@ -22,11 +47,141 @@ pub(super) struct Exec {
     run: Vec<OsString>,
 }
 
-/// Becomes the hook.
+/// A hook that did not take the drill.
+#[derive(Debug, thiserror::Error)]
+enum Failed {
+    /// Nobody would be told.
+    #[error("no hook asks for {0}")]
+    None(String),
+    /// So many of them.
+    #[error("{0} of {1} hooks failed; see above")]
+    Some(usize, usize),
+}
+
+/// What became of one hook's drill.
+#[derive(Debug, Serialize)]
+struct Drill {
+    hook: String,
+    level: Level,
+    is_taken: bool,
+    outcome: String,
+}
+
+#[derive(Debug, Serialize)]
+struct Report {
+    status: &'static str,
+    hooks: Vec<Drill>,
+}
+
+/// Runs the drill, or becomes the hook.
 pub(super) fn run(command: &Command) -> anyhow::Result<()> {
-    let Command::Exec(Exec { writable, run }) = command;
-    if let Some((program, arguments)) = run.split_first() {
-        match sandbox::become_hook(writable, program, arguments)? {}
+    match command {
+        Command::Test(args) => test(args),
+        Command::Exec(Exec { writable, run }) => {
+            if let Some((program, arguments)) = run.split_first() {
+                match sandbox::become_hook(writable, program, arguments)? {}
+            }
+            Ok(())
+        }
+    }
+}
+
+fn test(args: &Test) -> anyhow::Result<()> {
+    log::init(match args.output.format {
+        Format::Text => LogFormat::Text,
+        Format::Json => LogFormat::Json,
+    });
+    let mut config = config::load(&args.config)?;
+    config.wall_in_hooks(Path::new(OURSELVES));
+    let now = clock::now();
+    let told: Vec<(&HookConfig, Level)> = config
+        .hooks
+        .iter()
+        .filter_map(|hook| Some((hook, of_hook(hook, args.level)?)))
+        .collect();
+    if told.is_empty() {
+        let level = args.level.map_or("any level", Level::name);
+        return Err(Failed::None(level.to_owned()).into());
+    }
+    let mut hooks = Vec::new();
+    let runtime = asynchronous()?;
+    for (hook, level) in told {
+        let Some(alert) = drill(&config, hook, level, now) else {
+            continue;
+        };
+        let outcome = runtime.block_on(hook::run(hook, &alert, 1));
+        hooks.push(Drill {
+            hook: hook.name(),
+            level,
+            is_taken: outcome == Outcome::Done,
+            outcome: said(&outcome),
+        });
+    }
+    let status = Status::Test.name();
+    let report = Report { status, hooks };
+    args.output.print(&report, text)?;
+    let failed = report.hooks.iter().filter(|drill| !drill.is_taken).count();
+    if failed > 0 {
+        return Err(Failed::Some(failed, report.hooks.len()).into());
     }
     Ok(())
+}
+
+/// The level that the hook is told of; `None` where it is not asked.
+fn of_hook(hook: &HookConfig, wanted: Option<Level>) -> Option<Level> {
+    match wanted {
+        Some(level) => hook.levels.contains(&level).then_some(level),
+        // What the monitor cannot tell is no level of the slope.
+        None => {
+            (hook.levels.iter().copied()).max_by_key(|level| (*level != Level::Unknown, *level))
+        }
+    }
+}
+
+fn drill(config: &Config, hook: &HookConfig, level: Level, now: Timestamp) -> Option<Alert> {
+    let first = config.benchmarks.first().map(|one| one.id.clone());
+    let kind = EventKind::Alert {
+        level,
+        state: AlertState::Firing,
+        key: format!("drill/{level}/{now}"),
+        rule: "drill".to_owned(),
+        text: format!("DRILL: a test of this hook, nothing has happened; it would be {level}"),
+    };
+    let event = Event {
+        time: now,
+        benchmark: first.filter(|_| !hook.site),
+        kind,
+    };
+    Alert::new(&event, &config.site.name, None, Status::Test)
+}
+
+fn said(outcome: &Outcome) -> String {
+    match outcome {
+        Outcome::Done => "done".to_owned(),
+        Outcome::Failed(code) => format!("ended with exit code {code}"),
+        Outcome::Signalled(signal) => format!("ended by signal {signal}"),
+        Outcome::TimedOut => "killed when its time was up".to_owned(),
+        Outcome::NotStarted(why) => format!("not started: {why}"),
+    }
+}
+
+fn text(report: &Report) -> String {
+    let mut text = String::new();
+    for drill in &report.hooks {
+        let Drill {
+            hook,
+            level,
+            outcome,
+            ..
+        } = drill;
+        let _ = writeln!(text, "{level:8}{hook}: {outcome}");
+    }
+    text
+}
+
+fn level(text: &str) -> Result<Level, String> {
+    [Level::Yellow, Level::Orange, Level::Red, Level::Unknown]
+        .into_iter()
+        .find(|level| level.name() == text)
+        .ok_or_else(|| "expected yellow, orange, red or unknown".to_owned())
 }
