@@ -140,3 +140,11 @@ fn plain_thresholds_act_at_readings_that_are_not_refitted() {
         SignedDuration::from_hours(24)
     );
 }
+
+#[test]
+fn steady_creep_read_each_minute_stays_green() {
+    let told = told(&Settings::default(), &creep(1600, 1));
+    let is_alert = |event: &&Event| matches!(event.kind, EventKind::Alert { .. });
+    let alerts: Vec<&Event> = told.iter().flatten().filter(is_alert).collect();
+    assert!(alerts.is_empty(), "{alerts:#?}");
+}

@@ -181,47 +181,98 @@ pub(crate) fn displacement_sigma(values: &[Observation]) -> f64 {
     if misfits.is_empty() {
         return LEAST_DISPLACEMENT_SIGMA_MM;
     }
-    misfits.sort_by(f64::total_cmp);
+    let middle = misfits.len() / 2;
+    let (_, median, _) = misfits.select_nth_unstable_by(middle, f64::total_cmp);
     // The median of |normal| is 0.6745 of its standard deviation.
-    (misfits[misfits.len() / 2] / 0.6745).max(LEAST_DISPLACEMENT_SIGMA_MM)
+    (*median / 0.6745).max(LEAST_DISPLACEMENT_SIGMA_MM)
+}
+
+/// Readings that are one: their mean, and how far it may be off.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    t_days: f64,
+    value: f64,
+    /// Standard error, mm.
+    error: f64,
+    readings: u32,
+}
+
+/// Displacements at times that are told apart, counted back from the newest: where readings are closer together than
+/// [`FINEST_DAYS`] their mean, which their noise moves far less than any one of them.
+fn places(values: &[Observation]) -> Vec<Place> {
+    let common = displacement_sigma(values);
+    let mut places = Vec::new();
+    let mut means = Vec::new();
+    let mut left = values;
+    while let Some(newest) = left.last() {
+        let is_apart = |value: &Observation| newest.t_days - value.t_days >= 0.999 * FINEST_DAYS;
+        let one = left.iter().rposition(is_apart).map_or(0, |last| last + 1);
+        let (before, own) = left.split_at(one);
+        let count = own.len() as f64;
+        // A stated error is often the instrument's alone: the scatter seen is the least there is.
+        let error = |value: &Observation| value.sigma.map_or(common, |sigma| sigma.max(common));
+        let squares: f64 = own.iter().map(|value| error(value).powi(2)).sum();
+        let mean = |of: fn(&Observation) -> f64| own.iter().map(of).sum::<f64>() / count;
+        let (t_days, value) = match own {
+            [alone] => (alone.t_days, alone.value),
+            _ => (mean(|one| one.t_days), mean(|one| one.value)),
+        };
+        places.push(Place {
+            t_days,
+            value,
+            error: squares.sqrt() / count,
+            readings: u32::try_from(own.len()).unwrap_or(u32::MAX),
+        });
+        means.push(Observation {
+            t_days,
+            value,
+            sigma: None,
+        });
+        left = before;
+    }
+    places.reverse();
+    means.reverse();
+    // Noise that lasts, as of the air or of satellites, shows between the means alone.
+    let scatter = displacement_sigma(&means);
+    for place in &mut places {
+        place.error = place.error.max(scatter);
+    }
+    places
 }
 
 fn displacement_rates(values: &[Observation]) -> Vec<Rate> {
-    let (Some(first), Some(last)) = (values.first(), values.last()) else {
+    let places = places(values);
+    let (Some(first), Some(last)) = (places.first(), places.last()) else {
         return Vec::new();
     };
-    let common = displacement_sigma(values);
     let longest = (last.t_days - first.t_days) * LONGEST_SHARE;
-    let between = |earlier: &Observation, later: &Observation| {
+    let between = |earlier: &Place, later: &Place| {
         let span = later.t_days - earlier.t_days;
-        // A stated error is often the instrument's alone: the scatter seen is the least there is.
-        let error = |value: &Observation| value.sigma.map_or(common, |sigma| sigma.max(common));
-        let noise = error(later).hypot(error(earlier));
-        let velocity = (later.value - earlier.value) / span;
         Rate {
             from: earlier.t_days,
             to: later.t_days,
-            velocity,
-            sigma: noise / span,
+            velocity: (later.value - earlier.value) / span,
+            sigma: later.error.hypot(earlier.error) / span,
             readings: 1,
             error: ReadingError::OfEnds,
         }
     };
     let mut rates = Vec::new();
-    let mut end = values.len() - 1;
-    for start in (0..values.len() - 1).rev() {
-        let rate = between(&values[start], &values[end]);
+    let mut end = places.len() - 1;
+    for start in (0..places.len() - 1).rev() {
+        let rate = between(&places[start], &places[end]);
         // Judged over twice the readings: an interval that ended where its own noise was high would be fast.
-        let twice = between(&values[start.saturating_sub(end - start)], &values[end]);
+        let twice = between(&places[start.saturating_sub(end - start)], &places[end]);
         let clear = twice.velocity > CLEAR_OF_NOISE * rate.sigma;
         // A step just before must not be smeared over the stillness after it.
         let breaks = start > 0 && {
-            let next = between(&values[start - 1], &values[start]);
+            let next = between(&places[start - 1], &places[start]);
             (next.velocity - rate.velocity).abs() > CLEAR_OF_NOISE * next.sigma.hypot(rate.sigma)
         };
         let long_enough = rate.to - rate.from >= 0.999 * FINEST_DAYS;
         if long_enough && (clear || breaks || rate.to - rate.from >= longest) {
-            let readings = u32::try_from(end - start).unwrap_or(u32::MAX);
+            let own = places[start + 1..=end].iter();
+            let readings = own.fold(0_u32, |sum, place| sum.saturating_add(place.readings));
             rates.push(Rate { readings, ..rate });
             end = start;
         }
@@ -303,6 +354,30 @@ mod tests {
                 .len(),
             29
         );
+    }
+
+    #[test]
+    fn readings_too_close_to_be_told_apart_are_averaged_and_noise_that_lasts_is_not_averaged_away()
+    {
+        // A tenth of a mm to and fro each minute, and the same for an hour each.
+        let minutes = 1440_u32;
+        let at = |noise: &dyn Fn(u32) -> f64| {
+            let values: Vec<(f64, f64)> = (0..minutes)
+                .map(|i| (f64::from(i) / 1440.0, f64::from(i) / 60.0 + noise(i)))
+                .collect();
+            displacement(&values).rates(0..values.len(), RateOptions::default())
+        };
+        let sign = |odd: u32| if odd.is_multiple_of(2) { 0.1 } else { -0.1 };
+        let quick = at(&|i| sign(i / 7 + i / 3));
+        assert!(quick.len() >= 40, "{}", quick.len());
+        for rate in &quick {
+            assert!((rate.velocity - 24.0).abs() < 2.5, "{rate:?}");
+            assert!(rate.sigma < 3.0, "{rate:?}");
+        }
+        let lasting = at(&|i| sign(i / 60));
+        for rate in &lasting {
+            assert!((rate.velocity - 24.0).abs() < 4.0 * rate.sigma, "{rate:?}");
+        }
     }
 
     #[test]

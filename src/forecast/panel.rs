@@ -66,7 +66,7 @@ impl Panel {
         let outlook = outlook(observations, critical);
         let (outlook, expected) = outlook?;
         self.expected = expected;
-        self.seen = Seen::of(observations, &outlook.rates);
+        self.seen = Seen::of(observations);
         Some(Outlook {
             surprise_nats,
             ..outlook
@@ -160,14 +160,16 @@ pub(crate) fn outlook(
 }
 
 impl Seen {
-    fn of(observations: &Observations, rates: &[Rate]) -> Option<Self> {
+    fn of(observations: &Observations) -> Option<Self> {
         let newest = observations.values.last()?;
-        let noise = rates
-            .last()
-            .map_or(0.0, |rate| match observations.quantity {
-                Quantity::Displacement => rate.sigma * (rate.to - rate.from),
-                Quantity::Velocity => rate.sigma,
-            });
+        let stated = newest.sigma.unwrap_or(0.0);
+        let noise = match observations.quantity {
+            Quantity::Displacement => {
+                let seen = crate::fit::displacement_sigma(&observations.values);
+                stated.max(seen) * std::f64::consts::SQRT_2
+            }
+            Quantity::Velocity => stated,
+        };
         Some(Self {
             t_days: newest.t_days,
             value: newest.value,

@@ -17,11 +17,12 @@ impl Track {
         forecast: Option<&Forecast>,
     ) -> Vec<Event> {
         let within = |span| forecast.map(|forecast| forecast.chance_within(days(span)));
+        let reach = forecast.map_or(policy.outlook, |forecast| forecast.reach(policy));
         let rates = forecast.map_or(&[][..], |forecast| &forecast.plain.rates);
         let look = self.look.filter(|(until, _)| time < *until);
         let mut evidence = Evidence {
             chance_within_evacuation_time: within(policy.evacuation_time),
-            chance_within_outlook: within(policy.outlook),
+            chance_within_outlook: within(reach),
             causes: look.map(|(_, cause)| cause).into_iter().collect(),
             ..self.observed(time, rates)
         };
@@ -44,7 +45,7 @@ impl Track {
         self.levels.note(time, self.latch.level());
         let told = transitions
             .iter()
-            .map(|change| self.alert_event(time, policy, &evidence, change));
+            .map(|change| self.alert_event(time, policy, (&evidence, reach), change));
         events.extend(told);
         events
     }
@@ -57,7 +58,7 @@ impl Track {
         }
         let evidence = self.observed(time, &self.history.rates());
         let change = self.latch.raise(policy, &evidence)?;
-        Some(self.alert_event(time, policy, &evidence, &change))
+        Some(self.alert_event(time, policy, (&evidence, policy.outlook), &change))
     }
 
     /// What the readings show by themselves.
@@ -81,7 +82,7 @@ impl Track {
         &self,
         time: Timestamp,
         policy: &Policy,
-        evidence: &Evidence,
+        (evidence, reach): (&Evidence, SignedDuration),
         change: &Transition,
     ) -> Event {
         let state = match change.entered {
@@ -89,7 +90,7 @@ impl Track {
             Entered::No => AlertState::Resolved,
         };
         let key = format!("{}/{}/{}", self.benchmark, change.level, change.since);
-        let text = self.text(policy, evidence, change);
+        let text = self.text(policy, (evidence, reach), change);
         self.event(
             time,
             EventKind::Alert {
@@ -102,7 +103,12 @@ impl Track {
         )
     }
 
-    fn text(&self, policy: &Policy, evidence: &Evidence, change: &Transition) -> String {
+    fn text(
+        &self,
+        policy: &Policy,
+        (evidence, reach): (&Evidence, SignedDuration),
+        change: &Transition,
+    ) -> String {
         let verb = match change.entered {
             Entered::Yes => "",
             Entered::No => " ends",
@@ -128,11 +134,7 @@ impl Track {
                 evidence.chance_within_evacuation_time,
                 policy.evacuation_time
             ),
-            chance(
-                "the outlook",
-                evidence.chance_within_outlook,
-                policy.outlook
-            ),
+            chance("the outlook", evidence.chance_within_outlook, reach),
             policy.critical_velocity_mm_per_day,
         )
     }

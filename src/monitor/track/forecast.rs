@@ -1,6 +1,13 @@
 //! What one benchmark is forecast to do: by the law under a constant load, and by the fuller one beside it.
 
+use super::days;
+use crate::alert::Policy;
 use crate::forecast::{Outlook, Passage};
+use crate::reading::SECONDS_PER_DAY;
+use jiff::SignedDuration;
+
+/// A forecast is the slope's for so many lengths of its record; further ahead it is the prior's, and calls no level.
+const REACH: f64 = 5.0;
 
 /// The forecasts after one reading.
 #[derive(Debug)]
@@ -19,6 +26,20 @@ pub(super) struct Fuller {
 }
 
 impl Forecast {
+    /// How far ahead orange and yellow look: as the policy says, if the record is long enough for that; as far as an
+    /// evacuation takes in any case.
+    pub(super) fn reach(&self, policy: &Policy) -> SignedDuration {
+        let plain = &self.plain;
+        let first = plain.rates.first();
+        let length = first.map_or(0.0, |rate| plain.now_days - rate.from);
+        if REACH * length >= days(policy.outlook) {
+            return policy.outlook;
+        }
+        let reach = SignedDuration::try_from_secs_f64(REACH * length * SECONDS_PER_DAY);
+        let reach = reach.unwrap_or(policy.outlook);
+        reach.max(policy.evacuation_time).min(policy.outlook)
+    }
+
     /// The forecast that people are told: the fuller law's where it explains the present, else that of whichever
     /// gives failure the larger chance within `days`.
     pub(super) fn in_force(&self, days: f64) -> &Outlook {
