@@ -56,6 +56,14 @@ impl Track {
         if policy.thresholds.is_empty() {
             return None;
         }
+        // The rates are those of the whole record: only where they can matter.
+        let needs_rates = policy.thresholds.iter().any(|threshold| {
+            threshold.velocity_mm_per_day.is_some() || threshold.acceleration_mm_per_day2.is_some()
+        });
+        let by_displacement = policy.call(&self.observed(time, &[]));
+        if !needs_rates && by_displacement.level <= self.latch.level() {
+            return None;
+        }
         let evidence = self.observed(time, &self.history.rates());
         let change = self.latch.raise(policy, &evidence)?;
         Some(self.alert_event(time, policy, (&evidence, policy.outlook), &change))
