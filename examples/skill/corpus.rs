@@ -109,14 +109,16 @@ impl Subject {
                 };
                 self.leads.iter().filter_map(look).collect()
             }
-            Truth::StoodUntil(_) => {
+            Truth::StoodUntil(end) => {
                 let mut counts: Vec<usize> = (1..=LOOKS)
                     .map(|look| values.len() * look / LOOKS)
                     .collect();
                 counts.dedup();
                 let look = |count: usize| {
+                    // At the end nothing can come any more that would score.
+                    let at_days = read(count).filter(|at_days| *at_days < end)?;
                     Some(Look {
-                        at_days: read(count)?,
+                        at_days,
                         lead_days: None,
                     })
                 };

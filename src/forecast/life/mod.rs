@@ -221,6 +221,11 @@ mod tests {
                 (is, was) => assert_eq!(is, was, "{fate:?} {seed}"),
             }
         }
+        // Some of these were reset.
+        let many: f64 = (0..30)
+            .map(|seed| sum(&Life::draw(Fate::Failing, seed)))
+            .sum();
+        assert!(close(many, 1.0), "{many:?}");
         let together = Life::draw_together(3, 90_000);
         let counts: Vec<usize> = together.iter().map(|life| life.readings.len()).collect();
         assert_eq!(counts, [1707, 650, 1514]);
