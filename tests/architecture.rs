@@ -20,7 +20,7 @@ const ARROWS: [(&str, &[&str]); 16] = [
         "effects",
         &["fit", "forecast", "model", "reading", "regime"],
     ),
-    ("figures", &["effects", "plot", "reading"]),
+    ("figures", &["effects", "plot", "reading", "score"]),
     ("alert", &["reading"]),
     (
         "monitor",

@@ -76,7 +76,8 @@ fn recalibration(looks: &[Look], weighing: &Weighing) -> [[f64; LEVELS]; SITUATI
 /// The file that holds what was learnt.
 fn source(weighing: &Weighing, count: u64) -> anyhow::Result<String> {
     let mut text = format!(
-        "//! What the panel has learnt on {count} simulated slopes: written by `cargo run --release --example learn`.\n\n\
+        "//! What the panel has learnt on {count} simulated slopes: written by `cargo run --release --example learn`.\n\
+         #![allow(clippy::approx_constant, reason = \"a learnt figure may come near to a constant\")]\n\n\
          use super::members::{{FEATURES, MEMBERS}};\n\
          use super::weighing::{{LEVELS, SITUATIONS, Weighing}};\n\n\
          /// Of each member but the law: its window's line, and last the one that says the slope will stand.\n\

@@ -14,6 +14,7 @@ mod load;
 mod man;
 mod replay;
 mod run;
+mod score;
 mod simulate;
 mod state;
 mod sweep;
@@ -46,6 +47,7 @@ enum Command {
     Fit(fit::Args),
     Sweep(sweep::Args),
     Explain(explain::Args),
+    Score(score::Args),
     Simulate(simulate::Args),
     Convert(convert::Args),
     #[command(subcommand)]
@@ -70,6 +72,7 @@ pub fn main() -> ExitCode {
             Command::Fit(args) => fit::run(&args),
             Command::Sweep(args) => sweep::run(&args),
             Command::Explain(args) => explain::run(&args),
+            Command::Score(args) => score::run(&args),
             Command::Simulate(args) => simulate::run(&args),
             Command::Convert(args) => convert::run(&args),
             Command::Hook(command) => hook::run(&command),

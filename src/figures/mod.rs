@@ -1,9 +1,12 @@
-//! An explanation in figures: each one SVG text, for a page or a file of its own.
+//! An explanation and a scorecard in figures: each one SVG text, for a page or a file of its own.
 
 #[cfg(test)]
 pub(crate) mod fixture;
 mod in_time;
+mod life_expectancy;
 mod of_the_search;
+
+pub use life_expectancy::life_expectancy;
 
 use crate::effects::{Candidate, Explanation};
 use crate::reading::{Timestamp, days_since};

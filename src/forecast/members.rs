@@ -8,8 +8,9 @@ use crate::fit::{FINEST_DAYS, LoadPosterior, Rate};
 pub const LINES: [usize; 8] = [8, 12, 16, 24, 32, 48, 64, 96];
 /// The law, the lines, and one that says that the slope will stand.
 pub const MEMBERS: usize = LINES.len() + 2;
-/// What the weights depend on: a constant, how sure the law is of a failure, and of its time.
-pub const FEATURES: usize = 3;
+/// What the weights depend on: a constant, how sure the law is of a failure and of its time, how far the lines
+/// disagree, and how many of them fall.
+pub const FEATURES: usize = 5;
 
 /// The law's passages are followed so far, days.
 const FARTHEST_DAYS: f64 = 10.0 * HORIZON_DAYS;
@@ -25,6 +26,9 @@ const UNTRIED: f64 = 1.0;
 const SURE: f64 = 0.002;
 /// A spread of the law's times, ln of the ratio of their quartiles, is no wider than this.
 const WIDEST: f64 = 3.0;
+/// Lines disagree by no more than this, the standard deviation of ln of their times; and by this where there are
+/// too few to tell.
+const DISAGREEMENT: (f64, f64) = (2.0, 1.5);
 
 /// What the members say at one time.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,7 +86,28 @@ impl Members {
         let quartile = |share| self.quantile(share * total).max(FINEST_DAYS);
         let spread = (quartile(0.75) / quartile(0.25)).ln();
         let spread = if self.law.is_empty() { WIDEST } else { spread };
-        [1.0, (passes / (1.0 - passes)).ln(), spread.min(WIDEST)]
+        let (disagreement, falling) = self.agreement();
+        [
+            1.0,
+            (passes / (1.0 - passes)).ln(),
+            spread.min(WIDEST),
+            disagreement,
+            falling,
+        ]
+    }
+
+    /// How far the lines disagree, and the share of them that fall.
+    fn agreement(&self) -> (f64, f64) {
+        let times = self.lines.iter().flatten();
+        let times: Vec<f64> = times.map(|days| days.max(FINEST_DAYS).ln()).collect();
+        let count = times.len() as f64;
+        let falling = count / LINES.len() as f64;
+        if times.len() < 2 {
+            return (DISAGREEMENT.1, falling);
+        }
+        let mean = times.iter().sum::<f64>() / count;
+        let square = times.iter().map(|time| (time - mean).powi(2)).sum::<f64>();
+        ((square / count).sqrt().min(DISAGREEMENT.0), falling)
     }
 
     fn chance(&self, days: f64) -> f64 {

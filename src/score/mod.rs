@@ -1,11 +1,13 @@
 //! Forecasts of the time of failure scored as they were made: what was known at the time, against what came.
 
+mod card;
 mod compare;
 mod known;
 mod measure;
 mod method;
 mod rivals;
 
+pub use card::{Card, LEADS_DAYS, Lead, Look, Score, Truth, card};
 pub use compare::{Interval, Sum, mean, ratio};
 pub use known::{History, Known};
 pub use measure::{

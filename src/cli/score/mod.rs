@@ -1,0 +1,140 @@
+//! `score FILE...`: forecasts scored as they would have been made, against every rival.
+
+mod text;
+mod warning;
+
+use super::args::{OutputArgs, ReadingArgs};
+use super::exit;
+use crate::alert::Policy;
+use crate::figures;
+use crate::reading::{Recording, Series, Timestamp, days_since};
+use crate::score::{Card, History, METHODS, Truth, card};
+use anyhow::{Context, ensure};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+use std::path::PathBuf;
+use warning::Warning;
+
+/// Score forecasts of the failure time as they would have been made, against rival methods
+///
+/// At each lead before the failure every method is given what had been measured by then, and nothing
+/// later. A method with nothing to say is scored as saying that no failure comes. The warnings are
+/// those of a replay of the record up to the failure.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    #[command(flatten)]
+    readings: ReadingArgs,
+    /// When the slope failed
+    #[arg(long, value_name = "TIME", required_unless_present = "no_failure")]
+    failure_time: Option<Timestamp>,
+    /// It had not failed when the record ended
+    #[arg(long, conflicts_with = "failure_time")]
+    no_failure: bool,
+    /// Draw when each forecast said that the slope would fail, as SVG
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
+    #[command(flatten)]
+    output: OutputArgs,
+}
+
+/// What is printed of one benchmark.
+#[derive(Debug, Serialize)]
+struct Report {
+    benchmark: String,
+    failure_time: Option<Timestamp>,
+    /// Where each method was published.
+    sources: Vec<&'static str>,
+    #[serde(flatten)]
+    card: Card,
+    warning: Warning,
+}
+
+/// Reads the files and prints a scorecard for each benchmark.
+pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    let mut recording = args.readings.load()?.recording;
+    args.readings.narrow(&mut recording)?;
+    let policy = args.readings.policy(&Policy::default());
+    let count = recording.series.len();
+    ensure!(
+        args.plot.is_none() || count == 1,
+        "--plot draws one benchmark, and there are {count}: expected --benchmark"
+    );
+    for (index, series) in recording.series.iter().enumerate() {
+        let report = report(args, &recording, series, &policy)?;
+        if let Some(file) = &args.plot {
+            let svg = figures::life_expectancy(&report.card, report.failure_time);
+            std::fs::write(file, svg)
+                .with_context(|| format!("cannot write {}", file.display()))?;
+        }
+        let blank = if index == 0 { "" } else { "\n" };
+        args.output
+            .print(&report, |report| format!("{blank}{}", text::text(report)))?;
+    }
+    Ok(())
+}
+
+fn report(
+    args: &Args,
+    recording: &Recording,
+    series: &Series,
+    policy: &Policy,
+) -> anyhow::Result<Report> {
+    let mut series = series.clone();
+    let truth = match args.failure_time {
+        None => Truth::Stood,
+        Some(failure) => {
+            let before = series.readings.len();
+            series.readings.retain(|reading| reading.time <= failure);
+            let after = before - series.readings.len();
+            if after > 0 {
+                exit::complain(&format_args!(
+                    "benchmark {}: readings after the failure, which nothing is scored on: {after}",
+                    series.benchmark
+                ));
+            }
+            Truth::Failed(failure)
+        }
+    };
+    let epoch = series.readings.first().map(|reading| reading.time);
+    let epoch = epoch.with_context(|| {
+        format!(
+            "benchmark {}: expected readings before --failure-time",
+            series.benchmark
+        )
+    })?;
+    let history = History::of(
+        &series,
+        &recording.channels,
+        policy.critical_velocity_mm_per_day,
+    );
+    let bar = bar(series.benchmark.as_str());
+    let card = card(&history, epoch, truth, &mut |done, count| {
+        bar.set_length(count);
+        bar.set_position(done);
+    });
+    bar.finish_and_clear();
+    let until = match truth {
+        Truth::Failed(failure) => failure,
+        Truth::Stood => series.readings.last().map_or(epoch, |last| last.time),
+    };
+    let warning = warning::of(&series, &recording.channels, policy, until)?;
+    Ok(Report {
+        benchmark: series.benchmark.to_string(),
+        failure_time: args.failure_time,
+        sources: METHODS.iter().map(|method| method.source).collect(),
+        card,
+        warning,
+    })
+}
+
+/// The bar hides itself where stderr is no terminal.
+fn bar(benchmark: &str) -> ProgressBar {
+    let style = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} looks, {elapsed}").ok();
+    let bar = ProgressBar::new(0).with_message(format!("benchmark {benchmark}"));
+    style.map_or(bar.clone(), |style| bar.with_style(style))
+}
+
+/// Hours between two times.
+fn hours(from: Timestamp, to: Timestamp) -> f64 {
+    24.0 * days_since(from, to)
+}

@@ -1,0 +1,142 @@
+//! The scorecard for people.
+
+use super::{Report, hours};
+use crate::alert::Level;
+use crate::cli::table::{Table, time};
+use crate::reading::Timestamp;
+use crate::score::Score;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+/// Errors and scores of leads under this are told in hours.
+const HOURS_UNDER_DAYS: f64 = 2.0;
+
+pub(super) fn text(report: &Report) -> String {
+    let mut out = String::new();
+    // Writing to a string cannot fail.
+    let _ = match report.failure_time {
+        Some(failure) => writeln!(
+            out,
+            "benchmark {}, failed {}",
+            report.benchmark,
+            time(Some(failure))
+        ),
+        None => writeln!(out, "benchmark {}, did not fail", report.benchmark),
+    };
+    if report.failure_time.is_some() {
+        let _ = writeln!(
+            out,
+            "\nMedian less failure, and in brackets the CRPS: above 0 the forecast is late, which is the unsafe side.\n"
+        );
+        out.push_str(&leads(report).to_string());
+    } else {
+        let _ = writeln!(
+            out,
+            "\nOver {} looks: mean CRPS, days, and the highest chance of a failure within 400 days.\n",
+            report.card.looks.len()
+        );
+        out.push_str(&looks(report).to_string());
+    }
+    out.push('\n');
+    out.push_str(&warning(report));
+    out
+}
+
+/// A row for each method, a column for each lead.
+fn leads(report: &Report) -> Table {
+    let heads = report.card.leads.iter().map(|lead| {
+        if lead.lead_days < HOURS_UNDER_DAYS {
+            format!("{:.0} h before", 24.0 * lead.lead_days)
+        } else {
+            format!("{:.0} d before", lead.lead_days)
+        }
+    });
+    let mut table = Table::headed(std::iter::once("method".to_owned()).chain(heads));
+    for method in &report.card.methods {
+        let cells = report.card.leads.iter().map(|lead| {
+            let (factor, unit) = if lead.lead_days < HOURS_UNDER_DAYS {
+                (24.0, "h")
+            } else {
+                (1.0, "d")
+            };
+            lead.scores
+                .get(method)
+                .map_or_else(String::new, |score| cell(score, factor, unit))
+        });
+        table.row(std::iter::once((*method).to_owned()).chain(cells));
+    }
+    table
+}
+
+fn cell(score: &Score, factor: f64, unit: &str) -> String {
+    let crps = factor * score.crps_days;
+    if !score.said {
+        return format!("- ({crps:.1})");
+    }
+    match score.error_days {
+        Some(error) => format!("{:+.1} {unit} ({crps:.1})", factor * error),
+        None => format!("never ({crps:.1})"),
+    }
+}
+
+fn looks(report: &Report) -> Table {
+    let mut table = Table::headed(["method", "CRPS", "highest chance", "said"]);
+    for method in &report.card.methods {
+        let of = |look: &BTreeMap<&'static str, Score>| look.get(method).cloned();
+        let scores: Vec<Score> = report
+            .card
+            .looks
+            .iter()
+            .filter_map(|look| of(&look.scores))
+            .collect();
+        let count = scores.len().max(1) as f64;
+        let crps = scores.iter().map(|score| score.crps_days).sum::<f64>() / count;
+        let highest = scores
+            .iter()
+            .map(|score| score.probability)
+            .fold(0.0, f64::max);
+        let said = scores.iter().filter(|score| score.said).count();
+        table.row([
+            (*method).to_owned(),
+            format!("{crps:.2}"),
+            format!("{highest:.2}"),
+            format!("{said} of {}", scores.len()),
+        ]);
+    }
+    table
+}
+
+fn warning(report: &Report) -> String {
+    let warning = &report.warning;
+    let mut out = String::new();
+    let firsts: [(Level, Option<Timestamp>); 3] = [
+        (Level::Yellow, warning.first_yellow),
+        (Level::Orange, warning.first_orange),
+        (Level::Red, warning.first_red),
+    ];
+    for (level, first) in firsts {
+        let at = warning.hours_at.get(&level).copied().unwrap_or(0.0);
+        let _ = match (first, report.failure_time) {
+            (None, _) => writeln!(out, "{level}: never"),
+            (Some(first), Some(failure)) => writeln!(
+                out,
+                "{level}: first {}, {:.0} h before the failure; in force {at:.0} h",
+                time(Some(first)),
+                hours(first, failure)
+            ),
+            (Some(first), None) => {
+                writeln!(
+                    out,
+                    "{level}: first {}; in force {at:.0} h",
+                    time(Some(first))
+                )
+            }
+        };
+    }
+    let _ = writeln!(
+        out,
+        "orange or red in {:.0} hours a year of {:.0} h of record",
+        warning.hours_per_year, warning.hours
+    );
+    out
+}

@@ -1,0 +1,309 @@
+//! The scorecard of one benchmark: what each method said at each lead, and how that compares with what came.
+
+use super::measure::{Outcome, crps_days, is_covered, log_score, scored_days};
+use super::{History, Known, METHODS};
+use crate::fit::Observations;
+use crate::forecast::{FEWEST_READINGS, HORIZON_DAYS, Passage};
+use crate::reading::{Channel, Series, Timestamp, after_days, days_since};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// The leads that are scored where a record reaches so far back, days.
+pub const LEADS_DAYS: [f64; 14] = [
+    40.0,
+    20.0,
+    10.0,
+    5.0,
+    2.0,
+    1.0,
+    18.0 / 24.0,
+    12.0 / 24.0,
+    8.0 / 24.0,
+    6.0 / 24.0,
+    4.0 / 24.0,
+    3.0 / 24.0,
+    2.0 / 24.0,
+    1.0 / 24.0,
+];
+/// Looks at a slope that stood, evenly over its readings.
+const LOOKS: usize = 40;
+/// A forecast is for a lead where its newest reading lies at no more than so many leads.
+const FARTHEST_LEADS: f64 = 2.0;
+/// A reading at the lead itself is known, whatever the rounding of the two, days.
+const ROUNDING: f64 = 1e-9;
+/// Endings of the names of channels that are a river's flow.
+const FLOWS: [&str; 2] = ["m3_s", "cfs"];
+
+/// What came of a slope.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Truth {
+    /// It failed then.
+    Failed(Timestamp),
+    /// It had not by the end of its record.
+    Stood,
+}
+
+/// How the methods did on one benchmark.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Card {
+    /// Names, the program's own first.
+    pub methods: Vec<&'static str>,
+    /// Leads of a failure, longest first.
+    pub leads: Vec<Lead>,
+    /// Looks at a slope that stood, in order of time.
+    pub looks: Vec<Look>,
+}
+
+/// At one lead.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Lead {
+    /// The lead that was asked for, days.
+    pub lead_days: f64,
+    /// The latest measured-at time that any forecast here used.
+    pub known_until: Timestamp,
+    /// From there to the failure, days.
+    pub remaining_days: f64,
+    /// By method; one that had nothing to say is scored as saying that no failure comes.
+    pub scores: BTreeMap<&'static str, Score>,
+}
+
+/// At one look at a slope that stood.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Look {
+    /// The latest measured-at time that any forecast here used.
+    pub known_until: Timestamp,
+    /// From there to the end of the record, days.
+    pub stood_days: f64,
+    /// By method.
+    pub scores: BTreeMap<&'static str, Score>,
+}
+
+/// How one forecast did.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Score {
+    /// Median less failure, days: above 0 is late, and unsafe; `None` where no median, or no failure, came.
+    pub error_days: Option<f64>,
+    /// The continuous ranked probability score, days.
+    pub crps_days: f64,
+    /// Nats.
+    pub log_score: f64,
+    /// Whether the interval of 90 % held the failure; `None` for a point forecast, and where there was none.
+    pub covered: Option<bool>,
+    /// Chance of failure within the horizon.
+    pub probability: f64,
+    /// The unconditional 5 % quantile, median and 95 % quantile.
+    pub low: Option<Timestamp>,
+    /// See [`Score::low`].
+    pub median: Option<Timestamp>,
+    /// See [`Score::low`].
+    pub high: Option<Timestamp>,
+    /// Whether the method had anything to say.
+    pub said: bool,
+}
+
+impl History {
+    /// The readings of a series, with the first channel beside it that is a river's flow.
+    pub fn of(series: &Series, channels: &[Channel], critical_mm_per_day: f64) -> Self {
+        let epoch = series.readings.first().map(|reading| reading.time);
+        let is_flow = |channel: &&Channel| {
+            let unit = channel.unit.as_deref();
+            unit.is_some_and(|unit| FLOWS.contains(&unit))
+        };
+        let river = channels.iter().find(is_flow);
+        let samples = river.into_iter().flat_map(|channel| &channel.samples);
+        let days = |time| epoch.map_or(0.0, |epoch| days_since(epoch, time));
+        Self {
+            observations: Observations::of(series),
+            flow: samples.map(|one| (days(one.time), one.value)).collect(),
+            critical_mm_per_day,
+        }
+    }
+}
+
+/// The scorecard of a history that began at `epoch`; `progress` is told after each look how many are done, of how
+/// many.
+pub fn card(
+    history: &History,
+    epoch: Timestamp,
+    truth: Truth,
+    progress: &mut dyn FnMut(u64, u64),
+) -> Card {
+    let mut card = Card {
+        methods: METHODS.iter().map(|method| method.name).collect(),
+        leads: Vec::new(),
+        looks: Vec::new(),
+    };
+    let looks = looks(history, epoch, truth);
+    let count = looks.len() as u64;
+    for (done, (lead, known)) in (1..).zip(looks) {
+        let Some(at) = after_days(epoch, known.now_days) else {
+            continue;
+        };
+        match truth {
+            Truth::Failed(failure) => {
+                let remaining_days = days_since(at, failure);
+                card.leads.push(Lead {
+                    lead_days: lead,
+                    known_until: at,
+                    remaining_days,
+                    scores: scores(&known, at, Outcome::Failed(remaining_days)),
+                });
+            }
+            Truth::Stood => {
+                let last = history.observations.values.last();
+                let stood_days = last.map_or(0.0, |last| last.t_days - known.now_days);
+                card.looks.push(Look {
+                    known_until: at,
+                    stood_days,
+                    scores: scores(&known, at, Outcome::Stood(stood_days)),
+                });
+            }
+        }
+        progress(done, count);
+    }
+    card
+}
+
+/// What is known at each lead or look, with the lead.
+fn looks(history: &History, epoch: Timestamp, truth: Truth) -> Vec<(f64, Known)> {
+    let enough =
+        |known: &Known| known.observations.spaced(FEWEST_READINGS).len() >= FEWEST_READINGS;
+    match truth {
+        Truth::Failed(failure) => {
+            let failure = days_since(epoch, failure);
+            let known = LEADS_DAYS.iter().filter_map(|lead| {
+                let known = history.at(failure - lead + ROUNDING)?;
+                let near = failure - known.now_days <= FARTHEST_LEADS * lead;
+                (near && enough(&known)).then_some((*lead, known))
+            });
+            known.collect()
+        }
+        Truth::Stood => {
+            let values = &history.observations.values;
+            let looks = LOOKS.min(values.len().saturating_sub(1));
+            let known = (1..=looks).filter_map(|look| {
+                let last = (values.len() - 1) * look / looks;
+                let known = history.at(values.get(last.checked_sub(1)?)?.t_days)?;
+                enough(&known).then_some((0.0, known))
+            });
+            known.collect()
+        }
+    }
+}
+
+fn scores(known: &Known, at: Timestamp, outcome: Outcome) -> BTreeMap<&'static str, Score> {
+    let first = known.observations.values.first();
+    let length = first.map_or(0.0, |first| known.now_days - first.t_days);
+    let scored = scored_days(length);
+    let each = METHODS.iter().map(|method| {
+        let said = (method.forecast)(known);
+        (method.name, score(said.as_ref(), at, outcome, scored))
+    });
+    each.collect()
+}
+
+fn score(said: Option<&Passage>, at: Timestamp, outcome: Outcome, scored: f64) -> Score {
+    let never = Passage::default();
+    let forecast = said.unwrap_or(&never);
+    let quantile = |share| forecast.quantile(share, HORIZON_DAYS);
+    let time = |share| after_days(at, quantile(share)?);
+    let failed = match outcome {
+        Outcome::Failed(days) => Some(days),
+        Outcome::Stood(_) => None,
+    };
+    Score {
+        error_days: quantile(0.5)
+            .zip(failed)
+            .map(|(median, days)| median - days),
+        crps_days: crps_days(forecast, outcome, scored),
+        log_score: log_score(forecast, outcome),
+        covered: failed
+            .filter(|_| forecast.times().len() > 1)
+            .map(|days| is_covered(forecast, days)),
+        probability: forecast.chance_within(HORIZON_DAYS),
+        low: time(0.05),
+        median: time(0.5),
+        high: time(0.95),
+        said: said.is_some(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::Observation;
+    use crate::reading::Quantity;
+
+    /// 1/v falls in a line to zero at day 60; read daily.
+    fn history(days: u32) -> History {
+        let values = (0..days).map(|day| Observation {
+            t_days: f64::from(day),
+            value: -100.0 * (1.0 - f64::from(day) / 60.0).ln(),
+            sigma: None,
+        });
+        History {
+            observations: Observations {
+                quantity: Quantity::Displacement,
+                averaging_days: 0.0,
+                values: values.collect(),
+            },
+            flow: Vec::new(),
+            critical_mm_per_day: 1000.0,
+        }
+    }
+
+    fn epoch() -> Timestamp {
+        "2020-01-01T00:00:00Z".parse().unwrap()
+    }
+
+    #[test]
+    fn no_forecast_knows_what_was_read_after_its_lead() {
+        let failure = after_days(epoch(), 60.0).unwrap();
+        let (whole, part) = (history(60), history(51));
+        let card = |history| card(history, epoch(), Truth::Failed(failure), &mut |_, _| ());
+        let (later, earlier) = (card(&whole), card(&part));
+        for lead in &earlier.leads {
+            let same = later
+                .leads
+                .iter()
+                .find(|one| one.lead_days == lead.lead_days);
+            assert_eq!(Some(lead), same);
+            assert!(days_since(lead.known_until, failure) >= lead.lead_days - 1e-6);
+        }
+        assert_eq!(earlier.leads.len(), 3);
+        assert_eq!(later.leads.len(), 6);
+    }
+
+    #[test]
+    fn a_line_that_is_one_is_met_by_the_line_and_by_the_panel() {
+        let failure = after_days(epoch(), 60.0).unwrap();
+        let card = card(
+            &history(60),
+            epoch(),
+            Truth::Failed(failure),
+            &mut |_, _| (),
+        );
+        for lead in &card.leads {
+            let error = |name| lead.scores[name].error_days.unwrap_or(f64::NAN);
+            assert!(error("inverse-velocity-line").abs() < 0.5, "{lead:?}");
+            assert!(
+                error("panel").abs() < 0.35 * lead.remaining_days,
+                "{lead:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_slope_that_stood_has_looks_and_no_leads() {
+        let mut seen = 0;
+        let card = card(&history(30), epoch(), Truth::Stood, &mut |done, count| {
+            assert!(done <= count);
+            seen = done;
+        });
+        assert!(card.leads.is_empty());
+        assert_eq!(card.looks.len() as u64, seen);
+        assert!(card.looks.iter().all(|look| look.stood_days > 0.0));
+        let persistence = &card.looks[0].scores["persistence"];
+        assert!(persistence.crps_days.abs() < 1e-12 && persistence.covered.is_none());
+    }
+}
