@@ -205,9 +205,23 @@ mod tests {
     }
 
     #[test]
-    fn what_is_outside_the_filters_is_no_singularity() {
-        let known = slips(1.0, 92.0, |t| singular(t, 1.4, 11.0));
-        assert!(forecast(&known).unwrap().chance_within(1e9) < 0.5);
+    fn a_law_passes_the_filters_just_where_its_exponent_frequency_and_damping_are_within() {
+        let passes = |exponent: f64, omega: f64, amplitude: f64| {
+            let slip = |t: f64| {
+                let left = 100.0 - t;
+                -left.powf(exponent) * (1.0 + amplitude * (omega * left.ln()).cos())
+            };
+            let path: Vec<(f64, f64)> = (0..93)
+                .map(|day| (f64::from(day), slip(f64::from(day))))
+                .collect();
+            let window = Window::of(&path, 1.0).unwrap();
+            window.passes(&[(8.0_f64 / 92.0).ln(), exponent, omega])
+        };
+        assert!(passes(0.5, 11.0, 0.04));
+        assert!(!passes(1.3, 11.0, 0.04), "exponent");
+        assert!(!passes(0.5, 26.0, 0.01), "frequency");
+        assert!(!passes(0.5, 1.5, 0.04), "frequency");
+        assert!(!passes(0.5, 11.0, 0.08), "damping");
     }
 
     #[test]
