@@ -21,6 +21,8 @@ pub(crate) struct Batch {
 struct Row {
     features: [f64; FEATURES],
     misses: [f64; MEMBERS],
+    /// ln of what the weights are multiplied by.
+    room: [f64; MEMBERS],
     /// At each time of the grid: the members' chances of failure by then, and the share of the time left.
     chances: Vec<[f64; MEMBERS]>,
     spans: Vec<f64>,
@@ -78,6 +80,7 @@ impl Row {
         Self {
             features: look.members.features(),
             misses: look.members.misses,
+            room: look.members.room().map(f64::ln),
             chances,
             spans,
             failed,
@@ -205,14 +208,15 @@ fn sum(rows: &[Row], learnt: &[f64; LEARNT]) -> (f64, [f64; LEARNT]) {
 }
 
 fn weights(row: &Row, learnt: &[f64; LEARNT]) -> [f64; MEMBERS] {
-    let mut weights = [0.0; MEMBERS];
+    let mut weights = row.room;
     for member in 1..MEMBERS {
         let gate = &learnt[(member - 1) * FEATURES..member * FEATURES];
         let terms = gate
             .iter()
             .zip(&row.features)
             .map(|(by, feature)| by * feature);
-        weights[member] = terms.sum::<f64>() - learnt[LEARNT - 1] * row.misses[member];
+        weights[member] =
+            terms.sum::<f64>() - learnt[LEARNT - 1] * row.misses[member] + row.room[member];
     }
     let most = weights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let total: f64 = weights.iter().map(|weight| (weight - most).exp()).sum();

@@ -22,6 +22,8 @@ const SCORED: usize = 6;
 const WORST: f64 = 3.0;
 /// The score of what was never tried.
 const UNTRIED: f64 = 1.0;
+/// A line is heard as far as the law sees a failure possible within so many times as long as the line says.
+const AS_LONG: f64 = 3.0;
 /// A probability is no nearer to 0 or 1 than this.
 const SURE: f64 = 0.002;
 /// A spread of the law's times, ln of the ratio of their quartiles, is no wider than this.
@@ -94,6 +96,17 @@ impl Members {
             disagreement,
             falling,
         ]
+    }
+
+    /// What each member's weight is multiplied by: a line's, by the law's chance of a failure within three times as
+    /// long as the line says. Lines through the noise of a slope at rest meet zero as soon as any.
+    pub fn room(&self) -> [f64; MEMBERS] {
+        let mut room = [1.0; MEMBERS];
+        for (room, line) in room[1..].iter_mut().zip(&self.lines) {
+            let possible = line.map_or(1.0, |days| self.chance(AS_LONG * days));
+            *room = possible.clamp(SURE, 1.0);
+        }
+        room
     }
 
     /// How far the lines disagree, and the share of them that fall.

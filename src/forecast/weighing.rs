@@ -30,14 +30,14 @@ pub struct Weighing {
 impl Weighing {
     /// The weights of the members; they sum to 1.
     pub fn weights(&self, members: &Members) -> [f64; MEMBERS] {
-        let features = members.features();
+        let (features, room) = (members.features(), members.room());
         let mut weights = [0.0; MEMBERS];
         for (index, weight) in weights.iter_mut().enumerate() {
             let gate = index.checked_sub(1).map_or(0.0, |gate| {
                 let terms = self.gates[gate].iter().zip(&features);
                 terms.map(|(by, feature)| by * feature).sum::<f64>()
             });
-            *weight = gate - self.harshness * members.misses[index];
+            *weight = gate - self.harshness * members.misses[index] + room[index].ln();
         }
         let most = weights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let total: f64 = weights.iter().map(|weight| (weight - most).exp()).sum();

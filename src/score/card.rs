@@ -262,7 +262,8 @@ mod tests {
         let (whole, part) = (history(60), history(51));
         let card = |history| card(history, epoch(), Truth::Failed(failure), &mut |_, _| ());
         let (later, earlier) = (card(&whole), card(&part));
-        for lead in &earlier.leads {
+        // Five days before, the shorter record has only what it had ten days before.
+        for lead in earlier.leads.iter().filter(|lead| lead.lead_days >= 10.0) {
             let same = later
                 .leads
                 .iter()
@@ -270,8 +271,7 @@ mod tests {
             assert_eq!(Some(lead), same);
             assert!(days_since(lead.known_until, failure) >= lead.lead_days - 1e-6);
         }
-        assert_eq!(earlier.leads.len(), 3);
-        assert_eq!(later.leads.len(), 6);
+        assert_eq!((earlier.leads.len(), later.leads.len()), (4, 6));
     }
 
     #[test]

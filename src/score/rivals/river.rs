@@ -3,7 +3,7 @@
 //! in foreseeing failure in landslides: La Clapière, French Alps", Proc. 5th Int. Symp. Landslides, Lausanne,
 //! vol. 3, 1503-1504).
 //!
-//! Neither formula was published. Ours: a velocity weighs q/(q + flow), q the median flow, so that what
+//! We have seen neither formula. Ours: a velocity weighs q/(q + flow), q the median flow, so that what
 //! moved at low water, by itself, counts most; and the share is a multiple of the flow's departure from its mean, by
 //! least squares of the changes from velocity to velocity, in which a trend all but vanishes.
 
