@@ -188,6 +188,8 @@ fn completions_and_the_manual_name_every_command_and_no_hidden_one() {
         let text = fs::read_to_string(pages.join(page)).unwrap();
         assert!(text.contains(".SH NAME"), "{page}");
     }
-    assert!(pages.join("slipwatch-hook-test.1").exists() || pages.join("slipwatch-hook.1").exists());
+    assert!(
+        pages.join("slipwatch-hook-test.1").exists() || pages.join("slipwatch-hook.1").exists()
+    );
     assert!(!pages.join("slipwatch-hook-exec.1").exists());
 }

@@ -2,8 +2,8 @@
 //! src/forecast/learned.rs.
 //!
 //! Lives are those of `Corpus::TRAINING`, which no scorecard uses. Each is looked at at the scored leads and evenly over its
-//! record; the weights are those of least CRPS, each taken over the time that was left, and the recalibration is the
-//! distribution of where in the mixture the failures came.
+//! record; the weights are those of least CRPS, each taken over the time that was left, and the recalibration is how
+//! often each probability came true.
 
 #![expect(clippy::print_stderr, reason = "progress is what it prints")]
 
@@ -15,8 +15,6 @@ use looks::Look;
 use slipwatch::forecast::{Corpus, LEVELS, SITUATIONS, Weighing, situation};
 use std::fmt::Write as _;
 
-/// A failure is forecast with this probability at least where it teaches when.
-const LEAST_CHANCE: f64 = 0.3;
 /// Forecasts that each situation starts with, spread evenly, so that few cannot decide.
 const EVEN: f64 = 10.0;
 
@@ -43,34 +41,39 @@ fn even(level: usize) -> f64 {
     level as f64 / (LEVELS - 1) as f64
 }
 
-/// The share of failures by each level of the mixture, in each situation; a look counts for the two nearest.
+/// How often a failure had come by the time at which the mixture gave it each probability, among the looks that gave
+/// it at all, in each situation; a look counts for the two nearest. What stood until its record ended never failed.
 fn recalibration(looks: &[Look], weighing: &Weighing) -> [[f64; LEVELS]; SITUATIONS] {
-    let mut counts = [[0.0; LEVELS]; SITUATIONS];
-    let mut totals = [0.0; SITUATIONS];
-    for look in looks.iter().filter(|look| look.failed) {
+    let mut came = [[0.0; LEVELS]; SITUATIONS];
+    let mut given = [[0.0; LEVELS]; SITUATIONS];
+    for look in looks {
         let times = weighing.mixture(&look.members);
         let total: f64 = times.iter().map(|(_, share)| share).sum();
-        if total < LEAST_CHANCE {
+        if total <= 0.0 {
             continue;
         }
         let within = times.iter().take_while(|(days, _)| *days <= look.remaining);
-        let level = within.map(|(_, share)| share).sum::<f64>() / total;
+        let by_then: f64 = within.map(|(_, share)| share).sum();
+        let level = if look.failed { by_then } else { f64::INFINITY };
         let at = situation(&times, total, look.members.interval_days);
         for knot in 0..SITUATIONS {
-            let weight = total * (1.0 - (at - knot as f64).abs()).max(0.0);
-            totals[knot] += weight;
-            for (index, count) in counts[knot].iter_mut().enumerate() {
-                *count += if level <= even(index) { weight } else { 0.0 };
+            let weight = (1.0 - (at - knot as f64).abs()).max(0.0);
+            for index in (0..LEVELS).filter(|index| even(*index) <= total) {
+                given[knot][index] += weight;
+                came[knot][index] += if level <= even(index) { weight } else { 0.0 };
             }
         }
     }
-    for (levels, total) in counts.iter_mut().zip(totals) {
-        for (index, count) in levels.iter_mut().enumerate() {
-            *count = (*count + EVEN * even(index)) / (total + EVEN);
+    for (came, given) in came.iter_mut().zip(given) {
+        let mut highest: f64 = 0.0;
+        for (index, share) in came.iter_mut().enumerate() {
+            let often = (*share + EVEN * even(index)) / (given[index] + EVEN);
+            highest = highest.max(often);
+            *share = highest;
         }
-        (levels[0], levels[LEVELS - 1]) = (0.0, 1.0);
+        came[0] = 0.0;
     }
-    counts
+    came
 }
 
 /// The file that holds what was learnt.
@@ -87,7 +90,7 @@ fn source(weighing: &Weighing, count: u64) -> anyhow::Result<String> {
         writeln!(text, "    {},", row(gate))?;
     }
     text.push_str(
-        "];\n\n/// The share of failures by each level, a row for each situation.\n\
+        "];\n\n/// How often a failure had come by the time at which it was given each probability, a row for each situation.\n\
          const RECALIBRATION: [[f64; LEVELS]; SITUATIONS] = [\n",
     );
     for levels in &weighing.recalibration {

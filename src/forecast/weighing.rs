@@ -13,8 +13,9 @@ const NORMAL: [f64; 10] = [
 ];
 /// Levels of the recalibration.
 pub const LEVELS: usize = 21;
-/// Situations of the recalibration: ln of the median time to failure over the sampling interval, at 0, 1, 2, ...
-pub const SITUATIONS: usize = 7;
+/// Situations of the recalibration: ln of the median time to failure over the sampling interval, at 0, 1, 2 and 3, the
+/// last for all beyond. Farther off the share of simulated slopes that fail would decide, which is nobody's slope's.
+pub const SITUATIONS: usize = 4;
 
 /// What is learnt.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,7 +24,7 @@ pub struct Weighing {
     pub gates: [[f64; FEATURES]; MEMBERS - 1],
     /// What a member's recent miss takes from ln of its weight.
     pub harshness: f64,
-    /// For each situation, the share of failures that came by each level of the mixture's distribution.
+    /// For each situation, how often a failure had come by the time at which the mixture gave it each probability.
     pub recalibration: [[f64; LEVELS]; SITUATIONS],
 }
 
@@ -71,8 +72,8 @@ impl Weighing {
         let (mut reached, mut before) = (0.0, 0.0);
         for (_, share) in &mut times {
             reached += *share;
-            let level = at(&levels, reached / total);
-            *share = total * (level - before);
+            let level = at(&levels, reached.min(1.0));
+            *share = level - before;
             before = level;
         }
         times
@@ -144,8 +145,13 @@ mod tests {
     fn an_indifferent_panel_gives_each_member_its_share_and_none_is_lost() {
         let forecast = indifferent().forecast(&members());
         let total: f64 = forecast.iter().map(|(_, share)| share).sum();
-        let each = 1.0 / MEMBERS as f64;
-        assert!((total - each * (0.8 + 1.0)).abs() < 1e-12, "{total}");
+        let weights = indifferent().weights(&members());
+        assert!(
+            (weights[0] * 0.8 + weights[3] - total).abs() < 1e-12,
+            "{total}"
+        );
+        // A line is heard as far as the law sees a failure possible by then.
+        assert!((weights[3] / weights[0] - 0.8).abs() < 1e-12, "{weights:?}");
         assert!(forecast.windows(2).all(|pair| pair[0].0 <= pair[1].0));
     }
 
@@ -161,9 +167,9 @@ mod tests {
     }
 
     #[test]
-    fn recalibration_moves_probability_among_times_and_keeps_the_total() {
-        let mut late = indifferent();
-        for levels in &mut late.recalibration {
+    fn recalibration_takes_each_probability_to_how_often_it_came_true() {
+        let mut rarer = indifferent();
+        for levels in &mut rarer.recalibration {
             for (level, share) in levels.iter_mut().enumerate() {
                 *share = (level as f64 / (LEVELS - 1) as f64).powi(2);
             }
@@ -171,9 +177,9 @@ mod tests {
         let total = |forecast: &[(f64, f64)]| forecast.iter().map(|(_, share)| share).sum::<f64>();
         let (before, after) = (
             indifferent().forecast(&members()),
-            late.forecast(&members()),
+            rarer.forecast(&members()),
         );
-        assert!((total(&before) - total(&after)).abs() < 1e-12);
+        assert!((total(&before).powi(2) - total(&after)).abs() < 0.01);
         assert!(after[0].1 < 0.5 * before[0].1);
     }
 }

@@ -271,7 +271,7 @@ mod tests {
             assert_eq!(Some(lead), same);
             assert!(days_since(lead.known_until, failure) >= lead.lead_days - 1e-6);
         }
-        assert_eq!((earlier.leads.len(), later.leads.len()), (4, 6));
+        assert_eq!((earlier.leads.len(), later.leads.len()), (4, 8));
     }
 
     #[test]
