@@ -22,6 +22,8 @@ const SCORED: usize = 6;
 const WORST: f64 = 3.0;
 /// The score of what was never tried.
 const UNTRIED: f64 = 1.0;
+/// One of so many newest rates goes forward where the slope does: a reading of nothing must hide no failure.
+const GOES_ON: usize = 3;
 /// A line is heard as far as the law sees a failure possible within so many times as long as the line says.
 const AS_LONG: f64 = 3.0;
 /// A probability is no nearer to 0 or 1 than this.
@@ -65,7 +67,13 @@ impl Members {
             *days = (*days - later).max(0.0);
         }
         law.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // What does not go forward now does not accelerate, whatever it did.
+        let newest = &rates[rates.len().saturating_sub(GOES_ON)..];
+        let goes_on = newest.iter().any(InverseVelocityLine::takes);
         let meets = |window: usize| {
+            if !goes_on {
+                return None;
+            }
             let days = through(rates, window)?.intercept_days? - now_days;
             (days > 0.0 && days <= FARTHEST_LENGTHS * length).then_some(days)
         };

@@ -86,7 +86,7 @@ impl Weighing {
     }
 }
 
-/// Where on the scale of situations a mixture lies.
+/// Where on the scale of situations a mixture lies; beyond the last it is as in the last.
 pub fn situation(times: &[(f64, f64)], total: f64, interval_days: f64) -> f64 {
     let mut reached = 0.0;
     let median = times.iter().find(|(_, share)| {
@@ -94,9 +94,7 @@ pub fn situation(times: &[(f64, f64)], total: f64, interval_days: f64) -> f64 {
         reached >= 0.5 * total
     });
     let days = median.map_or(FINEST_DAYS, |(days, _)| days.max(FINEST_DAYS));
-    (days / interval_days)
-        .ln()
-        .clamp(0.0, (SITUATIONS - 1) as f64)
+    (days / interval_days).ln().max(0.0)
 }
 
 /// The knot below `x` of `count` at 0, 1, 2, ..., and how far it is to the next.
