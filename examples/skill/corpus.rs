@@ -1,6 +1,7 @@
 //! What forecasts are scored on: a series, when it was looked at, and what came of it.
 
 use slipwatch::forecast::{Corpus, Life};
+use slipwatch::reading::Timestamp;
 use slipwatch::score::{History, Outcome};
 
 /// What a series is. Scores of one kind say nothing of another, and stand apart.
@@ -15,6 +16,12 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
+    const ALL: [Self; 3] = [Self::Measured, Self::Reconstruction, Self::Simulated];
+
+    pub(crate) fn of(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Measured => "measured",
@@ -50,10 +57,14 @@ pub(crate) struct Subject {
     pub(crate) kind: Kind,
     /// The site, or the fate of a simulated life.
     pub(crate) family: String,
+    /// Of the first reading, which is day 0; `None` of a simulated life.
+    pub(crate) epoch: Option<Timestamp>,
     pub(crate) history: History,
     pub(crate) truth: Truth,
     /// Days before the failure at which it is looked at; of no use where it stood.
     pub(crate) leads: Vec<f64>,
+    /// Looks evenly over its readings, beside the leads.
+    pub(crate) spread: usize,
 }
 
 /// When a forecast is made.
@@ -61,14 +72,18 @@ pub(crate) struct Subject {
 pub(crate) struct Look {
     /// At the last reading until then, days.
     pub(crate) at_days: f64,
-    /// Days before the failure that were asked for.
+    /// Days before the failure that were asked for; `None` of a look that is one of several spread over the record.
     pub(crate) lead_days: Option<f64>,
 }
 
-/// Leads of simulated lives, days.
-const SIMULATED_LEADS: [f64; 5] = [40.0, 20.0, 10.0, 5.0, 2.0];
+/// Leads of simulated lives that methods are compared at, days.
+pub(crate) const SIMULATED_LEADS: [f64; 5] = [40.0, 20.0, 10.0, 5.0, 2.0];
+/// Leads beside those, for what is told of the last days.
+pub(crate) const SHORT_LEADS: [f64; 3] = [1.0, 0.5, 0.2];
 /// Looks at a slope that stood, evenly over its readings.
-const LOOKS: usize = 40;
+pub(crate) const LOOKS: usize = 40;
+/// The same of a simulated one that failed.
+pub(crate) const LOOKS_AT_FAILING: usize = 10;
 /// A tenth of a millisecond, days: a reading at the lead itself is known, whatever the rounding of the two.
 const ROUNDING: f64 = 1e-9;
 
@@ -81,50 +96,64 @@ impl Subject {
         Self {
             name,
             kind: Kind::Simulated,
+            epoch: None,
             family: format!("{:?}", life.fate).to_lowercase(),
             history: History {
                 observations: life.known(f64::INFINITY),
                 flow: Vec::new(),
                 critical_mm_per_day: Life::CRITICAL_MM_PER_DAY,
             },
+            spread: match truth {
+                Truth::FailedAt(_) => LOOKS_AT_FAILING,
+                Truth::StoodUntil(_) => LOOKS,
+            },
             truth,
-            leads: SIMULATED_LEADS.to_vec(),
+            leads: [&SIMULATED_LEADS[..], &SHORT_LEADS[..]].concat(),
         }
     }
 
     /// When forecasts are made of it. A lead that a gap in the readings makes more than twice as long is left out.
     pub(crate) fn looks(&self) -> Vec<Look> {
+        let (end, leads) = match self.truth {
+            Truth::FailedAt(failure) => (failure, &self.leads[..]),
+            // At the end nothing can come any more that would score.
+            Truth::StoodUntil(end) => (end, &[][..]),
+        };
+        let at_lead = |lead: &f64| {
+            let values = &self.history.observations.values;
+            let known = values.partition_point(|value| value.t_days <= end - lead + ROUNDING);
+            let at_days = self.read(known)?;
+            (end - at_days <= 2.0 * lead).then_some(Look {
+                at_days,
+                lead_days: Some(*lead),
+            })
+        };
+        let at_leads = leads.iter().filter_map(at_lead);
+        let at_spread = self.spread_days().into_iter().map(|at_days| Look {
+            at_days,
+            lead_days: None,
+        });
+        at_leads
+            .chain(at_spread.filter(|look| look.at_days < end))
+            .collect()
+    }
+
+    fn spread_days(&self) -> Vec<f64> {
+        let readings = self.history.observations.values.len();
+        let mut counts: Vec<usize> = (1..=self.spread)
+            .map(|look| readings * look / self.spread)
+            .collect();
+        counts.dedup();
+        counts
+            .into_iter()
+            .filter_map(|count| self.read(count))
+            .collect()
+    }
+
+    /// When the newest of so many readings was taken, days.
+    fn read(&self, count: usize) -> Option<f64> {
         let values = &self.history.observations.values;
-        let read = |count: usize| Some(values.get(count.checked_sub(1)?)?.t_days);
-        match self.truth {
-            Truth::FailedAt(failure) => {
-                let look = |lead: &f64| {
-                    let known =
-                        values.partition_point(|value| value.t_days <= failure - lead + ROUNDING);
-                    let at_days = read(known)?;
-                    (failure - at_days <= 2.0 * lead).then_some(Look {
-                        at_days,
-                        lead_days: Some(*lead),
-                    })
-                };
-                self.leads.iter().filter_map(look).collect()
-            }
-            Truth::StoodUntil(end) => {
-                let mut counts: Vec<usize> = (1..=LOOKS)
-                    .map(|look| values.len() * look / LOOKS)
-                    .collect();
-                counts.dedup();
-                let look = |count: usize| {
-                    // At the end nothing can come any more that would score.
-                    let at_days = read(count).filter(|at_days| *at_days < end)?;
-                    Some(Look {
-                        at_days,
-                        lead_days: None,
-                    })
-                };
-                counts.into_iter().filter_map(look).collect()
-            }
-        }
+        Some(values.get(count.checked_sub(1)?)?.t_days)
     }
 }
 

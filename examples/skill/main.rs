@@ -2,6 +2,7 @@
 //!
 //!     cargo run --release --example skill                        on the training lives, and the recordings
 //!     cargo run --release --example skill -- --judged            on the lives that nothing was tuned on
+//!     cargo run --release --example skill -- --judged --write    the same into docs/skill.md
 //!     cargo run --release --example skill -- --simulated 70 --records records.ndjson
 //!
 //! At each lead before a failure, and at looks spread over a record that ended without one, each method is given
@@ -11,13 +12,23 @@
     reason = "what is left out is told to who runs it"
 )]
 
+mod chances;
 mod corpus;
+mod document;
+mod figures;
+mod la_clapiere;
+mod lines;
 #[path = "../../tests/measured/mod.rs"]
 mod measured;
 mod record;
 mod recorded;
+mod reduce;
 mod run;
+mod simulated;
+mod sites;
+mod sums;
 mod table;
+mod verdicts;
 
 use anyhow::{Context, Result, bail};
 use clap::Parser;
@@ -26,6 +37,7 @@ use slipwatch::forecast::Corpus;
 use slipwatch::score::METHODS;
 use std::io::Write as _;
 use std::path::PathBuf;
+use sums::Scored;
 
 /// Scores forecasts of the time of failure.
 #[derive(Debug, Parser)]
@@ -42,6 +54,12 @@ struct Arguments {
     /// Writes every forecast into this file, a line each.
     #[arg(long, value_name = "FILE")]
     records: Option<PathBuf>,
+    /// Writes docs/skill.md and its figures instead of printing tables.
+    #[arg(long, conflicts_with = "only")]
+    write: bool,
+    /// Makes no forecast, and takes those that `--records` wrote into this file.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["only", "records"])]
+    from: Option<PathBuf>,
     /// Threads.
     #[arg(long, default_value_t = 2)]
     threads: usize,
@@ -69,10 +87,20 @@ fn main() -> Result<()> {
         Corpus::TRAINING
     };
     let subjects = Subjects::new(recorded, corpus, arguments.simulated);
-    let told = run::run(&subjects, &methods, arguments.threads)?;
+    let told = match &arguments.from {
+        Some(file) => {
+            let lines = std::fs::read_to_string(file);
+            lines::read(&lines.with_context(|| file.display().to_string())?)?
+        }
+        None => run::run(&subjects, &methods, arguments.threads)?,
+    };
     if let Some(file) = &arguments.records {
-        let lines = record::lines(&told)?;
+        let lines = lines::written(&told)?;
         std::fs::write(file, lines).with_context(|| file.display().to_string())?;
+    }
+    if arguments.write {
+        let names = methods.iter().map(|method| method.name).collect();
+        return document::write(&Scored::of(&told, names), arguments.judged);
     }
     write!(std::io::stdout(), "{}", table::text(&told, &methods))?;
     Ok(())

@@ -1,12 +1,14 @@
 //! One forecast as it was made, in short.
 
 use crate::corpus::{Kind, Look, Subject};
-use serde::Serialize;
 use slipwatch::forecast::Passage;
-use slipwatch::score::{Known, Method, Outcome};
+use slipwatch::reading::Timestamp;
+use slipwatch::score::{Known, Method, Outcome, is_covered, pit};
 
 /// A passage is reduced to so many times, each of about the same share of it.
 const MOST_TIMES: u32 = 64;
+/// Chances are told of passing within so many days.
+pub(crate) const HORIZONS_DAYS: [f64; 5] = [0.25, 1.0, 3.0, 10.0, 30.0];
 
 /// A series as its records name it.
 #[derive(Debug, Clone)]
@@ -14,6 +16,8 @@ pub(crate) struct Told {
     pub(crate) name: String,
     pub(crate) kind: Kind,
     pub(crate) family: String,
+    /// Of the first reading; `None` of a simulated life.
+    pub(crate) epoch: Option<Timestamp>,
     /// By look, then by method.
     pub(crate) records: Vec<Record>,
 }
@@ -22,7 +26,7 @@ pub(crate) struct Told {
 #[derive(Debug, Clone)]
 pub(crate) struct Record {
     pub(crate) method: &'static str,
-    /// Days before the failure that were asked for; `None` of a slope that stood.
+    /// Days before the failure that were asked for; `None` of a look that is one of several spread over the record.
     pub(crate) lead_days: Option<f64>,
     /// The latest measured-at time that was used, days since the first reading.
     pub(crate) now_days: f64,
@@ -30,18 +34,56 @@ pub(crate) struct Record {
     pub(crate) outcome: Outcome,
     /// `None` where the method had nothing to say.
     pub(crate) said: Option<Passage>,
+    /// Chance of passing within each of [`HORIZONS_DAYS`].
+    pub(crate) chances: [f64; HORIZONS_DAYS.len()],
+    /// Of a failure: the chance given to its coming by then.
+    pub(crate) pit: Option<f64>,
+    /// Whether the interval held the failure; `None` without a failure or an interval.
+    pub(crate) covered: Option<bool>,
 }
 
 impl Record {
     /// What `method` says at one look, of what is `known` by then.
     pub(crate) fn of(subject: &Subject, look: &Look, known: &Known, method: &Method) -> Self {
+        let said = (method.forecast)(known);
+        let outcome = subject.truth.from(known.now_days);
+        let after = match outcome {
+            Outcome::Failed(after) => Some(after),
+            Outcome::Stood(_) => None,
+        };
+        // An interval has more than one time, a point forecast one.
+        let spread = said.as_ref().filter(|said| said.times().len() > 1);
+        let chance = |days| said.as_ref().map_or(0.0, |said| said.chance_within(days));
         Self {
             method: method.name,
             lead_days: look.lead_days,
             now_days: known.now_days,
-            outcome: subject.truth.from(known.now_days),
-            said: (method.forecast)(known).map(|passage| reduced(&passage)),
+            outcome,
+            chances: HORIZONS_DAYS.map(chance),
+            pit: said
+                .as_ref()
+                .zip(after)
+                .map(|(said, after)| pit(said, after)),
+            covered: spread
+                .zip(after)
+                .map(|(said, after)| is_covered(said, after)),
+            said: said.as_ref().map(reduced),
         }
+    }
+
+    /// Days to the failure; `None` of a slope that stood.
+    pub(crate) fn remaining_days(&self) -> Option<f64> {
+        match self.outcome {
+            Outcome::Failed(days) => Some(days),
+            Outcome::Stood(_) => None,
+        }
+    }
+
+    /// The chance of passing within one of [`HORIZONS_DAYS`].
+    pub(crate) fn chance_within(&self, horizon_days: f64) -> f64 {
+        let mut each = HORIZONS_DAYS.iter().zip(&self.chances);
+        each.find_map(|(days, chance)| days.total_cmp(&horizon_days).is_eq().then_some(*chance))
+            .unwrap_or(0.0)
     }
 }
 
@@ -68,43 +110,4 @@ fn reduced(passage: &Passage) -> Passage {
         .into_iter()
         .map(|(_, sum, weight)| (sum / weight, weight));
     Passage::from_times(times.collect())
-}
-
-#[derive(Serialize)]
-struct Line<'a> {
-    series: &'a str,
-    kind: &'static str,
-    family: &'a str,
-    method: &'static str,
-    lead_days: Option<f64>,
-    now_days: f64,
-    failed_after_days: Option<f64>,
-    stood_for_days: Option<f64>,
-    passage: Option<&'a [(f64, f64)]>,
-}
-
-/// Every record, a line of JSON each.
-pub(crate) fn lines(told: &[Told]) -> serde_json::Result<String> {
-    let mut out = String::new();
-    for one in told {
-        for record in &one.records {
-            let (failed_after_days, stood_for_days) = match record.outcome {
-                Outcome::Failed(days) => (Some(days), None),
-                Outcome::Stood(days) => (None, Some(days)),
-            };
-            out.push_str(&serde_json::to_string(&Line {
-                series: &one.name,
-                kind: one.kind.name(),
-                family: &one.family,
-                method: record.method,
-                lead_days: record.lead_days,
-                now_days: record.now_days,
-                failed_after_days,
-                stood_for_days,
-                passage: record.said.as_ref().map(Passage::times),
-            })?);
-            out.push('\n');
-        }
-    }
-    Ok(out)
 }

@@ -4,7 +4,7 @@
 //! velocity would say nothing of it. What was measured of 40-1938 at Century Mine stands in two files, with
 //! different zeros and other days, and is scored from each.
 
-use crate::corpus::{Kind, Subject, Truth};
+use crate::corpus::{Kind, LOOKS, Subject, Truth};
 use crate::measured::measured;
 use anyhow::{Context, Result};
 use jiff::SignedDuration;
@@ -192,10 +192,15 @@ impl Source {
             name: format!("{}, {benchmark}", self.heading),
             kind: self.kind,
             family: self.heading.to_owned(),
+            epoch: Some(first.time),
             history: History {
                 observations,
                 flow,
                 critical_mm_per_day: CRITICAL_MM_PER_DAY,
+            },
+            spread: match truth {
+                Truth::FailedAt(_) => 0,
+                Truth::StoodUntil(_) => LOOKS,
             },
             truth,
             leads: leads.to_vec(),

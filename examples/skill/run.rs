@@ -59,6 +59,7 @@ fn told(subjects: &Subjects, index: u64, methods: &[&Method]) -> Told {
         name: subject.name,
         kind: subject.kind,
         family: subject.family,
+        epoch: subject.epoch,
         records,
     }
 }

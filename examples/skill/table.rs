@@ -2,16 +2,11 @@
 
 use crate::corpus::Kind;
 use crate::record::{Record, Told};
-use slipwatch::forecast::Passage;
-use slipwatch::score::{
-    Interval, Method, Outcome, Sum, crps_days, is_covered, log_score, mean, ratio, scored_days,
-};
+use crate::sums::{SEED, cell, crps, one_if, said, sums};
+use slipwatch::score::{Method, Sum, log_score, mean, ratio};
 use std::cmp::Ordering;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
-
-/// Of the bootstrap.
-const SEED: u64 = 1;
 
 const HEAD: &str = "| when | method | forecasts | silent | CRPS, days | ours over it | log score, nats | in 90 % |\n\
                     |---|---|---|---|---|---|---|---|\n";
@@ -49,25 +44,14 @@ pub(crate) fn text(told: &[Told], methods: &[&Method]) -> String {
 }
 
 fn rows(out: &mut String, lead: Option<f64>, (told, methods): (&[&Told], &[&Method])) {
-    let sums = |method: &Method, score: &dyn Fn(&Record) -> Option<f64>| -> Vec<Sum> {
-        let of = |one: &&Told| {
-            let meant = one.records.iter();
-            let meant =
-                meant.filter(|record| record.method == method.name && record.lead_days == lead);
-            meant
-                .filter_map(score)
-                .fold(Sum::default(), |sum, score| Sum {
-                    sum: sum.sum + score,
-                    count: sum.count + 1.0,
-                })
-        };
-        let each = told.iter().map(of);
-        each.filter(|sum| sum.count > 0.0).collect()
+    let sums = |method: &Method, score: &dyn Fn(&Record) -> Option<f64>| {
+        let at_lead = |record: &Record| (record.lead_days == lead).then(|| score(record))?;
+        sums(told, method.name, &at_lead)
     };
     let before = match lead {
         Some(days) if days <= 1.0 => format!("{:.0} h before it failed", 24.0 * days),
         Some(days) => format!("{days} d before it failed"),
-        None => "it stood".to_owned(),
+        None => "over the record".to_owned(),
     };
     let ours = methods
         .first()
@@ -77,7 +61,7 @@ fn rows(out: &mut String, lead: Option<f64>, (told, methods): (&[&Told], &[&Meth
         let count = |sums: &[Sum]| sums.iter().fold(0.0, |all, sum| all + sum.count);
         let silent = sums(method, &|one| one.said.is_none().then_some(1.0));
         let nats = sums(method, &|one| Some(log_score(&said(one), one.outcome)));
-        let held = sums(method, &covered);
+        let held = sums(method, &|one| one.covered.map(one_if));
         let over = ours.as_ref().and_then(|ours| ratio(ours, &theirs, SEED));
         let _ = writeln!(
             out,
@@ -91,29 +75,4 @@ fn rows(out: &mut String, lead: Option<f64>, (told, methods): (&[&Told], &[&Meth
             cell(mean(&held, SEED)),
         );
     }
-}
-
-fn said(record: &Record) -> Passage {
-    record.said.clone().unwrap_or_default()
-}
-
-/// The first reading is day 0 of every record.
-fn crps(record: &Record) -> f64 {
-    crps_days(&said(record), record.outcome, scored_days(record.now_days))
-}
-
-/// Whether its interval held the failure, 1 or 0; `None` without a failure or an interval.
-fn covered(record: &Record) -> Option<f64> {
-    let Outcome::Failed(after) = record.outcome else {
-        return None;
-    };
-    let said = record.said.as_ref()?;
-    (said.times().len() > 1).then(|| f64::from(u8::from(is_covered(said, after))))
-}
-
-fn cell(interval: Option<Interval>) -> String {
-    interval.map_or("–".to_owned(), |interval| {
-        let Interval { best, low, high } = interval;
-        format!("{best:.3} ({low:.3} to {high:.3})")
-    })
 }
