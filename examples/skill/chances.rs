@@ -56,7 +56,7 @@ pub(crate) fn brier_section(out: &mut String, scored: &Scored) {
         out,
         "\n## Passing the critical velocity within a time\n\nOver all looks at simulated slopes of which it is known: {LOOKS_AT_FAILING} evenly over the readings \
          of each that fails, its leads above, and {} days before the failure where it is read so often; {LOOKS} evenly over each that \
-         stands. These looks are in no table by lead above. Brier skill, 1 − Brier score / that of the base rate over the same looks (90 % interval, the \
+         stands. The looks beside those leads are in no table above. Brier skill, 1 − Brier score / that of the base rate over the same looks (90 % interval, the \
          base rate held). Above 0 is better than the base rate; a point forecast gives 0 or 1.",
         short.join(", ")
     );

@@ -3,6 +3,7 @@
 use crate::sums::{PANEL, Scored};
 use crate::{chances, figures, la_clapiere, simulated, sites, verdicts};
 use anyhow::{Context, Result};
+use slipwatch::forecast::Corpus;
 use slipwatch::score::{LONGEST_SCORED_DAYS, RECORDS_SCORED};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -45,14 +46,18 @@ fn head(scored: &Scored, judged: bool) -> String {
             "**The simulated slopes are those that the panel was tuned on**: its figures here are too good.",
         )
     };
-    let simulated = scored.failing.len() + scored.standing.len();
+    let simulated = (scored.failing.len() + scored.standing.len()) as u64;
+    let fewer = match simulated {
+        Corpus::LIVES => String::new(),
+        fewer => format!(" --simulated {fewer}"),
+    };
     let mut out = String::new();
     // Writing to a string cannot fail.
     let _ = writeln!(
         out,
         "# Skill: forecasts of the time of failure, scored as they would have been made
 
-Written by `cargo run --release --example skill --{flag} --simulated {simulated} --write`. Every number is of that run. The readings of some series
+Written by `cargo run --release --example skill --{flag}{fewer} --write`. Every number is of that run. The readings of some series
 may not be redistributed, and without them their sections are left out.
 
 - A forecast made at a time knows what had been *measured* by then, river and readings alike, and nothing later. When readings reach the

@@ -38,7 +38,7 @@ pub(crate) fn record_at<'a>(one: &'a Told, name: &str, lead: f64) -> Option<&'a 
 }
 
 /// The lowest CRPS of any rival at a lead, days.
-pub(crate) fn best_at(one: &Told, scored: &Scored, lead: f64) -> Option<(&'static str, f64)> {
+fn best_at(one: &Told, scored: &Scored, lead: f64) -> Option<(&'static str, f64)> {
     let each = scored
         .rivals()
         .filter_map(|name| Some((name, crps(record_at(one, name, lead)?))));
@@ -195,15 +195,17 @@ pub(crate) fn stood_section(out: &mut String, scored: &Scored) {
     grid(out, &head.map(str::to_owned), &rows);
 }
 
-/// The mean CRPS of the panel and of the best rival on each of several groups of records where that is lower.
+/// The panel's mean CRPS over some records, and every rival of a lower one, best first; `None` where there is none.
 pub(crate) fn loss(
     scored: &Scored,
     told: &[&Told],
     is_meant: &dyn Fn(&Record) -> bool,
-) -> Option<(f64, &'static str, f64)> {
-    let ours = average(&sums(told, PANEL, &|record| {
-        is_meant(record).then(|| crps(record))
-    }))?;
-    let (rival, theirs) = scored.best_rival(told, is_meant)?;
-    (theirs < ours).then_some((ours, rival, theirs))
+) -> Option<(f64, Vec<(f64, &'static str)>)> {
+    let score = |record: &Record| is_meant(record).then(|| crps(record));
+    let of = |name: &str| average(&sums(told, name, &score));
+    let ours = of(PANEL)?;
+    let rivals = scored.rivals().filter_map(|name| Some((of(name)?, name)));
+    let mut lower: Vec<(f64, &str)> = rivals.filter(|(theirs, _)| *theirs < ours).collect();
+    lower.sort_by(|one, other| one.0.total_cmp(&other.0));
+    (!lower.is_empty()).then_some((ours, lower))
 }

@@ -29,7 +29,8 @@ impl<'a> Scored<'a> {
     pub(crate) fn of(told: &'a [Told], methods: Vec<&'static str>) -> Self {
         let those = |simulated: bool, failed: bool| {
             let is_meant = |one: &&Told| {
-                let has_failed = one.records.iter().any(|one| one.lead_days.is_some());
+                let mut ends = one.records.iter().map(Record::remaining_days);
+                let has_failed = ends.any(|days| days.is_some());
                 (one.kind == Kind::Simulated) == simulated && has_failed == failed
             };
             told.iter().filter(is_meant).collect()
@@ -130,7 +131,7 @@ pub(crate) fn cell(interval: Option<Interval>) -> String {
 pub(crate) fn short_cell(interval: Option<Interval>) -> String {
     interval.map_or("–".to_owned(), |interval| {
         let Interval { best, low, high } = interval;
-        format!("{best:.2} ({low:.2}–{high:.2})")
+        format!("{best:.2} ({low:.2} to {high:.2})")
     })
 }
 

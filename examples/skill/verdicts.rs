@@ -2,11 +2,17 @@
 
 use crate::chances::{BRIER_DAYS, Called, share_called, skill};
 use crate::corpus::SIMULATED_LEADS;
+use crate::record::Record;
 use crate::simulated::{coverage, of_family, over_best, standing_fates};
-use crate::sites::{Standing, best_at, leads, loss, record_at, unit};
-use crate::sums::{PANEL, Scored, crps, grid, percent, short_cell};
+use crate::sites::{Standing, leads, loss, unit};
+use crate::sums::{PANEL, Scored, grid, percent, short_cell};
 use std::fmt::Write as _;
 
+/// The panel's mean CRPS, and the rivals that are lower, days.
+type Loss = (f64, Vec<(f64, &'static str)>);
+
+/// Nobody is told of less, days.
+const LEAST_DAYS: f64 = 0.005;
 /// What the figures rest on, in words.
 const REASONS: &str = include_str!("reasons.md");
 /// Coverage of 90 % intervals that was asked for.
@@ -18,50 +24,52 @@ const ORANGE: f64 = 0.02;
 
 /// The section on losses.
 pub(crate) fn losses(out: &mut String, scored: &Scored) {
-    out.push_str("\n## Where this program loses, and why\n\nEvery simulated lead and fate, every recorded series that stood and every lead of those that failed where a rival's mean CRPS is lower than the panel's; the best rival of each.\n");
+    // Writing to a string cannot fail.
+    let _ = writeln!(
+        out,
+        "\n## Where this program loses, and why\n\nEvery simulated lead and fate, every recorded series that stood and every lead of those that failed, where a rival's mean CRPS is \
+         lower than the panel's; all such rivals, best first. A panel's CRPS under {LEAST_DAYS} d is no loss."
+    );
     let mut rows = Vec::new();
-    let mut row = |place: String, (unit, factor): (&str, f64), lost: (f64, &str, f64)| {
-        let (ours, rival, theirs) = lost;
+    let mut row = |place: String, (unit, factor): (&str, f64), lost: Option<Loss>| {
+        let Some((ours, rivals)) = lost.filter(|(ours, _)| *ours >= LEAST_DAYS) else {
+            return;
+        };
+        let rivals = rivals
+            .iter()
+            .map(|(theirs, name)| format!("{name} {:.2}", factor * theirs));
+        let rivals: Vec<String> = rivals.collect();
         rows.push(vec![
             place,
-            format!("{:.3} {unit}", factor * ours),
-            rival.to_owned(),
-            format!("{:.3} {unit}", factor * theirs),
+            format!("{:.2} {unit}", factor * ours),
+            rivals.join(", "),
         ]);
     };
     let days = ("d", 1.0);
     for lead in SIMULATED_LEADS {
-        let is_meant = |record: &crate::record::Record| record.lead_days == Some(lead);
-        if let Some(lost) = loss(scored, &scored.failing, &is_meant) {
-            row(format!("simulated, {lead} d before"), days, lost);
-        }
-    }
-    for fate in standing_fates(scored) {
-        let told = of_family(&scored.standing, fate);
-        if let Some(lost) = loss(scored, &told, &|_| true) {
-            row(format!("simulated, {fate}"), days, lost);
-        }
+        let is_meant = |record: &Record| record.lead_days == Some(lead);
+        let lost = loss(scored, &scored.failing, &is_meant);
+        row(format!("simulated, {lead} d before"), days, lost);
     }
     for one in &scored.failed {
         let unit = unit(one);
         for lead in leads(one) {
-            let ours = record_at(one, PANEL, lead).map(crps);
-            if let Some((ours, (rival, theirs))) = ours.zip(best_at(one, scored, lead))
-                && theirs < ours
-            {
-                let lead = format!("{}, {:.0} {} before", one.name, unit.1 * lead, unit.0);
-                row(lead, unit, (ours, rival, theirs));
-            }
+            let is_meant = |record: &Record| record.lead_days == Some(lead);
+            let place = format!("{}, {:.0} {} before", one.name, unit.1 * lead, unit.0);
+            row(place, unit, loss(scored, &[one], &is_meant));
         }
+    }
+    for fate in standing_fates(scored) {
+        let told = of_family(&scored.standing, fate);
+        let lost = loss(scored, &told, &|_| true);
+        row(format!("simulated, {fate}"), days, lost);
     }
     for one in &scored.stood {
-        if let Some(lost) = loss(scored, &[one], &|_| true) {
-            row(format!("{}, stood", one.name), days, lost);
-        }
+        let lost = loss(scored, &[one], &|_| true);
+        row(format!("{}, stood", one.name), days, lost);
     }
-    let head = ["where", "panel", "best rival", "its CRPS"];
+    let head = ["where", "panel", "rivals that are lower"];
     grid(out, &head.map(str::to_owned), &rows);
-    // Writing to a string cannot fail.
     let _ = write!(out, "\n{REASONS}");
 }
 
