@@ -78,7 +78,7 @@ fn crps_by_lead(scored: &Scored) -> String {
         "Mean CRPS of simulated slopes by lead",
         Panel {
             title: "Simulated slopes that fail".to_owned(),
-            x: Axis::log("days before the failure", 1.5, 60.0),
+            x: Axis::log("days before the failure", 1.0, 100.0),
             y: Axis::log("mean CRPS, days", 0.2, 40.0),
             marks: marks.collect(),
             legend: Legend::TopLeft,
@@ -139,7 +139,7 @@ fn errors(one: &Told, scored: &Scored) -> String {
         "Error of the median by lead",
         Panel {
             title: one.name.clone(),
-            x: Axis::linear(&format!("{unit} before the failure"), 1.05 * longest, 0.0),
+            x: Axis::linear(&format!("{unit} before the failure"), 0.0, 1.05 * longest),
             y: Axis::linear(
                 &format!("median less failure, {unit}"),
                 -0.6 * longest,

@@ -267,7 +267,7 @@ mod tests {
             let same = later
                 .leads
                 .iter()
-                .find(|one| one.lead_days == lead.lead_days);
+                .find(|one| one.known_until == lead.known_until);
             assert_eq!(Some(lead), same);
             assert!(days_since(lead.known_until, failure) >= lead.lead_days - 1e-6);
         }
