@@ -225,9 +225,9 @@ impl Daemon {
 }
 
 proptest! {
-    // The seed is one that passes. Others found, once in some hundred runs, what is not mended: a row that nobody had
-    // read yet is stored twice where the target that a link has left and the file in its place both hold it at one
-    // look. The monitor takes it once.
+    // The seed is one that passes. Another found, now and then, what is not mended: a row that nobody had read yet is
+    // stored twice where the target that a link has left and the file in its place both hold it at one look. The
+    // monitor takes it once.
     #![proptest_config(ProptestConfig {
         cases: 48,
         rng_seed: proptest::test_runner::RngSeed::Fixed(1),
