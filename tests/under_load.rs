@@ -155,7 +155,7 @@ fn before_the_end(life: &Life, lead: f64) -> Option<(Outlook, f64)> {
     (remaining < 2.0 * lead).then_some((at(&life.known(failure), last.0)?, remaining))
 }
 
-/// `examples/lives.rs` measures the same on a thousand; the bounds here leave room for the scatter of 120.
+/// docs/skill.md measures the like on a thousand; the bounds here leave room for the scatter of 120.
 #[test]
 fn simulated_failures_are_foretold_without_bias_and_within_their_intervals() {
     let lives: Vec<Life> = (0..120)

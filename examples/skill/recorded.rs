@@ -8,8 +8,7 @@ use crate::corpus::{Kind, LOOKS, Subject, Truth};
 use crate::measured::measured;
 use anyhow::{Context, Result};
 use jiff::SignedDuration;
-use slipwatch::fit::{Observation, Observations};
-use slipwatch::reading::{Recording, SECONDS_PER_DAY, Series, Timestamp, days_since};
+use slipwatch::reading::{Recording, Series, Timestamp, days_since};
 use slipwatch::runtime::ingest::{ReadOptions, read_files};
 use slipwatch::score::History;
 use std::path::{Path, PathBuf};
@@ -169,35 +168,25 @@ impl Source {
             End::Failed { at, leads } => (Truth::FailedAt(day(at.parse()?)), leads),
             End::Stood => (Truth::StoodUntil(day(last.time)), &[][..]),
         };
-        let mut observations = observations(series, first.time);
-        if let Truth::FailedAt(failure) = truth {
-            observations.values.retain(|value| value.t_days <= failure);
-        }
-        let flow = match self.flow {
-            Some(name) => {
-                let mut channels = recording.channels.iter();
-                let channel = channels.find(|channel| channel.name == name);
-                let samples = &channel
-                    .with_context(|| format!("no channel {name}"))?
-                    .samples;
-                let flow = samples
-                    .iter()
-                    .map(|sample| (day(sample.time), sample.value));
-                flow.collect()
-            }
-            None => Vec::new(),
+        let named = |name| {
+            let mut channels = recording.channels.iter();
+            let channel = channels.find(|channel| channel.name == name);
+            channel.with_context(|| format!("no channel {name}"))
         };
+        let river = self.flow.map(named).transpose()?;
+        let channels = river.map_or(&[][..], std::slice::from_ref);
+        let mut history = History::of(series, channels, CRITICAL_MM_PER_DAY);
+        if let Truth::FailedAt(failure) = truth {
+            let values = &mut history.observations.values;
+            values.retain(|value| value.t_days <= failure);
+        }
         let benchmark = series.benchmark.as_str();
         Ok(Subject {
             name: format!("{}, {benchmark}", self.heading),
             kind: self.kind,
             family: self.heading.to_owned(),
             epoch: Some(first.time),
-            history: History {
-                observations,
-                flow,
-                critical_mm_per_day: CRITICAL_MM_PER_DAY,
-            },
+            history,
             spread: match truth {
                 Truth::FailedAt(_) => 0,
                 Truth::StoodUntil(_) => LOOKS,
@@ -205,21 +194,5 @@ impl Source {
             truth,
             leads: leads.to_vec(),
         })
-    }
-}
-
-/// In mm or mm/day, days since `first`.
-fn observations(series: &Series, first: Timestamp) -> Observations {
-    let factor = series.unit.factor();
-    let values = series.readings.iter().map(|reading| Observation {
-        t_days: days_since(first, reading.time),
-        value: reading.value * factor,
-        sigma: reading.sigma.map(|sigma| sigma * factor),
-    });
-    let averaging = series.averaging.map_or(0.0, |span| span.as_secs_f64());
-    Observations {
-        quantity: series.quantity(),
-        averaging_days: averaging / SECONDS_PER_DAY,
-        values: values.collect(),
     }
 }

@@ -131,14 +131,8 @@ pub(crate) fn outlook(
     observations: &Observations,
     critical: f64,
 ) -> Option<(Outlook, Option<Ensemble>)> {
-    if observations.spaced(FEWEST_READINGS).len() < FEWEST_READINGS {
-        return None;
-    }
     let now_days = observations.values.last()?.t_days;
-    let rates = observations.rates(0..observations.values.len(), RateOptions::default());
-    let posterior = LoadPosterior::fit(&rates);
-    let critical = critical.min(FASTEST_CRITICAL);
-    let members = Members::of(&rates, posterior.as_ref(), critical, now_days);
+    let (rates, posterior, members) = asked(observations, critical)?;
     let passage = members.map_or_else(Passage::default, |members| {
         Passage::from_times(LEARNED.forecast(&members))
     });
@@ -188,18 +182,23 @@ fn unknown() -> BTreeMap<Regime, f64> {
 /// What each member of the panel says of passing `critical` mm/day; `None` with too few readings, or where the
 /// slope does not measurably move.
 pub fn members(observations: &Observations, critical: f64) -> Option<Members> {
+    asked(observations, critical)?.2
+}
+
+/// The rates, what the law makes of them, and what the members say; `None` with too few readings.
+fn asked(
+    observations: &Observations,
+    critical: f64,
+) -> Option<(Vec<Rate>, Option<LoadPosterior>, Option<Members>)> {
     if observations.spaced(FEWEST_READINGS).len() < FEWEST_READINGS {
         return None;
     }
+    let now_days = observations.values.last()?.t_days;
     let rates = observations.rates(0..observations.values.len(), RateOptions::default());
     let posterior = LoadPosterior::fit(&rates);
-    let now_days = observations.values.last()?.t_days;
-    Members::of(
-        &rates,
-        posterior.as_ref(),
-        critical.min(FASTEST_CRITICAL),
-        now_days,
-    )
+    let critical = critical.min(FASTEST_CRITICAL);
+    let members = Members::of(&rates, posterior.as_ref(), critical, now_days);
+    Some((rates, posterior, members))
 }
 
 /// Whether any of the newest rates stands clear of its noise: where none does, a forecast would be the

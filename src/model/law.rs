@@ -129,6 +129,18 @@ impl Law {
         })
     }
 
+    /// From the velocity (mm/day) and healing `a` (1/day) at the start, loading b = S theta a, and p.
+    pub fn from_healing(v_i: f64, a: f64, s_theta: f64, p: f64) -> Self {
+        Self {
+            v_i,
+            r: a * (s_theta - 1.0),
+            kappa: a * p,
+            p,
+            a,
+            b: a * s_theta,
+        }
+    }
+
     /// From the regular coordinates of a fit; a = kappa/p, and at p = 0 it is unknown (kappa must be 0).
     pub fn from_fit(v_i: f64, r: f64, kappa: f64, p: f64) -> Self {
         let a = if p == 0.0 { f64::NAN } else { kappa / p };

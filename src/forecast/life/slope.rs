@@ -43,11 +43,11 @@ pub(super) fn law(fate: Fate, duration: f64, generator: &mut impl Rng) -> Law {
     let p = 1.0 - 1.0 / m;
     if fate == Fate::Failing {
         let s_theta = 1.0 + log_uniform(generator, 0.2, 10.0);
-        let unit = regular(1.0, 1.0, s_theta, p);
+        let unit = Law::from_healing(1.0, 1.0, s_theta, p);
         let a = unit.failure_days().unwrap_or(1.0) / duration;
         // v ~ (D_c/m) / (t_c - t) near failure, and D_c/m = v_i/b, mm.
         let v_i = log_uniform(generator, 50.0, 1000.0) * s_theta * a;
-        return regular(v_i, a, s_theta, p);
+        return Law::from_healing(v_i, a, s_theta, p);
     }
     // The velocity it keeps over that of the creep.
     let gain = match fate {
@@ -72,7 +72,7 @@ pub(super) fn law(fate: Fate, duration: f64, generator: &mut impl Rng) -> Law {
         | Fate::Seasonal
         | Fate::Reset => log_uniform(generator, 0.1, 10.0),
     };
-    regular(v_i, a, gain.powf((1.0 - m) / m), p)
+    Law::from_healing(v_i, a, gain.powf((1.0 - m) / m), p)
 }
 
 fn m(fate: Fate, generator: &mut impl Rng) -> f64 {
@@ -89,18 +89,6 @@ fn m(fate: Fate, generator: &mut impl Rng) -> f64 {
                 -log_uniform(generator, 0.3, 3.0)
             }
         }
-    }
-}
-
-/// The law with healing `a`, loading b = S theta a, and p.
-fn regular(v_i: f64, a: f64, s_theta: f64, p: f64) -> Law {
-    Law {
-        v_i,
-        r: a * (s_theta - 1.0),
-        kappa: a * p,
-        p,
-        a,
-        b: a * s_theta,
     }
 }
 
