@@ -73,10 +73,8 @@ fn a_sync_that_fails_at_the_start_ends_the_daemon_and_the_next_start_goes_well()
     );
     let mut failed = 0;
     for when in 1..=4 {
-        let inject = format!("inject=fsync,fdatasync:error=EIO:when={when}+");
-        let mut words = vec!["strace", "-f", "-qq", "-D", "-o", "/dev/null"];
-        words.extend(["-e", "trace=fsync,fdatasync", "-e", &inject]);
-        let mut program = site.start(&words);
+        let injected = format!("error=EIO:when={when}+");
+        let mut program = site.start_traced("fsync,fdatasync", &injected);
         let mut code = None;
         eventually("its end, or that it works", || {
             code = program.ended();

@@ -120,18 +120,7 @@ fn without_any_watch_files_are_looked_at_in_turn() {
     }
     let site = Site::new("");
     site.append("incoming/5.csv", &format!("{HEADER}{}", rows(1..4)));
-    let program = site.start(&[
-        "strace",
-        "-f",
-        "-qq",
-        "-D",
-        "-o",
-        "/dev/null",
-        "-e",
-        "trace=inotify_add_watch",
-        "-e",
-        "inject=inotify_add_watch:error=ENOSPC",
-    ]);
+    let program = site.start_traced("inotify_add_watch", "error=ENOSPC");
     eventually("caught up", || site.log().contains("caught up"));
     site.append("incoming/5.csv", &rows(4..9));
     eventually("what was added", || site.values().len() == 8);

@@ -232,19 +232,7 @@ fn a_daemon_killed_as_it_calls_the_system_loses_nothing() {
     let mut killed = BTreeMap::new();
     for (call, when) in rounds {
         loggers.grow(&site, 0);
-        let inject = format!("inject={call}:signal=KILL:when={when}");
-        let mut program = site.start(&[
-            "strace",
-            "-f",
-            "-qq",
-            "-D",
-            "-o",
-            "/dev/null",
-            "-e",
-            &format!("trace={call}"),
-            "-e",
-            &inject,
-        ]);
+        let mut program = site.start_traced(call, &format!("signal=KILL:when={when}"));
         // What it does until it stands still may be too little for the call to come.
         for _ in 0..40 {
             if program.ended().is_some() {

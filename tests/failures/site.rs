@@ -73,6 +73,16 @@ impl Site {
         fs::read_to_string(self.path("log")).unwrap_or_default()
     }
 
+    /// Starts the daemon under `strace`, which answers the `calls` with what `injected` says.
+    pub(crate) fn start_traced(&self, calls: &str, injected: &str) -> Program {
+        let (trace, inject) = (
+            format!("trace={calls}"),
+            format!("inject={calls}:{injected}"),
+        );
+        let quietly = ["strace", "-f", "-qq", "-D", "-o", "/dev/null"];
+        self.start(&[&quietly[..], &["-e", &trace, "-e", &inject]].concat())
+    }
+
     /// Starts the daemon, behind `before`.
     pub(crate) fn start(&self, before: &[&str]) -> Program {
         let words: Vec<&str> = (before.iter().copied())
