@@ -1,75 +1,177 @@
-//! What the members said at each look at each slope, and what came.
+//! Looks at simulated slopes: what was seen, and what came.
 
-use slipwatch::forecast::{Corpus, Life, Members, members};
+use crate::descent::Row;
+use rand::{Rng, RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use slipwatch::fit::Observations;
+use slipwatch::forecast::{Collapse, Family, INPUTS, Network, Simulated, questions};
 
-const LEADS: [f64; 7] = [40.0, 20.0, 10.0, 5.0, 2.0, 1.0, 0.5];
-/// Looks evenly over the record of a slope that fails, and of one that stands.
-const EVENLY: (usize, usize) = (6, 12);
+/// Fewest readings before a look.
+const FEWEST: usize = 12;
+/// Looks before the end of an acceleration, after one that stopped, and anywhere in a life.
+const BEFORE: usize = 6;
+const AFTER: usize = 2;
+const ANYWHERE: usize = 4;
+/// Of so many more looks anywhere, so many are kept in which an acceleration is the likeliest.
+const LIKELIEST: (usize, usize) = (16, 3);
+/// Looks before an end reach back so far, days.
+const FARTHEST_DAYS: f64 = 60.0;
+/// The shortest lead, days.
+const SHORTEST_DAYS: f64 = 1.0 / 24.0;
+/// Readings of a standing slope that the first network is asked about, and the looks that are kept of them: by the
+/// chance within a day and within thirty.
+const ASKED: usize = 400;
+const KEPT: (usize, usize) = (4, 3);
+/// How much a look at a slope that accelerated and stopped counts. What share of accelerations stops is known of
+/// famous slopes alone (Veslemannen 15 of 16 alarms, Brienz 1 of 2, Vaiont 2 of 3); the looks before a stop are
+/// taken to be a tenth as many as those before a collapse, so that a slope that runs away is believed.
+const STOPPED: f32 = 0.1;
 
+/// One look.
+#[derive(Debug)]
 pub(crate) struct Look {
-    pub(crate) members: Members,
-    /// Whether the slope failed; otherwise it stood until the record ended.
-    pub(crate) failed: bool,
-    /// Days until then.
-    pub(crate) remaining: f64,
-    /// Of the record so far, days.
-    pub(crate) length: f64,
+    pub(crate) family: Family,
+    /// (span, days; what is known of it).
+    questions: Vec<(f64, [f64; INPUTS])>,
+    /// Days to the collapse, or to the end of the life without one.
+    left_days: f64,
+    fails: bool,
 }
 
-/// All looks at the first `count` slopes of the corpus for learning, in the order of their seeds.
-pub(crate) fn all(count: u64) -> Vec<Look> {
-    let seeds: Vec<u64> = (0..count.min(Corpus::LIVES)).collect();
-    let half = seeds.len().div_ceil(2).max(1);
-    let looks = |seeds: &[u64]| -> Vec<Look> {
-        let lives = seeds.iter().map(|seed| Corpus::TRAINING.life(*seed));
-        lives.flat_map(|life| of(&life)).collect()
-    };
-    std::thread::scope(|scope| {
-        let parts: Vec<_> = seeds
-            .chunks(half)
-            .map(|part| scope.spawn(move || looks(part)))
-            .collect();
-        let done = parts.into_iter().filter_map(|part| part.join().ok());
-        done.flatten().collect()
+/// Looks at the first so many slopes of each family.
+pub(crate) fn of_families(slopes: u64) -> Vec<Look> {
+    let jobs: Vec<(Family, u64)> = Family::ALL
+        .iter()
+        .flat_map(|family| (0..slopes).map(|seed| (*family, seed)))
+        .collect();
+    in_two(&jobs, |(family, seed)| {
+        at(&Simulated::draw(*family, *seed), *seed)
     })
 }
 
-fn of(life: &Life) -> Vec<Look> {
-    let (Some((first, _)), Some((last, _))) = (life.readings.first(), life.readings.last()) else {
-        return Vec::new();
-    };
-    let end = life.failure_days.unwrap_or(*last);
-    let evenly = if life.failure_days.is_some() {
-        EVENLY.0
-    } else {
-        EVENLY.1
-    };
-    let mut times: Vec<(f64, f64)> = (0..evenly)
-        .map(|look| ((look as f64 + 0.5) / evenly as f64 * end, f64::INFINITY))
-        .collect();
-    if life.failure_days.is_some() {
-        times.extend(LEADS.map(|lead| (end - lead, 2.0 * lead)));
-    }
-    let mut looks = Vec::new();
-    for (at, farthest) in times {
-        let read = life.readings.partition_point(|(days, _)| *days <= at);
-        let Some((now, _)) = read.checked_sub(1).map(|last| life.readings[last]) else {
-            continue;
-        };
-        let remaining = end - now;
-        // A gap in the readings leaves nothing to judge at a lead.
-        if remaining > farthest || remaining <= 0.0 {
-            continue;
+/// What `work` makes of each job, on two threads, in the order of the jobs.
+pub(crate) fn in_two<J: Sync, T: Send>(jobs: &[J], work: impl Fn(&J) -> Vec<T> + Sync) -> Vec<T> {
+    let (one, other) = jobs.split_at(jobs.len() / 2);
+    std::thread::scope(|scope| {
+        let beside = scope.spawn(|| other.iter().flat_map(&work).collect::<Vec<T>>());
+        let mut all: Vec<T> = one.iter().flat_map(&work).collect();
+        if let Ok(rest) = beside.join() {
+            all.extend(rest);
         }
-        let Some(members) = members(&life.known(now), Life::CRITICAL_MM_PER_DAY) else {
-            continue;
-        };
-        looks.push(Look {
-            members,
-            failed: life.failure_days.is_some(),
-            remaining,
-            length: now - first,
-        });
+        all
+    })
+}
+
+/// The rows that one look teaches: a span each, as far as it is known whether a collapse came within it.
+pub(crate) fn rows(look: &Look) -> impl Iterator<Item = Row> {
+    let weight = if matches!(look.family, Family::Stopped | Family::Plateau) {
+        STOPPED
+    } else {
+        1.0
+    };
+    let known = look.questions.iter().filter_map(move |(span, inputs)| {
+        let came = look.fails && look.left_days <= *span;
+        (look.fails || look.left_days >= *span).then(|| Row {
+            inputs: inputs.map(|value| value as f32),
+            came,
+            weight,
+        })
+    });
+    known.collect::<Vec<Row>>().into_iter()
+}
+
+fn at(slope: &Simulated, seed: u64) -> Vec<Look> {
+    let values = &slope.observations.values;
+    if values.len() <= FEWEST {
+        return Vec::new();
     }
-    looks
+    let mut generator = Pcg64::seed_from_u64(seed ^ 0x5555);
+    let mut counts = Vec::new();
+    if let Some(end) = slope.collapse_days.or(slope.stopped_days) {
+        counts.extend(about(slope, end, &mut generator));
+    }
+    let mut anywhere = || generator.random_range(FEWEST..=values.len());
+    counts.extend((0..ANYWHERE).map(|_| anywhere()));
+    let mut likely: Vec<(f64, usize)> = (0..LIKELIEST.0)
+        .filter_map(|_| {
+            let count = anywhere();
+            let known = first(&slope.observations, count);
+            Some((Collapse::of(&known)?.accelerating, count))
+        })
+        .collect();
+    likely.sort_by(|a, b| b.0.total_cmp(&a.0));
+    counts.extend(likely.iter().take(LIKELIEST.1).map(|(_, count)| *count));
+    let looks = counts.into_iter().filter_map(|count| look(slope, count));
+    looks.collect()
+}
+
+/// Counts of readings at leads spread evenly in their logarithm, since the acceleration could be seen.
+fn about(slope: &Simulated, end: f64, generator: &mut impl Rng) -> Vec<usize> {
+    let values = &slope.observations.values;
+    let shortest = (2.0 * slope.interval_days).max(SHORTEST_DAYS);
+    let seen = end - slope.visible_days.min(end);
+    let longest = FARTHEST_DAYS.min(seen).max(1.2 * shortest);
+    let mut lead = || shortest * (longest / shortest).powf(generator.random::<f64>());
+    let mut times: Vec<f64> = (0..BEFORE).map(|_| end - lead()).collect();
+    if slope.stopped_days.is_some() {
+        times.extend((0..AFTER).map(|_| end + lead()));
+    }
+    let counts = times
+        .iter()
+        .map(|days| values.partition_point(|value| value.t_days <= *days));
+    counts.filter(|count| *count >= FEWEST).collect()
+}
+
+/// Counts of readings before the end of a slope that judges.
+pub(crate) fn about_the_end(slope: &Simulated, end: f64, seed: u64) -> Vec<usize> {
+    about(slope, end, &mut Pcg64::seed_from_u64(seed ^ 0x5555))
+}
+
+pub(crate) fn first(observations: &Observations, count: usize) -> Observations {
+    Observations {
+        values: observations.values[..count].to_vec(),
+        ..observations.clone()
+    }
+}
+
+fn look(slope: &Simulated, count: usize) -> Option<Look> {
+    let known = first(&slope.observations, count);
+    let now = known.values.last()?.t_days;
+    let left_days = slope.collapse_days.unwrap_or(slope.end_days) - now;
+    (left_days > 0.0).then_some(Look {
+        family: slope.family,
+        questions: questions(&known)?,
+        left_days,
+        fails: slope.collapse_days.is_some(),
+    })
+}
+
+/// The looks at standing slopes in which `network` gives a collapse the highest chances.
+pub(crate) fn misleading(network: &Network, slopes: u64, without: Option<Family>) -> Vec<Look> {
+    let stands = |family: &&Family| !family.fails() && Some(**family) != without;
+    let jobs: Vec<(Family, u64)> = Family::ALL
+        .iter()
+        .filter(stands)
+        .flat_map(|family| (0..slopes).map(|seed| (*family, seed)))
+        .collect();
+    in_two(&jobs, |(family, seed)| {
+        let slope = Simulated::draw(*family, *seed);
+        let all = slope.observations.values.len();
+        let asked = (FEWEST..=all).step_by((all / ASKED).max(1));
+        let mut chances: Vec<(f64, f64, usize)> = asked
+            .filter_map(|count| {
+                let found = Collapse::by(network, &first(&slope.observations, count))?;
+                let within = |days| found.passage.chance_within(days);
+                Some((within(1.0), within(30.0), count))
+            })
+            .collect();
+        chances.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut counts: Vec<usize> = chances.iter().take(KEPT.0).map(|one| one.2).collect();
+        chances.sort_by(|a, b| b.1.total_cmp(&a.1));
+        counts.extend(chances.iter().take(KEPT.1).map(|one| one.2));
+        counts.sort_unstable();
+        counts.dedup();
+        let looks = counts.into_iter().filter_map(|count| look(&slope, count));
+        looks.collect()
+    })
 }

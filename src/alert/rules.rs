@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 pub struct Evidence {
     /// Data time.
     pub now: Timestamp,
-    /// Chance of passing the critical velocity within the evacuation time, where there is a forecast.
+    /// Chance of a collapse before an evacuation that the next reading calls would end, where there is a forecast.
     pub chance_within_evacuation_time: Option<f64>,
     /// The same within the outlook.
     pub chance_within_outlook: Option<f64>,
@@ -68,7 +68,15 @@ impl Policy {
     pub fn call(&self, evidence: &Evidence) -> Call {
         let reaches =
             |chance: Option<f64>, limit: f64| chance.is_some_and(|chance| chance >= limit);
-        let mut call = if reaches(evidence.chance_within_evacuation_time, self.red_chance) {
+        let is_past = evidence
+            .settled_velocity_mm_per_day
+            .is_some_and(|velocity| velocity >= self.critical_velocity_mm_per_day);
+        let mut call = if is_past {
+            Call {
+                level: Level::Red,
+                rule: "critical-velocity",
+            }
+        } else if reaches(evidence.chance_within_evacuation_time, self.red_chance) {
             Call {
                 level: Level::Red,
                 rule: "chance-within-evacuation-time",

@@ -34,7 +34,7 @@ pub(super) fn forecast_change(
     };
     let median = |outlook: &Option<Outlook>| {
         let outlook = outlook.as_ref()?;
-        let days = outlook.passage.quantile(0.5, HORIZON_DAYS)?;
+        let days = outlook.collapse.quantile(0.5, HORIZON_DAYS)?;
         after_days(epoch, outlook.now_days + days)
     };
     ForecastChange {
@@ -45,7 +45,7 @@ pub(super) fn forecast_change(
                 .filter(|(regime, _)| UNSTABLE.contains(regime));
             Some(unstable.map(|(_, share)| share).sum())
         }),
-        probability_of_failure: both(&|outlook| Some(outlook.passage.chance_within(HORIZON_DAYS))),
+        probability_of_failure: both(&|outlook| Some(outlook.collapse.chance_within(HORIZON_DAYS))),
         failure_time: Change {
             before: median(&before),
             after: median(&after),
@@ -73,8 +73,8 @@ fn by_clock(
     let told = clock.told(observations, &fuller.in_reading(&channels, &read));
     let now = clock.log_load().last()? - usual;
     let pace = now.clamp(0.0, Clock::FARTHEST_LOAD).exp();
-    let (mut outlook, _) = outlook(&told, critical / pace)?;
-    outlook.passage = outlook.passage.sooner(pace);
+    let (outlook, _) = outlook(&told, critical / pace)?;
+    let mut outlook = outlook.sooner(pace);
     outlook.now_days = observations.values.last()?.t_days;
     Some(outlook)
 }

@@ -9,9 +9,6 @@ pub struct InverseVelocityLine {
     pub intercept_days: Option<f64>,
     /// Its coefficient of determination.
     pub r_squared: f64,
-    /// The mean time of its points (days) and inverse velocity (days/mm) there, and its slope (1/mm).
-    middle: (f64, f64),
-    slope: f64,
 }
 
 /// Fewer points than this make no line.
@@ -28,13 +25,8 @@ impl InverseVelocityLine {
     }
 
     /// Whether a rate moves forward and stands clear of its noise.
-    pub(super) fn takes(rate: &Rate) -> bool {
+    fn takes(rate: &Rate) -> bool {
         rate.velocity > 2.0 * rate.sigma && rate.velocity > 0.0
-    }
-
-    /// Inverse velocity on the line at a time, days/mm; negative past where it meets zero.
-    pub(super) fn at(&self, days: f64) -> f64 {
-        self.middle.1 + self.slope * (days - self.middle.0)
     }
 
     /// The line through (days, inverse velocity) points; `None` under four.
@@ -60,8 +52,6 @@ impl InverseVelocityLine {
         Some(Self {
             intercept_days,
             r_squared,
-            middle: (mean_t, mean_y),
-            slope,
         })
     }
 }

@@ -1,23 +1,29 @@
-//! When the critical velocity will be passed: the distribution, the inverse-velocity line, the panel.
+//! When a slope will collapse and when it will pass a critical velocity: distributions, the inverse-velocity line, and
+//! the simulated slopes that forecasts learn from and are judged by.
 
+mod collapse;
 mod dependence;
+mod evidence;
 mod learned;
 mod life;
 mod line;
-mod members;
+mod network;
 mod panel;
 mod passage;
+mod scales;
 mod surprise;
 mod together;
-mod weighing;
+mod world;
 
+pub use collapse::{Collapse, INPUTS, questions};
 pub use dependence::Dependence;
-pub use learned::LEARNED;
+pub use evidence::RATE_PER_YEAR;
 pub use life::{Corpus, Fate, Life};
 pub use line::InverseVelocityLine;
-pub use members::{FEATURES, LINES, MEMBERS, Members};
-pub use panel::{FEWEST_READINGS, HORIZON_DAYS, Outlook, Panel, members};
+pub use network::{HIDDEN, Network};
+pub use panel::{FEWEST_READINGS, HORIZON_DAYS, Outlook, Panel, by_the_law};
 pub(crate) use panel::{measurably_moves, outlook};
 pub use passage::Passage;
+pub use scales::{Change, Scale, Scales};
 pub use together::{Group, Look, Opinion, groups};
-pub use weighing::{LEVELS, LINE_SPREAD, SITUATIONS, Weighing, situation};
+pub use world::{Family, GaugeKind, Simulated};

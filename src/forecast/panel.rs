@@ -1,10 +1,8 @@
-//! What the readings foretell: the law under an undeclared load, averaged over its shapes and its starts,
-//! so that no one confident member silences the rest.
+//! What is expected of a slope: the collapse by what slopes of many kinds did, and, by the law under an undeclared
+//! load averaged over its shapes and its starts, the regime and the passage of a critical velocity.
 
-use super::Passage;
-use super::learned::LEARNED;
-use super::members::Members;
 use super::surprise::Surprise;
+use super::{Collapse, Passage};
 use crate::fit::{Ensemble, LoadPosterior, Observation, Observations, Rate, RateOptions};
 use crate::model::{Accuracy, Law, Trajectory};
 use crate::reading::Quantity;
@@ -16,6 +14,8 @@ use std::collections::BTreeMap;
 pub const FEWEST_READINGS: usize = 10;
 /// A slope at 50 m/day has failed by any account, mm/day.
 const FASTEST_CRITICAL: f64 = 5e4;
+/// The law's passages are followed so far, days.
+const FARTHEST_DAYS: f64 = 10.0 * HORIZON_DAYS;
 /// A reading is foreseen within so many standard deviations of where the law puts it.
 const FORESEEN: f64 = 4.0;
 /// How far the forecast looks, days.
@@ -26,8 +26,14 @@ pub const HORIZON_DAYS: f64 = 400.0;
 pub struct Outlook {
     /// The newest reading, days.
     pub now_days: f64,
-    /// Days to the critical velocity, from the newest reading.
+    /// Days to the collapse, from the newest reading.
+    pub collapse: Passage,
+    /// Days to the critical velocity by the law, from the newest reading, as far as the slope is sure to accelerate.
     pub passage: Passage,
+    /// Probability that the slope accelerates, against steady motion under its usual fluctuations.
+    pub accelerating: f64,
+    /// Between the newest readings, days.
+    pub interval_days: f64,
     /// How much less likely the newest reading was than usual, ln, where that stands out.
     pub surprise_nats: Option<f64>,
     /// Probability of each regime.
@@ -126,15 +132,28 @@ impl Panel {
     }
 }
 
-/// What `observations` foretell by themselves of passing `critical` mm/day, and the laws they leave open.
+/// What `observations` give by themselves, with `critical` in mm/day, and the laws they leave open; `None` with too few
+/// readings.
 pub(crate) fn outlook(
     observations: &Observations,
     critical: f64,
 ) -> Option<(Outlook, Option<Ensemble>)> {
+    if observations.spaced(FEWEST_READINGS).len() < FEWEST_READINGS {
+        return None;
+    }
     let now_days = observations.values.last()?.t_days;
-    let (rates, posterior, members) = asked(observations, critical)?;
-    let passage = members.map_or_else(Passage::default, |members| {
-        Passage::from_times(LEARNED.forecast(&members))
+    let rates = observations.rates(0..observations.values.len(), RateOptions::default());
+    let posterior = LoadPosterior::fit(&rates);
+    let collapse = Collapse::of(observations)?;
+    let law = passages(&rates, posterior.as_ref(), critical, now_days);
+    // What is past the critical velocity already need not accelerate to it.
+    let passed = law.into_iter().map(|(days, share)| {
+        let sure = if days > 0.0 {
+            collapse.accelerating
+        } else {
+            1.0
+        };
+        (days, share * sure)
     });
     let expected = posterior.as_ref().map(LoadPosterior::ensemble);
     let law = expected
@@ -142,7 +161,10 @@ pub(crate) fn outlook(
         .and_then(|ensemble| ensemble.samples.first());
     let outlook = Outlook {
         now_days,
-        passage,
+        passage: Passage::from_times(passed.collect()),
+        collapse: collapse.passage,
+        accelerating: collapse.accelerating,
+        interval_days: collapse.interval_days,
         surprise_nats: None,
         regimes: posterior
             .as_ref()
@@ -151,6 +173,51 @@ pub(crate) fn outlook(
         rates,
     };
     Some((outlook, expected))
+}
+
+/// What the law alone gives of passing `critical` mm/day; `None` with too few readings.
+pub fn by_the_law(observations: &Observations, critical: f64) -> Option<Passage> {
+    if observations.spaced(FEWEST_READINGS).len() < FEWEST_READINGS {
+        return None;
+    }
+    let now_days = observations.values.last()?.t_days;
+    let rates = observations.rates(0..observations.values.len(), RateOptions::default());
+    let posterior = LoadPosterior::fit(&rates);
+    let law = passages(&rates, posterior.as_ref(), critical, now_days);
+    Some(Passage::from_times(law))
+}
+
+/// (days from `now_days`, probability) of passing `critical` mm/day by the law; none where the slope does not
+/// measurably move.
+fn passages(
+    rates: &[Rate],
+    posterior: Option<&LoadPosterior>,
+    critical: f64,
+    now_days: f64,
+) -> Vec<(f64, f64)> {
+    let Some(posterior) = posterior.filter(|_| measurably_moves(rates)) else {
+        return Vec::new();
+    };
+    let later = now_days - posterior.now_days;
+    let critical = critical.min(FASTEST_CRITICAL);
+    let mut law = posterior.passages(critical, FARTHEST_DAYS + later);
+    for (days, _) in &mut law {
+        *days = (*days - later).max(0.0);
+    }
+    law
+}
+
+impl Outlook {
+    /// The same with everything to come `pace` times as soon.
+    #[must_use]
+    pub(crate) fn sooner(self, pace: f64) -> Self {
+        Self {
+            passage: self.passage.sooner(pace),
+            collapse: self.collapse.sooner(pace),
+            interval_days: self.interval_days / pace,
+            ..self
+        }
+    }
 }
 
 impl Seen {
@@ -177,28 +244,6 @@ fn unknown() -> BTreeMap<Regime, f64> {
         .into_iter()
         .map(|regime| (regime, 0.0))
         .collect()
-}
-
-/// What each member of the panel says of passing `critical` mm/day; `None` with too few readings, or where the
-/// slope does not measurably move.
-pub fn members(observations: &Observations, critical: f64) -> Option<Members> {
-    asked(observations, critical)?.2
-}
-
-/// The rates, what the law makes of them, and what the members say; `None` with too few readings.
-fn asked(
-    observations: &Observations,
-    critical: f64,
-) -> Option<(Vec<Rate>, Option<LoadPosterior>, Option<Members>)> {
-    if observations.spaced(FEWEST_READINGS).len() < FEWEST_READINGS {
-        return None;
-    }
-    let now_days = observations.values.last()?.t_days;
-    let rates = observations.rates(0..observations.values.len(), RateOptions::default());
-    let posterior = LoadPosterior::fit(&rates);
-    let critical = critical.min(FASTEST_CRITICAL);
-    let members = Members::of(&rates, posterior.as_ref(), critical, now_days);
-    Some((rates, posterior, members))
 }
 
 /// Whether any of the newest rates stands clear of its noise: where none does, a forecast would be the

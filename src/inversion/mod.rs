@@ -138,7 +138,8 @@ impl Inversion {
             transition_time: best
                 .and_then(|best| best.law.transition_days())
                 .and_then(|days| self.time_at(days)),
-            failure_time: FailureTime::of(self, outlook.as_ref()),
+            failure_time: FailureTime::of(self, outlook.as_ref().map(|one| &one.collapse)),
+            critical_velocity_time: FailureTime::of(self, outlook.as_ref().map(|one| &one.passage)),
             prior_sensitivity: UnderPrior::each(self, posterior.as_ref()),
             inverse_velocity: self.inverse_velocity(&rates, regime.probability_accelerating),
             regime,

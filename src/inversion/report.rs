@@ -39,8 +39,10 @@ pub struct FitReport {
     pub alternatives: Alternatives,
     /// Inflection of the best fit's velocity.
     pub transition_time: Option<Timestamp>,
-    /// When the critical velocity is passed.
+    /// When the slope collapses.
     pub failure_time: FailureTime,
+    /// When the critical velocity is passed.
+    pub critical_velocity_time: FailureTime,
     /// What the law alone would say under this prior and under others.
     pub prior_sensitivity: Vec<UnderPrior>,
     /// The straight line through inverse velocity.
@@ -277,9 +279,9 @@ impl UnderPrior {
 }
 
 impl FailureTime {
-    pub(super) fn of(inversion: &Inversion, outlook: Option<&Outlook>) -> Self {
+    /// As seen at the newest reading; `None`: there is no forecast.
+    pub(super) fn of(inversion: &Inversion, passage: Option<&Passage>) -> Self {
         let now = inversion.series.readings.last().map(|reading| reading.time);
-        let passage = outlook.map(|outlook| &outlook.passage);
         Self::from_passage(&inversion.options, now.zip(passage))
     }
 

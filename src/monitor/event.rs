@@ -30,8 +30,14 @@ pub enum EventKind {
         t_max: Timestamp,
         /// Which regime, with what probability.
         regime: RegimeReport,
-        /// When the critical velocity is passed.
+        /// When the slope collapses.
         failure_time: FailureTime,
+        /// When the critical velocity is passed.
+        #[serde(default)]
+        critical_velocity_time: FailureTime,
+        /// Probability that the slope accelerates, against steady motion.
+        #[serde(default)]
+        probability_of_acceleration: f64,
         /// The straight line through inverse velocity.
         inverse_velocity: InverseVelocity,
         /// Inflection of the fitted velocity.
@@ -244,8 +250,8 @@ pub struct RegimeReport {
     pub probabilities: BTreeMap<Regime, f64>,
 }
 
-/// The time of first passage of the critical velocity; quantiles are unconditional.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+/// The time of a collapse, or of the first passage of the critical velocity; quantiles are unconditional.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct FailureTime {
     /// 5 % quantile, `None` when not reached within the horizon.
     pub low: Option<Timestamp>,

@@ -115,8 +115,7 @@ impl Adopted {
         let outlook = self.panel.update(readings, critical / pace)?;
         Some(Outlook {
             now_days: history.observations.values.last()?.t_days,
-            passage: outlook.passage.sooner(pace),
-            ..outlook
+            ..outlook.sooner(pace)
         })
     }
 

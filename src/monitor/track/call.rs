@@ -17,11 +17,14 @@ impl Track {
         forecast: Option<&Forecast>,
     ) -> Vec<Event> {
         let within = |span| forecast.map(|forecast| forecast.chance_within(days(span)));
+        let before_it_is_late = forecast.map(|forecast| {
+            forecast.chance_within(forecast.to_the_next_reading(days(policy.evacuation_time)))
+        });
         let reach = forecast.map_or(policy.outlook, |forecast| forecast.reach(policy));
         let rates = forecast.map_or(&[][..], |forecast| &forecast.plain.rates);
         let look = self.look.filter(|(until, _)| time < *until);
         let mut evidence = Evidence {
-            chance_within_evacuation_time: within(policy.evacuation_time),
+            chance_within_evacuation_time: before_it_is_late,
             chance_within_outlook: within(reach),
             causes: look.map(|(_, cause)| cause).into_iter().collect(),
             ..self.observed(time, rates)

@@ -8,6 +8,8 @@ use jiff::SignedDuration;
 
 /// A forecast is the slope's for so many lengths of its record; further ahead it is the prior's, and calls no level.
 const REACH: f64 = 5.0;
+/// Red looks no further beyond the evacuation time for a slope that is read more seldom than once in so many of it.
+const MOST_INTERVALS: f64 = 2.0;
 
 /// The forecasts after one reading.
 #[derive(Debug)]
@@ -47,7 +49,7 @@ impl Forecast {
             Some(fuller) if fuller.is_explained => &fuller.outlook,
             Some(fuller) => {
                 let chance = |passage: &Passage| passage.chance_within(days);
-                if chance(&self.plain.passage) > chance(&fuller.outlook.passage) {
+                if chance(&self.plain.collapse) > chance(&fuller.outlook.collapse) {
                     &self.plain
                 } else {
                     &fuller.outlook
@@ -57,13 +59,23 @@ impl Forecast {
         }
     }
 
-    /// Chance of failure within `days`, as the level takes it: what the fuller law does not explain, it cannot
+    /// How far ahead red looks from the newest reading, days: an evacuation takes so long, and it can begin no sooner
+    /// than the next reading tells.
+    pub(super) fn to_the_next_reading(&self, evacuation_days: f64) -> f64 {
+        evacuation_days
+            + self
+                .plain
+                .interval_days
+                .min(MOST_INTERVALS * evacuation_days)
+    }
+
+    /// Chance of a collapse within `days`, as the level takes it: what the fuller law does not explain, it cannot
     /// talk away either.
     pub(super) fn chance_within(&self, days: f64) -> f64 {
-        let plain = self.plain.passage.chance_within(days);
+        let plain = self.plain.collapse.chance_within(days);
         match &self.fuller {
             Some(fuller) => {
-                let chance = fuller.outlook.passage.chance_within(days);
+                let chance = fuller.outlook.collapse.chance_within(days);
                 if fuller.is_explained {
                     chance
                 } else {

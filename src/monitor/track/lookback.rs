@@ -135,11 +135,15 @@ fn highest(
 fn evidence(policy: &Policy, observations: &Observations, now: Timestamp) -> Evidence {
     let outlook = Panel::default().update(observations, policy.critical_velocity_mm_per_day);
     let rates = outlook.as_ref().map_or(&[][..], |outlook| &outlook.rates);
-    let within = |span| Some(outlook.as_ref()?.passage.chance_within(days(span)));
+    let within = |days: f64| Some(outlook.as_ref()?.collapse.chance_within(days));
+    let evacuation = days(policy.evacuation_time);
+    let interval = outlook
+        .as_ref()
+        .map_or(0.0, |outlook| outlook.interval_days);
     Evidence {
         now,
-        chance_within_evacuation_time: within(policy.evacuation_time),
-        chance_within_outlook: within(policy.outlook),
+        chance_within_evacuation_time: within(evacuation + interval.min(2.0 * evacuation)),
+        chance_within_outlook: within(days(policy.outlook)),
         velocity_mm_per_day: rates
             .last()
             .map_or_else(|| newest_velocity(observations), |rate| Some(rate.velocity)),

@@ -4,7 +4,7 @@ use super::forecast::Forecast;
 use super::motion::recent;
 use super::{Track, days};
 use crate::alert::{Cause, Policy};
-use crate::forecast::{HORIZON_DAYS, InverseVelocityLine, Outlook};
+use crate::forecast::{HORIZON_DAYS, InverseVelocityLine, Outlook, Passage};
 use crate::monitor::drift;
 use crate::monitor::event::{
     Event, EventKind, FailureTime, InverseVelocity, Plain, RegimeReport, Unexplained,
@@ -114,7 +114,7 @@ impl Track {
         let plain = forecast.fuller.as_ref().map(|fuller| {
             Box::new(Plain {
                 regime: report(&forecast.plain),
-                failure_time: self.failure_time(&forecast.plain),
+                failure_time: self.reported(forecast.plain.now_days, &forecast.plain.collapse),
                 is_explained: fuller.is_explained,
             })
         });
@@ -123,7 +123,9 @@ impl Track {
             EventKind::Refit {
                 t_max: time,
                 regime: report(outlook),
-                failure_time: self.failure_time(outlook),
+                failure_time: self.reported(outlook.now_days, &outlook.collapse),
+                critical_velocity_time: self.reported(outlook.now_days, &outlook.passage),
+                probability_of_acceleration: outlook.accelerating,
                 inverse_velocity: InverseVelocity {
                     failure_time: at(intercept),
                     r_squared: line.map(|line| line.r_squared),
@@ -137,16 +139,16 @@ impl Track {
         )
     }
 
-    fn failure_time(&self, outlook: &Outlook) -> FailureTime {
+    fn reported(&self, now_days: f64, passage: &Passage) -> FailureTime {
         let quantile = |share| {
-            let days = outlook.passage.quantile(share, HORIZON_DAYS)?;
-            after_days(self.history.epoch, outlook.now_days + days)
+            let days = passage.quantile(share, HORIZON_DAYS)?;
+            after_days(self.history.epoch, now_days + days)
         };
         FailureTime {
             low: quantile(0.05),
             median: quantile(0.5),
             high: quantile(0.95),
-            probability: outlook.passage.chance_within(HORIZON_DAYS),
+            probability: passage.chance_within(HORIZON_DAYS),
             horizon_days: HORIZON_DAYS,
         }
     }

@@ -15,21 +15,17 @@ pub(super) mod voight;
 
 use super::Known;
 use crate::fit::{Rate, RateOptions};
-use crate::forecast::{FEWEST_READINGS, Panel, Passage, members};
+use crate::forecast::{Panel, Passage, by_the_law};
 
 /// What the monitor goes by.
 pub(super) fn panel(known: &Known) -> Option<Passage> {
     let outlook = Panel::default().update(&known.observations, known.critical_mm_per_day)?;
-    Some(outlook.passage)
+    Some(outlook.collapse)
 }
 
-/// The panel's first member, the law under an undeclared load, alone and as it comes.
+/// The law under an undeclared load, alone and as it comes.
 pub(super) fn slider_block(known: &Known) -> Option<Passage> {
-    let spaced = known.observations.spaced(FEWEST_READINGS);
-    (spaced.len() >= FEWEST_READINGS).then(|| {
-        let members = members(&known.observations, known.critical_mm_per_day);
-        members.map_or_else(Passage::default, |members| Passage::from_times(members.law))
-    })
+    by_the_law(&known.observations, known.critical_mm_per_day)
 }
 
 /// A point forecast, `days` from now: a time already past is now, one without end is never, and what is no

@@ -1,0 +1,168 @@
+//! How a network does on slopes of a family that taught it nothing.
+
+use crate::looks::{about_the_end, first, in_two};
+use slipwatch::forecast::{Collapse, Family, GaugeKind, Network, Passage, Simulated};
+use slipwatch::score::{Known, METHODS, Outcome, crps_days, is_covered, scored_days};
+use std::collections::BTreeMap;
+
+/// Seeds that judge.
+const FIRST_SEED: u64 = 1_000_000;
+/// Failing slopes of a family whose leads are scored, and slopes whose every reading is looked at.
+const SCORED: u64 = 60;
+const REPLAYED: u64 = 24;
+/// The program's own methods, in [`METHODS`].
+const OURS: [&str; 2] = ["panel", "slider-block"];
+/// Passing this velocity is failure for the rivals that ask, mm/day.
+const CRITICAL: f64 = 1000.0;
+/// Evacuation times, days.
+pub(crate) const EVACUATIONS: [f64; 3] = [0.5, 1.0, 3.0];
+/// A slope is to be read so often in an evacuation time.
+const READ: f64 = 4.0;
+/// Chances that call red and orange, and the outlook, days.
+const RED: f64 = 0.05;
+const ORANGE: (f64, f64) = (0.5, 30.0);
+/// Levels stay: another entry within so many days is the same alarm.
+const SAME_ALARM_DAYS: f64 = 3.0;
+const FEWEST: usize = 12;
+
+/// What came of one family.
+#[derive(Debug)]
+pub(crate) struct Judged {
+    pub(crate) family: Family,
+    pub(crate) leads: Vec<Lead>,
+    pub(crate) replays: Vec<Replay>,
+}
+
+/// A forecast before a collapse.
+#[derive(Debug)]
+pub(crate) struct Lead {
+    pub(crate) left_days: f64,
+    pub(crate) is_covered: bool,
+    pub(crate) median_days: f64,
+    pub(crate) crps_days: f64,
+    /// Of each rival, days.
+    pub(crate) rivals: BTreeMap<&'static str, f64>,
+}
+
+/// Every reading of one life.
+#[derive(Debug)]
+pub(crate) struct Replay {
+    pub(crate) gauge: GaugeKind,
+    pub(crate) years: f64,
+    pub(crate) reds: u32,
+    pub(crate) oranges: u32,
+    pub(crate) red_years: f64,
+    pub(crate) orange_years: f64,
+    /// For each evacuation time that the sampling serves, whether red came so long before the collapse.
+    pub(crate) in_time: [Option<bool>; EVACUATIONS.len()],
+}
+
+pub(crate) fn family(family: Family, network: &Network) -> Judged {
+    let seeds: Vec<u64> = (0..SCORED).map(|index| FIRST_SEED + index).collect();
+    let leads = if family.fails() {
+        in_two(&seeds, |seed| {
+            leads(&Simulated::draw(family, *seed), *seed, network)
+        })
+    } else {
+        Vec::new()
+    };
+    let seeds: Vec<u64> = (0..REPLAYED).map(|index| 2 * FIRST_SEED + index).collect();
+    Judged {
+        family,
+        leads,
+        replays: in_two(&seeds, |seed| {
+            vec![replay(&Simulated::draw(family, *seed), network)]
+        }),
+    }
+}
+
+fn leads(slope: &Simulated, seed: u64, network: &Network) -> Vec<Lead> {
+    let Some(collapse) = slope.collapse_days else {
+        return Vec::new();
+    };
+    let counts = about_the_end(slope, collapse, seed).into_iter();
+    let judged = counts.filter_map(|count| {
+        let observations = first(&slope.observations, count);
+        let now_days = observations.values.last()?.t_days;
+        let left_days = collapse - now_days;
+        let found = Collapse::by(network, &observations)?;
+        let scored = scored_days(now_days - observations.values[0].t_days);
+        let outcome = Outcome::Failed(left_days);
+        let known = Known {
+            now_days,
+            observations,
+            flow: Vec::new(),
+            critical_mm_per_day: CRITICAL,
+        };
+        let rivals = METHODS.iter().filter(|method| !OURS.contains(&method.name));
+        let rivals = rivals.map(|method| {
+            let forecast = (method.forecast)(&known).unwrap_or_default();
+            (method.name, crps_days(&forecast, outcome, scored))
+        });
+        let median = found.passage.quantile(0.5, f64::INFINITY);
+        Some(Lead {
+            left_days,
+            is_covered: is_covered(&found.passage, left_days),
+            median_days: median.unwrap_or(f64::INFINITY),
+            crps_days: crps_days(&found.passage, outcome, scored),
+            rivals: rivals.collect(),
+        })
+    });
+    judged.collect()
+}
+
+/// How far ahead red looks from a reading: the evacuation time, and until the next reading is due.
+fn ahead(evacuation: f64, found: &Collapse) -> f64 {
+    evacuation + found.interval_days.min(2.0 * evacuation)
+}
+
+fn replay(slope: &Simulated, network: &Network) -> Replay {
+    let values = &slope.observations.values;
+    let mut reds: [Vec<f64>; EVACUATIONS.len()] = Default::default();
+    let mut result = Replay {
+        gauge: slope.gauge,
+        years: 0.0,
+        reds: 0,
+        oranges: 0,
+        red_years: 0.0,
+        orange_years: 0.0,
+        in_time: [None; EVACUATIONS.len()],
+    };
+    let mut last = (f64::NEG_INFINITY, f64::NEG_INFINITY);
+    for count in FEWEST..=values.len() {
+        let Some(found) = Collapse::by(network, &first(&slope.observations, count)) else {
+            continue;
+        };
+        let now = values[count - 1].t_days;
+        let years = values.get(count).map_or(0.0, |next| next.t_days - now) / 365.25;
+        let chance = |days: f64, passage: &Passage| passage.chance_within(days);
+        for (days, times) in EVACUATIONS.iter().zip(&mut reds) {
+            if chance(ahead(*days, &found), &found.passage) >= RED {
+                times.push(now);
+            }
+        }
+        let is_red = chance(ahead(1.0, &found), &found.passage) >= RED;
+        let is_orange = is_red || chance(ORANGE.1, &found.passage) >= ORANGE.0;
+        result.years += years;
+        if is_red {
+            result.reds += u32::from(now - last.0 > SAME_ALARM_DAYS);
+            result.red_years += years;
+            last.0 = now;
+        }
+        if is_orange {
+            result.oranges += u32::from(now - last.1 > SAME_ALARM_DAYS);
+            result.orange_years += years;
+            last.1 = now;
+        }
+    }
+    if let Some(collapse) = slope.collapse_days {
+        for (index, days) in EVACUATIONS.iter().enumerate() {
+            let is_read = slope.interval_days <= days / READ;
+            let since = reds[index].iter().find(|at| **at >= slope.visible_days);
+            let in_time = since.is_some_and(|at| collapse - at >= *days);
+            let can_be = collapse - slope.visible_days >= *days;
+            result.in_time[index] = (is_read && can_be).then_some(in_time);
+        }
+    }
+    result
+}

@@ -1,0 +1,114 @@
+//! How sure it is that a slope accelerates: Bayes factors against steady motion under its usual fluctuations.
+//!
+//! At each scale of [`Scales`] the newest change of velocity is compared with what such changes were before. Under steady
+//! motion it has Student's t with the degrees of freedom of that comparison; under an acceleration it is
+//! [`SPREAD`] times as wide, and above 0. The ratio of the two has mean 1 under steady motion. The prior chance that an
+//! acceleration began within the newest block is proportional to the block's length, so that looking often does not
+//! cost: at a scale of D days one independent look is made in D days, each passes odds of c by chance with probability
+//! at most (prior rate) D / c (Markov), and all of them together pass it at most (prior rate) / c times a year, however
+//! often the slope is looked at in between. Summed over the scales the prior rate is at most [`RATE_PER_YEAR`].
+
+use super::Scales;
+use super::scales::{Change, Scale};
+use crate::fit::Observations;
+
+/// Prior rate of accelerations, a year, at one scale.
+const RATE_OF_A_SCALE: f64 = 0.3;
+/// The sum over [`Scales`] of a record of years read by the hour: sixteen scales.
+pub const RATE_PER_YEAR: f64 = 16.0 * RATE_OF_A_SCALE;
+/// How much wider changes are while a slope accelerates.
+const SPREAD: f64 = 8.0;
+/// One reading, ln, can add no more than this: the chance of a reading gone wrong is not smaller.
+const ONE_READING: f64 = 2.5;
+/// A daily wave is known by the days in which it was seen: degrees of freedom of blocks between these lengths, days, are
+/// no more than the first figure plus the second one a day.
+const DAILY_BLOCKS: (f64, f64) = (1.0 / 12.0, 2.0);
+const DAILY_FREEDOM: (f64, f64) = (2.0, 1.5);
+/// ln of a Bayes factor beyond which nothing changes.
+const SURE: f64 = 600.0;
+
+/// ln of the odds that the slope accelerates, after all of `observations`, of which `scales` are the scales.
+pub(super) fn ln_odds(observations: &Observations, scales: &Scales) -> f64 {
+    let with = of(scales);
+    let before = Scales::at(observations, observations.values.len().saturating_sub(1));
+    before.map_or(with, |before| with.min(of(&before) + ONE_READING))
+}
+
+/// The probability of odds whose logarithm is `ln_odds`.
+pub(super) fn probability(ln_odds: f64) -> f64 {
+    1.0 / (1.0 + (-ln_odds).exp())
+}
+
+fn of(scales: &Scales) -> f64 {
+    let each = scales.each.iter().map(|scale| odds(scales, scale));
+    each.sum::<f64>().max(f64::MIN_POSITIVE).ln()
+}
+
+fn odds(scales: &Scales, scale: &Scale) -> f64 {
+    let is_daily = (DAILY_BLOCKS.0..DAILY_BLOCKS.1).contains(&scale.days);
+    let most = if is_daily {
+        DAILY_FREEDOM.0 + DAILY_FREEDOM.1 * scales.length_days
+    } else {
+        f64::INFINITY
+    };
+    let factor = |change: &Change| ln_bayes_factor(change, most).min(SURE).exp();
+    let prior = RATE_OF_A_SCALE / 365.25 * scale.days;
+    prior * f64::midpoint(factor(&scale.near), factor(&scale.far))
+}
+
+/// ln of the density of a change that is [`SPREAD`] times as wide as usual and above 0, over that of a usual one; the
+/// side is smooth, so that no reading switches it.
+fn ln_bayes_factor(change: &Change, most_freedom: f64) -> f64 {
+    let z = change.newest / change.usual;
+    let freedom = change.freedom.min(most_freedom);
+    let wide = 1.0 + SPREAD * SPREAD;
+    let tails = (z * z / freedom).ln_1p() - (z * z / (freedom * wide)).ln_1p();
+    // The normal distribution function within .01 is a logistic one of this slope.
+    let above = 2.0 / (1.0 + (-1.702 * z).exp());
+    0.5 * (freedom + 1.0) * tails - 0.5 * wide.ln() + above.max(1e-12).ln()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn factor(z: f64, freedom: f64) -> f64 {
+        let change = Change {
+            newest: z,
+            usual: 1.0,
+            freedom,
+            largest: 0.0,
+        };
+        ln_bayes_factor(&change, f64::INFINITY).exp()
+    }
+
+    /// Density of Student's t by its definition, the constant by quadrature.
+    fn mean_under_steady_motion(freedom: f64) -> f64 {
+        let density = |z: f64| (1.0 + z * z / freedom).powf(-0.5 * (freedom + 1.0));
+        let (mut mass, mut mean) = (0.0, 0.0);
+        // Equal steps of asinh z, so that the tails are there.
+        let steps = 400_000;
+        for index in 0..steps {
+            let s = 40.0 * (f64::from(index) + 0.5) / f64::from(steps) - 20.0;
+            let (z, width) = (s.sinh(), s.cosh());
+            mass += density(z) * width;
+            mean += density(z) * width * factor(z, freedom);
+        }
+        mean / mass
+    }
+
+    #[test]
+    fn the_mean_bayes_factor_of_steady_motion_is_one_at_any_degrees_of_freedom() {
+        for freedom in [2.0, 5.0, 30.0, 300.0] {
+            let mean = mean_under_steady_motion(freedom);
+            assert!((mean - 1.0).abs() < 0.02, "{freedom}: {mean}");
+        }
+    }
+
+    #[test]
+    fn few_degrees_of_freedom_need_more_of_a_change() {
+        assert!(factor(6.0, 200.0) > 1e5);
+        assert!(factor(6.0, 3.0) < 100.0);
+        assert!(factor(-6.0, 200.0) < 1.0);
+    }
+}

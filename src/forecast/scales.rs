@@ -1,0 +1,375 @@
+//! The motion of a slope over doubling spans of time, counted back from the newest reading.
+//!
+//! At scale k the record is cut into blocks of `base` times 2^k days and each block is reduced to its mean displacement.
+//! A forecast rests on the newest velocity and the newest change of each scale, and on how large such changes were
+//! before: a change that is usual for the instrument or for the slope is no evidence of anything.
+
+use crate::fit::{Observation, Observations};
+use crate::reading::Quantity;
+
+/// No block is shorter, days: a quarter of an hour.
+const FINEST_BLOCK_DAYS: f64 = 1.0 / 96.0;
+/// Blocks of one scale, and scales, at most: they bound the work whatever the length of the record.
+const MOST_BLOCKS: usize = 512;
+const MOST_SCALES: usize = 24;
+/// Fewest readings.
+const FEWEST_READINGS: usize = 6;
+/// Newest spans between readings whose median is the sampling interval.
+const SPANS: usize = 256;
+/// A change is never known better than this, mm.
+const LEAST_CHANGE_MM: f64 = 1e-4;
+/// The usual change of the next shorter scale counts as much as so many observed ones.
+const PRIOR_COUNT: f64 = 2.0;
+/// Changes of neighbouring blocks overlap: so many of them are worth one that is independent.
+const OVERLAP: f64 = 3.0;
+/// Of the degrees of freedom at a scale, what is worth as much at the next longer one.
+const CARRIED: f64 = 0.5;
+/// The largest ratio of a single step to the motion of a span.
+const MOST_JUMP: f64 = 3.0;
+
+/// A change of velocity as a change of displacement over equal blocks, mm, with what is usual for it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Change {
+    /// The newest one, mm; above 0 is faster.
+    pub newest: f64,
+    /// Standard deviation of such changes before, mm, from those that slow down: a noise slows down as often as it
+    /// speeds up, a slope that runs away only speeds up.
+    pub usual: f64,
+    /// Degrees of freedom of `usual`.
+    pub freedom: f64,
+    /// The largest one before, mm.
+    pub largest: f64,
+}
+
+/// What one scale shows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scale {
+    /// Length of a block, days.
+    pub days: f64,
+    /// Between the two newest blocks, mm/day.
+    pub velocity: f64,
+    /// The highest one before, and the median of all before, mm/day.
+    pub highest_velocity: f64,
+    /// See [`Scale::highest_velocity`].
+    pub median_velocity: f64,
+    /// From one block to the next.
+    pub near: Change,
+    /// From one block to the third before it.
+    pub far: Change,
+    /// Largest step between two readings over the motion of the two newest blocks.
+    pub jump: f64,
+}
+
+/// The scales of a record, shortest first.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scales {
+    /// Days of the shortest blocks: the sampling interval, or [`FINEST_BLOCK_DAYS`].
+    pub base_days: f64,
+    /// Median of the newest spans between readings, days.
+    pub interval_days: f64,
+    /// From the first reading to the newest, days.
+    pub length_days: f64,
+    /// Half of the span over which a velocity is the mean: so long before its time stamp it is centred, days.
+    pub centred_before_days: f64,
+    /// At least one.
+    pub each: Vec<Scale>,
+}
+
+/// Displacement over time as straight lines between readings; the newest reading is (0, 0).
+struct Curve {
+    days: Vec<f64>,
+    mm: Vec<f64>,
+    /// Integral from the first reading to each, mm days.
+    area: Vec<f64>,
+}
+
+/// Block means of one scale, newest first, and which of the blocks hold a reading.
+struct Blocks {
+    days: f64,
+    means: Vec<f64>,
+    is_read: Vec<bool>,
+}
+
+impl Scales {
+    /// The scales of all `observations`; `None` with too few of them.
+    pub fn of(observations: &Observations) -> Option<Self> {
+        Self::at(observations, observations.values.len())
+    }
+
+    /// The scales of the first `count` observations.
+    pub fn at(observations: &Observations, count: usize) -> Option<Self> {
+        let values = observations.values.get(..count)?;
+        if values.len() < FEWEST_READINGS {
+            return None;
+        }
+        let curve = Curve::of(observations.quantity, observations.averaging_days, values);
+        let interval_days = curve.interval();
+        let base_days = interval_days.max(FINEST_BLOCK_DAYS);
+        let stated = stated_change(observations.quantity, values);
+        let mut each: Vec<Scale> = Vec::new();
+        for power in 0..MOST_SCALES {
+            let blocks = curve.blocks(power, base_days, interval_days);
+            let Some(scale) = blocks.scale(each.last(), stated, &curve) else {
+                break;
+            };
+            each.push(scale);
+        }
+        (!each.is_empty()).then_some(Self {
+            base_days,
+            interval_days,
+            length_days: -curve.days[0],
+            centred_before_days: 0.5 * observations.averaging_days,
+            each,
+        })
+    }
+}
+
+/// What a change of displacements of the stated standard error is, mm; 0 where none is stated.
+fn stated_change(quantity: Quantity, values: &[Observation]) -> f64 {
+    let mut stated: Vec<f64> = values.iter().filter_map(|value| value.sigma).collect();
+    if quantity == Quantity::Velocity || stated.is_empty() {
+        return 0.0;
+    }
+    let middle = stated.len() / 2;
+    // x0 - 2 x1 + x2.
+    *stated.select_nth_unstable_by(middle, f64::total_cmp).1 * 6.0_f64.sqrt()
+}
+
+impl Curve {
+    fn of(quantity: Quantity, averaging_days: f64, values: &[Observation]) -> Self {
+        let now = values[values.len() - 1].t_days;
+        let days: Vec<f64> = values.iter().map(|value| value.t_days - now).collect();
+        let mut mm: Vec<f64> = match quantity {
+            Quantity::Displacement => values.iter().map(|value| value.value).collect(),
+            Quantity::Velocity => integrated(averaging_days, values),
+        };
+        let newest = mm[mm.len() - 1];
+        for value in &mut mm {
+            *value -= newest;
+        }
+        let mut area = vec![0.0; mm.len()];
+        for index in 1..mm.len() {
+            let mean = f64::midpoint(mm[index - 1], mm[index]);
+            area[index] = area[index - 1] + mean * (days[index] - days[index - 1]);
+        }
+        Self { days, mm, area }
+    }
+
+    fn interval(&self) -> f64 {
+        let newest = self.days.windows(2).rev().take(SPANS);
+        let mut spans: Vec<f64> = newest.map(|pair| pair[1] - pair[0]).collect();
+        let middle = spans.len() / 2;
+        *spans.select_nth_unstable_by(middle, f64::total_cmp).1
+    }
+
+    /// The reading before `days`, and how far on the way to the next one that is.
+    fn place(&self, days: f64) -> (usize, f64) {
+        let after = self.days.partition_point(|at| *at <= days);
+        let after = after.clamp(1, self.days.len() - 1);
+        let (from, to) = (self.days[after - 1], self.days[after]);
+        (after - 1, ((days - from) / (to - from)).clamp(0.0, 1.0))
+    }
+
+    fn value(&self, days: f64) -> f64 {
+        let (index, share) = self.place(days);
+        self.mm[index] + share * (self.mm[index + 1] - self.mm[index])
+    }
+
+    fn integral(&self, days: f64) -> f64 {
+        let (index, share) = self.place(days);
+        let value = self.mm[index] + share * (self.mm[index + 1] - self.mm[index]);
+        let span = share * (self.days[index + 1] - self.days[index]);
+        self.area[index] + f64::midpoint(self.mm[index], value) * span
+    }
+
+    fn is_read(&self, from: f64, to: f64) -> bool {
+        const ROUNDING: f64 = 1e-9;
+        let first = self.days.partition_point(|at| *at < from - ROUNDING);
+        self.days.get(first).is_some_and(|at| *at <= to + ROUNDING)
+    }
+
+    /// The blocks of one scale. Sparse readings are taken as points at the two shortest scales: a mean over the line
+    /// between two of them would blur the newest motion.
+    fn blocks(&self, power: usize, base_days: f64, interval_days: f64) -> Blocks {
+        let days = base_days * f64::powi(2.0, i32::try_from(power).unwrap_or(i32::MAX));
+        let length = -self.days[0];
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a positive number, cut off at the most blocks"
+        )]
+        let count = ((length / days + 1e-6) as usize).min(MOST_BLOCKS);
+        let is_dense = interval_days < 0.5 * base_days;
+        let mean = |block: usize| {
+            let to = -(block as f64) * days;
+            match power {
+                0 if !is_dense => self.value(to),
+                1 if !is_dense => f64::midpoint(self.value(to), self.value(to - base_days)),
+                _ => (self.integral(to) - self.integral(to - days)) / days,
+            }
+        };
+        let is_read = |block: usize| {
+            let to = -(block as f64) * days;
+            self.is_read(to - days, to)
+        };
+        Blocks {
+            days,
+            means: (0..count).map(mean).collect(),
+            is_read: (0..count).map(is_read).collect(),
+        }
+    }
+
+    fn jump(&self, days: f64, usual: f64) -> f64 {
+        let from = self.days.partition_point(|at| *at < -2.0 * days);
+        let newest = &self.mm[from..];
+        let motion = newest.first().map_or(0.0, |first| first.abs());
+        let steps = newest.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+        (steps.fold(0.0, f64::max) / motion.max(usual)).min(MOST_JUMP)
+    }
+}
+
+/// Velocities added up to displacements, mm from the first: each holds for its span, or, as a point value, half
+/// way to its neighbours.
+fn integrated(averaging_days: f64, values: &[Observation]) -> Vec<f64> {
+    let mut mm = vec![0.0];
+    let mut reached = 0.0;
+    for pair in values.windows(2) {
+        let span = pair[1].t_days - pair[0].t_days;
+        let is_mean = averaging_days > 0.0 && span <= 1.5 * averaging_days;
+        let velocity = if is_mean {
+            pair[1].value
+        } else {
+            f64::midpoint(pair[0].value, pair[1].value)
+        };
+        reached += velocity * span;
+        mm.push(reached);
+    }
+    mm
+}
+
+impl Blocks {
+    /// What the blocks show; `None` where there are fewer than three. `shorter` is the scale below, `stated` a change
+    /// of the stated error, mm.
+    fn scale(&self, shorter: Option<&Scale>, stated: f64, curve: &Curve) -> Option<Scale> {
+        let means = &self.means;
+        if means.len() < 3 {
+            return None;
+        }
+        let prior = shorter.map(|scale| scale.near);
+        let near = self.change(1, stated, prior);
+        let first = Change {
+            freedom: PRIOR_COUNT,
+            ..near
+        };
+        let far = self.change(3, stated, Some(shorter.map_or(first, |scale| scale.far)));
+        let mut before: Vec<f64> = means[1..]
+            .windows(2)
+            .map(|pair| (pair[0] - pair[1]) / self.days)
+            .collect();
+        // The one next to the newest shares a block with it.
+        let highest = before.iter().skip(1).copied().fold(0.0, f64::max);
+        let middle = before.len() / 2;
+        Some(Scale {
+            days: self.days,
+            velocity: (means[0] - means[1]) / self.days,
+            highest_velocity: highest,
+            median_velocity: *before.select_nth_unstable_by(middle, f64::total_cmp).1,
+            near,
+            far,
+            jump: curve.jump(self.days, near.usual),
+        })
+    }
+
+    /// The change of velocity over `apart` blocks.
+    fn change(&self, apart: usize, stated: f64, prior: Option<Change>) -> Change {
+        let means = &self.means;
+        let last = apart + 1;
+        let at = |block: usize| {
+            let ends = [block, block + 1, block + apart, block + last];
+            let [a, b, c, d] = ends.map(|index| means[index]);
+            (a - b) - (c - d)
+        };
+        let is_read = |block: usize| {
+            let ends = [block, block + 1, block + apart, block + last];
+            ends.iter().all(|index| self.is_read[*index])
+        };
+        // The first of those before that shares at most a block with the newest.
+        let first = apart.div_ceil(2);
+        let before = (first..means.len().saturating_sub(last)).filter(|block| is_read(*block));
+        let (mut squares, mut count, mut largest) = (0.0, 0.0, 0.0_f64);
+        for change in before.map(at) {
+            squares += 2.0 * change.min(0.0).powi(2);
+            count += 1.0;
+            largest = largest.max(change);
+        }
+        let least = LEAST_CHANGE_MM.max(stated);
+        let known = prior.map_or(least, |prior| prior.usual);
+        let square = (squares + PRIOR_COUNT * known * known) / (count + PRIOR_COUNT);
+        let carried = prior.map_or(0.0, |prior| prior.freedom - PRIOR_COUNT);
+        Change {
+            newest: if means.len() > last { at(0) } else { 0.0 },
+            usual: square.sqrt().max(LEAST_CHANGE_MM),
+            freedom: PRIOR_COUNT + count / OVERLAP + CARRIED * carried,
+            largest,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn readings(interval: f64, count: u32, at: impl Fn(f64) -> f64) -> Observations {
+        let values = (0..count).map(|index| {
+            let t_days = interval * f64::from(index);
+            Observation {
+                t_days,
+                value: at(t_days),
+                sigma: None,
+            }
+        });
+        Observations {
+            quantity: Quantity::Displacement,
+            averaging_days: 0.0,
+            values: values.collect(),
+        }
+    }
+
+    #[test]
+    fn steady_motion_has_one_velocity_and_no_change_at_any_scale() {
+        let scales = Scales::of(&readings(0.25, 900, |t| 3.0 * t - 4e6)).unwrap();
+        assert!(scales.each.len() >= 7);
+        for scale in &scales.each {
+            assert!((scale.velocity - 3.0).abs() < 1e-6, "{scale:?}");
+            assert!((scale.median_velocity - 3.0).abs() < 1e-6, "{scale:?}");
+            assert!(scale.near.newest.abs() < 1e-5 && scale.far.newest.abs() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn a_wave_is_its_own_usual_change_and_an_acceleration_is_not() {
+        let wave = |t: f64| 5.0 * (std::f64::consts::TAU * t).sin();
+        let daily = Scales::of(&readings(1.0 / 24.0, 480, wave)).unwrap();
+        for scale in &daily.each {
+            assert!(scale.near.newest < 3.0 * scale.near.usual, "{scale:?}");
+        }
+        let clean = Scales::of(&readings(1.0 / 24.0, 480, |t| {
+            -20.0 * (1.0 - t / 21.0).ln()
+        }));
+        let clean = clean.unwrap();
+        let most = clean
+            .each
+            .iter()
+            .map(|scale| scale.near.newest / scale.near.usual)
+            .fold(0.0, f64::max);
+        assert!(most > 100.0, "{most}");
+    }
+
+    #[test]
+    fn velocities_add_up_to_the_motion_that_they_are_of() {
+        let mut velocities = readings(0.5, 200, |_| 7.0);
+        velocities.quantity = Quantity::Velocity;
+        let scales = Scales::of(&velocities).unwrap();
+        assert!((scales.each[2].velocity - 7.0).abs() < 1e-9);
+    }
+}
