@@ -120,7 +120,10 @@ impl Digitised {
             ),
             ("outcome", self.outcome),
             ("notes", self.notes),
-            ("made_by", "cargo run --example archive_digitised -- recordings"),
+            (
+                "made_by",
+                "cargo run --example archive_digitised -- recordings",
+            ),
         ];
         entries
             .map(|(key, text)| (key.to_owned(), text.to_owned()))

@@ -10,6 +10,8 @@ mod la_clapiere;
 mod loaded_law;
 #[path = "../examples/reconstruct/noise.rs"]
 mod noise;
+#[path = "../examples/reconstruct/projection.rs"]
+mod projection;
 #[path = "../examples/reconstruct/provenance.rs"]
 mod provenance;
 #[path = "../examples/reconstruct/vaiont.rs"]

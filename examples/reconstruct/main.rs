@@ -8,6 +8,7 @@ mod interpolation;
 mod la_clapiere;
 mod loaded_law;
 mod noise;
+mod projection;
 mod provenance;
 mod vaiont;
 
