@@ -1,10 +1,10 @@
 //! Vaiont: m, the regime and the time of failure of the four benchmarks, and the exponent alpha.
 
-use crate::recorded::{displacements, report, vaiont};
+use crate::recorded::{displacements, report};
 use anyhow::Result;
 use slipwatch::fit::{ConstantLoad, Exponent};
 use slipwatch::inversion::{Alternative, FitReport, Inversion, Options};
-use slipwatch::reading::{BenchmarkId, Series};
+use slipwatch::reading::{BenchmarkId, Recording, Series};
 
 /// The paper's m of each benchmark, in its order.
 pub(crate) const PAPER: [(&str, f64); 4] = [("5", 1.35), ("63", 1.24), ("67", 0.99), ("50", 1.00)];
@@ -38,8 +38,7 @@ pub(crate) enum Side {
 }
 
 /// The four benchmarks in the paper's order.
-pub(crate) fn inverted() -> Result<Vec<Benchmark>> {
-    let recording = vaiont()?;
+pub(crate) fn inverted(recording: &Recording) -> Result<Vec<Benchmark>> {
     let one = |(id, paper_m): (&'static str, f64)| {
         let series = recording.series(Some(&BenchmarkId::new(id)), None)?;
         let inversion = Inversion::new(series, &Options::default());
