@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![allow(dead_code, reason = "the document shows more than the tests claim")]
 
+#[path = "../examples/seed/as_drawn.rs"]
+mod as_drawn;
 #[path = "../examples/seed/claims.rs"]
 mod claims;
 #[path = "../examples/seed/claims_vaiont.rs"]
@@ -126,6 +128,16 @@ fn that_the_increase_exhausts_itself_is_given_up_and_said_so() {
 }
 
 #[test]
+fn noise_as_it_is_drawn_hides_m_unless_it_is_tiny() {
+    let share = |noise: f64| {
+        let one = STUDIES.as_drawn.iter().find(|one| one.noise <= noise);
+        one.unwrap().found.iter().sum::<f64>() / one.unwrap().found.len() as f64
+    };
+    assert!(share(0.04) < 0.3, "{:?}", STUDIES.as_drawn);
+    assert!(share(1e-4) > 0.8, "{:?}", STUDIES.as_drawn);
+}
+
+#[test]
 fn an_increase_that_exhausts_itself_moves_m_away_from_the_papers() {
     let [none, .., most] = STUDIES.trials.as_slice() else {
         panic!("no trials");
@@ -134,7 +146,7 @@ fn an_increase_that_exhausts_itself_moves_m_away_from_the_papers() {
     let paper = [1.35, 1.24, 1.00];
     for (index, m) in paper.into_iter().enumerate() {
         let of = |trial: &given_up::Trial| (trial.of[index].0.unwrap() - m).abs();
-        assert!(of(none) <= 0.05 && of(most) > 0.5, "{none:?} {most:?}");
+        assert!(of(none) <= 0.05 && of(most) > 0.3, "{none:?} {most:?}");
     }
 }
 
@@ -166,11 +178,21 @@ fn la_clapiere_to_1987_is_stable_with_the_papers_m_and_a_valley_that_holds_its_x
 #[test]
 fn m_and_x_i_of_la_clapiere_are_poorly_constrained_along_a_valley() {
     let valley = STUDIES.valley.as_ref().unwrap();
-    let (low, high) = valley.m().unwrap();
-    assert!(low < 0.95 && high > la_clapiere::PAPER_M, "{low} to {high}");
-    let (low, high) = valley.x_i().unwrap();
-    assert!((low..=high).contains(&la_clapiere::PAPER_X_I));
-    assert!(high > 1.2 * low, "{low} to {high}");
+    let (low, high) = valley.m(valley::AS_GOOD).unwrap();
+    assert!(
+        (low..=high).contains(&la_clapiere::PAPER_M),
+        "{low} to {high}"
+    );
+    let (low, high) = valley.x_i(valley::AS_GOOD).unwrap();
+    assert!(
+        (low..=high).contains(&la_clapiere::PAPER_X_I),
+        "{low} to {high}"
+    );
+    let (low, high) = valley.m(valley::NEARLY).unwrap();
+    assert!(low <= 0.9 && high > la_clapiere::PAPER_M, "{low} to {high}");
+    let x_i = STUDIES.fits[0].report.parameters.x_i;
+    let (low, high) = (x_i.low.unwrap(), x_i.high.unwrap());
+    assert!(low < la_clapiere::PAPER_X_I && high > 2.0 * low, "{x_i:?}");
 }
 
 #[test]
@@ -280,14 +302,12 @@ fn almost_all_fits_of_la_clapieres_velocity_have_m_below_one_and_x_i_above() {
 }
 
 #[test]
-fn displacement_and_velocity_give_another_best_m_of_63_and_one_regime_of_67() {
+fn displacement_and_velocity_give_one_regime_of_67() {
     let both = |id| {
         let one = benchmark(id);
         (&one.free, &one.from_displacement)
     };
-    let (velocity, displacement) = both("63");
     let m = |report: &slipwatch::inversion::FitReport| report.parameters.m.best.unwrap();
-    assert!((m(velocity) - m(displacement)).abs() > 1.0);
     let (velocity, displacement) = both("67");
     assert_eq!(velocity.regime.label, Regime::StableAccelerating);
     assert_eq!(displacement.regime.label, Regime::StableAccelerating);

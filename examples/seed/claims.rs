@@ -60,8 +60,10 @@ fn of_la_clapiere(studies: &Studies) -> Result<Vec<Claim>> {
     );
     let same = m.is_some_and(|m| (m - PAPER_M).abs() <= SAME_M);
     let valley = studies.valley.as_ref().context("no fit of La Clapière")?;
-    let (low, high) = valley.x_i().context("no x_i is as good as the best")?;
-    let (lowest, highest) = valley.m().context("no m is as good as the best")?;
+    let (low, high) = valley
+        .x_i(AS_GOOD)
+        .context("no x_i is as good as the best")?;
+    let (lowest, highest) = valley.m(AS_GOOD).context("no m is as good as the best")?;
     let accelerates_to_a_steady_velocity =
         m.is_some_and(|m| 0.0 < m && m < 1.0) && x_i.is_some_and(|x_i| x_i > 1.0);
     let rms = |fit: &Fit| fit.report.rms.context("no rms");
@@ -183,9 +185,9 @@ fn of_the_river(studies: &Studies) -> [Claim; 2] {
         Claim {
             paper: "the river explains the seasons of 1982 to 1985, and what was tuned on it fails in 1986 and 1987".to_owned(),
             here: format!(
-                "of the variance of ln v about the fit the flow explains {} to the end of 1985, and with that gain {} of 1986 and 1987 (below 0: it makes it worse)",
+                "of the variance of ln v about the fit the flow explains {} to the end of 1985; taken away with that gain it makes the rms of 1986 and 1987 {} times what it was",
                 percent(river.before),
-                percent(river.after)
+                number(river.after.map(|share| (1.0 - share).sqrt()))
             ),
             agrees: learned && fails,
             readings: Readings::Tuned,

@@ -1,5 +1,6 @@
 //! The document: every study's table, and the paper's statements beside ours.
 
+use crate::as_drawn::{self, AsDrawn};
 use crate::claims::{Claim, Readings, claims};
 use crate::document_vaiont::vaiont_section;
 use crate::given_up::{self, Trial};
@@ -8,7 +9,7 @@ use crate::recorded::{Archive, Kind, decimal_year, vaiont_day, velocities};
 use crate::river::{self, River};
 use crate::synthetic::{self, Study};
 use crate::vaiont::{self, Benchmark};
-use crate::valley::{self, AS_GOOD, Valley};
+use crate::valley::{self, AS_GOOD, NEARLY, Valley};
 use anyhow::{Context, Result};
 use slipwatch::fit::{Exponent, P_PRIOR};
 use slipwatch::inversion::{Estimate, FitReport, SweepReport};
@@ -22,6 +23,8 @@ pub(crate) struct Studies {
     pub(crate) vaiont_kind: Kind,
     /// Vaiont with an increase that exhausts itself.
     pub(crate) trials: Vec<Trial>,
+    /// Vaiont with noise as it is drawn.
+    pub(crate) as_drawn: Vec<AsDrawn>,
     /// Displacement of 1982.9 to 1987.9.
     pub(crate) la_clapiere: Series,
     pub(crate) la_clapiere_kind: Kind,
@@ -40,8 +43,10 @@ impl Studies {
         let la_clapiere = la_clapiere::readings(&archive.la_clapiere)?;
         let fits = la_clapiere::fits(&la_clapiere);
         let free = &fits.first().context("no fit")?.least_squares;
+        let vaiont = vaiont::inverted(&archive.vaiont)?;
         Ok(Self {
-            vaiont: vaiont::inverted(&archive.vaiont)?,
+            as_drawn: as_drawn::shares(&vaiont)?,
+            vaiont,
             vaiont_kind: archive.vaiont_kind.clone(),
             trials: given_up::trials(&archive.vaiont)?,
             la_clapiere_kind: archive.la_clapiere_kind.clone(),
@@ -300,6 +305,7 @@ fn valley_text(studies: &Studies) -> String {
         ]
     };
     let rows: Vec<Vec<String>> = valley.places.iter().map(row).collect();
+    let free = studies.fits.first();
     let ends = |ends: Option<(f64, f64)>, text: fn(Option<f64>) -> String| {
         ends.map_or("none".to_owned(), |(low, high)| {
             format!("from {} to {}", text(Some(low)), text(Some(high)))
@@ -314,12 +320,18 @@ fn valley_text(studies: &Studies) -> String {
         "above the least",
     ];
     format!(
-        "{} how poorly m and x_i are constrained, by the best fit at each m below 1. Within {:.0} % of the least rms lie m\n\
-         {} and x_i {}, of those tried.\n\n{}",
+        "{} How poorly m and x_i are constrained, by the best fit at each m below 1. Of those tried, m {}\n\
+         and x_i {} have an rms within {:.0} % of the least; m {} and x_i {}\n\
+         within {:.0} %. By the posterior 90 % lie in m {} and x_i {}.\n\n{}",
         studies.la_clapiere_kind.note("**Reconstruction †:**"),
+        ends(valley.m(AS_GOOD), m_text),
+        ends(valley.x_i(AS_GOOD), number),
         100.0 * AS_GOOD,
-        ends(valley.m(), m_text),
-        ends(valley.x_i(), number),
+        ends(valley.m(NEARLY), m_text),
+        ends(valley.x_i(NEARLY), number),
+        100.0 * NEARLY,
+        free.map_or("–".to_owned(), |fit| interval(&fit.report.parameters.m)),
+        free.map_or("–".to_owned(), |fit| interval(&fit.report.parameters.x_i)),
         table(&head, &rows)
     )
 }

@@ -4,6 +4,7 @@
 //!
 //! Every number in the document is measured by the run that writes it; a second run writes the same bytes.
 
+mod as_drawn;
 mod claims;
 mod claims_vaiont;
 mod document;

@@ -6,9 +6,11 @@ use slipwatch::reading::Series;
 
 /// An rms this much above the least, relative, is as good.
 pub(crate) const AS_GOOD: f64 = 0.05;
+/// And one this much above it nearly so.
+pub(crate) const NEARLY: f64 = 0.2;
 /// The m that are imposed.
 const IMPOSED: [f64; 12] = [
-    0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.999,
+    0.2, 0.4, 0.6, 0.8, 0.85, 0.9, 0.94, 0.96, 0.97, 0.98, 0.99, 0.999,
 ];
 
 /// The best fit with m imposed.
@@ -29,20 +31,20 @@ pub(crate) struct Valley {
 }
 
 impl Valley {
-    /// The places that are as good as the best.
-    pub(crate) fn floor(&self) -> impl Iterator<Item = &Place> {
-        let highest = (1.0 + AS_GOOD) * self.least_rms;
+    /// The places whose rms is within a share of the least.
+    fn within(&self, share: f64) -> impl Iterator<Item = &Place> {
+        let highest = (1.0 + share) * self.least_rms;
         self.places.iter().filter(move |place| place.rms <= highest)
     }
 
-    /// Lowest and highest m of the floor.
-    pub(crate) fn m(&self) -> Option<(f64, f64)> {
-        ends(self.floor().map(|place| place.m))
+    /// Lowest and highest m whose rms is within a share of the least.
+    pub(crate) fn m(&self, share: f64) -> Option<(f64, f64)> {
+        ends(self.within(share).map(|place| place.m))
     }
 
-    /// Lowest and highest `x_i` of the floor.
-    pub(crate) fn x_i(&self) -> Option<(f64, f64)> {
-        ends(self.floor().filter_map(|place| place.x_i))
+    /// Lowest and highest `x_i` there.
+    pub(crate) fn x_i(&self, share: f64) -> Option<(f64, f64)> {
+        ends(self.within(share).filter_map(|place| place.x_i))
     }
 }
 
