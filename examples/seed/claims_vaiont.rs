@@ -217,7 +217,7 @@ fn of_exhaustion(benchmarks: &[Benchmark]) -> Result<Claim> {
     Ok(Claim {
         paper: "Vaiont: the increase of the velocity exhausts itself before the critical time, for every benchmark".to_owned(),
         here: format!(
-            "ln v gains {} of what 1/({PAPER_LINE_DAY} - t) gains over the last four days; but only {} bends upwards in 1/v",
+            "ln v gains {} of what 1/({PAPER_LINE_DAY} - t) gains over the last four days; but 1/v bends upwards in {} only",
             texts.join(", "),
             list(&bends)
         ),
