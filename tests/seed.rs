@@ -25,6 +25,8 @@ mod recorded;
 mod regimes;
 #[path = "../examples/seed/river.rs"]
 mod river;
+#[path = "../examples/seed/simplex.rs"]
+mod simplex;
 #[path = "../examples/seed/synthetic.rs"]
 mod synthetic;
 #[path = "../examples/seed/vaiont.rs"]
@@ -75,6 +77,21 @@ fn the_best_m_of_each_vaiont_benchmark_is_the_papers_within_five_hundredths() {
         let best = one.free.parameters.m.best.unwrap();
         assert!((best - m).abs() <= 0.05, "{id}: {best}");
         assert!(has_the_papers_m(one), "{id}");
+    }
+}
+
+#[test]
+fn simplexes_from_many_starts_find_the_papers_m_of_each_vaiont_benchmark() {
+    for one in &STUDIES.vaiont {
+        let found = one.simplex.unwrap();
+        let least = one.free.rms.unwrap();
+        println!("{}: {found:?}, least {least}", one.id);
+        assert!(
+            (found.m - one.paper_m).abs() <= 0.05,
+            "{}: {found:?}",
+            one.id
+        );
+        assert!(found.rms >= least * (1.0 - 1e-6), "{}: {found:?}", one.id);
     }
 }
 

@@ -4,6 +4,7 @@ use crate::as_drawn::{self, AsDrawn};
 use crate::claims::SAME_M;
 use crate::document::{Studies, day, interval, m_text, number, share, table};
 use crate::given_up::{self, FROM_DAY};
+use crate::simplex;
 use crate::vaiont::{Benchmark, COLLAPSE_DAY, Side, best_on};
 use anyhow::Result;
 
@@ -18,8 +19,8 @@ pub(crate) fn vaiont_section(studies: &Studies) -> Result<String> {
     let failures = failure_rows(benchmarks)?;
     Ok(format!(
         "## Vaiont: m, regime and failure\n\n\
-         {} rms in\n\
-         mm/day. The last three columns are the best fits on either side of m = 1 and at it.\n\n{}\n\
+         {} rms in mm/day. The simplexes over (m, x_i, T) are the paper's own kind of fit, from {} starts, where they begin and end being chosen here.\n\
+         The last three columns are the best fits on either side of m = 1 and at it.\n\n{}\n\
          {}\n{}\n\
          {} Days from 2 August 1963, the collapse being day {COLLAPSE_DAY}. The line goes through the last quarter of the\n\
          record; passage is that of 1 m/day, by the panel of forecasts as the monitor uses it; the singularity that of\n\
@@ -28,6 +29,7 @@ pub(crate) fn vaiont_section(studies: &Studies) -> Result<String> {
          ![Velocity and inverse velocity, Vaiont](seed/vaiont.svg)\n\n\
          {} Dots: readings. Blue: the best fit. Red: the paper's m imposed. Green: where the line meets zero.\n",
         kind.note(VAIONT_MADE),
+        simplex::STARTS,
         m_table(benchmarks),
         as_drawn_text(studies),
         trials_text(studies),
@@ -59,10 +61,14 @@ fn m_table(benchmarks: &[Benchmark]) -> String {
     };
     let row = |one: &Benchmark| {
         let imposed = one.at_paper_m.best().map(|best| best.rms);
+        let simplex = one.simplex.map(|found| (found.m, found.rms));
         vec![
             one.id.to_owned(),
             format!("{:.2}", one.paper_m),
             m_text(one.free.parameters.m.best),
+            simplex.map_or("–".to_owned(), |(m, rms)| {
+                format!("{} ({})", m_text(Some(m)), number(Some(rms)))
+            }),
             interval(&one.free.parameters.m),
             share(one.free.regime.probability_unstable),
             one.free.regime.label.to_string(),
@@ -77,6 +83,7 @@ fn m_table(benchmarks: &[Benchmark]) -> String {
         "benchmark",
         "m, paper",
         "m, best",
+        "by simplexes (rms)",
         "m, 90 %",
         "P(unstable)",
         "regime",

@@ -15,6 +15,7 @@ mod la_clapiere;
 mod recorded;
 mod regimes;
 mod river;
+mod simplex;
 mod synthetic;
 mod vaiont;
 mod valley;

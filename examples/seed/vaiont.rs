@@ -1,6 +1,7 @@
 //! Vaiont: m, the regime and the time of failure of the four benchmarks, and the exponent alpha.
 
 use crate::recorded::{displacements, report};
+use crate::simplex::{self, Found};
 use anyhow::Result;
 use slipwatch::fit::{ConstantLoad, Exponent};
 use slipwatch::inversion::{Alternative, FitReport, Inversion, Options};
@@ -23,6 +24,8 @@ pub(crate) struct Benchmark {
     pub(crate) free: FitReport,
     /// The same with its laws.
     pub(crate) least_squares: ConstantLoad,
+    /// By simplexes over the paper's unknowns.
+    pub(crate) simplex: Option<Found>,
     /// With the paper's m imposed.
     pub(crate) at_paper_m: ConstantLoad,
     /// From the velocities summed to displacements.
@@ -52,6 +55,7 @@ pub(crate) fn inverted(recording: &Recording) -> Result<Vec<Benchmark>> {
             paper_m,
             series: series.clone(),
             free: inversion.report(&least_squares, 0.0),
+            simplex: simplex::fit(series)?,
             least_squares,
             at_paper_m: Inversion::new(series, &imposed).least_squares(),
             from_displacement: report(&displacements(series), &Options::default()),
