@@ -362,6 +362,21 @@ fn at_la_clapiere_the_river_then_the_loads_of_1987_are_found_and_not_the_season(
 }
 
 #[test]
+fn at_la_clapiere_the_river_is_found_in_the_years_in_which_it_acts() {
+    let mut recording = recorded("la-clapiere-1982-1995-reconstruction.mcap");
+    let readings = &mut recording.series[0].readings;
+    readings.retain(|reading| reading.time < time("1986-02-01T00:00:00Z"));
+    let said = explained(&recording, None);
+    assert!(!has(&said, Kind::Seasonal));
+    let river = &said.verdict;
+    assert_eq!(river.effect, Kind::Hydrological);
+    assert_eq!(river.channel.as_deref(), Some("tinee_flow_m3_s"));
+    assert!(river.gain_per_sd.unwrap() > 0.0);
+    let (before, after) = (said.error.fit.before, said.error.fit.after);
+    assert!(after.unwrap() < 0.5 * before.unwrap(), "{:?}", said.error);
+}
+
+#[test]
 fn a_law_with_the_river_learned_at_la_clapiere_until_1986_fails_after() {
     let mut recording = recorded("la-clapiere-1982-1995-reconstruction.mcap");
     let readings = &mut recording.series[0].readings;

@@ -10,8 +10,12 @@ mod la_clapiere;
 mod loaded_law;
 #[path = "../examples/reconstruct/noise.rs"]
 mod noise;
+#[path = "../examples/reconstruct/projection.rs"]
+mod projection;
 #[path = "../examples/reconstruct/provenance.rs"]
 mod provenance;
+#[path = "../examples/reconstruct/tinee.rs"]
+mod tinee;
 #[path = "../examples/reconstruct/vaiont.rs"]
 mod vaiont;
 
@@ -58,7 +62,7 @@ fn the_vaiont_reconstruction_keeps_the_papers_statements() {
 fn the_la_clapiere_reconstruction_keeps_the_papers_statements() {
     facts::la_clapiere(&committed(la_clapiere::FILE)).unwrap();
     let motions =
-        la_clapiere::motions(&la_clapiere::days().unwrap(), la_clapiere::Loads::Both).unwrap();
+        la_clapiere::motions(&la_clapiere::days().unwrap(), la_clapiere::Parts::All).unwrap();
     facts::la_clapiere_motion(&motions).unwrap();
 }
 
@@ -137,15 +141,28 @@ fn the_rivers_of_1986_to_1988_are_not_anomalously_high() {
 }
 
 #[test]
-fn the_acceleration_of_1987_is_the_extra_loads_and_not_the_rivers() {
+fn the_acceleration_of_1987_is_the_fits_and_not_the_rivers() {
     let days = la_clapiere::days().unwrap();
     let shares = la_clapiere::shares(&days).unwrap();
     assert_eq!(shares.len(), 5);
-    let (_, [law, river, both]) = shares[4];
-    assert!(law < river && river < 0.4 * both, "{law} {river} {both}");
-    let (_, [_, river_1985, both_1985]) = shares[2];
+    let (_, [fit_1986, river_1986, _]) = shares[3];
+    let (_, [fit_1987, river_1987, all_1987]) = shares[4];
+    // The last year's slip, of which the river has no part.
+    let (fit, river) = (fit_1987 - fit_1986, river_1987 - river_1986);
+    assert!((river / fit - 1.0).abs() < 1e-9, "{fit} {river}");
     assert!(
-        (river_1985 - both_1985).abs() < 1.0,
-        "no extra load before 1986"
+        (all_1987 / fit_1987 - 1.0).abs() < 0.1,
+        "{all_1987} {fit_1987}"
     );
+}
+
+#[test]
+fn noise_without_a_direction_has_no_part_along_it_and_keeps_the_rest() {
+    let along = vec![1.0, 1.0, 1.0, 1.0];
+    let twice = vec![2.0, 2.0, 2.0, 2.0];
+    let rest = projection::without(&[along, twice], vec![1.0, 2.0, 3.0, 6.0]);
+    let expected = [-2.0, -1.0, 0.0, 3.0];
+    for (value, expected) in rest.iter().zip(expected) {
+        assert!((value - expected).abs() < 1e-12, "{rest:?}");
+    }
 }

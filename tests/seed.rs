@@ -3,25 +3,41 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![allow(dead_code, reason = "the document shows more than the tests claim")]
 
+#[path = "../examples/seed/as_drawn.rs"]
+mod as_drawn;
 #[path = "../examples/seed/claims.rs"]
 mod claims;
+#[path = "../examples/seed/claims_vaiont.rs"]
+mod claims_vaiont;
 #[path = "../examples/seed/document.rs"]
 mod document;
+#[path = "../examples/seed/document_vaiont.rs"]
+mod document_vaiont;
 #[path = "../examples/seed/figures.rs"]
 mod figures;
+#[path = "../examples/seed/given_up.rs"]
+mod given_up;
 #[path = "../examples/seed/la_clapiere.rs"]
 mod la_clapiere;
 #[path = "../examples/seed/recorded.rs"]
 mod recorded;
 #[path = "../examples/seed/regimes.rs"]
 mod regimes;
+#[path = "../examples/seed/river.rs"]
+mod river;
+#[path = "../examples/seed/simplex.rs"]
+mod simplex;
 #[path = "../examples/seed/synthetic.rs"]
 mod synthetic;
 #[path = "../examples/seed/vaiont.rs"]
 mod vaiont;
+#[path = "../examples/seed/valley.rs"]
+mod valley;
 
-use claims::{Readings, claims, excess_below_one, line_day};
+use claims::{Readings, claims};
+use claims_vaiont::{excess_below_one, has_the_papers_m, line_day};
 use document::Studies;
+use recorded::{Archive, Kind};
 use slipwatch::reading::Quantity;
 use slipwatch::regime::Regime;
 use std::path::{Path, PathBuf};
@@ -29,7 +45,8 @@ use std::sync::LazyLock;
 use vaiont::Benchmark;
 
 /// Everything, with few synthetic series.
-static STUDIES: LazyLock<Studies> = LazyLock::new(|| Studies::run(3).unwrap());
+static STUDIES: LazyLock<Studies> =
+    LazyLock::new(|| Studies::run(3, &Archive::own().unwrap()).unwrap());
 /// Synthetic series where their shares matter.
 const SYNTHETICS: u64 = 30;
 
@@ -42,41 +59,59 @@ fn docs() -> PathBuf {
 }
 
 fn figures() -> Vec<(&'static str, String)> {
-    let all = [
-        ("regimes", figures::regimes(&regimes::columns().unwrap())),
-        ("vaiont", figures::vaiont(&STUDIES.vaiont).unwrap()),
-        (
-            "la-clapiere",
-            figures::la_clapiere(&STUDIES.la_clapiere, &STUDIES.fits).unwrap(),
-        ),
-        (
-            "sweep",
-            figures::sweep(&STUDIES.growing, &STUDIES.growing_velocity).unwrap(),
-        ),
-        ("synthetic", figures::synthetic(&STUDIES.synthetic)),
-    ];
+    let all = figures::all(&STUDIES).unwrap();
     all.map(|(name, figure)| (name, figure.svg())).to_vec()
 }
 
+/// What a row of the document's first table says, by how the paper's statement begins.
+fn claim(beginning: &str) -> claims::Claim {
+    let mut all = claims(&STUDIES).unwrap().into_iter();
+    all.find(|claim| claim.paper.starts_with(beginning))
+        .unwrap()
+}
+
 #[test]
-fn vaiont_5_and_63_are_fitted_alike_on_both_sides_of_m_one_and_67_below_it_only() {
+fn the_best_m_of_each_vaiont_benchmark_is_the_papers_within_five_hundredths() {
+    for (id, m) in [("5", 1.35), ("63", 1.24), ("67", 0.99), ("50", 1.00)] {
+        let one = benchmark(id);
+        let best = one.free.parameters.m.best.unwrap();
+        assert!((best - m).abs() <= 0.05, "{id}: {best}");
+        assert!(has_the_papers_m(one), "{id}");
+    }
+}
+
+#[test]
+fn simplexes_from_many_starts_find_the_papers_m_of_each_vaiont_benchmark() {
+    for one in &STUDIES.vaiont {
+        let found = one.simplex.unwrap();
+        let least = one.free.rms.unwrap();
+        println!("{}: {found:?}, least {least}", one.id);
+        assert!(
+            (found.m - one.paper_m).abs() <= 0.05,
+            "{}: {found:?}",
+            one.id
+        );
+        assert!(found.rms >= least * (1.0 - 1e-6), "{}: {found:?}", one.id);
+    }
+}
+
+#[test]
+fn laws_below_m_one_fit_5_and_63_only_slightly_worse_and_67_much_better() {
     for id in ["5", "63"] {
         let excess = excess_below_one(benchmark(id)).unwrap();
-        assert!(excess.abs() < 0.1, "{id}: {excess}");
+        assert!((0.0..0.1).contains(&excess), "{id}: {excess}");
     }
     let bent = benchmark("67");
     assert!(excess_below_one(bent).unwrap() < -0.5);
-    assert!(claims::has_the_papers_m(bent));
     assert!(bent.free.regime.probability_unstable.unwrap() < 0.05);
 }
 
 #[test]
-fn the_line_through_5_63_and_50_meets_zero_within_a_day_of_the_papers_and_that_of_67_later() {
-    for id in ["5", "63", "50"] {
+fn the_line_through_each_vaiont_benchmark_meets_zero_within_a_day_of_the_papers() {
+    for id in ["5", "63", "67", "50"] {
         let day = line_day(benchmark(id)).unwrap();
         assert!((day - vaiont::PAPER_LINE_DAY).abs() <= 1.0, "{id}: {day}");
     }
-    assert!(line_day(benchmark("67")).unwrap() > vaiont::PAPER_LINE_DAY + 1.0);
 }
 
 #[test]
@@ -90,6 +125,49 @@ fn alpha_is_two_where_inverse_velocity_is_straight_and_less_where_it_bends_upwar
 }
 
 #[test]
+fn vaionts_velocities_displacements_and_likenesses_are_the_papers() {
+    for beginning in ["Vaiont: velocities from 5", "Vaiont: 5 and 63 alike"] {
+        let claim = claim(beginning);
+        assert!(claim.agrees, "{claim:?}");
+    }
+}
+
+#[test]
+fn that_the_increase_exhausts_itself_is_given_up_and_said_so() {
+    let given_up = claim("Vaiont: the increase of the velocity exhausts itself");
+    assert!(!given_up.agrees, "{given_up:?}");
+    for one in &STUDIES.vaiont {
+        let gain = given_up::last_gain(&one.series).unwrap().unwrap();
+        assert!(gain < 1.0, "{}: {gain}", one.id);
+    }
+    let text = document::text(&STUDIES).unwrap();
+    assert!(text.contains("given up is that the increase of 5 and 63 exhausts itself"));
+}
+
+#[test]
+fn noise_as_it_is_drawn_hides_m_unless_it_is_tiny() {
+    let share = |noise: f64| {
+        let one = STUDIES.as_drawn.iter().find(|one| one.noise <= noise);
+        one.unwrap().found.iter().sum::<f64>() / one.unwrap().found.len() as f64
+    };
+    assert!(share(0.04) < 0.3, "{:?}", STUDIES.as_drawn);
+    assert!(share(1e-4) > 0.8, "{:?}", STUDIES.as_drawn);
+}
+
+#[test]
+fn an_increase_that_exhausts_itself_moves_m_away_from_the_papers() {
+    let [none, .., most] = STUDIES.trials.as_slice() else {
+        panic!("no trials");
+    };
+    assert!(none.loss_per_day.abs() < f64::EPSILON && most.loss_per_day > 0.03);
+    let paper = [1.35, 1.24, 1.00];
+    for (index, m) in paper.into_iter().enumerate() {
+        let of = |trial: &given_up::Trial| (trial.of[index].0.unwrap() - m).abs();
+        assert!(of(none) <= 0.05 && of(most) > 0.3, "{none:?} {most:?}");
+    }
+}
+
+#[test]
 fn benchmarks_5_63_and_50_pass_a_metre_a_day_within_a_day_of_the_collapse() {
     for id in ["5", "63", "50"] {
         let passage = benchmark(id).free.failure_time;
@@ -100,25 +178,115 @@ fn benchmarks_5_63_and_50_pass_a_metre_a_day_within_a_day_of_the_collapse() {
 }
 
 #[test]
-fn la_clapiere_to_1987_is_stable_and_an_imposed_m_of_one_and_a_half_only_the_straight_line() {
-    let [free, _, unit, imposed] = STUDIES.fits.as_slice() else {
+fn la_clapiere_to_1987_is_stable_with_the_papers_m_and_a_valley_that_holds_its_x_i() {
+    let [free, paper, unit, imposed] = STUDIES.fits.as_slice() else {
         panic!("{} fits", STUDIES.fits.len());
     };
     assert_eq!(free.report.regime.label, Regime::StableAccelerating);
+    let m = free.report.parameters.m.best.unwrap();
+    assert!((m - la_clapiere::PAPER_M).abs() <= 0.05, "{m}");
+    let x_i = free.report.parameters.x_i.best.unwrap();
+    assert!((20.0..80.0).contains(&x_i), "{x_i}");
     let rms = |fit: &la_clapiere::Fit| fit.report.rms.unwrap();
-    assert!(rms(imposed) > 1.5 * rms(free));
-    assert!((rms(imposed) / rms(unit) - 1.0).abs() < 1e-3);
-    assert!(imposed.report.parameters.x_i.best.unwrap() < 1e-3);
+    assert!(rms(paper) < 1.05 * rms(free));
+    assert!(rms(imposed) > 1.5 * rms(free) && rms(unit) > 1.5 * rms(free));
 }
 
 #[test]
-fn a_law_without_load_does_not_find_the_m_that_made_la_clapiere_under_one() {
-    let [free, paper, ..] = STUDIES.fits.as_slice() else {
-        panic!("{} fits", STUDIES.fits.len());
+fn m_and_x_i_of_la_clapiere_are_poorly_constrained_along_a_valley() {
+    let valley = STUDIES.valley.as_ref().unwrap();
+    let (low, high) = valley.m(valley::AS_GOOD).unwrap();
+    assert!(
+        (low..=high).contains(&la_clapiere::PAPER_M),
+        "{low} to {high}"
+    );
+    let (low, high) = valley.x_i(valley::AS_GOOD).unwrap();
+    assert!(
+        (low..=high).contains(&la_clapiere::PAPER_X_I),
+        "{low} to {high}"
+    );
+    let (low, high) = valley.m(valley::NEARLY).unwrap();
+    assert!(low <= 0.9 && high > la_clapiere::PAPER_M, "{low} to {high}");
+    let x_i = STUDIES.fits[0].report.parameters.x_i;
+    let (low, high) = (x_i.low.unwrap(), x_i.high.unwrap());
+    assert!(low < la_clapiere::PAPER_X_I && high > 2.0 * low, "{x_i:?}");
+}
+
+#[test]
+fn m_of_la_clapiere_lies_between_nothing_and_one_for_every_t_max_but_the_first_two() {
+    let rows = &STUDIES.growing.rows;
+    assert_eq!(rows.len(), 13);
+    for row in &rows[2..] {
+        assert!(claims::has_m_of_a_stable_law(row), "{row:?}");
+    }
+}
+
+#[test]
+fn the_transition_of_la_clapiere_recedes_as_t_max_grows() {
+    let rows = &STUDIES.growing.rows;
+    let transitions: Vec<_> = rows.iter().filter_map(|row| row.transition_time).collect();
+    assert!(transitions.len() >= 11, "{transitions:?}");
+    assert!(transitions.is_sorted(), "{transitions:?}");
+    let years = |time| recorded::decimal_year(time).unwrap();
+    let (first, last) = (
+        years(transitions[0]),
+        years(transitions[transitions.len() - 1]),
+    );
+    assert!(last - first > 2.0, "{first} to {last}");
+}
+
+#[test]
+fn the_river_explains_the_seasons_before_1986_and_nothing_after() {
+    let river = &STUDIES.river;
+    assert!(river.before.unwrap() > 0.5, "{river:?}");
+    assert!(river.after.unwrap() < 0.1, "{river:?}");
+}
+
+#[test]
+fn la_clapiere_is_six_times_slower_over_1988_to_1990() {
+    let fall = STUDIES.river.fall.unwrap();
+    assert!((5.0..7.0).contains(&fall), "{fall}");
+}
+
+#[test]
+fn every_statement_but_the_one_given_up_agrees() {
+    for claim in claims(&STUDIES).unwrap() {
+        // Three synthetic series of a kind are too few for their shares.
+        if claim.readings != Readings::Synthetic {
+            let is_given_up = claim.paper.contains("exhausts itself");
+            assert_eq!(claim.agrees, !is_given_up, "{claim:?}");
+        }
+    }
+}
+
+#[test]
+fn other_readings_in_a_folder_are_studied_and_called_no_reconstruction() {
+    let folder = tempfile::tempdir().unwrap();
+    let own = Archive::own().unwrap();
+    let mut vaiont = own.vaiont.clone();
+    vaiont.provenance = std::iter::once(("kind".to_owned(), "measured".to_owned())).collect();
+    let la_clapiere = slipwatch::reading::Recording {
+        series: vec![own.la_clapiere.clone()],
+        ..slipwatch::reading::Recording::default()
     };
-    let m = free.report.parameters.m.best.unwrap();
-    assert!(m < 1.0 && (m - la_clapiere::PAPER_M).abs() > 0.05, "{m}");
-    assert!(paper.report.rms.unwrap() > 1.1 * free.report.rms.unwrap());
+    for (name, recording) in [
+        ("vaiont-1963", &vaiont),
+        ("la-clapiere-1982-1995", &la_clapiere),
+    ] {
+        let file = folder.path().join(format!("{name}.mcap"));
+        slipwatch::runtime::ingest::write_mcap(recording, &file).unwrap();
+    }
+    let archive = Archive::of(folder.path()).unwrap();
+    assert_eq!(archive.vaiont_kind, Kind::Other("measured".to_owned()));
+    assert_eq!(archive.vaiont.series, own.vaiont.series);
+    assert_eq!(archive.la_clapiere, own.la_clapiere);
+    let studies = Studies::run(1, &archive).unwrap();
+    let text = document::text(&studies).unwrap();
+    assert!(!text.contains("Reconstruction") && !text.contains("reconstruction †"));
+    assert!(text.contains("Vaiont: measured."));
+    for (_, figure) in figures::all(&studies).unwrap() {
+        assert!(!figure.svg().contains("reconstruction"));
+    }
 }
 
 #[test]
@@ -151,14 +319,12 @@ fn almost_all_fits_of_la_clapieres_velocity_have_m_below_one_and_x_i_above() {
 }
 
 #[test]
-fn displacement_and_velocity_give_another_best_m_of_63_and_one_regime_of_67() {
+fn displacement_and_velocity_give_one_regime_of_67() {
     let both = |id| {
         let one = benchmark(id);
         (&one.free, &one.from_displacement)
     };
-    let (velocity, displacement) = both("63");
     let m = |report: &slipwatch::inversion::FitReport| report.parameters.m.best.unwrap();
-    assert!((m(velocity) - m(displacement)).abs() > 1.0);
     let (velocity, displacement) = both("67");
     assert_eq!(velocity.regime.label, Regime::StableAccelerating);
     assert_eq!(displacement.regime.label, Regime::StableAccelerating);

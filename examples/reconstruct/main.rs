@@ -8,7 +8,9 @@ mod interpolation;
 mod la_clapiere;
 mod loaded_law;
 mod noise;
+mod projection;
 mod provenance;
+mod tinee;
 mod vaiont;
 
 use anyhow::{Context, Result};
@@ -25,22 +27,22 @@ fn main() -> Result<()> {
     let la_clapiere = la_clapiere::recording()?;
     facts::la_clapiere(&la_clapiere)?;
     let days = la_clapiere::days()?;
-    let motions = la_clapiere::motions(&days, la_clapiere::Loads::Both)?;
+    let motions = la_clapiere::motions(&days, la_clapiere::Parts::All)?;
     facts::la_clapiere_motion(&motions)?;
     tell_shares(&days)?;
     write(&vaiont, &folder.join(vaiont::FILE))?;
     write(&la_clapiere, &folder.join(la_clapiere::FILE))
 }
 
-/// How much of La Clapière's slip the law alone, the river and the extra load account for.
+/// How much of La Clapière's slip the paper's fit, the river and the rest account for.
 fn tell_shares(days: &[la_clapiere::Day]) -> Result<()> {
     let mut out = std::io::stdout().lock();
     writeln!(
         out,
-        "La Clapière, slip since the first reading, mm: law alone, + river, + extra load"
+        "La Clapière, slip since the first reading, mm: the fit, + river, + the rest"
     )?;
-    for (year, [law, river, both]) in la_clapiere::shares(days)? {
-        writeln!(out, "{year:.1}  {law:6.0}  {river:6.0}  {both:6.0}")?;
+    for (year, [fit, river, all]) in la_clapiere::shares(days)? {
+        writeln!(out, "{year:.1}  {fit:6.0}  {river:6.0}  {all:6.0}")?;
     }
     Ok(())
 }

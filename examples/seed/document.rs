@@ -1,11 +1,16 @@
 //! The document: every study's table, and the paper's statements beside ours.
 
+use crate::as_drawn::{self, AsDrawn};
 use crate::claims::{Claim, Readings, claims};
+use crate::document_vaiont::vaiont_section;
+use crate::given_up::{self, Trial};
 use crate::la_clapiere::{self, Fit};
-use crate::recorded::{decimal_year, vaiont_day, velocities};
+use crate::recorded::{Archive, Kind, decimal_year, vaiont_day, velocities};
+use crate::river::{self, River};
 use crate::synthetic::{self, Study};
-use crate::vaiont::{self, Benchmark, COLLAPSE_DAY, Side, best_on};
-use anyhow::Result;
+use crate::vaiont::{self, Benchmark};
+use crate::valley::{self, AS_GOOD, NEARLY, Valley};
+use anyhow::{Context, Result};
 use slipwatch::fit::{Exponent, P_PRIOR};
 use slipwatch::inversion::{Estimate, FitReport, SweepReport};
 use slipwatch::reading::{Series, Timestamp};
@@ -15,8 +20,16 @@ use std::fmt::Write as _;
 #[derive(Debug)]
 pub(crate) struct Studies {
     pub(crate) vaiont: Vec<Benchmark>,
+    pub(crate) vaiont_kind: Kind,
+    /// Vaiont with an increase that exhausts itself.
+    pub(crate) trials: Vec<Trial>,
+    /// Vaiont with noise as it is drawn.
+    pub(crate) as_drawn: Vec<AsDrawn>,
     /// Displacement of 1982.9 to 1987.9.
     pub(crate) la_clapiere: Series,
+    pub(crate) la_clapiere_kind: Kind,
+    pub(crate) valley: Option<Valley>,
+    pub(crate) river: River,
     pub(crate) fits: Vec<Fit>,
     pub(crate) velocity_fit: FitReport,
     pub(crate) growing: SweepReport,
@@ -26,11 +39,20 @@ pub(crate) struct Studies {
 
 impl Studies {
     /// Runs every study, with `synthetics` series of each kind.
-    pub(crate) fn run(synthetics: u64) -> Result<Self> {
-        let la_clapiere = la_clapiere::readings()?;
+    pub(crate) fn run(synthetics: u64, archive: &Archive) -> Result<Self> {
+        let la_clapiere = la_clapiere::readings(&archive.la_clapiere)?;
+        let fits = la_clapiere::fits(&la_clapiere);
+        let free = &fits.first().context("no fit")?.least_squares;
+        let vaiont = vaiont::inverted(&archive.vaiont)?;
         Ok(Self {
-            vaiont: vaiont::inverted()?,
-            fits: la_clapiere::fits(&la_clapiere),
+            as_drawn: as_drawn::shares(&vaiont)?,
+            vaiont,
+            vaiont_kind: archive.vaiont_kind.clone(),
+            trials: given_up::trials(&archive.vaiont)?,
+            la_clapiere_kind: archive.la_clapiere_kind.clone(),
+            valley: valley::valley(&la_clapiere),
+            river: river::river(&archive.la_clapiere, archive.flow.as_ref(), free)?,
+            fits,
             velocity_fit: la_clapiere::velocity_fit(&la_clapiere)?,
             growing: la_clapiere::growing(&la_clapiere)?,
             growing_velocity: la_clapiere::growing(&velocities(&la_clapiere)?)?,
@@ -89,16 +111,16 @@ fn year(time: Option<Timestamp>) -> Result<String> {
     Ok(year.map_or("–".to_owned(), |year| format!("{year:.2}")))
 }
 
-fn day(time: Option<Timestamp>) -> Result<String> {
+pub(crate) fn day(time: Option<Timestamp>) -> Result<String> {
     let day = time.map(vaiont_day).transpose()?;
     Ok(day.map_or("–".to_owned(), |day| format!("{day:.2}")))
 }
 
-fn share(share: Option<f64>) -> String {
+pub(crate) fn share(share: Option<f64>) -> String {
     share.map_or("–".to_owned(), |share| format!("{share:.2}"))
 }
 
-fn interval(estimate: &Estimate) -> String {
+pub(crate) fn interval(estimate: &Estimate) -> String {
     let bound = |value: Option<f64>| match value {
         None => "open".to_owned(),
         value => m_text(value),
@@ -107,7 +129,7 @@ fn interval(estimate: &Estimate) -> String {
 }
 
 /// A table in Markdown.
-fn table(head: &[&str], rows: &[Vec<String>]) -> String {
+pub(crate) fn table(head: &[&str], rows: &[Vec<String>]) -> String {
     let mut out = format!("| {} |\n|{}\n", head.join(" | "), "---|".repeat(head.len()));
     for row in rows {
         let _ = writeln!(out, "| {} |", row.join(" | "));
@@ -118,16 +140,28 @@ fn table(head: &[&str], rows: &[Vec<String>]) -> String {
 /// The whole text.
 pub(crate) fn text(studies: &Studies) -> Result<String> {
     let sections = [
-        INTRODUCTION.to_owned(),
-        agreement(&claims(studies)?),
+        introduction(studies),
+        agreement(&claims(studies)?, studies),
         REGIMES.to_owned(),
-        vaiont_section(&studies.vaiont)?,
-        la_clapiere_section(&studies.fits)?,
-        growing_section(&studies.growing)?,
+        vaiont_section(studies)?,
+        la_clapiere_section(studies)?,
+        growing_section(studies)?,
         quantities_section(studies)?,
         synthetic_section(&studies.synthetic),
     ];
     Ok(sections.join("\n"))
+}
+
+fn introduction(studies: &Studies) -> String {
+    let readings = match (&studies.vaiont_kind, &studies.la_clapiere_kind) {
+        (Kind::Reconstruction, Kind::Reconstruction) => RECONSTRUCTED.to_owned(),
+        (vaiont, la_clapiere) => format!(
+            "The readings were given with `--recordings`. Vaiont: {}. La Clapière: {}.\n",
+            vaiont.name(),
+            la_clapiere.name()
+        ),
+    };
+    format!("{INTRODUCTION}\n{readings}\n{NOTATION}")
 }
 
 const INTRODUCTION: &str = "\
@@ -138,45 +172,66 @@ writes the same bytes. `tests/seed.rs` holds what is claimed.
 
 The paper: A. Helmstetter, D. Sornette, J.-R. Grasso, J. V. Andersen, S. Gluzman, V. Pisarenko, \"Slider-block friction model
 for landslides: application to Vaiont and La Clapière landslides\", J. Geophys. Res., 2004.
+";
 
-**The readings of both slopes are reconstructions, not measurements** ([recordings/README.md](../recordings/README.md)): made by
-the law itself under loads, their constants tuned by hand towards what the paper states. Where it says †, that statement was
+const RECONSTRUCTED: &str = "\
+**The readings of both slopes are reconstructions, not measurements** ([recordings/README.md](../recordings/README.md)): the
+laws that the paper fitted, with residuals that leave those fits the best. Where it says †, that statement was
 put in: where it comes out, the program finds what was put in; where it does not, these readings do not hold it. Neither
 is evidence about m, the regime or the slopes. The regimes of the law and the synthetic series need no recording.
 
+Whoever has the tables of the measured records can `slipwatch convert` them to `vaiont-1963.mcap` and
+`la-clapiere-1982-1995.mcap` (or .csv) in a folder, and `cargo run --release --example seed -- --recordings FOLDER` repeats every
+study on them, and writes this document and its figures there.
+";
+
+const NOTATION: &str = "\
 m, x_i, T and rms are those of the best unweighted least-squares fit, m from -20 to 29; 1⁻ and 1⁺ are laws that have run
 into m = 1 from below or above. Intervals bound 90 % by the posterior, \"open\" where the bound would be the prior's.
 P(unstable) is its probability of m > 1.
 ";
 
-fn agreement(claims: &[Claim]) -> String {
-    let rows: Vec<Vec<String>> = claims
-        .iter()
-        .map(|claim| {
-            let readings = match claim.readings {
-                Readings::Tuned => "reconstruction †",
-                Readings::Reconstructed => "reconstruction",
-                Readings::Synthetic => "synthetic",
-            };
-            let verdict = if claim.agrees {
-                "agrees"
-            } else {
-                "**differs**"
-            };
-            vec![
-                claim.paper.clone(),
-                claim.here.clone(),
-                readings.to_owned(),
-                verdict.to_owned(),
-            ]
-        })
-        .collect();
+fn agreement(claims: &[Claim], studies: &Studies) -> String {
+    let cells = |claim: &Claim| {
+        let is_of_vaiont = claim.paper.starts_with("Vaiont");
+        let kind = if is_of_vaiont {
+            &studies.vaiont_kind
+        } else {
+            &studies.la_clapiere_kind
+        };
+        let readings = match (claim.readings, kind) {
+            (Readings::Synthetic, _) => "synthetic".to_owned(),
+            (Readings::Tuned, Kind::Reconstruction) => "reconstruction †".to_owned(),
+            (_, kind) => kind.name().to_owned(),
+        };
+        let verdict = if claim.agrees {
+            "agrees"
+        } else {
+            "**differs**"
+        };
+        vec![
+            claim.paper.clone(),
+            claim.here.clone(),
+            readings,
+            verdict.to_owned(),
+        ]
+    };
+    let rows: Vec<Vec<String>> = claims.iter().map(cells).collect();
+    let is_made = studies.vaiont_kind == Kind::Reconstruction;
     format!(
-        "## Where ours and the paper agree\n\n{}\n\
-         A difference on a reconstruction says nothing against the paper either: its readings were not available.\n",
-        table(&["the paper", "here", "readings", "verdict"], &rows)
+        "## Where ours and the paper agree\n\n{}{}",
+        table(&["the paper", "here", "readings", "verdict"], &rows),
+        if is_made { GIVEN_UP } else { "" }
     )
 }
+
+/// What the differences above come from.
+const GIVEN_UP: &str = "
+A difference on a reconstruction says nothing against the paper either: its readings were not available. The one statement on
+Vaiont that was given up is that the increase of 5 and 63 exhausts itself: under the law, m = 1.35 and 1.24 bend 1/v
+downwards to the end, and any bend upwards in the last days moves m away (the trials below). What is kept of it: up to the
+last reading ln v gains less than 1/(69.5 - t) does.
+";
 
 const REGIMES: &str = "\
 ## The regimes of the law
@@ -188,96 +243,8 @@ contacts' initial age θᵢ and the initial velocity vᵢ. Red starts below the 
 approach, and fails where m ≥ 1; blue slows down.
 ";
 
-fn vaiont_section(benchmarks: &[Benchmark]) -> Result<String> {
-    let failures = failure_rows(benchmarks)?;
-    Ok(format!(
-        "## Vaiont: m, regime and failure\n\n\
-         **Reconstruction †:** m, x_i and T of the four motions, and the load lost in the last days, were put in. rms in mm/day. The\n\
-         last three columns are the best fits on either side of m = 1 and at it.\n\n{}\n\
-         **Reconstruction †:** days from 2 August 1963, the collapse being day {COLLAPSE_DAY}. The line goes through the last quarter of the\n\
-         record; passage is that of 1 m/day, by the panel of forecasts as the monitor uses it; the singularity that of\n\
-         the fit with the paper's m. α is the exponent of dv/dt = A v^α over the whole record, 2 where 1/v is straight; its interval takes the\n\
-         residuals as independent, which these are not (correlation 0.3 from day to day), and is too narrow.\n\n{}\n\
-         ![Velocity and inverse velocity, Vaiont](seed/vaiont.svg)\n\n\
-         Reconstruction †. Dots: readings. Blue: the best fit. Red: the paper's m imposed. Green: where the line meets zero.\n",
-        m_table(benchmarks),
-        table(
-            &[
-                "benchmark",
-                "line meets zero",
-                "r²",
-                "1 m/day: 5 %",
-                "50 %",
-                "95 %",
-                "chance in 400 days",
-                "singularity, paper's m",
-                "α",
-                "α, 90 %"
-            ],
-            &failures
-        )
-    ))
-}
-
-fn m_table(benchmarks: &[Benchmark]) -> String {
-    let side = |one: &Benchmark, side| {
-        best_on(side, &one.free).map_or("–".to_owned(), |best| {
-            format!("{} (m = {})", number(best.rms), m_text(best.m))
-        })
-    };
-    let row = |one: &Benchmark| {
-        let imposed = one.at_paper_m.best().map(|best| best.rms);
-        vec![
-            one.id.to_owned(),
-            format!("{:.2}", one.paper_m),
-            m_text(one.free.parameters.m.best),
-            interval(&one.free.parameters.m),
-            share(one.free.regime.probability_unstable),
-            one.free.regime.label.to_string(),
-            number(one.free.rms),
-            number(imposed),
-            side(one, Side::Above),
-            number(best_on(Side::At, &one.free).and_then(|best| best.rms)),
-            side(one, Side::Below),
-        ]
-    };
-    let head = [
-        "benchmark",
-        "m, paper",
-        "m, best",
-        "m, 90 %",
-        "P(unstable)",
-        "regime",
-        "rms",
-        "rms at the paper's m",
-        "m > 1",
-        "m = 1",
-        "m < 1",
-    ];
-    table(&head, &benchmarks.iter().map(row).collect::<Vec<_>>())
-}
-
-fn failure_rows(benchmarks: &[Benchmark]) -> Result<Vec<Vec<String>>> {
-    let row = |one: &Benchmark| -> Result<Vec<String>> {
-        let (line, passage) = (&one.free.inverse_velocity, &one.free.failure_time);
-        let imposed = one.at_paper_m.best();
-        Ok(vec![
-            one.id.to_owned(),
-            day(line.failure_time)?,
-            share(line.r_squared),
-            day(passage.low)?,
-            day(passage.median)?,
-            day(passage.high)?,
-            share(passage.probability),
-            number(imposed.and_then(|fit| fit.law.failure_days())),
-            number(line.alpha.and_then(|alpha| alpha.best)),
-            line.alpha.map_or("–".to_owned(), |alpha| interval(&alpha)),
-        ])
-    };
-    benchmarks.iter().map(row).collect()
-}
-
-fn la_clapiere_section(fits: &[Fit]) -> Result<String> {
+fn la_clapiere_section(studies: &Studies) -> Result<String> {
+    let fits = &studies.fits;
     let row = |fit: &Fit| -> Result<Vec<String>> {
         let (report, best) = (&fit.report, &fit.report.parameters);
         Ok(vec![
@@ -294,40 +261,100 @@ fn la_clapiere_section(fits: &[Fit]) -> Result<String> {
         ])
     };
     let rows = fits.iter().map(row).collect::<Result<Vec<_>>>()?;
+    let fitted = table(
+        &[
+            "m",
+            "best m",
+            "x_i",
+            "T, days",
+            "D, mm/day",
+            "rms, mm",
+            "transition",
+        ],
+        &rows,
+    );
+    let kind = &studies.la_clapiere_kind;
     Ok(format!(
         "## La Clapière, benchmark 10: displacement from 1982.9 to 1987.9\n\n\
-         **Reconstruction †:** made with m = 0.98 and x_i = 39 under a river and an extra load that were chosen until m < 1 came\n\
-         out. A law without load fits that load as friction, so neither m nor x_i is found again. The paper: m = 0.98, x_i = 39,\n\
-         beside an imposed m = 1.5. [la-clapiere.md](la-clapiere.md) has the shares of the loads.\n\n{}\n\
+         {}\n\n{fitted}\n{}\n\
          ![Displacement and velocity, La Clapière](seed/la-clapiere.svg)\n\n\
-         Reconstruction †. All fits are of the displacement; the right panel shows their velocities.\n",
-        table(
-            &[
-                "m",
-                "best m",
-                "x_i",
-                "T, days",
-                "D, mm/day",
-                "rms, mm",
-                "transition"
-            ],
-            &rows
-        )
+         {} All fits are of the displacement; the right panel shows their velocities.\n",
+        kind.note(LA_CLAPIERE_MADE),
+        valley_text(studies),
+        kind.note("Reconstruction †.")
     ))
 }
 
-fn growing_section(growing: &SweepReport) -> Result<String> {
+const LA_CLAPIERE_MADE: &str = "\
+**Reconstruction †:** the law with m = 0.98 and x_i = 39, times what a river does to the velocity until it loses its hold, and
+a slow change by a few percent that was searched for until this fit and those of the next section came out. The paper:
+m = 0.98, x_i = 39, poorly constrained, beside an imposed m = 1.5. [la-clapiere.md](la-clapiere.md) has the shares of the parts.";
+
+fn valley_text(studies: &Studies) -> String {
+    let Some(valley) = &studies.valley else {
+        return String::new();
+    };
+    let row = |place: &valley::Place| {
+        vec![
+            format!("{}", place.m),
+            number(place.x_i),
+            number(place.t_days),
+            number(place.d),
+            number(Some(place.rms)),
+            format!("{:+.1} %", 100.0 * (place.rms / valley.least_rms - 1.0)),
+        ]
+    };
+    let rows: Vec<Vec<String>> = valley.places.iter().map(row).collect();
+    let free = studies.fits.first();
+    let ends = |ends: Option<(f64, f64)>, text: fn(Option<f64>) -> String| {
+        ends.map_or("none".to_owned(), |(low, high)| {
+            format!("from {} to {}", text(Some(low)), text(Some(high)))
+        })
+    };
+    let head = [
+        "m imposed",
+        "x_i",
+        "T, days",
+        "D, mm/day",
+        "rms, mm",
+        "above the least",
+    ];
+    format!(
+        "{} How poorly m and x_i are constrained, by the best fit at each m below 1. Of those tried, m {}\n\
+         and x_i {} have an rms within {:.0} % of the least; m {} and x_i {}\n\
+         within {:.0} %. By the posterior 90 % lie in m {} and x_i {}.\n\n{}",
+        studies.la_clapiere_kind.note("**Reconstruction †:**"),
+        ends(valley.m(AS_GOOD), m_text),
+        ends(valley.x_i(AS_GOOD), number),
+        100.0 * AS_GOOD,
+        ends(valley.m(NEARLY), m_text),
+        ends(valley.x_i(NEARLY), number),
+        100.0 * NEARLY,
+        free.map_or("–".to_owned(), |fit| interval(&fit.report.parameters.m)),
+        free.map_or("–".to_owned(), |fit| interval(&fit.report.parameters.x_i)),
+        table(&head, &rows)
+    )
+}
+
+fn growing_section(studies: &Studies) -> Result<String> {
+    let kind = &studies.la_clapiere_kind;
     Ok(format!(
         "## La Clapière: t_max growing from two to five years\n\n\
-         **Reconstruction:** the river's season and the extra load are in these readings, and what follows of them was not tuned\n\
-         row by row. The minima are the distinct ones of the misfit. The transition is the inflection of the best fit's\n\
+         {}\n\
+         The minima are the distinct ones of the misfit. The transition is the inflection of the best fit's\n\
          velocity; a law that fails or only slows down has none, nor has one with m from -1 to 0.\n\n{}\n\
          ![Transition time, regime and minima against t_max](seed/sweep.svg)\n\n\
-         Reconstruction. Top: the transition time, where there is one; below the dashed line it is past. Middle: probability of\n\
+         {} Top: the transition time, where there is one; below the dashed line it is past. Middle: probability of\n\
          m > 1; the regime is undetermined between the dotted lines, or where no regime has .6. Bottom: m of every minimum.\n",
-        sweep_table(growing, "rms, mm")?
+        kind.note(GROWING_MADE),
+        sweep_table(&studies.growing, "rms, mm")?,
+        kind.note("Reconstruction.")
     ))
 }
+
+const GROWING_MADE: &str = "\
+**Reconstruction †:** the seasons of 1983 to 1985 and the slow change of the velocity were chosen so that 0 < m < 1 from the
+third refit on, and so that the transition recedes. What each refit's m and transition are was not.";
 
 fn sweep_table(growing: &SweepReport, rms: &str) -> Result<String> {
     let mut rows = Vec::new();
@@ -400,10 +427,12 @@ fn quantities_section(studies: &Studies) -> Result<String> {
     ];
     Ok(format!(
         "## Displacement against velocity\n\n\
-         **Reconstruction:** Vaiont's readings are velocities, summed to displacements by the trapezoidal rule; La Clapière's are\n\
+         {} Vaiont's readings are velocities, summed to displacements by the trapezoidal rule; La Clapière's are\n\
          displacements, their differences the mean velocities between, each at the middle of its interval.\n\n{}\n\
-         **Reconstruction:** the velocity of La Clapière under a growing t_max.\n\n{}",
+         {} The velocity of La Clapière under a growing t_max.\n\n{}",
+        studies.vaiont_kind.note("**Reconstruction:**"),
         table(&head, &rows),
+        studies.la_clapiere_kind.note("**Reconstruction:**"),
         sweep_table(&studies.growing_velocity, "rms, mm/day")?
     ))
 }

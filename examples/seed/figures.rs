@@ -1,6 +1,6 @@
 //! The figures of the document, each a file's text.
 
-use crate::document::m_text;
+use crate::document::{Studies, m_text};
 use crate::la_clapiere::Fit;
 use crate::recorded::{decimal_year, vaiont_day, velocities};
 use crate::regimes::{Column, Instant};
@@ -42,8 +42,27 @@ fn dots(name: &str, points: Vec<(f64, f64)>, colour: &'static str, radius: f64) 
     (name.to_owned(), mark)
 }
 
+/// Every figure, by the name of its file.
+pub(crate) fn all(studies: &Studies) -> Result<[(&'static str, Figure); 5]> {
+    let of_vaiont = studies.vaiont_kind.name();
+    let of_la_clapiere = studies.la_clapiere_kind.name();
+    Ok([
+        ("regimes", regimes(&crate::regimes::columns()?)),
+        ("vaiont", vaiont(&studies.vaiont, of_vaiont)?),
+        (
+            "la-clapiere",
+            la_clapiere(&studies.la_clapiere, &studies.fits, of_la_clapiere)?,
+        ),
+        (
+            "sweep",
+            sweep(&studies.growing, &studies.growing_velocity, of_la_clapiere)?,
+        ),
+        ("synthetic", synthetic(&studies.synthetic)),
+    ])
+}
+
 /// Slip, velocity and state, a row each, over the columns of m.
-pub(crate) fn regimes(columns: &[Column]) -> Figure {
+fn regimes(columns: &[Column]) -> Figure {
     let rows: [fn(&Instant) -> f64; 3] = [
         |instant| instant.slip,
         |instant| instant.velocity,
@@ -94,21 +113,20 @@ fn regime_panel(column: &Column, row: usize, of: fn(&Instant) -> f64) -> Panel {
 }
 
 /// Velocity and its inverse, a row each benchmark.
-pub(crate) fn vaiont(benchmarks: &[Benchmark]) -> Result<Figure> {
+fn vaiont(benchmarks: &[Benchmark], kind: &str) -> Result<Figure> {
     let mut panels = Vec::new();
     for benchmark in benchmarks {
-        panels.extend(vaiont_panels(benchmark)?);
+        panels.extend(vaiont_panels(benchmark, kind)?);
     }
     Ok(Figure {
-        description: "Velocity and inverse velocity of the four reconstructed Vaiont benchmarks"
-            .to_owned(),
+        description: format!("Velocity and inverse velocity of four Vaiont benchmarks ({kind})"),
         columns: 2,
         panel: (460.0, 250.0),
         panels,
     })
 }
 
-fn vaiont_panels(benchmark: &Benchmark) -> Result<[Panel; 2]> {
+fn vaiont_panels(benchmark: &Benchmark, kind: &str) -> Result<[Panel; 2]> {
     let mut readings = Vec::new();
     for reading in &benchmark.series.readings {
         readings.push((vaiont_day(reading.time)?, reading.value));
@@ -128,8 +146,9 @@ fn vaiont_panels(benchmark: &Benchmark) -> Result<[Panel; 2]> {
         });
     let paper_name = format!("paper's m = {:.2} imposed", benchmark.paper_m);
     let id = benchmark.id;
+    let name = format!("readings ({kind})");
     let mut inverse_marks = vec![
-        dots("readings (reconstruction)", inverse(&readings), BLACK, 2.2),
+        dots(&name, inverse(&readings), BLACK, 2.2),
         line(&best_name, inverse(&best), BLUE, ""),
         line(&paper_name, inverse(&at_paper_m), RED, DASHED),
     ];
@@ -144,7 +163,7 @@ fn vaiont_panels(benchmark: &Benchmark) -> Result<[Panel; 2]> {
             x: Axis::linear("days from 2 August 1963", 0.0, 76.0),
             y: Axis::linear("velocity, mm/day", 0.0, 1.35 * last),
             marks: vec![
-                dots("readings (reconstruction)", readings, BLACK, 2.2),
+                dots(&name, readings, BLACK, 2.2),
                 line(&best_name, best, BLUE, ""),
                 line(&paper_name, at_paper_m, RED, DASHED),
             ],
@@ -185,7 +204,7 @@ fn modelled(fit: &ConstantLoad, end_days: f64) -> Modelled {
 }
 
 /// Displacement and velocity of 1982.9 to 1987.9 with the fits of the displacement.
-pub(crate) fn la_clapiere(series: &Series, fits: &[Fit]) -> Result<Figure> {
+fn la_clapiere(series: &Series, fits: &[Fit], kind: &str) -> Result<Figure> {
     let first = series.readings.first().context("no readings")?.time;
     let start = decimal_year(first)?;
     let year = |day: f64| start + day / 365.25;
@@ -197,11 +216,11 @@ pub(crate) fn la_clapiere(series: &Series, fits: &[Fit]) -> Result<Figure> {
         pair.map(|one| (days_since(first, one.time), one.value))
             .collect()
     };
-    let name = "readings (reconstruction)";
-    let mut slip = vec![dots(name, metres(&pairs(series)), BLACK, 2.5)];
+    let name = format!("readings ({kind})");
+    let mut slip = vec![dots(&name, metres(&pairs(series)), BLACK, 2.5)];
     let between = pairs(&velocities(series)?);
     let mut speed = vec![dots(
-        "between readings (reconstruction)",
+        &format!("between readings ({kind})"),
         in_years(&between),
         BLACK,
         2.5,
@@ -218,8 +237,7 @@ pub(crate) fn la_clapiere(series: &Series, fits: &[Fit]) -> Result<Figure> {
     }
     let time = || Axis::linear("year", 1982.8, 1988.15);
     Ok(Figure {
-        description: "Displacement and velocity of benchmark 10 of La Clapière, reconstructed"
-            .to_owned(),
+        description: format!("Displacement and velocity of benchmark 10 of La Clapière ({kind})"),
         columns: 2,
         panel: (460.0, 320.0),
         panels: vec![
@@ -242,28 +260,29 @@ pub(crate) fn la_clapiere(series: &Series, fits: &[Fit]) -> Result<Figure> {
 }
 
 /// Transition time, regime and minima against t_max; a column each quantity.
-pub(crate) fn sweep(displacement: &SweepReport, velocity: &SweepReport) -> Result<Figure> {
+fn sweep(displacement: &SweepReport, velocity: &SweepReport, kind: &str) -> Result<Figure> {
     let mut panels = Vec::new();
     for row in 0..3 {
         for report in [displacement, velocity] {
             panels.push(match row {
-                0 => transition_panel(report)?,
-                1 => probability_panel(report)?,
-                _ => minima_panel(report)?,
+                0 => transition_panel(report, kind)?,
+                1 => probability_panel(report, kind)?,
+                _ => minima_panel(report, kind)?,
             });
         }
     }
     Ok(Figure {
-        description: "Transition time, regime and minima against t_max, La Clapière, reconstructed"
-            .to_owned(),
+        description: format!(
+            "Transition time, regime and minima against t_max, La Clapière ({kind})"
+        ),
         columns: 2,
         panel: (460.0, 260.0),
         panels,
     })
 }
 
-fn t_max_axis() -> Axis {
-    Axis::linear("t_max, year (reconstruction)", 1984.7, 1988.1)
+fn t_max_axis(kind: &str) -> Axis {
+    Axis::linear(&format!("t_max, year ({kind})"), 1984.7, 1988.1)
 }
 
 fn from_quantity(report: &SweepReport) -> &'static str {
@@ -273,7 +292,7 @@ fn from_quantity(report: &SweepReport) -> &'static str {
     }
 }
 
-fn transition_panel(report: &SweepReport) -> Result<Panel> {
+fn transition_panel(report: &SweepReport, kind: &str) -> Result<Panel> {
     let mut marks = vec![line(
         "transition at t_max",
         vec![(1984.0, 1984.0), (1989.0, 1989.0)],
@@ -285,14 +304,14 @@ fn transition_panel(report: &SweepReport) -> Result<Panel> {
     })?);
     Ok(Panel {
         title: format!("Transition time, {}", from_quantity(report)),
-        x: t_max_axis(),
+        x: t_max_axis(kind),
         y: Axis::linear("transition time, year", 1982.5, 1990.0),
         marks,
         legend: Legend::TopLeft,
     })
 }
 
-fn probability_panel(report: &SweepReport) -> Result<Panel> {
+fn probability_panel(report: &SweepReport, kind: &str) -> Result<Panel> {
     let mut marks = vec![
         line("", vec![(1984.0, 0.6), (1989.0, 0.6)], GREY, DOTTED),
         line("", vec![(1984.0, 0.4), (1989.0, 0.4)], GREY, DOTTED),
@@ -302,7 +321,7 @@ fn probability_panel(report: &SweepReport) -> Result<Panel> {
     })?);
     Ok(Panel {
         title: format!("Regime by the posterior, {}", from_quantity(report)),
-        x: t_max_axis(),
+        x: t_max_axis(kind),
         y: Axis::linear("P(unstable)", -0.05, 1.05),
         marks,
         legend: Legend::BottomLeft,
@@ -336,7 +355,7 @@ fn by_regime(
     Ok(marks)
 }
 
-fn minima_panel(report: &SweepReport) -> Result<Panel> {
+fn minima_panel(report: &SweepReport, kind: &str) -> Result<Panel> {
     let (mut others, mut best) = (Vec::new(), Vec::new());
     for row in &report.rows {
         let year = decimal_year(row.t_max)?;
@@ -350,7 +369,7 @@ fn minima_panel(report: &SweepReport) -> Result<Panel> {
     }
     Ok(Panel {
         title: format!("Minima of the misfit, {}", from_quantity(report)),
-        x: t_max_axis(),
+        x: t_max_axis(kind),
         y: Axis::linear("m", -22.0, 52.0),
         marks: vec![
             dots("local minimum", others, GREY, 2.5),
@@ -361,7 +380,7 @@ fn minima_panel(report: &SweepReport) -> Result<Panel> {
 }
 
 /// Best m and the posterior's interval of every series, in the order of the best m.
-pub(crate) fn synthetic(studies: &[Study]) -> Figure {
+fn synthetic(studies: &[Study]) -> Figure {
     let of_displacement = studies
         .iter()
         .filter(|study| study.quantity == Quantity::Displacement);

@@ -1,6 +1,6 @@
 //! La Clapière: the fit of 1982.9 to 1987.9, m free and imposed, and t_max growing from two to five years.
 
-use crate::recorded::{la_clapiere, report, velocities};
+use crate::recorded::{report, velocities};
 use anyhow::{Context, Result};
 use slipwatch::fit::{ConstantLoad, Exponent};
 use slipwatch::inversion::{FitReport, Inversion, Options, SweepOptions, SweepReport, sweep};
@@ -26,12 +26,12 @@ pub(crate) struct Fit {
 }
 
 /// The displacement readings of 1982.9 to 1987.9.
-pub(crate) fn readings() -> Result<Series> {
+pub(crate) fn readings(whole: &Series) -> Result<Series> {
     let options = Options {
         until: Some(FIVE_YEARS.parse()?),
         ..Options::default()
     };
-    Ok(Inversion::new(&la_clapiere()?, &options).series().clone())
+    Ok(Inversion::new(whole, &options).series().clone())
 }
 
 /// m free, then the paper's m, 1 and the imposed 1.5.

@@ -1,8 +1,10 @@
-//! The two reconstructions in the repository, and displacement and velocity out of each other.
+//! The readings of both slopes, reconstructions unless others are given, and displacement and velocity out of each other.
 
 use anyhow::{Context, Result};
 use slipwatch::inversion::{FitReport, Inversion, Options};
-use slipwatch::reading::{Reading, Recording, Series, Timestamp, Unit, after_days, days_since};
+use slipwatch::reading::{
+    Channel, Quantity, Reading, Recording, Series, Timestamp, Unit, after_days, days_since,
+};
 use slipwatch::runtime::ingest::{ReadOptions, read_files};
 use std::path::Path;
 
@@ -10,20 +12,105 @@ use std::path::Path;
 pub(crate) const VAIONT_DAY_ZERO: &str = "1963-08-02T00:00:00+01:00";
 const DAYS_PER_YEAR: f64 = 365.25;
 
-/// Benchmarks 5, 50, 63 and 67: velocity.
-pub(crate) fn vaiont() -> Result<Recording> {
-    recording("vaiont-1963-reconstruction.mcap")
+/// How the names of the files begin.
+const VAIONT: &str = "vaiont-1963";
+const LA_CLAPIERE: &str = "la-clapiere-1982-1995";
+/// Endings of files that can be read.
+const READABLE: [&str; 5] = ["mcap", "csv", "ndjson", "jsonl", "dat"];
+
+/// What the readings of a slope are.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// Made to fulfil what the paper states.
+    Reconstruction,
+    /// Anything else, as its file says.
+    Other(String),
 }
 
-/// Benchmark 10: displacement.
-pub(crate) fn la_clapiere() -> Result<Series> {
-    let recording = recording("la-clapiere-1982-1995-reconstruction.mcap")?;
-    Ok(recording.series(None, None)?.clone())
+impl Kind {
+    fn of(recording: &Recording) -> Self {
+        match recording.provenance.get("kind") {
+            Some(kind) if kind.contains("reconstruction") => Self::Reconstruction,
+            Some(kind) => Self::Other(kind.clone()),
+            None => Self::Other("of unstated origin".to_owned()),
+        }
+    }
+
+    /// `reconstructed` of a reconstruction, else what the readings are.
+    pub(crate) fn note(&self, reconstructed: &str) -> String {
+        match self {
+            Self::Reconstruction => reconstructed.to_owned(),
+            Self::Other(kind) => format!("**Readings {kind}.**"),
+        }
+    }
+
+    /// In a word or two.
+    pub(crate) fn name(&self) -> &str {
+        match self {
+            Self::Reconstruction => "reconstruction",
+            Self::Other(kind) => kind,
+        }
+    }
 }
 
-fn recording(file: &str) -> Result<Recording> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings");
-    let (recording, _) = read_files(&[folder.join(file)], &ReadOptions::default())?;
+/// The readings of both slopes.
+#[derive(Debug, Clone)]
+pub(crate) struct Archive {
+    /// Benchmarks 5, 50, 63 and 67: velocity.
+    pub(crate) vaiont: Recording,
+    pub(crate) vaiont_kind: Kind,
+    /// Benchmark 10: displacement.
+    pub(crate) la_clapiere: Series,
+    pub(crate) la_clapiere_kind: Kind,
+    /// The Tinée's flow, where the file has one channel.
+    pub(crate) flow: Option<Channel>,
+}
+
+impl Archive {
+    /// The recordings in the repository.
+    pub(crate) fn own() -> Result<Self> {
+        Self::of(&Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings"))
+    }
+
+    /// Those in a folder: a file each whose name begins as here, in any format that can be read.
+    pub(crate) fn of(folder: &Path) -> Result<Self> {
+        let vaiont = recording(folder, VAIONT)?;
+        let la_clapiere = recording(folder, LA_CLAPIERE)?;
+        let displacement = la_clapiere.series(None, Some(Quantity::Displacement))?;
+        Ok(Self {
+            vaiont_kind: Kind::of(&vaiont),
+            la_clapiere_kind: Kind::of(&la_clapiere),
+            la_clapiere: displacement.clone(),
+            flow: la_clapiere.channels.first().cloned(),
+            vaiont,
+        })
+    }
+}
+
+fn recording(folder: &Path, name: &str) -> Result<Recording> {
+    let context = || format!("{}: reading the folder", folder.display());
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).with_context(context)? {
+        let file = entry.with_context(context)?.path();
+        let is_named = |text: &str| text.starts_with(name);
+        let ending = file.extension().and_then(|ending| ending.to_str());
+        let is_readable = ending.is_some_and(|ending| READABLE.contains(&ending));
+        if is_readable
+            && file
+                .file_stem()
+                .and_then(|stem| stem.to_str())
+                .is_some_and(is_named)
+        {
+            found.push(file);
+        }
+    }
+    anyhow::ensure!(
+        found.len() == 1,
+        "{}: {} files whose name begins with {name}, expected one",
+        folder.display(),
+        found.len()
+    );
+    let (recording, _) = read_files(&found, &ReadOptions::default())?;
     Ok(recording)
 }
 

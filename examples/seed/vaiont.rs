@@ -1,10 +1,11 @@
 //! Vaiont: m, the regime and the time of failure of the four benchmarks, and the exponent alpha.
 
-use crate::recorded::{displacements, report, vaiont};
+use crate::recorded::{displacements, report};
+use crate::simplex::{self, Found};
 use anyhow::Result;
 use slipwatch::fit::{ConstantLoad, Exponent};
 use slipwatch::inversion::{Alternative, FitReport, Inversion, Options};
-use slipwatch::reading::{BenchmarkId, Series};
+use slipwatch::reading::{BenchmarkId, Recording, Series};
 
 /// The paper's m of each benchmark, in its order.
 pub(crate) const PAPER: [(&str, f64); 4] = [("5", 1.35), ("63", 1.24), ("67", 0.99), ("50", 1.00)];
@@ -23,6 +24,8 @@ pub(crate) struct Benchmark {
     pub(crate) free: FitReport,
     /// The same with its laws.
     pub(crate) least_squares: ConstantLoad,
+    /// By simplexes over the paper's unknowns.
+    pub(crate) simplex: Option<Found>,
     /// With the paper's m imposed.
     pub(crate) at_paper_m: ConstantLoad,
     /// From the velocities summed to displacements.
@@ -38,8 +41,7 @@ pub(crate) enum Side {
 }
 
 /// The four benchmarks in the paper's order.
-pub(crate) fn inverted() -> Result<Vec<Benchmark>> {
-    let recording = vaiont()?;
+pub(crate) fn inverted(recording: &Recording) -> Result<Vec<Benchmark>> {
     let one = |(id, paper_m): (&'static str, f64)| {
         let series = recording.series(Some(&BenchmarkId::new(id)), None)?;
         let inversion = Inversion::new(series, &Options::default());
@@ -53,6 +55,7 @@ pub(crate) fn inverted() -> Result<Vec<Benchmark>> {
             paper_m,
             series: series.clone(),
             free: inversion.report(&least_squares, 0.0),
+            simplex: simplex::fit(series)?,
             least_squares,
             at_paper_m: Inversion::new(series, &imposed).least_squares(),
             from_displacement: report(&displacements(series), &Options::default()),
