@@ -137,3 +137,40 @@ fn lanzada_f1_turns_red_between_48_and_6_hours_before_the_collapse_and_stays_red
     assert!((6.0..=48.0).contains(&hours), "red {hours:.1} h before");
     assert_eq!(crisis.last_level(), Level::Red);
 }
+
+const PREONZO: [&str; 5] = ["E1", "E2", "E3", "E4", "E5"];
+
+fn preonzo(id: &str) -> Crisis {
+    Crisis::of(&recording("preonzo-2012.mcap"), id, &policy(24))
+}
+
+/// In the early hours of 15 May 2012.
+fn preonzo_collapse() -> Timestamp {
+    "2012-05-15T01:30:00Z".parse().unwrap()
+}
+
+#[test]
+fn preonzo_is_red_at_each_extensometer_days_before_its_collapse_and_stays_so_through_the_pause() {
+    for id in PREONZO {
+        let crisis = preonzo(id);
+        let red = crisis.first(Level::Red);
+        let red = red.unwrap_or_else(|| panic!("{id}: never red"));
+        assert!(days_before(preonzo_collapse(), red) >= 2.0, "{id}: {red}");
+        assert_eq!(crisis.last_level(), Level::Red, "{id}");
+    }
+}
+
+#[test]
+fn preonzo_is_never_called_impossible_in_its_last_ten_days() {
+    for id in PREONZO {
+        let mut seen = 0;
+        for refit in preonzo(id).refits() {
+            if days_before(preonzo_collapse(), refit.time) > 10.0 {
+                continue;
+            }
+            assert!(refit.chance_within_outlook >= 0.05, "{id}: {refit:?}");
+            seen += 1;
+        }
+        assert!(seen >= 7, "{id}: {seen} refits");
+    }
+}

@@ -20,6 +20,8 @@ pub(crate) struct Refit {
     pub(crate) stable_accelerating: f64,
     #[allow(dead_code, reason = "shown where a claim about a refit fails")]
     pub(crate) red_chance: f64,
+    #[allow(dead_code, reason = "not every user of this file asks for it")]
+    pub(crate) chance_within_outlook: f64,
 }
 
 /// All series of a file, each velocity the mean of `averaging` where given.
@@ -87,6 +89,7 @@ impl Crisis {
                 failure_time,
                 inverse_velocity,
                 chance_within_evacuation_time,
+                chance_within_outlook,
                 ..
             } = &event.kind
             else {
@@ -99,6 +102,7 @@ impl Crisis {
                 intercept: inverse_velocity.failure_time,
                 stable_accelerating: regime.probabilities[&stable],
                 red_chance: *chance_within_evacuation_time,
+                chance_within_outlook: *chance_within_outlook,
             })
         };
         self.events.iter().filter_map(refit).collect()

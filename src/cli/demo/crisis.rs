@@ -16,7 +16,7 @@ pub(super) enum End {
 pub(super) struct Crisis {
     pub(super) site: &'static str,
     pub(super) benchmarks: &'static [&'static str],
-    /// `measured` or `reconstruction`.
+    /// `measured`, `measured (digitised)` or `reconstruction`.
     pub(super) kind: &'static str,
     pub(super) evacuation_hours: i64,
     pub(super) end: End,
@@ -25,7 +25,16 @@ pub(super) struct Crisis {
 }
 
 /// In the order in which they are played.
-pub(super) const CRISES: [Crisis; 3] = [
+pub(super) const CRISES: [Crisis; 4] = [
+    Crisis {
+        site: "Preonzo 2012",
+        benchmarks: &["E3", "E5"],
+        kind: "measured (digitised)",
+        evacuation_hours: 24,
+        end: End::Failed("2012-05-15T01:30:00Z"),
+        file: "preonzo-2012.mcap",
+        recording: include_bytes!("../../../recordings/preonzo-2012.mcap"),
+    },
     Crisis {
         site: "Vaiont 1963",
         benchmarks: &["5", "63"],

@@ -6,7 +6,7 @@ use crate::alert::Level;
 use crate::reading::{BenchmarkId, Timestamp, days_since};
 
 /// The table's head.
-pub(super) const HEAD: &str = "crisis                 point    kind            first orange               first red                  ten days before          what happened";
+pub(super) const HEAD: &str = "crisis                 point    kind                 first orange               first red                  ten days before          what happened";
 
 /// One benchmark's line of the table.
 pub(super) fn line(crisis: &Crisis, id: &BenchmarkId, record: &Record) -> String {
@@ -21,7 +21,7 @@ pub(super) fn line(crisis: &Crisis, id: &BenchmarkId, record: &Record) -> String
         End::Stood(words) => words.to_owned(),
     };
     format!(
-        "{:<22} {:<8} {:<15} {:<26} {:<26} {:<24} {happened}",
+        "{:<22} {:<8} {:<20} {:<26} {:<26} {:<24} {happened}",
         crisis.site,
         id.as_str(),
         crisis.kind,

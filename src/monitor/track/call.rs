@@ -9,6 +9,28 @@ use crate::monitor::event::{AlertState, Event, EventKind};
 use crate::reading::Timestamp;
 use jiff::SignedDuration;
 
+/// How far ahead red, and orange and yellow, look from the newest reading.
+#[derive(Debug, Clone, Copy)]
+struct Ahead {
+    red: SignedDuration,
+    orange: SignedDuration,
+}
+
+impl Ahead {
+    fn of(policy: &Policy, forecast: Option<&Forecast>) -> Self {
+        forecast.map_or(
+            Self {
+                red: policy.evacuation_time,
+                orange: policy.outlook,
+            },
+            |forecast| Self {
+                red: forecast.to_the_next_reading(policy.evacuation_time),
+                orange: forecast.reach(policy),
+            },
+        )
+    }
+}
+
 impl Track {
     pub(super) fn alert(
         &mut self,
@@ -17,15 +39,12 @@ impl Track {
         forecast: Option<&Forecast>,
     ) -> Vec<Event> {
         let within = |span| forecast.map(|forecast| forecast.chance_within(days(span)));
-        let before_it_is_late = forecast.map(|forecast| {
-            forecast.chance_within(forecast.to_the_next_reading(days(policy.evacuation_time)))
-        });
-        let reach = forecast.map_or(policy.outlook, |forecast| forecast.reach(policy));
+        let ahead = Ahead::of(policy, forecast);
         let rates = forecast.map_or(&[][..], |forecast| &forecast.plain.rates);
         let look = self.look.filter(|(until, _)| time < *until);
         let mut evidence = Evidence {
-            chance_within_evacuation_time: before_it_is_late,
-            chance_within_outlook: within(reach),
+            chance_within_evacuation_time: within(ahead.red),
+            chance_within_outlook: within(ahead.orange),
             causes: look.map(|(_, cause)| cause).into_iter().collect(),
             ..self.observed(time, rates)
         };
@@ -48,7 +67,7 @@ impl Track {
         self.levels.note(time, self.latch.level());
         let told = transitions
             .iter()
-            .map(|change| self.alert_event(time, policy, (&evidence, reach), change));
+            .map(|change| self.alert_event(time, policy, (&evidence, ahead), change));
         events.extend(told);
         events
     }
@@ -69,7 +88,7 @@ impl Track {
         }
         let evidence = self.observed(time, &self.history.rates());
         let change = self.latch.raise(policy, &evidence)?;
-        Some(self.alert_event(time, policy, (&evidence, policy.outlook), &change))
+        Some(self.alert_event(time, policy, (&evidence, Ahead::of(policy, None)), &change))
     }
 
     /// What the readings show by themselves.
@@ -93,7 +112,7 @@ impl Track {
         &self,
         time: Timestamp,
         policy: &Policy,
-        (evidence, reach): (&Evidence, SignedDuration),
+        (evidence, ahead): (&Evidence, Ahead),
         change: &Transition,
     ) -> Event {
         let state = match change.entered {
@@ -101,7 +120,7 @@ impl Track {
             Entered::No => AlertState::Resolved,
         };
         let key = format!("{}/{}/{}", self.benchmark, change.level, change.since);
-        let text = self.text(policy, (evidence, reach), change);
+        let text = self.text(policy, (evidence, ahead), change);
         self.event(
             time,
             EventKind::Alert {
@@ -117,7 +136,7 @@ impl Track {
     fn text(
         &self,
         policy: &Policy,
-        (evidence, reach): (&Evidence, SignedDuration),
+        (evidence, ahead): (&Evidence, Ahead),
         change: &Transition,
     ) -> String {
         let verb = match change.entered {
@@ -136,16 +155,16 @@ impl Track {
             })
         };
         format!(
-            "benchmark {}: {}{verb} ({}){}{}{velocity}; failure is {} mm/day",
+            "benchmark {}: {}{verb} ({}){}{}{velocity}; the critical velocity is {} mm/day",
             self.benchmark,
             change.level,
             change.rule,
             chance(
-                "the evacuation time",
+                "the evacuation time and until the next reading",
                 evidence.chance_within_evacuation_time,
-                policy.evacuation_time
+                ahead.red
             ),
-            chance("the outlook", evidence.chance_within_outlook, reach),
+            chance("the outlook", evidence.chance_within_outlook, ahead.orange),
             policy.critical_velocity_mm_per_day,
         )
     }

@@ -59,14 +59,13 @@ impl Forecast {
         }
     }
 
-    /// How far ahead red looks from the newest reading, days: an evacuation takes so long, and it can begin no sooner
-    /// than the next reading tells.
-    pub(super) fn to_the_next_reading(&self, evacuation_days: f64) -> f64 {
-        evacuation_days
-            + self
-                .plain
-                .interval_days
-                .min(MOST_INTERVALS * evacuation_days)
+    /// How far ahead red looks from the newest reading: what this one does not call, the next one may, and an
+    /// evacuation begins then.
+    pub(super) fn to_the_next_reading(&self, evacuation: SignedDuration) -> SignedDuration {
+        let most = MOST_INTERVALS * days(evacuation);
+        let interval = self.plain.interval_days.min(most) * SECONDS_PER_DAY;
+        let interval = SignedDuration::try_from_secs_f64(interval).unwrap_or_default();
+        evacuation.saturating_add(interval)
     }
 
     /// Chance of a collapse within `days`, as the level takes it: what the fuller law does not explain, it cannot
