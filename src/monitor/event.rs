@@ -155,7 +155,7 @@ pub enum EventKind {
     },
     /// People asked for something.
     Order {
-        /// `acknowledge`, `shelve` or `silence`.
+        /// `acknowledge`, `shelve`, `silence` or `unsilence`.
         order: String,
         /// Until when, by the wall clock.
         until: Option<Timestamp>,
