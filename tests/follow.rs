@@ -77,6 +77,7 @@ impl Bench {
                     benchmark, what, ..
                 } => format!("{benchmark} gives {what}"),
                 Input::Trouble { kind, .. } => kind,
+                Input::Notice(notice) => format!("{notice:?}"),
                 Input::Settings(_) | Input::Order(_) | Input::Found(_) | Input::Tick => {
                     panic!("not in a file")
                 }

@@ -298,7 +298,7 @@ async fn what_is_superseded_or_resolved_is_not_tried_again() {
     let orange = alert_of(Level::Orange, "orange", "");
     dispatcher.offer(&orange);
     eventually("some calls", || calls(&folder, "orange") >= 3).await;
-    // The hook does not ask for red, but hears no more of the orange either. Another level's
+    // The hook does not ask for red, but is told no more of the orange either. Another level's
     // alert in hand shows that the worker goes on.
     dispatcher.supersede(&alert_of(Level::Red, "red", ""));
     dispatcher.offer(&alert_of(Level::Unknown, "unknown", ""));
@@ -306,7 +306,7 @@ async fn what_is_superseded_or_resolved_is_not_tried_again() {
     let before = calls(&folder, "orange");
     eventually("more calls", || calls(&folder, "unknown") >= 10).await;
     assert_eq!(calls(&folder, "orange"), before);
-    // Neither does it hear more of a silence that has ended.
+    // Neither is it told more of a silence that has ended.
     let mut end = alert_of(Level::Unknown, "unknown", "");
     end.state = AlertState::Resolved;
     std::fs::write(folder.path().join("hook.sh"), "exit 0").unwrap();
@@ -342,10 +342,69 @@ async fn only_the_levels_that_a_hook_asks_for_reach_it() {
     let (folder, config) = hook("echo $SLIPWATCH_LEVEL >> calls");
     let dispatcher = Dispatcher::start(&[config], &quick_retry(), Delivered::default());
     for level in [Level::Yellow, Level::Orange, Level::Unknown, Level::Red] {
-        dispatcher.offer(&alert_of(level, level.name(), ""));
+        dispatcher.offer(&alert_at(level.name(), level, AlertState::Firing));
     }
     assert_eq!(dispatcher.close(LIMIT).await, Some(0));
-    assert_eq!(read(&folder, "calls"), "orange\nred\n");
+    let mut calls: Vec<String> = read(&folder, "calls").lines().map(str::to_owned).collect();
+    calls.sort();
+    assert_eq!(calls, ["orange", "red"]);
+}
+
+/// An alert at another benchmark than the others'.
+fn alert_at(benchmark: &str, level: Level, state: AlertState) -> Alert {
+    let mut alert = alert_of(level, &format!("{benchmark}/{level}"), "");
+    alert.event.benchmark = Some(BenchmarkId::new(benchmark));
+    alert.state = state;
+    alert
+}
+
+#[tokio::test]
+async fn a_red_is_told_before_everything_that_waits_for_a_slow_hook() {
+    let (folder, mut config) = hook("echo $SLIPWATCH_KEY >> calls; sleep 0.3");
+    config.levels.push(Level::Unknown);
+    let dispatcher = Dispatcher::start(&[config], &quick_retry(), Delivered::default());
+    for number in 0..40 {
+        let name = format!("p{number}");
+        assert!(dispatcher.offer(&alert_at(&name, Level::Unknown, AlertState::Firing)));
+    }
+    eventually("the first calls", || !read(&folder, "calls").is_empty()).await;
+    assert!(dispatcher.offer(&alert_at("toe", Level::Red, AlertState::Firing)));
+    eventually("the red", || read(&folder, "calls").contains("toe/red")).await;
+    let before = read(&folder, "calls")
+        .lines()
+        .take_while(|line| *line != "toe/red")
+        .count();
+    assert!(before <= 8, "{before} before it");
+    assert!(dispatcher.close(LIMIT).await.is_some());
+}
+
+#[tokio::test]
+async fn what_is_superseded_while_it_waits_is_not_told_and_a_silence_that_is_over_neither() {
+    let (folder, mut config) =
+        hook("echo $SLIPWATCH_KEY $SLIPWATCH_STATE >> calls; until [ -e go ]; do sleep 0.01; done");
+    config.levels.push(Level::Unknown);
+    let dispatcher = Dispatcher::start(&[config], &quick_retry(), Delivered::default());
+    // These keep the hook at work.
+    for number in 0..4 {
+        dispatcher.offer(&alert_at(
+            &format!("p{number}"),
+            Level::Red,
+            AlertState::Firing,
+        ));
+    }
+    eventually("four at once", || {
+        read(&folder, "calls").lines().count() == 4
+    })
+    .await;
+    dispatcher.offer(&alert_at("a", Level::Orange, AlertState::Firing));
+    dispatcher.offer(&alert_at("a", Level::Red, AlertState::Firing));
+    dispatcher.offer(&alert_at("b", Level::Unknown, AlertState::Firing));
+    dispatcher.offer(&alert_at("b", Level::Unknown, AlertState::Resolved));
+    std::fs::write(folder.path().join("go"), "").unwrap();
+    assert_eq!(dispatcher.close(LIMIT).await, Some(0));
+    let calls = read(&folder, "calls");
+    let rest: Vec<&str> = calls.lines().skip(4).collect();
+    assert_eq!(rest, ["a/red firing"], "{calls}");
 }
 
 async fn deliver_once(config: &HookConfig, state: &Path) {

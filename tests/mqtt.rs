@@ -168,6 +168,7 @@ fn values(delivery: &Delivery) -> Vec<f64> {
         Input::Sample { .. }
         | Input::Missing { .. }
         | Input::Trouble { .. }
+        | Input::Notice(_)
         | Input::Settings(_)
         | Input::Order(_)
         | Input::Found(_)
@@ -210,6 +211,97 @@ async fn what_was_acknowledged_does_not_come_again_and_what_was_not_does() {
     }
     assert_eq!(came, [3.0, 4.0, 5.0, 6.0]);
     second.end().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_message_that_is_too_long_is_set_aside_and_what_comes_after_it_is_taken() {
+    let Some(broker) = Mosquitto::start() else {
+        return;
+    };
+    let mut source = Source::start(&broker);
+    tokio::time::sleep(Duration::from_millis(1500)).await;
+    let long = "x".repeat(17 << 20);
+    let options = {
+        let mut options = MqttOptions::new("long writer", "127.0.0.1", broker.port);
+        options.set_max_packet_size(32 << 20, 32 << 20);
+        options
+    };
+    let (client, mut connection) = AsyncClient::new(options, 4);
+    let topic = "site/5/displacement";
+    for payload in [long, message(1)] {
+        client
+            .publish(topic, QoS::AtLeastOnce, false, payload)
+            .await
+            .unwrap();
+    }
+    let writer = tokio::spawn(async move { while connection.poll().await.is_ok() {} });
+    let delivery = source.next().await;
+    assert_eq!((values(&delivery), delivery.quarantined), (vec![], 1));
+    delivery.receipt.acknowledge().await.unwrap();
+    let delivery = source.next().await;
+    assert_eq!(values(&delivery), [1.0]);
+    delivery.receipt.acknowledge().await.unwrap();
+    writer.abort();
+    source.end().await;
+}
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_slipwatch");
+
+/// A daemon at work in a folder of its own; ended with the test.
+struct Daemon(TempDir, Child);
+
+impl Daemon {
+    fn start(broker: &Mosquitto) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let text = format!(
+            "[site]\nname = \"Toc\"\nstate_dir = \"state\"\n[[source]]\nid = \"radio\"\n\
+             kind = \"mqtt\"\nurl = \"mqtt://127.0.0.1:{}\"\ntopic = \"site/+/displacement\"\n",
+            broker.port
+        );
+        std::fs::write(folder.path().join("site.toml"), text).unwrap();
+        let process = Command::new(PROGRAM)
+            .args(["run", "site.toml"])
+            .current_dir(folder.path())
+            .stderr(Stdio::null())
+            .stdout(Stdio::null())
+            .spawn();
+        Self(folder, process.unwrap())
+    }
+
+    fn readings(&self) -> usize {
+        let store = slipwatch::store::Store::look(&self.0.path().join("state"));
+        let steps = store
+            .map(|store| store.steps(0).unwrap())
+            .unwrap_or_default();
+        let is_reading = |input: &Input| matches!(input, Input::Reading { .. });
+        steps.iter().filter(|step| is_reading(&step.input)).count()
+    }
+}
+
+impl Drop for Daemon {
+    fn drop(&mut self) {
+        let _ = self.1.kill();
+        let _ = self.1.wait();
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn two_daemons_of_one_site_name_each_get_every_message() {
+    let Some(broker) = Mosquitto::start() else {
+        return;
+    };
+    let daemons = [Daemon::start(&broker), Daemon::start(&broker)];
+    tokio::time::sleep(Duration::from_secs(4)).await;
+    broker
+        .publish(&(1..=20).map(message).collect::<Vec<_>>())
+        .await;
+    for _ in 0..300 {
+        if daemons.iter().all(|one| one.readings() == 20) {
+            return;
+        }
+        tokio::time::sleep(Duration::from_millis(100)).await;
+    }
+    panic!("{:?}", daemons.each_ref().map(Daemon::readings));
 }
 
 #[tokio::test(flavor = "multi_thread")]

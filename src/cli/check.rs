@@ -48,7 +48,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
 /// By what lies in the sources' files now.
 fn slow_sampling(file: &Path) -> Result<Vec<String>, ConfigError> {
     let config = config::load(file)?;
-    let lines = sampling::too_slow(&config).into_iter();
+    let lines = sampling::doubts(&config).into_iter();
     let place = file.display();
     Ok(lines
         .map(|line| format!("{place}: warning: {line}"))

@@ -21,6 +21,7 @@ mod sweep;
 mod table;
 mod text;
 
+use crate::runtime::log;
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
@@ -81,6 +82,7 @@ pub fn main() -> ExitCode {
         },
         Err(error) => return exit::of_parser(&error),
     };
+    log::finish();
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => exit::report(&error),

@@ -1,6 +1,7 @@
 //! Asks a site's state, or leaves an order in it: beside a running daemon or without one.
 
 use super::args::{Format, OutputArgs};
+use super::exit::UsageError;
 use super::table::Table;
 use super::text;
 use crate::alert::Level;
@@ -90,7 +91,7 @@ enum Action {
         /// Where
         #[arg(long, value_name = "ID")]
         benchmark: String,
-        /// For how long, such as 8h
+        /// For how long, such as 8h; thirty days at most
         #[arg(long = "for", value_name = "DURATION", value_parser = value::duration)]
         span: SignedDuration,
         #[command(flatten)]
@@ -101,12 +102,20 @@ enum Action {
         #[command(flatten)]
         site: SiteArgs,
     },
+    /// Tell again, from now on, of what was silenced or shelved
+    Unsilence {
+        /// Where; default is everywhere
+        #[arg(long, value_name = "ID")]
+        benchmark: Option<String>,
+        #[command(flatten)]
+        site: SiteArgs,
+    },
     /// Tell of nothing, red neither; what is in force at the end is told then
     Silence {
         /// Where; default is everywhere
         #[arg(long, value_name = "ID")]
         benchmark: Option<String>,
-        /// For how long, such as 30min
+        /// For how long, such as 30min; seven days at most
         #[arg(long = "for", value_name = "DURATION", value_parser = value::duration)]
         span: SignedDuration,
         #[command(flatten)]
@@ -148,7 +157,9 @@ struct Standing {
     since: Option<Timestamp>,
     /// Since when the monitor cannot tell: no data, a sensor fault.
     unknown_since: Option<Timestamp>,
-    newest_reading: Timestamp,
+    /// Whether nothing can be said of it now; so it is before its first reading.
+    is_unknown: bool,
+    newest_reading: Option<Timestamp>,
     regime: Option<String>,
     velocity_mm_per_day: Option<f64>,
     failure_time: Option<Timestamp>,
@@ -162,6 +173,10 @@ struct SiteStatus {
     steps: i64,
     alerts_waiting: usize,
     bytes: u64,
+    /// Since when nothing can be said of the site: too many benchmarks are unknown, or the clock is wrong.
+    site_unknown_since: Option<Timestamp>,
+    /// The orders by which alerts are not told.
+    silences: Vec<Event>,
 }
 
 /// Says how the site stands.
@@ -175,11 +190,16 @@ pub(super) fn status(args: &StatusArgs) -> anyhow::Result<()> {
             refits.insert(benchmark, event.kind);
         }
     }
-    let each = store.benchmarks()?.into_iter().map(|(benchmark, newest)| {
+    let mut newest: BTreeMap<BenchmarkId, Option<Timestamp>> = BTreeMap::new();
+    newest.extend(config.benchmarks.iter().map(|one| (one.id.clone(), None)));
+    let read = store.benchmarks()?.into_iter();
+    newest.extend(read.map(|(benchmark, time)| (benchmark, Some(time))));
+    let each = newest.into_iter().map(|(benchmark, newest)| {
         let standing = Standing {
             level: Level::Green,
             since: None,
             unknown_since: None,
+            is_unknown: newest.is_none(),
             newest_reading: newest,
             regime: None,
             velocity_mm_per_day: None,
@@ -195,6 +215,8 @@ pub(super) fn status(args: &StatusArgs) -> anyhow::Result<()> {
         steps: store.last_step(),
         alerts_waiting: store.waiting()?.len(),
         bytes: store.bytes()?,
+        site_unknown_since: levels.get(&(None, Level::Unknown)).map(|event| event.time),
+        silences: silences(&store)?,
     };
     args.site.output.print(&status, status_text)
 }
@@ -211,7 +233,7 @@ fn stands(
             continue;
         }
         if *level == Level::Unknown {
-            standing.unknown_since = Some(event.time);
+            (standing.unknown_since, standing.is_unknown) = (Some(event.time), true);
         } else {
             (standing.level, standing.since) = (*level, Some(event.time));
         }
@@ -248,22 +270,26 @@ fn status_text(status: &SiteStatus) -> String {
             .velocity_mm_per_day
             .map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
         table.row([
-            one.benchmark.to_string(),
-            if one.unknown_since.is_some() {
+            text::plain(one.benchmark.as_str()),
+            if one.is_unknown {
                 format!("{}, unknown", one.level)
             } else {
                 one.level.to_string()
             },
             time(one.unknown_since.or(one.since)),
-            text::minute(one.newest_reading),
+            time(one.newest_reading),
             one.regime.clone().unwrap_or_else(|| "-".to_owned()),
             velocity,
             time(one.failure_time),
         ]);
     }
+    let silences = status.silences.iter();
+    let silences: String = silences.map(|event| text::line(event) + "\n").collect();
     format!(
-        "{}: {} inputs taken, {} alerts wait for a hook\n\n{table}",
-        status.site, status.steps, status.alerts_waiting
+        "{}: {} inputs taken, {} alerts wait for a hook\n{silences}\n{table}",
+        text::plain(&status.site),
+        status.steps,
+        status.alerts_waiting
     )
 }
 
@@ -341,6 +367,7 @@ pub(super) fn alerts(args: &AlertsArgs) -> anyhow::Result<()> {
             span,
             site,
         } => {
+            limit(*span, Order::LONGEST_SHELVE)?;
             let (benchmark, until) = (BenchmarkId::new(benchmark), until(*span)?);
             (site, Order::Shelve { benchmark, until })
         }
@@ -349,12 +376,20 @@ pub(super) fn alerts(args: &AlertsArgs) -> anyhow::Result<()> {
             span,
             site,
         } => {
+            limit(*span, Order::LONGEST_SILENCE)?;
             let (benchmark, until) = (benchmark.as_ref().map(BenchmarkId::new), until(*span)?);
             (site, Order::Silence { benchmark, until })
         }
+        Action::Unsilence { benchmark, site } => {
+            let benchmark = benchmark.as_ref().map(BenchmarkId::new);
+            (site, Order::Unsilence { benchmark })
+        }
     };
-    let (_, store) = site.open()?;
+    let (config, store) = site.open()?;
+    let is_known =
+        |benchmark: &BenchmarkId| config.benchmarks.iter().any(|one| one.id == *benchmark);
     if let Some(benchmark) = order.benchmark()
+        && !is_known(benchmark)
         && !store.benchmarks()?.contains_key(benchmark)
     {
         anyhow::bail!("benchmark {benchmark} has given no readings yet");
@@ -363,6 +398,43 @@ pub(super) fn alerts(args: &AlertsArgs) -> anyhow::Result<()> {
     site.output.print(&order, |_| {
         "noted; the daemon takes it within a second, or at its next start\n".to_owned()
     })
+}
+
+/// Nobody is to be left without alerts for ever by one order.
+fn limit(span: SignedDuration, longest: SignedDuration) -> anyhow::Result<()> {
+    if span > longest {
+        let hours = longest.as_hours();
+        let told =
+            format!("--for {span:#} is too long: {hours}h at most, then give the order again");
+        return Err(UsageError(told).into());
+    }
+    Ok(())
+}
+
+/// The orders in force by which alerts are not told, as they were given.
+fn silences(store: &Store) -> anyhow::Result<Vec<Event>> {
+    let now = clock::now();
+    let mut standing: Vec<Event> = Vec::new();
+    let mut after = 0;
+    loop {
+        let events = store.events(after, Some("order"), None)?;
+        let Some((last, _)) = events.last() else {
+            return Ok(standing);
+        };
+        after = *last;
+        for (_, body) in &events {
+            let event: Event = serde_json::from_str(body)?;
+            let EventKind::Order { order, until, .. } = &event.kind else {
+                continue;
+            };
+            if order == "unsilence" {
+                let place = &event.benchmark;
+                standing.retain(|one| place.is_some() && one.benchmark != *place);
+            } else if until.is_some_and(|until| until > now) {
+                standing.push(event);
+            }
+        }
+    }
 }
 
 fn redeliver(site: &SiteArgs) -> anyhow::Result<()> {
@@ -380,6 +452,7 @@ fn list(site: &SiteArgs) -> anyhow::Result<()> {
     let (_, store) = site.open()?;
     let mut stdout = std::io::stdout().lock();
     let mut standing: Vec<Event> = in_force(&store)?.into_values().collect();
+    standing.extend(silences(&store)?);
     standing.sort_by_key(|event| event.time);
     for event in &standing {
         match site.output.format {

@@ -7,7 +7,24 @@ use crate::reading::Timestamp;
 /// One event on one line: when, where, what.
 pub(super) fn line(event: &Event) -> String {
     let place = event.benchmark.as_ref().map_or("site", |id| id.as_str());
-    format!("{}  {place}  {}", minute(event.time), what(&event.kind))
+    let text = format!("{}  {place}  {}", minute(event.time), what(&event.kind));
+    plain(&text)
+}
+
+/// The text with its control characters written out: a name with a line break in it forges no line.
+pub(super) fn plain(text: &str) -> String {
+    if !text.chars().any(char::is_control) {
+        return text.to_owned();
+    }
+    let mut plain = String::with_capacity(text.len() + 8);
+    for letter in text.chars() {
+        if letter.is_control() {
+            plain.extend(letter.escape_default());
+        } else {
+            plain.push(letter);
+        }
+    }
+    plain
 }
 
 fn what(kind: &EventKind) -> String {

@@ -1,6 +1,7 @@
 //! `check`: the site file and what it names on this machine, without starting anything.
 
 use super::{Config, ConfigError, HookConfig, SiteConfig, Source, Token, TokenError, load};
+use crate::alert::Level;
 use crate::reading::Quantity;
 use jiff::SignedDuration;
 use serde::Serialize;
@@ -53,6 +54,7 @@ pub fn check(file: &Path) -> Result<Summary, ConfigError> {
             .chain(config.hooks.iter().filter_map(missing_program))
             .chain(config.site.token_file.as_deref().and_then(open_token))
             .chain(slow_sampling(&config))
+            .chain(untold(&config))
             .map(|what| format!("{place}: warning: {what}")),
     );
     Ok(Summary {
@@ -85,6 +87,29 @@ fn missing_program(hook: &HookConfig) -> Option<String> {
             program.display()
         )
     })
+}
+
+/// Levels that no hook is told of: then nobody is.
+fn untold(config: &Config) -> Vec<String> {
+    if config.hooks.is_empty() {
+        return Vec::new();
+    }
+    let told = |level| config.hooks.iter().any(|hook| hook.levels.contains(&level));
+    let mut lines = Vec::new();
+    for (level, meaning) in [
+        (Level::Red, "a failure is near"),
+        (
+            Level::Unknown,
+            "a sensor is silent or at fault, or the clock is wrong",
+        ),
+    ] {
+        if !told(level) {
+            lines.push(format!(
+                "no hook has {level} among its levels: nobody is told that {meaning}"
+            ));
+        }
+    }
+    lines
 }
 
 fn open_token(file: &Path) -> Option<String> {

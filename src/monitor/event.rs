@@ -161,7 +161,7 @@ pub enum EventKind {
     },
     /// People asked for something.
     Order {
-        /// `acknowledge`, `shelve` or `silence`.
+        /// `acknowledge`, `shelve`, `silence` or `unsilence`.
         order: String,
         /// Until when, by the wall clock.
         until: Option<Timestamp>,

@@ -195,6 +195,7 @@ impl History {
         after.value - before.value - velocity * (after.t_days - before.t_days)
     }
 
+    /// The reading as it is kept, but for what resets take off.
     fn observation(&self, source: Source, reading: &Reading) -> Observation {
         let factor = source.unit.factor();
         Observation {
@@ -293,6 +294,13 @@ impl History {
                 Taken::Corrected(before)
             }
         }
+    }
+
+    /// Whether a reading has the value of the newest one, and comes after it.
+    pub(super) fn is_repeated_by(&self, source: Source, reading: &Reading) -> bool {
+        let mut new = self.observation(source, reading);
+        new.value -= self.taken_off(new.t_days);
+        source.unit.quantity() == self.observations.quantity && self.repeats(&new)
     }
 
     /// The velocities that the readings show.

@@ -1,16 +1,19 @@
 //! The state machine that owns every benchmark: readings in, events out, no clock and no files.
 
+mod awaited;
 mod covariates;
 mod declared;
 mod drift;
 mod event;
 mod history;
+mod notice;
 mod order;
 mod saved;
 mod search;
 mod sensor;
 mod silence;
 mod site;
+mod suspect;
 mod track;
 
 pub use declared::{Declaration, Declared};
@@ -18,6 +21,7 @@ pub use event::{
     AlertState, Event, EventKind, FailureTime, InverseVelocity, Plain, RegimeReport, Summary,
     Unexplained,
 };
+pub use notice::{CLOCK_FAULT, Notice};
 pub use order::Order;
 pub use saved::{Part, SavedError};
 pub use search::{Finding, SearchJob};
@@ -25,6 +29,7 @@ pub use site::SiteLevel;
 
 use crate::alert::{Level, Policy};
 use crate::reading::{BenchmarkId, Reading, Sample, Timestamp, Unit};
+use awaited::Awaited;
 use covariates::Covariates;
 use declared::Declarations;
 use jiff::SignedDuration;
@@ -79,6 +84,8 @@ pub enum Input {
     Order(Order),
     /// What a search came to; to be handed in before the first reading that is no earlier than it was due.
     Found(Finding),
+    /// How the watch goes on.
+    Notice(Notice),
     /// Time has passed and nothing came.
     Tick,
 }
@@ -163,6 +170,14 @@ pub struct Monitor {
     sensors: Sensors,
     searches: Vec<SearchJob>,
     site: SiteAlert,
+    /// Benchmarks of the config that have given no reading.
+    awaited: Awaited,
+    /// Benchmarks with late readings that are to be looked back on.
+    late: BTreeSet<BenchmarkId>,
+    /// Whether [`Notice::Settle`] says when what came late is judged.
+    settles: bool,
+    /// Since when the host's clock is wrong.
+    clock_wrong: Option<Timestamp>,
     summary: Summary,
     last_time: Option<Timestamp>,
 }
@@ -179,6 +194,10 @@ impl Monitor {
             sensors: Sensors::default(),
             searches: Vec::new(),
             site: SiteAlert::default(),
+            awaited: Awaited::default(),
+            late: BTreeSet::new(),
+            settles: false,
+            clock_wrong: None,
             summary: Summary::default(),
             last_time: None,
         }
@@ -198,7 +217,7 @@ impl Monitor {
                     unit: *unit,
                     averaging: *averaging,
                 };
-                self.read(benchmark, source, reading)
+                self.read(now, benchmark, source, reading)
             }
             Input::Missing {
                 benchmark,
@@ -206,6 +225,7 @@ impl Monitor {
                 what,
             } => self.missing(now, benchmark, (*time, what)),
             Input::Found(finding) => self.found(now, finding),
+            Input::Notice(notice) => self.heed(now, notice),
             Input::Sample {
                 channel,
                 unit,
@@ -224,6 +244,24 @@ impl Monitor {
             let levels = self.tracks.iter().map(|(id, track)| (id, track.level()));
             events.extend(self.site.update(self.settings.site, now, levels));
         }
+        let is_unknown = |event: &Event| {
+            matches!(
+                event.kind,
+                EventKind::Alert {
+                    level: Level::Unknown,
+                    ..
+                }
+            )
+        };
+        if events.iter().any(is_unknown) || matches!(input, Input::Settings(_)) {
+            let tracks = self.tracks.iter();
+            let unknown = tracks.filter(|(_, track)| track.is_unknown());
+            let unknown: Vec<&BenchmarkId> = unknown
+                .map(|(id, _)| id)
+                .chain(self.awaited.benchmarks())
+                .collect();
+            events.extend(self.site.update_unknown(self.settings.site, now, &unknown));
+        }
         for event in &events {
             self.summary.count(event);
         }
@@ -232,6 +270,7 @@ impl Monitor {
 
     fn read(
         &mut self,
+        now: Timestamp,
         benchmark: &BenchmarkId,
         source: history::Source,
         reading: &Reading,
@@ -242,6 +281,8 @@ impl Monitor {
         let beside = Beside {
             covariates: &self.covariates,
             explain: self.settings.explain,
+            now,
+            settles: self.settles,
         };
         let policy = self.settings.policy(benchmark);
         let track = self.tracks.entry(benchmark.clone()).or_insert_with(|| {
@@ -249,11 +290,19 @@ impl Monitor {
             Track::new(benchmark.clone(), source, reading.time, declared)
         });
         let before = track.deadline();
-        let events = track.take(policy, source, reading, &beside);
+        let mut events = if reading.time > now {
+            track.put_aside(now, source, reading)
+        } else {
+            track.take(policy, source, reading, &beside)
+        };
+        if self.settles && track.owes_look_back() {
+            self.late.insert(benchmark.clone());
+        }
         let critical = policy.critical_velocity_mm_per_day;
         self.searches.extend(track.search(critical, &beside));
         let after = track.deadline();
         self.expect((before, after), benchmark.clone());
+        events.extend(self.awaited.end(now, benchmark, "reads"));
         events
     }
 
@@ -294,6 +343,8 @@ impl Monitor {
         let beside = Beside {
             covariates: &self.covariates,
             explain: self.settings.explain,
+            now,
+            settles: self.settles,
         };
         let mut moved = Vec::new();
         for (id, track) in &mut self.tracks {
@@ -315,12 +366,19 @@ impl Monitor {
             .cloned()
             .collect();
         let mut events = Vec::new();
+        let awaited: Vec<BenchmarkId> = self.awaited.benchmarks().cloned().collect();
+        for id in awaited {
+            if !self.settings.watched.named.contains(&id) {
+                events.extend(self.awaited.end(now, &id, "is no longer watched"));
+            }
+        }
         for id in gone {
             if let Some(mut track) = self.tracks.remove(&id) {
                 self.expect((track.deadline(), None), id.clone());
                 events.extend(track.close(now));
             }
             self.searches.retain(|job| job.benchmark != id);
+            self.late.remove(&id);
             self.changed.insert(id);
         }
         events
@@ -351,6 +409,8 @@ impl Monitor {
         let beside = Beside {
             covariates: &self.covariates,
             explain: self.settings.explain,
+            now,
+            settles: self.settles,
         };
         let policy = self.settings.policy(&finding.benchmark);
         let critical = policy.critical_velocity_mm_per_day;

@@ -1,7 +1,8 @@
-//! What people tell the monitor: it keeps them as it keeps readings, so that a replay hears them too.
+//! What people tell the monitor: it keeps them as it keeps readings, so that a replay has them too.
 
 use super::event::{Event, EventKind};
 use crate::reading::{BenchmarkId, Timestamp};
+use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
 
 /// An order from people. It changes who is told, never what is found.
@@ -29,15 +30,26 @@ pub enum Order {
         /// Until when, by the wall clock.
         until: Timestamp,
     },
+    /// What was shelved or silenced is told again from now on.
+    Unsilence {
+        /// Where; `None`: everywhere.
+        benchmark: Option<BenchmarkId>,
+    },
 }
 
 impl Order {
+    /// Nothing is shelved for longer than this.
+    pub const LONGEST_SHELVE: SignedDuration = SignedDuration::from_hours(30 * 24);
+    /// Nothing is silenced for longer than this: a red is not told meanwhile.
+    pub const LONGEST_SILENCE: SignedDuration = SignedDuration::from_hours(7 * 24);
+
     /// That it was given.
     pub(super) fn event(&self, time: Timestamp) -> Event {
         let (order, until, by) = match self {
             Self::Acknowledge { by, .. } => ("acknowledge", None, by.clone()),
             Self::Shelve { until, .. } => ("shelve", Some(*until), None),
             Self::Silence { until, .. } => ("silence", Some(*until), None),
+            Self::Unsilence { .. } => ("unsilence", None, None),
         };
         Event {
             time,
@@ -53,9 +65,9 @@ impl Order {
     /// Whom it concerns; `None`: the whole site.
     pub fn benchmark(&self) -> Option<&BenchmarkId> {
         match self {
-            Self::Acknowledge { benchmark, .. } | Self::Silence { benchmark, .. } => {
-                benchmark.as_ref()
-            }
+            Self::Acknowledge { benchmark, .. }
+            | Self::Silence { benchmark, .. }
+            | Self::Unsilence { benchmark } => benchmark.as_ref(),
             Self::Shelve { benchmark, .. } => Some(benchmark),
         }
     }

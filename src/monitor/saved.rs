@@ -3,6 +3,7 @@
 //! A part for each benchmark, so that only what has changed since the last time is written, and one for the rest.
 //! The bytes are MessagePack with the fields' names: floats come back bit for bit, infinities too.
 
+use super::awaited::Awaited;
 use super::covariates::Covariates;
 use super::event::Summary;
 use super::search::SearchJob;
@@ -58,6 +59,14 @@ struct Rest {
     searches: Vec<SearchJob>,
     #[serde(default)]
     site: SiteAlert,
+    #[serde(default)]
+    awaited: Awaited,
+    #[serde(default)]
+    late: BTreeSet<BenchmarkId>,
+    #[serde(default)]
+    settles: bool,
+    #[serde(default)]
+    clock_wrong: Option<Timestamp>,
     summary: Summary,
     last_time: Option<Timestamp>,
 }
@@ -82,6 +91,10 @@ impl Monitor {
             sensors: self.sensors.clone(),
             searches: self.searches.clone(),
             site: self.site.clone(),
+            awaited: self.awaited.clone(),
+            late: self.late.clone(),
+            settles: self.settles,
+            clock_wrong: self.clock_wrong,
             summary: self.summary,
             last_time: self.last_time,
         };
@@ -122,6 +135,10 @@ impl Monitor {
             sensors: rest.sensors,
             searches: rest.searches,
             site: rest.site,
+            awaited: rest.awaited,
+            late: rest.late,
+            settles: rest.settles,
+            clock_wrong: rest.clock_wrong,
             summary: rest.summary,
             last_time: rest.last_time,
         })

@@ -9,6 +9,8 @@ use std::collections::VecDeque;
 const REMEMBERED: usize = 9;
 /// A benchmark may skip this many of its usual readings.
 const MAY_SKIP: i32 = 4;
+/// A benchmark with a single reading is called silent after this time: it may be one that is read once a week.
+const FIRST: SignedDuration = SignedDuration::from_hours(8 * 24);
 /// No benchmark is called silent within this time.
 const LEAST: SignedDuration = SignedDuration::from_mins(30);
 
@@ -18,10 +20,14 @@ pub(super) struct Silence {
     newest: Option<Timestamp>,
     spacings: VecDeque<SignedDuration>,
     silent: bool,
+    /// What time it was when a reading came that was measured long before.
+    #[serde(default)]
+    behind: Option<Timestamp>,
 }
 
 impl Silence {
-    /// Notes a reading; when it ends a silence, the reading before which that one began.
+    /// Notes a reading; when it ends a silence, the reading before which that one began. One of a backlog, by which the
+    /// benchmark would still be silent, ends none.
     pub(super) fn broken_by(&mut self, time: Timestamp) -> Option<Timestamp> {
         if let Some(newest) = self.newest
             && time > newest
@@ -40,7 +46,39 @@ impl Silence {
             return None;
         }
         let before = self.newest.replace(time);
-        before.filter(|_| std::mem::take(&mut self.silent))
+        if !self.silent || self.due().is_some_and(|due| Some(due) <= self.behind) {
+            return None;
+        }
+        (self.silent, self.behind) = (false, None);
+        before
+    }
+
+    /// What comes now was measured before `time`, which it is by the clock.
+    pub(super) fn is_behind(&mut self, time: Timestamp) {
+        self.behind = Some(time);
+    }
+
+    /// Whether it is silent.
+    pub(super) fn is_silent(&self) -> bool {
+        self.silent
+    }
+
+    /// The usual spacing; `None` while it is unknown.
+    pub(super) fn usual(&self) -> Option<SignedDuration> {
+        (self.spacings.len() >= 3).then(|| self.median())?
+    }
+
+    fn median(&self) -> Option<SignedDuration> {
+        let mut sorted: Vec<SignedDuration> = self.spacings.iter().copied().collect();
+        sorted.sort_unstable();
+        sorted.get(sorted.len() / 2).copied()
+    }
+
+    /// The longest of the spacings was none.
+    pub(super) fn forget_gap(&mut self) {
+        if let Some(longest) = self.spacings.iter().max().copied() {
+            self.spacings.retain(|one| *one < longest);
+        }
     }
 
     /// Notes a reading during maintenance: it ends no silence.
@@ -55,16 +93,21 @@ impl Silence {
         self.newest
     }
 
-    /// When silence becomes a fault; `None` while the usual spacing is unknown, or when it already is one.
+    /// When silence becomes a fault; `None` when it already is one.
     pub(super) fn deadline(&self) -> Option<Timestamp> {
-        if self.silent || self.spacings.len() < 3 {
-            return None;
-        }
-        let mut sorted: Vec<SignedDuration> = self.spacings.iter().copied().collect();
-        sorted.sort_unstable();
-        let allowed = sorted[sorted.len() / 2].checked_mul(MAY_SKIP)?.max(LEAST);
-        // The longest gap seen lately is no silence either.
-        self.newest?.checked_add(allowed.max(*sorted.last()?)).ok()
+        if self.silent { None } else { self.due() }
+    }
+
+    fn due(&self) -> Option<Timestamp> {
+        let longest = self.spacings.iter().max().copied();
+        let allowed = match longest {
+            None => FIRST,
+            // Two or three readings say little of how often there are some.
+            Some(longest) if self.spacings.len() < 3 => longest.checked_mul(MAY_SKIP)?,
+            // The longest gap seen lately is no silence either.
+            Some(longest) => self.median()?.checked_mul(MAY_SKIP)?.max(longest),
+        };
+        self.newest?.checked_add(allowed.max(LEAST)).ok()
     }
 
     /// Ends the silence that there is; the reading before which it began.

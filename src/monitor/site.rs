@@ -22,6 +22,9 @@ pub enum SiteLevel {
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct SiteAlert {
     in_force: Option<(Level, Timestamp)>,
+    /// Since when too many benchmarks are unknown.
+    #[serde(default)]
+    unknown: Option<Timestamp>,
 }
 
 impl SiteAlert {
@@ -59,6 +62,43 @@ impl SiteAlert {
         let entered = self.in_force;
         events.extend(entered.map(|entered| event(now, entered, AlertState::Firing, &reach)));
         events
+    }
+}
+
+impl SiteAlert {
+    /// Takes the benchmarks of which nothing can be said; says whether that becomes, or ceases to be, true of the
+    /// site: where those that are known cannot make its level, or would make a lower one than all together.
+    pub(super) fn update_unknown(
+        &mut self,
+        rule: Option<SiteLevel>,
+        now: Timestamp,
+        unknown: &[&BenchmarkId],
+    ) -> Option<Event> {
+        let needed = match rule? {
+            SiteLevel::Worst => 1,
+            SiteLevel::AtLeast(count) => count.max(1),
+        };
+        match (self.unknown, unknown.len() >= needed) {
+            (None, true) => {
+                self.unknown = Some(now);
+                Some(event(
+                    now,
+                    (Level::Unknown, now),
+                    AlertState::Firing,
+                    unknown,
+                ))
+            }
+            (Some(since), false) => {
+                self.unknown = None;
+                Some(event(
+                    now,
+                    (Level::Unknown, since),
+                    AlertState::Resolved,
+                    unknown,
+                ))
+            }
+            (None, false) | (Some(_), true) => None,
+        }
     }
 }
 

@@ -3,6 +3,7 @@
 use super::clock::{self, Stopwatch};
 use super::deliver::{Dispatcher, Retry};
 use super::delivered::Delivered;
+use super::log;
 use super::mqtt;
 use super::pulse::Pulse;
 use super::run::Progress;
@@ -13,7 +14,8 @@ use super::sources::Sources;
 use super::tail::{Arrival, Batch};
 use crate::config::{self, Config};
 use crate::monitor::Input;
-use crate::store::{Store, StoreError};
+use crate::store::{Position, Store, StoreError, Verified};
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -22,6 +24,8 @@ use tokio::sync::watch;
 
 /// How long the hooks may take to finish when the daemon stops, and those of a former config.
 pub(super) const DRAIN_LIMIT: Duration = Duration::from_secs(20);
+/// An alert that people are to be told of at once waits no longer than this for others.
+const URGENT: Duration = Duration::from_secs(2);
 /// How often time is let pass when nothing arrives.
 const TICK: Duration = Duration::from_secs(1);
 
@@ -36,6 +40,12 @@ pub(super) struct Daemon {
     /// Once, and as of the last batch: a logger that was away hands in its backlog in several.
     is_caught_up: bool,
     is_up_to_date: bool,
+    /// How far files have been read by what was taken, while some of it is held.
+    positions: Vec<Position>,
+    /// Since the last commit.
+    since_commit: Stopwatch,
+    /// How far the rows of the state have been looked at.
+    verified: Verified,
 }
 
 /// The way to the hooks of `config`.
@@ -60,6 +70,9 @@ impl Daemon {
             pulse,
             is_caught_up: false,
             is_up_to_date: false,
+            positions: Vec::new(),
+            since_commit: Stopwatch::start(),
+            verified: Verified::default(),
         }
     }
 
@@ -82,10 +95,14 @@ impl Daemon {
                     let Some(batch) = batch else { return Ok(()) };
                     tokio::task::block_in_place(|| self.take_batch(batch, &shutdown))?;
                 }
-                Some(delivery) = self.sources.deliveries.recv(), if !self.site.is_stalled() => {
+                Some(delivery) = self.sources.deliveries.recv(), if !self.site.is_stalled() && self.sources.has_room() => {
                     tokio::task::block_in_place(|| self.take_messages(delivery))?;
                 }
                 _ = tick.tick() => tokio::task::block_in_place(|| self.tick())?,
+                // Last, so that it keeps nothing else waiting.
+                () = std::future::ready(()), if self.site.owes_look_back() => {
+                    tokio::task::block_in_place(|| self.look_back())?;
+                }
             }
             let (counts, is_caught_up) = (self.site.counts(), self.is_caught_up);
             progress.send_replace(Progress {
@@ -111,14 +128,18 @@ impl Daemon {
                 return self.commit();
             }
             self.take(arrival)?;
+            self.commit_what_is_urgent()?;
         }
-        self.site.note_positions(batch.positions);
+        self.positions.extend(batch.positions);
+        self.release()?;
+        self.settle();
         self.commit()?;
         // Also while years of backlog come in: the state is not to hold all of their refits at once.
         self.thin()?;
         self.is_up_to_date = batch.caught_up;
         if self.is_up_to_date {
-            self.site.caught_up(clock::now())?;
+            let events = self.site.caught_up(clock::now())?;
+            self.pulse.vitals.note(&events);
         }
         if self.is_up_to_date && !self.is_caught_up {
             self.is_caught_up = true;
@@ -137,12 +158,39 @@ impl Daemon {
             vitals.quarantined(&delivery.source, delivery.quarantined);
             for arrival in &delivery.arrivals {
                 self.take(arrival)?;
+                self.commit_what_is_urgent()?;
             }
             let has_room = self.sources.hold(delivery.receipt);
             next = has_room
                 .then(|| self.sources.deliveries.try_recv().ok())
                 .flatten();
         }
+        self.settle();
+        self.commit()
+    }
+
+    /// Takes what was held for the clock; what files say of their positions counts once nothing is held.
+    fn release(&mut self) -> Result<(), StoreError> {
+        let events = self.site.release(clock::now())?;
+        self.pulse.vitals.note(&events);
+        if self.site.held() == 0 {
+            let positions = std::mem::take(&mut self.positions);
+            self.site.note_positions(positions);
+        } else {
+            keep_latest(&mut self.positions);
+        }
+        Ok(())
+    }
+
+    fn settle(&mut self) {
+        let events = self.site.settle();
+        self.pulse.vitals.note(&events);
+    }
+
+    /// Looks back on what came late at one benchmark.
+    fn look_back(&mut self) -> Result<(), StoreError> {
+        let events = self.site.look_back();
+        self.pulse.vitals.note(&events);
         self.commit()
     }
 
@@ -159,6 +207,7 @@ impl Daemon {
             | Input::Sample { .. }
             | Input::Missing { .. }
             | Input::Trouble { .. }
+            | Input::Notice(_)
             | Input::Settings(_)
             | Input::Order(_)
             | Input::Tick
@@ -168,17 +217,34 @@ impl Daemon {
         Ok(())
     }
 
+    /// An alert does not wait for the rest of the batch; those that come together go together.
+    fn commit_what_is_urgent(&mut self) -> Result<(), StoreError> {
+        if self.since_commit.elapsed() >= URGENT && self.site.is_urgent(clock::now()) {
+            self.since_commit = Stopwatch::start();
+            return self.site.commit(clock::now());
+        }
+        Ok(())
+    }
+
     fn commit(&mut self) -> Result<(), StoreError> {
+        self.since_commit = Stopwatch::start();
         let committed = self.site.commit(clock::now());
         let is_waiting = self.site.is_waiting();
-        if committed.is_ok() && !is_waiting {
+        if committed.is_ok() && !is_waiting && self.site.held() == 0 {
             self.pulse.vitals.has_taken();
             self.sources.acknowledge();
         }
         let (counts, queue) = (self.site.counts(), self.sources.batches.len());
         let (is_paused, searches) = (self.site.is_stalled(), self.site.searching());
+        let held = self.site.held() as u64;
+        let silences = self.site.mutes(clock::now());
+        let is_in_place = self.store.is_in_place();
         self.pulse.vitals.update(|health| {
-            health.is_store_writable = committed.is_ok() && !is_waiting;
+            health.is_store_writable = committed.is_ok() && !is_waiting && is_in_place;
+            health.is_clock_wrong = self.site.is_clock_wrong();
+            health.held = held;
+            health.log_lines_lost = log::lost();
+            health.silences = silences;
             health.is_paused = is_paused;
             health.readings = counts.taken;
             health.repeated = counts.repeated;
@@ -199,6 +265,19 @@ impl Daemon {
         }
     }
 
+    /// Looks at a few more rows of the state. Where one is damaged the work goes on, and people are to see to it.
+    fn verify(&mut self) {
+        let is_damaged = self.pulse.vitals.health().is_store_damaged;
+        if let Err(error) = self.store.verify(&mut self.verified)
+            && !is_damaged
+        {
+            tracing::error!(%error, "the state on the disk has changed by itself");
+            self.pulse
+                .vitals
+                .update(|health| health.is_store_damaged = true);
+        }
+    }
+
     /// What is due whether anything comes or not.
     fn tick(&mut self) -> Result<(), StoreError> {
         let now = clock::now();
@@ -209,14 +288,18 @@ impl Daemon {
         }
         // Data time is the clock's only once the past has been read.
         if self.is_caught_up {
-            let events = self.site.pass(now);
+            let events = self.site.live(now);
             self.pulse.vitals.note(&events);
         }
+        self.release()?;
+        self.settle();
         self.commit()?;
         if self.is_up_to_date {
-            self.site.caught_up(now)?;
+            let events = self.site.caught_up(now)?;
+            self.pulse.vitals.note(&events);
         }
         self.thin()?;
+        self.verify();
         let ((outbox, oldest), bytes) = (self.store.outbox()?, self.store.bytes()?);
         self.pulse.vitals.update(|health| {
             (health.outbox, health.outbox_oldest) = (outbox, oldest);
@@ -225,7 +308,7 @@ impl Daemon {
         Ok(())
     }
 
-    /// Waits for the hooks to finish. Were others told of the same meanwhile, people would hear it twice.
+    /// Waits for the hooks to finish. Were others told of the same meanwhile, people would be told twice.
     async fn close_hooks(&mut self) {
         let Some(former) = self.site.unhook() else {
             return;
@@ -270,6 +353,7 @@ impl Daemon {
         }
         let events = self.site.resettle(fresh.settings.clone());
         self.pulse.vitals.note(&events);
+        self.site.show(&self.pulse.vitals);
         self.commit()?;
         self.close_hooks().await;
         self.site.rehook(dispatcher(&fresh, &self.store))?;
@@ -279,4 +363,13 @@ impl Daemon {
         tracing::info!(file = %self.config.file.display(), "the config is taken");
         Ok(())
     }
+}
+
+/// Of each file only how far it was read last.
+fn keep_latest(positions: &mut Vec<Position>) {
+    let mut latest = BTreeMap::new();
+    for one in positions.drain(..) {
+        latest.insert(one.name.clone(), one);
+    }
+    positions.extend(latest.into_values());
 }

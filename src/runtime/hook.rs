@@ -3,13 +3,14 @@
 use super::sandbox;
 use crate::alert::Level;
 use crate::config::HookConfig;
-use crate::monitor::{AlertState, Event, EventKind};
+use crate::monitor::{AlertState, CLOCK_FAULT, Event, EventKind};
 use crate::reading::Timestamp;
-use nix::sys::signal::{Signal, killpg};
+use nix::sys::signal::{Signal, kill, killpg};
 use nix::unistd::Pid;
 use serde::{Deserialize, Serialize};
 use std::os::unix::process::ExitStatusExt;
 use std::process::{ExitStatus, Stdio};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWriteExt};
@@ -20,6 +21,8 @@ use tokio::task::JoinHandle;
 const KEPT_VARIABLES: [&str; 4] = ["PATH", "HOME", "LANG", "TZ"];
 /// Longest value of a variable, bytes.
 const LONGEST_VALUE: usize = 4096;
+/// The variable by which a run's processes are known.
+const RUN: &str = "SLIPWATCH_RUN";
 /// How much of a hook's output is kept, bytes a stream.
 const LONGEST_OUTPUT: usize = 64 * 1024;
 /// After the hook's end: how long what it has just written may take to arrive.
@@ -109,6 +112,11 @@ impl Alert {
         matches!(&self.event.kind, EventKind::Alert { rule, .. } if rule == FLOOD)
     }
 
+    /// Whether it says that the host's clock is wrong, or right again.
+    pub fn is_of_the_clock(&self) -> bool {
+        matches!(&self.event.kind, EventKind::Alert { rule, .. } if rule == CLOCK_FAULT)
+    }
+
     fn variables(&self, attempt: u32) -> [(&'static str, String); 10] {
         let benchmark = self.event.benchmark.as_ref();
         let optional_time = self.failure_time.map(|time| time.to_string());
@@ -178,7 +186,8 @@ pub enum Outcome {
 
 /// Runs `hook` for `alert`; `attempt` counts from 1.
 pub async fn run(hook: &HookConfig, alert: &Alert, attempt: u32) -> Outcome {
-    let mut child = match start(hook, alert, attempt) {
+    let run = run_name();
+    let mut child = match start(hook, alert, (attempt, &run)) {
         Ok(child) => child,
         Err(reason) => return Outcome::NotStarted(reason),
     };
@@ -205,6 +214,7 @@ pub async fn run(hook: &HookConfig, alert: &Alert, attempt: u32) -> Outcome {
         Ok(Err(error)) => Outcome::NotStarted(error.to_string()),
         Err(_elapsed) => {
             group.kill();
+            let _ = tokio::task::spawn_blocking(move || kill_all_of(&run)).await;
             // Reaps the child; a process stuck in the kernel must not hold the alerts up.
             let _ = tokio::time::timeout(KILL_GRACE, child.wait()).await;
             Outcome::TimedOut
@@ -218,7 +228,39 @@ pub async fn run(hook: &HookConfig, alert: &Alert, attempt: u32) -> Outcome {
     outcome
 }
 
-fn start(hook: &HookConfig, alert: &Alert, attempt: u32) -> Result<Child, String> {
+/// What a run's processes have in their environment, and no others.
+fn run_name() -> String {
+    static RUNS: AtomicU64 = AtomicU64::new(0);
+    let number = RUNS.fetch_add(1, Ordering::Relaxed);
+    format!("{}-{number}", std::process::id())
+}
+
+/// Ends what a run has started and what has left its group, as by `setsid`.
+fn kill_all_of(run: &str) {
+    let mark = format!("{RUN}={run}");
+    let is_of_it = |environment: &[u8]| {
+        environment
+            .split(|byte| *byte == 0)
+            .any(|one| one == mark.as_bytes())
+    };
+    let Ok(processes) = std::fs::read_dir("/proc") else {
+        return;
+    };
+    for process in processes.flatten() {
+        let number = process
+            .file_name()
+            .to_str()
+            .and_then(|name| name.parse().ok());
+        let Some(number) = number else { continue };
+        // It may have ended meanwhile, or be another user's.
+        let environment = std::fs::read(process.path().join("environ"));
+        if environment.is_ok_and(|environment| is_of_it(&environment)) {
+            let _ = kill(Pid::from_raw(number), Signal::SIGKILL);
+        }
+    }
+}
+
+fn start(hook: &HookConfig, alert: &Alert, (attempt, run): (u32, &str)) -> Result<Child, String> {
     let program = hook.program();
     let mut command = sandbox::command(hook);
     command
@@ -239,6 +281,7 @@ fn start(hook: &HookConfig, alert: &Alert, attempt: u32) -> Result<Child, String
     for (name, value) in alert.variables(attempt) {
         command.env(name, capped(&value));
     }
+    command.env(RUN, run);
     command
         .spawn()
         .map_err(|error| format!("{}: {error}", program.display()))

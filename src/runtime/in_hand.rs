@@ -15,6 +15,8 @@ struct Entry {
     state: AlertState,
     /// No other alert tells what it tells.
     stands_alone: bool,
+    /// A hook's run for it has begun.
+    is_tried: bool,
     /// Superseded, or resolved: not worth another attempt.
     is_over: bool,
 }
@@ -34,10 +36,38 @@ impl InHand {
             benchmark: alert.event.benchmark.clone(),
             state: alert.state,
             stands_alone: alert.is_flood(),
+            is_tried: false,
             is_over: false,
         };
         self.0.insert(token, entry);
         true
+    }
+
+    /// A run for it begins.
+    pub(super) fn is_tried(&mut self, alert: &Alert) {
+        if let Some(entry) = self.0.get_mut(&token(alert)) {
+            entry.is_tried = true;
+        }
+    }
+
+    /// Whether `alert` is the end of an `unknown` that has not been told: neither of them is then.
+    pub(super) fn cancels(&mut self, alert: &Alert) -> bool {
+        if alert.level != Level::Unknown || alert.state != AlertState::Resolved || alert.is_flood()
+        {
+            return false;
+        }
+        let firing = (
+            alert.key.clone(),
+            alert.level,
+            state_name(AlertState::Firing),
+        );
+        match self.0.get_mut(&firing) {
+            Some(entry) if !entry.is_tried => {
+                entry.is_over = true;
+                true
+            }
+            Some(_) | None => false,
+        }
     }
 
     pub(super) fn release(&mut self, alert: &Alert) {

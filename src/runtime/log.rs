@@ -1,6 +1,24 @@
-//! Where the log goes: stderr, as text or JSON, filtered by `RUST_LOG`.
+//! Where the log goes: stderr, as text or JSON, filtered by `RUST_LOG`. Writing it never fails or delays the work.
+//!
+//! A thread writes the lines. What stderr does not take (it is closed, or lies on a full disk), and what finds no room
+//! because stderr stands still, is lost and counted.
 
+use std::io::{self, Write};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::time::Duration;
 use tracing_subscriber::EnvFilter;
+
+/// Lines that may wait for stderr.
+const WAITING: usize = 4096;
+/// At the end: how long what waits may take to be written.
+const LAST_LINES: Duration = Duration::from_secs(1);
+
+/// Lines that were not written.
+static LOST: AtomicU64 = AtomicU64::new(0);
+/// The way to the thread that writes.
+static WRITER: OnceLock<SyncSender<Piece>> = OnceLock::new();
 
 /// How a line of the log looks.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -12,16 +30,132 @@ pub enum LogFormat {
     Json,
 }
 
+/// What is handed to the thread.
+#[derive(Debug)]
+enum Piece {
+    Line(Vec<u8>),
+    /// To be answered when all before it has been written.
+    Flush(SyncSender<()>),
+}
+
 /// Starts logging; a second call changes nothing.
 pub fn init(format: LogFormat) {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info"));
     let builder = tracing_subscriber::fmt()
-        .with_writer(std::io::stderr)
+        .with_writer(|| Line)
         .with_env_filter(filter)
+        // It would say on stderr that stderr cannot be written to, and end the process where that fails.
+        .log_internal_errors(false)
         .with_ansi(false);
     // An error means that someone has started it before.
     let _ = match format {
         LogFormat::Text => builder.try_init(),
         LogFormat::Json => builder.json().try_init(),
     };
+}
+
+/// Lines of the log that could not be written.
+pub fn lost() -> u64 {
+    LOST.load(Ordering::Relaxed)
+}
+
+/// Waits, for a bounded time, until what has been logged is written.
+pub fn finish() {
+    let Some(writer) = WRITER.get() else { return };
+    let (done, wait) = sync_channel(1);
+    if writer.try_send(Piece::Flush(done)).is_ok() {
+        // Whether in time or not, the process ends.
+        let _: Result<(), RecvTimeoutError> = wait.recv_timeout(LAST_LINES);
+    }
+}
+
+/// One line on its way.
+#[derive(Debug)]
+struct Line;
+
+impl Write for Line {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let writer = WRITER.get_or_init(start);
+        match writer.try_send(Piece::Line(plain(bytes))) {
+            Ok(()) => {}
+            Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => {
+                LOST.fetch_add(1, Ordering::Relaxed);
+            }
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// The line with the control characters within it written out: a name with a line break in it forges no line.
+fn plain(bytes: &[u8]) -> Vec<u8> {
+    let (line, end) = match bytes.strip_suffix(b"\n") {
+        Some(line) => (line, &b"\n"[..]),
+        None => (bytes, &b""[..]),
+    };
+    if !line.iter().any(u8::is_ascii_control) {
+        return bytes.to_vec();
+    }
+    let mut plain = Vec::with_capacity(bytes.len() + 8);
+    for byte in line {
+        if byte.is_ascii_control() && *byte != b'\t' {
+            plain.extend(byte.escape_ascii());
+        } else {
+            plain.push(*byte);
+        }
+    }
+    plain.extend(end);
+    plain
+}
+
+/// The thread that writes. It is not joined: where stderr stands still it never ends, and the process must.
+fn start() -> SyncSender<Piece> {
+    let (writer, pieces) = sync_channel(WAITING);
+    // Without a thread every line is lost, and counted.
+    let _ = std::thread::Builder::new()
+        .name("log".to_owned())
+        .spawn(move || write(&pieces));
+    writer
+}
+
+fn write(pieces: &Receiver<Piece>) {
+    let mut told = 0;
+    while let Ok(piece) = pieces.recv() {
+        match piece {
+            Piece::Line(line) => {
+                say_what_is_lost(&mut told);
+                if io::stderr().write_all(&line).is_err() {
+                    LOST.fetch_add(1, Ordering::Relaxed);
+                }
+            }
+            Piece::Flush(done) => {
+                // Whoever waited may have gone.
+                let _ = done.try_send(());
+            }
+        }
+    }
+}
+
+/// Says in the log how many lines are missing from it, once for each number.
+fn say_what_is_lost(told: &mut u64) {
+    let lost = lost();
+    if lost > *told && writeln!(io::stderr(), "{} lines of this log are lost", lost - *told).is_ok()
+    {
+        *told = lost;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_break_within_a_line_is_written_out() {
+        assert_eq!(plain(b"one\ntwo\x1b[0m\n"), b"one\\ntwo\\x1b[0m\n");
+        assert_eq!(plain(b"one\ttwo\n"), b"one\ttwo\n");
+        assert_eq!(plain("größe\n".as_bytes()), "größe\n".as_bytes());
+    }
 }

@@ -6,17 +6,24 @@
 use super::clock::Stopwatch;
 use super::ingest::FileUnits;
 use super::shutdown::Shutdown;
+use super::site::is_logged;
 use super::tail::{Arrival, Decoder};
 use crate::config::{Benchmark, Broker};
-use rumqttc::{AsyncClient, ClientError, Event, EventLoop, MqttOptions, Packet, Publish, QoS};
+use rumqttc::{
+    AsyncClient, ClientError, Event, EventLoop, MqttOptions, Packet, Publish, QoS,
+    SubscribeReasonCode,
+};
 use std::path::Path;
 use std::time::Duration;
 use tokio::sync::mpsc;
 
 /// Longest message whose lines are read, bytes.
 const LONGEST_MESSAGE: usize = 1 << 20;
-/// Longest packet that is taken from the broker at all, bytes.
-const LONGEST_PACKET: usize = 16 << 20;
+/// Longest packet that is taken from the broker at all, bytes: the longest there can be. What is too long is set aside
+/// and acknowledged; refused, it would come again for ever, and nothing behind it.
+const LONGEST_PACKET: usize = 268_435_455 + 5;
+/// Longest packet that we send, bytes.
+const LONGEST_SENT: usize = 1 << 20;
 /// Requests that may wait for the connection.
 const REQUESTS: usize = 64;
 /// How often we tell the broker that we live.
@@ -73,6 +80,7 @@ pub async fn follow(
         decoder: Decoder::of_messages(&broker, &benchmarks),
         units: FileUnits::default(),
         client,
+        quarantined: 0,
     };
     let mut wait = RECONNECT.0;
     loop {
@@ -93,6 +101,18 @@ pub async fn follow(
                     tokio::select! {
                         sent = deliveries.send(delivery) => if sent.is_err() { return },
                         () = shutdown.requested() => return,
+                    }
+                }
+                Ok(Some(Packet::SubAck(answer))) => {
+                    if answer.return_codes.contains(&SubscribeReasonCode::Failure) {
+                        let (source, topic) = (&broker.id, &broker.topic);
+                        tracing::error!(source, topic, ?RECONNECT, "the broker refuses the subscription: nothing comes from it");
+                        // Asked again after a while: its rules may be others then.
+                        let _ = reader.client.try_disconnect();
+                        tokio::select! {
+                            () = tokio::time::sleep(RECONNECT.1) => {}
+                            () = shutdown.requested() => return,
+                        }
                     }
                 }
                 Ok(Some(_) | None) => {}
@@ -123,7 +143,7 @@ fn options(broker: &Broker, client_id: String) -> MqttOptions {
         .set_clean_session(false)
         .set_manual_acks(true)
         .set_keep_alive(KEEP_ALIVE)
-        .set_max_packet_size(LONGEST_PACKET, LONGEST_PACKET);
+        .set_max_packet_size(LONGEST_PACKET, LONGEST_SENT);
     if let Some((user, password)) = &address.login {
         options.set_credentials(user, password);
     }
@@ -135,15 +155,21 @@ struct Reader {
     decoder: Decoder,
     units: FileUnits,
     client: AsyncClient,
+    /// Lines that could not be used.
+    quarantined: u64,
 }
 
 impl Reader {
     fn read(&mut self, message: Publish) -> Delivery {
         let found = Stopwatch::start();
         let (mut arrivals, mut quarantined) = (Vec::new(), 0);
+        let mut total = self.quarantined;
         let mut complain = |error: &dyn std::error::Error| {
             quarantined += 1;
-            tracing::warn!(topic = message.topic, %error, "line of a message quarantined");
+            total += 1;
+            if is_logged(total) {
+                tracing::warn!(topic = message.topic, %error, total, "line of a message quarantined");
+            }
         };
         let rows = self.decoder.text_rows(Path::new(&message.topic));
         match (rows, text(&message.payload)) {
@@ -160,6 +186,7 @@ impl Reader {
             (_, Err(error)) => complain(&error),
             (None, Ok(_)) => {}
         }
+        self.quarantined = total;
         Delivery {
             arrivals,
             source: self.source.clone(),

@@ -244,6 +244,7 @@ mod tests {
             Input::Sample { channel, .. } => channel.clone(),
             Input::Missing { .. }
             | Input::Trouble { .. }
+            | Input::Notice(_)
             | Input::Settings(_)
             | Input::Order(_)
             | Input::Found(_)

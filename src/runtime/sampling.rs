@@ -16,8 +16,17 @@ const MOST_VALUES: usize = 2_000_000;
 /// acceleration needs several, and the last of them must leave time to go.
 const READINGS_AN_EVACUATION: i32 = 4;
 
-/// The median time between the latest readings of each benchmark.
-pub fn spacings(config: &Config) -> BTreeMap<BenchmarkId, SignedDuration> {
+/// What lies in the files of a site now.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Sampling {
+    /// The median time between the latest readings of each benchmark.
+    pub spacings: BTreeMap<BenchmarkId, SignedDuration>,
+    /// Benchmarks of the config of which no file has a reading, where there are files.
+    pub absent: Vec<BenchmarkId>,
+}
+
+/// Looks at the files.
+pub fn sample(config: &Config) -> Sampling {
     let mut follower = Follower::new(&config.sources, &config.benchmarks, &[]);
     let mut times: BTreeMap<BenchmarkId, BTreeSet<Timestamp>> = BTreeMap::new();
     let mut values = 0;
@@ -37,10 +46,22 @@ pub fn spacings(config: &Config) -> BTreeMap<BenchmarkId, SignedDuration> {
             break;
         }
     }
+    let is_whole = values <= MOST_VALUES;
+    let of_files: BTreeSet<&str> = config.sources.iter().map(|one| one.id.as_str()).collect();
+    let mut absent: Vec<BenchmarkId> = Vec::new();
+    for benchmark in &config.benchmarks {
+        let has_files =
+            of_files.contains(benchmark.source.as_str()) && follower.follows(&benchmark.source);
+        if is_whole && has_files && !times.contains_key(&benchmark.id) {
+            absent.push(benchmark.id.clone());
+        }
+    }
     let medians = times.into_iter().map(|(id, times)| (id, median(&times)));
-    medians
-        .filter_map(|(id, median)| Some((id, median?)))
-        .collect()
+    let spacings = medians.filter_map(|(id, median)| Some((id, median?)));
+    Sampling {
+        spacings: spacings.collect(),
+        absent,
+    }
 }
 
 fn median(times: &BTreeSet<Timestamp>) -> Option<SignedDuration> {
@@ -50,10 +71,17 @@ fn median(times: &BTreeSet<Timestamp>) -> Option<SignedDuration> {
     gaps.get(gaps.len() / 2).copied()
 }
 
-/// A line for each benchmark that is measured too rarely for its evacuation time to mean anything.
-pub fn too_slow(config: &Config) -> Vec<String> {
+/// A line for each benchmark that is measured too rarely for its evacuation time to mean anything, or not at all.
+pub fn doubts(config: &Config) -> Vec<String> {
     let settings = &config.settings;
-    let lines = spacings(config).into_iter().filter_map(|(id, spacing)| {
+    let Sampling { spacings, absent } = sample(config);
+    let absent = absent.into_iter().map(|id| {
+        format!(
+            "benchmark {:?}: the files that are there have no reading of it; are its column and its id right?",
+            id.as_str()
+        )
+    });
+    let lines = spacings.into_iter().filter_map(|(id, spacing)| {
         let policy = settings.benchmarks.get(&id).unwrap_or(&settings.policy);
         let evacuation = policy.evacuation_time;
         (spacing > evacuation / READINGS_AN_EVACUATION).then(|| {
@@ -64,5 +92,5 @@ pub fn too_slow(config: &Config) -> Vec<String> {
             )
         })
     });
-    lines.collect()
+    lines.chain(absent).collect()
 }

@@ -4,7 +4,7 @@ use crate::monitor::{Finding, SearchJob};
 use crate::reading::{BenchmarkId, Timestamp};
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Most threads; one core is left to the monitor where there are several.
@@ -62,6 +62,21 @@ impl Searches {
         let _ = queue.send((job.clone(), sender));
         self.asked
             .insert(job.benchmark.clone(), Asked { job, answer });
+    }
+
+    /// The answer that is due at a reading of `time`, if there is one by now.
+    pub(super) fn answered(&mut self, benchmark: &BenchmarkId, time: Timestamp) -> Option<Finding> {
+        let asked = self.asked.get(benchmark)?;
+        if asked.job.due > time {
+            return None;
+        }
+        let finding = match asked.answer.try_recv() {
+            Ok(finding) => finding,
+            Err(TryRecvError::Disconnected) => asked.job.in_vain(),
+            Err(TryRecvError::Empty) => return None,
+        };
+        self.asked.remove(benchmark);
+        Some(finding)
     }
 
     /// The answer that is due at a reading of `time`; waits for it where the search is still at work.

@@ -34,7 +34,7 @@ impl Sources {
     pub(super) fn start(config: &Config, store: &Store) -> Result<Self, StoreError> {
         let (messages, deliveries) = mpsc::channel(MESSAGES);
         let (stop, stopped) = shutdown::pair();
-        listen(config, &messages, &stopped);
+        listen(config, store.instance()?, (&messages, &stopped));
         let follower = Follower::new(&config.sources, &config.benchmarks, &store.positions()?);
         let (sender, batches) = mpsc::channel(BATCHES);
         let task = tokio::spawn(tail::follow(follower, sender, stopped));
@@ -63,6 +63,11 @@ impl Sources {
     /// Keeps the acknowledgement until what it is for is durable; says whether there is room for more.
     pub(super) fn hold(&mut self, receipt: Receipt) -> bool {
         self.unacknowledged.push(receipt);
+        self.has_room()
+    }
+
+    /// Whether another message may wait to be acknowledged.
+    pub(super) fn has_room(&self) -> bool {
         self.unacknowledged.len() < MESSAGES
     }
 
@@ -84,10 +89,18 @@ impl Sources {
 }
 
 /// Listens to the brokers.
-fn listen(config: &Config, messages: &mpsc::Sender<Delivery>, stopped: &Shutdown) {
+fn listen(
+    config: &Config,
+    instance: i64,
+    (messages, stopped): (&mpsc::Sender<Delivery>, &Shutdown),
+) {
     for broker in &config.brokers {
-        // One session for each site and source, found again after a restart.
-        let client = format!("slipwatch-{}-{}", config.site.name, broker.id);
+        // One session for each state and source, found again after a restart. Two daemons of one site's name would
+        // each get a part of the messages.
+        let client = format!(
+            "slipwatch-{}-{}-{instance:016x}",
+            config.site.name, broker.id
+        );
         tokio::spawn(mqtt::follow(
             broker.clone(),
             config.benchmarks.clone(),

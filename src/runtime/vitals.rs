@@ -1,6 +1,7 @@
 //! What the daemon knows of its own health; the work loop writes it, whoever asks reads it.
 
 use super::clock::Stopwatch;
+use super::site::Mute;
 use crate::alert::Level;
 use crate::monitor::{AlertState, Event, EventKind, Unexplained};
 use crate::reading::{BenchmarkId, Timestamp};
@@ -18,11 +19,17 @@ const REFIT_SECONDS: [f64; 10] = [0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 
 
 /// The site as a whole.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a key of its own in the answer"
+)]
 pub struct Health {
     /// Whether the past has been read.
     pub is_caught_up: bool,
     /// Whether the last write to the state folder went well.
     pub is_store_writable: bool,
+    /// Whether the rows of the state are what was written, as far as they have been looked at.
+    pub is_store_damaged: bool,
     /// Whether nothing is taken in because the disk is full.
     pub is_paused: bool,
     /// Values that the monitor took.
@@ -35,6 +42,14 @@ pub struct Health {
     pub without_clock: u64,
     /// Inputs that wait, unacknowledged, for room on the disk.
     pub unwritten: u64,
+    /// Whether the host's clock is earlier than readings that are known.
+    pub is_clock_wrong: bool,
+    /// Values that wait, unacknowledged, until the host's clock is right.
+    pub held: u64,
+    /// Lines of the log that could not be written.
+    pub log_lines_lost: u64,
+    /// Alerts that people asked not to be told.
+    pub silences: Vec<Mute>,
     /// Lines, records and files that could not be used, a source.
     pub quarantined: BTreeMap<String, u64>,
     /// How long the oldest value that was found and is not durable yet has waited; zero when none waits.
@@ -210,10 +225,16 @@ impl Vitals {
     }
 
     /// How a benchmark stood when the daemon last stopped.
-    pub fn resume(&self, benchmark: &BenchmarkId, newest: Timestamp, level: Level) {
+    pub fn resume(
+        &self,
+        benchmark: &BenchmarkId,
+        newest: Option<Timestamp>,
+        level: Level,
+        is_unknown: bool,
+    ) {
         let mut points = locked(&self.points);
         let point = points.entry(benchmark.clone()).or_default();
-        (point.newest, point.level) = (Some(newest), level);
+        (point.newest, point.level, point.is_unknown) = (newest, level, is_unknown);
     }
 
     /// Events that came of something else than a reading.

@@ -2,9 +2,11 @@
 
 use super::outbox::{Fate, WAITING};
 use super::series::{self, Series};
+use super::sum::sum;
 use super::{Inner, Store, StoreError, nanoseconds};
 use crate::monitor::{Event, Input, Part};
 use crate::reading::Timestamp;
+use rusqlite::types::ValueRef;
 use rusqlite::{Connection, params};
 use std::collections::BTreeMap;
 
@@ -227,6 +229,7 @@ fn value(input: &Input) -> Option<(Timestamp, f64, Option<f64>)> {
         Input::Sample { sample, .. } => Some((sample.time, sample.value, None)),
         Input::Missing { .. }
         | Input::Trouble { .. }
+        | Input::Notice(_)
         | Input::Settings(_)
         | Input::Order(_)
         | Input::Found(_)
@@ -241,33 +244,29 @@ fn insert_step(
     number: &dyn Fn(&Series) -> Option<i64>,
 ) -> Result<(), StoreError> {
     let mut insert = connection.prepare_cached(
-        "INSERT INTO step (seq, now, series, time, value, sigma, body) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
+        "INSERT INTO step (seq, now, series, time, value, sigma, body, sum) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
     )?;
-    if let (Some(series), Some((time, value, sigma))) = (Series::of(input), value(input)) {
-        let own = (now != time).then(|| nanoseconds(now)).transpose()?;
-        let (number, time) = (number(&series), nanoseconds(time)?);
-        insert.execute(params![
-            seq,
-            own,
-            number,
-            time,
-            value,
-            sigma,
-            None::<Vec<u8>>
-        ])?;
-    } else {
-        let body = super::read::encode(input)?;
-        let none = None::<f64>;
-        insert.execute(params![
-            seq,
-            nanoseconds(now)?,
-            None::<i64>,
-            None::<i64>,
-            none,
-            none,
-            body
-        ])?;
-    }
+    let (own, number, time, value, sigma, body) =
+        if let (Some(series), Some((time, value, sigma))) = (Series::of(input), value(input)) {
+            let own = (now != time).then(|| nanoseconds(now)).transpose()?;
+            let time = nanoseconds(time)?;
+            (own, number(&series), Some(time), Some(value), sigma, None)
+        } else {
+            let body = super::read::encode(input)?;
+            (Some(nanoseconds(now)?), None, None, None, None, body)
+        };
+    let integer = |value: Option<i64>| value.map_or(ValueRef::Null, ValueRef::Integer);
+    let real = |value: Option<f64>| value.map_or(ValueRef::Null, ValueRef::Real);
+    let sum = sum(&[
+        ValueRef::Integer(seq),
+        integer(own),
+        integer(number),
+        integer(time),
+        real(value),
+        real(sigma),
+        body.as_deref().map_or(ValueRef::Null, ValueRef::Blob),
+    ]);
+    insert.execute(params![seq, own, number, time, value, sigma, body, sum])?;
     Ok(())
 }
 
@@ -281,11 +280,20 @@ fn insert_event(
         serde_json::to_string(event).map_err(|error| StoreError::Unreadable(error.to_string()))?;
     let benchmark = event.benchmark.as_ref().map(ToString::to_string);
     let (time, kind) = (nanoseconds(event.time)?, event.kind.name());
+    let named = benchmark.as_deref().map(str::as_bytes);
+    let sum = sum(&[
+        ValueRef::Integer(seq),
+        ValueRef::Integer(step),
+        ValueRef::Integer(time),
+        ValueRef::Text(kind.as_bytes()),
+        named.map_or(ValueRef::Null, ValueRef::Text),
+        ValueRef::Text(body.as_bytes()),
+    ]);
     connection
         .prepare_cached(
-            "INSERT INTO event (seq, step, time, kind, benchmark, body) VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
+            "INSERT INTO event (seq, step, time, kind, benchmark, body, sum) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
         )?
-        .execute(params![seq, step, time, kind, benchmark, body])?;
+        .execute(params![seq, step, time, kind, benchmark, body, sum])?;
     Ok(body)
 }
 

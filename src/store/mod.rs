@@ -11,16 +11,19 @@ mod read;
 mod retention;
 mod schema;
 mod series;
+mod sum;
 
 pub use batch::{Batch, Position};
 pub use outbox::{Delivery, Fate};
 pub use read::{Recorded, StepRow};
+pub use sum::Verified;
 
 use crate::reading::Timestamp;
 use rusqlite::{Connection, ErrorCode, OpenFlags, ffi};
 use series::Catalogue;
-use std::fs::{File, TryLockError};
+use std::fs::{File, Metadata, TryLockError};
 use std::io;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -128,8 +131,18 @@ impl StoreError {
 #[derive(Debug)]
 pub struct Store {
     inner: Mutex<Inner>,
-    /// Held as long as the daemon runs.
-    _lock: Option<File>,
+    /// Held as long as the daemon runs, after the connection: to close the database's file would undo the locks that
+    /// the database itself holds on it.
+    lock: Option<Lock>,
+}
+
+/// The folder and the database for ourselves.
+#[derive(Debug)]
+struct Lock {
+    /// Held for programs of an earlier version, which look at nothing else.
+    _folder: File,
+    database: File,
+    path: PathBuf,
 }
 
 #[derive(Debug)]
@@ -160,7 +173,10 @@ impl Store {
         schema::migrate(&mut connection)?;
         // Makes the file's own name durable.
         File::open(folder)?.sync_all()?;
-        Self::of(connection, Some(lock))
+        let store = Self::of(connection, Some(lock))?;
+        let mut verified = Verified::default();
+        while !store.verify(&mut verified)? {}
+        Ok(store)
     }
 
     /// Opens the state in `folder` to look at it, beside a daemon or without one.
@@ -185,7 +201,7 @@ impl Store {
         Self::of(connection, None)
     }
 
-    fn of(connection: Connection, lock: Option<File>) -> Result<Self, StoreError> {
+    fn of(connection: Connection, lock: Option<Lock>) -> Result<Self, StoreError> {
         let last = |table: &str| {
             let query = format!("SELECT coalesce(max(seq), 0) FROM {table}");
             connection.query_row(&query, [], |row| row.get(0))
@@ -202,7 +218,7 @@ impl Store {
         };
         Ok(Self {
             inner: Mutex::new(inner),
-            _lock: lock,
+            lock,
         })
     }
 
@@ -239,6 +255,35 @@ impl Store {
         Ok(u64::try_from(bytes).unwrap_or(0))
     }
 
+    /// A number that is this state's alone, drawn when it was first asked for.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn instance(&self) -> Result<i64, StoreError> {
+        let inner = self.inner();
+        if let Some(known) = read::meta(&inner.connection, "instance")? {
+            return Ok(known);
+        }
+        inner.connection.execute(
+            "INSERT INTO meta (name, value) VALUES ('instance', random())",
+            [],
+        )?;
+        Ok(read::meta(&inner.connection, "instance")?.unwrap_or_default())
+    }
+
+    /// Whether the database is still the file under its name: where it was removed, what is written is lost.
+    pub fn is_in_place(&self) -> bool {
+        let Some(lock) = &self.lock else { return true };
+        let identity = |metadata: io::Result<Metadata>| metadata.map(|one| (one.dev(), one.ino()));
+        match (
+            identity(lock.database.metadata()),
+            identity(std::fs::metadata(&lock.path)),
+        ) {
+            (Ok(ours), Ok(there)) => ours == there,
+            (Err(_), _) | (_, Err(_)) => false,
+        }
+    }
+
     fn inner(&self) -> MutexGuard<'_, Inner> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -246,14 +291,25 @@ impl Store {
 
 /// The folder for ourselves. A daemon that has just ended may hold it for a moment more: a hook that it was starting
 /// has its files until the hook's own program begins.
-fn lock(folder: &Path) -> Result<File, StoreError> {
-    let lock = File::create(folder.join("lock"))?;
+fn lock(folder: &Path) -> Result<Lock, StoreError> {
+    let path = folder.join(FILE);
+    let mut options = File::options();
+    options.read(true).write(true).create(true).truncate(false);
+    Ok(Lock {
+        _folder: locked(File::create(folder.join("lock"))?, folder)?,
+        // The database too: whoever removes the other file lets nobody in.
+        database: locked(options.open(&path)?, folder)?,
+        path,
+    })
+}
+
+fn locked(file: File, folder: &Path) -> Result<File, StoreError> {
     for attempt in 0..LOCK_ATTEMPTS {
         if attempt > 0 {
             std::thread::sleep(LOCK_WAIT);
         }
-        match lock.try_lock() {
-            Ok(()) => return Ok(lock),
+        match file.try_lock() {
+            Ok(()) => return Ok(file),
             Err(TryLockError::WouldBlock) => {}
             Err(TryLockError::Error(error)) => return Err(error.into()),
         }

@@ -2,7 +2,7 @@
 
 use super::series::Series;
 use super::{Store, StoreError, timestamp};
-use crate::monitor::{Finding, Input, Order, Part, Settings};
+use crate::monitor::{Finding, Input, Notice, Order, Part, Settings};
 use crate::reading::{BenchmarkId, Reading, Sample, Timestamp};
 use rusqlite::{Connection, params};
 use serde::{Deserialize, Serialize};
@@ -39,6 +39,7 @@ enum Told {
     Order(Order),
     Missing(BenchmarkId, Timestamp, String),
     Trouble(String, String),
+    Notice(Notice),
 }
 
 /// `None` where only time has passed.
@@ -53,6 +54,7 @@ pub(super) fn encode(input: &Input) -> Result<Option<Vec<u8>>, StoreError> {
             what,
         } => Told::Missing(benchmark.clone(), *time, what.clone()),
         Input::Trouble { kind, text } => Told::Trouble(kind.clone(), text.clone()),
+        Input::Notice(notice) => Told::Notice(notice.clone()),
         Input::Tick | Input::Reading { .. } | Input::Sample { .. } => return Ok(None),
     };
     let body = rmp_serde::to_vec_named(&told);
@@ -76,6 +78,7 @@ fn decode(body: Option<Vec<u8>>) -> Result<Input, StoreError> {
                 what,
             },
             Told::Trouble(kind, text) => Input::Trouble { kind, text },
+            Told::Notice(notice) => Input::Notice(notice),
         },
     )
 }

@@ -7,7 +7,7 @@ use rusqlite::Connection;
 const APPLICATION: i32 = 0x736c_6970;
 
 /// One step for each version: `MIGRATIONS[n]` leads from version n to n + 1.
-const MIGRATIONS: [&str; 1] = ["
+const MIGRATIONS: [&str; 2] = ["
     CREATE TABLE series (
         id INTEGER PRIMARY KEY,
         -- 0: a covariate; 1: readings of a benchmark
@@ -86,6 +86,11 @@ const MIGRATIONS: [&str; 1] = ["
         name TEXT PRIMARY KEY,
         value INTEGER NOT NULL
     ) STRICT;
+",
+// Of all other columns; null in rows of the version before.
+"
+    ALTER TABLE step ADD COLUMN sum INTEGER;
+    ALTER TABLE event ADD COLUMN sum INTEGER;
 "];
 
 /// The version that this program writes.

@@ -40,6 +40,7 @@ impl Series {
             }
             Input::Missing { .. }
             | Input::Trouble { .. }
+            | Input::Notice(_)
             | Input::Settings(_)
             | Input::Order(_)
             | Input::Found(_)

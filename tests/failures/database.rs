@@ -84,3 +84,40 @@ fn a_second_daemon_is_refused_and_the_first_goes_on() {
     assert_eq!(first.ended(), None);
     first.stop();
 }
+
+#[test]
+fn a_second_daemon_is_refused_although_the_lock_file_was_deleted() {
+    let site = used();
+    let first = site.caught_up();
+    fs::remove_file(site.path("state/lock")).unwrap();
+    let output = site.ask(&["run", "site.toml"]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(74), "{said}");
+    assert!(
+        said.contains("another slipwatch is at work on it"),
+        "{said}"
+    );
+    first.stop();
+}
+
+/// Flips a bit in each of the values that were taken and the events that were said, one at a time.
+#[test]
+fn a_flipped_bit_in_what_was_taken_or_said_is_seen_at_the_next_start() {
+    let site = used();
+    let file = site.path("state/slipwatch.db");
+    let changes = [
+        "UPDATE step SET value = value + 0.0000001 WHERE seq = (SELECT max(seq) FROM step WHERE value IS NOT NULL)",
+        "UPDATE step SET time = time + 1 WHERE seq = (SELECT min(seq) FROM step WHERE time IS NOT NULL)",
+        "UPDATE event SET body = replace(body, '1', '3') WHERE seq = (SELECT min(seq) FROM event)",
+    ];
+    let whole = fs::read(&file).unwrap();
+    for change in changes {
+        fs::write(&file, &whole).unwrap();
+        let database = Connection::open(&file).unwrap();
+        assert_eq!(database.execute(change, []).unwrap(), 1, "{change}");
+        drop(database);
+        is_refused(&site, "is not what was written");
+    }
+    fs::write(&file, &whole).unwrap();
+    site.caught_up().stop();
+}

@@ -22,6 +22,14 @@
 //! | 20 | clocks that step, a machine that sleeps | `machine`, `orders`; the watchdog is in tests/service.rs |
 //! | 21 | a config that is wrong, a benchmark that is taken out | `orders` |
 //! | 22 | recordings | tests/follow.rs, tests/ingest_mcap.rs, tests/mutated_files.rs |
+//! | 23 | a log that cannot be written | `log` |
+//! | 24 | the host's clock, one wrong time stamp, a clock that was never set | `time`; src/runtime/site/timekeeper.rs |
+//! | 25 | sensors that are stuck, spoilt, or give another quantity | `sensors`; src/monitor/suspect.rs |
+//! | 26 | files and messages that give nothing | `feeds`; tests/mqtt.rs |
+//! | 27 | backlogs, corrections, silences, slow hooks, hooks of the site | `telling`; tests/hooks.rs |
+//! | 28 | what an operator is to see: what never read, restarts, a state that is gone, forged names | `view` |
+//!
+//! docs/failure-modes.md says the same for operators.
 //!
 //! What the machine must have for it (strace, mounts of one's own, libfaketime) a test asks for, and says where it was
 //! skipped. Not covered: a loss of power (a killed process leaves what the kernel has; whether a disk keeps what it said
@@ -42,9 +50,15 @@
 mod crowd;
 mod database;
 mod disk;
+mod feeds;
 mod files;
 mod killed;
+mod log;
 mod machine;
 mod model;
 mod orders;
+mod sensors;
 mod site;
+mod telling;
+mod time;
+mod view;

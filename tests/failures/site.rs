@@ -5,7 +5,8 @@ use nix::unistd::Pid;
 use slipwatch::reading::Timestamp;
 use slipwatch::store::Store;
 use std::fs::{self, File, OpenOptions};
-use std::io::Write;
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
@@ -23,6 +24,19 @@ pub(crate) fn eventually(what: &str, mut claim: impl FnMut() -> bool) {
         std::thread::sleep(Duration::from_millis(10));
     }
     panic!("never: {what}");
+}
+
+/// What the daemon answers, its head too.
+pub(crate) fn get(address: &str, path: &str) -> String {
+    let mut stream = TcpStream::connect(address).unwrap();
+    stream
+        .set_read_timeout(Some(Duration::from_secs(30)))
+        .unwrap();
+    let request = format!("GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    stream.write_all(request.as_bytes()).unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).unwrap();
+    answer
 }
 
 /// A folder with a site that reads `incoming/*.csv` and `incoming/*.mcap`, and a hook that notes the keys it is told.
@@ -51,6 +65,20 @@ impl Site {
              levels = [\"yellow\", \"orange\", \"red\", \"unknown\"]\n"
         );
         fs::write(self.path("site.toml"), text).unwrap();
+    }
+
+    /// Has it answer questions; where.
+    pub(crate) fn listen(&self) -> String {
+        let free = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = free.local_addr().unwrap().to_string();
+        let text = fs::read_to_string(self.path("site.toml")).unwrap();
+        let text = text.replacen(
+            "state_dir",
+            &format!("listen = \"{address}\"\nstate_dir"),
+            1,
+        );
+        fs::write(self.path("site.toml"), text).unwrap();
+        address
     }
 
     pub(crate) fn path(&self, name: &str) -> PathBuf {

@@ -1,9 +1,10 @@
 //! What people declare, as it acts on one benchmark.
 
+use super::unknown::Reason;
 use super::{Beside, Track};
 use crate::alert::Policy;
 use crate::monitor::declared::Declarations;
-use crate::monitor::event::{AlertState, Event};
+use crate::monitor::event::Event;
 use crate::monitor::history::Source;
 use crate::reading::{Reading, Timestamp};
 
@@ -63,7 +64,7 @@ impl Track {
             self.silence.broken_by(time)
         }?;
         let text = format!("benchmark {} reads again", self.benchmark);
-        Some(self.unknown((now, since), AlertState::Resolved, text))
+        self.ends_unknown((now, since), Reason::NoData, text)
     }
 
     /// Goes by other declarations from here on, and looks anew at the readings that it has where they concern some.

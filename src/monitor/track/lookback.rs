@@ -72,7 +72,11 @@ impl Track {
     ///
     /// The same rules go over the readings as they were known and as they are now, each by a scratch latch: what
     /// these leave out (an adopted effect, a regime's flip) is left out of both, and makes no difference.
-    pub(super) fn look_back(&mut self, policy: &Policy, time: Timestamp) -> Option<Event> {
+    pub(in crate::monitor) fn look_back(
+        &mut self,
+        policy: &Policy,
+        time: Timestamp,
+    ) -> Option<Event> {
         let Lookback {
             since,
             before,

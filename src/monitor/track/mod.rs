@@ -1,6 +1,7 @@
 //! One benchmark: each new reading grows t_max, refits, and may change regime, intercept and level.
 
 mod adopted;
+mod ahead;
 mod call;
 mod declared;
 mod forecast;
@@ -8,6 +9,8 @@ mod lookback;
 mod motion;
 mod pace;
 mod refit;
+mod sensor;
+mod unknown;
 mod watch;
 
 use super::Explain;
@@ -22,11 +25,13 @@ use crate::forecast::Panel;
 use crate::reading::{BenchmarkId, Reading, SECONDS_PER_DAY, Timestamp};
 use crate::regime::Tracker;
 use adopted::Adopted;
+use ahead::Ahead;
 use forecast::Forecast;
 use jiff::SignedDuration;
 use lookback::{Levels, Lookback};
 use pace::Pace;
 use serde::{Deserialize, Serialize};
+use unknown::{Reason, Unknown};
 use watch::Watch;
 
 pub(super) use motion::settled;
@@ -39,6 +44,10 @@ const STUCK: usize = 24;
 pub(super) struct Beside<'a> {
     pub(super) covariates: &'a Covariates,
     pub(super) explain: Explain,
+    /// Data time.
+    pub(super) now: Timestamp,
+    /// Whether what comes late is judged when all that came with it has been taken.
+    pub(super) settles: bool,
 }
 
 /// Everything the monitor knows of one benchmark.
@@ -70,6 +79,21 @@ pub(super) struct Track {
     /// What came late and is to be looked back on with the next newest reading.
     #[serde(default)]
     lookback: Option<Lookback>,
+    /// What makes it unknown.
+    #[serde(default)]
+    unknown: Unknown,
+    /// A reading that lies far ahead of all others.
+    #[serde(default)]
+    ahead: Option<Ahead>,
+    /// By how much its readings jump to and fro, where they are spoilt.
+    #[serde(default)]
+    spoilt_by: Option<f64>,
+    /// Readings of a second quantity in a row.
+    #[serde(default)]
+    others: u32,
+    /// Something came late and has not been judged.
+    #[serde(default)]
+    owes: bool,
 }
 
 impl Track {
@@ -83,6 +107,11 @@ impl Track {
             declared,
             levels: Levels::default(),
             lookback: None,
+            unknown: Unknown::default(),
+            ahead: None,
+            spoilt_by: None,
+            others: 0,
+            owes: false,
             benchmark,
             history: History::new(source, epoch),
             panel: Panel::default(),
@@ -110,8 +139,20 @@ impl Track {
         Some(self.declared.put_off(newest, due))
     }
 
-    /// Takes one reading.
+    /// Takes one reading, and the one before it that waited for this.
     pub(super) fn take(
+        &mut self,
+        policy: &Policy,
+        source: Source,
+        reading: &Reading,
+        beside: &Beside<'_>,
+    ) -> Vec<Event> {
+        let mut events = self.judge_ahead(policy, reading.time, beside);
+        events.extend(self.take_one(policy, source, reading, beside));
+        events
+    }
+
+    fn take_one(
         &mut self,
         policy: &Policy,
         source: Source,
@@ -123,6 +164,10 @@ impl Track {
             events.extend(self.leave_out(source, reading));
             return events;
         }
+        if self.unknown.has(Reason::Stuck) && self.history.is_repeated_by(source, reading) {
+            events.extend(self.go_on_stuck(reading.time));
+            return events;
+        }
         // For the look back, which begins with the first that comes late.
         let is_late = self.newest.is_some_and(|newest| reading.time <= newest);
         let before =
@@ -130,31 +175,83 @@ impl Track {
         let taken = self.history.take(source, reading);
         events.extend(self.complaint(taken, reading.time));
         match taken {
-            Taken::Known | Taken::OtherQuantity | Taken::OutOfRange(_) => return events,
+            Taken::OtherQuantity => {
+                events.extend(self.count_other(reading.time));
+                return events;
+            }
+            Taken::Known | Taken::OutOfRange(_) => return events,
             Taken::Newest => {
                 self.newest = Some(reading.time);
                 self.watch.count();
+                events.extend(self.unstick(reading.time));
             }
             // What came late or was corrected is judged at once, as of the newest reading.
             Taken::Late | Taken::Corrected(_) => self.note_late(reading.time, before),
         }
+        events.extend(self.count_own(reading.time));
         let time = self.newest.unwrap_or(reading.time);
         events.extend(self.reset(time));
         events.extend(self.reads_again(time, reading.time));
+        events.extend(self.leave_out_clockless(time));
         if taken == Taken::Newest {
-            events.extend(self.look_back(policy, time));
+            events.extend(self.judge_sensor(time));
+            if !beside.settles {
+                events.extend(self.look_back(policy, time));
+            }
         }
-        if !self.is_refit_due(policy, taken, reading.time) {
+        let is_owed = beside.settles && taken != Taken::Newest;
+        self.owes |= is_owed;
+        let is_stuck = self.unknown.has(Reason::Stuck);
+        if is_owed || is_stuck || !self.is_refit_due(policy, taken, reading.time) {
             events.extend(self.raise(policy, time));
             return events;
         }
+        events.extend(self.judge(policy, time, beside));
+        events
+    }
+
+    /// What follows from the readings as they are now.
+    fn judge(&mut self, policy: &Policy, time: Timestamp, beside: &Beside<'_>) -> Vec<Event> {
+        let mut events = Vec::new();
+        self.owes = false;
         let forecast = self.forecast(policy.critical_velocity_mm_per_day, beside);
         if let Some(forecast) = &forecast {
             events.extend(self.refit(policy, time, forecast));
             events.extend(self.watch(policy, time, forecast, beside));
         }
-        events.extend(self.alert(policy, time, forecast.as_ref()));
+        let (may_fall, latch) = (self.may_fall(), self.latch.clone());
+        let called = self.alert(policy, time, forecast.as_ref());
+        if !may_fall && self.latch.level() < latch.level() {
+            self.levels.note(time, latch.level());
+            self.latch = latch;
+            return events;
+        }
+        events.extend(called);
         events
+    }
+
+    /// Everything that came together has been taken: judges what of it came late.
+    pub(super) fn settle(&mut self, policy: &Policy, beside: &Beside<'_>) -> Vec<Event> {
+        match self.newest {
+            Some(time) if self.owes => self.judge(policy, time, beside),
+            Some(_) | None => Vec::new(),
+        }
+    }
+
+    /// What comes now was measured long before `time`, which it is by the clock.
+    pub(super) fn is_behind(&mut self, time: Timestamp) {
+        self.silence.is_behind(time);
+    }
+
+    /// Whether something that came late is still to be looked back on.
+    pub(super) fn owes_look_back(&self) -> bool {
+        self.lookback.is_some()
+    }
+
+    /// One more reading of a stuck sensor: it is none, but the benchmark is not silent.
+    fn go_on_stuck(&mut self, time: Timestamp) -> Option<Event> {
+        self.newest = Some(time);
+        self.reads_again(time, time)
     }
 
     /// What the laws foretell after the newest reading.
@@ -233,19 +330,15 @@ impl Track {
             "benchmark {}: no reading since {newest}{fault}{latched}",
             self.benchmark
         );
-        vec![
-            self.fault(now, "no-data", text.clone()),
-            self.unknown((now, newest), AlertState::Firing, text),
-        ]
+        let mut events = vec![self.fault(now, "no-data", text.clone())];
+        events.extend(self.begins_unknown((now, newest), Reason::NoData, text));
+        events
     }
 
     /// The benchmark is no longer watched: what is in force at it ends.
     pub(super) fn close(&mut self, now: Timestamp) -> Vec<Event> {
         let text = format!("benchmark {} is no longer watched", self.benchmark);
-        let mut events = Vec::new();
-        if let Some(since) = self.silence.end() {
-            events.push(self.unknown((now, since), AlertState::Resolved, text.clone()));
-        }
+        let mut events: Vec<Event> = self.ends_all_unknown(now, &text).into_iter().collect();
         if let Some((level, since)) = self.latch.in_force() {
             let kind = EventKind::Alert {
                 level,
@@ -264,23 +357,6 @@ impl Track {
             .checked_add(policy.steady_for)
             .ok()
             .map(|until| (until, cause));
-    }
-
-    /// A silence that began after the reading of `since`: part of the key, so that each is told anew.
-    fn unknown(
-        &self,
-        (time, since): (Timestamp, Timestamp),
-        state: AlertState,
-        text: String,
-    ) -> Event {
-        let kind = EventKind::Alert {
-            level: Level::Unknown,
-            state,
-            key: format!("{}/{}/{since}", self.benchmark, Level::Unknown),
-            rule: "no-data".to_owned(),
-            text,
-        };
-        self.event(time, kind)
     }
 
     fn fault(&self, time: Timestamp, kind: &str, text: String) -> Event {

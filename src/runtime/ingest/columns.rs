@@ -1,6 +1,6 @@
 //! What the columns of a CSV file mean, by their names alone.
 
-use super::IngestError;
+use super::{IngestError, ReadOptions};
 use crate::reading::{BenchmarkId, Unit};
 use std::path::Path;
 use std::str::FromStr;
@@ -178,6 +178,9 @@ pub(super) fn channel_unit(name: &str) -> Option<&str> {
         })
 }
 
+/// What a column of readings should have.
+const A_UNIT: &str = "a unit at its end: mm, cm, m, in or ft, a velocity per h, day or yr, such as displacement_mm or velocity_mm_per_h";
+
 /// A header, understood.
 #[derive(Debug, Clone)]
 pub(super) struct Layout {
@@ -198,7 +201,7 @@ impl Layout {
         file: &Path,
         line: u64,
         names: Vec<String>,
-        maps: &[ColumnMap],
+        options: &ReadOptions,
     ) -> Result<Self, IngestError> {
         let fail = |column: &str, problem, expected| IngestError::Header {
             file: file.into(),
@@ -211,25 +214,16 @@ impl Layout {
         let mut columns = Vec::new();
         let mut sigmas = Vec::new();
         for (index, name) in names.iter().enumerate() {
-            if name.is_empty() {
-                return Err(fail(
-                    name,
-                    "a column without a name",
-                    "a name for every column",
-                ));
-            }
-            if names[..index].contains(name) {
-                return Err(fail(name, "the name stands twice", "every name once"));
-            }
-            let map = maps.iter().find(|map| map.column == *name);
+            Self::name_is_right(name, &names[..index])
+                .map_err(|(problem, expected)| fail(name, problem, expected))?;
+            let map = options.columns.iter().find(|map| map.column == *name);
             let (benchmark, measure) = match (map, name_of(name)) {
                 (Some(map), _) => (map.benchmark.clone(), map.measure),
                 (None, Name::Measure(id, measure)) => {
                     (id.map_or_else(|| stem.clone(), BenchmarkId::new), measure)
                 }
                 (None, Name::WithoutUnit) => {
-                    let expected = "a unit at its end: mm, cm, m, in or ft, a velocity per h, day or yr, such as displacement_mm or velocity_mm_per_h";
-                    return Err(fail(name, "a reading without a known unit", expected));
+                    return Err(fail(name, "a reading without a known unit", A_UNIT));
                 }
                 (None, Name::Time) => {
                     columns.push(Column::Time);
@@ -240,12 +234,16 @@ impl Layout {
                     continue;
                 }
                 (None, Name::Channel(unit)) => {
-                    let unit = unit.map(str::to_owned);
-                    columns.push(Column::Channel { unit });
+                    columns.push(Column::Channel {
+                        unit: unit.map(str::to_owned),
+                    });
                     continue;
                 }
             };
             columns.push(match measure {
+                Measure::Reading(_) if map.is_none() && options.reserves(&benchmark) => {
+                    Column::Ignored
+                }
                 Measure::Reading(unit) => Column::Reading {
                     benchmark,
                     unit,
@@ -270,6 +268,17 @@ impl Layout {
         layout.refuse_twins(fail)?;
         layout.pair(sigmas, fail)?;
         Ok(layout)
+    }
+
+    /// What is wrong with a name after those `before` it, and what was expected.
+    fn name_is_right(name: &String, before: &[String]) -> Result<(), (&'static str, &'static str)> {
+        if name.is_empty() {
+            Err(("a column without a name", "a name for every column"))
+        } else if before.contains(name) {
+            Err(("the name stands twice", "every name once"))
+        } else {
+            Ok(())
+        }
     }
 
     fn time_column(

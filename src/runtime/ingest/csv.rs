@@ -111,7 +111,7 @@ impl CsvRows {
 
     fn understand(&mut self, line: u64, text: &str) -> Result<(), IngestError> {
         let names = self.cells.iter().map(str::to_owned).collect();
-        let layout = Layout::new(&self.file, line, names, &self.options.columns)?;
+        let layout = Layout::new(&self.file, line, names, &self.options)?;
         self.table = Some(TableRows::new(&self.file, layout, &self.options));
         self.header = vec![text.to_owned()];
         Ok(())

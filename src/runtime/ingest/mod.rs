@@ -46,6 +46,8 @@ pub struct ReadOptions {
     pub epoch: Timestamp,
     /// What columns mean whose names do not say it.
     pub columns: Vec<ColumnMap>,
+    /// Benchmarks whose readings stand in those columns alone, and in no other that has their name.
+    pub reserved: Vec<BenchmarkId>,
     /// The span over which velocities are means, for series that state none.
     pub averaging: Option<SignedDuration>,
     /// How times and missing values are written.
@@ -59,6 +61,7 @@ impl Default for ReadOptions {
         Self {
             epoch: Timestamp::constant(946_684_800, 0),
             columns: Vec::new(),
+            reserved: Vec::new(),
             averaging: None,
             conventions: Conventions::default(),
             vectors: Vec::new(),
@@ -67,6 +70,11 @@ impl Default for ReadOptions {
 }
 
 impl ReadOptions {
+    /// Whether its readings stand in a column that is given, and in no other.
+    fn reserves(&self, benchmark: &BenchmarkId) -> bool {
+        self.reserved.contains(benchmark)
+    }
+
     fn averaging_of(&self, unit: Unit, stated: Option<SignedDuration>) -> Option<SignedDuration> {
         match unit.quantity() {
             Quantity::Velocity => stated.or(self.averaging),

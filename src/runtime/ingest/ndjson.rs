@@ -152,7 +152,7 @@ impl NdjsonRows {
     fn cells(&mut self, line: u64, object: &Object) -> Result<Vec<Item>, IngestError> {
         let names: Vec<String> = object.keys().map(|key| key.trim().to_owned()).collect();
         if !self.tables.contains_key(&names) {
-            let layout = Layout::new(&self.file, line, names.clone(), &self.options.columns)?;
+            let layout = Layout::new(&self.file, line, names.clone(), &self.options)?;
             if self.tables.len() >= MOST_LAYOUTS {
                 self.tables.clear();
             }

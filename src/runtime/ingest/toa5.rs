@@ -153,7 +153,7 @@ impl Toa5Rows {
         let columns = names.iter().zip(&units);
         let meant = columns.map(|(name, unit)| self.full_name(line - 2, name, unit));
         let meant = meant.collect::<Result<Vec<String>, IngestError>>()?;
-        let mut layout = Layout::new(&self.file, line - 2, meant, &self.options.columns)?;
+        let mut layout = Layout::new(&self.file, line - 2, meant, &self.options)?;
         for (column, (name, kind)) in layout.columns.iter_mut().zip(names.iter().zip(&processing)) {
             if name == "RECORD" || TIMES_OF_EXTREMES.contains(&kind) {
                 *column = Column::Ignored;

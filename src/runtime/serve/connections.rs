@@ -6,11 +6,10 @@ use axum::Router;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
-use std::sync::Arc;
+use std::collections::VecDeque;
 use std::time::Duration;
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::Semaphore;
-use tokio::task::JoinSet;
+use tokio::task::{AbortHandle, JoinSet};
 
 /// Longest request line with its headers, bytes.
 const LONGEST_HEAD: usize = 16 * 1024;
@@ -19,36 +18,35 @@ const MOST_HEADERS: usize = 64;
 /// After a connection could not be taken, as when there are no more file descriptors.
 const BREATH: Duration = Duration::from_millis(200);
 
-/// Serves until `stopped`; open connections are then dropped.
+/// Serves until `stopped`; open connections are then dropped. Where there are as many as may be, one more takes the
+/// place of the oldest: whoever opens many and asks nothing keeps nobody else waiting.
 pub(super) async fn serve(
     listener: TcpListener,
     router: Router,
     limits: Limits,
     mut stopped: Shutdown,
 ) {
-    let slots = Arc::new(Semaphore::new(limits.connections));
     let mut open = JoinSet::new();
+    let mut oldest: VecDeque<AbortHandle> = VecDeque::new();
     loop {
         // Whatever has ended is let go of, or the set would grow for ever.
         while open.try_join_next().is_some() {}
-        let next = async {
-            let slot = Arc::clone(&slots).acquire_owned().await;
-            (slot, listener.accept().await)
-        };
-        let (slot, accepted) = tokio::select! {
+        let accepted = tokio::select! {
             () = stopped.requested() => return,
-            next = next => next,
+            accepted = listener.accept() => accepted,
         };
-        match (slot, accepted) {
-            (Ok(slot), Ok((stream, _))) => {
+        match accepted {
+            Ok((stream, _)) => {
+                oldest.retain(|one| !one.is_finished());
+                if oldest.len() >= limits.connections
+                    && let Some(first) = oldest.pop_front()
+                {
+                    first.abort();
+                }
                 let router = router.clone();
-                open.spawn(async move {
-                    answer(stream, router, limits).await;
-                    drop(slot);
-                });
+                oldest.push_back(open.spawn(answer(stream, router, limits)));
             }
-            (Err(_closed), _) => return,
-            (_, Err(error)) => {
+            Err(error) => {
                 tracing::warn!(%error, "a connection could not be taken");
                 tokio::time::sleep(BREATH).await;
             }

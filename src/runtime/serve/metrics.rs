@@ -37,6 +37,7 @@ impl Collector for Vitals {
             turn,
         )?;
         state(&mut sheet, &health)?;
+        trouble(&mut sheet, &health)?;
         counts(&mut sheet, &health)?;
         let about = "Time to work in a reading that led to a refit";
         sheet.whole("refit_seconds", about, self.refits())?;
@@ -49,8 +50,45 @@ impl Collector for Vitals {
     }
 }
 
+fn flag(is: bool) -> f64 {
+    f64::from(u8::from(is))
+}
+
+/// What somebody must see to.
+fn trouble(sheet: &mut Sheet<'_>, health: &Health) -> fmt::Result {
+    let gauges = [
+        (
+            "store_damaged",
+            "1 when a row of the state is not what was written",
+            flag(health.is_store_damaged),
+        ),
+        (
+            "clock_wrong",
+            "1 while the host's clock is earlier than readings that are known",
+            flag(health.is_clock_wrong),
+        ),
+        (
+            "held_inputs",
+            "Inputs that wait, unacknowledged, until the host's clock is right",
+            health.held as f64,
+        ),
+        (
+            "silences",
+            "Orders in force by which alerts are not told",
+            health.silences.len() as f64,
+        ),
+    ];
+    for (name, about, value) in gauges {
+        sheet.gauge(name, about, value)?;
+    }
+    if let Some(until) = health.silences.iter().map(|mute| mute.until).max() {
+        let about = "When the last order ends by which alerts are not told, Unix time";
+        sheet.gauge("silenced_until_timestamp_seconds", about, seconds(until))?;
+    }
+    Ok(())
+}
+
 fn state(sheet: &mut Sheet<'_>, health: &Health) -> fmt::Result {
-    let flag = |is: bool| f64::from(u8::from(is));
     let gauges = [
         (
             "caught_up",
@@ -123,6 +161,11 @@ fn counts(sheet: &mut Sheet<'_>, health: &Health) -> fmt::Result {
             "without_clock",
             "Values of a time that no clock gives that is set, set aside",
             health.without_clock,
+        ),
+        (
+            "log_lines_lost",
+            "Lines of the log that could not be written",
+            health.log_lines_lost,
         ),
     ];
     for (name, about, count) in counters {

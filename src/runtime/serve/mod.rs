@@ -20,7 +20,7 @@ use tokio::task::JoinHandle;
 /// What one caller may take up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
-    /// Connections at once; one more waits until one of them ends.
+    /// Connections at once; one more takes the place of the oldest.
     pub connections: usize,
     /// By when the head of a request must be there.
     pub head_time: Duration,

@@ -155,6 +155,16 @@ async fn ready(State(vitals): State<Arc<Vitals>>) -> (StatusCode, &'static str) 
             StatusCode::SERVICE_UNAVAILABLE,
             "the state folder cannot be written to\n",
         )
+    } else if health.is_store_damaged {
+        (
+            StatusCode::SERVICE_UNAVAILABLE,
+            "the state is damaged: restore a backup\n",
+        )
+    } else if health.is_clock_wrong {
+        (
+            StatusCode::SERVICE_UNAVAILABLE,
+            "the host's clock is wrong: readings that are known lie after it\n",
+        )
     } else {
         (StatusCode::OK, "ready\n")
     }

@@ -3,7 +3,7 @@
 use super::flood::Outgoing;
 use super::{LEAST_FRESHNESS, LEAST_WATCHED, MOST_UNWRITTEN, Site, Standing};
 use crate::alert::{Level, Policy};
-use crate::monitor::AlertState;
+use crate::monitor::{AlertState, Event};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::deliver::Dispatcher;
 use crate::runtime::delivered::delivery;
@@ -16,18 +16,20 @@ impl Site {
     /// for what began longer before `wall` than twice the evacuation time: of that, [`Site::caught_up`] sends what
     /// is still in force. The end of what was told is told however long ago it was.
     ///
-    /// On a full disk everything waits for the next commit, and the hooks hear all the same: an alert may then
+    /// On a full disk everything waits for the next commit, and the hooks are told all the same: an alert may then
     /// come twice after a crash, with the same key.
     ///
     /// # Errors
     /// When it cannot be made durable for another reason; the alerts have gone out all the same.
     pub fn commit(&mut self, wall: Timestamp) -> Result<(), StoreError> {
+        let now = self.keeper.now(wall);
         let mut to_send = Vec::new();
         for alert in std::mem::take(&mut self.fresh) {
-            let age = wall.duration_since(alert.event.time);
-            let is_fresh = age <= self.freshness(alert.event.benchmark.as_ref());
-            let is_due = is_fresh || self.is_waited_for(&alert);
-            let is_sent = is_due && !self.is_muted(&alert, wall);
+            let age = now.duration_since(alert.event.time);
+            let is_fresh =
+                age <= self.freshness(alert.event.benchmark.as_ref()) || self.never_read(&alert);
+            let is_due = is_fresh && !self.ends_untold(&alert) || self.is_waited_for(&alert);
+            let is_sent = is_due && !self.is_muted(&alert, now);
             if is_sent {
                 to_send.push(alert.clone());
             } else {
@@ -161,7 +163,7 @@ impl Site {
 
     /// Whether so much waits for room on the disk that nothing more is to be taken in.
     pub fn is_stalled(&self) -> bool {
-        self.is_full && self.batch.steps() >= MOST_UNWRITTEN
+        self.is_full && self.batch.steps() >= MOST_UNWRITTEN || self.holds_too_many()
     }
 
     /// Notes what is in force: a level supersedes the lower ones of its benchmark, and its end
@@ -198,6 +200,19 @@ impl Site {
             && had.is_some_and(|had| had.was_told && had.alert.level <= alert.level)
     }
 
+    /// Whether it says that a benchmark has given no reading: that is never long past.
+    fn never_read(&self, alert: &Alert) -> bool {
+        let benchmark = alert.event.benchmark.as_ref();
+        alert.level == Level::Unknown && benchmark.is_some_and(|one| !self.newest.contains_key(one))
+    }
+
+    /// Whether it is the end of what nobody has been told of.
+    fn ends_untold(&self, alert: &Alert) -> bool {
+        let place = (alert.event.benchmark.clone(), alert.level == Level::Unknown);
+        let had = self.standing.get(&place);
+        alert.state == AlertState::Resolved && had.is_some_and(|had| !had.was_told)
+    }
+
     /// Everything there is has been read: what is in force and was not sent because it began long
     /// ago goes out, however long ago that was.
     ///
@@ -207,7 +222,12 @@ impl Site {
     ///
     /// # Errors
     /// As [`Site::commit`].
-    pub fn caught_up(&mut self, wall: Timestamp) -> Result<(), StoreError> {
+    pub fn caught_up(&mut self, wall: Timestamp) -> Result<Vec<Event>, StoreError> {
+        let events = self.rest(wall);
+        if !events.is_empty() {
+            self.commit(wall)?;
+        }
+        let now = self.keeper.now(wall);
         let mut standing = std::mem::take(&mut self.standing);
         let mut to_send = Vec::new();
         for one in standing.values_mut() {
@@ -216,8 +236,9 @@ impl Site {
                 if one.alert.must_arrive() && !one.is_told_together {
                     self.send(&one.alert);
                 }
-            } else if self.is_watched(one.alert.event.benchmark.as_ref(), wall)
-                && !self.is_muted(&one.alert, wall)
+            } else if (self.never_read(&one.alert)
+                || self.is_watched(one.alert.event.benchmark.as_ref(), now))
+                && !self.is_muted(&one.alert, now)
             {
                 to_send.push(one.alert.clone());
                 (one.is_sent, one.was_told) = (true, true);
@@ -226,10 +247,19 @@ impl Site {
             }
         }
         self.standing = standing;
-        if to_send.is_empty() {
-            return Ok(());
+        if !to_send.is_empty() {
+            self.record_and_send(&to_send)?;
         }
-        self.record_and_send(&to_send)
+        Ok(events)
+    }
+
+    /// Whether something has been called that people are to be told of at once.
+    pub fn is_urgent(&self, wall: Timestamp) -> bool {
+        let now = self.keeper.now(wall);
+        self.fresh.iter().any(|alert| {
+            let age = now.duration_since(alert.event.time);
+            alert.must_arrive() && age <= self.freshness(alert.event.benchmark.as_ref())
+        })
     }
 
     fn is_watched(&self, benchmark: Option<&BenchmarkId>, wall: Timestamp) -> bool {

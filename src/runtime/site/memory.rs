@@ -53,6 +53,7 @@ impl Site {
         if *site.monitor.settings() != settings || store.last_step() == 0 {
             site.resettle(settings);
         }
+        site.begin();
         Ok(site)
     }
 
@@ -60,7 +61,14 @@ impl Site {
     pub fn show(&self, vitals: &Vitals) {
         for (benchmark, newest) in &self.newest {
             let level = self.monitor.level(benchmark).unwrap_or(Level::Green);
-            vitals.resume(benchmark, *newest, level);
+            let is_unknown = self.monitor.is_unknown(benchmark);
+            vitals.resume(benchmark, Some(*newest), level, is_unknown);
+        }
+        for benchmark in &self.monitor.settings().watched.named {
+            if !self.newest.contains_key(benchmark) {
+                let is_unknown = self.monitor.is_unknown(benchmark);
+                vitals.resume(benchmark, None, Level::Green, is_unknown);
+            }
         }
     }
 

@@ -5,15 +5,19 @@
 //! The wall clock comes in as an argument; whoever replays hands in the data's own time.
 
 mod alerts;
+mod arrivals;
 mod flood;
 mod memory;
 mod mute;
+mod timekeeper;
 
-use mute::Mute;
+pub(super) use arrivals::is_logged;
+pub use mute::Mute;
+
+use timekeeper::Timekeeper;
 
 use crate::monitor::{Event, EventKind, Input, Monitor, Order, Settings};
 use crate::reading::{BenchmarkId, Timestamp};
-use crate::runtime::clock;
 use crate::runtime::deliver::Dispatcher;
 use crate::runtime::hook::{Alert, Status};
 use crate::runtime::searches::Searches;
@@ -21,7 +25,7 @@ use crate::runtime::tail::Arrival;
 use crate::store::{Batch, Position, Store, StoreError};
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -39,10 +43,6 @@ const STEPS_A_MEMORY: usize = 2_000;
 const STEPS_A_BENCHMARK: usize = 20;
 /// The site's own part of the memory, beside those of the monitor.
 const OWN: &str = "\0site";
-/// The first day of 1970, UTC: where a logger starts whose clock is not set. No reading of a site that is watched now
-/// was measured then; a replay of an archive takes it.
-const CLOCKLESS: std::ops::Range<Timestamp> =
-    Timestamp::UNIX_EPOCH..Timestamp::constant(24 * 60 * 60, 0);
 /// Before all readings.
 const DAWN: Timestamp = Timestamp::constant(-9_223_372_036, 0);
 
@@ -114,6 +114,13 @@ pub struct Site {
     /// Who asked not to be told.
     mutes: Vec<Mute>,
     counts: Counts,
+    keeper: Timekeeper,
+    /// Benchmarks that had given readings when everything there was had been read: what comes of them now is live.
+    at_rest: BTreeSet<BenchmarkId>,
+    /// Values that wait, unacknowledged, until the host's clock is right.
+    held: VecDeque<Arrival>,
+    /// Of which silent benchmarks it is known how late their readings come, and what time it was then.
+    behind: BTreeMap<BenchmarkId, Timestamp>,
 }
 
 impl Site {
@@ -135,66 +142,11 @@ impl Site {
             standing: BTreeMap::new(),
             mutes: Vec::new(),
             counts: Counts::default(),
+            keeper: Timekeeper::default(),
+            at_rest: BTreeSet::new(),
+            held: VecDeque::new(),
+            behind: BTreeMap::new(),
         }
-    }
-
-    /// Takes one value. What was taken before, or lies ahead of the wall clock, changes nothing.
-    /// A reading by which the answer of a search is due waits for that.
-    ///
-    /// # Errors
-    /// When the state cannot be asked whether the value is known.
-    pub fn take(&mut self, arrival: &Arrival, wall: Timestamp) -> Result<Vec<Event>, StoreError> {
-        if matches!(arrival.input, Input::Trouble { .. }) {
-            return Ok(self.step(self.now.unwrap_or(DAWN), &arrival.input));
-        }
-        let ahead = arrival.time.duration_since(wall);
-        if ahead > clock::TOLERANCE {
-            self.counts.from_the_future += 1;
-            let (time, total) = (arrival.time, self.counts.from_the_future);
-            tracing::warn!(%time, ?arrival.input, total, "measured in the future: quarantined");
-            return Ok(Vec::new());
-        }
-        if let Some(store) = &self.sinks.store {
-            if arrival.time < DAWN {
-                self.counts.without_clock += 1;
-                let time = arrival.time;
-                tracing::warn!(%time, ?arrival.input, "measured before 1678: quarantined");
-                return Ok(Vec::new());
-            }
-            if CLOCKLESS.contains(&arrival.time) {
-                self.counts.without_clock += 1;
-                let (time, total) = (arrival.time, self.counts.without_clock);
-                tracing::warn!(%time, ?arrival.input, total, "measured on the first day of 1970, as by a logger whose clock is not set: quarantined");
-                return Ok(Vec::new());
-            }
-            if !self.is_newest(arrival) && store.has(&self.batch, &arrival.input)? {
-                self.counts.repeated += 1;
-                return Ok(Vec::new());
-            }
-        }
-        self.counts.taken += 1;
-        let mut events = self.pass(arrival.time);
-        let now = self.now.map_or(arrival.time, |now| now.max(arrival.time));
-        if let Input::Reading { benchmark, .. } = &arrival.input
-            && let Some(finding) = self.searches.due(benchmark, arrival.time)
-        {
-            events.extend(self.step(now, &Input::Found(finding)));
-        }
-        events.extend(self.step(now, &arrival.input));
-        for job in self.monitor.searches() {
-            self.searches.start(job);
-        }
-        Ok(events)
-    }
-
-    /// Whether the benchmark has given no reading as late as this one: it cannot be known then.
-    fn is_newest(&self, arrival: &Arrival) -> bool {
-        let Input::Reading { benchmark, .. } = &arrival.input else {
-            return false;
-        };
-        self.newest
-            .get(benchmark)
-            .is_none_or(|newest| *newest < arrival.time)
     }
 
     /// Thins a piece of what is older than `keep` by data time; whether there may be more.
@@ -240,6 +192,7 @@ impl Site {
     /// Takes an order of people, which stands under this number in the state.
     pub fn order(&mut self, number: i64, order: Order) -> Vec<Event> {
         self.batch.taken(number);
+        tracing::warn!(?order, "people ask for something");
         let now = self.now.unwrap_or(DAWN);
         self.step(now, &Input::Order(order))
     }
@@ -269,8 +222,11 @@ impl Site {
             benchmark, reading, ..
         } = input
         {
-            let newest = self.newest.entry(benchmark.clone()).or_insert(reading.time);
-            *newest = reading.time.max(*newest);
+            // One that lies ahead of data time waits until another one confirms it.
+            if reading.time <= now {
+                let newest = self.newest.entry(benchmark.clone()).or_insert(reading.time);
+                *newest = reading.time.max(*newest);
+            }
         }
         if let Input::Order(order) = input {
             self.obey(order);

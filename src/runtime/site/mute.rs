@@ -1,10 +1,12 @@
-//! Who asked not to be told, of what, until when.
+//! Who asked not to be told, of what, until when: never for longer than an order may last, whatever the clock says.
 
 use super::Site;
 use crate::alert::Level;
 use crate::monitor::Order;
 use crate::reading::{BenchmarkId, Timestamp};
+use crate::runtime::clock::TOLERANCE;
 use crate::runtime::hook::Alert;
+use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
 
 /// Orders in force at most; the oldest goes.
@@ -12,12 +14,25 @@ const MOST: usize = 256;
 
 /// Alerts that are not told for a time.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct Mute {
+pub struct Mute {
     /// `None`: of the whole site.
-    benchmark: Option<BenchmarkId>,
+    pub benchmark: Option<BenchmarkId>,
     /// Nothing above it is muted; `None`: everything is.
-    up_to: Option<Level>,
-    until: Timestamp,
+    pub up_to: Option<Level>,
+    /// Its end.
+    pub until: Timestamp,
+}
+
+impl Mute {
+    /// Whether it is in force at `now`. Of one that would last longer than it may, a clock is wrong.
+    fn is_in_force(&self, now: Timestamp) -> bool {
+        let longest = match self.up_to {
+            Some(_) => Order::LONGEST_SHELVE,
+            None => Order::LONGEST_SILENCE,
+        };
+        let left = self.until.duration_since(now);
+        left > SignedDuration::ZERO && left <= longest + TOLERANCE
+    }
 }
 
 impl Site {
@@ -41,6 +56,10 @@ impl Site {
                 self.mute(Some(benchmark.clone()), Some(level), *until);
             }
             Order::Silence { benchmark, until } => self.mute(benchmark.clone(), None, *until),
+            Order::Unsilence { benchmark } => {
+                let ends = |mute: &Mute| benchmark.is_none() || mute.benchmark == *benchmark;
+                self.mutes.retain(|mute| !ends(mute));
+            }
         }
     }
 
@@ -54,12 +73,19 @@ impl Site {
         self.mutes.drain(..excess);
     }
 
-    /// Whether nobody is to be told of this alert at `wall`.
-    pub(super) fn is_muted(&self, alert: &Alert, wall: Timestamp) -> bool {
+    /// Who is not to be told of what while the host's clock says `wall`.
+    pub fn mutes(&self, wall: Timestamp) -> Vec<Mute> {
+        let now = self.keeper.now(wall);
+        let all = self.mutes.iter();
+        all.filter(|mute| mute.is_in_force(now)).cloned().collect()
+    }
+
+    /// Whether nobody is to be told of this alert at `now`.
+    pub(super) fn is_muted(&self, alert: &Alert, now: Timestamp) -> bool {
         self.mutes.iter().any(|mute| {
             let here = mute.benchmark.is_none() || mute.benchmark == alert.event.benchmark;
             let low = mute.up_to.is_none_or(|up_to| alert.level <= up_to);
-            here && low && wall < mute.until
+            here && low && mute.is_in_force(now)
         })
     }
 }

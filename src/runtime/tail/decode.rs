@@ -27,6 +27,7 @@ impl Arrival {
                 (true, benchmark.as_str())
             }
             Input::Trouble { .. }
+            | Input::Notice(_)
             | Input::Settings(_)
             | Input::Order(_)
             | Input::Found(_)
@@ -107,8 +108,10 @@ impl Decoder {
                 measure: Measure::Reading(unit),
             })
         });
+        let of_a_column = self.wanted.iter().filter(|one| one.column.is_some());
         ReadOptions {
             columns: columns.collect(),
+            reserved: of_a_column.map(|one| one.id.clone()).collect(),
             vectors: vectors.collect(),
             conventions: self.conventions.clone(),
             ..ReadOptions::default()

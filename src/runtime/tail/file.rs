@@ -4,9 +4,9 @@ use super::decode::{Arrival, Decoder};
 use super::records::{self, Channels, Frame, HEADER_BYTES, MAGIC, RawMessage};
 use super::saved::Saved;
 use super::text::{BadLine, Fed, TextReader, Unpacking};
-use crate::monitor::Input;
 use crate::reading::Timestamp;
 use crate::runtime::ingest::{Item, decode_message, is_packed};
+use crate::runtime::site::is_logged;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use std::fs::{File, Metadata};
@@ -19,13 +19,19 @@ use std::sync::Arc;
 const READ_BYTES: usize = 16 * 1024;
 /// Bytes before the offset that must not change.
 const MARK_BYTES: u64 = 256;
+/// Bytes that may be read of one file, without a value in them, before others have their turn.
+const TURN_BYTES: u64 = 1 << 20;
+/// After so many bytes without a value others need not wait for the file any more,
+pub(super) const VALUELESS_BYTES: u64 = 64 << 20;
+/// and after so many it is refused.
+const REFUSED_BYTES: u64 = 1 << 30;
 /// How much of a bad line stands in the log, characters.
 const SHOWN: usize = 200;
 
 /// One followed file.
 #[derive(Debug)]
 pub(super) struct FileTail {
-    path: PathBuf,
+    pub(super) path: PathBuf,
     decoder: Arc<Decoder>,
     pub(super) content: Content,
     /// Everything before this has been read.
@@ -41,8 +47,14 @@ pub(super) struct FileTail {
     trouble: Option<String>,
     /// Where we were when the file was last found under another name.
     left_at: Option<u64>,
+    /// Bytes read since the last value.
+    pub(super) valueless: u64,
+    /// Whether its turn ended before it had been read to its end.
+    pub(super) has_more: bool,
+    /// Whether it has not been looked at since a restart.
+    pub(super) is_restored: bool,
     /// When the newest value was measured that it has given.
-    newest: Option<Timestamp>,
+    pub(super) newest: Option<Timestamp>,
     /// From where a restart goes on.
     pub(super) safe: Saved,
     /// As [`FileTail::moved`] last told it.
@@ -125,6 +137,9 @@ impl FileTail {
             quarantined: 0,
             trouble: None,
             left_at: None,
+            valueless: 0,
+            has_more: false,
+            is_restored: false,
             newest: None,
             safe: Saved::default(),
             told: Saved::default(),
@@ -153,12 +168,22 @@ impl FileTail {
         Some(path)
     }
 
-    /// Reads until something is pending or there is no more for now.
+    /// Reads until something is pending, there is no more for now, or its turn is over.
     pub(super) fn refill(&mut self) {
+        let mut turn = 0;
+        self.has_more = false;
         while self.pending.is_empty() {
+            if turn >= TURN_BYTES {
+                self.has_more = true;
+                return;
+            }
             self.settle();
             match self.advance() {
-                Ok(true) => self.trouble = None,
+                Ok(true) => {
+                    self.trouble = None;
+                    turn += READ_BYTES as u64;
+                    self.count_valueless();
+                }
                 Ok(false) => return,
                 Err(error) => {
                     let trouble = error.to_string();
@@ -173,6 +198,19 @@ impl FileTail {
         }
     }
 
+    fn count_valueless(&mut self) {
+        if !self.pending.is_empty() {
+            self.valueless = 0;
+            return;
+        }
+        self.valueless += READ_BYTES as u64;
+        if self.valueless > REFUSED_BYTES {
+            self.valueless = 0;
+            let error = format!("{REFUSED_BYTES} bytes without a value");
+            self.refuse(&io::Error::other(error));
+        }
+    }
+
     /// One read; `false` when there is no more for now.
     fn advance(&mut self) -> io::Result<bool> {
         let glance = Glance::at(&std::fs::metadata(&self.path)?);
@@ -180,6 +218,7 @@ impl FileTail {
             return Ok(false);
         }
         let file = File::open(&self.path)?;
+        self.is_restored = false;
         let glance = Glance::at(&file.metadata()?);
         if !self.is_same(&file, glance)? {
             let is_read =
@@ -220,13 +259,11 @@ impl FileTail {
         let text = format!(
             "{name}: cut off at {size} bytes after {at} had been read; what was written just before may be missing"
         );
-        let time = self.newest.unwrap_or(Timestamp::MIN);
-        let kind = "possible-gap".to_owned();
-        let input = Input::Trouble { kind, text };
-        self.pending.push_back(Arrival { time, input });
+        let gap = self.gap(text);
+        self.pending.push_back(gap);
     }
 
-    fn mark_start(&self) -> u64 {
+    pub(super) fn mark_start(&self) -> u64 {
         self.at.saturating_sub(MARK_BYTES)
     }
 
@@ -303,6 +340,9 @@ impl FileTail {
     fn quarantine_line(&mut self, line: &BadLine) {
         self.quarantined += 1;
         let (file, total) = (self.path.display(), self.quarantined);
+        if !is_logged(total) {
+            return;
+        }
         let BadLine {
             number,
             text,
@@ -375,7 +415,9 @@ impl FileTail {
             Err(error) => {
                 self.quarantined += 1;
                 let (file, offset, total) = (self.path.display(), self.at, self.quarantined);
-                tracing::warn!(%file, offset, %error, total, "record quarantined");
+                if is_logged(total) {
+                    tracing::warn!(%file, offset, %error, total, "record quarantined");
+                }
                 self.at = end;
             }
         }
@@ -393,13 +435,15 @@ impl FileTail {
             Err(error) => {
                 self.quarantined += 1;
                 let (file, total) = (self.path.display(), self.quarantined);
-                tracing::warn!(%file, %error, total, "message quarantined");
+                if is_logged(total) {
+                    tracing::warn!(%file, %error, total, "message quarantined");
+                }
             }
         }
     }
 }
 
-fn read_at(file: &File, at: u64, length: u64) -> io::Result<Vec<u8>> {
+pub(super) fn read_at(file: &File, at: u64, length: u64) -> io::Result<Vec<u8>> {
     let length = usize::try_from(length).map_err(io::Error::other)?;
     let mut bytes = vec![0; length];
     file.read_exact_at(&mut bytes, at)?;

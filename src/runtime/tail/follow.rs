@@ -23,8 +23,10 @@ pub struct Batch {
     pub arrivals: Vec<Arrival>,
     /// How far files have been read once all of these, and those before, are taken: what has changed.
     pub positions: Vec<Position>,
-    /// Whether the files hold no more for now.
+    /// Whether the files hold no more for now; one that has given nothing for very long is not waited for.
     pub caught_up: bool,
+    /// Whether there is a file of which more is to be read.
+    pub has_more: bool,
     /// Runs since the look that found the first of these values; also where the files held more than one batch.
     pub found: Option<Stopwatch>,
     /// Lines, records and files that could not be used, a source: what is new.
@@ -62,6 +64,10 @@ pub struct Follower {
     looked: Option<Stopwatch>,
     /// Positions that nobody needs any more.
     gone: Vec<(usize, Position)>,
+    /// What may be missing of files that are gone.
+    lost: Vec<Arrival>,
+    /// Files whose names are no text, as they were told.
+    not_text: BTreeSet<PathBuf>,
 }
 
 impl Follower {
@@ -86,6 +92,8 @@ impl Follower {
             missing: BTreeSet::new(),
             looked: None,
             gone: Vec::new(),
+            lost: Vec::new(),
+            not_text: BTreeSet::new(),
         }
     }
 
@@ -93,6 +101,14 @@ impl Follower {
     pub fn folders(&self) -> BTreeSet<PathBuf> {
         let folders = self.sources.iter().map(|source| source.pattern.folder());
         folders.map(Path::to_owned).collect()
+    }
+
+    /// Whether there is a file of this source.
+    pub fn follows(&self, source: &str) -> bool {
+        let files = self.files.keys();
+        files
+            .into_iter()
+            .any(|(index, _)| self.sources[*index].id == source)
     }
 
     /// Lines, records and files that could not be used so far.
@@ -151,11 +167,15 @@ impl Follower {
             self.heads.extend(head(key, file));
         }
         let mut arrivals = self.release(wall);
+        arrivals.append(&mut self.lost);
         arrivals.extend(direct);
         let is_due = |source: &Followed| source.reorder.as_ref().is_some_and(Reorder::is_due);
         Batch {
             positions: self.positions(),
-            caught_up: self.heads.is_empty() && !self.sources.iter().any(is_due),
+            caught_up: self.heads.is_empty()
+                && !self.sources.iter().any(is_due)
+                && !self.files.values().any(FileTail::is_awaited),
+            has_more: self.files.values().any(|file| file.has_more),
             found: self.looked.filter(|_| !arrivals.is_empty()),
             quarantined: self.newly_quarantined(),
             arrivals,
@@ -222,6 +242,9 @@ impl Follower {
                 self.files.insert(moved, file);
             } else {
                 tracing::info!(file = %key.1.display(), "gone");
+                if file.is_lost(&key.1) {
+                    self.lost.push(file.lost());
+                }
                 self.sources[key.0].quarantined_in_gone += file.quarantined;
             }
         }
@@ -238,11 +261,17 @@ impl Follower {
 
     fn list(&mut self) -> BTreeMap<Key, Place> {
         let mut present = BTreeMap::new();
-        for (index, source) in self.sources.iter().enumerate() {
+        for (index, source) in self.sources.iter_mut().enumerate() {
             let pattern = &source.pattern;
             match list(pattern, &source.decoder) {
-                Ok(files) => {
+                Ok((files, not_text)) => {
                     self.missing.remove(pattern.folder());
+                    for path in not_text {
+                        if self.not_text.insert(path.clone()) {
+                            tracing::warn!(file = ?path, "its name is no UTF-8: it is not read; rename it");
+                            source.quarantined_in_gone += 1;
+                        }
+                    }
                     let keyed = files
                         .into_iter()
                         .map(|(path, place)| ((index, path), place));
@@ -286,18 +315,27 @@ fn name(source: &str, path: &Path) -> String {
     format!("{source}:{}", path.display())
 }
 
-/// The files of the pattern, packed ones among them where the source has text.
-fn list(pattern: &FilePattern, decoder: &Decoder) -> io::Result<Vec<(PathBuf, Place)>> {
+/// Files, and what has a name that is no text.
+type Listed = (Vec<(PathBuf, Place)>, Vec<PathBuf>);
+
+/// The files of the pattern, packed ones among them where the source has text; and those that would be, if their names
+/// were text.
+fn list(pattern: &FilePattern, decoder: &Decoder) -> io::Result<Listed> {
     let is_ours = |name: &str| {
         let packed = name.strip_suffix(".gz").filter(|_| decoder.takes_packed());
         pattern.matches(name) || packed.is_some_and(|name| pattern.matches(name))
     };
-    let mut files = Vec::new();
+    let (mut files, mut not_text) = (Vec::new(), Vec::new());
     for entry in std::fs::read_dir(pattern.folder())? {
         let entry = entry?;
         let name = entry.file_name();
-        if !name.to_str().is_some_and(is_ours) {
-            continue;
+        match name.to_str() {
+            Some(name) if is_ours(name) => {}
+            None if is_ours(&name.to_string_lossy()) => {
+                not_text.push(entry.path());
+                continue;
+            }
+            Some(_) | None => continue,
         }
         // Not the entry's own: a link counts as the file that it leads to.
         if let Ok(metadata) = std::fs::metadata(entry.path())
@@ -306,5 +344,5 @@ fn list(pattern: &FilePattern, decoder: &Decoder) -> io::Result<Vec<(PathBuf, Pl
             files.push((entry.path(), Place::of(&metadata)));
         }
     }
-    Ok(files)
+    Ok((files, not_text))
 }

@@ -10,6 +10,7 @@
 mod decode;
 mod file;
 mod follow;
+mod gap;
 pub mod lines;
 pub mod records;
 mod reorder;
@@ -53,7 +54,7 @@ pub async fn follow(
     let mut watch = Watch::new(follower.folders());
     let mut rescan = tokio::time::interval(RESCAN);
     rescan.set_missed_tick_behavior(MissedTickBehavior::Delay);
-    loop {
+    while !shutdown.is_requested() {
         watch.renew();
         let looking = Stopwatch::start();
         let batch;
@@ -64,12 +65,21 @@ pub async fn follow(
         .await?;
         let rest = (REST * looking.elapsed()).clamp(SHORTEST_REST, LONGEST_REST);
         let rested = clock::later(rest);
-        let caught_up = batch.caught_up;
+        let (waits, rests) = (
+            batch.caught_up && !batch.has_more,
+            batch.has_more && batch.arrivals.is_empty(),
+        );
         tokio::select! {
             sent = batches.send(batch) => if sent.is_err() { return Ok(()) },
             () = shutdown.requested() => return Ok(()),
         }
-        if caught_up {
+        if rests {
+            tokio::select! {
+                () = tokio::time::sleep_until(rested) => {}
+                () = shutdown.requested() => return Ok(()),
+            }
+        }
+        if waits {
             tokio::select! {
                 () = watch.wake.notified() => tokio::time::sleep_until(rested).await,
                 _ = rescan.tick() => {}
@@ -77,6 +87,7 @@ pub async fn follow(
             }
         }
     }
+    Ok(())
 }
 
 /// One watcher for all folders.

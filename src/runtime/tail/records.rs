@@ -18,6 +18,9 @@ pub const HEADER_BYTES: usize = 9;
 /// Longest record that is read into memory, and longest content of a chunk, bytes.
 pub const LONGEST_RECORD: u64 = 64 * 1024 * 1024;
 
+/// No file is longer: a record that says it is, an attachment too, hides all that comes after it.
+const FARTHEST: u64 = 1 << 44;
+
 /// The header of a chunk that is still being written.
 pub const OPEN_CHUNK: [u8; HEADER_BYTES] = [op::CHUNK, 255, 255, 255, 255, 255, 255, 255, 255];
 
@@ -55,7 +58,7 @@ pub fn frame(header: [u8; HEADER_BYTES], available: u64) -> Frame {
     let needed = matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE | op::CHUNK);
     if header == OPEN_CHUNK {
         Frame::Wait
-    } else if needed && length > LONGEST_RECORD {
+    } else if (needed || opcode == op::METADATA) && length > LONGEST_RECORD || length > FARTHEST {
         Frame::Damaged { length }
     } else if length > available {
         Frame::Wait

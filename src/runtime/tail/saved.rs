@@ -55,6 +55,7 @@ impl FileTail {
                 return Ok(file);
             }
         };
+        file.is_restored = true;
         file.at = saved.at;
         file.place = saved.place;
         file.mark.clone_from(&saved.mark);

@@ -1,21 +1,24 @@
 //! Takes alerts to the hooks: a worker and a bounded queue each, retries that hold nothing up.
 //!
+//! The gravest goes first, whatever waits before it; of one benchmark one alert at a time. What has been superseded
+//! while it waited is not told any more.
+//!
 //! Orange, red and unknown are tried until the hook takes them, they are resolved or superseded, or
 //! the daemon stops; the next start then offers them again. Whatever else is given up in the end.
 
-use super::clock;
+mod worker;
+
 use super::delivered::Delivered;
-use super::hook::{self, Alert, Outcome};
+use super::hook::Alert;
 use super::in_hand::InHand;
 use crate::config::HookConfig;
 use crate::store::Fate;
-use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tokio::sync::mpsc;
-use tokio::task::{JoinHandle, JoinSet};
-use tokio::time::Instant;
+use tokio::task::JoinSet;
+use worker::Worker;
 
 /// Alerts that may wait for one hook.
 const QUEUE: usize = 1024;
@@ -83,17 +86,8 @@ impl Dispatcher {
         for hook in hooks {
             let (queue, receiver) = mpsc::channel(QUEUE);
             let in_hand = Arc::new(Mutex::new(InHand::default()));
-            let worker = Worker {
-                hook: Arc::new(hook.clone()),
-                retry: retry.clone(),
-                delivered: Arc::clone(&delivered),
-                in_hand: Arc::clone(&in_hand),
-                waiting: BTreeMap::new(),
-                untried: 0,
-                taken: 0,
-                lost: 0,
-            };
-            workers.spawn(worker.run(receiver));
+            let shared = (Arc::clone(&delivered), Arc::clone(&in_hand));
+            workers.spawn(Worker::new(hook, retry, shared).run(receiver));
             let hook = hook.clone();
             queues.push(Way {
                 hook,
@@ -139,7 +133,7 @@ impl Dispatcher {
         }
     }
 
-    /// What `alert` supersedes or resolves is not tried again, whether a hook hears of `alert` or not.
+    /// What `alert` supersedes or resolves is not tried again, whether a hook is told of `alert` or not.
     pub fn supersede(&self, alert: &Alert) {
         for way in &self.hooks {
             locked(&way.in_hand).supersede(alert);
@@ -157,6 +151,13 @@ impl Dispatcher {
         let (name, key) = (way.hook.name(), &alert.key);
         // In hand first: a worker notes the receipt before it lets go.
         let mut in_hand = locked(&way.in_hand);
+        if in_hand.cancels(alert) {
+            tracing::debug!(hook = name, key, "over before it was told");
+            if let Err(error) = locked(&self.delivered).note(alert, &name, Fate::Over) {
+                tracing::warn!(hook = name, key, %error, "no receipt: a restart may send it");
+            }
+            return true;
+        }
         if !in_hand.take(alert) {
             return true;
         }
@@ -198,191 +199,16 @@ impl HookConfig {
     }
 
     /// Whether it is told of an alert of this level, at a benchmark or the whole site. What tells of many benchmarks
-    /// at once stands for theirs.
+    /// at once stands for theirs; that the clock is wrong concerns everyone.
     fn asks_for(&self, alert: &Alert) -> bool {
         let is_of_the_site = alert.event.benchmark.is_none() && !alert.is_flood();
-        self.levels.contains(&alert.level) && self.site == is_of_the_site
+        let is_ours = self.site == is_of_the_site || alert.is_of_the_clock();
+        self.levels.contains(&alert.level) && is_ours
     }
 }
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-#[derive(Debug)]
-struct Waiting {
-    alert: Alert,
-    /// Counts from 1, over restarts.
-    attempt: u32,
-    /// Not tried since the start.
-    is_new: bool,
-}
-
-#[derive(Debug)]
-struct Worker {
-    hook: Arc<HookConfig>,
-    retry: Retry,
-    delivered: Arc<Mutex<Delivered>>,
-    in_hand: Arc<Mutex<InHand>>,
-    /// By when it is due, then in order of arrival: a retry never holds up a new alert.
-    waiting: BTreeMap<(Instant, u64), Waiting>,
-    /// How many of them wait for their first attempt. Only these keep the queue waiting: those
-    /// that must arrive are few, because their benchmark's next one ends their retries.
-    untried: usize,
-    taken: u64,
-    lost: usize,
-}
-
-impl Worker {
-    async fn run(mut self, mut queue: mpsc::Receiver<Alert>) -> usize {
-        let mut open = true;
-        let mut running: Option<Running> = None;
-        loop {
-            if running.is_none() {
-                running = self.next_run(open);
-            }
-            if !open && running.is_none() {
-                return self.lost;
-            }
-            let due = self.waiting.keys().next().map(|(due, _)| *due);
-            tokio::select! {
-                alert = queue.recv(), if open && self.untried < QUEUE => match alert {
-                    Some(alert) => self.begin(alert),
-                    None => open = false,
-                },
-                outcome = finished(&mut running), if running.is_some() => {
-                    if let Some(run) = running.take() {
-                        self.settle(&run.waiting, outcome.as_ref(), open);
-                    }
-                }
-                () = until(due), if running.is_none() && due.is_some() => {}
-            }
-        }
-    }
-
-    /// Starts the first alert that is due; on the way out everything is.
-    fn next_run(&mut self, open: bool) -> Option<Running> {
-        loop {
-            let (due, _) = *self.waiting.keys().next()?;
-            if open && due > clock::later(Duration::ZERO) {
-                return None;
-            }
-            let (_, waiting) = self.waiting.pop_first()?;
-            if waiting.is_new {
-                self.untried -= 1;
-            } else if self.is_over(&waiting.alert) {
-                self.drop_over(&waiting.alert);
-                continue;
-            }
-            let (hook, alert) = (Arc::clone(&self.hook), waiting.alert.clone());
-            let attempt = waiting.attempt;
-            let task = tokio::spawn(async move { hook::run(&hook, &alert, attempt).await });
-            return Some(Running { task, waiting });
-        }
-    }
-
-    fn settle(&mut self, waiting: &Waiting, outcome: Option<&Outcome>, open: bool) {
-        let (hook, key) = (self.hook.name(), waiting.alert.key.clone());
-        let attempt = waiting.attempt;
-        let goes_on = waiting.alert.must_arrive() || attempt < self.retry.attempts;
-        if outcome == Some(&Outcome::Done) {
-            self.let_go(&waiting.alert, Fate::Delivered);
-        } else if self.is_over(&waiting.alert) {
-            self.drop_over(&waiting.alert);
-        } else if open && goes_on {
-            let delay = self.retry.delay(&key, attempt);
-            let delay_s = delay.as_secs_f64();
-            tracing::warn!(
-                hook,
-                key,
-                attempt,
-                ?outcome,
-                delay_s,
-                "hook will be retried"
-            );
-            self.note(&waiting.alert, Fate::Waiting);
-            let again = Waiting {
-                alert: waiting.alert.clone(),
-                attempt: attempt.saturating_add(1),
-                is_new: false,
-            };
-            self.wait(again, clock::later(delay));
-        } else {
-            tracing::error!(hook, key, attempt, ?outcome, "alert not delivered");
-            self.lost += 1;
-            // What is given up only because the daemon stops, the next start tries again.
-            let fate = if open { Fate::Dead } else { Fate::Waiting };
-            self.let_go(&waiting.alert, fate);
-        }
-    }
-
-    /// Notes what became of an alert, then lets go of it.
-    fn let_go(&self, alert: &Alert, fate: Fate) {
-        self.note(alert, fate);
-        locked(&self.in_hand).release(alert);
-    }
-
-    fn note(&self, alert: &Alert, fate: Fate) {
-        let hook = self.hook.name();
-        if let Err(error) = locked(&self.delivered).note(alert, &hook, fate) {
-            let key = &alert.key;
-            tracing::warn!(hook, key, %error, "no receipt: a restart may send it again");
-        }
-    }
-
-    fn is_over(&self, alert: &Alert) -> bool {
-        locked(&self.in_hand).is_over(alert)
-    }
-
-    fn drop_over(&mut self, alert: &Alert) {
-        let (hook, key) = (self.hook.name(), &alert.key);
-        tracing::error!(hook, key, "alert not delivered before it was over");
-        self.lost += 1;
-        self.let_go(alert, Fate::Over);
-    }
-
-    fn begin(&mut self, alert: Alert) {
-        let before = locked(&self.delivered).attempts(&alert, &self.hook.name());
-        let waiting = Waiting {
-            alert,
-            attempt: before.saturating_add(1),
-            is_new: true,
-        };
-        self.wait(waiting, clock::later(Duration::ZERO));
-    }
-
-    fn wait(&mut self, waiting: Waiting, due: Instant) {
-        self.taken += 1;
-        self.untried += usize::from(waiting.is_new);
-        self.waiting.insert((due, self.taken), waiting);
-    }
-}
-
-/// A hook's run, and for what. It ends with its worker.
-#[derive(Debug)]
-struct Running {
-    task: JoinHandle<Outcome>,
-    waiting: Waiting,
-}
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        self.task.abort();
-    }
-}
-
-/// `None` when the run broke off.
-async fn finished(running: &mut Option<Running>) -> Option<Outcome> {
-    match running {
-        Some(run) => (&mut run.task).await.ok(),
-        None => None,
-    }
-}
-
-async fn until(due: Option<Instant>) {
-    if let Some(due) = due {
-        tokio::time::sleep_until(due).await;
-    }
 }
 
 #[cfg(test)]

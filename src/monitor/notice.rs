@@ -1,0 +1,181 @@
+//! What the runtime knows of the watch and of its clock: kept among the steps, so that a replay knows it too.
+
+use super::Monitor;
+use super::event::{AlertState, Event, EventKind};
+use super::track::{Beside, Track};
+use crate::alert::Level;
+use crate::reading::{BenchmarkId, Timestamp};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+
+/// The rule of the alert that says that the host's clock is wrong.
+pub const CLOCK_FAULT: &str = "clock-fault";
+
+/// Something that is no reading and concerns how the watch goes on.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Notice {
+    /// The past has been read: a benchmark of the config that has given no reading is unknown from now on.
+    Watching,
+    /// What came late or was corrected is judged only when [`Notice::Settle`] says so, and not reading by reading.
+    Settles,
+    /// Everything that came together has been taken: what came late is judged now, once.
+    Settle,
+    /// Whether late readings of this benchmark would have called another level is looked into now.
+    LookBack(BenchmarkId),
+    /// The readings of a silent benchmark that come now were measured long before `time`, which it is: a backlog.
+    Behind {
+        /// Whose.
+        benchmark: BenchmarkId,
+        /// What time it is.
+        time: Timestamp,
+    },
+    /// The host's clock is wrong: readings that are known lie after it.
+    ClockWrong {
+        /// One line for a person.
+        text: String,
+    },
+    /// The host's clock is right again.
+    ClockRight {
+        /// One line for a person.
+        text: String,
+    },
+}
+
+impl Monitor {
+    pub(super) fn heed(&mut self, now: Timestamp, notice: &Notice) -> Vec<Event> {
+        match notice {
+            Notice::Watching => {
+                let silent = self.never_read();
+                let each = silent.iter().map(|id| self.awaited.begin(now, id));
+                each.flatten().collect()
+            }
+            Notice::Settles => {
+                self.settles = true;
+                Vec::new()
+            }
+            Notice::Settle => self.settle(now),
+            Notice::LookBack(benchmark) => self.look_back(now, benchmark),
+            Notice::Behind { benchmark, time } => {
+                if let Some(track) = self.tracks.get_mut(benchmark) {
+                    track.is_behind(*time);
+                    self.changed.insert(benchmark.clone());
+                }
+                Vec::new()
+            }
+            Notice::ClockWrong { text } => {
+                let since = *self.clock_wrong.get_or_insert(now);
+                clock_fault(now, since, AlertState::Firing, text)
+            }
+            Notice::ClockRight { text } => self.clock_wrong.take().map_or_else(Vec::new, |since| {
+                clock_fault(now, since, AlertState::Resolved, text)
+            }),
+        }
+    }
+
+    fn never_read(&self) -> Vec<BenchmarkId> {
+        let named = self.settings.watched.named.iter();
+        named
+            .filter(|id| !self.tracks.contains_key(id))
+            .cloned()
+            .collect()
+    }
+
+    /// Whether benchmarks of the config have given no reading, and nobody has been told.
+    pub fn misses_some(&self) -> bool {
+        let told: BTreeSet<&BenchmarkId> = self.awaited.benchmarks().collect();
+        self.never_read().iter().any(|id| !told.contains(id))
+    }
+
+    fn settle(&mut self, now: Timestamp) -> Vec<Event> {
+        let mut events = Vec::new();
+        for id in self.late.clone() {
+            let beside = Beside {
+                covariates: &self.covariates,
+                explain: self.settings.explain,
+                now,
+                settles: self.settles,
+            };
+            let policy = self.settings.policy(&id);
+            if let Some(track) = self.tracks.get_mut(&id) {
+                events.extend(track.settle(policy, &beside));
+                self.changed.insert(id);
+            }
+        }
+        events
+    }
+
+    fn look_back(&mut self, now: Timestamp, benchmark: &BenchmarkId) -> Vec<Event> {
+        self.late.remove(benchmark);
+        let policy = self.settings.policy(benchmark);
+        let Some(track) = self.tracks.get_mut(benchmark) else {
+            return Vec::new();
+        };
+        self.changed.insert(benchmark.clone());
+        track.look_back(policy, now).into_iter().collect()
+    }
+
+    /// A benchmark whose late readings are to be looked back on: [`Notice::LookBack`] does it.
+    pub fn late(&self) -> Option<&BenchmarkId> {
+        self.late.first()
+    }
+
+    /// Whether a reading of `time` lies so far after all others of its benchmark that its time may be wrong.
+    pub fn leaps(&self, benchmark: &BenchmarkId, time: Timestamp) -> bool {
+        let track = self.tracks.get(benchmark);
+        track.is_some_and(|track| track.leaps(time))
+    }
+
+    /// Whether nothing can be said of a benchmark now: of one of the config also before its first reading.
+    pub fn is_unknown(&self, benchmark: &BenchmarkId) -> bool {
+        match self.tracks.get(benchmark) {
+            Some(track) => track.is_unknown(),
+            None => self.settings.watched.named.contains(benchmark),
+        }
+    }
+
+    /// Whether what comes late is judged only when [`Notice::Settle`] says so.
+    pub fn settles(&self) -> bool {
+        self.settles
+    }
+
+    /// Whether a benchmark that has given readings is silent.
+    pub fn is_silent(&self, benchmark: &BenchmarkId) -> bool {
+        let track = self.tracks.get(benchmark);
+        track.is_some_and(Track::is_silent)
+    }
+
+    /// Since when the host's clock is wrong.
+    pub fn clock_wrong(&self) -> Option<Timestamp> {
+        self.clock_wrong
+    }
+}
+
+/// That the clock is wrong since `since`, or no longer is.
+pub(super) fn clock_fault(
+    time: Timestamp,
+    since: Timestamp,
+    state: AlertState,
+    text: &str,
+) -> Vec<Event> {
+    let event = |kind| Event {
+        time,
+        kind,
+        benchmark: None,
+    };
+    let alert = event(EventKind::Alert {
+        level: Level::Unknown,
+        state,
+        key: format!("site/{}/clock/{since}", Level::Unknown),
+        rule: CLOCK_FAULT.to_owned(),
+        text: text.to_owned(),
+    });
+    let fault = event(EventKind::Fault {
+        kind: CLOCK_FAULT.to_owned(),
+        text: text.to_owned(),
+    });
+    match state {
+        AlertState::Firing => vec![fault, alert],
+        AlertState::Resolved => vec![alert],
+    }
+}

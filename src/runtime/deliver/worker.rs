@@ -1,0 +1,284 @@
+//! The worker of one hook: what is due, in the order of its gravity, a few at once.
+
+use super::{QUEUE, Retry, locked};
+use crate::alert::Level;
+use crate::config::HookConfig;
+use crate::monitor::AlertState;
+use crate::reading::BenchmarkId;
+use crate::runtime::clock;
+use crate::runtime::delivered::Delivered;
+use crate::runtime::hook::{self, Alert, Outcome};
+use crate::runtime::in_hand::InHand;
+use crate::store::Fate;
+use std::collections::BTreeMap;
+use std::pin::Pin;
+use std::sync::{Arc, Mutex};
+use std::task::Poll;
+use std::time::Duration;
+use tokio::sync::mpsc;
+use tokio::task::JoinHandle;
+use tokio::time::Instant;
+
+/// Runs of one hook at a time, each for another benchmark.
+const MOST_AT_ONCE: usize = 4;
+
+#[derive(Debug)]
+struct Waiting {
+    alert: Alert,
+    /// Counts from 1, over restarts.
+    attempt: u32,
+    /// Not tried since the start.
+    is_new: bool,
+}
+
+/// How grave it is: of two that are due the higher goes first.
+fn gravity(alert: &Alert) -> u8 {
+    match (alert.level, alert.state) {
+        (Level::Red, AlertState::Firing) => 5,
+        (Level::Orange, AlertState::Firing) => 4,
+        (Level::Unknown, AlertState::Firing) => 3,
+        (Level::Red | Level::Orange | Level::Unknown, AlertState::Resolved) => 2,
+        (Level::Yellow, _) => 1,
+        (Level::Green, _) => 0,
+    }
+}
+
+/// What is told by one run at a time, so that its order stays.
+fn place(alert: &Alert) -> Option<&BenchmarkId> {
+    alert.event.benchmark.as_ref()
+}
+
+/// By when it is due, then in order of arrival.
+type Turn = (Instant, u64);
+
+#[derive(Debug)]
+pub(super) struct Worker {
+    hook: Arc<HookConfig>,
+    retry: Retry,
+    delivered: Arc<Mutex<Delivered>>,
+    in_hand: Arc<Mutex<InHand>>,
+    /// A retry never holds up a new alert.
+    waiting: BTreeMap<Turn, Waiting>,
+    running: Vec<Running>,
+    /// How many of them wait for their first attempt. Only these keep the queue waiting: those
+    /// that must arrive are few, because their benchmark's next one ends their retries.
+    untried: usize,
+    taken: u64,
+    lost: usize,
+}
+
+impl Worker {
+    pub(super) fn new(
+        hook: &HookConfig,
+        retry: &Retry,
+        (delivered, in_hand): (Arc<Mutex<Delivered>>, Arc<Mutex<InHand>>),
+    ) -> Self {
+        Self {
+            hook: Arc::new(hook.clone()),
+            retry: retry.clone(),
+            delivered,
+            in_hand,
+            waiting: BTreeMap::new(),
+            running: Vec::new(),
+            untried: 0,
+            taken: 0,
+            lost: 0,
+        }
+    }
+
+    pub(super) async fn run(mut self, mut queue: mpsc::Receiver<Alert>) -> usize {
+        let mut open = true;
+        loop {
+            // What has come by now is weighed together.
+            while open && self.untried < QUEUE {
+                match queue.try_recv() {
+                    Ok(alert) => self.begin(alert),
+                    Err(_) => break,
+                }
+            }
+            while self.running.len() < MOST_AT_ONCE && self.start_next(open) {}
+            if !open && self.running.is_empty() {
+                return self.lost;
+            }
+            let due = self.next_due();
+            let is_full = self.running.len() >= MOST_AT_ONCE;
+            tokio::select! {
+                alert = queue.recv(), if open && self.untried < QUEUE => match alert {
+                    Some(alert) => self.begin(alert),
+                    None => open = false,
+                },
+                (run, outcome) = finished(&mut self.running), if !self.running.is_empty() => {
+                    let run = self.running.swap_remove(run);
+                    self.settle(&run.waiting, outcome.as_ref(), open);
+                }
+                () = until(due), if !is_full && due.is_some() => {}
+            }
+        }
+    }
+
+    /// When the next one is due whose benchmark nothing is being told of.
+    fn next_due(&self) -> Option<Instant> {
+        let mut free = self.waiting.iter().filter(|(_, one)| self.is_free(one));
+        free.next().map(|((due, _), _)| *due)
+    }
+
+    fn is_free(&self, waiting: &Waiting) -> bool {
+        let mut running = self.running.iter();
+        running.all(|run| place(&run.waiting.alert) != place(&waiting.alert))
+    }
+
+    /// Starts the gravest alert that is due; on the way out everything is.
+    fn start_next(&mut self, open: bool) -> bool {
+        self.drop_what_is_over(open);
+        let now = clock::later(Duration::ZERO);
+        let due = self.waiting.iter();
+        let due = due.take_while(|((due, _), _)| !open || *due <= now);
+        let free = due.filter(|(_, waiting)| self.is_free(waiting));
+        let next = free.max_by_key(|((due, number), waiting)| {
+            (gravity(&waiting.alert), std::cmp::Reverse((*due, *number)))
+        });
+        let Some(turn) = next.map(|(turn, _)| *turn) else {
+            return false;
+        };
+        let Some(waiting) = self.waiting.remove(&turn) else {
+            return false;
+        };
+        self.untried -= usize::from(waiting.is_new);
+        locked(&self.in_hand).is_tried(&waiting.alert);
+        let (hook, alert) = (Arc::clone(&self.hook), waiting.alert.clone());
+        let attempt = waiting.attempt;
+        let task = tokio::spawn(async move { hook::run(&hook, &alert, attempt).await });
+        self.running.push(Running { task, waiting });
+        true
+    }
+
+    /// What was superseded or resolved while it waited, as far as it is due.
+    fn drop_what_is_over(&mut self, open: bool) {
+        let now = clock::later(Duration::ZERO);
+        let due = self.waiting.iter();
+        let due = due.take_while(|((due, _), _)| !open || *due <= now);
+        let over = due.filter(|(_, waiting)| self.is_over(&waiting.alert));
+        let over: Vec<Turn> = over.map(|(turn, _)| *turn).collect();
+        for turn in over {
+            let Some(waiting) = self.waiting.remove(&turn) else {
+                continue;
+            };
+            if waiting.is_new {
+                self.untried -= 1;
+                let (hook, key) = (self.hook.name(), &waiting.alert.key);
+                tracing::info!(hook, key, "superseded before it was told");
+                self.let_go(&waiting.alert, Fate::Over);
+            } else {
+                self.drop_over(&waiting.alert);
+            }
+        }
+    }
+
+    fn settle(&mut self, waiting: &Waiting, outcome: Option<&Outcome>, open: bool) {
+        let (hook, key) = (self.hook.name(), waiting.alert.key.clone());
+        let attempt = waiting.attempt;
+        let goes_on = waiting.alert.must_arrive() || attempt < self.retry.attempts;
+        if outcome == Some(&Outcome::Done) {
+            self.let_go(&waiting.alert, Fate::Delivered);
+        } else if self.is_over(&waiting.alert) {
+            self.drop_over(&waiting.alert);
+        } else if open && goes_on {
+            let delay = self.retry.delay(&key, attempt);
+            let delay_s = delay.as_secs_f64();
+            tracing::warn!(
+                hook,
+                key,
+                attempt,
+                ?outcome,
+                delay_s,
+                "hook will be retried"
+            );
+            self.note(&waiting.alert, Fate::Waiting);
+            let again = Waiting {
+                alert: waiting.alert.clone(),
+                attempt: attempt.saturating_add(1),
+                is_new: false,
+            };
+            self.wait(again, clock::later(delay));
+        } else {
+            tracing::error!(hook, key, attempt, ?outcome, "alert not delivered");
+            self.lost += 1;
+            // What is given up only because the daemon stops, the next start tries again.
+            let fate = if open { Fate::Dead } else { Fate::Waiting };
+            self.let_go(&waiting.alert, fate);
+        }
+    }
+
+    /// Notes what became of an alert, then lets go of it.
+    fn let_go(&self, alert: &Alert, fate: Fate) {
+        self.note(alert, fate);
+        locked(&self.in_hand).release(alert);
+    }
+
+    fn note(&self, alert: &Alert, fate: Fate) {
+        let hook = self.hook.name();
+        if let Err(error) = locked(&self.delivered).note(alert, &hook, fate) {
+            let key = &alert.key;
+            tracing::warn!(hook, key, %error, "no receipt: a restart may send it again");
+        }
+    }
+
+    fn is_over(&self, alert: &Alert) -> bool {
+        locked(&self.in_hand).is_over(alert)
+    }
+
+    fn drop_over(&mut self, alert: &Alert) {
+        let (hook, key) = (self.hook.name(), &alert.key);
+        tracing::error!(hook, key, "alert not delivered before it was over");
+        self.lost += 1;
+        self.let_go(alert, Fate::Over);
+    }
+
+    fn begin(&mut self, alert: Alert) {
+        let before = locked(&self.delivered).attempts(&alert, &self.hook.name());
+        let waiting = Waiting {
+            alert,
+            attempt: before.saturating_add(1),
+            is_new: true,
+        };
+        self.wait(waiting, clock::later(Duration::ZERO));
+    }
+
+    fn wait(&mut self, waiting: Waiting, due: Instant) {
+        self.taken += 1;
+        self.untried += usize::from(waiting.is_new);
+        self.waiting.insert((due, self.taken), waiting);
+    }
+}
+
+/// A hook's run, and for what. It ends with its worker.
+#[derive(Debug)]
+struct Running {
+    task: JoinHandle<Outcome>,
+    waiting: Waiting,
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        self.task.abort();
+    }
+}
+
+/// The first run that ends, by its place; `None` when it broke off.
+async fn finished(running: &mut [Running]) -> (usize, Option<Outcome>) {
+    std::future::poll_fn(|context| {
+        for (index, run) in running.iter_mut().enumerate() {
+            if let Poll::Ready(ended) = Pin::new(&mut run.task).poll(context) {
+                return Poll::Ready((index, ended.ok()));
+            }
+        }
+        Poll::Pending
+    })
+    .await
+}
+
+async fn until(due: Option<Instant>) {
+    if let Some(due) = due {
+        tokio::time::sleep_until(due).await;
+    }
+}

@@ -1,0 +1,282 @@
+//! What becomes of a value that arrives: it is taken, known already, held while the host's clock is wrong, or set aside.
+
+use super::{DAWN, MOST_UNWRITTEN, Site};
+use crate::monitor::{Event, Input, Notice};
+use crate::reading::{BenchmarkId, Timestamp};
+use crate::runtime::clock;
+use crate::runtime::tail::Arrival;
+use crate::store::StoreError;
+use jiff::SignedDuration;
+
+/// The first day of 1970, UTC: where a logger starts whose clock is not set. No reading of a site that is watched now
+/// was measured then; a replay of an archive takes it.
+const CLOCKLESS: std::ops::Range<Timestamp> =
+    Timestamp::UNIX_EPOCH..Timestamp::constant(24 * 60 * 60, 0);
+/// A reading so near to the time at the site has not leapt ahead.
+const NEAR: SignedDuration = SignedDuration::from_hours(24);
+/// A reading that lies further behind is one of a backlog; how late that comes is noted again after this time.
+const NOTED_FOR: SignedDuration = SignedDuration::from_mins(30);
+/// So many values of a kind that are set aside are logged one by one; then each time their number has doubled.
+const LOGGED: u64 = 16;
+
+/// Whether the value that is set aside as number `total` is logged.
+pub(in crate::runtime) fn is_logged(total: u64) -> bool {
+    total <= LOGGED || total.is_power_of_two()
+}
+
+impl Site {
+    /// Takes one value. What was taken before, or lies ahead of the clock, changes nothing; while the host's clock is
+    /// earlier than readings that are known, what lies ahead of it is held. A replay waits for the answer of a search
+    /// that is due at a reading; a daemon takes it with the first reading after it has come.
+    ///
+    /// # Errors
+    /// When the state cannot be asked whether the value is known.
+    pub fn take(&mut self, arrival: &Arrival, wall: Timestamp) -> Result<Vec<Event>, StoreError> {
+        if matches!(arrival.input, Input::Trouble { .. }) {
+            return Ok(self.step(self.now.unwrap_or(DAWN), &arrival.input));
+        }
+        if self.is_set_aside(arrival, wall) {
+            return Ok(Vec::new());
+        }
+        if let Some(store) = &self.sinks.store
+            && !self.is_newest(arrival)
+            && store.has(&self.batch, &arrival.input)?
+        {
+            self.counts.repeated += 1;
+            return Ok(Vec::new());
+        }
+        self.counts.taken += 1;
+        if let Some(now) = self.now
+            && self.has_leapt(arrival, (now, wall))
+        {
+            return Ok(self.step(now, &arrival.input));
+        }
+        self.keep_time(arrival, wall);
+        let mut events = self.pass(arrival.time);
+        let now = self.now.map_or(arrival.time, |now| now.max(arrival.time));
+        if let Input::Reading { benchmark, .. } = &arrival.input
+            && let Some(finding) = self.answer(benchmark, arrival.time)
+        {
+            events.extend(self.step(now, &Input::Found(finding)));
+        }
+        events.extend(self.step(now, &arrival.input));
+        for job in self.monitor.searches() {
+            self.searches.start(job);
+        }
+        Ok(events)
+    }
+
+    fn answer(
+        &mut self,
+        benchmark: &BenchmarkId,
+        time: Timestamp,
+    ) -> Option<crate::monitor::Finding> {
+        if self.sinks.store.is_some() {
+            self.searches.answered(benchmark, time)
+        } else {
+            self.searches.due(benchmark, time)
+        }
+    }
+
+    /// Whether the value is not to be taken now: it is from the future, or no clock gives its time.
+    fn is_set_aside(&mut self, arrival: &Arrival, wall: Timestamp) -> bool {
+        let time = arrival.time;
+        let latest = self.keeper.now(wall).max(wall);
+        if time.duration_since(latest) > clock::TOLERANCE {
+            if self.sinks.store.is_some() && self.keeper.is_behind(wall) {
+                return self.hold(arrival);
+            }
+            self.counts.from_the_future += 1;
+            let total = self.counts.from_the_future;
+            if is_logged(total) {
+                tracing::warn!(%time, ?arrival.input, total, "measured in the future: quarantined");
+            }
+            return true;
+        }
+        if self.sinks.store.is_none() || (time >= DAWN && !CLOCKLESS.contains(&time)) {
+            return false;
+        }
+        self.counts.without_clock += 1;
+        let total = self.counts.without_clock;
+        if !is_logged(total) {
+        } else if time < DAWN {
+            tracing::warn!(%time, ?arrival.input, "measured before 1678: quarantined");
+        } else {
+            tracing::warn!(%time, ?arrival.input, total, "measured on the first day of 1970, as by a logger whose clock is not set: quarantined");
+        }
+        true
+    }
+
+    /// Holds a value until the host's clock is right; `false` where the loggers' time has proved right by now.
+    fn hold(&mut self, arrival: &Arrival) -> bool {
+        if let Input::Reading { benchmark, .. } = &arrival.input
+            && self.is_newest(arrival)
+            && self.keeper.holds(benchmark.as_str(), arrival.time)
+        {
+            tracing::warn!(%benchmark, time = %arrival.time, "the loggers' time goes on steadily: it counts, and the host's clock does not");
+            return false;
+        }
+        self.held.push_back(arrival.clone());
+        true
+    }
+
+    /// Takes what was held, as far as the clock allows it by now.
+    ///
+    /// # Errors
+    /// As [`Site::take`].
+    pub fn release(&mut self, wall: Timestamp) -> Result<Vec<Event>, StoreError> {
+        let mut events = Vec::new();
+        if self.held.is_empty() {
+            return Ok(events);
+        }
+        let latest = self.keeper.now(wall).max(wall);
+        let is_right = !self.keeper.is_behind(wall);
+        for arrival in std::mem::take(&mut self.held) {
+            if is_right || arrival.time.duration_since(latest) <= clock::TOLERANCE {
+                events.extend(self.take(&arrival, wall)?);
+            } else {
+                self.held.push_back(arrival);
+            }
+        }
+        if self.held.is_empty() {
+            self.keeper.releases();
+        }
+        Ok(events)
+    }
+
+    /// Values that wait, unacknowledged, for the clock.
+    pub fn held(&self) -> usize {
+        self.held.len()
+    }
+
+    /// Whether so many wait for the clock that nothing more is to be taken in.
+    pub(super) fn holds_too_many(&self) -> bool {
+        self.held.len() >= MOST_UNWRITTEN
+    }
+
+    /// Whether the time of a reading lies far ahead of everything that is known, and of the clock.
+    fn has_leapt(&self, arrival: &Arrival, (now, wall): (Timestamp, Timestamp)) -> bool {
+        let Input::Reading { benchmark, .. } = &arrival.input else {
+            return false;
+        };
+        let is_near = |time: Timestamp| arrival.time.duration_since(time).abs() <= NEAR;
+        self.sinks.store.is_some()
+            && arrival.time > now
+            && !is_near(now)
+            && !is_near(self.keeper.now(wall))
+            && self.monitor.leaps(benchmark, arrival.time)
+    }
+
+    /// Learns from a reading what time it is, and notes where it is one of a backlog.
+    fn keep_time(&mut self, arrival: &Arrival, wall: Timestamp) {
+        let Input::Reading { benchmark, .. } = &arrival.input else {
+            return;
+        };
+        if self.sinks.store.is_none() || !self.is_newest(arrival) {
+            return;
+        }
+        let is_live = self.at_rest.contains(benchmark);
+        self.keeper.knows(arrival.time, is_live);
+        let time = self.keeper.now(wall);
+        let is_noted = self
+            .behind
+            .get(benchmark)
+            .is_some_and(|noted| time.duration_since(*noted) < NOTED_FOR);
+        let is_late = time.duration_since(arrival.time) > NOTED_FOR;
+        if is_live && is_late && !is_noted && self.monitor.is_silent(benchmark) {
+            let benchmark = benchmark.clone();
+            self.behind.insert(benchmark.clone(), time);
+            let now = self.now.map_or(arrival.time, |now| now.max(arrival.time));
+            self.step(now, &Input::Notice(Notice::Behind { benchmark, time }));
+        }
+    }
+
+    /// Whether the benchmark has given no reading as late as this one: it cannot be known then.
+    fn is_newest(&self, arrival: &Arrival) -> bool {
+        let Input::Reading { benchmark, .. } = &arrival.input else {
+            return false;
+        };
+        self.newest
+            .get(benchmark)
+            .is_none_or(|newest| *newest < arrival.time)
+    }
+
+    /// What the monitor is to know before anything arrives.
+    pub fn begin(&mut self) {
+        for time in self.newest.values() {
+            self.keeper.knows(*time, false);
+        }
+        if !self.monitor.settles() {
+            self.step(self.now.unwrap_or(DAWN), &Input::Notice(Notice::Settles));
+        }
+    }
+
+    /// Everything there is has been read: what comes from now on is live, and what has given no reading is unknown.
+    pub(super) fn rest(&mut self, wall: Timestamp) -> Vec<Event> {
+        if self.at_rest.len() != self.newest.len() {
+            self.at_rest = self.newest.keys().cloned().collect();
+        }
+        if self.sinks.store.is_none() || !self.monitor.misses_some() {
+            return Vec::new();
+        }
+        let now = self.now.unwrap_or_else(|| self.keeper.now(wall));
+        self.step(now, &Input::Notice(Notice::Watching))
+    }
+
+    /// Lets data time pass, as far as time has passed at the site while the host's clock says `wall`, and says where
+    /// that clock is wrong.
+    pub fn live(&mut self, wall: Timestamp) -> Vec<Event> {
+        let now = self.keeper.now(wall);
+        let mut events = self.pass(now);
+        let is_behind = self.keeper.is_behind(wall);
+        let notice = match (is_behind, self.monitor.clock_wrong()) {
+            (true, None) => {
+                let held = self.held.len();
+                tracing::error!(%wall, site_time = %now, held, "the host's clock is wrong: earlier than readings that are known");
+                let text = format!(
+                    "the host's clock says {wall}, and there are readings of {now}: set it; what lies ahead of it waits"
+                );
+                Notice::ClockWrong { text }
+            }
+            (false, Some(_)) => {
+                tracing::warn!(%wall, "the host's clock is right again");
+                let text = "the host's clock is right again".to_owned();
+                Notice::ClockRight { text }
+            }
+            (true, Some(_)) | (false, None) => return events,
+        };
+        let now = self.now.unwrap_or(now);
+        events.extend(self.step(now, &Input::Notice(notice)));
+        events
+    }
+
+    /// Whether the host's clock is earlier than readings that are known.
+    pub fn is_clock_wrong(&self) -> bool {
+        self.monitor.clock_wrong().is_some()
+    }
+
+    /// All that came together has been taken: judges what of it came late, once.
+    pub fn settle(&mut self) -> Vec<Event> {
+        match self.now {
+            Some(now) if self.monitor.late().is_some() => {
+                self.step(now, &Input::Notice(Notice::Settle))
+            }
+            Some(_) | None => Vec::new(),
+        }
+    }
+
+    /// Whether something that came late is still to be looked back on.
+    pub fn owes_look_back(&self) -> bool {
+        self.monitor.late().is_some()
+    }
+
+    /// Looks back on what came late at one benchmark.
+    pub fn look_back(&mut self) -> Vec<Event> {
+        match (self.now, self.monitor.late().cloned()) {
+            (Some(now), Some(benchmark)) => {
+                self.step(now, &Input::Notice(Notice::LookBack(benchmark)))
+            }
+            (None, _) | (_, None) => Vec::new(),
+        }
+    }
+}

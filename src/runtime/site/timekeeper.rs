@@ -1,0 +1,142 @@
+//! What time it is at a site, from the host's clock and from what the loggers say.
+//!
+//! The host's clock may be years off: a battery is flat, a time server is wrong. The readings know better: it cannot be
+//! earlier than the newest of them that is known, and while readings come in live, it is about as late as they say.
+
+use crate::reading::Timestamp;
+use crate::runtime::clock::{Stopwatch, TOLERANCE};
+use jiff::SignedDuration;
+use std::collections::{BTreeMap, VecDeque};
+use std::time::Duration;
+
+/// Live readings that lie further than this behind the host's clock say what time it is, and not the clock.
+const BEHIND: SignedDuration = SignedDuration::from_hours(24);
+/// Held readings of one benchmark that come as far apart as they were measured: so many say that their time is right.
+const STEADY: usize = 4;
+/// As far apart: by this share of the time between them, and by so much in any case.
+const APART: f64 = 0.25;
+const LEAST_APART: Duration = Duration::from_secs(60);
+
+/// What is known of the time.
+#[derive(Debug, Default)]
+pub(super) struct Timekeeper {
+    /// The newest time of a reading that is known, and how long ago it came.
+    known: Option<(Timestamp, Stopwatch)>,
+    /// Whether that reading came in live.
+    is_live: bool,
+    /// Of each benchmark the latest readings that are held, and how long ago they came.
+    held: BTreeMap<String, VecDeque<(Timestamp, Stopwatch)>>,
+}
+
+impl Timekeeper {
+    /// A reading of `time` is known.
+    pub(super) fn knows(&mut self, time: Timestamp, is_live: bool) {
+        let now = Stopwatch::start();
+        let is_later = self.estimate().is_none_or(|estimate| time > estimate);
+        if is_later || (is_live && !self.is_live) {
+            let known = self.known.map_or(time, |(known, _)| known.max(time));
+            self.known = Some((known, now));
+        }
+        self.is_live |= is_live;
+    }
+
+    /// The newest known time and what has passed since.
+    fn estimate(&self) -> Option<Timestamp> {
+        let (known, since) = self.known?;
+        let passed = SignedDuration::try_from(since.elapsed()).ok()?;
+        known.checked_add(passed).ok()
+    }
+
+    /// Whether the host's clock, which says `wall`, is earlier than what is known.
+    pub(super) fn is_behind(&self, wall: Timestamp) -> bool {
+        self.known
+            .is_some_and(|(known, _)| known.duration_since(wall) > TOLERANCE)
+    }
+
+    /// The time at the site, while the host's clock says `wall`.
+    pub(super) fn now(&self, wall: Timestamp) -> Timestamp {
+        let Some(estimate) = self.estimate() else {
+            return wall;
+        };
+        let is_ahead = self.is_live && wall.duration_since(estimate) > BEHIND;
+        if self.is_behind(wall) || is_ahead {
+            estimate
+        } else {
+            wall
+        }
+    }
+
+    /// A reading of `benchmark` and `time` lies beyond what the clock allows, and is held. Whether those of this
+    /// benchmark come as far apart as they were measured: their time is right then.
+    pub(super) fn holds(&mut self, benchmark: &str, time: Timestamp) -> bool {
+        let held = self.held.entry(benchmark.to_owned()).or_default();
+        held.push_back((time, Stopwatch::start()));
+        if held.len() > STEADY {
+            held.pop_front();
+        }
+        let is_steady = held.len() == STEADY
+            && held
+                .iter()
+                .zip(held.iter().skip(1))
+                .all(|(before, after)| are_as_far_apart(*before, *after));
+        if is_steady {
+            self.held.clear();
+            self.known = Some((time, Stopwatch::start()));
+        }
+        is_steady
+    }
+
+    /// Nothing is held any more.
+    pub(super) fn releases(&mut self) {
+        self.held.clear();
+    }
+}
+
+fn are_as_far_apart(before: (Timestamp, Stopwatch), after: (Timestamp, Stopwatch)) -> bool {
+    let came = before.1.elapsed().saturating_sub(after.1.elapsed());
+    let Ok(measured) = Duration::try_from(after.0.duration_since(before.0)) else {
+        return false;
+    };
+    let allowed = measured.mul_f64(APART).max(LEAST_APART);
+    measured > allowed && came.abs_diff(measured) <= allowed
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use jiff::ToSpan;
+
+    fn noon() -> Timestamp {
+        "2026-03-01T12:00:00Z".parse().unwrap()
+    }
+
+    #[test]
+    fn a_clock_that_is_earlier_than_a_known_reading_is_not_believed() {
+        let mut keeper = Timekeeper::default();
+        assert_eq!(keeper.now(noon()), noon());
+        keeper.knows(noon(), false);
+        assert!(!keeper.is_behind(noon() - 30.minutes()));
+        assert!(keeper.is_behind(noon() - 48.hours()));
+        assert!(keeper.now(noon() - 48.hours()) >= noon());
+        let later = noon() + 9000.hours();
+        assert_eq!(keeper.now(later), later, "the daemon was off");
+    }
+
+    #[test]
+    fn a_clock_that_is_far_ahead_of_live_readings_is_not_believed() {
+        let mut keeper = Timekeeper::default();
+        keeper.knows(noon(), true);
+        let ahead = noon() + 1000.hours();
+        assert!(keeper.now(ahead) < noon() + 1.hour());
+        assert_eq!(keeper.now(noon() + 3.hours()), noon() + 3.hours());
+    }
+
+    #[test]
+    fn readings_that_come_all_at_once_do_not_say_what_time_it_is() {
+        let mut keeper = Timekeeper::default();
+        keeper.knows(noon(), false);
+        for hour in 1..100 {
+            assert!(!keeper.holds("5", noon() + hour.hours()));
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! A sum over each row of what was taken in and said: a bit that flips on the disk is seen.
+
+use super::{Store, StoreError};
+use rusqlite::types::ValueRef;
+use rusqlite::{Connection, Row};
+
+/// Rows that are looked at in one go.
+const PIECE: i64 = 2000;
+/// FNV-1a, 64 bits: its offset and its prime.
+const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
+const PRIME: u64 = 0x0000_0100_0000_01b3;
+
+/// What the rows of one table are, the sum last.
+const TABLES: [(&str, &str, usize); 2] = [
+    (
+        "step",
+        "SELECT seq, now, series, time, value, sigma, body, sum FROM step
+         WHERE seq > ?1 AND sum IS NOT NULL ORDER BY seq LIMIT ?2",
+        7,
+    ),
+    (
+        "event",
+        "SELECT seq, step, time, kind, benchmark, body, sum FROM event
+         WHERE seq > ?1 AND sum IS NOT NULL ORDER BY seq LIMIT ?2",
+        6,
+    ),
+];
+
+/// The sum of a row's values.
+pub(super) fn sum(values: &[ValueRef<'_>]) -> i64 {
+    let mut hash = OFFSET;
+    let mut feed = |bytes: &[u8]| {
+        for byte in bytes {
+            hash = (hash ^ u64::from(*byte)).wrapping_mul(PRIME);
+        }
+    };
+    for value in values {
+        match value {
+            ValueRef::Null => feed(&[0]),
+            ValueRef::Integer(number) => {
+                feed(&[1]);
+                feed(&number.to_le_bytes());
+            }
+            ValueRef::Real(number) => {
+                feed(&[2]);
+                // The tables keep no negative zero.
+                feed(&(number + 0.0).to_le_bytes());
+            }
+            ValueRef::Text(bytes) | ValueRef::Blob(bytes) => {
+                feed(&[3]);
+                feed(&(bytes.len() as u64).to_le_bytes());
+                feed(bytes);
+            }
+        }
+    }
+    hash.cast_signed()
+}
+
+/// How far the rows have been looked at.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Verified {
+    table: usize,
+    after: i64,
+}
+
+impl Store {
+    /// Looks at the next rows, from the beginning again where it came to the end; whether it did.
+    ///
+    /// # Errors
+    /// [`StoreError::Damaged`] where a row is not what was written.
+    pub fn verify(&self, verified: &mut Verified) -> Result<bool, StoreError> {
+        let inner = self.inner();
+        let (table, ..) = TABLES[verified.table];
+        if let Some(after) = piece(&inner.connection, *verified)? {
+            verified.after = after;
+            return Ok(false);
+        }
+        let is_last = table == TABLES[TABLES.len() - 1].0;
+        *verified = Verified {
+            table: if is_last { 0 } else { verified.table + 1 },
+            after: 0,
+        };
+        Ok(is_last)
+    }
+}
+
+/// The number of the last row of the next piece; `None` at the end.
+fn piece(connection: &Connection, verified: Verified) -> Result<Option<i64>, StoreError> {
+    let (table, query, values) = TABLES[verified.table];
+    let mut query = connection.prepare_cached(query)?;
+    let mut rows = query.query([verified.after, PIECE])?;
+    let mut last = None;
+    while let Some(row) = rows.next()? {
+        let number = row.get_ref(0)?;
+        if !is_whole(row, values)? {
+            let detail = format!("row {number:?} of the table {table} is not what was written");
+            return Err(StoreError::Damaged { detail });
+        }
+        last = Some(row.get(0)?);
+    }
+    Ok(last)
+}
+
+fn is_whole(row: &Row<'_>, values: usize) -> Result<bool, StoreError> {
+    let all = (0..values).map(|index| row.get_ref(index));
+    let all: Vec<ValueRef<'_>> = all.collect::<Result<_, _>>()?;
+    Ok(row.get_ref(values)? == ValueRef::Integer(sum(&all)))
+}

@@ -1,0 +1,107 @@
+//! Sensors that fail without falling silent.
+
+use crate::site::{Program, Site, eventually};
+use crate::telling::failing;
+use jiff::SignedDuration;
+use slipwatch::runtime::clock;
+
+const HEADER: &str = "time,displacement_mm\n";
+const POLICY: &str = "[alert]\nevacuation_time = \"3h\"\n";
+
+fn told(site: &Site, begins: &str, ends: &str) -> usize {
+    let lines = site.lines("told");
+    let is_it = |line: &&String| line.starts_with(begins) && line.ends_with(ends);
+    lines.iter().filter(is_it).count()
+}
+
+fn changed(rows: &str, change: impl Fn(usize, f64) -> f64) -> String {
+    let each = rows.lines().enumerate().map(|(number, line)| {
+        let (time, value) = line.split_once(',').unwrap();
+        format!("{time},{:.4}\n", change(number, value.parse().unwrap()))
+    });
+    each.collect()
+}
+
+/// A site whose benchmark 5 is at red 30 hours ago.
+fn at_red(more: &str) -> (Site, Program) {
+    let site = Site::new(&format!("{POLICY}{more}"));
+    let earlier = |text: String| {
+        let each = text.lines().map(|line| {
+            let (time, value) = line.split_once(',').unwrap();
+            let time: jiff::Timestamp = time.parse().unwrap();
+            format!("{},{value}\n", time - SignedDuration::from_hours(30))
+        });
+        each.collect::<String>()
+    };
+    site.append(
+        "incoming/5.csv",
+        &format!("{HEADER}{}", earlier(failing(0..114))),
+    );
+    let program = site.caught_up();
+    eventually("a red", || told(&site, "5/red/", "firing") == 1);
+    (site, program)
+}
+
+#[test]
+fn a_sensor_that_repeats_its_value_after_a_red_is_unknown_and_the_red_stays() {
+    let (site, program) = at_red("");
+    let last = 200.0 * (120.0_f64 / 7.0).ln();
+    for hour in (0..30).rev() {
+        let time = clock::now() - SignedDuration::from_hours(hour);
+        site.append("incoming/5.csv", &format!("{time},{last:.4}\n"));
+    }
+    eventually("unknown", || site.events().contains("stuck-sensor"));
+    eventually("everything", || site.values().len() == 144);
+    program.stop();
+    let events = site.proven_events();
+    assert_eq!(told(&site, "5/red/", "resolved"), 0, "{events}");
+    assert!(told(&site, "5/unknown/", "firing") >= 1, "{events}");
+}
+
+fn spoils(change: impl Fn(usize, f64) -> f64) {
+    let site = Site::new(POLICY);
+    site.append("incoming/5.csv", HEADER);
+    let program = site.caught_up();
+    site.append("incoming/5.csv", &changed(&failing(0..114), change));
+    eventually("unknown", || told(&site, "5/unknown/", "firing") == 1);
+    program.stop();
+    site.proven_events();
+}
+
+#[test]
+fn a_benchmark_with_each_third_reading_spoilt_is_unknown() {
+    spoils(|number, value| {
+        if number % 3 == 0 {
+            value + 300.0
+        } else {
+            value
+        }
+    });
+}
+
+#[test]
+fn a_benchmark_whose_readings_alternate_in_sign_is_unknown() {
+    spoils(|number, value| if number % 2 == 0 { -value } else { value });
+}
+
+#[test]
+fn a_benchmark_that_gave_one_velocity_and_then_displacements_is_unknown() {
+    let site = Site::new(POLICY);
+    let now = clock::now();
+    let rows: String = failing(1..114)
+        .lines()
+        .map(|line| {
+            let (time, value) = line.split_once(',').unwrap();
+            format!("{time},{value},\n")
+        })
+        .collect();
+    let first = now - SignedDuration::from_hours(113);
+    site.append(
+        "incoming/5.csv",
+        &format!("time,displacement_mm,velocity_mm_per_day\n{first},,3\n{rows}"),
+    );
+    let program = site.caught_up();
+    eventually("unknown", || told(&site, "5/unknown/", "firing") == 1);
+    program.stop();
+    site.proven_events();
+}

@@ -1,0 +1,217 @@
+//! Who is told of what: in which order, how often, and what people ask for.
+
+use crate::site::{Site, eventually, get};
+use jiff::{SignedDuration, Timestamp};
+use slipwatch::runtime::clock;
+use std::fs;
+use std::ops::Range;
+use std::sync::OnceLock;
+use std::time::Duration;
+
+const POLICY: &str = "[alert]\nevacuation_time = \"3h\"\n";
+
+/// The same for all rows of a test.
+static NOW: OnceLock<Timestamp> = OnceLock::new();
+
+/// Hourly readings that run away, the 114th of them now.
+pub(crate) fn failing(rows: Range<i32>) -> String {
+    let now = *NOW.get_or_init(clock::now);
+    rows.map(|row| {
+        let time = now - SignedDuration::from_hours(i64::from(113 - row));
+        let left = f64::from(120 - row);
+        format!("{time},{:.4}\n", 200.0 * (120.0 / left).ln())
+    })
+    .collect()
+}
+
+fn told(site: &Site, begins: &str, ends: &str) -> usize {
+    let lines = site.lines("told");
+    let is_it = |line: &&String| line.starts_with(begins) && line.ends_with(ends);
+    lines.iter().filter(is_it).count()
+}
+
+/// 12 benchmarks of one file.
+fn rows(hours: Range<i64>) -> Vec<String> {
+    let now = *NOW.get_or_init(clock::now);
+    hours
+        .map(|hour| {
+            let values: String = (0..12)
+                .map(|one| format!(",{}.{one}", hour + 500))
+                .collect();
+            format!("{}{values}\n", now + SignedDuration::from_hours(hour))
+        })
+        .collect()
+}
+
+#[test]
+fn a_backlog_that_comes_in_row_by_row_is_one_silence_a_benchmark() {
+    let site = Site::new("");
+    let names: String = (0..12)
+        .map(|one| format!(",p{one}_displacement_mm"))
+        .collect();
+    site.append(
+        "incoming/all.csv",
+        &format!("time{names}\n{}", rows(-120..-72).concat()),
+    );
+    let program = site.caught_up();
+    eventually("that they are silent", || {
+        told(&site, "", "firing") >= 1
+            && site
+                .events()
+                .matches("unknown\",\"state\":\"firing")
+                .count()
+                >= 12
+    });
+    for row in rows(-72..-48) {
+        site.append("incoming/all.csv", &row);
+        std::thread::sleep(Duration::from_millis(250));
+    }
+    site.append("incoming/all.csv", &rows(-48..1).concat());
+    eventually("that they read again", || {
+        let events = site.events();
+        let ends = events.lines().filter(|line| {
+            line.contains("unknown\",\"state\":\"resolved") && line.contains("benchmark\":\"p")
+        });
+        ends.count() == 12
+    });
+    program.stop();
+    let events = site.events();
+    let of_benchmarks = events
+        .lines()
+        .filter(|line| line.contains("\"level\":\"unknown\"") && line.contains("benchmark\":\"p"));
+    assert_eq!(of_benchmarks.count(), 24, "each silence once: {events}");
+    assert!(site.lines("told").len() <= 24, "{:?}", site.lines("told"));
+    site.proven_events();
+}
+
+#[test]
+fn corrected_readings_are_judged_once_a_batch_and_delay_no_red_of_another_benchmark() {
+    let site = Site::new(POLICY);
+    site.append(
+        "incoming/4.csv",
+        &format!("time,displacement_mm\n{}", failing(0..60)),
+    );
+    site.append(
+        "incoming/5.csv",
+        &format!("time,displacement_mm\n{}", failing(0..60)),
+    );
+    let program = site.caught_up();
+    let refits = || {
+        let events = site.events();
+        let is_one = |line: &&str| {
+            line.contains("\"event\":\"refit\"") && line.contains("benchmark\":\"4\"")
+        };
+        events.lines().filter(is_one).count()
+    };
+    let before = refits();
+    // The same times with other values, many times over.
+    let again = failing(5..59);
+    let corrected: String = (1..=9)
+        .flat_map(|round| again.lines().map(move |line| format!("{line}{round}\n")))
+        .collect();
+    site.append("incoming/4.csv", &corrected);
+    site.append("incoming/5.csv", &failing(60..114));
+    eventually("the other's red", || told(&site, "5/red/", "firing") == 1);
+    eventually("all corrections", || {
+        site.events().matches("\"kind\":\"corrected\"").count() == 486
+    });
+    program.stop();
+    assert!(refits() <= before + 20, "{} refits of {before}", refits());
+    site.proven_events();
+}
+
+#[test]
+fn a_silence_has_a_longest_time_and_an_end_and_is_seen_everywhere() {
+    let site = Site::new(POLICY);
+    let listen = site.listen();
+    site.append(
+        "incoming/5.csv",
+        &format!("time,displacement_mm\n{}", failing(0..60)),
+    );
+    let program = site.caught_up();
+    let alerts = |words: &[&str]| {
+        let all = [&["alerts"], words, &["--config", "site.toml"]].concat();
+        site.ask(&all)
+    };
+    let refused = alerts(&["silence", "--for", "876000h"]);
+    assert_eq!(refused.status.code(), Some(2), "{refused:?}");
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("168h at most"));
+    assert!(alerts(&["silence", "--for", "2h"]).status.success());
+    let shown = |what: &str| get(&listen, what);
+    eventually("in the metrics", || {
+        shown("/metrics").contains("slipwatch_silences 1")
+    });
+    assert!(shown("/api/status").contains("\"silences\":[{"));
+    assert!(site.log().contains("Silence"), "{}", site.log());
+    for words in [&["status"][..], &["alerts", "list"]] {
+        let said = site.printed(&[words, &["--config", "site.toml"]].concat());
+        assert!(said.contains("silence until"), "{said}");
+    }
+    site.append("incoming/5.csv", &failing(60..114));
+    eventually("a red", || site.events().contains("\"level\":\"red\""));
+    std::thread::sleep(Duration::from_secs(2));
+    assert_eq!(told(&site, "5/red/", "firing"), 0, "it was silenced");
+    assert!(alerts(&["unsilence"]).status.success());
+    eventually("told", || told(&site, "5/red/", "firing") == 1);
+    assert!(shown("/metrics").contains("slipwatch_silences 0"));
+    program.stop();
+    site.proven_events();
+}
+
+#[test]
+fn a_hook_of_the_whole_site_is_told_that_its_sensors_are_silent() {
+    let site = Site::new("");
+    let text = fs::read_to_string(site.path("site.toml")).unwrap();
+    let text = text.replace("[[hook]]\n", "[[hook]]\nsite = true\n");
+    fs::write(site.path("site.toml"), text).unwrap();
+    let old = rows(-100..-60);
+    site.append(
+        "incoming/all.csv",
+        &format!(
+            "time,a_displacement_mm\n{}",
+            old.iter()
+                .map(|row| row.split(',').take(2).collect::<Vec<_>>().join(",") + "\n")
+                .collect::<String>()
+        ),
+    );
+    let program = site.caught_up();
+    eventually("told", || told(&site, "site/unknown/", "firing") == 1);
+    program.stop();
+    site.proven_events();
+}
+
+#[test]
+fn a_site_of_which_nobody_is_told_that_a_sensor_is_dead_does_not_pass_the_check_unseen() {
+    let site = Site::new("");
+    let text = fs::read_to_string(site.path("site.toml")).unwrap();
+    let text = text.replace(", \"unknown\"]", "]");
+    fs::write(site.path("site.toml"), text).unwrap();
+    let output = site.ask(&["check", "site.toml"]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(said.contains("no hook has unknown"), "{said}");
+}
+
+#[test]
+fn a_child_that_leaves_its_hooks_group_does_not_outlive_the_attempt() {
+    let site = Site::new(POLICY);
+    let text = fs::read_to_string(site.path("site.toml")).unwrap();
+    fs::write(site.path("site.toml"), format!("{text}timeout = \"1s\"\n")).unwrap();
+    let script =
+        "[ $SLIPWATCH_LEVEL = red ] || exit 0\nsetsid sh -c 'echo $$ >> children; sleep 300'\n";
+    fs::write(site.path("hook.sh"), script).unwrap();
+    site.append(
+        "incoming/5.csv",
+        &format!("time,displacement_mm\n{}", failing(0..114)),
+    );
+    let program = site.caught_up();
+    eventually("two attempts", || site.lines("children").len() >= 2);
+    let first = site.lines("children").swap_remove(0);
+    eventually("its end", || {
+        let stat = fs::read_to_string(format!("/proc/{first}/stat")).unwrap_or_default();
+        stat.is_empty() || stat.contains(") Z ")
+    });
+    program.let_go();
+    for child in site.lines("children") {
+        let _ = std::process::Command::new("kill").arg(child).status();
+    }
+}

@@ -1,0 +1,146 @@
+//! Clocks that are wrong: the host's, and those of loggers.
+
+use crate::machine::by_another_clock;
+use crate::site::{Site, eventually};
+use crate::telling::failing;
+use jiff::{SignedDuration, Timestamp};
+use nix::sys::signal::Signal;
+use slipwatch::runtime::clock;
+use std::fs;
+use std::time::Duration;
+
+const HEADER: &str = "time,displacement_mm\n";
+const POLICY: &str = "[alert]\nevacuation_time = \"3h\"\n";
+
+fn told(site: &Site, begins: &str, ends: &str) -> usize {
+    let lines = site.lines("told");
+    let is_it = |line: &&String| line.starts_with(begins) && line.ends_with(ends);
+    lines.iter().filter(is_it).count()
+}
+
+#[test]
+fn what_arrives_live_is_told_although_the_hosts_clock_is_forty_days_ahead() {
+    let site = Site::new(POLICY);
+    site.append("incoming/5.csv", &format!("{HEADER}{}", failing(0..40)));
+    fs::write(site.path("ahead"), "+40d").unwrap();
+    let Some(program) = by_another_clock(&site) else {
+        return;
+    };
+    for first in (40..114).step_by(10) {
+        site.append("incoming/5.csv", &failing(first..(first + 10).min(114)));
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    eventually("told", || told(&site, "5/red/", "firing") == 1);
+    program.stop();
+    site.proven_events();
+}
+
+#[test]
+fn a_clock_that_is_years_back_is_told_and_what_lies_ahead_is_taken_when_it_is_right() {
+    let site = Site::new(POLICY);
+    site.append("incoming/5.csv", &format!("{HEADER}{}", failing(0..90)));
+    site.caught_up().stop();
+    assert_eq!(site.values().len(), 90);
+    fs::write(site.path("ahead"), "-9000d").unwrap();
+    let Some(program) = by_another_clock(&site) else {
+        return;
+    };
+    eventually("that the clock is wrong", || {
+        told(&site, "site/unknown/clock/", "firing") == 1
+    });
+    site.append("incoming/5.csv", &failing(100..114));
+    std::thread::sleep(Duration::from_secs(3));
+    assert_eq!(site.values().len(), 90, "what lies ahead is held");
+    // Nothing of it is acknowledged.
+    program.signal(Signal::SIGKILL);
+    drop(program);
+    let program = by_another_clock(&site).unwrap();
+    std::thread::sleep(Duration::from_secs(3));
+    assert_eq!(site.values().len(), 90, "and again after a restart");
+    fs::write(site.path("ahead"), "+0").unwrap();
+    eventually("what was held", || site.values().len() == 104);
+    eventually("the end of it", || {
+        told(&site, "site/unknown/clock/", "resolved") == 1
+    });
+    eventually("the red", || told(&site, "5/red/", "firing") == 1);
+    program.stop();
+    site.proven_events();
+}
+
+#[test]
+fn a_clock_that_is_set_back_by_two_days_keeps_no_reading_from_being_taken() {
+    let site = Site::new(POLICY);
+    site.append("incoming/5.csv", &format!("{HEADER}{}", failing(0..113)));
+    fs::write(site.path("ahead"), "+0").unwrap();
+    let Some(program) = by_another_clock(&site) else {
+        return;
+    };
+    fs::write(site.path("ahead"), "-2d").unwrap();
+    site.append("incoming/5.csv", &failing(113..114));
+    eventually("it is taken", || site.values().len() == 114);
+    eventually("and told", || {
+        told(&site, "site/unknown/clock/", "firing") == 1
+    });
+    program.stop();
+    site.proven_events();
+}
+
+/// Hourly readings from 60 days ago on, ever faster from the 60th on.
+fn old(rows: std::ops::Range<i32>) -> String {
+    let start = clock::now() - SignedDuration::from_hours(60 * 24);
+    rows.map(|row| {
+        let time = start + SignedDuration::from_hours(i64::from(row));
+        let noise = f64::from((row * 7919) % 13) * 0.01;
+        let faster = f64::from((row - 60).max(0));
+        format!(
+            "{time},{:.4}\n",
+            f64::from(row) * 0.1 + noise + 0.25 * faster * faster
+        )
+    })
+    .collect()
+}
+
+#[test]
+fn one_reading_stamped_a_month_ahead_keeps_no_later_one_from_counting() {
+    let site = Site::new(
+        "[alert]\nevacuation_time = \"3h\"\n[[alert.threshold]]\nlevel = \"red\"\nvelocity = \"500 mm/day\"\n",
+    );
+    site.append("incoming/5.csv", &format!("{HEADER}{}", old(0..60)));
+    let program = site.caught_up();
+    let ahead = clock::now() - SignedDuration::from_hours(28 * 24);
+    site.append("incoming/5.csv", &format!("{ahead},6.5\n"));
+    eventually("that it is doubted", || {
+        site.events().contains("leaps-ahead")
+    });
+    for first in (60..113).step_by(10) {
+        site.append("incoming/5.csv", &old(first..(first + 10).min(113)));
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    eventually("told", || told(&site, "5/red/", "firing") == 1);
+    program.stop();
+    let events = site.proven_events();
+    assert!(events.contains("leapt-ahead"), "{events}");
+}
+
+#[test]
+fn what_an_unset_clock_gave_first_does_not_disarm_a_displacement_threshold() {
+    let site = Site::new("[[alert.threshold]]\nlevel = \"red\"\ndisplacement = \"96 mm\"\n");
+    let now = clock::now();
+    let row = |hour: i32| {
+        let time = now - SignedDuration::from_hours(i64::from(40 - hour));
+        let noise = f64::from((hour * 7919) % 13) * 0.05;
+        format!("{time},{:.3}\n", 2.49 * f64::from(hour) + noise)
+    };
+    // 95 mm by an hour ago; the logger gave what it reads now before its clock was set.
+    let unset: Timestamp = "2000-01-01T00:00:00Z".parse().unwrap();
+    let text: String = (1..40).map(row).collect();
+    site.append("incoming/5.csv", &format!("{HEADER}{text}"));
+    let program = site.caught_up();
+    site.append("incoming/5.csv", &format!("{unset},97.5\n"));
+    site.append("incoming/5.csv", &row(40));
+    eventually("told", || told(&site, "5/red/", "firing") == 1);
+    program.stop();
+    let events = site.proven_events();
+    assert!(events.contains("displacement-threshold"), "{events}");
+    assert!(events.contains("clock-not-set"), "{events}");
+}

@@ -1,0 +1,241 @@
+//! What an operator sees.
+
+use crate::site::{Site, eventually, get};
+use crate::telling::failing;
+use jiff::SignedDuration;
+use slipwatch::runtime::clock;
+use std::collections::BTreeMap;
+use std::ffi::OsStr;
+use std::fs;
+use std::net::TcpStream;
+use std::os::unix::ffi::OsStrExt;
+use std::time::Duration;
+
+const HEADER: &str = "time,displacement_mm\n";
+
+fn told(site: &Site, begins: &str, ends: &str) -> usize {
+    let lines = site.lines("told");
+    let is_it = |line: &&String| line.starts_with(begins) && line.ends_with(ends);
+    lines.iter().filter(is_it).count()
+}
+
+#[test]
+fn a_benchmark_that_never_gave_a_reading_is_seen_and_unknown_from_the_start() {
+    let ids = ["absent", "refused", "nan", "strange"];
+    let benchmarks: String = ids
+        .map(|id| format!("[[benchmark]]\nid = \"{id}\"\nsource = \"logger\"\n"))
+        .concat();
+    let site = Site::new(&benchmarks);
+    let listen = site.listen();
+    site.append("incoming/refused.csv", "when,what\n1,2\n");
+    site.append(
+        "incoming/nan.csv",
+        "time,displacement_mm\n2020-01-01T00:00:00Z,NAN\n2020-01-02T00:00:00Z,NAN\n",
+    );
+    let strange = site
+        .path("incoming")
+        .join(OsStr::from_bytes(b"strange\xff.csv"));
+    fs::write(strange, format!("{HEADER}{}", failing(0..20))).unwrap();
+    let program = site.caught_up();
+    let metrics = get(&listen, "/metrics");
+    let status = site.printed(&["status", "--config", "site.toml"]);
+    for id in ids {
+        let line = format!("slipwatch_benchmark_unknown{{benchmark=\"{id}\"}} 1");
+        assert!(metrics.contains(&line), "{metrics}");
+        let row = status.lines().find(|line| line.starts_with(id)).unwrap();
+        assert!(row.contains("unknown"), "{status}");
+        eventually("told", || {
+            told(&site, &format!("{id}/unknown/"), "firing") == 1
+        });
+    }
+    assert!(
+        site.log().contains("its name is no UTF-8"),
+        "{}",
+        site.log()
+    );
+    site.append(
+        "incoming/absent.csv",
+        &format!("{HEADER}{}", failing(0..114)),
+    );
+    eventually("its end", || {
+        told(&site, "absent/unknown/", "resolved") == 1
+    });
+    assert!(
+        get(&listen, "/metrics").contains("slipwatch_benchmark_unknown{benchmark=\"absent\"} 0")
+    );
+    program.stop();
+    site.caught_up().stop();
+    assert_eq!(
+        told(&site, "nan/unknown/", "firing"),
+        1,
+        "told again after a restart"
+    );
+    site.proven_events();
+}
+
+#[test]
+fn three_readings_and_then_silence_are_unknown() {
+    let site = Site::new("");
+    site.append("incoming/5.csv", &format!("{HEADER}{}", failing(90..93)));
+    let program = site.caught_up();
+    eventually("told", || told(&site, "5/unknown/", "firing") == 1);
+    program.stop();
+    site.proven_events();
+}
+
+#[test]
+fn a_benchmark_that_is_unknown_is_so_after_a_restart_too() {
+    let site = Site::new("");
+    let listen = site.listen();
+    site.append("incoming/5.csv", &format!("{HEADER}{}", failing(0..60)));
+    let is_unknown = || {
+        let metrics = get(&listen, "/metrics");
+        metrics.contains("slipwatch_benchmark_unknown{benchmark=\"5\"} 1")
+            && get(&listen, "/api/status").contains("\"is_unknown\":true")
+    };
+    let program = site.caught_up();
+    eventually("unknown", is_unknown);
+    program.stop();
+    let program = site.caught_up();
+    assert!(is_unknown());
+    program.stop();
+}
+
+#[test]
+fn a_state_folder_that_was_removed_is_not_ready() {
+    let site = Site::new("");
+    let listen = site.listen();
+    site.append("incoming/5.csv", &format!("{HEADER}{}", failing(0..20)));
+    let program = site.caught_up();
+    eventually("ready", || get(&listen, "/readyz").contains("200 OK"));
+    fs::remove_dir_all(site.path("state")).unwrap();
+    eventually("not ready", || {
+        get(&listen, "/readyz").contains("cannot be written")
+    });
+    program.let_go();
+}
+
+#[test]
+fn two_thousand_connections_that_ask_nothing_shut_nobody_out() {
+    let site = Site::new("");
+    let listen = site.listen();
+    let program = site.caught_up();
+    let mut held = Vec::new();
+    for _ in 0..900 {
+        held.extend(TcpStream::connect(&listen));
+    }
+    assert!(held.len() > 500, "{}", held.len());
+    assert!(get(&listen, "/healthz").contains("200 OK"));
+    program.stop();
+}
+
+#[test]
+fn a_name_with_a_line_break_in_it_forges_no_line_of_the_status_or_the_log() {
+    let site = Site::new("");
+    let forged = "x\n7  red  2026-01-01\u{1b}[2J";
+    fs::write(site.path("incoming/5.mcap"), recording(forged)).unwrap();
+    let program = site.caught_up();
+    eventually("a reading", || !site.values().is_empty());
+    let status = site.printed(&["status", "--config", "site.toml"]);
+    assert!(
+        !status.lines().any(|line| line.starts_with("7  red")),
+        "{status}"
+    );
+    assert!(!status.contains('\u{1b}'), "{status}");
+    program.stop();
+    assert!(
+        !site.log().lines().any(|line| line.starts_with("7  red")),
+        "{}",
+        site.log()
+    );
+}
+
+/// A recording with one reading of a benchmark of this name.
+fn recording(name: &str) -> Vec<u8> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let options = mcap::WriteOptions::new().use_chunks(false);
+    let mut writer = options.create(&mut bytes).unwrap();
+    let topic = format!("/benchmarks/{name}/displacement");
+    let channel = writer
+        .add_channel(0, &topic, "json", &BTreeMap::default())
+        .unwrap();
+    let header = mcap::records::MessageHeader {
+        channel_id: channel,
+        sequence: 0,
+        log_time: 1_577_836_800_000_000_000,
+        publish_time: 1_577_836_800_000_000_000,
+    };
+    let body = br#"{"time":"2020-01-01T00:00:00Z","value":1.0,"unit":"mm"}"#;
+    writer.write_to_known_channel(&header, body).unwrap();
+    writer.finish().unwrap();
+    drop(writer);
+    bytes.into_inner()
+}
+
+/// Two benchmarks that rain and a lake move, with eight covariates beside them.
+fn moved_by_water(rows: i32) -> String {
+    let mut text = "time,rain_mm,lake_level_m,temp_c,pore_kpa,tide_m,flow_m3_s,wind_m_s,snow_mm,\
+                    a_displacement_mm,b_displacement_mm\n"
+        .to_owned();
+    let now = clock::now();
+    let (mut level, mut slip) = (0.0_f64, [0.0, 0.0]);
+    for row in 0..rows {
+        let time = now - SignedDuration::from_hours(4 * i64::from(rows - 1 - row));
+        let chance = |seed: i32| f64::from((row * 7919 + seed * 104_729).rem_euclid(997)) / 997.0;
+        let rain = if chance(1) < 0.2 {
+            20.0 * chance(2)
+        } else {
+            0.0
+        };
+        level = 0.95 * level + 0.1 * rain;
+        let phase = f64::from(row);
+        let others = [
+            rain,
+            level,
+            10.0 + 5.0 * (phase / 30.0).sin(),
+            20.0 + 3.0 * level,
+            (phase * 0.9).sin(),
+            5.0 + level,
+            9.0 * chance(3),
+            (phase / 90.0).sin().max(0.0),
+        ];
+        text += &time.to_string();
+        for value in others {
+            text += &format!(",{value:.4}");
+        }
+        for (index, slip) in (0..).zip(&mut slip) {
+            *slip += 0.5 * (0.3 * level).exp() * (1.0 + 0.02 * f64::from(index));
+            text += &format!(",{:.4}", *slip + 0.2 * chance(4 + index));
+        }
+        text.push('\n');
+    }
+    text
+}
+
+#[test]
+fn a_search_that_is_at_work_does_not_hold_the_work_loop() {
+    let site = Site::new("");
+    let listen = site.listen();
+    site.append("incoming/all.csv", &moved_by_water(150));
+    let program = site.start(&[]);
+    eventually("a start", || site.log().contains("listening"));
+    let (mut searches, mut longest) = (0.0_f64, 0.0_f64);
+    for _ in 0..600 {
+        let metrics = get(&listen, "/metrics");
+        let figure = |name: &str| -> f64 {
+            let line = metrics.lines().find(|line| line.starts_with(name)).unwrap();
+            line.rsplit_once(' ').unwrap().1.parse().unwrap()
+        };
+        searches = searches.max(figure("slipwatch_searches "));
+        longest = longest.max(figure("slipwatch_work_loop_idle_seconds "));
+        if site.log().contains("caught up") {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(200));
+    }
+    assert!(site.log().contains("caught up"));
+    assert!(searches > 0.0, "no search was made");
+    assert!(longest < 15.0, "the work loop stood still for {longest} s");
+    assert!(get(&listen, "/healthz").contains("200 OK"));
+    program.stop();
+}
