@@ -179,9 +179,13 @@ async fn a_daemon_says_what_a_replay_says_search_and_all() {
     let replayed = adopted().await;
     let daemon = said_by_a_daemon().await;
     assert!(!found(&daemon).is_empty());
+    let first = daemon
+        .iter()
+        .zip(replayed)
+        .find(|(one, other)| one != other);
     assert!(
         daemon == replayed,
-        "{} and {} events",
+        "{first:?}; {} and {} events",
         daemon.len(),
         replayed.len()
     );

@@ -53,6 +53,14 @@ fn refit(time: Timestamp) -> EventKind {
             probability: 0.123_456_789_012_345_6,
             horizon_days: 400.0,
         },
+        critical_velocity_time: Box::new(FailureTime {
+            low: later(4),
+            median: later(31),
+            high: later(301),
+            probability: 0.123_456_789_012_345_6,
+            horizon_days: 400.0,
+        }),
+        probability_of_acceleration: 0.123_456_789_012_345_6,
         inverse_velocity: InverseVelocity {
             failure_time: later(7),
             r_squared: Some(0.123_456_789_012_345_6),

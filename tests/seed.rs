@@ -170,7 +170,7 @@ fn an_increase_that_exhausts_itself_moves_m_away_from_the_papers() {
 #[test]
 fn benchmarks_5_63_and_50_pass_a_metre_a_day_within_a_day_of_the_collapse() {
     for id in ["5", "63", "50"] {
-        let passage = benchmark(id).free.failure_time;
+        let passage = benchmark(id).free.critical_velocity_time;
         let day = recorded::vaiont_day(passage.median.unwrap()).unwrap();
         assert!((day - vaiont::COLLAPSE_DAY).abs() < 1.0, "{id}: {day}");
         assert!(passage.probability.unwrap() > 0.9, "{id}: {passage:?}");

@@ -34,7 +34,7 @@ fn until(time: Timestamp) -> Options {
 fn alone(series: &Series, options: &Options) -> FailureTime {
     let inversion = Inversion::new(series, options);
     let report = inversion.report(&inversion.least_squares(), 0.0);
-    report.failure_time
+    report.critical_velocity_time
 }
 
 /// A series of (days, value).

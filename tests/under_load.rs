@@ -108,7 +108,8 @@ fn lanzada_f1_has_its_collapse_within_the_90_percent_interval_at_8_of_9_leads() 
         let (low, median, high) = (hours(0.05), hours(0.5), hours(0.95));
         println!("{lead} h before: {low:.1?} {median:.1?} {high:.1?}");
         // The collapse came between 08:15 and 08:40.
-        let holds = low.unwrap() <= lead + 25.0 / 60.0 && high.is_none_or(|high| high >= *lead);
+        let in_time = low.is_some_and(|low| low <= lead + 25.0 / 60.0);
+        let holds = in_time && high.is_none_or(|high| high >= *lead);
         met += u32::from(holds);
         if (2.0..=12.0).contains(lead) {
             let ratio = median.unwrap() / lead;

@@ -7,6 +7,10 @@
 //! Slopes that teach have seeds from 0 on, those that judge from 1,000,000 on.
 
 #![expect(clippy::print_stderr, reason = "progress is what it prints")]
+#![expect(
+    clippy::cast_possible_truncation,
+    reason = "weights have single precision"
+)]
 
 mod descent;
 mod judge;
@@ -48,11 +52,7 @@ fn learn(looks: &[Look], slopes: u64, without: Option<Family>) -> Network {
     let counts = |look: &&Look| Some(look.family) != without;
     let mut rows: Vec<Row> = looks.iter().filter(counts).flat_map(looks::rows).collect();
     let first = teach(&rows, PASSES.0);
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a share of a count"
-    )]
+    #[expect(clippy::cast_sign_loss, reason = "a share of a count")]
     let asked = (slopes as f64 * ASKED) as u64;
     let misleading = looks::misleading(&first, asked, without);
     rows.extend(misleading.iter().flat_map(looks::rows));

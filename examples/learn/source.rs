@@ -29,7 +29,7 @@ fn text(network: &Network, slopes: u64) -> anyhow::Result<String> {
     for unit in &network.hidden {
         writeln!(out, "{},", row(unit))?;
     }
-    let output: Vec<String> = network.output.iter().map(figure).collect();
+    let output: Vec<String> = network.output.iter().copied().map(figure).collect();
     write!(
         out,
         "];\n\n/// The network in force.\npub(super) const LEARNED: Network = Network {{\nhidden: UNITS,\noutput: [{}],\ndirect: {},\n}};\n",
@@ -40,10 +40,10 @@ fn text(network: &Network, slopes: u64) -> anyhow::Result<String> {
 }
 
 fn row(weights: &[f32; INPUTS]) -> String {
-    let all: Vec<String> = weights.iter().map(figure).collect();
+    let all: Vec<String> = weights.iter().copied().map(figure).collect();
     format!("[{}]", all.join(", "))
 }
 
-fn figure(weight: &f32) -> String {
+fn figure(weight: f32) -> String {
     format!("{weight:.4}")
 }

@@ -98,7 +98,7 @@ fn m_table(benchmarks: &[Benchmark]) -> String {
 
 fn failure_rows(benchmarks: &[Benchmark]) -> Result<Vec<Vec<String>>> {
     let row = |one: &Benchmark| -> Result<Vec<String>> {
-        let (line, passage) = (&one.free.inverse_velocity, &one.free.failure_time);
+        let (line, passage) = (&one.free.inverse_velocity, &one.free.critical_velocity_time);
         let imposed = one.at_paper_m.best();
         Ok(vec![
             one.id.to_owned(),

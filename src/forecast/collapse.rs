@@ -19,7 +19,7 @@ const BEYOND: usize = 3;
 const LONGEST_DAYS: f64 = 1200.0;
 /// The share of the network's chance that is left where no acceleration shows, over long spans, and the span, days, at
 /// which half of that is reached: within days nothing is called that the readings do not show.
-const UNSEEN: f64 = 0.1;
+const UNSEEN: f64 = 0.15;
 const UNSEEN_DAYS: f64 = 4.0;
 /// Steps of the distribution in one doubling of time.
 const STEPS: u32 = 8;
@@ -27,7 +27,7 @@ const STEPS: u32 = 8;
 const LAST_VELOCITY: f64 = 93.0;
 /// A slope whose newest velocity is under this share of its velocity over a span is the less likely to collapse within
 /// the span: set with Century Mine 40-1938 in view, which jumped by 231 mm and lay still.
-const SLOWED: f64 = 0.2;
+const SLOWED: f64 = 0.5;
 /// Inputs lie between plus and minus this.
 const MOST: f64 = 3.0;
 

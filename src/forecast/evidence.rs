@@ -63,9 +63,9 @@ fn ln_bayes_factor(change: &Change, most_freedom: f64) -> f64 {
     let freedom = change.freedom.min(most_freedom);
     let wide = 1.0 + SPREAD * SPREAD;
     let tails = (z * z / freedom).ln_1p() - (z * z / (freedom * wide)).ln_1p();
-    // The normal distribution function within .01 is a logistic one of this slope.
-    let above = 2.0 / (1.0 + (-1.702 * z).exp());
-    0.5 * (freedom + 1.0) * tails - 0.5 * wide.ln() + above.max(1e-12).ln()
+    // The normal distribution function within .0002 is a logistic one of this cubic.
+    let above = 2.0 / (1.0 + (-1.597_6 * z - 0.070_56 * z.powi(3)).exp());
+    0.5 * (freedom + 1.0) * tails - 0.5 * wide.ln() + above.max(f64::MIN_POSITIVE).ln()
 }
 
 #[cfg(test)]

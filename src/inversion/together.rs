@@ -41,7 +41,7 @@ pub struct GroupReport {
     pub probabilities: Vec<f64>,
     /// The look from which on they have been a group; [`TogetherReport::judged_from`]: from the first.
     pub since: Timestamp,
-    /// When their common failure comes.
+    /// When they pass the critical velocity together, by the law.
     pub failure_time: FailureTime,
 }
 
@@ -135,7 +135,7 @@ fn foretold(inversion: &Inversion, time: Timestamp) -> Option<(Passage, f64)> {
     let critical = inversion.options.critical_velocity_mm_per_day;
     let (outlook, _) = outlook(&observations, critical)?;
     let moves = measurably_moves(&outlook.rates);
-    moves.then_some((outlook.collapse, days - outlook.now_days))
+    moves.then_some((outlook.passage, days - outlook.now_days))
 }
 
 /// The looks back and their times: all benchmarks have readings enough by the first, and the last is now.

@@ -34,7 +34,7 @@ pub enum EventKind {
         failure_time: FailureTime,
         /// When the critical velocity is passed.
         #[serde(default)]
-        critical_velocity_time: FailureTime,
+        critical_velocity_time: Box<FailureTime>,
         /// Probability that the slope accelerates, against steady motion.
         #[serde(default)]
         probability_of_acceleration: f64,

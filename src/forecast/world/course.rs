@@ -135,20 +135,21 @@ impl Course {
     }
 
     fn standing(family: Family, end: f64, generator: &mut impl Rng) -> Self {
-        let most = match family {
-            Family::Steady | Family::TwoRates | Family::Resets => 200.0,
-            _ => 5.0,
-        };
+        let is_plain = matches!(family, Family::Steady | Family::TwoRates | Family::Resets);
+        let most = if is_plain { 200.0 } else { 5.0 };
         let creep = if happens(generator, 0.1) {
             0.0
         } else {
             log_uniform(generator, 0.005, most)
         };
-        let stretches = match family {
-            Family::TwoRates => two_rates(end, creep, generator),
-            Family::Reservoir => draw_downs(end, creep, generator),
-            Family::StickSlip => fits(end, creep, generator),
-            _ => Vec::new(),
+        let stretches = if family == Family::TwoRates {
+            two_rates(end, creep, generator)
+        } else if family == Family::Reservoir {
+            draw_downs(end, creep, generator)
+        } else if family == Family::StickSlip {
+            fits(end, creep, generator)
+        } else {
+            Vec::new()
         };
         Self {
             stretches,
@@ -223,7 +224,16 @@ impl Acceleration {
                 stretches.push(relaxing((to, to + rest), velocities, memory));
             }
             Family::Plateau => self.to_a_plateau(stretches, generator),
-            _ => whole(self.alpha, SMOOTH),
+            Family::Voight
+            | Family::Law
+            | Family::Steady
+            | Family::TwoRates
+            | Family::Rain
+            | Family::Season
+            | Family::Reservoir
+            | Family::FreezeThaw
+            | Family::StickSlip
+            | Family::Resets => whole(self.alpha, SMOOTH),
         }
     }
 

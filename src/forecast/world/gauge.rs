@@ -110,7 +110,7 @@ impl Gauge {
                 gauge.on_the_ground(generator);
             }
             GaugeKind::GnssDaily | GaugeKind::GnssHourly => gauge.by_satellite(generator),
-            GaugeKind::TotalStation | GaugeKind::Survey => gauge.from_afar(generator),
+            GaugeKind::TotalStation | GaugeKind::Survey => gauge.by_eye(generator),
             GaugeKind::Plain | GaugeKind::VelocityColumn => gauge.of_any_kind(generator),
         }
         if family == Family::Resets {
@@ -120,33 +120,29 @@ impl Gauge {
     }
 
     fn on_the_ground(&mut self, generator: &mut impl Rng) {
-        match self.kind {
-            GaugeKind::Radar => {
-                self.interval = log_uniform(generator, 4.0 * MINUTE, 30.0 * MINUTE);
-                self.white = log_uniform(generator, 0.1, 1.0);
-                let size = log_uniform(generator, 0.2, 2.0);
-                self.air = (size, log_uniform(generator, 0.04, 0.5));
-                self.step = if happens(generator, 0.4) { 1.0 } else { 0.1 };
-                if happens(generator, 0.5) {
-                    self.daily = log_uniform(generator, 0.2, 2.0);
-                }
+        if self.kind == GaugeKind::Radar {
+            self.interval = log_uniform(generator, 4.0 * MINUTE, 30.0 * MINUTE);
+            self.white = log_uniform(generator, 0.1, 1.0);
+            let size = log_uniform(generator, 0.2, 2.0);
+            self.air = (size, log_uniform(generator, 0.04, 0.5));
+            self.step = if happens(generator, 0.4) { 1.0 } else { 0.1 };
+            if happens(generator, 0.5) {
+                self.daily = log_uniform(generator, 0.2, 2.0);
             }
-            GaugeKind::Crackmeter => {
-                self.interval = log_uniform(generator, 5.0 * MINUTE, 0.25);
-                self.white = log_uniform(generator, 0.005, 0.1);
-                self.daily = log_uniform(generator, 0.01, 0.5);
-                self.yearly = log_uniform(generator, 0.05, 1.0);
-                self.step = log_uniform(generator, 0.005, 0.1);
+        } else if self.kind == GaugeKind::Crackmeter {
+            self.interval = log_uniform(generator, 5.0 * MINUTE, 0.25);
+            self.white = log_uniform(generator, 0.005, 0.1);
+            self.daily = log_uniform(generator, 0.01, 0.5);
+            self.yearly = log_uniform(generator, 0.05, 1.0);
+            self.step = log_uniform(generator, 0.005, 0.1);
+        } else {
+            self.interval = log_uniform(generator, 10.0 * MINUTE, 1.0);
+            self.white = log_uniform(generator, 0.05, 1.0);
+            if happens(generator, 0.6) {
+                self.daily = log_uniform(generator, 0.05, 2.0);
             }
-            _ => {
-                self.interval = log_uniform(generator, 10.0 * MINUTE, 1.0);
-                self.white = log_uniform(generator, 0.05, 1.0);
-                if happens(generator, 0.6) {
-                    self.daily = log_uniform(generator, 0.05, 2.0);
-                }
-                if happens(generator, 0.4) {
-                    self.step = log_uniform(generator, 0.05, 1.0);
-                }
+            if happens(generator, 0.4) {
+                self.step = log_uniform(generator, 0.05, 1.0);
             }
         }
     }
@@ -164,7 +160,7 @@ impl Gauge {
         }
     }
 
-    fn from_afar(&mut self, generator: &mut impl Rng) {
+    fn by_eye(&mut self, generator: &mut impl Rng) {
         if self.kind == GaugeKind::TotalStation {
             self.interval = log_uniform(generator, 1.0 / 24.0, 1.0);
             self.white = log_uniform(generator, 0.5, 3.0);

@@ -115,36 +115,31 @@ impl Weather {
 }
 
 fn pulses(family: Family, end: f64, generator: &mut impl Rng) -> Vec<Pulse> {
-    match family {
-        Family::Rain => {
-            let storms = log_uniform(generator, 5.0, 40.0);
-            let least = 3.0 * 365.25 / end * between(generator, 0.3, 1.5);
-            let kind = Kind {
-                often: storms.max(least),
-                size: (0.5, 30.0),
-                rise: (0.02, 1.0),
-                fade: (0.3, 12.0),
-            };
-            kind.pulses(end, generator)
+    let kind = if family == Family::Rain {
+        let storms = log_uniform(generator, 5.0, 40.0);
+        let least = 3.0 * 365.25 / end * between(generator, 0.3, 1.5);
+        Kind {
+            often: storms.max(least),
+            size: (0.5, 30.0),
+            rise: (0.02, 1.0),
+            fade: (0.3, 12.0),
         }
-        Family::FreezeThaw => {
-            let kind = Kind {
-                often: 60.0,
-                size: (0.5, 10.0),
-                rise: (0.05, 0.3),
-                fade: (0.2, 1.5),
-            };
-            kind.pulses(end, generator)
+    } else if family == Family::FreezeThaw {
+        Kind {
+            often: 60.0,
+            size: (0.5, 10.0),
+            rise: (0.05, 0.3),
+            fade: (0.2, 1.5),
         }
-        _ if happens(generator, 0.25) => {
-            let kind = Kind {
-                often: log_uniform(generator, 3.0, 20.0),
-                size: (0.2, 4.0),
-                rise: (0.02, 1.0),
-                fade: (0.3, 10.0),
-            };
-            kind.pulses(end, generator)
+    } else if happens(generator, 0.25) {
+        Kind {
+            often: log_uniform(generator, 3.0, 20.0),
+            size: (0.2, 4.0),
+            rise: (0.02, 1.0),
+            fade: (0.3, 10.0),
         }
-        _ => Vec::new(),
-    }
+    } else {
+        return Vec::new();
+    };
+    kind.pulses(end, generator)
 }

@@ -124,7 +124,7 @@ impl Track {
                 t_max: time,
                 regime: report(outlook),
                 failure_time: self.reported(outlook.now_days, &outlook.collapse),
-                critical_velocity_time: self.reported(outlook.now_days, &outlook.passage),
+                critical_velocity_time: Box::new(self.reported(outlook.now_days, &outlook.passage)),
                 probability_of_acceleration: outlook.accelerating,
                 inverse_velocity: InverseVelocity {
                     failure_time: at(intercept),
