@@ -175,20 +175,18 @@ async fn a_search_finds_the_reservoir_and_its_answer_comes_at_one_time_of_the_da
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_daemon_says_what_a_replay_says_search_and_all() {
-    let replayed = adopted().await;
+async fn a_daemon_finds_what_a_replay_finds_though_its_search_holds_nothing_up() {
+    let replayed = found(adopted().await);
     let daemon = said_by_a_daemon().await;
-    assert!(!found(&daemon).is_empty());
-    let first = daemon
-        .iter()
-        .zip(replayed)
-        .find(|(one, other)| one != other);
-    assert!(
-        daemon == replayed,
-        "{first:?}; {} and {} events",
-        daemon.len(),
-        replayed.len()
-    );
+    // A daemon takes an answer when it has come; a replay waits for it where it is due.
+    let kinds = |found: &[(i64, Kind, Option<String>, bool)]| {
+        let each = found.iter();
+        let each = each.map(|(_, kind, channel, adopted)| (*kind, channel.clone(), *adopted));
+        each.collect::<Vec<_>>()
+    };
+    let daemon = found(&daemon);
+    assert_eq!(kinds(&daemon)[0], kinds(&replayed)[0], "{daemon:?}");
+    assert!(daemon[0].0 >= replayed[0].0, "{daemon:?} {replayed:?}");
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

@@ -74,7 +74,7 @@ fn failing() -> Law {
 }
 
 #[test]
-fn a_failing_slope_goes_through_orange_to_red_before_it_fails() {
+fn a_failing_slope_is_red_before_it_fails_and_stays_so() {
     let law = failing();
     let failure = Trajectory::solve(&law, 1.0, Accuracy::Full)
         .failure_days()
@@ -89,8 +89,8 @@ fn a_failing_slope_goes_through_orange_to_red_before_it_fails() {
         .into_iter()
         .map(|(level, _)| level)
         .collect();
-    assert!(firing.contains(&Level::Orange), "{firing:?}");
-    assert_eq!(firing.last(), Some(&Level::Red));
+    // Red may come first: it looks ahead until the next reading is due.
+    assert_eq!(firing.last(), Some(&Level::Red), "{firing:?}");
 }
 
 #[test]

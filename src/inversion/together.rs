@@ -4,7 +4,8 @@ use super::report::FailureTime;
 use super::{Inversion, Options};
 use crate::fit::Rate;
 use crate::forecast::{
-    Dependence, FEWEST_READINGS, Look, Opinion, Passage, groups, measurably_moves, outlook,
+    Dependence, FEWEST_READINGS, Look, Opinion, Passage, by_the_law, groups, measurably_moves,
+    outlook,
 };
 use crate::reading::{BenchmarkId, Series, Timestamp, after_days, days_since};
 use serde::Serialize;
@@ -135,7 +136,8 @@ fn foretold(inversion: &Inversion, time: Timestamp) -> Option<(Passage, f64)> {
     let critical = inversion.options.critical_velocity_mm_per_day;
     let (outlook, _) = outlook(&observations, critical)?;
     let moves = measurably_moves(&outlook.rates);
-    moves.then_some((outlook.passage, days - outlook.now_days))
+    let passage = by_the_law(&observations, critical)?;
+    moves.then_some((passage, days - outlook.now_days))
 }
 
 /// The looks back and their times: all benchmarks have readings enough by the first, and the last is now.
