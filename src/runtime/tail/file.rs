@@ -22,7 +22,7 @@ const MARK_BYTES: u64 = 256;
 /// Bytes that may be read of one file, without a value in them, before others have their turn.
 const TURN_BYTES: u64 = 1 << 20;
 /// After so many bytes without a value others need not wait for the file any more,
-pub(super) const VALUELESS_BYTES: u64 = 64 << 20;
+pub(super) const VALUELESS_BYTES: u64 = 8 << 20;
 /// and after so many it is refused.
 const REFUSED_BYTES: u64 = 1 << 30;
 /// How much of a bad line stands in the log, characters.
