@@ -102,7 +102,7 @@ fn introduce(out: &mut impl Write, crisis: &Crisis, recording: &Recording) -> io
     let (site, kind) = (crisis.site, crisis.kind.to_uppercase());
     writeln!(
         out,
-        "\n=== {site}: {kind}; {readings} readings; evacuation time {} h; failure is 1 m/day\n",
+        "\n=== {site}: {kind}; {readings} readings; evacuation time {} h; critical velocity 1 m/day\n",
         crisis.evacuation_hours
     )?;
     writeln!(out, "{}", timeline::HEAD)
