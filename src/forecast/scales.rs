@@ -63,7 +63,7 @@ pub struct Scale {
 /// The scales of a record, shortest first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scales {
-    /// Days of the shortest blocks: the sampling interval, or [`FINEST_BLOCK_DAYS`].
+    /// Days of the shortest blocks: the sampling interval, or a quarter of an hour.
     pub base_days: f64,
     /// Median of the newest spans between readings, days.
     pub interval_days: f64,
