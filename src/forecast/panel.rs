@@ -14,6 +14,10 @@ use std::collections::BTreeMap;
 pub const FEWEST_READINGS: usize = 10;
 /// A slope at 50 m/day has failed by any account, mm/day.
 const FASTEST_CRITICAL: f64 = 5e4;
+/// The law's weight in the pool, set with Lanzada, Preonzo and Longjingcun in view; and what is left of it where no
+/// acceleration shows.
+const OF_THE_LAW: f64 = 0.6;
+const UNSURE: f64 = 0.5;
 /// The law's passages are followed so far, days.
 const FARTHEST_DAYS: f64 = 10.0 * HORIZON_DAYS;
 /// A reading is foreseen within so many standard deviations of where the law puts it.
@@ -26,8 +30,11 @@ pub const HORIZON_DAYS: f64 = 400.0;
 pub struct Outlook {
     /// The newest reading, days.
     pub now_days: f64,
-    /// Days to the collapse, from the newest reading.
+    /// Days to the collapse, from the newest reading: the network's and the law's forecasts, pooled. The law's is the
+    /// sharper where a slope runs away, the network's holds where a slope pauses or does not keep the law.
     pub collapse: Passage,
+    /// Days to the collapse by the network alone, which knows how slopes stand: what levels go by.
+    pub chances: Passage,
     /// Days to the critical velocity by the law, from the newest reading, as far as the slope is sure to accelerate.
     pub passage: Passage,
     /// Probability that the slope accelerates, against steady motion under its usual fluctuations.
@@ -147,32 +154,43 @@ pub(crate) fn outlook(
     let collapse = Collapse::of(observations)?;
     let law = passages(&rates, posterior.as_ref(), critical, now_days);
     // What is past the critical velocity already need not accelerate to it.
-    let passed = law.into_iter().map(|(days, share)| {
-        let sure = if days > 0.0 {
+    let passed = law.iter().map(|(days, share)| {
+        let sure = if *days > 0.0 {
             collapse.accelerating
         } else {
             1.0
         };
-        (days, share * sure)
+        (*days, share * sure)
     });
+    let passed = passed.collect();
     let expected = posterior.as_ref().map(LoadPosterior::ensemble);
-    let law = expected
+    let likeliest = expected
         .as_ref()
         .and_then(|ensemble| ensemble.samples.first());
     let outlook = Outlook {
         now_days,
-        passage: Passage::from_times(passed.collect()),
-        collapse: collapse.passage,
+        passage: Passage::from_times(passed),
+        collapse: pooled(&collapse.passage, &law, collapse.accelerating),
+        chances: collapse.passage,
         accelerating: collapse.accelerating,
         interval_days: collapse.interval_days,
         surprise_nats: None,
         regimes: posterior
             .as_ref()
             .map_or_else(unknown, LoadPosterior::regimes),
-        law: law.map(|sample| sample.law),
+        law: likeliest.map(|sample| sample.law),
         rates,
     };
     Some((outlook, expected))
+}
+
+/// The linear pool of the network's forecast and the law's, as far as the slope is sure to accelerate.
+fn pooled(network: &Passage, law: &[(f64, f64)], accelerating: f64) -> Passage {
+    let own = network.times().iter();
+    let own = own.map(|(days, share)| (*days, (1.0 - OF_THE_LAW) * share));
+    let sure = OF_THE_LAW * (accelerating + UNSURE * (1.0 - accelerating));
+    let laws = law.iter().map(|(days, share)| (*days, sure * share));
+    Passage::from_times(own.chain(laws).collect())
 }
 
 /// What the law alone gives of passing `critical` mm/day; `None` with too few readings.
@@ -214,6 +232,7 @@ impl Outlook {
         Self {
             passage: self.passage.sooner(pace),
             collapse: self.collapse.sooner(pace),
+            chances: self.chances.sooner(pace),
             interval_days: self.interval_days / pace,
             ..self
         }

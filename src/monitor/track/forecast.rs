@@ -49,7 +49,7 @@ impl Forecast {
             Some(fuller) if fuller.is_explained => &fuller.outlook,
             Some(fuller) => {
                 let chance = |passage: &Passage| passage.chance_within(days);
-                if chance(&self.plain.collapse) > chance(&fuller.outlook.collapse) {
+                if chance(&self.plain.chances) > chance(&fuller.outlook.chances) {
                     &self.plain
                 } else {
                     &fuller.outlook
@@ -71,10 +71,10 @@ impl Forecast {
     /// Chance of a collapse within `days`, as the level takes it: what the fuller law does not explain, it cannot
     /// talk away either.
     pub(super) fn chance_within(&self, days: f64) -> f64 {
-        let plain = self.plain.collapse.chance_within(days);
+        let plain = self.plain.chances.chance_within(days);
         match &self.fuller {
             Some(fuller) => {
-                let chance = fuller.outlook.collapse.chance_within(days);
+                let chance = fuller.outlook.chances.chance_within(days);
                 if fuller.is_explained {
                     chance
                 } else {

@@ -139,7 +139,7 @@ fn highest(
 fn evidence(policy: &Policy, observations: &Observations, now: Timestamp) -> Evidence {
     let outlook = Panel::default().update(observations, policy.critical_velocity_mm_per_day);
     let rates = outlook.as_ref().map_or(&[][..], |outlook| &outlook.rates);
-    let within = |days: f64| Some(outlook.as_ref()?.collapse.chance_within(days));
+    let within = |days: f64| Some(outlook.as_ref()?.chances.chance_within(days));
     let evacuation = days(policy.evacuation_time);
     let interval = outlook
         .as_ref()
