@@ -2,10 +2,9 @@
 
 use super::report::FailureTime;
 use super::{Inversion, Options};
-use crate::fit::Rate;
+use crate::fit::{Rate, RateOptions};
 use crate::forecast::{
     Dependence, FEWEST_READINGS, Look, Opinion, Passage, by_the_law, groups, measurably_moves,
-    outlook,
 };
 use crate::reading::{BenchmarkId, Series, Timestamp, after_days, days_since};
 use serde::Serialize;
@@ -134,10 +133,10 @@ fn foretold(inversion: &Inversion, time: Timestamp) -> Option<(Passage, f64)> {
     let days = inversion.days_at(time);
     observations.values.retain(|value| value.t_days <= days);
     let critical = inversion.options.critical_velocity_mm_per_day;
-    let (outlook, _) = outlook(&observations, critical)?;
-    let moves = measurably_moves(&outlook.rates);
     let passage = by_the_law(&observations, critical)?;
-    moves.then_some((passage, days - outlook.now_days))
+    let now_days = observations.values.last()?.t_days;
+    let rates = observations.rates(0..observations.values.len(), RateOptions::default());
+    measurably_moves(&rates).then_some((passage, days - now_days))
 }
 
 /// The looks back and their times: all benchmarks have readings enough by the first, and the last is now.

@@ -62,10 +62,7 @@ impl Forecast {
     /// How far ahead red looks from the newest reading: what this one does not call, the next one may, and an
     /// evacuation begins then.
     pub(super) fn to_the_next_reading(&self, evacuation: SignedDuration) -> SignedDuration {
-        let most = MOST_INTERVALS * days(evacuation);
-        let interval = self.plain.interval_days.min(most) * SECONDS_PER_DAY;
-        let interval = SignedDuration::try_from_secs_f64(interval).unwrap_or_default();
-        evacuation.saturating_add(interval)
+        to_the_next_reading(&self.plain, evacuation)
     }
 
     /// Chance of a collapse within `days`, as the level takes it: what the fuller law does not explain, it cannot
@@ -93,4 +90,12 @@ impl Forecast {
                 fuller.outlook.surprise_nats
             })
     }
+}
+
+/// See [`Forecast::to_the_next_reading`].
+pub(super) fn to_the_next_reading(outlook: &Outlook, evacuation: SignedDuration) -> SignedDuration {
+    let most = MOST_INTERVALS * days(evacuation);
+    let interval = outlook.interval_days.min(most) * SECONDS_PER_DAY;
+    let interval = SignedDuration::try_from_secs_f64(interval).unwrap_or_default();
+    evacuation.saturating_add(interval)
 }

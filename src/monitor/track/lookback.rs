@@ -1,5 +1,6 @@
 //! Looking back after late readings: would another level have been called?
 
+use super::forecast::to_the_next_reading;
 use super::motion::{acceleration, displacement_mm, newest_velocity, settled};
 use super::{Track, days};
 use crate::alert::{Evidence, Latch, Level, Policy};
@@ -139,15 +140,15 @@ fn highest(
 fn evidence(policy: &Policy, observations: &Observations, now: Timestamp) -> Evidence {
     let outlook = Panel::default().update(observations, policy.critical_velocity_mm_per_day);
     let rates = outlook.as_ref().map_or(&[][..], |outlook| &outlook.rates);
-    let within = |days: f64| Some(outlook.as_ref()?.chances.chance_within(days));
-    let evacuation = days(policy.evacuation_time);
-    let interval = outlook
-        .as_ref()
-        .map_or(0.0, |outlook| outlook.interval_days);
+    let within = |span| Some(outlook.as_ref()?.chances.chance_within(days(span)));
+    let evacuation = policy.evacuation_time;
+    let ahead = outlook.as_ref().map_or(evacuation, |outlook| {
+        to_the_next_reading(outlook, evacuation)
+    });
     Evidence {
         now,
-        chance_within_evacuation_time: within(evacuation + interval.min(2.0 * evacuation)),
-        chance_within_outlook: within(days(policy.outlook)),
+        chance_within_evacuation_time: within(ahead),
+        chance_within_outlook: within(policy.outlook),
         velocity_mm_per_day: rates
             .last()
             .map_or_else(|| newest_velocity(observations), |rate| Some(rate.velocity)),
