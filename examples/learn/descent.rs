@@ -1,11 +1,14 @@
-//! The network of least cross entropy, by Adam (Kingma and Ba 2015) with a step that shrinks.
+//! Networks of least cross entropy, by Adam (Kingma and Ba 2015) with a step that shrinks, and their mean.
 
+use crate::looks::in_two;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 use slipwatch::forecast::{HIDDEN, INPUTS, Network};
 
-const SEED: u64 = 1;
+/// Networks that are taught from different first weights; the mean of their ln odds is steadier where nothing was learnt.
+pub(crate) const NETWORKS: usize = 4;
+const UNITS: usize = HIDDEN / NETWORKS;
 const BATCH: usize = 256;
 /// The first step, and its least share.
 const STEP: (f32, f32) = (0.004, 0.02);
@@ -24,16 +27,45 @@ pub(crate) struct Row {
     pub(crate) weight: f32,
 }
 
+/// One of the networks.
+#[derive(Debug, Clone)]
+struct One {
+    hidden: [[f32; INPUTS]; UNITS],
+    output: [f32; UNITS],
+    direct: [f32; INPUTS],
+}
+
 /// Moments of the gradient of one network.
 struct Adam {
-    first: Network,
-    second: Network,
+    first: One,
+    second: One,
     steps: i32,
 }
 
-/// The network taught in so many passes over `rows`.
-pub(crate) fn teach(rows: &[Row], passes: usize) -> Network {
-    let mut generator = Pcg64::seed_from_u64(SEED);
+/// The mean of the first `networks`, each taught in so many passes over `rows`.
+pub(crate) fn teach(rows: &[Row], passes: usize, networks: usize) -> Network {
+    let seeds: Vec<u64> = (1..).take(networks).collect();
+    let each = in_two(&seeds, |seed| vec![one(rows, passes, *seed)]);
+    let mut mean = Network {
+        hidden: [[0.0; INPUTS]; HIDDEN],
+        output: [0.0; HIDDEN],
+        direct: [0.0; INPUTS],
+    };
+    let share = 1.0 / networks as f32;
+    for (one, first) in each.iter().zip((0..).step_by(UNITS)) {
+        for (unit, weights) in one.hidden.iter().enumerate() {
+            mean.hidden[first + unit] = *weights;
+            mean.output[first + unit] = share * one.output[unit];
+        }
+        for (slot, weight) in mean.direct.iter_mut().zip(&one.direct) {
+            *slot += share * weight;
+        }
+    }
+    mean
+}
+
+fn one(rows: &[Row], passes: usize, seed: u64) -> One {
+    let mut generator = Pcg64::seed_from_u64(seed);
     let mut network = nothing();
     for weight in network.hidden.iter_mut().flatten() {
         let z: f64 = generator.sample(StandardNormal);
@@ -66,10 +98,10 @@ pub(crate) fn teach(rows: &[Row], passes: usize) -> Network {
     network
 }
 
-fn nothing() -> Network {
-    Network {
-        hidden: [[0.0; INPUTS]; HIDDEN],
-        output: [0.0; HIDDEN],
+fn nothing() -> One {
+    One {
+        hidden: [[0.0; INPUTS]; UNITS],
+        output: [0.0; UNITS],
         direct: [0.0; INPUTS],
     }
 }
@@ -79,8 +111,8 @@ fn product(weights: &[f32; INPUTS], inputs: &[f32; INPUTS]) -> f32 {
 }
 
 /// Adds the gradient of one row.
-fn add(network: &Network, row: &Row, gradient: &mut Network) {
-    let units: [f32; HIDDEN] =
+fn add(network: &One, row: &Row, gradient: &mut One) {
+    let units: [f32; UNITS] =
         std::array::from_fn(|unit| product(&network.hidden[unit], &row.inputs).tanh());
     let through: f32 = units.iter().zip(&network.output).map(|(a, b)| a * b).sum();
     let ln_odds = through + product(&network.direct, &row.inputs);
@@ -99,13 +131,13 @@ fn add(network: &Network, row: &Row, gradient: &mut Network) {
 }
 
 /// All weights of a network, in one order.
-fn weights(network: &mut Network) -> impl Iterator<Item = &mut f32> {
+fn weights(network: &mut One) -> impl Iterator<Item = &mut f32> {
     let hidden = network.hidden.iter_mut().flatten();
     hidden.chain(&mut network.output).chain(&mut network.direct)
 }
 
 impl Adam {
-    fn step(&mut self, network: &mut Network, gradient: &Network, (count, size): (usize, f32)) {
+    fn step(&mut self, network: &mut One, gradient: &One, (count, size): (usize, f32)) {
         self.steps += 1;
         let unbiased = |moment: f32| 1.0 - moment.powi(self.steps);
         let (of_first, of_second) = (unbiased(MOMENTS.0), unbiased(MOMENTS.1));

@@ -1,15 +1,16 @@
 //! How a network does on slopes of a family that taught it nothing.
 
 use crate::looks::{about_the_end, first, in_two};
-use slipwatch::forecast::{Collapse, Family, GaugeKind, Network, Passage, Simulated};
+use slipwatch::fit::Observations;
+use slipwatch::forecast::{Family, GaugeKind, Indicators, Members, Network, Simulated};
 use slipwatch::score::{Known, METHODS, Outcome, crps_days, is_covered, scored_days};
 use std::collections::BTreeMap;
 
 /// Seeds that judge.
 const FIRST_SEED: u64 = 1_000_000;
-/// Failing slopes of a family whose leads are scored, and slopes whose every reading is looked at.
+/// Failing slopes of a family whose leads are scored, and slopes that fail and that stand whose lives are followed.
 const SCORED: u64 = 60;
-const REPLAYED: u64 = 24;
+const REPLAYED: (u64, u64) = (40, 100);
 /// The program's own methods, in [`METHODS`].
 const OURS: [&str; 2] = ["panel", "slider-block"];
 /// Passing this velocity is failure for the rivals that ask, mm/day.
@@ -24,6 +25,8 @@ const ORANGE: (f64, f64) = (0.5, 30.0);
 /// Levels stay: another entry within so many days is the same alarm.
 const SAME_ALARM_DAYS: f64 = 3.0;
 const FEWEST: usize = 12;
+/// Readings of a life that are looked at, at most.
+const MOST_ASKED: usize = 1500;
 
 /// What came of one family.
 #[derive(Debug)]
@@ -48,6 +51,7 @@ pub(crate) struct Lead {
 #[derive(Debug)]
 pub(crate) struct Replay {
     pub(crate) gauge: GaugeKind,
+    pub(crate) interval_days: f64,
     pub(crate) years: f64,
     pub(crate) reds: u32,
     pub(crate) oranges: u32,
@@ -66,7 +70,12 @@ pub(crate) fn family(family: Family, network: &Network) -> Judged {
     } else {
         Vec::new()
     };
-    let seeds: Vec<u64> = (0..REPLAYED).map(|index| 2 * FIRST_SEED + index).collect();
+    let lives = if family.fails() {
+        REPLAYED.0
+    } else {
+        REPLAYED.1
+    };
+    let seeds: Vec<u64> = (0..lives).map(|index| 2 * FIRST_SEED + index).collect();
     Judged {
         family,
         leads,
@@ -85,7 +94,8 @@ fn leads(slope: &Simulated, seed: u64, network: &Network) -> Vec<Lead> {
         let observations = first(&slope.observations, count);
         let now_days = observations.values.last()?.t_days;
         let left_days = collapse - now_days;
-        let found = Collapse::by(network, &observations)?;
+        let indicators = Indicators::of(&observations)?;
+        let found = indicators.collapse_by(network, &Members::of(&observations));
         let scored = scored_days(now_days - observations.values[0].t_days);
         let outcome = Outcome::Failed(left_days);
         let known = Known {
@@ -112,8 +122,23 @@ fn leads(slope: &Simulated, seed: u64, network: &Network) -> Vec<Lead> {
 }
 
 /// How far ahead red looks from a reading: the evacuation time, and until the next reading is due.
-fn ahead(evacuation: f64, found: &Collapse) -> f64 {
-    evacuation + found.interval_days.min(2.0 * evacuation)
+fn ahead(evacuation: f64, indicators: &Indicators) -> f64 {
+    evacuation + indicators.interval_days().min(2.0 * evacuation)
+}
+
+/// Chances that levels go by, within each span; none where the evidence leaves none that could call a level.
+fn chances(observations: &Observations, network: &Network) -> Option<[f64; EVACUATIONS.len() + 1]> {
+    let indicators = Indicators::of(observations)?;
+    let spans = EVACUATIONS.map(|days| ahead(days, &indicators));
+    let is_quiet = spans.iter().all(|days| indicators.most(*days) < RED);
+    if is_quiet && indicators.most(ORANGE.1) < ORANGE.0 {
+        return Some([0.0; EVACUATIONS.len() + 1]);
+    }
+    let found = indicators.collapse_by(network, &Members::of(observations));
+    let within = |index: usize| spans.get(index).copied().unwrap_or(ORANGE.1);
+    Some(std::array::from_fn(|index| {
+        found.sure.chance_within(within(index))
+    }))
 }
 
 fn replay(slope: &Simulated, network: &Network) -> Replay {
@@ -121,6 +146,7 @@ fn replay(slope: &Simulated, network: &Network) -> Replay {
     let mut reds: [Vec<f64>; EVACUATIONS.len()] = Default::default();
     let mut result = Replay {
         gauge: slope.gauge,
+        interval_days: slope.interval_days,
         years: 0.0,
         reds: 0,
         oranges: 0,
@@ -129,20 +155,21 @@ fn replay(slope: &Simulated, network: &Network) -> Replay {
         in_time: [None; EVACUATIONS.len()],
     };
     let mut last = (f64::NEG_INFINITY, f64::NEG_INFINITY);
-    for count in FEWEST..=values.len() {
-        let Some(found) = Collapse::by(network, &first(&slope.observations, count)) else {
+    let step = values.len().div_ceil(MOST_ASKED);
+    for count in (FEWEST..=values.len()).step_by(step) {
+        let Some(chances) = chances(&first(&slope.observations, count), network) else {
             continue;
         };
         let now = values[count - 1].t_days;
-        let years = values.get(count).map_or(0.0, |next| next.t_days - now) / 365.25;
-        let chance = |days: f64, passage: &Passage| passage.chance_within(days);
-        for (days, times) in EVACUATIONS.iter().zip(&mut reds) {
-            if chance(ahead(*days, &found), &found.passage) >= RED {
+        let next = values.get(count - 1 + step);
+        let years = next.map_or(0.0, |next| next.t_days - now) / 365.25;
+        for (chance, times) in chances.iter().zip(&mut reds) {
+            if *chance >= RED {
                 times.push(now);
             }
         }
-        let is_red = chance(ahead(1.0, &found), &found.passage) >= RED;
-        let is_orange = is_red || chance(ORANGE.1, &found.passage) >= ORANGE.0;
+        let is_red = chances[1] >= RED;
+        let is_orange = is_red || chances[EVACUATIONS.len()] >= ORANGE.0;
         result.years += years;
         if is_red {
             result.reds += u32::from(now - last.0 > SAME_ALARM_DAYS);

@@ -18,43 +18,56 @@ mod looks;
 mod source;
 mod table;
 
-use descent::{Row, teach};
+use descent::{NETWORKS, Row, teach};
 use looks::Look;
 use slipwatch::forecast::{Family, Network};
 
 /// Slopes of each family that teach, unless another number is given.
-const SLOPES: u64 = 500;
+const SLOPES: u64 = 400;
 /// Passes over the looks: a first network finds the looks that mislead it, the second is taught on those too.
 const PASSES: (usize, usize) = (6, 12);
-/// The share of the standing slopes whose every reading the first network is asked about.
-const ASKED: f64 = 0.4;
-
 fn main() -> anyhow::Result<()> {
     let mut arguments: Vec<String> = std::env::args().skip(1).collect();
     let is_left_out = arguments.iter().any(|one| one == "--left-out");
     arguments.retain(|one| one != "--left-out");
     let slopes = arguments.first().map_or(Ok(SLOPES), |text| text.parse())?;
-    let looks = looks::of_families(slopes);
-    eprintln!("{} looks at {slopes} slopes of each family", looks.len());
+    let material = Material {
+        looks: looks::of_families(slopes),
+        standing: looks::of_standing(slopes),
+    };
+    eprintln!(
+        "{} looks at {slopes} slopes of each family, and {} at those that stand",
+        material.looks.len(),
+        material.standing.len()
+    );
     if is_left_out {
-        let families = Family::ALL.map(|family| {
-            let network = learn(&looks, slopes, Some(family));
+        let families = looks::in_two(&Family::ALL, |family| {
+            let network = material.learn(Some(*family));
             eprintln!("taught without {family:?}");
-            judge::family(family, &network)
+            vec![judge::family(*family, &network)]
         });
         return table::write(&families, slopes);
     }
-    source::write(&learn(&looks, slopes, None), slopes)
+    source::write(&material.learn(None), slopes)
 }
 
-/// A network taught on all families but one.
-fn learn(looks: &[Look], slopes: u64, without: Option<Family>) -> Network {
-    let counts = |look: &&Look| Some(look.family) != without;
-    let mut rows: Vec<Row> = looks.iter().filter(counts).flat_map(looks::rows).collect();
-    let first = teach(&rows, PASSES.0);
-    #[expect(clippy::cast_sign_loss, reason = "a share of a count")]
-    let asked = (slopes as f64 * ASKED) as u64;
-    let misleading = looks::misleading(&first, asked, without);
-    rows.extend(misleading.iter().flat_map(looks::rows));
-    teach(&rows, PASSES.1)
+/// What networks are taught on.
+struct Material {
+    looks: Vec<Look>,
+    /// Of which only those count that mislead.
+    standing: Vec<Look>,
+}
+
+impl Material {
+    /// A network taught on all families but one.
+    fn learn(&self, without: Option<Family>) -> Network {
+        let counts = |look: &&Look| Some(look.family) != without;
+        let looks = self.looks.iter().filter(counts);
+        let mut rows: Vec<Row> = looks.flat_map(looks::rows).collect();
+        let first = teach(&rows, PASSES.0, 1);
+        let standing: Vec<&Look> = self.standing.iter().filter(counts).collect();
+        let misleading = looks::misleading(&first, &standing);
+        rows.extend(misleading.into_iter().flat_map(looks::rows));
+        teach(&rows, PASSES.1, NETWORKS)
+    }
 }

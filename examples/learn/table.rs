@@ -24,6 +24,7 @@ fn text(families: &[Judged], slopes: u64) -> anyhow::Result<String> {
     in_time(&mut out, families)?;
     standing(&mut out, families)?;
     by_gauge(&mut out, families)?;
+    by_sampling(&mut out, families)?;
     Ok(out)
 }
 
@@ -110,7 +111,7 @@ const HEAD: &str = "| years | reds a year | oranges a year | time at red | time 
 fn standing(out: &mut String, families: &[Judged]) -> anyhow::Result<()> {
     writeln!(
         out,
-        "\n## Slopes that stand\n\nEvery reading of whole lives, as the daemon looks at them, evacuation time 24 h; alarms less than three days apart are one. Stopped and Plateau \
+        "\n## Slopes that stand\n\nWhole lives, at every reading or at 1,500 of them evenly, evacuation time 24 h; alarms less than three days apart are one. Stopped and Plateau \
          accelerate as failing slopes do, and only then stop.\n\n| family {HEAD}"
     )?;
     for one in families.iter().filter(|one| !one.family.fails()) {
@@ -130,6 +131,28 @@ fn by_gauge(out: &mut String, families: &[Judged]) -> anyhow::Result<()> {
         let replays = stands.flat_map(|one| &one.replays);
         let replays: Vec<&Replay> = replays.filter(|replay| replay.gauge == gauge).collect();
         alarms(out, &format!("{gauge:?}"), &replays)?;
+    }
+    Ok(())
+}
+
+/// Intervals between readings, days: their upper bounds and names.
+const SAMPLINGS: [(f64, &str); 4] = [
+    (1.0 / 48.0, "under 30 min"),
+    (0.15, "30 min to 3.6 h"),
+    (0.7, "3.6 to 17 h"),
+    (f64::INFINITY, "17 h to 30 d"),
+];
+
+fn by_sampling(out: &mut String, families: &[Judged]) -> anyhow::Result<()> {
+    writeln!(out, "\nAnd by sampling:\n\n| interval {HEAD}")?;
+    let mut from = 0.0;
+    for (to, name) in SAMPLINGS {
+        let stands = families.iter().filter(|one| !one.family.fails());
+        let replays = stands.flat_map(|one| &one.replays);
+        let within = |replay: &&Replay| (from..to).contains(&replay.interval_days);
+        let replays: Vec<&Replay> = replays.filter(within).collect();
+        alarms(out, name, &replays)?;
+        from = to;
     }
     Ok(())
 }

@@ -8,6 +8,9 @@ use slipwatch::score::{LONGEST_SCORED_DAYS, RECORDS_SCORED};
 use std::fmt::Write as _;
 use std::path::Path;
 
+/// Constants that a person set who could see how measured series came out.
+const IN_VIEW: &str = include_str!("in_view.md");
+
 /// Writes docs/skill.md and its figures.
 pub(crate) fn write(scored: &Scored, judged: bool) -> Result<()> {
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
@@ -31,6 +34,7 @@ fn text(scored: &Scored, judged: bool) -> String {
     la_clapiere::section(&mut out, scored);
     verdicts::losses(&mut out, scored);
     verdicts::targets(&mut out, scored);
+    out.push_str(IN_VIEW);
     out
 }
 

@@ -63,7 +63,19 @@ const VAIONT: End = End::Failed {
     leads: &[20.0, 10.0, 5.0, 2.0, 1.0],
 };
 
-const SOURCES: [Source; 10] = [
+/// In the early hours.
+const PREONZO: End = End::Failed {
+    at: "2012-05-15T01:30:00Z",
+    leads: &[15.0, 12.0, 10.0, 8.0, 7.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.0],
+};
+const LONGJINGCUN: End = End::Failed {
+    at: "2019-02-17T05:53:00+08:00",
+    leads: &[10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.0],
+};
+
+const SOURCES: [Source; 12] = [
+    Source::measured("Preonzo", "preonzo-2012.mcap", PREONZO),
+    Source::measured("Longjingcun", "longjingcun-2019.mcap", LONGJINGCUN),
     Source::measured("Lanzada F1", "lanzada_2025_f1.csv", LANZADA).averaged(1),
     Source::measured("Lanzada F4", "lanzada_2025_f4.csv", LANZADA).averaged(1),
     Source::measured("Century Mine west", "century-mine-2013.mcap", End::Stood),

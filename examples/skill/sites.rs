@@ -1,10 +1,15 @@
 //! What is told of measured and reconstructed series.
 
 use crate::chances::{Called, share_called};
+use crate::corpus::Kind;
 use crate::record::{Record, Told};
 use crate::sums::{PANEL, Scored, average, crps, error_days, grid, percent, sums};
+use slipwatch::score::{METHODS, Outcome};
 use std::cmp::Ordering;
 use std::fmt::Write as _;
+
+/// A ratio of a CRPS to the time that remained is no less in a geometric mean: a point forecast hits by chance.
+const LEAST_RATIO: f64 = 0.01;
 
 /// How the panel did beside its rivals on one series that failed.
 #[derive(Debug)]
@@ -93,6 +98,7 @@ pub(crate) fn failed_section(out: &mut String, scored: &Scored) {
             _ => {}
         }
     }
+    each_site_once(out, scored);
     out.push_str("\n### The panel beside its rivals\n\nLeads at which its CRPS is at or under that of the rival best at that lead, and of the rival best over all leads; leads with a late median:\n");
     let row = |one: &&Told| {
         let standing = Standing::of(one, scored)?;
@@ -107,6 +113,62 @@ pub(crate) fn failed_section(out: &mut String, scored: &Scored) {
     let rows: Vec<Vec<String>> = scored.failed.iter().filter_map(row).collect();
     let head = ["series", "best at each lead", "best over all", "late"];
     grid(out, &head.map(str::to_owned), &rows);
+}
+
+/// The place of a measured series: the first word of its heading.
+fn place(one: &Told) -> &str {
+    let heading = one.family.split(',').next().unwrap_or(&one.family);
+    heading.split(' ').next().unwrap_or(heading)
+}
+
+/// CRPS over the time that remained, of every method, the measured places that failed each counted once.
+fn each_site_once(out: &mut String, scored: &Scored) {
+    let measured = scored
+        .failed
+        .iter()
+        .filter(|one| one.kind == Kind::Measured);
+    let measured: Vec<&Told> = measured.collect();
+    let mut places: Vec<&str> = measured.iter().map(|one| place(one)).collect();
+    places.dedup();
+    let mut rows: Vec<(f64, Vec<String>)> = Vec::new();
+    for method in METHODS {
+        let (mut cells, mut of_all, mut of_means) = (vec![method.name.to_owned()], 0.0, 0.0);
+        for of in &places {
+            let records = measured.iter().filter(|one| place(one) == *of);
+            let records = records.flat_map(|one| &one.records);
+            let ratios: Vec<f64> = records
+                .filter(|record| record.method == method.name)
+                .filter_map(|record| match record.outcome {
+                    Outcome::Failed(left) => Some(crps(record) / left),
+                    Outcome::Stood(_) => None,
+                })
+                .collect();
+            let count = ratios.len() as f64;
+            let mean = ratios.iter().sum::<f64>() / count;
+            let ln = ratios
+                .iter()
+                .map(|ratio| ratio.max(LEAST_RATIO).ln())
+                .sum::<f64>()
+                / count;
+            cells.push(format!("{mean:.2}, {:.2}", ln.exp()));
+            of_all += ln;
+            of_means += mean.ln();
+        }
+        let count = places.len() as f64;
+        let (means, all) = ((of_means / count).exp(), (of_all / count).exp());
+        cells.push(format!("**{means:.2}**, {all:.2}"));
+        rows.push((means, cells));
+    }
+    rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let head = ["method"].into_iter().chain(places).chain(["all places"]);
+    let head: Vec<String> = head.map(str::to_owned).collect();
+    let _ = writeln!(
+        out,
+        "\n### Measured failures, each place once\n\nCRPS over the time that remained: its mean over leads and benchmarks, and, after the comma, its geometric \
+         mean (a ratio under {LEAST_RATIO} counts as that). *All places*: the geometric mean over them.\n"
+    );
+    let rows: Vec<Vec<String>> = rows.into_iter().map(|(_, cells)| cells).collect();
+    grid(out, &head, &rows);
 }
 
 fn table_of(out: &mut String, one: &Told, scored: &Scored) {

@@ -15,7 +15,7 @@ mod surprise;
 mod together;
 mod world;
 
-pub use collapse::{Collapse, INPUTS, questions};
+pub use collapse::{Collapse, INPUTS, Indicators, Members};
 pub use dependence::Dependence;
 pub use evidence::RATE_PER_YEAR;
 pub use life::{Corpus, Fate, Life};

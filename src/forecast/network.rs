@@ -2,8 +2,8 @@
 
 use super::collapse::INPUTS;
 
-/// Hidden units.
-pub const HIDDEN: usize = 32;
+/// Hidden units: 32 of each of four networks that were taught apart, and whose mean is taken.
+pub const HIDDEN: usize = 4 * 32;
 
 /// Weights of a network from [`INPUTS`] numbers to a chance.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,7 +2,7 @@
 //! load averaged over its shapes and its starts, the regime and the passage of a critical velocity.
 
 use super::surprise::Surprise;
-use super::{Collapse, Passage};
+use super::{Collapse, Indicators, Members, Passage};
 use crate::fit::{Ensemble, LoadPosterior, Observation, Observations, Rate, RateOptions};
 use crate::model::{Accuracy, Law, Trajectory};
 use crate::reading::Quantity;
@@ -14,10 +14,6 @@ use std::collections::BTreeMap;
 pub const FEWEST_READINGS: usize = 10;
 /// A slope at 50 m/day has failed by any account, mm/day.
 const FASTEST_CRITICAL: f64 = 5e4;
-/// The law's weight in the pool, set with Lanzada, Preonzo and Longjingcun in view; and what is left of it where no
-/// acceleration shows.
-const OF_THE_LAW: f64 = 0.6;
-const UNSURE: f64 = 0.5;
 /// The law's passages are followed so far, days.
 const FARTHEST_DAYS: f64 = 10.0 * HORIZON_DAYS;
 /// A reading is foreseen within so many standard deviations of where the law puts it.
@@ -30,10 +26,9 @@ pub const HORIZON_DAYS: f64 = 400.0;
 pub struct Outlook {
     /// The newest reading, days.
     pub now_days: f64,
-    /// Days to the collapse, from the newest reading: the network's and the law's forecasts, pooled. The law's is the
-    /// sharper where a slope runs away, the network's holds where a slope pauses or does not keep the law.
+    /// Days to the collapse, from the newest reading: what is reported.
     pub collapse: Passage,
-    /// Days to the collapse by the network alone, which knows how slopes stand: what levels go by.
+    /// The same as far as the slope is sure to accelerate: what levels go by.
     pub chances: Passage,
     /// Days to the critical velocity by the law, from the newest reading, as far as the slope is sure to accelerate.
     pub passage: Passage,
@@ -151,16 +146,18 @@ pub(crate) fn outlook(
     let now_days = observations.values.last()?.t_days;
     let rates = observations.rates(0..observations.values.len(), RateOptions::default());
     let posterior = LoadPosterior::fit(&rates);
-    let collapse = Collapse::of(observations)?;
-    let law = passages(&rates, posterior.as_ref(), critical, now_days);
+    let indicators = Indicators::of(observations)?;
+    let accelerating = indicators.accelerating();
+    let members = Members::by(&rates, posterior.as_ref(), now_days);
+    let Collapse { passage, sure } = indicators.collapse(&members);
+    let law = members.law_to(critical).map_or_else(
+        || passages(&rates, posterior.as_ref(), critical, now_days),
+        <[(f64, f64)]>::to_vec,
+    );
     // What is past the critical velocity already need not accelerate to it.
     let passed = law.iter().map(|(days, share)| {
-        let sure = if *days > 0.0 {
-            collapse.accelerating
-        } else {
-            1.0
-        };
-        (*days, share * sure)
+        let counts = if *days > 0.0 { accelerating } else { 1.0 };
+        (*days, share * counts)
     });
     let passed = passed.collect();
     let expected = posterior.as_ref().map(LoadPosterior::ensemble);
@@ -170,10 +167,10 @@ pub(crate) fn outlook(
     let outlook = Outlook {
         now_days,
         passage: Passage::from_times(passed),
-        collapse: pooled(&collapse.passage, &law, collapse.accelerating),
-        chances: collapse.passage,
-        accelerating: collapse.accelerating,
-        interval_days: collapse.interval_days,
+        collapse: passage,
+        chances: sure,
+        accelerating,
+        interval_days: indicators.interval_days(),
         surprise_nats: None,
         regimes: posterior
             .as_ref()
@@ -182,15 +179,6 @@ pub(crate) fn outlook(
         rates,
     };
     Some((outlook, expected))
-}
-
-/// The linear pool of the network's forecast and the law's, as far as the slope is sure to accelerate.
-fn pooled(network: &Passage, law: &[(f64, f64)], accelerating: f64) -> Passage {
-    let own = network.times().iter();
-    let own = own.map(|(days, share)| (*days, (1.0 - OF_THE_LAW) * share));
-    let sure = OF_THE_LAW * (accelerating + UNSURE * (1.0 - accelerating));
-    let laws = law.iter().map(|(days, share)| (*days, sure * share));
-    Passage::from_times(own.chain(laws).collect())
 }
 
 /// What the law alone gives of passing `critical` mm/day; `None` with too few readings.
@@ -207,7 +195,7 @@ pub fn by_the_law(observations: &Observations, critical: f64) -> Option<Passage>
 
 /// (days from `now_days`, probability) of passing `critical` mm/day by the law; none where the slope does not
 /// measurably move.
-fn passages(
+pub(super) fn passages(
     rates: &[Rate],
     posterior: Option<&LoadPosterior>,
     critical: f64,

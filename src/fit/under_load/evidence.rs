@@ -1,7 +1,7 @@
 //! The evidence of four shapes of the law at one slope, summed over every start that the law may have.
 
 use super::gains::{Gains, LEVEL_VARIANCE, Record};
-use super::shape::{Block, LANES, Place};
+use super::shape::{BLOCKS, Block, LANES, Place};
 
 /// Rates that a law must explain, at least.
 const FEWEST_UNDER_THE_LAW: usize = 4;
@@ -17,14 +17,14 @@ pub(super) struct Slope {
     pub(super) r: f64,
     /// ln(1 + |r| t) at the middle of each rate.
     pub(super) u: Vec<f64>,
-    /// The same in the tables: start, middle and end.
-    places: Vec<[Place; 3]>,
+    /// ln of the mean rate that each shape of each block predicts, in units of the velocity now; of blocks that nobody
+    /// asks about none.
+    predicted: Vec<Vec<[f64; LANES]>>,
 }
 
 /// Room for one evaluation, used again and again.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Room {
-    predicted: Vec<[f64; LANES]>,
     ln_evidence: Vec<[f64; LANES]>,
     today: Vec<[[f64; LANES]; 2]>,
 }
@@ -41,25 +41,29 @@ pub(super) struct Evidence {
 }
 
 impl Slope {
-    pub(super) fn new(r: f64, record: &Record) -> Self {
+    /// `blocks`: those that are asked about.
+    pub(super) fn new(r: f64, record: &Record, blocks: &[bool]) -> Self {
         let u = |days: &f64| (r * days).ln_1p();
         let places = record.from.iter().zip(&record.middle).zip(&record.to);
+        let places: Vec<[Place; 3]> = places
+            .map(|((from, middle), to)| [from, middle, to].map(|days| Place::of(u(days))))
+            .collect();
+        let predicted = BLOCKS.iter().zip(blocks).map(|(block, is_asked)| {
+            let places: &[[Place; 3]] = if *is_asked { &places } else { &[] };
+            predict(block, places)
+        });
         Self {
             r,
             u: record.middle.iter().map(u).collect(),
-            places: places
-                .map(|((from, middle), to)| [from, middle, to].map(|days| Place::of(u(days))))
-                .collect(),
+            predicted: predicted.collect(),
         }
     }
 }
 
-/// ln of the mean rate that each shape of `block` predicts, in units of the velocity now.
-fn predict(block: &Block, slope: &Slope, predicted: &mut Vec<[f64; LANES]>) {
-    predicted.clear();
-    for [from, middle, to] in &slope.places {
+fn predict(block: &Block, places: &[[Place; 3]]) -> Vec<[f64; LANES]> {
+    let mean = |[from, middle, to]: &[Place; 3]| {
         let (from, middle, to) = (block.ln_y(*from), block.ln_y(*middle), block.ln_y(*to));
-        predicted.push(std::array::from_fn(|lane| {
+        std::array::from_fn(|lane| {
             // ln of the mean of e^x over an x that falls evenly: ln(sinh(h)/h) above the middle.
             let h2 = 0.25 * (from[lane] - to[lane]).powi(2);
             let above = if h2 < 4.0 {
@@ -68,26 +72,27 @@ fn predict(block: &Block, slope: &Slope, predicted: &mut Vec<[f64; LANES]>) {
                 h2.sqrt() - (2.0 * h2.sqrt()).ln()
             };
             above - middle[lane]
-        }));
-    }
+        })
+    };
+    places.iter().map(mean).collect()
 }
 
-/// The evidence of each shape of `block`; `before`: that of what came before each rate, by no law.
+/// The evidence of each shape of the block of that index; `before`: that of what came before each rate, by no law.
 pub(super) fn weigh(
     record: &Record,
-    (block, slope): (&Block, &Slope),
+    (block, slope): (usize, &Slope),
     gains: &Gains,
     before: &[f64],
     room: &mut Room,
 ) -> [Evidence; LANES] {
-    predict(block, slope, &mut room.predicted);
+    let predicted = &slope.predicted[block];
     room.ln_evidence.clear();
     room.today.clear();
     let count = record.ln_velocity.len();
     let [mut load, mut level, mut velocity_now, mut load_now, mut ln] = [[0.0; LANES]; 5];
     for (step, gain) in gains.steps.iter().enumerate() {
         let index = count - 1 - step;
-        let (read, predicted) = (record.ln_velocity[index], &room.predicted[index]);
+        let (read, predicted) = (record.ln_velocity[index], &predicted[index]);
         let outside = gains.ln_normaliser[step] + before[index];
         let mut total = [0.0; LANES];
         for lane in 0..LANES {
@@ -149,19 +154,17 @@ fn over_starts(record: &Record, gains: &Gains, room: &Room, lane: usize) -> Evid
 /// law over the whole record.
 pub(super) fn misses(
     record: &Record,
-    (block, slope): (&Block, &Slope),
+    (block, slope): (usize, &Slope),
     (lane, scatter): (usize, f64),
     gains: &Gains,
-    room: &mut Room,
 ) -> Vec<f64> {
-    predict(block, slope, &mut room.predicted);
     let count = record.ln_velocity.len();
     let mut squares = vec![0.0; count];
     let (mut load, mut level) = (0.0, 0.0);
     for (step, gain) in gains.steps.iter().enumerate() {
         let index = count - 1 - step;
         load *= gain.keep;
-        let miss = record.ln_velocity[index] - room.predicted[index][lane] - load - level;
+        let miss = record.ln_velocity[index] - slope.predicted[block][index][lane] - load - level;
         let doubted = record.variance(index, scatter) * (1.0 - record.trust[index]);
         squares[index] = miss * miss / (1.0 / gain.precision - doubted).max(1e-12);
         load += gain.load * miss;

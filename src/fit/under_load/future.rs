@@ -2,6 +2,7 @@
 
 use super::{Cell, LoadPosterior, WANDER};
 use crate::fit::quasi_random::{halton, normal_quantile};
+use std::sync::LazyLock;
 
 /// Draws of a cell: one for each of this share of the probability, so many at most.
 const DRAWS: (f64, usize) = (400.0, 64);
@@ -9,6 +10,17 @@ const DRAWS: (f64, usize) = (400.0, 64);
 const IN_TIME: f64 = 0.3;
 /// Rounds of the search for the time at which the load has let enough of the law pass.
 const ROUNDS: usize = 6;
+/// Two rounds that differ by no more than this share have found it.
+const CLOSE: f64 = 1e-4;
+
+/// The first of the normal deviates, in the order in which they are drawn.
+static DEVIATES: LazyLock<Vec<[f64; 5]>> =
+    LazyLock::new(|| (1..=KEPT_DEVIATES).map(deviates).collect());
+const KEPT_DEVIATES: u32 = 8192;
+
+fn deviates(index: u32) -> [f64; 5] {
+    halton(index).map(normal_quantile)
+}
 
 impl LoadPosterior {
     /// (days from the present, probability) of the first passage of `velocity` mm/day, of those that come
@@ -25,7 +37,8 @@ impl LoadPosterior {
             let draws = ((cell.weight * DRAWS.0) as usize + 1).min(DRAWS.1);
             for _ in 0..draws {
                 index += 1;
-                let z = halton(index).map(normal_quantile);
+                let kept = DEVIATES.get(index as usize - 1).copied();
+                let z = kept.unwrap_or_else(|| deviates(index));
                 if let Some(days) = cell.days_to(velocity.ln(), z)
                     && days <= horizon
                 {
@@ -67,6 +80,9 @@ impl Cell {
                 load * keep + self.sigma * (1.0 - keep * keep).sqrt() * (0.6 * z[2] + 0.8 * z[3]);
             let law = shape.days_to(ln_velocity - (now - load) - at_the_end) / self.r;
             let next = law * (-mean).exp() / pace;
+            if (next - days).abs() <= CLOSE * days {
+                return Some(next);
+            }
             days = if days.is_finite() && next.is_finite() {
                 f64::midpoint(days, next)
             } else {

@@ -63,9 +63,40 @@ impl Record {
     }
 }
 
+/// What a noise makes of the times of a record, whatever the law: newest rate first.
+#[derive(Debug, Clone)]
+pub(super) struct Memory {
+    noise: Noise,
+    /// The share of the load that is left from the rate after it.
+    keep: Vec<f64>,
+    /// What the load's variance loses in the mean over each rate.
+    smoothed: Vec<f64>,
+}
+
+impl Memory {
+    pub(super) fn new(record: &Record, noise: &Noise) -> Self {
+        let variance = noise.sigma * noise.sigma;
+        let mut ago = 0.0;
+        let (mut keep, mut smoothed) = (Vec::new(), Vec::new());
+        for index in (0..record.middle.len()).rev() {
+            let days = (record.middle[index] - ago).max(0.0);
+            ago = record.middle[index];
+            keep.push((-days / noise.tau).exp());
+            let width = (record.from[index] - record.to[index]) / noise.tau;
+            smoothed.push(variance * (1.0 - variance_of_mean(width)));
+        }
+        Self {
+            noise: *noise,
+            keep,
+            smoothed,
+        }
+    }
+}
+
 impl Gains {
     /// `u`: ln(1 + |r| t) at the middle of each rate, oldest first.
-    pub(super) fn new(record: &Record, noise: &Noise, u: &[f64]) -> Self {
+    pub(super) fn new(record: &Record, memory: &Memory, u: &[f64]) -> Self {
+        let noise = &memory.noise;
         let count = record.middle.len();
         let variance = noise.sigma * noise.sigma;
         // Load, level, velocity of today, load of today.
@@ -81,22 +112,20 @@ impl Gains {
             ln_normaliser: Vec::with_capacity(count),
             today: Vec::with_capacity(count),
         };
-        let (mut ago, mut u_before, mut normaliser) = (0.0, 0.0, 0.0);
-        for index in (0..count).rev() {
-            let days = (record.middle[index] - ago).max(0.0);
+        let (mut u_before, mut normaliser) = (0.0, 0.0);
+        let of_time = memory.keep.iter().zip(&memory.smoothed);
+        for (index, (keep, smoothed)) in (0..count).rev().zip(of_time) {
+            let keep = *keep;
             let e_folds = (u[index] - u_before).max(0.0);
-            (ago, u_before) = (record.middle[index], u[index]);
-            let keep = (-days / noise.tau).exp();
+            u_before = u[index];
             for slot in &mut p[0] {
                 *slot *= keep;
             }
             p[0][0] = keep * p[0][0] + variance * (1.0 - keep * keep);
             (p[1][0], p[2][0], p[3][0]) = (p[0][1], p[0][2], p[0][3]);
             p[1][1] += WANDER * WANDER * e_folds;
-            let width = (record.from[index] - record.to[index]) / noise.tau;
             let error = record.variance(index, noise.scatter);
             let h: [f64; 4] = std::array::from_fn(|i| p[0][i] + p[1][i]);
-            let smoothed = variance * (1.0 - variance_of_mean(width));
             let s = (h[0] + h[1] + error - smoothed).max(error).max(1e-12);
             normaliser -= 0.5 * s.ln();
             gains.steps.push(Gain {

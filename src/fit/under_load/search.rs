@@ -1,7 +1,7 @@
 //! The search over slopes, shapes and noises: coarse, then fine where the evidence is.
 
 use super::evidence::{self, Evidence, Room, Slope, weigh};
-use super::gains::{Gains, Noise, Record};
+use super::gains::{Gains, Memory, Noise, Record};
 use super::shape::{BLOCKS, SHAPES};
 use super::{Cell, KEPT};
 use crate::fit::Rate;
@@ -40,7 +40,8 @@ const CENTRE: usize = 9;
 /// The laws that the rates leave open; `None` where none has an evidence.
 pub(super) fn cells(rates: &[Rate]) -> Option<Vec<Cell>> {
     let mut search = Search::new(rates);
-    let coarse = search.slopes(search.lowest, search.highest, search.coarse);
+    let all = vec![true; BLOCKS.len()];
+    let coarse = search.slopes((search.lowest, search.highest), search.coarse, &all);
     let mut noises = noises(rates);
     let mut scored = Vec::new();
     for _ in 0..2 {
@@ -101,11 +102,14 @@ impl Search {
         }
     }
 
-    /// `count` slopes at the middles of equal steps of ln r.
-    fn slopes(&self, lowest: f64, highest: f64, count: usize) -> Vec<Slope> {
+    /// `count` slopes at the middles of equal steps of ln r, to be asked about `blocks`.
+    fn slopes(&self, (lowest, highest): (f64, f64), count: usize, blocks: &[bool]) -> Vec<Slope> {
         let at = |index: usize| (index as f64 + 0.5) / count as f64;
         (0..count)
-            .map(|index| Slope::new(lowest * (highest / lowest).powf(at(index)), &self.record))
+            .map(|index| {
+                let r = lowest * (highest / lowest).powf(at(index));
+                Slope::new(r, &self.record, blocks)
+            })
             .collect()
     }
 
@@ -133,11 +137,18 @@ impl Search {
     /// Every shape at every slope under one noise, best first.
     fn sweep(&mut self, slopes: &[Slope], noise: &Noise) -> Vec<Scored> {
         let before = evidence::before_the_law(&self.record, noise.scatter);
+        let memory = Memory::new(&self.record, noise);
         let mut scored = Vec::with_capacity(slopes.len() * SHAPES.len());
         for (index, slope) in slopes.iter().enumerate() {
-            let gains = Gains::new(&self.record, noise, &slope.u);
+            let gains = Gains::new(&self.record, &memory, &slope.u);
             for (block, of) in BLOCKS.iter().enumerate() {
-                let found = weigh(&self.record, (of, slope), &gains, &before, &mut self.room);
+                let found = weigh(
+                    &self.record,
+                    (block, slope),
+                    &gains,
+                    &before,
+                    &mut self.room,
+                );
                 for (lane, evidence) in found.iter().enumerate() {
                     let ln = evidence.ln + self.ln_prior(of.first + lane, slope.r, evidence);
                     if ln.is_finite() {
@@ -158,15 +169,9 @@ impl Search {
     /// Doubts the rates that the best law cannot explain.
     fn doubt(&mut self, slopes: &[Slope], best: &Scored, noise: &Noise) {
         let slope = &slopes[best.slope];
-        let gains = Gains::new(&self.record, noise, &slope.u);
-        let law = (&BLOCKS[best.block], slope);
-        let squares = evidence::misses(
-            &self.record,
-            law,
-            (best.lane, noise.scatter),
-            &gains,
-            &mut self.room,
-        );
+        let gains = Gains::new(&self.record, &Memory::new(&self.record, noise), &slope.u);
+        let law = (best.block, slope);
+        let squares = evidence::misses(&self.record, law, (best.lane, noise.scatter), &gains);
         for (trust, square) in self.record.trust.iter_mut().zip(squares) {
             *trust = ((STUDENT + 1.0) / (STUDENT + square)).min(1.0);
         }
@@ -187,10 +192,11 @@ impl Search {
         let befores = self.befores();
         for noise in noises.iter_mut() {
             let before = &befores[&noise.scatter.to_bits()];
+            let memory = Memory::new(&self.record, noise);
             let evidence = chosen.iter().map(|one| {
                 let slope = &slopes[one.slope];
-                let gains = Gains::new(&self.record, noise, &slope.u);
-                let law = (&BLOCKS[one.block], slope);
+                let gains = Gains::new(&self.record, &memory, &slope.u);
+                let law = (one.block, slope);
                 let found = weigh(&self.record, law, &gains, before, &mut self.room);
                 found[one.lane].ln + SHAPES[BLOCKS[one.block].first + one.lane].ln_prior
             });
@@ -213,21 +219,19 @@ impl Search {
             self.lowest * (self.highest / self.lowest).powf(share)
         };
         let count = ((last - first + 3) * FINER).min(MOST.1);
-        let slopes = self.slopes(at(first as f64 - 1.0), at(last as f64 + 2.0), count);
+        let range = (at(first as f64 - 1.0), at(last as f64 + 2.0));
+        let slopes = self.slopes(range, count, &blocks);
         let likely = noises[0].ln_evidence - LEFT_OUT.1;
         let likely = noises.iter().take_while(|noise| noise.ln_evidence > likely);
         let mut cells = Vec::new();
         let befores = self.befores();
         for noise in likely.take(MOST.2) {
             let before = &befores[&noise.scatter.to_bits()];
+            let memory = Memory::new(&self.record, noise);
             for slope in &slopes {
-                let gains = Gains::new(&self.record, noise, &slope.u);
-                for (block, of) in BLOCKS
-                    .iter()
-                    .enumerate()
-                    .filter(|(block, _)| blocks[*block])
-                {
-                    let law = (of, slope);
+                let gains = Gains::new(&self.record, &memory, &slope.u);
+                for block in (0..BLOCKS.len()).filter(|block| blocks[*block]) {
+                    let law = (block, slope);
                     let found = weigh(&self.record, law, &gains, before, &mut self.room);
                     for (lane, evidence) in found.iter().enumerate() {
                         cells.push(self.cell(BLOCKS[block].first + lane, slope, noise, evidence));

@@ -68,6 +68,10 @@ pub(super) struct Gauge {
     pub(super) averaging: f64,
 }
 
+/// The share of instruments at their best (corrected for the weather, near the slope, on good mounts), and how small their
+/// errors get.
+const FINE: (f64, f64) = (0.5, 0.1);
+
 /// What moves within the instrument, from reading to reading.
 #[derive(Default)]
 struct Moving {
@@ -116,7 +120,25 @@ impl Gauge {
         if family == Family::Resets {
             gauge.resets = 0.8;
         }
+        if happens(generator, FINE.0) {
+            gauge.finer(log_uniform(generator, FINE.1, 1.0));
+        }
         gauge
+    }
+
+    /// The same instrument at its best: every error so many times as large.
+    fn finer(&mut self, share: f64) {
+        let errors = [
+            &mut self.white,
+            &mut self.air.0,
+            &mut self.flicker,
+            &mut self.daily,
+            &mut self.yearly,
+            &mut self.step,
+        ];
+        for error in errors {
+            *error *= share;
+        }
     }
 
     fn on_the_ground(&mut self, generator: &mut impl Rng) {

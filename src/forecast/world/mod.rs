@@ -22,6 +22,9 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 
+/// The share of records that begin within an acceleration, or anywhere in a life without one, and how far on, at most.
+const BEGUN: (f64, f64) = (0.3, 0.7);
+
 /// How a slope moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Family {
@@ -172,7 +175,14 @@ impl Simulated {
         if family.fails() && course.end - visible_days < 4.0 * gauge.interval {
             return None;
         }
-        let readings = gauge.read(&path, family, generator);
+        let mut readings = gauge.read(&path, family, generator);
+        // Many a record begins when somebody has seen the slope move.
+        let begins = if happens(generator, BEGUN.0) {
+            course.onset + between(generator, 0.0, BEGUN.1) * (course.end - course.onset)
+        } else {
+            0.0
+        };
+        readings.retain(|(days, _)| *days >= begins);
         if readings.len() < FEWEST {
             return None;
         }
@@ -198,7 +208,7 @@ impl Simulated {
             interval_days: gauge.interval,
             collapse_days: family.fails().then_some(course.end),
             stopped_days: ends,
-            visible_days,
+            visible_days: visible_days.max(begins),
             end_days: course.end,
         })
     }

@@ -7,6 +7,10 @@ use std::f64::consts::TAU;
 /// Pulses of a life, at most.
 const MOST_PULSES: usize = 400;
 
+/// How fast a slope that rain loads gets in a storm, in multiples of its creep: from 1 to 231 mm in a day at Century Mine, from
+/// 0.1 to 300 mm/day at Veslemannen.
+const RAIN: (f64, f64) = (0.5, 300.0);
+
 /// A pulse of velocity: it rises within days and fades.
 #[derive(Debug, Clone, Copy)]
 struct Pulse {
@@ -120,7 +124,7 @@ fn pulses(family: Family, end: f64, generator: &mut impl Rng) -> Vec<Pulse> {
         let least = 3.0 * 365.25 / end * between(generator, 0.3, 1.5);
         Kind {
             often: storms.max(least),
-            size: (0.5, 30.0),
+            size: RAIN,
             rise: (0.02, 1.0),
             fade: (0.3, 12.0),
         }
