@@ -75,7 +75,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     };
     match &args.output {
         Some(file) => {
-            std::fs::write(file, svg).with_context(|| format!("cannot write {}", file.display()))?
+            std::fs::write(file, svg)
+                .with_context(|| format!("cannot write {}", file.display()))?;
         }
         None => std::io::stdout().lock().write_all(svg.as_bytes())?,
     }

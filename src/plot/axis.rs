@@ -32,6 +32,8 @@ pub struct Axis {
 
 /// A linear axis has at most about so many ticks.
 const TICKS: f64 = 6.0;
+/// How much closer than side by side labels may stand above one another.
+const UPRIGHT: f64 = 2.5;
 
 impl Axis {
     /// Numbers, evenly.
@@ -108,6 +110,11 @@ impl Axis {
             Scale::Date => calendar::ticks(self.from, self.to, length),
             Scale::Named => self.names.clone(),
         }
+    }
+
+    /// The same on an axis that stands, where labels need only a line's height.
+    pub(super) fn upright_ticks(&self, length: f64) -> Vec<(f64, String)> {
+        self.ticks(UPRIGHT * length)
     }
 
     fn linear_ticks(&self) -> Vec<(f64, String)> {

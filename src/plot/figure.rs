@@ -61,7 +61,7 @@ impl Figure {
         let labels = self
             .panels
             .iter()
-            .flat_map(|panel| panel.y.ticks(self.panel.1));
+            .flat_map(|panel| panel.y.upright_ticks(self.panel.1));
         let widest = labels
             .map(|(_, label)| width_of(&label))
             .fold(0.0, f64::max);

@@ -130,7 +130,7 @@ impl Panel {
                 );
             }
         }
-        for (value, text) in self.y.ticks(frame.height) {
+        for (value, text) in self.y.upright_ticks(frame.height) {
             let Some(share) = self.y.share(value) else {
                 continue;
             };
@@ -338,11 +338,11 @@ impl Panel {
             } => {
                 let before = self.place(frame, (*from, *y));
                 let after = self.place(frame, (*to, *y));
-                let needed = width_of(text) + 2.0 * GAP;
+                let needed = width_of(text) + 3.0 * GAP;
                 let fits = |place: &(f64, f64)| place.0 - frame.left >= needed;
                 let roomier = after.is_none_or(|place| right - place.0 < needed);
                 match before.filter(|place| fits(place) || roomier) {
-                    Some((x, y)) => (text, colour, Some((x - 2.0 * GAP, y)), "end"),
+                    Some((x, y)) => (text, colour, Some((x - 3.0 * GAP, y)), "end"),
                     None => (text, colour, after, "start"),
                 }
             }

@@ -68,7 +68,7 @@ impl Stack {
         let labels = self
             .panels
             .iter()
-            .flat_map(|(height, panel)| panel.y.ticks(*height));
+            .flat_map(|(height, panel)| panel.y.upright_ticks(*height));
         let widest = labels
             .map(|(_, label)| width_of(&label))
             .fold(0.0, f64::max);

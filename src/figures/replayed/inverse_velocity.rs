@@ -6,7 +6,7 @@ use crate::figures::day;
 use crate::figures::in_time::{dots, line, thinned};
 use crate::fit::Rate;
 use crate::forecast::InverseVelocityLine;
-use crate::monitor::recent;
+use crate::monitor::{FailureTime, recent};
 use crate::plot::{Axis, BLACK, BLUE, GREY, Legend, Mark, PURPLE, Panel, Stack};
 use crate::reading::{Quantity, Timestamp};
 
@@ -14,12 +14,12 @@ use crate::reading::{Quantity, Timestamp};
 const COLOURS: [&str; 5] = [BLUE, PURPLE, "#8c5109", "#117777", "#444444"];
 const DOTTED: &str = "2 3";
 const READINGS: f64 = 150.0;
-const INVERSE: f64 = 210.0;
+const INVERSE: f64 = 240.0;
 const ROW: f64 = 30.0;
 /// Where a row's bar stands in it, and its text, from below.
 const BAR: f64 = 0.5;
-/// The upright axis of inverse velocity holds this share of the points.
-const HELD: f64 = 0.92;
+/// The upright axis of inverse velocity holds all points in this last share of the record.
+const HELD: f64 = 0.5;
 /// Two lines that meet zero within this, days, are one.
 const SAME_DAYS: f64 = 0.01;
 /// A bound that is never reached lies off the sheet, so many lengths of the axis ahead.
@@ -56,7 +56,7 @@ impl Replayed<'_> {
             panels.push((height, self.forecasts_panel(&x, &dated)));
         }
         panels.push((levels::HEIGHT, levels::panel(self, &x)));
-        let title = self.title("what was forecast and called");
+        let title = self.title("readings, forecasts and levels");
         Stack {
             description: format!(
                 "{title}. Readings, inverse velocity with the forecasts as they were made, and the levels in force."
@@ -81,6 +81,9 @@ impl Replayed<'_> {
         let y = Axis::around(label, points.iter().map(|point| point.1));
         let points = thinned(points);
         let mut marks = uprights(dated);
+        if let Some(first) = marks.first_mut() {
+            "forecast made".clone_into(&mut first.0);
+        }
         marks.push((String::new(), line(points.clone(), GREY, "")));
         marks.push(("reading".to_owned(), dots(points, BLACK, 2.2)));
         marks.extend(self.collapse_line());
@@ -108,9 +111,9 @@ impl Replayed<'_> {
         let points: Vec<(f64, f64)> = forward
             .map(|rate| (rate.middle(), 1.0 / rate.velocity))
             .collect();
-        let top = highest(&points);
+        let (start, end) = (self.start(), self.end());
+        let top = highest(&points, end - HELD * (end - start));
         let mut marks = uprights(dated);
-        marks.extend(dated.iter().filter_map(|one| fan(one, x)));
         let mut name = "line through the newest, to zero".to_owned();
         for one in dated {
             let Some(refit) = one.refit else { continue };
@@ -126,7 +129,7 @@ impl Replayed<'_> {
         let above = points.iter().filter(|point| point.1 > top).count();
         let title = match above {
             0 => "inverse velocity".to_owned(),
-            above => format!("inverse velocity ({above} higher)"),
+            above => format!("inverse velocity ({above} points lie above)"),
         };
         Panel {
             title,
@@ -145,11 +148,16 @@ impl Replayed<'_> {
         let y = Axis::named(0.0, count, names.collect());
         let mut marks = Vec::new();
         for (index, one) in dated.iter().enumerate() {
-            marks.extend(self.row(one, height(index), x, index == 0));
+            marks.extend(self.row(one, (index, height(index)), x));
         }
         marks.extend(self.collapse_line());
+        let horizon = dated.iter().find_map(|one| one.refit);
+        let horizon = horizon.map_or_else(String::new, |refit| {
+            let days = refit.failure_time.horizon_days;
+            format!(", chance within {days:.0} days")
+        });
         Panel {
-            title: "forecast with the readings until then".to_owned(),
+            title: format!("forecast with the readings until then{horizon}"),
             x: x.clone(),
             y,
             marks,
@@ -157,9 +165,15 @@ impl Replayed<'_> {
         }
     }
 
-    /// The marks of one forecast; those of the first row are named.
-    fn row(&self, one: &Dated, y: f64, x: &Axis, is_first: bool) -> Vec<(String, Mark)> {
-        let named = |name: &str| is_first.then(|| name.to_owned()).unwrap_or_default();
+    /// The marks of one forecast in its row, with their names in the first.
+    fn row(&self, one: &Dated, (index, y): (usize, f64), x: &Axis) -> Vec<(String, Mark)> {
+        let named = |name: &str| {
+            if index == 0 {
+                name.to_owned()
+            } else {
+                String::new()
+            }
+        };
         let colour = one.colour;
         let Some(refit) = one.refit else {
             let at = day(one.date);
@@ -191,33 +205,27 @@ impl Replayed<'_> {
         let end = bar.map_or(at, |(_, high, _)| high);
         marks.push((
             String::new(),
-            beside((at, end), y, self.told(&refit), colour),
+            beside((at, end), y, self.told(&failure), colour),
         ));
         marks
     }
 
     /// A forecast in words.
-    fn told(&self, refit: &Refit) -> String {
-        let failure = refit.failure_time;
-        let short = |time: Option<Timestamp>| time.map(|time| self.short(time));
-        let chance = format!(
-            "chance {:.2} in {:.0} days",
-            failure.probability, failure.horizon_days
-        );
-        match (
-            short(failure.low),
-            short(failure.median),
-            short(failure.high),
-        ) {
-            (Some(low), Some(median), Some(high)) => {
-                format!("median {median}, 5 to 95 % {low} to {high}; {chance}")
-            }
-            (Some(low), Some(median), None) => {
-                format!("median {median}, 5 % by {low}; {chance}")
-            }
-            (Some(low), None, _) => format!("no median, 5 % by {low}; {chance}"),
-            (None, _, _) => chance,
+    fn told(&self, failure: &FailureTime) -> String {
+        let chance = format!("chance {:.2}", failure.probability);
+        if failure.low.is_none() {
+            return chance;
         }
+        let bounds = [
+            ("5 %", failure.low),
+            ("median", failure.median),
+            ("95 %", failure.high),
+        ];
+        let told = bounds.map(|(name, time)| match time {
+            Some(time) => format!("{name} {}", self.short(time)),
+            None => format!("{name} never"),
+        });
+        format!("{}; {chance}", told.join(", "))
     }
 }
 
@@ -248,24 +256,6 @@ fn uprights(dated: &[Dated]) -> Vec<(String, Mark)> {
     dated.iter().map(upright).collect()
 }
 
-/// From the newest velocity at a date to the interval of the collapse, where inverse velocity is zero.
-fn fan(one: &Dated, x: &Axis) -> Option<(String, Mark)> {
-    let refit = one.refit?;
-    let failure = refit.failure_time;
-    let velocity = refit
-        .velocity_mm_per_day
-        .filter(|velocity| *velocity > 0.0)?;
-    let (at, from) = (day(refit.time), 1.0 / velocity);
-    let low = day(failure.low?);
-    let high = never(failure.high, x);
-    let upper = from * (high - low) / (high - at);
-    let fan = Mark::Band {
-        points: vec![(at, from, from), (low, 0.0, upper), (high, 0.0, 0.0)],
-        colour: one.colour,
-    };
-    Some((String::new(), fan))
-}
-
 /// The line of a refit, from the oldest of the velocities it goes through to zero; `None` where these rates do not
 /// give the line that the monitor told of.
 fn straight(rates: &[Rate], refit: &Refit) -> Option<Vec<(f64, f64)>> {
@@ -288,16 +278,10 @@ fn straight(rates: &[Rate], refit: &Refit) -> Option<Vec<(f64, f64)>> {
     Some(vec![(oldest, height), (zero, 0.0)])
 }
 
-/// The top of the axis: above most points, as a few slow ones would press the others flat.
-fn highest(points: &[(f64, f64)]) -> f64 {
-    let mut heights: Vec<f64> = points.iter().map(|point| point.1).collect();
-    heights.sort_by(f64::total_cmp);
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a share of a count"
-    )]
-    let held = (heights.len() as f64 * HELD).ceil() as usize;
-    let held = heights.get(held.saturating_sub(1)).copied().unwrap_or(1.0);
-    1.15 * held
+/// The top of the axis: above the points of the record's last part, as the slow ones before would press them flat.
+fn highest(points: &[(f64, f64)], from: f64) -> f64 {
+    let late = points.iter().filter(|point| point.0 >= from);
+    let late = late.map(|point| point.1).reduce(f64::max);
+    let any = points.iter().map(|point| point.1).reduce(f64::max);
+    1.15 * late.or(any).unwrap_or(1.0)
 }

@@ -97,7 +97,9 @@ impl Course {
 
 /// The band.
 pub(super) fn panel(replayed: &Replayed, x: &Axis) -> Panel {
-    let (levels, unknown) = stretches(replayed);
+    let (mut levels, unknown) = stretches(replayed);
+    // In the order of the legend; none lies over another.
+    levels.sort_by_key(|stretch| stretch.level);
     let mut marks: Vec<(String, Mark)> = Vec::new();
     for stretch in &levels {
         let named = marks.iter().any(|mark| mark.0 == stretch.level.name());
@@ -136,7 +138,7 @@ fn fill(replayed: &Replayed, stretch: &Stretch) -> Mark {
     let since = format!("{name} from {}", replayed.short(stretch.from));
     let before = replayed.collapse.map(|time| days_since(stretch.from, time));
     let before = before.filter(|days| *days > 0.0 && stretch.level > Level::Green);
-    let before = before.map(|days| format!("{since}, {days:.1} days before the collapse"));
+    let before = before.map(|days| format!("{since}, {days:.1} days before collapse"));
     let words = before.into_iter().chain([since, name.to_owned()]);
     Mark::Fill {
         from: day(stretch.from),
