@@ -96,13 +96,7 @@ fn a_crisis_is_drawn_as_well_formed_xml_with_its_levels_and_its_collapse_in_word
     for kind in [&INVERSE, &FORECAST] {
         let svg = drawn(&[&PREONZO, &COLLAPSE, kind]);
         check_xml(&svg);
-        for word in [
-            "green",
-            "red",
-            ">collapse<",
-            "2012-05-15 01:30Z",
-            "E3",
-        ] {
+        for word in ["green", "red", ">collapse<", "2012-05-15 01:30Z", "E3"] {
             assert!(svg.contains(word), "{word}");
         }
         // One file alone: nothing is fetched.

@@ -117,18 +117,19 @@ impl Panel {
                 continue;
             };
             let x = frame.left + share * frame.width;
-            let _ = writeln!(
+            let _ = write!(
                 out,
                 r##"<path d="M{x:.1} {:.1}V{bottom:.1}" stroke="#e4e4e4"/>"##,
                 frame.top
             );
             if frame.foot == Foot::Axis {
-                let _ = writeln!(
+                let _ = write!(
                     out,
                     r#"<text x="{x:.1}" y="{:.1}" text-anchor="middle">{text}</text>"#,
                     bottom + 16.0
                 );
             }
+            out.push('\n');
         }
         for (value, text) in self.y.upright_ticks(frame.height) {
             let Some(share) = self.y.share(value) else {
