@@ -6,7 +6,7 @@
 //! main -> cli -> runtime, config -> monitor -> alert, regime, forecast -> fit -> model -> reading
 //!         cli -> inversion -> regime, forecast, fit
 //!         cli -> effects -> forecast, fit, model
-//!         cli -> figures -> effects, plot
+//!         cli -> figures -> effects, monitor, plot
 //!         cli -> score -> forecast, fit
 //! ```
 //!

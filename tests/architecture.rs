@@ -20,7 +20,12 @@ const ARROWS: [(&str, &[&str]); 16] = [
         "effects",
         &["fit", "forecast", "model", "reading", "regime"],
     ),
-    ("figures", &["effects", "plot", "reading", "score"]),
+    (
+        "figures",
+        &[
+            "alert", "effects", "fit", "forecast", "monitor", "plot", "reading", "score",
+        ],
+    ),
     ("alert", &["reading"]),
     (
         "monitor",

@@ -176,7 +176,7 @@ fn completions_and_the_manual_name_every_command_and_no_hidden_one() {
             .assert()
             .success();
         let text = String::from_utf8(ended.get_output().stdout.clone()).unwrap();
-        for command in ["replay", "doctor", "explain"] {
+        for command in ["replay", "doctor", "explain", "plot"] {
             assert!(text.contains(command), "{shell}: {command}");
         }
     }

@@ -221,7 +221,7 @@ pub(crate) const SUBJECTS: [Subject; 13] = [
         averaging_hours: None,
         until: None,
         figures: ALL,
-        comment: "The river and not the season, and then what no river explains: the change at the end of 1987. The geometry and the friction change that follow are what the end of the record is consistent with, and stand under what cannot be told apart.",
+        comment: "The series was made with a river that acts until 1986 and another law from the end of November 1987 on. The river is not found: the flow does not lower the BIC. The change is found, and told as three effects at its date, an offset of the readings, a step of the load and a change of the friction; of these only the last was put in.",
     },
     Subject {
         name: "la-clapiere-until-1988",
@@ -233,7 +233,7 @@ pub(crate) const SUBJECTS: [Subject; 13] = [
         averaging_hours: None,
         until: Some("1988-04-01T00:00:00Z"),
         figures: &["readings"],
-        comment: "The river learned on the years before fails from 1986 on, as the paper says: the held-out error hardly falls with it, and is many times that of the fit.",
+        comment: "Unexplained. The river that was put in does not lower the BIC, and a change of the friction at the end of 1987, where the law does change, leaves structure behind and is refused as the nearest label.",
     },
     Subject {
         name: "vaiont",
@@ -257,7 +257,7 @@ pub(crate) const SUBJECTS: [Subject; 13] = [
         averaging_hours: None,
         until: None,
         figures: &["readings", "contributions"],
-        comment: "Flat, then 231 mm in a day after 115 mm of rain, then still: never a failure, and the model case of a false alarm. The rain is what the step is consistent with; a single storm cannot prove it, and the held-out block, which holds the storm, is foretold no better.",
+        comment: "Flat, then 231 mm in a day after 115 mm of rain, then slow sliding that stopped: no failure is known, and the model case of a false alarm. The rain is what the step is consistent with; a single storm cannot prove it, and the held-out block, which holds the storm, is foretold no better.",
     },
     Subject {
         name: "century-31-1931",

@@ -12,6 +12,7 @@ mod fit;
 mod hook;
 mod load;
 mod man;
+mod plot;
 mod replay;
 mod run;
 mod score;
@@ -49,6 +50,7 @@ enum Command {
     Sweep(sweep::Args),
     Explain(explain::Args),
     Score(score::Args),
+    Plot(plot::Args),
     Simulate(simulate::Args),
     Convert(convert::Args),
     #[command(subcommand)]
@@ -74,6 +76,7 @@ pub fn main() -> ExitCode {
             Command::Sweep(args) => sweep::run(&args),
             Command::Explain(args) => explain::run(&args),
             Command::Score(args) => score::run(&args),
+            Command::Plot(args) => plot::run(&args),
             Command::Simulate(args) => simulate::run(&args),
             Command::Convert(args) => convert::run(&args),
             Command::Hook(command) => hook::run(&command),

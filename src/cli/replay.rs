@@ -95,6 +95,32 @@ fn run_state(args: &Args, folder: &Path) -> anyhow::Result<()> {
     })
 }
 
+/// The events of a recording, for those who do not print them.
+pub(super) fn events(
+    recording: &Recording,
+    settings: &Settings,
+    until: Option<Timestamp>,
+) -> anyhow::Result<Vec<Event>> {
+    let plan = Plan {
+        site: NAMELESS,
+        settings,
+        hooks: &[],
+        pace: Pace::Max,
+        until,
+    };
+    let mut events = Vec::new();
+    asynchronous()?.block_on(async {
+        let shutdown = Shutdown::on_signals().context("cannot listen for signals")?;
+        let mut keep = |event: &Event| {
+            events.push(event.clone());
+            Ok(())
+        };
+        replay::replay(recording, &plan, shutdown, &mut keep).await?;
+        anyhow::Ok(())
+    })?;
+    Ok(events)
+}
+
 fn print(out: &mut impl Write, event: &Event, format: Format) -> io::Result<()> {
     let line = match format {
         Format::Json => serde_json::to_string(event)?,

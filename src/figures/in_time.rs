@@ -253,7 +253,7 @@ fn unit_label(explanation: &Explanation) -> String {
     format!("{}, {}", explanation.quantity, explanation.unit)
 }
 
-fn line(points: Vec<(f64, f64)>, colour: &'static str, dash: &'static str) -> Mark {
+pub(super) fn line(points: Vec<(f64, f64)>, colour: &'static str, dash: &'static str) -> Mark {
     Mark::Line {
         points,
         colour,
@@ -261,7 +261,7 @@ fn line(points: Vec<(f64, f64)>, colour: &'static str, dash: &'static str) -> Ma
     }
 }
 
-fn dots(points: Vec<(f64, f64)>, colour: &'static str, radius: f64) -> Mark {
+pub(super) fn dots(points: Vec<(f64, f64)>, colour: &'static str, radius: f64) -> Mark {
     Mark::Dots {
         points,
         colour,
@@ -274,7 +274,7 @@ fn zero(x: &Axis) -> Mark {
 }
 
 /// As many points as a sheet can show: of each run of neighbours the lowest and the highest.
-fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+pub(super) fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     if points.len() <= MOST_POINTS {
         return points;
     }
@@ -291,7 +291,7 @@ fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
 }
 
 /// The same for what is smooth: one of each run of neighbours.
-fn every_few<T: Copy>(points: Vec<T>) -> Vec<T> {
+pub(super) fn every_few<T: Copy>(points: Vec<T>) -> Vec<T> {
     let run = points.len().div_ceil(MOST_POINTS).max(1);
     let last = points.len().saturating_sub(1);
     let kept = points.into_iter().enumerate();

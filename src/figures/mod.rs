@@ -1,12 +1,14 @@
-//! An explanation and a scorecard in figures: each one SVG text, for a page or a file of its own.
+//! An explanation, a scorecard and a replay in figures: each one SVG text, for a page or a file of its own.
 
 #[cfg(test)]
 pub(crate) mod fixture;
 mod in_time;
 mod life_expectancy;
 mod of_the_search;
+mod replayed;
 
 pub use life_expectancy::life_expectancy;
+pub use replayed::Replayed;
 
 use crate::effects::{Candidate, Explanation};
 use crate::reading::{Timestamp, days_since};

@@ -26,6 +26,7 @@ pub use order::Order;
 pub use saved::{Part, SavedError};
 pub use search::{Finding, SearchJob};
 pub use site::SiteLevel;
+pub(crate) use track::recent;
 
 use crate::alert::{Level, Policy};
 use crate::reading::{BenchmarkId, Reading, Sample, Timestamp, Unit};

@@ -11,6 +11,8 @@ pub enum Scale {
     Log,
     /// As days since 1970-01-01, evenly, with dates at the ticks.
     Date,
+    /// Evenly, with names at the ticks.
+    Named,
 }
 
 /// One axis; what lies outside its range is cut off.
@@ -24,10 +26,14 @@ pub struct Axis {
     pub to: f64,
     /// What lies between.
     pub scale: Scale,
+    /// What stands where, of an axis that is [`Scale::Named`].
+    pub names: Vec<(f64, String)>,
 }
 
 /// A linear axis has at most about so many ticks.
 const TICKS: f64 = 6.0;
+/// How much closer than side by side labels may stand above one another.
+const UPRIGHT: f64 = 2.5;
 
 impl Axis {
     /// Numbers, evenly.
@@ -37,6 +43,16 @@ impl Axis {
             from,
             to,
             scale: Scale::Linear,
+            names: Vec::new(),
+        }
+    }
+
+    /// Places from the bottom up, each with its name; bare where there are no names.
+    pub fn named(from: f64, to: f64, names: Vec<(f64, String)>) -> Self {
+        Self {
+            scale: Scale::Named,
+            names,
+            ..Self::linear("", from, to)
         }
     }
 
@@ -77,7 +93,9 @@ impl Axis {
     /// The share of the axis at `value`; `None` where it has none.
     pub(super) fn share(&self, value: f64) -> Option<f64> {
         let share = match self.scale {
-            Scale::Linear | Scale::Date => (value - self.from) / (self.to - self.from),
+            Scale::Linear | Scale::Date | Scale::Named => {
+                (value - self.from) / (self.to - self.from)
+            }
             Scale::Log => (value / self.from).ln() / (self.to / self.from).ln(),
         };
         // Far outside is as good as the edge of the sheet, and keeps the numbers short.
@@ -90,7 +108,13 @@ impl Axis {
             Scale::Linear => self.linear_ticks(),
             Scale::Log => self.decades(),
             Scale::Date => calendar::ticks(self.from, self.to, length),
+            Scale::Named => self.names.clone(),
         }
+    }
+
+    /// The same on an axis that stands, where labels need only a line's height.
+    pub(super) fn upright_ticks(&self, length: f64) -> Vec<(f64, String)> {
+        self.ticks(UPRIGHT * length)
     }
 
     fn linear_ticks(&self) -> Vec<(f64, String)> {

@@ -1,6 +1,6 @@
 //! A sheet of panels in rows.
 
-use super::panel::{Frame, Panel};
+use super::panel::{Foot, Frame, Panel};
 use super::{opened, width_of};
 
 /// Panels in rows of `columns`.
@@ -48,6 +48,7 @@ impl Figure {
                 width: self.panel.0 - left - RIGHT,
                 height: self.panel.1 - TOP - BOTTOM,
                 label: x + LABEL,
+                foot: Foot::Axis,
             };
             panel.draw(&frame, &format!("{name}c{index}"), &mut out);
         }
@@ -60,7 +61,7 @@ impl Figure {
         let labels = self
             .panels
             .iter()
-            .flat_map(|panel| panel.y.ticks(self.panel.1));
+            .flat_map(|panel| panel.y.upright_ticks(self.panel.1));
         let widest = labels
             .map(|(_, label)| width_of(&label))
             .fold(0.0, f64::max);

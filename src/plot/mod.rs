@@ -4,12 +4,16 @@ mod axis;
 mod bars;
 mod calendar;
 mod figure;
+mod mark;
 mod panel;
+mod stack;
 
 pub use axis::{Axis, Scale};
 pub use bars::{Bar, Bars};
 pub use figure::Figure;
-pub use panel::{Legend, Mark, Panel};
+pub use mark::Mark;
+pub use panel::{Legend, Panel};
+pub use stack::Stack;
 
 /// Blue. All colours are distinct for every kind of colour vision (Okabe and Ito, 2008).
 pub const BLUE: &str = "#0072b2";
@@ -33,9 +37,11 @@ fn width_of(text: &str) -> f64 {
     CHARACTER * FONT * text.chars().count() as f64
 }
 
-/// `text` as it may stand between tags.
+/// `text` as it may stand between tags; what XML cannot hold is left out.
 pub fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
+    let held = |letter: &char| !letter.is_control() || matches!(letter, '\t' | '\n' | '\r');
+    let held: String = text.chars().filter(held).collect();
+    held.replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")
 }

@@ -1,63 +1,9 @@
 //! One pair of axes and what stands between them.
 
 use super::axis::Axis;
+use super::mark::{BAR_OPACITY, Mark, OPACITY, SIGN, entry, width_of_entry};
 use super::{BLACK, escaped, shortened, width_of};
 use std::fmt::Write as _;
-
-/// What is drawn in a panel.
-#[derive(Debug, Clone)]
-pub enum Mark {
-    /// A line; `dash` is SVG's `stroke-dasharray`, empty for an unbroken one.
-    Line {
-        /// From left to right.
-        points: Vec<(f64, f64)>,
-        /// As SVG has it.
-        colour: &'static str,
-        /// As SVG has it.
-        dash: &'static str,
-    },
-    /// Dots of one radius.
-    Dots {
-        /// Their middles.
-        points: Vec<(f64, f64)>,
-        /// As SVG has it.
-        colour: &'static str,
-        /// In the sheet's units.
-        radius: f64,
-    },
-    /// Upright strokes from zero to each point.
-    Stems {
-        /// Their ends.
-        points: Vec<(f64, f64)>,
-        /// As SVG has it.
-        colour: &'static str,
-    },
-    /// The room between two lines, as (x, lower, upper).
-    Band {
-        /// From left to right.
-        points: Vec<(f64, f64, f64)>,
-        /// As SVG has it.
-        colour: &'static str,
-    },
-    /// All of the panel's height between two places.
-    Shade {
-        /// Where it begins.
-        from: f64,
-        /// Where it ends.
-        to: f64,
-        /// As SVG has it.
-        colour: &'static str,
-    },
-    /// Upright lines through all of the panel.
-    Uprights {
-        /// Where they stand.
-        at: Vec<f64>,
-        /// As SVG has it.
-        colour: &'static str,
-        /// As SVG has it.
-        dash: &'static str,
-    },
-}
 
 /// Where a panel's legend stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -87,10 +33,8 @@ pub struct Panel {
     pub legend: Legend,
 }
 
-/// How much of what lies below shows through a band or a shade.
-const OPACITY: f64 = 0.18;
-/// The width of a legend's sign with the room around it.
-const SIGN: f64 = 44.0;
+/// From a mark to the text beside it.
+const GAP: f64 = 6.0;
 /// How much wider bold letters are.
 const BOLD: f64 = 1.15;
 
@@ -103,6 +47,16 @@ pub(super) struct Frame {
     pub(super) height: f64,
     /// Where the label of the upright axis stands.
     pub(super) label: f64,
+    pub(super) foot: Foot,
+}
+
+/// What stands under a panel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Foot {
+    /// The ticks' texts and the label of the axis.
+    Axis,
+    /// Nothing: the axis is that of the panel below.
+    Nothing,
 }
 
 impl Panel {
@@ -163,14 +117,21 @@ impl Panel {
                 continue;
             };
             let x = frame.left + share * frame.width;
-            let _ = writeln!(
+            let _ = write!(
                 out,
-                r##"<path d="M{x:.1} {:.1}V{bottom:.1}" stroke="#e4e4e4"/><text x="{x:.1}" y="{:.1}" text-anchor="middle">{text}</text>"##,
-                frame.top,
-                bottom + 16.0
+                r##"<path d="M{x:.1} {:.1}V{bottom:.1}" stroke="#e4e4e4"/>"##,
+                frame.top
             );
+            if frame.foot == Foot::Axis {
+                let _ = write!(
+                    out,
+                    r#"<text x="{x:.1}" y="{:.1}" text-anchor="middle">{text}</text>"#,
+                    bottom + 16.0
+                );
+            }
+            out.push('\n');
         }
-        for (value, text) in self.y.ticks(frame.height) {
+        for (value, text) in self.y.upright_ticks(frame.height) {
             let Some(share) = self.y.share(value) else {
                 continue;
             };
@@ -183,12 +144,14 @@ impl Panel {
                 y + 4.0
             );
         }
-        let (x, y) = (frame.left + 0.5 * frame.width, bottom + 36.0);
-        let _ = writeln!(
-            out,
-            r#"<text x="{x:.1}" y="{y:.1}" text-anchor="middle">{}</text>"#,
-            escaped(&self.x.label)
-        );
+        if frame.foot == Foot::Axis {
+            let (x, y) = (frame.left + 0.5 * frame.width, bottom + 36.0);
+            let _ = writeln!(
+                out,
+                r#"<text x="{x:.1}" y="{y:.1}" text-anchor="middle">{}</text>"#,
+                escaped(&self.x.label)
+            );
+        }
         let (x, y) = (frame.label, frame.top + 0.5 * frame.height);
         let _ = writeln!(
             out,
@@ -252,7 +215,14 @@ impl Panel {
                     r#"<polygon points="{edge}" fill="{colour}" fill-opacity="{OPACITY}"/>"#
                 );
             }
-            Mark::Shade { from, to, colour } => self.shade(frame, (*from, *to), colour, out),
+            Mark::Shade { from, to, colour } => {
+                self.shade(frame, (*from, *to), (colour, OPACITY), out);
+            }
+            Mark::Fill { from, to, .. } => self.fill(frame, (*from, *to), mark, out),
+            Mark::Lying { .. } | Mark::Standing { .. } | Mark::Strokes { .. } => {
+                self.bars(frame, mark, out);
+            }
+            Mark::Words { .. } | Mark::Beside { .. } => self.words(frame, mark, out),
             Mark::Uprights { at, colour, dash } => {
                 for share in at.iter().filter_map(|x| self.x.share(*x)) {
                     let x = frame.left + share * frame.width;
@@ -266,17 +236,135 @@ impl Panel {
         }
     }
 
-    fn shade(&self, frame: &Frame, (from, to): (f64, f64), colour: &str, out: &mut String) {
+    fn shade(
+        &self,
+        frame: &Frame,
+        (from, to): (f64, f64),
+        (colour, opacity): (&str, f64),
+        out: &mut String,
+    ) {
         let (Some(from), Some(to)) = (self.x.share(from), self.x.share(to)) else {
             return;
         };
         let _ = writeln!(
             out,
-            r#"<rect x="{:.1}" y="{:.1}" width="{:.1}" height="{:.1}" fill="{colour}" fill-opacity="{OPACITY}"/>"#,
+            r#"<rect x="{:.1}" y="{:.1}" width="{:.1}" height="{:.1}" fill="{colour}" fill-opacity="{opacity}"/>"#,
             frame.left + from * frame.width,
             frame.top,
             ((to - from) * frame.width).max(0.0),
             frame.height
+        );
+    }
+
+    fn fill(&self, frame: &Frame, (from, to): (f64, f64), mark: &Mark, out: &mut String) {
+        let Mark::Fill {
+            colour, ink, words, ..
+        } = mark
+        else {
+            return;
+        };
+        self.shade(frame, (from, to), (colour, 1.0), out);
+        let (Some(from), Some(to)) = (self.x.share(from), self.x.share(to)) else {
+            return;
+        };
+        let (from, to) = (from.clamp(0.0, 1.0), to.clamp(0.0, 1.0));
+        let room = (to - from) * frame.width - GAP;
+        let Some(word) = words.iter().find(|word| BOLD * width_of(word) <= room) else {
+            return;
+        };
+        let _ = writeln!(
+            out,
+            r#"<text x="{:.1}" y="{:.1}" text-anchor="middle" fill="{ink}">{}</text>"#,
+            frame.left + f64::midpoint(from, to) * frame.width,
+            frame.top + 0.5 * frame.height + 4.0,
+            escaped(word)
+        );
+    }
+
+    fn bars(&self, frame: &Frame, mark: &Mark, out: &mut String) {
+        let mut bar = |from: (f64, f64), to: (f64, f64), (wide, high): (f64, f64), colour: &str| {
+            let (Some(from), Some(to)) = (self.place(frame, from), self.place(frame, to)) else {
+                return;
+            };
+            let _ = writeln!(
+                out,
+                r#"<rect x="{:.1}" y="{:.1}" width="{:.1}" height="{:.1}" fill="{colour}" fill-opacity="{BAR_OPACITY}"/>"#,
+                from.0 - 0.5 * wide,
+                to.1 - 0.5 * high,
+                to.0 - from.0 + wide,
+                from.1 - to.1 + high
+            );
+        };
+        match mark {
+            Mark::Lying { spans, colour } => {
+                for &(from, to, y) in spans {
+                    bar((from, y), (to, y), (0.0, 10.0), colour);
+                }
+            }
+            Mark::Standing { spans, colour } => {
+                for &(x, low, high) in spans {
+                    bar((x, low), (x, high), (5.0, 0.0), colour);
+                }
+            }
+            Mark::Strokes { points, colour } => {
+                for (x, y) in points.iter().filter_map(|point| self.place(frame, *point)) {
+                    let y = y - 8.0;
+                    let _ = writeln!(
+                        out,
+                        r#"<path d="M{x:.1} {y:.1}v16" stroke="{colour}" stroke-width="3"/>"#
+                    );
+                }
+            }
+            Mark::Line { .. }
+            | Mark::Dots { .. }
+            | Mark::Stems { .. }
+            | Mark::Band { .. }
+            | Mark::Shade { .. }
+            | Mark::Uprights { .. }
+            | Mark::Fill { .. }
+            | Mark::Words { .. }
+            | Mark::Beside { .. } => {}
+        }
+    }
+
+    fn words(&self, frame: &Frame, mark: &Mark, out: &mut String) {
+        let right = frame.left + frame.width;
+        let (text, colour, at, anchor) = match mark {
+            Mark::Words { at, text, colour } => (text, colour, self.place(frame, *at), "start"),
+            Mark::Beside {
+                span: (from, to),
+                y,
+                text,
+                colour,
+            } => {
+                let before = self.place(frame, (*from, *y));
+                let after = self.place(frame, (*to, *y));
+                let needed = width_of(text) + 3.0 * GAP;
+                let fits = |place: &(f64, f64)| place.0 - frame.left >= needed;
+                let roomier = after.is_none_or(|place| right - place.0 < needed);
+                match before.filter(|place| fits(place) || roomier) {
+                    Some((x, y)) => (text, colour, Some((x - 3.0 * GAP, y)), "end"),
+                    None => (text, colour, after, "start"),
+                }
+            }
+            Mark::Line { .. }
+            | Mark::Dots { .. }
+            | Mark::Stems { .. }
+            | Mark::Band { .. }
+            | Mark::Shade { .. }
+            | Mark::Uprights { .. }
+            | Mark::Fill { .. }
+            | Mark::Lying { .. }
+            | Mark::Standing { .. }
+            | Mark::Strokes { .. } => return,
+        };
+        let Some((x, y)) = at else { return };
+        let _ = writeln!(
+            out,
+            r#"<text x="{:.1}" y="{:.1}" text-anchor="{anchor}" fill="{colour}">{}</text>"#,
+            x + GAP,
+            y + 4.0,
+            escaped(text)
         );
     }
 
@@ -321,52 +409,6 @@ impl Panel {
 fn joined(places: impl Iterator<Item = (f64, f64)>) -> String {
     let places: Vec<String> = places.map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
     places.join(" ")
-}
-
-/// The room of a sign and a name in a legend above.
-fn width_of_entry(name: &str) -> f64 {
-    SIGN + 4.0 + width_of(name)
-}
-
-/// A mark's sign and name; `y` is the middle of the line.
-fn entry(name: &str, mark: &Mark, (left, y): (f64, f64), out: &mut String) {
-    let _ = match mark {
-        Mark::Line { colour, dash, .. } => writeln!(
-            out,
-            r#"<path d="M{:.1} {y:.1}h26" stroke="{colour}" stroke-width="1.8" stroke-dasharray="{dash}"/>"#,
-            left + 6.0
-        ),
-        Mark::Dots { colour, radius, .. } => writeln!(
-            out,
-            r#"<circle cx="{:.1}" cy="{y:.1}" r="{radius}" fill="{colour}"/>"#,
-            left + 19.0
-        ),
-        Mark::Stems { colour, .. } => writeln!(
-            out,
-            r#"<path d="M{:.1} {:.1}v10" stroke="{colour}" stroke-width="3"/>"#,
-            left + 19.0,
-            y - 5.0
-        ),
-        Mark::Uprights { colour, dash, .. } => writeln!(
-            out,
-            r#"<path d="M{:.1} {:.1}v12" stroke="{colour}" stroke-width="1.2" stroke-dasharray="{dash}"/>"#,
-            left + 19.0,
-            y - 6.0
-        ),
-        Mark::Band { colour, .. } | Mark::Shade { colour, .. } => writeln!(
-            out,
-            r#"<rect x="{:.1}" y="{:.1}" width="26" height="10" fill="{colour}" fill-opacity="{OPACITY}"/>"#,
-            left + 6.0,
-            y - 5.0
-        ),
-    };
-    let _ = writeln!(
-        out,
-        r#"<text x="{:.1}" y="{:.1}">{}</text>"#,
-        left + 38.0,
-        y + 4.0,
-        escaped(name)
-    );
 }
 
 #[cfg(test)]

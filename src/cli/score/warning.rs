@@ -2,11 +2,9 @@
 
 use super::hours;
 use crate::alert::{Level, Policy};
-use crate::cli::run::asynchronous;
-use crate::monitor::{AlertState, Event, EventKind, Settings};
+use crate::cli::replay;
+use crate::monitor::{AlertState, EventKind, Settings};
 use crate::reading::{Channel, Recording, Series, Timestamp};
-use crate::runtime::replay::{self, Pace, Plan};
-use crate::runtime::shutdown::Shutdown;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -44,25 +42,16 @@ pub(super) fn of(
         policy: policy.clone(),
         ..Settings::default()
     };
-    let plan = Plan {
-        site: "",
-        settings: &settings,
-        hooks: &[],
-        pace: Pace::Max,
-        until: Some(until),
-    };
-    let mut changes = Vec::new();
-    asynchronous()?.block_on(async {
-        let shutdown = Shutdown::on_signals()?;
-        let mut keep = |event: &Event| {
-            if let EventKind::Alert { level, state, .. } = &event.kind {
-                changes.push((event.time, *level, *state));
-            }
-            Ok(())
-        };
-        replay::replay(&recording, &plan, shutdown, &mut keep).await?;
-        anyhow::Ok(())
-    })?;
+    let events = replay::events(&recording, &settings, Some(until))?;
+    let changes: Vec<_> = events
+        .iter()
+        .filter_map(|event| {
+            let EventKind::Alert { level, state, .. } = &event.kind else {
+                return None;
+            };
+            Some((event.time, *level, *state))
+        })
+        .collect();
     let first = series.readings.first().map_or(until, |first| first.time);
     Ok(told(&changes, first, until))
 }

@@ -34,6 +34,7 @@ use serde::{Deserialize, Serialize};
 use unknown::{Reason, Unknown};
 use watch::Watch;
 
+pub(crate) use motion::recent;
 pub(super) use motion::settled;
 
 /// So many readings in a row with one value are a stuck sensor, or a resolution too coarse to tell.

@@ -12,7 +12,7 @@ const SETTLED: usize = 5;
 const HIGHER: f64 = 1.25;
 
 /// The newest rates, through which the line goes.
-pub(super) fn recent(rates: &[Rate]) -> &[Rate] {
+pub(crate) fn recent(rates: &[Rate]) -> &[Rate] {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,

@@ -1,7 +1,7 @@
 //! What a refit says: the regime, the failure time, and predicted times that moved.
 
 use super::forecast::Forecast;
-use super::motion::recent;
+use super::recent;
 use super::{Track, days};
 use crate::alert::{Cause, Policy};
 use crate::forecast::{HORIZON_DAYS, InverseVelocityLine, Outlook, Passage};
