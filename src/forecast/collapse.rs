@@ -37,7 +37,7 @@ const LAST_VELOCITY: f64 = 93.0;
 /// 40-1938 jumped by 231 mm and lay still.
 const SLOWED: f64 = 0.5;
 /// How far the time of a collapse is the law's where the law is sure that one comes; set with Lanzada in view.
-const TIMED: f64 = 0.5;
+const TIMED: f64 = 0.35;
 /// Inputs lie between plus and minus this.
 const MOST: f64 = 3.0;
 

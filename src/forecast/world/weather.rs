@@ -11,6 +11,9 @@ const MOST_PULSES: usize = 400;
 /// 0.1 to 300 mm/day at Veslemannen.
 const RAIN: (f64, f64) = (0.5, 300.0);
 
+/// What storms are multiples of where the creep is less, mm/day: of any slope, and of one that rain drives.
+const LEAST: (f64, f64) = (0.2, 1.0);
+
 /// A pulse of velocity: it rises within days and fades.
 #[derive(Debug, Clone, Copy)]
 struct Pulse {
@@ -25,6 +28,8 @@ struct Pulse {
 #[derive(Debug)]
 pub(super) struct Weather {
     pulses: Vec<Pulse>,
+    /// What the sizes of pulses are multiples of where the creep is less, mm/day.
+    least: f64,
     /// Standard deviation and memory, days, of ln of the velocity, and where it stands.
     roughness: (f64, f64),
     rough: f64,
@@ -90,6 +95,11 @@ impl Weather {
         };
         Self {
             pulses: pulses(family, end, generator),
+            least: if family == Family::Rain {
+                LEAST.1
+            } else {
+                LEAST.0
+            },
             roughness: (rough, memory),
             rough: 0.0,
             season: (season, between(generator, 0.0, TAU)),
@@ -114,7 +124,7 @@ impl Weather {
         let turn = year + self.swing.1;
         let swing = self.swing.0 * (turn.sin() + 0.4 * (2.0 * turn).sin());
         let pulses: f64 = self.pulses.iter().map(|pulse| pulse.velocity(days)).sum();
-        velocity * (self.rough + season + swing).exp() + creep.max(0.2) * pulses
+        velocity * (self.rough + season + swing).exp() + creep.max(self.least) * pulses
     }
 }
 
