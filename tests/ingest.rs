@@ -137,7 +137,17 @@ fn a_bad_line_or_header_is_named() {
             "a_displacement_mm,x\n1,2\n",
             "column \"time\": there is no such column",
         ),
-        ("time;a_displacement_mm\n1;2\n", "comma-separated"),
+        ("time|a_displacement_mm\n1|2\n", "--time-column"),
+        (
+            "time;a_displacement_mm\n2020-01-01T00:00:00Z;1,5\n",
+            "decimal comma",
+        ),
+        (
+            "time,a_displacement_mm\n01.02.2020 00:00,1\n",
+            "--time-format",
+        ),
+        ("time,a_displacement_mm\n43831.5,1\n", "excel"),
+        ("time,a_displacement_mm\n1577836800,1\n", "unix"),
         ("time,t_days,x\n1,2,3\n", "a second column gives the time"),
         ("time,x,x\n1,2,3\n", "column \"x\": the name stands twice"),
         ("time,x,\n1,2,3\n", "a column without a name"),
@@ -188,7 +198,7 @@ fn bytes_that_are_no_text_are_named_by_their_line() {
     .unwrap();
     let error = read(&file).unwrap_err().to_string();
     assert!(
-        error.contains("line 3") && error.contains("UTF-8"),
+        error.contains("line 3") && error.contains("found"),
         "{error}"
     );
 }

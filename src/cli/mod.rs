@@ -12,6 +12,7 @@ mod fit;
 mod hook;
 mod load;
 mod man;
+mod preview;
 mod replay;
 mod run;
 mod score;
