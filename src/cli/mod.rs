@@ -18,6 +18,7 @@ mod run;
 mod score;
 mod simulate;
 mod state;
+mod status;
 mod sweep;
 mod table;
 mod text;
@@ -42,7 +43,7 @@ enum Command {
     Doctor(doctor::Args),
     #[command(mut_arg("files", |files| files.required_unless_present("state").required(false)))]
     Replay(replay::Args),
-    Status(state::StatusArgs),
+    Status(status::StatusArgs),
     Events(state::EventsArgs),
     Alerts(state::AlertsArgs),
     Backup(state::BackupArgs),
@@ -67,7 +68,7 @@ pub fn main() -> ExitCode {
             Command::Check(args) => check::run(&args),
             Command::Doctor(args) => doctor::run(&args),
             Command::Replay(args) => replay::run(&args),
-            Command::Status(args) => state::status(&args),
+            Command::Status(args) => status::status(&args),
             Command::Events(args) => state::events(&args),
             Command::Alerts(args) => state::alerts(&args),
             Command::Backup(args) => state::backup(&args),
