@@ -90,13 +90,27 @@ fn csv_holds_all_but_averaging_and_provenance_and_convert_says_so() {
 
 #[test]
 fn a_bad_value_is_named_with_file_line_column() {
-    let good = "time,a_displacement_mm,rain_mm\n2020-01-01T00:00:00Z,1,\n";
+    let good = "time,a_displacement_mm,rain_mm\n2020-01-01T00:00:00Z,1,0.5\n";
     for value in ["x", "1e999", "1 mm", "0x10"] {
         let error = error_of(&format!("{good}\n2020-01-02T00:00:00Z,2,{value}\n"));
         for part in ["prism.csv", "line 4", "\"rain_mm\"", value, "finite number"] {
             assert!(error.contains(part), "{part} is not in: {error}");
         }
     }
+}
+
+#[test]
+fn a_column_of_text_is_no_covariate_and_costs_no_reading() {
+    let text = "time,a_displacement_mm,remark,rain_mm\n2020-01-01T00:00:00Z,1,new battery,\n\
+                2020-01-02T00:00:00Z,2,,0.5\n2020-01-03T00:00:00Z,3,fog,0\n";
+    let (recording, _) = read_text(text).unwrap();
+    assert_eq!(recording.series[0].readings.len(), 3);
+    let channels: Vec<&str> = recording
+        .channels
+        .iter()
+        .map(|one| one.name.as_str())
+        .collect();
+    assert_eq!(channels, ["rain_mm"]);
 }
 
 #[test]

@@ -36,7 +36,7 @@ struct Unwatched {
 struct Shown<'a> {
     #[serde(flatten)]
     summary: &'a Summary,
-    #[serde(flatten)]
+    /// None where the files were not looked at.
     preview: Option<&'a Preview>,
 }
 
@@ -65,9 +65,13 @@ pub(super) fn check(file: &Path, output: OutputArgs, looks_at_files: bool) -> an
                 let shown = Shown { summary, preview };
                 writeln!(stdout, "{}", serde_json::to_string(&shown)?)?;
             } else {
-                writeln!(stdout, "{summary}")?;
+                let is_fed = preview
+                    .as_ref()
+                    .is_none_or(|preview| preview.unfed.is_empty());
+                writeln!(stdout, "{}{summary}", if is_fed { "" } else { "not " })?;
                 if let Some(preview) = &preview {
-                    write!(stdout, "{}", text::told(preview))?;
+                    let zone = config::load(file)?.site.time_zone;
+                    write!(stdout, "{}", text::told(preview, &zone))?;
                 }
             }
             stdout.flush()?;

@@ -10,6 +10,7 @@ mod exit;
 mod explain;
 mod fit;
 mod hook;
+mod init;
 mod load;
 mod man;
 mod preview;
@@ -38,6 +39,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Demo(demo::Args),
+    Init(Box<init::Args>),
     Run(run::Args),
     Check(check::Args),
     Doctor(doctor::Args),
@@ -64,6 +66,7 @@ pub fn main() -> ExitCode {
     let done = match Cli::try_parse() {
         Ok(cli) => match cli.command {
             Command::Demo(args) => demo::run(&args),
+            Command::Init(args) => init::run(&args),
             Command::Run(args) => run::run(&args),
             Command::Check(args) => check::run(&args),
             Command::Doctor(args) => doctor::run(&args),

@@ -1,18 +1,20 @@
 //! What a site's files hold, for people.
 
+use crate::reading::Timestamp;
 use crate::runtime::ingest::Meaning;
 use crate::runtime::preview::{BenchmarkView, ColumnView, CovariateView, Preview, SourceView};
 use jiff::SignedDuration;
+use jiff::tz::TimeZone;
 use std::fmt::Write as _;
 
 /// The sources with their columns, the benchmarks and the covariates.
-pub(super) fn told(preview: &Preview) -> String {
+pub(super) fn told(preview: &Preview, zone: &TimeZone) -> String {
     let mut text = String::new();
     for source in &preview.sources {
         tell_source(&mut text, source);
     }
     for benchmark in &preview.benchmarks {
-        tell_benchmark(&mut text, benchmark);
+        tell_benchmark(&mut text, benchmark, zone);
     }
     for covariate in &preview.covariates {
         tell_covariate(&mut text, covariate);
@@ -88,7 +90,7 @@ fn meaning(column: &ColumnView) -> String {
     }
 }
 
-fn tell_benchmark(text: &mut String, benchmark: &BenchmarkView) {
+fn tell_benchmark(text: &mut String, benchmark: &BenchmarkView, zone: &TimeZone) {
     let BenchmarkView {
         id,
         source,
@@ -98,16 +100,34 @@ fn tell_benchmark(text: &mut String, benchmark: &BenchmarkView) {
         first,
         last,
         every_s,
+        suspicions,
     } = benchmark;
     let every = every_s.map_or(String::new(), |seconds| {
         format!(", every {:#}", SignedDuration::from_secs(seconds))
     });
     let _ = writeln!(
         text,
-        "\nbenchmark {id} ({source}): {readings} readings of {quantity}{every}\n  \
-         first {}  {} {unit}\n  last  {}  {} {unit}",
-        first.0, first.1, last.0, last.1
+        "\nbenchmark {id} ({source}): {readings} readings of {quantity}{every}"
     );
+    for (which, (time, value)) in [("first", first), ("last ", last)] {
+        let _ = writeln!(
+            text,
+            "  {which} {time}{}  {value} {unit}",
+            there(*time, zone)
+        );
+    }
+    for line in suspicions {
+        let _ = writeln!(text, "  suspicion: {line}");
+    }
+}
+
+/// The same time on the clocks of the site.
+fn there(time: Timestamp, zone: &TimeZone) -> String {
+    if *zone == TimeZone::UTC {
+        return String::new();
+    }
+    let local = time.to_zoned(zone.clone());
+    local.strftime(" (%Y-%m-%d %H:%M %Z)").to_string()
 }
 
 fn tell_covariate(text: &mut String, covariate: &CovariateView) {

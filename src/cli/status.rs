@@ -1,11 +1,13 @@
 //! `status`: how a site stands, with or without a running daemon.
 
+use super::preview::told;
 use super::state::{InForce, SiteArgs, acknowledged, in_force, orders, silences};
 use super::table::Table;
 use super::text;
 use crate::alert::Level;
 use crate::monitor::{Event, EventKind};
 use crate::reading::{BenchmarkId, Timestamp};
+use crate::runtime::preview::{Preview, preview};
 use crate::store::Store;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -15,6 +17,10 @@ use std::collections::BTreeMap;
 pub(super) struct StatusArgs {
     #[command(flatten)]
     site: SiteArgs,
+    /// Also what the files of its sources hold now, as check shows it: the last row of each benchmark and covariate,
+    /// rows that are refused
+    #[arg(long)]
+    sources: bool,
 }
 
 /// How one benchmark stands.
@@ -52,6 +58,8 @@ struct SiteStatus {
     acknowledged: Vec<Event>,
     /// The orders by which alerts are not told.
     silences: Vec<Event>,
+    /// What the files hold, where that was asked for.
+    preview: Option<Preview>,
 }
 
 /// Says how the site stands.
@@ -84,6 +92,8 @@ pub(super) fn status(args: &StatusArgs) -> anyhow::Result<()> {
         };
         stands(standing, &levels, &refits)
     });
+    let preview = args.sources.then(|| preview(&config));
+    let zone = config.site.time_zone;
     let status = SiteStatus {
         site: config.site.name,
         benchmarks: each.collect(),
@@ -95,8 +105,13 @@ pub(super) fn status(args: &StatusArgs) -> anyhow::Result<()> {
         acknowledged: acknowledged(&orders, &levels),
         silences: silences(&orders),
         alerts: levels.into_values().collect(),
+        preview,
     };
-    args.site.output.print(&status, status_text)
+    args.site.output.print(&status, |status| {
+        let preview = status.preview.as_ref();
+        let files = preview.map_or_else(String::new, |preview| told(preview, &zone));
+        status_text(status) + &files
+    })
 }
 
 fn stands(

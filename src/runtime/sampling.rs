@@ -1,4 +1,4 @@
-//! How often the benchmarks of a site are measured, by what lies in its files now.
+//! What is doubtful in the readings of a site, by what lies in its files now: above all how rarely it is measured.
 
 use super::preview::Preview;
 use crate::config::Config;
@@ -8,7 +8,8 @@ use jiff::SignedDuration;
 /// acceleration needs several, and the last of them must leave time to go.
 const READINGS_AN_EVACUATION: i32 = 4;
 
-/// A line for each benchmark that is measured too rarely for its evacuation time to mean anything, or not at all.
+/// A line for each benchmark that is measured too rarely for its evacuation time to mean anything, or not at all, or
+/// whose readings hardly mean what was intended.
 pub fn doubts(config: &Config, preview: &Preview) -> Vec<String> {
     let settings = &config.settings;
     let lines = preview.benchmarks.iter().filter_map(|benchmark| {
@@ -24,6 +25,11 @@ pub fn doubts(config: &Config, preview: &Preview) -> Vec<String> {
             )
         })
     });
+    let suspicions = preview.benchmarks.iter().flat_map(|benchmark| {
+        let id = benchmark.id.as_str();
+        let lines = benchmark.suspicions.iter();
+        lines.map(move |line| format!("benchmark {id:?}: {line}"))
+    });
     let absent = preview.unfed.iter().map(|unfed| unfed.text.clone());
-    lines.chain(absent).collect()
+    lines.chain(suspicions).chain(absent).collect()
 }

@@ -1,16 +1,19 @@
 //! What the files of a site hold now, as the daemon would take it: a look before it starts.
 
+mod suspicion;
 mod view;
 
 pub use view::{
     BenchmarkView, ColumnView, CovariateView, LayoutView, Preview, Refusal, SourceView, Unfed,
 };
 
+use super::clock;
 use super::ingest::{IngestError, Item, Meaning, ReadOptions, is_packed, read_files, unpack};
 use super::tail::{Arrival, BadLine, Decoder, Fed, TextReader, list};
 use crate::config::{Config, Source, SourceKind};
 use crate::monitor::Input;
 use crate::reading::{BenchmarkId, LocalClock, Quantity, Recording, SummerTime, Timestamp};
+use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::{self, Read};
@@ -31,10 +34,15 @@ pub fn preview(config: &Config) -> Preview {
         look.views.push(view);
     }
     let unfed = look.unfed(config);
+    let now = clock::now();
     Preview {
         is_whole: look.values <= MOST_VALUES,
         sources: look.views,
-        benchmarks: look.benchmarks.into_values().map(Track::finish).collect(),
+        benchmarks: look
+            .benchmarks
+            .into_values()
+            .map(|track| track.finish(now))
+            .collect(),
         covariates: look.covariates.into_values().collect(),
         unwatched: look.unwatched,
         unfed,
@@ -44,7 +52,7 @@ pub fn preview(config: &Config) -> Preview {
 #[derive(Debug)]
 struct Track {
     view: BenchmarkView,
-    latest: BTreeSet<Timestamp>,
+    readings: Vec<(Timestamp, f64)>,
 }
 
 #[derive(Debug, Default)]
@@ -104,6 +112,7 @@ impl Look {
             }
         }
         view.refused = refused.into_values().collect();
+        view.refused.sort_by_key(|refusal| Reverse(refusal.rows));
         view
     }
 
@@ -259,8 +268,9 @@ impl Look {
                     first: here,
                     last: here,
                     every_s: None,
+                    suspicions: Vec::new(),
                 },
-                latest: BTreeSet::new(),
+                readings: Vec::new(),
             });
             track.take(here);
         }
@@ -352,17 +362,17 @@ impl Track {
         if here.0 >= view.last.0 {
             view.last = here;
         }
-        self.latest.insert(here.0);
-        if self.latest.len() > LATEST {
-            self.latest.pop_first();
-        }
+        self.readings.push(here);
     }
 
-    fn finish(mut self) -> BenchmarkView {
-        let pairs = self.latest.iter().zip(self.latest.iter().skip(1));
-        let mut gaps: Vec<i64> = pairs.map(|(a, b)| b.duration_since(*a).as_secs()).collect();
+    fn finish(mut self, now: Timestamp) -> BenchmarkView {
+        let times: BTreeSet<Timestamp> = self.readings.iter().map(|reading| reading.0).collect();
+        let latest: Vec<Timestamp> = times.into_iter().rev().take(LATEST).collect();
+        let pairs = latest.iter().zip(latest.iter().skip(1));
+        let mut gaps: Vec<i64> = pairs.map(|(b, a)| b.duration_since(*a).as_secs()).collect();
         gaps.sort_unstable();
         self.view.every_s = gaps.get(gaps.len() / 2).copied();
+        self.view.suspicions = suspicion::suspicions(&self.view, &self.readings, now);
         self.view
     }
 }

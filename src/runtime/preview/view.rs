@@ -93,6 +93,8 @@ pub struct BenchmarkView {
     pub last: (Timestamp, f64),
     /// The median time between the latest, s.
     pub every_s: Option<i64>,
+    /// What in them hardly means what was intended, with its evidence.
+    pub suspicions: Vec<String>,
 }
 
 /// One covariate.
