@@ -40,8 +40,19 @@ fn the_example_config_is_right_and_says_what_it_means() {
     assert_eq!(config.site.name, "Monte Toc");
     assert_eq!(config.site.state_dir, file.parent().unwrap().join("state"));
     let kinds: Vec<SourceKind> = config.sources.iter().map(|source| source.kind).collect();
-    assert_eq!(kinds, [SourceKind::Csv, SourceKind::Toa5, SourceKind::Mcap]);
-    let campbell = &config.sources[1].conventions;
+    assert_eq!(
+        kinds,
+        [
+            SourceKind::Csv,
+            SourceKind::Csv,
+            SourceKind::Toa5,
+            SourceKind::Mcap
+        ]
+    );
+    let office = &config.sources[1].dialect;
+    assert_eq!(office.time_columns, ["Date", "Time"]);
+    assert_eq!(office.number("12,5"), Some(12.5));
+    let campbell = &config.sources[2].conventions;
     assert_eq!(campbell.clock.summer_time, SummerTime::Standard);
     assert_eq!(campbell.clock.zone, Some(config.site.time_zone.clone()));
     assert!(campbell.missing.has("9999.0") && campbell.missing.has("BAD"));
@@ -234,6 +245,42 @@ fn check_warns_when_the_sampling_cannot_protect_and_when_the_hook_is_missing() {
     );
     assert!(warnings.contains("there is no program"), "{warnings}");
     assert!(warnings.contains("there is no folder"), "{warnings}");
+}
+
+#[test]
+fn how_a_source_writes_its_tables_is_checked() {
+    let source = |kind: &str, lines: &str| {
+        format!("[[source]]\nid = \"b\"\nkind = \"{kind}\"\npath = \"b.txt\"\n{lines}")
+    };
+    let cases = [
+        (
+            "csv",
+            "delimiter = \"|\"\n",
+            "14:13: error: source.delimiter = \"|\" cannot be used; write comma, semicolon or tab",
+        ),
+        (
+            "csv",
+            "time_format = \"dd.mm.yyyy\"\n",
+            "14:15: error: source.time_format = \"dd.mm.yyyy\" cannot be used; write a pattern",
+        ),
+        (
+            "csv",
+            "time_column = 1\n",
+            "14:15: error: source.time_column is of type integer, not a string",
+        ),
+        (
+            "toa5",
+            "decimal = \"comma\"\n",
+            "14:11: error: source.decimal does nothing for this kind; leave it out",
+        ),
+    ];
+    for (kind, lines, expected) in cases {
+        let found = problem(&source(kind, lines));
+        assert!(
+            found.starts_with(&format!("site.toml:{expected}")),
+            "{found}"
+        );
+    }
 }
 
 #[test]

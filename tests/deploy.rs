@@ -58,9 +58,9 @@ fn the_unit_waits_for_readiness_feeds_the_watchdog_and_checks_before_it_starts_o
     for line in [
         "Type=notify",
         "WatchdogSec=120",
-        "ExecStartPre=slipwatch check /etc/slipwatch/site.toml",
+        "ExecStartPre=slipwatch check --config-only /etc/slipwatch/site.toml",
         "ExecStart=slipwatch run /etc/slipwatch/site.toml",
-        "ExecReload=slipwatch check /etc/slipwatch/site.toml",
+        "ExecReload=slipwatch check --config-only /etc/slipwatch/site.toml",
         "ExecReload=kill -HUP $MAINPID",
         "RestartPreventExitStatus=78",
     ] {

@@ -90,13 +90,27 @@ fn csv_holds_all_but_averaging_and_provenance_and_convert_says_so() {
 
 #[test]
 fn a_bad_value_is_named_with_file_line_column() {
-    let good = "time,a_displacement_mm,rain_mm\n2020-01-01T00:00:00Z,1,\n";
+    let good = "time,a_displacement_mm,rain_mm\n2020-01-01T00:00:00Z,1,0.5\n";
     for value in ["x", "1e999", "1 mm", "0x10"] {
         let error = error_of(&format!("{good}\n2020-01-02T00:00:00Z,2,{value}\n"));
         for part in ["prism.csv", "line 4", "\"rain_mm\"", value, "finite number"] {
             assert!(error.contains(part), "{part} is not in: {error}");
         }
     }
+}
+
+#[test]
+fn a_column_of_text_is_no_covariate_and_costs_no_reading() {
+    let text = "time,a_displacement_mm,remark,rain_mm\n2020-01-01T00:00:00Z,1,new battery,\n\
+                2020-01-02T00:00:00Z,2,,0.5\n2020-01-03T00:00:00Z,3,fog,0\n";
+    let (recording, _) = read_text(text).unwrap();
+    assert_eq!(recording.series[0].readings.len(), 3);
+    let channels: Vec<&str> = recording
+        .channels
+        .iter()
+        .map(|one| one.name.as_str())
+        .collect();
+    assert_eq!(channels, ["rain_mm"]);
 }
 
 #[test]
@@ -137,7 +151,17 @@ fn a_bad_line_or_header_is_named() {
             "a_displacement_mm,x\n1,2\n",
             "column \"time\": there is no such column",
         ),
-        ("time;a_displacement_mm\n1;2\n", "comma-separated"),
+        ("time|a_displacement_mm\n1|2\n", "--time-column"),
+        (
+            "time;a_displacement_mm\n2020-01-01T00:00:00Z;1,5\n",
+            "decimal comma",
+        ),
+        (
+            "time,a_displacement_mm\n01.02.2020 00:00,1\n",
+            "--time-format",
+        ),
+        ("time,a_displacement_mm\n43831.5,1\n", "excel"),
+        ("time,a_displacement_mm\n1577836800,1\n", "unix"),
         ("time,t_days,x\n1,2,3\n", "a second column gives the time"),
         ("time,x,x\n1,2,3\n", "column \"x\": the name stands twice"),
         ("time,x,\n1,2,3\n", "a column without a name"),
@@ -188,7 +212,7 @@ fn bytes_that_are_no_text_are_named_by_their_line() {
     .unwrap();
     let error = read(&file).unwrap_err().to_string();
     assert!(
-        error.contains("line 3") && error.contains("UTF-8"),
+        error.contains("line 3") && error.contains("found"),
         "{error}"
     );
 }

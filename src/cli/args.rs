@@ -2,12 +2,15 @@
 
 use super::exit;
 use crate::alert::Policy;
-use crate::config::value;
+use crate::config::{Config, value};
 use crate::reading::{
-    BenchmarkId, Conventions, Disorder, LocalClock, MissingValues, Quantity, Recording,
-    SelectError, Series, SummerTime, Timestamp,
+    BenchmarkId, Conventions, DecimalMark, Delimiter, Dialect, Disorder, LocalClock, MissingValues,
+    Quantity, Recording, SelectError, Series, SummerTime, TimeFormat, Timestamp,
 };
-use crate::runtime::ingest::{ColumnMap, IngestError, ReadOptions, read_channels, read_files};
+use crate::runtime::ingest::{
+    ColumnMap, FilesRead, IngestError, ReadOptions, read_channels, read_each, read_with_remarks,
+};
+use crate::runtime::tail::options_of;
 use jiff::SignedDuration;
 use jiff::tz::TimeZone;
 use serde::Serialize;
@@ -74,6 +77,39 @@ pub struct FileArgs {
     /// A further mark for a missing value, such as -7999
     #[arg(long, value_name = "VALUE", allow_hyphen_values = true)]
     pub missing: Vec<String>,
+    /// How the tables are written.
+    #[command(flatten)]
+    pub dialect: DialectArgs,
+}
+
+/// How tables of text are written, where it is not as in CSV with RFC 3339 times.
+#[derive(Debug, Clone, Default, clap::Args)]
+pub struct DialectArgs {
+    /// What parts the cells of a table: comma, semicolon or tab [default: as in the header]
+    #[arg(long, value_name = "MARK", value_parser = Delimiter::parse)]
+    pub delimiter: Option<Delimiter>,
+    /// What stands before the decimals: point or comma [default: point]
+    #[arg(long, value_name = "MARK", value_parser = DecimalMark::parse)]
+    pub decimal: Option<DecimalMark>,
+    /// The column that gives the time; twice where date and time stand in two [default: time or t_days]
+    #[arg(long = "time-column", value_name = "NAME")]
+    pub time_columns: Vec<String>,
+    /// How times are written: a pattern such as "%d.%m.%Y %H:%M", rfc3339, unix, unix_ms or excel
+    /// [default: rfc3339]
+    #[arg(long, value_name = "FORMAT", value_parser = TimeFormat::parse)]
+    pub time_format: Option<TimeFormat>,
+}
+
+impl DialectArgs {
+    /// The same for the readers.
+    pub fn dialect(&self) -> Dialect {
+        Dialect {
+            delimiter: self.delimiter,
+            decimal: self.decimal.unwrap_or_default(),
+            time_columns: self.time_columns.clone(),
+            time_format: self.time_format.clone().unwrap_or_default(),
+        }
+    }
 }
 
 impl FileArgs {
@@ -90,6 +126,7 @@ impl FileArgs {
             columns: self.columns.clone(),
             averaging: self.averaging,
             conventions: Conventions { clock, missing },
+            dialect: self.dialect.dialect(),
             ..ReadOptions::default()
         }
     }
@@ -134,12 +171,44 @@ impl ReadingArgs {
     /// Reads all files, and warns on stderr of rows that were not in order.
     ///
     /// # Errors
-    /// [`IngestError`] as [`read_files`] and [`read_channels`].
+    /// [`IngestError`] as [`read_files`](crate::runtime::ingest::read_files) and [`read_channels`].
     pub fn load(&self) -> Result<Loaded, IngestError> {
         let options = self.file.options();
-        let (mut recording, mut disorder) = read_files(&self.files, &options)?;
+        self.joined(read_with_remarks(&self.files, &options)?, &options)
+    }
+
+    /// The same, where the files of a site's sources are written as its config says.
+    ///
+    /// # Errors
+    /// As [`ReadingArgs::load`].
+    pub fn load_as_of(&self, config: &Config) -> Result<Loaded, IngestError> {
+        let options = self.file.options();
+        let of = |file: &PathBuf| {
+            let source = config
+                .sources
+                .iter()
+                .find(|source| source.pattern.is_of(file));
+            let own = source.map(|source| options_of(source, &config.benchmarks, file));
+            own.unwrap_or_else(|| options.clone())
+        };
+        let own: Vec<ReadOptions> = self.files.iter().map(of).collect();
+        let files = self.files.iter().map(PathBuf::as_path).zip(&own);
+        self.joined(read_each(&files.collect::<Vec<_>>())?, &options)
+    }
+
+    /// With the covariates that stand in files of their own.
+    fn joined(&self, read: FilesRead, options: &ReadOptions) -> Result<Loaded, IngestError> {
+        let FilesRead {
+            mut recording,
+            mut disorder,
+            remarks,
+            ..
+        } = read;
+        for (file, remark) in remarks {
+            exit::complain(&format_args!("{}: {remark}", file.display()));
+        }
         if !self.channels.is_empty() {
-            let (channels, met) = read_channels(&self.channels, &options)?;
+            let (channels, met) = read_channels(&self.channels, options)?;
             let covariates = Recording {
                 channels,
                 ..Recording::default()

@@ -1,39 +1,81 @@
-//! `check CONFIG`: whether the site file is right.
+//! `check CONFIG`: whether the site file is right, and what its files would be taken for.
 
 use super::args::{Format, OutputArgs};
-use super::exit;
-use crate::config::{self, ConfigError};
+use super::{exit, preview as text};
+use crate::config::{self, ConfigError, Summary};
+use crate::runtime::preview::{Preview, preview};
 use crate::runtime::sampling;
+use serde::Serialize;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Check a site's config and say everything that is wrong with it
+/// Check a site's config and say everything that is wrong with it, and what its files hold
+///
+/// Exits 1 where a benchmark is fed by no file: it would go unwatched.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// The site's config
     #[arg(value_name = "CONFIG")]
     config: PathBuf,
+    /// Look at the config alone, not at the files: for a service that must start while a logger is silent
+    #[arg(long)]
+    config_only: bool,
     #[command(flatten)]
     output: OutputArgs,
+}
+
+/// What is fed by nothing.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: fed by nothing, see the warnings: {}", config.display(), what.join(", "))]
+struct Unwatched {
+    config: PathBuf,
+    what: Vec<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct Shown<'a> {
+    #[serde(flatten)]
+    summary: &'a Summary,
+    /// None where the files were not looked at.
+    preview: Option<&'a Preview>,
 }
 
 /// Says what the site file amounts to. Warnings and problems go to stderr; with JSON the problems
 /// go to stdout as well.
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
-    let json = args.output.format == Format::Json;
+    check(&args.config, args.output, !args.config_only)
+}
+
+/// The same for another command that has written a config.
+pub(super) fn check(file: &Path, output: OutputArgs, looks_at_files: bool) -> anyhow::Result<()> {
+    let json = output.format == Format::Json;
     let mut stdout = std::io::stdout().lock();
-    match config::check(&args.config) {
+    match config::check(file) {
         Ok(mut summary) => {
-            summary.warnings.extend(slow_sampling(&args.config)?);
+            let preview = if looks_at_files {
+                Some(look(file, &mut summary)?)
+            } else {
+                None
+            };
             for warning in &summary.warnings {
                 exit::complain(&warning);
             }
             if json {
-                writeln!(stdout, "{}", serde_json::to_string(&summary)?)?;
+                let (summary, preview) = (&summary, preview.as_ref());
+                let shown = Shown { summary, preview };
+                writeln!(stdout, "{}", serde_json::to_string(&shown)?)?;
             } else {
-                writeln!(stdout, "{summary}")?;
+                let is_fed = preview
+                    .as_ref()
+                    .is_none_or(|preview| preview.unfed.is_empty());
+                writeln!(stdout, "{}{summary}", if is_fed { "" } else { "not " })?;
+                if let Some(preview) = &preview {
+                    let zone = config::load(file)?.site.time_zone;
+                    write!(stdout, "{}", text::told(preview, &zone))?;
+                }
             }
-            Ok(())
+            stdout.flush()?;
+            preview.map_or(Ok(()), |preview| all_are_fed(file, &preview))
         }
         Err(error) => {
             if json && let ConfigError::Invalid { problems } = &error {
@@ -45,12 +87,30 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
 }
 
-/// By what lies in the sources' files now.
-fn slow_sampling(file: &Path) -> Result<Vec<String>, ConfigError> {
+/// Looks at what lies in the sources' files now; doubts about it become warnings.
+fn look(file: &Path, summary: &mut Summary) -> Result<Preview, ConfigError> {
     let config = config::load(file)?;
-    let lines = sampling::doubts(&config).into_iter();
+    let preview = preview(&config);
     let place = file.display();
-    Ok(lines
-        .map(|line| format!("{place}: warning: {line}"))
-        .collect())
+    let doubts = sampling::doubts(&config, &preview).into_iter();
+    summary
+        .warnings
+        .extend(doubts.map(|line| format!("{place}: warning: {line}")));
+    Ok(preview)
+}
+
+fn all_are_fed(config: &Path, preview: &Preview) -> anyhow::Result<()> {
+    if preview.unfed.is_empty() {
+        return Ok(());
+    }
+    let what = preview.unfed.iter().map(|unfed| match &unfed.benchmark {
+        Some(benchmark) => format!("benchmark {:?}", benchmark.as_str()),
+        None if unfed.source.is_empty() => "the site".to_owned(),
+        None => format!("source {:?}", unfed.source),
+    });
+    Err(Unwatched {
+        config: config.to_owned(),
+        what: what.collect(),
+    }
+    .into())
 }

@@ -3,6 +3,7 @@
 use super::args::{OutputArgs, ReadingArgs};
 use super::table::{Table, number, time};
 use crate::alert::Policy;
+use crate::config::value;
 use crate::fit::Exponent;
 use crate::inversion::{
     Estimate, FitReport, Inversion, Options, RegimeReport, TogetherReport, UnderPrior, together,
@@ -31,10 +32,10 @@ pub(super) struct Args {
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub(super) struct InversionArgs {
     /// Use no reading before this
-    #[arg(long, value_name = "TIME")]
+    #[arg(long, value_name = "TIME", value_parser = value::instant)]
     from: Option<Timestamp>,
     /// Use no reading after this
-    #[arg(long, value_name = "TIME")]
+    #[arg(long, value_name = "TIME", value_parser = value::instant)]
     until: Option<Timestamp>,
     /// Hold m at this value
     #[arg(long, value_name = "m=M", value_parser = fixed)]

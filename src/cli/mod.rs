@@ -10,14 +10,17 @@ mod exit;
 mod explain;
 mod fit;
 mod hook;
+mod init;
 mod load;
 mod man;
 mod plot;
+mod preview;
 mod replay;
 mod run;
 mod score;
 mod simulate;
 mod state;
+mod status;
 mod sweep;
 mod table;
 mod text;
@@ -37,12 +40,13 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Demo(demo::Args),
+    Init(Box<init::Args>),
     Run(run::Args),
     Check(check::Args),
     Doctor(doctor::Args),
     #[command(mut_arg("files", |files| files.required_unless_present("state").required(false)))]
     Replay(replay::Args),
-    Status(state::StatusArgs),
+    Status(status::StatusArgs),
     Events(state::EventsArgs),
     Alerts(state::AlertsArgs),
     Backup(state::BackupArgs),
@@ -64,11 +68,12 @@ pub fn main() -> ExitCode {
     let done = match Cli::try_parse() {
         Ok(cli) => match cli.command {
             Command::Demo(args) => demo::run(&args),
+            Command::Init(args) => init::run(&args),
             Command::Run(args) => run::run(&args),
             Command::Check(args) => check::run(&args),
             Command::Doctor(args) => doctor::run(&args),
             Command::Replay(args) => replay::run(&args),
-            Command::Status(args) => state::status(&args),
+            Command::Status(args) => status::status(&args),
             Command::Events(args) => state::events(&args),
             Command::Alerts(args) => state::alerts(&args),
             Command::Backup(args) => state::backup(&args),

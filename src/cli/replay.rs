@@ -3,9 +3,9 @@
 use super::args::{Format, OutputArgs, ReadingArgs};
 use super::run::asynchronous;
 use super::{exit, text};
-use crate::config::{self, Config};
+use crate::config::{self, Config, value};
 use crate::monitor::{Event, Settings};
-use crate::reading::{Quantity, Recording, Timestamp};
+use crate::reading::{BenchmarkId, Quantity, Recording, SelectError, Timestamp};
 use crate::runtime::log::{self, LogFormat};
 use crate::runtime::replay::{self, Pace, Plan};
 use crate::runtime::sandbox::OURSELVES;
@@ -32,10 +32,10 @@ pub(super) struct Args {
     #[arg(long, value_name = "max|N", default_value = "max", value_parser = pace)]
     speed: Pace,
     /// Play what the daemon of this state folder took in, in the order in which it did, instead of files
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["config", "hooks"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["config", "hooks", "quantity"])]
     state: Option<PathBuf>,
     /// Stop at this time of the data
-    #[arg(long, value_name = "TIME")]
+    #[arg(long, value_name = "TIME", value_parser = value::instant)]
     until: Option<Timestamp>,
     /// Run the hooks of --config, told that it is an exercise
     #[arg(long, requires = "config")]
@@ -57,7 +57,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     for warning in config.iter().flat_map(|config| &config.warnings) {
         exit::complain(warning);
     }
-    let mut recording = args.readings.load()?.recording;
+    let loaded = match &config {
+        Some(config) => args.readings.load_as_of(config)?,
+        None => args.readings.load()?,
+    };
+    let mut recording = loaded.recording;
     args.readings.narrow(&mut recording)?;
     if let Some(config) = &config {
         lend_averaging(&mut recording, config);
@@ -82,14 +86,32 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     })
 }
 
-/// Prints the events of the stored input.
+/// Prints the events of the stored input; with `--benchmark` those of one benchmark and of the site as a whole.
 fn run_state(args: &Args, folder: &Path) -> anyhow::Result<()> {
     let store = Store::look(folder)
         .with_context(|| format!("cannot read the state in {}", folder.display()))?;
+    let wanted = args.readings.benchmark.as_ref().map(BenchmarkId::new);
+    if let Some(asked) = &wanted {
+        let known = store.benchmarks()?;
+        if !known.contains_key(asked) {
+            return Err(SelectError::NoSuch {
+                asked: format!("benchmark {asked}"),
+                available: known.keys().map(ToString::to_string).collect(),
+            }
+            .into());
+        }
+    }
+    let is_wanted =
+        |event: &Event| wanted.is_none() || event.benchmark.is_none() || event.benchmark == wanted;
     let mut stdout = io::stdout().lock();
     asynchronous()?.block_on(async {
         let shutdown = Shutdown::on_signals().context("cannot listen for signals")?;
-        let mut print = |event: &Event| print(&mut stdout, event, args.output.format);
+        let mut print = |event: &Event| {
+            if is_wanted(event) {
+                print(&mut stdout, event, args.output.format)?;
+            }
+            Ok(())
+        };
         replay::replay_state(&store, args.until, &shutdown, &mut print)?;
         Ok(())
     })

@@ -2,47 +2,39 @@
 
 use super::args::{Format, OutputArgs};
 use super::exit::UsageError;
-use super::table::Table;
 use super::text;
 use crate::alert::Level;
 use crate::config::{self, Config, value};
 use crate::monitor::{AlertState, Event, EventKind, Order};
-use crate::reading::{BenchmarkId, Timestamp};
+use crate::reading::BenchmarkId;
 use crate::runtime::clock;
 use crate::store::Store;
 use anyhow::Context;
 use clap::Subcommand;
+use clap::builder::PossibleValuesParser;
 use jiff::SignedDuration;
-use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::PathBuf;
 
 /// `--config`.
 #[derive(Debug, clap::Args)]
-struct SiteArgs {
+pub(super) struct SiteArgs {
     /// The site whose daemon, or whose state, is asked
     #[arg(long, value_name = "CONFIG")]
     config: PathBuf,
     #[command(flatten)]
-    output: OutputArgs,
+    pub(super) output: OutputArgs,
 }
 
 impl SiteArgs {
-    fn open(&self) -> anyhow::Result<(Config, Store)> {
+    pub(super) fn open(&self) -> anyhow::Result<(Config, Store)> {
         let config = config::load(&self.config)?;
         let folder = &config.site.state_dir;
         let store = Store::look(folder)
             .with_context(|| format!("cannot read the state in {}", folder.display()))?;
         Ok((config, store))
     }
-}
-
-/// Say what a site's benchmarks do: level, regime, failure time, newest reading
-#[derive(Debug, clap::Args)]
-pub(super) struct StatusArgs {
-    #[command(flatten)]
-    site: SiteArgs,
 }
 
 /// Print a site's events, oldest first, as `replay` does
@@ -54,7 +46,7 @@ pub(super) struct EventsArgs {
     #[arg(long, value_name = "ID")]
     benchmark: Option<String>,
     /// Only of this kind, such as alert
-    #[arg(long, value_name = "KIND")]
+    #[arg(long, value_name = "KIND", value_parser = PossibleValuesParser::new(EventKind::NAMES))]
     kind: Option<String>,
     /// Wait for more, until interrupted
     #[arg(long)]
@@ -148,153 +140,10 @@ pub(super) fn backup(args: &BackupArgs) -> anyhow::Result<()> {
     })
 }
 
-/// How one benchmark stands.
-#[derive(Debug, Serialize)]
-struct Standing {
-    benchmark: BenchmarkId,
-    level: Level,
-    /// Since when.
-    since: Option<Timestamp>,
-    /// Since when the monitor cannot tell: no data, a sensor fault.
-    unknown_since: Option<Timestamp>,
-    /// Whether nothing can be said of it now; so it is before its first reading.
-    is_unknown: bool,
-    newest_reading: Option<Timestamp>,
-    regime: Option<String>,
-    velocity_mm_per_day: Option<f64>,
-    failure_time: Option<Timestamp>,
-    chance_within_evacuation_time: Option<f64>,
-}
-
-#[derive(Debug, Serialize)]
-struct SiteStatus {
-    site: String,
-    benchmarks: Vec<Standing>,
-    steps: i64,
-    alerts_waiting: usize,
-    bytes: u64,
-    /// Since when nothing can be said of the site: too many benchmarks are unknown, or the clock is wrong.
-    site_unknown_since: Option<Timestamp>,
-    /// The orders by which alerts are not told.
-    silences: Vec<Event>,
-}
-
-/// Says how the site stands.
-pub(super) fn status(args: &StatusArgs) -> anyhow::Result<()> {
-    let (config, store) = args.site.open()?;
-    let levels = in_force(&store)?;
-    let mut refits = BTreeMap::new();
-    for body in store.latest("refit")? {
-        let event: Event = serde_json::from_str(&body)?;
-        if let Some(benchmark) = event.benchmark {
-            refits.insert(benchmark, event.kind);
-        }
-    }
-    let mut newest: BTreeMap<BenchmarkId, Option<Timestamp>> = BTreeMap::new();
-    newest.extend(config.benchmarks.iter().map(|one| (one.id.clone(), None)));
-    let read = store.benchmarks()?.into_iter();
-    newest.extend(read.map(|(benchmark, time)| (benchmark, Some(time))));
-    let each = newest.into_iter().map(|(benchmark, newest)| {
-        let standing = Standing {
-            level: Level::Green,
-            since: None,
-            unknown_since: None,
-            is_unknown: newest.is_none(),
-            newest_reading: newest,
-            regime: None,
-            velocity_mm_per_day: None,
-            failure_time: None,
-            chance_within_evacuation_time: None,
-            benchmark,
-        };
-        stands(standing, &levels, &refits)
-    });
-    let status = SiteStatus {
-        site: config.site.name,
-        benchmarks: each.collect(),
-        steps: store.last_step(),
-        alerts_waiting: store.waiting()?.len(),
-        bytes: store.bytes()?,
-        site_unknown_since: levels.get(&(None, Level::Unknown)).map(|event| event.time),
-        silences: silences(&store)?,
-    };
-    args.site.output.print(&status, status_text)
-}
-
-type InForce = BTreeMap<(Option<BenchmarkId>, Level), Event>;
-
-fn stands(
-    mut standing: Standing,
-    levels: &InForce,
-    refits: &BTreeMap<BenchmarkId, EventKind>,
-) -> Standing {
-    for ((place, level), event) in levels {
-        if place.as_ref() != Some(&standing.benchmark) {
-            continue;
-        }
-        if *level == Level::Unknown {
-            (standing.unknown_since, standing.is_unknown) = (Some(event.time), true);
-        } else {
-            (standing.level, standing.since) = (*level, Some(event.time));
-        }
-    }
-    if let Some(EventKind::Refit {
-        regime,
-        failure_time,
-        velocity_mm_per_day,
-        chance_within_evacuation_time,
-        ..
-    }) = refits.get(&standing.benchmark)
-    {
-        standing.regime = Some(regime.label.to_string());
-        standing.velocity_mm_per_day = *velocity_mm_per_day;
-        standing.failure_time = failure_time.median;
-        standing.chance_within_evacuation_time = Some(*chance_within_evacuation_time);
-    }
-    standing
-}
-
-fn status_text(status: &SiteStatus) -> String {
-    let mut table = Table::headed([
-        "benchmark",
-        "level",
-        "since",
-        "newest reading",
-        "regime",
-        "mm/day",
-        "failure (median)",
-    ]);
-    let time = |time: Option<Timestamp>| time.map_or_else(|| "-".to_owned(), text::minute);
-    for one in &status.benchmarks {
-        let velocity = one
-            .velocity_mm_per_day
-            .map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
-        table.row([
-            text::plain(one.benchmark.as_str()),
-            if one.is_unknown {
-                format!("{}, unknown", one.level)
-            } else {
-                one.level.to_string()
-            },
-            time(one.unknown_since.or(one.since)),
-            time(one.newest_reading),
-            one.regime.clone().unwrap_or_else(|| "-".to_owned()),
-            velocity,
-            time(one.failure_time),
-        ]);
-    }
-    let silences = status.silences.iter();
-    let silences: String = silences.map(|event| text::line(event) + "\n").collect();
-    format!(
-        "{}: {} inputs taken, {} alerts wait for a hook\n{silences}\n{table}",
-        text::plain(&status.site),
-        status.steps,
-        status.alerts_waiting
-    )
-}
+pub(super) type InForce = BTreeMap<(Option<BenchmarkId>, Level), Event>;
 
 /// The alerts in force: by benchmark and level, of each benchmark the highest, and `unknown` beside it.
-fn in_force(store: &Store) -> anyhow::Result<InForce> {
+pub(super) fn in_force(store: &Store) -> anyhow::Result<InForce> {
     let mut standing = InForce::new();
     let mut after = 0;
     loop {
@@ -411,30 +260,54 @@ fn limit(span: SignedDuration, longest: SignedDuration) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The orders in force by which alerts are not told, as they were given.
-fn silences(store: &Store) -> anyhow::Result<Vec<Event>> {
-    let now = clock::now();
-    let mut standing: Vec<Event> = Vec::new();
+/// Every order that was taken, oldest first.
+pub(super) fn orders(store: &Store) -> anyhow::Result<Vec<Event>> {
+    let mut orders = Vec::new();
     let mut after = 0;
     loop {
         let events = store.events(after, Some("order"), None)?;
         let Some((last, _)) = events.last() else {
-            return Ok(standing);
+            return Ok(orders);
         };
         after = *last;
         for (_, body) in &events {
-            let event: Event = serde_json::from_str(body)?;
-            let EventKind::Order { order, until, .. } = &event.kind else {
-                continue;
-            };
-            if order == "unsilence" {
-                let place = &event.benchmark;
-                standing.retain(|one| place.is_some() && one.benchmark != *place);
-            } else if until.is_some_and(|until| until > now) {
-                standing.push(event);
-            }
+            orders.push(serde_json::from_str(body)?);
         }
     }
+}
+
+/// The orders in force by which alerts are not told, as they were given.
+pub(super) fn silences(orders: &[Event]) -> Vec<Event> {
+    let now = clock::now();
+    let mut standing: Vec<Event> = Vec::new();
+    for event in orders {
+        let EventKind::Order { order, until, .. } = &event.kind else {
+            continue;
+        };
+        if order == "unsilence" {
+            let place = &event.benchmark;
+            standing.retain(|one| place.is_some() && one.benchmark != *place);
+        } else if until.is_some_and(|until| until > now) {
+            standing.push(event.clone());
+        }
+    }
+    standing
+}
+
+/// Who has seen what is in force: acknowledgements since its alert was called.
+pub(super) fn acknowledged(orders: &[Event], in_force: &InForce) -> Vec<Event> {
+    let is_of = |ack: &Event, place: &Option<BenchmarkId>, alert: &Event| {
+        (ack.benchmark.is_none() || ack.benchmark == *place) && ack.time >= alert.time
+    };
+    let is_one = |event: &&Event| {
+        let is_ack =
+            matches!(&event.kind, EventKind::Order { order, .. } if order == "acknowledge");
+        is_ack
+            && in_force
+                .iter()
+                .any(|((place, _), alert)| is_of(event, place, alert))
+    };
+    orders.iter().filter(is_one).cloned().collect()
 }
 
 fn redeliver(site: &SiteArgs) -> anyhow::Result<()> {
@@ -451,8 +324,10 @@ fn redeliver(site: &SiteArgs) -> anyhow::Result<()> {
 fn list(site: &SiteArgs) -> anyhow::Result<()> {
     let (_, store) = site.open()?;
     let mut stdout = std::io::stdout().lock();
-    let mut standing: Vec<Event> = in_force(&store)?.into_values().collect();
-    standing.extend(silences(&store)?);
+    let (in_force, orders) = (in_force(&store)?, orders(&store)?);
+    let mut standing = silences(&orders);
+    standing.extend(acknowledged(&orders, &in_force));
+    standing.extend(in_force.into_values());
     standing.sort_by_key(|event| event.time);
     for event in &standing {
         match site.output.format {

@@ -22,7 +22,7 @@ pub use vector::Vector;
 
 use crate::alert::Level;
 use crate::monitor::Settings;
-use crate::reading::{BenchmarkId, Conventions, Quantity, Unit};
+use crate::reading::{BenchmarkId, Conventions, Dialect, Quantity, Unit};
 use jiff::SignedDuration;
 use problem::Notebook;
 use std::cell::RefCell;
@@ -106,6 +106,8 @@ pub struct Source {
     pub pattern: FilePattern,
     /// How times and missing values are written in them.
     pub conventions: Conventions,
+    /// How its tables are written.
+    pub dialect: Dialect,
     /// Values wait this long for earlier ones; zero: not at all.
     pub reorder: SignedDuration,
 }

@@ -28,9 +28,24 @@ impl FilePattern {
                 "write which files in the folder, such as \"{text}*.csv\""
             ));
         }
+        if [".xlsx", ".xls", ".xlsm", ".xlsb", ".ods"]
+            .iter()
+            .any(|end| text.ends_with(end))
+        {
+            return Err(
+                "a workbook cannot be followed: have the sheet saved as \"CSV UTF-8\", and write that file's path"
+                    .to_owned(),
+            );
+        }
         if text.matches('*').count() > 1 || folder.to_string_lossy().contains('*') {
             return Err("write at most one *, in the file name".to_owned());
         }
+        // Where the config and the path are bare names, the folder is the one that we stand in.
+        let folder = if folder.as_os_str().is_empty() {
+            Path::new(".")
+        } else {
+            folder
+        };
         let (prefix, suffix) = match name.split_once('*') {
             Some((prefix, suffix)) => (prefix, Some(suffix.to_owned())),
             None => (name, None),
@@ -45,6 +60,25 @@ impl FilePattern {
     /// The folder that the files stand in.
     pub fn folder(&self) -> &Path {
         &self.folder
+    }
+
+    /// Whether this is one of the files, however its path is written.
+    pub fn is_of(&self, file: &Path) -> bool {
+        let whole = |folder: &Path| folder.canonicalize().ok();
+        let name = file.file_name().and_then(|name| name.to_str());
+        let folder = file
+            .parent()
+            .filter(|folder| !folder.as_os_str().is_empty());
+        let is_here = || {
+            let ours = whole(&self.folder);
+            ours.is_some() && ours == whole(folder.unwrap_or(Path::new(".")))
+        };
+        name.is_some_and(|name| {
+            self.matches(name)
+                || name
+                    .strip_suffix(".gz")
+                    .is_some_and(|name| self.matches(name))
+        }) && is_here()
     }
 
     /// Whether a file of this name is one of them. A hidden file never is by way of `*`: writers
@@ -84,6 +118,13 @@ mod tests {
         assert_eq!(pattern.to_string(), "/site/in/toc-*.csv");
         let all = FilePattern::parse("in/*.csv", Path::new("/site")).unwrap();
         assert!(!all.matches(".5.csv"), "half-written");
+    }
+
+    #[test]
+    fn a_bare_file_name_is_a_file_of_the_folder_that_we_stand_in() {
+        let pattern = FilePattern::parse("slope.csv", Path::new("")).unwrap();
+        assert_eq!(pattern.folder(), Path::new("."));
+        assert!(pattern.matches("slope.csv"));
     }
 
     #[test]

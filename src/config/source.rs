@@ -3,7 +3,9 @@
 use super::section::unique;
 use super::table::Section;
 use super::{Broker, FilePattern, Source, SourceKind, broker, value};
-use crate::reading::{Conventions, LocalClock, MissingValues, SummerTime};
+use crate::reading::{
+    Conventions, DecimalMark, Delimiter, Dialect, LocalClock, MissingValues, SummerTime, TimeFormat,
+};
 use jiff::SignedDuration;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -63,6 +65,7 @@ fn source(mut section: Section<'_>, base: &Path, taken: &mut BTreeSet<String>) -
         .required("path", "\"incoming/*.csv\"")
         .and_then(|_| section.parsed("path", |text| FilePattern::parse(text, base)));
     let conventions = conventions(&mut section, kind);
+    let dialect = dialect(&mut section, kind);
     let reorder = section.parsed("reorder", value::duration_or_none);
     section.finish();
     let Kind::Files(kind) = kind? else {
@@ -73,8 +76,49 @@ fn source(mut section: Section<'_>, base: &Path, taken: &mut BTreeSet<String>) -
         kind,
         pattern: pattern?.value,
         conventions,
+        dialect,
         reorder: reorder.map_or(SignedDuration::ZERO, |given| given.value),
     }))
+}
+
+/// How the source's tables are written.
+fn dialect(section: &mut Section<'_>, kind: Option<Kind>) -> Dialect {
+    let delimiter = section.parsed("delimiter", Delimiter::parse);
+    let decimal = section.parsed("decimal", DecimalMark::parse);
+    let time_columns = section.text_or_texts("time_column");
+    let time_format = section.parsed("time_format", TimeFormat::parse);
+    let given = [
+        ("delimiter", delimiter.as_ref().map(|given| &given.at)),
+        ("decimal", decimal.as_ref().map(|given| &given.at)),
+        ("time_column", time_columns.as_ref().map(|given| &given.at)),
+        ("time_format", time_format.as_ref().map(|given| &given.at)),
+    ];
+    for (key, at) in given {
+        if let Some(at) = at.filter(|_| kind.is_some_and(|kind| !kind.takes(key))) {
+            section.error(
+                at,
+                format!("source.{key} does nothing for this kind"),
+                "leave it out, or write kind = \"csv\"",
+            );
+        }
+    }
+    Dialect {
+        delimiter: delimiter.map(|given| given.value),
+        decimal: decimal.map_or_else(DecimalMark::default, |given| given.value),
+        time_columns: time_columns.map_or_else(Vec::new, |given| given.value),
+        time_format: time_format.map_or_else(TimeFormat::default, |given| given.value),
+    }
+}
+
+impl Kind {
+    /// Whether a key that says how a table is written means something for it.
+    fn takes(self, key: &str) -> bool {
+        match self {
+            Self::Files(SourceKind::Csv) => true,
+            Self::Files(SourceKind::Ndjson) => key.starts_with("time"),
+            Self::Files(SourceKind::Toa5 | SourceKind::Mcap) | Self::Mqtt => false,
+        }
+    }
 }
 
 fn source_kind(text: &str) -> Result<Kind, String> {

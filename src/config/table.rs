@@ -183,6 +183,23 @@ impl<'t> Section<'t> {
         self.list(key, ("a number or a string", &example), mark)
     }
 
+    /// A string, or a list of them, of which none is empty.
+    pub(super) fn text_or_texts(&mut self, key: &'static str) -> Option<Placed<Vec<String>>> {
+        let is_list = self.get(key)?.get_ref().as_array().is_some();
+        if !is_list {
+            let text = self.text(key)?;
+            return Some(Placed {
+                value: vec![text.value],
+                at: text.at,
+            });
+        }
+        let words = self.texts(key)?;
+        Some(Placed {
+            value: words.value.into_iter().map(|word| word.value).collect(),
+            at: words.at,
+        })
+    }
+
     /// A list of numbers.
     pub(super) fn numbers(&mut self, key: &'static str) -> Option<Placed<Vec<f64>>> {
         let example = format!("{key} = [0.7, 0.6, -0.4]");

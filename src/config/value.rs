@@ -24,9 +24,14 @@ pub(super) fn duration_or_none(text: &str) -> Result<SignedDuration, String> {
 }
 
 /// An instant: `2017-06-06T17:00:00Z`.
-pub(super) fn instant(text: &str) -> Result<Timestamp, String> {
-    text.parse()
-        .map_err(|_| "write it as in \"2017-06-06T17:00:00Z\"".to_owned())
+pub(crate) fn instant(text: &str) -> Result<Timestamp, String> {
+    text.parse().map_err(|_| {
+        if text.parse::<jiff::civil::Date>().is_ok() && !text.contains(':') {
+            format!("write the time of day and the offset too, as in \"{}T17:00:00Z\"", text.trim())
+        } else {
+            "write it with its offset, as in \"2017-06-06T17:00:00Z\" or \"2017-06-06T19:00:00+02:00\"".to_owned()
+        }
+    })
 }
 
 /// A time zone by its IANA name: `Europe/Rome`.

@@ -173,6 +173,23 @@ pub enum EventKind {
 }
 
 impl EventKind {
+    /// Every word that [`EventKind::name`] may give.
+    pub const NAMES: [&str; 13] = [
+        "refit",
+        "regime-flip",
+        "intercept-drift",
+        "transition-drift",
+        "unexplained-residual",
+        "effect-found",
+        "effect-dropped",
+        "alert",
+        "fault",
+        "declared",
+        "correction",
+        "order",
+        "summary",
+    ];
+
     /// The word in its JSON.
     pub fn name(&self) -> &'static str {
         match self {

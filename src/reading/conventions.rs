@@ -80,6 +80,24 @@ pub enum TimeFault {
     Twice,
     /// The clocks skipped it.
     Never,
+    /// It states no offset, and no zone is known.
+    NoZone,
+    /// It is not as the pattern says.
+    NotThePattern,
+    /// It is no number of seconds or milliseconds since 1970.
+    NotUnix,
+    /// It is no number of days since 1900.
+    NotExcel,
+    /// It may be such a number of days, where none was expected.
+    LikeExcel,
+    /// It may be such a number of seconds, where none was expected.
+    LikeUnix,
+    /// It begins with a day or with a month.
+    LikeDayOrMonthFirst,
+    /// It begins with the year, and not as in RFC 3339.
+    LikeAPattern,
+    /// It has no time of day.
+    OnlyADate,
 }
 
 impl TimeFault {
@@ -94,6 +112,29 @@ impl TimeFault {
             }
             Self::Never => {
                 "a local time that the zone's clocks showed; this one they skipped: set dst (--dst) to standard, earlier or later"
+            }
+            Self::NoZone => {
+                "a time with its offset, or the source's time_zone (--time-zone), such as Europe/Rome"
+            }
+            Self::NotThePattern => "a time as time_format (--time-format) says",
+            Self::NotUnix => {
+                "seconds since 1970, as time_format (--time-format) says; unix_ms for milliseconds"
+            }
+            Self::NotExcel => "days since 1900, as time_format (--time-format) = excel says",
+            Self::LikeExcel => {
+                "an RFC 3339 time; if this is a date of Excel's, set time_format (--time-format) to excel"
+            }
+            Self::LikeUnix => {
+                "an RFC 3339 time; if these are seconds since 1970, set time_format (--time-format) to unix, for milliseconds to unix_ms"
+            }
+            Self::LikeDayOrMonthFirst => {
+                "an RFC 3339 time; set time_format (--time-format), as in %d.%m.%Y %H:%M where the day stands first or %m/%d/%Y %H:%M where the month does"
+            }
+            Self::LikeAPattern => {
+                "an RFC 3339 time; set time_format (--time-format), as in %Y/%m/%d %H:%M:%S"
+            }
+            Self::OnlyADate => {
+                "an RFC 3339 time with its hour; if midnight is meant, set time_format (--time-format) to %Y-%m-%d, and time_zone (--time-zone)"
             }
         }
     }
@@ -117,6 +158,15 @@ impl LocalClock {
             return Err(TimeFault::NotATime);
         }
         let local: DateTime = text.parse().map_err(|_| TimeFault::NotATime)?;
+        self.resolve(zone, local)
+    }
+
+    /// The instant at which the clock showed this.
+    ///
+    /// # Errors
+    /// [`TimeFault`] says why there is no such instant, or no single one.
+    pub fn of_local(&self, local: DateTime) -> Result<Timestamp, TimeFault> {
+        let zone = self.zone.as_ref().ok_or(TimeFault::NoZone)?;
         self.resolve(zone, local)
     }
 

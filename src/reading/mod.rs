@@ -4,11 +4,13 @@
 //! is the same readings; the science converts to millimetres and days at its own door.
 
 mod conventions;
+mod dialect;
 mod recording;
 mod series;
 mod unit;
 
 pub use conventions::{Conventions, LocalClock, MissingValues, SummerTime, TimeFault};
+pub use dialect::{DecimalMark, Delimiter, Dialect, TimeFormat};
 pub use jiff::Timestamp;
 pub use recording::{MergeError, Recording, SelectError};
 pub use series::{Channel, Disorder, Reading, Sample, Series};

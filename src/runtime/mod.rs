@@ -11,6 +11,7 @@ mod in_hand;
 pub mod ingest;
 pub mod log;
 pub mod mqtt;
+pub mod preview;
 pub mod pulse;
 pub mod replay;
 pub mod run;

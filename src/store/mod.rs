@@ -291,6 +291,15 @@ impl Store {
 
 /// The folder for ourselves. A daemon that has just ended may hold it for a moment more: a hook that it was starting
 /// has its files until the hook's own program begins.
+impl Store {
+    /// Whether a daemon holds the state in `folder`.
+    pub fn is_held(folder: &Path) -> bool {
+        // Only for a moment: a daemon that starts tries several times.
+        let lock = File::open(folder.join("lock"));
+        lock.is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
+    }
+}
+
 fn lock(folder: &Path) -> Result<Lock, StoreError> {
     let path = folder.join(FILE);
     let mut options = File::options();

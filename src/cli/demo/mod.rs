@@ -1,6 +1,7 @@
 //! `demo`: the archived crises through the daemon's own site, on an accelerated clock, with a real hook.
 
 mod crisis;
+mod marks;
 mod timeline;
 mod verdict;
 
@@ -32,6 +33,13 @@ pub(super) struct Args {
 }
 
 const HOOK: &str = include_str!("../../../deploy/notify.sh");
+/// What is said at the end.
+const LAST_WORDS: &str = "
+A reconstruction fulfils what the literature states of a slope whose readings
+are not public; it is not data. recordings/README.md says what each rests on.
+Next, with readings of your own: slipwatch init FILE; and slipwatch --help";
+/// Columns of the screen.
+const COLUMNS: usize = 80;
 /// Where the sample hook writes what it was told.
 const TOLD: &str = "told.txt";
 
@@ -39,15 +47,13 @@ const TOLD: &str = "told.txt";
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let folder = tempfile::tempdir().context("cannot make a folder for the demo's state")?;
     let mut out = io::stdout().lock();
-    let mut table = vec![verdict::HEAD.to_owned()];
+    let (mut table, mut ends) = (vec![verdict::HEAD.to_owned()], Vec::new());
+    writeln!(out, "{}", timeline::LEGEND)?;
     let runtime = asynchronous()?;
     for crisis in &CRISES {
         let recording = recording(folder.path(), crisis)?;
         introduce(&mut out, crisis, &recording)?;
-        let mut timeline = Timeline::new(
-            crisis,
-            recording.series.iter().map(|s| s.readings.len()).sum(),
-        );
+        let mut timeline = Timeline::new();
         runtime.block_on(play(
             args,
             folder.path(),
@@ -58,7 +64,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
                 told.map_or(Ok(()), |line| writeln!(out, "{line}"))
             },
         ))?;
+        write!(out, "{}", timeline.pictures())?;
         tell_hook(&mut out, folder.path())?;
+        ends.push(verdict::happened(crisis));
         table.extend(
             timeline
                 .records
@@ -66,18 +74,15 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
                 .map(|(id, record)| verdict::line(crisis, id, record)),
         );
     }
-    writeln!(out, "\nWhat was called when, against what happened\n")?;
-    for line in table {
+    writeln!(out, "\n=== What was called when, against what happened\n")?;
+    for line in &table {
         writeln!(out, "{line}")?;
     }
-    writeln!(
-        out,
-        "\nA reconstruction fulfils what the literature states of a slope whose readings are not public; it is not"
-    )?;
-    writeln!(
-        out,
-        "data. recordings/README.md says what each rests on. Next: slipwatch replay recordings/century-mine-2013.mcap; slipwatch --help"
-    )?;
+    writeln!(out)?;
+    for end in &ends {
+        writeln!(out, "{}", wrapped(end))?;
+    }
+    writeln!(out, "{LAST_WORDS}")?;
     Ok(())
 }
 
@@ -99,13 +104,11 @@ fn introduce(out: &mut impl Write, crisis: &Crisis, recording: &Recording) -> io
         .iter()
         .map(|series| series.readings.len())
         .sum();
-    let (site, kind) = (crisis.site, crisis.kind.to_uppercase());
     writeln!(
         out,
-        "\n=== {site}: {kind}; {readings} readings; evacuation time {} h; critical velocity 1 m/day\n",
-        crisis.evacuation_hours
-    )?;
-    writeln!(out, "{}", timeline::HEAD)
+        "\n=== {}, {}\n    {readings} readings; an evacuation takes {} h\n",
+        crisis.site, crisis.kind, crisis.evacuation_hours
+    )
 }
 
 async fn play(
@@ -182,17 +185,36 @@ fn sample_hook(folder: &Path) -> anyhow::Result<HookConfig> {
     })
 }
 
-/// Prints what the hook wrote, and empties it for the next crisis.
+/// Prints what the hook wrote first, and empties its file for the next crisis.
 fn tell_hook(out: &mut impl Write, folder: &Path) -> anyhow::Result<()> {
     let file = folder.join(TOLD);
     let told = std::fs::read_to_string(&file).unwrap_or_default();
-    writeln!(out, "\nthe hook, a process of its own, wrote:")?;
-    if told.is_empty() {
-        writeln!(out, "  nothing: it is run for orange, red and unknown")?;
-    }
-    for line in told.lines() {
-        writeln!(out, "  {line}")?;
+    let count = told.lines().count();
+    match told.lines().next() {
+        None => writeln!(out, "\nthe hook, a process of its own, was not run")?,
+        Some(line) => writeln!(
+            out,
+            "\nthe hook, a process of its own, was run {count} times; what it wrote first:\n{}",
+            wrapped(line)
+        )?,
     }
     std::fs::write(&file, "")?;
     Ok(())
+}
+
+/// The words of a line, indented, on as many lines as they need.
+fn wrapped(line: &str) -> String {
+    let mut text = String::new();
+    let mut at = COLUMNS;
+    for word in line.split(' ') {
+        let length = word.chars().count() + 1;
+        if at + length > COLUMNS {
+            text.push_str(if text.is_empty() { " " } else { "\n " });
+            at = 1;
+        }
+        text.push(' ');
+        text.push_str(word);
+        at += length;
+    }
+    text
 }

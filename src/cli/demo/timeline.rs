@@ -1,219 +1,288 @@
-//! A crisis as it unfolds: one row for some refits and for everything that changes.
+//! A crisis as it unfolds: a line for each change of a level, with its reason; then velocity, level and forecast as marks.
 
-use super::crisis::Crisis;
+use super::marks::{self, Scale};
 use crate::alert::Level;
-use crate::monitor::{AlertState, Event, EventKind, FailureTime, Unexplained};
+use crate::monitor::{AlertState, Event, EventKind, FailureTime};
 use crate::reading::{BenchmarkId, Timestamp, days_since};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-/// What became of one benchmark, for the table at the end.
+/// Lines that one crisis may take; what changes beyond is counted.
+const MOST_LINES: usize = 12;
+/// Marks in a row.
+const MARKS: usize = 52;
+
+/// What is printed before the first crisis.
+pub(super) const LEGEND: &str = "\
+Four archived slopes, played to the monitor as it would have lived them. A line
+is printed whenever the level of a measured point changes, with the reason:
+
+  green    nothing to do; every point begins so
+  yellow   look closer: collapse within 30 days has a chance of 10 % or more, or
+           the motion has changed its kind
+  orange   prepare: collapse within 30 days has a chance of 50 % or more
+  red      leave: collapse within the time that an evacuation takes, or before
+           the next reading, has a chance of 5 % or more
+  unknown  nothing can be said: no readings, or a sensor at fault
+
+\"54 % in 30 days\" is that chance; at the median date the collapse is as likely
+to come before as after. A level falls only when the slope has slowed down or
+has been steady for long enough.
+
+Below stand, over the same time, from left to right: the velocity, from the
+slowest to the fastest (logarithmic); the level (. green, y, o, r); the days
+that were left to the collapse by the forecast of that time, from the fewest to
+the most (logarithmic), blank where no collapse was likely.";
+
+/// What the monitor said with one reading.
+#[derive(Debug, Clone, Copy)]
+struct Moment {
+    time: Timestamp,
+    velocity_mm_per_day: Option<f64>,
+    within_evacuation: f64,
+    within_outlook: f64,
+    failure: FailureTime,
+    level: Level,
+}
+
+/// What became of one benchmark.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Record {
     pub(super) first: BTreeMap<Level, Timestamp>,
-    pub(super) level: Option<Level>,
+    level: Option<Level>,
     pub(super) forecasts: Vec<(Timestamp, FailureTime)>,
-    refits: usize,
+    moments: Vec<Moment>,
+    /// The end of a level, before it is known whether a lower one follows.
+    fall: Option<Fall>,
+}
+
+#[derive(Debug, Clone)]
+struct Fall {
+    time: Timestamp,
+    line: String,
+    rule: String,
 }
 
 /// Follows the events of one crisis.
 #[derive(Debug)]
 pub(super) struct Timeline {
-    /// Refits between two rows.
-    every: usize,
+    lines: usize,
+    left_out: usize,
     pub(super) records: BTreeMap<BenchmarkId, Record>,
 }
 
-/// The columns' heads.
-pub(super) const HEAD: &str = "t_max       point    v mm/day  regime (probability)          failure: median [5 % .. 95 %]          1/v is zero  level";
-
 impl Timeline {
-    pub(super) fn new(crisis: &Crisis, readings: usize) -> Self {
-        let rows = 14;
+    pub(super) fn new() -> Self {
         Self {
-            every: (readings / rows / crisis.benchmarks.len()).max(1),
+            lines: 0,
+            left_out: 0,
             records: BTreeMap::new(),
         }
     }
 
-    /// The row or line for an event, where it is worth one.
+    /// The line for an event that changes a level.
     pub(super) fn tell(&mut self, event: &Event) -> Option<String> {
         let id = event.benchmark.as_ref()?;
         let record = self.records.entry(id.clone()).or_default();
-        match &event.kind {
-            EventKind::Refit { failure_time, .. } => {
-                record.forecasts.push((event.time, *failure_time));
-                record.refits += 1;
-                (record.refits % self.every == 1 || self.every == 1)
-                    .then(|| row(id, event, record.level))
-                    .flatten()
-            }
-            EventKind::Alert {
-                level, state, rule, ..
-            } => {
-                match state {
-                    AlertState::Firing if *level != Level::Unknown => {
-                        record.first.entry(*level).or_insert(event.time);
-                        record.level = Some(*level);
-                    }
-                    AlertState::Resolved if record.level == Some(*level) => record.level = None,
-                    AlertState::Firing | AlertState::Resolved => {}
-                }
-                let verb = if *state == AlertState::Firing {
-                    "begins"
-                } else {
-                    "ends"
-                };
-                Some(format!(
-                    "{}  {id:<8} >>> {level} {verb} ({rule})",
-                    day(event.time)
-                ))
-            }
-            EventKind::RegimeFlip {
-                from,
-                to,
-                probability,
-            } => Some(format!(
-                "{}  {id:<8}   regime flips from {from} to {to} ({probability:.2})",
-                day(event.time)
-            )),
-            EventKind::InterceptDrift { .. } | EventKind::TransitionDrift { .. } => {
-                drift(id, event)
-            }
-            EventKind::UnexplainedResidual(what) => Some(format!(
-                "{}  {id:<8}   {}",
-                day(event.time),
-                unexplained(what)
-            )),
-            EventKind::EffectFound {
-                effect, channel, ..
-            } => Some(format!(
-                "{}  {id:<8}   consistent with {effect} {}",
-                day(event.time),
-                channel.as_deref().unwrap_or("")
-            )),
-            EventKind::EffectDropped { effect, .. } => Some(format!(
-                "{}  {id:<8}   no longer consistent with {effect}",
-                day(event.time)
-            )),
-            EventKind::Fault { kind, .. } => {
-                Some(format!("{}  {id:<8}   fault: {kind}", day(event.time)))
-            }
-            EventKind::Declared { text, .. } | EventKind::Correction { text, .. } => {
-                Some(format!("{}  {text}", day(event.time)))
-            }
-            EventKind::Order { .. } | EventKind::Summary(_) => None,
-        }
-    }
-}
-
-fn unexplained(what: &Unexplained) -> String {
-    match what {
-        Unexplained::Reading {
+        if let EventKind::Refit {
+            failure_time,
             velocity_mm_per_day,
+            chance_within_evacuation_time,
+            chance_within_outlook,
             ..
-        } => format!(
-            "a reading that nobody expected: {:.1} mm/day",
-            velocity_mm_per_day.unwrap_or(f64::NAN)
-        ),
-        Unexplained::Structure { load_sd, since, .. } => format!(
-            "its velocity wanders by {load_sd:.1} e-folds about the law since {}",
-            day(*since)
-        ),
+        } = &event.kind
+        {
+            record.forecasts.push((event.time, *failure_time));
+            record.moments.push(Moment {
+                time: event.time,
+                velocity_mm_per_day: *velocity_mm_per_day,
+                within_evacuation: *chance_within_evacuation_time,
+                within_outlook: *chance_within_outlook,
+                failure: *failure_time,
+                level: record.level.unwrap_or(Level::Green),
+            });
+            return None;
+        }
+        let EventKind::Alert {
+            level,
+            state,
+            rule,
+            text,
+            ..
+        } = &event.kind
+        else {
+            return None;
+        };
+        let fall = record.fall.take();
+        let shown = record.changed(*level, *state, event.time);
+        let place = format!("{} {:<8}", day(event.time), id.as_str());
+        if *state == AlertState::Resolved {
+            // Where a lower level holds from now on, the next event says so.
+            record.fall = shown.map(|level| Fall {
+                time: event.time,
+                line: format!("{place} {:<8} {}", level.name(), words(rule)),
+                rule: rule.clone(),
+            });
+            return self.counted([fall.map(|fall| fall.line)]);
+        }
+        let (before, reason) = match fall {
+            Some(fall) if fall.time == event.time => (None, words(&fall.rule)),
+            other => {
+                let reason = reason(rule, text, record.moments.last());
+                (other.map(|fall| fall.line), reason)
+            }
+        };
+        let line = shown.map(|level| format!("{place} {:<8} {reason}", level.name()));
+        self.counted([before, line].into_iter().flatten().map(Some))
+    }
+
+    /// As many of these lines as may still be printed.
+    fn counted(&mut self, lines: impl IntoIterator<Item = Option<String>>) -> Option<String> {
+        let mut kept = Vec::new();
+        for line in lines.into_iter().flatten() {
+            if self.lines < MOST_LINES {
+                self.lines += 1;
+                kept.push(line);
+            } else {
+                self.left_out += 1;
+            }
+        }
+        (!kept.is_empty()).then(|| kept.join("\n"))
+    }
+
+    /// Velocity, level and forecast of each benchmark.
+    pub(super) fn pictures(&mut self) -> String {
+        let falls = self
+            .records
+            .values_mut()
+            .filter_map(|record| record.fall.take());
+        let falls: Vec<Option<String>> = falls.map(|fall| Some(fall.line)).collect();
+        let mut text = self
+            .counted(falls)
+            .map_or_else(String::new, |lines| lines + "\n");
+        if self.left_out > 0 {
+            let _ = writeln!(text, "and {} more changes of a level", self.left_out);
+        }
+        for (id, record) in &self.records {
+            record.picture(&mut text, id);
+        }
+        text
     }
 }
 
-fn drift(id: &BenchmarkId, event: &Event) -> Option<String> {
-    let (what, from, to, figures) = match &event.kind {
-        EventKind::InterceptDrift {
-            from,
-            to,
-            drift_days_per_day,
-            expected_days_per_day,
-        } => {
-            let expected = expected_days_per_day.map_or_else(String::new, |drift| {
-                // Rounded here: a minus nought reads like a mistake.
-                let drift = (10.0 * drift).round() / 10.0 + 0.0;
-                format!(", {drift:+.1} expected by the fitted law")
-            });
-            (
-                "1/v intercept",
-                from,
-                to,
-                format!(" ({drift_days_per_day:+.1} days a day{expected})"),
-            )
+impl Record {
+    /// The level after an alert, where it is another or nothing can be said.
+    fn changed(&mut self, level: Level, state: AlertState, time: Timestamp) -> Option<Level> {
+        let shown = match state {
+            AlertState::Firing if level == Level::Unknown => return Some(level),
+            AlertState::Firing => {
+                self.first.entry(level).or_insert(time);
+                self.level = Some(level);
+                level
+            }
+            AlertState::Resolved if self.level == Some(level) => {
+                self.level = None;
+                Level::Green
+            }
+            AlertState::Resolved => return None,
+        };
+        if let Some(moment) = self.moments.last_mut().filter(|moment| moment.time == time) {
+            moment.level = shown;
         }
-        EventKind::TransitionDrift { from, to, .. } => ("transition time", from, to, String::new()),
-        EventKind::Refit { .. }
-        | EventKind::RegimeFlip { .. }
-        | EventKind::UnexplainedResidual(_)
-        | EventKind::EffectFound { .. }
-        | EventKind::EffectDropped { .. }
-        | EventKind::Alert { .. }
-        | EventKind::Fault { .. }
-        | EventKind::Declared { .. }
-        | EventKind::Correction { .. }
-        | EventKind::Order { .. }
-        | EventKind::Summary(_) => return None,
-    };
-    let (from, to) = (day(*from), day(*to));
-    Some(format!(
-        "{}  {id:<8}   {what} drifts from {from} to {to}{figures}",
-        day(event.time)
-    ))
-}
+        Some(shown)
+    }
 
-fn row(id: &BenchmarkId, event: &Event, level: Option<Level>) -> Option<String> {
-    let EventKind::Refit {
-        regime,
-        failure_time,
-        inverse_velocity,
-        velocity_mm_per_day,
-        ..
-    } = &event.kind
-    else {
-        return None;
-    };
-    let probability = regime.probabilities.get(&regime.label).copied();
-    let sure = probability.map_or_else(String::new, |p| format!(" ({p:.2})"));
-    let mut line = format!("{}  {:<8}", day(event.time), id.as_str());
-    let velocity = velocity_mm_per_day.unwrap_or(f64::NAN);
-    let _ = write!(
-        line,
-        " {velocity:>8.2}  {:<29}",
-        format!("{}{sure}", regime.label)
-    );
-    let _ = write!(line, " {:<38}", forecast(failure_time));
-    let zero = inverse_velocity
-        .failure_time
-        .map_or_else(|| "-".to_owned(), day);
-    let _ = write!(line, " {zero:<12} {}", level.unwrap_or(Level::Green));
-    Some(line)
-}
-
-/// `1963-10-09 [10-08 .. 10-12] 0.98`, or how unlikely failure is.
-fn forecast(failure: &FailureTime) -> String {
-    let Some(median) = failure.median else {
-        return format!(
-            "none likely ({:.2} in {:.0} days)",
-            failure.probability, failure.horizon_days
+    fn picture(&self, text: &mut String, id: &BenchmarkId) {
+        let (Some(first), Some(last)) = (self.moments.first(), self.moments.last()) else {
+            return;
+        };
+        let over = |values: &dyn Fn(&Moment) -> Option<f64>| {
+            let points = self
+                .moments
+                .iter()
+                .filter_map(|one| Some((one.time, values(one)?)));
+            Scale::of(points.collect(), (first.time, last.time), MARKS)
+        };
+        let velocity = over(&|one| one.velocity_mm_per_day.filter(|v| *v > 0.0));
+        let left = over(&|one| {
+            let left = days_since(one.time, one.failure.median?);
+            (left > 0.0).then_some(left)
+        });
+        let levels = marks::levels(
+            self.moments.iter().map(|one| (one.time, one.level)),
+            (first.time, last.time),
+            MARKS,
         );
+        let (from, to) = (day(first.time), day(last.time));
+        let _ = writeln!(text, "\n{:<8} {from} to {to}", id.as_str());
+        let _ = writeln!(
+            text,
+            "velocity  {}  {} mm/day",
+            velocity.marks,
+            velocity.ends()
+        );
+        let _ = writeln!(text, "level     {levels}");
+        let _ = writeln!(text, "forecast  {}  {} days", left.marks, left.ends());
+    }
+}
+
+/// Why a level was called: the velocity, and the chance that passed a threshold, or the rule in words.
+fn reason(rule: &str, text: &str, moment: Option<&Moment>) -> String {
+    let Some(moment) = moment.filter(|_| rule != "no-data") else {
+        return words(rule);
     };
-    let short = |time: Option<Timestamp>| time.map_or_else(|| "never".to_owned(), day);
-    format!(
-        "{} [{} .. {}]",
-        day(median),
-        &short(failure.low),
-        &short(failure.high)
-    )
+    let velocity = moment
+        .velocity_mm_per_day
+        .map_or_else(String::new, |v| format!("{v:.1} mm/day; "));
+    let median = moment
+        .failure
+        .median
+        .map_or_else(String::new, |time| format!("; median {}", day(time)));
+    let why = match rule {
+        "chance-within-outlook" => {
+            format!("{:.0} % in 30 days{median}", 100.0 * moment.within_outlook)
+        }
+        "chance-within-evacuation-time" => {
+            let (chance, span) = until_next(text).unwrap_or((moment.within_evacuation, "time"));
+            format!("{:.0} % in {span}{median}", 100.0 * chance)
+        }
+        other => words(other),
+    };
+    velocity + &why
+}
+
+/// The chance by which red was called and the time that it is for, as the alert says them.
+fn until_next(text: &str) -> Option<(f64, &str)> {
+    let part = text
+        .split("; ")
+        .find(|part| part.contains("within the evacuation time"))?;
+    let chance = part
+        .strip_prefix("chance ")?
+        .split(' ')
+        .next()?
+        .parse()
+        .ok()?;
+    let (_, span) = part.rsplit_once('(')?;
+    Some((chance, span.trim_end_matches(')')))
+}
+
+/// A rule in words.
+fn words(rule: &str) -> String {
+    match rule {
+        "critical-velocity" => "faster than the critical 1 m/day",
+        "decelerated" => "it has slowed down",
+        "steady" | "quiet" => "steady for long enough",
+        "regime-flip" => "an unstable acceleration has begun",
+        "intercept-drifting-in" => "the forecast date moves nearer",
+        "transition-drifting-in" => "the turn to acceleration moves nearer",
+        "unexplained-residual" => "readings leave the law, cause unknown",
+        "no-data" => "no reading when one was due",
+        other => return other.replace('-', " "),
+    }
+    .to_owned()
 }
 
 /// The date alone.
 pub(super) fn day(time: Timestamp) -> String {
     time.strftime("%Y-%m-%d").to_string()
-}
-
-/// Days from `time` to `end`, as words.
-pub(super) fn lead(end: Timestamp, time: Timestamp) -> String {
-    format!("{:.1} d before", days_since(time, end))
 }

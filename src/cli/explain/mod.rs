@@ -8,6 +8,7 @@ mod text;
 use super::args::{OutputArgs, ReadingArgs};
 use super::exit;
 use crate::alert::Policy;
+use crate::config::value;
 use crate::effects::{self, Explanation, Options};
 use crate::reading::{Channel, Recording, SelectError, Series, Timestamp};
 use anyhow::Context;
@@ -31,10 +32,10 @@ pub(super) struct Args {
     #[command(flatten)]
     readings: ReadingArgs,
     /// Use no reading before this
-    #[arg(long, value_name = "TIME")]
+    #[arg(long, value_name = "TIME", value_parser = value::instant)]
     from: Option<Timestamp>,
     /// Use no reading and no covariate after this
-    #[arg(long, value_name = "TIME")]
+    #[arg(long, value_name = "TIME", value_parser = value::instant)]
     until: Option<Timestamp>,
     /// Write a page with plots to this file, which needs no other
     #[arg(long, value_name = "FILE")]

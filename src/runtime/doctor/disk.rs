@@ -4,6 +4,7 @@ use super::{Finding, Verdict};
 use crate::config::Config;
 use crate::runtime::clock::Stopwatch;
 use nix::sys::statfs::statfs;
+use nix::unistd::{AccessFlags, access};
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::Path;
@@ -124,6 +125,17 @@ fn kind(folder: &Path) -> nix::Result<(String, Kind)> {
 pub(super) fn fsync(folder: &Path) -> Finding {
     let place = folder.display();
     if !folder.is_dir() {
+        let there = folder.ancestors().find(|path| path.exists());
+        let there = there
+            .filter(|path| !path.as_os_str().is_empty())
+            .unwrap_or(Path::new("."));
+        if let Err(error) = access(there, AccessFlags::W_OK) {
+            let there = there.display();
+            let text = format!(
+                "{place} is not there, and cannot be created in {there} as this user: {error}"
+            );
+            return Finding::new(FSYNC, Verdict::Wrong, text);
+        }
         let text = format!("{place} is not there yet; it is created at the first start");
         return Finding::new(FSYNC, Verdict::Unknown, text);
     }

@@ -27,9 +27,15 @@ fn runnable(program: &Path) -> Result<String, String> {
     let name = found.display();
     access(&found, AccessFlags::X_OK)
         .map_err(|error| format!("{name} cannot be executed ({error}); chmod +x it"))?;
-    let interpreter = interpreter(&found).map_err(|error| format!("{name}: {error}"))?;
-    let Some(words) = interpreter else {
-        return Ok(format!("{name} can be run"));
+    let words = match start(&found).map_err(|error| format!("{name}: {error}"))? {
+        Start::Binary => return Ok(format!("{name} can be run")),
+        Start::Windows => {
+            return Err(format!(
+                "{name}: its lines end as on Windows, so that the kernel finds no such interpreter; \
+                 write them anew with sed -i 's/\\r$//' {name}"
+            ));
+        }
+        Start::Script(words) => words,
     };
     for word in &words {
         let there = find(word).filter(|path| access(path, AccessFlags::X_OK).is_ok());
@@ -49,16 +55,27 @@ fn find(program: &Path) -> Option<PathBuf> {
         .find(|path| path.is_file())
 }
 
-/// What the script's first line names, and for `env` what that would start; `None` for a binary.
-fn interpreter(program: &Path) -> std::io::Result<Option<Vec<PathBuf>>> {
+/// How a program begins.
+enum Start {
+    Binary,
+    /// What its first line names, and for `env` what that would start.
+    Script(Vec<PathBuf>),
+    /// A first line that ends in a carriage return, which the kernel takes for a part of the name.
+    Windows,
+}
+
+fn start(program: &Path) -> std::io::Result<Start> {
     let mut start = Vec::new();
     File::open(program)?
         .take(FIRST_LINE_BYTES)
         .read_to_end(&mut start)?;
     let Some(line) = start.strip_prefix(b"#!") else {
-        return Ok(None);
+        return Ok(Start::Binary);
     };
     let line = line.split(|byte| *byte == b'\n').next().unwrap_or(line);
+    if line.ends_with(b"\r") {
+        return Ok(Start::Windows);
+    }
     let mut words = line
         .split(u8::is_ascii_whitespace)
         .filter(|word| !word.is_empty())
@@ -67,7 +84,7 @@ fn interpreter(program: &Path) -> std::io::Result<Option<Vec<PathBuf>>> {
     let is_env = first.iter().any(|path| path.ends_with("env"));
     let options = |word: &PathBuf| word.as_os_str().as_bytes().starts_with(b"-");
     let second = words.find(|word| is_env && !options(word));
-    Ok(Some(first.into_iter().chain(second).collect()))
+    Ok(Start::Script(first.into_iter().chain(second).collect()))
 }
 
 /// Whether the kernel would hold the walls, where a hook is to have some.

@@ -2,6 +2,7 @@
 
 mod clock_sync;
 mod disk;
+mod feeds;
 mod hooks;
 mod recordings;
 mod watches;
@@ -38,7 +39,7 @@ impl Verdict {
 /// One thing that was looked at.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Finding {
-    /// What: `inotify`, `file-system`, `clock`, `fsync`, `hook`, `sandbox`, `recording`.
+    /// What: `inotify`, `file-system`, `clock`, `fsync`, `hook`, `sandbox`, `source`, `recording`.
     pub check: &'static str,
     /// How it stands.
     pub verdict: Verdict,
@@ -64,6 +65,7 @@ pub fn examine(config: &Config) -> Vec<Finding> {
     findings.push(clock_sync::finding());
     findings.extend(config.hooks.iter().map(hooks::finding));
     findings.extend(hooks::walls(&config.hooks));
+    findings.extend(feeds::findings(config));
     findings.extend(recordings::findings(&config.sources));
     findings
 }

@@ -4,7 +4,7 @@ use super::IngestError;
 use flate2::read::MultiGzDecoder;
 use std::fs::File;
 use std::io::{self, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Most that is unpacked of one file, bytes: what packs a thousandfold must not fill the memory.
 const MOST_UNPACKED: u64 = 512 << 20;
@@ -15,11 +15,12 @@ pub fn is_packed(file: &Path) -> bool {
         .is_some_and(|extension| extension.eq_ignore_ascii_case("gz"))
 }
 
-/// The name without `.gz`.
-pub fn unpacked_name(file: &Path) -> &Path {
-    match file.file_stem() {
-        Some(stem) if is_packed(file) => Path::new(stem),
-        _ => file,
+/// The path without `.gz`.
+pub fn unpacked_name(file: &Path) -> PathBuf {
+    if is_packed(file) {
+        file.with_extension("")
+    } else {
+        file.to_owned()
     }
 }
 

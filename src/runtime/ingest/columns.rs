@@ -1,7 +1,8 @@
 //! What the columns of a CSV file mean, by their names alone.
 
-use super::{IngestError, ReadOptions};
-use crate::reading::{BenchmarkId, Unit};
+use super::{IngestError, ReadOptions, Remark};
+use crate::reading::{BenchmarkId, Dialect, Unit};
+use serde::Serialize;
 use std::path::Path;
 use std::str::FromStr;
 
@@ -89,8 +90,69 @@ pub(super) enum Column {
     Channel {
         unit: Option<String>,
     },
+    /// Read together with the others of its vector.
+    Component {
+        benchmark: BenchmarkId,
+        unit: Unit,
+    },
     /// Neither: a logger's record number.
     Ignored,
+}
+
+/// What a column is taken for, for a person to see.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(tag = "is", rename_all = "kebab-case")]
+pub enum Meaning {
+    /// When a row was measured, or a part of that.
+    Time,
+    /// Readings.
+    Reading {
+        /// Whose.
+        benchmark: BenchmarkId,
+        /// In which unit.
+        unit: String,
+    },
+    /// Standard errors of readings.
+    Sigma,
+    /// One component of a benchmark that moves in space.
+    Component {
+        /// Whose.
+        benchmark: BenchmarkId,
+        /// In which unit.
+        unit: String,
+    },
+    /// A covariate.
+    Covariate {
+        /// In which unit, where its name says that.
+        unit: Option<String>,
+    },
+    /// It holds text.
+    Text,
+    /// It has held nothing so far.
+    Empty,
+    /// It is not used.
+    Unused,
+}
+
+impl Column {
+    pub(super) fn meaning(&self) -> Meaning {
+        match self {
+            Self::Time | Self::Days => Meaning::Time,
+            Self::Reading {
+                benchmark, unit, ..
+            } => Meaning::Reading {
+                benchmark: benchmark.clone(),
+                unit: unit.to_string(),
+            },
+            Self::Sigma => Meaning::Sigma,
+            Self::Component { benchmark, unit } => Meaning::Component {
+                benchmark: benchmark.clone(),
+                unit: unit.to_string(),
+            },
+            Self::Channel { unit } => Meaning::Covariate { unit: unit.clone() },
+            Self::Ignored => Meaning::Unused,
+        }
+    }
 }
 
 /// Where a reading's standard error stands.
@@ -140,13 +202,42 @@ pub(super) fn name_of(column: &str) -> Name<'_> {
 }
 
 fn measure_at(plain: &str, at: usize, keyword: &str) -> Option<Measure> {
-    let unit = plain[at + keyword.len()..].strip_prefix('_')?;
+    let rest = &plain[at + keyword.len()..];
+    let unit = rest.strip_prefix('_').or_else(|| in_brackets(rest))?;
     let unit = Unit::parse(unit).ok()?;
     match keyword {
         "sigma" => Some(Measure::Sigma(unit)),
         _ if unit.quantity().name() == keyword => Some(Measure::Reading(unit)),
         _ => None,
     }
+}
+
+/// `mm/d` of ` [mm/d]` or `(mm/d)`.
+fn in_brackets(rest: &str) -> Option<&str> {
+    let rest = rest.trim();
+    let inner = |open, close| rest.strip_prefix(open)?.strip_suffix(close);
+    inner('[', ']').or_else(|| inner('(', ')')).map(str::trim)
+}
+
+/// What to know of a covariate that is named as readings are: `P1_displacement_mm/d` or `P1 displacement mm`.
+fn like_a_reading(name: &str) -> Option<Remark> {
+    let plain = name.to_ascii_lowercase();
+    let is_one = ["displacement", "velocity"].into_iter().any(|keyword| {
+        plain.rsplit_once(keyword).is_some_and(|(_, rest)| {
+            let unit = rest.strip_prefix('_').or_else(|| in_brackets(rest));
+            rest.is_empty()
+                || unit.is_some_and(|unit| Unit::parse(unit).is_ok())
+                || channel_unit(name).is_none()
+        })
+    });
+    is_one.then(|| Remark {
+        about: format!("column {name:?}"),
+        text: format!(
+            "named like a reading, and taken as a covariate; expected [ID_]displacement_UNIT with mm, cm, m, in or ft, \
+             or [ID_]velocity_UNIT with one of these per h, day or yr; \
+             or say it with [[benchmark]] column = {name:?} and unit (--column {name:?}=ID:displacement:mm)"
+        ),
+    })
 }
 
 /// `velocity_kmh` is a reading in a unit that is not known; `displacement_sensor_voltage_v` is a
@@ -170,12 +261,17 @@ const CHANNEL_UNITS: [&str; 41] = [
 
 /// The longest known unit at a name's end: `mm_per_day` of `rain_mm_per_day`.
 pub(super) fn channel_unit(name: &str) -> Option<&str> {
-    name.match_indices('_')
-        .map(|(at, _)| &name[at + 1..])
-        .find(|suffix| {
-            let plain = suffix.to_ascii_lowercase();
-            CHANNEL_UNITS.contains(&plain.as_str()) || Unit::parse(&plain).is_ok()
-        })
+    let is_known = |unit: &&str| {
+        let plain = unit.to_ascii_lowercase();
+        CHANNEL_UNITS.contains(&plain.as_str()) || Unit::parse(&plain).is_ok()
+    };
+    let bracketed = name
+        .find(['[', '('])
+        .and_then(|at| in_brackets(&name[at..]));
+    let suffixes = name.match_indices('_').map(|(at, _)| &name[at + 1..]);
+    bracketed
+        .filter(is_known)
+        .or_else(|| suffixes.into_iter().find(is_known))
 }
 
 /// What a column of readings should have.
@@ -186,8 +282,14 @@ const A_UNIT: &str = "a unit at its end: mm, cm, m, in or ft, a velocity per h, 
 pub(super) struct Layout {
     pub(super) names: Vec<String>,
     pub(super) columns: Vec<Column>,
-    pub(super) time: usize,
+    /// Where the time stands, or its parts in their order.
+    pub(super) time: Vec<usize>,
+    /// What a person should know of the names.
+    pub(super) remarks: Vec<Remark>,
 }
+
+/// A reading or standard error and whose, or another kind of column.
+type ByName = Result<(Option<BenchmarkId>, Measure), Column>;
 
 struct Sigma {
     index: usize,
@@ -211,32 +313,22 @@ impl Layout {
             expected,
         };
         let stem = BenchmarkId::new(file.file_stem().unwrap_or_default().to_string_lossy());
-        let mut columns = Vec::new();
-        let mut sigmas = Vec::new();
+        let (mut columns, mut sigmas, mut remarks) = (Vec::new(), Vec::new(), Vec::new());
         for (index, name) in names.iter().enumerate() {
             Self::name_is_right(name, &names[..index])
                 .map_err(|(problem, expected)| fail(name, problem, expected))?;
             let map = options.columns.iter().find(|map| map.column == *name);
-            let (benchmark, measure) = match (map, name_of(name)) {
-                (Some(map), _) => (map.benchmark.clone(), map.measure),
-                (None, Name::Measure(id, measure)) => {
-                    (id.map_or_else(|| stem.clone(), BenchmarkId::new), measure)
-                }
-                (None, Name::WithoutUnit) => {
-                    return Err(fail(name, "a reading without a known unit", A_UNIT));
-                }
-                (None, Name::Time) => {
-                    columns.push(Column::Time);
-                    continue;
-                }
-                (None, Name::Days) => {
-                    columns.push(Column::Days);
-                    continue;
-                }
-                (None, Name::Channel(unit)) => {
-                    columns.push(Column::Channel {
-                        unit: unit.map(str::to_owned),
-                    });
+            let measured = match map {
+                Some(map) => Ok((Some(map.benchmark.clone()), map.measure)),
+                None => Self::by_name(name, &options.dialect)
+                    .map_err(|(problem, expected)| fail(name, problem, expected))?,
+            };
+            let (benchmark, measure) = match measured {
+                Ok((benchmark, measure)) => (benchmark.unwrap_or_else(|| stem.clone()), measure),
+                Err(other) => {
+                    let is_covariate = matches!(other, Column::Channel { .. });
+                    remarks.extend(is_covariate.then(|| like_a_reading(name)).flatten());
+                    columns.push(other);
                     continue;
                 }
             };
@@ -259,15 +351,54 @@ impl Layout {
                 }
             });
         }
-        let time = Self::time_column(&columns, &names, fail)?;
+        let time = match &options.dialect.time_columns[..] {
+            [] => vec![Self::time_column(&columns, &names, fail)?],
+            stated => Self::stated_time(stated, &names, fail)?,
+        };
         let mut layout = Self {
             names,
             columns,
             time,
+            remarks,
         };
         layout.refuse_twins(fail)?;
         layout.pair(sigmas, fail)?;
         Ok(layout)
+    }
+
+    /// What the name of a column says: a benchmark's reading or its standard error, else what it is instead.
+    fn by_name(name: &str, dialect: &Dialect) -> Result<ByName, (&'static str, &'static str)> {
+        let stated = &dialect.time_columns;
+        Ok(match name_of(name) {
+            _ if stated.iter().any(|one| one == name) => Err(Column::Time),
+            Name::Measure(id, measure) => Ok((id.map(BenchmarkId::new), measure)),
+            Name::WithoutUnit => return Err(("a reading without a known unit", A_UNIT)),
+            Name::Time | Name::Days if !stated.is_empty() => Err(Column::Ignored),
+            Name::Time => Err(Column::Time),
+            Name::Days => Err(Column::Days),
+            Name::Channel(unit) => Err(Column::Channel {
+                unit: unit.map(str::to_owned),
+            }),
+        })
+    }
+
+    /// Where the columns stand that the config names for the time.
+    fn stated_time(
+        stated: &[String],
+        names: &[String],
+        fail: impl Fn(&str, &'static str, &'static str) -> IngestError,
+    ) -> Result<Vec<usize>, IngestError> {
+        let place = |wanted: &String| {
+            let place = names.iter().position(|name| name == wanted);
+            place.ok_or_else(|| {
+                fail(
+                    wanted,
+                    "there is no such column",
+                    "in the header every column that time_column (--time-column) names",
+                )
+            })
+        };
+        stated.iter().map(place).collect()
     }
 
     /// What is wrong with a name after those `before` it, and what was expected.
@@ -287,7 +418,7 @@ impl Layout {
         fail: impl Fn(&str, &'static str, &'static str) -> IngestError,
     ) -> Result<usize, IngestError> {
         let is_time = |column: &&Column| matches!(column, Column::Time | Column::Days);
-        let expected = "one column named time (RFC 3339) or t_days, and comma-separated fields";
+        let expected = "one column named time (RFC 3339) or t_days, or time_column (--time-column) with the name of the one that gives the time; comma-separated fields, or semicolons or tabs in the header too";
         let Some(time) = columns.iter().position(|column| is_time(&column)) else {
             return Err(fail("time", "there is no such column", expected));
         };

@@ -8,6 +8,7 @@ use super::columns::Layout;
 use super::split::Splitter;
 use super::table::TableRows;
 use super::{IngestError, Item, ReadOptions};
+use crate::reading::Delimiter;
 use ::csv::StringRecord;
 use std::path::{Path, PathBuf};
 
@@ -31,12 +32,14 @@ impl CsvRows {
     /// with the header.
     pub fn new(file: &Path, header: &str, options: &ReadOptions) -> Result<Self, IngestError> {
         let header = header.strip_prefix('\u{feff}').unwrap_or(header);
+        let stated = options.dialect.delimiter;
+        let delimiter = stated.unwrap_or_else(|| Delimiter::of_header(header));
         let mut rows = Self {
             file: file.into(),
             options: options.clone(),
             header: Vec::new(),
             table: None,
-            splitter: Splitter::new(),
+            splitter: Splitter::new(delimiter),
             cells: StringRecord::new(),
         };
         rows.splitter
@@ -59,6 +62,10 @@ impl CsvRows {
     /// The columns' names, in their order.
     pub fn columns(&self) -> &[String] {
         self.table.as_ref().map_or(&[], TableRows::names)
+    }
+
+    pub(super) fn table(&mut self) -> Option<&mut TableRows> {
+        self.table.as_mut()
     }
 
     pub(super) fn header(&self) -> &[String] {
@@ -99,8 +106,14 @@ impl CsvRows {
         }
     }
 
-    /// A logger that starts again writes its header again; no other row has `time` for a time.
+    /// A logger that starts again writes its header again; no other row has the name of a time for a time.
     fn is_header(&self) -> bool {
+        let stated = &self.options.dialect.time_columns;
+        if !stated.is_empty() {
+            return stated
+                .iter()
+                .all(|name| self.cells.iter().any(|cell| cell == name));
+        }
         let is_name = |cell: &str| {
             ["time", "t_days"]
                 .iter()

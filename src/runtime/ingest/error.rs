@@ -30,6 +30,15 @@ pub enum IngestError {
         /// The file.
         file: PathBuf,
     },
+    /// A workbook of a spreadsheet program.
+    #[error(
+        "{}: found a workbook, expected text; save the sheet as \"CSV UTF-8\" in the program that made it, and give that file",
+        file.display()
+    )]
+    Workbook {
+        /// The file.
+        file: PathBuf,
+    },
     /// A column of the header cannot be what it is.
     #[error("{}, line {line}, column {column:?}: {problem}, expected {expected}", file.display())]
     Header {

@@ -6,6 +6,7 @@ mod collect;
 mod columns;
 mod convert;
 mod csv;
+mod encoding;
 mod error;
 mod mcap;
 mod mcap_write;
@@ -13,6 +14,7 @@ mod message;
 mod ndjson;
 mod ndjson_write;
 mod split;
+mod survey;
 mod table;
 mod table_write;
 mod text;
@@ -21,20 +23,23 @@ mod units;
 mod vector;
 
 pub use bytes::{is_packed, unpack, unpacked_name};
-pub use columns::{ColumnMap, ColumnMapError, Measure};
+pub use columns::{ColumnMap, ColumnMapError, Meaning, Measure};
 pub use convert::{ChannelCount, ConvertReport, SeriesCount, convert};
 pub use csv::CsvRows;
+pub use encoding::{Transcoder, latin1};
 pub use error::IngestError;
 pub use mcap_write::{encode_mcap, write_mcap};
 pub use message::{MessageError, decode_message};
 pub use ndjson_write::write_ndjson;
+pub use survey::{Survey, survey};
 pub use table_write::{write_csv, write_toa5};
-pub use text::{Taken, TextFormat, TextRows};
+pub use text::{Looked, Remark, Taken, TextFormat, TextRows, look_through};
 pub use units::FileUnits;
 pub use vector::VectorMap;
 
 use crate::reading::{
-    BenchmarkId, Channel, Conventions, Disorder, Quantity, Reading, Recording, Sample, Unit,
+    BenchmarkId, Channel, Conventions, Dialect, Disorder, Quantity, Reading, Recording, Sample,
+    Unit,
 };
 use jiff::{SignedDuration, Timestamp};
 use std::path::{Path, PathBuf};
@@ -52,6 +57,8 @@ pub struct ReadOptions {
     pub averaging: Option<SignedDuration>,
     /// How times and missing values are written.
     pub conventions: Conventions,
+    /// How a table of text is written.
+    pub dialect: Dialect,
     /// Readings that are given by their components.
     pub vectors: Vec<VectorMap>,
 }
@@ -64,6 +71,7 @@ impl Default for ReadOptions {
             reserved: Vec::new(),
             averaging: None,
             conventions: Conventions::default(),
+            dialect: Dialect::default(),
             vectors: Vec::new(),
         }
     }
@@ -129,13 +137,29 @@ impl Format {
         let name = bytes::unpacked_name(file);
         let extension = name.extension().unwrap_or_default().to_string_lossy();
         match extension.to_ascii_lowercase().as_str() {
-            "csv" => Ok(Self::Text(TextFormat::Csv)),
+            "csv" | "tsv" | "txt" => Ok(Self::Text(TextFormat::Csv)),
             "ndjson" | "jsonl" => Ok(Self::Text(TextFormat::Ndjson)),
             "dat" => Ok(Self::Text(TextFormat::Toa5)),
             "mcap" if !is_packed(file) => Ok(Self::Mcap),
+            "xlsx" | "xls" | "xlsm" | "xlsb" | "ods" => {
+                Err(IngestError::Workbook { file: file.into() })
+            }
             _ => Err(IngestError::UnknownFormat { file: file.into() }),
         }
     }
+}
+
+/// What files hold, and what a person should know of them.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct FilesRead {
+    /// The readings and covariates, in order.
+    pub recording: Recording,
+    /// What putting them in order met.
+    pub disorder: Disorder,
+    /// What has been found out about the files.
+    pub remarks: Vec<(PathBuf, Remark)>,
+    /// The columns of their tables.
+    pub columns: Vec<String>,
 }
 
 /// Reads and joins files, each in the format of its extension; a later file stands over an earlier one.
@@ -147,32 +171,57 @@ pub fn read_files(
     paths: &[PathBuf],
     options: &ReadOptions,
 ) -> Result<(Recording, Disorder), IngestError> {
-    let mut parts = Vec::new();
-    let mut disorder = Disorder::default();
-    let mut columns = Vec::new();
-    for path in paths {
+    let read = read_with_remarks(paths, options)?;
+    Ok((read.recording, read.disorder))
+}
+
+/// As [`read_files`], and says what a person should know of the files.
+///
+/// # Errors
+/// As [`read_files`].
+pub fn read_with_remarks(
+    paths: &[PathBuf],
+    options: &ReadOptions,
+) -> Result<FilesRead, IngestError> {
+    let each: Vec<(&Path, &ReadOptions)> =
+        paths.iter().map(|path| (path.as_path(), options)).collect();
+    let read = read_each(&each)?;
+    for map in &options.columns {
+        if !read.columns.contains(&map.column) {
+            return Err(IngestError::NoSuchColumn {
+                column: map.column.clone(),
+                available: read.columns,
+            });
+        }
+    }
+    Ok(read)
+}
+
+/// The same for files that are each to be read in their own way.
+///
+/// # Errors
+/// As [`read_files`], but for columns of the options that no file has.
+pub fn read_each(files: &[(&Path, &ReadOptions)]) -> Result<FilesRead, IngestError> {
+    let (mut parts, mut read) = (Vec::new(), FilesRead::default());
+    for (path, options) in files {
         let (recording, met) = match Format::of(path)? {
             Format::Text(format) => {
                 let table = text::read_text(format, path, options)?;
-                columns.extend(table.columns);
+                read.columns.extend(table.columns);
+                let remarks = table.remarks.into_iter();
+                read.remarks
+                    .extend(remarks.map(|one| (path.to_path_buf(), one)));
                 (table.recording, table.disorder)
             }
             Format::Mcap => mcap::read_mcap(path, options)?,
         };
         parts.push(recording);
-        disorder += met;
-    }
-    for map in &options.columns {
-        if !columns.contains(&map.column) {
-            return Err(IngestError::NoSuchColumn {
-                column: map.column.clone(),
-                available: columns,
-            });
-        }
+        read.disorder += met;
     }
     let (recording, overlap) = Recording::merge(parts)?;
-    disorder += overlap;
-    Ok((recording, disorder))
+    read.disorder += overlap;
+    read.recording = recording;
+    Ok(read)
 }
 
 /// Reads covariates kept in files of their own; benchmarks that stand there too are left out.

@@ -62,6 +62,10 @@ impl NdjsonRows {
         }
     }
 
+    pub(super) fn tables(&mut self) -> impl Iterator<Item = &mut TableRows> {
+        self.tables.values_mut()
+    }
+
     /// All that is intact in one line, and what is wrong with the rest.
     pub(super) fn row(&mut self, line: u64, text: &str) -> Taken {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
@@ -117,7 +121,7 @@ impl NdjsonRows {
         };
         let conventions = &self.options.conventions;
         let text = fields.text("time")?.unwrap_or_default();
-        let time = (conventions.clock.instant(text))
+        let time = (self.options.dialect.instant(text, &conventions.clock))
             .map_err(|fault| fields.fail("time", format!("{text:?}"), fault.expected()))?;
         let value = object.get("value");
         let topic = match kind {

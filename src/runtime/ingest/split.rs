@@ -1,5 +1,6 @@
 //! Splits one line of CSV at a time, without a new parser for each.
 
+use crate::reading::Delimiter;
 use ::csv::{ReaderBuilder, StringRecord, Terminator, Trim};
 use std::io::{self, Read};
 
@@ -7,6 +8,7 @@ use std::io::{self, Read};
 #[derive(Debug)]
 pub(super) struct Splitter {
     reader: ::csv::Reader<Line>,
+    delimiter: Delimiter,
 }
 
 /// The line to be split, as a stream that ends with it.
@@ -28,15 +30,16 @@ impl Read for Line {
 }
 
 impl Splitter {
-    pub(super) fn new() -> Self {
+    pub(super) fn new(delimiter: Delimiter) -> Self {
         let reader = ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
+            .delimiter(delimiter.byte())
             .trim(Trim::All)
             // Only what ends our lines: a stray carriage return is part of its cell.
             .terminator(Terminator::Any(b'\n'))
             .from_reader(Line::default());
-        Self { reader }
+        Self { reader, delimiter }
     }
 
     /// The cells of one line, trimmed; none if it is blank.
@@ -64,7 +67,7 @@ impl Splitter {
         match failed {
             None => Ok(()),
             Some(problem) => {
-                *self = Self::new();
+                *self = Self::new(self.delimiter);
                 Err(problem)
             }
         }
@@ -83,7 +86,7 @@ mod tests {
 
     #[test]
     fn lines_are_split_one_after_another_whatever_stood_before() {
-        let mut splitter = Splitter::new();
+        let mut splitter = Splitter::new(Delimiter::Comma);
         let long = "x".repeat(100_000);
         let long_cells = format!("{long},1");
         let cases: [(&str, &[&str]); 7] = [
@@ -102,7 +105,7 @@ mod tests {
 
     #[test]
     fn an_open_quote_spoils_its_own_line_only() {
-        let mut splitter = Splitter::new();
+        let mut splitter = Splitter::new(Delimiter::Comma);
         let error = cells(&mut splitter, "1,\"2").unwrap_err();
         assert!(error.contains("quote"), "{error}");
         assert_eq!(cells(&mut splitter, "3,4").unwrap(), ["3", "4"]);

@@ -1,11 +1,15 @@
 //! Rows of a table whose columns are understood: cells in, readings and covariates out.
 
-use super::columns::{Column, Layout, SigmaColumn};
+use super::columns::{Column, Layout, Meaning, SigmaColumn};
 use super::vector::{self, Vector};
-use super::{IngestError, Item, ReadOptions};
-use crate::reading::{BenchmarkId, Reading, Sample, Timestamp, Unit, after_days};
+use super::{IngestError, Item, ReadOptions, Remark};
+use crate::reading::{BenchmarkId, DecimalMark, Reading, Sample, Timestamp, Unit, after_days};
 use ::csv::StringRecord;
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
+
+/// Characters of a text that are shown of it.
+const SHOWN: usize = 40;
 
 /// Reads the rows under one header.
 #[derive(Debug)]
@@ -15,6 +19,10 @@ pub(super) struct TableRows {
     vectors: Vec<Vector>,
     options: ReadOptions,
     filled: Vec<bool>,
+    /// Columns that have held a number: what is no number in one of them is a fault, in others text.
+    numeric: Vec<bool>,
+    /// What has been found out and not been told.
+    remarks: Vec<Remark>,
 }
 
 impl TableRows {
@@ -22,6 +30,8 @@ impl TableRows {
         Self {
             file: file.into(),
             filled: vec![false; layout.names.len()],
+            numeric: vec![false; layout.names.len()],
+            remarks: std::mem::take(&mut layout.remarks),
             vectors: vector::claim(&mut layout, &options.vectors),
             layout,
             options: options.clone(),
@@ -53,7 +63,19 @@ impl TableRows {
             cells,
             line,
         };
-        let items = row.items()?;
+        let Met {
+            items,
+            numbers,
+            texts,
+        } = row.items()?;
+        for index in numbers {
+            self.numeric[index] = true;
+        }
+        for index in texts {
+            if !self.is_text(index) {
+                self.remarks.push(self.text_column(index, &cells[index]));
+            }
+        }
         for (filled, cell) in self.filled.iter_mut().zip(cells) {
             *filled |= !cell.is_empty();
         }
@@ -65,11 +87,67 @@ impl TableRows {
         !self.filled.contains(&true)
     }
 
-    /// The first column that has held nothing so far.
-    pub(super) fn unfilled(&self) -> Option<&String> {
-        let mut columns = self.layout.names.iter().zip(&self.filled);
-        columns.find_map(|(name, filled)| (!filled).then_some(name))
+    /// Whether the column has held text and no number.
+    fn is_text(&self, index: usize) -> bool {
+        let is_channel = matches!(self.layout.columns[index], Column::Channel { .. });
+        is_channel && self.filled[index] && !self.numeric[index]
     }
+
+    fn text_column(&self, index: usize, found: &str) -> Remark {
+        let shown: String = found.chars().take(SHOWN).collect();
+        let comma = self.options.dialect.decimal == DecimalMark::Point
+            && found.replacen(',', ".", 1).parse::<f64>().is_ok();
+        let cure = if comma {
+            "if it is a number, set decimal (--decimal) to comma"
+        } else {
+            "if it is a covariate's mark for no value, add it to missing (--missing)"
+        };
+        Remark {
+            about: format!("column {:?}", self.layout.names[index]),
+            text: format!(
+                "found {shown:?}, which is no number: no covariate, and not used; {cure}"
+            ),
+        }
+    }
+
+    /// What has been found out since it was last asked.
+    pub(super) fn take_remarks(&mut self) -> Vec<Remark> {
+        std::mem::take(&mut self.remarks)
+    }
+
+    /// What each column is taken for.
+    pub(super) fn meanings(&self) -> Vec<(String, Meaning)> {
+        let columns = self.layout.names.iter().zip(&self.layout.columns);
+        let meaning = |(index, (name, column)): (usize, (&String, &Column))| {
+            let is_channel = matches!(column, Column::Channel { .. });
+            let meaning = match (self.filled[index], self.numeric[index]) {
+                (false, _) if is_channel => Meaning::Empty,
+                (true, false) if is_channel => Meaning::Text,
+                (true | false, _) => column.meaning(),
+            };
+            (name.clone(), meaning)
+        };
+        columns.enumerate().map(meaning).collect()
+    }
+
+    /// The first column that should hold readings, or their times, and has held nothing so far.
+    pub(super) fn unfilled(&self) -> Option<&String> {
+        let columns = self.layout.columns.iter().zip(&self.filled);
+        let is_needed =
+            |column: &Column| !matches!(column, Column::Channel { .. } | Column::Ignored);
+        let mut empty = columns.zip(&self.layout.names);
+        empty.find_map(|((column, filled), name)| (!filled && is_needed(column)).then_some(name))
+    }
+}
+
+/// What a row holds, and which columns have shown what they are.
+#[derive(Default)]
+struct Met {
+    items: Vec<Item>,
+    /// Columns of covariates with their first number.
+    numbers: Vec<usize>,
+    /// Columns of covariates with text.
+    texts: Vec<usize>,
 }
 
 /// What stands in a cell.
@@ -87,33 +165,44 @@ struct Row<'a> {
 }
 
 impl Row<'_> {
-    fn items(&self) -> Result<Vec<Item>, IngestError> {
+    fn items(&self) -> Result<Met, IngestError> {
         let layout = &self.rows.layout;
         let time = self.time()?;
-        let mut items = Vec::new();
+        let mut met = Met::default();
         for (index, column) in layout.columns.iter().enumerate() {
             match column {
                 Column::Reading {
                     benchmark,
                     unit,
                     sigma,
-                } => items.extend(self.reading(time, index, benchmark, (*unit, *sigma))?),
-                Column::Channel { unit } => {
-                    if let Cell::Number(value) = self.cell(index)? {
-                        items.push(Item::Sample {
+                } => met
+                    .items
+                    .extend(self.reading(time, index, benchmark, (*unit, *sigma))?),
+                Column::Channel { unit } => match self.cell(index) {
+                    Ok(Cell::Number(value)) => {
+                        met.numbers
+                            .extend((!self.rows.numeric[index]).then_some(index));
+                        met.items.push(Item::Sample {
                             channel: layout.names[index].clone(),
                             unit: unit.clone(),
                             sample: Sample { time, value },
                         });
                     }
-                }
-                Column::Time | Column::Days | Column::Sigma | Column::Ignored => {}
+                    Ok(Cell::Empty | Cell::Missing) => {}
+                    Err(fault) if self.rows.numeric[index] => return Err(fault),
+                    Err(_) => met.texts.push(index),
+                },
+                Column::Time
+                | Column::Days
+                | Column::Sigma
+                | Column::Component { .. }
+                | Column::Ignored => {}
             }
         }
         for vector in &self.rows.vectors {
-            items.extend(self.vector(time, vector)?);
+            met.items.extend(self.vector(time, vector)?);
         }
-        Ok(items)
+        Ok(met)
     }
 
     /// The projection of a vector; with a component missing it is missing as a whole.
@@ -182,7 +271,7 @@ impl Row<'_> {
 
     fn time(&self) -> Result<Timestamp, IngestError> {
         let (layout, options) = (&self.rows.layout, &self.rows.options);
-        let index = layout.time;
+        let index = layout.time[0];
         if layout.columns[index] == Column::Days {
             let days = match self.cell(index)? {
                 Cell::Number(days) => after_days(options.epoch, days),
@@ -190,10 +279,22 @@ impl Row<'_> {
             };
             return days.ok_or_else(|| self.fail(index, "a number of days within the calendar"));
         }
+        let text = match &layout.time[..] {
+            [only] => Cow::Borrowed(&self.cells[*only]),
+            parts => {
+                let parts: Vec<&str> = parts.iter().map(|part| &self.cells[*part]).collect();
+                Cow::Owned(parts.join(" "))
+            }
+        };
         let clock = &options.conventions.clock;
-        clock
-            .instant(&self.cells[index])
-            .map_err(|fault| self.fail(index, fault.expected()))
+        let instant = options.dialect.instant(&text, clock);
+        instant.map_err(|fault| IngestError::Field {
+            file: self.rows.file.clone(),
+            line: self.line,
+            column: layout.names[index].clone(),
+            value: text.into_owned(),
+            expected: fault.expected(),
+        })
     }
 
     fn cell(&self, index: usize) -> Result<Cell, IngestError> {
@@ -202,14 +303,23 @@ impl Row<'_> {
             return Ok(Cell::Empty);
         }
         let marks = &self.rows.options.conventions.missing;
-        match cell.parse::<f64>() {
-            Ok(value) if value.is_finite() && marks.has_number(value) => Ok(Cell::Missing),
-            Ok(value) if value.is_finite() => Ok(Cell::Number(value)),
+        match self.rows.options.dialect.number(cell) {
+            Some(value) if value.is_finite() && marks.has_number(value) => Ok(Cell::Missing),
+            Some(value) if value.is_finite() => Ok(Cell::Number(value)),
             _ if marks.has(cell) => Ok(Cell::Missing),
-            _ => Err(self.fail(
-                index,
-                "a finite number, or an empty cell where it is missing",
-            )),
+            _ => Err(self.fail(index, self.a_number())),
+        }
+    }
+
+    /// What should stand in a cell.
+    fn a_number(&self) -> &'static str {
+        match self.rows.options.dialect.decimal {
+            DecimalMark::Point => {
+                "a finite number, or an empty cell where it is missing; for a decimal comma set decimal (--decimal) to comma, for another mark of no value missing (--missing)"
+            }
+            DecimalMark::Comma => {
+                "a finite number with a decimal comma and without marks for thousands, or an empty cell where it is missing"
+            }
         }
     }
 

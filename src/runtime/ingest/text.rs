@@ -2,12 +2,16 @@
 
 use super::bytes::read_bytes;
 use super::collect::Collector;
+use super::columns::Meaning;
 use super::csv::CsvRows;
+use super::encoding::{Transcoder, latin1};
 use super::ndjson::NdjsonRows;
+use super::table::TableRows;
 use super::toa5::Toa5Rows;
 use super::{IngestError, Item, ReadOptions};
-use crate::reading::{Disorder, Recording};
-use std::collections::BTreeMap;
+use crate::reading::{BenchmarkId, Disorder, Recording, Unit};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 /// How a text file is laid out.
@@ -28,15 +32,55 @@ pub struct Taken {
     pub items: Vec<Item>,
     /// What of it cannot be used, and why.
     pub fault: Option<IngestError>,
+    /// What has been found out about the file, each once.
+    pub remarks: Vec<Remark>,
+}
+
+/// Something that a person should know of a file of which nothing is lost by it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Remark {
+    /// The column, or what else it is about; one remark about each is enough.
+    pub about: String,
+    /// What there is to know.
+    pub text: String,
+}
+
+impl Remark {
+    /// That a table is taken as Latin-1 from this line on.
+    pub fn latin1(line: u64) -> Self {
+        Self {
+            about: "encoding".to_owned(),
+            text: format!(
+                "line {line} is not in UTF-8: such lines are taken as Latin-1 (ISO 8859-1)"
+            ),
+        }
+    }
+
+    /// That a file is in UTF-16.
+    pub fn utf16() -> Self {
+        Self {
+            about: "encoding".to_owned(),
+            text: "the file is in UTF-16, as its first bytes say, and is read as such".to_owned(),
+        }
+    }
+}
+
+impl fmt::Display for Remark {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.about, self.text)
+    }
 }
 
 impl From<Result<Vec<Item>, IngestError>> for Taken {
     fn from(taken: Result<Vec<Item>, IngestError>) -> Self {
         match taken {
-            Ok(items) => Self { items, fault: None },
+            Ok(items) => Self {
+                items,
+                ..Self::default()
+            },
             Err(fault) => Self {
-                items: Vec::new(),
                 fault: Some(fault),
+                ..Self::default()
             },
         }
     }
@@ -78,7 +122,7 @@ impl TextRows {
     /// Takes one line; `line` is its number in the file, from 1. A fault is that line's alone, unless
     /// [`TextRows::is_lost`] afterwards.
     pub fn take(&mut self, line: u64, text: &str) -> Taken {
-        match &mut self.rows {
+        let mut taken: Taken = match &mut self.rows {
             Rows::NewCsv => match CsvRows::new(&self.file, text, &self.options) {
                 Ok(rows) => {
                     self.rows = Rows::Csv(Box::new(rows));
@@ -89,7 +133,31 @@ impl TextRows {
             Rows::Csv(rows) => rows.row(line, text).into(),
             Rows::Ndjson(rows) => rows.row(line, text),
             Rows::Toa5(rows) => rows.row(line, text).into(),
+        };
+        let mut ask = |table: &mut TableRows| taken.remarks.extend(table.take_remarks());
+        match &mut self.rows {
+            Rows::NewCsv => {}
+            Rows::Csv(rows) => rows.table().into_iter().for_each(&mut ask),
+            Rows::Ndjson(rows) => rows.tables().for_each(&mut ask),
+            Rows::Toa5(rows) => rows.table().into_iter().for_each(&mut ask),
         }
+        taken
+    }
+
+    /// What the columns are taken for, by what has been read so far; none for messages, each of which says it.
+    pub fn meanings(&mut self) -> Vec<(String, Meaning)> {
+        match &mut self.rows {
+            Rows::NewCsv => Vec::new(),
+            Rows::Csv(rows) => rows.table().map_or_else(Vec::new, |table| table.meanings()),
+            Rows::Ndjson(rows) => rows.tables().flat_map(|table| table.meanings()).collect(),
+            Rows::Toa5(rows) => rows.table().map_or_else(Vec::new, |table| table.meanings()),
+        }
+    }
+
+    /// Whether a line that is not UTF-8 may be taken as Latin-1: in a table only column names and text could
+    /// differ by it, never a number.
+    pub fn takes_latin1(&self) -> bool {
+        matches!(self.rows, Rows::NewCsv | Rows::Csv(_))
     }
 
     /// Whether the file does not begin as its format does, so that nothing of it can be read.
@@ -134,6 +202,8 @@ pub(super) struct Table {
     pub(super) disorder: Disorder,
     /// None for NDJSON, where each line has its own.
     pub(super) columns: Vec<String>,
+    /// What a person should know of the file.
+    pub(super) remarks: Vec<Remark>,
 }
 
 /// Reads a whole file; the first fault is an error.
@@ -143,11 +213,16 @@ pub(super) fn read_text(
     options: &ReadOptions,
 ) -> Result<Table, IngestError> {
     let bytes = read_bytes(file)?;
-    let name = super::bytes::unpacked_name(file);
-    let mut rows = TextRows::new(format, &file.with_file_name(name), options);
+    let bytes = Transcoder::default().feed(&bytes);
+    let mut rows = TextRows::new(format, &super::bytes::unpacked_name(file), options);
     let mut collected = Collector::default();
+    let mut remarks = Vec::new();
     for (text, line) in bytes.split(|byte| *byte == b'\n').zip(1..) {
-        let taken = rows.take(line, decode(file, line, text)?);
+        let taken = match std::str::from_utf8(text) {
+            Ok(text) => rows.take(line, text),
+            Err(_) => rows.take(line, &not_utf8(&rows, file, (line, text), &mut remarks)?),
+        };
+        remarks.extend(taken.remarks);
         if let Some(fault) = taken.fault {
             return Err(fault);
         }
@@ -175,15 +250,71 @@ pub(super) fn read_text(
         recording,
         disorder,
         columns,
+        remarks,
     })
 }
 
-fn decode<'a>(file: &Path, line: u64, text: &'a [u8]) -> Result<&'a str, IngestError> {
-    std::str::from_utf8(text).map_err(|_| IngestError::Field {
+/// A line that is no UTF-8, as Latin-1 where that can do no harm; which is told once.
+fn not_utf8(
+    rows: &TextRows,
+    file: &Path,
+    (line, text): (u64, &[u8]),
+    remarks: &mut Vec<Remark>,
+) -> Result<String, IngestError> {
+    let read = latin1(text).filter(|_| rows.takes_latin1());
+    let remark = Remark::latin1(line);
+    if read.is_some() && remarks.iter().all(|one| one.about != remark.about) {
+        remarks.push(remark);
+    }
+    read.ok_or_else(|| IngestError::Field {
         file: file.into(),
         line,
         column: "(any)".to_owned(),
         value: String::from_utf8_lossy(text).into_owned(),
-        expected: "text in UTF-8",
+        expected: "text in UTF-8, or a table in Latin-1",
     })
+}
+
+/// What a file holds, whatever is wrong with some of its rows.
+#[derive(Debug, Default)]
+pub struct Looked {
+    /// What its columns are taken for; none for messages.
+    pub columns: Vec<(String, Meaning)>,
+    /// Whose readings it has, in which units.
+    pub readings: BTreeSet<(BenchmarkId, Unit)>,
+}
+
+/// Looks through a text file.
+///
+/// # Errors
+/// [`IngestError`] where it cannot be read or does not begin as its format does.
+pub fn look_through(
+    format: TextFormat,
+    file: &Path,
+    options: &ReadOptions,
+) -> Result<Looked, IngestError> {
+    let bytes = read_bytes(file)?;
+    let bytes = Transcoder::default().feed(&bytes);
+    let mut rows = TextRows::new(format, &super::bytes::unpacked_name(file), options);
+    let mut looked = Looked::default();
+    for (text, line) in bytes.split(|byte| *byte == b'\n').zip(1..) {
+        let text = match std::str::from_utf8(text) {
+            Ok(text) => text.to_owned(),
+            Err(_) => latin1(text).unwrap_or_default(),
+        };
+        let taken = rows.take(line, &text);
+        if let Some(fault) = taken.fault.filter(|_| rows.is_lost()) {
+            return Err(fault);
+        }
+        looked
+            .readings
+            .extend(taken.items.into_iter().filter_map(|item| match item {
+                Item::Reading {
+                    benchmark, unit, ..
+                } => Some((benchmark, unit)),
+                Item::Sample { .. } | Item::Missing { .. } => None,
+            }));
+    }
+    looked.columns = rows.meanings();
+    Ok(looked)
 }

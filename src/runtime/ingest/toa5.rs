@@ -9,7 +9,7 @@ use super::columns::{Column, ColumnMap, Layout, Measure, Name, channel_unit, nam
 use super::split::Splitter;
 use super::table::TableRows;
 use super::{IngestError, Item, ReadOptions};
-use crate::reading::Unit;
+use crate::reading::{Delimiter, Dialect, Unit};
 use ::csv::StringRecord;
 use std::path::{Path, PathBuf};
 
@@ -41,12 +41,14 @@ impl Toa5Rows {
             file: file.into(),
             options: ReadOptions {
                 conventions,
+                // A logger writes them all alike.
+                dialect: Dialect::default(),
                 ..options.clone()
             },
             header: Vec::new(),
             table: None,
             is_new: true,
-            splitter: Splitter::new(),
+            splitter: Splitter::new(Delimiter::Comma),
             cells: StringRecord::new(),
         }
     }
@@ -66,6 +68,10 @@ impl Toa5Rows {
 
     pub(super) fn columns(&self) -> &[String] {
         self.table.as_ref().map_or(&[], TableRows::names)
+    }
+
+    pub(super) fn table(&mut self) -> Option<&mut TableRows> {
+        self.table.as_mut()
     }
 
     pub(super) fn row(&mut self, line: u64, text: &str) -> Result<Vec<Item>, IngestError> {

@@ -43,8 +43,13 @@ pub(super) fn claim(layout: &mut Layout, maps: &[VectorMap]) -> Vec<Vector> {
             tracing::warn!(%benchmark, ?columns, "not all components of the benchmark are there: no reading of it");
         }
     }
-    for (place, _) in vectors.iter().flat_map(|vector| &vector.components) {
-        layout.columns[*place] = Column::Ignored;
+    for vector in &vectors {
+        for (place, _) in &vector.components {
+            layout.columns[*place] = Column::Component {
+                benchmark: vector.benchmark.clone(),
+                unit: vector.unit,
+            };
+        }
     }
     vectors
 }

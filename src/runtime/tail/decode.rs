@@ -2,12 +2,14 @@
 
 use crate::config::{Benchmark, Broker, Source, SourceKind};
 use crate::monitor::Input;
-use crate::reading::{BenchmarkId, Conventions, Quantity, Timestamp, Unit};
+use crate::reading::{BenchmarkId, Conventions, Dialect, Quantity, Timestamp, Unit};
 use crate::runtime::ingest::{
-    ColumnMap, Item, Measure, ReadOptions, TextFormat, TextRows, VectorMap, unpacked_name,
+    ColumnMap, Item, Measure, ReadOptions, Remark, TextFormat, TextRows, VectorMap, unpacked_name,
 };
 use jiff::SignedDuration;
+use std::collections::BTreeSet;
 use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// One value on its way to the monitor.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,17 +44,22 @@ impl Arrival {
 pub(in crate::runtime) struct Decoder {
     kind: SourceKind,
     conventions: Conventions,
+    dialect: Dialect,
     /// With none, whatever benchmarks the files name are taken.
     wanted: Vec<Benchmark>,
+    /// What of the source's files has been remarked on, so that a thousand files say it once.
+    remarked: Arc<Mutex<BTreeSet<String>>>,
 }
 
 impl Decoder {
-    pub(super) fn new(source: &Source, benchmarks: &[Benchmark]) -> Self {
+    pub(in crate::runtime) fn new(source: &Source, benchmarks: &[Benchmark]) -> Self {
         let conventions = source.conventions.clone();
         Self {
             kind: source.kind,
             conventions,
+            dialect: source.dialect.clone(),
             wanted: of_source(&source.id, benchmarks),
+            remarked: Arc::default(),
         }
     }
 
@@ -61,8 +68,16 @@ impl Decoder {
         Self {
             kind: SourceKind::Ndjson,
             conventions: broker.conventions.clone(),
+            dialect: Dialect::default(),
             wanted: of_source(&broker.id, benchmarks),
+            remarked: Arc::default(),
         }
+    }
+
+    /// Whether no file of the source has been remarked on for this before.
+    pub(super) fn is_news(&self, remark: &Remark) -> bool {
+        let mut told = self.remarked.lock().unwrap_or_else(PoisonError::into_inner);
+        told.insert(remark.about.clone())
     }
 
     /// The reader of the lines of `file`; `None` for recordings.
@@ -73,7 +88,7 @@ impl Decoder {
             SourceKind::Toa5 => TextFormat::Toa5,
             SourceKind::Mcap => return None,
         };
-        let name = file.with_file_name(unpacked_name(file));
+        let name = unpacked_name(file);
         Some(TextRows::new(format, &name, &self.options(&name)))
     }
 
@@ -114,6 +129,7 @@ impl Decoder {
             reserved: of_a_column.map(|one| one.id.clone()).collect(),
             vectors: vectors.collect(),
             conventions: self.conventions.clone(),
+            dialect: self.dialect.clone(),
             ..ReadOptions::default()
         }
     }
@@ -194,6 +210,11 @@ impl Decoder {
     fn wanted(&self, benchmark: &BenchmarkId) -> Option<&Benchmark> {
         self.wanted.iter().find(|one| one.id == *benchmark)
     }
+}
+
+/// How the daemon reads a file of this source.
+pub fn options_of(source: &Source, benchmarks: &[Benchmark], file: &Path) -> ReadOptions {
+    Decoder::new(source, benchmarks).options(&unpacked_name(file))
 }
 
 fn of_source(id: &str, benchmarks: &[Benchmark]) -> Vec<Benchmark> {

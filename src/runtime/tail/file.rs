@@ -92,7 +92,7 @@ impl Content {
 
 /// Which file it is, as the file system counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct Place {
+pub(in crate::runtime) struct Place {
     device: u64,
     inode: u64,
 }
@@ -317,6 +317,11 @@ impl FileTail {
     }
 
     fn take(&mut self, fed: Fed) {
+        for remark in fed.remarks {
+            if self.decoder.is_news(&remark) {
+                tracing::info!(file = %self.path.display(), "{remark}");
+            }
+        }
         for item in fed.items {
             self.expect(item);
         }

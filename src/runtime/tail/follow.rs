@@ -316,11 +316,11 @@ fn name(source: &str, path: &Path) -> String {
 }
 
 /// Files, and what has a name that is no text.
-type Listed = (Vec<(PathBuf, Place)>, Vec<PathBuf>);
+pub(in crate::runtime) type Listed = (Vec<(PathBuf, Place)>, Vec<PathBuf>);
 
 /// The files of the pattern, packed ones among them where the source has text; and those that would be, if their names
 /// were text.
-fn list(pattern: &FilePattern, decoder: &Decoder) -> io::Result<Listed> {
+pub(in crate::runtime) fn list(pattern: &FilePattern, decoder: &Decoder) -> io::Result<Listed> {
     let is_ours = |name: &str| {
         let packed = name.strip_suffix(".gz").filter(|_| decoder.takes_packed());
         pattern.matches(name) || packed.is_some_and(|name| pattern.matches(name))

@@ -1,5 +1,6 @@
 //! Cuts a growing text into lines: bytes in, whole lines out, a partial last one held.
 
+use crate::runtime::ingest::{Transcoder, latin1};
 use serde::{Deserialize, Serialize};
 
 /// Longest line that is read, bytes.
@@ -25,6 +26,8 @@ pub enum LineFault {
     NotUtf8 {
         /// What can be shown of it.
         shown: String,
+        /// The line, were it in Latin-1.
+        latin1: Option<String>,
     },
     /// It has NUL bytes, as a file has that was not synced before the power failed.
     #[error("has NUL bytes")]
@@ -34,6 +37,9 @@ pub enum LineFault {
 /// The state between two reads; memory is bounded by [`LONGEST_LINE`].
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Lines {
+    /// Absent in what was kept before there was one.
+    #[serde(default)]
+    transcoder: Transcoder,
     partial: Vec<u8>,
     too_long: bool,
     number: u64,
@@ -42,8 +48,12 @@ pub struct Lines {
 impl Lines {
     /// Takes the next bytes of the file and returns the lines that they complete.
     pub fn feed(&mut self, bytes: &[u8]) -> Vec<Line> {
+        if self.number > 0 || !self.partial.is_empty() {
+            self.transcoder.go_on();
+        }
+        let bytes = self.transcoder.feed(bytes);
         let mut lines = Vec::new();
-        let mut rest = bytes;
+        let mut rest = &bytes[..];
         while let Some(end) = rest.iter().position(|byte| *byte == b'\n') {
             self.hold(&rest[..end]);
             lines.push(self.complete());
@@ -51,6 +61,16 @@ impl Lines {
         }
         self.hold(rest);
         lines
+    }
+
+    /// Whether the text is in UTF-16.
+    pub fn is_utf16(&self) -> bool {
+        self.transcoder.is_utf16()
+    }
+
+    /// Whether the text ends within a line.
+    pub fn is_within_a_line(&self) -> bool {
+        self.too_long || !self.partial.is_empty()
     }
 
     fn hold(&mut self, bytes: &[u8]) {
@@ -72,6 +92,7 @@ impl Lines {
         } else {
             String::from_utf8(bytes).map_err(|error| LineFault::NotUtf8 {
                 shown: shown(error.as_bytes()),
+                latin1: latin1(error.as_bytes()),
             })
         };
         Line {

@@ -17,9 +17,11 @@ mod reorder;
 mod saved;
 mod text;
 
-pub use decode::Arrival;
 pub(super) use decode::Decoder;
+pub use decode::{Arrival, options_of};
+pub(super) use follow::list;
 pub use follow::{Batch, Follower};
+pub(super) use text::{BadLine, Fed, TextReader};
 
 use super::clock::{self, Stopwatch};
 use super::shutdown::Shutdown;

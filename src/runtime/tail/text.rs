@@ -1,7 +1,7 @@
 //! The text of one file on its way in: bytes to lines, lines to values and faults.
 
-use super::lines::Lines;
-use crate::runtime::ingest::{FileUnits, IngestError, Item, TextRows, unpack};
+use super::lines::{LineFault, Lines};
+use crate::runtime::ingest::{FileUnits, IngestError, Item, Meaning, Remark, TextRows, unpack};
 use serde::{Deserialize, Serialize};
 use std::error::Error;
 use std::fmt::Debug;
@@ -13,31 +13,35 @@ const PIECE_BYTES: usize = 16 * 1024;
 
 /// A line that cannot be used, or a part of one.
 #[derive(Debug)]
-pub(super) struct BadLine {
-    pub(super) number: u64,
-    pub(super) text: String,
-    pub(super) error: Box<dyn Error + Send + Sync>,
+pub(in crate::runtime) struct BadLine {
+    pub(in crate::runtime) number: u64,
+    pub(in crate::runtime) text: String,
+    pub(in crate::runtime) error: Box<dyn Error + Send + Sync>,
 }
 
 /// What came of some bytes.
 #[derive(Debug, Default)]
-pub(super) struct Fed {
-    pub(super) items: Vec<Item>,
-    pub(super) bad: Vec<BadLine>,
+pub(in crate::runtime) struct Fed {
+    pub(in crate::runtime) items: Vec<Item>,
+    pub(in crate::runtime) bad: Vec<BadLine>,
     /// The file does not begin as it should: the last of `bad` says why, and nothing follows.
-    pub(super) is_lost: bool,
+    pub(in crate::runtime) is_lost: bool,
+    /// What has been found out about the file, perhaps once more.
+    pub(in crate::runtime) remarks: Vec<Remark>,
 }
+
+type Fault = Box<dyn Error + Send + Sync>;
 
 /// Where we are in a text.
 #[derive(Debug)]
-pub(super) struct TextReader {
+pub(in crate::runtime) struct TextReader {
     lines: Lines,
     rows: TextRows,
     units: FileUnits,
 }
 
 impl TextReader {
-    pub(super) fn new(rows: TextRows) -> Self {
+    pub(in crate::runtime) fn new(rows: TextRows) -> Self {
         Self {
             lines: Lines::default(),
             rows,
@@ -71,20 +75,19 @@ impl TextReader {
     }
 
     /// Takes the next bytes.
-    pub(super) fn feed(&mut self, bytes: &[u8]) -> Fed {
+    pub(in crate::runtime) fn feed(&mut self, bytes: &[u8]) -> Fed {
         let mut fed = Fed::default();
         for line in self.lines.feed(bytes) {
             let number = line.number;
             let (text, error) = match line.text {
-                Err(fault) => (String::new(), Some(fault.into())),
-                Ok(text) => {
-                    let taken = self.rows.take(number, &text);
-                    let mut items = taken.items;
-                    items.sort_by(|a, b| order(a).cmp(&order(b)));
-                    let guarded = items.into_iter().map(|item| self.units.guard(item));
-                    fed.items.extend(guarded);
-                    (text, taken.fault.map(Into::into))
+                Err(LineFault::NotUtf8 {
+                    latin1: Some(text), ..
+                }) if self.rows.takes_latin1() => {
+                    fed.remarks.push(Remark::latin1(number));
+                    self.line(number, text, &mut fed)
                 }
+                Err(fault) => (String::new(), Some(fault.into())),
+                Ok(text) => self.line(number, text, &mut fed),
             };
             let Some(error) = error else { continue };
             fed.is_lost = !text.is_empty() && self.rows.is_lost();
@@ -97,7 +100,30 @@ impl TextReader {
                 break;
             }
         }
+        if self.lines.is_utf16() {
+            fed.remarks.push(Remark::utf16());
+        }
         fed
+    }
+
+    fn line(&mut self, number: u64, text: String, fed: &mut Fed) -> (String, Option<Fault>) {
+        let taken = self.rows.take(number, &text);
+        let mut items = taken.items;
+        items.sort_by(|a, b| order(a).cmp(&order(b)));
+        let guarded = items.into_iter().map(|item| self.units.guard(item));
+        fed.items.extend(guarded);
+        fed.remarks.extend(taken.remarks);
+        (text, taken.fault.map(Into::into))
+    }
+
+    /// What the columns are taken for, by what has been read so far.
+    pub(in crate::runtime) fn meanings(&mut self) -> Vec<(String, Meaning)> {
+        self.rows.meanings()
+    }
+
+    /// Whether the text ends within a line.
+    pub(in crate::runtime) fn is_within_a_line(&self) -> bool {
+        self.lines.is_within_a_line()
     }
 }
 
@@ -131,7 +157,7 @@ trait Packed: Read + Send + Debug {}
 impl<T: Read + Send + Debug> Packed for T {}
 
 impl Unpacking {
-    pub(super) fn new(rows: TextRows) -> Self {
+    pub(in crate::runtime) fn new(rows: TextRows) -> Self {
         Self {
             packed: None,
             text: TextReader::new(rows),

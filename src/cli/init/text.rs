@@ -1,0 +1,121 @@
+//! The site file that is written: what was found, and what can be added, in comments.
+
+use super::Plan;
+use super::times::word;
+use crate::config::SourceKind;
+use crate::reading::{DecimalMark, Delimiter, TimeFormat};
+use std::fmt::Write as _;
+
+/// The whole file.
+pub(super) fn config(plan: &Plan) -> String {
+    let mut text = format!(
+        "# What slipwatch watches here. Paths are relative to this file. After a change: slipwatch check FILE\n\n\
+         [site]\nname = {}\nstate_dir = \"state\"                # everything the daemon knows; created when missing\n\
+         # listen = \"127.0.0.1:8642\"        # /healthz, /readyz, /metrics, /api/status over HTTP\n",
+        quoted(&plan.name)
+    );
+    if let Some(zone) = &plan.zone {
+        let _ = writeln!(text, "time_zone = {}", quoted(zone));
+    }
+    for source in &plan.sources {
+        tell_source(&mut text, source, plan);
+    }
+    text.push_str("\n# The points that are watched.\n");
+    for benchmark in &plan.benchmarks {
+        let _ = write!(
+            text,
+            "[[benchmark]]\nid = {}\nsource = {}\n",
+            quoted(&benchmark.id),
+            quoted(&benchmark.source)
+        );
+        if let Some((column, unit)) = &benchmark.column {
+            let _ = write!(
+                text,
+                "column = {}\nunit = {}\n",
+                quoted(column),
+                quoted(unit)
+            );
+        }
+        if benchmark.is_velocity {
+            text.push_str("# averaging = \"1h\"                 # if each velocity is the mean of the time before it\n");
+        }
+        text.push('\n');
+    }
+    tell_alert(&mut text, plan);
+    text
+}
+
+fn tell_source(text: &mut String, source: &super::PlannedSource, plan: &Plan) {
+    let _ = write!(
+        text,
+        "\n[[source]]\nid = {}\nkind = \"{}\"\npath = {}\n",
+        quoted(&source.id),
+        source.kind.name(),
+        quoted(&source.path)
+    );
+    if let Some(zone) = plan
+        .zone
+        .as_ref()
+        .filter(|_| source.kind != SourceKind::Mcap)
+    {
+        let _ = writeln!(
+            text,
+            "time_zone = {}          # of times that state no offset",
+            quoted(zone)
+        );
+    }
+    if let Some(dst) = &plan.dst {
+        let _ = writeln!(text, "dst = {}", quoted(dst));
+    }
+    if !plan.missing.is_empty() {
+        let marks: Vec<String> = plan.missing.iter().map(|mark| quoted(mark)).collect();
+        let _ = writeln!(text, "missing = [{}]", marks.join(", "));
+    }
+    let dialect = &source.dialect;
+    if let Some(delimiter @ (Delimiter::Semicolon | Delimiter::Tab)) = dialect.delimiter {
+        let _ = writeln!(text, "delimiter = \"{}\"", delimiter.name());
+    }
+    if dialect.decimal == DecimalMark::Comma {
+        text.push_str("decimal = \"comma\"\n");
+    }
+    match &dialect.time_columns[..] {
+        [] => {}
+        [one] => {
+            let _ = writeln!(text, "time_column = {}", quoted(one));
+        }
+        several => {
+            let names: Vec<String> = several.iter().map(|name| quoted(name)).collect();
+            let _ = writeln!(text, "time_column = [{}]", names.join(", "));
+        }
+    }
+    if dialect.time_format != TimeFormat::Rfc3339 {
+        let _ = writeln!(text, "time_format = {}", quoted(word(&dialect.time_format)));
+    }
+}
+
+fn tell_alert(text: &mut String, plan: &Plan) {
+    let evacuation = match &plan.evacuation_time {
+        Some(given) => format!("evacuation_time = {}", quoted(given)),
+        None => "# evacuation_time = \"24h\"".to_owned(),
+    };
+    let _ = write!(
+        text,
+        "[alert]\n{evacuation:35}# how long it takes to bring everyone out; red looks so far ahead\n\
+         # outlook = \"30d\"                # yellow and orange look so far ahead\n\
+         # critical_velocity = \"1 m/day\"  # passing this is failure\n\n\
+         # A program that is run when a level is entered or left; it gets the alert as JSON on stdin.\n"
+    );
+    match &plan.hook {
+        Some(hook) => {
+            let _ = write!(text, "[[hook]]\nrun = [{}]\n", quoted(hook));
+            text.push_str("levels = [\"orange\", \"red\", \"unknown\"]\n");
+        }
+        None => text.push_str(
+            "# [[hook]]\n# run = [\"./notify.sh\"]\n# levels = [\"orange\", \"red\", \"unknown\"]\n",
+        ),
+    }
+}
+
+fn quoted(text: &str) -> String {
+    toml::Value::String(text.to_owned()).to_string()
+}

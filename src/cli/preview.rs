@@ -1,0 +1,149 @@
+//! What a site's files hold, for people.
+
+use crate::reading::Timestamp;
+use crate::runtime::ingest::Meaning;
+use crate::runtime::preview::{BenchmarkView, ColumnView, CovariateView, Preview, SourceView};
+use jiff::SignedDuration;
+use jiff::tz::TimeZone;
+use std::fmt::Write as _;
+
+/// The sources with their columns, the benchmarks and the covariates.
+pub(super) fn told(preview: &Preview, zone: &TimeZone) -> String {
+    let mut text = String::new();
+    for source in &preview.sources {
+        tell_source(&mut text, source);
+    }
+    for benchmark in &preview.benchmarks {
+        tell_benchmark(&mut text, benchmark, zone);
+    }
+    for covariate in &preview.covariates {
+        tell_covariate(&mut text, covariate);
+    }
+    for id in &preview.unwatched {
+        let _ = writeln!(
+            text,
+            "\nnot watched: {id} is in the files, and no [[benchmark]] names it"
+        );
+    }
+    if !preview.is_whole {
+        text.push_str("\nonly the first values were looked at, there are very many\n");
+    }
+    text
+}
+
+fn tell_source(text: &mut String, source: &SourceView) {
+    let SourceView {
+        id,
+        kind,
+        path,
+        times,
+        files,
+        ..
+    } = source;
+    let files = match files {
+        0 => "no file yet".to_owned(),
+        1 => "1 file".to_owned(),
+        many => format!("{many} files"),
+    };
+    let _ = writeln!(
+        text,
+        "\nsource {id} ({kind}): {path}, {files}; times {times}"
+    );
+    for layout in &source.layouts {
+        let more = match layout.files {
+            1 => String::new(),
+            many => format!(" and {} more with the same columns", many - 1),
+        };
+        let _ = writeln!(text, "  {}{more}", layout.file.display());
+        let columns = layout.columns.iter();
+        let width = columns.map(|column| column.name.chars().count()).max();
+        for column in &layout.columns {
+            let (name, width) = (&column.name, width.unwrap_or_default());
+            let _ = writeln!(text, "    {name:width$}  {}", meaning(column));
+        }
+    }
+    for refusal in &source.refused {
+        let rows = match refusal.rows {
+            1 => "1 row".to_owned(),
+            many => format!("{many} rows"),
+        };
+        let _ = writeln!(text, "  refused: {rows}, the first: {}", refusal.first);
+    }
+    for remark in &source.remarks {
+        let _ = writeln!(text, "  {remark}");
+    }
+}
+
+fn meaning(column: &ColumnView) -> String {
+    match &column.meaning {
+        Meaning::Time => "time".to_owned(),
+        Meaning::Reading { benchmark, unit } => format!("benchmark {benchmark}, {unit}"),
+        Meaning::Sigma => "standard error of the readings".to_owned(),
+        Meaning::Component { benchmark, unit } => {
+            format!("one component of benchmark {benchmark}, {unit}")
+        }
+        Meaning::Covariate { unit: Some(unit) } => format!("covariate, {unit}"),
+        Meaning::Covariate { unit: None } => "covariate without a unit in its name".to_owned(),
+        Meaning::Text => "not used: text".to_owned(),
+        Meaning::Empty => "not used: empty so far".to_owned(),
+        Meaning::Unused => "not used".to_owned(),
+    }
+}
+
+fn tell_benchmark(text: &mut String, benchmark: &BenchmarkView, zone: &TimeZone) {
+    let BenchmarkView {
+        id,
+        source,
+        quantity,
+        unit,
+        readings,
+        first,
+        last,
+        every_s,
+        suspicions,
+    } = benchmark;
+    let every = every_s.map_or(String::new(), |seconds| {
+        format!(", every {:#}", SignedDuration::from_secs(seconds))
+    });
+    let _ = writeln!(
+        text,
+        "\nbenchmark {id} ({source}): {readings} readings of {quantity}{every}"
+    );
+    for (which, (time, value)) in [("first", first), ("last ", last)] {
+        let _ = writeln!(
+            text,
+            "  {which} {time}{}  {value} {unit}",
+            there(*time, zone)
+        );
+    }
+    for line in suspicions {
+        let _ = writeln!(text, "  suspicion: {line}");
+    }
+}
+
+/// The same time on the clocks of the site.
+fn there(time: Timestamp, zone: &TimeZone) -> String {
+    if *zone == TimeZone::UTC {
+        return String::new();
+    }
+    let local = time.to_zoned(zone.clone());
+    local.strftime(" (%Y-%m-%d %H:%M %Z)").to_string()
+}
+
+fn tell_covariate(text: &mut String, covariate: &CovariateView) {
+    let CovariateView {
+        name,
+        unit,
+        source,
+        values,
+        first,
+        last,
+    } = covariate;
+    let unit = unit
+        .as_ref()
+        .map_or(String::new(), |unit| format!(", {unit}"));
+    let _ = writeln!(
+        text,
+        "\ncovariate {name} ({source}): {values} values{unit}, {first} to {last}"
+    );
+}

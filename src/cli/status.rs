@@ -1,0 +1,209 @@
+//! `status`: how a site stands, with or without a running daemon.
+
+use super::preview::told;
+use super::state::{InForce, SiteArgs, acknowledged, in_force, orders, silences};
+use super::table::Table;
+use super::text;
+use crate::alert::Level;
+use crate::monitor::{Event, EventKind};
+use crate::reading::{BenchmarkId, Timestamp};
+use crate::runtime::preview::{Preview, preview};
+use crate::store::Store;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Say what a site's benchmarks do: level, regime, failure time, newest reading
+#[derive(Debug, clap::Args)]
+pub(super) struct StatusArgs {
+    #[command(flatten)]
+    site: SiteArgs,
+    /// Also what the files of its sources hold now, as check shows it: the last row of each benchmark and covariate,
+    /// rows that are refused
+    #[arg(long)]
+    sources: bool,
+}
+
+/// How one benchmark stands.
+#[derive(Debug, Serialize)]
+struct Standing {
+    benchmark: BenchmarkId,
+    level: Level,
+    /// Since when.
+    since: Option<Timestamp>,
+    /// Since when the monitor cannot tell: no data, a sensor fault.
+    unknown_since: Option<Timestamp>,
+    /// Whether nothing can be said of it now; so it is before its first reading.
+    is_unknown: bool,
+    newest_reading: Option<Timestamp>,
+    regime: Option<String>,
+    velocity_mm_per_day: Option<f64>,
+    failure_time: Option<Timestamp>,
+    chance_within_evacuation_time: Option<f64>,
+}
+
+#[derive(Debug, Serialize)]
+struct SiteStatus {
+    site: String,
+    benchmarks: Vec<Standing>,
+    steps: i64,
+    alerts_waiting: usize,
+    bytes: u64,
+    /// Since when nothing can be said of the site: too many benchmarks are unknown, or the clock is wrong.
+    site_unknown_since: Option<Timestamp>,
+    /// Whether a daemon watches the site now.
+    is_running: bool,
+    /// The alerts in force.
+    alerts: Vec<Event>,
+    /// Acknowledgements of them.
+    acknowledged: Vec<Event>,
+    /// The orders by which alerts are not told.
+    silences: Vec<Event>,
+    /// What the files hold, where that was asked for.
+    preview: Option<Preview>,
+}
+
+/// Says how the site stands.
+pub(super) fn status(args: &StatusArgs) -> anyhow::Result<()> {
+    let (config, store) = args.site.open()?;
+    let (levels, orders) = (in_force(&store)?, orders(&store)?);
+    let mut refits = BTreeMap::new();
+    for body in store.latest("refit")? {
+        let event: Event = serde_json::from_str(&body)?;
+        if let Some(benchmark) = event.benchmark {
+            refits.insert(benchmark, event.kind);
+        }
+    }
+    let mut newest: BTreeMap<BenchmarkId, Option<Timestamp>> = BTreeMap::new();
+    newest.extend(config.benchmarks.iter().map(|one| (one.id.clone(), None)));
+    let read = store.benchmarks()?.into_iter();
+    newest.extend(read.map(|(benchmark, time)| (benchmark, Some(time))));
+    let each = newest.into_iter().map(|(benchmark, newest)| {
+        let standing = Standing {
+            level: Level::Green,
+            since: None,
+            unknown_since: None,
+            is_unknown: newest.is_none(),
+            newest_reading: newest,
+            regime: None,
+            velocity_mm_per_day: None,
+            failure_time: None,
+            chance_within_evacuation_time: None,
+            benchmark,
+        };
+        stands(standing, &levels, &refits)
+    });
+    let preview = args.sources.then(|| preview(&config));
+    let zone = config.site.time_zone;
+    let status = SiteStatus {
+        site: config.site.name,
+        benchmarks: each.collect(),
+        steps: store.last_step(),
+        alerts_waiting: store.waiting()?.len(),
+        bytes: store.bytes()?,
+        site_unknown_since: levels.get(&(None, Level::Unknown)).map(|event| event.time),
+        is_running: Store::is_held(&config.site.state_dir),
+        acknowledged: acknowledged(&orders, &levels),
+        silences: silences(&orders),
+        alerts: levels.into_values().collect(),
+        preview,
+    };
+    args.site.output.print(&status, |status| {
+        let preview = status.preview.as_ref();
+        let files = preview.map_or_else(String::new, |preview| told(preview, &zone));
+        status_text(status) + &files
+    })
+}
+
+fn stands(
+    mut standing: Standing,
+    levels: &InForce,
+    refits: &BTreeMap<BenchmarkId, EventKind>,
+) -> Standing {
+    for ((place, level), event) in levels {
+        if place.as_ref() != Some(&standing.benchmark) {
+            continue;
+        }
+        if *level == Level::Unknown {
+            (standing.unknown_since, standing.is_unknown) = (Some(event.time), true);
+        } else {
+            (standing.level, standing.since) = (*level, Some(event.time));
+        }
+    }
+    if let Some(EventKind::Refit {
+        regime,
+        failure_time,
+        velocity_mm_per_day,
+        chance_within_evacuation_time,
+        ..
+    }) = refits.get(&standing.benchmark)
+    {
+        standing.regime = Some(regime.label.to_string());
+        standing.velocity_mm_per_day = *velocity_mm_per_day;
+        standing.failure_time = failure_time.median;
+        standing.chance_within_evacuation_time = Some(*chance_within_evacuation_time);
+    }
+    standing
+}
+
+fn status_text(status: &SiteStatus) -> String {
+    let mut table = Table::headed([
+        "benchmark",
+        "level",
+        "since",
+        "newest reading",
+        "regime",
+        "mm/day",
+        "failure (median)",
+        "chance",
+    ]);
+    let time = |time: Option<Timestamp>| time.map_or_else(|| "-".to_owned(), text::minute);
+    for one in &status.benchmarks {
+        let velocity = one
+            .velocity_mm_per_day
+            .map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
+        table.row([
+            text::plain(one.benchmark.as_str()),
+            match one.unknown_since {
+                Some(since) if one.since.is_some() => {
+                    format!("{}, unknown since {}", one.level, text::minute(since))
+                }
+                _ if one.is_unknown => format!("{}, unknown", one.level),
+                _ => one.level.to_string(),
+            },
+            time(one.since.or(one.unknown_since)),
+            time(one.newest_reading),
+            one.regime.clone().unwrap_or_else(|| "-".to_owned()),
+            velocity,
+            time(one.failure_time),
+            chance(one.chance_within_evacuation_time),
+        ]);
+    }
+    let lines = |events: &[Event]| -> String {
+        events
+            .iter()
+            .map(|event| text::line(event) + "\n")
+            .collect()
+    };
+    let dead = if status.is_running {
+        ""
+    } else {
+        "NO DAEMON RUNS: nothing is watched; what follows is as of its last reading\n"
+    };
+    let force = match &status.alerts[..] {
+        [] => String::new(),
+        alerts => format!("\nin force:\n{}", lines(alerts)),
+    };
+    format!(
+        "{dead}{}: {} inputs taken, {} alerts wait for a hook\n{}{}\n{table}\
+         chance: of passing the critical velocity within the evacuation time\n{force}",
+        text::plain(&status.site),
+        status.steps,
+        status.alerts_waiting,
+        lines(&status.silences),
+        lines(&status.acknowledged),
+    )
+}
+
+fn chance(chance: Option<f64>) -> String {
+    chance.map_or_else(|| "-".to_owned(), |chance| format!("{chance:.2}"))
+}

@@ -1,0 +1,349 @@
+//! How a table of text is written: what parts its cells, how its numbers and its times look.
+
+use super::{LocalClock, TimeFault};
+use jiff::civil::{Date, DateTime, Time};
+use jiff::fmt::strtime::BrokenDownTime;
+use jiff::{SignedDuration, Timestamp};
+
+/// What holds for every file of a source, where it is not as in CSV with RFC 3339 times.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Dialect {
+    /// What parts the cells; with none, it is that of the header, see [`Delimiter::of_header`].
+    pub delimiter: Option<Delimiter>,
+    /// What stands before the decimals.
+    pub decimal: DecimalMark,
+    /// The columns that give the time, joined by a blank; with none, the one named `time` or `t_days`.
+    pub time_columns: Vec<String>,
+    /// How a time is written.
+    pub time_format: TimeFormat,
+}
+
+impl Dialect {
+    /// The instant that a time of such a file means.
+    ///
+    /// # Errors
+    /// [`TimeFault`] says what is wrong with it.
+    pub fn instant(&self, text: &str, clock: &LocalClock) -> Result<Timestamp, TimeFault> {
+        match &self.time_format {
+            TimeFormat::Rfc3339 => clock.instant(text).map_err(|fault| {
+                if fault == TimeFault::NotATime {
+                    likely_fault(text)
+                } else {
+                    fault
+                }
+            }),
+            TimeFormat::Pattern(pattern) => by_pattern(pattern, text, clock),
+            TimeFormat::UnixSeconds => {
+                let seconds = self
+                    .number(text)
+                    .filter(|one| one.abs() < LATEST_UNIX_SECOND);
+                from_milliseconds(seconds.map(|one| one * 1e3)).ok_or(TimeFault::NotUnix)
+            }
+            TimeFormat::UnixMilliseconds => {
+                from_milliseconds(self.number(text)).ok_or(TimeFault::NotUnix)
+            }
+            TimeFormat::ExcelDays => {
+                let days = self.number(text).filter(|days| EXCEL_DAYS.contains(days));
+                let local = days.and_then(excel_date).ok_or(TimeFault::NotExcel)?;
+                clock.of_local(local)
+            }
+        }
+    }
+
+    /// The finite number that a cell holds.
+    pub fn number(&self, cell: &str) -> Option<f64> {
+        let number: f64 = match self.decimal {
+            DecimalMark::Point => cell.parse().ok()?,
+            // A point beside a decimal comma parts thousands in some countries: nothing is guessed.
+            DecimalMark::Comma if cell.contains('.') => return None,
+            DecimalMark::Comma => cell.replacen(',', ".", 1).parse().ok()?,
+        };
+        Some(number)
+    }
+}
+
+/// What parts the cells of a row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Delimiter {
+    /// `,`
+    Comma,
+    /// `;`
+    Semicolon,
+    /// A tab.
+    Tab,
+}
+
+impl Delimiter {
+    /// Parses `,`, `;` or a tab, or `comma`, `semicolon`, `tab`.
+    ///
+    /// # Errors
+    /// What to write instead.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        match text {
+            "," | "comma" => Ok(Self::Comma),
+            ";" | "semicolon" => Ok(Self::Semicolon),
+            "\t" | "tab" | "\\t" => Ok(Self::Tab),
+            _ => Err("write comma, semicolon or tab".to_owned()),
+        }
+    }
+
+    /// The word in the config.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Comma => "comma",
+            Self::Semicolon => "semicolon",
+            Self::Tab => "tab",
+        }
+    }
+
+    /// The byte itself.
+    pub fn byte(self) -> u8 {
+        match self {
+            Self::Comma => b',',
+            Self::Semicolon => b';',
+            Self::Tab => b'\t',
+        }
+    }
+
+    /// A comma, unless the header has none and has tabs or semicolons.
+    pub fn of_header(header: &str) -> Self {
+        let has = |mark: char| header.contains(mark);
+        match (has(','), has('\t'), has(';')) {
+            (false, true, _) => Self::Tab,
+            (false, false, true) => Self::Semicolon,
+            (true, _, _) | (false, false, false) => Self::Comma,
+        }
+    }
+}
+
+/// What stands before the decimals of a number.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum DecimalMark {
+    /// `12.5`
+    #[default]
+    Point,
+    /// `12,5`
+    Comma,
+}
+
+impl DecimalMark {
+    /// Parses `.` or `,`, or `point`, `comma`.
+    ///
+    /// # Errors
+    /// What to write instead.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        match text {
+            "." | "point" => Ok(Self::Point),
+            "," | "comma" => Ok(Self::Comma),
+            _ => Err("write point or comma".to_owned()),
+        }
+    }
+}
+
+/// How the times of a file are written.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub enum TimeFormat {
+    /// `2017-06-06T17:00:00+02:00`, or without the offset where the zone is known.
+    #[default]
+    Rfc3339,
+    /// As a pattern says: `%d.%m.%Y %H:%M`.
+    Pattern(String),
+    /// Seconds since 1970-01-01T00:00:00Z.
+    UnixSeconds,
+    /// Milliseconds since 1970-01-01T00:00:00Z.
+    UnixMilliseconds,
+    /// Days since 1899-12-30 on the local clock, as Excel keeps a date.
+    ExcelDays,
+}
+
+/// The year 5138; what is larger is not in seconds.
+const LATEST_UNIX_SECOND: f64 = 1e11;
+/// From 1900 to 2173.
+const EXCEL_DAYS: std::ops::Range<f64> = 1.0..100_000.0;
+/// Day 0 of Excel's dates after February 1900.
+const EXCEL_EPOCH: Date = Date::constant(1899, 12, 30);
+/// An instant that every part of a pattern can write.
+const TRIAL: DateTime = DateTime::constant(2017, 11, 23, 17, 46, 39, 0);
+
+impl TimeFormat {
+    /// Parses `rfc3339`, `unix`, `unix_ms`, `excel` or a pattern of `%Y %m %d %H %M %S`.
+    ///
+    /// # Errors
+    /// What to write instead.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        match text {
+            "rfc3339" => Ok(Self::Rfc3339),
+            "unix" => Ok(Self::UnixSeconds),
+            "unix_ms" => Ok(Self::UnixMilliseconds),
+            "excel" => Ok(Self::ExcelDays),
+            pattern if is_pattern(pattern) => Ok(Self::Pattern(pattern.to_owned())),
+            _ => Err(
+                "write a pattern with day, month and year, such as \"%d.%m.%Y %H:%M\" or \"%m/%d/%Y %I:%M %p\", \
+                 or one of rfc3339, unix, unix_ms, excel"
+                    .to_owned(),
+            ),
+        }
+    }
+}
+
+/// Whether a date that the pattern writes is read as the same date again.
+fn is_pattern(pattern: &str) -> bool {
+    let Ok(zoned) = TRIAL.to_zoned(jiff::tz::TimeZone::UTC) else {
+        return false;
+    };
+    let Ok(written) = BrokenDownTime::from(&zoned).to_string(pattern) else {
+        return false;
+    };
+    let read = BrokenDownTime::parse(pattern, &written);
+    read.and_then(|read| read.to_date())
+        .is_ok_and(|date| date == TRIAL.date())
+}
+
+fn by_pattern(pattern: &str, text: &str, clock: &LocalClock) -> Result<Timestamp, TimeFault> {
+    let read = BrokenDownTime::parse(pattern, text).map_err(|_| TimeFault::NotThePattern)?;
+    if read.offset().is_some() {
+        return read.to_timestamp().map_err(|_| TimeFault::NotThePattern);
+    }
+    let date = read.to_date().map_err(|_| TimeFault::NotThePattern)?;
+    let time = match read.hour() {
+        None => Time::midnight(),
+        Some(_) => read.to_time().map_err(|_| TimeFault::NotThePattern)?,
+    };
+    clock.of_local(date.to_datetime(time))
+}
+
+fn from_milliseconds(milliseconds: Option<f64>) -> Option<Timestamp> {
+    let milliseconds = milliseconds?.round();
+    if !milliseconds.is_finite() || milliseconds.abs() > LATEST_UNIX_SECOND * 1e3 {
+        return None;
+    }
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "bounded by 1e14 just above"
+    )]
+    let milliseconds = milliseconds as i64;
+    Timestamp::from_millisecond(milliseconds).ok()
+}
+
+/// To the nearest second: a day is kept as a number of 15 digits.
+fn excel_date(days: f64) -> Option<DateTime> {
+    #[expect(clippy::cast_possible_truncation, reason = "bounded by EXCEL_DAYS")]
+    let seconds = (days * super::SECONDS_PER_DAY).round() as i64;
+    let start = EXCEL_EPOCH.to_datetime(Time::midnight());
+    start.checked_add(SignedDuration::from_secs(seconds)).ok()
+}
+
+/// What a text most likely is that is no RFC 3339 time.
+fn likely_fault(text: &str) -> TimeFault {
+    if let Ok(number) = text.parse::<f64>() {
+        return match number {
+            20_000.0..80_000.0 => TimeFault::LikeExcel,
+            1e8..1e13 => TimeFault::LikeUnix,
+            _ => TimeFault::NotATime,
+        };
+    }
+    let digits = text.bytes().take_while(u8::is_ascii_digit).count();
+    let mark = text.as_bytes().get(digits).copied().unwrap_or_default();
+    match (digits, mark) {
+        (1 | 2, b'.' | b'/' | b'-') => TimeFault::LikeDayOrMonthFirst,
+        (4, b'/' | b'.') => TimeFault::LikeAPattern,
+        (4, b'-') if text.parse::<Date>().is_ok() && !text.contains(':') => TimeFault::OnlyADate,
+        _ => TimeFault::NotATime,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reading::SummerTime;
+
+    fn rome() -> LocalClock {
+        LocalClock {
+            zone: Some(jiff::tz::TimeZone::get("Europe/Rome").unwrap()),
+            summer_time: SummerTime::Reject,
+        }
+    }
+
+    fn utc(format: &str, text: &str) -> String {
+        let dialect = Dialect {
+            time_format: TimeFormat::parse(format).unwrap(),
+            ..Dialect::default()
+        };
+        match dialect.instant(text, &rome()) {
+            Ok(time) => time.to_string(),
+            Err(fault) => format!("{fault:?}"),
+        }
+    }
+
+    #[test]
+    fn a_time_is_read_as_its_format_says() {
+        let cases = [
+            ("%d.%m.%Y %H:%M", "06.07.2017 17:00", "2017-07-06T15:00:00Z"),
+            ("%d.%m.%Y %H:%M", "6.7.2017 17:00", "2017-07-06T15:00:00Z"),
+            (
+                "%m/%d/%Y %H:%M:%S",
+                "06/07/2017 17:00:30",
+                "2017-06-07T15:00:30Z",
+            ),
+            (
+                "%m/%d/%Y %I:%M %p",
+                "06/07/2017 05:00 PM",
+                "2017-06-07T15:00:00Z",
+            ),
+            ("%d/%m/%Y", "06/07/2017", "2017-07-05T22:00:00Z"),
+            (
+                "%Y-%m-%d %H:%M:%S%z",
+                "2017-07-06 17:00:00+0500",
+                "2017-07-06T12:00:00Z",
+            ),
+            ("%d.%m.%Y %H:%M", "07/06/2017 17:00", "NotThePattern"),
+            ("unix", "1499353200", "2017-07-06T15:00:00Z"),
+            ("unix", "1499353200000", "NotUnix"),
+            ("unix_ms", "1499353200000", "2017-07-06T15:00:00Z"),
+            ("excel", "42922.708333333", "2017-07-06T15:00:00Z"),
+            ("excel", "1499353200", "NotExcel"),
+            ("rfc3339", "06/07/2017 17:00", "LikeDayOrMonthFirst"),
+            ("rfc3339", "42922.7083", "LikeExcel"),
+            ("rfc3339", "1499353200", "LikeUnix"),
+            ("rfc3339", "2017/07/06 17:00", "LikeAPattern"),
+            ("rfc3339", "2017-07-06", "OnlyADate"),
+            ("rfc3339", "noon", "NotATime"),
+        ];
+        for (format, text, expected) in cases {
+            assert_eq!(utc(format, text), expected, "{format}: {text}");
+        }
+    }
+
+    #[test]
+    fn a_pattern_that_gives_no_date_is_refused() {
+        for text in ["", "dd.mm.yyyy", "%H:%M", "%d.%m", "%Q", "Excel"] {
+            assert!(TimeFormat::parse(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_decimal_comma_is_one_only_where_that_is_said() {
+        let comma = Dialect {
+            decimal: DecimalMark::Comma,
+            ..Dialect::default()
+        };
+        assert_eq!(comma.number("-12,5"), Some(-12.5));
+        assert_eq!(comma.number("12"), Some(12.0));
+        assert_eq!(comma.number("1.234,5"), None);
+        assert_eq!(Dialect::default().number("12,5"), None);
+    }
+
+    #[test]
+    fn a_header_without_commas_shows_what_parts_its_cells() {
+        let cases = [
+            ("time,a", Delimiter::Comma),
+            ("time;a", Delimiter::Semicolon),
+            ("time\ta", Delimiter::Tab),
+            ("time;a,b", Delimiter::Comma),
+            ("time", Delimiter::Comma),
+        ];
+        for (header, delimiter) in cases {
+            assert_eq!(Delimiter::of_header(header), delimiter, "{header}");
+        }
+    }
+}

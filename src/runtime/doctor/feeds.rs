@@ -1,0 +1,74 @@
+//! Whether the readings can be had: the files' folders and files, as this user; the brokers.
+
+use super::{Finding, Verdict};
+use crate::config::{Broker, Config, Source};
+use crate::runtime::tail::{Decoder, list};
+use std::fs::File;
+use std::io::{self, Read};
+use std::net::{TcpStream, ToSocketAddrs};
+use std::path::Path;
+use std::time::Duration;
+
+/// A broker that takes longer to answer is not there.
+const ANSWER: Duration = Duration::from_secs(3);
+const SOURCE: &str = "source";
+
+/// One finding for each source.
+pub(super) fn findings(config: &Config) -> Vec<Finding> {
+    let files = config.sources.iter().map(|source| {
+        let decoder = Decoder::new(source, &config.benchmarks);
+        files(source, &decoder)
+    });
+    files.chain(config.brokers.iter().map(broker)).collect()
+}
+
+fn files(source: &Source, decoder: &Decoder) -> Finding {
+    let finding =
+        |verdict, text: String| Finding::new(SOURCE, verdict, format!("{:?}: {text}", source.id));
+    let pattern = &source.pattern;
+    let folder = pattern.folder().display();
+    let listed = match list(pattern, decoder) {
+        Ok((listed, _)) => listed,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            let text = format!("there is no folder {folder}; create it, or put the path right");
+            return finding(Verdict::Doubtful, text);
+        }
+        Err(error) => {
+            let text = format!("{folder} cannot be listed as this user: {error}");
+            return finding(Verdict::Wrong, text);
+        }
+    };
+    let failed = listed
+        .iter()
+        .find_map(|(file, _)| Some((file, open(file).err()?)));
+    match (failed, listed.len()) {
+        (Some((file, error)), _) => {
+            let text = format!("{} cannot be read as this user: {error}", file.display());
+            finding(Verdict::Wrong, text)
+        }
+        (None, 0) => finding(Verdict::Doubtful, format!("there is no file {pattern} yet")),
+        (None, count) => finding(Verdict::Good, format!("files that can be read: {count}")),
+    }
+}
+
+fn open(file: &Path) -> io::Result<()> {
+    File::open(file)?.read(&mut [0; 1]).map(|_| ())
+}
+
+fn broker(broker: &Broker) -> Finding {
+    let address = &broker.address;
+    let tried = (address.host.as_str(), address.port).to_socket_addrs();
+    let answer = tried.and_then(|mut places| {
+        let none = || io::Error::other("the name has no address");
+        TcpStream::connect_timeout(&places.next().ok_or_else(none)?, ANSWER)
+    });
+    let (verdict, text) = match answer {
+        Ok(_) => (Verdict::Good, "answers".to_owned()),
+        Err(error) => (Verdict::Wrong, format!("cannot be reached: {error}")),
+    };
+    Finding::new(
+        SOURCE,
+        verdict,
+        format!("{:?}: the broker {address:?} {text}", broker.id),
+    )
+}

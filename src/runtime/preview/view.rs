@@ -1,0 +1,126 @@
+//! What a look at a site's files has found.
+
+use crate::reading::{BenchmarkId, Quantity, Timestamp};
+use crate::runtime::ingest::Meaning;
+use serde::Serialize;
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+
+/// What lies in the files of a site now.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Preview {
+    /// The sources that are files.
+    pub sources: Vec<SourceView>,
+    /// What would be watched.
+    pub benchmarks: Vec<BenchmarkView>,
+    /// What would be taken as covariates.
+    pub covariates: Vec<CovariateView>,
+    /// Benchmarks in the files that no `[[benchmark]]` asks for.
+    pub unwatched: BTreeSet<BenchmarkId>,
+    /// What no file feeds.
+    pub unfed: Vec<Unfed>,
+    /// Whether everything was looked at, and not the first values of very many alone.
+    pub is_whole: bool,
+}
+
+/// One source and its files.
+#[derive(Debug, Clone, Serialize)]
+pub struct SourceView {
+    /// Its id.
+    pub id: String,
+    /// Its kind.
+    pub kind: &'static str,
+    /// Its files' path.
+    pub path: String,
+    /// How times without an offset are understood.
+    pub times: String,
+    /// Its files.
+    pub files: usize,
+    /// The tables in them, those with the same columns as one.
+    pub layouts: Vec<LayoutView>,
+    /// What of them is refused, each kind once.
+    pub refused: Vec<Refusal>,
+    /// What else there is to know.
+    pub remarks: Vec<String>,
+}
+
+/// The columns of one file or of several.
+#[derive(Debug, Clone, Serialize)]
+pub struct LayoutView {
+    /// The first file that has them.
+    pub file: PathBuf,
+    /// How many have them.
+    pub files: usize,
+    /// The columns.
+    pub columns: Vec<ColumnView>,
+}
+
+/// One column.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ColumnView {
+    /// Its name.
+    pub name: String,
+    /// What it is taken for.
+    #[serde(flatten)]
+    pub meaning: Meaning,
+}
+
+/// Rows of one kind that cannot be used.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Refusal {
+    /// How many.
+    pub rows: u64,
+    /// What is wrong with the first.
+    pub first: String,
+}
+
+/// One quantity of a benchmark.
+#[derive(Debug, Clone, Serialize)]
+pub struct BenchmarkView {
+    /// Its id.
+    pub id: BenchmarkId,
+    /// Where its readings come from.
+    pub source: String,
+    /// Displacement or velocity.
+    pub quantity: Quantity,
+    /// Their unit.
+    pub unit: String,
+    /// How many there are.
+    pub readings: u64,
+    /// The earliest, its time and value.
+    pub first: (Timestamp, f64),
+    /// The latest, its time and value.
+    pub last: (Timestamp, f64),
+    /// The median time between the latest, s.
+    pub every_s: Option<i64>,
+    /// What in them hardly means what was intended, with its evidence.
+    pub suspicions: Vec<String>,
+}
+
+/// One covariate.
+#[derive(Debug, Clone, Serialize)]
+pub struct CovariateView {
+    /// Its name.
+    pub name: String,
+    /// Its unit, where the name says it.
+    pub unit: Option<String>,
+    /// Where it comes from.
+    pub source: String,
+    /// How many values there are.
+    pub values: u64,
+    /// When the earliest was measured.
+    pub first: Timestamp,
+    /// When the latest was measured.
+    pub last: Timestamp,
+}
+
+/// A benchmark of the config without a reading, or a source without a benchmark.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Unfed {
+    /// The benchmark; none where a source was to give whatever benchmarks it has.
+    pub benchmark: Option<BenchmarkId>,
+    /// The source.
+    pub source: String,
+    /// What is wrong, and what to do about it.
+    pub text: String,
+}
