@@ -1,6 +1,6 @@
 //! Teaches the network that gives the chance of a collapse, on simulated slopes alone.
 //!
-//! - `learn [SLOPES]` teaches it on so many slopes of each family and writes src/forecast/learned.rs.
+//! - `learn [SLOPES]` teaches it on so many slopes of each family and writes src/forecast/learned.txt.
 //! - `learn --left-out [SLOPES]` teaches one network for each family on all the others, judges each family by the network
 //!   that never saw it, and writes docs/families.md.
 //!
@@ -48,7 +48,7 @@ fn main() -> anyhow::Result<()> {
         });
         return table::write(&families, slopes);
     }
-    source::write(&material.learn(None), slopes)
+    source::write(&material.learn(None))
 }
 
 /// What networks are taught on.

@@ -123,11 +123,8 @@ fn place(one: &Told) -> &str {
 
 /// CRPS over the time that remained, of every method, the measured places that failed each counted once.
 fn each_site_once(out: &mut String, scored: &Scored) {
-    let measured = scored
-        .failed
-        .iter()
-        .filter(|one| one.kind == Kind::Measured);
-    let measured: Vec<&Told> = measured.collect();
+    let failed = scored.failed.iter().copied();
+    let measured: Vec<&Told> = failed.filter(|one| one.kind == Kind::Measured).collect();
     let mut places: Vec<&str> = measured.iter().map(|one| place(one)).collect();
     places.dedup();
     let mut rows: Vec<(f64, Vec<String>)> = Vec::new();

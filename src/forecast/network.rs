@@ -17,6 +17,51 @@ pub struct Network {
 }
 
 impl Network {
+    /// From its text: a line for each hidden unit, its weights and then the output's for it; at last the direct ones. What is
+    /// missing is 0.
+    pub fn from_text(text: &str) -> Self {
+        let mut lines = text.lines().map(|line| {
+            let words = line.split_whitespace();
+            words
+                .map(|word| word.parse::<f32>().unwrap_or(0.0))
+                .collect::<Vec<f32>>()
+        });
+        let mut network = Self {
+            hidden: [[0.0; INPUTS]; HIDDEN],
+            output: [0.0; HIDDEN],
+            direct: [0.0; INPUTS],
+        };
+        let units = network.hidden.iter_mut().zip(&mut network.output);
+        for ((weights, output), line) in units.zip(&mut lines) {
+            for (slot, weight) in weights.iter_mut().zip(&line) {
+                *slot = *weight;
+            }
+            *output = line.get(INPUTS).copied().unwrap_or(0.0);
+        }
+        for (slot, weight) in network
+            .direct
+            .iter_mut()
+            .zip(lines.next().unwrap_or_default())
+        {
+            *slot = weight;
+        }
+        network
+    }
+
+    /// The text that gives it, to four decimals.
+    pub fn text(&self) -> String {
+        let figures = |weights: &[f32]| {
+            let words: Vec<String> = weights
+                .iter()
+                .map(|weight| format!("{weight:.4}"))
+                .collect();
+            words.join(" ")
+        };
+        let units = self.hidden.iter().zip(&self.output);
+        let lines = units.map(|(weights, output)| format!("{} {output:.4}\n", figures(weights)));
+        lines.collect::<String>() + &figures(&self.direct) + "\n"
+    }
+
     /// The chance that it gives; ln of its odds changes by no more than the weights allow, whatever the inputs.
     pub fn chance(&self, inputs: &[f64; INPUTS]) -> f64 {
         1.0 / (1.0 + (-self.ln_odds(inputs)).exp())
@@ -32,5 +77,23 @@ impl Network {
         let hidden = self.hidden.iter().zip(&self.output);
         let units = hidden.map(|(weights, output)| f64::from(*output) * sum(weights).tanh());
         sum(&self.direct) + units.sum::<f64>()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_text_of_the_network_in_force_is_whole_and_gives_it_back() {
+        let text = include_str!("learned.txt");
+        let words = text.lines().map(|line| line.split_whitespace().count());
+        let expected = std::iter::repeat_n(INPUTS + 1, HIDDEN).chain([INPUTS]);
+        assert!(words.eq(expected));
+        assert!(
+            text.split_whitespace()
+                .all(|word| word.parse::<f32>().is_ok())
+        );
+        assert_eq!(Network::from_text(text).text(), text);
     }
 }
