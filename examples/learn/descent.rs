@@ -46,11 +46,7 @@ struct Adam {
 pub(crate) fn teach(rows: &[Row], passes: usize, networks: usize) -> Network {
     let seeds: Vec<u64> = (1..).take(networks).collect();
     let each = in_two(&seeds, |seed| vec![one(rows, passes, *seed)]);
-    let mut mean = Network {
-        hidden: [[0.0; INPUTS]; HIDDEN],
-        output: [0.0; HIDDEN],
-        direct: [0.0; INPUTS],
-    };
+    let mut mean = Network::silent();
     let share = 1.0 / networks as f32;
     for (one, first) in each.iter().zip((0..).step_by(UNITS)) {
         for (unit, weights) in one.hidden.iter().enumerate() {

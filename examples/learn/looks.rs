@@ -74,7 +74,7 @@ pub(crate) fn rows(look: &Look) -> impl Iterator<Item = Row> {
     let weight = weight(look.family);
     let known = look.questions.iter().filter_map(move |(span, inputs)| {
         let came = look.fails && look.left_days <= *span;
-        (look.fails || look.left_days >= *span).then(|| Row {
+        (look.fails || look.left_days >= *span).then_some(Row {
             inputs: *inputs,
             came,
             weight,

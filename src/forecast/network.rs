@@ -9,14 +9,23 @@ pub const HIDDEN: usize = 4 * 32;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Network {
     /// Of each hidden unit, for each input.
-    pub hidden: [[f32; INPUTS]; HIDDEN],
+    pub hidden: Vec<[f32; INPUTS]>,
     /// Of the output, for each hidden unit.
-    pub output: [f32; HIDDEN],
+    pub output: Vec<f32>,
     /// Of the output, for each input.
     pub direct: [f32; INPUTS],
 }
 
 impl Network {
+    /// All weights 0.
+    pub fn silent() -> Self {
+        Self {
+            hidden: vec![[0.0; INPUTS]; HIDDEN],
+            output: vec![0.0; HIDDEN],
+            direct: [0.0; INPUTS],
+        }
+    }
+
     /// From its text: a line for each hidden unit, its weights and then the output's for it; at last the direct ones. What is
     /// missing is 0.
     pub fn from_text(text: &str) -> Self {
@@ -26,11 +35,7 @@ impl Network {
                 .map(|word| word.parse::<f32>().unwrap_or(0.0))
                 .collect::<Vec<f32>>()
         });
-        let mut network = Self {
-            hidden: [[0.0; INPUTS]; HIDDEN],
-            output: [0.0; HIDDEN],
-            direct: [0.0; INPUTS],
-        };
+        let mut network = Self::silent();
         let units = network.hidden.iter_mut().zip(&mut network.output);
         for ((weights, output), line) in units.zip(&mut lines) {
             for (slot, weight) in weights.iter_mut().zip(&line) {
