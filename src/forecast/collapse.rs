@@ -10,7 +10,7 @@
 use super::evidence;
 use super::learned::LEARNED;
 use super::network::Network;
-use super::{Passage, Scale, Scales};
+use super::{InverseVelocityLine, Passage, Scale, Scales};
 use crate::fit::{LoadPosterior, Observations, Rate, RateOptions};
 
 /// Numbers that the network is given of one span.
@@ -19,8 +19,6 @@ pub const INPUTS: usize = 54;
 const PASSED: f64 = 1000.0;
 /// Newest rates through whose inverses straight lines are drawn.
 const LINES: [usize; 3] = [8, 16, 32];
-/// A line through inverse velocity is not followed below this share of its mean.
-const NEARLY_ZERO: f64 = 0.02;
 /// Spans beyond the longest scale that are still asked for, and the longest span, days.
 const BEYOND: usize = 3;
 const LONGEST_DAYS: f64 = 1200.0;
@@ -154,7 +152,7 @@ impl Members {
         let law = super::panel::passages(rates, posterior, PASSED, now_days);
         let line = |count: usize| {
             let newest = &rates[rates.len().saturating_sub(count)..];
-            approach(newest, now_days).unwrap_or(0.0)
+            InverseVelocityLine::approach(newest, now_days).unwrap_or(0.0)
         };
         Self {
             law: Passage::from_times(law),
@@ -193,27 +191,6 @@ impl Members {
             inputs.push((0.6 * (2.0 * days * line).asinh()).clamp(-MOST, MOST));
         }
     }
-}
-
-/// One over the days from `now_days` to where the least-squares line through inverse velocity meets zero: the rate at which
-/// it falls over what is left of it, without a break where it is level. `None` under four rates that move.
-fn approach(rates: &[Rate], now_days: f64) -> Option<f64> {
-    let usable = rates
-        .iter()
-        .filter(|rate| rate.velocity > 2.0 * rate.sigma && rate.velocity > 0.0);
-    let points: Vec<(f64, f64)> = usable
-        .map(|rate| (rate.middle() - now_days, 1.0 / rate.velocity))
-        .collect();
-    if points.len() < 4 {
-        return None;
-    }
-    let count = points.len() as f64;
-    let mean = |of: &dyn Fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / count;
-    let (t, y) = (mean(&|point| point.0), mean(&|point| point.1));
-    let square = mean(&|point| (point.0 - t).powi(2));
-    let product = mean(&|point| (point.0 - t) * (point.1 - y));
-    let slope = product / square.max(f64::MIN_POSITIVE);
-    Some(-slope / (y - slope * t).max(NEARLY_ZERO * y))
 }
 
 /// The share of the chance within the span of scale `power` that is left to a slope that has slowed: since the span, and
@@ -415,10 +392,15 @@ mod tests {
             });
             rate.collect()
         };
-        let left = 1.0 / approach(&rates(0.005), 12.0).unwrap();
+        let left = 1.0 / InverseVelocityLine::approach(&rates(0.005), 12.0).unwrap();
         assert!((left - 8.0).abs() < 1e-9, "{left}");
         for gain in [-1e-9, 0.0, 1e-9] {
-            assert!(approach(&rates(gain), 12.0).unwrap().abs() < 1e-6);
+            assert!(
+                InverseVelocityLine::approach(&rates(gain), 12.0)
+                    .unwrap()
+                    .abs()
+                    < 1e-6
+            );
         }
     }
 

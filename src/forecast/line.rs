@@ -13,24 +13,21 @@ pub struct InverseVelocityLine {
 
 /// Fewer points than this make no line.
 const FEWEST: usize = 4;
+/// The line is not followed below this share of its mean.
+const NEARLY_ZERO: f64 = 0.02;
 
-impl InverseVelocityLine {
-    /// The line through the rates that move forward and stand clear of their noise; `None` under four.
-    pub fn fit(rates: &[Rate]) -> Option<Self> {
-        let usable = rates.iter().filter(|rate| Self::takes(rate));
-        let points: Vec<(f64, f64)> = usable
-            .map(|rate| (rate.middle(), 1.0 / rate.velocity))
-            .collect();
-        Self::through(&points)
-    }
+/// Sums of squares and products about the means of (days, inverse velocity) points.
+struct Moments {
+    mean_t: f64,
+    mean_y: f64,
+    tt: f64,
+    ty: f64,
+    yy: f64,
+}
 
-    /// Whether a rate moves forward and stands clear of its noise.
-    fn takes(rate: &Rate) -> bool {
-        rate.velocity > 2.0 * rate.sigma && rate.velocity > 0.0
-    }
-
-    /// The line through (days, inverse velocity) points; `None` under four.
-    pub fn through(points: &[(f64, f64)]) -> Option<Self> {
+impl Moments {
+    /// `None` under four points, or where all stand at one time.
+    fn of(points: &[(f64, f64)]) -> Option<Self> {
         if points.len() < FEWEST {
             return None;
         }
@@ -43,12 +40,58 @@ impl InverseVelocityLine {
             ty += (t - mean_t) * (y - mean_y);
             yy += (y - mean_y) * (y - mean_y);
         }
-        if tt <= 0.0 {
-            return None;
-        }
-        let slope = ty / tt;
-        let intercept_days = (slope < 0.0).then(|| mean_t - mean_y / slope);
-        let r_squared = if yy > 0.0 { ty * ty / (tt * yy) } else { 0.0 };
+        (tt > 0.0).then_some(Self {
+            mean_t,
+            mean_y,
+            tt,
+            ty,
+            yy,
+        })
+    }
+
+    fn slope(&self) -> f64 {
+        self.ty / self.tt
+    }
+}
+
+impl InverseVelocityLine {
+    /// The line through the rates that move forward and stand clear of their noise; `None` under four.
+    pub fn fit(rates: &[Rate]) -> Option<Self> {
+        Self::through(&Self::points(rates))
+    }
+
+    /// One over the days from `now_days` to where the line meets zero: the rate at which it falls over what is left of
+    /// it, without a break where it is level, and below 0 where it rises. `None` under four rates that move.
+    pub(super) fn approach(rates: &[Rate], now_days: f64) -> Option<f64> {
+        let line = Moments::of(&Self::points(rates))?;
+        let slope = line.slope();
+        let left = line.mean_y + slope * (now_days - line.mean_t);
+        Some(-slope / left.max(NEARLY_ZERO * line.mean_y))
+    }
+
+    /// (days, inverse velocity) of the rates that it takes.
+    fn points(rates: &[Rate]) -> Vec<(f64, f64)> {
+        let usable = rates.iter().filter(|rate| Self::takes(rate));
+        usable
+            .map(|rate| (rate.middle(), 1.0 / rate.velocity))
+            .collect()
+    }
+
+    /// Whether a rate moves forward and stands clear of its noise.
+    fn takes(rate: &Rate) -> bool {
+        rate.velocity > 2.0 * rate.sigma && rate.velocity > 0.0
+    }
+
+    /// The line through (days, inverse velocity) points; `None` under four.
+    pub fn through(points: &[(f64, f64)]) -> Option<Self> {
+        let line = Moments::of(points)?;
+        let slope = line.slope();
+        let intercept_days = (slope < 0.0).then(|| line.mean_t - line.mean_y / slope);
+        let r_squared = if line.yy > 0.0 {
+            line.ty * line.ty / (line.tt * line.yy)
+        } else {
+            0.0
+        };
         Some(Self {
             intercept_days,
             r_squared,
