@@ -1,8 +1,10 @@
 //! Events as lines for people.
 
 use crate::effects::Kind;
-use crate::monitor::{AlertState, Event, EventKind, FailureTime, Summary, Unexplained};
-use crate::reading::Timestamp;
+use crate::monitor::{
+    AlertState, Event, EventKind, FailureTime, SharedFailure, Summary, Unexplained,
+};
+use crate::reading::{BenchmarkId, Timestamp};
 
 /// One event on one line: when, where, what.
 pub(super) fn line(event: &Event) -> String {
@@ -83,6 +85,7 @@ fn what(kind: &EventKind) -> String {
             };
             format!("ALERT {level} {state}: {text}")
         }
+        EventKind::Together { groups } => together(groups),
         EventKind::Fault { kind, text } => format!("fault {kind}: {text}"),
         EventKind::Declared { text, .. } => format!("declared: {text}"),
         EventKind::Correction { text, .. } => format!("correction: {text}"),
@@ -93,6 +96,18 @@ fn what(kind: &EventKind) -> String {
             alerts,
         }) => format!("summary: {readings} readings, {refits} refits, {alerts} alerts"),
     }
+}
+
+fn together(groups: &[SharedFailure]) -> String {
+    if groups.is_empty() {
+        return "no benchmarks share a failure time any more".to_owned();
+    }
+    let each = groups.iter().map(|group| {
+        let names: Vec<&str> = group.benchmarks.iter().map(BenchmarkId::as_str).collect();
+        let names = names.join(", ");
+        format!("{names} share one: {}", forecast(&group.failure_time))
+    });
+    format!("failure times: {}", each.collect::<Vec<_>>().join("; "))
 }
 
 fn ordered(order: &str, until: Option<Timestamp>, by: Option<&str>) -> String {

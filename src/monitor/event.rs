@@ -126,6 +126,12 @@ pub enum EventKind {
         /// One line for a person.
         text: String,
     },
+    /// Benchmarks in alarm that share one failure time, where that is other than last reported; none any more where the
+    /// list is empty.
+    Together {
+        /// Each of at least two benchmarks.
+        groups: Vec<SharedFailure>,
+    },
     /// The monitor cannot rely on what it is told.
     Fault {
         /// `no-data`, `out-of-range`, `out-of-order`, ...
@@ -174,7 +180,7 @@ pub enum EventKind {
 
 impl EventKind {
     /// Every word that [`EventKind::name`] may give.
-    pub const NAMES: [&str; 13] = [
+    pub const NAMES: [&str; 14] = [
         "refit",
         "regime-flip",
         "intercept-drift",
@@ -183,6 +189,7 @@ impl EventKind {
         "effect-found",
         "effect-dropped",
         "alert",
+        "together",
         "fault",
         "declared",
         "correction",
@@ -201,6 +208,7 @@ impl EventKind {
             Self::EffectFound { .. } => "effect-found",
             Self::EffectDropped { .. } => "effect-dropped",
             Self::Alert { .. } => "alert",
+            Self::Together { .. } => "together",
             Self::Fault { .. } => "fault",
             Self::Declared { .. } => "declared",
             Self::Correction { .. } => "correction",
@@ -282,6 +290,19 @@ pub struct FailureTime {
     pub horizon_days: f64,
 }
 
+/// Benchmarks that share one failure time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SharedFailure {
+    /// Which.
+    pub benchmarks: Vec<BenchmarkId>,
+    /// How probably each fails with the others, in the same order.
+    pub probabilities: Vec<f64>,
+    /// When they collapse together.
+    pub failure_time: FailureTime,
+    /// The chance of that within the site's evacuation time.
+    pub chance_within_evacuation_time: f64,
+}
+
 /// The straight line through 1/v.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct InverseVelocity {
@@ -318,6 +339,7 @@ impl Summary {
             | EventKind::UnexplainedResidual(_)
             | EventKind::EffectFound { .. }
             | EventKind::EffectDropped { .. }
+            | EventKind::Together { .. }
             | EventKind::Fault { .. }
             | EventKind::Declared { .. }
             | EventKind::Correction { .. }

@@ -6,6 +6,7 @@ mod declared;
 mod drift;
 mod event;
 mod history;
+mod kept;
 mod notice;
 mod order;
 mod saved;
@@ -14,12 +15,13 @@ mod sensor;
 mod silence;
 mod site;
 mod suspect;
+mod together;
 mod track;
 
 pub use declared::{Declaration, Declared};
 pub use event::{
-    AlertState, Event, EventKind, FailureTime, InverseVelocity, Plain, RegimeReport, Summary,
-    Unexplained,
+    AlertState, Event, EventKind, FailureTime, InverseVelocity, Plain, RegimeReport, SharedFailure,
+    Summary, Unexplained,
 };
 pub use notice::{CLOCK_FAULT, Notice};
 pub use order::Order;
@@ -38,6 +40,7 @@ use sensor::Sensors;
 use serde::{Deserialize, Serialize};
 use site::SiteAlert;
 use std::collections::{BTreeMap, BTreeSet};
+use together::Together;
 use track::{Beside, Track};
 
 /// What the monitor is told.
@@ -171,6 +174,7 @@ pub struct Monitor {
     sensors: Sensors,
     searches: Vec<SearchJob>,
     site: SiteAlert,
+    together: Together,
     /// Benchmarks of the config that have given no reading.
     awaited: Awaited,
     /// Benchmarks with late readings that are to be looked back on.
@@ -195,6 +199,7 @@ impl Monitor {
             sensors: Sensors::default(),
             searches: Vec::new(),
             site: SiteAlert::default(),
+            together: Together::default(),
             awaited: Awaited::default(),
             late: BTreeSet::new(),
             settles: false,
@@ -263,10 +268,29 @@ impl Monitor {
                 .collect();
             events.extend(self.site.update_unknown(self.settings.site, now, &unknown));
         }
+        events.extend(self.compare(now, &events));
         for event in &events {
             self.summary.count(event);
         }
         events
+    }
+
+    /// Which benchmarks share a failure time, after `events`: asked when a forecast or a level is new.
+    fn compare(&mut self, now: Timestamp, events: &[Event]) -> Option<Event> {
+        let has_changed = events
+            .iter()
+            .any(|event| matches!(event.kind, EventKind::Alert { .. }));
+        let is_new = |event: &Event| {
+            let track = event.benchmark.as_ref().and_then(|id| self.tracks.get(id));
+            matches!(event.kind, EventKind::Refit { .. })
+                && track.is_some_and(|track| track.level() > Level::Green)
+        };
+        if !has_changed && !events.iter().any(is_new) {
+            return None;
+        }
+        let policy = &self.settings.policy;
+        self.together
+            .update(now, policy, (&self.tracks, has_changed))
     }
 
     fn read(

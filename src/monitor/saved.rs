@@ -9,6 +9,7 @@ use super::event::Summary;
 use super::search::SearchJob;
 use super::sensor::Sensors;
 use super::site::SiteAlert;
+use super::together::Together;
 use super::track::Track;
 use super::{Monitor, Settings};
 use crate::reading::{BenchmarkId, Timestamp};
@@ -60,6 +61,8 @@ struct Rest {
     #[serde(default)]
     site: SiteAlert,
     #[serde(default)]
+    together: Together,
+    #[serde(default)]
     awaited: Awaited,
     #[serde(default)]
     late: BTreeSet<BenchmarkId>,
@@ -91,6 +94,7 @@ impl Monitor {
             sensors: self.sensors.clone(),
             searches: self.searches.clone(),
             site: self.site.clone(),
+            together: self.together.clone(),
             awaited: self.awaited.clone(),
             late: self.late.clone(),
             settles: self.settles,
@@ -135,6 +139,7 @@ impl Monitor {
             sensors: rest.sensors,
             searches: rest.searches,
             site: rest.site,
+            together: rest.together,
             awaited: rest.awaited,
             late: rest.late,
             settles: rest.settles,

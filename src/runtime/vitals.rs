@@ -113,6 +113,7 @@ impl Point {
             | EventKind::TransitionDrift { .. }
             | EventKind::EffectFound { .. }
             | EventKind::EffectDropped { .. }
+            | EventKind::Together { .. }
             | EventKind::Fault { .. }
             | EventKind::Declared { .. }
             | EventKind::Correction { .. }

@@ -19,10 +19,12 @@ use super::declared::Declarations;
 use super::drift::Drift;
 use super::event::{AlertState, Event, EventKind};
 use super::history::{History, Source, Taken};
+use super::kept::KeptForecast;
 use super::silence::Silence;
 use crate::alert::{Cause, Latch, Level, Policy};
+use crate::fit::Rate;
 use crate::forecast::Panel;
-use crate::reading::{BenchmarkId, Reading, SECONDS_PER_DAY, Timestamp};
+use crate::reading::{BenchmarkId, Reading, SECONDS_PER_DAY, Timestamp, days_since};
 use crate::regime::Tracker;
 use adopted::Adopted;
 use ahead::Ahead;
@@ -95,6 +97,9 @@ pub(super) struct Track {
     /// Something came late and has not been judged.
     #[serde(default)]
     owes: bool,
+    /// The newest forecast, while a level is in force.
+    #[serde(default)]
+    kept: Option<KeptForecast>,
 }
 
 impl Track {
@@ -113,6 +118,7 @@ impl Track {
             spoilt_by: None,
             others: 0,
             owes: false,
+            kept: None,
             benchmark,
             history: History::new(source, epoch),
             panel: Panel::default(),
@@ -228,7 +234,23 @@ impl Track {
             return events;
         }
         events.extend(called);
+        let is_kept = self.latch.level() > Level::Green;
+        self.kept = forecast.filter(|_| is_kept).map(|forecast| {
+            let outlook = forecast.in_force(days(policy.outlook));
+            KeptForecast::of(time, &outlook.collapse)
+        });
         events
+    }
+
+    /// The newest forecast, while a level is in force.
+    pub(super) fn kept_forecast(&self) -> Option<&KeptForecast> {
+        self.kept.as_ref()
+    }
+
+    /// Rates of the whole record, and `now` on its clock, days.
+    pub(super) fn rates_at(&self, now: Timestamp) -> (Vec<Rate>, f64) {
+        let now_days = days_since(self.history.epoch, now);
+        (self.history.rates(), now_days)
     }
 
     /// Everything that came together has been taken: judges what of it came late.

@@ -1,0 +1,182 @@
+//! Benchmarks in alarm that share one failure time, as far as their newest forecasts agree about it.
+//!
+//! Only benchmarks at orange or above are compared, a bounded number of them, so that a quiet site costs nothing. What is
+//! reported here calls no level and lowers none: a neighbour that is noisy, halted or silent takes nothing from the
+//! benchmark that runs away.
+
+use super::event::{Event, EventKind, FailureTime, SharedFailure};
+use super::kept::KeptForecast;
+use super::track::Track;
+use crate::alert::{Level, Policy};
+use crate::fit::Rate;
+use crate::forecast::{Dependence, Group, HORIZON_DAYS, Look, groups};
+use crate::reading::{BenchmarkId, SECONDS_PER_DAY, Timestamp, after_days, days_since};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Benchmarks that are compared, at most: those of the highest levels.
+const MOST_COMPARED: usize = 12;
+/// Comparisons that are remembered: an agreement is judged over those of late.
+const MOST_KEPT: usize = 6;
+/// Between two comparisons, unless a level changes, in evacuation times.
+const APART: f64 = 0.125;
+/// A forecast older than so many evacuation times says nothing of now.
+const STALE: f64 = 2.0;
+/// A median is reported again when it has moved by this share of the time that was left.
+const MOVED: f64 = 0.25;
+/// A benchmark is reported with others from this probability on that it fails with them.
+const BELONGS: f64 = 0.8;
+/// Benchmarks under this level are not compared: forecasts that expect little agree with all others.
+const LEAST: Level = Level::Orange;
+
+/// What has been compared and reported.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Together {
+    /// Forecasts at the newest comparisons, oldest first.
+    kept: Vec<(Timestamp, BTreeMap<BenchmarkId, KeptForecast>)>,
+    reported: Vec<SharedFailure>,
+}
+
+impl Together {
+    /// Takes the newest forecasts; says which benchmarks share a failure time where that is other than last reported.
+    pub(super) fn update(
+        &mut self,
+        now: Timestamp,
+        policy: &Policy,
+        (tracks, has_changed): (&BTreeMap<BenchmarkId, Track>, bool),
+    ) -> Option<Event> {
+        let evacuation_days = policy.evacuation_time.as_secs_f64() / SECONDS_PER_DAY;
+        let newest = self.kept.last().map(|(time, _)| days_since(*time, now));
+        if !has_changed && newest.is_some_and(|ago| ago < APART * evacuation_days) {
+            return None;
+        }
+        let compared = compared(tracks, now, STALE * evacuation_days);
+        if compared.len() < 2 {
+            self.kept.clear();
+            return self.report(now, Vec::new());
+        }
+        let forecasts = compared.iter().filter_map(|id| {
+            let forecast = tracks.get(*id)?.kept_forecast()?.clone();
+            Some(((*id).clone(), forecast))
+        });
+        self.kept.push((now, forecasts.collect()));
+        let excess = self.kept.len().saturating_sub(MOST_KEPT);
+        self.kept.drain(..excess);
+        let found = self.shared(now, &compared, tracks);
+        let shared = found
+            .iter()
+            .filter_map(|group| shared_failure(now, group, (&compared, evacuation_days)));
+        let shared = shared.collect();
+        self.report(now, shared)
+    }
+
+    fn shared(
+        &self,
+        now: Timestamp,
+        compared: &[&BenchmarkId],
+        tracks: &BTreeMap<BenchmarkId, Track>,
+    ) -> Vec<Group> {
+        let left = |time: Timestamp, forecasts: &BTreeMap<BenchmarkId, KeptForecast>| {
+            let medians = forecasts.values().filter_map(|one| one.left_days(time));
+            medians.fold(HORIZON_DAYS, f64::min).max(0.0)
+        };
+        let looks: Vec<Look> = self
+            .kept
+            .iter()
+            .map(|(time, forecasts)| Look {
+                left_days: left(*time, forecasts),
+                opinions: compared
+                    .iter()
+                    .map(|id| forecasts.get(*id).map(|one| one.opinion(*time)))
+                    .collect(),
+            })
+            .collect();
+        let rates: Vec<(Vec<Rate>, f64)> = compared
+            .iter()
+            .filter_map(|id| Some(tracks.get(*id)?.rates_at(now)))
+            .collect();
+        let rates: Vec<(&[Rate], f64)> = rates.iter().map(|(rates, at)| (&**rates, *at)).collect();
+        groups(&looks, &Dependence::measured(&rates))
+    }
+
+    fn report(&mut self, now: Timestamp, shared: Vec<SharedFailure>) -> Option<Event> {
+        let is_known = shared.len() == self.reported.len()
+            && shared
+                .iter()
+                .zip(&self.reported)
+                .all(|(new, old)| is_the_same(now, new, old));
+        if is_known {
+            return None;
+        }
+        self.reported.clone_from(&shared);
+        Some(Event {
+            time: now,
+            benchmark: None,
+            kind: EventKind::Together { groups: shared },
+        })
+    }
+}
+
+/// Those at orange or above of which something can be said, the highest levels first.
+fn compared(
+    tracks: &BTreeMap<BenchmarkId, Track>,
+    now: Timestamp,
+    oldest_days: f64,
+) -> Vec<&BenchmarkId> {
+    let is_recent = |track: &Track| {
+        let kept = track.kept_forecast();
+        kept.is_some_and(|one| days_since(one.time(), now) <= oldest_days)
+    };
+    let mut all: Vec<(Level, &BenchmarkId)> = tracks
+        .iter()
+        .filter(|(_, track)| track.level() >= LEAST && !track.is_unknown())
+        .filter(|(_, track)| is_recent(track))
+        .map(|(id, track)| (track.level(), id))
+        .collect();
+    all.sort_by_key(|(level, id)| (std::cmp::Reverse(*level), *id));
+    all.truncate(MOST_COMPARED);
+    let mut ids: Vec<&BenchmarkId> = all.into_iter().map(|(_, id)| id).collect();
+    ids.sort();
+    ids
+}
+
+/// `None` where fewer than two belong to the group for sure.
+fn shared_failure(
+    now: Timestamp,
+    group: &Group,
+    (compared, evacuation_days): (&[&BenchmarkId], f64),
+) -> Option<SharedFailure> {
+    let passage = &group.passage;
+    let quantile = |share| after_days(now, passage.quantile(share, HORIZON_DAYS)?);
+    let members = group.members.iter().zip(&group.probabilities);
+    let (benchmarks, probabilities): (Vec<BenchmarkId>, Vec<f64>) = members
+        .filter(|(_, probability)| **probability >= BELONGS)
+        .map(|(member, probability)| (compared[*member].clone(), *probability))
+        .unzip();
+    (benchmarks.len() > 1).then(|| SharedFailure {
+        benchmarks,
+        probabilities,
+        failure_time: FailureTime {
+            low: quantile(0.05),
+            median: quantile(0.5),
+            high: quantile(0.95),
+            probability: passage.chance_within(HORIZON_DAYS),
+            horizon_days: HORIZON_DAYS,
+        },
+        chance_within_evacuation_time: passage.chance_within(evacuation_days),
+    })
+}
+
+/// Whether nobody would act otherwise on the new one.
+fn is_the_same(now: Timestamp, new: &SharedFailure, old: &SharedFailure) -> bool {
+    let medians = (new.failure_time.median, old.failure_time.median);
+    let near = match medians {
+        (Some(new), Some(old)) => {
+            let left = days_since(now, old).max(0.0);
+            days_since(old, new).abs() <= MOVED * left.max(f64::MIN_POSITIVE)
+        }
+        (None, None) => true,
+        (Some(_), None) | (None, Some(_)) => false,
+    };
+    new.benchmarks == old.benchmarks && near
+}
