@@ -5,7 +5,8 @@
 )]
 
 use jiff::{SignedDuration, Timestamp};
-use std::time::{Duration, Instant};
+use std::time::Duration;
+use tokio::time::Instant;
 
 /// So far ahead of the wall clock a measurement may be: clocks differ, days do not.
 pub(crate) const TOLERANCE: SignedDuration = SignedDuration::from_hours(1);
@@ -15,7 +16,8 @@ pub fn now() -> Timestamp {
     Timestamp::now()
 }
 
-/// A running stopwatch, for figures such as `seconds` in a fit's report.
+/// A running stopwatch, for figures such as `seconds` in a fit's report. It runs on the runtime's own clock, which a
+/// simulation moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stopwatch(Instant);
 
@@ -32,6 +34,6 @@ impl Stopwatch {
 }
 
 /// The instant `delay` from now on the runtime's own clock, for waits.
-pub(crate) fn later(delay: Duration) -> tokio::time::Instant {
-    tokio::time::Instant::now() + delay
+pub(crate) fn later(delay: Duration) -> Instant {
+    Instant::now() + delay
 }

@@ -1,6 +1,6 @@
 //! The daemon's work loop: takes what comes, lets time go by, obeys people, goes by another config when told.
 
-use super::clock::{self, Stopwatch};
+use super::clock::Stopwatch;
 use super::deliver::{Dispatcher, Retry};
 use super::delivered::Delivered;
 use super::log;
@@ -14,6 +14,7 @@ use super::sources::Sources;
 use super::tail::{Arrival, Batch};
 use crate::config::{self, Config};
 use crate::monitor::Input;
+use crate::reading::Timestamp;
 use crate::store::{Position, Store, StoreError, Verified};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -31,12 +32,17 @@ const TICK: Duration = Duration::from_secs(1);
 
 /// A site with what feeds it and what shows how it is.
 #[derive(Debug)]
-pub(super) struct Daemon {
+pub struct Daemon {
     pub(super) config: Config,
     pub(super) store: Arc<Store>,
-    pub(super) site: Site,
-    pub(super) sources: Sources,
-    pub(super) pulse: Pulse,
+    /// The site.
+    pub site: Site,
+    /// What feeds it.
+    pub sources: Sources,
+    /// What shows how it is.
+    pub pulse: Pulse,
+    /// The host's clock.
+    wall: fn() -> Timestamp,
     /// Once, and as of the last batch: a logger that was away hands in its backlog in several.
     is_caught_up: bool,
     is_up_to_date: bool,
@@ -56,11 +62,13 @@ pub(super) fn dispatcher(config: &Config, store: &Arc<Store>) -> Dispatcher {
 }
 
 impl Daemon {
-    pub(super) fn new(
+    /// The daemon on a site that has been resumed from `store`; `wall` is the host's clock.
+    pub fn new(
         config: &Config,
         store: Arc<Store>,
         site: Site,
         (sources, pulse): (Sources, Pulse),
+        wall: fn() -> Timestamp,
     ) -> Self {
         Self {
             config: config.clone(),
@@ -68,6 +76,7 @@ impl Daemon {
             site,
             sources,
             pulse,
+            wall,
             is_caught_up: false,
             is_up_to_date: false,
             positions: Vec::new(),
@@ -114,7 +123,10 @@ impl Daemon {
 
     /// Steps the monitor through a batch; a stop that is asked for half-way ends it after a value, and the rest of
     /// the batch is read again by the next start.
-    fn take_batch(&mut self, batch: Batch, shutdown: &Shutdown) -> Result<(), StoreError> {
+    ///
+    /// # Errors
+    /// When the state cannot be used any more.
+    pub fn take_batch(&mut self, batch: Batch, shutdown: &Shutdown) -> Result<(), StoreError> {
         let vitals = &self.pulse.vitals;
         batch
             .found
@@ -138,7 +150,7 @@ impl Daemon {
         self.thin()?;
         self.is_up_to_date = batch.caught_up;
         if self.is_up_to_date {
-            let events = self.site.caught_up(clock::now())?;
+            let events = self.site.caught_up((self.wall)())?;
             self.pulse.vitals.note(&events);
         }
         if self.is_up_to_date && !self.is_caught_up {
@@ -150,7 +162,10 @@ impl Daemon {
     }
 
     /// Takes a broker's message, and whatever else has come from there by now, in one commit.
-    fn take_messages(&mut self, first: mqtt::Delivery) -> Result<(), StoreError> {
+    ///
+    /// # Errors
+    /// When the state cannot be used any more.
+    pub fn take_messages(&mut self, first: mqtt::Delivery) -> Result<(), StoreError> {
         let mut next = Some(first);
         while let Some(delivery) = next {
             let vitals = &self.pulse.vitals;
@@ -171,7 +186,7 @@ impl Daemon {
 
     /// Takes what was held for the clock; what files say of their positions counts once nothing is held.
     fn release(&mut self) -> Result<(), StoreError> {
-        let events = self.site.release(clock::now())?;
+        let events = self.site.release((self.wall)())?;
         self.pulse.vitals.note(&events);
         if self.site.held() == 0 {
             let positions = std::mem::take(&mut self.positions);
@@ -188,7 +203,10 @@ impl Daemon {
     }
 
     /// Looks back on what came late at one benchmark.
-    fn look_back(&mut self) -> Result<(), StoreError> {
+    ///
+    /// # Errors
+    /// When the state cannot be used any more.
+    pub fn look_back(&mut self) -> Result<(), StoreError> {
         let events = self.site.look_back();
         self.pulse.vitals.note(&events);
         self.commit()
@@ -197,7 +215,7 @@ impl Daemon {
     fn take(&mut self, arrival: &Arrival) -> Result<(), StoreError> {
         let stopwatch = Stopwatch::start();
         let taken = self.site.counts().taken;
-        let events = self.site.take(arrival, clock::now())?;
+        let events = self.site.take(arrival, (self.wall)())?;
         let vitals = &self.pulse.vitals;
         match &arrival.input {
             Input::Reading { benchmark, .. } if self.site.counts().taken > taken => {
@@ -219,16 +237,16 @@ impl Daemon {
 
     /// An alert does not wait for the rest of the batch; those that come together go together.
     fn commit_what_is_urgent(&mut self) -> Result<(), StoreError> {
-        if self.since_commit.elapsed() >= URGENT && self.site.is_urgent(clock::now()) {
+        if self.since_commit.elapsed() >= URGENT && self.site.is_urgent((self.wall)()) {
             self.since_commit = Stopwatch::start();
-            return self.site.commit(clock::now());
+            return self.site.commit((self.wall)());
         }
         Ok(())
     }
 
     fn commit(&mut self) -> Result<(), StoreError> {
         self.since_commit = Stopwatch::start();
-        let committed = self.site.commit(clock::now());
+        let committed = self.site.commit((self.wall)());
         let is_waiting = self.site.is_waiting();
         if committed.is_ok() && !is_waiting && self.site.held() == 0 {
             self.pulse.vitals.has_taken();
@@ -237,7 +255,7 @@ impl Daemon {
         let (counts, queue) = (self.site.counts(), self.sources.batches.len());
         let (is_paused, searches) = (self.site.is_stalled(), self.site.searching());
         let held = self.site.held() as u64;
-        let silences = self.site.mutes(clock::now());
+        let silences = self.site.mutes((self.wall)());
         let is_in_place = self.store.is_in_place();
         self.pulse.vitals.update(|health| {
             health.is_store_writable = committed.is_ok() && !is_waiting && is_in_place;
@@ -279,8 +297,11 @@ impl Daemon {
     }
 
     /// What is due whether anything comes or not.
-    fn tick(&mut self) -> Result<(), StoreError> {
-        let now = clock::now();
+    ///
+    /// # Errors
+    /// When the state cannot be used any more.
+    pub fn tick(&mut self) -> Result<(), StoreError> {
+        let now = (self.wall)();
         if !self.site.is_waiting() {
             for (number, order) in self.store.orders()? {
                 self.site.order(number, order);

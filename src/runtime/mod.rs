@@ -2,7 +2,7 @@
 
 mod archive;
 pub mod clock;
-mod daemon;
+pub mod daemon;
 pub mod deliver;
 pub mod delivered;
 pub mod doctor;
@@ -22,6 +22,6 @@ pub mod serve;
 pub mod service;
 pub mod shutdown;
 pub mod site;
-mod sources;
+pub mod sources;
 pub mod tail;
 pub mod vitals;

@@ -48,19 +48,35 @@ pub struct Delivery {
 
 /// The acknowledgement that a message waits for.
 #[derive(Debug)]
-pub struct Receipt {
-    client: AsyncClient,
-    message: Publish,
+pub struct Receipt(Of);
+
+/// What is acknowledged.
+#[derive(Debug)]
+enum Of {
+    Message(Box<(AsyncClient, Publish)>),
+    Number(u64, mpsc::UnboundedSender<u64>),
 }
 
 impl Receipt {
+    /// For a broker that is no broker: it gets the number.
+    pub fn numbered(number: u64, acknowledged: mpsc::UnboundedSender<u64>) -> Self {
+        Self(Of::Number(number, acknowledged))
+    }
+
     /// Tells the broker that the message need not come again. Not to be called by the task that runs
     /// [`follow`].
     ///
     /// # Errors
     /// When that task has ended; the message comes again.
     pub async fn acknowledge(self) -> Result<(), ClientError> {
-        self.client.ack(&self.message).await
+        match self.0 {
+            Of::Message(of) => of.0.ack(&of.1).await,
+            Of::Number(number, acknowledged) => {
+                // Whoever does not listen any more needs no answer.
+                let _ = acknowledged.send(number);
+                Ok(())
+            }
+        }
     }
 }
 
@@ -192,10 +208,7 @@ impl Reader {
             source: self.source.clone(),
             found,
             quarantined,
-            receipt: Receipt {
-                client: self.client.clone(),
-                message,
-            },
+            receipt: Receipt(Of::Message(Box::new((self.client.clone(), message)))),
         }
     }
 }

@@ -74,7 +74,7 @@ pub async fn run(
     let site = tokio::task::block_in_place(resume).map_err(fail)?;
     site.show(&pulse.vitals);
     let sources = Sources::start(config, &store).map_err(fail)?;
-    let mut daemon = Daemon::new(config, store, site, (sources, pulse));
+    let mut daemon = Daemon::new(config, store, site, (sources, pulse), clock::now);
     tracing::info!(site = name, state = %config.site.state_dir.display(), "started");
     let worked = daemon.work(shutdown, progress).await;
     let Daemon {

@@ -15,11 +15,11 @@ pub(super) const MESSAGES: usize = 64;
 
 /// The sources at work.
 #[derive(Debug)]
-pub(super) struct Sources {
+pub struct Sources {
     /// What files hold.
-    pub(super) batches: mpsc::Receiver<Batch>,
+    pub batches: mpsc::Receiver<Batch>,
     /// What brokers send.
-    pub(super) deliveries: mpsc::Receiver<Delivery>,
+    pub deliveries: mpsc::Receiver<Delivery>,
     /// What has been taken and is not durable yet.
     unacknowledged: Vec<Receipt>,
     /// Held, so that without a broker the other end waits.
@@ -38,14 +38,25 @@ impl Sources {
         let follower = Follower::new(&config.sources, &config.benchmarks, &store.positions()?);
         let (sender, batches) = mpsc::channel(BATCHES);
         let task = tokio::spawn(tail::follow(follower, sender, stopped));
-        Ok(Self {
+        let mut sources = Self::of((messages, deliveries), stop);
+        (sources.batches, sources.task) = (batches, task);
+        Ok(sources)
+    }
+
+    /// Messages that somebody else brings, and no files; needs a tokio runtime.
+    pub fn of(
+        (messages, deliveries): (mpsc::Sender<Delivery>, mpsc::Receiver<Delivery>),
+        stop: Trigger,
+    ) -> Self {
+        let (_, batches) = mpsc::channel(1);
+        Self {
             batches,
             deliveries,
             unacknowledged: Vec::new(),
             _messages: messages,
             stop,
-            task,
-        })
+            task: tokio::spawn(async { Ok(()) }),
+        }
     }
 
     /// Asks them to stop; what they have read already can still be taken.
@@ -67,7 +78,7 @@ impl Sources {
     }
 
     /// Whether another message may wait to be acknowledged.
-    pub(super) fn has_room(&self) -> bool {
+    pub fn has_room(&self) -> bool {
         self.unacknowledged.len() < MESSAGES
     }
 

@@ -6,7 +6,10 @@
 //! Orange, red and unknown are tried until the hook takes them, they are resolved or superseded, or
 //! the daemon stops; the next start then offers them again. Whatever else is given up in the end.
 
+mod runner;
 mod worker;
+
+pub use runner::{Processes, Run, Runner};
 
 use super::delivered::Delivered;
 use super::hook::Alert;
@@ -78,8 +81,18 @@ pub struct Dispatcher {
 }
 
 impl Dispatcher {
-    /// Starts a worker for each hook; needs a tokio runtime.
+    /// Starts a worker for each hook, which runs it as a process; needs a tokio runtime.
     pub fn start(hooks: &[HookConfig], retry: &Retry, delivered: Delivered) -> Self {
+        Self::with(Arc::new(Processes), hooks, retry, delivered)
+    }
+
+    /// Starts a worker for each hook, which `runner` runs; needs a tokio runtime.
+    pub fn with(
+        runner: Arc<dyn Runner>,
+        hooks: &[HookConfig],
+        retry: &Retry,
+        delivered: Delivered,
+    ) -> Self {
         let delivered = Arc::new(Mutex::new(delivered));
         let mut workers = JoinSet::new();
         let mut queues = Vec::new();
@@ -87,7 +100,8 @@ impl Dispatcher {
             let (queue, receiver) = mpsc::channel(QUEUE);
             let in_hand = Arc::new(Mutex::new(InHand::default()));
             let shared = (Arc::clone(&delivered), Arc::clone(&in_hand));
-            workers.spawn(Worker::new(hook, retry, shared).run(receiver));
+            let worker = Worker::new((hook, Arc::clone(&runner)), retry, shared);
+            workers.spawn(worker.run(receiver));
             let hook = hook.clone();
             queues.push(Way {
                 hook,

@@ -1,13 +1,13 @@
 //! The worker of one hook: what is due, in the order of its gravity, a few at once.
 
-use super::{QUEUE, Retry, locked};
+use super::{QUEUE, Retry, Runner, locked};
 use crate::alert::Level;
 use crate::config::HookConfig;
 use crate::monitor::AlertState;
 use crate::reading::BenchmarkId;
 use crate::runtime::clock;
 use crate::runtime::delivered::Delivered;
-use crate::runtime::hook::{self, Alert, Outcome};
+use crate::runtime::hook::{Alert, Outcome};
 use crate::runtime::in_hand::InHand;
 use crate::store::Fate;
 use std::collections::BTreeMap;
@@ -54,6 +54,7 @@ type Turn = (Instant, u64);
 #[derive(Debug)]
 pub(super) struct Worker {
     hook: Arc<HookConfig>,
+    runner: Arc<dyn Runner>,
     retry: Retry,
     delivered: Arc<Mutex<Delivered>>,
     in_hand: Arc<Mutex<InHand>>,
@@ -69,12 +70,13 @@ pub(super) struct Worker {
 
 impl Worker {
     pub(super) fn new(
-        hook: &HookConfig,
+        (hook, runner): (&HookConfig, Arc<dyn Runner>),
         retry: &Retry,
         (delivered, in_hand): (Arc<Mutex<Delivered>>, Arc<Mutex<InHand>>),
     ) -> Self {
         Self {
             hook: Arc::new(hook.clone()),
+            runner,
             retry: retry.clone(),
             delivered,
             in_hand,
@@ -146,8 +148,7 @@ impl Worker {
         self.untried -= usize::from(waiting.is_new);
         locked(&self.in_hand).is_tried(&waiting.alert);
         let (hook, alert) = (Arc::clone(&self.hook), waiting.alert.clone());
-        let attempt = waiting.attempt;
-        let task = tokio::spawn(async move { hook::run(&hook, &alert, attempt).await });
+        let task = tokio::spawn(self.runner.run(hook, alert, waiting.attempt));
         self.running.push(Running { task, waiting });
         true
     }

@@ -1,0 +1,77 @@
+//! A daemon that lives through hours in which much goes wrong, by a plan that a seed draws, in simulated time.
+//!
+//! Real: the daemon's turns (`Daemon::take_batch`, `take_messages`, `tick`, `look_back`), the site and the monitor, the
+//! follower and the files that it reads, the store in SQLite, the outbox and the dispatcher with its queues and retries.
+//! Simulated: the host's clock (an argument) and the runtime's (tokio's, moved by hand), the runs of a hook (a task
+//! instead of a process), the broker (messages decoded already, and their acknowledgements), the choice of the next turn
+//! (`Daemon::work` waits for real events), and a kill (the daemon is dropped between two turns; `tests/failures/killed.rs`
+//! kills real processes at any system call). The full disk is a limit on the length of files.
+//!
+//! In each life three benchmarks meet with trouble of their own, and a fourth with none but what the machine has. Three
+//! properties are held:
+//!
+//! 1. What could be read is in the state once, when the trouble is over.
+//! 2. Where red was due, people have been told red, or `unknown` for the benchmark or the clock, within [`life::BOUND`] in
+//!    which the daemon ran and the hook worked.
+//! 3. The fourth benchmark's readings are in the state at the end of the turn in which they came, and property 2 holds for
+//!    it, whatever the others do, while the machine is well.
+//!
+//! And a replay of the state says what the daemon said.
+//!
+//! `HOSTILE_HOURS` sets how many hours are lived through; by default [`HOURS`], in `.ci/run` ten thousand. Lives begin at
+//! the seed `HOSTILE_SEED`, 0 by default. What a seed found is mended and the seed stays in [`FOUND`].
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::print_stdout,
+    clippy::format_push_string,
+    reason = "a test fails by panicking, and says how much it has seen"
+)]
+
+mod clock;
+mod host;
+mod life;
+mod logger;
+mod people;
+mod plan;
+mod radio;
+mod slope;
+
+use life::{LIFE_HOURS, Seen, live};
+
+/// Hours that are lived through unless `HOSTILE_HOURS` says otherwise.
+const HOURS: u64 = 500;
+/// Seeds that found something, and what.
+const FOUND: [(u64, &str); 0] = [];
+
+fn number(name: &str, otherwise: u64) -> u64 {
+    std::env::var(name).map_or(otherwise, |text| text.parse().unwrap())
+}
+
+#[test]
+fn in_hostile_hours_no_reading_is_lost_no_red_is_kept_from_people_and_no_benchmark_waits_for_another() {
+    let lives = number("HOSTILE_HOURS", HOURS).div_ceil(LIFE_HOURS);
+    let first = number("HOSTILE_SEED", 0);
+    let mut seen = Seen::default();
+    for seed in first..first + lives {
+        seen.add(&live(seed));
+    }
+    println!("{seen:?}");
+    if lives >= 20 {
+        // That the plan reaches what is claimed: most reds are told as such, and not only as unknown.
+        assert!(seen.reds_due > lives, "{seen:?}");
+        assert!(seen.reds_told * 2 > seen.reds_due, "{seen:?}");
+        assert!(seen.restarts > lives && seen.full_disk > 0, "{seen:?}");
+    }
+}
+
+#[test]
+fn what_seeds_have_found_is_mended() {
+    for (seed, what) in FOUND {
+        println!("seed {seed}: {what}");
+        live(seed);
+    }
+}

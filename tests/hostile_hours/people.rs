@@ -1,0 +1,89 @@
+//! The hook, as the people behind it see it: what they have been told, and when the hook works.
+
+use slipwatch::alert::Level;
+use slipwatch::config::HookConfig;
+use slipwatch::monitor::AlertState;
+use slipwatch::runtime::deliver::{Run, Runner};
+use slipwatch::runtime::hook::{Alert, Outcome};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+/// How long a run takes.
+const RUN: Duration = Duration::from_millis(300);
+
+/// What the hook does.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub(crate) enum Mood {
+    #[default]
+    Works,
+    Fails,
+    Hangs,
+    /// For alerts of this benchmark alone.
+    HangsAt(&'static str),
+}
+
+/// What people have been told, and the hook between.
+#[derive(Debug, Default)]
+pub(crate) struct People {
+    pub(crate) mood: Mood,
+    /// By benchmark (none: the site, its clock) and level, the keys that are in force.
+    in_force: BTreeMap<(Option<String>, Level), BTreeSet<String>>,
+    pub(crate) told: u64,
+    pub(crate) failed: u64,
+}
+
+impl People {
+    /// Whether they know of this level at the benchmark.
+    pub(crate) fn know(&self, benchmark: Option<&str>, level: Level) -> bool {
+        let place = (benchmark.map(str::to_owned), level);
+        self.in_force.get(&place).is_some_and(|keys| !keys.is_empty())
+    }
+
+    fn hear(&mut self, alert: &Alert) {
+        self.told += 1;
+        let benchmark = alert.event.benchmark.as_ref().map(ToString::to_string);
+        let keys = self.in_force.entry((benchmark, alert.level)).or_default();
+        match alert.state {
+            AlertState::Firing => keys.insert(alert.key.clone()),
+            AlertState::Resolved => keys.remove(&alert.key),
+        };
+    }
+
+    fn does(&self, alert: &Alert) -> Mood {
+        match &self.mood {
+            Mood::HangsAt(name) if alert.event.benchmark.as_ref().is_none_or(|one| one.as_str() != *name) => Mood::Works,
+            Mood::HangsAt(_) => Mood::Hangs,
+            other @ (Mood::Works | Mood::Fails | Mood::Hangs) => other.clone(),
+        }
+    }
+}
+
+/// Runs the hook.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Hook(pub(crate) Arc<Mutex<People>>);
+
+impl Runner for Hook {
+    fn run(&self, hook: Arc<HookConfig>, alert: Alert, _attempt: u32) -> Run {
+        let people = Arc::clone(&self.0);
+        Box::pin(async move {
+            tokio::time::sleep(RUN).await;
+            let mood = people.lock().unwrap().does(&alert);
+            match mood {
+                Mood::Works => {
+                    people.lock().unwrap().hear(&alert);
+                    Outcome::Done
+                }
+                Mood::Fails => {
+                    people.lock().unwrap().failed += 1;
+                    Outcome::Failed(1)
+                }
+                Mood::Hangs | Mood::HangsAt(_) => {
+                    tokio::time::sleep(hook.timeout).await;
+                    people.lock().unwrap().failed += 1;
+                    Outcome::TimedOut
+                }
+            }
+        })
+    }
+}
