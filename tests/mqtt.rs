@@ -13,7 +13,7 @@ use slipwatch::monitor::Input;
 use slipwatch::runtime::mqtt::{Delivery, follow};
 use slipwatch::runtime::shutdown::{self, Trigger};
 use std::net::TcpListener;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 use tempfile::TempDir;
@@ -24,7 +24,7 @@ const LIMIT: Duration = Duration::from_secs(30);
 
 /// A broker of our own, on a port of its own.
 struct Mosquitto {
-    program: &'static str,
+    program: PathBuf,
     folder: TempDir,
     port: u16,
     process: Child,
@@ -32,27 +32,35 @@ struct Mosquitto {
 
 impl Mosquitto {
     fn start() -> Option<Self> {
-        let programs = [
+        Self::start_with(|_| Some(String::new()))
+    }
+
+    /// With more in its config, if that can be had.
+    fn start_with(more: impl Fn(&Path) -> Option<String>) -> Option<Self> {
+        let installed = [
             "/usr/sbin/mosquitto",
             "/usr/bin/mosquitto",
             "/usr/local/sbin/mosquitto",
         ];
-        let Some(program) = programs.into_iter().find(|one| Path::new(one).exists()) else {
-            println!("skipped: Mosquitto is not installed (apt-get install mosquitto)");
+        let named = std::env::var_os("MOSQUITTO").map(PathBuf::from);
+        let mut programs = named.into_iter().chain(installed.map(PathBuf::from));
+        let Some(program) = programs.find(|one| one.exists()) else {
+            println!("skipped: Mosquitto is not installed (apt-get install mosquitto), nor named by MOSQUITTO");
             return None;
         };
         let folder = tempfile::tempdir().unwrap();
+        let more = more(folder.path())?;
         let free = TcpListener::bind("127.0.0.1:0").unwrap();
         let port = free.local_addr().unwrap().port();
         drop(free);
         let conf = folder.path().join("mosquitto.conf");
         let text = format!(
             "listener {port} 127.0.0.1\nallow_anonymous true\npersistence true\n\
-             persistence_location {}/\nuser root\n",
+             persistence_location {}/\nuser root\n{more}",
             folder.path().display()
         );
         std::fs::write(conf, text).unwrap();
-        let process = spawn(program, &folder);
+        let process = spawn(&program, &folder);
         Some(Self {
             program,
             folder,
@@ -66,7 +74,7 @@ impl Mosquitto {
         let id = self.process.id().to_string();
         assert!(Command::new("kill").arg(id).status().unwrap().success());
         self.process.wait().unwrap();
-        self.process = spawn(self.program, &self.folder);
+        self.process = spawn(&self.program, &self.folder);
     }
 
     fn config(&self) -> Config {
@@ -108,7 +116,7 @@ impl Mosquitto {
     }
 }
 
-fn spawn(program: &str, folder: &TempDir) -> Child {
+fn spawn(program: &Path, folder: &TempDir) -> Child {
     Command::new(program)
         .arg("-c")
         .arg(folder.path().join("mosquitto.conf"))
@@ -252,20 +260,30 @@ struct Daemon(TempDir, Child);
 
 impl Daemon {
     fn start(broker: &Mosquitto) -> Self {
+        Self::start_with(broker, "")
+    }
+
+    /// With more in its config; it reads the files in its folder beside.
+    fn start_with(broker: &Mosquitto, more: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let text = format!(
             "[site]\nname = \"Toc\"\nstate_dir = \"state\"\n[[source]]\nid = \"radio\"\n\
-             kind = \"mqtt\"\nurl = \"mqtt://127.0.0.1:{}\"\ntopic = \"site/+/displacement\"\n",
+             kind = \"mqtt\"\nurl = \"mqtt://127.0.0.1:{}\"\ntopic = \"site/+/displacement\"\n{more}",
             broker.port
         );
         std::fs::write(folder.path().join("site.toml"), text).unwrap();
+        let log = std::fs::File::create(folder.path().join("log")).unwrap();
         let process = Command::new(PROGRAM)
             .args(["run", "site.toml"])
             .current_dir(folder.path())
-            .stderr(Stdio::null())
+            .stderr(log)
             .stdout(Stdio::null())
             .spawn();
         Self(folder, process.unwrap())
+    }
+
+    fn text(&self, name: &str) -> String {
+        std::fs::read_to_string(self.0.path().join(name)).unwrap_or_default()
     }
 
     fn readings(&self) -> usize {
@@ -329,4 +347,53 @@ async fn a_broker_that_restarts_is_found_again_and_a_bad_line_stops_nothing() {
     assert_eq!(values(&delivery), [3.0]);
     delivery.receipt.acknowledge().await.unwrap();
     source.end().await;
+}
+
+/// The config of a broker that lets anybody in and refuses each subscription; it needs the plug-in that comes with
+/// Mosquitto, as a file of access rules does not refuse subscriptions.
+fn refusing(folder: &Path) -> Option<String> {
+    let rules = folder.join("rules.json");
+    let text = r#"{"defaultACLAccess":{"publishClientSend":true,"publishClientReceive":true,"subscribe":false,
+                   "unsubscribe":true},"clients":[],"groups":[],"roles":[]}"#;
+    std::fs::write(&rules, text).unwrap();
+    let named = std::env::var("LD_LIBRARY_PATH").unwrap_or_default();
+    let folders = ["/usr/lib/x86_64-linux-gnu", "/usr/lib/aarch64-linux-gnu", "/usr/lib"];
+    let mut plugins = named.split(':').chain(folders).map(|one| {
+        Path::new(one).join("mosquitto_dynamic_security.so")
+    });
+    let Some(plugin) = plugins.find(|one| one.exists()) else {
+        println!("skipped: mosquitto_dynamic_security.so is not there");
+        return None;
+    };
+    Some(format!("plugin {}\nplugin_opt_config_file {}\n", plugin.display(), rules.display()))
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_broker_that_refuses_the_subscription_is_told_and_its_benchmark_is_unknown() {
+    let Some(broker) = Mosquitto::start_with(refusing) else {
+        return;
+    };
+    tokio::time::sleep(Duration::from_millis(500)).await;
+    let daemon = Daemon::start_with(
+        &broker,
+        "[[source]]\nid = \"logger\"\nkind = \"csv\"\npath = \"*.csv\"\n\
+         [[benchmark]]\nid = \"5\"\nsource = \"radio\"\n[[benchmark]]\nid = \"6\"\nsource = \"logger\"\n\
+         [[hook]]\nrun = [\"/bin/sh\", \"-c\", \"echo $SLIPWATCH_KEY $SLIPWATCH_STATE >> told\"]\n\
+         levels = [\"unknown\"]\n",
+    );
+    let now = slipwatch::runtime::clock::now();
+    std::fs::write(daemon.0.path().join("6.csv"), format!("time,displacement_mm\n{now},1\n")).unwrap();
+    let is_told = || {
+        let told = daemon.text("told");
+        let mut told = told.lines();
+        told.any(|line| line.starts_with("5/unknown/") && line.ends_with("firing"))
+    };
+    for _ in 0..300 {
+        let is_said = daemon.text("log").contains("the broker refuses the subscription");
+        if is_told() && is_said && daemon.readings() == 1 {
+            return;
+        }
+        tokio::time::sleep(Duration::from_millis(100)).await;
+    }
+    panic!("{}\n{}", daemon.text("told"), daemon.text("log"));
 }

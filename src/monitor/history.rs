@@ -53,6 +53,9 @@ pub(super) struct History {
     /// Readings that declared events leave out, by time, as they were read.
     #[serde(default)]
     aside: Vec<Observation>,
+    /// Between which values the readings of a sensor at the end of its range lie.
+    #[serde(default)]
+    pub(super) range_end: Option<(f64, f64)>,
 }
 
 /// A declared reset that has taken effect.
@@ -81,6 +84,7 @@ impl History {
             averaging: source.averaging,
             resets: Vec::new(),
             aside: Vec::new(),
+            range_end: None,
         }
     }
 
@@ -296,7 +300,8 @@ impl History {
         }
     }
 
-    /// Whether a reading has the value of the newest one, and comes after it.
+    /// Whether a reading has the value of the newest one, or one of a sensor that stands at the end of its range, and
+    /// comes after it.
     pub(super) fn is_repeated_by(&self, source: Source, reading: &Reading) -> bool {
         let mut new = self.observation(source, reading);
         new.value -= self.taken_off(new.t_days);

@@ -15,6 +15,12 @@ const COARSE: f64 = 0.1;
 /// The chance under which as many equal readings are no chance.
 const NO_CHANCE: f64 = 1e-6;
 
+/// Readings that stand at the end of a sensor's range, as many as are looked at; and those of the motion before them.
+const STANDING: usize = 6;
+const MOVING: usize = 4;
+/// They lie within this share of what the motion before them would have made of their time.
+const JITTER: f64 = 0.02;
+
 /// The readings that are looked at for spikes.
 const LOOKED_AT: RangeInclusive<usize> = 18..=36;
 /// A spike stands out by so many times what its neighbours differ by,
@@ -61,15 +67,49 @@ impl History {
         is_stuck.then(|| Some((count, self.time(values[first].t_days)?)))?
     }
 
-    /// Whether a reading of this value, as the monitor takes it, repeats the newest one.
-    pub(super) fn repeats(&self, new: &Observation) -> bool {
-        let newest = self.observations.values.last();
-        newest.is_some_and(|newest| are_equal(newest, new) && new.t_days > newest.t_days)
+    /// Whether the newest readings stand, but for a jitter, farther than any before them, while those just before them
+    /// moved there ten times as fast or more: how many, the time of the first, and between which values.
+    ///
+    /// A slope that slows down has readings in between.
+    pub(super) fn stands_at_the_end(&self) -> Option<(usize, Timestamp, (f64, f64))> {
+        let values = &self.observations.values;
+        let first = values.len().checked_sub(STANDING)?;
+        let (before, standing) = values.split_at(first);
+        let moving = &before[before.len().checked_sub(MOVING)?..];
+        let velocity = |pair: &[Observation]| {
+            (pair[1].value - pair[0].value) / (pair[1].t_days - pair[0].t_days)
+        };
+        let velocities = || moving.windows(2).map(velocity);
+        let slowest = velocities().map(f64::abs).fold(f64::INFINITY, f64::min);
+        let is_upwards = velocities().all(|velocity| velocity > 0.0);
+        let is_downwards = velocities().all(|velocity| velocity < 0.0);
+        let span = standing[STANDING - 1].t_days - standing[0].t_days;
+        let extent = |of: &[Observation]| {
+            let values = || of.iter().map(|one| one.value);
+            (
+                values().fold(f64::INFINITY, f64::min),
+                values().fold(f64::NEG_INFINITY, f64::max),
+            )
+        };
+        let ((low, high), (lowest, highest)) = (extent(standing), extent(before));
+        let is_beyond = is_upwards && low >= highest || is_downwards && high <= lowest;
+        let jitter = high - low;
+        let stands = is_beyond && jitter > 0.0 && jitter <= JITTER * slowest * span;
+        let around = (low - jitter, high + jitter);
+        stands.then(|| Some((STANDING, self.time(standing[0].t_days)?, around)))?
     }
 
-    /// Of equal newest readings only the first is left.
-    pub(super) fn forget_repeats(&mut self) {
-        let count = self.identical();
+    /// Whether a reading of this value, as the monitor takes it, repeats the newest one.
+    pub(super) fn repeats(&self, new: &Observation) -> bool {
+        let stands = (self.range_end).is_some_and(|(low, high)| low <= new.value && new.value <= high);
+        let newest = self.observations.values.last();
+        newest.is_some_and(|newest| {
+            (stands || are_equal(newest, new)) && new.t_days > newest.t_days
+        })
+    }
+
+    /// Of so many newest readings, that say nothing, only the first is left.
+    pub(super) fn forget_repeats(&mut self, count: usize) {
         let kept = self.observations.values.len() + 1 - count.max(1);
         self.observations.values.truncate(kept);
     }
@@ -203,6 +243,31 @@ mod tests {
             None,
             "it never gave anything else"
         );
+    }
+
+    #[test]
+    fn a_jitter_where_a_fast_motion_ended_at_once_is_the_end_of_a_range_and_a_slope_that_slows_down_is_not() {
+        let moving = |hour: u32| f64::from(hour) * 16.0 + noise(hour);
+        let jitter = |hour: u32| 30.0 * 16.0 + noise(hour);
+        let at_end = history((0..30).map(moving).chain((30..36).map(jitter)));
+        let (count, _, (low, high)) = at_end.stands_at_the_end().unwrap();
+        assert!(count == 6 && low < 480.0 && high > 481.0 && high - low < 4.0);
+        let downwards = history((0..30).map(moving).chain((30..36).map(jitter)).map(|value| -value));
+        assert!(downwards.stands_at_the_end().is_some());
+        // As fast as the noise, nobody can tell.
+        let creeping = history((0..36).map(|hour| f64::from(hour.min(30)) * 0.2 + noise(hour)));
+        assert!(creeping.stands_at_the_end().is_none());
+        for per_hour in [0.2_f64, 0.5, 0.8, 0.95] {
+            let slowing = |hour: u32| 480.0 + 16.0 * (1.0 - per_hour.powi(hour as i32)) / (1.0 - per_hour);
+            for end in 1..60 {
+                let all = (0..30).map(moving).chain((0..end).map(slowing));
+                assert!(history(all).stands_at_the_end().is_none(), "{per_hour}, {end}");
+            }
+        }
+        for end in 10..119 {
+            let failing = |hour: u32| 200.0 * (120.0 / (120.0 - f64::from(hour))).ln() + noise(hour);
+            assert!(history((0..end).map(failing)).stands_at_the_end().is_none());
+        }
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! One commit: the steps, what follows from them, and how far the files have been read.
 
 use super::outbox::{Fate, WAITING};
+use super::sealed::seal;
 use super::series::{self, Series};
 use super::sum::sum;
 use super::{Inner, Store, StoreError, nanoseconds};
@@ -320,7 +321,7 @@ fn keep(
     match body {
         Some(body) => connection
             .prepare_cached(&insert)?
-            .execute(params![name, body])?,
+            .execute(params![name, seal(&[ValueRef::Text(name.as_bytes())], body)])?,
         None => connection.prepare_cached(&delete)?.execute([name])?,
     };
     Ok(())

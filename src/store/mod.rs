@@ -10,6 +10,7 @@ mod outbox;
 mod read;
 mod retention;
 mod schema;
+mod sealed;
 mod series;
 mod sum;
 

@@ -1,8 +1,10 @@
 //! What the hooks are to be told: written with the events that say so, ticked off when a hook has taken it.
 
+use super::sealed::{seal, unseal};
 use super::{Inner, Store, StoreError, nanoseconds, timestamp};
 use crate::reading::Timestamp;
-use rusqlite::{Connection, params};
+use rusqlite::types::ValueRef;
+use rusqlite::{Connection, Row, params};
 
 /// A delivery that no hook has taken yet.
 pub(super) const WAITING: &str = "waiting";
@@ -62,15 +64,16 @@ impl Delivery {
             time,
             body,
         } = self;
-        insert.execute(params![
-            key,
-            level,
-            state,
-            hook,
-            status,
-            nanoseconds(*time)?,
-            body
-        ])?;
+        let time = nanoseconds(*time)?;
+        let beside = [
+            ValueRef::Text(key.as_bytes()),
+            ValueRef::Text(level.as_bytes()),
+            ValueRef::Text(state.as_bytes()),
+            ValueRef::Text(hook.as_bytes()),
+            ValueRef::Integer(time),
+        ];
+        let body = seal(&beside, body);
+        insert.execute(params![key, level, state, hook, status, time, body])?;
         Ok(())
     }
 }
@@ -83,10 +86,19 @@ impl Store {
     pub fn waiting(&self) -> Result<Vec<Vec<u8>>, StoreError> {
         let inner = self.inner();
         let mut query = inner.connection.prepare(
-            "SELECT body FROM outbox WHERE status = 'waiting' GROUP BY key, level, state ORDER BY min(id)",
+            "SELECT id, key, level, state, hook, time, body FROM outbox WHERE status = 'waiting'
+             GROUP BY key, level, state ORDER BY min(id)",
         )?;
-        let rows = query.query_map([], |row| row.get(0))?;
-        Ok(rows.collect::<Result<_, _>>()?)
+        let mut rows = query.query([])?;
+        let mut bodies = Vec::new();
+        while let Some(row) = rows.next()? {
+            match body(row)? {
+                Some(body) => bodies.push(body),
+                // What is in force is told again when the past has been read.
+                None => tracing::error!(id = ?row.get_ref(0)?, "an alert that waited is not what was written"),
+            }
+        }
+        Ok(bodies)
     }
 
     /// How many deliveries wait, and when the oldest of their alerts was called.
@@ -159,6 +171,14 @@ impl Store {
         let written = inner.settle(settled);
         inner.committed(settled.len(), written)
     }
+}
+
+/// The body of a row of number, key, level, state, hook, time and body; `None` where the row is not what was written.
+pub(super) fn body(row: &Row<'_>) -> Result<Option<Vec<u8>>, StoreError> {
+    let beside = (1..6).map(|index| row.get_ref(index));
+    let beside: Vec<ValueRef<'_>> = beside.collect::<Result<_, _>>()?;
+    let sealed: Vec<u8> = row.get(6)?;
+    Ok(unseal(&beside, &sealed).map(<[u8]>::to_vec))
 }
 
 impl Inner {

@@ -1,9 +1,11 @@
 //! What a restart, a replay of the stored input, and people who ask read back.
 
+use super::sealed::unseal;
 use super::series::Series;
 use super::{Store, StoreError, timestamp};
 use crate::monitor::{Finding, Input, Notice, Order, Part, Settings};
 use crate::reading::{BenchmarkId, Reading, Sample, Timestamp};
+use rusqlite::types::ValueRef;
 use rusqlite::{Connection, params};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -93,13 +95,16 @@ impl Store {
         let mut query = inner
             .connection
             .prepare("SELECT name, body FROM memory ORDER BY name")?;
-        let part = |row: &rusqlite::Row<'_>| {
-            Ok(Part {
-                name: row.get(0)?,
-                body: row.get(1)?,
-            })
-        };
-        let parts = query.query_map([], part)?.collect::<Result<_, _>>()?;
+        let mut rows = query.query([])?;
+        let mut parts = Vec::new();
+        while let Some(row) = rows.next()? {
+            let (name, body) = named(row)?;
+            if body.is_none() {
+                tracing::warn!(name, "this part of the memory is not what was written: it is made anew");
+                return Ok(Recorded::default());
+            }
+            parts.push(Part { name, body });
+        }
         let step = meta(&inner.connection, "memory_step")?.unwrap_or(0);
         Ok(Recorded { parts, step })
     }
@@ -113,8 +118,17 @@ impl Store {
         let mut query = inner
             .connection
             .prepare("SELECT name, body FROM position")?;
-        let rows = query.query_map([], |row| Ok((row.get(0)?, row.get(1)?)))?;
-        Ok(rows.collect::<Result<_, _>>()?)
+        let mut rows = query.query([])?;
+        let mut positions = Vec::new();
+        while let Some(row) = rows.next()? {
+            match named(row)? {
+                (name, Some(body)) => positions.push((name, body)),
+                (name, None) => {
+                    tracing::warn!(name, "how far it was read is not what was written: from its start again");
+                }
+            }
+        }
+        Ok(positions)
     }
 
     /// The next few steps after number `after`, in their order; none at the end.
@@ -241,6 +255,14 @@ impl Store {
         })?;
         Ok(rows.collect::<Result<_, _>>()?)
     }
+}
+
+/// A name and what is kept under it; `None` where that is not what was written.
+fn named(row: &rusqlite::Row<'_>) -> Result<(String, Option<Vec<u8>>), StoreError> {
+    let name: String = row.get(0)?;
+    let sealed: Vec<u8> = row.get(1)?;
+    let body = unseal(&[ValueRef::Text(name.as_bytes())], &sealed).map(<[u8]>::to_vec);
+    Ok((name, body))
 }
 
 fn lost(seq: i64) -> StoreError {

@@ -1,6 +1,6 @@
-//! A sum over each row of what was taken in and said: a bit that flips on the disk is seen.
+//! A sum over each row of what was taken in, said and is to be told: a bit that flips on the disk is seen.
 
-use super::{Store, StoreError};
+use super::{Store, StoreError, outbox};
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, Row};
 
@@ -10,19 +10,27 @@ const PIECE: i64 = 2000;
 const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
 const PRIME: u64 = 0x0000_0100_0000_01b3;
 
-/// What the rows of one table are, the sum last.
-const TABLES: [(&str, &str, usize); 2] = [
+/// Whether a row is what was written.
+type IsWhole = fn(&Row<'_>) -> Result<bool, StoreError>;
+
+/// The rows of each table, and how they are looked at.
+const TABLES: [(&str, &str, IsWhole); 3] = [
     (
         "step",
         "SELECT seq, now, series, time, value, sigma, body, sum FROM step
          WHERE seq > ?1 AND sum IS NOT NULL ORDER BY seq LIMIT ?2",
-        7,
+        |row| is_whole(row, 7),
     ),
     (
         "event",
         "SELECT seq, step, time, kind, benchmark, body, sum FROM event
          WHERE seq > ?1 AND sum IS NOT NULL ORDER BY seq LIMIT ?2",
-        6,
+        |row| is_whole(row, 6),
+    ),
+    (
+        "outbox",
+        "SELECT id, key, level, state, hook, time, body FROM outbox WHERE id > ?1 ORDER BY id LIMIT ?2",
+        |row| Ok(outbox::body(row)?.is_some()),
     ),
 ];
 
@@ -86,13 +94,13 @@ impl Store {
 
 /// The number of the last row of the next piece; `None` at the end.
 fn piece(connection: &Connection, verified: Verified) -> Result<Option<i64>, StoreError> {
-    let (table, query, values) = TABLES[verified.table];
+    let (table, query, is_whole) = TABLES[verified.table];
     let mut query = connection.prepare_cached(query)?;
     let mut rows = query.query([verified.after, PIECE])?;
     let mut last = None;
     while let Some(row) = rows.next()? {
         let number = row.get_ref(0)?;
-        if !is_whole(row, values)? {
+        if !is_whole(row)? {
             let detail = format!("row {number:?} of the table {table} is not what was written");
             return Err(StoreError::Damaged { detail });
         }
@@ -101,6 +109,7 @@ fn piece(connection: &Connection, verified: Verified) -> Result<Option<i64>, Sto
     Ok(last)
 }
 
+/// Whether the sum, which stands behind so many values, is theirs.
 fn is_whole(row: &Row<'_>, values: usize) -> Result<bool, StoreError> {
     let all = (0..values).map(|index| row.get_ref(index));
     let all: Vec<ValueRef<'_>> = all.collect::<Result<_, _>>()?;

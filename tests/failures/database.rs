@@ -1,6 +1,7 @@
 //! 17: a database that must not be touched.
 
-use crate::site::Site;
+use crate::site::{Site, eventually, get};
+use crate::telling::failing;
 use rusqlite::Connection;
 use std::fs;
 
@@ -120,4 +121,54 @@ fn a_flipped_bit_in_what_was_taken_or_said_is_seen_at_the_next_start() {
     }
     fs::write(&file, &whole).unwrap();
     site.caught_up().stop();
+}
+
+#[test]
+fn a_flipped_bit_in_the_memory_or_a_position_is_seen_and_both_are_made_anew() {
+    let site = used();
+    let before = site.proven_events();
+    let file = site.path("state/slipwatch.db");
+    let database = Connection::open(&file).unwrap();
+    for table in ["memory", "position"] {
+        let flip = format!("UPDATE {table} SET body = substr(body, 1, 40) || x'00' || substr(body, 42)");
+        assert!(database.execute(&flip, []).unwrap() > 0, "{table}");
+    }
+    drop(database);
+    site.caught_up().stop();
+    assert!(site.log().contains("it is made anew"), "{}", site.log());
+    assert!(site.log().contains("from its start again"), "{}", site.log());
+    assert_eq!(site.values().len(), 200, "taken twice");
+    assert!(site.proven_events().starts_with(&before));
+}
+
+#[test]
+fn a_flipped_bit_in_what_hooks_are_to_be_told_is_seen_at_the_next_start() {
+    let site = Site::new("");
+    let rows = failing(0..114);
+    site.append("incoming/5.csv", &format!("time,displacement_mm\n{rows}"));
+    let program = site.caught_up();
+    eventually("an alert", || !site.lines("told").is_empty());
+    program.stop();
+    let database = Connection::open(site.path("state/slipwatch.db")).unwrap();
+    let flip = "UPDATE outbox SET key = key || '1' WHERE id = (SELECT min(id) FROM outbox)";
+    assert_eq!(database.execute(flip, []).unwrap(), 1);
+    drop(database);
+    is_refused(&site, "is not what was written");
+}
+
+#[test]
+fn a_bit_that_flips_while_the_daemon_runs_is_told() {
+    let site = used();
+    let listen = site.listen();
+    let program = site.caught_up();
+    eventually("ready", || get(&listen, "/readyz").contains("200 OK"));
+    let database = Connection::open(site.path("state/slipwatch.db")).unwrap();
+    let flip = "UPDATE event SET body = replace(body, '1', '3') WHERE seq = (SELECT min(seq) FROM event)";
+    assert_eq!(database.execute(flip, []).unwrap(), 1);
+    drop(database);
+    eventually("told", || !get(&listen, "/readyz").contains("200 OK"));
+    eventually("in the metrics", || {
+        get(&listen, "/metrics").contains("slipwatch_store_damaged 1")
+    });
+    program.stop();
 }

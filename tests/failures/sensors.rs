@@ -58,6 +58,23 @@ fn a_sensor_that_repeats_its_value_after_a_red_is_unknown_and_the_red_stays() {
     assert!(told(&site, "5/unknown/", "firing") >= 1, "{events}");
 }
 
+#[test]
+fn a_sensor_that_jitters_at_the_end_of_its_range_after_a_red_is_unknown_and_the_red_stays() {
+    let (site, program) = at_red("");
+    let end = 200.0 * (120.0_f64 / 7.0).ln() + 10.0;
+    for hour in (0..30).rev() {
+        let time = clock::now() - SignedDuration::from_hours(hour);
+        let jitter = 0.01 * f64::from((i32::try_from(hour).unwrap() * 7) % 5);
+        site.append("incoming/5.csv", &format!("{time},{:.4}\n", end + jitter));
+    }
+    eventually("unknown", || site.events().contains("stuck-sensor"));
+    eventually("everything", || site.values().len() == 144);
+    program.stop();
+    let events = site.proven_events();
+    assert_eq!(told(&site, "5/red/", "resolved"), 0, "{events}");
+    assert!(told(&site, "5/unknown/", "firing") >= 1, "{events}");
+}
+
 fn spoils(change: impl Fn(usize, f64) -> f64) {
     let site = Site::new(POLICY);
     site.append("incoming/5.csv", HEADER);

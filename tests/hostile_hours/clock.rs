@@ -22,7 +22,7 @@ pub(crate) fn begin() {
 
 /// The true time.
 pub(crate) fn truth() -> Timestamp {
-    let passed = Instant::now() - START.get().expect("a life has begun");
+    let passed = Instant::now() - START.get().unwrap_or_else(Instant::now);
     beginning() + SignedDuration::try_from(passed).unwrap()
 }
 
@@ -34,4 +34,13 @@ pub(crate) fn wall() -> Timestamp {
 /// From now on the host's clock is wrong by so much.
 pub(crate) fn set_wrong_by(span: SignedDuration) {
     WRONG_BY.set(span);
+}
+
+/// Writes the true time before a line of the log.
+pub(crate) struct Truth;
+
+impl tracing_subscriber::fmt::time::FormatTime for Truth {
+    fn format_time(&self, writer: &mut tracing_subscriber::fmt::format::Writer<'_>) -> std::fmt::Result {
+        write!(writer, "{}", truth())
+    }
 }

@@ -123,6 +123,10 @@ pub(crate) fn live(seed: u64) -> Seen {
         seen: Seen { hours: LIFE_HOURS, ..Seen::default() },
     };
     let plan = Plan::drawn(seed);
+    if std::env::var_os("HOSTILE_LOG").is_some() {
+        let _ = tracing_subscriber::fmt().with_timer(clock::Truth).with_ansi(false).try_init();
+        println!("{plan:#?}");
+    }
     life.host.start();
     for step in 0..STEPS + CALM {
         life.step(step, &plan);

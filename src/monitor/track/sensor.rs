@@ -41,13 +41,14 @@ impl Track {
     pub(super) fn judge_sensor(&mut self, time: Timestamp) -> Vec<Event> {
         let mut events = Vec::new();
         if let Some((count, since)) = self.history.stuck() {
-            self.history.forget_repeats();
-            let text = format!(
-                "benchmark {}: {count} readings in a row are the same, as this sensor never gave them before: it is stuck",
-                self.benchmark
-            );
-            events.push(self.fault(time, "stuck-sensor", text.clone()));
-            events.extend(self.begins_unknown((time, since), Reason::Stuck, text));
+            let what = "are the same, as this sensor never gave them before: it is stuck";
+            events.extend(self.sticks(time, (count, since), what));
+        } else if self.latch.level() >= Level::Orange
+            && let Some((count, since, around)) = self.history.stands_at_the_end()
+        {
+            self.history.range_end = Some(around);
+            let what = "only jitter where a fast motion ended at once: the sensor is stuck, or at the end of its range";
+            events.extend(self.sticks(time, (count, since), what));
         }
         let was_spoilt = self.spoilt_by.is_some();
         self.spoilt_by = self.history.spoilt(self.spoilt_by);
@@ -66,11 +67,26 @@ impl Track {
         events
     }
 
+    /// So many readings since a time say nothing, as it turns out at `time`.
+    fn sticks(
+        &mut self,
+        time: Timestamp,
+        (count, since): (usize, Timestamp),
+        what: &str,
+    ) -> Vec<Event> {
+        self.history.forget_repeats(count);
+        let text = format!("benchmark {}: {count} readings in a row {what}", self.benchmark);
+        let mut events = vec![self.fault(time, "stuck-sensor", text.clone())];
+        events.extend(self.begins_unknown((time, since), Reason::Stuck, text));
+        events
+    }
+
     /// The stuck sensor gives another value, at `time`.
     pub(super) fn unstick(&mut self, time: Timestamp) -> Option<Event> {
         if !self.unknown.has(Reason::Stuck) {
             return None;
         }
+        self.history.range_end = None;
         let text = format!("benchmark {}: its readings change again", self.benchmark);
         self.ends_unknown((time, time), Reason::Stuck, text)
     }

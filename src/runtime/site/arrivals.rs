@@ -39,7 +39,7 @@ impl Site {
             return Ok(Vec::new());
         }
         if let Some(store) = &self.sinks.store
-            && !self.is_newest(arrival)
+            && !self.is_latest(arrival)
             && store.has(&self.batch, &arrival.input)?
         {
             self.counts.repeated += 1;
@@ -191,7 +191,16 @@ impl Site {
         }
     }
 
-    /// Whether the benchmark has given no reading as late as this one: it cannot be known then.
+    /// Whether nothing as late as this reading of its benchmark has been taken: it cannot be known then.
+    fn is_latest(&self, arrival: &Arrival) -> bool {
+        let Input::Reading { benchmark, .. } = &arrival.input else {
+            return false;
+        };
+        let ahead = self.ahead.get(benchmark);
+        self.is_newest(arrival) && ahead.is_none_or(|ahead| *ahead < arrival.time)
+    }
+
+    /// Whether the benchmark has given no reading as late as this one, of those that do not wait for another one.
     fn is_newest(&self, arrival: &Arrival) -> bool {
         let Input::Reading { benchmark, .. } = &arrival.input else {
             return false;

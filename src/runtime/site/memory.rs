@@ -18,6 +18,8 @@ struct Own {
     asked: Vec<SearchJob>,
     now: Option<Timestamp>,
     newest: BTreeMap<BenchmarkId, Timestamp>,
+    #[serde(default)]
+    ahead: BTreeMap<BenchmarkId, Timestamp>,
     failure_times: BTreeMap<Option<BenchmarkId>, Timestamp>,
     standing: Vec<(Place, Standing)>,
     mutes: Vec<Mute>,
@@ -92,6 +94,7 @@ impl Site {
             .for_each(|job| self.searches.note(job));
         self.now = own.now;
         self.newest = own.newest;
+        self.ahead = own.ahead;
         self.failure_times = own.failure_times;
         self.standing = own.standing.into_iter().collect();
         self.mutes = own.mutes;
@@ -167,6 +170,7 @@ impl Site {
             asked: self.searches.jobs().cloned().collect(),
             now: self.now,
             newest: self.newest.clone(),
+            ahead: self.ahead.clone(),
             failure_times: self.failure_times.clone(),
             standing: self
                 .standing

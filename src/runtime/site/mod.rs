@@ -106,6 +106,8 @@ pub struct Site {
     /// The latest data time stepped to; it never goes back.
     now: Option<Timestamp>,
     newest: BTreeMap<BenchmarkId, Timestamp>,
+    /// The latest of the readings of a benchmark that lay ahead of data time when they were taken.
+    ahead: BTreeMap<BenchmarkId, Timestamp>,
     failure_times: BTreeMap<Option<BenchmarkId>, Timestamp>,
     /// Alerts since the last commit.
     fresh: Vec<Alert>,
@@ -137,6 +139,7 @@ impl Site {
             steps_since_memory: 0,
             now: None,
             newest: BTreeMap::new(),
+            ahead: BTreeMap::new(),
             failure_times: BTreeMap::new(),
             fresh: Vec::new(),
             standing: BTreeMap::new(),
@@ -223,10 +226,13 @@ impl Site {
         } = input
         {
             // One that lies ahead of data time waits until another one confirms it.
-            if reading.time <= now {
-                let newest = self.newest.entry(benchmark.clone()).or_insert(reading.time);
-                *newest = reading.time.max(*newest);
-            }
+            let known = if reading.time <= now {
+                &mut self.newest
+            } else {
+                &mut self.ahead
+            };
+            let latest = known.entry(benchmark.clone()).or_insert(reading.time);
+            *latest = reading.time.max(*latest);
         }
         if let Input::Order(order) = input {
             self.obey(order);

@@ -49,8 +49,9 @@ impl Timekeeper {
 
     /// Whether the host's clock, which says `wall`, is earlier than what is known.
     pub(super) fn is_behind(&self, wall: Timestamp) -> bool {
-        self.known
-            .is_some_and(|(known, _)| known.duration_since(wall) > TOLERANCE)
+        // Not the known time alone: it may be that of a reading of days ago, where all since came in time.
+        self.estimate()
+            .is_some_and(|estimate| estimate.duration_since(wall) > TOLERANCE)
     }
 
     /// The time at the site, while the host's clock says `wall`.
@@ -129,6 +130,20 @@ mod tests {
         let ahead = noon() + 1000.hours();
         assert!(keeper.now(ahead) < noon() + 1.hour());
         assert_eq!(keeper.now(noon() + 3.hours()), noon() + 3.hours());
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_clock_that_is_set_back_after_days_of_readings_in_time_is_not_believed() {
+        let mut keeper = Timekeeper::default();
+        for hour in 0..100 {
+            keeper.knows(noon() + hour.hours(), true);
+            assert!(!keeper.is_behind(noon() + hour.hours()), "{hour}");
+            tokio::time::advance(Duration::from_secs(3600)).await;
+        }
+        let now = noon() + 100.hours();
+        assert!(keeper.is_behind(now - 2.hours()));
+        assert_eq!(keeper.now(now - 2.hours()), now);
+        assert!(!keeper.is_behind(now));
     }
 
     #[test]
