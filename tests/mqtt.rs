@@ -45,7 +45,9 @@ impl Mosquitto {
         let named = std::env::var_os("MOSQUITTO").map(PathBuf::from);
         let mut programs = named.into_iter().chain(installed.map(PathBuf::from));
         let Some(program) = programs.find(|one| one.exists()) else {
-            println!("skipped: Mosquitto is not installed (apt-get install mosquitto), nor named by MOSQUITTO");
+            println!(
+                "skipped: Mosquitto is not installed (apt-get install mosquitto), nor named by MOSQUITTO"
+            );
             return None;
         };
         let folder = tempfile::tempdir().unwrap();
@@ -357,15 +359,24 @@ fn refusing(folder: &Path) -> Option<String> {
                    "unsubscribe":true},"clients":[],"groups":[],"roles":[]}"#;
     std::fs::write(&rules, text).unwrap();
     let named = std::env::var("LD_LIBRARY_PATH").unwrap_or_default();
-    let folders = ["/usr/lib/x86_64-linux-gnu", "/usr/lib/aarch64-linux-gnu", "/usr/lib"];
-    let mut plugins = named.split(':').chain(folders).map(|one| {
-        Path::new(one).join("mosquitto_dynamic_security.so")
-    });
+    let folders = [
+        "/usr/lib/x86_64-linux-gnu",
+        "/usr/lib/aarch64-linux-gnu",
+        "/usr/lib",
+    ];
+    let mut plugins = named
+        .split(':')
+        .chain(folders)
+        .map(|one| Path::new(one).join("mosquitto_dynamic_security.so"));
     let Some(plugin) = plugins.find(|one| one.exists()) else {
         println!("skipped: mosquitto_dynamic_security.so is not there");
         return None;
     };
-    Some(format!("plugin {}\nplugin_opt_config_file {}\n", plugin.display(), rules.display()))
+    Some(format!(
+        "plugin {}\nplugin_opt_config_file {}\n",
+        plugin.display(),
+        rules.display()
+    ))
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -382,14 +393,20 @@ async fn a_broker_that_refuses_the_subscription_is_told_and_its_benchmark_is_unk
          levels = [\"unknown\"]\n",
     );
     let now = slipwatch::runtime::clock::now();
-    std::fs::write(daemon.0.path().join("6.csv"), format!("time,displacement_mm\n{now},1\n")).unwrap();
+    std::fs::write(
+        daemon.0.path().join("6.csv"),
+        format!("time,displacement_mm\n{now},1\n"),
+    )
+    .unwrap();
     let is_told = || {
         let told = daemon.text("told");
         let mut told = told.lines();
         told.any(|line| line.starts_with("5/unknown/") && line.ends_with("firing"))
     };
     for _ in 0..300 {
-        let is_said = daemon.text("log").contains("the broker refuses the subscription");
+        let is_said = daemon
+            .text("log")
+            .contains("the broker refuses the subscription");
         if is_told() && is_said && daemon.readings() == 1 {
             return;
         }

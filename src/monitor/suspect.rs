@@ -19,7 +19,7 @@ const NO_CHANCE: f64 = 1e-6;
 const STANDING: usize = 6;
 const MOVING: usize = 4;
 /// They lie within this share of what the motion before them would have made of their time.
-const JITTER: f64 = 0.02;
+const JITTER: f64 = 0.005;
 
 /// The readings that are looked at for spikes.
 const LOOKED_AT: RangeInclusive<usize> = 18..=36;
@@ -68,7 +68,7 @@ impl History {
     }
 
     /// Whether the newest readings stand, but for a jitter, farther than any before them, while those just before them
-    /// moved there ten times as fast or more: how many, the time of the first, and between which values.
+    /// moved there, two hundred times as far in the same time or more: how many, the time of the first, and between which values.
     ///
     /// A slope that slows down has readings in between.
     pub(super) fn stands_at_the_end(&self) -> Option<(usize, Timestamp, (f64, f64))> {
@@ -101,11 +101,11 @@ impl History {
 
     /// Whether a reading of this value, as the monitor takes it, repeats the newest one.
     pub(super) fn repeats(&self, new: &Observation) -> bool {
-        let stands = (self.range_end).is_some_and(|(low, high)| low <= new.value && new.value <= high);
+        let stands =
+            (self.range_end).is_some_and(|(low, high)| low <= new.value && new.value <= high);
         let newest = self.observations.values.last();
-        newest.is_some_and(|newest| {
-            (stands || are_equal(newest, new)) && new.t_days > newest.t_days
-        })
+        newest
+            .is_some_and(|newest| (stands || are_equal(newest, new)) && new.t_days > newest.t_days)
     }
 
     /// Of so many newest readings, that say nothing, only the first is left.
@@ -246,26 +246,37 @@ mod tests {
     }
 
     #[test]
-    fn a_jitter_where_a_fast_motion_ended_at_once_is_the_end_of_a_range_and_a_slope_that_slows_down_is_not() {
+    fn a_jitter_where_a_fast_motion_ended_at_once_is_the_end_of_a_range_and_a_slope_that_slows_down_is_not()
+     {
         let moving = |hour: u32| f64::from(hour) * 16.0 + noise(hour);
         let jitter = |hour: u32| 30.0 * 16.0 + noise(hour);
         let at_end = history((0..30).map(moving).chain((30..36).map(jitter)));
         let (count, _, (low, high)) = at_end.stands_at_the_end().unwrap();
         assert!(count == 6 && low < 480.0 && high > 481.0 && high - low < 4.0);
-        let downwards = history((0..30).map(moving).chain((30..36).map(jitter)).map(|value| -value));
+        let downwards = history(
+            (0..30)
+                .map(moving)
+                .chain((30..36).map(jitter))
+                .map(|value| -value),
+        );
         assert!(downwards.stands_at_the_end().is_some());
         // As fast as the noise, nobody can tell.
         let creeping = history((0..36).map(|hour| f64::from(hour.min(30)) * 0.2 + noise(hour)));
         assert!(creeping.stands_at_the_end().is_none());
         for per_hour in [0.2_f64, 0.5, 0.8, 0.95] {
-            let slowing = |hour: u32| 480.0 + 16.0 * (1.0 - per_hour.powi(hour as i32)) / (1.0 - per_hour);
+            let slowing =
+                |hour: u32| 480.0 + 16.0 * (1.0 - per_hour.powi(hour as i32)) / (1.0 - per_hour);
             for end in 1..60 {
                 let all = (0..30).map(moving).chain((0..end).map(slowing));
-                assert!(history(all).stands_at_the_end().is_none(), "{per_hour}, {end}");
+                assert!(
+                    history(all).stands_at_the_end().is_none(),
+                    "{per_hour}, {end}"
+                );
             }
         }
         for end in 10..119 {
-            let failing = |hour: u32| 200.0 * (120.0 / (120.0 - f64::from(hour))).ln() + noise(hour);
+            let failing =
+                |hour: u32| 200.0 * (120.0 / (120.0 - f64::from(hour))).ln() + noise(hour);
             assert!(history((0..end).map(failing)).stands_at_the_end().is_none());
         }
     }

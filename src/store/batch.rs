@@ -319,9 +319,10 @@ fn keep(
     let insert = format!("INSERT OR REPLACE INTO {table} (name, body) VALUES (?1, ?2)");
     let delete = format!("DELETE FROM {table} WHERE name = ?1");
     match body {
-        Some(body) => connection
-            .prepare_cached(&insert)?
-            .execute(params![name, seal(&[ValueRef::Text(name.as_bytes())], body)])?,
+        Some(body) => connection.prepare_cached(&insert)?.execute(params![
+            name,
+            seal(&[ValueRef::Text(name.as_bytes())], body)
+        ])?,
         None => connection.prepare_cached(&delete)?.execute([name])?,
     };
     Ok(())

@@ -95,7 +95,9 @@ impl Store {
             match body(row)? {
                 Some(body) => bodies.push(body),
                 // What is in force is told again when the past has been read.
-                None => tracing::error!(id = ?row.get_ref(0)?, "an alert that waited is not what was written"),
+                None => {
+                    tracing::error!(id = ?row.get_ref(0)?, "an alert that waited is not what was written")
+                }
             }
         }
         Ok(bodies)

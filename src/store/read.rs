@@ -100,7 +100,10 @@ impl Store {
         while let Some(row) = rows.next()? {
             let (name, body) = named(row)?;
             if body.is_none() {
-                tracing::warn!(name, "this part of the memory is not what was written: it is made anew");
+                tracing::warn!(
+                    name,
+                    "this part of the memory is not what was written: it is made anew"
+                );
                 return Ok(Recorded::default());
             }
             parts.push(Part { name, body });
@@ -124,7 +127,10 @@ impl Store {
             match named(row)? {
                 (name, Some(body)) => positions.push((name, body)),
                 (name, None) => {
-                    tracing::warn!(name, "how far it was read is not what was written: from its start again");
+                    tracing::warn!(
+                        name,
+                        "how far it was read is not what was written: from its start again"
+                    );
                 }
             }
         }

@@ -25,7 +25,11 @@ pub(super) fn unseal<'a>(beside: &[ValueRef<'_>], sealed: &'a [u8]) -> Option<&'
 }
 
 fn of(beside: &[ValueRef<'_>], body: &[u8]) -> i64 {
-    let all: Vec<ValueRef<'_>> = beside.iter().copied().chain([ValueRef::Blob(body)]).collect();
+    let all: Vec<ValueRef<'_>> = beside
+        .iter()
+        .copied()
+        .chain([ValueRef::Blob(body)])
+        .collect();
     sum(&all)
 }
 

@@ -130,13 +130,18 @@ fn a_flipped_bit_in_the_memory_or_a_position_is_seen_and_both_are_made_anew() {
     let file = site.path("state/slipwatch.db");
     let database = Connection::open(&file).unwrap();
     for table in ["memory", "position"] {
-        let flip = format!("UPDATE {table} SET body = substr(body, 1, 40) || x'00' || substr(body, 42)");
+        let flip =
+            format!("UPDATE {table} SET body = substr(body, 1, 40) || x'00' || substr(body, 42)");
         assert!(database.execute(&flip, []).unwrap() > 0, "{table}");
     }
     drop(database);
     site.caught_up().stop();
     assert!(site.log().contains("it is made anew"), "{}", site.log());
-    assert!(site.log().contains("from its start again"), "{}", site.log());
+    assert!(
+        site.log().contains("from its start again"),
+        "{}",
+        site.log()
+    );
     assert_eq!(site.values().len(), 200, "taken twice");
     assert!(site.proven_events().starts_with(&before));
 }
@@ -163,7 +168,8 @@ fn a_bit_that_flips_while_the_daemon_runs_is_told() {
     let program = site.caught_up();
     eventually("ready", || get(&listen, "/readyz").contains("200 OK"));
     let database = Connection::open(site.path("state/slipwatch.db")).unwrap();
-    let flip = "UPDATE event SET body = replace(body, '1', '3') WHERE seq = (SELECT min(seq) FROM event)";
+    let flip =
+        "UPDATE event SET body = replace(body, '1', '3') WHERE seq = (SELECT min(seq) FROM event)";
     assert_eq!(database.execute(flip, []).unwrap(), 1);
     drop(database);
     eventually("told", || !get(&listen, "/readyz").contains("200 OK"));

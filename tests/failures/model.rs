@@ -225,14 +225,16 @@ impl Daemon {
     }
 }
 
-/// Each draws its own sequences of actions.
-const SEEDS: std::ops::Range<u64> = 1..41;
+/// Each draws sequences of its own; so many seeds unless `MODEL_SEEDS` says otherwise.
+const SEEDS: u64 = 8;
 
 /// 1 to 5.
 #[test]
 fn whatever_is_done_to_a_file_each_row_is_taken_once_and_none_that_could_be_read_is_lost() {
     let sequences = prop::collection::vec(action(), 1..40);
-    for seed in SEEDS {
+    let seeds = std::env::var("MODEL_SEEDS").map_or(SEEDS, |text| text.parse().unwrap());
+    // 34 found readings that were taken for those of a benchmark that is named after a file's later name.
+    for seed in (1..=seeds).chain([34]) {
         let config = ProptestConfig {
             cases: 16,
             rng_seed: RngSeed::Fixed(seed),

@@ -40,7 +40,10 @@ pub(crate) fn set_wrong_by(span: SignedDuration) {
 pub(crate) struct Truth;
 
 impl tracing_subscriber::fmt::time::FormatTime for Truth {
-    fn format_time(&self, writer: &mut tracing_subscriber::fmt::format::Writer<'_>) -> std::fmt::Result {
+    fn format_time(
+        &self,
+        writer: &mut tracing_subscriber::fmt::format::Writer<'_>,
+    ) -> std::fmt::Result {
         write!(writer, "{}", truth())
     }
 }

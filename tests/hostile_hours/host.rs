@@ -88,18 +88,38 @@ impl<'a> Host<'a> {
         let delivered = Delivered::of(Arc::clone(&store));
         let hook = Arc::new(self.hook.clone());
         let alerts = Dispatcher::with(hook, &self.config.hooks, &Retry::default(), delivered);
-        let sinks = Sinks { store: Some(Arc::clone(&store)), alerts: Some(alerts), status: Status::Actual };
+        let sinks = Sinks {
+            store: Some(Arc::clone(&store)),
+            alerts: Some(alerts),
+            status: Status::Actual,
+        };
         let settings = self.config.settings.clone();
         let site = Site::resume(&self.config.site.name, settings, sinks, &mut || {}).unwrap();
-        let pulse = self.runtime.block_on(Pulse::start(&self.config.site, None)).unwrap();
+        let pulse = self
+            .runtime
+            .block_on(Pulse::start(&self.config.site, None))
+            .unwrap();
         site.show(&pulse.vitals);
         let (stop, stopped) = shutdown::pair();
         let (messages, deliveries) = mpsc::channel(CHANNEL);
         let sources = Sources::of((messages.clone(), deliveries), shutdown::pair().0);
         let positions = store.positions().unwrap();
         let follower = Follower::new(&self.config.sources, &self.config.benchmarks, &positions);
-        let daemon = Daemon::new(self.config, Arc::clone(&store), site, (sources, pulse), wall);
-        Running { daemon, follower, store, messages, stopped, _stop: stop }
+        let daemon = Daemon::new(
+            self.config,
+            Arc::clone(&store),
+            site,
+            (sources, pulse),
+            wall,
+        );
+        Running {
+            daemon,
+            follower,
+            store,
+            messages,
+            stopped,
+            _stop: stop,
+        }
     }
 
     /// The daemon's turns until it has nothing to do. The readings of messages that it was sent.
@@ -145,7 +165,9 @@ impl<'a> Host<'a> {
     /// Whether all that it was given is on the disk.
     pub(crate) fn is_settled(&self) -> bool {
         let running = self.running.as_ref();
-        running.is_some_and(|running| !running.daemon.site.is_waiting() && running.daemon.site.held() == 0)
+        running.is_some_and(|running| {
+            !running.daemon.site.is_waiting() && running.daemon.site.held() == 0
+        })
     }
 
     pub(crate) fn is_clock_wrong(&self) -> bool {
@@ -172,7 +194,11 @@ impl<'a> Host<'a> {
             benchmark: BenchmarkId::new(name),
             unit: Unit::MM,
             averaging: None,
-            reading: Reading { time: measured.time, value: measured.value, sigma: None },
+            reading: Reading {
+                time: measured.time,
+                value: measured.value,
+                sigma: None,
+            },
         };
         let store = self.store().expect("the daemon runs");
         store.has(&Batch::default(), &input).unwrap()

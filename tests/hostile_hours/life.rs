@@ -94,18 +94,29 @@ struct Life<'a> {
 pub(crate) fn live(seed: u64) -> Seen {
     // In memory, where there is such a place: what the disk of the machine costs is not what is tested.
     let shared = Path::new("/dev/shm");
-    let folder = if shared.is_dir() { TempDir::new_in(shared) } else { TempDir::new() }.unwrap();
+    let folder = if shared.is_dir() {
+        TempDir::new_in(shared)
+    } else {
+        TempDir::new()
+    }
+    .unwrap();
     for name in ["incoming", "quiet"] {
         fs::create_dir(folder.path().join(name)).unwrap();
     }
     let config = config(folder.path());
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().start_paused(true).build().unwrap();
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .start_paused(true)
+        .build()
+        .unwrap();
     let _entered = runtime.enter();
     clock::begin();
     let from = truth();
     let to = from + SignedDuration::try_from(STEP * STEPS as u32).unwrap();
     let slopes = [("a", 1), ("b", 2), ("m", 3), ("q", 3)];
-    let slopes = (0..).zip(slopes).map(|(index, (name, hours))| Slope::new(name, hours, 31 * seed + index, (from, to)));
+    let slopes = (0..)
+        .zip(slopes)
+        .map(|(index, (name, hours))| Slope::new(name, hours, 31 * seed + index, (from, to)));
     let mut life = Life {
         seed,
         host: Host::new(&runtime, &config),
@@ -120,11 +131,17 @@ pub(crate) fn live(seed: u64) -> Seen {
         random: Pcg64::seed_from_u64(seed ^ 0xfeed),
         dues: Vec::new(),
         readable: BTreeMap::new(),
-        seen: Seen { hours: LIFE_HOURS, ..Seen::default() },
+        seen: Seen {
+            hours: LIFE_HOURS,
+            ..Seen::default()
+        },
     };
     let plan = Plan::drawn(seed);
     if std::env::var_os("HOSTILE_LOG").is_some() {
-        let _ = tracing_subscriber::fmt().with_timer(clock::Truth).with_ansi(false).try_init();
+        let _ = tracing_subscriber::fmt()
+            .with_timer(clock::Truth)
+            .with_ansi(false)
+            .try_init();
         println!("{plan:#?}");
     }
     life.host.start();
@@ -136,9 +153,14 @@ pub(crate) fn live(seed: u64) -> Seen {
 }
 
 fn config(folder: &Path) -> Config {
-    let benchmarks: String = [("a", "logger"), ("b", "logger"), ("q", "quiet"), ("m", "radio")]
-        .map(|(id, source)| format!("[[benchmark]]\nid = \"{id}\"\nsource = \"{source}\"\n"))
-        .concat();
+    let benchmarks: String = [
+        ("a", "logger"),
+        ("b", "logger"),
+        ("q", "quiet"),
+        ("m", "radio"),
+    ]
+    .map(|(id, source)| format!("[[benchmark]]\nid = \"{id}\"\nsource = \"{source}\"\n"))
+    .concat();
     let text = format!(
         "[site]\nname = \"Toc\"\nstate_dir = \"state\"\n\
          [[source]]\nid = \"logger\"\nkind = \"csv\"\npath = \"incoming/*.csv\"\n\
@@ -186,7 +208,10 @@ impl Life<'_> {
 
     /// Whether what concerns all benchmarks is well.
     fn is_machine_well(&self) -> bool {
-        self.host.is_settled() && !self.host.is_full && !self.host.is_clock_wrong() && clock::wall() == truth()
+        self.host.is_settled()
+            && !self.host.is_full
+            && !self.host.is_clock_wrong()
+            && clock::wall() == truth()
     }
 
     fn begin(&mut self, trouble: &Trouble) {
@@ -199,8 +224,14 @@ impl Life<'_> {
             Trouble::FolderGone => {
                 let _ = fs::rename(self.folder.join("incoming"), self.folder.join("away"));
             }
-            Trouble::HookFails | Trouble::HookHangs | Trouble::HookHangsAt(_) | Trouble::LoggerAway(_)
-            | Trouble::BrokerAway | Trouble::BrokerStutters | Trouble::HalfRows(_) | Trouble::LateRows(_) => {}
+            Trouble::HookFails
+            | Trouble::HookHangs
+            | Trouble::HookHangsAt(_)
+            | Trouble::LoggerAway(_)
+            | Trouble::BrokerAway
+            | Trouble::BrokerStutters
+            | Trouble::HalfRows(_)
+            | Trouble::LateRows(_) => {}
         }
     }
 
@@ -211,8 +242,15 @@ impl Life<'_> {
                 let _ = fs::rename(self.folder.join("away"), self.folder.join("incoming"));
             }
             Trouble::BrokerAway => self.radio.reconnect(),
-            Trouble::Down { .. } | Trouble::FullDisk | Trouble::Clock(_) | Trouble::HookFails | Trouble::HookHangs
-            | Trouble::HookHangsAt(_) | Trouble::LoggerAway(_) | Trouble::BrokerStutters | Trouble::HalfRows(_)
+            Trouble::Down { .. }
+            | Trouble::FullDisk
+            | Trouble::Clock(_)
+            | Trouble::HookFails
+            | Trouble::HookHangs
+            | Trouble::HookHangsAt(_)
+            | Trouble::LoggerAway(_)
+            | Trouble::BrokerStutters
+            | Trouble::HalfRows(_)
             | Trouble::LateRows(_) => {}
         }
     }
@@ -236,7 +274,10 @@ impl Life<'_> {
     }
 
     fn logger(&mut self, name: &str) -> &mut Logger {
-        self.loggers.iter_mut().find(|one| one.name == name).unwrap()
+        self.loggers
+            .iter_mut()
+            .find(|one| one.name == name)
+            .unwrap()
     }
 
     fn happens(&mut self, mishap: Mishap) {
@@ -244,14 +285,19 @@ impl Life<'_> {
             Mishap::Rotate(name) => self.logger(name).rotate(),
             Mishap::Replace(name) => self.logger(name).replace(),
             Mishap::CopyTruncate(name) => self.logger(name).copy_truncate(),
-            Mishap::Garbage(name) => self.logger(name).scribble("\u{0}\u{1}garbage;;,\n,,,\n2026-13-45,x\n"),
+            Mishap::Garbage(name) => self
+                .logger(name)
+                .scribble("\u{0}\u{1}garbage;;,\n,,,\n2026-13-45,x\n"),
             Mishap::FarStamp(name) => {
                 let line = format!("{},1.5\n", truth() + SignedDuration::from_hours(30 * 24));
                 self.logger(name).scribble(&line);
             }
             Mishap::BigFile => {
                 let row = format!("{},1.5\n", truth());
-                let _ = fs::write(self.folder.join("incoming/big.csv"), format!("time,x_displacement_mm\n{}", row.repeat(120_000)));
+                let _ = fs::write(
+                    self.folder.join("incoming/big.csv"),
+                    format!("time,x_displacement_mm\n{}", row.repeat(120_000)),
+                );
             }
             Mishap::Kill => self.host.kill(),
         }
@@ -260,7 +306,11 @@ impl Life<'_> {
     fn measure(&mut self, is_calm: bool) {
         let now = truth();
         for slope in &mut self.slopes {
-            let measured = if is_calm { Vec::new() } else { slope.measure(now) };
+            let measured = if is_calm {
+                Vec::new()
+            } else {
+                slope.measure(now)
+            };
             match self.loggers.iter_mut().find(|one| one.name == slope.name) {
                 Some(logger) => logger.keep(measured),
                 None => measured.into_iter().for_each(|one| self.radio.publish(one)),
@@ -282,14 +332,24 @@ impl Life<'_> {
             known.push(one);
             if one.calls_red {
                 self.seen.reds_due += 1;
-                self.dues.push(Due { name, of: one.time, untold_since: None, was_unknown: false });
+                self.dues.push(Due {
+                    name,
+                    of: one.time,
+                    untold_since: None,
+                    was_unknown: false,
+                });
             }
         }
     }
 
     fn nothing_keeps_the_quiet_one_waiting(&self) {
         if let Some(newest) = self.readable.get("q").and_then(|all| all.last()) {
-            assert!(self.host.has("q", newest), "seed {}, {}: {newest:?} waits", self.seed, truth());
+            assert!(
+                self.host.has("q", newest),
+                "seed {}, {}: {newest:?} waits",
+                self.seed,
+                truth()
+            );
         }
     }
 
@@ -304,7 +364,8 @@ impl Life<'_> {
     fn is_done(&mut self, due: &mut Due, now: Timestamp) -> bool {
         let (knows_red, knows_unknown) = {
             let people = self.host.hook.0.lock().unwrap();
-            let knows_unknown = people.know(Some(due.name), Level::Unknown) || people.know(None, Level::Unknown);
+            let knows_unknown =
+                people.know(Some(due.name), Level::Unknown) || people.know(None, Level::Unknown);
             (people.know(Some(due.name), Level::Red), knows_unknown)
         };
         if knows_red {
@@ -335,7 +396,10 @@ impl Life<'_> {
     /// The trouble is over.
     fn end(&mut self) {
         let seed = self.seed;
-        assert!(self.radio.is_empty() && self.loggers.iter().all(Logger::is_empty), "seed {seed}: not all has been sent");
+        assert!(
+            self.radio.is_empty() && self.loggers.iter().all(Logger::is_empty),
+            "seed {seed}: not all has been sent"
+        );
         assert!(self.host.is_settled(), "seed {seed}: something is held");
         assert!(self.dues.is_empty(), "seed {seed}: a red waits");
         let store = self.host.store().expect("the daemon runs");
@@ -344,13 +408,18 @@ impl Life<'_> {
             let mut own = taken.remove(*name).unwrap_or_default();
             let far = truth() + SignedDuration::from_hours(24);
             own.retain(|(time, value)| *time < far && value.to_bits() != 1.5_f64.to_bits());
-            let mut expected: Vec<(Timestamp, f64)> = measured.iter().map(|one| (one.time, one.value)).collect();
+            let mut expected: Vec<(Timestamp, f64)> =
+                measured.iter().map(|one| (one.time, one.value)).collect();
             expected.sort_by_key(|(time, _)| *time);
             own.sort_by_key(|(time, _)| *time);
             let lost = expected.iter().filter(|one| !own.contains(one));
             let lost: Vec<_> = lost.collect();
             assert!(lost.is_empty(), "seed {seed}, {name}: lost {lost:?}");
-            assert_eq!(own.len(), expected.len(), "seed {seed}, {name}: taken twice");
+            assert_eq!(
+                own.len(),
+                expected.len(),
+                "seed {seed}, {name}: taken twice"
+            );
             self.seen.readings += expected.len();
         }
         assert!(taken.is_empty(), "seed {seed}: {taken:?} was made up");
@@ -389,8 +458,12 @@ fn readings(store: &Store) -> BTreeMap<String, Vec<(Timestamp, f64)>> {
         };
         after = last.seq;
         for row in &rows {
-            if let Input::Reading { benchmark, reading, .. } = &row.input {
-                let own: &mut Vec<(Timestamp, f64)> = taken.entry(benchmark.to_string()).or_default();
+            if let Input::Reading {
+                benchmark, reading, ..
+            } = &row.input
+            {
+                let own: &mut Vec<(Timestamp, f64)> =
+                    taken.entry(benchmark.to_string()).or_default();
                 own.push((reading.time, reading.value));
             }
         }
@@ -410,13 +483,21 @@ fn is_what_a_replay_says(seed: u64, store: &Store) {
     let (mut stored, mut after) = (Vec::new(), 0);
     loop {
         let events = store.events(after, None, None).unwrap();
-        let Some((last, _)) = events.last() else { break };
+        let Some((last, _)) = events.last() else {
+            break;
+        };
         after = *last;
         stored.extend(events.into_iter().map(|(_, body)| body));
     }
-    let differs = said.iter().zip(&stored).position(|(one, other)| one != other);
+    let differs = said
+        .iter()
+        .zip(&stored)
+        .position(|(one, other)| one != other);
     if let Some(at) = differs {
-        panic!("seed {seed}: a replay says\n{}\nand the daemon said\n{}", said[at], stored[at]);
+        panic!(
+            "seed {seed}: a replay says\n{}\nand the daemon said\n{}",
+            said[at], stored[at]
+        );
     }
     assert_eq!(said.len(), stored.len(), "seed {seed}: events");
 }

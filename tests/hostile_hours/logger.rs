@@ -56,7 +56,11 @@ impl Logger {
 
     fn append(&mut self, text: &str) {
         self.is_unsettled = true;
-        let mut file = OpenOptions::new().create(true).append(true).open(self.file()).unwrap();
+        let mut file = OpenOptions::new()
+            .create(true)
+            .append(true)
+            .open(self.file())
+            .unwrap();
         if file.metadata().unwrap().len() == 0 {
             file.write_all(HEADER.as_bytes()).unwrap();
         }
@@ -110,7 +114,9 @@ impl Logger {
         }
         self.rotations += 1;
         self.is_rotated = self.is_unsettled;
-        let other = self.folder.join(format!("{}.csv.{}", self.name, self.rotations));
+        let other = self
+            .folder
+            .join(format!("{}.csv.{}", self.name, self.rotations));
         fs::rename(self.file(), other).unwrap();
     }
 
@@ -127,9 +133,16 @@ impl Logger {
     pub(crate) fn copy_truncate(&mut self) {
         if self.half.is_none() && !self.is_unsettled && self.file().exists() {
             self.rotations += 1;
-            let other = self.folder.join(format!("{}.csv.{}", self.name, self.rotations));
+            let other = self
+                .folder
+                .join(format!("{}.csv.{}", self.name, self.rotations));
             fs::copy(self.file(), other).unwrap();
-            OpenOptions::new().write(true).open(self.file()).unwrap().set_len(0).unwrap();
+            OpenOptions::new()
+                .write(true)
+                .open(self.file())
+                .unwrap()
+                .set_len(0)
+                .unwrap();
         }
     }
 

@@ -52,7 +52,8 @@ fn number(name: &str, otherwise: u64) -> u64 {
 }
 
 #[test]
-fn in_hostile_hours_no_reading_is_lost_no_red_is_kept_from_people_and_no_benchmark_waits_for_another() {
+fn in_hostile_hours_no_reading_is_lost_no_red_is_kept_from_people_and_no_benchmark_waits_for_another()
+ {
     let lives = number("HOSTILE_HOURS", HOURS).div_ceil(LIFE_HOURS);
     let first = number("HOSTILE_SEED", 0);
     let (mut seen, mut found) = (Seen::default(), Vec::new());
@@ -63,7 +64,10 @@ fn in_hostile_hours_no_reading_is_lost_no_red_is_kept_from_people_and_no_benchma
         }
     }
     println!("{seen:?}");
-    assert!(found.is_empty(), "seeds that found something, said above: {found:?}");
+    assert!(
+        found.is_empty(),
+        "seeds that found something, said above: {found:?}"
+    );
     if lives >= 20 {
         // That the plan reaches what is claimed: most reds are told as such, and not only as unknown.
         assert!(seen.reds_due > lives, "{seen:?}");

@@ -37,7 +37,9 @@ impl People {
     /// Whether they know of this level at the benchmark.
     pub(crate) fn know(&self, benchmark: Option<&str>, level: Level) -> bool {
         let place = (benchmark.map(str::to_owned), level);
-        self.in_force.get(&place).is_some_and(|keys| !keys.is_empty())
+        self.in_force
+            .get(&place)
+            .is_some_and(|keys| !keys.is_empty())
     }
 
     fn hear(&mut self, alert: &Alert) {
@@ -52,7 +54,15 @@ impl People {
 
     fn does(&self, alert: &Alert) -> Mood {
         match &self.mood {
-            Mood::HangsAt(name) if alert.event.benchmark.as_ref().is_none_or(|one| one.as_str() != *name) => Mood::Works,
+            Mood::HangsAt(name)
+                if alert
+                    .event
+                    .benchmark
+                    .as_ref()
+                    .is_none_or(|one| one.as_str() != *name) =>
+            {
+                Mood::Works
+            }
             Mood::HangsAt(_) => Mood::Hangs,
             other @ (Mood::Works | Mood::Fails | Mood::Hangs) => other.clone(),
         }

@@ -16,7 +16,9 @@ pub(crate) enum Trouble {
     HookHangs,
     HookHangsAt(&'static str),
     /// The daemon does not run. How it ended.
-    Down { is_killed: bool },
+    Down {
+        is_killed: bool,
+    },
     /// The folder of the files is not mounted.
     FolderGone,
     /// A logger keeps its rows.
@@ -66,10 +68,8 @@ impl Plan {
             let trouble = trouble(&mut random);
             let from = random.random_range(8..STEPS);
             let to = from + random.random_range(1..=longest(&trouble));
-            // Two of a kind do not overlap.
-            let kind = std::mem::discriminant(&trouble);
             let overlaps = |(start, end, other): &(usize, usize, Trouble)| {
-                std::mem::discriminant(other) == kind && *start <= to && from <= *end
+                *start <= to && from <= *end && excludes(&trouble, other)
             };
             if !troubles.iter().any(overlaps) {
                 troubles.push((from, to, trouble));
@@ -84,16 +84,23 @@ impl Plan {
     }
 }
 
+/// Whether the two are not drawn for one time.
+fn excludes(one: &Trouble, other: &Trouble) -> bool {
+    std::mem::discriminant(one) == std::mem::discriminant(other)
+}
+
 fn trouble(random: &mut Pcg64) -> Trouble {
     let file = FILES[random.random_range(0..FILES.len())];
     match random.random_range(0..13) {
-        0 => Trouble::Clock(-SignedDuration::from_mins(random.random_range(10..6000))),
+        0 => Trouble::Clock(-SignedDuration::from_mins(random.random_range(240..6000))),
         1 => Trouble::Clock(SignedDuration::from_mins(random.random_range(10..90_000))),
         2 => Trouble::FullDisk,
         3 => Trouble::HookFails,
         4 => Trouble::HookHangs,
         5 => Trouble::HookHangsAt(["a", "b", "m"][random.random_range(0..3)]),
-        6 => Trouble::Down { is_killed: random.random_bool(0.7) },
+        6 => Trouble::Down {
+            is_killed: random.random_bool(0.7),
+        },
         7 => Trouble::FolderGone,
         8 => Trouble::LoggerAway(file),
         9 => Trouble::BrokerAway,
@@ -130,6 +137,8 @@ impl Plan {
     /// Whether the daemon does not run at this step.
     pub(crate) fn is_down(&self, step: usize) -> bool {
         let mut all = self.troubles.iter();
-        all.any(|(from, to, trouble)| matches!(trouble, Trouble::Down { .. }) && *from <= step && step < *to)
+        all.any(|(from, to, trouble)| {
+            matches!(trouble, Trouble::Down { .. }) && *from <= step && step < *to
+        })
     }
 }

@@ -26,7 +26,14 @@ pub(crate) struct Radio {
 impl Radio {
     pub(crate) fn new() -> Self {
         let (sender, acknowledged) = mpsc::unbounded_channel();
-        Self { next: 0, kept: BTreeMap::new(), sender, acknowledged, is_away: false, stutters: false }
+        Self {
+            next: 0,
+            kept: BTreeMap::new(),
+            sender,
+            acknowledged,
+            is_away: false,
+            stutters: false,
+        }
     }
 
     pub(crate) fn publish(&mut self, measured: Measured) {
@@ -54,7 +61,12 @@ impl Radio {
         if self.is_away {
             return Vec::new();
         }
-        let mut numbers: Vec<u64> = self.kept.iter().filter(|(_, (_, sent))| !sent).map(|(number, _)| *number).collect();
+        let mut numbers: Vec<u64> = self
+            .kept
+            .iter()
+            .filter(|(_, (_, sent))| !sent)
+            .map(|(number, _)| *number)
+            .collect();
         if self.stutters {
             numbers.extend_from_within(..);
             numbers.shuffle(random);
@@ -76,11 +88,20 @@ impl Radio {
 
 fn delivery(number: u64, measured: &Measured, sender: &UnboundedSender<u64>) -> Delivery {
     assert!(measured.time <= truth());
-    let reading = Reading { time: measured.time, value: measured.value, sigma: None };
+    let reading = Reading {
+        time: measured.time,
+        value: measured.value,
+        sigma: None,
+    };
     Delivery {
         arrivals: vec![Arrival {
             time: measured.time,
-            input: Input::Reading { benchmark: BenchmarkId::new("m"), unit: Unit::MM, averaging: None, reading },
+            input: Input::Reading {
+                benchmark: BenchmarkId::new("m"),
+                unit: Unit::MM,
+                averaging: None,
+                reading,
+            },
         }],
         source: "radio".to_owned(),
         found: Stopwatch::start(),

@@ -33,13 +33,21 @@ pub(crate) struct Slope {
 }
 
 impl Slope {
-    pub(crate) fn new(name: &'static str, hours: i64, seed: u64, (from, to): (Timestamp, Timestamp)) -> Self {
+    pub(crate) fn new(
+        name: &'static str,
+        hours: i64,
+        seed: u64,
+        (from, to): (Timestamp, Timestamp),
+    ) -> Self {
         let mut random = Pcg64::seed_from_u64(seed);
         let every = SignedDuration::from_hours(hours);
         let length = to.duration_since(from);
         let mut crises = Vec::new();
         for _ in 0..random.random_range(1..=2) {
-            let begins = from + SignedDuration::from_secs_f64(length.as_secs_f64() * random.random_range(0.2..0.8));
+            let begins = from
+                + SignedDuration::from_secs_f64(
+                    length.as_secs_f64() * random.random_range(0.2..0.8),
+                );
             crises.push((begins, begins + every * random.random_range(7..16)));
         }
         Self {
@@ -61,8 +69,15 @@ impl Slope {
             let time = self.next;
             self.next = time + self.every;
             let days = self.every.as_secs_f64() / 86_400.0;
-            let is_of_a_crisis = self.crises.iter().any(|(from, to)| *from < time && time <= *to);
-            let velocity = if is_of_a_crisis { CRISIS_MM_PER_DAY } else { self.creep };
+            let is_of_a_crisis = self
+                .crises
+                .iter()
+                .any(|(from, to)| *from < time && time <= *to);
+            let velocity = if is_of_a_crisis {
+                CRISIS_MM_PER_DAY
+            } else {
+                self.creep
+            };
             self.value += velocity * days;
             self.in_a_row = if is_of_a_crisis { self.in_a_row + 1 } else { 0 };
             let noise = self.random.random_range(-0.05..0.05);

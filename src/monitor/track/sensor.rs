@@ -75,7 +75,10 @@ impl Track {
         what: &str,
     ) -> Vec<Event> {
         self.history.forget_repeats(count);
-        let text = format!("benchmark {}: {count} readings in a row {what}", self.benchmark);
+        let text = format!(
+            "benchmark {}: {count} readings in a row {what}",
+            self.benchmark
+        );
         let mut events = vec![self.fault(time, "stuck-sensor", text.clone())];
         events.extend(self.begins_unknown((time, since), Reason::Stuck, text));
         events

@@ -83,14 +83,12 @@ impl Site {
         let time = arrival.time;
         let latest = self.keeper.now(wall).max(wall);
         if time.duration_since(latest) > clock::TOLERANCE {
-            if self.sinks.store.is_some() && self.keeper.is_behind(wall) {
+            if self.sinks.store.is_some()
+                && (self.keeper.is_behind(wall) || self.may_prove_it(arrival))
+            {
                 return self.hold(arrival);
             }
-            self.counts.from_the_future += 1;
-            let total = self.counts.from_the_future;
-            if is_logged(total) {
-                tracing::warn!(%time, ?arrival.input, total, "measured in the future: quarantined");
-            }
+            self.set_aside(arrival);
             return true;
         }
         if self.sinks.store.is_none() || (time >= DAWN && !CLOCKLESS.contains(&time)) {
@@ -130,7 +128,7 @@ impl Site {
             return Ok(events);
         }
         let latest = self.keeper.now(wall).max(wall);
-        let is_right = !self.keeper.is_behind(wall);
+        let is_right = self.unproven.is_over() && !self.keeper.is_behind(wall);
         for arrival in std::mem::take(&mut self.held) {
             if is_right || arrival.time.duration_since(latest) <= clock::TOLERANCE {
                 events.extend(self.take(&arrival, wall)?);
@@ -175,6 +173,7 @@ impl Site {
         if self.sinks.store.is_none() || !self.is_newest(arrival) {
             return;
         }
+        self.unproven.comes(benchmark, arrival.time);
         let is_live = self.at_rest.contains(benchmark);
         self.keeper.knows(arrival.time, is_live);
         let time = self.keeper.now(wall);
@@ -225,6 +224,7 @@ impl Site {
         if self.at_rest.len() != self.newest.len() {
             self.at_rest = self.newest.keys().cloned().collect();
         }
+        self.prove(wall);
         if self.sinks.store.is_none() || !self.monitor.misses_some() {
             return Vec::new();
         }

@@ -10,11 +10,13 @@ mod flood;
 mod memory;
 mod mute;
 mod timekeeper;
+mod unproven;
 
 pub(super) use arrivals::is_logged;
 pub use mute::Mute;
 
 use timekeeper::Timekeeper;
+use unproven::Unproven;
 
 use crate::monitor::{Event, EventKind, Input, Monitor, Order, Settings};
 use crate::reading::{BenchmarkId, Timestamp};
@@ -117,6 +119,7 @@ pub struct Site {
     mutes: Vec<Mute>,
     counts: Counts,
     keeper: Timekeeper,
+    unproven: Unproven,
     /// Benchmarks that had given readings when everything there was had been read: what comes of them now is live.
     at_rest: BTreeSet<BenchmarkId>,
     /// Values that wait, unacknowledged, until the host's clock is right.
@@ -146,6 +149,7 @@ impl Site {
             mutes: Vec::new(),
             counts: Counts::default(),
             keeper: Timekeeper::default(),
+            unproven: Unproven::default(),
             at_rest: BTreeSet::new(),
             held: VecDeque::new(),
             behind: BTreeMap::new(),

@@ -32,6 +32,8 @@ const SHOWN: usize = 200;
 #[derive(Debug)]
 pub(super) struct FileTail {
     pub(super) path: PathBuf,
+    /// The name under which it was found first: a benchmark may be named after it, whatever it is renamed to.
+    pub(super) origin: PathBuf,
     decoder: Arc<Decoder>,
     pub(super) content: Content,
     /// Everything before this has been read.
@@ -127,6 +129,7 @@ impl FileTail {
     pub(super) fn new(path: PathBuf, decoder: Arc<Decoder>) -> Self {
         Self {
             content: Content::of(&decoder, &path),
+            origin: path.clone(),
             path,
             decoder,
             at: 0,
@@ -228,7 +231,7 @@ impl FileTail {
             } else {
                 tracing::info!(file = %self.path.display(), at = self.at, "another file: read from its start");
             }
-            self.content = Content::of(&self.decoder, &self.path);
+            self.content = Content::of(&self.decoder, &self.origin);
             self.at = 0;
         }
         self.place = Some(glance.place);
@@ -309,7 +312,7 @@ impl FileTail {
             }
             Err(error) => {
                 // Perhaps it is still being packed: from its start again when it has changed.
-                self.content = Content::of(&self.decoder, &self.path);
+                self.content = Content::of(&self.decoder, &self.origin);
                 self.idle = Some(glance);
                 Err(error)
             }

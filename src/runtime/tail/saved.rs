@@ -16,6 +16,9 @@ pub(super) struct Saved {
     place: Option<Place>,
     mark: Vec<u8>,
     content: SavedContent,
+    /// The name under which it was found first, where it was renamed since.
+    #[serde(default)]
+    origin: Option<PathBuf>,
 }
 
 /// What of [`Content`] a restart needs.
@@ -40,8 +43,10 @@ impl FileTail {
         body: &[u8],
     ) -> Result<Self, Box<dyn Error>> {
         let saved: Saved = rmp_serde::from_slice(body)?;
-        let rows = decoder.text_rows(&path);
-        let mut file = Self::new(path, decoder);
+        let origin = saved.origin.clone().unwrap_or_else(|| path.clone());
+        let rows = decoder.text_rows(&origin);
+        let mut file = Self::new(origin, decoder);
+        file.path = path;
         file.content = match (saved.content.clone(), rows) {
             (SavedContent::Text(text), Some(rows)) => {
                 Content::Text(Box::new(TextReader::restored(rows, text)?))
@@ -93,6 +98,7 @@ impl FileTail {
             place: self.place,
             mark: self.mark.clone(),
             content,
+            origin: (self.origin != self.path).then(|| self.origin.clone()),
         };
     }
 }
