@@ -25,9 +25,10 @@
 //! | 23 | a log that cannot be written | `log` |
 //! | 24 | the host's clock, one wrong time stamp, a clock that was never set | `time`; src/runtime/site/timekeeper.rs |
 //! | 25 | sensors that are stuck, spoilt, or give another quantity | `sensors`; src/monitor/suspect.rs |
-//! | 26 | files and messages that give nothing | `feeds`; tests/mqtt.rs |
+//! | 26 | files, messages and brokers that give nothing | `feeds`; tests/mqtt.rs |
 //! | 27 | backlogs, corrections, silences, slow hooks, hooks of the site | `telling`; tests/hooks.rs |
 //! | 28 | what an operator is to see: what never read, restarts, a state that is gone, forged names | `view` |
+//! | 29 | much of it at once, for ten thousand hours | tests/hostile_hours |
 //!
 //! docs/failure-modes.md says the same for operators.
 //!
