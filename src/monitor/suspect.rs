@@ -249,10 +249,10 @@ mod tests {
     fn a_jitter_where_a_fast_motion_ended_at_once_is_the_end_of_a_range_and_a_slope_that_slows_down_is_not()
      {
         let moving = |hour: u32| f64::from(hour) * 16.0 + noise(hour);
-        let jitter = |hour: u32| 30.0 * 16.0 + noise(hour);
+        let jitter = |hour: u32| 30.0 * 16.0 + 1.0 + 0.2 * noise(hour);
         let at_end = history((0..30).map(moving).chain((30..36).map(jitter)));
         let (count, _, (low, high)) = at_end.stands_at_the_end().unwrap();
-        assert!(count == 6 && low < 480.0 && high > 481.0 && high - low < 4.0);
+        assert!(count == 6 && low < 481.1 && high > 481.1 && high - low < 0.7);
         let downwards = history(
             (0..30)
                 .map(moving)

@@ -130,9 +130,13 @@ fn a_flipped_bit_in_the_memory_or_a_position_is_seen_and_both_are_made_anew() {
     let file = site.path("state/slipwatch.db");
     let database = Connection::open(&file).unwrap();
     for table in ["memory", "position"] {
-        let flip =
-            format!("UPDATE {table} SET body = substr(body, 1, 40) || x'00' || substr(body, 42)");
-        assert!(database.execute(&flip, []).unwrap() > 0, "{table}");
+        let first = format!("SELECT name, body FROM {table} ORDER BY name LIMIT 1");
+        let row = database.query_row(&first, [], |row| Ok((row.get(0)?, row.get(1)?)));
+        let (name, mut body): (String, Vec<u8>) = row.unwrap();
+        body[40] ^= 1;
+        let flip = format!("UPDATE {table} SET body = ?2 WHERE name = ?1");
+        let flipped = database.execute(&flip, rusqlite::params![name, body]);
+        assert_eq!(flipped.unwrap(), 1, "{table}");
     }
     drop(database);
     site.caught_up().stop();
