@@ -178,7 +178,7 @@ impl<'a> Host<'a> {
     /// Whether the hook takes alerts of this benchmark.
     pub(crate) fn tells(&self, name: &str) -> bool {
         match &self.hook.0.lock().unwrap().mood {
-            Mood::Works => true,
+            Mood::Works | Mood::LosesRed => true,
             Mood::HangsAt(other) => *other != name,
             Mood::Fails | Mood::Hangs => false,
         }

@@ -19,6 +19,7 @@ use slipwatch::store::Store;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 use tempfile::TempDir;
 
@@ -30,6 +31,7 @@ pub(crate) const STEPS: usize = 500;
 /// Within so much time in which the daemon runs and the hook works, people are told: a turn, and the longest wait
 /// between two attempts at a hook.
 pub(crate) const BOUND: SignedDuration = SignedDuration::from_mins(45);
+static ALONE: Mutex<()> = Mutex::new(());
 /// Steps without trouble at the end: what was held, kept or refused comes in.
 const CALM: usize = 24;
 
@@ -92,6 +94,13 @@ struct Life<'a> {
 
 /// Lives through what the seed draws.
 pub(crate) fn live(seed: u64) -> Seen {
+    live_with(seed, Mood::Works)
+}
+
+/// The same with a hook that does this while nothing else is the matter with it.
+pub(crate) fn live_with(seed: u64, hook: Mood) -> Seen {
+    // The limit that stands for a full disk is that of the whole process: one life at a time.
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     // In memory, where there is such a place: what the disk of the machine costs is not what is tested.
     let shared = Path::new("/dev/shm");
     let folder = if shared.is_dir() {
@@ -136,6 +145,10 @@ pub(crate) fn live(seed: u64) -> Seen {
             ..Seen::default()
         },
     };
+    {
+        let mut people = life.host.hook.0.lock().unwrap();
+        (people.mood, people.usual) = (hook.clone(), hook);
+    }
     let plan = Plan::drawn(seed);
     if std::env::var_os("HOSTILE_LOG").is_some() {
         let _ = tracing_subscriber::fmt()
@@ -256,7 +269,8 @@ impl Life<'_> {
     }
 
     fn set(&mut self, trouble: &Trouble, is_on: bool) {
-        let mood = |mood: Mood| if is_on { mood } else { Mood::Works };
+        let usual = self.host.hook.0.lock().unwrap().usual.clone();
+        let mood = |mood: Mood| if is_on { mood } else { usual.clone() };
         let people = &self.host.hook.0;
         match trouble {
             Trouble::Clock(span) => set_wrong_by(if is_on { *span } else { SignedDuration::ZERO }),

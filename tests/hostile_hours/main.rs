@@ -40,12 +40,22 @@ mod plan;
 mod radio;
 mod slope;
 
-use life::{LIFE_HOURS, Seen, live};
+use life::{LIFE_HOURS, Seen, live, live_with};
+use people::Mood;
 
 /// Hours that are lived through unless `HOSTILE_HOURS` says otherwise.
 const HOURS: u64 = 500;
 /// Seeds that found something, and what.
-const FOUND: [(u64, &str); 0] = [];
+const FOUND: [(u64, &str); 2] = [
+    (
+        1,
+        "a clock that is set back after days of readings in time: honest readings were set aside for good",
+    ),
+    (
+        37,
+        "the same, and the clock was said to be right again while it was not",
+    ),
+];
 
 fn number(name: &str, otherwise: u64) -> u64 {
     std::env::var(name).map_or(otherwise, |text| text.parse().unwrap())
@@ -82,4 +92,10 @@ fn what_seeds_have_found_is_mended() {
         println!("seed {seed}: {what}");
         live(seed);
     }
+}
+
+#[test]
+#[should_panic(expected = "has not been told")]
+fn a_hook_that_loses_red_is_found() {
+    live_with(0, Mood::LosesRed);
 }

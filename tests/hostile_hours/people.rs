@@ -21,12 +21,16 @@ pub(crate) enum Mood {
     Hangs,
     /// For alerts of this benchmark alone.
     HangsAt(&'static str),
+    /// It says that it took what it did not: a fault that the properties are to find.
+    LosesRed,
 }
 
 /// What people have been told, and the hook between.
 #[derive(Debug, Default)]
 pub(crate) struct People {
     pub(crate) mood: Mood,
+    /// Between troubles.
+    pub(crate) usual: Mood,
     /// By benchmark (none: the site, its clock) and level, the keys that are in force.
     in_force: BTreeMap<(Option<String>, Level), BTreeSet<String>>,
     pub(crate) told: u64,
@@ -64,6 +68,8 @@ impl People {
                 Mood::Works
             }
             Mood::HangsAt(_) => Mood::Hangs,
+            Mood::LosesRed if alert.level == Level::Red => Mood::LosesRed,
+            Mood::LosesRed => Mood::Works,
             other @ (Mood::Works | Mood::Fails | Mood::Hangs) => other.clone(),
         }
     }
@@ -84,6 +90,7 @@ impl Runner for Hook {
                     people.lock().unwrap().hear(&alert);
                     Outcome::Done
                 }
+                Mood::LosesRed => Outcome::Done,
                 Mood::Fails => {
                     people.lock().unwrap().failed += 1;
                     Outcome::Failed(1)
