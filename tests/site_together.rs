@@ -2,7 +2,10 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-#[allow(dead_code, reason = "of the helpers only those that read recordings are used here")]
+#[allow(
+    dead_code,
+    reason = "of the helpers only those that read recordings are used here"
+)]
 mod crisis;
 
 use crisis::{days_before, policy, recording, series};

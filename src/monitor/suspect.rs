@@ -264,8 +264,7 @@ mod tests {
         let creeping = history((0..36).map(|hour| f64::from(hour.min(30)) * 0.2 + noise(hour)));
         assert!(creeping.stands_at_the_end().is_none());
         for per_hour in [0.2_f64, 0.5, 0.8, 0.95] {
-            let slowing =
-                |hour: u32| 480.0 + 16.0 * (1.0 - per_hour.powi(hour as i32)) / (1.0 - per_hour);
+            let slowing = |hour: i32| 480.0 + 16.0 * (1.0 - per_hour.powi(hour)) / (1.0 - per_hour);
             for end in 1..60 {
                 let all = (0..30).map(moving).chain((0..end).map(slowing));
                 assert!(

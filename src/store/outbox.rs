@@ -96,7 +96,7 @@ impl Store {
                 Some(body) => bodies.push(body),
                 // What is in force is told again when the past has been read.
                 None => {
-                    tracing::error!(id = ?row.get_ref(0)?, "an alert that waited is not what was written")
+                    tracing::error!(id = ?row.get_ref(0)?, "an alert that waited is not what was written");
                 }
             }
         }

@@ -10,7 +10,7 @@ use slipwatch::config::Config;
 use slipwatch::monitor::Input;
 use slipwatch::reading::{BenchmarkId, Reading, Unit};
 use slipwatch::runtime::daemon::Daemon;
-use slipwatch::runtime::deliver::{Dispatcher, Retry};
+use slipwatch::runtime::deliver::{Dispatcher, Retry, Runner};
 use slipwatch::runtime::delivered::Delivered;
 use slipwatch::runtime::hook::Status;
 use slipwatch::runtime::mqtt::Delivery;
@@ -86,8 +86,8 @@ impl<'a> Host<'a> {
 
     fn resume(&self, store: Arc<Store>) -> Running {
         let delivered = Delivered::of(Arc::clone(&store));
-        let hook = Arc::new(self.hook.clone());
-        let alerts = Dispatcher::with(hook, &self.config.hooks, &Retry::default(), delivered);
+        let hook: Arc<dyn Runner> = Arc::new(self.hook.clone());
+        let alerts = Dispatcher::with(&hook, &self.config.hooks, &Retry::default(), delivered);
         let sinks = Sinks {
             store: Some(Arc::clone(&store)),
             alerts: Some(alerts),

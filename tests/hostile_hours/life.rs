@@ -7,15 +7,12 @@ use crate::people::Mood;
 use crate::plan::{Mishap, Plan, Trouble};
 use crate::radio::Radio;
 use crate::slope::{Measured, Slope};
+use crate::state::{is_over, is_what_a_replay_says, readings};
 use jiff::{SignedDuration, Timestamp};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use slipwatch::alert::Level;
 use slipwatch::config::{self, Config};
-use slipwatch::monitor::Input;
-use slipwatch::runtime::replay::replay_state;
-use slipwatch::runtime::shutdown;
-use slipwatch::store::Store;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
@@ -392,7 +389,8 @@ impl Life<'_> {
             due.untold_since = None;
             return false;
         }
-        if is_over(self.host.store().expect("the daemon runs"), due) {
+        let store = self.host.store().expect("the daemon runs");
+        if is_over(store, due.name, due.of) {
             self.seen.over += 1;
             return true;
         }
@@ -442,76 +440,4 @@ impl Life<'_> {
         let people = self.host.hook.0.lock().unwrap();
         (self.seen.told, self.seen.failed_runs) = (people.told, people.failed);
     }
-}
-
-/// Whether the monitor has ended the red since: what nobody was told of before is not told any more.
-fn is_over(store: &Store, due: &Due) -> bool {
-    let (mut after, mut is_over) = (0, false);
-    loop {
-        let events = store.events(after, Some("alert"), Some(due.name)).unwrap();
-        let Some((last, _)) = events.last() else {
-            return is_over;
-        };
-        after = *last;
-        for (_, body) in &events {
-            let event: serde_json::Value = serde_json::from_str(body).unwrap();
-            let time: Timestamp = event["time"].as_str().unwrap().parse().unwrap();
-            if event["level"] == "red" && time >= due.of {
-                is_over = event["state"] == "resolved";
-            }
-        }
-    }
-}
-
-fn readings(store: &Store) -> BTreeMap<String, Vec<(Timestamp, f64)>> {
-    let (mut taken, mut after) = (BTreeMap::new(), 0);
-    loop {
-        let rows = store.steps(after).unwrap();
-        let Some(last) = rows.last() else {
-            return taken;
-        };
-        after = last.seq;
-        for row in &rows {
-            if let Input::Reading {
-                benchmark, reading, ..
-            } = &row.input
-            {
-                let own: &mut Vec<(Timestamp, f64)> =
-                    taken.entry(benchmark.to_string()).or_default();
-                own.push((reading.time, reading.value));
-            }
-        }
-    }
-}
-
-fn is_what_a_replay_says(seed: u64, store: &Store) {
-    let (_stop, stopped) = shutdown::pair();
-    let mut said = Vec::new();
-    let mut note = |event: &slipwatch::monitor::Event| {
-        said.push(serde_json::to_string(event).unwrap());
-        Ok(())
-    };
-    replay_state(store, None, &stopped, &mut note).unwrap();
-    // The summary is a replay's own.
-    said.pop();
-    let (mut stored, mut after) = (Vec::new(), 0);
-    loop {
-        let events = store.events(after, None, None).unwrap();
-        let Some((last, _)) = events.last() else {
-            break;
-        };
-        after = *last;
-        stored.extend(events.into_iter().map(|(_, body)| body));
-    }
-    let differs = said
-        .iter()
-        .zip(&stored)
-        .position(|(one, other)| one != other);
-    if let Some(at) = differs {
-        panic!(
-            "seed {seed}: a replay says\n{}\nand the daemon said\n{}",
-            said[at], stored[at]
-        );
-    }
-    assert_eq!(said.len(), stored.len(), "seed {seed}: events");
 }

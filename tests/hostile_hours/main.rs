@@ -26,6 +26,8 @@
     clippy::expect_used,
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
+    clippy::cast_possible_wrap,
+    clippy::struct_excessive_bools,
     clippy::print_stdout,
     clippy::format_push_string,
     reason = "a test fails by panicking, and says how much it has seen"
@@ -39,6 +41,7 @@ mod people;
 mod plan;
 mod radio;
 mod slope;
+mod state;
 
 use life::{LIFE_HOURS, Seen, live, live_with};
 use people::Mood;

@@ -83,12 +83,13 @@ pub struct Dispatcher {
 impl Dispatcher {
     /// Starts a worker for each hook, which runs it as a process; needs a tokio runtime.
     pub fn start(hooks: &[HookConfig], retry: &Retry, delivered: Delivered) -> Self {
-        Self::with(Arc::new(Processes), hooks, retry, delivered)
+        let runner: Arc<dyn Runner> = Arc::new(Processes);
+        Self::with(&runner, hooks, retry, delivered)
     }
 
     /// Starts a worker for each hook, which `runner` runs; needs a tokio runtime.
     pub fn with(
-        runner: Arc<dyn Runner>,
+        runner: &Arc<dyn Runner>,
         hooks: &[HookConfig],
         retry: &Retry,
         delivered: Delivered,
@@ -100,7 +101,7 @@ impl Dispatcher {
             let (queue, receiver) = mpsc::channel(QUEUE);
             let in_hand = Arc::new(Mutex::new(InHand::default()));
             let shared = (Arc::clone(&delivered), Arc::clone(&in_hand));
-            let worker = Worker::new((hook, Arc::clone(&runner)), retry, shared);
+            let worker = Worker::new((hook, Arc::clone(runner)), retry, shared);
             workers.spawn(worker.run(receiver));
             let hook = hook.clone();
             queues.push(Way {
