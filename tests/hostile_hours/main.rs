@@ -47,7 +47,7 @@ use life::{LIFE_HOURS, Seen, live, live_with};
 use people::Mood;
 
 /// Hours that are lived through unless `HOSTILE_HOURS` says otherwise.
-const HOURS: u64 = 500;
+const HOURS: u64 = 250;
 /// Seeds that found something, and what.
 const FOUND: [(u64, &str); 2] = [
     (
