@@ -2,7 +2,7 @@
 
 use super::{DAWN, MOST_UNWRITTEN, Site};
 use crate::monitor::{Event, Input, Notice};
-use crate::reading::{BenchmarkId, Timestamp};
+use crate::reading::{BenchmarkId, Timestamp, suspicion};
 use crate::runtime::clock;
 use crate::runtime::tail::Arrival;
 use crate::store::StoreError;
@@ -60,6 +60,7 @@ impl Site {
             events.extend(self.step(now, &Input::Found(finding)));
         }
         events.extend(self.step(now, &arrival.input));
+        events.extend(self.compare_with_clock(arrival, (now, wall)));
         for job in self.monitor.searches() {
             self.searches.start(job);
         }
@@ -189,6 +190,32 @@ impl Site {
             let now = self.now.map_or(arrival.time, |now| now.max(arrival.time));
             self.step(now, &Input::Notice(Notice::Behind { benchmark, time }));
         }
+    }
+
+    /// Notes where readings come with a time ahead of the host's clock, and where they no longer do.
+    fn compare_with_clock(
+        &mut self,
+        arrival: &Arrival,
+        (now, wall): (Timestamp, Timestamp),
+    ) -> Vec<Event> {
+        let Input::Reading { benchmark, .. } = &arrival.input else {
+            return Vec::new();
+        };
+        let is_newest = self.newest.get(benchmark) == Some(&arrival.time);
+        let clock = self.keeper.now(wall).max(wall);
+        let is_ahead = suspicion::ahead(arrival.time, clock).is_some();
+        if self.sinks.store.is_none()
+            || !is_newest
+            || is_ahead == self.monitor.is_ahead(benchmark)
+        {
+            return Vec::new();
+        }
+        let came = Notice::Came {
+            benchmark: benchmark.clone(),
+            time: arrival.time,
+            clock,
+        };
+        self.step(now, &Input::Notice(came))
     }
 
     /// Whether the benchmark has given no reading as late as this one: it cannot be known then.

@@ -16,7 +16,7 @@ pub use mute::Mute;
 
 use timekeeper::Timekeeper;
 
-use crate::monitor::{Event, EventKind, Input, Monitor, Order, Settings};
+use crate::monitor::{Event, EventKind, Input, Monitor, Order, SUSPECT, Settings};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::deliver::Dispatcher;
 use crate::runtime::hook::{Alert, Status};
@@ -210,6 +210,7 @@ impl Site {
         let events = self.follow(now, input);
         if self.sinks.store.is_some() {
             self.batch.step(now, input, &events);
+            log_suspicions(&events);
             self.steps_since_memory += 1;
         }
         events
@@ -282,5 +283,16 @@ impl Site {
             None => Some(0),
         };
         recorded.map(|()| lost)
+    }
+}
+
+/// What the readings hardly mean is for people to look into, and nobody else says it.
+fn log_suspicions(events: &[Event]) {
+    for event in events {
+        if let EventKind::Fault { kind, text } = &event.kind
+            && kind.starts_with(SUSPECT)
+        {
+            tracing::warn!(kind, "{text}");
+        }
     }
 }
