@@ -71,7 +71,7 @@ pub(super) fn check(file: &Path, output: OutputArgs, looks_at_files: bool) -> an
                 writeln!(stdout, "{}{summary}", if is_fed { "" } else { "not " })?;
                 if let Some(preview) = &preview {
                     let zone = config::load(file)?.site.time_zone;
-                    write!(stdout, "{}", text::told(preview, &zone))?;
+                    write!(stdout, "{}", text::shown(preview, &zone))?;
                 }
             }
             stdout.flush()?;

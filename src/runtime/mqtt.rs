@@ -40,7 +40,7 @@ pub struct Delivery {
     pub source: String,
     /// Runs since it came.
     pub found: Stopwatch,
-    /// Lines in it that cannot be used.
+    /// Lines in it that cannot be used; one where nothing in it is for this site.
     pub quarantined: u64,
     /// To be given back once that is durable.
     pub receipt: Receipt,
@@ -155,22 +155,15 @@ struct Reader {
     decoder: Decoder,
     units: FileUnits,
     client: AsyncClient,
-    /// Lines that could not be used.
+    /// Lines and whole messages that could not be used.
     quarantined: u64,
 }
 
 impl Reader {
     fn read(&mut self, message: Publish) -> Delivery {
         let found = Stopwatch::start();
-        let (mut arrivals, mut quarantined) = (Vec::new(), 0);
-        let mut total = self.quarantined;
-        let mut complain = |error: &dyn std::error::Error| {
-            quarantined += 1;
-            total += 1;
-            if is_logged(total) {
-                tracing::warn!(topic = message.topic, %error, total, "line of a message quarantined");
-            }
-        };
+        let mut arrivals = Vec::new();
+        let mut faults: Vec<Box<dyn std::error::Error>> = Vec::new();
         let rows = self.decoder.text_rows(Path::new(&message.topic));
         match (rows, text(&message.payload)) {
             (Some(mut rows), Ok(text)) => {
@@ -178,20 +171,27 @@ impl Reader {
                     let taken = rows.take(number, line);
                     let items = taken.items.into_iter().map(|item| self.units.guard(item));
                     arrivals.extend(items.filter_map(|item| self.decoder.arrival(item)));
-                    if let Some(fault) = taken.fault {
-                        complain(&fault);
-                    }
+                    faults.extend(taken.fault.map(Into::into));
                 }
             }
-            (_, Err(error)) => complain(&error),
+            (_, Err(error)) => faults.push(error.into()),
             (None, Ok(_)) => {}
         }
-        self.quarantined = total;
+        if arrivals.is_empty() && faults.is_empty() {
+            faults.push(GivesNothing.into());
+        }
+        for error in &faults {
+            self.quarantined += 1;
+            let total = self.quarantined;
+            if is_logged(total) {
+                tracing::warn!(topic = message.topic, %error, total, "message, or line of one, quarantined");
+            }
+        }
         Delivery {
             arrivals,
             source: self.source.clone(),
             found,
-            quarantined,
+            quarantined: faults.len() as u64,
             receipt: Receipt {
                 client: self.client.clone(),
                 message,
@@ -199,6 +199,14 @@ impl Reader {
         }
     }
 }
+
+/// A message that can be read, and in which nothing is for this site.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "the message gives no value: none of its benchmarks is watched and it has no covariate; \
+     is the id right? docs/messages.md shows what a message looks like"
+)]
+struct GivesNothing;
 
 /// Why a message is no text.
 #[derive(Debug, thiserror::Error)]

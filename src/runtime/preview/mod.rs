@@ -436,11 +436,11 @@ fn kind_of(line: &BadLine) -> String {
 }
 
 fn shown(line: &BadLine) -> String {
-    let told = line.error.to_string();
+    let text = line.error.to_string();
     if line.error.is::<IngestError>() {
-        told
+        text
     } else {
-        format!("line {}: {told}", line.number)
+        format!("line {}: {text}", line.number)
     }
 }
 

@@ -24,6 +24,20 @@ pub(in crate::runtime) fn is_logged(total: u64) -> bool {
     total <= LOGGED || total.is_power_of_two()
 }
 
+/// What a value is of.
+fn name(input: &Input) -> &str {
+    match input {
+        Input::Reading { benchmark, .. } | Input::Missing { benchmark, .. } => benchmark.as_str(),
+        Input::Sample { channel, .. } => channel,
+        Input::Trouble { .. }
+        | Input::Settings(_)
+        | Input::Order(_)
+        | Input::Found(_)
+        | Input::Notice(_)
+        | Input::Tick => "",
+    }
+}
+
 impl Site {
     /// Takes one value. What was taken before, or lies ahead of the clock, changes nothing; while the host's clock is
     /// earlier than readings that are known, what lies ahead of it is held. A replay waits for the answer of a search
@@ -90,7 +104,7 @@ impl Site {
             self.counts.from_the_future += 1;
             let total = self.counts.from_the_future;
             if is_logged(total) {
-                tracing::warn!(%time, ?arrival.input, total, "measured in the future: quarantined");
+                tracing::warn!(%time, what = name(&arrival.input), total, "measured in the future: quarantined");
             }
             return true;
         }
@@ -101,9 +115,9 @@ impl Site {
         let total = self.counts.without_clock;
         if !is_logged(total) {
         } else if time < DAWN {
-            tracing::warn!(%time, ?arrival.input, "measured before 1678: quarantined");
+            tracing::warn!(%time, what = name(&arrival.input), "measured before 1678: quarantined");
         } else {
-            tracing::warn!(%time, ?arrival.input, total, "measured on the first day of 1970, as by a logger whose clock is not set: quarantined");
+            tracing::warn!(%time, what = name(&arrival.input), total, "measured on the first day of 1970, as by a logger whose clock is not set: quarantined");
         }
         true
     }

@@ -113,6 +113,8 @@ pub struct Site {
     standing: BTreeMap<Place, Standing>,
     /// Who asked not to be told.
     mutes: Vec<Mute>,
+    /// Ends of alerts that people were told of, which fell into a silence: they are sent after it.
+    put_off: Vec<Alert>,
     counts: Counts,
     keeper: Timekeeper,
     /// Benchmarks that had given readings when everything there was had been read: what comes of them now is live.
@@ -141,6 +143,7 @@ impl Site {
             fresh: Vec::new(),
             standing: BTreeMap::new(),
             mutes: Vec::new(),
+            put_off: Vec::new(),
             counts: Counts::default(),
             keeper: Timekeeper::default(),
             at_rest: BTreeSet::new(),
