@@ -1,5 +1,6 @@
 //! The exit codes, which error has which, and how an error is said.
 
+use super::doctor::AsUser;
 use crate::config::ConfigError;
 use crate::model::LawError;
 use crate::reading::{MergeError, SelectError};
@@ -74,6 +75,9 @@ fn code_of(error: &(dyn Error + 'static)) -> Option<u8> {
             ReplayError::Output(_) | ReplayError::State(_) => IO,
             ReplayError::Interrupted | ReplayError::Undelivered => TROUBLE,
         });
+    }
+    if let Some(error) = error.downcast_ref::<AsUser>() {
+        return error.1;
     }
     let table = [
         (error.is::<UsageError>() || error.is::<LawError>(), USAGE),

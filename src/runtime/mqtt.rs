@@ -223,3 +223,46 @@ fn text(payload: &[u8]) -> Result<&str, NoText> {
     }
     Ok(std::str::from_utf8(payload)?)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config;
+    use std::fs;
+
+    /// What a reader of this site makes of one message: its values, and what could not be used.
+    fn read(payload: &str) -> (usize, u64) {
+        let site = "[site]\nname = \"Toc\"\nstate_dir = \"state\"\n[[source]]\nid = \"radio\"\nkind = \"mqtt\"\n\
+                    url = \"mqtt://127.0.0.1:1883\"\ntopic = \"site/+/displacement\"\n[[benchmark]]\nid = \"P1\"\n";
+        let config = config::parse(site, Path::new("site.toml")).unwrap();
+        let broker = &config.brokers[0];
+        let (client, _connection) = AsyncClient::new(options(broker, "test".to_owned()), 1);
+        let mut reader = Reader {
+            source: broker.id.clone(),
+            decoder: Decoder::of_messages(broker, &config.benchmarks),
+            units: FileUnits::default(),
+            client,
+            quarantined: 0,
+        };
+        let message = Publish::new("site/P1/displacement", QoS::AtLeastOnce, payload, None);
+        let delivery = reader.read(message);
+        assert_eq!(reader.quarantined, delivery.quarantined);
+        (delivery.arrivals.len(), delivery.quarantined)
+    }
+
+    #[test]
+    fn a_message_that_gives_nothing_is_counted_and_every_example_of_the_documentation_gives_a_value() {
+        let nothing = r#"{"benchmark": "P9", "time": "2017-06-06T17:00:00Z", "value": 1, "unit": "mm"}"#;
+        assert_eq!(read(nothing), (0, 1));
+        assert_eq!(read(""), (0, 1));
+        assert_eq!(read("no JSON"), (0, 1));
+        let page = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/messages.md"));
+        let page = page.unwrap();
+        let examples: Vec<&str> = page.lines().filter(|line| line.starts_with('{')).collect();
+        assert!(examples.len() >= 5, "{examples:?}");
+        for line in examples {
+            let (values, refused) = read(line);
+            assert_eq!((values >= 1, refused), (true, 0), "{line}");
+        }
+    }
+}
