@@ -82,7 +82,11 @@ fn run_as(name: &str, args: &Args) -> anyhow::Result<()> {
         .with_context(|| format!("cannot become user {name}"))?;
     match ended.code() {
         Some(0) => Ok(()),
-        code => Err(AsUser(name.to_owned(), code.and_then(|code| u8::try_from(code).ok())).into()),
+        code => Err(AsUser(
+            name.to_owned(),
+            code.and_then(|code| u8::try_from(code).ok()),
+        )
+        .into()),
     }
 }
 

@@ -178,7 +178,9 @@ pub(super) fn events(args: &EventsArgs) -> anyhow::Result<()> {
             after = *seq;
             match args.site.output.format {
                 Format::Json => writeln!(stdout, "{body}")?,
-                Format::Text => writeln!(stdout, "{}", text::line(&serde_json::from_str(body)?, zone))?,
+                Format::Text => {
+                    writeln!(stdout, "{}", text::line(&serde_json::from_str(body)?, zone))?
+                }
             }
         }
         if events.is_empty() {

@@ -237,8 +237,10 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
     let refused = status.quarantined.iter();
     let refused: String = refused
         .map(|(source, count)| {
-            format!("source {source}: lines, records and files that could not be used: {count}; \
-                     status --sources shows the first of each kind\n")
+            format!(
+                "source {source}: lines, records and files that could not be used: {count}; \
+                     status --sources shows the first of each kind\n"
+            )
         })
         .collect();
     let suspicions = status.benchmarks.iter().flat_map(|one| &one.suspicions);

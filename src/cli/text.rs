@@ -47,8 +47,14 @@ fn time_at(text: &str) -> Option<(Timestamp, usize)> {
     let seconds = rest.find(|letter: char| !matches!(letter, ':' | '.' | '0'..='9'))?;
     let length = MINUTE.len() + seconds + 1;
     let is_utc = rest[seconds..].starts_with('Z');
-    let seconds = if seconds == 0 { ":00" } else { &rest[..seconds] };
-    let time = format!("{}{seconds}Z", &text[..MINUTE.len()]).parse().ok()?;
+    let seconds = if seconds == 0 {
+        ":00"
+    } else {
+        &rest[..seconds]
+    };
+    let time = format!("{}{seconds}Z", &text[..MINUTE.len()])
+        .parse()
+        .ok()?;
     is_utc.then_some((time, length))
 }
 
@@ -271,7 +277,10 @@ mod tests {
         for (text, shown) in [
             ("2017-06-05 01:00Z  P1", "2017-06-05 03:00 CEST  P1"),
             ("since 2017-01-05T23:30:00Z.", "since 2017-01-06 00:30 CET."),
-            ("at 2017-06-05T01:00:00.25Z, é", "at 2017-06-05 03:00 CEST, é"),
+            (
+                "at 2017-06-05T01:00:00.25Z, é",
+                "at 2017-06-05 03:00 CEST, é",
+            ),
             ("2017-06-05T01:00:00+02:00", "2017-06-05T01:00:00+02:00"),
             ("2017-06-05 01:00", "2017-06-05 01:00"),
             ("x 2017-06-05é", "x 2017-06-05é"),

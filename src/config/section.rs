@@ -184,9 +184,11 @@ fn benchmarks(root: &mut Section<'_>, sources: &[&str], policy: &Policy) -> (Vec
         let benchmark = benchmark(section, id, sources);
         if let Some(benchmark) = &benchmark {
             let id = &benchmark.id;
-            own.policies.extend(policy.map(|policy| (id.clone(), policy)));
+            own.policies
+                .extend(policy.map(|policy| (id.clone(), policy)));
             let some = (!accepted.is_empty()).then_some(accepted);
-            own.accepted.extend(some.map(|accepted| (id.clone(), accepted)));
+            own.accepted
+                .extend(some.map(|accepted| (id.clone(), accepted)));
         }
         benchmarks.extend(benchmark);
     }
@@ -195,7 +197,9 @@ fn benchmarks(root: &mut Section<'_>, sources: &[&str], policy: &Policy) -> (Vec
 
 /// The suspicions that people have looked into.
 fn accepted(section: &mut Section<'_>) -> BTreeSet<Suspicion> {
-    let words = section.texts("accept").map_or_else(Vec::new, |given| given.value);
+    let words = section
+        .texts("accept")
+        .map_or_else(Vec::new, |given| given.value);
     let known = |word: &str| Suspicion::ALL.into_iter().find(|one| one.name() == word);
     let mut accepted = BTreeSet::new();
     for word in words {
@@ -205,7 +209,10 @@ fn accepted(section: &mut Section<'_>) -> BTreeSet<Suspicion> {
             }
             None => section.error(
                 &word.at,
-                format!("benchmark.accept has {:?}, which is no suspicion", word.value),
+                format!(
+                    "benchmark.accept has {:?}, which is no suspicion",
+                    word.value
+                ),
                 format!("write {}", Suspicion::ALL.map(Suspicion::name).join(", ")),
             ),
         }

@@ -79,9 +79,7 @@ impl Monitor {
             } => {
                 self.changed.insert(benchmark.clone());
                 let track = self.tracks.get_mut(benchmark);
-                track.map_or_else(Vec::new, |track| {
-                    track.suspect_ahead(now, (*time, *clock))
-                })
+                track.map_or_else(Vec::new, |track| track.suspect_ahead(now, (*time, *clock)))
             }
             Notice::ClockWrong { text } => {
                 let since = *self.clock_wrong.get_or_insert(now);

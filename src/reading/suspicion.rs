@@ -80,11 +80,7 @@ pub fn ahead(newest: Timestamp, now: Timestamp) -> Option<Evidence> {
 }
 
 /// What the values of readings in `unit`, in order of time, give rise to.
-pub fn of_values(
-    readings: &[(Timestamp, f64)],
-    quantity: Quantity,
-    unit: &str,
-) -> Vec<Evidence> {
+pub fn of_values(readings: &[(Timestamp, f64)], quantity: Quantity, unit: &str) -> Vec<Evidence> {
     let mut readings = readings.to_vec();
     let mut found = Vec::new();
     if readings.len() < FEWEST {
@@ -155,8 +151,7 @@ fn steps(readings: &[(Timestamp, f64)]) -> impl Iterator<Item = (Timestamp, Time
 
 fn fall(readings: &[(Timestamp, f64)], unit: &str) -> Option<Evidence> {
     let (usual, scatter) = scatter(readings)?;
-    let (before, at, step) =
-        steps(readings).min_by(|one, other| one.2.total_cmp(&other.2))?;
+    let (before, at, step) = steps(readings).min_by(|one, other| one.2.total_cmp(&other.2))?;
     (usual - step > LEAP * scatter).then(|| Evidence {
         kind: Suspicion::Fall,
         at,

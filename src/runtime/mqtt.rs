@@ -244,15 +244,17 @@ mod tests {
             client,
             quarantined: 0,
         };
-        let message = Publish::new("site/P1/displacement", QoS::AtLeastOnce, payload, None);
+        let message = Publish::new("site/P1/displacement", QoS::AtLeastOnce, payload);
         let delivery = reader.read(message);
         assert_eq!(reader.quarantined, delivery.quarantined);
         (delivery.arrivals.len(), delivery.quarantined)
     }
 
     #[test]
-    fn a_message_that_gives_nothing_is_counted_and_every_example_of_the_documentation_gives_a_value() {
-        let nothing = r#"{"benchmark": "P9", "time": "2017-06-06T17:00:00Z", "value": 1, "unit": "mm"}"#;
+    fn a_message_that_gives_nothing_is_counted_and_every_example_of_the_documentation_gives_a_value()
+     {
+        let nothing =
+            r#"{"benchmark": "P9", "time": "2017-06-06T17:00:00Z", "value": 1, "unit": "mm"}"#;
         assert_eq!(read(nothing), (0, 1));
         assert_eq!(read(""), (0, 1));
         assert_eq!(read("no JSON"), (0, 1));

@@ -2,7 +2,14 @@
 
 /// By command.
 pub(super) const ALL: [(&str, &[&str]); 28] = [
-    ("", &["slipwatch demo", "slipwatch init slope.csv", "slipwatch run site.toml"]),
+    (
+        "",
+        &[
+            "slipwatch demo",
+            "slipwatch init slope.csv",
+            "slipwatch run site.toml",
+        ],
+    ),
     ("demo", &["slipwatch demo", "slipwatch demo --pace 0s"]),
     (
         "init",
@@ -12,8 +19,20 @@ pub(super) const ALL: [(&str, &[&str]); 28] = [
         ],
     ),
     ("run", &["slipwatch run site.toml"]),
-    ("check", &["slipwatch check site.toml", "slipwatch check --config-only - < site.toml"]),
-    ("doctor", &["slipwatch doctor site.toml", "slipwatch doctor site.toml --user slipwatch"]),
+    (
+        "check",
+        &[
+            "slipwatch check site.toml",
+            "slipwatch check --config-only - < site.toml",
+        ],
+    ),
+    (
+        "doctor",
+        &[
+            "slipwatch doctor site.toml",
+            "slipwatch doctor site.toml --user slipwatch",
+        ],
+    ),
     (
         "replay",
         &[
@@ -22,7 +41,13 @@ pub(super) const ALL: [(&str, &[&str]); 28] = [
             "slipwatch replay --state state --benchmark P1",
         ],
     ),
-    ("status", &["slipwatch status --config site.toml", "slipwatch status --config site.toml --sources"]),
+    (
+        "status",
+        &[
+            "slipwatch status --config site.toml",
+            "slipwatch status --config site.toml --sources",
+        ],
+    ),
     (
         "events",
         &[
@@ -32,11 +57,26 @@ pub(super) const ALL: [(&str, &[&str]); 28] = [
     ),
     ("alerts", &["slipwatch alerts list --config site.toml"]),
     ("alerts list", &["slipwatch alerts list --config site.toml"]),
-    ("alerts ack", &["slipwatch alerts ack --config site.toml --benchmark P1 --by Ada"]),
-    ("alerts shelve", &["slipwatch alerts shelve --config site.toml --benchmark P1 --for 8h"]),
-    ("alerts silence", &["slipwatch alerts silence --config site.toml --for 30min"]),
-    ("alerts unsilence", &["slipwatch alerts unsilence --config site.toml"]),
-    ("alerts redeliver", &["slipwatch alerts redeliver --config site.toml"]),
+    (
+        "alerts ack",
+        &["slipwatch alerts ack --config site.toml --benchmark P1 --by Ada"],
+    ),
+    (
+        "alerts shelve",
+        &["slipwatch alerts shelve --config site.toml --benchmark P1 --for 8h"],
+    ),
+    (
+        "alerts silence",
+        &["slipwatch alerts silence --config site.toml --for 30min"],
+    ),
+    (
+        "alerts unsilence",
+        &["slipwatch alerts unsilence --config site.toml"],
+    ),
+    (
+        "alerts redeliver",
+        &["slipwatch alerts redeliver --config site.toml"],
+    ),
     ("backup", &["slipwatch backup copy.db --config site.toml"]),
     (
         "fit",
@@ -64,16 +104,16 @@ pub(super) const ALL: [(&str, &[&str]); 28] = [
         "plot",
         &["slipwatch plot slope.csv --benchmark P1 --kind inverse-velocity -o slope.svg"],
     ),
-    ("simulate", &["slipwatch simulate --m 1.35 --x-i 0.6 --times 0,0.5,1,1.25"]),
+    (
+        "simulate",
+        &["slipwatch simulate --m 1.35 --x-i 0.6 --times 0,0.5,1,1.25"],
+    ),
     ("convert", &["slipwatch convert slope.csv slope.mcap"]),
     ("hook", &["slipwatch hook test --config site.toml"]),
     (
         "hook test",
         &["slipwatch hook test --config site.toml --level red"],
     ),
-    (
-        "completions",
-        &["slipwatch completions bash"],
-    ),
+    ("completions", &["slipwatch completions bash"]),
     ("man", &["slipwatch man man"]),
 ];

@@ -156,7 +156,9 @@ impl Track {
         };
         let outlook = if ahead.orange < policy.outlook {
             let hours = policy.outlook.as_secs() / 3600;
-            format!("five times the record's length, which is shorter than the outlook of {hours} h,")
+            format!(
+                "five times the record's length, which is shorter than the outlook of {hours} h,"
+            )
         } else {
             "the outlook".to_owned()
         };

@@ -218,9 +218,7 @@ impl Site {
         let is_newest = self.newest.get(benchmark) == Some(&arrival.time);
         let clock = self.keeper.now(wall).max(wall);
         let is_ahead = suspicion::ahead(arrival.time, clock).is_some();
-        if self.sinks.store.is_none()
-            || !is_newest
-            || is_ahead == self.monitor.is_ahead(benchmark)
+        if self.sinks.store.is_none() || !is_newest || is_ahead == self.monitor.is_ahead(benchmark)
         {
             return Vec::new();
         }
