@@ -35,7 +35,7 @@ const NOT_RUN: u8 = 126;
 #[error("{0}")]
 pub(super) struct UsageError(pub(super) String);
 
-/// Writes a line to stderr; nobody can be told when that fails.
+/// Writes a line to stderr; nothing can be done when that fails.
 pub(super) fn complain(what: &dyn Display) {
     let _ = writeln!(io::stderr(), "{what}");
 }

@@ -38,7 +38,7 @@ pub(super) struct Args {
     /// Stop at this time of the data
     #[arg(long, value_name = "TIME", value_parser = value::instant)]
     until: Option<Timestamp>,
-    /// Run the hooks of --config, told that it is an exercise
+    /// Run the hooks of --config, marked as an exercise
     #[arg(long, requires = "config")]
     hooks: bool,
     #[command(flatten)]

@@ -277,7 +277,7 @@ pub(super) fn every(store: &Store, kind: &str) -> anyhow::Result<Vec<Event>> {
     }
 }
 
-/// The orders in force by which alerts are not told, as they were given.
+/// The orders in force by which no hook is run, as they were given.
 pub(super) fn silences(orders: &[Event]) -> Vec<Event> {
     let now = clock::now();
     let mut standing: Vec<Event> = Vec::new();

@@ -31,7 +31,7 @@ struct Standing {
     level: Level,
     /// Since when.
     since: Option<Timestamp>,
-    /// Since when the monitor cannot tell: no data, a sensor fault.
+    /// Since when nothing can be said of it: no data, a sensor fault.
     unknown_since: Option<Timestamp>,
     /// Whether nothing can be said of it now; so it is before its first reading.
     is_unknown: bool,
@@ -63,7 +63,7 @@ struct SiteStatus {
     alerts: Vec<Event>,
     /// Acknowledgements of them.
     acknowledged: Vec<Event>,
-    /// The orders by which alerts are not told.
+    /// The orders by which no hook is run.
     silences: Vec<Event>,
     /// Lines, records and files that could not be used, a source.
     quarantined: BTreeMap<String, u64>,

@@ -81,7 +81,7 @@ impl Timeline {
     }
 
     /// The line for an event that changes a level.
-    pub(super) fn tell(&mut self, event: &Event) -> Option<String> {
+    pub(super) fn take(&mut self, event: &Event) -> Option<String> {
         let id = event.benchmark.as_ref()?;
         let record = self.records.entry(id.clone()).or_default();
         if let EventKind::Refit {
