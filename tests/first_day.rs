@@ -230,7 +230,10 @@ fn the_end_of_an_alert_that_falls_into_a_silence_is_sent_after_it_and_a_red_keep
     alerts(&["unshelve"]);
     office.until("the end is sent", || written(&office).iter().any(is_end));
     std::thread::sleep(std::time::Duration::from_secs(2));
-    assert_eq!(written(&office).iter().filter(|line| is_end(line)).count(), 1);
+    assert_eq!(
+        written(&office).iter().filter(|line| is_end(line)).count(),
+        1
+    );
     drop(daemon);
 }
 
@@ -318,8 +321,8 @@ fn stdin_is_a_file_in_any_format() {
 fn every_example_of_a_message_is_a_line_that_a_file_may_hold() {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/messages.md");
     let page = fs::read_to_string(page).unwrap();
-    let lines = page.lines().filter(|line| line.starts_with('{'));
-    let text: String = lines.map(|line| format!("{line}\n")).collect();
+    let lines: Vec<&str> = page.lines().filter(|line| line.starts_with('{')).collect();
+    let text = lines.join("\n") + "\n";
     assert_eq!(text.lines().count(), 5, "{text}");
     let config = site("slope.ndjson", "").replace("\"csv\"", "\"ndjson\"");
     let office = Office::with(&[("slope.ndjson", &text), ("site.toml", &config)]);

@@ -12,6 +12,7 @@ use crate::store::Store;
 use jiff::tz::TimeZone;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 
 /// Say what a site's benchmarks do: level, regime, failure time, newest reading
 #[derive(Debug, clap::Args)]
@@ -234,15 +235,15 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
     } else {
         "NO DAEMON RUNS: nothing is watched; what follows is as of its last reading\n"
     };
-    let refused = status.quarantined.iter();
-    let refused: String = refused
-        .map(|(source, count)| {
-            format!(
-                "source {source}: lines, records and files that could not be used: {count}; \
-                     status --sources shows the first of each kind\n"
-            )
-        })
-        .collect();
+    let mut refused = String::new();
+    for (source, count) in &status.quarantined {
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            refused,
+            "source {source}: lines, records and files that could not be used: {count}; \
+             status --sources shows the first of each kind"
+        );
+    }
     let suspicions = status.benchmarks.iter().flat_map(|one| &one.suspicions);
     let suspicions: String = suspicions
         .map(|one| text::local(&text::plain(one), zone) + "\n")

@@ -56,7 +56,11 @@ pub(super) fn of(
     Ok(warning(&changes, first, until))
 }
 
-fn warning(changes: &[(Timestamp, Level, AlertState)], first: Timestamp, until: Timestamp) -> Warning {
+fn warning(
+    changes: &[(Timestamp, Level, AlertState)],
+    first: Timestamp,
+    until: Timestamp,
+) -> Warning {
     let begun = |level| {
         let mut begun = changes
             .iter()

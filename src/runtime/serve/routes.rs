@@ -11,7 +11,7 @@ use axum::routing::get;
 use axum::{Json, Router};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fmt::Debug;
+use std::fmt::{Debug, Write as _};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -171,10 +171,12 @@ fn not_ready(health: &Health) -> Option<&'static str> {
 
 /// A line for each source of which something could not be used.
 fn refused(health: &Health) -> String {
-    let lines = health.quarantined.iter();
+    let mut lines = String::new();
+    for (source, count) in &health.quarantined {
+        // Writing to a string cannot fail.
+        let _ = writeln!(lines, "source {source}: could not be used: {count}");
+    }
     lines
-        .map(|(source, count)| format!("source {source}: could not be used: {count}\n"))
-        .collect()
 }
 
 async fn expose(State(vitals): State<Arc<Vitals>>) -> Response {
