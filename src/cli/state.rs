@@ -179,7 +179,7 @@ pub(super) fn events(args: &EventsArgs) -> anyhow::Result<()> {
             match args.site.output.format {
                 Format::Json => writeln!(stdout, "{body}")?,
                 Format::Text => {
-                    writeln!(stdout, "{}", text::line(&serde_json::from_str(body)?, zone))?
+                    writeln!(stdout, "{}", text::line(&serde_json::from_str(body)?, zone))?;
                 }
             }
         }

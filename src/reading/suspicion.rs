@@ -116,8 +116,8 @@ fn mark(readings: &[(Timestamp, f64)]) -> Option<(f64, Evidence)> {
     let before = readings[..index].last().or(others.first())?.1;
     let is_leap = scatter(&others)
         .is_some_and(|(usual, scatter)| (value - before - usual).abs() > LEAP * scatter);
-    let marked = readings.iter().filter(|(_, other)| same(*other, value));
-    let (count, at) = (marked.clone().count(), marked.last()?.0);
+    let mut marked = readings.iter().filter(|(_, other)| same(*other, value));
+    let (count, at) = (marked.clone().count(), marked.next_back()?.0);
     (away > AWAY * (high - low) || is_leap).then(|| {
         let text = format!(
             "{value} stands {count} times, first at {first}, and all other readings lie between {low} and {high}: \

@@ -43,19 +43,15 @@ fn database(folder: &Path) -> Option<Finding> {
         let opened = File::options().read(true).write(true).open(file);
         Some((file, opened.err()?))
     });
-    Some(match tried {
-        Some((file, error)) => {
-            let text = format!(
-                "{} cannot be written as this user: {error}; give the state folder to the daemon's user with chown -R",
-                file.display()
-            );
-            Finding::new(STATE, Verdict::Wrong, text)
-        }
-        None => {
-            let text = format!("the state in {} can be written", folder.display());
-            Finding::new(STATE, Verdict::Good, text)
-        }
-    })
+    let Some((file, error)) = tried else {
+        let text = format!("the state in {} can be written", folder.display());
+        return Some(Finding::new(STATE, Verdict::Good, text));
+    };
+    let text = format!(
+        "{} cannot be written as this user: {error}; give the state folder to the daemon's user with chown -R",
+        file.display()
+    );
+    Some(Finding::new(STATE, Verdict::Wrong, text))
 }
 
 fn token(config: &Config) -> Finding {
