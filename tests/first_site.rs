@@ -60,7 +60,7 @@ fn one_command_leads_from_a_file_of_the_office_to_a_watch_that_reads_it() {
         assert!(config.contains(line), "no {line:?} in {config}");
     }
     let daemon = office.run(&["run", "site.toml"]);
-    let status = office.status_until("2017-06-05 01:00");
+    let status = office.status_until("2017-06-05 03:00 CEST");
     assert!(!status.contains("NO DAEMON RUNS"), "{status}");
     let status = office.done(&["status", "--sources", "--config", "site.toml"]);
     assert!(
