@@ -74,7 +74,7 @@ pub fn ahead(newest: Timestamp, now: Timestamp) -> Option<Evidence> {
         kind: Suspicion::Ahead,
         at: newest,
         text: format!(
-            "the last reading, {newest}, is {ahead:#} ahead of this machine's clock: is the time_zone of the source right, and dst?"
+            "the last reading, {newest}, is {ahead:#} ahead of this machine's clock: is the time_zone of the source right, and dst, and the clock itself?"
         ),
     })
 }
