@@ -33,6 +33,13 @@ fn the_demo_says_what_will_be_seen_fits_eighty_columns_and_gives_a_reason_for_ea
             "{crisis}"
         );
     }
+    let silences = crises.matches("  unknown ").count();
+    let ends = crises.matches("there are readings again").count();
+    assert_eq!(
+        (silences, ends),
+        (1, 1),
+        "a silence without its end: {crises}"
+    );
     for point in ["E3", "E5", "63", "40-1938"] {
         assert!(
             card.contains(&format!(" {point} ")),

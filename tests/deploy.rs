@@ -201,6 +201,7 @@ fn the_built_package_holds_the_program_the_unit_the_manual_and_the_completions()
         "-rwxr-xr-x ./usr/bin/slipwatch",
         "-rw-r--r-- ./usr/lib/systemd/system/slipwatch.service",
         "-rw-r--r-- ./usr/share/man/man1/slipwatch-run.1.gz",
+        "-rw-r--r-- ./usr/share/man/man5/slipwatch-config.5.gz",
         "-rw-r--r-- ./usr/share/bash-completion/completions/slipwatch",
         "-rw-r--r-- ./etc/slipwatch/site.toml",
         "-rwxr-xr-x ./etc/slipwatch/notify.sh",

@@ -65,7 +65,7 @@ fn finding(check: &str, folder: &Path) -> (String, String) {
 }
 
 #[test]
-fn a_machine_that_can_carry_the_site_is_good_in_what_can_be_told() {
+fn a_machine_that_can_carry_the_site_is_good_in_what_can_be_seen() {
     let folder = site("#!/bin/sh\ntouch ran\n");
     let at = folder.path();
     for check in ["inotify", "hook", "recording", "fsync"] {

@@ -2,112 +2,13 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod office;
+
+use office::{Daemon, Office, PROGRAM, ended, plain, rows, site};
 use std::fmt::Write as _;
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
-use std::time::Duration;
-use tempfile::TempDir;
-
-const PROGRAM: &str = env!("CARGO_BIN_EXE_slipwatch");
-const PAUSE: Duration = Duration::from_millis(200);
-const ATTEMPTS: usize = 300;
-
-/// A folder to stand in.
-struct Office {
-    folder: TempDir,
-}
-
-impl Office {
-    fn with(files: &[(&str, &str)]) -> Self {
-        let office = Self {
-            folder: tempfile::tempdir().unwrap(),
-        };
-        for (name, text) in files {
-            fs::write(office.path(name), text).unwrap();
-        }
-        office
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn command(&self, args: &[&str]) -> Command {
-        let mut command = Command::new(PROGRAM);
-        command.args(args).current_dir(self.folder.path());
-        command
-    }
-
-    /// Exit code, stdout and stderr.
-    fn say(&self, args: &[&str]) -> (i32, String, String) {
-        told(&self.command(args).output().unwrap())
-    }
-
-    /// What it says on stderr, when it must exit with this.
-    fn refused(&self, code: i32, args: &[&str]) -> String {
-        let (exit, out, err) = self.say(args);
-        assert_eq!(exit, code, "{args:?}: {out}{err}");
-        err
-    }
-
-    /// What it says on stdout, when it must succeed.
-    fn done(&self, args: &[&str]) -> String {
-        let (exit, out, err) = self.say(args);
-        assert_eq!(exit, 0, "{args:?}: {out}{err}");
-        out
-    }
-
-    fn run(&self, args: &[&str]) -> Daemon {
-        let mut command = self.command(args);
-        command.stdout(Stdio::null()).stderr(Stdio::null());
-        Daemon(command.spawn().unwrap())
-    }
-
-    /// Waits for a text in what `status` says.
-    fn status_until(&self, wanted: &str) -> String {
-        let mut said = String::new();
-        for _ in 0..ATTEMPTS {
-            let (_, out, err) = self.say(&["status", "--config", "site.toml"]);
-            if out.contains(wanted) {
-                return out;
-            }
-            said = format!("{out}{err}");
-            std::thread::sleep(PAUSE);
-        }
-        panic!("no {wanted:?} in {said}");
-    }
-}
-
-struct Daemon(Child);
-
-impl Drop for Daemon {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-fn told(output: &Output) -> (i32, String, String) {
-    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    (
-        output.status.code().unwrap(),
-        text(&output.stdout),
-        text(&output.stderr),
-    )
-}
-
-/// So many hourly rows from 2017-06-01 00:00 in Rome, each as `row` writes it.
-fn rows(count: i64, row: impl Fn(jiff::civil::DateTime, f64) -> String) -> String {
-    let start = jiff::civil::date(2017, 6, 1).at(0, 0, 0, 0);
-    let rows = (0..count).map(|hour| {
-        let time = start
-            .checked_add(jiff::SignedDuration::from_hours(hour))
-            .unwrap();
-        row(time, 0.5 * hour as f64)
-    });
-    rows.collect()
-}
+use std::path::Path;
+use std::process::{Command, Stdio};
 
 /// Semicolons, decimal commas, date and time in two columns, and a remark now and then.
 fn of_the_office(count: i64) -> String {
@@ -122,11 +23,6 @@ fn of_the_office(count: i64) -> String {
         format!("{day};{hour};{value};0,2;{remark}\n")
     });
     format!("Datum;Zeit;Prisma 1;Regen_mm;Bemerkung\n{body}")
-}
-
-fn plain(count: i64) -> String {
-    let body = rows(count, |time, value| format!("{time}+02:00,{value}\n"));
-    format!("time,P1_displacement_mm\n{body}")
 }
 
 const INIT: [&str; 6] = [
@@ -164,7 +60,7 @@ fn one_command_leads_from_a_file_of_the_office_to_a_watch_that_reads_it() {
         assert!(config.contains(line), "no {line:?} in {config}");
     }
     let daemon = office.run(&["run", "site.toml"]);
-    let status = office.status_until("2017-06-05 01:00");
+    let status = office.status_until("2017-06-05 03:00 CEST");
     assert!(!status.contains("NO DAEMON RUNS"), "{status}");
     let status = office.done(&["status", "--sources", "--config", "site.toml"]);
     assert!(
@@ -367,12 +263,6 @@ fn an_encoding_and_a_column_of_text_are_said_and_no_row_is_lost_by_them() {
     assert!(!said.contains("refused"), "{said}");
 }
 
-fn site(path: &str, more: &str) -> String {
-    format!(
-        "[site]\nname = \"Toc\"\nstate_dir = \"state\"\n[[source]]\nid = \"logger\"\nkind = \"csv\"\npath = {path:?}\n{more}"
-    )
-}
-
 #[test]
 fn check_exits_1_where_a_benchmark_is_fed_by_nothing_and_says_what_the_files_have() {
     let typing_error = "[[benchmark]]\nid = \"P2\"\n";
@@ -567,14 +457,14 @@ fn every_command_of_the_page_on_the_first_site_does_what_it_says() {
             office.status_until("P1");
             continue;
         }
-        let (exit, out, err) = told(&shell(line).output().unwrap());
+        let (exit, out, err) = ended(&shell(line).output().unwrap());
         // A machine may be doubtful; that is no fault of the command.
         let is_doctor = line.starts_with("slipwatch doctor ");
         assert!(
             exit == 0 || is_doctor && exit == 1,
             "{line}: {exit} {out}{err}"
         );
-        if line == "cat told.txt" {
+        if line == "cat hook.txt" {
             assert!(out.starts_with("Test: "), "{out}");
         }
     }

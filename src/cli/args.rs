@@ -135,7 +135,8 @@ impl FileArgs {
 /// Which readings, and what they mean: common to all commands that read some.
 #[derive(Debug, Clone, clap::Args)]
 pub struct ReadingArgs {
-    /// Readings, CSV, NDJSON, TOA5 or MCAP by the name's ending; a later file stands over an earlier one
+    /// Readings, CSV, NDJSON, TOA5 or MCAP by the name's ending; - reads stdin, by how it begins; a later file stands over an
+    /// earlier one
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
     /// Take this benchmark only

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// Exits 1 where a benchmark is fed by no file: it would go unwatched.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// The site's config
+    /// The site's config; - reads stdin, with paths from the working folder
     #[arg(value_name = "CONFIG")]
     config: PathBuf,
     /// Look at the config alone, not at the files: for a service that must start while a logger is silent
@@ -71,7 +71,7 @@ pub(super) fn check(file: &Path, output: OutputArgs, looks_at_files: bool) -> an
                 writeln!(stdout, "{}{summary}", if is_fed { "" } else { "not " })?;
                 if let Some(preview) = &preview {
                     let zone = config::load(file)?.site.time_zone;
-                    write!(stdout, "{}", text::told(preview, &zone))?;
+                    write!(stdout, "{}", text::shown(preview, &zone))?;
                 }
             }
             stdout.flush()?;

@@ -1,5 +1,6 @@
 //! The exit codes, which error has which, and how an error is said.
 
+use super::doctor::AsUser;
 use crate::config::ConfigError;
 use crate::model::LawError;
 use crate::reading::{MergeError, SelectError};
@@ -34,7 +35,7 @@ const NOT_RUN: u8 = 126;
 #[error("{0}")]
 pub(super) struct UsageError(pub(super) String);
 
-/// Writes a line to stderr; nobody can be told when that fails.
+/// Writes a line to stderr; nothing can be done when that fails.
 pub(super) fn complain(what: &dyn Display) {
     let _ = writeln!(io::stderr(), "{what}");
 }
@@ -74,6 +75,9 @@ fn code_of(error: &(dyn Error + 'static)) -> Option<u8> {
             ReplayError::Output(_) | ReplayError::State(_) => IO,
             ReplayError::Interrupted | ReplayError::Undelivered => TROUBLE,
         });
+    }
+    if let Some(error) = error.downcast_ref::<AsUser>() {
+        return error.1;
     }
     let table = [
         (error.is::<UsageError>() || error.is::<LawError>(), USAGE),

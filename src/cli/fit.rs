@@ -13,6 +13,9 @@ use crate::runtime::clock::Stopwatch;
 use serde::Serialize;
 use std::fmt::Write as _;
 
+/// From this difference of two chances of m > 1 on, it is explained.
+const DISAGREE: f64 = 0.5;
+
 /// Invert a benchmark's readings: the law's parameters, the regime, the failure time
 ///
 /// Several benchmarks are inverted one by one, and then asked which of them fail together, and when.
@@ -124,6 +127,7 @@ fn text(report: &FitReport) -> String {
     out.push_str(&summary(report).to_string());
     out.push('\n');
     out.push_str(&parameters(report).to_string());
+    out.push_str(&notes(report));
     if !report.alternatives.0.is_empty() {
         out.push('\n');
         out.push_str(&alternatives(report).to_string());
@@ -135,7 +139,7 @@ fn summary(report: &FitReport) -> Table {
     let percent = |share: Option<f64>| {
         share.map_or("-".to_owned(), |share| format!("{:.0} %", 100.0 * share))
     };
-    let told = |regime: &RegimeReport| {
+    let shown = |regime: &RegimeReport| {
         format!(
             "{} (unstable {}, accelerating {})",
             regime.label,
@@ -146,9 +150,9 @@ fn summary(report: &FitReport) -> Table {
     let failure = &report.failure_time;
     let line = &report.inverse_velocity;
     let mut table = Table::plain();
-    table.row(["regime".to_owned(), told(&report.regime)]);
+    table.row(["regime".to_owned(), shown(&report.regime)]);
     if let Some(regime) = &report.regime_under_load {
-        table.row(["  if the load changes".to_owned(), told(regime)]);
+        table.row(["  if the load changes".to_owned(), shown(regime)]);
     }
     table.row(["  other priors".to_owned(), other_priors(report)]);
     table.row([
@@ -192,6 +196,36 @@ fn summary(report: &FitReport) -> Table {
     table
 }
 
+/// What needs an explanation where the report has it.
+fn notes(report: &FitReport) -> String {
+    let mut out = String::new();
+    if estimates(report).iter().any(|(_, one, _)| is_outside(one)) {
+        out.push_str(
+            "*  outside of its interval. The best fit is the one law of constant load with the least squares; the\n   \
+             interval bounds 90 % of all laws that fit the readings within their noise. Where many different laws fit\n   \
+             (see the minima below), the best one may be an extreme among them: go by the interval.\n",
+        );
+    }
+    let unstable = |regime: &RegimeReport| regime.probability_unstable;
+    let under_load = report.regime_under_load.as_ref();
+    if let (Some(constant), Some(load)) = (unstable(&report.regime), under_load.and_then(unstable))
+        && (constant - load).abs() > DISAGREE
+    {
+        out.push_str(
+            "The two regimes differ: the first takes the load for constant over the whole record, the second does not.\n\
+             One of them may be wrong; the monitor goes by the second.\n",
+        );
+    }
+    out
+}
+
+/// Whether the best fit lies outside of the interval.
+fn is_outside(estimate: &Estimate) -> bool {
+    estimate.best.is_some_and(|best| {
+        estimate.low.is_some_and(|low| best < low) || estimate.high.is_some_and(|high| best > high)
+    })
+}
+
 /// How far the chance of m > 1 and the law's own failure time hang on the prior.
 fn other_priors(report: &FitReport) -> String {
     let all = &report.prior_sensitivity;
@@ -212,7 +246,9 @@ fn other_priors(report: &FitReport) -> String {
     )
 }
 
-fn parameters(report: &FitReport) -> Table {
+type Row<'a> = (&'static str, &'a Estimate, String);
+
+fn estimates(report: &FitReport) -> [Row<'_>; 9] {
     let velocity = match report.unit {
         unit @ Unit::Rate(..) => unit.to_string(),
         unit @ Unit::Length(_) => format!("{unit}/day"),
@@ -221,7 +257,7 @@ fn parameters(report: &FitReport) -> Table {
         Unit::Length(length) | Unit::Rate(length, _) => length.symbol(),
     };
     let p = &report.parameters;
-    let rows: [(&str, &Estimate, &str); 9] = [
+    let rows = [
         ("m", &p.m, ""),
         ("x_i", &p.x_i, ""),
         ("T", &p.t_unit_days, "days"),
@@ -232,14 +268,19 @@ fn parameters(report: &FitReport) -> Table {
         ("r", &p.r_per_day, "1/day"),
         ("kappa", &p.kappa_per_day, "1/day"),
     ];
+    rows.map(|(name, estimate, unit)| (name, estimate, unit.to_owned()))
+}
+
+fn parameters(report: &FitReport) -> Table {
     let mut table = Table::headed(["parameter", "best fit", "5 %", "95 %", "unit"]);
-    for (name, estimate, unit) in rows {
+    for (name, estimate, unit) in estimates(report) {
+        let mark = if is_outside(estimate) { " *" } else { "" };
         table.row([
             name.to_owned(),
-            number(estimate.best),
+            number(estimate.best) + mark,
             number(estimate.low),
             number(estimate.high),
-            unit.to_owned(),
+            unit,
         ]);
     }
     table

@@ -30,7 +30,7 @@ pub(super) struct Test {
     /// The site whose hooks are run
     #[arg(long, value_name = "CONFIG")]
     config: PathBuf,
-    /// Only the hooks for this level, of which they are told; default is every hook, told of its gravest
+    /// Only the hooks for this level, run with it; default is every hook, run with its gravest
     #[arg(long, value_name = "LEVEL", value_parser = level)]
     level: Option<Level>,
     #[command(flatten)]
@@ -50,7 +50,7 @@ pub(super) struct Exec {
 /// A hook that did not take the drill.
 #[derive(Debug, thiserror::Error)]
 enum Failed {
-    /// Nobody would be told.
+    /// No hook would be run.
     #[error("no hook asks for {0}")]
     None(String),
     /// So many of them.
@@ -94,18 +94,18 @@ fn test(args: &Test) -> anyhow::Result<()> {
     let mut config = config::load(&args.config)?;
     config.wall_in_hooks(Path::new(OURSELVES));
     let now = clock::now();
-    let told: Vec<(&HookConfig, Level)> = config
+    let asked: Vec<(&HookConfig, Level)> = config
         .hooks
         .iter()
         .filter_map(|hook| Some((hook, of_hook(hook, args.level)?)))
         .collect();
-    if told.is_empty() {
+    if asked.is_empty() {
         let level = args.level.map_or("any level", Level::name);
         return Err(Failed::None(level.to_owned()).into());
     }
     let mut hooks = Vec::new();
     let runtime = asynchronous()?;
-    for (hook, level) in told {
+    for (hook, level) in asked {
         let Some(alert) = drill(&config, hook, level, now) else {
             continue;
         };
@@ -127,11 +127,11 @@ fn test(args: &Test) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The level that the hook is told of; `None` where it is not asked.
+/// The level that the hook is run with; `None` where it does not ask for any.
 fn of_hook(hook: &HookConfig, wanted: Option<Level>) -> Option<Level> {
     match wanted {
         Some(level) => hook.levels.contains(&level).then_some(level),
-        // What the monitor cannot tell is no level of the slope.
+        // Unknown is no level of the slope.
         None => {
             (hook.levels.iter().copied()).max_by_key(|level| (*level != Level::Unknown, *level))
         }

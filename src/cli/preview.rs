@@ -1,5 +1,6 @@
 //! What a site's files hold, for people.
 
+use super::text::clock;
 use crate::reading::Timestamp;
 use crate::runtime::ingest::Meaning;
 use crate::runtime::preview::{BenchmarkView, ColumnView, CovariateView, Preview, SourceView};
@@ -8,16 +9,16 @@ use jiff::tz::TimeZone;
 use std::fmt::Write as _;
 
 /// The sources with their columns, the benchmarks and the covariates.
-pub(super) fn told(preview: &Preview, zone: &TimeZone) -> String {
+pub(super) fn shown(preview: &Preview, zone: &TimeZone) -> String {
     let mut text = String::new();
     for source in &preview.sources {
-        tell_source(&mut text, source);
+        source_lines(&mut text, source);
     }
     for benchmark in &preview.benchmarks {
-        tell_benchmark(&mut text, benchmark, zone);
+        benchmark_lines(&mut text, benchmark, zone);
     }
     for covariate in &preview.covariates {
-        tell_covariate(&mut text, covariate);
+        covariate_line(&mut text, covariate);
     }
     for id in &preview.unwatched {
         let _ = writeln!(
@@ -31,7 +32,7 @@ pub(super) fn told(preview: &Preview, zone: &TimeZone) -> String {
     text
 }
 
-fn tell_source(text: &mut String, source: &SourceView) {
+fn source_lines(text: &mut String, source: &SourceView) {
     let SourceView {
         id,
         kind,
@@ -90,7 +91,7 @@ fn meaning(column: &ColumnView) -> String {
     }
 }
 
-fn tell_benchmark(text: &mut String, benchmark: &BenchmarkView, zone: &TimeZone) {
+fn benchmark_lines(text: &mut String, benchmark: &BenchmarkView, zone: &TimeZone) {
     let BenchmarkView {
         id,
         source,
@@ -126,11 +127,10 @@ fn there(time: Timestamp, zone: &TimeZone) -> String {
     if *zone == TimeZone::UTC {
         return String::new();
     }
-    let local = time.to_zoned(zone.clone());
-    local.strftime(" (%Y-%m-%d %H:%M %Z)").to_string()
+    format!(" ({})", clock(time, zone))
 }
 
-fn tell_covariate(text: &mut String, covariate: &CovariateView) {
+fn covariate_line(text: &mut String, covariate: &CovariateView) {
     let CovariateView {
         name,
         unit,

@@ -12,6 +12,7 @@ use crate::runtime::sandbox::OURSELVES;
 use crate::runtime::shutdown::Shutdown;
 use crate::store::Store;
 use anyhow::Context;
+use jiff::tz::TimeZone;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -37,11 +38,18 @@ pub(super) struct Args {
     /// Stop at this time of the data
     #[arg(long, value_name = "TIME", value_parser = value::instant)]
     until: Option<Timestamp>,
-    /// Run the hooks of --config, told that it is an exercise
+    /// Run the hooks of --config, marked as an exercise
     #[arg(long, requires = "config")]
     hooks: bool,
     #[command(flatten)]
     output: OutputArgs,
+}
+
+/// How events are printed.
+struct Look {
+    format: Format,
+    /// By whose clocks text gives times.
+    zone: TimeZone,
 }
 
 /// Replays the files and prints the events.
@@ -77,10 +85,16 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         pace: args.speed,
         until: args.until,
     };
+    let look = Look {
+        format: args.output.format,
+        zone: config
+            .as_ref()
+            .map_or(TimeZone::UTC, |config| config.site.time_zone.clone()),
+    };
     let mut stdout = io::stdout().lock();
     asynchronous()?.block_on(async {
         let shutdown = Shutdown::on_signals().context("cannot listen for signals")?;
-        let mut print = |event: &Event| print(&mut stdout, event, args.output.format);
+        let mut print = |event: &Event| print(&mut stdout, event, &look);
         replay::replay(&recording, &plan, shutdown, &mut print).await?;
         Ok(())
     })
@@ -103,12 +117,16 @@ fn run_state(args: &Args, folder: &Path) -> anyhow::Result<()> {
     }
     let is_wanted =
         |event: &Event| wanted.is_none() || event.benchmark.is_none() || event.benchmark == wanted;
+    let look = Look {
+        format: args.output.format,
+        zone: TimeZone::UTC,
+    };
     let mut stdout = io::stdout().lock();
     asynchronous()?.block_on(async {
         let shutdown = Shutdown::on_signals().context("cannot listen for signals")?;
         let mut print = |event: &Event| {
             if is_wanted(event) {
-                print(&mut stdout, event, args.output.format)?;
+                print(&mut stdout, event, &look)?;
             }
             Ok(())
         };
@@ -143,10 +161,10 @@ pub(super) fn events(
     Ok(events)
 }
 
-fn print(out: &mut impl Write, event: &Event, format: Format) -> io::Result<()> {
-    let line = match format {
+fn print(out: &mut impl Write, event: &Event, look: &Look) -> io::Result<()> {
+    let line = match look.format {
         Format::Json => serde_json::to_string(event)?,
-        Format::Text => text::line(event),
+        Format::Text => text::line(event, &look.zone),
     };
     writeln!(out, "{line}")
 }

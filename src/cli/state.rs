@@ -53,7 +53,7 @@ pub(super) struct EventsArgs {
     follow: bool,
 }
 
-/// List the alerts in force, or say that they are seen, or that they are not to be told for a time
+/// List the alerts in force, acknowledge them, or have no hook run for a time
 #[derive(Debug, clap::Args)]
 pub(super) struct AlertsArgs {
     #[command(subcommand)]
@@ -78,7 +78,7 @@ enum Action {
         #[command(flatten)]
         site: SiteArgs,
     },
-    /// Do not tell of the level in force at a benchmark, or a lower one; a higher one is told at once
+    /// Run no hook for the level in force at a benchmark or a lower one; for a higher one they are run at once
     Shelve {
         /// Where
         #[arg(long, value_name = "ID")]
@@ -94,7 +94,8 @@ enum Action {
         #[command(flatten)]
         site: SiteArgs,
     },
-    /// Tell again, from now on, of what was silenced or shelved
+    /// Run the hooks again, from now on, for what was silenced or shelved; what is in force is sent then
+    #[command(visible_alias = "unshelve")]
     Unsilence {
         /// Where; default is everywhere
         #[arg(long, value_name = "ID")]
@@ -102,7 +103,7 @@ enum Action {
         #[command(flatten)]
         site: SiteArgs,
     },
-    /// Tell of nothing, red neither; what is in force at the end is told then
+    /// Run no hook, not for red either; what is in force at the end, or has ended meanwhile, is sent then
     Silence {
         /// Where; default is everywhere
         #[arg(long, value_name = "ID")]
@@ -145,37 +146,30 @@ pub(super) type InForce = BTreeMap<(Option<BenchmarkId>, Level), Event>;
 /// The alerts in force: by benchmark and level, of each benchmark the highest, and `unknown` beside it.
 pub(super) fn in_force(store: &Store) -> anyhow::Result<InForce> {
     let mut standing = InForce::new();
-    let mut after = 0;
-    loop {
-        let events = store.events(after, Some("alert"), None)?;
-        let Some((last, _)) = events.last() else {
-            return Ok(standing);
+    for event in every(store, "alert")? {
+        let EventKind::Alert { level, state, .. } = &event.kind else {
+            continue;
         };
-        after = *last;
-        for (_, body) in &events {
-            let event: Event = serde_json::from_str(body)?;
-            let EventKind::Alert { level, state, .. } = &event.kind else {
-                continue;
-            };
-            let (level, state, place) = (*level, *state, event.benchmark.clone());
-            match state {
-                AlertState::Firing => {
-                    standing.retain(|(own, lower), _| {
-                        *own != place || (*lower == Level::Unknown) != (level == Level::Unknown)
-                    });
-                    standing.insert((place, level), event);
-                }
-                AlertState::Resolved => {
-                    standing.remove(&(place, level));
-                }
+        let (level, state, place) = (*level, *state, event.benchmark.clone());
+        match state {
+            AlertState::Firing => {
+                standing.retain(|(own, lower), _| {
+                    *own != place || (*lower == Level::Unknown) != (level == Level::Unknown)
+                });
+                standing.insert((place, level), event);
+            }
+            AlertState::Resolved => {
+                standing.remove(&(place, level));
             }
         }
     }
+    Ok(standing)
 }
 
 /// Prints events.
 pub(super) fn events(args: &EventsArgs) -> anyhow::Result<()> {
-    let (_, store) = args.site.open()?;
+    let (config, store) = args.site.open()?;
+    let zone = &config.site.time_zone;
     let mut stdout = std::io::stdout().lock();
     let mut after = 0;
     loop {
@@ -184,7 +178,9 @@ pub(super) fn events(args: &EventsArgs) -> anyhow::Result<()> {
             after = *seq;
             match args.site.output.format {
                 Format::Json => writeln!(stdout, "{body}")?,
-                Format::Text => writeln!(stdout, "{}", text::line(&serde_json::from_str(body)?))?,
+                Format::Text => {
+                    writeln!(stdout, "{}", text::line(&serde_json::from_str(body)?, zone))?;
+                }
             }
         }
         if events.is_empty() {
@@ -253,30 +249,35 @@ pub(super) fn alerts(args: &AlertsArgs) -> anyhow::Result<()> {
 fn limit(span: SignedDuration, longest: SignedDuration) -> anyhow::Result<()> {
     if span > longest {
         let hours = longest.as_hours();
-        let told =
+        let text =
             format!("--for {span:#} is too long: {hours}h at most, then give the order again");
-        return Err(UsageError(told).into());
+        return Err(UsageError(text).into());
     }
     Ok(())
 }
 
 /// Every order that was taken, oldest first.
 pub(super) fn orders(store: &Store) -> anyhow::Result<Vec<Event>> {
-    let mut orders = Vec::new();
+    every(store, "order")
+}
+
+/// Every event of a kind, oldest first.
+pub(super) fn every(store: &Store, kind: &str) -> anyhow::Result<Vec<Event>> {
+    let mut all = Vec::new();
     let mut after = 0;
     loop {
-        let events = store.events(after, Some("order"), None)?;
+        let events = store.events(after, Some(kind), None)?;
         let Some((last, _)) = events.last() else {
-            return Ok(orders);
+            return Ok(all);
         };
         after = *last;
         for (_, body) in &events {
-            orders.push(serde_json::from_str(body)?);
+            all.push(serde_json::from_str(body)?);
         }
     }
 }
 
-/// The orders in force by which alerts are not told, as they were given.
+/// The orders in force by which no hook is run, as they were given.
 pub(super) fn silences(orders: &[Event]) -> Vec<Event> {
     let now = clock::now();
     let mut standing: Vec<Event> = Vec::new();
@@ -322,7 +323,7 @@ fn redeliver(site: &SiteArgs) -> anyhow::Result<()> {
 }
 
 fn list(site: &SiteArgs) -> anyhow::Result<()> {
-    let (_, store) = site.open()?;
+    let (config, store) = site.open()?;
     let mut stdout = std::io::stdout().lock();
     let (in_force, orders) = (in_force(&store)?, orders(&store)?);
     let mut standing = silences(&orders);
@@ -332,7 +333,7 @@ fn list(site: &SiteArgs) -> anyhow::Result<()> {
     for event in &standing {
         match site.output.format {
             Format::Json => writeln!(stdout, "{}", serde_json::to_string(event)?)?,
-            Format::Text => writeln!(stdout, "{}", text::line(event))?,
+            Format::Text => writeln!(stdout, "{}", text::line(event, &config.site.time_zone))?,
         }
     }
     Ok(())

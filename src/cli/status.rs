@@ -1,16 +1,18 @@
 //! `status`: how a site stands, with or without a running daemon.
 
-use super::preview::told;
-use super::state::{InForce, SiteArgs, acknowledged, in_force, orders, silences};
+use super::preview::shown;
+use super::state::{InForce, SiteArgs, acknowledged, every, in_force, orders, silences};
 use super::table::Table;
 use super::text;
 use crate::alert::Level;
-use crate::monitor::{Event, EventKind};
+use crate::monitor::{Event, EventKind, SUSPECT, SUSPECT_ENDS};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::preview::{Preview, preview};
 use crate::store::Store;
+use jiff::tz::TimeZone;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 
 /// Say what a site's benchmarks do: level, regime, failure time, newest reading
 #[derive(Debug, clap::Args)]
@@ -30,7 +32,7 @@ struct Standing {
     level: Level,
     /// Since when.
     since: Option<Timestamp>,
-    /// Since when the monitor cannot tell: no data, a sensor fault.
+    /// Since when nothing can be said of it: no data, a sensor fault.
     unknown_since: Option<Timestamp>,
     /// Whether nothing can be said of it now; so it is before its first reading.
     is_unknown: bool,
@@ -39,6 +41,12 @@ struct Standing {
     velocity_mm_per_day: Option<f64>,
     failure_time: Option<Timestamp>,
     chance_within_evacuation_time: Option<f64>,
+    /// Why it is at its level.
+    reason: Option<String>,
+    /// Why nothing can be said of it.
+    unknown_reason: Option<String>,
+    /// What its readings hardly mean.
+    suspicions: Vec<String>,
 }
 
 #[derive(Debug, Serialize)]
@@ -56,8 +64,10 @@ struct SiteStatus {
     alerts: Vec<Event>,
     /// Acknowledgements of them.
     acknowledged: Vec<Event>,
-    /// The orders by which alerts are not told.
+    /// The orders by which no hook is run.
     silences: Vec<Event>,
+    /// Lines, records and files that could not be used, a source.
+    quarantined: BTreeMap<String, u64>,
     /// What the files hold, where that was asked for.
     preview: Option<Preview>,
 }
@@ -73,6 +83,7 @@ pub(super) fn status(args: &StatusArgs) -> anyhow::Result<()> {
             refits.insert(benchmark, event.kind);
         }
     }
+    let suspicions = suspicions(&store)?;
     let mut newest: BTreeMap<BenchmarkId, Option<Timestamp>> = BTreeMap::new();
     newest.extend(config.benchmarks.iter().map(|one| (one.id.clone(), None)));
     let read = store.benchmarks()?.into_iter();
@@ -88,6 +99,9 @@ pub(super) fn status(args: &StatusArgs) -> anyhow::Result<()> {
             velocity_mm_per_day: None,
             failure_time: None,
             chance_within_evacuation_time: None,
+            reason: None,
+            unknown_reason: None,
+            suspicions: suspicions.get(&benchmark).cloned().unwrap_or_default(),
             benchmark,
         };
         stands(standing, &levels, &refits)
@@ -104,13 +118,14 @@ pub(super) fn status(args: &StatusArgs) -> anyhow::Result<()> {
         is_running: Store::is_held(&config.site.state_dir),
         acknowledged: acknowledged(&orders, &levels),
         silences: silences(&orders),
+        quarantined: store.quarantined()?,
         alerts: levels.into_values().collect(),
         preview,
     };
     args.site.output.print(&status, |status| {
         let preview = status.preview.as_ref();
-        let files = preview.map_or_else(String::new, |preview| told(preview, &zone));
-        status_text(status) + &files
+        let files = preview.map_or_else(String::new, |preview| shown(preview, &zone));
+        status_text(status, &zone) + &files
     })
 }
 
@@ -123,10 +138,17 @@ fn stands(
         if place.as_ref() != Some(&standing.benchmark) {
             continue;
         }
+        let reason = if let EventKind::Alert { text, .. } = &event.kind {
+            Some(text.clone())
+        } else {
+            None
+        };
         if *level == Level::Unknown {
             (standing.unknown_since, standing.is_unknown) = (Some(event.time), true);
+            standing.unknown_reason = reason;
         } else {
             (standing.level, standing.since) = (*level, Some(event.time));
+            standing.reason = reason;
         }
     }
     if let Some(EventKind::Refit {
@@ -145,7 +167,30 @@ fn stands(
     standing
 }
 
-fn status_text(status: &SiteStatus) -> String {
+/// The suspicions that have not ended, by benchmark.
+fn suspicions(store: &Store) -> anyhow::Result<BTreeMap<BenchmarkId, Vec<String>>> {
+    let mut open: BTreeMap<(BenchmarkId, String), String> = BTreeMap::new();
+    for event in every(store, "fault")? {
+        let (Some(benchmark), EventKind::Fault { kind, text }) = (event.benchmark, event.kind)
+        else {
+            continue;
+        };
+        if !kind.starts_with(SUSPECT) {
+            continue;
+        }
+        match kind.strip_suffix(SUSPECT_ENDS) {
+            Some(begun) => open.remove(&(benchmark, begun.to_owned())),
+            None => open.insert((benchmark, kind), text),
+        };
+    }
+    let mut all: BTreeMap<BenchmarkId, Vec<String>> = BTreeMap::new();
+    for ((benchmark, _), text) in open {
+        all.entry(benchmark).or_default().push(text);
+    }
+    Ok(all)
+}
+
+fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
     let mut table = Table::headed([
         "benchmark",
         "level",
@@ -156,7 +201,8 @@ fn status_text(status: &SiteStatus) -> String {
         "failure (median)",
         "chance",
     ]);
-    let time = |time: Option<Timestamp>| time.map_or_else(|| "-".to_owned(), text::minute);
+    let clock = |time: Timestamp| text::clock(time, zone);
+    let time = |time: Option<Timestamp>| time.map_or_else(|| "-".to_owned(), clock);
     for one in &status.benchmarks {
         let velocity = one
             .velocity_mm_per_day
@@ -165,7 +211,7 @@ fn status_text(status: &SiteStatus) -> String {
             text::plain(one.benchmark.as_str()),
             match one.unknown_since {
                 Some(since) if one.since.is_some() => {
-                    format!("{}, unknown since {}", one.level, text::minute(since))
+                    format!("{}, unknown since {}", one.level, clock(since))
                 }
                 _ if one.is_unknown => format!("{}, unknown", one.level),
                 _ => one.level.to_string(),
@@ -181,7 +227,7 @@ fn status_text(status: &SiteStatus) -> String {
     let lines = |events: &[Event]| -> String {
         events
             .iter()
-            .map(|event| text::line(event) + "\n")
+            .map(|event| text::line(event, zone) + "\n")
             .collect()
     };
     let dead = if status.is_running {
@@ -189,13 +235,26 @@ fn status_text(status: &SiteStatus) -> String {
     } else {
         "NO DAEMON RUNS: nothing is watched; what follows is as of its last reading\n"
     };
+    let mut refused = String::new();
+    for (source, count) in &status.quarantined {
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            refused,
+            "source {source}: lines, records and files that could not be used: {count}; \
+             status --sources shows the first of each kind"
+        );
+    }
+    let suspicions = status.benchmarks.iter().flat_map(|one| &one.suspicions);
+    let suspicions: String = suspicions
+        .map(|one| text::local(&text::plain(one), zone) + "\n")
+        .collect();
     let force = match &status.alerts[..] {
         [] => String::new(),
         alerts => format!("\nin force:\n{}", lines(alerts)),
     };
     format!(
-        "{dead}{}: {} inputs taken, {} alerts wait for a hook\n{}{}\n{table}\
-         chance: of passing the critical velocity within the evacuation time\n{force}",
+        "{dead}{}: {} inputs taken, {} alerts wait for a hook\n{}{}{refused}{suspicions}\n{table}\
+         chance: of a collapse within the evacuation time\n{force}",
         text::plain(&status.site),
         status.steps,
         status.alerts_waiting,

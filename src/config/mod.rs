@@ -26,8 +26,10 @@ use crate::reading::{BenchmarkId, Conventions, Dialect, Quantity, Unit};
 use jiff::SignedDuration;
 use problem::Notebook;
 use std::cell::RefCell;
+use std::io;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 use std::time::Duration;
 use table::Section;
 
@@ -157,11 +159,21 @@ pub struct HookConfig {
 /// # Errors
 /// [`ConfigError`] when it cannot be read, or with every problem found in it.
 pub fn load(file: &Path) -> Result<Config, ConfigError> {
-    let text = std::fs::read_to_string(file).map_err(|source| ConfigError::Unreadable {
+    let text = read(file).map_err(|source| ConfigError::Unreadable {
         file: file.to_owned(),
         source,
     })?;
     parse(&text, file)
+}
+
+/// The text of the file; `-` is stdin, which is read once.
+fn read(file: &Path) -> io::Result<String> {
+    static STDIN: OnceLock<Result<String, io::ErrorKind>> = OnceLock::new();
+    if file.as_os_str() != "-" {
+        return std::fs::read_to_string(file);
+    }
+    let all = STDIN.get_or_init(|| io::read_to_string(io::stdin()).map_err(|error| error.kind()));
+    all.clone().map_err(Into::into)
 }
 
 /// Reads a site file's `text`; relative paths in it start at the folder of `file`.

@@ -4,7 +4,7 @@ use super::table::{Placed, Section};
 use super::{Benchmark, Config, HookConfig, SiteConfig, alert, declared, source, value, vector};
 use crate::alert::{Level, Policy};
 use crate::monitor::{Explain, Settings, SiteLevel, Watched};
-use crate::reading::{BenchmarkId, Quantity, Unit};
+use crate::reading::{BenchmarkId, Quantity, Suspicion, Unit};
 use jiff::SignedDuration;
 use jiff::tz::TimeZone;
 use std::collections::{BTreeMap, BTreeSet};
@@ -52,11 +52,12 @@ pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
         benchmarks,
         settings: Settings {
             policy,
-            benchmarks: own,
+            benchmarks: own.policies,
             explain,
             watched,
             declared,
             site: Some(site_level),
+            accepted: own.accepted,
         },
         hooks,
         warnings: Vec::new(),
@@ -162,10 +163,15 @@ fn watched(sources: &[&str], benchmarks: &[Benchmark]) -> Watched {
     }
 }
 
-type Own = BTreeMap<BenchmarkId, Policy>;
+/// What `[[benchmark]]` says of single ones to the monitor.
+#[derive(Debug, Default)]
+struct Own {
+    policies: BTreeMap<BenchmarkId, Policy>,
+    accepted: BTreeMap<BenchmarkId, BTreeSet<Suspicion>>,
+}
 
 fn benchmarks(root: &mut Section<'_>, sources: &[&str], policy: &Policy) -> (Vec<Benchmark>, Own) {
-    let (mut taken, mut own, mut benchmarks) = (BTreeSet::new(), Own::new(), Vec::new());
+    let (mut taken, mut own, mut benchmarks) = (BTreeSet::new(), Own::default(), Vec::new());
     for mut section in root.tables("benchmark", "benchmark") {
         let id = section.required("id", "\"5\"");
         unique(&section, id.as_ref(), &mut taken);
@@ -174,13 +180,44 @@ fn benchmarks(root: &mut Section<'_>, sources: &[&str], policy: &Policy) -> (Vec
             .then(|| alert::policy(section.table("alert", "benchmark.alert"), policy));
         // Asked for in any case, so that it is among the known keys.
         section.table("alert", "benchmark.alert");
+        let accepted = accepted(&mut section);
         let benchmark = benchmark(section, id, sources);
-        if let (Some(benchmark), Some(policy)) = (&benchmark, policy) {
-            own.insert(benchmark.id.clone(), policy);
+        if let Some(benchmark) = &benchmark {
+            let id = &benchmark.id;
+            own.policies
+                .extend(policy.map(|policy| (id.clone(), policy)));
+            let some = (!accepted.is_empty()).then_some(accepted);
+            own.accepted
+                .extend(some.map(|accepted| (id.clone(), accepted)));
         }
         benchmarks.extend(benchmark);
     }
     (benchmarks, own)
+}
+
+/// The suspicions that people have looked into.
+fn accepted(section: &mut Section<'_>) -> BTreeSet<Suspicion> {
+    let words = section
+        .texts("accept")
+        .map_or_else(Vec::new, |given| given.value);
+    let known = |word: &str| Suspicion::ALL.into_iter().find(|one| one.name() == word);
+    let mut accepted = BTreeSet::new();
+    for word in words {
+        match known(&word.value) {
+            Some(kind) => {
+                accepted.insert(kind);
+            }
+            None => section.error(
+                &word.at,
+                format!(
+                    "benchmark.accept has {:?}, which is no suspicion",
+                    word.value
+                ),
+                format!("write {}", Suspicion::ALL.map(Suspicion::name).join(", ")),
+            ),
+        }
+    }
+    accepted
 }
 
 fn benchmark(

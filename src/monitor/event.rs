@@ -178,6 +178,11 @@ pub enum EventKind {
     Summary(Summary),
 }
 
+/// How the kind of a fault begins that says a suspicion of readings, and how that of its end ends.
+pub const SUSPECT: &str = "suspect-";
+/// See [`SUSPECT`].
+pub const SUSPECT_ENDS: &str = "-ends";
+
 impl EventKind {
     /// Every word that [`EventKind::name`] may give.
     pub const NAMES: [&str; 14] = [

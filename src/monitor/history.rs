@@ -300,6 +300,16 @@ impl History {
         }
     }
 
+    /// The newest `most` readings as they were read, in `unit`, but for what is declared to be no motion.
+    pub(super) fn as_read(&self, unit: Unit, most: usize) -> Vec<(Timestamp, f64)> {
+        let values = &self.observations.values;
+        let newest = &values[values.len().saturating_sub(most)..];
+        let read = newest
+            .iter()
+            .filter_map(|one| Some((self.time(one.t_days)?, one.value / unit.factor())));
+        read.collect()
+    }
+
     /// Whether a reading has the value of the newest one, or one of a sensor that stands at the end of its range, and
     /// comes after it.
     pub(super) fn is_repeated_by(&self, source: Source, reading: &Reading) -> bool {

@@ -20,8 +20,8 @@ mod track;
 
 pub use declared::{Declaration, Declared};
 pub use event::{
-    AlertState, Event, EventKind, FailureTime, InverseVelocity, Plain, RegimeReport, SharedFailure,
-    Summary, Unexplained,
+    AlertState, Event, EventKind, FailureTime, InverseVelocity, Plain, RegimeReport, SUSPECT,
+    SUSPECT_ENDS, SharedFailure, Summary, Unexplained,
 };
 pub use notice::{CLOCK_FAULT, Notice};
 pub use order::Order;
@@ -31,7 +31,7 @@ pub use site::SiteLevel;
 pub(crate) use track::recent;
 
 use crate::alert::{Level, Policy};
-use crate::reading::{BenchmarkId, Reading, Sample, Timestamp, Unit};
+use crate::reading::{BenchmarkId, Reading, Sample, Suspicion, Timestamp, Unit};
 use awaited::Awaited;
 use covariates::Covariates;
 use declared::Declarations;
@@ -112,6 +112,9 @@ pub struct Settings {
     /// How the benchmarks' levels make one of the whole site; `None`: there is none.
     #[serde(default)]
     pub site: Option<SiteLevel>,
+    /// Suspicions that people have looked into, and that do not hold.
+    #[serde(default)]
+    pub accepted: BTreeMap<BenchmarkId, BTreeSet<Suspicion>>,
 }
 
 /// The benchmarks that are watched.
@@ -158,6 +161,11 @@ impl Settings {
     /// The policy in force for a benchmark.
     pub fn policy(&self, benchmark: &BenchmarkId) -> &Policy {
         self.benchmarks.get(benchmark).unwrap_or(&self.policy)
+    }
+
+    /// The suspicions of a benchmark that do not hold.
+    fn accepted(&self, benchmark: &BenchmarkId) -> BTreeSet<Suspicion> {
+        self.accepted.get(benchmark).cloned().unwrap_or_default()
     }
 }
 
@@ -312,7 +320,9 @@ impl Monitor {
         let policy = self.settings.policy(benchmark);
         let track = self.tracks.entry(benchmark.clone()).or_insert_with(|| {
             let declared = Declarations::of(&self.settings.declared, benchmark);
-            Track::new(benchmark.clone(), source, reading.time, declared)
+            let mut track = Track::new(benchmark.clone(), source, reading.time, declared);
+            track.accept(now, self.settings.accepted(benchmark));
+            track
         });
         let before = track.deadline();
         let mut events = if reading.time > now {
@@ -375,6 +385,7 @@ impl Monitor {
         for (id, track) in &mut self.tracks {
             let declared = Declarations::of(&self.settings.declared, id);
             let before = track.deadline();
+            events.extend(track.accept(now, self.settings.accepted(id)));
             events.extend(track.redeclare(self.settings.policy(id), declared, &beside));
             moved.push(((before, track.deadline()), id.clone()));
         }

@@ -30,6 +30,15 @@ pub enum Notice {
         /// What time it is.
         time: Timestamp,
     },
+    /// The newest reading of a benchmark, of `time`, came while the host's clock said `clock`: perhaps ahead of it.
+    Came {
+        /// Whose.
+        benchmark: BenchmarkId,
+        /// When it was measured.
+        time: Timestamp,
+        /// What the clock said.
+        clock: Timestamp,
+    },
     /// The host's clock is wrong: readings that are known lie after it.
     ClockWrong {
         /// One line for a person.
@@ -62,6 +71,15 @@ impl Monitor {
                     self.changed.insert(benchmark.clone());
                 }
                 Vec::new()
+            }
+            Notice::Came {
+                benchmark,
+                time,
+                clock,
+            } => {
+                self.changed.insert(benchmark.clone());
+                let track = self.tracks.get_mut(benchmark);
+                track.map_or_else(Vec::new, |track| track.suspect_ahead(now, (*time, *clock)))
             }
             Notice::ClockWrong { text } => {
                 let since = *self.clock_wrong.get_or_insert(now);
@@ -143,6 +161,12 @@ impl Monitor {
     pub fn is_silent(&self, benchmark: &BenchmarkId) -> bool {
         let track = self.tracks.get(benchmark);
         track.is_some_and(Track::is_silent)
+    }
+
+    /// Whether the times of a benchmark's readings lie ahead of the clock.
+    pub fn is_ahead(&self, benchmark: &BenchmarkId) -> bool {
+        let track = self.tracks.get(benchmark);
+        track.is_some_and(Track::is_ahead)
     }
 
     /// Since when the host's clock is wrong.

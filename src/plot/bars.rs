@@ -20,7 +20,7 @@ pub struct Bar {
 /// Rows of bars on one axis.
 #[derive(Debug, Clone)]
 pub struct Bars {
-    /// For those who hear the picture.
+    /// For screen readers.
     pub description: String,
     /// Above it.
     pub title: String,

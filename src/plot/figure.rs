@@ -6,7 +6,7 @@ use super::{opened, width_of};
 /// Panels in rows of `columns`.
 #[derive(Debug, Clone)]
 pub struct Figure {
-    /// For those who hear the picture.
+    /// For screen readers.
     pub description: String,
     /// How many stand in a row.
     pub columns: usize,

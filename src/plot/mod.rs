@@ -46,7 +46,7 @@ pub fn escaped(text: &str) -> String {
         .replace('>', "&gt;")
 }
 
-/// The opening of a sheet: its size, its title for those who hear it, and a white ground.
+/// The opening of a sheet: its size, its title for screen readers, and a white ground.
 fn opened(width: f64, height: f64, description: &str) -> String {
     format!(
         r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}" font-family="DejaVu Sans, Verdana, sans-serif" font-size="{FONT}" fill="{BLACK}">

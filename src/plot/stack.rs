@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 /// Panels under one title; the axis stands under the last of them.
 #[derive(Debug, Clone)]
 pub struct Stack {
-    /// For those who hear the picture.
+    /// For screen readers.
     pub description: String,
     /// Above it.
     pub title: String,

@@ -7,6 +7,7 @@ mod conventions;
 mod dialect;
 mod recording;
 mod series;
+pub mod suspicion;
 mod unit;
 
 pub use conventions::{Conventions, LocalClock, MissingValues, SummerTime, TimeFault};
@@ -14,6 +15,7 @@ pub use dialect::{DecimalMark, Delimiter, Dialect, TimeFormat};
 pub use jiff::Timestamp;
 pub use recording::{MergeError, Recording, SelectError};
 pub use series::{Channel, Disorder, Reading, Sample, Series};
+pub use suspicion::Suspicion;
 pub use unit::{LengthUnit, Quantity, TimeUnit, Unit, UnitError};
 
 use serde::{Deserialize, Serialize};

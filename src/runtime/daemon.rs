@@ -50,6 +50,8 @@ pub struct Daemon {
     positions: Vec<Position>,
     /// Since the last commit.
     since_commit: Stopwatch,
+    /// Lines, records and files that could not be used, as the state has it.
+    quarantined: BTreeMap<String, u64>,
     /// How far the rows of the state have been looked at.
     verified: Verified,
 }
@@ -81,6 +83,7 @@ impl Daemon {
             is_up_to_date: false,
             positions: Vec::new(),
             since_commit: Stopwatch::start(),
+            quarantined: BTreeMap::new(),
             verified: Verified::default(),
         }
     }
@@ -156,7 +159,15 @@ impl Daemon {
         if self.is_up_to_date && !self.is_caught_up {
             self.is_caught_up = true;
             self.pulse.caught_up();
-            tracing::info!(counts = ?self.site.counts(), "caught up");
+            let counts = self.site.counts();
+            let quarantined: u64 = self.pulse.vitals.health().quarantined.values().sum();
+            tracing::info!(
+                taken = counts.taken,
+                repeated = counts.repeated,
+                from_the_future = counts.from_the_future,
+                quarantined,
+                "caught up"
+            );
         }
         Ok(())
     }
@@ -283,6 +294,22 @@ impl Daemon {
         }
     }
 
+    /// Keeps how much could not be used, for those who ask the state; on a full disk the next time does.
+    fn note_quarantined(&mut self) -> Result<(), StoreError> {
+        let counts = self.pulse.vitals.health().quarantined;
+        if counts == self.quarantined {
+            return Ok(());
+        }
+        match self.store.note_quarantined(&counts) {
+            Ok(()) => {
+                self.quarantined = counts;
+                Ok(())
+            }
+            Err(error) if error.is_full() => Ok(()),
+            Err(error) => Err(error),
+        }
+    }
+
     /// Looks at a few more rows of the state. Where one is damaged the work goes on, and people are to see to it.
     fn verify(&mut self) {
         let is_damaged = self.pulse.vitals.health().is_store_damaged;
@@ -321,6 +348,7 @@ impl Daemon {
         }
         self.thin()?;
         self.verify();
+        self.note_quarantined()?;
         let ((outbox, oldest), bytes) = (self.store.outbox()?, self.store.bytes()?);
         self.pulse.vitals.update(|health| {
             (health.outbox, health.outbox_oldest) = (outbox, oldest);

@@ -40,7 +40,7 @@ pub struct Delivery {
     pub source: String,
     /// Runs since it came.
     pub found: Stopwatch,
-    /// Lines in it that cannot be used.
+    /// Lines in it that cannot be used; one where nothing in it is for this site.
     pub quarantined: u64,
     /// To be given back once that is durable.
     pub receipt: Receipt,
@@ -171,22 +171,15 @@ struct Reader {
     decoder: Decoder,
     units: FileUnits,
     client: AsyncClient,
-    /// Lines that could not be used.
+    /// Lines and whole messages that could not be used.
     quarantined: u64,
 }
 
 impl Reader {
     fn read(&mut self, message: Publish) -> Delivery {
         let found = Stopwatch::start();
-        let (mut arrivals, mut quarantined) = (Vec::new(), 0);
-        let mut total = self.quarantined;
-        let mut complain = |error: &dyn std::error::Error| {
-            quarantined += 1;
-            total += 1;
-            if is_logged(total) {
-                tracing::warn!(topic = message.topic, %error, total, "line of a message quarantined");
-            }
-        };
+        let mut arrivals = Vec::new();
+        let mut faults: Vec<Box<dyn std::error::Error>> = Vec::new();
         let rows = self.decoder.text_rows(Path::new(&message.topic));
         match (rows, text(&message.payload)) {
             (Some(mut rows), Ok(text)) => {
@@ -194,24 +187,39 @@ impl Reader {
                     let taken = rows.take(number, line);
                     let items = taken.items.into_iter().map(|item| self.units.guard(item));
                     arrivals.extend(items.filter_map(|item| self.decoder.arrival(item)));
-                    if let Some(fault) = taken.fault {
-                        complain(&fault);
-                    }
+                    faults.extend(taken.fault.map(Into::into));
                 }
             }
-            (_, Err(error)) => complain(&error),
+            (_, Err(error)) => faults.push(error.into()),
             (None, Ok(_)) => {}
         }
-        self.quarantined = total;
+        if arrivals.is_empty() && faults.is_empty() {
+            faults.push(GivesNothing.into());
+        }
+        for error in &faults {
+            self.quarantined += 1;
+            let total = self.quarantined;
+            if is_logged(total) {
+                tracing::warn!(topic = message.topic, %error, total, "message, or line of one, quarantined");
+            }
+        }
         Delivery {
             arrivals,
             source: self.source.clone(),
             found,
-            quarantined,
+            quarantined: faults.len() as u64,
             receipt: Receipt(Of::Message(Box::new((self.client.clone(), message)))),
         }
     }
 }
+
+/// A message that can be read, and in which nothing is for this site.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "the message gives no value: none of its benchmarks is watched and it has no covariate; \
+     is the id right? docs/messages.md shows what a message looks like"
+)]
+struct GivesNothing;
 
 /// Why a message is no text.
 #[derive(Debug, thiserror::Error)]
@@ -227,4 +235,49 @@ fn text(payload: &[u8]) -> Result<&str, NoText> {
         return Err(NoText::TooLong);
     }
     Ok(std::str::from_utf8(payload)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config;
+    use std::fs;
+
+    /// What a reader of this site makes of one message: its values, and what could not be used.
+    fn read(payload: &str) -> (usize, u64) {
+        let site = "[site]\nname = \"Toc\"\nstate_dir = \"state\"\n[[source]]\nid = \"radio\"\nkind = \"mqtt\"\n\
+                    url = \"mqtt://127.0.0.1:1883\"\ntopic = \"site/+/displacement\"\n[[benchmark]]\nid = \"P1\"\n";
+        let config = config::parse(site, Path::new("site.toml")).unwrap();
+        let broker = &config.brokers[0];
+        let (client, _connection) = AsyncClient::new(options(broker, "test".to_owned()), 1);
+        let mut reader = Reader {
+            source: broker.id.clone(),
+            decoder: Decoder::of_messages(broker, &config.benchmarks),
+            units: FileUnits::default(),
+            client,
+            quarantined: 0,
+        };
+        let message = Publish::new("site/P1/displacement", QoS::AtLeastOnce, payload);
+        let delivery = reader.read(message);
+        assert_eq!(reader.quarantined, delivery.quarantined);
+        (delivery.arrivals.len(), delivery.quarantined)
+    }
+
+    #[test]
+    fn a_message_that_gives_nothing_is_counted_and_every_example_of_the_documentation_gives_a_value()
+     {
+        let nothing =
+            r#"{"benchmark": "P9", "time": "2017-06-06T17:00:00Z", "value": 1, "unit": "mm"}"#;
+        assert_eq!(read(nothing), (0, 1));
+        assert_eq!(read(""), (0, 1));
+        assert_eq!(read("no JSON"), (0, 1));
+        let page = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/messages.md"));
+        let page = page.unwrap();
+        let examples: Vec<&str> = page.lines().filter(|line| line.starts_with('{')).collect();
+        assert!(examples.len() >= 5, "{examples:?}");
+        for line in examples {
+            let (values, refused) = read(line);
+            assert_eq!((values >= 1, refused), (true, 0), "{line}");
+        }
+    }
 }

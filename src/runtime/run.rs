@@ -73,6 +73,9 @@ pub async fn run(
     let resume = || Site::resume(name, config.settings.clone(), sinks, &mut || pulse.turn());
     let site = tokio::task::block_in_place(resume).map_err(fail)?;
     site.show(&pulse.vitals);
+    for (source, count) in store.quarantined().map_err(fail)? {
+        pulse.vitals.quarantined(&source, count);
+    }
     let sources = Sources::start(config, &store).map_err(fail)?;
     let mut daemon = Daemon::new(config, store, site, (sources, pulse), clock::now);
     tracing::info!(site = name, state = %config.site.state_dir.display(), "started");

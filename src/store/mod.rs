@@ -293,6 +293,11 @@ impl Store {
 /// The folder for ourselves. A daemon that has just ended may hold it for a moment more: a hook that it was starting
 /// has its files until the hook's own program begins.
 impl Store {
+    /// The database of the state in `folder`.
+    pub fn file(folder: &Path) -> PathBuf {
+        folder.join(FILE)
+    }
+
     /// Whether a daemon holds the state in `folder`.
     pub fn is_held(folder: &Path) -> bool {
         // Only for a moment: a daemon that starts tries several times.

@@ -13,6 +13,9 @@ use std::collections::BTreeMap;
 /// Steps read at once.
 const CHUNK: i64 = 4096;
 
+/// How the names of counts of what could not be used begin.
+const QUARANTINED: &str = "quarantined/";
+
 /// One step as it stands in the state.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StepRow {
@@ -233,6 +236,43 @@ impl Store {
         self.inner()
             .connection
             .execute("INSERT INTO command (body) VALUES (?1)", [body])?;
+        Ok(())
+    }
+
+    /// Lines, records and files that could not be used, a source, since the state began.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn quarantined(&self) -> Result<BTreeMap<String, u64>, StoreError> {
+        let inner = self.inner();
+        let mut query = inner
+            .connection
+            .prepare_cached("SELECT name, value FROM meta WHERE name LIKE ?1 || '%'")?;
+        let rows = query.query_map([QUARANTINED], |row| {
+            Ok((row.get::<_, String>(0)?, row.get::<_, i64>(1)?))
+        })?;
+        let mut counts = BTreeMap::new();
+        for row in rows {
+            let (name, count) = row?;
+            let source = name.strip_prefix(QUARANTINED).unwrap_or(&name).to_owned();
+            counts.insert(source, u64::try_from(count).unwrap_or(0));
+        }
+        Ok(counts)
+    }
+
+    /// Notes how many there are by now.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn note_quarantined(&self, counts: &BTreeMap<String, u64>) -> Result<(), StoreError> {
+        let inner = self.inner();
+        for (source, count) in counts {
+            let count = i64::try_from(*count).unwrap_or(i64::MAX);
+            inner.connection.execute(
+                "INSERT OR REPLACE INTO meta (name, value) VALUES (?1, ?2)",
+                params![format!("{QUARANTINED}{source}"), count],
+            )?;
+        }
         Ok(())
     }
 

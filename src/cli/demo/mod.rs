@@ -40,8 +40,8 @@ are not public; it is not data. recordings/README.md says what each rests on.
 Next, with readings of your own: slipwatch init FILE; and slipwatch --help";
 /// Columns of the screen.
 const COLUMNS: usize = 80;
-/// Where the sample hook writes what it was told.
-const TOLD: &str = "told.txt";
+/// Where the sample hook writes.
+const WRITTEN: &str = "hook.txt";
 
 /// Plays every crisis, then the table.
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
@@ -60,12 +60,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             crisis,
             &recording,
             &mut |event| {
-                let told = timeline.tell(event);
-                told.map_or(Ok(()), |line| writeln!(out, "{line}"))
+                let line = timeline.take(event);
+                line.map_or(Ok(()), |line| writeln!(out, "{line}"))
             },
         ))?;
         write!(out, "{}", timeline.pictures())?;
-        tell_hook(&mut out, folder.path())?;
+        show_hook(&mut out, folder.path())?;
         ends.push(verdict::happened(crisis));
         table.extend(
             timeline
@@ -137,11 +137,11 @@ async fn play(
     };
     let bar = bar(arrivals.len());
     let shutdown = Shutdown::on_signals().context("cannot listen for signals")?;
-    let mut tell = |event: &Event| {
+    let mut show = |event: &Event| {
         bar.set_position(arrivals.partition_point(|arrival| arrival.time <= event.time) as u64);
         bar.suspend(|| each(event))
     };
-    replay::replay(recording, &plan, shutdown, &mut tell).await?;
+    replay::replay(recording, &plan, shutdown, &mut show).await?;
     bar.finish_and_clear();
     Ok(())
 }
@@ -175,7 +175,7 @@ fn sample_hook(folder: &Path) -> anyhow::Result<HookConfig> {
         .with_context(|| format!("cannot write {}", script.display()))?;
     Ok(HookConfig {
         site: false,
-        run: vec![script.display().to_string(), TOLD.to_owned()],
+        run: vec![script.display().to_string(), WRITTEN.to_owned()],
         levels: vec![Level::Orange, Level::Red, Level::Unknown],
         timeout: Duration::from_secs(10),
         folder: folder.to_owned(),
@@ -186,11 +186,11 @@ fn sample_hook(folder: &Path) -> anyhow::Result<HookConfig> {
 }
 
 /// Prints what the hook wrote first, and empties its file for the next crisis.
-fn tell_hook(out: &mut impl Write, folder: &Path) -> anyhow::Result<()> {
-    let file = folder.join(TOLD);
-    let told = std::fs::read_to_string(&file).unwrap_or_default();
-    let count = told.lines().count();
-    match told.lines().next() {
+fn show_hook(out: &mut impl Write, folder: &Path) -> anyhow::Result<()> {
+    let file = folder.join(WRITTEN);
+    let text = std::fs::read_to_string(&file).unwrap_or_default();
+    let count = text.lines().count();
+    match text.lines().next() {
         None => writeln!(out, "\nthe hook, a process of its own, was not run")?,
         Some(line) => writeln!(
             out,

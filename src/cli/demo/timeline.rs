@@ -81,7 +81,7 @@ impl Timeline {
     }
 
     /// The line for an event that changes a level.
-    pub(super) fn tell(&mut self, event: &Event) -> Option<String> {
+    pub(super) fn take(&mut self, event: &Event) -> Option<String> {
         let id = event.benchmark.as_ref()?;
         let record = self.records.entry(id.clone()).or_default();
         if let EventKind::Refit {
@@ -114,6 +114,16 @@ impl Timeline {
             return None;
         };
         let fall = record.fall.take();
+        if *level == Level::Unknown && *state == AlertState::Resolved {
+            let stays = record.level.unwrap_or(Level::Green);
+            let line = format!(
+                "{} {:<8} {:<8} there are readings again: no longer unknown",
+                day(event.time),
+                id.as_str(),
+                stays.name()
+            );
+            return self.counted([fall.map(|fall| fall.line), Some(line)]);
+        }
         let shown = record.changed(*level, *state, event.time);
         let place = format!("{} {:<8}", day(event.time), id.as_str());
         if *state == AlertState::Resolved {

@@ -17,7 +17,7 @@ use std::path::PathBuf;
 
 /// Fewer surrogates cannot give a p-value that an effect is accepted for.
 const FEWEST_SURROGATES: usize = 99;
-/// More tell nothing and take for ever.
+/// More show nothing and take for ever.
 const MOST_SURROGATES: usize = 9999;
 /// Steps of the progress bar.
 const STEPS: f64 = 1000.0;

@@ -5,7 +5,7 @@ use crate::effects::{Effect, Explained, Explanation, Form, Kind, Structure, Toge
 use crate::reading::BenchmarkId;
 
 const HOURS_PER_DAY: f64 = 24.0;
-/// Spans under so many days are told in hours.
+/// Spans under so many days are given in hours.
 const A_FEW_DAYS: f64 = 2.0;
 
 /// The verdict in one sentence.

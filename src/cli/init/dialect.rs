@@ -13,7 +13,7 @@ pub(super) struct Written {
     pub(super) needs_zone: bool,
 }
 
-/// How the table is written, or what cannot be told of it.
+/// How the table is written, or what the file leaves open.
 pub(super) fn written(survey: &Survey, stated: &DialectArgs) -> Result<Written, Vec<String>> {
     let decimal = stated.decimal.map_or_else(|| decimal(survey), Ok);
     let decimal_mark = decimal.clone().unwrap_or_default();

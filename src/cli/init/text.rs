@@ -18,7 +18,7 @@ pub(super) fn config(plan: &Plan) -> String {
         let _ = writeln!(text, "time_zone = {}", quoted(zone));
     }
     for source in &plan.sources {
-        tell_source(&mut text, source, plan);
+        source_lines(&mut text, source, plan);
     }
     text.push_str("\n# The points that are watched.\n");
     for benchmark in &plan.benchmarks {
@@ -41,11 +41,11 @@ pub(super) fn config(plan: &Plan) -> String {
         }
         text.push('\n');
     }
-    tell_alert(&mut text, plan);
+    alert_lines(&mut text, plan);
     text
 }
 
-fn tell_source(text: &mut String, source: &super::PlannedSource, plan: &Plan) {
+fn source_lines(text: &mut String, source: &super::PlannedSource, plan: &Plan) {
     let _ = write!(
         text,
         "\n[[source]]\nid = {}\nkind = \"{}\"\npath = {}\n",
@@ -93,7 +93,7 @@ fn tell_source(text: &mut String, source: &super::PlannedSource, plan: &Plan) {
     }
 }
 
-fn tell_alert(text: &mut String, plan: &Plan) {
+fn alert_lines(text: &mut String, plan: &Plan) {
     let evacuation = match &plan.evacuation_time {
         Some(given) => format!("evacuation_time = {}", quoted(given)),
         None => "# evacuation_time = \"24h\"".to_owned(),

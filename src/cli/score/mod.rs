@@ -108,11 +108,14 @@ fn report(
         policy.critical_velocity_mm_per_day,
     );
     let bar = bar(series.benchmark.as_str());
-    let card = card(&history, epoch, truth, &mut |done, count| {
+    let mut card = card(&history, epoch, truth, &mut |done, count| {
         bar.set_length(count);
         bar.set_position(done);
     });
     bar.finish_and_clear();
+    if history.flow.is_empty() {
+        leave_out_rivers(&mut card);
+    }
     let until = match truth {
         Truth::Failed(failure) => failure,
         Truth::Stood => series.readings.last().map_or(epoch, |last| last.time),
@@ -121,10 +124,25 @@ fn report(
     Ok(Report {
         benchmark: series.benchmark.to_string(),
         failure_time: args.failure_time,
-        sources: METHODS.iter().map(|method| method.source).collect(),
+        sources: METHODS
+            .iter()
+            .filter(|method| card.methods.contains(&method.name))
+            .map(|method| method.source)
+            .collect(),
         card,
         warning,
     })
+}
+
+/// Without a river the methods that weigh its flow have nothing to say.
+fn leave_out_rivers(card: &mut Card) {
+    let is_of_a_river = |name: &str| name.starts_with("river-");
+    card.methods.retain(|name| !is_of_a_river(name));
+    let of_leads = card.leads.iter_mut().map(|lead| &mut lead.scores);
+    let of_looks = card.looks.iter_mut().map(|look| &mut look.scores);
+    for scores in of_leads.chain(of_looks) {
+        scores.retain(|name, _| !is_of_a_river(name));
+    }
 }
 
 /// The bar hides itself where stderr is no terminal.

@@ -8,7 +8,7 @@ use crate::score::Score;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-/// Errors and scores of leads under this are told in hours.
+/// Errors and scores of leads under this are given in hours.
 const HOURS_UNDER_DAYS: f64 = 2.0;
 
 pub(super) fn text(report: &Report) -> String {

@@ -1,4 +1,4 @@
-//! What people would have been told, and how long before the failure.
+//! Which levels would have been called, and how long before the failure.
 
 use super::hours;
 use crate::alert::{Level, Policy};
@@ -53,10 +53,14 @@ pub(super) fn of(
         })
         .collect();
     let first = series.readings.first().map_or(until, |first| first.time);
-    Ok(told(&changes, first, until))
+    Ok(warning(&changes, first, until))
 }
 
-fn told(changes: &[(Timestamp, Level, AlertState)], first: Timestamp, until: Timestamp) -> Warning {
+fn warning(
+    changes: &[(Timestamp, Level, AlertState)],
+    first: Timestamp,
+    until: Timestamp,
+) -> Warning {
     let begun = |level| {
         let mut begun = changes
             .iter()
@@ -109,7 +113,7 @@ mod tests {
             (at(12), Level::Orange, AlertState::Resolved),
             (at(20), Level::Red, AlertState::Firing),
         ];
-        let warning = told(&changes, at(0), at(24));
+        let warning = warning(&changes, at(0), at(24));
         assert_eq!(warning.first_red, Some(at(20)));
         assert_eq!(warning.first_yellow, None);
         assert!((warning.hours_at[&Level::Orange] - 2.0).abs() < 1e-12);

@@ -154,6 +154,14 @@ impl Track {
                 format!("; chance {chance:.2} within {name} ({hours} h)")
             })
         };
+        let outlook = if ahead.orange < policy.outlook {
+            let hours = policy.outlook.as_secs() / 3600;
+            format!(
+                "five times the record's length, which is shorter than the outlook of {hours} h,"
+            )
+        } else {
+            "the outlook".to_owned()
+        };
         format!(
             "benchmark {}: {}{verb} ({}){}{}{velocity}; the critical velocity is {} mm/day",
             self.benchmark,
@@ -164,7 +172,7 @@ impl Track {
                 evidence.chance_within_evacuation_time,
                 ahead.red
             ),
-            chance("the outlook", evidence.chance_within_outlook, ahead.orange),
+            chance(&outlook, evidence.chance_within_outlook, ahead.orange),
             policy.critical_velocity_mm_per_day,
         )
     }

@@ -10,6 +10,7 @@ mod motion;
 mod pace;
 mod refit;
 mod sensor;
+mod suspicion;
 mod unknown;
 mod watch;
 
@@ -24,7 +25,9 @@ use super::silence::Silence;
 use crate::alert::{Cause, Latch, Level, Policy};
 use crate::fit::Rate;
 use crate::forecast::Panel;
-use crate::reading::{BenchmarkId, Reading, SECONDS_PER_DAY, Timestamp, days_since};
+use crate::reading::{
+    BenchmarkId, Reading, SECONDS_PER_DAY, Suspicion, Timestamp, days_since,
+};
 use crate::regime::Tracker;
 use adopted::Adopted;
 use ahead::Ahead;
@@ -33,6 +36,7 @@ use jiff::SignedDuration;
 use lookback::{Levels, Lookback};
 use pace::Pace;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use unknown::{Reason, Unknown};
 use watch::Watch;
 
@@ -100,6 +104,9 @@ pub(super) struct Track {
     /// The newest forecast, while a level is in force.
     #[serde(default)]
     kept: Option<KeptForecast>,
+    /// Suspicions that people have looked into, and that do not hold.
+    #[serde(default)]
+    accepted: BTreeSet<Suspicion>,
 }
 
 impl Track {
@@ -119,6 +126,7 @@ impl Track {
             others: 0,
             owes: false,
             kept: None,
+            accepted: BTreeSet::new(),
             benchmark,
             history: History::new(source, epoch),
             panel: Panel::default(),
@@ -202,6 +210,7 @@ impl Track {
         events.extend(self.leave_out_clockless(time));
         if taken == Taken::Newest {
             events.extend(self.judge_sensor(time));
+            events.extend(self.suspect(source, time));
             if !beside.settles {
                 events.extend(self.look_back(policy, time));
             }

@@ -5,7 +5,7 @@ use super::unknown::Reason;
 use super::{Track, days};
 use crate::alert::Level;
 use crate::monitor::event::Event;
-use crate::reading::Timestamp;
+use crate::reading::{Suspicion, Timestamp};
 use jiff::SignedDuration;
 
 /// Readings of a second quantity in a row that are told, where the first quantity has hardly been read.
@@ -139,6 +139,12 @@ impl Track {
 
     /// Whether the level in force may fall: not on readings that say nothing.
     pub(super) fn may_fall(&self) -> bool {
-        !self.unknown.has(Reason::Spoilt) || self.latch.level() == Level::Green
+        let says_nothing = [
+            Reason::Spoilt,
+            Reason::Suspect(Suspicion::Mark),
+            Reason::Suspect(Suspicion::Fall),
+        ];
+        let is_sound = |reason: Reason| !self.unknown.has(reason);
+        says_nothing.into_iter().all(is_sound) || self.latch.level() == Level::Green
     }
 }

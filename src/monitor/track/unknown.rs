@@ -2,8 +2,8 @@
 
 use super::Track;
 use crate::alert::Level;
-use crate::monitor::event::{AlertState, Event, EventKind};
-use crate::reading::Timestamp;
+use crate::monitor::event::{AlertState, Event, EventKind, SUSPECT_ENDS};
+use crate::reading::{Suspicion, Timestamp};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
@@ -19,17 +19,30 @@ pub(super) enum Reason {
     Spoilt,
     /// It gives another quantity than the one that is monitored.
     SecondQuantity,
+    /// Its readings hardly mean what was intended.
+    Suspect(Suspicion),
 }
 
 impl Reason {
     /// The rule's name in the alert.
-    fn name(self) -> &'static str {
+    pub(super) fn name(self) -> &'static str {
         match self {
             Self::NoData => "no-data",
             Self::Stuck => "stuck-sensor",
             Self::Spoilt => "spoilt-readings",
             Self::SecondQuantity => "second-quantity",
+            Self::Suspect(Suspicion::Ahead) => "suspect-ahead",
+            Self::Suspect(Suspicion::Mark) => "suspect-mark",
+            Self::Suspect(Suspicion::Fall) => "suspect-fall",
+            Self::Suspect(Suspicion::Scale) => "suspect-scale",
         }
+    }
+}
+
+impl Reason {
+    /// The kind of the fault that says its end.
+    pub(super) fn end_name(self) -> String {
+        format!("{}{SUSPECT_ENDS}", self.name())
     }
 }
 

@@ -1,6 +1,7 @@
 //! Whether this machine can carry a site.
 
 mod clock_sync;
+mod daemon;
 mod disk;
 mod feeds;
 mod hooks;
@@ -39,7 +40,7 @@ impl Verdict {
 /// One thing that was looked at.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Finding {
-    /// What: `inotify`, `file-system`, `clock`, `fsync`, `hook`, `sandbox`, `source`, `recording`.
+    /// What: `user`, `state`, `token`, `listen`, `inotify`, `file-system`, `clock`, `fsync`, `hook`, `sandbox`, `source`, `recording`.
     pub check: &'static str,
     /// How it stands.
     pub verdict: Verdict,
@@ -59,7 +60,8 @@ impl Finding {
 
 /// Looks at everything that `config` needs; runs no hook and leaves nothing behind.
 pub fn examine(config: &Config) -> Vec<Finding> {
-    let mut findings = vec![watches::finding(config)];
+    let mut findings = daemon::findings(config);
+    findings.push(watches::finding(config));
     findings.extend(disk::file_systems(config));
     findings.push(disk::fsync(&config.site.state_dir));
     findings.push(clock_sync::finding());

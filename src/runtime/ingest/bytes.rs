@@ -5,6 +5,7 @@ use flate2::read::MultiGzDecoder;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 /// Most that is unpacked of one file, bytes: what packs a thousandfold must not fill the memory.
 const MOST_UNPACKED: u64 = 512 << 20;
@@ -36,8 +37,43 @@ pub fn unpack(file: &Path) -> io::Result<impl Read + Send + std::fmt::Debug + us
     })
 }
 
+/// The name by which stdin is read as a file.
+const STDIN: &str = "-";
+
+/// Whether stdin is meant.
+pub(super) fn is_stdin(file: &Path) -> bool {
+    file.as_os_str() == STDIN
+}
+
+/// All of stdin: read once, as several look at a file.
+pub(super) fn stdin() -> io::Result<&'static [u8]> {
+    static ALL: OnceLock<Result<Vec<u8>, io::ErrorKind>> = OnceLock::new();
+    let read = || {
+        let mut all = Vec::new();
+        let mut bounded = io::stdin().lock().take(MOST_UNPACKED);
+        let read = bounded.read_to_end(&mut all);
+        read.map(|_| all).map_err(|error| error.kind())
+    };
+    match ALL.get_or_init(read) {
+        Ok(all) => Ok(all),
+        Err(kind) => Err((*kind).into()),
+    }
+}
+
+/// The name of a file as errors and benchmarks without an id have it, unpacked.
+pub(super) fn shown_name(file: &Path) -> PathBuf {
+    if is_stdin(file) {
+        PathBuf::from("stdin")
+    } else {
+        unpacked_name(file)
+    }
+}
+
 pub(super) fn read_bytes(file: &Path) -> Result<Vec<u8>, IngestError> {
     let read = || {
+        if is_stdin(file) {
+            return stdin().map(<[u8]>::to_vec);
+        }
         if !is_packed(file) {
             return std::fs::read(file);
         }

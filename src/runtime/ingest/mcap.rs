@@ -4,6 +4,7 @@
 //! might be less, or other, than what was measured. Topics that are neither benchmarks nor channels
 //! are left out.
 
+use super::bytes::{is_stdin, stdin};
 use super::collect::Collector;
 use super::mcap_write::PROVENANCE;
 use super::message::{MessageError, Topic, decode_message};
@@ -30,7 +31,11 @@ pub(super) fn read_mcap(
         file: file.into(),
         source,
     };
-    let mut input = File::open(file).map_err(fail)?;
+    let mut input: Box<dyn Read> = if is_stdin(file) {
+        Box::new(stdin().map_err(fail)?)
+    } else {
+        Box::new(File::open(file).map_err(fail)?)
+    };
     let mut reader = LinearReader::new_with_options(
         LinearReaderOptions::default()
             .with_check_finishes_after_end_magic(true)

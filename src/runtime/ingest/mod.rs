@@ -134,6 +134,9 @@ enum Format {
 
 impl Format {
     fn of(file: &Path) -> Result<Self, IngestError> {
+        if bytes::is_stdin(file) {
+            return Self::of_stdin();
+        }
         let name = bytes::unpacked_name(file);
         let extension = name.extension().unwrap_or_default().to_string_lossy();
         match extension.to_ascii_lowercase().as_str() {
@@ -148,6 +151,30 @@ impl Format {
         }
     }
 }
+
+impl Format {
+    /// As what stdin begins with.
+    fn of_stdin() -> Result<Self, IngestError> {
+        let all = bytes::stdin().map_err(|source| IngestError::Read {
+            file: "stdin".into(),
+            source,
+        })?;
+        let text = all.strip_prefix("\u{feff}".as_bytes()).unwrap_or(all);
+        let text = text.trim_ascii_start();
+        Ok(if all.starts_with(MCAP_MAGIC) {
+            Self::Mcap
+        } else if text.starts_with(b"{") {
+            Self::Text(TextFormat::Ndjson)
+        } else if text.starts_with(b"\"TOA5\"") || text.starts_with(b"TOA5,") {
+            Self::Text(TextFormat::Toa5)
+        } else {
+            Self::Text(TextFormat::Csv)
+        })
+    }
+}
+
+/// How a recording begins.
+const MCAP_MAGIC: &[u8] = b"\x89MCAP0\r\n";
 
 /// What files hold, and what a person should know of them.
 #[derive(Debug, Clone, Default, PartialEq)]

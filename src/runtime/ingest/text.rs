@@ -214,7 +214,7 @@ pub(super) fn read_text(
 ) -> Result<Table, IngestError> {
     let bytes = read_bytes(file)?;
     let bytes = Transcoder::default().feed(&bytes);
-    let mut rows = TextRows::new(format, &super::bytes::unpacked_name(file), options);
+    let mut rows = TextRows::new(format, &super::bytes::shown_name(file), options);
     let mut collected = Collector::default();
     let mut remarks = Vec::new();
     for (text, line) in bytes.split(|byte| *byte == b'\n').zip(1..) {
@@ -295,7 +295,7 @@ pub fn look_through(
 ) -> Result<Looked, IngestError> {
     let bytes = read_bytes(file)?;
     let bytes = Transcoder::default().feed(&bytes);
-    let mut rows = TextRows::new(format, &super::bytes::unpacked_name(file), options);
+    let mut rows = TextRows::new(format, &super::bytes::shown_name(file), options);
     let mut looked = Looked::default();
     for (text, line) in bytes.split(|byte| *byte == b'\n').zip(1..) {
         let text = match std::str::from_utf8(text) {

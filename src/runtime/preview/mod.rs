@@ -1,6 +1,5 @@
 //! What the files of a site hold now, as the daemon would take it: a look before it starts.
 
-mod suspicion;
 mod view;
 
 pub use view::{
@@ -12,7 +11,9 @@ use super::ingest::{IngestError, Item, Meaning, ReadOptions, is_packed, read_fil
 use super::tail::{Arrival, BadLine, Decoder, Fed, TextReader, list};
 use crate::config::{Config, Source, SourceKind};
 use crate::monitor::Input;
-use crate::reading::{BenchmarkId, LocalClock, Quantity, Recording, SummerTime, Timestamp};
+use crate::reading::{
+    BenchmarkId, LocalClock, Quantity, Recording, SummerTime, Suspicion, Timestamp, suspicion,
+};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -28,7 +29,10 @@ const PIECE: usize = 64 * 1024;
 
 /// Looks at the files of `config`.
 pub fn preview(config: &Config) -> Preview {
-    let mut look = Look::default();
+    let mut look = Look {
+        accepted: config.settings.accepted.clone(),
+        ..Look::default()
+    };
     for source in &config.sources {
         let view = look.source(source, &Decoder::new(source, &config.benchmarks));
         look.views.push(view);
@@ -52,6 +56,8 @@ pub fn preview(config: &Config) -> Preview {
 #[derive(Debug)]
 struct Track {
     view: BenchmarkView,
+    /// Suspicions that people have looked into.
+    accepted: BTreeSet<Suspicion>,
     readings: Vec<(Timestamp, f64)>,
 }
 
@@ -61,6 +67,7 @@ struct Look {
     benchmarks: BTreeMap<(String, BenchmarkId, Quantity), Track>,
     covariates: BTreeMap<(String, String), CovariateView>,
     unwatched: BTreeSet<BenchmarkId>,
+    accepted: BTreeMap<BenchmarkId, BTreeSet<Suspicion>>,
     values: u64,
 }
 
@@ -258,6 +265,7 @@ impl Look {
         {
             let key = (source.to_owned(), benchmark.clone(), unit.quantity());
             let here = (time, reading.value);
+            let accepted = self.accepted.get(&benchmark).cloned().unwrap_or_default();
             let track = self.benchmarks.entry(key).or_insert_with(|| Track {
                 view: BenchmarkView {
                     id: benchmark,
@@ -270,6 +278,7 @@ impl Look {
                     every_s: None,
                     suspicions: Vec::new(),
                 },
+                accepted,
                 readings: Vec::new(),
             });
             track.take(here);
@@ -372,8 +381,22 @@ impl Track {
         let mut gaps: Vec<i64> = pairs.map(|(b, a)| b.duration_since(*a).as_secs()).collect();
         gaps.sort_unstable();
         self.view.every_s = gaps.get(gaps.len() / 2).copied();
-        self.view.suspicions = suspicion::suspicions(&self.view, &self.readings, now);
+        self.view.suspicions = self.suspicions(now);
         self.view
+    }
+
+    fn suspicions(&mut self, now: Timestamp) -> Vec<String> {
+        self.readings.sort_by_key(|(time, _)| *time);
+        let BenchmarkView {
+            last,
+            quantity,
+            unit,
+            ..
+        } = &self.view;
+        let ahead = suspicion::ahead(last.0, now).into_iter();
+        let all = ahead.chain(suspicion::of_values(&self.readings, *quantity, unit));
+        let not_accepted = all.filter(|one| !self.accepted.contains(&one.kind));
+        not_accepted.map(|one| one.text).collect()
     }
 }
 
@@ -413,11 +436,11 @@ fn kind_of(line: &BadLine) -> String {
 }
 
 fn shown(line: &BadLine) -> String {
-    let told = line.error.to_string();
+    let text = line.error.to_string();
     if line.error.is::<IngestError>() {
-        told
+        text
     } else {
-        format!("line {}: {told}", line.number)
+        format!("line {}: {text}", line.number)
     }
 }
 

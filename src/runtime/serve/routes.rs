@@ -11,7 +11,7 @@ use axum::routing::get;
 use axum::{Json, Router};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fmt::Debug;
+use std::fmt::{Debug, Write as _};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -146,28 +146,37 @@ async fn healthy(State((vitals, longest)): State<(Arc<Vitals>, Duration)>) -> (S
     }
 }
 
-async fn ready(State(vitals): State<Arc<Vitals>>) -> (StatusCode, &'static str) {
+async fn ready(State(vitals): State<Arc<Vitals>>) -> (StatusCode, String) {
     let health = vitals.health();
-    if !health.is_caught_up {
-        (StatusCode::SERVICE_UNAVAILABLE, "still reading the past\n")
-    } else if health.is_paused || !health.is_store_writable {
-        (
-            StatusCode::SERVICE_UNAVAILABLE,
-            "the state folder cannot be written to\n",
-        )
-    } else if health.is_store_damaged {
-        (
-            StatusCode::SERVICE_UNAVAILABLE,
-            "the state is damaged: restore a backup\n",
-        )
-    } else if health.is_clock_wrong {
-        (
-            StatusCode::SERVICE_UNAVAILABLE,
-            "the host's clock is wrong: readings that are known lie after it\n",
-        )
-    } else {
-        (StatusCode::OK, "ready\n")
+    let refused = refused(&health);
+    match not_ready(&health) {
+        Some(why) => (StatusCode::SERVICE_UNAVAILABLE, format!("{why}\n{refused}")),
+        None => (StatusCode::OK, format!("ready\n{refused}")),
     }
+}
+
+fn not_ready(health: &Health) -> Option<&'static str> {
+    if !health.is_caught_up {
+        Some("still reading the past")
+    } else if health.is_paused || !health.is_store_writable {
+        Some("the state folder cannot be written to")
+    } else if health.is_store_damaged {
+        Some("the state is damaged: restore a backup")
+    } else if health.is_clock_wrong {
+        Some("the host's clock is wrong: readings that are known lie after it")
+    } else {
+        None
+    }
+}
+
+/// A line for each source of which something could not be used.
+fn refused(health: &Health) -> String {
+    let mut lines = String::new();
+    for (source, count) in &health.quarantined {
+        // Writing to a string cannot fail.
+        let _ = writeln!(lines, "source {source}: could not be used: {count}");
+    }
+    lines
 }
 
 async fn expose(State(vitals): State<Arc<Vitals>>) -> Response {

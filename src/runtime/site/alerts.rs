@@ -11,6 +11,9 @@ use crate::runtime::hook::Alert;
 use crate::store::StoreError;
 use jiff::SignedDuration;
 
+/// Ends of alerts that are kept through a silence at most; the oldest goes.
+const MOST_PUT_OFF: usize = 4096;
+
 impl Site {
     /// Makes everything since the last commit durable in one transaction, then hands the alerts to the hooks, but
     /// for what began longer before `wall` than twice the evacuation time: of that, [`Site::caught_up`] sends what
@@ -29,7 +32,11 @@ impl Site {
             let is_fresh =
                 age <= self.freshness(alert.event.benchmark.as_ref()) || self.never_read(&alert);
             let is_due = is_fresh && !self.ends_untold(&alert) || self.is_waited_for(&alert);
-            let is_sent = is_due && !self.is_muted(&alert, now);
+            let is_muted = self.is_muted(&alert, now);
+            let is_sent = is_due && !is_muted;
+            if is_muted && self.is_waited_for(&alert) {
+                self.put_off(&alert);
+            }
             if is_sent {
                 to_send.push(alert.clone());
             } else {
@@ -192,8 +199,23 @@ impl Site {
         }
     }
 
+    /// Keeps the end of an alert until the silence that it fell into is over.
+    pub(super) fn put_off(&mut self, alert: &Alert) {
+        self.put_off.push(alert.clone());
+        let excess = self.put_off.len().saturating_sub(MOST_PUT_OFF);
+        self.put_off.drain(..excess);
+    }
+
+    /// What was put off and can be sent at `now`.
+    fn no_longer_put_off(&mut self, now: Timestamp) -> Vec<Alert> {
+        let all = std::mem::take(&mut self.put_off);
+        let (muted, due) = all.into_iter().partition(|one| self.is_muted(one, now));
+        self.put_off = muted;
+        due
+    }
+
     /// Whether it is the end of what people have been told of.
-    fn is_waited_for(&self, alert: &Alert) -> bool {
+    pub(super) fn is_waited_for(&self, alert: &Alert) -> bool {
         let place = (alert.event.benchmark.clone(), alert.level == Level::Unknown);
         let had = self.standing.get(&place);
         alert.state == AlertState::Resolved
@@ -228,8 +250,8 @@ impl Site {
             self.commit(wall)?;
         }
         let now = self.keeper.now(wall);
+        let mut to_send = self.no_longer_put_off(now);
         let mut standing = std::mem::take(&mut self.standing);
-        let mut to_send = Vec::new();
         for one in standing.values_mut() {
             if one.is_sent {
                 // Again: there may have been no room for it. The hooks that have it ignore it.

@@ -2,7 +2,7 @@
 
 use super::{DAWN, MOST_UNWRITTEN, Site};
 use crate::monitor::{Event, Input, Notice};
-use crate::reading::{BenchmarkId, Timestamp};
+use crate::reading::{BenchmarkId, Timestamp, suspicion};
 use crate::runtime::clock;
 use crate::runtime::tail::Arrival;
 use crate::store::StoreError;
@@ -22,6 +22,20 @@ const LOGGED: u64 = 16;
 /// Whether the value that is set aside as number `total` is logged.
 pub(in crate::runtime) fn is_logged(total: u64) -> bool {
     total <= LOGGED || total.is_power_of_two()
+}
+
+/// What a value is of.
+fn name(input: &Input) -> &str {
+    match input {
+        Input::Reading { benchmark, .. } | Input::Missing { benchmark, .. } => benchmark.as_str(),
+        Input::Sample { channel, .. } => channel,
+        Input::Trouble { .. }
+        | Input::Settings(_)
+        | Input::Order(_)
+        | Input::Found(_)
+        | Input::Notice(_)
+        | Input::Tick => "",
+    }
 }
 
 impl Site {
@@ -60,6 +74,7 @@ impl Site {
             events.extend(self.step(now, &Input::Found(finding)));
         }
         events.extend(self.step(now, &arrival.input));
+        events.extend(self.compare_with_clock(arrival, (now, wall)));
         for job in self.monitor.searches() {
             self.searches.start(job);
         }
@@ -98,9 +113,9 @@ impl Site {
         let total = self.counts.without_clock;
         if !is_logged(total) {
         } else if time < DAWN {
-            tracing::warn!(%time, ?arrival.input, "measured before 1678: quarantined");
+            tracing::warn!(%time, what = name(&arrival.input), "measured before 1678: quarantined");
         } else {
-            tracing::warn!(%time, ?arrival.input, total, "measured on the first day of 1970, as by a logger whose clock is not set: quarantined");
+            tracing::warn!(%time, what = name(&arrival.input), total, "measured on the first day of 1970, as by a logger whose clock is not set: quarantined");
         }
         true
     }
@@ -188,6 +203,30 @@ impl Site {
             let now = self.now.map_or(arrival.time, |now| now.max(arrival.time));
             self.step(now, &Input::Notice(Notice::Behind { benchmark, time }));
         }
+    }
+
+    /// Notes where readings come with a time ahead of the host's clock, and where they no longer do.
+    fn compare_with_clock(
+        &mut self,
+        arrival: &Arrival,
+        (now, wall): (Timestamp, Timestamp),
+    ) -> Vec<Event> {
+        let Input::Reading { benchmark, .. } = &arrival.input else {
+            return Vec::new();
+        };
+        let is_newest = self.newest.get(benchmark) == Some(&arrival.time);
+        let clock = self.keeper.now(wall).max(wall);
+        let is_ahead = suspicion::ahead(arrival.time, clock).is_some();
+        if self.sinks.store.is_none() || !is_newest || is_ahead == self.monitor.is_ahead(benchmark)
+        {
+            return Vec::new();
+        }
+        let came = Notice::Came {
+            benchmark: benchmark.clone(),
+            time: arrival.time,
+            clock,
+        };
+        self.step(now, &Input::Notice(came))
     }
 
     /// Whether nothing as late as this reading of its benchmark has been taken: it cannot be known then.

@@ -23,6 +23,8 @@ struct Own {
     failure_times: BTreeMap<Option<BenchmarkId>, Timestamp>,
     standing: Vec<(Place, Standing)>,
     mutes: Vec<Mute>,
+    #[serde(default)]
+    put_off: Vec<Alert>,
     counts: Counts,
 }
 
@@ -98,6 +100,7 @@ impl Site {
         self.failure_times = own.failure_times;
         self.standing = own.standing.into_iter().collect();
         self.mutes = own.mutes;
+        self.put_off = own.put_off;
         self.counts = own.counts;
         Ok(())
     }
@@ -131,6 +134,10 @@ impl Site {
             }
             for alert in std::mem::take(&mut self.fresh) {
                 let is_sent = store.is_noted(identity(&alert), None, None)?;
+                // What is due is noted with the step itself: this one fell into a silence.
+                if !is_sent && self.is_waited_for(&alert) {
+                    self.put_off(&alert);
+                }
                 self.stand(alert, is_sent);
             }
         }
@@ -178,6 +185,7 @@ impl Site {
                 .map(|(place, one)| (place.clone(), one.clone()))
                 .collect(),
             mutes: self.mutes.clone(),
+            put_off: self.put_off.clone(),
             counts: self.counts,
         };
         let saved = self.monitor.save().map_err(|error| error.to_string());

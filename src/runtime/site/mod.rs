@@ -18,7 +18,7 @@ pub use mute::Mute;
 use timekeeper::Timekeeper;
 use unproven::Unproven;
 
-use crate::monitor::{Event, EventKind, Input, Monitor, Order, Settings};
+use crate::monitor::{Event, EventKind, Input, Monitor, Order, SUSPECT, Settings};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::deliver::Dispatcher;
 use crate::runtime::hook::{Alert, Status};
@@ -117,6 +117,8 @@ pub struct Site {
     standing: BTreeMap<Place, Standing>,
     /// Who asked not to be told.
     mutes: Vec<Mute>,
+    /// Ends of alerts that people were told of, which fell into a silence: they are sent after it.
+    put_off: Vec<Alert>,
     counts: Counts,
     keeper: Timekeeper,
     unproven: Unproven,
@@ -147,6 +149,7 @@ impl Site {
             fresh: Vec::new(),
             standing: BTreeMap::new(),
             mutes: Vec::new(),
+            put_off: Vec::new(),
             counts: Counts::default(),
             keeper: Timekeeper::default(),
             unproven: Unproven::default(),
@@ -217,6 +220,7 @@ impl Site {
         let events = self.follow(now, input);
         if self.sinks.store.is_some() {
             self.batch.step(now, input, &events);
+            log_suspicions(&events);
             self.steps_since_memory += 1;
         }
         events
@@ -292,5 +296,16 @@ impl Site {
             None => Some(0),
         };
         recorded.map(|()| lost)
+    }
+}
+
+/// What the readings hardly mean is for people to look into, and nobody else says it.
+fn log_suspicions(events: &[Event]) {
+    for event in events {
+        if let EventKind::Fault { kind, text } = &event.kind
+            && kind.starts_with(SUSPECT)
+        {
+            tracing::warn!(kind, "{text}");
+        }
     }
 }

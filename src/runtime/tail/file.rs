@@ -5,7 +5,7 @@ use super::records::{self, Channels, Frame, HEADER_BYTES, MAGIC, RawMessage};
 use super::saved::Saved;
 use super::text::{BadLine, Fed, TextReader, Unpacking};
 use crate::reading::Timestamp;
-use crate::runtime::ingest::{Item, decode_message, is_packed};
+use crate::runtime::ingest::{IngestError, Item, decode_message, is_packed};
 use crate::runtime::site::is_logged;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
@@ -356,8 +356,13 @@ impl FileTail {
             text,
             error,
         } = line;
-        let text: String = text.chars().take(SHOWN).collect();
-        tracing::warn!(%file, line = number, text, %error, total, "line quarantined");
+        if error.is::<IngestError>() {
+            // Names the file, the line and what stands there.
+            tracing::warn!(%error, total, "line quarantined");
+        } else {
+            let text: String = text.chars().take(SHOWN).collect();
+            tracing::warn!(%file, line = number, text, %error, total, "line quarantined");
+        }
     }
 
     fn refuse(&mut self, error: &dyn std::error::Error) {

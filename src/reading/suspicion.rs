@@ -1,0 +1,204 @@
+//! What in a benchmark's readings hardly means what was intended: a wrong unit, a wrong zone, a mark for no value, a
+//! reset that nobody declared.
+
+use super::{Quantity, Timestamp};
+use jiff::SignedDuration;
+use serde::{Deserialize, Serialize};
+
+/// Numbers that loggers write where they have no value, as far as their digits go.
+const MARKS: [f64; 12] = [
+    99.0, 999.0, 999.9, 999.99, 6999.0, 7999.0, 8888.0, 9999.0, 9999.9, 32_768.0, 99_999.0,
+    999_999.0,
+];
+/// So many times the span of the others a mark is away from them.
+const AWAY: f64 = 5.0;
+/// A step of so many times the usual scatter of a step.
+const LEAP: f64 = 50.0;
+/// Fewer readings show nothing.
+const FEWEST: usize = 10;
+/// Fewer readings show nothing of their unit.
+const FEWEST_OF_SCALE: usize = 24;
+/// A slope of which all readings lie within so many mm, and are given to a thousandth of one, may be in m,
+const SMALL_MM: f64 = 2.0;
+/// where two readings in a row differ by no more than this, as a total station's do in m.
+const SMALL_STEP_MM: f64 = 0.02;
+/// A slope that moved by more m than this may be in mm.
+const LARGE_M: f64 = 100.0;
+/// A reading that is further ahead of the clock was given a wrong time; a logger's clock is off by minutes.
+pub const AHEAD: SignedDuration = SignedDuration::from_mins(10);
+
+/// The kinds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Suspicion {
+    /// Times that lie ahead of the clock.
+    Ahead,
+    /// A number that elsewhere means that there is no value.
+    Mark,
+    /// A displacement that falls at once by far more than it ever does.
+    Fall,
+    /// A movement that is the size of another unit.
+    Scale,
+}
+
+impl Suspicion {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Ahead, Self::Mark, Self::Fall, Self::Scale];
+
+    /// The word in a config.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ahead => "ahead",
+            Self::Mark => "mark",
+            Self::Fall => "fall",
+            Self::Scale => "scale",
+        }
+    }
+}
+
+/// One suspicion and what it rests on.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Evidence {
+    /// Which.
+    pub kind: Suspicion,
+    /// The latest reading that shows it.
+    pub at: Timestamp,
+    /// One line for a person.
+    pub text: String,
+}
+
+/// The newest reading, of `newest`, came while the clock said `now`.
+pub fn ahead(newest: Timestamp, now: Timestamp) -> Option<Evidence> {
+    let ahead = SignedDuration::from_secs(newest.duration_since(now).as_secs());
+    (ahead > AHEAD).then(|| Evidence {
+        kind: Suspicion::Ahead,
+        at: newest,
+        text: format!(
+            "the last reading, {newest}, is {ahead:#} ahead of this machine's clock: is the time_zone of the source right, and dst, and the clock itself?"
+        ),
+    })
+}
+
+/// What the values of readings in `unit`, in order of time, give rise to.
+pub fn of_values(readings: &[(Timestamp, f64)], quantity: Quantity, unit: &str) -> Vec<Evidence> {
+    let mut readings = readings.to_vec();
+    let mut found = Vec::new();
+    if readings.len() < FEWEST {
+        return found;
+    }
+    if let Some((value, evidence)) = mark(&readings) {
+        readings.retain(|(_, other)| !same(*other, value));
+        found.push(evidence);
+    }
+    if quantity == Quantity::Displacement {
+        found.extend(fall(&readings, unit));
+        found.extend(scale(&readings, unit));
+    }
+    found
+}
+
+fn same(one: f64, other: f64) -> bool {
+    (one - other).abs() < 1e-9
+}
+
+/// A number that marks no value elsewhere, far from all others, or from the one before it.
+fn mark(readings: &[(Timestamp, f64)]) -> Option<(f64, Evidence)> {
+    let is_mark = |value: f64| MARKS.iter().any(|mark| same(value.abs(), *mark));
+    let index = readings.iter().position(|(_, value)| is_mark(*value))?;
+    let (first, value) = readings[index];
+    let others: Vec<(Timestamp, f64)> = readings
+        .iter()
+        .filter(|(_, other)| !same(*other, value))
+        .copied()
+        .collect();
+    let (low, high) = span(&others)?;
+    let away = (value - high).max(low - value);
+    let before = readings[..index].last().or(others.first())?.1;
+    let is_leap = scatter(&others)
+        .is_some_and(|(usual, scatter)| (value - before - usual).abs() > LEAP * scatter);
+    let mut marked = readings.iter().filter(|(_, other)| same(*other, value));
+    let (count, at) = (marked.clone().count(), marked.next_back()?.0);
+    (away > AWAY * (high - low) || is_leap).then(|| {
+        let text = format!(
+            "{value} stands {count} times, first at {first}, and all other readings lie between {low} and {high}: \
+             if it means that there is no value, add missing = [{value}] to the source"
+        );
+        let kind = Suspicion::Mark;
+        (value, Evidence { kind, at, text })
+    })
+}
+
+fn span(readings: &[(Timestamp, f64)]) -> Option<(f64, f64)> {
+    readings.iter().fold(None, |span, (_, value)| {
+        let (low, high) = span.unwrap_or((*value, *value));
+        Some((value.min(low), value.max(high)))
+    })
+}
+
+/// The usual step from one reading to the next, and how steps scatter; `None` where they do not.
+fn scatter(readings: &[(Timestamp, f64)]) -> Option<(f64, f64)> {
+    let steps: Vec<f64> = steps(readings).map(|(.., step)| step).collect();
+    let usual = median(steps.iter().copied())?;
+    let scatter = 1.4826 * median(steps.iter().map(|step| (step - usual).abs()))?;
+    let scatter = scatter.max(median(steps.iter().map(|step| step.abs()))?);
+    (scatter > 0.0).then_some((usual, scatter))
+}
+
+fn steps(readings: &[(Timestamp, f64)]) -> impl Iterator<Item = (Timestamp, Timestamp, f64)> {
+    let pairs = readings.iter().zip(readings.iter().skip(1));
+    pairs.map(|(before, after)| (before.0, after.0, after.1 - before.1))
+}
+
+fn fall(readings: &[(Timestamp, f64)], unit: &str) -> Option<Evidence> {
+    let (usual, scatter) = scatter(readings)?;
+    let (before, at, step) = steps(readings).min_by(|one, other| one.2.total_cmp(&other.2))?;
+    (usual - step > LEAP * scatter).then(|| Evidence {
+        kind: Suspicion::Fall,
+        at,
+        text: format!(
+            "between {before} and {at} it fell by {:.3} {unit}, {:.0} times the usual scatter of a step: \
+             if the sensor was reset, declare it with [[event]] kind = \"reset\"",
+            -step,
+            (usual - step) / scatter
+        ),
+    })
+}
+
+fn scale(readings: &[(Timestamp, f64)], unit: &str) -> Option<Evidence> {
+    let (low, high) = span(readings)?;
+    let moved = high - low;
+    let evidence = |text: String| Evidence {
+        kind: Suspicion::Scale,
+        at: readings.last().map_or(Timestamp::UNIX_EPOCH, |last| last.0),
+        text,
+    };
+    if readings.len() < FEWEST_OF_SCALE {
+        return None;
+    }
+    if unit == "m" && moved > LARGE_M {
+        return Some(evidence(format!(
+            "the readings span {moved:.0} m: if they are millimetres, say unit = \"mm\""
+        )));
+    }
+    let is_whole = |value: f64| (value - value.round()).abs() < 1e-6;
+    let in_thousandths = readings.iter().all(|(_, value)| is_whole(value * 1e3))
+        && readings.iter().any(|(_, value)| !is_whole(value * 1e2));
+    let is_small = moved > 0.0
+        && moved < SMALL_MM
+        && median(steps(readings).map(|step| step.2.abs()))? <= SMALL_STEP_MM;
+    (unit == "mm" && is_small && in_thousandths).then(|| {
+        evidence(format!(
+            "all readings lie within {moved:.3} mm and are given to 0.001 mm: if they are metres, say unit = \"m\""
+        ))
+    })
+}
+
+fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.collect();
+    let middle = values.len() / 2;
+    if values.is_empty() {
+        return None;
+    }
+    let (_, median, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
+    Some(*median)
+}
