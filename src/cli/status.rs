@@ -1,13 +1,15 @@
 //! `status`: how a site stands, with or without a running daemon.
 
 use super::preview::told;
-use super::state::{InForce, SiteArgs, acknowledged, in_force, orders, silences};
+use super::state::SiteArgs;
 use super::table::Table;
 use super::text;
 use crate::alert::Level;
 use crate::monitor::{Event, EventKind};
 use crate::reading::{BenchmarkId, Timestamp};
+use crate::runtime::clock;
 use crate::runtime::preview::{Preview, preview};
+use crate::runtime::standing::{InForce, acknowledged, in_force, orders, silences};
 use crate::store::Store;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -65,7 +67,7 @@ struct SiteStatus {
 /// Says how the site stands.
 pub(super) fn status(args: &StatusArgs) -> anyhow::Result<()> {
     let (config, store) = args.site.open()?;
-    let (levels, orders) = (in_force(&store)?, orders(&store)?);
+    let (levels, orders) = (in_force(&store, None)?, orders(&store)?);
     let mut refits = BTreeMap::new();
     for body in store.latest("refit")? {
         let event: Event = serde_json::from_str(&body)?;
@@ -103,7 +105,7 @@ pub(super) fn status(args: &StatusArgs) -> anyhow::Result<()> {
         site_unknown_since: levels.get(&(None, Level::Unknown)).map(|event| event.time),
         is_running: Store::is_held(&config.site.state_dir),
         acknowledged: acknowledged(&orders, &levels),
-        silences: silences(&orders),
+        silences: silences(&orders, clock::now()),
         alerts: levels.into_values().collect(),
         preview,
     };
