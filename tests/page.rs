@@ -93,7 +93,7 @@ fn a_moment_is_shown_as_it_was_known_then() {
         let time: jiff::Timestamp = one["time"].as_str().unwrap().parse().unwrap();
         one["benchmark"] == "E3" && time <= before
     };
-    let newest = refits.iter().filter(is_then).next_back().unwrap();
+    let newest = refits.iter().rfind(is_then).unwrap();
     assert_eq!(then["failure_time"], newest["failure_time"]);
     let answer = site.json(&format!("/api/benchmark?id=E3&at={before}"));
     assert_eq!(&answer["latest"], newest);
@@ -141,7 +141,7 @@ fn an_order_needs_the_token_a_name_and_a_span_that_is_allowed() {
         assert_eq!(status, 422, "{wrong}: {said}");
     }
     assert_eq!(order(&headers, &good).0, 200);
-    let start = std::time::Instant::now();
+    let start = slipwatch::runtime::clock::Stopwatch::start();
     let orders = loop {
         let orders = site.events("order");
         if !orders.is_empty() || start.elapsed().as_secs() > 60 {

@@ -64,10 +64,9 @@ pub async fn run(
     if let Err(error) = shutdown::survive_the_file_limit() {
         tracing::warn!(%error, "a limit on the length of files would end this process");
     }
-    let desk = Desk::open(&config.site.state_dir, Facts::of(config)).map_err(fail)?;
     let behind = Behind {
         archive: Some(Arc::new(super::archive::Events::of(Arc::clone(&store)))),
-        desk: Some(Arc::new(desk)),
+        desk: desk(config),
     };
     let mut pulse = Pulse::start(&config.site, behind).await?;
     let sinks = Sinks {
@@ -98,4 +97,16 @@ pub async fn run(
     worked.and(closed.map(drop)).map_err(fail)?;
     followed?;
     Ok(counts)
+}
+
+/// What the page asks, where the site listens. A page that cannot be shown is no reason not to watch.
+fn desk(config: &Config) -> Option<Arc<Desk>> {
+    config.site.listen?;
+    match Desk::open(&config.site.state_dir, Facts::of(config)) {
+        Ok(desk) => Some(Arc::new(desk)),
+        Err(error) => {
+            tracing::error!(%error, "the page cannot be shown");
+            None
+        }
+    }
 }

@@ -255,3 +255,62 @@ fn value(row: &Row<'_>, is_reading: bool) -> Result<Value, StoreError> {
             .map(SignedDuration::from_nanos),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::monitor::Input;
+    use crate::reading::{BenchmarkId, Reading};
+    use crate::store::Batch;
+
+    fn at(second: i64) -> Timestamp {
+        Timestamp::from_second(second).unwrap()
+    }
+
+    fn reading(second: i64, value: f64) -> Input {
+        Input::Reading {
+            benchmark: BenchmarkId::new("5"),
+            unit: Unit::parse("m").unwrap(),
+            averaging: None,
+            reading: Reading {
+                time: at(second),
+                value,
+                sigma: None,
+            },
+        }
+    }
+
+    #[test]
+    fn what_came_late_or_was_corrected_is_known_only_from_then_on() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open(folder.path()).unwrap();
+        let mut batch = Batch::default();
+        batch.step(at(100), &reading(100, 1.0), &[]);
+        batch.step(at(200), &reading(200, 2.0), &[]);
+        // Measured between them, and come after both; then the first is corrected.
+        batch.step(at(200), &reading(150, 1.5), &[]);
+        batch.step(at(300), &reading(100, 1.1), &[]);
+        store.commit(&batch).unwrap();
+        let known = |second: i64| -> Vec<(i64, f64)> {
+            let wanted = Values {
+                name: "5",
+                is_reading: true,
+                from: at(0),
+                to: at(1000),
+                known: at(second),
+                most: 10,
+            };
+            let values = store.values(&wanted).unwrap();
+            let value = |one: &Value| (one.time.as_second(), one.value.round());
+            values.iter().map(value).collect()
+        };
+        assert_eq!(known(199), [(100, 1000.0)]);
+        assert_eq!(
+            known(200),
+            [(100, 1000.0), (150, 1500.0), (200, 2000.0)],
+            "in mm"
+        );
+        assert_eq!(known(300), [(100, 1100.0), (150, 1500.0), (200, 2000.0)]);
+        assert_eq!(store.newest_reading("5", at(160)).unwrap(), Some(at(150)));
+    }
+}

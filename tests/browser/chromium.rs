@@ -1,15 +1,16 @@
 //! A headless Chromium of our own, driven over its DevTools protocol through two pipes.
 
 use serde_json::{Value, json};
+use slipwatch::runtime::clock::Stopwatch;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use tempfile::TempDir;
 
 /// A page that does not come to show what is waited for in this time is broken.
-const LIMIT: Duration = Duration::from_secs(60);
+const LIMIT: Duration = Duration::from_secs(20);
 
 pub(crate) struct Chromium {
     process: Child,
@@ -88,6 +89,11 @@ impl Chromium {
         loop {
             let answer = self.read();
             if answer["id"] == self.number {
+                // While another page is being loaded there is nothing to ask.
+                let said = answer["error"]["message"].as_str().unwrap_or_default();
+                if said.contains("navigated") || said.contains("context") {
+                    return Value::Null;
+                }
                 assert!(answer["error"].is_null(), "{method}: {answer}");
                 return answer["result"].clone();
             }
@@ -147,10 +153,13 @@ impl Chromium {
         text.as_str().unwrap().to_owned()
     }
 
-    /// Waits until an expression is true.
+    /// Waits until an expression is true; one that cannot be asked yet, because the page is being loaded, is not.
     pub(crate) fn until(&mut self, expression: &str) {
-        let start = Instant::now();
-        while self.value(&format!("Boolean({expression})")) != true {
+        let asked = format!(
+            "(() => {{ try {{ return Boolean({expression}); }} catch {{ return false; }} }})()"
+        );
+        let start = Stopwatch::start();
+        while self.value(&asked) != true {
             if start.elapsed() > LIMIT {
                 let shown = self.value("document.body.innerText");
                 panic!("never: {expression}; {:?}; {shown}", self.complaints);
@@ -202,8 +211,11 @@ impl Chromium {
 
     pub(crate) fn press(&mut self, key: &str, code: u32) {
         for kind in ["keyDown", "keyUp"] {
-            let event =
+            let mut event =
                 json!({ "type": kind, "key": key, "code": key, "windowsVirtualKeyCode": code });
+            if key == "Enter" && kind == "keyDown" {
+                event["text"] = json!("\r");
+            }
             self.call("Input.dispatchKeyEvent", &event);
         }
     }

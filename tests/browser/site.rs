@@ -1,15 +1,19 @@
 //! A daemon of our own over measured readings, moved in time so that the last one is an hour old.
-#![allow(dead_code, reason = "two test programs share it, and neither uses all of it")]
+#![allow(
+    dead_code,
+    reason = "two test programs share it, and neither uses all of it"
+)]
 
 use assert_cmd::Command;
 use jiff::{SignedDuration, Timestamp};
 use serde_json::Value;
+use slipwatch::runtime::clock::Stopwatch;
 use std::fmt::Write as _;
 use std::fs;
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::process::{Child, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use tempfile::TempDir;
 
 pub(crate) const PROGRAM: &str = env!("CARGO_BIN_EXE_slipwatch");
@@ -26,14 +30,19 @@ pub(crate) struct Site {
 
 impl Site {
     pub(crate) fn start() -> Self {
+        Self::with(MARKUP)
+    }
+
+    /// The same with another name for the benchmark that stands still.
+    pub(crate) fn with(still: &str) -> Self {
         let free = TcpListener::bind("127.0.0.1:0").unwrap();
         let port = free.local_addr().unwrap().port();
         drop(free);
         let folder = tempfile::tempdir().unwrap();
         let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
         write("token", TOKEN);
-        write("slope.csv", &readings());
-        write("site.toml", &config(port));
+        write("slope.csv", &readings(still));
+        write("site.toml", &config(port, still));
         let mut site = Self {
             folder,
             port,
@@ -53,7 +62,7 @@ impl Site {
             .stderr(log)
             .spawn();
         self.process = Some(process.unwrap());
-        let start = Instant::now();
+        let start = Stopwatch::start();
         while self.get("/readyz").0 != 200 {
             let log = fs::read_to_string(self.folder.path().join("log")).unwrap();
             assert!(start.elapsed() < LIMIT, "{log}");
@@ -126,7 +135,7 @@ impl Drop for Site {
 }
 
 /// Preonzo's E3 and E5, a benchmark that stands still, and rain.
-fn readings() -> String {
+fn readings(name: &str) -> String {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/preonzo-2012.mcap");
     let folder = tempfile::tempdir().unwrap();
     let table = folder.path().join("table.csv");
@@ -145,7 +154,7 @@ fn readings() -> String {
     let hour_ago = slipwatch::runtime::clock::now() - SignedDuration::from_hours(1);
     let shift = hour_ago.duration_since(newest);
     let mut text =
-        format!("time,E3_displacement_mm,E5_displacement_mm,{MARKUP}_displacement_mm,rain_mm\n");
+        format!("time,E3_displacement_mm,E5_displacement_mm,{name}_displacement_mm,rain_mm\n");
     for (index, row) in rows.iter().enumerate() {
         let [e3, e5] = columns.map(|column| &row[column]);
         let still = 0.05 * (index % 3) as f64;
@@ -155,7 +164,7 @@ fn readings() -> String {
     text
 }
 
-fn config(port: u16) -> String {
+fn config(port: u16, still: &str) -> String {
     let benchmark = |id: &str, position: &str| {
         format!(
             "[[benchmark]]\nid = \"{id}\"\nsource = \"logger\"\ncolumn = \"{id}_displacement_mm\"\nposition = {position}\n"
@@ -167,7 +176,7 @@ fn config(port: u16) -> String {
         "[[source]]\nid = \"logger\"\nkind = \"csv\"\npath = \"slope.csv\"\n".to_owned(),
         benchmark("E3", "[120, 80, 1410]"),
         benchmark("E5", "[180, 140, 1460]"),
-        benchmark(MARKUP, "[60, 20, 1350]"),
+        benchmark(still, "[60, 20, 1350]"),
         "[[hook]]\nrun = [\"/bin/true\"]\n".to_owned(),
     ]
     .concat()

@@ -2,7 +2,7 @@
 
 use super::{Args, CRISES, pace, policy, recording};
 use crate::cli::run::asynchronous;
-use crate::monitor::Settings;
+use crate::monitor::{Settings, SiteLevel};
 use crate::runtime::exhibit::{Exhibit, show};
 use crate::runtime::replay;
 use crate::runtime::serve::{Door, Limits};
@@ -27,6 +27,7 @@ pub(super) fn serve(args: &Args, listen: SocketAddr, folder: &Path) -> anyhow::R
         recording: &recording,
         settings: Settings {
             policy: policy(crisis),
+            site: Some(SiteLevel::Worst),
             ..Settings::default()
         },
         pace: pace(args.pace.unwrap_or(PACE), &arrivals),

@@ -22,8 +22,8 @@ const LOOK: Duration = Duration::from_secs(1);
 /// A stream ends after so many looks; whoever reads it asks again, from where it ended. So none holds a place for
 /// ever, and all end before [`super::Limits::request_time`].
 const LOOKS: u32 = 20;
-/// Changes that are told one by one; after more of them everything is to be asked for again.
-const MOST_TOLD: usize = 200;
+/// Events told at one look; after more of them the next look follows at once.
+const MOST_TOLD: usize = 500;
 
 /// The routes.
 pub(super) fn router(desk: Arc<Desk>) -> Router {
@@ -138,12 +138,13 @@ async fn changes(State(desk): State<Arc<Desk>>, Query(since): Query<Since>) -> R
         event: since.since,
         step: None,
         looks: 0,
+        is_behind: false,
     };
     let parts = stream::unfold(place, |mut place| async move {
         if place.looks == LOOKS {
             return None;
         }
-        if place.looks > 0 {
+        if place.looks > 0 && !place.is_behind {
             tokio::time::sleep(LOOK).await;
         }
         place.looks += 1;
@@ -169,6 +170,8 @@ struct Place {
     event: Option<i64>,
     step: Option<i64>,
     looks: u32,
+    /// Whether there is more to tell than one look tells.
+    is_behind: bool,
 }
 
 impl Place {
@@ -176,20 +179,25 @@ impl Place {
     fn look(&mut self) -> Result<String, StoreError> {
         let Heads { step, event } = self.desk.heads()?;
         let told = self.event.unwrap_or(event);
+        let mut fresh = if event > told {
+            self.desk.events_after(told)?
+        } else {
+            Vec::new()
+        };
+        self.is_behind = fresh.len() > MOST_TOLD;
+        fresh.truncate(MOST_TOLD);
         let mut text = String::new();
-        if event > told {
-            let fresh = self.desk.events_after(told)?;
-            for (number, body) in fresh.iter().rev().take(MOST_TOLD).rev() {
-                let _ = write!(text, "id: {number}\nevent: change\ndata: {body}\n\n");
-            }
+        for (number, body) in &fresh {
+            let _ = write!(text, "id: {number}\nevent: change\ndata: {body}\n\n");
         }
+        let told = fresh.last().map_or(event, |(number, _)| *number);
         if self.step != Some(step) {
             let _ = write!(
                 text,
-                "id: {event}\nevent: progress\ndata: {{\"step\":{step},\"event\":{event}}}\n\n"
+                "id: {told}\nevent: progress\ndata: {{\"step\":{step},\"event\":{event}}}\n\n"
             );
         }
-        (self.event, self.step) = (Some(event), Some(step));
+        (self.event, self.step) = (Some(told), Some(step));
         Ok(if text.is_empty() {
             ": nothing new\n\n".to_owned()
         } else {

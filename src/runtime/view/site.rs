@@ -100,7 +100,6 @@ impl Desk {
         let called = site_levels.map(|((_, level), _)| *level);
         let called = called.filter(|level| *level != Level::Unknown).max();
         let benchmarks: Vec<Standing> = benchmarks.collect::<Result<_, _>>()?;
-        let worst = benchmarks.iter().map(|one| one.level).max();
         Ok(SiteView {
             site: self.facts.name.clone(),
             version: env!("CARGO_PKG_VERSION"),
@@ -111,7 +110,7 @@ impl Desk {
             last: span.map(|(_, last)| last),
             collapse: self.facts.collapse,
             takes_orders: self.facts.takes_orders,
-            level: called.or(worst).unwrap_or(Level::Green),
+            level: called.unwrap_or(Level::Green),
             unknown_since: levels.get(&(None, Level::Unknown)).map(|event| event.time),
             benchmarks,
             acknowledged: seen,
@@ -182,7 +181,14 @@ impl Desk {
 
     fn log(&self, at: Option<Timestamp>) -> Result<Vec<Event>, StoreError> {
         let mut log = Vec::new();
-        for kind in ["alert", "fault", "order", "correction", "declared"] {
+        for kind in [
+            "alert",
+            "together",
+            "fault",
+            "order",
+            "correction",
+            "declared",
+        ] {
             for body in self
                 .store
                 .newest_events(kind, at.unwrap_or(LATEST), LISTED)?

@@ -100,7 +100,7 @@ export class Charts {
 
   add(chart) {
     const caption = el('figcaption');
-    const figureNode = el('figure', { class: 'chart', 'data-chart': chart.key, role: 'group', 'aria-label': chart.title }, caption);
+    const figureNode = el('figure', { class: 'chart', 'data-chart': chart.key, 'aria-label': chart.title }, caption);
     this.node.append(figureNode);
     const entry = { chart, caption };
     this.plots.set(chart.key, entry);

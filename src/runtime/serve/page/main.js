@@ -8,7 +8,7 @@ import { el, field, instant, keepMoment, minute, useZone } from '/page/words.js'
 const SOON_MS = 300;
 const SELDOM_MS = 30000;
 const byId = (id) => document.getElementById(id);
-const state = { at: null, route: null, page: null, span: null, isLost: false, since: null, asked: null };
+const state = { at: null, route: null, page: null, span: null, isLost: false, since: null, asked: null, cost: 0 };
 
 /** #/?at=T or #/b/ID?at=T */
 function readAddress() {
@@ -51,11 +51,15 @@ async function refresh() {
   const asked = new AbortController();
   state.asked = asked;
   const page = state.page;
+  const started = performance.now();
   try {
     const answer = await page.ask(state.at, asked.signal);
     if (asked.signal.aborted || page !== state.page) return;
     frame(answer.frame);
+    const focus = focused();
     page.draw(answer, state.at);
+    focus?.();
+    state.cost = performance.now() - started;
     document.documentElement.dataset.shown = String(Date.now());
     if (!state.isLost) banner();
   } catch (error) {
@@ -63,6 +67,18 @@ async function refresh() {
     if (error instanceof Refused) warn(error.message);
     else lost();
   }
+}
+
+/** How to give the focus back after the view was drawn anew. */
+function focused() {
+  const node = document.activeElement;
+  if (!node || !byId('view').contains(node) || node === byId('view')) return null;
+  const alike = () => [...byId('view').querySelectorAll(node.tagName)].filter((one) => one.getAttribute('href') === node.getAttribute('href')
+    && one.dataset.order === node.dataset.order && one.textContent === node.textContent);
+  const index = alike().indexOf(node);
+  return () => {
+    if (!node.isConnected) alike()[Math.max(0, index)]?.focus({ preventScroll: true });
+  };
 }
 
 /** What stands around every view: the name, the moment, the slider. */
@@ -132,7 +148,7 @@ function changed() {
   timer ??= setTimeout(() => {
     timer = null;
     refresh();
-  }, SOON_MS);
+  }, Math.max(SOON_MS, 4 * state.cost));
 }
 
 /** Lets a person give an order. */

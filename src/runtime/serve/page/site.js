@@ -139,7 +139,7 @@ function drawing(standings, points, name) {
   const left0 = (WIDTH - width * scale) / 2;
   const at = ([x, y]) => [left0 + (x - Math.min(...xs)) * scale, size - EDGE - (y - Math.min(...ys)) * scale];
   const bar = nice((WIDTH / 4) / scale);
-  return svg('svg', { class: 'sketch', viewBox: `0 0 ${WIDTH} ${size.toFixed(0)}`, role: 'img', 'aria-label': name },
+  return svg('svg', { class: 'sketch', viewBox: `0 0 ${WIDTH} ${size.toFixed(0)}`, role: 'group', 'aria-label': name },
     svg('path', { class: 'rule', d: `M12 ${size - 10}h${bar * scale}m0-4v8M12 ${size - 14}v8` }),
     svg('text', { x: 16 + bar * scale, y: size - 6 }, `${bar} m`),
     standings.map((one, index) => {

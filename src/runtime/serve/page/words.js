@@ -149,6 +149,9 @@ export function left(forecast, now) {
 export function told(event) {
   switch (event.event) {
     case 'alert': return event.state === 'firing' ? event.text : `${event.level} ${event.state}: ${event.text}`;
+    case 'together': return event.groups.map((group) => `${group.benchmarks.join(', ')} share a failure time: ${
+      group.failure_time.median ? minute(group.failure_time.median) : 'none in sight'}, chance ${
+      percent(group.chance_within_evacuation_time)} within the evacuation time`).join('; ') || 'no benchmarks share a failure time any more';
     case 'order': return `${event.order}${event.by ? ` by ${event.by}` : ''}${event.until ? ` until ${minute(event.until)}` : ''}`;
     case 'regime-flip': return `regime ${event.from} to ${event.to}, probability ${percent(event.probability)}`;
     case 'intercept-drift': return `inverse-velocity intercept moved to ${minute(event.to)}`;
