@@ -1,5 +1,6 @@
 //! `status`: how a site stands, with or without a running daemon.
 
+use super::args::Format;
 use super::preview::told;
 use super::state::SiteArgs;
 use super::table::Table;
@@ -11,8 +12,11 @@ use crate::runtime::clock;
 use crate::runtime::preview::{Preview, preview};
 use crate::runtime::standing::{InForce, acknowledged, in_force, orders, silences};
 use crate::store::Store;
+use jiff::tz::TimeZone;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::io::{self, IsTerminal, Write};
+use std::time::Duration;
 
 /// Say what a site's benchmarks do: level, regime, failure time, newest reading
 #[derive(Debug, clap::Args)]
@@ -23,7 +27,15 @@ pub(super) struct StatusArgs {
     /// rows that are refused
     #[arg(long)]
     sources: bool,
+    /// Say it again every two seconds, until interrupted
+    #[arg(long)]
+    watch: bool,
 }
+
+/// How often `--watch` looks.
+const LOOK: Duration = Duration::from_secs(2);
+/// Puts a terminal's cursor at the top of an empty screen.
+const CLEAR: &str = "\u{1b}[H\u{1b}[2J";
 
 /// How one benchmark stands.
 #[derive(Debug, Serialize)]
@@ -64,8 +76,28 @@ struct SiteStatus {
     preview: Option<Preview>,
 }
 
-/// Says how the site stands.
+/// Says how the site stands, once or until interrupted.
 pub(super) fn status(args: &StatusArgs) -> anyhow::Result<()> {
+    loop {
+        // Looked up before the screen is emptied, so that it does not flicker.
+        let status = gathered(args)?;
+        if args.watch && args.site.output.format == Format::Text && io::stdout().is_terminal() {
+            write!(io::stdout(), "{CLEAR}")?;
+        }
+        let (status, zone) = &status;
+        args.site.output.print(status, |status| {
+            let preview = status.preview.as_ref();
+            let files = preview.map_or_else(String::new, |preview| told(preview, zone));
+            status_text(status) + &files
+        })?;
+        if !args.watch {
+            return Ok(());
+        }
+        std::thread::sleep(LOOK);
+    }
+}
+
+fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
     let (config, store) = args.site.open()?;
     let (levels, orders) = (in_force(&store, None)?, orders(&store)?);
     let mut refits = BTreeMap::new();
@@ -109,11 +141,7 @@ pub(super) fn status(args: &StatusArgs) -> anyhow::Result<()> {
         alerts: levels.into_values().collect(),
         preview,
     };
-    args.site.output.print(&status, |status| {
-        let preview = status.preview.as_ref();
-        let files = preview.map_or_else(String::new, |preview| told(preview, &zone));
-        status_text(status) + &files
-    })
+    Ok((status, zone))
 }
 
 fn stands(
@@ -151,32 +179,25 @@ fn status_text(status: &SiteStatus) -> String {
     let mut table = Table::headed([
         "benchmark",
         "level",
-        "since",
         "newest reading",
-        "regime",
         "mm/day",
-        "failure (median)",
+        "collapse",
         "chance",
     ]);
-    let time = |time: Option<Timestamp>| time.map_or_else(|| "-".to_owned(), text::minute);
+    let dash = || "-".to_owned();
     for one in &status.benchmarks {
-        let velocity = one
-            .velocity_mm_per_day
-            .map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
+        let velocity = one.velocity_mm_per_day;
+        let day = |time: Timestamp| time.strftime("%Y-%m-%d").to_string();
         table.row([
             text::plain(one.benchmark.as_str()),
-            match one.unknown_since {
-                Some(since) if one.since.is_some() => {
-                    format!("{}, unknown since {}", one.level, text::minute(since))
-                }
-                _ if one.is_unknown => format!("{}, unknown", one.level),
-                _ => one.level.to_string(),
+            match (one.is_unknown, one.since) {
+                (true, Some(_)) => format!("{}, unknown", one.level),
+                (true, None) => "unknown".to_owned(),
+                (false, _) => one.level.to_string(),
             },
-            time(one.since.or(one.unknown_since)),
-            time(one.newest_reading),
-            one.regime.clone().unwrap_or_else(|| "-".to_owned()),
-            velocity,
-            time(one.failure_time),
+            one.newest_reading.map_or_else(dash, text::minute),
+            velocity.map_or_else(dash, |velocity| format!("{velocity:.3}")),
+            one.failure_time.map_or_else(dash, day),
             chance(one.chance_within_evacuation_time),
         ]);
     }
@@ -197,7 +218,7 @@ fn status_text(status: &SiteStatus) -> String {
     };
     format!(
         "{dead}{}: {} inputs taken, {} alerts wait for a hook\n{}{}\n{table}\
-         chance: of passing the critical velocity within the evacuation time\n{force}",
+         collapse: median of the forecast; chance: of collapse within the evacuation time\n{force}",
         text::plain(&status.site),
         status.steps,
         status.alerts_waiting,

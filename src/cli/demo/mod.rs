@@ -3,7 +3,7 @@
 mod crisis;
 mod marks;
 mod serve;
-mod timeline;
+pub(super) mod timeline;
 mod verdict;
 
 use super::run::asynchronous;
