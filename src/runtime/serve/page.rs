@@ -19,7 +19,7 @@ struct Asset {
     text: &'static str,
 }
 
-const ASSETS: [Asset; 11] = [
+const ASSETS: [Asset; 12] = [
     Asset {
         path: "/",
         kind: "text/html; charset=utf-8",
@@ -44,6 +44,11 @@ const ASSETS: [Asset; 11] = [
         path: "/page/uplot.js",
         kind: SCRIPT,
         text: include_str!("page/uPlot.iife.min.js"),
+    },
+    Asset {
+        path: "/page/uplot.license",
+        kind: "text/plain; charset=utf-8",
+        text: include_str!("page/uPlot.LICENSE"),
     },
     Asset {
         path: "/page/main.js",
