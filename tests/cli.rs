@@ -282,6 +282,23 @@ fn a_replay_is_the_same_bytes_twice_and_at_any_speed() {
 }
 
 #[test]
+fn a_replay_as_text_ends_with_velocity_level_and_forecast_as_marks_in_eighty_columns() {
+    let said = out(&slipwatch(&["replay", &vaiont(), "--benchmark", "63"]).success());
+    let (_, marks) = said.split_once("\n63 ").unwrap();
+    let rows: Vec<&str> = marks.lines().skip(1).collect();
+    for (row, name) in rows.iter().zip(["velocity", "level", "forecast"]) {
+        assert!(row.starts_with(name) && row.chars().count() <= 80, "{row}");
+    }
+    assert!(rows[1].contains('r'), "{marks}");
+    let json =
+        out(&slipwatch(&["replay", &vaiont(), "--benchmark", "63", "--format", "json"]).success());
+    assert!(
+        !json.contains("velocity  "),
+        "as JSON there are events alone"
+    );
+}
+
+#[test]
 fn a_replay_up_to_a_time_is_the_beginning_of_the_whole_one() {
     let vaiont = vaiont();
     let replay = ["replay", &vaiont, "--format", "json", "--benchmark", "5"];

@@ -39,17 +39,88 @@ fn said(output: &Output) -> String {
 }
 
 #[test]
-fn the_unit_is_hardened_to_a_score_of_two_or_lower() {
-    let arguments = [
-        "security",
-        "--offline=yes",
-        "--threshold=20",
-        "--no-pager",
+fn the_units_are_hardened_to_a_score_of_two_or_lower() {
+    for unit in [
         "deploy/slipwatch.service",
-    ];
-    if let Some(output) = tool("systemd-analyze", &arguments) {
+        "deploy/slipwatch-report.service",
+    ] {
+        let arguments = [
+            "security",
+            "--offline=yes",
+            "--threshold=20",
+            "--no-pager",
+            unit,
+        ];
+        if let Some(output) = tool("systemd-analyze", &arguments) {
+            assert!(output.status.success(), "{}", said(&output));
+        }
+    }
+}
+
+#[test]
+fn the_weekly_report_is_written_from_the_daemons_state_by_its_own_user() {
+    let unit = text("deploy/slipwatch-report.service");
+    for line in [
+        "ExecStart=slipwatch report --config /etc/slipwatch/site.toml --last 7d -o /var/lib/slipwatch/reports",
+        "User=slipwatch",
+        "DynamicUser=yes",
+        "StateDirectory=slipwatch",
+    ] {
+        assert!(unit.lines().any(|had| had == line), "{line}");
+    }
+    let timer = text("deploy/slipwatch-report.timer");
+    let calendar = timer
+        .lines()
+        .find_map(|line| line.strip_prefix("OnCalendar="));
+    if let Some(output) = tool("systemd-analyze", &["calendar", calendar.unwrap()]) {
         assert!(output.status.success(), "{}", said(&output));
     }
+}
+
+#[test]
+fn the_command_of_the_weekly_report_writes_a_page_from_a_state() {
+    let unit = text("deploy/slipwatch-report.service");
+    let command = unit
+        .lines()
+        .find_map(|line| line.strip_prefix("ExecStart=slipwatch "));
+    let folder = tempfile::tempdir().unwrap();
+    let site = "[site]\nname = \"A slope\"\nstate_dir = \"state\"\n[[source]]\nid = \"l\"\nkind = \"csv\"\npath = \"in.csv\"\n";
+    std::fs::write(folder.path().join("site.toml"), site).unwrap();
+    let state = folder.path().join("state");
+    let store = slipwatch::store::Store::open(&state).unwrap();
+    let mut batch = slipwatch::store::Batch::default();
+    for hour in 0..24 * 20 {
+        let time: jiff::Timestamp = "2026-01-01T00:00:00Z".parse().unwrap();
+        let time = time + jiff::SignedDuration::from_hours(hour);
+        let input = slipwatch::monitor::Input::Reading {
+            benchmark: BenchmarkId::new("<5>"),
+            unit: slipwatch::reading::Unit::MM,
+            averaging: None,
+            reading: slipwatch::reading::Reading {
+                time,
+                value: hour as f64,
+                sigma: None,
+            },
+        };
+        batch.step(time, &input, &[]);
+    }
+    store.commit(&batch).unwrap();
+    let words = command.unwrap().split(' ').map(|word| match word {
+        "/etc/slipwatch/site.toml" => "site.toml",
+        "/var/lib/slipwatch/reports" => "reports",
+        word => word,
+    });
+    let output = Command::new(env!("CARGO_BIN_EXE_slipwatch"))
+        .args(words)
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", said(&output));
+    let page = folder.path().join("reports/report-2026-01-20.html");
+    let page = std::fs::read_to_string(page).unwrap();
+    assert!(page.contains("<h1>A slope</h1>") && page.contains("Benchmark &lt;5&gt;"));
+    // A week, and four before it for the figures: the record is shorter.
+    assert!(page.contains("480 readings"), "{page:.2000}");
 }
 
 #[test]
@@ -200,6 +271,7 @@ fn the_built_package_holds_the_program_the_unit_the_manual_and_the_completions()
     for wanted in [
         "-rwxr-xr-x ./usr/bin/slipwatch",
         "-rw-r--r-- ./usr/lib/systemd/system/slipwatch.service",
+        "-rw-r--r-- ./usr/lib/systemd/system/slipwatch-report.timer",
         "-rw-r--r-- ./usr/share/man/man1/slipwatch-run.1.gz",
         "-rw-r--r-- ./usr/share/man/man5/slipwatch-config.5.gz",
         "-rw-r--r-- ./usr/share/bash-completion/completions/slipwatch",

@@ -62,6 +62,14 @@ fn one_command_leads_from_a_file_of_the_office_to_a_watch_that_reads_it() {
     let daemon = office.run(&["run", "site.toml"]);
     let status = office.status_until("2017-06-05 03:00 CEST");
     assert!(!status.contains("NO DAEMON RUNS"), "{status}");
+    let table = status
+        .lines()
+        .skip_while(|line| !line.starts_with("benchmark "));
+    let table: Vec<&str> = table.take_while(|line| !line.is_empty()).collect();
+    assert!(table.len() >= 3, "{status}");
+    for line in table {
+        assert!(line.chars().count() <= 80, "{line}");
+    }
     let status = office.done(&["status", "--sources", "--config", "site.toml"]);
     assert!(
         status.contains("covariate Regen_mm (slope): 100 values"),

@@ -10,6 +10,7 @@ const PREONZO: [&str; 3] = ["recordings/preonzo-2012.mcap", "--benchmark", "E3"]
 const COLLAPSE: [&str; 2] = ["--failure-time", "2012-05-15T01:30:00Z"];
 const INVERSE: [&str; 2] = ["--kind", "inverse-velocity"];
 const FORECAST: [&str; 2] = ["--kind", "forecast"];
+const REGIME: [&str; 2] = ["--kind", "regime"];
 
 fn plot(arguments: &[&[&str]]) -> Assert {
     Command::new(env!("CARGO_BIN_EXE_slipwatch"))
@@ -93,7 +94,7 @@ fn check_attributes(text: &str) {
 
 #[test]
 fn a_crisis_is_drawn_as_well_formed_xml_with_its_levels_and_its_collapse_in_words() {
-    for kind in [&INVERSE, &FORECAST] {
+    for kind in [&INVERSE, &FORECAST, &REGIME] {
         let svg = drawn(&[&PREONZO, &COLLAPSE, kind]);
         check_xml(&svg);
         for word in ["green", "red", ">collapse<", "2012-05-15 01:30Z", "E3"] {
@@ -104,6 +105,20 @@ fn a_crisis_is_drawn_as_well_formed_xml_with_its_levels_and_its_collapse_in_word
             assert!(!svg.contains(reference), "{reference}");
         }
     }
+}
+
+#[test]
+fn the_residual_is_that_of_the_readings_asked_for() {
+    let residual = ["--kind", "residual"];
+    let svg = drawn(&[&PREONZO, &residual]);
+    check_xml(&svg);
+    let earlier = drawn(&[&PREONZO, &residual, &["--until", "2012-05-08"]]);
+    check_xml(&earlier);
+    assert_ne!(svg, earlier);
+    let few = refused(&[&PREONZO, &residual, &["--until", "2012-04-11"]]);
+    assert!(few.1.contains("too few readings"), "{few:?}");
+    let dated = refused(&[&PREONZO, &residual, &["--at", "2012-05-07"]]);
+    assert_eq!(dated.0, 2);
 }
 
 #[test]

@@ -225,12 +225,12 @@ fn a_later_versions_tables_are_refused_and_an_empty_file_gets_ours() {
     let version: i64 = connection
         .pragma_query_value(None, "user_version", |row| row.get(0))
         .unwrap();
-    assert_eq!(version, 2);
-    connection.pragma_update(None, "user_version", 3).unwrap();
+    assert_eq!(version, 3);
+    connection.pragma_update(None, "user_version", 4).unwrap();
     drop(connection);
     for refused in [Store::open(folder.path()), Store::look(folder.path())] {
         assert!(
-            matches!(refused, Err(StoreError::Newer { version: 3 })),
+            matches!(refused, Err(StoreError::Newer { version: 4 })),
             "{refused:?}"
         );
     }
@@ -242,7 +242,8 @@ fn tables_of_the_version_before_are_brought_up_and_what_they_hold_stays() {
     let file = folder.path().join("slipwatch.db");
     drop(Store::open(folder.path()).unwrap());
     let connection = rusqlite::Connection::open(&file).unwrap();
-    let before = "ALTER TABLE step DROP COLUMN sum; ALTER TABLE event DROP COLUMN sum;
+    let before =
+        "DROP INDEX event_at; ALTER TABLE step DROP COLUMN sum; ALTER TABLE event DROP COLUMN sum;
                   INSERT INTO step (seq, now) VALUES (1, 5); PRAGMA user_version = 1;";
     connection.execute_batch(before).unwrap();
     drop(connection);

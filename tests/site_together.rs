@@ -36,9 +36,12 @@ fn watch(series: &[Series]) -> Vec<Event> {
 }
 
 fn shared(events: &[Event]) -> Vec<(Timestamp, Vec<SharedFailure>)> {
-    let together = events.iter().filter_map(|event| match &event.kind {
-        EventKind::Together { groups } => Some((event.time, groups.clone())),
-        _ => None,
+    let together = events.iter().filter_map(|event| {
+        if let EventKind::Together { groups } = &event.kind {
+            Some((event.time, groups.clone()))
+        } else {
+            None
+        }
     });
     together.collect()
 }

@@ -16,6 +16,7 @@ mod man;
 mod plot;
 mod preview;
 mod replay;
+mod report;
 mod run;
 mod score;
 mod simulate;
@@ -55,6 +56,8 @@ enum Command {
     Explain(explain::Args),
     Score(score::Args),
     Plot(plot::Args),
+    #[command(mut_arg("files", |files| files.required_unless_present("config").required(false)))]
+    Report(Box<report::Args>),
     Simulate(simulate::Args),
     Convert(convert::Args),
     #[command(subcommand)]
@@ -82,6 +85,7 @@ pub fn main() -> ExitCode {
             Command::Explain(args) => explain::run(&args),
             Command::Score(args) => score::run(&args),
             Command::Plot(args) => plot::run(&args),
+            Command::Report(args) => report::run(&args),
             Command::Simulate(args) => simulate::run(&args),
             Command::Convert(args) => convert::run(&args),
             Command::Hook(command) => hook::run(&command),

@@ -2,9 +2,9 @@
 
 use super::args::ReadingArgs;
 use super::exit::UsageError;
-use super::replay;
+use super::{explain, replay};
 use crate::alert::Policy;
-use crate::figures::Replayed;
+use crate::figures::{Replayed, pictures};
 use crate::monitor::{Event, Settings};
 use crate::reading::{Recording, Series, Timestamp};
 use anyhow::{Context, bail};
@@ -44,14 +44,21 @@ enum Kind {
     InverseVelocity,
     /// The time of collapse that was forecast against the time at which it was
     Forecast,
+    /// How sure the law was of instability and of acceleration, the chances, levels
+    Regime,
+    /// What the law does not explain, as `explain` finds it
+    Residual,
 }
 
 /// Replays the files and draws.
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
-    if args.kind == Kind::Forecast && !args.at.is_empty() {
+    if args.kind != Kind::InverseVelocity && !args.at.is_empty() {
         let text =
-            "--at chooses forecasts for --kind inverse-velocity; --kind forecast draws all of them";
+            "--at chooses forecasts for --kind inverse-velocity; the other kinds draw all of them";
         bail!(UsageError(text.to_owned()));
+    }
+    if args.kind == Kind::Residual {
+        return write(args, &residual(args)?);
     }
     let mut recording = args.readings.load()?.recording;
     let mut series = args.readings.series(&recording)?.clone();
@@ -72,7 +79,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         }
         Kind::InverseVelocity => replayed.inverse_velocity(&args.at),
         Kind::Forecast => replayed.forecasts(),
+        Kind::Regime | Kind::Residual => replayed.regimes(),
     };
+    write(args, &svg)
+}
+
+fn write(args: &Args, svg: &str) -> anyhow::Result<()> {
     match &args.output {
         Some(file) => {
             std::fs::write(file, svg)
@@ -81,6 +93,31 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         None => std::io::stdout().lock().write_all(svg.as_bytes())?,
     }
     Ok(())
+}
+
+/// The residual of the law under a constant load, of the readings until `--until`.
+fn residual(args: &Args) -> anyhow::Result<String> {
+    let mut recording = args.readings.load()?.recording;
+    if let Some(until) = args.until {
+        for series in &mut recording.series {
+            series.readings.retain(|reading| reading.time <= until);
+        }
+    }
+    let series = args.readings.series(&recording)?;
+    let explanation = explain::quick(
+        series,
+        &recording,
+        &args.readings.policy(&Policy::default()),
+    );
+    let found = pictures(&explanation);
+    let picture = found.into_iter().find(|picture| picture.name == "residual");
+    let picture = picture.with_context(|| {
+        format!(
+            "benchmark {}: too few readings for a residual",
+            series.benchmark
+        )
+    })?;
+    Ok(picture.svg)
 }
 
 fn events(args: &Args, recording: &Recording) -> anyhow::Result<Vec<Event>> {

@@ -1,6 +1,7 @@
 //! `replay FILE...`: the monitor over recorded readings, in data time.
 
 use super::args::{Format, OutputArgs, ReadingArgs};
+use super::demo::timeline::Timeline;
 use super::run::asynchronous;
 use super::{exit, text};
 use crate::config::{self, Config, value};
@@ -45,13 +46,6 @@ pub(super) struct Args {
     output: OutputArgs,
 }
 
-/// How events are printed.
-struct Look {
-    format: Format,
-    /// By whose clocks text gives times.
-    zone: TimeZone,
-}
-
 /// Replays the files and prints the events.
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     log::init(LogFormat::Text);
@@ -85,19 +79,16 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         pace: args.speed,
         until: args.until,
     };
-    let look = Look {
-        format: args.output.format,
-        zone: config
-            .as_ref()
-            .map_or(TimeZone::UTC, |config| config.site.time_zone.clone()),
-    };
-    let mut stdout = io::stdout().lock();
+    let zone = config
+        .as_ref()
+        .map_or(TimeZone::UTC, |config| config.site.time_zone.clone());
+    let mut printer = Printer::new(args.output.format, zone);
     asynchronous()?.block_on(async {
         let shutdown = Shutdown::on_signals().context("cannot listen for signals")?;
-        let mut print = |event: &Event| print(&mut stdout, event, &look);
-        replay::replay(&recording, &plan, shutdown, &mut print).await?;
-        Ok(())
-    })
+        let mut print = |event: &Event| printer.print(event);
+        anyhow::Ok(replay::replay(&recording, &plan, shutdown, &mut print).await?)
+    })?;
+    Ok(printer.end()?)
 }
 
 /// Prints the events of the stored input; with `--benchmark` those of one benchmark and of the site as a whole.
@@ -117,22 +108,20 @@ fn run_state(args: &Args, folder: &Path) -> anyhow::Result<()> {
     }
     let is_wanted =
         |event: &Event| wanted.is_none() || event.benchmark.is_none() || event.benchmark == wanted;
-    let look = Look {
-        format: args.output.format,
-        zone: TimeZone::UTC,
-    };
-    let mut stdout = io::stdout().lock();
+    let mut printer = Printer::new(args.output.format, TimeZone::UTC);
     asynchronous()?.block_on(async {
         let shutdown = Shutdown::on_signals().context("cannot listen for signals")?;
         let mut print = |event: &Event| {
             if is_wanted(event) {
-                print(&mut stdout, event, &look)?;
+                printer.print(event)?;
             }
             Ok(())
         };
-        replay::replay_state(&store, args.until, &shutdown, &mut print)?;
-        Ok(())
-    })
+        anyhow::Ok(replay::replay_state(
+            &store, args.until, &shutdown, &mut print,
+        )?)
+    })?;
+    Ok(printer.end()?)
 }
 
 /// The events of a recording, for those who do not print them.
@@ -161,12 +150,38 @@ pub(super) fn events(
     Ok(events)
 }
 
-fn print(out: &mut impl Write, event: &Event, look: &Look) -> io::Result<()> {
-    let line = match look.format {
-        Format::Json => serde_json::to_string(event)?,
-        Format::Text => text::line(event, &look.zone),
-    };
-    writeln!(out, "{line}")
+/// A line for each event; as text, at the end velocity, level and forecast of each benchmark as marks.
+struct Printer {
+    out: io::StdoutLock<'static>,
+    format: Format,
+    zone: TimeZone,
+    timeline: Timeline,
+}
+
+impl Printer {
+    fn new(format: Format, zone: TimeZone) -> Self {
+        Self {
+            out: io::stdout().lock(),
+            format,
+            zone,
+            timeline: Timeline::new(),
+        }
+    }
+
+    fn print(&mut self, event: &Event) -> io::Result<()> {
+        let line = match self.format {
+            Format::Json => serde_json::to_string(event)?,
+            Format::Text => {
+                self.timeline.take(event);
+                text::line(event, &self.zone)
+            }
+        };
+        writeln!(self.out, "{line}")
+    }
+
+    fn end(mut self) -> io::Result<()> {
+        write!(self.out, "{}", self.timeline.bands())
+    }
 }
 
 fn settings(args: &Args, config: Option<&Config>) -> Settings {

@@ -3,17 +3,16 @@
 use super::args::{Format, OutputArgs};
 use super::exit::UsageError;
 use super::text;
-use crate::alert::Level;
 use crate::config::{self, Config, value};
-use crate::monitor::{AlertState, Event, EventKind, Order};
+use crate::monitor::{EventKind, Order};
 use crate::reading::BenchmarkId;
 use crate::runtime::clock;
+use crate::runtime::standing::{acknowledged, in_force, orders, silences};
 use crate::store::Store;
 use anyhow::Context;
 use clap::Subcommand;
 use clap::builder::PossibleValuesParser;
 use jiff::SignedDuration;
-use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -86,6 +85,9 @@ enum Action {
         /// For how long, such as 8h; thirty days at most
         #[arg(long = "for", value_name = "DURATION", value_parser = value::duration)]
         span: SignedDuration,
+        /// Who
+        #[arg(long, value_name = "NAME")]
+        by: Option<String>,
         #[command(flatten)]
         site: SiteArgs,
     },
@@ -100,6 +102,9 @@ enum Action {
         /// Where; default is everywhere
         #[arg(long, value_name = "ID")]
         benchmark: Option<String>,
+        /// Who
+        #[arg(long, value_name = "NAME")]
+        by: Option<String>,
         #[command(flatten)]
         site: SiteArgs,
     },
@@ -111,6 +116,9 @@ enum Action {
         /// For how long, such as 30min; seven days at most
         #[arg(long = "for", value_name = "DURATION", value_parser = value::duration)]
         span: SignedDuration,
+        /// Who
+        #[arg(long, value_name = "NAME")]
+        by: Option<String>,
         #[command(flatten)]
         site: SiteArgs,
     },
@@ -139,31 +147,6 @@ pub(super) fn backup(args: &BackupArgs) -> anyhow::Result<()> {
     args.site.output.print(&said, |said| {
         format!("{}: {} bytes\n", args.file.display(), said["bytes"])
     })
-}
-
-pub(super) type InForce = BTreeMap<(Option<BenchmarkId>, Level), Event>;
-
-/// The alerts in force: by benchmark and level, of each benchmark the highest, and `unknown` beside it.
-pub(super) fn in_force(store: &Store) -> anyhow::Result<InForce> {
-    let mut standing = InForce::new();
-    for event in every(store, "alert")? {
-        let EventKind::Alert { level, state, .. } = &event.kind else {
-            continue;
-        };
-        let (level, state, place) = (*level, *state, event.benchmark.clone());
-        match state {
-            AlertState::Firing => {
-                standing.retain(|(own, lower), _| {
-                    *own != place || (*lower == Level::Unknown) != (level == Level::Unknown)
-                });
-                standing.insert((place, level), event);
-            }
-            AlertState::Resolved => {
-                standing.remove(&(place, level));
-            }
-        }
-    }
-    Ok(standing)
 }
 
 /// Prints events.
@@ -210,24 +193,46 @@ pub(super) fn alerts(args: &AlertsArgs) -> anyhow::Result<()> {
         Action::Shelve {
             benchmark,
             span,
+            by,
             site,
         } => {
             limit(*span, Order::LONGEST_SHELVE)?;
             let (benchmark, until) = (BenchmarkId::new(benchmark), until(*span)?);
-            (site, Order::Shelve { benchmark, until })
+            let by = by.clone();
+            (
+                site,
+                Order::Shelve {
+                    benchmark,
+                    until,
+                    by,
+                },
+            )
         }
         Action::Silence {
             benchmark,
             span,
+            by,
             site,
         } => {
             limit(*span, Order::LONGEST_SILENCE)?;
             let (benchmark, until) = (benchmark.as_ref().map(BenchmarkId::new), until(*span)?);
-            (site, Order::Silence { benchmark, until })
+            let by = by.clone();
+            (
+                site,
+                Order::Silence {
+                    benchmark,
+                    until,
+                    by,
+                },
+            )
         }
-        Action::Unsilence { benchmark, site } => {
-            let benchmark = benchmark.as_ref().map(BenchmarkId::new);
-            (site, Order::Unsilence { benchmark })
+        Action::Unsilence {
+            benchmark,
+            by,
+            site,
+        } => {
+            let (benchmark, by) = (benchmark.as_ref().map(BenchmarkId::new), by.clone());
+            (site, Order::Unsilence { benchmark, by })
         }
     };
     let (config, store) = site.open()?;
@@ -256,61 +261,6 @@ fn limit(span: SignedDuration, longest: SignedDuration) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Every order that was taken, oldest first.
-pub(super) fn orders(store: &Store) -> anyhow::Result<Vec<Event>> {
-    every(store, "order")
-}
-
-/// Every event of a kind, oldest first.
-pub(super) fn every(store: &Store, kind: &str) -> anyhow::Result<Vec<Event>> {
-    let mut all = Vec::new();
-    let mut after = 0;
-    loop {
-        let events = store.events(after, Some(kind), None)?;
-        let Some((last, _)) = events.last() else {
-            return Ok(all);
-        };
-        after = *last;
-        for (_, body) in &events {
-            all.push(serde_json::from_str(body)?);
-        }
-    }
-}
-
-/// The orders in force by which no hook is run, as they were given.
-pub(super) fn silences(orders: &[Event]) -> Vec<Event> {
-    let now = clock::now();
-    let mut standing: Vec<Event> = Vec::new();
-    for event in orders {
-        let EventKind::Order { order, until, .. } = &event.kind else {
-            continue;
-        };
-        if order == "unsilence" {
-            let place = &event.benchmark;
-            standing.retain(|one| place.is_some() && one.benchmark != *place);
-        } else if until.is_some_and(|until| until > now) {
-            standing.push(event.clone());
-        }
-    }
-    standing
-}
-
-/// Who has seen what is in force: acknowledgements since its alert was called.
-pub(super) fn acknowledged(orders: &[Event], in_force: &InForce) -> Vec<Event> {
-    let is_of = |ack: &Event, place: &Option<BenchmarkId>, alert: &Event| {
-        (ack.benchmark.is_none() || ack.benchmark == *place) && ack.time >= alert.time
-    };
-    let is_one = |event: &&Event| {
-        let is_ack =
-            matches!(&event.kind, EventKind::Order { order, .. } if order == "acknowledge");
-        is_ack
-            && in_force
-                .iter()
-                .any(|((place, _), alert)| is_of(event, place, alert))
-    };
-    orders.iter().filter(is_one).cloned().collect()
-}
-
 fn redeliver(site: &SiteArgs) -> anyhow::Result<()> {
     let (_, store) = site.open()?;
     let said = serde_json::json!({ "deliveries": store.redeliver()? });
@@ -325,8 +275,8 @@ fn redeliver(site: &SiteArgs) -> anyhow::Result<()> {
 fn list(site: &SiteArgs) -> anyhow::Result<()> {
     let (config, store) = site.open()?;
     let mut stdout = std::io::stdout().lock();
-    let (in_force, orders) = (in_force(&store)?, orders(&store)?);
-    let mut standing = silences(&orders);
+    let (in_force, orders) = (in_force(&store, None)?, orders(&store)?);
+    let mut standing = silences(&orders, clock::now());
     standing.extend(acknowledged(&orders, &in_force));
     standing.extend(in_force.into_values());
     standing.sort_by_key(|event| event.time);

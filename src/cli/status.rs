@@ -1,18 +1,23 @@
 //! `status`: how a site stands, with or without a running daemon.
 
+use super::args::Format;
 use super::preview::shown;
-use super::state::{InForce, SiteArgs, acknowledged, every, in_force, orders, silences};
+use super::state::SiteArgs;
 use super::table::Table;
 use super::text;
 use crate::alert::Level;
 use crate::monitor::{Event, EventKind, SUSPECT, SUSPECT_ENDS};
 use crate::reading::{BenchmarkId, Timestamp};
+use crate::runtime::clock;
 use crate::runtime::preview::{Preview, preview};
+use crate::runtime::standing::{InForce, acknowledged, every, in_force, orders, silences};
 use crate::store::Store;
 use jiff::tz::TimeZone;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use std::io::{self, IsTerminal, Write};
+use std::time::Duration;
 
 /// Say what a site's benchmarks do: level, regime, failure time, newest reading
 #[derive(Debug, clap::Args)]
@@ -23,7 +28,15 @@ pub(super) struct StatusArgs {
     /// rows that are refused
     #[arg(long)]
     sources: bool,
+    /// Say it again every two seconds, until interrupted
+    #[arg(long)]
+    watch: bool,
 }
+
+/// How often `--watch` looks.
+const LOOK: Duration = Duration::from_secs(2);
+/// Puts a terminal's cursor at the top of an empty screen.
+const CLEAR: &str = "\u{1b}[H\u{1b}[2J";
 
 /// How one benchmark stands.
 #[derive(Debug, Serialize)]
@@ -72,10 +85,30 @@ struct SiteStatus {
     preview: Option<Preview>,
 }
 
-/// Says how the site stands.
+/// Says how the site stands, once or until interrupted.
 pub(super) fn status(args: &StatusArgs) -> anyhow::Result<()> {
+    loop {
+        // Looked up before the screen is emptied, so that it does not flicker.
+        let status = gathered(args)?;
+        if args.watch && args.site.output.format == Format::Text && io::stdout().is_terminal() {
+            write!(io::stdout(), "{CLEAR}")?;
+        }
+        let (status, zone) = &status;
+        args.site.output.print(status, |status| {
+            let preview = status.preview.as_ref();
+            let files = preview.map_or_else(String::new, |preview| shown(preview, zone));
+            status_text(status, zone) + &files
+        })?;
+        if !args.watch {
+            return Ok(());
+        }
+        std::thread::sleep(LOOK);
+    }
+}
+
+fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
     let (config, store) = args.site.open()?;
-    let (levels, orders) = (in_force(&store)?, orders(&store)?);
+    let (levels, orders) = (in_force(&store, None)?, orders(&store)?);
     let mut refits = BTreeMap::new();
     for body in store.latest("refit")? {
         let event: Event = serde_json::from_str(&body)?;
@@ -117,16 +150,12 @@ pub(super) fn status(args: &StatusArgs) -> anyhow::Result<()> {
         site_unknown_since: levels.get(&(None, Level::Unknown)).map(|event| event.time),
         is_running: Store::is_held(&config.site.state_dir),
         acknowledged: acknowledged(&orders, &levels),
-        silences: silences(&orders),
+        silences: silences(&orders, clock::now()),
         quarantined: store.quarantined()?,
         alerts: levels.into_values().collect(),
         preview,
     };
-    args.site.output.print(&status, |status| {
-        let preview = status.preview.as_ref();
-        let files = preview.map_or_else(String::new, |preview| shown(preview, &zone));
-        status_text(status, &zone) + &files
-    })
+    Ok((status, zone))
 }
 
 fn stands(
@@ -194,33 +223,28 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
     let mut table = Table::headed([
         "benchmark",
         "level",
-        "since",
         "newest reading",
-        "regime",
         "mm/day",
-        "failure (median)",
+        "collapse",
         "chance",
     ]);
     let clock = |time: Timestamp| text::clock(time, zone);
-    let time = |time: Option<Timestamp>| time.map_or_else(|| "-".to_owned(), clock);
+    let dash = || "-".to_owned();
     for one in &status.benchmarks {
-        let velocity = one
-            .velocity_mm_per_day
-            .map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
+        let velocity = one.velocity_mm_per_day;
+        let day = |time: Timestamp| time.to_zoned(zone.clone()).strftime("%Y-%m-%d").to_string();
         table.row([
             text::plain(one.benchmark.as_str()),
             match one.unknown_since {
                 Some(since) if one.since.is_some() => {
                     format!("{}, unknown since {}", one.level, clock(since))
                 }
-                _ if one.is_unknown => format!("{}, unknown", one.level),
+                _ if one.is_unknown => "unknown".to_owned(),
                 _ => one.level.to_string(),
             },
-            time(one.since.or(one.unknown_since)),
-            time(one.newest_reading),
-            one.regime.clone().unwrap_or_else(|| "-".to_owned()),
-            velocity,
-            time(one.failure_time),
+            one.newest_reading.map_or_else(dash, clock),
+            velocity.map_or_else(dash, |velocity| format!("{velocity:.3}")),
+            one.failure_time.map_or_else(dash, day),
             chance(one.chance_within_evacuation_time),
         ]);
     }
@@ -254,7 +278,7 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
     };
     format!(
         "{dead}{}: {} inputs taken, {} alerts wait for a hook\n{}{}{refused}{suspicions}\n{table}\
-         chance: of a collapse within the evacuation time\n{force}",
+         collapse: median of the forecast; chance: of collapse within the evacuation time\n{force}",
         text::plain(&status.site),
         status.steps,
         status.alerts_waiting,

@@ -131,6 +131,8 @@ pub struct Benchmark {
     pub vector: Option<Vector>,
     /// The span over which each velocity is the mean.
     pub averaging: Option<SignedDuration>,
+    /// Where it stands, for the map: east and north, and height where it is given, m.
+    pub position: Option<Vec<f64>>,
 }
 
 /// `[[hook]]`: a program to run when a level is entered or left.

@@ -237,6 +237,7 @@ fn benchmark(
     });
     let averaging = section.parsed("averaging", value::duration);
     let vector = vector::vector(&mut section, unit.as_ref().map(|given| given.value));
+    let position = position(&mut section);
     if let (Some(unit), Some(quantity)) = (&unit, &quantity)
         && unit.value.quantity() != quantity.value
     {
@@ -259,7 +260,24 @@ fn benchmark(
         unit,
         averaging: averaging.map(|given| given.value),
         vector,
+        position,
     })
+}
+
+/// East and north, and height where it is known, in metres of any plane frame.
+fn position(section: &mut Section<'_>) -> Option<Vec<f64>> {
+    let given = section.numbers("position")?;
+    let is_place =
+        (2..=3).contains(&given.value.len()) && given.value.iter().all(|n| n.is_finite());
+    if is_place {
+        return Some(given.value);
+    }
+    section.error(
+        &given.at,
+        format!("benchmark.position has {} numbers", given.value.len()),
+        "write east and north in metres, and height if it is known: position = [120.0, 85.5, 1410.0]",
+    );
+    None
 }
 
 /// The unit that the column's name ends in.

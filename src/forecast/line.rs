@@ -15,6 +15,8 @@ pub struct InverseVelocityLine {
 const FEWEST: usize = 4;
 /// The line is not followed below this share of its mean.
 const NEARLY_ZERO: f64 = 0.02;
+/// Two lines that meet zero within this, days, are one.
+const SAME_DAYS: f64 = 0.01;
 
 /// Sums of squares and products about the means of (days, inverse velocity) points.
 struct Moments {
@@ -80,6 +82,21 @@ impl InverseVelocityLine {
     /// Whether a rate moves forward and stands clear of its noise.
     fn takes(rate: &Rate) -> bool {
         rate.velocity > 2.0 * rate.sigma && rate.velocity > 0.0
+    }
+
+    /// The line through the rates from its oldest point to where it meets zero, as (days, inverse velocity), if that
+    /// is at `zero_days`: a line that was fitted to other rates is not drawn through these.
+    pub fn segment(rates: &[Rate], zero_days: f64) -> Option<[(f64, f64); 2]> {
+        let points = Self::points(rates);
+        let drawn = Self::through(&points)?.intercept_days?;
+        if (drawn - zero_days).abs() > SAME_DAYS {
+            return None;
+        }
+        // A line of least squares goes through the mean of its points.
+        let Moments { mean_t, mean_y, .. } = Moments::of(&points)?;
+        let oldest = points.first()?.0;
+        let height = mean_y * (zero_days - oldest) / (zero_days - mean_t);
+        Some([(oldest, height), (zero_days, 0.0)])
     }
 
     /// The line through (days, inverse velocity) points; `None` under four.

@@ -1,6 +1,7 @@
 //! The state machine that owns every benchmark: readings in, events out, no clock and no files.
 
 mod awaited;
+mod course;
 mod covariates;
 mod declared;
 mod drift;
@@ -18,6 +19,7 @@ mod suspect;
 mod together;
 mod track;
 
+pub use course::{Stretch, levels_in};
 pub use declared::{Declaration, Declared};
 pub use event::{
     AlertState, Event, EventKind, FailureTime, InverseVelocity, Plain, RegimeReport, SUSPECT,

@@ -22,6 +22,9 @@ pub enum Order {
         benchmark: BenchmarkId,
         /// Until when, by the wall clock.
         until: Timestamp,
+        /// Who.
+        #[serde(default)]
+        by: Option<String>,
     },
     /// Nothing is told until then; what is in force at its end is told at its end.
     Silence {
@@ -29,11 +32,17 @@ pub enum Order {
         benchmark: Option<BenchmarkId>,
         /// Until when, by the wall clock.
         until: Timestamp,
+        /// Who.
+        #[serde(default)]
+        by: Option<String>,
     },
     /// What was shelved or silenced is told again from now on.
     Unsilence {
         /// Where; `None`: everywhere.
         benchmark: Option<BenchmarkId>,
+        /// Who.
+        #[serde(default)]
+        by: Option<String>,
     },
 }
 
@@ -46,10 +55,10 @@ impl Order {
     /// That it was given.
     pub(super) fn event(&self, time: Timestamp) -> Event {
         let (order, until, by) = match self {
-            Self::Acknowledge { by, .. } => ("acknowledge", None, by.clone()),
-            Self::Shelve { until, .. } => ("shelve", Some(*until), None),
-            Self::Silence { until, .. } => ("silence", Some(*until), None),
-            Self::Unsilence { .. } => ("unsilence", None, None),
+            Self::Acknowledge { by, .. } => ("acknowledge", None, by),
+            Self::Shelve { until, by, .. } => ("shelve", Some(*until), by),
+            Self::Silence { until, by, .. } => ("silence", Some(*until), by),
+            Self::Unsilence { by, .. } => ("unsilence", None, by),
         };
         Event {
             time,
@@ -57,7 +66,7 @@ impl Order {
             kind: EventKind::Order {
                 order: order.to_owned(),
                 until,
-                by,
+                by: by.clone(),
             },
         }
     }
@@ -67,7 +76,7 @@ impl Order {
         match self {
             Self::Acknowledge { benchmark, .. }
             | Self::Silence { benchmark, .. }
-            | Self::Unsilence { benchmark } => benchmark.as_ref(),
+            | Self::Unsilence { benchmark, .. } => benchmark.as_ref(),
             Self::Shelve { benchmark, .. } => Some(benchmark),
         }
     }

@@ -1,6 +1,6 @@
 //! What the work loop shows of itself to those outside: its vitals, the server, the service manager.
 
-use super::serve::{Archive, Door, Limits, ListenError, Server};
+use super::serve::{Behind, Door, Limits, ListenError, Server};
 use super::service::Service;
 use super::vitals::Vitals;
 use crate::config::{SiteConfig, TokenError};
@@ -32,10 +32,7 @@ impl Pulse {
     ///
     /// # Errors
     /// [`PulseError`].
-    pub async fn start(
-        site: &SiteConfig,
-        archive: Option<Arc<dyn Archive>>,
-    ) -> Result<Self, PulseError> {
+    pub async fn start(site: &SiteConfig, behind: Behind) -> Result<Self, PulseError> {
         let vitals = Arc::new(Vitals::default());
         let server = match site.listen {
             None => None,
@@ -45,7 +42,7 @@ impl Pulse {
                     token: site.token()?,
                     limits: Limits::default(),
                 };
-                Some(Server::start(door, Arc::clone(&vitals), archive).await?)
+                Some(Server::open(door, Arc::clone(&vitals), behind).await?)
             }
         };
         let service = Service::of_environment();

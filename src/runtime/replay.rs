@@ -193,7 +193,7 @@ fn sinks(hooks: &[HookConfig]) -> Sinks {
 }
 
 /// How long after the start `time` is due; `None` for at once.
-fn wait(pace: Pace, first: Timestamp, time: Timestamp) -> Option<Duration> {
+pub(super) fn wait(pace: Pace, first: Timestamp, time: Timestamp) -> Option<Duration> {
     let Pace::Times(times) = pace else {
         return None;
     };

@@ -4,9 +4,11 @@ use super::clock;
 use super::daemon::{DRAIN_LIMIT, Daemon, dispatcher};
 use super::hook::Status;
 use super::pulse::{Pulse, PulseError};
+use super::serve::Behind;
 use super::shutdown::{self, Shutdown};
 use super::site::{Counts, Sinks, Site};
 use super::sources::Sources;
+use super::view::{Desk, Facts};
 use crate::config::Config;
 use crate::store::{Store, StoreError};
 use std::path::PathBuf;
@@ -62,8 +64,11 @@ pub async fn run(
     if let Err(error) = shutdown::survive_the_file_limit() {
         tracing::warn!(%error, "a limit on the length of files would end this process");
     }
-    let archive = Arc::new(super::archive::Events::of(Arc::clone(&store)));
-    let mut pulse = Pulse::start(&config.site, Some(archive)).await?;
+    let behind = Behind {
+        archive: Some(Arc::new(super::archive::Events::of(Arc::clone(&store)))),
+        desk: desk(config),
+    };
+    let mut pulse = Pulse::start(&config.site, behind).await?;
     let sinks = Sinks {
         store: Some(Arc::clone(&store)),
         alerts: Some(dispatcher(config, &store)),
@@ -95,4 +100,16 @@ pub async fn run(
     worked.and(closed.map(drop)).map_err(fail)?;
     followed?;
     Ok(counts)
+}
+
+/// What the page asks, where the site listens. A page that cannot be shown is no reason not to watch.
+fn desk(config: &Config) -> Option<Arc<Desk>> {
+    config.site.listen?;
+    match Desk::open(&config.site.state_dir, Facts::of(config)) {
+        Ok(desk) => Some(Arc::new(desk)),
+        Err(error) => {
+            tracing::error!(%error, "the page cannot be shown");
+            None
+        }
+    }
 }

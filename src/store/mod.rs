@@ -7,6 +7,7 @@
 mod batch;
 mod checkpoint;
 mod outbox;
+mod past;
 mod read;
 mod retention;
 mod schema;
@@ -16,6 +17,7 @@ mod sum;
 
 pub use batch::{Batch, Position};
 pub use outbox::{Delivery, Fate};
+pub use past::{Heads, Value, Values};
 pub use read::{Recorded, StepRow};
 pub use sum::Verified;
 

@@ -7,7 +7,7 @@ use rusqlite::Connection;
 const APPLICATION: i32 = 0x736c_6970;
 
 /// One step for each version: `MIGRATIONS[n]` leads from version n to n + 1.
-const MIGRATIONS: [&str; 2] = ["
+const MIGRATIONS: [&str; 3] = ["
     CREATE TABLE series (
         id INTEGER PRIMARY KEY,
         -- 0: a covariate; 1: readings of a benchmark
@@ -91,6 +91,10 @@ const MIGRATIONS: [&str; 2] = ["
 "
     ALTER TABLE step ADD COLUMN sum INTEGER;
     ALTER TABLE event ADD COLUMN sum INTEGER;
+",
+// What was said of a benchmark at a moment is looked up, however many events there are.
+"
+    CREATE INDEX event_at ON event (benchmark, kind, time);
 "];
 
 /// The version that this program writes.

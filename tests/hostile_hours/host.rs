@@ -15,6 +15,7 @@ use slipwatch::runtime::delivered::Delivered;
 use slipwatch::runtime::hook::Status;
 use slipwatch::runtime::mqtt::Delivery;
 use slipwatch::runtime::pulse::Pulse;
+use slipwatch::runtime::serve::Behind;
 use slipwatch::runtime::shutdown;
 use slipwatch::runtime::site::{Sinks, Site};
 use slipwatch::runtime::sources::Sources;
@@ -97,7 +98,7 @@ impl<'a> Host<'a> {
         let site = Site::resume(&self.config.site.name, settings, sinks, &mut || {}).unwrap();
         let pulse = self
             .runtime
-            .block_on(Pulse::start(&self.config.site, None))
+            .block_on(Pulse::start(&self.config.site, Behind::default()))
             .unwrap();
         site.show(&pulse.vitals);
         let (stop, stopped) = shutdown::pair();

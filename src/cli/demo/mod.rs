@@ -2,7 +2,8 @@
 
 mod crisis;
 mod marks;
-mod timeline;
+mod serve;
+pub(super) mod timeline;
 mod verdict;
 
 use super::run::asynchronous;
@@ -18,6 +19,7 @@ use crisis::{CRISES, Crisis};
 use indicatif::{ProgressBar, ProgressStyle};
 use jiff::SignedDuration;
 use std::io::{self, Write};
+use std::net::SocketAddr;
 use std::path::Path;
 use std::time::Duration;
 use timeline::Timeline;
@@ -27,10 +29,28 @@ use timeline::Timeline;
 /// Needs nothing. Alerts go to a sample hook, a real process; state lies in a temporary folder.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// How long each crisis takes to play, such as 5s; 0s plays as fast as the monitor works
-    #[arg(long, value_name = "DURATION", value_parser = humantime::parse_duration, default_value = "5s")]
-    pace: Duration,
+    /// How long each crisis takes to play, such as 5s; 0s plays as fast as the monitor works [default: 5s; with --serve 2min]
+    #[arg(long, value_name = "DURATION", value_parser = humantime::parse_duration)]
+    pace: Option<Duration>,
+    /// Show the first crisis on the daemon's page instead, at this address, until interrupted
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:8642", value_parser = loopback)]
+    serve: Option<SocketAddr>,
 }
+
+/// The demo asks nobody for a token.
+fn loopback(text: &str) -> Result<SocketAddr, String> {
+    let address: SocketAddr = text
+        .parse()
+        .map_err(|_| "write an address and a port, such as 127.0.0.1:8642".to_owned())?;
+    if address.ip().is_loopback() {
+        Ok(address)
+    } else {
+        Err("the demo is shown to this machine only: write 127.0.0.1 and a port".to_owned())
+    }
+}
+
+/// How long a crisis takes where nothing else is asked for.
+const PACE: Duration = Duration::from_secs(5);
 
 const HOOK: &str = include_str!("../../../deploy/notify.sh");
 /// What is said at the end.
@@ -46,6 +66,9 @@ const WRITTEN: &str = "hook.txt";
 /// Plays every crisis, then the table.
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let folder = tempfile::tempdir().context("cannot make a folder for the demo's state")?;
+    if let Some(listen) = args.serve {
+        return serve::serve(args, listen, folder.path());
+    }
     let mut out = io::stdout().lock();
     let (mut table, mut ends) = (vec![verdict::HEAD.to_owned()], Vec::new());
     writeln!(out, "{}", timeline::LEGEND)?;
@@ -118,12 +141,8 @@ async fn play(
     recording: &Recording,
     each: &mut (dyn FnMut(&Event) -> io::Result<()> + '_),
 ) -> anyhow::Result<()> {
-    let policy = Policy {
-        evacuation_time: SignedDuration::from_hours(crisis.evacuation_hours),
-        ..Policy::default()
-    };
     let settings = Settings {
-        policy,
+        policy: policy(crisis),
         ..Settings::default()
     };
     let hooks = [sample_hook(folder)?];
@@ -132,7 +151,7 @@ async fn play(
         site: crisis.site,
         settings: &settings,
         hooks: &hooks,
-        pace: pace(args, &arrivals),
+        pace: pace(args.pace.unwrap_or(PACE), &arrivals),
         until: None,
     };
     let bar = bar(arrivals.len());
@@ -153,13 +172,20 @@ fn bar(length: usize) -> ProgressBar {
     style.map_or(bar.clone(), |style| bar.with_style(style))
 }
 
-/// So many seconds of data a second that the whole crisis takes as long as was asked.
-fn pace(args: &Args, arrivals: &[crate::runtime::tail::Arrival]) -> Pace {
+fn policy(crisis: &Crisis) -> Policy {
+    Policy {
+        evacuation_time: SignedDuration::from_hours(crisis.evacuation_hours),
+        ..Policy::default()
+    }
+}
+
+/// So many seconds of data a second that the whole crisis takes so long.
+fn pace(length: Duration, arrivals: &[crate::runtime::tail::Arrival]) -> Pace {
     let (Some(first), Some(last)) = (arrivals.first(), arrivals.last()) else {
         return Pace::Max;
     };
     let span = last.time.duration_since(first.time).as_secs_f64();
-    let times = span / args.pace.as_secs_f64();
+    let times = span / length.as_secs_f64();
     if times.is_finite() && times > 0.0 {
         Pace::Times(times)
     } else {

@@ -2,6 +2,7 @@
 
 use super::marks::{self, Scale};
 use crate::alert::Level;
+use crate::cli::text::plain;
 use crate::monitor::{AlertState, Event, EventKind, FailureTime};
 use crate::reading::{BenchmarkId, Timestamp, days_since};
 use std::collections::BTreeMap;
@@ -65,14 +66,14 @@ struct Fall {
 
 /// Follows the events of one crisis.
 #[derive(Debug)]
-pub(super) struct Timeline {
+pub(in crate::cli) struct Timeline {
     lines: usize,
     left_out: usize,
     pub(super) records: BTreeMap<BenchmarkId, Record>,
 }
 
 impl Timeline {
-    pub(super) fn new() -> Self {
+    pub(in crate::cli) fn new() -> Self {
         Self {
             lines: 0,
             left_out: 0,
@@ -81,7 +82,7 @@ impl Timeline {
     }
 
     /// The line for an event that changes a level.
-    pub(super) fn take(&mut self, event: &Event) -> Option<String> {
+    pub(in crate::cli) fn take(&mut self, event: &Event) -> Option<String> {
         let id = event.benchmark.as_ref()?;
         let record = self.records.entry(id.clone()).or_default();
         if let EventKind::Refit {
@@ -173,6 +174,12 @@ impl Timeline {
         if self.left_out > 0 {
             let _ = writeln!(text, "and {} more changes of a level", self.left_out);
         }
+        text + &self.bands()
+    }
+
+    /// The same without the changes that no line was printed of.
+    pub(in crate::cli) fn bands(&self) -> String {
+        let mut text = String::new();
         for (id, record) in &self.records {
             record.picture(&mut text, id);
         }
@@ -224,7 +231,7 @@ impl Record {
             MARKS,
         );
         let (from, to) = (day(first.time), day(last.time));
-        let _ = writeln!(text, "\n{:<8} {from} to {to}", id.as_str());
+        let _ = writeln!(text, "\n{:<8} {from} to {to}", plain(id.as_str()));
         let _ = writeln!(
             text,
             "velocity  {}  {} mm/day",

@@ -5,6 +5,8 @@ mod sections;
 mod sentence;
 mod text;
 
+pub(super) use page::{STYLE, part};
+
 use super::args::{OutputArgs, ReadingArgs};
 use super::exit;
 use crate::alert::Policy;
@@ -108,6 +110,19 @@ fn options(args: &Args) -> Options {
         surrogates: args.surrogates,
         ..Options::default()
     }
+}
+
+/// The search with its usual settings, for those who show a part of it.
+pub(super) fn quick(series: &Series, recording: &Recording, policy: &Policy) -> Explanation {
+    let options = Options {
+        critical_velocity_mm_per_day: policy.critical_velocity_mm_per_day,
+        ..Options::default()
+    };
+    let mut explanation = search(series, recording, &options);
+    if let Some(remark) = remark_on_origin(recording) {
+        explanation.remarks.insert(0, remark);
+    }
+    explanation
 }
 
 fn search(series: &Series, recording: &Recording, options: &Options) -> Explanation {

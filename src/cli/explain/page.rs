@@ -8,7 +8,7 @@ use crate::plot::escaped;
 use std::fmt::Write as _;
 
 /// In the dark the figures' own colours are turned as well: a style outranks an attribute.
-const STYLE: &str = "
+pub(in crate::cli) const STYLE: &str = "
 :root { color-scheme: light dark; --ground: #ffffff; --text: #1a1a1a; --faint: #5a5a5a; --line: #d8d8d8; --note: #f3f5f8; }
 body { background: var(--ground); color: var(--text); font: 16px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 62rem; padding: 0 1rem; }
 h1 { font-size: 1.35rem; line-height: 1.35; margin: 0 0 .8rem; }
@@ -77,6 +77,20 @@ pub(super) fn page(explanation: &Explanation) -> String {
         "<footer><p>slipwatch {}. An effect is what the readings are consistent with; it is not proved to cause them.</p></footer>\n</body>\n</html>",
         escaped(&explanation.settings.version)
     );
+    out
+}
+
+/// What is found, in short, as a part of another page.
+pub(in crate::cli) fn part(explanation: &Explanation) -> String {
+    let mut out = format!("<p>{}</p>\n", escaped(&sentence::verdict(explanation)));
+    // Writing to a string cannot fail.
+    for sentence in sentence::others(explanation) {
+        let _ = writeln!(out, "<p>{}</p>", escaped(&sentence));
+    }
+    for section in gained(explanation) {
+        let table = section.table.html();
+        let _ = writeln!(out, "<div class=\"wide\">{table}</div>");
+    }
     out
 }
 

@@ -60,7 +60,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         "--plot draws one benchmark, and there are {count}: expected --benchmark"
     );
     for (index, series) in recording.series.iter().enumerate() {
-        let report = report(args, &recording, series, &policy)?;
+        let report = report(args.failure_time, (&recording, series), &policy)?;
         if let Some(file) = &args.plot {
             let svg = figures::life_expectancy(&report.card, report.failure_time);
             std::fs::write(file, svg)
@@ -73,14 +73,28 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// The scorecard and its figure as a part of a page.
+pub(super) fn part(
+    failure_time: Option<Timestamp>,
+    whole: (&Recording, &Series),
+    policy: &Policy,
+) -> anyhow::Result<String> {
+    let report = report(failure_time, whole, policy)?;
+    let svg = figures::life_expectancy(&report.card, failure_time);
+    Ok(format!(
+        "<figure>\n{svg}</figure>\n<p>{}</p>\n<div class=\"wide\">{}</div>\n",
+        text::meaning(&report),
+        text::table(&report).html()
+    ))
+}
+
 fn report(
-    args: &Args,
-    recording: &Recording,
-    series: &Series,
+    failure_time: Option<Timestamp>,
+    (recording, series): (&Recording, &Series),
     policy: &Policy,
 ) -> anyhow::Result<Report> {
     let mut series = series.clone();
-    let truth = match args.failure_time {
+    let truth = match failure_time {
         None => Truth::Stood,
         Some(failure) => {
             let before = series.readings.len();
@@ -123,7 +137,7 @@ fn report(
     let warning = warning::of(&series, &recording.channels, policy, until)?;
     Ok(Report {
         benchmark: series.benchmark.to_string(),
-        failure_time: args.failure_time,
+        failure_time,
         sources: METHODS
             .iter()
             .filter(|method| card.methods.contains(&method.name))

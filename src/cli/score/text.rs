@@ -23,23 +23,32 @@ pub(super) fn text(report: &Report) -> String {
         ),
         None => writeln!(out, "benchmark {}, did not fail", report.benchmark),
     };
-    if report.failure_time.is_some() {
-        let _ = writeln!(
-            out,
-            "\nMedian less failure, and in brackets the CRPS: above 0 the forecast is late, which is the unsafe side.\n"
-        );
-        out.push_str(&leads(report).to_string());
-    } else {
-        let _ = writeln!(
-            out,
-            "\nOver {} looks: mean CRPS, days, and the highest chance of a failure within 400 days.\n",
-            report.card.looks.len()
-        );
-        out.push_str(&looks(report).to_string());
-    }
+    let _ = writeln!(out, "\n{}\n", meaning(report));
+    out.push_str(&table(report).to_string());
     out.push('\n');
     out.push_str(&warning(report));
     out
+}
+
+/// What the table's figures are.
+pub(super) fn meaning(report: &Report) -> String {
+    if report.failure_time.is_some() {
+        "Median less failure, and in brackets the CRPS: above 0 the forecast is late, which is the unsafe side.".to_owned()
+    } else {
+        let looks = report.card.looks.len();
+        format!(
+            "Over {looks} looks: mean CRPS, days, and the highest chance of a failure within 400 days."
+        )
+    }
+}
+
+/// The scores.
+pub(super) fn table(report: &Report) -> Table {
+    if report.failure_time.is_some() {
+        leads(report)
+    } else {
+        looks(report)
+    }
 }
 
 /// A row for each method, a column for each lead.

@@ -20,8 +20,6 @@ const ROW: f64 = 30.0;
 const BAR: f64 = 0.5;
 /// The upright axis of inverse velocity holds all points in this last share of the record.
 const HELD: f64 = 0.5;
-/// Two lines that meet zero within this, days, are one.
-const SAME_DAYS: f64 = 0.01;
 /// A bound that is never reached lies off the sheet, so many lengths of the axis ahead.
 const FAR: f64 = 20.0;
 
@@ -260,22 +258,7 @@ fn uprights(dated: &[Dated]) -> Vec<(String, Mark)> {
 /// give the line that the monitor told of.
 fn straight(rates: &[Rate], refit: &Refit) -> Option<Vec<(f64, f64)>> {
     let zero = day(refit.intercept?);
-    let newest = recent(rates).iter();
-    let clear = newest.filter(|rate| rate.velocity > 2.0 * rate.sigma && rate.velocity > 0.0);
-    let points: Vec<(f64, f64)> = clear
-        .map(|rate| (rate.middle(), 1.0 / rate.velocity))
-        .collect();
-    let drawn = InverseVelocityLine::through(&points)?.intercept_days?;
-    if (drawn - zero).abs() > SAME_DAYS {
-        return None;
-    }
-    // A line of least squares goes through the mean of its points.
-    let count = points.len() as f64;
-    let mean_day = points.iter().map(|point| point.0).sum::<f64>() / count;
-    let mean = points.iter().map(|point| point.1).sum::<f64>() / count;
-    let oldest = points.first()?.0;
-    let height = mean * (zero - oldest) / (zero - mean_day);
-    Some(vec![(oldest, height), (zero, 0.0)])
+    InverseVelocityLine::segment(recent(rates), zero).map(Vec::from)
 }
 
 /// The top of the axis: above the points of the record's last part, as the slow ones before would press them flat.

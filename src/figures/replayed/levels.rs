@@ -3,96 +3,20 @@
 use super::Replayed;
 use crate::alert::Level;
 use crate::figures::day;
-use crate::monitor::{AlertState, EventKind};
+use crate::monitor::{Stretch, levels_in};
 use crate::plot::{Axis, BLACK, GREY, Legend, Mark, Panel};
-use crate::reading::{Timestamp, days_since};
+use crate::reading::days_since;
 
 /// Height of the band.
 pub(super) const HEIGHT: f64 = 26.0;
 const WHITE: &str = "#ffffff";
 
-/// A level and how long it was in force.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Stretch {
-    pub(super) level: Level,
-    pub(super) from: Timestamp,
-    pub(super) to: Timestamp,
-}
-
 /// Every stretch of one level, from the first reading to the last; then those in which it was unknown, which
 /// stand beside the level.
 pub(super) fn stretches(replayed: &Replayed) -> (Vec<Stretch>, Vec<Stretch>) {
-    let Some((first, last)) = replayed.span() else {
-        return (Vec::new(), Vec::new());
-    };
-    let mut levels = Course::new(Level::Green, first);
-    let mut unknown = Course::new(Level::Green, first);
-    for event in replayed.events {
-        let EventKind::Alert { level, state, .. } = &event.kind else {
-            continue;
-        };
-        if event.benchmark.as_ref() != Some(&replayed.series.benchmark) {
-            continue;
-        }
-        let course = match level {
-            Level::Unknown => &mut unknown,
-            Level::Green | Level::Yellow | Level::Orange | Level::Red => &mut levels,
-        };
-        match state {
-            AlertState::Firing => course.enter(*level, event.time),
-            // Another level has been entered already where this is not the one in force.
-            AlertState::Resolved if course.level == *level => {
-                course.enter(Level::Green, event.time);
-            }
-            AlertState::Resolved => {}
-        }
-    }
-    let mut unknown = unknown.until(last);
-    unknown.retain(|stretch| stretch.level == Level::Unknown);
-    (levels.until(last), unknown)
-}
-
-/// A level as it changes.
-#[derive(Debug)]
-struct Course {
-    level: Level,
-    since: Timestamp,
-    past: Vec<Stretch>,
-}
-
-impl Course {
-    fn new(level: Level, since: Timestamp) -> Self {
-        Self {
-            level,
-            since,
-            past: Vec::new(),
-        }
-    }
-
-    fn enter(&mut self, level: Level, at: Timestamp) {
-        if level == self.level {
-            return;
-        }
-        if at > self.since {
-            self.past.push(Stretch {
-                level: self.level,
-                from: self.since,
-                to: at,
-            });
-        }
-        self.level = level;
-        self.since = at;
-    }
-
-    fn until(mut self, end: Timestamp) -> Vec<Stretch> {
-        // The level that is in force at the end has no width where it was entered there.
-        self.past.push(Stretch {
-            level: self.level,
-            from: self.since,
-            to: end.max(self.since),
-        });
-        self.past
-    }
+    replayed.span().map_or_else(Default::default, |span| {
+        levels_in(replayed.events, &replayed.series.benchmark, span)
+    })
 }
 
 /// The band.

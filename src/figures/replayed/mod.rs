@@ -3,6 +3,7 @@
 mod forecast;
 mod inverse_velocity;
 mod levels;
+mod regime;
 
 use crate::figures::day;
 use crate::fit::{Observations, Rate, RateOptions};
@@ -28,6 +29,12 @@ struct Refit {
     failure_time: FailureTime,
     /// Where the line through inverse velocity meets zero.
     intercept: Option<Timestamp>,
+    /// The probability of kappa above 0, and of r above 0.
+    unstable: f64,
+    accelerating: f64,
+    /// The chance of a collapse.
+    within_evacuation_time: f64,
+    within_outlook: f64,
 }
 
 /// Width of the sheets.
@@ -81,6 +88,9 @@ impl<'a> Replayed<'a> {
             let EventKind::Refit {
                 failure_time,
                 inverse_velocity,
+                regime,
+                chance_within_evacuation_time,
+                chance_within_outlook,
                 ..
             } = &event.kind
             else {
@@ -90,6 +100,10 @@ impl<'a> Replayed<'a> {
                 time: event.time,
                 failure_time: *failure_time,
                 intercept: inverse_velocity.failure_time,
+                unstable: regime.probability_unstable,
+                accelerating: regime.probability_accelerating,
+                within_evacuation_time: *chance_within_evacuation_time,
+                within_outlook: *chance_within_outlook,
             })
         })
     }
@@ -307,7 +321,9 @@ mod tests {
         ] {
             assert!(svg.contains(text), "{text}: {svg}");
         }
-        for svg in [svg, replayed.forecasts()] {
+        let regimes = replayed.regimes();
+        assert!(regimes.contains("unstable: kappa &gt; 0"), "{regimes}");
+        for svg in [svg, replayed.forecasts(), regimes] {
             assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
         }
     }

@@ -25,9 +25,7 @@ use super::silence::Silence;
 use crate::alert::{Cause, Latch, Level, Policy};
 use crate::fit::Rate;
 use crate::forecast::Panel;
-use crate::reading::{
-    BenchmarkId, Reading, SECONDS_PER_DAY, Suspicion, Timestamp, days_since,
-};
+use crate::reading::{BenchmarkId, Reading, SECONDS_PER_DAY, Suspicion, Timestamp, days_since};
 use crate::regime::Tracker;
 use adopted::Adopted;
 use ahead::Ahead;

@@ -1,13 +1,16 @@
-//! Answers over HTTP: whether the daemon lives and is ready, its metrics, its status, its events.
+//! Answers over HTTP: whether the daemon lives and is ready, its metrics, its status, its events, its page.
 
 mod connections;
+mod desk;
 mod metrics;
+mod page;
 mod routes;
 
 pub use metrics::CONTENT_TYPE;
 pub use routes::{Archive, ArchiveError, Page};
 
 use super::shutdown::{self, Trigger};
+use super::view::Desk;
 use super::vitals::Vitals;
 use crate::config::Token;
 use std::io;
@@ -70,6 +73,15 @@ pub struct Server {
     task: JoinHandle<()>,
 }
 
+/// What there is to ask about beside the daemon's health.
+#[derive(Debug, Clone, Default)]
+pub struct Behind {
+    /// Past events.
+    pub archive: Option<Arc<dyn Archive>>,
+    /// What the page shows.
+    pub desk: Option<Arc<Desk>>,
+}
+
 impl Server {
     /// Starts to listen; needs a tokio runtime. `archive` answers for past events, where there is one.
     ///
@@ -80,6 +92,19 @@ impl Server {
         vitals: Arc<Vitals>,
         archive: Option<Arc<dyn Archive>>,
     ) -> Result<Self, ListenError> {
+        let desk = None;
+        Self::open(door, vitals, Behind { archive, desk }).await
+    }
+
+    /// Starts to listen, with the page where there is a desk.
+    ///
+    /// # Errors
+    /// [`ListenError`].
+    pub async fn open(
+        door: Door,
+        vitals: Arc<Vitals>,
+        behind: Behind,
+    ) -> Result<Self, ListenError> {
         let fail = |source| ListenError {
             address: door.listen,
             source,
@@ -88,7 +113,7 @@ impl Server {
         let address = listener.local_addr().map_err(fail)?;
         let (stop, stopped) = shutdown::pair();
         let limits = door.limits;
-        let router = routes::router(door, vitals, archive);
+        let router = routes::router(door, vitals, behind);
         let task = tokio::spawn(connections::serve(listener, router, limits, stopped));
         tracing::info!(%address, "listening");
         Ok(Self {

@@ -1,6 +1,6 @@
 //! What is answered to which request, and to whom.
 
-use super::{Door, metrics};
+use super::{Behind, Door, desk, metrics, page};
 use crate::config::Token;
 use crate::runtime::vitals::{Health, Point, Vitals};
 use axum::extract::{DefaultBodyLimit, Query, Request, State};
@@ -62,28 +62,32 @@ impl IntoResponse for ArchiveError {
     }
 }
 
-/// All routes; every one but `/healthz` asks for the token, where there is one.
-pub(super) fn router(door: Door, vitals: Arc<Vitals>, archive: Option<Arc<dyn Archive>>) -> Router {
+/// All routes; every one but `/healthz` and the page's own files, which say nothing of the site, asks for the token,
+/// where there is one.
+pub(super) fn router(door: Door, vitals: Arc<Vitals>, behind: Behind) -> Router {
     let mut guarded = Router::new()
         .route("/readyz", get(ready))
         .route("/metrics", get(expose))
         .route("/api/status", get(status))
         .with_state(Arc::clone(&vitals));
-    if let Some(archive) = archive {
+    if let Some(archive) = behind.archive {
         guarded = guarded.merge(
             Router::new()
                 .route("/api/events", get(events))
                 .with_state(archive),
         );
     }
+    let mut open = Router::new()
+        .route("/healthz", get(healthy))
+        .with_state((vitals, door.limits.turn_time));
+    if let Some(desk) = behind.desk {
+        guarded = guarded.merge(desk::router(desk));
+        open = open.merge(page::router());
+    }
     guarded
         .fallback(|| async { (StatusCode::NOT_FOUND, "no such page\n") })
         .layer(from_fn_with_state(door.token.map(Arc::new), admit))
-        .merge(
-            Router::new()
-                .route("/healthz", get(healthy))
-                .with_state((vitals, door.limits.turn_time)),
-        )
+        .merge(open)
         .layer(DefaultBodyLimit::max(LONGEST_BODY))
         .layer(from_fn(refuse_long_bodies))
 }

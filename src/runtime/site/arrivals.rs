@@ -25,7 +25,7 @@ pub(in crate::runtime) fn is_logged(total: u64) -> bool {
 }
 
 /// What a value is of.
-fn name(input: &Input) -> &str {
+pub(super) fn name(input: &Input) -> &str {
     match input {
         Input::Reading { benchmark, .. } | Input::Missing { benchmark, .. } => benchmark.as_str(),
         Input::Sample { channel, .. } => channel,

@@ -51,12 +51,16 @@ impl Site {
                     }
                 }
             }
-            Order::Shelve { benchmark, until } => {
+            Order::Shelve {
+                benchmark, until, ..
+            } => {
                 let level = self.monitor.level(benchmark).unwrap_or(Level::Green);
                 self.mute(Some(benchmark.clone()), Some(level), *until);
             }
-            Order::Silence { benchmark, until } => self.mute(benchmark.clone(), None, *until),
-            Order::Unsilence { benchmark } => {
+            Order::Silence {
+                benchmark, until, ..
+            } => self.mute(benchmark.clone(), None, *until),
+            Order::Unsilence { benchmark, .. } => {
                 let ends = |mute: &Mute| benchmark.is_none() || mute.benchmark == *benchmark;
                 self.mutes.retain(|mute| !ends(mute));
             }

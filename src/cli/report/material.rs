@@ -1,0 +1,198 @@
+//! What a report is made of: readings and events, from files by a replay or from a daemon's state.
+
+use super::Args;
+use crate::alert::Policy;
+use crate::cli::replay;
+use crate::config;
+use crate::monitor::{Event, Settings};
+use crate::reading::{
+    BenchmarkId, Channel, Quantity, Reading, Recording, Sample, Series, Timestamp, Unit,
+};
+use crate::store::{Store, Value, Values};
+use anyhow::Context;
+use std::path::Path;
+
+/// Readings of one series at most, the newest.
+const MOST_READINGS: usize = 200_000;
+/// Before the stretch that is reported, its figures show so many times its length.
+const BEFORE: i32 = 4;
+/// What the state can hold.
+const EARLIEST: Timestamp = Timestamp::constant(-9_000_000_000, 0);
+const LATEST: Timestamp = Timestamp::constant(9_000_000_000, 0);
+
+/// All that a report says something about.
+#[derive(Debug)]
+pub(super) struct Material {
+    /// Its title.
+    pub(super) title: String,
+    /// Readings and covariates.
+    pub(super) recording: Recording,
+    /// What the monitor said, oldest first.
+    pub(super) events: Vec<Event>,
+    /// Events before this are not listed.
+    pub(super) listed_from: Timestamp,
+    /// By which it judged.
+    pub(super) policy: Policy,
+    /// Where it comes from, as (what, which).
+    pub(super) sources: Vec<(String, String)>,
+}
+
+impl Material {
+    /// The newest reading.
+    pub(super) fn end(&self) -> Timestamp {
+        let series = self.recording.series.iter();
+        let newest = series
+            .filter_map(|one| one.readings.last())
+            .max_by_key(|one| one.time);
+        newest.map_or(Timestamp::UNIX_EPOCH, |one| one.time)
+    }
+}
+
+/// From files, by a replay of them.
+pub(super) fn of_files(args: &Args) -> anyhow::Result<Material> {
+    let mut recording = args.readings.load()?.recording;
+    args.readings.narrow(&mut recording)?;
+    let policy = args.readings.policy(&Policy::default());
+    let settings = Settings {
+        policy: policy.clone(),
+        ..Settings::default()
+    };
+    let events = replay::events(&recording, &settings, None)?;
+    let name = |file: &Path| {
+        file.file_name()
+            .map(|name| name.to_string_lossy().into_owned())
+    };
+    let files: Vec<String> = args
+        .readings
+        .files
+        .iter()
+        .filter_map(|file| name(file))
+        .collect();
+    let title = recording.provenance.get("title").cloned();
+    Ok(Material {
+        title: title.unwrap_or_else(|| files.join(", ")),
+        events,
+        listed_from: EARLIEST,
+        policy,
+        sources: vec![
+            ("files".to_owned(), files.join(", ")),
+            (
+                "levels and forecasts".to_owned(),
+                "of a replay of these files".to_owned(),
+            ),
+        ],
+        recording,
+    })
+}
+
+/// From the state of a site, as its daemon lived it.
+pub(super) fn of_state(args: &Args, file: &Path) -> anyhow::Result<Material> {
+    let config = config::load(file)?;
+    let folder = &config.site.state_dir;
+    let store = Store::look(folder)
+        .with_context(|| format!("cannot read the state in {}", folder.display()))?;
+    let end = store.span(None)?.map_or(LATEST, |(_, last)| last);
+    let since = |spans: i32| {
+        let span = args.last.and_then(|span| span.checked_mul(spans));
+        let from = span.and_then(|span| end.checked_sub(span).ok());
+        from.unwrap_or(EARLIEST).max(EARLIEST)
+    };
+    let listed_from = since(1);
+    let drawn_from = since(1 + BEFORE);
+    let mut recording = Recording::default();
+    for id in store.benchmarks()?.into_keys() {
+        if args
+            .readings
+            .benchmark
+            .as_deref()
+            .is_none_or(|one| one == id.as_str())
+        {
+            recording.series.extend(series(&store, &id, drawn_from)?);
+        }
+    }
+    for (name, unit) in store.channels()? {
+        let samples = store.values(&wanted((&name, false), drawn_from))?;
+        let samples = samples.into_iter().map(|one| Sample {
+            time: one.time,
+            value: one.value,
+        });
+        let samples = samples.collect();
+        recording.channels.push(Channel {
+            name,
+            unit,
+            samples,
+        });
+    }
+    let span = args.last.map_or_else(
+        || "all of its data".to_owned(),
+        |span| format!("from {}", (end - span).strftime("%Y-%m-%d %H:%MZ")),
+    );
+    Ok(Material {
+        title: config.site.name.clone(),
+        recording,
+        events: events(&store)?,
+        listed_from,
+        policy: config.settings.policy.clone(),
+        sources: vec![
+            ("state of the daemon".to_owned(), span),
+            (
+                "levels and forecasts".to_owned(),
+                "as the daemon said them at the time".to_owned(),
+            ),
+        ],
+    })
+}
+
+fn wanted((name, is_reading): (&str, bool), from: Timestamp) -> Values<'_> {
+    Values {
+        name,
+        is_reading,
+        from,
+        to: LATEST,
+        known: LATEST,
+        most: MOST_READINGS,
+    }
+}
+
+/// The benchmark's readings in mm or mm/day; of two quantities the displacement.
+fn series(store: &Store, id: &BenchmarkId, from: Timestamp) -> anyhow::Result<Option<Series>> {
+    let values = store.values(&wanted((id.as_str(), true), from))?;
+    let is_displacement = |value: &Value| value.quantity == Some(Quantity::Displacement);
+    let has_displacement = values.iter().any(is_displacement);
+    let ours = values
+        .iter()
+        .filter(|value| is_displacement(value) == has_displacement);
+    let readings: Vec<Reading> = ours
+        .clone()
+        .map(|value| Reading {
+            time: value.time,
+            value: value.value,
+            sigma: value.sigma,
+        })
+        .collect();
+    let unit = if has_displacement {
+        Unit::MM
+    } else {
+        Unit::MM_PER_DAY
+    };
+    Ok((!readings.is_empty()).then(|| Series {
+        benchmark: id.clone(),
+        unit,
+        averaging: ours.clone().find_map(|value| value.averaging),
+        readings,
+    }))
+}
+
+fn events(store: &Store) -> anyhow::Result<Vec<Event>> {
+    let (mut events, mut after) = (Vec::new(), 0);
+    loop {
+        let chunk = store.events(after, None, None)?;
+        let Some((last, _)) = chunk.last() else {
+            return Ok(events);
+        };
+        after = *last;
+        for (_, body) in &chunk {
+            events.push(serde_json::from_str(body)?);
+        }
+    }
+}

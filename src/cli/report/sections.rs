@@ -1,0 +1,177 @@
+//! The parts of a report on one benchmark.
+
+use super::Args;
+use super::material::Material;
+use crate::alert::Level;
+use crate::cli::table::{Table, time};
+use crate::cli::{explain, score, text};
+use crate::figures::{self, Replayed};
+use crate::monitor::{Event, EventKind, FailureTime, levels_in};
+use crate::plot::escaped;
+use crate::reading::{Series, Timestamp, days_since};
+use jiff::tz::TimeZone;
+use std::fmt::Write as _;
+
+/// Events that are listed, the newest.
+const LISTED: usize = 200;
+const HOURS: f64 = 24.0;
+
+/// One sentence that says how the benchmark stands at the end.
+pub(super) fn summary(material: &Material, series: &Series) -> String {
+    let (first, last) = span(series);
+    let (levels, unknown) = levels_in(&material.events, &series.benchmark, (first, last));
+    let level = levels.last().map_or(Level::Green, |stretch| stretch.level);
+    let beside = unknown.last().is_some_and(|stretch| stretch.to >= last);
+    let beside = if beside { " and unknown" } else { "" };
+    let since = levels.last().map_or(first, |stretch| stretch.from);
+    let mut out = format!(
+        "{level}{beside} since {}; {} readings, {} to {}",
+        time(Some(since)),
+        series.readings.len(),
+        time(Some(first)),
+        time(Some(last)),
+    );
+    if let Some((velocity, failure)) = newest_forecast(material, series) {
+        // Writing to a string cannot fail.
+        let _ = match velocity {
+            Some(velocity) => write!(out, "; {velocity:.3} mm/day"),
+            None => Ok(()),
+        };
+        let _ = write!(
+            out,
+            "; collapse forecast {} (90 %: {} to {}; chance {:.2} in {:.0} days)",
+            never(failure.median),
+            never(failure.low),
+            never(failure.high),
+            failure.probability,
+            failure.horizon_days
+        );
+    }
+    out + "."
+}
+
+fn never(at: Option<Timestamp>) -> String {
+    at.map_or_else(|| "never".to_owned(), |at| time(Some(at)))
+}
+
+fn newest_forecast(material: &Material, series: &Series) -> Option<(Option<f64>, FailureTime)> {
+    let ours = material.events.iter().rev();
+    let mut ours = ours.filter(|event| event.benchmark.as_ref() == Some(&series.benchmark));
+    ours.find_map(|event| {
+        let EventKind::Refit {
+            velocity_mm_per_day,
+            failure_time,
+            ..
+        } = &event.kind
+        else {
+            return None;
+        };
+        Some((*velocity_mm_per_day, *failure_time))
+    })
+}
+
+fn span(series: &Series) -> (Timestamp, Timestamp) {
+    let readings = &series.readings;
+    let time = |reading: Option<&crate::reading::Reading>| {
+        reading.map_or(Timestamp::UNIX_EPOCH, |reading| reading.time)
+    };
+    (time(readings.first()), time(readings.last()))
+}
+
+/// The figures of the replay.
+pub(super) fn figures(args: &Args, material: &Material, series: &Series) -> Vec<String> {
+    let replayed = Replayed {
+        series,
+        events: &material.events,
+        collapse: args.failure_time,
+    };
+    vec![
+        replayed.inverse_velocity(&replayed.three_dates()),
+        replayed.forecasts(),
+        replayed.regimes(),
+    ]
+}
+
+/// What was said of a benchmark but its forecasts, oldest first.
+pub(super) fn in_order(material: &Material, series: &Series) -> Table {
+    let ours = |event: &&Event| {
+        let kind = event.kind.name();
+        event.benchmark.as_ref() == Some(&series.benchmark)
+            && kind != "refit"
+            && kind != "summary"
+            && event.time >= material.listed_from
+    };
+    let said: Vec<&Event> = material.events.iter().filter(ours).collect();
+    let mut table = Table::headed(["time", "kind", "what"]);
+    for event in &said[said.len().saturating_sub(LISTED)..] {
+        let line = text::line(event, &TimeZone::UTC);
+        // Time and place stand before it, two blanks apart.
+        let what = line.splitn(3, "  ").nth(2).unwrap_or(&line);
+        table.row([
+            time(Some(event.time)),
+            event.kind.name().to_owned(),
+            what.to_owned(),
+        ]);
+    }
+    table
+}
+
+/// When each level was first in force, for how long, and how long before the failure.
+pub(super) fn levels(args: &Args, material: &Material, series: &Series) -> Table {
+    let (levels, unknown) = levels_in(&material.events, &series.benchmark, span(series));
+    let mut table = Table::headed([
+        "level",
+        "first",
+        "hours in force",
+        "days before the failure",
+    ]);
+    for level in [Level::Yellow, Level::Orange, Level::Red, Level::Unknown] {
+        let stretches = levels.iter().chain(&unknown);
+        let own: Vec<_> = stretches.filter(|one| one.level == level).collect();
+        let lengths = own.iter().map(|one| HOURS * days_since(one.from, one.to));
+        let hours = lengths.fold(0.0, |sum, one| sum + one);
+        let first = own.first().map(|one| one.from);
+        let before = args.failure_time.zip(first);
+        let before = before.map_or_else(
+            || "-".to_owned(),
+            |(failure, first)| format!("{:.1}", days_since(first, failure)),
+        );
+        table.row([
+            level.to_string(),
+            first.map_or_else(|| "never".to_owned(), |first| time(Some(first))),
+            format!("{hours:.0}"),
+            before,
+        ]);
+    }
+    table
+}
+
+/// What the law lacks: the verdict, the error before and after, the residual.
+pub(super) fn closing_the_loop(material: &Material, series: &Series) -> String {
+    let explanation = explain::quick(series, &material.recording, &material.policy);
+    let mut out = explain::part(&explanation);
+    for picture in figures::pictures(&explanation) {
+        if matches!(picture.name, "residual" | "contributions") {
+            let _ = write!(
+                out,
+                "<figure>\n{}<figcaption>{}</figcaption>\n</figure>\n",
+                picture.svg,
+                escaped(&picture.caption)
+            );
+        }
+    }
+    out
+}
+
+/// Forecasts scored as they were made, where it is known what happened.
+pub(super) fn scorecard(
+    args: &Args,
+    material: &Material,
+    series: &Series,
+) -> anyhow::Result<Option<String>> {
+    if args.failure_time.is_none() && !args.no_failure {
+        return Ok(None);
+    }
+    let whole = (&material.recording, series);
+    score::part(args.failure_time, whole, &material.policy).map(Some)
+}

@@ -1,0 +1,128 @@
+//! A recording played through a site with a state folder and the page, at a pace that one can watch.
+
+use super::clock;
+use super::hook::Status;
+use super::replay::{Pace, arrivals, wait};
+use super::serve::{Behind, Door, ListenError, Server};
+use super::shutdown::Shutdown;
+use super::site::{Sinks, Site};
+use super::view::{Desk, Facts};
+use super::vitals::Vitals;
+use crate::monitor::{Input, Settings};
+use crate::reading::Recording;
+use crate::store::{Store, StoreError};
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// How often orders are looked for.
+const LOOK: Duration = Duration::from_millis(300);
+
+/// What is played, and to whom it is shown.
+#[derive(Debug)]
+pub struct Exhibit<'a> {
+    /// What was measured.
+    pub recording: &'a Recording,
+    /// How the monitor judges it.
+    pub settings: Settings,
+    /// How fast data time goes by.
+    pub pace: Pace,
+    /// What the page says of the site.
+    pub facts: Facts,
+    /// Where the page is.
+    pub door: Door,
+}
+
+/// Why nothing is shown.
+#[derive(Debug, thiserror::Error)]
+pub enum ExhibitError {
+    /// The state cannot be used.
+    #[error(transparent)]
+    State(#[from] StoreError),
+    /// The address cannot be listened on.
+    #[error(transparent)]
+    Listen(#[from] ListenError),
+}
+
+/// Plays it into the state in `folder` and stays up until `shutdown`; `opened` is called once the page is there. Needs
+/// a multi-threaded tokio runtime.
+///
+/// # Errors
+/// [`ExhibitError`].
+pub async fn show(
+    exhibit: Exhibit<'_>,
+    folder: &Path,
+    mut shutdown: Shutdown,
+    opened: &mut (dyn FnMut(std::net::SocketAddr) + '_),
+) -> Result<(), ExhibitError> {
+    let store = Arc::new(Store::open(folder)?);
+    let desk = Some(Arc::new(Desk::open(folder, exhibit.facts.clone())?));
+    let archive = Some(Arc::new(super::archive::Events::of(Arc::clone(&store))) as _);
+    let vitals = Arc::new(Vitals::default());
+    vitals.update(|health| (health.is_caught_up, health.is_store_writable) = (true, true));
+    let behind = Behind { archive, desk };
+    let server = Server::open(exhibit.door.clone(), Arc::clone(&vitals), behind).await?;
+    opened(server.address());
+    let sinks = Sinks {
+        store: Some(Arc::clone(&store)),
+        alerts: None,
+        status: Status::Exercise,
+    };
+    let site = Site::new(&exhibit.facts.name, exhibit.settings, sinks);
+    let mut stage = Stage {
+        site,
+        store,
+        vitals,
+    };
+    let arrivals = arrivals(exhibit.recording);
+    let started = clock::later(Duration::ZERO);
+    for arrival in &arrivals {
+        let due = started + wait(exhibit.pace, arrivals[0].time, arrival.time).unwrap_or_default();
+        stage.wait(Some(due), &mut shutdown).await?;
+        if shutdown.is_requested() {
+            break;
+        }
+        let events = tokio::task::block_in_place(|| stage.site.take(arrival, arrival.time))?;
+        stage.site.commit(arrival.time)?;
+        if let Input::Reading { benchmark, .. } = &arrival.input {
+            (stage.vitals).read(benchmark, arrival.time, &events, Duration::ZERO);
+        }
+    }
+    stage.wait(None, &mut shutdown).await?;
+    server.stop().await;
+    Ok(())
+}
+
+struct Stage {
+    site: Site,
+    store: Arc<Store>,
+    vitals: Arc<Vitals>,
+}
+
+impl Stage {
+    /// Takes orders until `due`, or for ever; a stop that is asked for ends it.
+    async fn wait(
+        &mut self,
+        due: Option<tokio::time::Instant>,
+        shutdown: &mut Shutdown,
+    ) -> Result<(), StoreError> {
+        loop {
+            self.vitals.turned();
+            for (number, order) in self.store.orders()? {
+                self.site.order(number, order);
+                // Orders fire no hook here: the time of the data is all there is.
+                let now = self.store.newest_step()?.unwrap_or_else(clock::now);
+                self.site.commit(now)?;
+            }
+            let next = clock::later(LOOK);
+            let next = due.map_or(next, |due| due.min(next));
+            tokio::select! {
+                () = tokio::time::sleep_until(next) => {}
+                () = shutdown.requested() => return Ok(()),
+            }
+            if due.is_some_and(|due| next >= due) {
+                return Ok(());
+            }
+        }
+    }
+}

@@ -1,0 +1,207 @@
+//! What the page asks: the site, a benchmark, changes as they come, and orders to be given.
+
+use crate::monitor::Order;
+use crate::reading::Timestamp;
+use crate::runtime::view::{Asked, BenchmarkView, Desk, OrderError, SiteView, Window};
+use crate::store::{Heads, StoreError};
+use axum::body::Body;
+use axum::extract::{Query, State};
+use axum::http::{StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use axum::routing::{get, post};
+use axum::{Json, Router};
+use futures_util::stream;
+use serde::Deserialize;
+use std::convert::Infallible;
+use std::fmt::Write as _;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// How often the state is looked at for changes.
+const LOOK: Duration = Duration::from_secs(1);
+/// A stream ends after so many looks; whoever reads it asks again, from where it ended. So none holds a place for
+/// ever, and all end before [`super::Limits::request_time`].
+const LOOKS: u32 = 20;
+/// Events told at one look; after more of them the next look follows at once.
+const MOST_TOLD: usize = 500;
+
+/// The routes.
+pub(super) fn router(desk: Arc<Desk>) -> Router {
+    Router::new()
+        .route("/api/site", get(site))
+        .route("/api/benchmark", get(benchmark))
+        .route("/api/stream", get(changes))
+        .route("/api/orders", post(ask))
+        .with_state(desk)
+}
+
+/// What could not be answered.
+#[derive(Debug)]
+enum Failure {
+    Store(StoreError),
+    Order(OrderError),
+    NoSuch(String),
+    Broken(String),
+}
+
+impl From<StoreError> for Failure {
+    fn from(error: StoreError) -> Self {
+        Self::Store(error)
+    }
+}
+
+impl IntoResponse for Failure {
+    fn into_response(self) -> Response {
+        let (status, text) = match self {
+            Self::Store(error) => (StatusCode::SERVICE_UNAVAILABLE, error.to_string()),
+            Self::Order(error) => {
+                let status = match &error {
+                    OrderError::NotHere => StatusCode::FORBIDDEN,
+                    OrderError::Wrong(_) => StatusCode::UNPROCESSABLE_ENTITY,
+                    OrderError::Store(_) => StatusCode::SERVICE_UNAVAILABLE,
+                };
+                (status, error.to_string())
+            }
+            Self::NoSuch(name) => (StatusCode::NOT_FOUND, format!("no benchmark {name:?}")),
+            Self::Broken(what) => (StatusCode::INTERNAL_SERVER_ERROR, what),
+        };
+        (status, text + "\n").into_response()
+    }
+}
+
+/// The state is asked on a thread that may wait.
+async fn blocking<T: Send + 'static>(
+    work: impl FnOnce() -> Result<T, Failure> + Send + 'static,
+) -> Result<T, Failure> {
+    let done = tokio::task::spawn_blocking(work).await;
+    done.unwrap_or_else(|error| Err(Failure::Broken(error.to_string())))
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Moment {
+    at: Option<Timestamp>,
+}
+
+async fn site(
+    State(desk): State<Arc<Desk>>,
+    Query(moment): Query<Moment>,
+) -> Result<Json<SiteView>, Failure> {
+    blocking(move || Ok(desk.site(moment.at)?)).await.map(Json)
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OfBenchmark {
+    id: String,
+    at: Option<Timestamp>,
+    from: Option<Timestamp>,
+    to: Option<Timestamp>,
+    buckets: Option<usize>,
+}
+
+async fn benchmark(
+    State(desk): State<Arc<Desk>>,
+    Query(asked): Query<OfBenchmark>,
+) -> Result<Json<BenchmarkView>, Failure> {
+    let window = Window {
+        at: asked.at,
+        from: asked.from,
+        to: asked.to,
+        buckets: asked.buckets,
+    };
+    let found = blocking(move || {
+        let view = desk.benchmark(&asked.id, window)?;
+        view.ok_or(Failure::NoSuch(asked.id))
+    });
+    found.await.map(Json)
+}
+
+async fn ask(
+    State(desk): State<Arc<Desk>>,
+    Json(asked): Json<Asked>,
+) -> Result<Json<Order>, Failure> {
+    let taken = blocking(move || desk.ask(&asked).map_err(Failure::Order));
+    taken.await.map(Json)
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Since {
+    since: Option<i64>,
+}
+
+/// Server-sent events: each event of the site with its number as id, and `progress` when anything was taken in.
+async fn changes(State(desk): State<Arc<Desk>>, Query(since): Query<Since>) -> Response {
+    let place = Place {
+        desk,
+        event: since.since,
+        step: None,
+        looks: 0,
+        is_behind: false,
+    };
+    let parts = stream::unfold(place, |mut place| async move {
+        if place.looks == LOOKS {
+            return None;
+        }
+        if place.looks > 0 && !place.is_behind {
+            tokio::time::sleep(LOOK).await;
+        }
+        place.looks += 1;
+        let (place, text) = blocking(move || {
+            let text = place.look()?;
+            Ok((place, text))
+        })
+        .await
+        .ok()?;
+        Some((Ok::<_, Infallible>(text), place))
+    });
+    let headers = [
+        (header::CONTENT_TYPE, "text/event-stream"),
+        (header::CACHE_CONTROL, "no-store"),
+    ];
+    (headers, Body::from_stream(parts)).into_response()
+}
+
+/// How far a stream has told.
+struct Place {
+    desk: Arc<Desk>,
+    /// The last event; `None`: only what comes from now on is told.
+    event: Option<i64>,
+    step: Option<i64>,
+    looks: u32,
+    /// Whether there is more to tell than one look tells.
+    is_behind: bool,
+}
+
+impl Place {
+    /// What has changed since the last look; a comment where nothing has, so that a dead connection shows.
+    fn look(&mut self) -> Result<String, StoreError> {
+        let Heads { step, event } = self.desk.heads()?;
+        let told = self.event.unwrap_or(event);
+        let mut fresh = if event > told {
+            self.desk.events_after(told)?
+        } else {
+            Vec::new()
+        };
+        self.is_behind = fresh.len() > MOST_TOLD;
+        fresh.truncate(MOST_TOLD);
+        let mut text = String::new();
+        for (number, body) in &fresh {
+            let _ = write!(text, "id: {number}\nevent: change\ndata: {body}\n\n");
+        }
+        let told = fresh.last().map_or(event, |(number, _)| *number);
+        if self.step != Some(step) {
+            let _ = write!(
+                text,
+                "id: {told}\nevent: progress\ndata: {{\"step\":{step},\"event\":{event}}}\n\n"
+            );
+        }
+        (self.event, self.step) = (Some(told), Some(step));
+        Ok(if text.is_empty() {
+            ": nothing new\n\n".to_owned()
+        } else {
+            text
+        })
+    }
+}

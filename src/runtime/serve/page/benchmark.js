@@ -1,0 +1,162 @@
+// One benchmark: how it stands, and everything on one axis of time.
+
+import { get } from '/page/ask.js';
+import { Charts } from '/page/charts.js';
+import { buttons } from '/page/site.js';
+import { badges, collapse, el, figure, left, list, percent, place, span, svg, told, when } from '/page/words.js';
+
+const DAY = 86400;
+const SPANS = [[null, 'Whole record'], [365 * DAY, '1 year'], [30 * DAY, '30 days'], [7 * DAY, '7 days'], [DAY, '1 day']];
+/** A zoomed stretch is asked for again in more detail after this pause. */
+const PAUSE_MS = 250;
+
+export class BenchmarkPage {
+  constructor(view, name, orders) {
+    this.name = name;
+    this.view = view;
+    this.orders = orders;
+    this.window = null;
+    this.at = null;
+  }
+
+  async ask(at, signal) {
+    const edges = this.window ? this.window.map((t) => new Date(1000 * t).toISOString()) : [null, null];
+    const buckets = Math.max(200, Math.min(1000, Math.round(this.view.clientWidth / 2)));
+    const answer = await get('/api/benchmark', { id: this.name, at, from: edges[0], to: edges[1], buckets }, signal);
+    return { ...answer, frame: answer };
+  }
+
+  close() {
+    clearTimeout(this.timer);
+    this.charts?.close();
+  }
+
+  restyle() {
+    this.charts?.restyle();
+  }
+
+  draw(view, at) {
+    this.at = at;
+    this.last = view;
+    if (!this.charts) this.build();
+    this.headNode.replaceChildren(...this.head(view));
+    this.factsNode.replaceChildren(...facts(view));
+    this.giveNode.replaceChildren(...(at === null ? [buttons(view, (kind) => this.orders(kind, this.name), ['acknowledge', 'shelve', 'silence', 'unsilence'])] : []));
+    this.charts.draw(view);
+    this.planeNode.replaceChildren(plane(view.forecasts));
+    this.effectsNode.replaceChildren(...effects(view));
+    fillList(this.alertsNode, list(view.alerts, 'No alert so far.', this.name));
+    fillList(this.marksNode, list([...view.marks].reverse(), 'Nothing found, declared or ordered so far.', this.name));
+  }
+
+  build() {
+    [this.headNode, this.factsNode, this.giveNode, this.chartsNode, this.planeNode, this.effectsNode, this.alertsNode, this.marksNode] =
+      Array.from({ length: 8 }, () => el('div'));
+    this.headNode.className = 'head';
+    const tools = el('div', { class: 'tools', role: 'toolbar', 'aria-label': 'Stretch of time' },
+      SPANS.map(([length, text]) => el('button', { type: 'button', onclick: () => this.near(length) }, text)),
+      [['Earlier', -0.5, 1], ['Later', 0.5, 1], ['Nearer', 0, 0.5], ['Wider', 0, 2]].map(([text, shift, factor]) =>
+        el('button', { type: 'button', onclick: () => this.move(shift, factor) }, text)));
+    this.view.replaceChildren(this.headNode,
+      el('section', { class: 'card', 'aria-label': 'How it stands' }, this.factsNode, this.giveNode),
+      el('section', { class: 'card', 'aria-label': 'Over time' }, tools, this.chartsNode,
+        el('p', { class: 'soft' }, 'The upright line is the moment that is shown. Drag across a chart to look closer; a double click shows the whole record.')),
+      el('div', { class: 'two' },
+        el('section', { class: 'card' }, el('h2', {}, 'Regime, with its trail'), this.planeNode),
+        el('section', { class: 'card' }, el('h2', {}, 'What the law lacks here'), this.effectsNode)),
+      el('div', { class: 'two' },
+        el('section', { class: 'card' }, el('h2', {}, 'Alerts'), this.alertsNode),
+        el('section', { class: 'card' }, el('h2', {}, 'Found, declared, ordered'), this.marksNode)));
+    this.charts = new Charts(this.chartsNode, (range) => this.zoomed(range));
+  }
+
+  head(view) {
+    const seen = view.acknowledged.filter((ack) => ack.benchmark === null || ack.benchmark === undefined || ack.benchmark === this.name).pop();
+    const quiet = view.silences.filter((one) => !one.benchmark || one.benchmark === this.name);
+    return [el('a', { href: place(null) }, 'All benchmarks'), el('h1', {}, this.name), ...badges(view.standing, 'big'),
+      ...(seen && view.standing.since && seen.time >= view.standing.since ? [el('span', { class: 'soft' }, `seen by ${seen.by ?? 'somebody'}`)] : []),
+      ...quiet.map((one) => el('span', { class: 'soft' }, `not told: ${told(one)}`))];
+  }
+
+  /** So many seconds until the moment that is shown. */
+  near(length) {
+    const end = Date.parse(this.last.at ?? this.last.last ?? this.last.now) / 1000;
+    this.charts.show(length === null ? null : [end - length, end + 0.25 * length]);
+  }
+
+  move(shift, factor) {
+    const [from, to] = this.charts.range();
+    const [middle, half] = [(from + to) / 2 + shift * (to - from), (factor * (to - from)) / 2];
+    this.charts.show([middle - half, middle + half]);
+  }
+
+  zoomed(range) {
+    this.window = range;
+    clearTimeout(this.timer);
+    this.timer = setTimeout(async () => {
+      try {
+        const answer = await this.ask(this.at);
+        this.draw(answer, this.at);
+      } catch {
+        // The next refresh says so.
+      }
+    }, PAUSE_MS);
+  }
+}
+
+function fillList(node, fresh) {
+  const had = node.querySelector('ul.log')?.scrollTop ?? 0;
+  node.replaceChildren(fresh);
+  if (had) fresh.scrollTop = had;
+}
+
+function facts(view) {
+  const { standing } = view;
+  const reading = standing.newest_reading ? [when(standing.newest_reading), el('small', {}, `${span(standing.silent_seconds)} ago`)] : ['none yet'];
+  const rows = [
+    ['Level', standing.since ? [standing.level, el('small', {}, 'since ', when(standing.since))] : [standing.level]],
+    ['Newest reading', reading],
+    ['Velocity', [`${figure(standing.velocity_mm_per_day)} mm/day`]],
+    ['Collapse forecast', [...collapse(standing.failure_time), left(standing.failure_time, view.at ?? view.now) ? el('small', {}, left(standing.failure_time, view.at ?? view.now)) : null]],
+    ['Chance within the evacuation time', [percent(standing.chance_within_evacuation_time), el('small', {}, `${percent(standing.chance_within_outlook)} within the outlook`)]],
+    ['Regime', [standing.regime ?? '-', view.latest ? el('small', {}, `unstable ${percent(view.latest.regime.probability_unstable)}, accelerating ${percent(view.latest.regime.probability_accelerating)}`) : null]],
+  ];
+  const nodes = [el('dl', {}, rows.map(([name, value]) => el('div', {}, el('dt', {}, name), el('dd', {}, value.filter((part) => part !== null)))))];
+  if (view.is_cut) nodes.push(el('p', { class: 'soft' }, 'Only the newest 200,000 readings are looked at.'));
+  return nodes;
+}
+
+/** Each forecast at its probabilities: the upper right is a slope that accelerates to failure. */
+function plane(forecasts) {
+  const at = (one) => [40 + 250 * one.probability_unstable, 270 - 250 * one.probability_accelerating];
+  const points = forecasts.slice(-120).map(at);
+  const corner = (x, y, text, anchor) => svg('text', { x, y, 'text-anchor': anchor }, text);
+  const last = points[points.length - 1];
+  return svg('svg', { class: 'plane', viewBox: '0 0 320 310', role: 'img', 'aria-label': 'The probability of acceleration against that of instability, with its trail' },
+    svg('rect', { class: 'frame', x: 40, y: 20, width: 250, height: 250 }),
+    svg('path', { class: 'frame', d: 'M165 20v250M40 145h250' }),
+    [['stable,', 46, 'start'], ['unstable,', 285, 'end']].flatMap(([word, x, anchor]) => [
+      corner(x, 34, word, anchor), corner(x, 47, 'accelerating', anchor), corner(x, 252, word, anchor), corner(x, 265, 'decelerating', anchor)]),
+    corner(165, 302, 'probability unstable (kappa > 0)', 'middle'),
+    svg('text', { x: 14, y: 145, 'text-anchor': 'middle', transform: 'rotate(-90 14 145)' }, 'probability accelerating (r > 0)'),
+    corner(40, 286, '0', 'middle'), corner(290, 286, '1', 'middle'), corner(34, 274, '0', 'end'), corner(34, 24, '1', 'end'),
+    points.length > 1 ? svg('polyline', { class: 'trail', points: points.map((point) => point.map((n) => n.toFixed(1)).join()).join(' ') }) : null,
+    last ? svg('circle', { class: 'here', cx: last[0], cy: last[1], r: 6 }) : null);
+}
+
+/** What was found, and the forecast with and without it. */
+function effects(view) {
+  const found = view.marks.filter((mark) => ['effect-found', 'effect-dropped'].includes(mark.event));
+  const load = view.marks.filter((mark) => mark.event === 'unexplained-residual' && mark.load_sd !== undefined).pop();
+  const nodes = [];
+  if (load) nodes.push(el('p', {}, `${told(load)[0].toUpperCase()}${told(load).slice(1)}.`));
+  if (found.length === 0) nodes.push(el('p', { class: 'soft' }, 'No effect was found: forecasts go by the law and by motion alone.'));
+  for (const one of found) nodes.push(el('p', {}, when(one.time), ` ${told(one)}.`));
+  const plain = view.latest?.plain;
+  if (plain) {
+    nodes.push(el('table', {}, el('thead', {}, el('tr', {}, ['', 'Critical velocity passed'].map((name) => el('th', { scope: 'col' }, name)))),
+      el('tbody', {}, [['with the effect', view.latest.critical_velocity_time], ['without it', plain.failure_time]].map(([name, forecast]) =>
+        el('tr', {}, el('th', { scope: 'row' }, name), el('td', {}, collapse(forecast)))))));
+  }
+  return nodes;
+}

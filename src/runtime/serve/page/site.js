@@ -1,0 +1,160 @@
+// The site: every benchmark by level, where each stands, what is in force.
+
+import { get } from '/page/ask.js';
+import { badge, badges, collapse, el, figure, left, list, percent, place, shape, span, svg, told, when } from '/page/words.js';
+
+const RANK = { green: 0, unknown: 0.5, yellow: 1, orange: 2, red: 3 };
+const HEALTH = [
+  [(h) => !h.is_caught_up, 'The daemon is still reading the past.'],
+  [(h) => h.is_paused || !h.is_store_writable, 'The state folder cannot be written to.'],
+  [(h) => h.is_store_damaged, 'The state is damaged: restore a backup.'],
+  [(h) => h.is_clock_wrong, 'The host\u2019s clock is wrong: readings that are known lie after it.'],
+];
+
+export class SitePage {
+  constructor(view, orders) {
+    this.name = null;
+    this.view = view;
+    this.orders = orders;
+  }
+
+  async ask(at, signal) {
+    const [site, status] = await Promise.all([get('/api/site', { at }, signal), get('/api/status', {}, signal)]);
+    return { site, status, frame: { ...site, version: status.version } };
+  }
+
+  close() {}
+
+  draw({ site, status }, at) {
+    const sorted = [...site.benchmarks].sort((a, b) => rank(b) - rank(a)
+      || (b.chance_within_evacuation_time ?? 0) - (a.chance_within_evacuation_time ?? 0)
+      || a.benchmark.localeCompare(b.benchmark, 'en', { numeric: true }));
+    const scrolled = this.view.querySelector('ul.log')?.scrollTop ?? 0;
+    this.view.replaceChildren(
+      this.head(site),
+      ...(at ? [] : HEALTH.filter(([is]) => is(status)).map(([, text]) => el('p', { class: 'card level red' }, text))),
+      el('section', { class: 'card', 'aria-label': 'Benchmarks' }, table(sorted, site)),
+      el('div', { class: sorted.some((one) => one.position) ? 'two' : '' },
+        sketch(sorted),
+        el('section', { class: 'card' }, el('h2', {}, 'In force'), this.force(site, at))),
+      el('section', { class: 'card' }, el('h2', {}, 'What was said'), list(site.log, 'Nothing yet.')));
+    const log = this.view.querySelector('ul.log');
+    if (log) log.scrollTop = scrolled;
+  }
+
+  head(site) {
+    const count = (level) => site.benchmarks.filter((one) => one.level === level && !(level === 'green' && one.is_unknown)).length;
+    const unknown = site.benchmarks.filter((one) => one.is_unknown).length;
+    const counts = ['red', 'orange', 'yellow', 'green'].map((level) => [count(level), level]);
+    counts.push([unknown, 'unknown']);
+    const text = counts.filter(([n]) => n > 0).map(([n, level]) => `${n} ${level}`).join(', ');
+    return el('div', { class: 'head' }, el('h1', {}, site.site), badge(site.level, 'big'),
+      site.unknown_since ? [badge('unknown', 'big'), el('span', {}, 'since ', when(site.unknown_since))] : null,
+      el('span', { class: 'soft' }, `${site.benchmarks.length} benchmarks: ${text || 'none yet'}`));
+  }
+
+  force(site, at) {
+    const alerts = site.alerts.filter((alert) => alert.benchmark);
+    const items = alerts.map((alert) => {
+      const seen = site.acknowledged.filter((ack) => (!ack.benchmark || ack.benchmark === alert.benchmark) && ack.time >= alert.time).pop();
+      return el('li', {}, badge(alert.level), ' ', el('a', { href: place(alert.benchmark) }, alert.benchmark), ' since ', when(alert.time),
+        el('div', {}, alert.text),
+        seen ? el('div', { class: 'soft' }, `seen by ${seen.by ?? 'somebody'} at `, when(seen.time)) : null);
+    });
+    const quiet = site.silences.map((one) => el('li', {}, `${one.benchmark ?? 'the whole site'}: ${told(one)}`));
+    const nodes = [items.length ? el('ul', { class: 'log', tabindex: '0' }, items) : el('p', { class: 'soft' }, 'No alert is in force.')];
+    if (quiet.length) nodes.push(el('h2', {}, 'Not told'), el('ul', { class: 'log' }, quiet));
+    if (at === null) nodes.push(buttons(site, (kind) => this.orders(kind, null), ['acknowledge', 'silence', 'unsilence']));
+    return nodes;
+  }
+}
+
+/** The buttons for orders, or why there are none. */
+export function buttons(site, give, kinds) {
+  if (!site.takes_orders) {
+    return el('p', { class: 'soft' }, 'Orders are taken here where site.token_file is set; else by ', el('code', {}, 'slipwatch alerts'), '.');
+  }
+  const name = (kind) => kind[0].toUpperCase() + kind.slice(1);
+  return el('p', { class: 'actions' }, kinds.map((kind) => el('button', { type: 'button', 'data-order': kind, onclick: () => give(kind) }, name(kind))));
+}
+
+function rank(standing) {
+  return Math.max(RANK[standing.level], standing.is_unknown ? RANK.unknown : 0);
+}
+
+function table(standings, site) {
+  if (standings.length === 0) return el('p', {}, 'No benchmark has given a reading yet.');
+  const names = ['Level', 'Benchmark', 'Newest reading', 'Velocity', 'Collapse forecast', 'Chance in time', 'Regime'];
+  const row = (one) => {
+    const cells = [
+      [badges(one), one.since ? el('small', {}, 'since ', when(one.since)) : null],
+      [el('a', { class: 'id', href: place(one.benchmark) }, one.benchmark)],
+      one.newest_reading ? [when(one.newest_reading), el('small', {}, `${span(one.silent_seconds)} ago`)] : ['none yet'],
+      [`${figure(one.velocity_mm_per_day)} mm/day`],
+      [...collapse(one.failure_time), one.failure_time ? el('small', {}, left(one.failure_time, site.at ?? site.now)) : null],
+      [percent(one.chance_within_evacuation_time), el('small', {}, `${percent(one.chance_within_outlook)} in the outlook`)],
+      [one.regime ?? '-'],
+    ];
+    return el('tr', { 'data-benchmark': one.benchmark, 'data-level': one.level }, cells.map((cell, index) => el('td', { 'data-name': names[index] }, cell)));
+  };
+  return el('table', { class: 'cards' },
+    el('thead', {}, el('tr', {}, names.map((name) => el('th', { scope: 'col' }, name)))),
+    el('tbody', {}, standings.map(row)));
+}
+
+/** The plan, and where heights are known a section along the direction in which the benchmarks lie. */
+function sketch(standings) {
+  const placed = standings.filter((one) => one.position);
+  if (placed.length === 0) return null;
+  const plan = placed.map((one) => [one.position[0], one.position[1]]);
+  const nodes = [el('h2', {}, 'Plan, north up'), drawing(placed, plan, 'Plan of the benchmarks')];
+  if (placed.length > 1 && placed.every((one) => one.position.length === 3)) {
+    const along = direction(plan);
+    const section = placed.map((one, index) => [plan[index][0] * along[0] + plan[index][1] * along[1], one.position[2]]);
+    nodes.push(el('h2', {}, 'Section'), drawing(placed, section, 'Section of the benchmarks'));
+  }
+  return el('section', { class: 'card' }, nodes);
+}
+
+function direction(points) {
+  const mean = [0, 1].map((axis) => points.reduce((sum, point) => sum + point[axis], 0) / points.length);
+  let [xx, xy, yy] = [0, 0, 0];
+  for (const [x, y] of points) {
+    xx += (x - mean[0]) ** 2;
+    xy += (x - mean[0]) * (y - mean[1]);
+    yy += (y - mean[1]) ** 2;
+  }
+  const angle = 0.5 * Math.atan2(2 * xy, xx - yy);
+  return [Math.cos(angle), Math.sin(angle)];
+}
+
+const WIDTH = 420;
+const EDGE = 46;
+
+function drawing(standings, points, name) {
+  const [xs, ys] = [0, 1].map((axis) => points.map((point) => point[axis]));
+  const [width, height] = [Math.max(...xs) - Math.min(...xs), Math.max(...ys) - Math.min(...ys)];
+  const scale = Math.min((WIDTH - 2 * EDGE) / Math.max(width, 1e-9), 220 / Math.max(height, 1e-9), 1e6);
+  const size = Math.max(height * scale, 30) + 2 * EDGE;
+  const left0 = (WIDTH - width * scale) / 2;
+  const at = ([x, y]) => [left0 + (x - Math.min(...xs)) * scale, size - EDGE - (y - Math.min(...ys)) * scale];
+  const bar = nice((WIDTH / 4) / scale);
+  return svg('svg', { class: 'sketch', viewBox: `0 0 ${WIDTH} ${size.toFixed(0)}`, role: 'group', 'aria-label': name },
+    svg('path', { class: 'rule', d: `M12 ${size - 10}h${bar * scale}m0-4v8M12 ${size - 14}v8` }),
+    svg('text', { x: 16 + bar * scale, y: size - 6 }, `${bar} m`),
+    standings.map((one, index) => {
+      const [x, y] = at(points[index]);
+      const level = one.is_unknown && one.level === 'green' ? 'unknown' : one.level;
+      const mark = shape(level);
+      mark.setAttribute('class', 'mark');
+      const words = `${one.benchmark}: ${one.level}${one.is_unknown ? ', unknown' : ''}`;
+      return svg('a', { href: place(one.benchmark), 'aria-label': words },
+        svg('g', { class: level, transform: `translate(${x - 9} ${y - 9}) scale(1.15)` }, mark),
+        svg('text', { x, y: y - 13, 'text-anchor': x < WIDTH / 3 ? 'start' : x > (2 * WIDTH) / 3 ? 'end' : 'middle' }, one.benchmark));
+    }));
+}
+
+function nice(length) {
+  const power = 10 ** Math.floor(Math.log10(length));
+  return [5, 2, 1].map((factor) => factor * power).find((one) => one <= length) ?? power;
+}

@@ -1,0 +1,103 @@
+//! What stands at a moment, from the events in a site's state: alerts in force, orders, who has seen what.
+
+use crate::alert::Level;
+use crate::monitor::{AlertState, Event, EventKind};
+use crate::reading::{BenchmarkId, Timestamp};
+use crate::store::{Store, StoreError};
+use std::collections::BTreeMap;
+
+/// The alerts in force, by place and level.
+pub type InForce = BTreeMap<(Option<BenchmarkId>, Level), Event>;
+
+/// The alerts in force: by benchmark and level, of each benchmark the highest, and `unknown` beside it.
+///
+/// # Errors
+/// [`StoreError`].
+pub fn in_force(store: &Store, until: Option<Timestamp>) -> Result<InForce, StoreError> {
+    let mut standing = InForce::new();
+    for event in every(store, "alert")? {
+        if until.is_some_and(|until| event.time > until) {
+            continue;
+        }
+        let EventKind::Alert { level, state, .. } = &event.kind else {
+            continue;
+        };
+        let (level, state, place) = (*level, *state, event.benchmark.clone());
+        match state {
+            AlertState::Firing => {
+                standing.retain(|(own, lower), _| {
+                    *own != place || (*lower == Level::Unknown) != (level == Level::Unknown)
+                });
+                standing.insert((place, level), event);
+            }
+            AlertState::Resolved => {
+                standing.remove(&(place, level));
+            }
+        }
+    }
+    Ok(standing)
+}
+
+/// Every event of a kind, oldest first.
+///
+/// # Errors
+/// [`StoreError`].
+pub fn every(store: &Store, kind: &str) -> Result<Vec<Event>, StoreError> {
+    let mut all = Vec::new();
+    let mut after = 0;
+    loop {
+        let events = store.events(after, Some(kind), None)?;
+        let Some((last, _)) = events.last() else {
+            return Ok(all);
+        };
+        after = *last;
+        for (_, body) in &events {
+            all.push(read(body)?);
+        }
+    }
+}
+
+/// Every order that was taken, oldest first.
+///
+/// # Errors
+/// [`StoreError`].
+pub fn orders(store: &Store) -> Result<Vec<Event>, StoreError> {
+    every(store, "order")
+}
+
+/// The orders in force at `now` by which no hook is run, as they were given.
+pub fn silences(orders: &[Event], now: Timestamp) -> Vec<Event> {
+    let mut standing: Vec<Event> = Vec::new();
+    for event in orders {
+        let EventKind::Order { order, until, .. } = &event.kind else {
+            continue;
+        };
+        if order == "unsilence" {
+            let place = &event.benchmark;
+            standing.retain(|one| place.is_some() && one.benchmark != *place);
+        } else if until.is_some_and(|until| until > now) {
+            standing.push(event.clone());
+        }
+    }
+    standing
+}
+
+/// Who has seen what is in force: acknowledgements since its alert was called.
+pub fn acknowledged(orders: &[Event], in_force: &InForce) -> Vec<Event> {
+    let is_of = |ack: &Event, place: &Option<BenchmarkId>, alert: &Event| {
+        (ack.benchmark.is_none() || ack.benchmark == *place) && ack.time >= alert.time
+    };
+    let is_one = |event: &&Event| {
+        let is_ack =
+            matches!(&event.kind, EventKind::Order { order, .. } if order == "acknowledge");
+        is_ack
+            && in_force
+                .iter()
+                .any(|((place, _), alert)| is_of(event, place, alert))
+    };
+    orders.iter().filter(is_one).cloned().collect()
+}
+
+fn read(body: &str) -> Result<Event, StoreError> {
+    serde_json::from_str(body).map_err(|error| StoreError::Unreadable(error.to_string()))
+}

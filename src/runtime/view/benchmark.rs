@@ -1,0 +1,437 @@
+//! One benchmark at a moment: its readings, every forecast until then, what was found and called.
+
+use super::site::Standing;
+use super::thin::{self, Point};
+use super::{Desk, EARLIEST, LATEST, held, read};
+use crate::fit::{Observations, Rate, RateOptions};
+use crate::forecast::InverseVelocityLine;
+use crate::monitor::{Event, EventKind, FailureTime, Stretch, levels_in, recent};
+use crate::reading::{
+    BenchmarkId, Quantity, Reading, SECONDS_PER_DAY, Series, Timestamp, Unit, days_since,
+};
+use crate::runtime::standing::in_force;
+use crate::store::{StoreError, Value, Values};
+use serde::Serialize;
+use std::collections::VecDeque;
+
+/// Readings that are looked at for one answer, the newest.
+const MOST_READINGS: usize = 200_000;
+/// Stretches of time of which each series keeps its extremes, at most.
+const MOST_BUCKETS: usize = 2000;
+const BUCKETS: usize = 400;
+/// Velocities that are drawn.
+const VELOCITIES: usize = 400;
+/// Events of one kind that are listed, the newest.
+const MOST_EVENTS: usize = 300;
+/// What is marked on the axis of time.
+const MARKED: [&str; 10] = [
+    "regime-flip",
+    "intercept-drift",
+    "transition-drift",
+    "unexplained-residual",
+    "effect-found",
+    "effect-dropped",
+    "fault",
+    "declared",
+    "correction",
+    "order",
+];
+
+/// What is asked for.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Window {
+    /// The moment; `None`: now.
+    pub at: Option<Timestamp>,
+    /// From when on; `None`: all.
+    pub from: Option<Timestamp>,
+    /// Until when; `None`: all.
+    pub to: Option<Timestamp>,
+    /// Stretches of time of which each series keeps its extremes.
+    pub buckets: Option<usize>,
+}
+
+/// A series by columns: seconds since 1970, and values.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Columns {
+    /// Seconds since 1970.
+    pub t: Vec<f64>,
+    /// Values.
+    pub v: Vec<f64>,
+}
+
+impl Columns {
+    fn of(points: &[Point], buckets: usize) -> Self {
+        let kept = thin::min_max(points, buckets);
+        Self {
+            t: kept.iter().map(|point| point.0).collect(),
+            v: kept.iter().map(|point| point.1).collect(),
+        }
+    }
+}
+
+/// A covariate.
+#[derive(Debug, Clone, Serialize)]
+pub struct Covariate {
+    /// Its name.
+    pub name: String,
+    /// Its unit, where it has one.
+    pub unit: Option<String>,
+    /// Its samples.
+    #[serde(flatten)]
+    pub samples: Columns,
+}
+
+/// One forecast, short.
+#[derive(Debug, Clone, Serialize)]
+pub struct Forecast {
+    /// When it was made.
+    pub time: Timestamp,
+    /// When the slope collapses.
+    pub failure_time: FailureTime,
+    /// The chance of that within the evacuation time.
+    pub chance_within_evacuation_time: f64,
+    /// The chance of that within the outlook.
+    pub chance_within_outlook: f64,
+    /// Of kappa above 0.
+    pub probability_unstable: f64,
+    /// Of r above 0.
+    pub probability_accelerating: f64,
+    /// The regime.
+    pub regime: &'static str,
+    /// The velocity then, mm/day.
+    pub velocity_mm_per_day: Option<f64>,
+    /// Where an effect is adopted: what the law says without it.
+    pub without_effect: Option<FailureTime>,
+}
+
+/// One benchmark.
+#[derive(Debug, Clone, Serialize)]
+pub struct BenchmarkView {
+    /// The site's name.
+    pub site: String,
+    /// The daemon's version.
+    pub version: &'static str,
+    /// The zone that people there live in.
+    pub time_zone: String,
+    /// Whether orders are taken from here.
+    pub takes_orders: bool,
+    /// How it stands.
+    pub standing: Standing,
+    /// The moment that is shown; `None`: now.
+    pub at: Option<Timestamp>,
+    /// What time it is at the site.
+    pub now: Timestamp,
+    /// The first reading of all.
+    pub first: Option<Timestamp>,
+    /// The last reading of all, also after the moment.
+    pub last: Option<Timestamp>,
+    /// In a replay: when the slope collapsed.
+    pub collapse: Option<Timestamp>,
+    /// What is measured.
+    pub quantity: Quantity,
+    /// Whether there are earlier readings in the window than could be looked at.
+    pub is_cut: bool,
+    /// Readings, mm or mm/day.
+    pub readings: Columns,
+    /// Velocities in them, mm/day.
+    pub velocities: Columns,
+    /// The straight line through the newest inverse velocities, from (seconds, day/mm) to zero.
+    pub line: Option<[Point; 2]>,
+    /// Every forecast, thinned.
+    pub forecasts: Vec<Forecast>,
+    /// The newest refit whole.
+    pub latest: Option<Event>,
+    /// The levels in force.
+    pub levels: Vec<Stretch>,
+    /// When nothing could be said.
+    pub unknown: Vec<Stretch>,
+    /// Covariates.
+    pub covariates: Vec<Covariate>,
+    /// What was found, declared, ordered.
+    pub marks: Vec<Event>,
+    /// Alerts, newest first.
+    pub alerts: Vec<Event>,
+    /// Who has seen what is in force, on the whole site.
+    pub acknowledged: Vec<Event>,
+    /// The orders in force by which alerts are not told, on the whole site.
+    pub silences: Vec<Event>,
+}
+
+impl Desk {
+    /// One benchmark as it was known at a moment; `None` where there is none of that name.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn benchmark(
+        &self,
+        name: &str,
+        window: Window,
+    ) -> Result<Option<BenchmarkView>, StoreError> {
+        let id = BenchmarkId::new(name);
+        if !self.known()?.contains(&id) {
+            return Ok(None);
+        }
+        let now = self.now()?;
+        let (at, moment) = (window.at.map(held), window.at.map_or(now, held));
+        let known = at.unwrap_or(LATEST);
+        let from = window.from.map_or(EARLIEST, held);
+        let to = window.to.map_or(LATEST, held).min(known);
+        let buckets = window.buckets.unwrap_or(BUCKETS).clamp(10, MOST_BUCKETS);
+        let all = self.series(&id, (EARLIEST, known), known)?;
+        let is_cut = all.readings.len() >= MOST_READINGS;
+        let shown = within(&all, (from, to));
+        let latest = self.store.event_at(name, "refit", known)?;
+        let latest: Option<Event> = latest.as_deref().map(read).transpose()?;
+        let mut alerts = self.events((name, "alert"), (EARLIEST, known))?;
+        let course = all
+            .readings
+            .first()
+            .map(|first| levels_in(&alerts, &id, (first.time, moment)));
+        let (levels, unknown) = course.unwrap_or_default();
+        alerts.reverse();
+        alerts.truncate(MOST_EVENTS);
+        let levels_now = in_force(&self.store, at)?;
+        let span = self.store.span(Some(name))?;
+        let (seen, quiet) = self.orders(&levels_now, (at, moment))?;
+        Ok(Some(BenchmarkView {
+            site: self.facts.name.clone(),
+            version: env!("CARGO_PKG_VERSION"),
+            time_zone: self.facts.time_zone.clone(),
+            takes_orders: self.facts.takes_orders,
+            acknowledged: seen,
+            silences: quiet,
+            standing: self.standing(id, &levels_now, (at, moment))?,
+            at,
+            now,
+            first: span.map(|(first, _)| first),
+            last: span.map(|(_, last)| last),
+            collapse: self.facts.collapse,
+            quantity: all.quantity(),
+            is_cut,
+            readings: Columns::of(&points(&shown), buckets),
+            velocities: velocities(&shown, VELOCITIES),
+            line: line(&all, latest.as_ref()),
+            forecasts: self.forecasts(name, (from, to), buckets)?,
+            latest,
+            levels,
+            unknown,
+            covariates: self.covariates((from, to), known, buckets)?,
+            marks: self.marks(name, known)?,
+            alerts,
+        }))
+    }
+
+    /// The benchmark's readings in mm or mm/day; of two quantities the displacement.
+    fn series(
+        &self,
+        id: &BenchmarkId,
+        (from, to): (Timestamp, Timestamp),
+        known: Timestamp,
+    ) -> Result<Series, StoreError> {
+        let values = self.store.values(&Values {
+            name: id.as_str(),
+            is_reading: true,
+            from,
+            to,
+            known,
+            most: MOST_READINGS,
+        })?;
+        let is_displacement = |value: &Value| value.quantity == Some(Quantity::Displacement);
+        let has_displacement = values.iter().any(is_displacement);
+        let ours = (values.iter()).filter(|value| is_displacement(value) == has_displacement);
+        Ok(Series {
+            benchmark: id.clone(),
+            unit: if has_displacement || values.is_empty() {
+                Unit::MM
+            } else {
+                Unit::MM_PER_DAY
+            },
+            averaging: ours.clone().find_map(|value| value.averaging),
+            readings: ours
+                .map(|value| Reading {
+                    time: value.time,
+                    value: value.value,
+                    sigma: value.sigma,
+                })
+                .collect(),
+        })
+    }
+
+    fn covariates(
+        &self,
+        (from, to): (Timestamp, Timestamp),
+        known: Timestamp,
+        buckets: usize,
+    ) -> Result<Vec<Covariate>, StoreError> {
+        let mut covariates = Vec::new();
+        for (name, unit) in self.store.channels()? {
+            let samples = self.store.values(&Values {
+                name: &name,
+                is_reading: false,
+                from,
+                to,
+                known,
+                most: MOST_READINGS,
+            })?;
+            let points: Vec<Point> = samples
+                .iter()
+                .map(|sample| (seconds(sample.time), sample.value))
+                .collect();
+            covariates.push(Covariate {
+                name,
+                unit,
+                samples: Columns::of(&points, buckets),
+            });
+        }
+        Ok(covariates)
+    }
+
+    /// Of each stretch of time the forecast with the greatest chance, and the last.
+    fn forecasts(
+        &self,
+        name: &str,
+        span: (Timestamp, Timestamp),
+        buckets: usize,
+    ) -> Result<Vec<Forecast>, StoreError> {
+        let (mut all, mut failure) = (Vec::new(), None);
+        self.store
+            .events_within((name, "refit"), span, &mut |body| match read(body) {
+                Ok(event) => all.extend(forecast(&event)),
+                Err(error) => failure = Some(error),
+            })?;
+        failure.map_or_else(|| Ok(thinned(all, buckets)), Err)
+    }
+
+    fn marks(&self, name: &str, until: Timestamp) -> Result<Vec<Event>, StoreError> {
+        let mut marks = Vec::new();
+        for kind in MARKED {
+            marks.extend(self.events((name, kind), (EARLIEST, until))?);
+        }
+        marks.sort_by_key(|event| event.time);
+        Ok(marks)
+    }
+
+    /// The newest events of one kind, oldest first.
+    fn events(
+        &self,
+        which: (&str, &str),
+        span: (Timestamp, Timestamp),
+    ) -> Result<Vec<Event>, StoreError> {
+        let (mut events, mut failure) = (VecDeque::new(), None);
+        self.store
+            .events_within(which, span, &mut |body| match read(body) {
+                Ok(event) => {
+                    events.push_back(event);
+                    if events.len() > 10 * MOST_EVENTS {
+                        events.pop_front();
+                    }
+                }
+                Err(error) => failure = Some(error),
+            })?;
+        failure.map_or_else(|| Ok(events.into()), Err)
+    }
+}
+
+fn seconds(time: Timestamp) -> f64 {
+    time.as_millisecond() as f64 / 1e3
+}
+
+fn points(series: &Series) -> Vec<Point> {
+    let readings = series.readings.iter();
+    readings
+        .map(|reading| (seconds(reading.time), reading.value))
+        .collect()
+}
+
+fn within(series: &Series, (from, to): (Timestamp, Timestamp)) -> Series {
+    let mut part = series.clone();
+    part.readings
+        .retain(|reading| (from..=to).contains(&reading.time));
+    part
+}
+
+/// Velocities in the readings, `most` at most; of readings that are velocities the readings themselves.
+fn velocities(series: &Series, most: usize) -> Columns {
+    if series.quantity() == Quantity::Velocity {
+        return Columns::of(&points(series), most / 4);
+    }
+    let Some(first) = series.readings.first() else {
+        return Columns::default();
+    };
+    let rates = rates(series, RateOptions { most });
+    let second = |rate: &Rate| SECONDS_PER_DAY.mul_add(rate.middle(), seconds(first.time));
+    Columns {
+        t: rates.iter().map(second).collect(),
+        v: rates.iter().map(|rate| rate.velocity).collect(),
+    }
+}
+
+fn rates(series: &Series, options: RateOptions) -> Vec<Rate> {
+    let observations = Observations::of(series);
+    let all = 0..observations.values.len();
+    observations.rates(all, options)
+}
+
+/// The line of the newest refit, where these readings give it.
+fn line(series: &Series, latest: Option<&Event>) -> Option<[Point; 2]> {
+    let latest = latest?;
+    let EventKind::Refit {
+        inverse_velocity,
+        t_max,
+        ..
+    } = &latest.kind
+    else {
+        return None;
+    };
+    let start = series.readings.first()?.time;
+    let until = within(series, (start, *t_max));
+    let zero = days_since(start, inverse_velocity.failure_time?);
+    let rates = rates(&until, RateOptions::default());
+    let segment = InverseVelocityLine::segment(recent(&rates), zero)?;
+    Some(segment.map(|(day, height)| (SECONDS_PER_DAY.mul_add(day, seconds(start)), height)))
+}
+
+fn forecast(event: &Event) -> Option<Forecast> {
+    let EventKind::Refit {
+        regime,
+        failure_time,
+        velocity_mm_per_day,
+        chance_within_evacuation_time,
+        chance_within_outlook,
+        plain,
+        ..
+    } = &event.kind
+    else {
+        return None;
+    };
+    Some(Forecast {
+        time: event.time,
+        failure_time: *failure_time,
+        chance_within_evacuation_time: *chance_within_evacuation_time,
+        chance_within_outlook: *chance_within_outlook,
+        probability_unstable: regime.probability_unstable,
+        probability_accelerating: regime.probability_accelerating,
+        regime: regime.label.label(),
+        velocity_mm_per_day: *velocity_mm_per_day,
+        without_effect: plain.as_ref().map(|plain| plain.failure_time),
+    })
+}
+
+fn thinned(all: Vec<Forecast>, buckets: usize) -> Vec<Forecast> {
+    if all.len() <= 2 * buckets {
+        return all;
+    }
+    let size = all.len().div_ceil(buckets);
+    let mut kept = Vec::new();
+    for part in all.chunks(size) {
+        let chance = |one: &&Forecast| one.chance_within_evacuation_time;
+        let greatest = part
+            .iter()
+            .rev()
+            .max_by(|a, b| chance(a).total_cmp(&chance(b)));
+        let last = part.last();
+        kept.extend(greatest.filter(|one| last.is_some_and(|last| last.time > one.time)));
+        kept.extend(last);
+    }
+    kept.into_iter().cloned().collect()
+}

@@ -1,0 +1,123 @@
+//! What the page shows: the site and its benchmarks at any moment, as they were known then.
+
+mod benchmark;
+mod order;
+mod site;
+mod thin;
+
+pub use benchmark::{BenchmarkView, Window};
+pub use order::{Asked, OrderError};
+pub use site::{SiteView, Standing};
+
+use super::clock;
+use crate::config::Config;
+use crate::reading::{BenchmarkId, Timestamp};
+use crate::store::{Heads, Store, StoreError};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// The earliest and the latest time that the state can hold.
+const EARLIEST: Timestamp = Timestamp::constant(-9_000_000_000, 0);
+const LATEST: Timestamp = Timestamp::constant(9_000_000_000, 0);
+
+/// What time it is on the page.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Now {
+    /// The host's clock.
+    Wall,
+    /// Data time of the last step: a recording is being played.
+    Data,
+}
+
+/// What the config says of a site, as the page needs it.
+#[derive(Debug, Clone)]
+pub struct Facts {
+    /// The site's name.
+    pub name: String,
+    /// The zone that people there live in.
+    pub time_zone: String,
+    /// Benchmarks that the config names; others show once they have given a reading.
+    pub named: Vec<BenchmarkId>,
+    /// Where each stands, m.
+    pub positions: BTreeMap<BenchmarkId, Vec<f64>>,
+    /// Whether orders are taken: whoever gives one must know a secret.
+    pub takes_orders: bool,
+    /// What time it is.
+    pub now: Now,
+    /// In a replay: when the slope collapsed.
+    pub collapse: Option<Timestamp>,
+}
+
+impl Facts {
+    /// Of a site that is watched.
+    pub fn of(config: &Config) -> Self {
+        let benchmarks = config.benchmarks.iter();
+        Self {
+            name: config.site.name.clone(),
+            time_zone: config
+                .site
+                .time_zone
+                .iana_name()
+                .unwrap_or("UTC")
+                .to_owned(),
+            named: benchmarks.clone().map(|one| one.id.clone()).collect(),
+            positions: benchmarks
+                .filter_map(|one| Some((one.id.clone(), one.position.clone()?)))
+                .collect(),
+            takes_orders: config.site.token_file.is_some(),
+            now: Now::Wall,
+            collapse: None,
+        }
+    }
+}
+
+/// Answers what the page asks, from the state on the disk.
+#[derive(Debug)]
+pub struct Desk {
+    /// A connection of its own: a long answer keeps the work loop from nothing.
+    store: Store,
+    facts: Facts,
+}
+
+impl Desk {
+    /// Opens the state in `folder`, which is there already.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn open(folder: &Path, facts: Facts) -> Result<Self, StoreError> {
+        let store = Store::look(folder)?;
+        Ok(Self { store, facts })
+    }
+
+    /// How far the state has grown.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn heads(&self) -> Result<Heads, StoreError> {
+        self.store.heads()
+    }
+
+    /// The next events after number `after`, as (number, JSON).
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn events_after(&self, after: i64) -> Result<Vec<(i64, String)>, StoreError> {
+        self.store.events(after, None, None)
+    }
+
+    fn now(&self) -> Result<Timestamp, StoreError> {
+        Ok(match self.facts.now {
+            Now::Wall => clock::now(),
+            Now::Data => (self.store.newest_step()?).unwrap_or_else(clock::now),
+        })
+    }
+}
+
+/// As the state can hold it.
+fn held(time: Timestamp) -> Timestamp {
+    time.clamp(EARLIEST, LATEST)
+}
+
+fn read<T: serde::de::DeserializeOwned>(body: &str) -> Result<T, StoreError> {
+    serde_json::from_str(body).map_err(|error| StoreError::Unreadable(error.to_string()))
+}

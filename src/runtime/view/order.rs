@@ -1,0 +1,107 @@
+//! An order that was given on the page, and whether it is taken.
+
+use super::{Desk, EARLIEST};
+use crate::monitor::Order;
+use crate::reading::BenchmarkId;
+use crate::store::StoreError;
+use jiff::SignedDuration;
+use serde::Deserialize;
+
+/// Longest name of whoever gives an order, bytes.
+const LONGEST_NAME: usize = 100;
+
+/// What is asked for.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Asked {
+    /// `acknowledge`, `shelve`, `silence` or `unsilence`.
+    pub order: String,
+    /// Where; the whole site without one.
+    pub benchmark: Option<String>,
+    /// Who asks.
+    pub by: String,
+    /// For how long, of a shelve or a silence.
+    pub seconds: Option<i64>,
+}
+
+/// Why an order is not taken.
+#[derive(Debug, thiserror::Error)]
+pub enum OrderError {
+    /// The site has no token.
+    #[error("orders are taken here only where site.token_file is set: use `slipwatch alerts`")]
+    NotHere,
+    /// It cannot be meant.
+    #[error("{0}")]
+    Wrong(String),
+    /// The state cannot be written to.
+    #[error("the order could not be kept: {0}")]
+    Store(#[from] StoreError),
+}
+
+impl Desk {
+    /// Leaves the order for the daemon, which takes it within a second.
+    ///
+    /// # Errors
+    /// [`OrderError`].
+    pub fn ask(&self, asked: &Asked) -> Result<Order, OrderError> {
+        if !self.facts.takes_orders {
+            return Err(OrderError::NotHere);
+        }
+        let order = self.order(asked)?;
+        if let Some(benchmark) = order.benchmark()
+            && !self.known()?.contains(benchmark)
+        {
+            return wrong(format!("there is no benchmark {benchmark}"));
+        }
+        tracing::warn!(?order, "an order came over the network");
+        self.store.ask(&order)?;
+        Ok(order)
+    }
+
+    fn order(&self, asked: &Asked) -> Result<Order, OrderError> {
+        let name = asked.by.trim();
+        if name.is_empty() || name.len() > LONGEST_NAME || name.chars().any(char::is_control) {
+            return wrong(format!("by: a name of 1 to {LONGEST_NAME} bytes is needed"));
+        }
+        let by = Some(name.to_owned());
+        let benchmark = asked.benchmark.as_ref().map(BenchmarkId::new);
+        let until = |longest: SignedDuration| {
+            let span = asked.seconds.map(SignedDuration::from_secs);
+            let span = span.filter(|span| *span > SignedDuration::ZERO && *span <= longest);
+            let now = self.now()?.max(EARLIEST);
+            match span.and_then(|span| now.checked_add(span).ok()) {
+                Some(until) => Ok(until),
+                None => wrong(format!("seconds: 1 to {} are needed", longest.as_secs())),
+            }
+        };
+        Ok(match (asked.order.as_str(), benchmark) {
+            ("acknowledge", benchmark) => Order::Acknowledge { benchmark, by },
+            ("unsilence", benchmark) => Order::Unsilence { benchmark, by },
+            ("silence", benchmark) => {
+                let until = until(Order::LONGEST_SILENCE)?;
+                Order::Silence {
+                    benchmark,
+                    until,
+                    by,
+                }
+            }
+            ("shelve", Some(benchmark)) => {
+                let until = until(Order::LONGEST_SHELVE)?;
+                Order::Shelve {
+                    benchmark,
+                    until,
+                    by,
+                }
+            }
+            ("shelve", None) => return wrong("benchmark: only one can be shelved".to_owned()),
+            _ => {
+                let known = "acknowledge, shelve, silence or unsilence";
+                return wrong(format!("order: {known} is needed"));
+            }
+        })
+    }
+}
+
+fn wrong<T>(what: String) -> Result<T, OrderError> {
+    Err(OrderError::Wrong(what))
+}

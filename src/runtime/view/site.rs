@@ -1,0 +1,225 @@
+//! The whole site at a moment: how each benchmark stands, what is in force, what was said last.
+
+use super::{Desk, LATEST, held, read};
+use crate::alert::Level;
+use crate::monitor::{Event, EventKind, FailureTime};
+use crate::reading::{BenchmarkId, Timestamp};
+use crate::regime::Regime;
+use crate::runtime::standing::{InForce, acknowledged, in_force, orders, silences};
+use crate::store::StoreError;
+use serde::Serialize;
+use std::collections::BTreeSet;
+
+/// Alerts, faults and orders that are listed, the newest.
+const LISTED: usize = 60;
+
+/// How one benchmark stands.
+#[derive(Debug, Clone, Serialize)]
+pub struct Standing {
+    /// Its name.
+    pub benchmark: BenchmarkId,
+    /// The level in force.
+    pub level: Level,
+    /// Since when; `None` for green.
+    pub since: Option<Timestamp>,
+    /// Whether nothing can be said of it: beside the level, never instead of it.
+    pub is_unknown: bool,
+    /// Since when not.
+    pub unknown_since: Option<Timestamp>,
+    /// When its newest reading was measured.
+    pub newest_reading: Option<Timestamp>,
+    /// How long before the moment that was.
+    pub silent_seconds: Option<i64>,
+    /// When its newest forecast was made.
+    pub forecast_at: Option<Timestamp>,
+    /// The velocity then, mm/day.
+    pub velocity_mm_per_day: Option<f64>,
+    /// The regime then.
+    pub regime: Option<Regime>,
+    /// When it was forecast to collapse.
+    pub failure_time: Option<FailureTime>,
+    /// The chance of that within the evacuation time.
+    pub chance_within_evacuation_time: Option<f64>,
+    /// The chance of that within the outlook.
+    pub chance_within_outlook: Option<f64>,
+    /// Where it stands: east, north and perhaps height, m.
+    pub position: Option<Vec<f64>>,
+}
+
+/// The site.
+#[derive(Debug, Clone, Serialize)]
+pub struct SiteView {
+    /// Its name.
+    pub site: String,
+    /// The daemon's version.
+    pub version: &'static str,
+    /// The zone that people there live in.
+    pub time_zone: String,
+    /// What time it is there.
+    pub now: Timestamp,
+    /// The moment that is shown; `None`: now.
+    pub at: Option<Timestamp>,
+    /// The first reading of all.
+    pub first: Option<Timestamp>,
+    /// The last reading of all.
+    pub last: Option<Timestamp>,
+    /// In a replay: when the slope collapsed.
+    pub collapse: Option<Timestamp>,
+    /// Whether orders are taken from here.
+    pub takes_orders: bool,
+    /// The whole site's level.
+    pub level: Level,
+    /// Since when nothing can be said of the site.
+    pub unknown_since: Option<Timestamp>,
+    /// Every benchmark.
+    pub benchmarks: Vec<Standing>,
+    /// The alerts in force, of the site as a whole too.
+    pub alerts: Vec<Event>,
+    /// Who has seen them.
+    pub acknowledged: Vec<Event>,
+    /// The orders in force by which alerts are not told.
+    pub silences: Vec<Event>,
+    /// What was said last, newest first: alerts, faults, orders.
+    pub log: Vec<Event>,
+}
+
+impl Desk {
+    /// The site as it was known at `at`, or as it is.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn site(&self, at: Option<Timestamp>) -> Result<SiteView, StoreError> {
+        let now = self.now()?;
+        let (at, moment) = (at.map(held), at.map_or(now, held));
+        let levels = in_force(&self.store, at)?;
+        let (seen, quiet) = self.orders(&levels, (at, moment))?;
+        let span = self.store.span(None)?;
+        let benchmarks = self.known()?.into_iter();
+        let benchmarks = benchmarks.map(|one| self.standing(one, &levels, (at, moment)));
+        let site_levels = levels.iter().filter(|((place, _), _)| place.is_none());
+        let called = site_levels.map(|((_, level), _)| *level);
+        let called = called.filter(|level| *level != Level::Unknown).max();
+        let benchmarks: Vec<Standing> = benchmarks.collect::<Result<_, _>>()?;
+        Ok(SiteView {
+            site: self.facts.name.clone(),
+            version: env!("CARGO_PKG_VERSION"),
+            time_zone: self.facts.time_zone.clone(),
+            now,
+            at,
+            first: span.map(|(first, _)| first),
+            last: span.map(|(_, last)| last),
+            collapse: self.facts.collapse,
+            takes_orders: self.facts.takes_orders,
+            level: called.unwrap_or(Level::Green),
+            unknown_since: levels.get(&(None, Level::Unknown)).map(|event| event.time),
+            benchmarks,
+            acknowledged: seen,
+            silences: quiet,
+            log: self.log(at)?,
+            alerts: levels.into_values().collect(),
+        })
+    }
+
+    /// Who had seen what was in force, and what was not told, at `moment`.
+    pub(super) fn orders(
+        &self,
+        levels: &InForce,
+        (at, moment): (Option<Timestamp>, Timestamp),
+    ) -> Result<(Vec<Event>, Vec<Event>), StoreError> {
+        let mut orders = orders(&self.store)?;
+        orders.retain(|order| at.is_none_or(|at| order.time <= at));
+        Ok((acknowledged(&orders, levels), silences(&orders, moment)))
+    }
+
+    /// Every benchmark that the config names or that has given a reading.
+    pub(super) fn known(&self) -> Result<BTreeSet<BenchmarkId>, StoreError> {
+        let mut known: BTreeSet<BenchmarkId> = self.store.benchmarks()?.into_keys().collect();
+        known.extend(self.facts.named.iter().cloned());
+        Ok(known)
+    }
+
+    /// How a benchmark stands at `moment`, by what was known `at` then.
+    pub(super) fn standing(
+        &self,
+        benchmark: BenchmarkId,
+        levels: &InForce,
+        (at, moment): (Option<Timestamp>, Timestamp),
+    ) -> Result<Standing, StoreError> {
+        let until = at.unwrap_or(LATEST);
+        let newest = self.store.newest_reading(benchmark.as_str(), until)?;
+        let own = levels
+            .iter()
+            .filter(|((place, _), _)| place.as_ref() == Some(&benchmark));
+        let (unknown, called): (Vec<_>, Vec<_>) =
+            own.partition(|((_, level), _)| *level == Level::Unknown);
+        let highest = called.into_iter().max_by_key(|((_, level), _)| *level);
+        let unknown_since = unknown.first().map(|(_, event)| event.time);
+        let mut standing = Standing {
+            level: highest.map_or(Level::Green, |((_, level), _)| *level),
+            since: highest.map(|(_, event)| event.time),
+            is_unknown: newest.is_none() || unknown_since.is_some(),
+            unknown_since,
+            newest_reading: newest,
+            silent_seconds: newest.map(|newest| moment.duration_since(newest).as_secs().max(0)),
+            position: self.facts.positions.get(&benchmark).cloned(),
+            forecast_at: None,
+            velocity_mm_per_day: None,
+            regime: None,
+            failure_time: None,
+            chance_within_evacuation_time: None,
+            chance_within_outlook: None,
+            benchmark,
+        };
+        let refit = self
+            .store
+            .event_at(standing.benchmark.as_str(), "refit", until)?;
+        if let Some(body) = refit {
+            standing.forecast(&read(&body)?);
+        }
+        Ok(standing)
+    }
+
+    fn log(&self, at: Option<Timestamp>) -> Result<Vec<Event>, StoreError> {
+        let mut log = Vec::new();
+        for kind in [
+            "alert",
+            "together",
+            "fault",
+            "order",
+            "correction",
+            "declared",
+        ] {
+            for body in self
+                .store
+                .newest_events(kind, at.unwrap_or(LATEST), LISTED)?
+            {
+                log.push(read::<Event>(&body)?);
+            }
+        }
+        log.sort_by_key(|event| std::cmp::Reverse(event.time));
+        log.truncate(LISTED);
+        Ok(log)
+    }
+}
+
+impl Standing {
+    fn forecast(&mut self, refit: &Event) {
+        let EventKind::Refit {
+            regime,
+            failure_time,
+            velocity_mm_per_day,
+            chance_within_evacuation_time,
+            chance_within_outlook,
+            ..
+        } = &refit.kind
+        else {
+            return;
+        };
+        self.forecast_at = Some(refit.time);
+        self.velocity_mm_per_day = *velocity_mm_per_day;
+        self.regime = Some(regime.label);
+        self.failure_time = Some(*failure_time);
+        self.chance_within_evacuation_time = Some(*chance_within_evacuation_time);
+        self.chance_within_outlook = Some(*chance_within_outlook);
+    }
+}
