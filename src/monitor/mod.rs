@@ -285,24 +285,6 @@ impl Monitor {
         events
     }
 
-    /// Which benchmarks share a failure time, after `events`: asked when a forecast or a level is new.
-    fn compare(&mut self, now: Timestamp, events: &[Event]) -> Option<Event> {
-        let has_changed = events
-            .iter()
-            .any(|event| matches!(event.kind, EventKind::Alert { .. }));
-        let is_new = |event: &Event| {
-            let track = event.benchmark.as_ref().and_then(|id| self.tracks.get(id));
-            matches!(event.kind, EventKind::Refit { .. })
-                && track.is_some_and(|track| track.level() > Level::Green)
-        };
-        if !has_changed && !events.iter().any(is_new) {
-            return None;
-        }
-        let policy = &self.settings.policy;
-        self.together
-            .update(now, policy, (&self.tracks, has_changed))
-    }
-
     fn read(
         &mut self,
         now: Timestamp,

@@ -4,6 +4,7 @@
 //! reported here calls no level and lowers none: a neighbour that is noisy, halted or silent takes nothing from the
 //! benchmark that runs away.
 
+use super::Monitor;
 use super::event::{Event, EventKind, FailureTime, SharedFailure};
 use super::kept::KeptForecast;
 use super::track::Track;
@@ -114,6 +115,26 @@ impl Together {
             benchmark: None,
             kind: EventKind::Together { groups: shared },
         })
+    }
+}
+
+impl Monitor {
+    /// Which benchmarks share a failure time, after `events`: asked when a forecast or a level is new.
+    pub(super) fn compare(&mut self, now: Timestamp, events: &[Event]) -> Option<Event> {
+        let has_changed = events
+            .iter()
+            .any(|event| matches!(event.kind, EventKind::Alert { .. }));
+        let is_new = |event: &Event| {
+            let track = event.benchmark.as_ref().and_then(|id| self.tracks.get(id));
+            matches!(event.kind, EventKind::Refit { .. })
+                && track.is_some_and(|track| track.level() > Level::Green)
+        };
+        if !has_changed && !events.iter().any(is_new) {
+            return None;
+        }
+        let policy = &self.settings.policy;
+        self.together
+            .update(now, policy, (&self.tracks, has_changed))
     }
 }
 
