@@ -116,7 +116,7 @@ export class Charts {
       height: chart.height,
       tzDate: axisDate,
       legend: { show: false },
-      padding: [6, 8, 0, 0],
+      padding: [6, 24, 0, 0],
       cursor: {
         y: false, points: { size: 7 }, drag: { x: true, y: false, setScale: false }, sync: { key: 'time' },
         bind: { dblclick: () => () => { this.show(null); return null; } },
