@@ -235,12 +235,11 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
         let day = |time: Timestamp| time.to_zoned(zone.clone()).strftime("%Y-%m-%d").to_string();
         table.row([
             text::plain(one.benchmark.as_str()),
-            match one.unknown_since {
-                Some(since) if one.since.is_some() => {
-                    format!("{}, unknown since {}", one.level, clock(since))
-                }
-                _ if one.is_unknown => "unknown".to_owned(),
-                _ => one.level.to_string(),
+            // Since when, and why, stands below the table.
+            match (one.is_unknown, one.since) {
+                (true, Some(_)) => format!("{}, unknown", one.level),
+                (true, None) => "unknown".to_owned(),
+                (false, _) => one.level.to_string(),
             },
             one.newest_reading.map_or_else(dash, clock),
             velocity.map_or_else(dash, |velocity| format!("{velocity:.3}")),

@@ -1,7 +1,7 @@
 //! Examples of every command, for its page.
 
 /// By command.
-pub(super) const ALL: [(&str, &[&str]); 28] = [
+pub(super) const ALL: [(&str, &[&str]); 29] = [
     (
         "",
         &[
@@ -103,6 +103,13 @@ pub(super) const ALL: [(&str, &[&str]); 28] = [
     (
         "plot",
         &["slipwatch plot slope.csv --benchmark P1 --kind inverse-velocity -o slope.svg"],
+    ),
+    (
+        "report",
+        &[
+            "slipwatch report slope.csv -o report",
+            "slipwatch report --config site.toml --last 7d -o report",
+        ],
     ),
     (
         "simulate",
