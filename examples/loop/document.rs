@@ -32,15 +32,16 @@ The law is the slider block of Helmstetter et al. (2004) in one regular equation
 3. Every kind of effect is tried inside the law, with every channel, as level and as rate, through exponential and gamma
    responses. The law's own parameters are refitted with it. The best one enters, and the search begins again (*after*).
 4. An effect is accepted only if the BIC falls by 10 or more, the sign is one that the ground allows, its memory is short against the
-   record, a search in vain on 399 surrogates gains as much in fewer than 1 % of cases, and a later block, held out, is foretold no
-   worse. Everything else is listed with the reason.
+   record, a search in vain on 399 surrogates gains as much in fewer than 1 % of cases, and a later block, held out, is predicted
+   no worse: extrapolated over the whole block, or, where the law's own drift rules that, reading after reading; an extrapolation that
+   grows by half is refused in any case. Everything else is listed with the reason.
 5. Effects within the margin of each other stand under *cannot be separated from*. Structure that is left is called so.
 
 What it assumes: the load acts through the ratio of shear to normal stress only (the state's direct response to normal stress is left
 out); responses are linear; covariates are measured where it matters; what is held out is the last third of the record, or half of
 what follows the last dated effect. Errors are root mean squares of least-squares fits in the unit of the readings, on the same data
-before and after; the held-out ones are extrapolations of the law over the whole block, with the covariates known, and so are mostly
-larger. An effect is what the readings are consistent with, and is not proved to cause them.
+before and after. The held-out errors are given twice: each reading of the block predicted from those before it, with the effects as
+they were learned before the block; and the law extrapolated over the whole block, with the covariates known, which is mostly larger. An effect is what the readings are consistent with, and is not proved to cause them.
 ";
 
 /// The whole document.
@@ -48,7 +49,7 @@ pub(crate) fn text(told: &[Told]) -> String {
     let mut out = METHOD.to_owned();
     out.push_str("\n## All series\n\nError before → after.\n\n");
     out.push_str(
-        "| series | readings | first effect | fit | held out | unit |\n|---|---|---|---|---|---|\n",
+        "| series | readings | first effect | fit | held out, by step | held out, extrapolated | unit |\n|---|---|---|---|---|---|---|\n",
     );
     for Told {
         subject,
@@ -97,10 +98,12 @@ fn section(out: &mut String, told: &Told) {
     let from = held_out_from.map_or("–".to_owned(), |from| from.strftime("%F").to_string());
     let _ = writeln!(
         out,
-        "- Error, {}: fit {} → {}; held out from {from} on: {} → {}.",
+        "- Error, {}: fit {} → {}; held out from {from} on: {} → {} reading by reading, {} → {} extrapolated.",
         error.unit,
         number(error.fit.before),
         number(error.fit.after),
+        number(error.held_out_step.before),
+        number(error.held_out_step.after),
         number(error.held_out.before),
         number(error.held_out.after),
     );

@@ -149,7 +149,7 @@ pub(crate) const SUBJECTS: [Subject; 13] = [
         averaging_hours: None,
         until: None,
         figures: &["readings", "contributions"],
-        comment: "The gain is negative: a falling reservoir speeds the slope up. The reservoir is drawn down once a year, so a season cannot be told from it. The held-out error of the displacement does not fall: extrapolated over two years it is ruled by the law's own drift, and the draw-down was accepted because it foretells the changes from month to month.",
+        comment: "The gain is negative: a falling reservoir speeds the slope up. The reservoir is drawn down once a year, so a season cannot be told from it. Reading by reading the held-out error falls by a third; extrapolated over two years it does not, because the law's own drift rules it there.",
     },
     Subject {
         name: "baishuihe",
@@ -197,7 +197,7 @@ pub(crate) const SUBJECTS: [Subject; 13] = [
         averaging_hours: Some(1),
         until: None,
         figures: &["readings", "undeclared-load"],
-        comment: "A failing slope that bends away from the straight line in 1/v before it fails. What is adopted makes the fit closer and the held-out error larger: it is a description of the record up to its end, and no reason to expect a pause.",
+        comment: "A failing slope that bends away from the straight line in 1/v before it fails. What is adopted makes the fit closer and the extrapolation into the last days no better: it is a description of the record up to its end, and no reason to expect a pause.",
     },
     Subject {
         name: "lanzada-temperature",
@@ -257,7 +257,7 @@ pub(crate) const SUBJECTS: [Subject; 13] = [
         averaging_hours: None,
         until: None,
         figures: &["readings", "contributions"],
-        comment: "Flat, then 231 mm in a day after 115 mm of rain, then slow sliding that stopped: no failure is known, and the model case of a false alarm. The rain is what the step is consistent with; a single storm cannot prove it, and the held-out block, which holds the storm, is foretold no better.",
+        comment: "Flat, then 231 mm in a day after 115 mm of rain, then slow sliding that stopped: no failure is known, and the model case of a false alarm. The rain is what the step is consistent with; a single storm cannot prove it, and extrapolated over the held-out block, which holds the storm, the law does no better.",
     },
     Subject {
         name: "century-31-1931",

@@ -75,9 +75,11 @@ pub(crate) fn effect(effect: &Effect) -> String {
 pub(crate) fn error_cells(explanation: &Explanation) -> String {
     let error = &explanation.error;
     format!(
-        "{} → {} | {} → {} | {}",
+        "{} → {} | {} → {} | {} → {} | {}",
         number(error.fit.before),
         number(error.fit.after),
+        number(error.held_out_step.before),
+        number(error.held_out_step.after),
         number(error.held_out.before),
         number(error.held_out.after),
         error.unit,

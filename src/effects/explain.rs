@@ -7,11 +7,12 @@ use super::explanation::{
 use super::faults::{Inspected, inspect};
 use super::fuller::Fuller;
 use super::judge::is_label;
-use super::kind::Kind;
+use super::kind::{FaultKind, Kind};
 use super::outlook::forecast_change;
 use super::partition::partition_candidate;
 use super::ready::Ready;
 use super::remarks;
+use super::search::NO_READINGS;
 use super::tell::tell;
 use super::term::Scratch;
 use super::verdict::conclude;
@@ -113,7 +114,11 @@ fn look(
         return;
     };
     progress(0.05);
-    let search = ready.search(options);
+    let is_drawn = explanation
+        .flags
+        .iter()
+        .any(|flag| flag == FaultKind::Interpolated.name());
+    let search = ready.search(options, is_drawn);
     if let Some(mut found) = search.run(ready.plain.clone(), progress) {
         let ground = (
             &ready.problem,
@@ -127,7 +132,35 @@ fn look(
             (options.bic_margin, &mut scratch),
         );
         tell(explanation, ground, (found, verdict), options, &mut scratch);
+        if is_drawn {
+            withhold(explanation);
+        }
     }
+}
+
+/// Of values that are no readings no noise is concluded, and what they would show if they were readings is a remark.
+fn withhold(explanation: &mut Explanation) {
+    if explanation.verdict.effect == Kind::CorrelatedNoise {
+        explanation.verdict = Effect::of(Kind::Unexplained);
+        explanation.explained = Explained::None;
+    }
+    explanation
+        .also
+        .retain(|also| also.effect != Kind::CorrelatedNoise);
+    let withheld = |one: &&Candidate| one.rejected_because.as_deref() == Some(NO_READINGS);
+    let best = explanation.candidates.iter().filter(withheld);
+    let best = best.max_by(|a, b| a.bic_gain.total_cmp(&b.bic_gain));
+    let Some(best) = best else { return };
+    if explanation.verdict.effect == Kind::None {
+        explanation.verdict = Effect::of(Kind::Unexplained);
+    }
+    let at = best
+        .at
+        .map_or(String::new(), |at| at.strftime(" of %Y-%m-%d").to_string());
+    explanation.remarks.push(format!(
+        "If the values were readings, {}{at} would be what explains them best; they are not, and nothing is concluded.",
+        best.effect
+    ));
 }
 
 /// Everything that is known before the search.
@@ -148,6 +181,7 @@ fn blank(series: &Series, channels: &[Channel], options: &Options) -> Explanatio
             unit: series.unit,
             fit: Change::default(),
             held_out: Change::default(),
+            held_out_step: Change::default(),
             held_out_from: None,
             caveat: None,
         },

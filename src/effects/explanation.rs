@@ -165,8 +165,10 @@ pub struct ErrorChange {
     pub unit: Unit,
     /// Over all readings.
     pub fit: Change,
-    /// Over a later block that the fit did not see.
+    /// Over a later block that the fit did not see: extrapolated over all of it.
     pub held_out: Change,
+    /// Over the same block, each reading predicted from those before it, with the effects as they were learned before it.
+    pub held_out_step: Change,
     /// The first reading of that block.
     pub held_out_from: Option<Timestamp>,
     /// Why the held-out figure means little, where it does.

@@ -48,7 +48,7 @@ pub fn error_given(
     let channels = distinct(channels, &faulty);
     let ready = Ready::of(&series, &channels, &mut Vec::new())?;
     let problem = &ready.problem;
-    let full = fitted(ready.search(options), &ready.plain, causes)?;
+    let full = fitted(ready.search(options, false), &ready.plain, causes)?;
     let mut scratch = Scratch::default();
     let after = least_squares(problem, &full, &mut scratch)?;
     let all = 0..problem.t.len();
@@ -63,6 +63,7 @@ pub fn error_given(
             after: of(&after, all.clone()),
         },
         held_out: Change::default(),
+        held_out_step: Change::default(),
         held_out_from: None,
         caveat: None,
     };

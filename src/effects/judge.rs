@@ -184,35 +184,51 @@ pub(super) fn without_block(
     refit_from(&part, &starts, &bank, scratch)
 }
 
-/// How much worse the later block is foretold, reading after reading, with the newest term as it was learned before the
-/// block than without it, in -2 ln likelihood. The law itself is fitted to all readings on both sides: its own
-/// extrapolation is not what is in question.
-pub(super) fn foretelling(
+/// The later block predicted reading after reading, each from those before it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct StepErrors {
+    /// Root mean square errors, mm or mm/day.
+    pub(super) before: f64,
+    pub(super) after: f64,
+    /// How much worse it is predicted with the terms, in -2 ln likelihood.
+    pub(super) surprise: f64,
+}
+
+/// The later block by its innovations, without and with the newest `learned` coefficients of `after` as they were learned
+/// before the block. The law itself is fitted to all readings on both sides: its own extrapolation is not what is in
+/// question. `None` where it cannot be fitted.
+pub(super) fn step_errors(
     problem: &Problem,
     (before, after): (&Fitted, &Fitted),
-    from: usize,
+    (from, learned): (usize, usize),
     scratch: &mut Scratch,
-) -> Option<f64> {
+) -> Option<StepErrors> {
     let part = problem.trained_on(from);
     let known = [Whitener::new(&part, after.noise)];
-    let learned = refit(&part, &Start::at(after), &known, scratch)?;
+    let early = refit(&part, &Start::at(after), &known, scratch)?;
     let whole = [Whitener::new(problem, after.noise)];
-    let newest = after.terms.last()?.coefficients();
     let start = Start {
         parameters: [
-            &after.parameters[..after.parameters.len() - newest],
-            &learned.parameters[learned.parameters.len() - newest..],
+            &after.parameters[..after.parameters.len() - learned],
+            &early.parameters[early.parameters.len() - learned..],
         ]
         .concat(),
-        frozen: newest,
+        frozen: learned,
         ..Start::at(after)
     };
     let frozen = refit(problem, &start, &whole, scratch)?;
-    let surprise = |fitted: &Fitted, whitener: &Whitener| {
-        whitener.surprise_from(&fitted.residual(problem), from, fitted.sigma)
-    };
     let own = Whitener::new(problem, before.noise);
-    Some(surprise(&frozen, &whole[0]) - surprise(before, &own))
+    let errors = |fitted: &Fitted, whitener: &Whitener| {
+        let residual = fitted.residual(problem);
+        let surprise = whitener.surprise_from(&residual, from, fitted.sigma);
+        (whitener.step_errors_from(&residual, from), surprise)
+    };
+    let (without, with) = (errors(before, &own), errors(&frozen, &whole[0]));
+    Some(StepErrors {
+        before: without.0,
+        after: with.0,
+        surprise: with.1 - without.1,
+    })
 }
 
 /// The plain-language name of a term: its kind, and its channel where there is one.

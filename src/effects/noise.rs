@@ -285,6 +285,14 @@ impl Whitener {
         .sum()
     }
 
+    /// Root mean square errors of the readings from `from` on, each predicted from those before it, mm or mm/day.
+    pub(super) fn step_errors_from(&self, errors: &[f64], from: usize) -> f64 {
+        let innovations = self.innovations(errors);
+        let each = innovations.iter().zip(&self.gates).skip(from);
+        let squares = each.map(|(u, gate)| (u / (gate.scale * gate.weight)).powi(2));
+        (squares.sum::<f64>() / (errors.len() - from) as f64).sqrt()
+    }
+
     /// The column whose innovations these are.
     pub(super) fn colour(&self, innovations: &[f64]) -> Vec<f64> {
         let (mut gathered, mut state) = (0.0, 0.0);

@@ -43,14 +43,15 @@ impl Ready {
         })
     }
 
-    /// The search, before anything was tried.
-    pub(super) fn search<'a>(&'a self, options: &'a Options) -> Search<'a> {
+    /// The search, before anything was tried; `is_drawn`: the values are smoother than any instrument's.
+    pub(super) fn search<'a>(&'a self, options: &'a Options, is_drawn: bool) -> Search<'a> {
         Search {
             problem: &self.problem,
             drivers: &self.drivers,
             temperatures: &self.temperatures,
             bank: &self.bank,
             options,
+            is_drawn,
             scratch: Scratch::default(),
             candidates: Vec::new(),
         }

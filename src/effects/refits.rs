@@ -82,7 +82,7 @@ impl<'a> Search<'a> {
         if others.iter().any(|one| one.gain > self.options.bic_margin) {
             all.extend(others.into_iter().map(|one| {
                 let gain = one.gain;
-                one.judged_by(&alone, gain)
+                one.judged_by(&alone, gain).judged_by_astronomy()
             }));
         } else {
             all.extend(others);

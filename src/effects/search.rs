@@ -3,7 +3,7 @@
 use super::candidates;
 use super::explain::Options;
 use super::explanation::Candidate;
-use super::judge::{foretelling, held_out, objection, title};
+use super::judge::{block, held_out, objection, step_errors, title};
 use super::kind::Kind;
 use super::noise::{Noise, Whitener};
 use super::problem::Problem;
@@ -17,12 +17,22 @@ use crate::reading::{Timestamp, after_days};
 const MOST_EFFECTS: usize = 10;
 /// A search's p-value must lie under this.
 pub(super) const SIGNIFICANT: f64 = 0.01;
-/// The held-out error, which carries the law's own extrapolation, may grow if reading after reading the later
-/// block is foretold no worse than by this, in -2 ln likelihood.
+/// The held-out error, which carries the law's own extrapolation, may grow by this factor at most, and only if the later
+/// block is predicted no worse reading after reading: neither by its likelihood, by more than this in -2 ln likelihood,
+/// nor by its errors, by more than this factor.
+const MOST_EXTRAPOLATED: f64 = 1.5;
 const WORSE: f64 = 2.0;
+const WORSE_STEPS: f64 = 1.005;
 
 /// The load steps by less than this where the velocity's own jump goes unseen, e-folds.
 const LEAST_JUMP: f64 = 0.1;
+
+/// Sets of constituents that are tried, with a margin for noise of another kind than those of the bank.
+const ASTRONOMICAL: f64 = 20.0;
+
+/// Why nothing is concluded from a drawn or interpolated curve by its shape alone.
+pub(super) const NO_READINGS: &str =
+    "the values are no readings: they are smoother than any instrument's";
 
 /// One effect that was believed.
 #[derive(Debug, Clone)]
@@ -52,6 +62,8 @@ pub(super) struct Search<'a> {
     pub(super) temperatures: &'a [bool],
     pub(super) bank: &'a [Whitener],
     pub(super) options: &'a Options,
+    /// Whether the values are no readings: smoother than any instrument's.
+    pub(super) is_drawn: bool,
     pub(super) scratch: Scratch,
     pub(super) candidates: Vec<Candidate>,
 }
@@ -90,6 +102,21 @@ impl Refitted {
     pub(super) fn judged_by(self, vain: &Vain, gain: f64) -> Self {
         Self {
             p_value: (2.0 * vain.p_value(gain)).min(1.0),
+            ..self
+        }
+    }
+}
+
+impl Refitted {
+    /// The periods of a tide are known beforehand: what a search over all kinds and times gains from nothing is no measure
+    /// of it, and the likelihood that the gain stands for is enough.
+    pub(super) fn judged_by_astronomy(self) -> Self {
+        if self.term.kind != Kind::Tide {
+            return self;
+        }
+        let by_chance = ASTRONOMICAL * (-0.5 * self.gain).exp();
+        Self {
+            p_value: self.p_value.min(by_chance),
             ..self
         }
     }
@@ -207,31 +234,43 @@ impl Search<'_> {
         if let Some(reason) = objection(self.problem, &one.fitted, self.drivers) {
             return (None, Some(reason));
         }
+        if self.is_drawn && !has_witness(one.term.kind) {
+            return (None, Some(NO_READINGS.to_owned()));
+        }
         // A jump, or the blur of a mean, says nothing of what comes.
         if matches!(one.term.kind, Kind::Offset | Kind::IntervalMean) {
             return (None, None);
         }
+        self.held_out(base, one)
+    }
+
+    /// The held-out error with `one` over that without, and why it speaks against it.
+    fn held_out(&mut self, base: &Fitted, one: &Refitted) -> (Option<f64>, Option<String>) {
         let share = self.options.held_out_share;
-        let held = held_out(
-            self.problem,
-            (&base.terms, &one.fitted),
-            share,
-            &mut self.scratch,
-        );
-        let Some(held) = held else {
+        if block(self.problem, &one.fitted.terms, share).is_none() {
             return (None, None);
+        }
+        let models = (base.terms.as_slice(), &one.fitted);
+        let Some(held) = held_out(self.problem, models, share, &mut self.scratch) else {
+            let reason = "without the later block it cannot be fitted".to_owned();
+            return (None, Some(reason));
         };
         let (before, after) = held.errors(self.problem);
         let ratio = after / before.max(1e-300);
-        let worse = foretelling(
-            self.problem,
-            (base, &one.fitted),
-            held.from,
-            &mut self.scratch,
-        );
-        let refused = ratio > 1.0 && worse.is_none_or(|worse| worse > WORSE);
-        let reason = refused.then(|| format!("the held-out error grows to {:.0} %", 100.0 * ratio));
-        (Some(ratio), reason)
+        let grows = || format!("the held-out error grows to {:.0} %", 100.0 * ratio);
+        if !ratio.is_finite() || ratio > MOST_EXTRAPOLATED {
+            return (Some(ratio).filter(|ratio| ratio.is_finite()), Some(grows()));
+        }
+        if ratio <= 1.0 {
+            return (Some(ratio), None);
+        }
+        let newest = one.fitted.terms.last().map_or(0, Term::coefficients);
+        let both = (base, &one.fitted);
+        let steps = step_errors(self.problem, both, (held.from, newest), &mut self.scratch);
+        let is_no_worse = steps.is_some_and(|steps| {
+            steps.surprise <= WORSE && steps.after <= WORSE_STEPS * steps.before
+        });
+        (Some(ratio), (!is_no_worse).then(grows))
     }
 
     fn note(&mut self, term: &Term, one: &Refitted, held: Option<f64>, reason: Option<String>) {
@@ -259,6 +298,11 @@ impl Search<'_> {
         });
         self.candidates.push(candidate);
     }
+}
+
+/// Whether a covariate or the sky bears witness to a kind, and not the shape of the curve alone.
+fn has_witness(kind: Kind) -> bool {
+    matches!(kind, Kind::Hydrological | Kind::Thermal | Kind::Tide)
 }
 
 /// When an event before reading `at` happened.

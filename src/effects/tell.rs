@@ -4,9 +4,11 @@ use super::diagnosis::{
     Judged, autocorrelation, innovations, is_clear, load_sd, runs, stoffer_toloi, undeclared_load,
 };
 use super::explain::Options;
-use super::explanation::{Change, Curves, Explained, Explanation, NoiseReport, Structure};
+use super::explanation::{
+    Change, Curves, Explained, Explanation, NoiseReport, ResidualTests, Structure,
+};
 use super::fuller::Fuller;
-use super::judge::{HeldOut, held_out, title};
+use super::judge::{HeldOut, held_out, step_errors, title};
 use super::noise::{Memory, Noise, Whitener};
 use super::problem::Problem;
 use super::refit::{Fitted, Start, plain_starts, refit_from};
@@ -15,6 +17,9 @@ use super::search::Found;
 use super::term::{Act, Scratch, Term};
 use super::verdict::{LARGEST_REST, Verdict, contribution};
 use crate::reading::after_days;
+
+/// What is left is no noise where a test gives it less than this p-value.
+const LEFT_OVER: f64 = 0.001;
 
 /// Most stretches of structure that are told.
 const MOST_STRETCHES: usize = 8;
@@ -66,6 +71,13 @@ pub(super) fn tell(
             after: Some(after / factor),
         };
         explanation.error.held_out_from = after_days(problem.epoch, problem.t[held.from]);
+        let learned: usize = full.terms.iter().map(Term::coefficients).sum();
+        let both = (&found.null, &full);
+        let steps = step_errors(problem, both, (held.from, learned), scratch);
+        explanation.error.held_out_step = Change {
+            before: steps.map(|steps| steps.before / factor),
+            after: steps.map(|steps| steps.after / factor),
+        };
     }
     // What remembers in the residual may pass for an instrument's only while it is small.
     let noise = explanation.noise.white;
@@ -75,6 +87,9 @@ pub(super) fn tell(
         explanation.explained = Explained::Partly;
     }
     residual_tests(explanation, ground, (&found.null, &full), scratch);
+    if explanation.explained == Explained::Full && is_contradicted(&explanation.residual) {
+        explanation.explained = Explained::Partly;
+    }
     curves(explanation, problem, (&found.plain, &after, held.as_ref()));
     for (index, term) in full.terms.iter().enumerate() {
         let name = unique(&explanation.curves, title(term, drivers));
@@ -91,6 +106,12 @@ pub(super) fn tell(
     let mut candidates = found.candidates;
     candidates.sort_by(|a, b| b.bic_gain.total_cmp(&a.bic_gain));
     explanation.candidates = candidates;
+}
+
+/// Whether a test of what is left says that it is no noise.
+fn is_contradicted(residual: &ResidualTests) -> bool {
+    let values = [residual.runs.after, residual.stoffer_toloi.after];
+    values.into_iter().flatten().any(|p| p < LEFT_OVER)
 }
 
 /// The law with the effects of `full`, by least squares over all readings.

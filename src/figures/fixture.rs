@@ -40,6 +40,7 @@ pub(crate) fn lake() -> Explanation {
             unit: Unit::MM,
             fit: some(7.89, 3.31),
             held_out: some(20.9, 11.3),
+            held_out_step: some(5.1, 3.4),
             held_out_from: times.get(240).copied(),
             caveat: None,
         },
@@ -234,6 +235,7 @@ pub(crate) fn bare(kind: Kind) -> Explanation {
         error: ErrorChange {
             fit: Change::default(),
             held_out: Change::default(),
+            held_out_step: Change::default(),
             held_out_from: None,
             ..full.error
         },

@@ -63,7 +63,15 @@ fn error(explanation: &Explanation) -> Table {
     let held_out = from.map_or("held out".to_owned(), |from| {
         format!("held out from {}", time(Some(from)))
     });
-    for (name, change) in [("fit".to_owned(), error.fit), (held_out, error.held_out)] {
+    let rows = [
+        ("fit".to_owned(), error.fit),
+        (held_out, error.held_out),
+        (
+            "the same, reading by reading".to_owned(),
+            error.held_out_step,
+        ),
+    ];
+    for (name, change) in rows {
         table.row([
             name,
             number(change.before),
