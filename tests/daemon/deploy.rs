@@ -22,15 +22,12 @@ fn text(name: &str) -> String {
     std::fs::read_to_string(root().join(name)).unwrap()
 }
 
-/// Runs a tool in the repository; `None`, said on stderr, where it is not installed.
-fn tool(name: &str, arguments: &[&str]) -> Option<Output> {
+/// Runs a tool in the repository.
+fn tool(name: &str, arguments: &[&str]) -> Output {
     let mut command = Command::new(name);
     command.args(arguments).current_dir(root());
     let output = command.stdin(Stdio::null()).output();
-    if output.is_err() {
-        let _ = writeln!(std::io::stderr(), "skipped: {name} is not installed");
-    }
-    output.ok()
+    output.unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
 fn said(output: &Output) -> String {
@@ -39,6 +36,10 @@ fn said(output: &Output) -> String {
 }
 
 #[test]
+#[cfg_attr(
+    not(has_systemd_analyze),
+    ignore = "systemd-analyze was not found by build.rs"
+)]
 fn the_units_are_hardened_to_a_score_of_two_or_lower() {
     for unit in [
         "deploy/slipwatch.service",
@@ -51,13 +52,16 @@ fn the_units_are_hardened_to_a_score_of_two_or_lower() {
             "--no-pager",
             unit,
         ];
-        if let Some(output) = tool("systemd-analyze", &arguments) {
-            assert!(output.status.success(), "{}", said(&output));
-        }
+        let output = tool("systemd-analyze", &arguments);
+        assert!(output.status.success(), "{}", said(&output));
     }
 }
 
 #[test]
+#[cfg_attr(
+    not(has_systemd_analyze),
+    ignore = "systemd-analyze was not found by build.rs"
+)]
 fn the_weekly_report_is_written_from_the_daemons_state_by_its_own_user() {
     let unit = text("deploy/slipwatch-report.service");
     for line in [
@@ -72,9 +76,8 @@ fn the_weekly_report_is_written_from_the_daemons_state_by_its_own_user() {
     let calendar = timer
         .lines()
         .find_map(|line| line.strip_prefix("OnCalendar="));
-    if let Some(output) = tool("systemd-analyze", &["calendar", calendar.unwrap()]) {
-        assert!(output.status.success(), "{}", said(&output));
-    }
+    let output = tool("systemd-analyze", &["calendar", calendar.unwrap()]);
+    assert!(output.status.success(), "{}", said(&output));
 }
 
 #[test]
@@ -198,11 +201,11 @@ async fn rules_and_dashboard_ask_only_for_metrics_that_there_are_and_the_dashboa
 }
 
 #[test]
+#[cfg_attr(not(has_promtool), ignore = "promtool was not found by build.rs")]
 fn the_rules_are_ones_that_prometheus_takes() {
     let arguments = ["check", "rules", "deploy/prometheus-rules.yml"];
-    if let Some(output) = tool("promtool", &arguments) {
-        assert!(output.status.success(), "{}", said(&output));
-    }
+    let output = tool("promtool", &arguments);
+    assert!(output.status.success(), "{}", said(&output));
 }
 
 #[test]
@@ -255,18 +258,19 @@ fn what_the_package_takes_is_there_and_its_config_is_the_administrators() {
 }
 
 #[test]
+#[cfg_attr(
+    not(has_cargo_deb),
+    ignore = "cargo-deb and dpkg-deb were not found by build.rs"
+)]
 fn the_built_package_holds_the_program_the_unit_the_manual_and_the_completions() {
-    if tool("cargo-deb", &["--version"]).is_none() || tool("dpkg-deb", &["--version"]).is_none() {
-        return;
-    }
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().to_str().unwrap();
     let program = env!("CARGO_BIN_EXE_slipwatch");
-    let built = tool("deploy/package.sh", &[out, program]).unwrap();
+    let built = tool("deploy/package.sh", &[out, program]);
     assert!(built.status.success(), "{}", said(&built));
     let file = std::fs::read_dir(folder.path()).unwrap().next().unwrap();
     let file = file.unwrap().path();
-    let contents = tool("dpkg-deb", &["--contents", file.to_str().unwrap()]).unwrap();
+    let contents = tool("dpkg-deb", &["--contents", file.to_str().unwrap()]);
     let contents = said(&contents);
     for wanted in [
         "-rwxr-xr-x ./usr/bin/slipwatch",
@@ -288,6 +292,6 @@ fn the_built_package_holds_the_program_the_unit_the_manual_and_the_completions()
             "{wanted} not in\n{contents}"
         );
     }
-    let conf_files = tool("dpkg-deb", &["--info", file.to_str().unwrap(), "conffiles"]).unwrap();
+    let conf_files = tool("dpkg-deb", &["--info", file.to_str().unwrap(), "conffiles"]);
     assert_eq!(said(&conf_files).lines().count(), 2);
 }

@@ -3,8 +3,7 @@
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
-    clippy::print_stdout,
-    reason = "a test fails by panicking; a skipped one must say so"
+    reason = "a test fails by panicking"
 )]
 
 use rumqttc::{AsyncClient, Event, MqttOptions, Packet, QoS};
@@ -31,12 +30,12 @@ struct Mosquitto {
 }
 
 impl Mosquitto {
-    fn start() -> Option<Self> {
-        Self::start_with(|_| Some(String::new()))
+    fn start() -> Self {
+        Self::start_with(|_| String::new())
     }
 
-    /// With more in its config, if that can be had.
-    fn start_with(more: impl Fn(&Path) -> Option<String>) -> Option<Self> {
+    /// With more in its config.
+    fn start_with(more: impl Fn(&Path) -> String) -> Self {
         let installed = [
             "/usr/sbin/mosquitto",
             "/usr/bin/mosquitto",
@@ -44,14 +43,10 @@ impl Mosquitto {
         ];
         let named = std::env::var_os("MOSQUITTO").map(PathBuf::from);
         let mut programs = named.into_iter().chain(installed.map(PathBuf::from));
-        let Some(program) = programs.find(|one| one.exists()) else {
-            println!(
-                "skipped: Mosquitto is not installed (apt-get install mosquitto), nor named by MOSQUITTO"
-            );
-            return None;
-        };
+        let program = programs.find(|one| one.exists());
+        let program = program.expect("Mosquitto, installed or named by MOSQUITTO");
         let folder = tempfile::tempdir().unwrap();
-        let more = more(folder.path())?;
+        let more = more(folder.path());
         let free = TcpListener::bind("127.0.0.1:0").unwrap();
         let port = free.local_addr().unwrap().port();
         drop(free);
@@ -63,12 +58,12 @@ impl Mosquitto {
         );
         std::fs::write(conf, text).unwrap();
         let process = spawn(&program, &folder);
-        Some(Self {
+        Self {
             program,
             folder,
             port,
             process,
-        })
+        }
     }
 
     /// Ends it as a reboot would, and starts it again.
@@ -192,10 +187,9 @@ fn values(delivery: &Delivery) -> Vec<f64> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+#[cfg_attr(not(has_mosquitto), ignore = "Mosquitto was not found by build.rs")]
 async fn what_was_acknowledged_does_not_come_again_and_what_was_not_does() {
-    let Some(broker) = Mosquitto::start() else {
-        return;
-    };
+    let broker = Mosquitto::start();
     // The session must be there before anything is written.
     let mut first = Source::start(&broker);
     tokio::time::sleep(Duration::from_millis(1500)).await;
@@ -224,10 +218,9 @@ async fn what_was_acknowledged_does_not_come_again_and_what_was_not_does() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+#[cfg_attr(not(has_mosquitto), ignore = "Mosquitto was not found by build.rs")]
 async fn a_message_that_is_too_long_is_set_aside_and_what_comes_after_it_is_taken() {
-    let Some(broker) = Mosquitto::start() else {
-        return;
-    };
+    let broker = Mosquitto::start();
     let mut source = Source::start(&broker);
     tokio::time::sleep(Duration::from_millis(1500)).await;
     let long = "x".repeat(17 << 20);
@@ -306,10 +299,9 @@ impl Drop for Daemon {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+#[cfg_attr(not(has_mosquitto), ignore = "Mosquitto was not found by build.rs")]
 async fn two_daemons_of_one_site_name_each_get_every_message() {
-    let Some(broker) = Mosquitto::start() else {
-        return;
-    };
+    let broker = Mosquitto::start();
     let daemons = [Daemon::start(&broker), Daemon::start(&broker)];
     tokio::time::sleep(Duration::from_secs(4)).await;
     broker
@@ -325,10 +317,9 @@ async fn two_daemons_of_one_site_name_each_get_every_message() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+#[cfg_attr(not(has_mosquitto), ignore = "Mosquitto was not found by build.rs")]
 async fn a_broker_that_restarts_is_found_again_and_a_bad_line_stops_nothing() {
-    let Some(mut broker) = Mosquitto::start() else {
-        return;
-    };
+    let mut broker = Mosquitto::start();
     let mut source = Source::start(&broker);
     tokio::time::sleep(Duration::from_millis(1500)).await;
     let two = format!("{}\n{{\"torn\": {}\n\n", message(1), message(2));
@@ -353,7 +344,7 @@ async fn a_broker_that_restarts_is_found_again_and_a_bad_line_stops_nothing() {
 
 /// The config of a broker that lets anybody in and refuses each subscription; it needs the plug-in that comes with
 /// Mosquitto, as a file of access rules does not refuse subscriptions.
-fn refusing(folder: &Path) -> Option<String> {
+fn refusing(folder: &Path) -> String {
     let rules = folder.join("rules.json");
     let text = r#"{"defaultACLAccess":{"publishClientSend":true,"publishClientReceive":true,"subscribe":false,
                    "unsubscribe":true},"clients":[],"groups":[],"roles":[]}"#;
@@ -368,22 +359,22 @@ fn refusing(folder: &Path) -> Option<String> {
         .split(':')
         .chain(folders)
         .map(|one| Path::new(one).join("mosquitto_dynamic_security.so"));
-    let Some(plugin) = plugins.find(|one| one.exists()) else {
-        println!("skipped: mosquitto_dynamic_security.so is not there");
-        return None;
-    };
-    Some(format!(
+    let plugin = plugins.find(|one| one.exists());
+    let plugin = plugin.expect("mosquitto_dynamic_security.so");
+    format!(
         "plugin {}\nplugin_opt_config_file {}\n",
         plugin.display(),
         rules.display()
-    ))
+    )
 }
 
 #[tokio::test(flavor = "multi_thread")]
+#[cfg_attr(
+    not(has_mosquitto_plugin),
+    ignore = "Mosquitto with its security plugin was not found by build.rs"
+)]
 async fn a_broker_that_refuses_the_subscription_is_told_and_its_benchmark_is_unknown() {
-    let Some(broker) = Mosquitto::start_with(refusing) else {
-        return;
-    };
+    let broker = Mosquitto::start_with(refusing);
     tokio::time::sleep(Duration::from_millis(500)).await;
     let daemon = Daemon::start_with(
         &broker,

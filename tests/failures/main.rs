@@ -32,8 +32,8 @@
 //!
 //! docs/failure-modes.md says the same for operators.
 //!
-//! What the machine must have for it (strace, mounts of one's own, libfaketime) a test asks for, and says where it was
-//! skipped. Not covered: a loss of power (a killed process leaves what the kernel has; whether a disk keeps what it said
+//! A test for which the machine lacks something (strace, mounts of one's own, libfaketime) is ignored, as `build.rs` finds
+//! it. Not covered: a loss of power (a killed process leaves what the kernel has; whether a disk keeps what it said
 //! was synced only pulling its plug tells), and a server whose files are gone (ESTALE is an answer that strace gives).
 
 #![allow(

@@ -34,10 +34,9 @@ fn expected(faults: &[(FaultKind, &str, &str)]) -> Vec<(FaultKind, String, Strin
 }
 
 #[test]
+#[cfg_attr(not(measured_data), ignore = "no measured data here")]
 fn salmon_falls_loggers_were_reset_on_the_three_known_days_and_each_benchmark_has_one_outlier() {
-    let Some(file) = measured("salmon_falls_2017.csv") else {
-        return;
-    };
+    let file = measured("salmon_falls_2017.csv");
     let recording = read(file);
     let resets = [
         (FaultKind::Reset, "creek_sensor_raw_m", "2017-06-06", -0.659),
@@ -59,10 +58,9 @@ fn salmon_falls_loggers_were_reset_on_the_three_known_days_and_each_benchmark_ha
 }
 
 #[test]
+#[cfg_attr(not(measured_data), ignore = "no measured data here")]
 fn corrected_salmon_falls_loggers_tell_what_their_owners_corrected_values_tell() {
-    let Some(file) = measured("salmon_falls_2017.csv") else {
-        return;
-    };
+    let file = measured("salmon_falls_2017.csv");
     let recording = read(file);
     let channels = inspect(&recording.series[0], &recording.channels).channels;
     let channel = |name: &str| channels.iter().find(|one| one.name == name).unwrap();
@@ -83,10 +81,9 @@ fn corrected_salmon_falls_loggers_tell_what_their_owners_corrected_values_tell()
 }
 
 #[test]
+#[cfg_attr(not(measured_data), ignore = "no measured data here")]
 fn raw_salmon_falls_loggers_alone_show_the_visit_that_moved_both() {
-    let Some(file) = measured("salmon_falls_2017.csv") else {
-        return;
-    };
+    let file = measured("salmon_falls_2017.csv");
     let recording = read(file);
     let is_raw =
         |channel: &&Channel| !["lake_level_m", "creek_stage_m"].contains(&channel.name.as_str());
@@ -102,10 +99,9 @@ fn raw_salmon_falls_loggers_alone_show_the_visit_that_moved_both() {
 }
 
 #[test]
+#[cfg_attr(not(measured_data), ignore = "no measured data here")]
 fn baishuihe_has_one_copied_reading_and_its_rain_and_level_are_its_own() {
-    let Some(file) = measured("baishuihe_2006.csv") else {
-        return;
-    };
+    let file = measured("baishuihe_2006.csv");
     let recording = read(file);
     let inspected = inspect(&recording.series[0], &recording.channels);
     // Stamped at midnight, UTC+08:00.
@@ -129,10 +125,9 @@ fn baishuihe_has_one_copied_reading_and_its_rain_and_level_are_its_own() {
 }
 
 #[test]
+#[cfg_attr(not(measured_data), ignore = "no measured data here")]
 fn the_columbia_speed_is_a_drawn_curve_and_is_kept_whole() {
-    let Some(file) = measured("columbia_1985_marker1.csv") else {
-        return;
-    };
+    let file = measured("columbia_1985_marker1.csv");
     let recording = read(file);
     let inspected = inspect(&recording.series[0], &recording.channels);
     assert_eq!(inspected.flags, ["interpolated"]);
@@ -141,6 +136,7 @@ fn the_columbia_speed_is_a_drawn_curve_and_is_kept_whole() {
 }
 
 #[test]
+#[cfg_attr(not(measured_data), ignore = "no measured data here")]
 fn the_other_measured_series_are_without_fault() {
     for name in [
         "bazimen_2006.csv",
@@ -155,9 +151,7 @@ fn the_other_measured_series_are_without_fault() {
         "lanzada_2025_f4.csv",
         "lanzada_2025_rock_temperature.csv",
     ] {
-        if let Some(file) = measured(name) {
-            without_fault(name, &read(file));
-        }
+        without_fault(name, &read(measured(name)));
     }
 }
 

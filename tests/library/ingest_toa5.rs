@@ -232,7 +232,8 @@ fn the_lines_of_the_header_are_all_that_a_reader_needs_to_go_on() {
 }
 
 #[test]
-fn a_recording_converted_to_toa5_and_back_is_the_same_readings() {
+#[cfg_attr(not(measured_data), ignore = "no measured data here")]
+fn a_measured_recording_converted_to_toa5_and_back_is_the_same_readings() {
     let folder = TempDir::new().unwrap();
     let options = ReadOptions::default();
     let names = [
@@ -240,7 +241,7 @@ fn a_recording_converted_to_toa5_and_back_is_the_same_readings() {
         "baishuihe_2006.csv",
         "columbia_1985_marker1.csv",
     ];
-    for file in names.into_iter().filter_map(measured) {
+    for file in names.map(measured) {
         let table = folder.path().join("table.dat");
         let back = folder.path().join("back.csv");
         convert(&file, &table, &options).unwrap();
@@ -251,6 +252,11 @@ fn a_recording_converted_to_toa5_and_back_is_the_same_readings() {
         assert_identical(&original, &there);
         assert_identical(&original, &read(&back).unwrap().0);
     }
+}
+
+#[test]
+fn a_recording_converted_to_toa5_and_back_is_the_same_readings() {
+    let folder = TempDir::new().unwrap();
     let mut expected = made_up();
     expected.provenance.clear();
     expected.series[0].averaging = None;
