@@ -1,7 +1,5 @@
 //! Solving a law again, reading it, and following it under a load allocate nothing.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use allocation_counter::measure;
 use slipwatch::model::{Accuracy, Law, Load, LoadedLaw, Sensitivities, Trajectory};
 

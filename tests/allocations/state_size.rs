@@ -1,7 +1,5 @@
 //! What a benchmark holds in memory is bounded, however many readings it has had.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use jiff::{SignedDuration, Timestamp};
 use slipwatch::monitor::{Input, Monitor, Settings};
 use slipwatch::reading::{BenchmarkId, Reading, Unit};

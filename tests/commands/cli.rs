@@ -1,7 +1,5 @@
 //! The program from outside: exit codes, what it prints, signals and pipes.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use assert_cmd::Command;
 use assert_cmd::assert::Assert;
 use nix::sys::signal::{Signal, kill};

@@ -1,7 +1,5 @@
 //! `doctor` and the sampling that `check` looks at, on real folders, files and hooks.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use assert_cmd::Command;
 use slipwatch::reading::Recording;
 use slipwatch::runtime::ingest::encode_mcap;

@@ -1,7 +1,5 @@
 //! `hook test`: a drill, with hooks that are real processes.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use assert_cmd::Command;
 use std::fs;
 use std::time::Duration;

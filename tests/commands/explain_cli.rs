@@ -1,7 +1,5 @@
 //! `explain` from outside: its flags, its keys, its exit codes, its page.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use assert_cmd::Command;
 use assert_cmd::assert::Assert;
 use serde_json::Value;

@@ -1,8 +1,6 @@
 //! The first day at a site, when something is not as it should be: what the files hardly mean, what operators do, what
 //! the machine does not allow.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use crate::office::{Office, PROGRAM, ended, plain, rows, site};
 use jiff::SignedDuration;
 use slipwatch::reading::Timestamp;

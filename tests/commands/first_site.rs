@@ -1,7 +1,5 @@
 //! The first day at a site: files as people have them, from `init` to a running watch with a tested hook.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use crate::office::{Daemon, Office, PROGRAM, ended, plain, rows, site};
 use std::fmt::Write as _;
 use std::fs;

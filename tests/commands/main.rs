@@ -1,5 +1,7 @@
 //! The program from outside, command by command.
 
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 mod cli;
 mod config;
 mod demo;

@@ -1,7 +1,5 @@
 //! `plot` from outside: what is drawn, and what a wrong call is told.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use assert_cmd::Command;
 use assert_cmd::assert::Assert;
 use std::fs;

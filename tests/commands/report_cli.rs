@@ -1,7 +1,5 @@
 //! `report` from outside: one page, complete in itself, that says what a replay and a scorecard say.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use assert_cmd::Command;
 use std::path::Path;
 

@@ -1,7 +1,5 @@
 //! `score` from the outside: what a script reads, and what a wrong call is told.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use assert_cmd::Command;
 use serde_json::Value;
 

@@ -1,7 +1,5 @@
 //! What lies in `deploy/` fits the program: the unit, the package, the rules, the dashboard.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use slipwatch::config;
 use slipwatch::reading::BenchmarkId;
 use slipwatch::runtime::serve::{Door, Limits, Server};

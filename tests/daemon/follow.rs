@@ -1,7 +1,5 @@
 //! Files that grow, shrink and are replaced while they are followed.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use jiff::SignedDuration;
 use slipwatch::config::{self, Config};
 use slipwatch::monitor::Input;

@@ -1,5 +1,7 @@
 //! The daemon, and what belongs to it: hooks, brokers, its page, the files of its deployment.
 
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 mod browser;
 mod daemon;
 mod deploy;

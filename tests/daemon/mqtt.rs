@@ -1,5 +1,4 @@
 //! Readings from a real Mosquitto: none is lost that was not acknowledged.
-#![allow(missing_docs, reason = "the claims are the names")]
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,

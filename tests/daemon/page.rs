@@ -1,5 +1,4 @@
 //! What the daemon answers to its page, asked without a browser.
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::site::{MARKUP, Site, TOKEN};
 use serde_json::{Value, json};

@@ -1,7 +1,5 @@
 //! What the state keeps over the years, and how large it becomes.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use jiff::{SignedDuration, Timestamp};
 use slipwatch::monitor::{Event, EventKind, FailureTime, Input, InverseVelocity, RegimeReport};
 use slipwatch::reading::{BenchmarkId, Reading, Unit};

@@ -1,7 +1,5 @@
 //! Hooks within walls, run for real through the program that walls itself in.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use slipwatch::alert::Level;
 use slipwatch::config::HookConfig;
 use slipwatch::monitor::{AlertState, Event, EventKind};

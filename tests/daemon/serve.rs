@@ -1,7 +1,5 @@
 //! The daemon's answers over HTTP, asked by a client on a real socket.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use assert_cmd::Command;
 use jiff::Timestamp;
 use slipwatch::alert::Level;

@@ -1,7 +1,5 @@
 //! Every archived crisis, lived through reading by reading: what was called when, against what happened.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use crate::crisis::{Crisis, days_before, policy, recording, series};
 use crate::measured::measured;
 use jiff::SignedDuration;

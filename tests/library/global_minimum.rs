@@ -1,6 +1,4 @@
 //! The inversion's best misfit is the same wherever the search begins, and at or below the published recipe's.
-#![allow(missing_docs, reason = "the claims are the names")]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::measured::measured;
 use slipwatch::fit::{ConstantLoad, Exponent, Lattice, PointReadings, Solution};

@@ -1,6 +1,4 @@
 //! Readings that make no sense end in a name: never in a panic, never in a number that nobody measured.
-#![allow(missing_docs, reason = "the claims are the names")]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use jiff::SignedDuration;
 use proptest::prelude::*;

@@ -1,6 +1,4 @@
 //! What goes into a file of readings comes out of it again, and what is wrong with it is named.
-#![allow(missing_docs, reason = "the claims are the names")]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::made_up::{assert_identical, made_up, read};
 use crate::measured::measured;

@@ -1,6 +1,4 @@
 //! An MCAP archive is read as it was written, or refused.
-#![allow(missing_docs, reason = "the claims are the names")]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::made_up::{assert_identical, made_up, read};
 use jiff::Timestamp;

@@ -1,6 +1,4 @@
 //! NDJSON: messages, rows, and what a killed writer leaves behind.
-#![allow(missing_docs, reason = "the claims are the names")]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::made_up::{assert_identical, made_up, read};
 use crate::measured::measured;

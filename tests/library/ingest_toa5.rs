@@ -1,6 +1,4 @@
 //! A Campbell logger's tables: what their headers mean, what their marks mean, and what goes wrong in them.
-#![allow(missing_docs, reason = "the claims are the names")]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::made_up::{assert_identical, made_up, read};
 use crate::measured::measured;

@@ -1,6 +1,4 @@
 //! The inversion finds the global minimum, says what it cannot know, and stops on what makes no sense.
-#![allow(missing_docs, reason = "the claims are the names")]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use jiff::SignedDuration;
 use proptest::prelude::*;

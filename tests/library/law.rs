@@ -1,7 +1,5 @@
 //! The law against 20-digit reference solutions (tests/reference, with the scripts that make them).
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use slipwatch::model::{Accuracy, Law, SteadyState, Trajectory};
 
 struct Row {

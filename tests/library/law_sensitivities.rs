@@ -1,7 +1,5 @@
 //! Derivatives of the solution, against 20-digit references and against differences of solutions.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use slipwatch::model::{Accuracy, Gradient, Law, Sensitivities, Trajectory};
 
 /// r, kappa, p, t, y, slip, then y and slip each by r, kappa and p; `None` for the slip of a failure.

@@ -1,5 +1,7 @@
 //! What the library does, within this process: laws, fits, forecasts, effects, the monitor and the readers of files.
 
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 mod calibration;
 mod crises;
 mod crisis;

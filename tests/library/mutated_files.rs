@@ -1,6 +1,5 @@
 //! Damaged files never bring a reader down, nor get a value through that is no number: the fuzz targets'
 //! own entry points, on real files with seeded damage.
-#![allow(missing_docs, reason = "the claims are the names")]
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,

@@ -1,6 +1,4 @@
 //! The recordings in the repository are whole, attributed, and what was measured.
-#![allow(missing_docs, reason = "the claims are the names")]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 #[path = "../../examples/archive_digitised.rs"]
 #[allow(dead_code, reason = "its main is not called")]

@@ -1,7 +1,5 @@
 //! Which readings are refitted, and what acts at those that are not.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use jiff::{SignedDuration, Timestamp};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;

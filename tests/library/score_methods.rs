@@ -1,6 +1,4 @@
 //! The methods that are scored know the past alone, and no record breaks them.
-#![allow(missing_docs, reason = "the claims are the names")]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use slipwatch::fit::{Observation, Observations};
 use slipwatch::forecast::{Fate, Life, Passage};

@@ -1,6 +1,4 @@
 //! What docs/seed.md says of the paper's studies holds, and is labelled where it was put in by hand.
-#![allow(missing_docs, reason = "the claims are the names")]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![allow(dead_code, reason = "the document shows more than the tests claim")]
 
 #[path = "../../examples/seed/as_drawn.rs"]

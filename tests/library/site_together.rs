@@ -1,7 +1,5 @@
 //! Which benchmarks of a site share a failure time, as the monitor reports it while they are in alarm.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use crate::crisis::{days_before, policy, recording, series};
 use slipwatch::monitor::{Event, EventKind, Input, Monitor, Settings, SharedFailure};
 use slipwatch::reading::{BenchmarkId, Reading, Series, Timestamp, Unit};

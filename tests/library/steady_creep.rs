@@ -1,7 +1,5 @@
 //! A straight line under noise, read as loggers read it, is called to no collapse.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use crate::crisis::{Crisis, policy};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;

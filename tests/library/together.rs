@@ -1,6 +1,4 @@
 //! Benchmarks of one site that fail together share one forecast; those that do not are told apart.
-#![allow(missing_docs, reason = "the claims are the names")]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::measured::measured;
 use assert_cmd::Command;

@@ -1,6 +1,5 @@
 //! The law under an undeclared load, on measured collapses, on slopes that stood, and on simulated lives.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![allow(
     clippy::print_stdout,
     reason = "what a claim rests on is shown when it fails"

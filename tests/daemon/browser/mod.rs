@@ -1,5 +1,4 @@
 //! The page in a real browser, over a real daemon. Without Chromium every test is ignored.
-#![allow(missing_docs, reason = "the claims are the names")]
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
