@@ -1,7 +1,7 @@
 //! Any bytes through the readers of files: as a whole file, and as the daemon takes a growing one.
 //!
 //! Both must come to an end, and a value that they let through must be a number. The fuzz targets and
-//! `tests/mutated_files.rs` share this file.
+//! `tests/library/mutated_files.rs` share this file.
 
 use slipwatch::reading::Recording;
 use slipwatch::runtime::ingest::{

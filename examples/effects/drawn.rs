@@ -6,14 +6,14 @@
 //! an rms of `SHOWS` times the noise (log-uniform, for the weakest effect), and draws in which this noise is no
 //! noise of an instrument are dropped. Effects of the reading have their sizes in multiples of the noise.
 
-use crate::chance::{log_uniform, so, uniform};
-use crate::family::{Family, Range, Recipe};
-use crate::instrument::Instrument;
-use crate::read::{self, Slope};
-use crate::scene::{Place, Planned, Scene};
-use crate::slope::{Ground, Path, path};
-use crate::truth::{TrueLaw, TrueNoise, Truth};
-use crate::{ground, instrument};
+use super::chance::{log_uniform, so, uniform};
+use super::family::{Family, Range, Recipe};
+use super::instrument::Instrument;
+use super::read::{self, Slope};
+use super::scene::{Place, Planned, Scene};
+use super::slope::{Ground, Path, path};
+use super::truth::{TrueLaw, TrueNoise, Truth};
+use super::{ground, instrument};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use slipwatch::effects::Kind;
@@ -244,7 +244,7 @@ fn size(rng: &mut Pcg64, scene: &Scene, whole: &Path, noise: f64) -> Option<f64>
 }
 
 fn channels(scene: &Scene) -> Option<Vec<Channel>> {
-    let channel = |weather: &crate::weather::Weather| {
+    let channel = |weather: &super::weather::Weather| {
         let samples = weather.recorded().map(|(day, value)| {
             let time = scene.time(day)?;
             Some(Sample { time, value })

@@ -1,6 +1,6 @@
 //! Series as files: a CSV in the format that `slipwatch` reads, and beside it what is known of it.
 
-use crate::drawn::Drawn;
+use super::drawn::Drawn;
 use anyhow::{Context, Result};
 use slipwatch::reading::Recording;
 use slipwatch::runtime::ingest::write_csv;

@@ -1,8 +1,8 @@
 //! The families of series: one for each kind of effect, and those with none, two, or one outside the table.
 
-use crate::chance::{one_of, so};
-use crate::laws::{self, Character};
-use crate::schedule::Need;
+use super::chance::{one_of, so};
+use super::laws::{self, Character};
+use super::schedule::Need;
 use rand_pcg::Pcg64;
 use slipwatch::effects::Kind;
 

@@ -1,12 +1,12 @@
 //! Effects inside the law, drawn for a scene: loads, jumps of the state, changes of the friction, loads that
 //! follow the motion, and loads that no label fits.
 
-use crate::chance::{log_uniform, normal, one_of, sign, so, uniform};
-use crate::laws;
-use crate::scene::{Place, Planned, Scene};
-use crate::slope::{Ground, path};
-use crate::truth::TrueEffect;
-use crate::weather::{Covariate, Response, Weather, YEAR, moments};
+use super::chance::{log_uniform, normal, one_of, sign, so, uniform};
+use super::laws;
+use super::scene::{Place, Planned, Scene};
+use super::slope::{Ground, path};
+use super::truth::TrueEffect;
+use super::weather::{Covariate, Response, Weather, YEAR, moments};
 use rand_pcg::Pcg64;
 use slipwatch::effects::{Form, Kind};
 use slipwatch::model::Load;

@@ -1,9 +1,9 @@
 //! Effects of the reading: offsets, temperature, means over an interval, noise that remembers.
 
-use crate::chance::{count, log_uniform, normal, sign, so, uniform};
-use crate::scene::{Planned, Scene};
-use crate::truth::TrueEffect;
-use crate::weather::{Covariate, Response, moments};
+use super::chance::{count, log_uniform, normal, sign, so, uniform};
+use super::scene::{Planned, Scene};
+use super::truth::TrueEffect;
+use super::weather::{Covariate, Response, moments};
 use rand_pcg::Pcg64;
 use slipwatch::effects::Kind;
 use slipwatch::model::Load;

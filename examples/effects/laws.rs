@@ -1,6 +1,6 @@
 //! Laws as slopes follow them: creeping, accelerating, saturating, slowing down, settling.
 
-use crate::chance::{log_uniform, one_of, uniform};
+use super::chance::{log_uniform, one_of, uniform};
 use rand_pcg::Pcg64;
 use slipwatch::model::Law;
 

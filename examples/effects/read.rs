@@ -1,9 +1,9 @@
 //! The reading of a slope: its benchmark and the benchmarks beside it, with noise and instruments' effects.
 
-use crate::chance::{count, log_uniform, normal, one_of, so};
-use crate::instrument::Instrument;
-use crate::scene::Scene;
-use crate::slope::{Ground, Path, path};
+use super::chance::{count, log_uniform, normal, one_of, so};
+use super::instrument::Instrument;
+use super::scene::Scene;
+use super::slope::{Ground, Path, path};
 use rand_pcg::Pcg64;
 use slipwatch::reading::{BenchmarkId, Quantity, Reading, Series, Unit};
 

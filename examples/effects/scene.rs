@@ -1,13 +1,13 @@
 //! One slope before it is read: its law, the times, the weather, and the effects planned for it.
 
-use crate::chance::{count, log_uniform, one_of, so, uniform};
-use crate::family::Recipe;
-use crate::instrument::Instrument;
-use crate::laws;
-use crate::schedule::Schedule;
-use crate::slope::Ground;
-use crate::truth::TrueEffect;
-use crate::weather::{Covariate, Weather};
+use super::chance::{count, log_uniform, one_of, so, uniform};
+use super::family::Recipe;
+use super::instrument::Instrument;
+use super::laws;
+use super::schedule::Schedule;
+use super::slope::Ground;
+use super::truth::TrueEffect;
+use super::weather::{Covariate, Weather};
 use rand_pcg::Pcg64;
 use slipwatch::effects::Kind;
 use slipwatch::model::Law;

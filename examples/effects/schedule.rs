@@ -1,6 +1,6 @@
 //! When a slope is read: hourly to monthly, even or not, with gaps.
 
-use crate::chance::{count, log_uniform, one_of, so, uniform};
+use super::chance::{count, log_uniform, one_of, so, uniform};
 use rand_pcg::Pcg64;
 use slipwatch::reading::SECONDS_PER_DAY;
 

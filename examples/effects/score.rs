@@ -1,8 +1,8 @@
 //! One explanation beside the truth: what was named rightly, and by how much its figures are off.
 
-use crate::drawn::Drawn;
-use crate::family::Family;
-use crate::truth::{TrueEffect, Truth};
+use super::drawn::Drawn;
+use super::family::Family;
+use super::truth::{TrueEffect, Truth};
 use slipwatch::effects::{Cause, Effect, Explained, Explanation, Kind, Options, error_given};
 use slipwatch::reading::{Timestamp, days_since};
 use std::collections::BTreeSet;

@@ -1,7 +1,7 @@
 //! docs/effects-table.md: how the families went.
 
-use crate::family::{Family, Range};
-use crate::score::{Grade, Outcome};
+use super::family::{Family, Range};
+use super::score::{Grade, Outcome};
 use slipwatch::effects::Kind;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

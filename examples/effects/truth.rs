@@ -1,6 +1,6 @@
 //! What is known of a drawn series: the effects in it, the law, the noise, the prediction without noise.
 
-use crate::read::Groups;
+use super::read::Groups;
 use serde::Serialize;
 use slipwatch::effects::{Form, Kind};
 use slipwatch::model::Law;

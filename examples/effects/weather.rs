@@ -2,7 +2,7 @@
 //!
 //! Each has a weather of its own, so that none is related to another but by the season.
 
-use crate::chance::{log_uniform, normal, one_of, sign, so, uniform};
+use super::chance::{log_uniform, normal, one_of, sign, so, uniform};
 use rand_pcg::Pcg64;
 use std::f64::consts::TAU;
 

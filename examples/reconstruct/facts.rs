@@ -2,7 +2,7 @@
 //!
 //! The ranges are wider than the paper's figures by the noise that the reconstruction adds.
 
-use crate::la_clapiere::Motion;
+use super::la_clapiere::Motion;
 use anyhow::{Context, Result, ensure};
 use jiff::Timestamp;
 use slipwatch::reading::{Recording, days_since};

@@ -2,11 +2,11 @@
 //!
 //! "Paper" is Helmstetter et al. (2004); everything else is invented within what it leaves open.
 
-use crate::interpolation::between;
-use crate::loaded_law::Block;
-use crate::noise::{ColouredNoise, rounded};
-use crate::provenance::Provenance;
-use crate::tinee;
+use super::interpolation::between;
+use super::loaded_law::Block;
+use super::noise::{ColouredNoise, rounded};
+use super::provenance::Provenance;
+use super::tinee;
 use anyhow::{Context, Result};
 use jiff::civil::{Date, date};
 use jiff::tz::TimeZone;

@@ -2,10 +2,10 @@
 //!
 //! "Paper" is Helmstetter et al. (2004); everything else is invented within what it leaves open.
 
-use crate::interpolation::between;
-use crate::noise::{ColouredNoise, rounded};
-use crate::projection::{combined, without};
-use crate::provenance::Provenance;
+use super::interpolation::between;
+use super::noise::{ColouredNoise, rounded};
+use super::projection::{combined, without};
+use super::provenance::Provenance;
 use anyhow::{Context, Result};
 use slipwatch::model::{Accuracy, Law, Trajectory};
 use slipwatch::reading::{

@@ -1,8 +1,8 @@
 //! How small noise must be for the best m to be the law's, where nothing is taken from the noise.
 
-use crate::claims::SAME_M;
-use crate::recorded::vaiont_day;
-use crate::vaiont::Benchmark;
+use super::claims::SAME_M;
+use super::recorded::vaiont_day;
+use super::vaiont::Benchmark;
 use anyhow::{Context, Result};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};

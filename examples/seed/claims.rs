@@ -1,10 +1,10 @@
 //! What the paper says, what the same study gives here, and whether the two agree.
 
-use crate::claims_vaiont::of_vaiont;
-use crate::document::{Studies, m_text, number, years};
-use crate::la_clapiere::{self, Fit, IMPOSED_M, PAPER_M, PAPER_X_I};
-use crate::synthetic::{M, Study};
-use crate::valley::AS_GOOD;
+use super::claims_vaiont::of_vaiont;
+use super::document::{Studies, m_text, number, years};
+use super::la_clapiere::{self, Fit, IMPOSED_M, PAPER_M, PAPER_X_I};
+use super::synthetic::{M, Study};
+use super::valley::AS_GOOD;
 use anyhow::{Context, Result};
 use slipwatch::inversion::{SweepReport, SweepRow};
 use slipwatch::reading::Quantity;

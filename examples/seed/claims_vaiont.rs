@@ -1,10 +1,10 @@
 //! What the paper says of Vaiont, what the same study gives here, and whether the two agree.
 
-use crate::claims::{Claim, Readings, SAME_M};
-use crate::document::{list, m_text, number};
-use crate::given_up::last_gain;
-use crate::recorded::{displacements, vaiont_day};
-use crate::vaiont::{Benchmark, PAPER_LINE_DAY, Side, best_on};
+use super::claims::{Claim, Readings, SAME_M};
+use super::document::{list, m_text, number};
+use super::given_up::last_gain;
+use super::recorded::{displacements, vaiont_day};
+use super::vaiont::{Benchmark, PAPER_LINE_DAY, Side, best_on};
 use anyhow::Result;
 
 /// Days between the zeros of two straight lines that are one.

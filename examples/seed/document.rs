@@ -1,15 +1,15 @@
 //! The document: every study's table, and the paper's statements beside ours.
 
-use crate::as_drawn::{self, AsDrawn};
-use crate::claims::{Claim, Readings, claims};
-use crate::document_vaiont::vaiont_section;
-use crate::given_up::{self, Trial};
-use crate::la_clapiere::{self, Fit};
-use crate::recorded::{Archive, Kind, decimal_year, vaiont_day, velocities};
-use crate::river::{self, River};
-use crate::synthetic::{self, Study};
-use crate::vaiont::{self, Benchmark};
-use crate::valley::{self, AS_GOOD, NEARLY, Valley};
+use super::as_drawn::{self, AsDrawn};
+use super::claims::{Claim, Readings, claims};
+use super::document_vaiont::vaiont_section;
+use super::given_up::{self, Trial};
+use super::la_clapiere::{self, Fit};
+use super::recorded::{Archive, Kind, decimal_year, vaiont_day, velocities};
+use super::river::{self, River};
+use super::synthetic::{self, Study};
+use super::vaiont::{self, Benchmark};
+use super::valley::{self, AS_GOOD, NEARLY, Valley};
 use anyhow::{Context, Result};
 use slipwatch::fit::{Exponent, P_PRIOR};
 use slipwatch::inversion::{Estimate, FitReport, SweepReport};
@@ -168,7 +168,7 @@ const INTRODUCTION: &str = "\
 # The paper's studies, repeated
 
 Written by `cargo run --release --example seed`, which measures every number and draws every figure below; a second run
-writes the same bytes. `tests/seed.rs` holds what is claimed.
+writes the same bytes. `tests/library/seed.rs` holds what is claimed.
 
 The paper: A. Helmstetter, D. Sornette, J.-R. Grasso, J. V. Andersen, S. Gluzman, V. Pisarenko, \"Slider-block friction model
 for landslides: application to Vaiont and La Clapière landslides\", J. Geophys. Res., 2004.

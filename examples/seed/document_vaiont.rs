@@ -1,11 +1,11 @@
 //! The section of the document on Vaiont.
 
-use crate::as_drawn::{self, AsDrawn};
-use crate::claims::SAME_M;
-use crate::document::{Studies, day, interval, m_text, number, share, table};
-use crate::given_up::{self, FROM_DAY};
-use crate::simplex;
-use crate::vaiont::{Benchmark, COLLAPSE_DAY, Side, best_on};
+use super::as_drawn::{self, AsDrawn};
+use super::claims::SAME_M;
+use super::document::{Studies, day, interval, m_text, number, share, table};
+use super::given_up::{self, FROM_DAY};
+use super::simplex;
+use super::vaiont::{Benchmark, COLLAPSE_DAY, Side, best_on};
 use anyhow::Result;
 
 const VAIONT_MADE: &str = "\

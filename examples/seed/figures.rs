@@ -1,11 +1,11 @@
 //! The figures of the document, each a file's text.
 
-use crate::document::{Studies, m_text};
-use crate::la_clapiere::Fit;
-use crate::recorded::{decimal_year, vaiont_day, velocities};
-use crate::regimes::{Column, Instant};
-use crate::synthetic::{self, Study};
-use crate::vaiont::Benchmark;
+use super::document::{Studies, m_text};
+use super::la_clapiere::Fit;
+use super::recorded::{decimal_year, vaiont_day, velocities};
+use super::regimes::{Column, Instant};
+use super::synthetic::{self, Study};
+use super::vaiont::Benchmark;
 use anyhow::{Context, Result};
 use slipwatch::fit::{ConstantLoad, Exponent};
 use slipwatch::inversion::{SweepReport, SweepRow};
@@ -47,7 +47,7 @@ pub(crate) fn all(studies: &Studies) -> Result<[(&'static str, Figure); 5]> {
     let of_vaiont = studies.vaiont_kind.name();
     let of_la_clapiere = studies.la_clapiere_kind.name();
     Ok([
-        ("regimes", regimes(&crate::regimes::columns()?)),
+        ("regimes", regimes(&super::regimes::columns()?)),
         ("vaiont", vaiont(&studies.vaiont, of_vaiont)?),
         (
             "la-clapiere",

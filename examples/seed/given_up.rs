@@ -1,7 +1,7 @@
 //! The one statement on Vaiont that cannot be had together with the others, and the numbers tried.
 
-use crate::recorded::vaiont_day;
-use crate::vaiont::PAPER_LINE_DAY;
+use super::recorded::vaiont_day;
+use super::vaiont::PAPER_LINE_DAY;
 use anyhow::Result;
 use slipwatch::inversion::{Inversion, Options};
 use slipwatch::reading::{BenchmarkId, Recording, Series};

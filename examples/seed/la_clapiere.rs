@@ -1,6 +1,6 @@
 //! La Clapière: the fit of 1982.9 to 1987.9, m free and imposed, and t_max growing from two to five years.
 
-use crate::recorded::{report, velocities};
+use super::recorded::{report, velocities};
 use anyhow::{Context, Result};
 use slipwatch::fit::{ConstantLoad, Exponent};
 use slipwatch::inversion::{FitReport, Inversion, Options, SweepOptions, SweepReport, sweep};

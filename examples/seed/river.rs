@@ -1,6 +1,6 @@
 //! La Clapière: what the Tinée explains of the velocity before 1986 and after, and what became of the peak.
 
-use crate::recorded::{decimal_year, velocities};
+use super::recorded::{decimal_year, velocities};
 use anyhow::{Context, Result};
 use slipwatch::fit::ConstantLoad;
 use slipwatch::model::{Accuracy, Trajectory};

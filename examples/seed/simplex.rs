@@ -3,7 +3,7 @@
 //!
 //! The paper does not state where its simplexes began, nor when they ended; that is chosen here.
 
-use crate::recorded::vaiont_day;
+use super::recorded::vaiont_day;
 use anyhow::Result;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};

@@ -3,7 +3,7 @@
 //! Paper: m, x_i, five years, and 1.5 m/yr at the start. Chosen here: monthly readings with an error of
 //! 10 mm, a scatter of each month's slip, and when the velocity inflects, before the end or after it.
 
-use crate::recorded::velocities;
+use super::recorded::velocities;
 use anyhow::{Context, Result};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};

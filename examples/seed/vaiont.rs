@@ -1,7 +1,7 @@
 //! Vaiont: m, the regime and the time of failure of the four benchmarks, and the exponent alpha.
 
-use crate::recorded::{displacements, report};
-use crate::simplex::{self, Found};
+use super::recorded::{displacements, report};
+use super::simplex::{self, Found};
 use anyhow::Result;
 use slipwatch::fit::{ConstantLoad, Exponent};
 use slipwatch::inversion::{Alternative, FitReport, Inversion, Options};

@@ -114,10 +114,8 @@ fn what_cannot_be_read_stops_no_other_source() {
 
 /// 12. The kernel refuses every watch, as when the user has none left.
 #[test]
+#[cfg_attr(not(has_strace), ignore = "strace was not found by build.rs")]
 fn without_any_watch_files_are_looked_at_in_turn() {
-    if !crate::site::has_strace() {
-        return;
-    }
     let site = Site::new("");
     site.append("incoming/5.csv", &format!("{HEADER}{}", rows(1..4)));
     let program = site.start_traced("inotify_add_watch", "error=ENOSPC");

@@ -1,6 +1,6 @@
 //! The daemon is killed, again and again, while its files grow.
 
-use crate::site::{Program, Site, eventually, has_strace};
+use crate::site::{Program, Site, eventually};
 use jiff::{SignedDuration, Timestamp};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -214,10 +214,8 @@ fn a_daemon_killed_at_random_moments_loses_nothing_and_takes_nothing_twice() {
 
 /// 15.
 #[test]
+#[cfg_attr(not(has_strace), ignore = "strace was not found by build.rs")]
 fn a_daemon_killed_as_it_calls_the_system_loses_nothing() {
-    if !has_strace() {
-        return;
-    }
     let site = Site::new(POLICY);
     let calls = [
         "write,pwrite64,lseek",

@@ -234,35 +234,23 @@ impl Drop for Program {
     }
 }
 
-/// Whether `strace` is there and may trace.
-pub(crate) fn has_strace() -> bool {
-    has(&["strace", "-o", "/dev/null", "true"])
-}
-
-/// Has `strace` change what the system answers to `program` from now on, until it is stopped. `None` where it may not,
-/// which it says.
-pub(crate) fn tamper(site: &Site, program: &Program, words: &[&str]) -> Option<Program> {
+/// Has `strace` change what the system answers to `program` from now on, until it is stopped.
+pub(crate) fn tamper(site: &Site, program: &Program, words: &[&str]) -> Program {
     let said = site.path("strace");
     let id = program.0.id().to_string();
-    let child = Command::new("strace")
+    let tracer = Command::new("strace")
         .args(["-f", "-o", "/dev/null", "-p", &id])
         .args(words)
         .current_dir(site.0.path())
         .stderr(File::create(&said).unwrap())
         .spawn();
-    let mut tracer = child.ok().map(Program);
-    let mut is_attached = false;
+    let mut tracer = Program(tracer.unwrap());
+    let is_attached = || fs::read_to_string(&said).unwrap().contains("attached");
     eventually("strace's answer", || {
-        is_attached = fs::read_to_string(&said).unwrap().contains("attached");
-        is_attached
-            || tracer
-                .as_mut()
-                .is_none_or(|tracer| tracer.ended().is_some())
+        is_attached() || tracer.ended().is_some()
     });
-    if !is_attached {
-        let _ = writeln!(std::io::stderr(), "skipped: strace may not attach here");
-    }
-    tracer.filter(|_| is_attached)
+    assert!(is_attached(), "{}", fs::read_to_string(&said).unwrap());
+    tracer
 }
 
 /// Whether this is a run that has mounts of its own. Where it is not, makes such a run of `test`.
@@ -273,12 +261,9 @@ pub(crate) fn has_own_mounts(test: &str) -> bool {
     }
     let (root, user): (&[&str], &[&str]) = (&["unshare", "-m"], &["unshare", "-Urm"]);
     let mount = ["mount", "-t", "tmpfs", "tmpfs", "/mnt"];
-    let Some(how) = [root, user]
-        .into_iter()
-        .find(|how| has(&[*how, &mount[..]].concat()))
-    else {
-        return false;
-    };
+    let mut ways = [root, user].into_iter();
+    let how = ways.find(|how| has(&[*how, &mount[..]].concat()));
+    let how = how.expect("mounts of its own");
     let run = Command::new(how[0])
         .args(&how[1..])
         .arg(std::env::current_exe().unwrap())
@@ -296,16 +281,12 @@ pub(crate) fn command(words: &[&str]) {
     assert!(has(words), "{words:?}");
 }
 
-/// Whether a command goes well; says so where not.
-pub(crate) fn has(words: &[&str]) -> bool {
+/// Whether a command goes well.
+fn has(words: &[&str]) -> bool {
     let status = Command::new(words[0])
         .args(&words[1..])
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .status();
-    let is_there = status.is_ok_and(|status| status.success());
-    if !is_there {
-        let _ = writeln!(std::io::stderr(), "skipped: {words:?} does not work here");
-    }
-    is_there
+    status.is_ok_and(|status| status.success())
 }

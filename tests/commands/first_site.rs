@@ -1,0 +1,520 @@
+//! The first day at a site: files as people have them, from `init` to a running watch with a tested hook.
+
+use crate::office::{Daemon, Office, PROGRAM, ended, plain, rows, site};
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+/// Semicolons, decimal commas, date and time in two columns, and a remark now and then.
+fn of_the_office(count: i64) -> String {
+    let body = rows(count, |time, value| {
+        let remark = if time.hour() == 3 {
+            "Akku getauscht"
+        } else {
+            ""
+        };
+        let (day, hour) = (time.strftime("%d.%m.%Y"), time.strftime("%H:%M"));
+        let value = format!("{value:.2}").replace('.', ",");
+        format!("{day};{hour};{value};0,2;{remark}\n")
+    });
+    format!("Datum;Zeit;Prisma 1;Regen_mm;Bemerkung\n{body}")
+}
+
+const INIT: [&str; 6] = [
+    "init",
+    "slope.csv",
+    "--time-zone",
+    "Europe/Rome",
+    "--column",
+    "Prisma 1=P1:displacement:mm",
+];
+
+#[test]
+fn one_command_leads_from_a_file_of_the_office_to_a_watch_that_reads_it() {
+    let office = Office::with(&[("slope.csv", &of_the_office(100))]);
+    let said = office.done(&INIT);
+    for part in [
+        "wrote site.toml",
+        "ok: ",
+        "benchmark P1, mm",
+        "covariate, mm",
+        "not used: text",
+        "100 readings of displacement, every 1h",
+        "first 2017-05-31T22:00:00Z (2017-06-01 00:00 CEST)  0 mm",
+        "last  2017-06-05T01:00:00Z (2017-06-05 03:00 CEST)  49.5 mm",
+        "slipwatch run site.toml",
+    ] {
+        assert!(said.contains(part), "no {part:?} in {said}");
+    }
+    let config = fs::read_to_string(office.path("site.toml")).unwrap();
+    for line in [
+        "path = \"slope.csv\"",
+        "decimal = \"comma\"",
+        "time_column = [\"Datum\", \"Zeit\"]",
+    ] {
+        assert!(config.contains(line), "no {line:?} in {config}");
+    }
+    let daemon = office.run(&["run", "site.toml"]);
+    let status = office.status_until("2017-06-05 03:00 CEST");
+    assert!(!status.contains("NO DAEMON RUNS"), "{status}");
+    let table = status
+        .lines()
+        .skip_while(|line| !line.starts_with("benchmark "));
+    let table: Vec<&str> = table.take_while(|line| !line.is_empty()).collect();
+    assert!(table.len() >= 3, "{status}");
+    for line in table {
+        assert!(line.chars().count() <= 80, "{line}");
+    }
+    let status = office.done(&["status", "--sources", "--config", "site.toml"]);
+    assert!(
+        status.contains("covariate Regen_mm (slope): 100 values"),
+        "{status}"
+    );
+    drop(daemon);
+    let status = office.done(&["status", "--config", "site.toml"]);
+    assert!(status.starts_with("NO DAEMON RUNS"), "{status}");
+    assert!(status.contains("P1"), "{status}");
+}
+
+#[test]
+fn init_writes_nothing_where_a_file_leaves_something_open_and_names_the_flag() {
+    let ambiguous = rows(50, |time, value| {
+        format!(
+            "{}/06/2017 {:02}:00,{value}\n",
+            1 + time.day() % 9,
+            time.hour()
+        )
+    });
+    let ambiguous = format!("time,P1_displacement_mm\n{ambiguous}");
+    let local = plain(5).replace("+02:00", "");
+    let thousands =
+        "time;P1_displacement_mm\n2017-06-01T00:00:00Z;1,234\n2017-06-01T01:00:00Z;1,250\n";
+    let two = "measured,received,P1_displacement_mm\n2017-06-01 00:00,2017-06-01 00:10,1\n";
+    let cases: [(&str, &[&str], &[&str]); 6] = [
+        (
+            &ambiguous,
+            &["--time-zone", "UTC"],
+            &["%d/%m/%Y %H:%M", "%m/%d/%Y %H:%M"],
+        ),
+        (&local, &[], &["--time-zone"]),
+        (thousands, &[], &["--decimal comma"]),
+        (
+            two,
+            &["--time-zone", "UTC"],
+            &["--time-column", "measured, received"],
+        ),
+        ("when,x\nyesterday,1\n", &[], &["--time-column"]),
+        (
+            "time,lower,upper\n2017-06-01T00:00:00Z,1,2\n",
+            &[],
+            &["--column \"lower=P1:displacement:mm\"", "lower, upper"],
+        ),
+    ];
+    for (text, flags, wanted) in cases {
+        let office = Office::with(&[("slope.csv", text)]);
+        let args = [&["init", "slope.csv"], flags].concat();
+        let said = office.refused(2, &args);
+        for part in wanted {
+            assert!(said.contains(part), "no {part:?} in {said}");
+        }
+        assert!(!office.path("site.toml").exists(), "{text}");
+    }
+}
+
+#[test]
+fn a_day_above_twelve_decides_which_number_is_the_month() {
+    let american = rows(24 * 20, |time, value| {
+        format!("{},{value}\n", time.strftime("%m/%d/%Y %I:%M %p"))
+    });
+    let office = Office::with(&[("slope.csv", &format!("when,P1_displacement_mm\n{american}"))]);
+    let said = office.done(&["init", "slope.csv", "--time-zone", "America/Denver"]);
+    assert!(said.contains("last  2017-06-21T05:00:00Z"), "{said}");
+    let config = fs::read_to_string(office.path("site.toml")).unwrap();
+    assert!(
+        config.contains("time_format = \"%m/%d/%Y %I:%M %p\""),
+        "{config}"
+    );
+}
+
+#[test]
+fn init_writes_over_no_config_unasked() {
+    let office = Office::with(&[("slope.csv", &plain(5)), ("site.toml", "mine")]);
+    let said = office.refused(2, &["init", "slope.csv"]);
+    assert!(
+        said.contains("site.toml") && said.contains("--force"),
+        "{said}"
+    );
+    assert_eq!(
+        fs::read_to_string(office.path("site.toml")).unwrap(),
+        "mine"
+    );
+    office.done(&["init", "slope.csv", "--force"]);
+}
+
+#[test]
+#[expect(
+    clippy::too_many_lines,
+    reason = "a table of ways to write the same readings"
+)]
+fn the_same_readings_come_out_however_the_table_is_written() {
+    let zone = jiff::tz::TimeZone::get("Europe/Rome").unwrap();
+    let unix =
+        |time: jiff::civil::DateTime| time.to_zoned(zone.clone()).unwrap().timestamp().as_second();
+    let days = |time: jiff::civil::DateTime| {
+        42887.0 + f64::from(time.day() - 1) + f64::from(time.hour()) / 24.0
+    };
+    let table = |header: &str, row: &dyn Fn(jiff::civil::DateTime, f64) -> String| {
+        format!("{header}\n{}", rows(40, row)).into_bytes()
+    };
+    let european = of_the_office(40);
+    let latin1: Vec<u8> = european
+        .replace("Akku getauscht", "Akku überprüft")
+        .chars()
+        .map(|letter| u8::try_from(u32::from(letter)).unwrap())
+        .collect();
+    let utf16 = std::iter::once(0xfeff).chain(european.encode_utf16());
+    let utf16: Vec<u8> = utf16.flat_map(u16::to_le_bytes).collect();
+    let rome = ["--time-zone", "Europe/Rome"];
+    let office: Vec<&str> = [
+        &rome[..],
+        &[
+            "--decimal",
+            "comma",
+            "--time-column",
+            "Datum",
+            "--time-column",
+            "Zeit",
+        ],
+        &[
+            "--time-format",
+            "%d.%m.%Y %H:%M",
+            "--column",
+            "Prisma 1=P1:displacement:mm",
+        ],
+    ]
+    .concat();
+    let tabs = plain(40).replace(',', "\t").into_bytes();
+    let excel = table("time;P1_displacement_mm", &|time, value| {
+        format!("{};{value}\n", days(time))
+    });
+    let seconds = table("stamp,P1_displacement_mm", &|time, value| {
+        format!("{},{value}\n", unix(time))
+    });
+    let brackets = table("time,P1_displacement [mm]", &|time, value| {
+        format!("{time}+02:00,{value}\n")
+    });
+    let excel_flags = [&rome[..], &["--time-format", "excel"]].concat();
+    let cases: [(Vec<u8>, &[&str]); 8] = [
+        (plain(40).into_bytes(), &[]),
+        (european.into_bytes(), &office),
+        (latin1, &office),
+        (utf16, &office),
+        (tabs, &[]),
+        (excel, &excel_flags),
+        (
+            seconds,
+            &["--time-column", "stamp", "--time-format", "unix"],
+        ),
+        (brackets, &[]),
+    ];
+    let mut before: Option<String> = None;
+    for (number, (bytes, flags)) in cases.iter().enumerate() {
+        let office = Office::with(&[]);
+        fs::write(office.path("slope.csv"), bytes).unwrap();
+        let args = [
+            &["fit", "slope.csv", "--format", "json", "--benchmark", "P1"],
+            *flags,
+        ]
+        .concat();
+        let fit: serde_json::Value = serde_json::from_str(&office.done(&args)).unwrap();
+        let read = format!(
+            "{} {} {} {}",
+            fit["readings"], fit["first"], fit["last"], fit["rms"]
+        );
+        assert_eq!(before.get_or_insert(read.clone()), &read, "case {number}");
+    }
+}
+
+#[test]
+fn an_encoding_and_a_column_of_text_are_said_and_no_row_is_lost_by_them() {
+    let text = plain(5).replace("P1_displacement_mm", "P1_displacement_mm,remark");
+    let lines = text.lines().map(|line| {
+        let end = if line.contains("remark") {
+            ""
+        } else {
+            ",Böschung"
+        };
+        [line, end, "\n"].concat()
+    });
+    let text = lines.collect::<Vec<String>>().concat();
+    let latin1: Vec<u8> = text
+        .chars()
+        .map(|letter| u8::try_from(u32::from(letter)).unwrap())
+        .collect();
+    let office = Office::with(&[]);
+    fs::write(office.path("slope.csv"), latin1).unwrap();
+    fs::write(office.path("site.toml"), site("slope.csv", "")).unwrap();
+    let said = office.done(&["check", "site.toml"]);
+    for part in [
+        "5 readings",
+        "Latin-1",
+        "column \"remark\": found \"Böschung\", which is no number",
+        "not used: text",
+    ] {
+        assert!(said.contains(part), "no {part:?} in {said}");
+    }
+    assert!(!said.contains("refused"), "{said}");
+}
+
+#[test]
+fn check_exits_1_where_a_benchmark_is_fed_by_nothing_and_says_what_the_files_have() {
+    let typing_error = "[[benchmark]]\nid = \"P2\"\n";
+    let cases = [
+        (
+            plain(5),
+            site("slope.csv", typing_error),
+            "they have P1, which no [[benchmark]] names",
+        ),
+        (
+            plain(5),
+            site("slopes.csv", typing_error),
+            "there is no file",
+        ),
+        (
+            plain(5).replace("P1_displacement_mm", "P1_displacement_mm/d"),
+            site("slope.csv", ""),
+            "nothing is watched",
+        ),
+    ];
+    for (text, config, wanted) in cases {
+        let office = Office::with(&[("slope.csv", &text), ("site.toml", &config)]);
+        let said = office.refused(1, &["check", "site.toml"]);
+        assert!(said.contains(wanted), "no {wanted:?} in {said}");
+        office.done(&["check", "--config-only", "site.toml"]);
+    }
+}
+
+#[test]
+fn check_shows_the_rows_that_are_refused_each_kind_once() {
+    let mut text = plain(30);
+    for line in 0..20_000 {
+        let _ = writeln!(text, "2017-06-05T00:00:00Z,bad{line}");
+    }
+    text.push_str("not a time,1\n2017-06-05T00:00:00Z,1,2\n2017-06-05T01:00:00Z,1");
+    let office = Office::with(&[
+        ("slope.csv", &text),
+        ("site.toml", &site("./slope.csv", "")),
+    ]);
+    let said = office.done(&["check", "site.toml"]);
+    for part in [
+        "20000 rows, the first: ./slope.csv, line 32, column \"P1_displacement_mm\": found \"bad0\"",
+        "1 row, the first: ./slope.csv, line 20032, column \"time\"",
+        "found 3 fields",
+        "its last line has no line break",
+        "30 readings",
+    ] {
+        assert!(said.contains(part), "no {part:?} in {said}");
+    }
+    assert!(said.lines().count() < 30, "{said}");
+    let (_, json, _) = office.say(&["check", "site.toml", "--format", "json"]);
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(json["preview"]["benchmarks"][0]["id"], "P1", "{json}");
+    assert_eq!(
+        json["preview"]["sources"][0]["refused"][0]["rows"], 20_000,
+        "{json}"
+    );
+}
+
+#[test]
+fn what_hardly_means_what_was_intended_is_said_as_a_suspicion_with_its_evidence() {
+    let table = |row: &dyn Fn(jiff::civil::DateTime, f64) -> String| {
+        format!("time,P1_displacement_mm\n{}", rows(60, row))
+    };
+    let marked = plain(60).replace("+02:00,10\n", "+02:00,-999\n");
+    let wobble = |value: f64| value * 0.01 + (value * 7.0).sin();
+    let fallen = table(&|time, value| {
+        let after = if value > 20.0 { -400.0 } else { 0.0 };
+        format!("{time}+02:00,{:.3}\n", wobble(value) + after)
+    });
+    let metres = table(&|time, value| format!("{time}+02:00,{:.3}\n", 12.345 + value / 1000.0));
+    let ahead = plain(60).replace("2017-", "2417-");
+    let cases = [
+        (marked, "-999 stands 1 times, first at 2017-06-01T18:00:00Z"),
+        (fallen, "it fell by 401.824 mm, 195 times the usual scatter"),
+        (metres, "unit = \"m\""),
+        (ahead, "ahead of this machine's clock: is the time_zone"),
+    ];
+    for (text, wanted) in cases {
+        let office = Office::with(&[("slope.csv", &text), ("site.toml", &site("slope.csv", ""))]);
+        let (_, out, err) = office.say(&["check", "site.toml"]);
+        let line = out.lines().find(|line| line.contains("suspicion: "));
+        assert!(
+            line.is_some_and(|line| line.contains(wanted)),
+            "no {wanted:?} in {out}"
+        );
+        assert!(err.contains(wanted), "{err}");
+    }
+    let office = Office::with(&[
+        ("slope.csv", &plain(60)),
+        ("site.toml", &site("slope.csv", "")),
+    ]);
+    assert!(
+        !office.done(&["check", "site.toml"]).contains("suspicion"),
+        "a plain record"
+    );
+}
+
+#[test]
+fn a_relative_path_stands_once_in_an_error() {
+    let office = Office::with(&[]);
+    fs::create_dir_all(office.path("x/in")).unwrap();
+    fs::write(
+        office.path("x/in/slope.csv"),
+        "time,P1_displacement_mm\nnoon,1\n",
+    )
+    .unwrap();
+    let said = office.refused(65, &["fit", "x/in/slope.csv"]);
+    assert!(said.starts_with("x/in/slope.csv, line 2"), "{said}");
+}
+
+#[test]
+fn a_workbook_is_refused_with_the_way_out() {
+    let office = Office::with(&[("slope.xlsx", "PK")]);
+    let mut said = vec![office.refused(65, &["init", "slope.xlsx"])];
+    said.push(office.refused(65, &["fit", "slope.xlsx"]));
+    fs::write(office.path("site.toml"), site("slope.xlsx", "")).unwrap();
+    said.push(office.refused(78, &["check", "site.toml"]));
+    for said in said {
+        assert!(said.contains("CSV UTF-8"), "{said}");
+    }
+}
+
+#[test]
+fn what_cannot_be_meant_is_refused_with_what_can() {
+    let office = Office::with(&[
+        ("slope.csv", &plain(40)),
+        ("site.toml", &site("slope.csv", "")),
+    ]);
+    let said = office.refused(2, &["events", "--config", "site.toml", "--kind", "nosuch"]);
+    assert!(
+        said.contains("regime-flip") && said.contains("alert"),
+        "{said}"
+    );
+    let said = office.refused(2, &["replay", "slope.csv", "--until", "1985-08-07"]);
+    assert!(said.contains("1985-08-07T17:00:00Z"), "{said}");
+}
+
+#[test]
+fn a_replay_of_a_state_keeps_to_the_benchmark_and_an_acknowledgement_is_shown() {
+    let both = plain(60).replace("P1_", "P2_");
+    let office = Office::with(&[("a.csv", &plain(60)), ("b.csv", &both)]);
+    fs::write(office.path("site.toml"), site("*.csv", "")).unwrap();
+    let daemon = office.run(&["run", "site.toml"]);
+    office.status_until("in force:");
+    office.done(&["alerts", "ack", "--by", "Ada", "--config", "site.toml"]);
+    office.status_until("by Ada");
+    drop(daemon);
+    let listed = office.done(&["alerts", "list", "--config", "site.toml"]);
+    assert!(listed.contains("acknowledge by Ada"), "{listed}");
+    let events = office.done(&[
+        "replay",
+        "--state",
+        "state",
+        "--benchmark",
+        "P1",
+        "--format",
+        "json",
+    ]);
+    assert!(events.contains("\"P1\""), "{events}");
+    assert!(!events.contains("\"benchmark\":\"P2\""), "{events}");
+    let said = office.refused(65, &["replay", "--state", "state", "--benchmark", "P9"]);
+    assert!(said.contains("P9") && said.contains("P1"), "{said}");
+}
+
+/// The commands of a page: its indented lines.
+fn commands(page: &str) -> Vec<String> {
+    let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(page)).unwrap();
+    let lines = text.lines().filter_map(|line| line.strip_prefix("    "));
+    lines.map(str::to_owned).collect()
+}
+
+#[test]
+fn every_command_of_the_page_on_the_first_site_does_what_it_says() {
+    let office = Office::with(&[("slope.csv", &of_the_office(200))]);
+    let programs = Path::new(PROGRAM).parent().unwrap().to_str().unwrap();
+    let path = format!("{programs}:{}", std::env::var("PATH").unwrap());
+    let shell = |line: &str| {
+        let mut command = Command::new("sh");
+        command.args(["-c", line]).current_dir(office.folder.path());
+        command.env("PATH", &path);
+        command
+    };
+    let mut daemon = None;
+    let commands = commands("docs/first-site.md");
+    assert!(commands.len() >= 10, "{commands:?}");
+    for line in &commands {
+        if line.starts_with("slipwatch run ") {
+            let mut command = shell(&format!("exec {line}"));
+            command.stdout(Stdio::null()).stderr(Stdio::null());
+            daemon = Some(Daemon(command.spawn().unwrap()));
+            office.status_until("P1");
+            continue;
+        }
+        let (exit, out, err) = ended(&shell(line).output().unwrap());
+        // A machine may be doubtful; that is no fault of the command.
+        let is_doctor = line.starts_with("slipwatch doctor ");
+        assert!(
+            exit == 0 || is_doctor && exit == 1,
+            "{line}: {exit} {out}{err}"
+        );
+        if line == "cat hook.txt" {
+            assert!(out.starts_with("Test: "), "{out}");
+        }
+    }
+    assert!(daemon.is_some(), "{commands:?}");
+}
+
+#[test]
+fn the_readme_shows_no_other_commands_for_a_slope_of_ones_own_than_those_that_are_run() {
+    let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).unwrap();
+    let (_, rest) = text.split_once("## A slope of your own").unwrap();
+    let (part, _) = rest.split_once("\n## ").unwrap();
+    let shown: Vec<&str> = part
+        .lines()
+        .filter_map(|line| line.strip_prefix("    "))
+        .collect();
+    assert_eq!(shown.len(), 5, "{shown:?}");
+    let run = commands("docs/first-site.md");
+    for line in shown {
+        assert!(run.iter().any(|one| one == line), "{line} is in no test");
+    }
+}
+
+#[test]
+fn doctor_tries_the_files_and_the_broker_and_knows_a_hook_from_windows() {
+    let more = "[[source]]\nid = \"rain\"\nkind = \"csv\"\npath = \"rain/*.csv\"\n\
+                [[source]]\nid = \"radio\"\nkind = \"mqtt\"\nurl = \"mqtt://127.0.0.1:1\"\ntopic = \"a\"\n\
+                [[hook]]\nrun = [\"./notify.sh\"]\n";
+    let office = Office::with(&[
+        ("slope.csv", &plain(5)),
+        ("site.toml", &site("slope.csv", more)),
+        ("notify.sh", "#!/bin/sh\r\necho\r\n"),
+    ]);
+    let script = office.path("notify.sh");
+    fs::set_permissions(&script, std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
+    let (exit, out, err) = office.say(&["doctor", "site.toml"]);
+    assert_eq!(exit, 1, "{out}{err}");
+    for (verdict, part) in [
+        ("good", "\"logger\": files that can be read: 1"),
+        ("doubtful", "there is no folder"),
+        ("wrong", "cannot be reached"),
+        ("wrong", "end as on Windows"),
+    ] {
+        let line = out.lines().find(|line| line.contains(part));
+        assert!(
+            line.is_some_and(|line| line.starts_with(verdict)),
+            "{part}: {out}"
+        );
+    }
+}

@@ -1,0 +1,450 @@
+//! The daemon and its core, with real folders, files and hooks.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test fails by panicking"
+)]
+
+use jiff::{SignedDuration, Timestamp};
+use slipwatch::alert::Level;
+use slipwatch::config::{self, Config};
+use slipwatch::monitor::{AlertState, Event, EventKind, Input};
+use slipwatch::reading::{BenchmarkId, Reading, Unit};
+use slipwatch::runtime::deliver::{Dispatcher, Retry};
+use slipwatch::runtime::delivered::Delivered;
+use slipwatch::runtime::hook::Status;
+use slipwatch::runtime::run::{Progress, RunError, run};
+use slipwatch::runtime::shutdown::{self, Shutdown};
+use slipwatch::runtime::site::{Counts, Sinks, Site};
+use slipwatch::runtime::tail::Arrival;
+use slipwatch::store::{Fate, Store, StoreError};
+use std::fs::{self, OpenOptions};
+use std::io::Write;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+use tempfile::TempDir;
+use tokio::sync::watch;
+use tokio::task::JoinHandle;
+
+mod crisis;
+
+const LIMIT: Duration = Duration::from_secs(60);
+const MULTI: &str = "time,5_displacement_mm,6_displacement_mm\n";
+
+/// A site whose hook writes down what it is told.
+fn site_folder() -> (TempDir, Config) {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("incoming")).unwrap();
+    let script = "echo $SLIPWATCH_KEY $SLIPWATCH_STATUS >> told\ncat >> stdin\n";
+    fs::write(folder.path().join("hook.sh"), script).unwrap();
+    let text = "[site]\nname = \"Toc\"\nstate_dir = \"state\"\n\
+                [[source]]\nid = \"logger\"\nkind = \"csv\"\npath = \"incoming/*.csv\"\n\
+                [alert]\nevacuation_time = \"12h\"\n\
+                [[hook]]\nrun = [\"/bin/sh\", \"hook.sh\"]\nlevels = [\"orange\", \"red\"]\n";
+    let file = folder.path().join("site.toml");
+    fs::write(&file, text).unwrap();
+    let config = config::load(&file).unwrap();
+    (folder, config)
+}
+
+fn lines(folder: &TempDir, name: &str) -> Vec<String> {
+    let text = fs::read_to_string(folder.path().join(name)).unwrap_or_default();
+    text.lines().map(str::to_owned).collect()
+}
+
+fn alert(time: Timestamp, level: Level, state: AlertState) -> Event {
+    Event {
+        time,
+        benchmark: Some(BenchmarkId::new("5")),
+        kind: EventKind::Alert {
+            level,
+            state,
+            key: format!("5/{level}/{}", time.as_second()),
+            rule: "chance".to_owned(),
+            text: "text".to_owned(),
+        },
+    }
+}
+
+fn reading(time: Timestamp, value: f64) -> Arrival {
+    Arrival {
+        time,
+        input: Input::Reading {
+            benchmark: BenchmarkId::new("5"),
+            unit: Unit::MM,
+            averaging: None,
+            reading: Reading {
+                time,
+                value,
+                sigma: None,
+            },
+        },
+    }
+}
+
+fn site(config: &Config) -> Site {
+    let store = Arc::new(Store::open(&config.site.state_dir).unwrap());
+    let delivered = Delivered::of(Arc::clone(&store));
+    let dispatcher = Dispatcher::start(&config.hooks, &Retry::default(), delivered);
+    let sinks = Sinks {
+        store: Some(store),
+        alerts: Some(dispatcher),
+        status: Status::Actual,
+    };
+    Site::resume(
+        &config.site.name,
+        config.settings.clone(),
+        sinks,
+        &mut || {},
+    )
+    .unwrap()
+}
+
+/// The events in the site's state.
+fn events(folder: &TempDir) -> Vec<Event> {
+    let Ok(store) = Store::look(&folder.path().join("state")) else {
+        return Vec::new();
+    };
+    let (mut events, mut after) = (Vec::new(), 0);
+    loop {
+        let some = store.events(after, None, None).unwrap();
+        let Some((last, _)) = some.last() else {
+            return events;
+        };
+        after = *last;
+        let each = some
+            .iter()
+            .map(|(_, body)| serde_json::from_str::<Event>(body).unwrap());
+        events.extend(each);
+    }
+}
+
+fn noon() -> Timestamp {
+    "2017-06-06T12:00:00Z".parse().unwrap()
+}
+
+fn hours(count: i64) -> SignedDuration {
+    SignedDuration::from_hours(count)
+}
+
+async fn close(site: Site, wall: Timestamp) {
+    assert_eq!(site.close(wall, LIMIT).await.unwrap(), Some(0));
+}
+
+#[tokio::test]
+async fn an_alert_is_told_and_after_a_restart_not_again() {
+    let (folder, config) = site_folder();
+    for _start in 0..2 {
+        let mut site = site(&config);
+        site.handle(&alert(noon(), Level::Red, AlertState::Firing));
+        site.commit(noon()).unwrap();
+        close(site, noon()).await;
+    }
+    let key = format!("5/red/{}", noon().as_second());
+    assert_eq!(lines(&folder, "told"), [format!("{key} Actual")]);
+    let store = Store::look(&config.site.state_dir).unwrap();
+    let taken = store.is_noted((&key, "red", "firing"), None, Some(Fate::Delivered));
+    assert!(taken.unwrap());
+}
+
+#[tokio::test]
+async fn attempts_are_counted_over_restarts() {
+    let (folder, config) = site_folder();
+    let script = "echo $SLIPWATCH_ATTEMPT >> told\nexit 1\n";
+    fs::write(folder.path().join("hook.sh"), script).unwrap();
+    for start in 0..3 {
+        let mut site = site(&config);
+        if start == 0 {
+            site.handle(&alert(noon(), Level::Red, AlertState::Firing));
+        }
+        site.commit(noon()).unwrap();
+        assert_eq!(site.close(noon(), LIMIT).await.unwrap(), Some(1));
+    }
+    let told = lines(&folder, "told");
+    assert!(told.len() >= 3, "{told:?}");
+    let counted = (1..).map(|attempt: u32| attempt.to_string());
+    assert!(
+        told.iter().cloned().eq(counted.take(told.len())),
+        "{told:?}"
+    );
+}
+
+#[tokio::test]
+async fn what_was_given_up_is_made_to_wait_again_and_told_at_the_next_start() {
+    let (folder, config) = site_folder();
+    let (key, told) = (format!("5/red/{}", noon().as_second()), "told");
+    let mut first = site(&config);
+    first.handle(&alert(noon(), Level::Red, AlertState::Firing));
+    first.commit(noon()).unwrap();
+    close(first, noon()).await;
+    let database = rusqlite::Connection::open(config.site.state_dir.join("slipwatch.db")).unwrap();
+    database
+        .execute("UPDATE outbox SET status = 'dead'", [])
+        .unwrap();
+    drop(database);
+    close(site(&config), noon()).await;
+    assert_eq!(lines(&folder, told).len(), 1, "it had been given up");
+    let store = Store::look(&config.site.state_dir).unwrap();
+    assert_eq!(store.redeliver().unwrap(), 1);
+    drop(store);
+    close(site(&config), noon()).await;
+    let line = format!("{key} Actual");
+    assert_eq!(lines(&folder, told), [line.clone(), line]);
+}
+
+#[tokio::test]
+async fn what_is_long_past_fires_no_hook() {
+    let (folder, config) = site_folder();
+    let mut site = site(&config);
+    // Twice the evacuation time is a day.
+    let wall = noon() + hours(24);
+    site.handle(&alert(noon() - hours(1), Level::Red, AlertState::Firing));
+    site.handle(&alert(noon(), Level::Orange, AlertState::Firing));
+    site.commit(wall).unwrap();
+    assert_eq!(site.counts().long_past, 1);
+    site.caught_up(wall).unwrap();
+    close(site, wall).await;
+    let told = lines(&folder, "told");
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(told[0].starts_with("5/orange/"));
+}
+
+#[tokio::test]
+async fn an_old_alert_still_in_force_is_told_when_its_readings_are_recent() {
+    let (folder, config) = site_folder();
+    let wall = noon() + hours(24 * 30);
+    let mut site = site(&config);
+    site.handle(&alert(noon() - hours(2), Level::Orange, AlertState::Firing));
+    site.handle(&alert(
+        noon() - hours(1),
+        Level::Orange,
+        AlertState::Resolved,
+    ));
+    site.handle(&alert(noon(), Level::Red, AlertState::Firing));
+    site.commit(wall).unwrap();
+    site.take(&reading(wall - hours(1), 5.0), wall).unwrap();
+    site.caught_up(wall).unwrap();
+    close(site, wall).await;
+    let told = lines(&folder, "told");
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(told[0].starts_with("5/red/"));
+}
+
+#[tokio::test]
+async fn the_end_of_what_was_told_is_told_however_late_it_comes_and_after_a_restart_too() {
+    let (folder, config) = site_folder();
+    let mut first = site(&config);
+    first.handle(&alert(noon(), Level::Orange, AlertState::Firing));
+    first.commit(noon()).unwrap();
+    close(first, noon()).await;
+    let wall = noon() + hours(24 * 30);
+    let mut second = site(&config);
+    // Long past, and so not told; the orange that it supersedes was.
+    second.handle(&alert(noon() + hours(1), Level::Red, AlertState::Firing));
+    let end = noon() + hours(2);
+    second.handle(&alert(end, Level::Red, AlertState::Resolved));
+    // Of these nobody has heard.
+    second.handle(&alert(noon() + hours(3), Level::Red, AlertState::Firing));
+    second.handle(&alert(noon() + hours(4), Level::Red, AlertState::Resolved));
+    second.commit(wall).unwrap();
+    close(second, wall).await;
+    let expected = [
+        format!("5/orange/{} Actual", noon().as_second()),
+        format!("5/red/{} Actual", end.as_second()),
+    ];
+    assert_eq!(lines(&folder, "told"), expected);
+}
+
+#[tokio::test]
+async fn an_old_alert_in_force_is_told_in_whatever_batch_it_comes_and_once() {
+    let (folder, config) = site_folder();
+    let wall = noon() + hours(24 * 3);
+    let mut site = site(&config);
+    site.take(&reading(noon() - hours(2), 4.0), wall).unwrap();
+    site.caught_up(wall).unwrap();
+    // The backlog: silence at its end does not make the red past.
+    site.handle(&alert(noon() - hours(1), Level::Orange, AlertState::Firing));
+    site.handle(&alert(noon(), Level::Red, AlertState::Firing));
+    site.commit(wall).unwrap();
+    assert_eq!(site.counts().long_past, 2);
+    for _batch in 0..3 {
+        site.caught_up(wall).unwrap();
+    }
+    assert_eq!(site.counts().long_past, 1, "the orange, superseded");
+    close(site, wall).await;
+    let told = lines(&folder, "told");
+    assert_eq!(told, [format!("5/red/{} Actual", noon().as_second())]);
+}
+
+#[tokio::test]
+async fn an_alert_of_a_benchmark_that_nobody_watches_any_more_fires_no_hook() {
+    let (folder, config) = site_folder();
+    let mut site = site(&config);
+    let wall = noon() + hours(24 * 30 + 1);
+    site.take(&reading(noon(), 4.0), wall).unwrap();
+    site.handle(&alert(noon(), Level::Red, AlertState::Firing));
+    site.commit(wall).unwrap();
+    site.caught_up(wall).unwrap();
+    close(site, wall).await;
+    assert_eq!(lines(&folder, "told"), [""; 0]);
+}
+
+#[tokio::test]
+async fn a_value_counts_once_a_correction_counts_and_the_future_never() {
+    let (_folder, config) = site_folder();
+    let mut site = site(&config);
+    let wall = noon() + hours(1);
+    for value in [1.0, 1.0, 1.5, 1.5] {
+        site.take(&reading(noon(), value), wall).unwrap();
+    }
+    site.take(&reading(wall + hours(2), 9.0), wall).unwrap();
+    // Until the past has been read it may be the clock that is behind.
+    assert_eq!((site.held(), site.counts().from_the_future), (1, 0));
+    site.caught_up(wall).unwrap();
+    assert_eq!(site.held(), 0);
+    let expected = Counts {
+        taken: 2,
+        repeated: 2,
+        from_the_future: 1,
+        without_clock: 0,
+        long_past: 0,
+    };
+    assert_eq!(site.counts(), expected);
+    close(site, wall).await;
+}
+
+fn write_rows(file: &Path, rows: std::ops::Range<i64>) {
+    let mut file = OpenOptions::new()
+        .create(true)
+        .append(true)
+        .open(file)
+        .unwrap();
+    if file.metadata().unwrap().len() == 0 {
+        file.write_all(MULTI.as_bytes()).unwrap();
+    }
+    for row in rows {
+        let time = noon() + hours(row);
+        writeln!(file, "{time},{row},{row}.5").unwrap();
+    }
+}
+
+/// A daemon at work.
+struct Daemon {
+    trigger: shutdown::Trigger,
+    progress: watch::Receiver<Progress>,
+    task: JoinHandle<Result<Counts, RunError>>,
+}
+
+impl Daemon {
+    fn start(config: &Config) -> Self {
+        let (trigger, shutdown) = shutdown::pair();
+        let (sender, progress) = watch::channel(Progress::default());
+        let config = config.clone();
+        let task = tokio::spawn(async move { run(&config, shutdown, &sender).await });
+        Self {
+            trigger,
+            progress,
+            task,
+        }
+    }
+
+    async fn until(&mut self, what: &str, claim: impl Fn(&Progress) -> bool) {
+        let waited = tokio::time::timeout(LIMIT, self.progress.wait_for(claim)).await;
+        assert!(matches!(waited, Ok(Ok(_))), "never: {what}");
+    }
+
+    async fn stop(self) -> Counts {
+        self.trigger.pull();
+        let ended = tokio::time::timeout(LIMIT, self.task).await;
+        ended.expect("no end").unwrap().unwrap()
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn the_daemon_takes_the_past_and_what_is_added_and_ends_when_asked() {
+    let (folder, config) = site_folder();
+    let file = folder.path().join("incoming/logger.csv");
+    write_rows(&file, 0..300);
+    let mut daemon = Daemon::start(&config);
+    daemon
+        .until("the past", |progress| progress.is_caught_up)
+        .await;
+    write_rows(&file, 300..310);
+    let all = |progress: &Progress| progress.counts.taken >= 2 * 310;
+    daemon.until("what was added", all).await;
+    assert_eq!(daemon.stop().await.taken, 2 * 310);
+    // A restart rebuilds the past from the same file.
+    let mut daemon = Daemon::start(&config);
+    daemon
+        .until("the past", |progress| progress.is_caught_up)
+        .await;
+    let counts = daemon.stop().await;
+    assert_eq!((counts.taken, counts.repeated), (2 * 310, 0));
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_file_that_is_replaced_by_a_longer_copy_adds_only_what_is_new() {
+    let (folder, config) = site_folder();
+    let file = folder.path().join("incoming/logger.csv");
+    write_rows(&file, 0..10);
+    let mut daemon = Daemon::start(&config);
+    daemon
+        .until("the past", |progress| progress.is_caught_up)
+        .await;
+    let copy = folder.path().join("copy");
+    write_rows(&copy, 0..15);
+    fs::rename(copy, file).unwrap();
+    let all = |progress: &Progress| progress.counts.taken >= 2 * 15;
+    daemon.until("the copy", all).await;
+    let counts = daemon.stop().await;
+    assert_eq!((counts.taken, counts.repeated), (2 * 15, 2 * 10));
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_source_folder_that_appears_later_is_followed() {
+    let (folder, config) = site_folder();
+    fs::remove_dir(folder.path().join("incoming")).unwrap();
+    let mut daemon = Daemon::start(&config);
+    daemon
+        .until("nothing", |progress| progress.is_caught_up)
+        .await;
+    fs::create_dir(folder.path().join("incoming")).unwrap();
+    write_rows(&folder.path().join("incoming/logger.csv"), 0..5);
+    let all = |progress: &Progress| progress.counts.taken >= 2 * 5;
+    daemon.until("the new folder's file", all).await;
+    daemon.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_second_daemon_on_the_same_state_folder_is_refused() {
+    let (_folder, config) = site_folder();
+    let mut first = Daemon::start(&config);
+    first
+        .until("its start", |progress| progress.is_caught_up)
+        .await;
+    let second = Daemon::start(&config).task.await.unwrap();
+    let Err(RunError::State { source, .. }) = second else {
+        panic!("{second:?}");
+    };
+    assert!(matches!(source, StoreError::InUse { .. }), "{source:?}");
+    first.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_state_folder_that_cannot_be_made_is_said_so() {
+    let (folder, config) = site_folder();
+    fs::write(folder.path().join("state"), "a file").unwrap();
+    let error = Daemon::start(&config).task.await.unwrap().unwrap_err();
+    assert!(error.to_string().contains("state folder"), "{error}");
+}
+
+#[tokio::test]
+async fn sigterm_asks_for_the_stop() {
+    let mut shutdown = Shutdown::on_signals().unwrap();
+    assert!(!shutdown.is_requested());
+    nix::sys::signal::raise(nix::sys::signal::Signal::SIGTERM).unwrap();
+    let asked = tokio::time::timeout(LIMIT, shutdown.requested()).await;
+    assert!(asked.is_ok());
+}

@@ -1,0 +1,16 @@
+//! The daemon, and what belongs to it: hooks, brokers, its page, the files of its deployment.
+
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod browser;
+mod daemon;
+mod deploy;
+mod follow;
+mod hooks;
+mod mqtt;
+mod page;
+mod retention;
+mod sandbox;
+mod serve;
+mod service;
+mod site;

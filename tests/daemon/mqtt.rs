@@ -1,0 +1,406 @@
+//! Readings from a real Mosquitto: none is lost that was not acknowledged.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test fails by panicking"
+)]
+
+use rumqttc::{AsyncClient, Event, MqttOptions, Packet, QoS};
+use slipwatch::config::{self, Config};
+use slipwatch::monitor::Input;
+use slipwatch::runtime::mqtt::{Delivery, follow};
+use slipwatch::runtime::shutdown::{self, Trigger};
+use std::net::TcpListener;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+use tempfile::TempDir;
+use tokio::sync::mpsc::{self, Receiver};
+use tokio::task::JoinHandle;
+
+const LIMIT: Duration = Duration::from_secs(30);
+
+/// A broker of our own, on a port of its own.
+struct Mosquitto {
+    program: PathBuf,
+    folder: TempDir,
+    port: u16,
+    process: Child,
+}
+
+impl Mosquitto {
+    fn start() -> Self {
+        Self::start_with(|_| String::new())
+    }
+
+    /// With more in its config.
+    fn start_with(more: impl Fn(&Path) -> String) -> Self {
+        let installed = [
+            "/usr/sbin/mosquitto",
+            "/usr/bin/mosquitto",
+            "/usr/local/sbin/mosquitto",
+        ];
+        let named = std::env::var_os("MOSQUITTO").map(PathBuf::from);
+        let mut programs = named.into_iter().chain(installed.map(PathBuf::from));
+        let program = programs.find(|one| one.exists());
+        let program = program.expect("Mosquitto, installed or named by MOSQUITTO");
+        let folder = tempfile::tempdir().unwrap();
+        let more = more(folder.path());
+        let free = TcpListener::bind("127.0.0.1:0").unwrap();
+        let port = free.local_addr().unwrap().port();
+        drop(free);
+        let conf = folder.path().join("mosquitto.conf");
+        let text = format!(
+            "listener {port} 127.0.0.1\nallow_anonymous true\npersistence true\n\
+             persistence_location {}/\nuser root\n{more}",
+            folder.path().display()
+        );
+        std::fs::write(conf, text).unwrap();
+        let process = spawn(&program, &folder);
+        Self {
+            program,
+            folder,
+            port,
+            process,
+        }
+    }
+
+    /// Ends it as a reboot would, and starts it again.
+    fn restart(&mut self) {
+        let id = self.process.id().to_string();
+        assert!(Command::new("kill").arg(id).status().unwrap().success());
+        self.process.wait().unwrap();
+        self.process = spawn(&self.program, &self.folder);
+    }
+
+    fn config(&self) -> Config {
+        let text = format!(
+            "[site]\nname = \"Toc\"\nstate_dir = \"state\"\n[[source]]\nid = \"radio\"\n\
+             kind = \"mqtt\"\nurl = \"mqtt://127.0.0.1:{}\"\ntopic = \"site/+/displacement\"\n",
+            self.port
+        );
+        config::parse(&text, Path::new("site.toml")).unwrap()
+    }
+
+    /// Publishes and waits until the broker has it all.
+    async fn publish(&self, payloads: &[String]) {
+        let options = MqttOptions::new("writer", "127.0.0.1", self.port);
+        let (client, mut connection) = AsyncClient::new(options, 100);
+        for payload in payloads {
+            client
+                .publish(
+                    "site/5/displacement",
+                    QoS::AtLeastOnce,
+                    false,
+                    payload.as_bytes(),
+                )
+                .await
+                .unwrap();
+        }
+        let mut taken = 0;
+        while taken < payloads.len() {
+            match tokio::time::timeout(LIMIT, connection.poll())
+                .await
+                .unwrap()
+            {
+                Ok(Event::Incoming(Packet::PubAck(_))) => taken += 1,
+                Ok(_) => {}
+                // The broker is not up yet.
+                Err(_) => tokio::time::sleep(Duration::from_millis(50)).await,
+            }
+        }
+    }
+}
+
+fn spawn(program: &Path, folder: &TempDir) -> Child {
+    Command::new(program)
+        .arg("-c")
+        .arg(folder.path().join("mosquitto.conf"))
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap()
+}
+
+impl Drop for Mosquitto {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+/// A daemon's source at work.
+struct Source {
+    deliveries: Receiver<Delivery>,
+    stop: Trigger,
+    task: JoinHandle<()>,
+}
+
+impl Source {
+    fn start(broker: &Mosquitto) -> Self {
+        let config = broker.config();
+        let (sender, deliveries) = mpsc::channel(8);
+        let (stop, stopped) = shutdown::pair();
+        let radio = config.brokers[0].clone();
+        let id = "slipwatch-toc-radio".to_owned();
+        let task = tokio::spawn(follow(radio, config.benchmarks, id, sender, stopped));
+        Self {
+            deliveries,
+            stop,
+            task,
+        }
+    }
+
+    async fn next(&mut self) -> Delivery {
+        let came = tokio::time::timeout(LIMIT, self.deliveries.recv()).await;
+        came.expect("in time").expect("a delivery")
+    }
+
+    async fn end(self) {
+        self.stop.pull();
+        self.task.await.unwrap();
+    }
+}
+
+fn message(day: usize) -> String {
+    format!(r#"{{"benchmark":"5","time":"2017-06-{day:02}T00:00:00Z","value":{day},"unit":"mm"}}"#)
+}
+
+fn values(delivery: &Delivery) -> Vec<f64> {
+    let value = |input: &Input| match input {
+        Input::Reading { reading, .. } => reading.value,
+        Input::Sample { .. }
+        | Input::Missing { .. }
+        | Input::Trouble { .. }
+        | Input::Notice(_)
+        | Input::Settings(_)
+        | Input::Order(_)
+        | Input::Found(_)
+        | Input::Tick => f64::NAN,
+    };
+    delivery
+        .arrivals
+        .iter()
+        .map(|one| value(&one.input))
+        .collect()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+#[cfg_attr(not(has_mosquitto), ignore = "Mosquitto was not found by build.rs")]
+async fn what_was_acknowledged_does_not_come_again_and_what_was_not_does() {
+    let broker = Mosquitto::start();
+    // The session must be there before anything is written.
+    let mut first = Source::start(&broker);
+    tokio::time::sleep(Duration::from_millis(1500)).await;
+    broker
+        .publish(&(1..=5).map(message).collect::<Vec<_>>())
+        .await;
+    for day in [1.0, 2.0] {
+        let delivery = first.next().await;
+        assert_eq!(values(&delivery), [day]);
+        delivery.receipt.acknowledge().await.unwrap();
+    }
+    // Taken, and the daemon ends before it is durable.
+    assert_eq!(values(&first.next().await), [3.0]);
+    tokio::time::sleep(Duration::from_millis(500)).await;
+    first.end().await;
+    broker.publish(&[message(6)]).await;
+    let mut second = Source::start(&broker);
+    let mut came = Vec::new();
+    while came.len() < 4 {
+        let delivery = second.next().await;
+        came.extend(values(&delivery));
+        delivery.receipt.acknowledge().await.unwrap();
+    }
+    assert_eq!(came, [3.0, 4.0, 5.0, 6.0]);
+    second.end().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+#[cfg_attr(not(has_mosquitto), ignore = "Mosquitto was not found by build.rs")]
+async fn a_message_that_is_too_long_is_set_aside_and_what_comes_after_it_is_taken() {
+    let broker = Mosquitto::start();
+    let mut source = Source::start(&broker);
+    tokio::time::sleep(Duration::from_millis(1500)).await;
+    let long = "x".repeat(17 << 20);
+    let options = {
+        let mut options = MqttOptions::new("long writer", "127.0.0.1", broker.port);
+        options.set_max_packet_size(32 << 20, 32 << 20);
+        options
+    };
+    let (client, mut connection) = AsyncClient::new(options, 4);
+    let topic = "site/5/displacement";
+    for payload in [long, message(1)] {
+        client
+            .publish(topic, QoS::AtLeastOnce, false, payload)
+            .await
+            .unwrap();
+    }
+    let writer = tokio::spawn(async move { while connection.poll().await.is_ok() {} });
+    let delivery = source.next().await;
+    assert_eq!((values(&delivery), delivery.quarantined), (vec![], 1));
+    delivery.receipt.acknowledge().await.unwrap();
+    let delivery = source.next().await;
+    assert_eq!(values(&delivery), [1.0]);
+    delivery.receipt.acknowledge().await.unwrap();
+    writer.abort();
+    source.end().await;
+}
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_slipwatch");
+
+/// A daemon at work in a folder of its own; ended with the test.
+struct Daemon(TempDir, Child);
+
+impl Daemon {
+    fn start(broker: &Mosquitto) -> Self {
+        Self::start_with(broker, "")
+    }
+
+    /// With more in its config; it reads the files in its folder beside.
+    fn start_with(broker: &Mosquitto, more: &str) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let text = format!(
+            "[site]\nname = \"Toc\"\nstate_dir = \"state\"\n[[source]]\nid = \"radio\"\n\
+             kind = \"mqtt\"\nurl = \"mqtt://127.0.0.1:{}\"\ntopic = \"site/+/displacement\"\n{more}",
+            broker.port
+        );
+        std::fs::write(folder.path().join("site.toml"), text).unwrap();
+        let log = std::fs::File::create(folder.path().join("log")).unwrap();
+        let process = Command::new(PROGRAM)
+            .args(["run", "site.toml"])
+            .current_dir(folder.path())
+            .stderr(log)
+            .stdout(Stdio::null())
+            .spawn();
+        Self(folder, process.unwrap())
+    }
+
+    fn text(&self, name: &str) -> String {
+        std::fs::read_to_string(self.0.path().join(name)).unwrap_or_default()
+    }
+
+    fn readings(&self) -> usize {
+        let store = slipwatch::store::Store::look(&self.0.path().join("state"));
+        let steps = store
+            .map(|store| store.steps(0).unwrap())
+            .unwrap_or_default();
+        let is_reading = |input: &Input| matches!(input, Input::Reading { .. });
+        steps.iter().filter(|step| is_reading(&step.input)).count()
+    }
+}
+
+impl Drop for Daemon {
+    fn drop(&mut self) {
+        let _ = self.1.kill();
+        let _ = self.1.wait();
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+#[cfg_attr(not(has_mosquitto), ignore = "Mosquitto was not found by build.rs")]
+async fn two_daemons_of_one_site_name_each_get_every_message() {
+    let broker = Mosquitto::start();
+    let daemons = [Daemon::start(&broker), Daemon::start(&broker)];
+    tokio::time::sleep(Duration::from_secs(4)).await;
+    broker
+        .publish(&(1..=20).map(message).collect::<Vec<_>>())
+        .await;
+    for _ in 0..300 {
+        if daemons.iter().all(|one| one.readings() == 20) {
+            return;
+        }
+        tokio::time::sleep(Duration::from_millis(100)).await;
+    }
+    panic!("{:?}", daemons.each_ref().map(Daemon::readings));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+#[cfg_attr(not(has_mosquitto), ignore = "Mosquitto was not found by build.rs")]
+async fn a_broker_that_restarts_is_found_again_and_a_bad_line_stops_nothing() {
+    let mut broker = Mosquitto::start();
+    let mut source = Source::start(&broker);
+    tokio::time::sleep(Duration::from_millis(1500)).await;
+    let two = format!("{}\n{{\"torn\": {}\n\n", message(1), message(2));
+    broker.publish(&[two, "\u{0}".to_owned()]).await;
+    let delivery = source.next().await;
+    assert_eq!(
+        (values(&delivery), delivery.quarantined),
+        (vec![1.0, 2.0], 1)
+    );
+    delivery.receipt.acknowledge().await.unwrap();
+    let delivery = source.next().await;
+    assert_eq!((values(&delivery), delivery.quarantined), (vec![], 1));
+    delivery.receipt.acknowledge().await.unwrap();
+    tokio::time::sleep(Duration::from_millis(300)).await;
+    broker.restart();
+    broker.publish(&[message(3)]).await;
+    let delivery = source.next().await;
+    assert_eq!(values(&delivery), [3.0]);
+    delivery.receipt.acknowledge().await.unwrap();
+    source.end().await;
+}
+
+/// The config of a broker that lets anybody in and refuses each subscription; it needs the plug-in that comes with
+/// Mosquitto, as a file of access rules does not refuse subscriptions.
+fn refusing(folder: &Path) -> String {
+    let rules = folder.join("rules.json");
+    let text = r#"{"defaultACLAccess":{"publishClientSend":true,"publishClientReceive":true,"subscribe":false,
+                   "unsubscribe":true},"clients":[],"groups":[],"roles":[]}"#;
+    std::fs::write(&rules, text).unwrap();
+    let named = std::env::var("LD_LIBRARY_PATH").unwrap_or_default();
+    let folders = [
+        "/usr/lib/x86_64-linux-gnu",
+        "/usr/lib/aarch64-linux-gnu",
+        "/usr/lib",
+    ];
+    let mut plugins = named
+        .split(':')
+        .chain(folders)
+        .map(|one| Path::new(one).join("mosquitto_dynamic_security.so"));
+    let plugin = plugins.find(|one| one.exists());
+    let plugin = plugin.expect("mosquitto_dynamic_security.so");
+    format!(
+        "plugin {}\nplugin_opt_config_file {}\n",
+        plugin.display(),
+        rules.display()
+    )
+}
+
+#[tokio::test(flavor = "multi_thread")]
+#[cfg_attr(
+    not(has_mosquitto_plugin),
+    ignore = "Mosquitto with its security plugin was not found by build.rs"
+)]
+async fn a_broker_that_refuses_the_subscription_is_told_and_its_benchmark_is_unknown() {
+    let broker = Mosquitto::start_with(refusing);
+    tokio::time::sleep(Duration::from_millis(500)).await;
+    let daemon = Daemon::start_with(
+        &broker,
+        "[[source]]\nid = \"logger\"\nkind = \"csv\"\npath = \"*.csv\"\n\
+         [[benchmark]]\nid = \"5\"\nsource = \"radio\"\n[[benchmark]]\nid = \"6\"\nsource = \"logger\"\n\
+         [[hook]]\nrun = [\"/bin/sh\", \"-c\", \"echo $SLIPWATCH_KEY $SLIPWATCH_STATE >> told\"]\n\
+         levels = [\"unknown\"]\n",
+    );
+    let now = slipwatch::runtime::clock::now();
+    std::fs::write(
+        daemon.0.path().join("6.csv"),
+        format!("time,displacement_mm\n{now},1\n"),
+    )
+    .unwrap();
+    let is_told = || {
+        let told = daemon.text("told");
+        let mut told = told.lines();
+        told.any(|line| line.starts_with("5/unknown/") && line.ends_with("firing"))
+    };
+    for _ in 0..300 {
+        let is_said = daemon
+            .text("log")
+            .contains("the broker refuses the subscription");
+        if is_told() && is_said && daemon.readings() == 1 {
+            return;
+        }
+        tokio::time::sleep(Duration::from_millis(100)).await;
+    }
+    panic!("{}\n{}", daemon.text("told"), daemon.text("log"));
+}

@@ -1,0 +1,143 @@
+//! Hooks within walls, run for real through the program that walls itself in.
+
+use slipwatch::alert::Level;
+use slipwatch::config::HookConfig;
+use slipwatch::monitor::{AlertState, Event, EventKind};
+use slipwatch::reading::BenchmarkId;
+use slipwatch::runtime::hook::{self, Alert, Outcome, Status};
+use slipwatch::runtime::sandbox::{self, Walls};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use tempfile::TempDir;
+
+fn alert() -> Alert {
+    let event = Event {
+        time: "2017-06-06T17:00:00Z".parse().unwrap(),
+        benchmark: Some(BenchmarkId::new("5")),
+        kind: EventKind::Alert {
+            level: Level::Red,
+            state: AlertState::Firing,
+            key: "5/red/1".to_owned(),
+            rule: "chance".to_owned(),
+            text: "text".to_owned(),
+        },
+    };
+    Alert::new(&event, "Toc", None, Status::Test).unwrap()
+}
+
+fn folder() -> TempDir {
+    tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap()
+}
+
+/// A folder outside /tmp, where every hook may write, wherever the repository lies.
+fn folder_outside_tmp() -> Option<TempDir> {
+    let home = std::env::var_os("HOME").map(PathBuf::from);
+    let places = [PathBuf::from(env!("CARGO_TARGET_TMPDIR"))].into_iter();
+    let others = ["/var/tmp", "/dev/shm"].map(PathBuf::from);
+    let is_outside = |place: &PathBuf| {
+        let place = fs::canonicalize(place);
+        place.is_ok_and(|place| !place.starts_with("/tmp"))
+    };
+    let mut places = places.chain(others).chain(home).filter(is_outside);
+    places.find_map(|place| tempfile::tempdir_in(place).ok())
+}
+
+fn walled(folder: &Path, run: &[&str]) -> HookConfig {
+    HookConfig {
+        site: false,
+        run: run.iter().map(|word| (*word).to_owned()).collect(),
+        levels: vec![Level::Red],
+        timeout: Duration::from_secs(30),
+        folder: folder.to_owned(),
+        sandbox: true,
+        writable: Vec::new(),
+        launcher: Some(env!("CARGO_BIN_EXE_slipwatch").into()),
+    }
+}
+
+#[tokio::test]
+#[cfg_attr(not(has_landlock), ignore = "this kernel has no landlock")]
+async fn a_hook_writes_where_it_may_and_nowhere_else() {
+    assert_ne!(sandbox::probe(), Walls::Missing);
+    let all = folder_outside_tmp().unwrap();
+    let at = all.path();
+    for name in ["own", "elsewhere", "allowed"] {
+        fs::create_dir(at.join(name)).unwrap();
+        fs::write(at.join(name).join("there"), "before").unwrap();
+    }
+    let script = "echo after > there; echo after > ../allowed/there; echo x > /dev/null\n\
+                  t=$(mktemp /tmp/slipwatch-test-XXXXXX) && rm \"$t\" && echo ok > tmp\n\
+                  for try in 'echo after > ../elsewhere/there' 'echo x > ../elsewhere/new' \
+                  'rm ../elsewhere/there' 'mkdir ../elsewhere/folder' 'mv there ../elsewhere/'; do\n\
+                  (eval \"$try\") 2>/dev/null && echo \"$try\" >> done\ndone\n\
+                  cat ../elsewhere/there > read\n";
+    fs::write(at.join("own/hook.sh"), script).unwrap();
+    let mut hook = walled(&at.join("own"), &["/bin/sh", "hook.sh"]);
+    hook.writable = vec![at.join("allowed"), at.join("not-there")];
+    assert_eq!(hook::run(&hook, &alert(), 1).await, Outcome::Done);
+    let read = |name: &str| fs::read_to_string(at.join(name)).unwrap_or_default();
+    assert_eq!(read("own/done"), "", "written elsewhere");
+    assert_eq!(read("own/there"), "after\n");
+    assert_eq!(read("allowed/there"), "after\n");
+    assert_eq!(read("own/tmp"), "ok\n");
+    assert_eq!(read("elsewhere/there"), "before");
+    assert_eq!(read("own/read"), "before", "reading is free");
+}
+
+#[tokio::test]
+async fn walls_change_neither_the_arguments_nor_the_environment_nor_stdin() {
+    let folder = folder();
+    let script = "printf '%s|' \"$@\" > args; env > env; cat > stdin";
+    let odd = ["--writable", "--", "a b", "$(touch no)", ""];
+    let mut run = vec!["/bin/sh", "-c", script, "name"];
+    run.extend(odd);
+    let mut outcomes = Vec::new();
+    for launcher in [true, false] {
+        let mut hook = walled(folder.path(), &run);
+        if !launcher {
+            hook.launcher = None;
+        }
+        outcomes.push(hook::run(&hook, &alert(), 1).await);
+        let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
+        assert_eq!(read("args"), "--writable|--|a b|$(touch no)||");
+        assert!(read("env").contains("SLIPWATCH_KEY=5/red/1"));
+        for name in ["LD_", "CARGO", "RUST"] {
+            assert!(!read("env").contains(&format!("\n{name}")), "{name} leaked");
+        }
+        assert_eq!(read("stdin").lines().count(), 1);
+    }
+    assert_eq!(outcomes, [Outcome::Done, Outcome::Done]);
+}
+
+#[tokio::test]
+async fn a_hook_within_walls_that_is_missing_fails_and_one_that_hangs_is_killed() {
+    let folder = folder();
+    let missing = walled(folder.path(), &["./not-there.sh"]);
+    assert_eq!(hook::run(&missing, &alert(), 1).await, Outcome::Failed(126));
+    let mut hanging = walled(folder.path(), &["/bin/sh", "-c", "sleep 300 & sleep 300"]);
+    hanging.timeout = Duration::from_millis(500);
+    assert_eq!(hook::run(&hanging, &alert(), 1).await, Outcome::TimedOut);
+}
+
+#[tokio::test]
+async fn a_hook_of_a_config_under_a_relative_path_is_found() {
+    let folder = folder();
+    let here = fs::canonicalize(std::env::current_dir().unwrap()).unwrap();
+    let there = fs::canonicalize(folder.path()).unwrap();
+    // Up to the root and down again.
+    let mut relative: PathBuf = here.iter().skip(1).map(|_| "..").collect();
+    relative.push(there.strip_prefix("/").unwrap());
+    let relative = relative.as_path();
+    fs::write(folder.path().join("hook.sh"), "#!/bin/sh\ntouch ran\n").unwrap();
+    let mode = std::os::unix::fs::PermissionsExt::from_mode(0o755);
+    fs::set_permissions(folder.path().join("hook.sh"), mode).unwrap();
+    for launcher in [true, false] {
+        let mut hook = walled(relative, &["./hook.sh"]);
+        if !launcher {
+            hook.launcher = None;
+        }
+        assert_eq!(hook::run(&hook, &alert(), 1).await, Outcome::Done);
+        fs::remove_file(folder.path().join("ran")).unwrap();
+    }
+}

@@ -1,0 +1,223 @@
+//! Searches beside the monitor: what they find, and that nothing but the data decides when it takes effect.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::wildcard_enum_match_arm,
+    clippy::cast_precision_loss,
+    dead_code,
+    reason = "a helper that fails is a test that fails; a test looks for the kinds it names"
+)]
+
+use crate::loaded::{Measured, RESERVOIR, Slope, flood, restless, start};
+use jiff::SignedDuration;
+use slipwatch::config;
+use slipwatch::effects::{Kind, Options, explain};
+use slipwatch::monitor::{Event, EventKind, Explain, Settings};
+use slipwatch::reading::{BenchmarkId, Channel, Recording, Series, Timestamp, Unit};
+use slipwatch::runtime::replay::{Pace, Plan, replay};
+use slipwatch::runtime::run::{Progress, run};
+use slipwatch::runtime::shutdown;
+use slipwatch::store::Store;
+use std::fmt::Write;
+use std::time::Duration;
+use tokio::sync::{OnceCell, watch};
+
+/// Half a year beside a reservoir, with a flood in it.
+fn half_a_year() -> Measured {
+    let slope = Slope {
+        v: 5.0,
+        life: f64::INFINITY,
+        gain: 0.8,
+    };
+    slope.measured(190, |day| restless(day) + flood(day, 100.0, 1.5))
+}
+
+fn recording(measured: &Measured) -> Recording {
+    Recording {
+        series: vec![Series {
+            benchmark: BenchmarkId::new("a"),
+            unit: Unit::MM,
+            averaging: None,
+            readings: measured.readings.clone(),
+        }],
+        channels: vec![Channel {
+            name: RESERVOIR.to_owned(),
+            unit: Some("m".to_owned()),
+            samples: measured.samples.clone(),
+        }],
+        ..Recording::default()
+    }
+}
+
+/// The events of a replay, one JSON object each, without the summary.
+async fn said(explain: Explain, pace: Pace, until: Option<Timestamp>) -> Vec<String> {
+    let settings = Settings {
+        explain,
+        ..Settings::default()
+    };
+    let plan = Plan {
+        site: "Toc",
+        settings: &settings,
+        hooks: &[],
+        pace,
+        until,
+    };
+    let (_trigger, shutdown) = shutdown::pair();
+    let mut events = Vec::new();
+    let mut each = |event: &Event| {
+        events.push(serde_json::to_string(event)?);
+        Ok(())
+    };
+    let recording = recording(&half_a_year());
+    replay(&recording, &plan, shutdown, &mut each)
+        .await
+        .unwrap();
+    events.pop();
+    events
+}
+
+/// Of a replay with adoption, as fast as it goes: made once for all tests.
+async fn adopted() -> &'static [String] {
+    static ONCE: OnceCell<Vec<String>> = OnceCell::const_new();
+    ONCE.get_or_init(|| said(Explain::Adopt, Pace::Max, None))
+        .await
+}
+
+/// The same from a daemon over a file, up to the last reading: after it, the clock is today's.
+async fn said_by_a_daemon() -> Vec<String> {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("incoming")).unwrap();
+    let measured = half_a_year();
+    let mut text = format!("time,{RESERVOIR},a_displacement_mm\n");
+    for (sample, reading) in measured.samples.iter().zip(&measured.readings) {
+        writeln!(text, "{},{},{}", sample.time, sample.value, reading.value).unwrap();
+    }
+    std::fs::write(folder.path().join("incoming/logger.csv"), text).unwrap();
+    let site = "[site]\nname = \"Toc\"\nstate_dir = \"state\"\n\
+                [[source]]\nid = \"logger\"\nkind = \"csv\"\npath = \"incoming/*.csv\"\n\
+                [[hook]]\nrun = [\"/bin/true\"]\n";
+    let file = folder.path().join("site.toml");
+    std::fs::write(&file, site).unwrap();
+    let config = config::load(&file).unwrap();
+    let (trigger, shutdown) = shutdown::pair();
+    let (sender, mut progress) = watch::channel(Progress::default());
+    let own = config.clone();
+    let task = tokio::spawn(async move { run(&own, shutdown, &sender).await });
+    let caught_up = progress.wait_for(|progress| progress.is_caught_up);
+    tokio::time::timeout(Duration::from_secs(120), caught_up)
+        .await
+        .unwrap()
+        .unwrap();
+    trigger.pull();
+    task.await.unwrap().unwrap();
+    let store = Store::look(&config.site.state_dir).unwrap();
+    let mut events = Vec::new();
+    while let Some(some) = Some(
+        store
+            .events(events.last().map_or(0, |(seq, _)| *seq), None, None)
+            .unwrap(),
+    )
+    .filter(|some| !some.is_empty())
+    {
+        events.extend(some);
+    }
+    let last = measured.readings.last().unwrap().time;
+    let events = events.into_iter().map(|(_, line)| line).filter(|line| {
+        let event: Event = serde_json::from_str(line).unwrap();
+        // A replay without a config has no level of the whole site.
+        event.time <= last && event.benchmark.is_some()
+    });
+    events.collect()
+}
+
+/// (day, kind, channel, adopted) of every effect found.
+fn found(events: &[String]) -> Vec<(i64, Kind, Option<String>, bool)> {
+    let one = |line: &String| match serde_json::from_str::<Event>(line).unwrap() {
+        Event {
+            time,
+            kind:
+                EventKind::EffectFound {
+                    effect,
+                    channel,
+                    adopted,
+                    ..
+                },
+            ..
+        } => {
+            let day = time.duration_since(start()).as_hours() / 24;
+            Some((day, effect, channel, adopted))
+        }
+        _ => None,
+    };
+    events.iter().filter_map(one).collect()
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_search_finds_the_reservoir_and_its_answer_comes_at_one_time_of_the_data_at_any_pace() {
+    let fast = adopted().await;
+    let found = found(fast);
+    let (day, kind, channel, adopted) = &found[0];
+    assert_eq!(*kind, Kind::Hydrological, "{found:?}");
+    assert_eq!(channel.as_deref(), Some(RESERVOIR));
+    assert!(*adopted);
+    // A day in 10 ms: the search takes longer than that, and is waited for.
+    let slow = said(Explain::Adopt, Pace::Times(8_640_000.0), None).await;
+    assert!(fast == slow, "the pace changed the events");
+    // What comes before the answer does not know of it.
+    let until = start() + SignedDuration::from_hours(24 * (*day + 3));
+    let beginning = said(Explain::Adopt, Pace::Max, Some(until)).await;
+    assert!(fast.starts_with(&beginning), "no beginning of the whole");
+    assert!(
+        beginning.len() < fast.len() && beginning.iter().any(|line| line.contains("is_explained"))
+    );
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_daemon_finds_what_a_replay_finds_though_its_search_holds_nothing_up() {
+    let replayed = found(adopted().await);
+    let daemon = said_by_a_daemon().await;
+    // A daemon takes an answer when it has come; a replay waits for it where it is due.
+    let kinds = |found: &[(i64, Kind, Option<String>, bool)]| {
+        let each = found.iter();
+        let each = each.map(|(_, kind, channel, adopted)| (*kind, channel.clone(), *adopted));
+        each.collect::<Vec<_>>()
+    };
+    let daemon = found(&daemon);
+    assert_eq!(kinds(&daemon)[0], kinds(&replayed)[0], "{daemon:?}");
+    assert!(daemon[0].0 >= replayed[0].0, "{daemon:?} {replayed:?}");
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_search_that_is_switched_off_finds_nothing_and_one_that_only_tells_adopts_nothing() {
+    assert_eq!(found(&said(Explain::Off, Pace::Max, None).await), []);
+    let told = said(Explain::Tell, Pace::Max, None).await;
+    let found = found(&told);
+    assert!(
+        !found.is_empty() && found.iter().all(|one| !one.3),
+        "{found:?}"
+    );
+    assert!(!told.iter().any(|line| line.contains("is_explained")));
+}
+
+#[test]
+fn the_load_that_forecasts_use_is_the_one_that_was_fitted() {
+    let recording = recording(&half_a_year());
+    let options = Options {
+        surrogates: 99,
+        ..Options::default()
+    };
+    let said = explain(
+        &recording.series[0],
+        &recording.channels,
+        &[],
+        &options,
+        &mut |_| {},
+    );
+    let channels: Vec<&Channel> = recording.channels.iter().collect();
+    let told = said.fuller.log_load(&channels, &said.curves.times);
+    assert!(!said.curves.log_loads.is_empty());
+    for (index, told) in told.into_iter().enumerate() {
+        let fitted: f64 = said.curves.log_loads.values().map(|load| load[index]).sum();
+        assert!((told - fitted).abs() < 1e-6, "{index}: {told} {fitted}");
+    }
+}

@@ -1,0 +1,16 @@
+//! Measured series that may be read here but not redistributed. A test of them is ignored where `build.rs` has not
+//! found their folder.
+
+#[path = "../measured/mod.rs"]
+mod folder;
+
+use std::path::PathBuf;
+
+/// The file of that name.
+///
+/// # Panics
+///
+/// Where it is not there.
+pub(crate) fn measured(name: &str) -> PathBuf {
+    folder::measured(name).unwrap_or_else(|| panic!("{name} is not among the measured series"))
+}
