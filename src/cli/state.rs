@@ -7,7 +7,7 @@ use crate::config::{self, Config, value};
 use crate::monitor::{EventKind, Order};
 use crate::reading::BenchmarkId;
 use crate::runtime::clock;
-use crate::runtime::standing::{acknowledged, in_force, orders, silences};
+use crate::runtime::standing::{acknowledged, closed, in_force, orders, silences};
 use crate::store::Store;
 use anyhow::Context;
 use clap::Subcommand;
@@ -278,6 +278,7 @@ fn list(site: &SiteArgs) -> anyhow::Result<()> {
     let (in_force, orders) = (in_force(&store, None)?, orders(&store)?);
     let mut standing = silences(&orders, clock::now());
     standing.extend(acknowledged(&orders, &in_force));
+    standing.extend(closed(&store, &in_force)?);
     standing.extend(in_force.into_values());
     standing.sort_by_key(|event| event.time);
     for event in &standing {

@@ -10,7 +10,7 @@ use crate::monitor::{Event, EventKind, SUSPECT, SUSPECT_ENDS};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::clock;
 use crate::runtime::preview::{Preview, preview};
-use crate::runtime::standing::{InForce, acknowledged, every, in_force, orders, silences};
+use crate::runtime::standing::{InForce, acknowledged, closed, every, in_force, orders, silences};
 use crate::store::Store;
 use jiff::tz::TimeZone;
 use serde::Serialize;
@@ -79,6 +79,8 @@ struct SiteStatus {
     acknowledged: Vec<Event>,
     /// The orders by which no hook is run.
     silences: Vec<Event>,
+    /// Alerts in force that a hook did not take and will not: it is not in the config any more.
+    closed: Vec<Event>,
     /// Lines, records and files that could not be used, a source.
     quarantined: BTreeMap<String, u64>,
     /// What the files hold, where that was asked for.
@@ -151,6 +153,7 @@ fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
         is_running: Store::is_held(&config.site.state_dir),
         acknowledged: acknowledged(&orders, &levels),
         silences: silences(&orders, clock::now()),
+        closed: closed(&store, &levels)?,
         quarantined: store.quarantined()?,
         alerts: levels.into_values().collect(),
         preview,
@@ -276,13 +279,14 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
         alerts => format!("\nin force:\n{}", lines(alerts)),
     };
     format!(
-        "{dead}{}: {} inputs taken, {} alerts wait for a hook\n{}{}{refused}{suspicions}\n{table}\
+        "{dead}{}: {} inputs taken, {} alerts wait for a hook\n{}{}{}{refused}{suspicions}\n{table}\
          collapse: median of the forecast; chance: of collapse within the evacuation time\n{force}",
         text::plain(&status.site),
         status.steps,
         status.alerts_waiting,
         lines(&status.silences),
         lines(&status.acknowledged),
+        lines(&status.closed),
     )
 }
 

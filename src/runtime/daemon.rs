@@ -94,6 +94,7 @@ impl Daemon {
         mut shutdown: Shutdown,
         progress: &watch::Sender<Progress>,
     ) -> Result<(), StoreError> {
+        self.note_closed()?;
         let mut hangup = signal(SignalKind::hangup())?;
         let mut tick = tokio::time::interval(TICK);
         tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
@@ -310,6 +311,13 @@ impl Daemon {
         }
     }
 
+    /// Deliveries are closed where the hooks are set up: at the start and when a config is taken.
+    fn note_closed(&self) -> Result<(), StoreError> {
+        let closed = self.store.closed_deliveries()?.len();
+        (self.pulse.vitals).update(|health| health.outbox_closed = closed);
+        Ok(())
+    }
+
     /// Looks at a few more rows of the state. Where one is damaged the work goes on, and people are to see to it.
     fn verify(&mut self) {
         let is_damaged = self.pulse.vitals.health().is_store_damaged;
@@ -406,6 +414,7 @@ impl Daemon {
         self.commit()?;
         self.close_hooks().await;
         self.site.rehook(dispatcher(&fresh, &self.store))?;
+        self.note_closed()?;
         self.sources = Sources::start(&fresh, &self.store)?;
         (self.is_up_to_date, self.config) = (false, fresh);
         self.pulse.service.ready("watching");

@@ -98,6 +98,35 @@ pub fn acknowledged(orders: &[Event], in_force: &InForce) -> Vec<Event> {
     orders.iter().filter(is_one).cloned().collect()
 }
 
+/// The alerts in force that a hook did not take and will not: it left the config, or does not ask for them any more.
+///
+/// # Errors
+/// [`StoreError`].
+pub fn closed(store: &Store, in_force: &InForce) -> Result<Vec<Event>, StoreError> {
+    let mut found = Vec::new();
+    for [hook, closed_key, closed_level, state] in store.closed_deliveries()? {
+        let is_it = |event: &&Event| {
+            matches!(&event.kind, EventKind::Alert { key, level, .. }
+                if *key == closed_key && level.name() == closed_level)
+        };
+        let Some(alert) = in_force.values().find(is_it).filter(|_| state == "firing") else {
+            continue;
+        };
+        found.push(Event {
+            time: alert.time,
+            benchmark: alert.benchmark.clone(),
+            kind: EventKind::Fault {
+                kind: "delivery-closed".to_owned(),
+                text: format!(
+                    "hook {hook:?} has not taken the {closed_level} alert {closed_key}, and will not: \
+                     the config has no such hook any more, or it does not ask for such an alert"
+                ),
+            },
+        });
+    }
+    Ok(found)
+}
+
 fn read(body: &str) -> Result<Event, StoreError> {
     serde_json::from_str(body).map_err(|error| StoreError::Unreadable(error.to_string()))
 }

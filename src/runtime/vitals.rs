@@ -60,6 +60,8 @@ pub struct Health {
     pub outbox: usize,
     /// When the oldest of them was called, data time.
     pub outbox_oldest: Option<Timestamp>,
+    /// Deliveries closed because the config has no such hook any more.
+    pub outbox_closed: usize,
     /// Searches for an effect that are at work.
     pub searches: usize,
     /// Size of the database, bytes.

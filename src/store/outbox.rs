@@ -37,6 +37,8 @@ pub enum Fate {
     Over,
     /// It was given up.
     Dead,
+    /// The config has no such hook any more, or that hook does not ask for it any more.
+    Closed,
 }
 
 impl Fate {
@@ -46,6 +48,7 @@ impl Fate {
             Self::Delivered => "delivered",
             Self::Over => "over",
             Self::Dead => "dead",
+            Self::Closed => "closed",
         }
     }
 }
@@ -103,6 +106,53 @@ impl Store {
         Ok(bodies)
     }
 
+    /// The hooks that have not taken this alert yet and are still to.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn awaited(
+        &self,
+        (key, level, state): (&str, &str, &str),
+    ) -> Result<Vec<String>, StoreError> {
+        let inner = self.inner();
+        let mut query = inner.connection.prepare_cached(
+            "SELECT hook FROM outbox WHERE key = ?1 AND level = ?2 AND state = ?3 AND status = 'waiting'",
+        )?;
+        let rows = query.query_map(params![key, level, state], |row| row.get(0))?;
+        Ok(rows.collect::<Result<_, _>>()?)
+    }
+
+    /// Ends deliveries that nothing will make, and has their alerts wait for other hooks in the same transaction.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn close_deliveries(
+        &self,
+        ended: &[Delivery],
+        instead: &[Delivery],
+    ) -> Result<(), StoreError> {
+        let mut inner = self.inner();
+        inner.trusted()?;
+        let written = inner.close_deliveries(ended, instead);
+        inner.committed(ended.len(), written)
+    }
+
+    /// The deliveries that were closed because nothing would have made them, as (hook, key, level, state), the
+    /// oldest first.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn closed_deliveries(&self) -> Result<Vec<[String; 4]>, StoreError> {
+        let inner = self.inner();
+        let mut query = inner.connection.prepare_cached(
+            "SELECT hook, key, level, state FROM outbox WHERE status = 'closed' ORDER BY id",
+        )?;
+        let rows = query.query_map([], |row| {
+            Ok([row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?])
+        })?;
+        Ok(rows.collect::<Result<_, _>>()?)
+    }
+
     /// How many deliveries wait, and when the oldest of their alerts was called.
     ///
     /// # Errors
@@ -153,13 +203,14 @@ impl Store {
         Ok(rows.next()?.map_or(Ok(0), |row| row.get(0))?)
     }
 
-    /// Has what was given up wait again, as if it had never been tried; says how many deliveries that are. The daemon
+    /// Has what was given up, or closed, wait again, as if it had never been tried; says how many deliveries that are. The daemon
     /// takes them at its next start, or when it takes its config again.
     ///
     /// # Errors
     /// [`StoreError`].
     pub fn redeliver(&self) -> Result<usize, StoreError> {
-        let again = "UPDATE outbox SET status = 'waiting', attempts = 0 WHERE status = 'dead'";
+        let again = "UPDATE outbox SET status = 'waiting', attempts = 0
+                     WHERE status IN ('dead', 'closed')";
         Ok(self.inner().connection.execute(again, [])?)
     }
 
@@ -184,6 +235,27 @@ pub(super) fn body(row: &Row<'_>) -> Result<Option<Vec<u8>>, StoreError> {
 }
 
 impl Inner {
+    fn close_deliveries(
+        &mut self,
+        ended: &[Delivery],
+        instead: &[Delivery],
+    ) -> Result<(), StoreError> {
+        let transaction = self.connection.transaction()?;
+        for delivery in instead {
+            delivery.insert(&transaction, WAITING)?;
+        }
+        for one in ended {
+            transaction
+                .prepare_cached(
+                    "UPDATE outbox SET status = 'closed'
+                     WHERE key = ?1 AND level = ?2 AND state = ?3 AND hook = ?4 AND status = 'waiting'",
+                )?
+                .execute(params![one.key, one.level, one.state, one.hook])?;
+        }
+        transaction.commit()?;
+        Ok(())
+    }
+
     fn settle(&mut self, settled: &[(Delivery, Fate)]) -> Result<(), StoreError> {
         let transaction = self.connection.transaction()?;
         for (delivery, fate) in settled {

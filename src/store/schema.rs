@@ -63,7 +63,7 @@ const MIGRATIONS: [&str; 3] = ["
         level TEXT NOT NULL,
         state TEXT NOT NULL,
         hook TEXT NOT NULL,
-        -- waiting, delivered, over, dead
+        -- waiting, delivered, over, dead, closed
         status TEXT NOT NULL,
         attempts INTEGER NOT NULL DEFAULT 0,
         -- of the alert

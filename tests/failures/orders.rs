@@ -101,3 +101,84 @@ fn data_time_never_goes_back_in_what_is_stored() {
     assert!(steps.len() >= 5);
     assert!(steps.is_sorted_by_key(|step| step.now), "{steps:?}");
 }
+
+/// What stands in the outbox of benchmark 5's red, a line each: hook and status.
+fn outbox(site: &Site) -> Vec<String> {
+    let database = rusqlite::Connection::open(site.path("state/slipwatch.db")).unwrap();
+    let mut query = database
+        .prepare("SELECT hook || ' ' || status FROM outbox WHERE key LIKE '5/red/%' ORDER BY id")
+        .unwrap();
+    let rows = query.query_map([], |row| row.get(0)).unwrap();
+    rows.collect::<Result<_, _>>().unwrap()
+}
+
+/// Another command line in the config; the old one has taken nothing.
+#[test]
+fn an_alert_that_waits_for_a_hook_whose_command_line_changed_goes_to_the_new_one_and_nothing_waits()
+{
+    let site = Site::new(POLICY);
+    let listen = site.listen();
+    std::fs::write(site.path("hook.sh"), "exit 1\n").unwrap();
+    std::fs::write(
+        site.path("new.sh"),
+        "echo $SLIPWATCH_KEY $SLIPWATCH_STATE >> told\n",
+    )
+    .unwrap();
+    site.append("incoming/5.csv", &failing("5"));
+    let program = site.caught_up();
+    eventually("that the red waits", || {
+        outbox(&site) == ["/bin/sh hook.sh waiting"]
+    });
+    let text = std::fs::read_to_string(site.path("site.toml")).unwrap();
+    std::fs::write(site.path("site.toml"), text.replace("hook.sh", "new.sh")).unwrap();
+    program.signal(Signal::SIGHUP);
+    eventually("that the new one has taken it", || {
+        outbox(&site) == ["/bin/sh hook.sh closed", "/bin/sh new.sh delivered"]
+    });
+    let told = site.lines("told");
+    let reds = told.iter().filter(|line| line.starts_with("5/red/"));
+    assert_eq!(reds.count(), 1, "{told:?}");
+    let closed = "alerts waited for a hook that does not ask for them any more";
+    assert!(site.log().contains(closed), "{}", site.log());
+    eventually("that it is counted", || {
+        crate::site::get(&listen, "/metrics").contains("slipwatch_outbox_closed_alerts 1")
+    });
+    for words in [&["status"][..], &["alerts", "list"]] {
+        let said = site.printed(&[words, &["--config", "site.toml"]].concat());
+        assert!(
+            said.contains("hook \"/bin/sh hook.sh\" has not taken the red alert"),
+            "{said}"
+        );
+    }
+    program.stop();
+    site.proven_events();
+}
+
+/// It is found at a start too, and where no other hook asks for the level.
+#[test]
+fn an_alert_that_no_hook_asks_for_any_more_is_closed_at_the_next_start_and_can_be_had_again() {
+    let site = Site::new(POLICY);
+    std::fs::write(site.path("hook.sh"), "exit 1\n").unwrap();
+    site.append("incoming/5.csv", &failing("5"));
+    let program = site.caught_up();
+    eventually("that the red waits", || {
+        outbox(&site) == ["/bin/sh hook.sh waiting"]
+    });
+    program.stop();
+    let before = std::fs::read_to_string(site.path("site.toml")).unwrap();
+    let levels = "\"yellow\", \"orange\", \"red\", \"unknown\"";
+    std::fs::write(site.path("site.toml"), before.replace(levels, "\"yellow\"")).unwrap();
+    let program = site.caught_up();
+    eventually("that it is closed", || {
+        outbox(&site) == ["/bin/sh hook.sh closed"]
+    });
+    program.stop();
+    std::fs::write(site.path("site.toml"), before).unwrap();
+    std::fs::write(site.path("hook.sh"), "echo $SLIPWATCH_KEY >> told\n").unwrap();
+    site.printed(&["alerts", "redeliver", "--config", "site.toml"]);
+    let program = site.caught_up();
+    eventually("that it is told", || {
+        outbox(&site) == ["/bin/sh hook.sh delivered"]
+    });
+    program.stop();
+}

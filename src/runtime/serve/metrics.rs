@@ -121,6 +121,11 @@ fn state(sheet: &mut Sheet<'_>, health: &Health) -> fmt::Result {
             health.outbox as f64,
         ),
         (
+            "outbox_closed_alerts",
+            "Alerts that waited for a hook that is not in the config any more",
+            health.outbox_closed as f64,
+        ),
+        (
             "unwritten_inputs",
             "Inputs that wait, unacknowledged, for room on the disk",
             health.unwritten as f64,

@@ -5,9 +5,10 @@ use super::{Counts, OWN, Place, STEPS_A_BENCHMARK, STEPS_A_MEMORY, Sinks, Site, 
 use crate::alert::Level;
 use crate::monitor::{Input, Monitor, Part, SavedError, SearchJob, Settings};
 use crate::reading::{BenchmarkId, Timestamp};
+use crate::runtime::delivered::delivery;
 use crate::runtime::hook::{Alert, state_name};
 use crate::runtime::vitals::Vitals;
-use crate::store::{Fate, Recorded, Store, StoreError};
+use crate::store::{Delivery, Fate, Recorded, Store, StoreError};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -158,11 +159,46 @@ impl Site {
             one.was_told |= one.is_sent;
             one.is_told_together |= store.is_noted(identity, None, Some(Fate::Over))?;
         }
+        let mut waiting = Vec::new();
         for body in store.waiting()? {
             match rmp_serde::from_slice::<Alert>(&body) {
-                Ok(alert) => self.send(&alert),
+                Ok(alert) => waiting.push(alert),
                 Err(error) => tracing::error!(%error, "an alert that waited cannot be read"),
             }
+        }
+        match self.close_what_nobody_takes(&store, &waiting) {
+            // The next start does it.
+            Err(error) if error.is_full() => tracing::warn!(%error, "deliveries are not closed"),
+            closed => closed?,
+        }
+        for alert in &waiting {
+            self.send(alert);
+        }
+        Ok(())
+    }
+
+    /// What waits for a hook that is not in the config any more, or that does not ask for it any more, is closed, and
+    /// waits for the hooks that ask for it now.
+    fn close_what_nobody_takes(&self, store: &Store, waiting: &[Alert]) -> Result<(), StoreError> {
+        let Some(dispatcher) = &self.sinks.alerts else {
+            return Ok(());
+        };
+        let (mut ended, mut instead) = (Vec::new(), Vec::new());
+        for alert in waiting {
+            let asking = dispatcher.asking(alert);
+            let awaited = store.awaited(identity(alert))?;
+            let gone = awaited.iter().filter(|hook| !asking.contains(hook));
+            let gone: Vec<&String> = gone.collect();
+            for hook in &gone {
+                ended.push(delivery(alert, hook)?);
+            }
+            for hook in asking.iter().filter(|_| !gone.is_empty()) {
+                instead.push(delivery(alert, hook)?);
+            }
+        }
+        if !ended.is_empty() {
+            store.close_deliveries(&ended, &instead)?;
+            announce_closed(&ended);
         }
         Ok(())
     }
@@ -205,6 +241,23 @@ impl Site {
                 None
             }
         }
+    }
+}
+
+/// Says it once a hook, not once a delivery: there may be thousands.
+fn announce_closed(ended: &[Delivery]) {
+    let mut by_hook: BTreeMap<&str, Vec<&Delivery>> = BTreeMap::new();
+    for one in ended {
+        by_hook.entry(&one.hook).or_default().push(one);
+    }
+    for (hook, closed) in by_hook {
+        let (count, key) = (closed.len(), closed.first().map(|one| &one.key));
+        tracing::error!(
+            hook,
+            count,
+            ?key,
+            "alerts waited for a hook that does not ask for them any more: they are closed, and go to the hooks that do"
+        );
     }
 }
 
