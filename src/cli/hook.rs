@@ -140,6 +140,7 @@ fn of_hook(hook: &HookConfig, wanted: Option<Level>) -> Option<Level> {
 
 fn drill(config: &Config, hook: &HookConfig, level: Level, now: Timestamp) -> Option<Alert> {
     let first = config.benchmarks.first().map(|one| one.id.clone());
+    let first = hook.benchmarks.first().cloned().or(first);
     let kind = EventKind::Alert {
         level,
         state: AlertState::Firing,
@@ -161,6 +162,7 @@ fn said(outcome: &Outcome) -> String {
         Outcome::Failed(code) => format!("ended with exit code {code}"),
         Outcome::Signalled(signal) => format!("ended by signal {signal}"),
         Outcome::TimedOut => "killed when its time was up".to_owned(),
+        Outcome::Refused(status) => format!("answered with status {status}"),
         Outcome::NotStarted(why) => format!("not started: {why}"),
     }
 }

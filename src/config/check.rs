@@ -1,8 +1,8 @@
 //! `check`: the site file and what it names on this machine, without starting anything.
 
-use super::{Config, ConfigError, HookConfig, SiteConfig, Source, Token, TokenError, load};
+use super::{Config, ConfigError, HookConfig, Secret, SiteConfig, Source, Token, TokenError, load};
 use crate::alert::Level;
-use crate::reading::Quantity;
+use crate::reading::{BenchmarkId, Quantity};
 use jiff::SignedDuration;
 use serde::Serialize;
 use std::fmt;
@@ -55,6 +55,7 @@ pub fn check(file: &Path) -> Result<Summary, ConfigError> {
             .chain(config.site.token_file.as_deref().and_then(open_token))
             .chain(slow_sampling(&config))
             .chain(untold(&config))
+            .chain(unknown_benchmarks(&config))
             .map(|what| format!("{place}: warning: {what}")),
     );
     Ok(Summary {
@@ -79,6 +80,10 @@ fn missing_folder(source: &Source) -> Option<String> {
 }
 
 fn missing_program(hook: &HookConfig) -> Option<String> {
+    if let Some(webhook) = &hook.webhook {
+        let error = Secret::read(&webhook.secret_file).err()?;
+        return Some(format!("webhook: {error}; alerts would go nowhere"));
+    }
     let program = hook.program();
     let named_by_path = program.components().count() > 1;
     (named_by_path && !program.is_file()).then(|| {
@@ -110,6 +115,20 @@ fn untold(config: &Config) -> Vec<String> {
         }
     }
     lines
+}
+
+/// A hook of a benchmark whose name is mistyped would never be told.
+fn unknown_benchmarks(config: &Config) -> impl Iterator<Item = String> {
+    let is_known = |id: &BenchmarkId| config.benchmarks.iter().any(|one| one.id == *id);
+    let asked = config.hooks.iter().flat_map(|hook| &hook.benchmarks);
+    asked
+        .filter(move |id| !config.benchmarks.is_empty() && !is_known(id))
+        .map(|id| {
+            format!(
+                "a hook asks for benchmark {:?}, which the config does not name",
+                id.as_str()
+            )
+        })
 }
 
 fn open_token(file: &Path) -> Option<String> {

@@ -4,8 +4,10 @@ mod alert;
 mod broker;
 mod check;
 mod declared;
+mod hook;
 mod pattern;
 mod problem;
+mod secret;
 mod section;
 mod source;
 mod table;
@@ -17,6 +19,7 @@ pub use broker::{Broker, BrokerAddress};
 pub use check::{Summary, check};
 pub use pattern::FilePattern;
 pub use problem::{ConfigError, Problem, Severity};
+pub use secret::{Secret, SecretError};
 pub use token::{Token, TokenError};
 pub use vector::Vector;
 
@@ -26,6 +29,7 @@ use crate::reading::{BenchmarkId, Conventions, Dialect, Quantity, Unit};
 use jiff::SignedDuration;
 use problem::Notebook;
 use std::cell::RefCell;
+use std::collections::BTreeSet;
 use std::io;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -48,7 +52,7 @@ pub struct Config {
     pub benchmarks: Vec<Benchmark>,
     /// `[alert]` and the benchmarks' own, `[explain]` and `[[event]]`, as the monitor takes them.
     pub settings: Settings,
-    /// `[[hook]]`.
+    /// `[[hook]]` and `[[webhook]]`.
     pub hooks: Vec<HookConfig>,
     /// What is doubtful, but not refused.
     pub warnings: Vec<Problem>,
@@ -135,13 +139,28 @@ pub struct Benchmark {
     pub position: Option<Vec<f64>>,
 }
 
-/// `[[hook]]`: a program to run when a level is entered or left.
+/// `[[webhook]]`: an address that alerts are sent to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Webhook {
+    /// What logs and receipts call it.
+    pub name: String,
+    /// Where to, over plain HTTP.
+    pub address: hyper::Uri,
+    /// The file with the secret that signs what is sent.
+    pub secret_file: PathBuf,
+}
+
+/// `[[hook]]`: a program to run when a level is entered or left; or `[[webhook]]`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct HookConfig {
-    /// The program and its arguments.
+    /// The program and its arguments; none of a webhook.
     pub run: Vec<String>,
+    /// Where to send to instead of running a program.
+    pub webhook: Option<Webhook>,
     /// Which levels it is run for.
     pub levels: Vec<Level>,
+    /// Of which benchmarks it is told; none: of all.
+    pub benchmarks: BTreeSet<BenchmarkId>,
     /// Whether it is told of the whole site's level, and of nothing else; of its benchmarks' else.
     pub site: bool,
     /// After this it is killed.

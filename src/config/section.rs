@@ -1,8 +1,8 @@
 //! The tables of the site file, one function each.
 
 use super::table::{Placed, Section};
-use super::{Benchmark, Config, HookConfig, SiteConfig, alert, declared, source, value, vector};
-use crate::alert::{Level, Policy};
+use super::{Benchmark, Config, SiteConfig, alert, declared, hook, source, value, vector};
+use crate::alert::Policy;
 use crate::monitor::{Explain, Settings, SiteLevel, Watched};
 use crate::reading::{BenchmarkId, Quantity, Suspicion, Unit};
 use jiff::SignedDuration;
@@ -10,12 +10,9 @@ use jiff::tz::TimeZone;
 use std::collections::{BTreeMap, BTreeSet};
 use std::net::SocketAddr;
 use std::path::Path;
-use std::time::Duration;
 
 /// Refits of the last three months are all kept.
 const KEEP_REFITS: SignedDuration = SignedDuration::from_hours(90 * 24);
-
-const HOOK_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// The whole file; `None` where something without which there is no config is missing.
 pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
@@ -32,18 +29,7 @@ pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
     let (benchmarks, own) = benchmarks(root, &known, &policy);
     let declared = declared::events(root, &benchmarks);
     let watched = watched(&known, &benchmarks);
-    let hooks: Vec<HookConfig> = root
-        .tables("hook", "hook")
-        .into_iter()
-        .filter_map(|section| hook(section, base))
-        .collect();
-    if hooks.is_empty() && !root.has("hook") {
-        root.warning(
-            root.at(),
-            "there is no [[hook]]: nobody is told of an alert".to_owned(),
-            "add [[hook]] with run = [\"./notify.sh\"]",
-        );
-    }
+    let hooks = hook::hooks(root, base);
     Some(Config {
         file: file.to_owned(),
         site: site?,
@@ -323,65 +309,4 @@ fn benchmark_source(section: &mut Section<'_>, known: &[&str]) -> Option<String>
             None
         }
     }
-}
-
-fn hook(mut section: Section<'_>, base: &Path) -> Option<HookConfig> {
-    let run = section.texts("run");
-    if run.as_ref().is_none_or(|run| run.value.is_empty()) {
-        let at = run.as_ref().map_or(section.at(), |run| &run.at);
-        section.error(
-            at,
-            "hook.run names no program".to_owned(),
-            "write run = [\"./notify.sh\"]",
-        );
-    }
-    let levels = hook_levels(&mut section);
-    let timeout = section.parsed("timeout", value::duration);
-    let sandbox = section.switch("sandbox").unwrap_or(true);
-    let site = section.switch("site").unwrap_or(false);
-    let writable = section.texts("writable");
-    if let Some(paths) = writable.as_ref().filter(|_| !sandbox) {
-        section.warning(
-            &paths.at,
-            "hook.writable without a sandbox allows nothing more".to_owned(),
-            "leave it out, or write sandbox = true",
-        );
-    }
-    let writable = writable.map_or_else(Vec::new, |paths| paths.value);
-    section.finish();
-    Some(HookConfig {
-        run: run?.value.into_iter().map(|word| word.value).collect(),
-        levels,
-        site,
-        timeout: timeout.map_or(HOOK_TIMEOUT, |given| given.value.unsigned_abs()),
-        folder: base.to_owned(),
-        sandbox,
-        writable: (writable.iter().map(|path| base.join(&path.value))).collect(),
-        launcher: None,
-    })
-}
-
-fn hook_levels(section: &mut Section<'_>) -> Vec<Level> {
-    let Some(words) = section.texts("levels") else {
-        return vec![Level::Orange, Level::Red, Level::Unknown];
-    };
-    if words.value.is_empty() {
-        section.error(
-            &words.at,
-            "hook.levels is empty: the hook would never run".to_owned(),
-            "write levels = [\"orange\", \"red\"]",
-        );
-    }
-    let mut levels = Vec::new();
-    for word in words.value {
-        match value::level(&word.value) {
-            Ok(level) => levels.push(level),
-            Err(fix) => section.error(
-                &word.at,
-                format!("hook.levels has {:?}, which is no level", word.value),
-                fix,
-            ),
-        }
-    }
-    levels
 }

@@ -1,6 +1,6 @@
 //! Runs one hook once: cleaned environment, alert on stdin, own process group, killed at its timeout.
 
-use super::sandbox;
+use super::{sandbox, webhook};
 use crate::alert::Level;
 use crate::config::HookConfig;
 use crate::monitor::{AlertState, CLOCK_FAULT, Event, EventKind};
@@ -180,12 +180,32 @@ pub enum Outcome {
     Signalled(i32),
     /// Killed with all its children when the time was up.
     TimedOut,
-    /// It could not be run at all.
+    /// The receiver of a webhook answered with this status.
+    Refused(u16),
+    /// It could not be run, or sent, at all.
     NotStarted(String),
 }
 
-/// Runs `hook` for `alert`; `attempt` counts from 1.
+/// Runs `hook` for `alert`, or sends it where it is a webhook; `attempt` counts from 1.
 pub async fn run(hook: &HookConfig, alert: &Alert, attempt: u32) -> Outcome {
+    let Some(to) = &hook.webhook else {
+        return run_program(hook, alert, attempt).await;
+    };
+    let outcome = match alert.body(attempt) {
+        Ok(body) => webhook::send(to, alert, (body, hook.timeout)).await,
+        Err(error) => Outcome::NotStarted(error.to_string()),
+    };
+    tracing::info!(
+        webhook = to.name,
+        key = alert.key,
+        attempt,
+        ?outcome,
+        "webhook ended"
+    );
+    outcome
+}
+
+async fn run_program(hook: &HookConfig, alert: &Alert, attempt: u32) -> Outcome {
     let run = run_name();
     let mut child = match start(hook, alert, (attempt, &run)) {
         Ok(child) => child,

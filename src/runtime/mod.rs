@@ -28,3 +28,4 @@ pub mod standing;
 pub mod tail;
 pub mod view;
 pub mod vitals;
+mod webhook;

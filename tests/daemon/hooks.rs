@@ -14,6 +14,7 @@ use slipwatch::runtime::deliver::{Dispatcher, Retry};
 use slipwatch::runtime::delivered::Delivered;
 use slipwatch::runtime::hook::{self, Alert, Outcome, Status};
 use slipwatch::store::{Fate, Store};
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -47,6 +48,8 @@ fn hook(script: &str) -> (TempDir, HookConfig) {
     std::fs::write(folder.path().join("hook.sh"), script).unwrap();
     let config = HookConfig {
         site: false,
+        webhook: None,
+        benchmarks: BTreeSet::new(),
         run: vec!["/bin/sh".to_owned(), "hook.sh".to_owned()],
         levels: vec![Level::Orange, Level::Red],
         timeout: Duration::from_secs(30),

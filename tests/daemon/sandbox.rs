@@ -6,6 +6,7 @@ use slipwatch::monitor::{AlertState, Event, EventKind};
 use slipwatch::reading::BenchmarkId;
 use slipwatch::runtime::hook::{self, Alert, Outcome, Status};
 use slipwatch::runtime::sandbox::{self, Walls};
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -46,6 +47,8 @@ fn folder_outside_tmp() -> Option<TempDir> {
 fn walled(folder: &Path, run: &[&str]) -> HookConfig {
     HookConfig {
         site: false,
+        webhook: None,
+        benchmarks: BTreeSet::new(),
         run: run.iter().map(|word| (*word).to_owned()).collect(),
         levels: vec![Level::Red],
         timeout: Duration::from_secs(30),

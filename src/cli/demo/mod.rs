@@ -18,6 +18,7 @@ use anyhow::Context;
 use crisis::{CRISES, Crisis};
 use indicatif::{ProgressBar, ProgressStyle};
 use jiff::SignedDuration;
+use std::collections::BTreeSet;
 use std::io::{self, Write};
 use std::net::SocketAddr;
 use std::path::Path;
@@ -201,6 +202,8 @@ fn sample_hook(folder: &Path) -> anyhow::Result<HookConfig> {
         .with_context(|| format!("cannot write {}", script.display()))?;
     Ok(HookConfig {
         site: false,
+        webhook: None,
+        benchmarks: BTreeSet::new(),
         run: vec![script.display().to_string(), WRITTEN.to_owned()],
         levels: vec![Level::Orange, Level::Red, Level::Unknown],
         timeout: Duration::from_secs(10),

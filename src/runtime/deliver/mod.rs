@@ -208,9 +208,10 @@ impl Dispatcher {
 }
 
 impl HookConfig {
-    /// What logs and receipts call it: its command line.
+    /// What logs and receipts call it: its command line, or the webhook's name.
     pub fn name(&self) -> String {
-        self.run.join(" ")
+        let own = self.webhook.as_ref().map(|webhook| webhook.name.clone());
+        own.unwrap_or_else(|| self.run.join(" "))
     }
 
     /// Whether it is told of an alert of this level, at a benchmark or the whole site. What tells of many benchmarks
@@ -218,7 +219,9 @@ impl HookConfig {
     fn asks_for(&self, alert: &Alert) -> bool {
         let is_of_the_site = alert.event.benchmark.is_none() && !alert.is_flood();
         let is_ours = self.site == is_of_the_site || alert.is_of_the_clock();
-        self.levels.contains(&alert.level) && is_ours
+        let is_of_ours = (alert.event.benchmark.as_ref())
+            .is_none_or(|one| self.benchmarks.is_empty() || self.benchmarks.contains(one));
+        self.levels.contains(&alert.level) && is_ours && is_of_ours
     }
 }
 

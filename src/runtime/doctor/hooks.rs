@@ -1,7 +1,7 @@
 //! Whether the hooks could be run; none is.
 
 use super::{Finding, Verdict};
-use crate::config::HookConfig;
+use crate::config::{HookConfig, Secret};
 use crate::runtime::sandbox::{self, Walls};
 use nix::unistd::{AccessFlags, access};
 use std::ffi::OsStr;
@@ -15,6 +15,20 @@ const FIRST_LINE_BYTES: u64 = 256;
 
 /// Is it there, can it be executed, is its interpreter there.
 pub(super) fn finding(hook: &HookConfig) -> Finding {
+    if let Some(webhook) = &hook.webhook {
+        let name = &webhook.name;
+        let (verdict, text) = match Secret::read(&webhook.secret_file) {
+            Ok(_) => (
+                Verdict::Good,
+                format!("{name} has its secret; hook test sends to it"),
+            ),
+            Err(error) => (
+                Verdict::Wrong,
+                format!("{name}: {error}: alerts would go nowhere"),
+            ),
+        };
+        return Finding::new("webhook", verdict, text);
+    }
     let (verdict, text) = match runnable(&hook.program()) {
         Ok(text) => (Verdict::Good, text),
         Err(text) => (Verdict::Wrong, format!("{text}: alerts would go nowhere")),

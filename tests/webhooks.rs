@@ -1,0 +1,374 @@
+//! Webhooks against real listeners: what they get, that it is signed, and how failures are tried again.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test fails by panicking"
+)]
+
+use slipwatch::alert::Level;
+use slipwatch::config::{self, HookConfig};
+use slipwatch::monitor::{AlertState, Event, EventKind};
+use slipwatch::reading::BenchmarkId;
+use slipwatch::runtime::deliver::{Dispatcher, Retry};
+use slipwatch::runtime::delivered::Delivered;
+use slipwatch::runtime::hook::{self, Alert, Outcome, Status};
+use slipwatch::store::{Fate, Store};
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpListener;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+const SECRET: &str = "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw";
+
+/// What one request held.
+#[derive(Debug, Clone)]
+struct Got {
+    line: String,
+    headers: BTreeMap<String, String>,
+    body: String,
+}
+
+/// A receiver on a port of its own, which answers with these statuses in turn and then with the last one; 0: never.
+struct Receiver {
+    url: String,
+    got: Arc<Mutex<Vec<Got>>>,
+}
+
+impl Receiver {
+    fn answering(statuses: &[u16]) -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let url = format!("http://{}/alerts?x=1", listener.local_addr().unwrap());
+        let got = Arc::new(Mutex::new(Vec::new()));
+        let (seen, statuses) = (Arc::clone(&got), statuses.to_vec());
+        std::thread::spawn(move || {
+            let mut open = Vec::new();
+            for (number, stream) in listener.incoming().enumerate() {
+                let mut stream = stream.unwrap();
+                seen.lock().unwrap().push(request(&stream));
+                let status = statuses[number.min(statuses.len() - 1)];
+                if status == 0 {
+                    // Held open, never answered.
+                    open.push(stream);
+                    continue;
+                }
+                let answer = format!("HTTP/1.1 {status} Said\r\ncontent-length: 2\r\n\r\nok");
+                stream.write_all(answer.as_bytes()).unwrap();
+            }
+        });
+        Self { url, got }
+    }
+
+    fn got(&self) -> Vec<Got> {
+        self.got.lock().unwrap().clone()
+    }
+}
+
+fn request(stream: &std::net::TcpStream) -> Got {
+    let mut reader = BufReader::new(stream);
+    let mut next = || {
+        let mut line = String::new();
+        reader.read_line(&mut line).unwrap();
+        line.trim_end().to_owned()
+    };
+    let line = next();
+    let mut headers = BTreeMap::new();
+    loop {
+        let line = next();
+        let Some((name, value)) = line.split_once(": ") else {
+            break;
+        };
+        headers.insert(name.to_ascii_lowercase(), value.to_owned());
+    }
+    let mut body = vec![0; headers["content-length"].parse().unwrap()];
+    reader.read_exact(&mut body).unwrap();
+    let body = String::from_utf8(body).unwrap();
+    Got {
+        line,
+        headers,
+        body,
+    }
+}
+
+/// The webhooks of a config with these tables.
+fn webhooks(folder: &Path, tables: &str) -> Vec<HookConfig> {
+    std::fs::write(folder.join("secret"), format!("{SECRET}\n")).unwrap();
+    config::parse(&text(tables), &folder.join("site.toml"))
+        .unwrap()
+        .hooks
+}
+
+fn text(tables: &str) -> String {
+    format!(
+        "[site]\nname = \"Monte Toc\"\nstate_dir = \"state\"\n\
+         [[source]]\nid = \"logger\"\nkind = \"csv\"\npath = \"*.csv\"\n{tables}"
+    )
+}
+
+fn webhook(url: &str, more: &str) -> String {
+    format!("[[webhook]]\nurl = \"{url}\"\nsecret_file = \"secret\"\n{more}\n")
+}
+
+fn alert(benchmark: &str, key: &str) -> Alert {
+    let event = Event {
+        time: "2017-06-06T17:00:00Z".parse().unwrap(),
+        benchmark: Some(BenchmarkId::new(benchmark)),
+        kind: EventKind::Alert {
+            level: Level::Red,
+            state: AlertState::Firing,
+            key: key.to_owned(),
+            rule: "chance".to_owned(),
+            text: "red at 5: caf\u{e9}".to_owned(),
+        },
+    };
+    Alert::new(&event, "Monte Toc", None, Status::Actual).unwrap()
+}
+
+fn quick() -> Retry {
+    Retry {
+        attempts: 3,
+        first_delay: Duration::from_millis(20),
+        longest_delay: Duration::from_millis(40),
+        seed: 7,
+    }
+}
+
+async fn eventually(what: &str, mut claim: impl FnMut() -> bool) {
+    for _ in 0..3000 {
+        if claim() {
+            return;
+        }
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    panic!("never: {what}");
+}
+
+/// The signature as Python's own library makes it.
+fn signature_by_python(got: &Got) -> Option<String> {
+    let program = "import base64,hashlib,hmac,sys\n\
+        key = base64.b64decode(sys.argv[1].removeprefix('whsec_'))\n\
+        signed = (sys.argv[2] + '.' + sys.argv[3] + '.').encode() + sys.stdin.buffer.read()\n\
+        print('v1,' + base64.b64encode(hmac.new(key, signed, hashlib.sha256).digest()).decode())";
+    let (id, time) = (
+        &got.headers["webhook-id"],
+        &got.headers["webhook-timestamp"],
+    );
+    let mut child = Command::new("python3")
+        .args(["-c", program, SECRET, id, time])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .ok()?;
+    let mut stdin = child.stdin.take().unwrap();
+    stdin.write_all(got.body.as_bytes()).unwrap();
+    drop(stdin);
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success());
+    Some(String::from_utf8(output.stdout).unwrap().trim().to_owned())
+}
+
+#[tokio::test]
+async fn a_webhook_gets_what_a_hook_gets_on_stdin_under_a_signature() {
+    let folder = tempfile::tempdir().unwrap();
+    let receiver = Receiver::answering(&[204]);
+    let hooks = webhooks(folder.path(), &webhook(&receiver.url, ""));
+    let alert = alert("m\u{fc}hle", "m\u{fc}hle/red/1.5");
+    assert_eq!(hook::run(&hooks[0], &alert, 3).await, Outcome::Done);
+    let got = receiver.got().remove(0);
+    assert_eq!(got.line, "POST /alerts?x=1 HTTP/1.1");
+    assert_eq!(got.headers["content-type"], "application/json");
+    // No full stop: it parts what is signed.
+    assert_eq!(got.headers["webhook-id"], "m%C3%BChle/red/1%2E5/red/firing");
+    let body: serde_json::Value = serde_json::from_str(&got.body).unwrap();
+    for (key, value) in [
+        ("event", "alert"),
+        ("benchmark", "m\u{fc}hle"),
+        ("level", "red"),
+        ("key", "m\u{fc}hle/red/1.5"),
+        ("site", "Monte Toc"),
+        ("status", "Actual"),
+    ] {
+        assert_eq!(body[key], value, "{key}");
+    }
+    assert_eq!(body["attempt"], 3);
+    let sent: i64 = got.headers["webhook-timestamp"].parse().unwrap();
+    let now = slipwatch::runtime::clock::now().as_second();
+    assert!(
+        (now - 600..=now).contains(&sent),
+        "{sent} is not now: {now}"
+    );
+    match signature_by_python(&got) {
+        Some(expected) => assert_eq!(got.headers["webhook-signature"], expected),
+        None => eprintln!("skipped: the signature, without python3"),
+    }
+}
+
+#[tokio::test]
+async fn a_webhook_that_fails_is_tried_again_under_the_same_id_until_it_is_taken() {
+    let folder = tempfile::tempdir().unwrap();
+    // More failures than what need not arrive is given: a red is never given up. A redirection is a failure.
+    let receiver = Receiver::answering(&[500, 503, 302, 429, 200]);
+    let hooks = webhooks(folder.path(), &webhook(&receiver.url, ""));
+    let store = Arc::new(Store::open(&folder.path().join("state")).unwrap());
+    let dispatcher = Dispatcher::start(&hooks, &quick(), Delivered::of(Arc::clone(&store)));
+    let red = alert("5", "toc/5/red/1");
+    assert!(dispatcher.offer(&red));
+    let identity = ("toc/5/red/1", "red", "firing");
+    let is_taken = || {
+        let noted = store.is_noted(identity, Some(&receiver.url), Some(Fate::Delivered));
+        noted.unwrap()
+    };
+    eventually("taken", is_taken).await;
+    assert!(dispatcher.offer(&red), "it has been taken");
+    assert_eq!(dispatcher.close(Duration::from_secs(20)).await, Some(0));
+    let got = receiver.got();
+    assert_eq!(got.len(), 5, "it is sent again after it was taken");
+    let ids: BTreeSet<&str> = (got.iter())
+        .map(|one| one.headers["webhook-id"].as_str())
+        .collect();
+    assert_eq!(ids, BTreeSet::from(["toc/5/red/1/red/firing"]));
+    assert_eq!(store.attempts(identity, &receiver.url).unwrap(), 5);
+}
+
+#[tokio::test]
+async fn a_receiver_that_never_answers_holds_no_other_ones_red() {
+    let folder = tempfile::tempdir().unwrap();
+    let (hanging, other) = (Receiver::answering(&[0]), Receiver::answering(&[200]));
+    let tables = [
+        webhook(&hanging.url, "timeout = \"1h\""),
+        webhook(&other.url, "timeout = \"1h\""),
+    ];
+    let hooks = webhooks(folder.path(), &tables.concat());
+    let dispatcher = Dispatcher::start(&hooks, &quick(), Delivered::default());
+    for number in 0..20 {
+        let benchmark = format!("b{number}");
+        assert!(dispatcher.offer(&alert(&benchmark, &format!("{benchmark}/red/1"))));
+    }
+    eventually("that the hanging one is at work", || {
+        !hanging.got().is_empty()
+    })
+    .await;
+    eventually("the other one's", || other.got().len() == 20).await;
+    // Cut off: the hanging one has an hour.
+    assert_eq!(dispatcher.close(Duration::from_millis(100)).await, None);
+}
+
+#[tokio::test]
+async fn a_webhook_ends_at_its_timeout_and_says_why_it_cannot_be_sent() {
+    let folder = tempfile::tempdir().unwrap();
+    let hanging = Receiver::answering(&[0]);
+    let free = TcpListener::bind("127.0.0.1:0")
+        .unwrap()
+        .local_addr()
+        .unwrap();
+    let tables = [
+        webhook(&hanging.url, "timeout = \"300ms\""),
+        webhook(&format!("http://{free}/"), ""),
+    ];
+    let hooks = webhooks(folder.path(), &tables.concat());
+    let alert = alert("5", "k");
+    assert_eq!(hook::run(&hooks[0], &alert, 1).await, Outcome::TimedOut);
+    let refused = hook::run(&hooks[1], &alert, 1).await;
+    assert!(
+        matches!(&refused, Outcome::NotStarted(why) if why.contains("refused")),
+        "{refused:?}"
+    );
+    std::fs::write(folder.path().join("secret"), "guess me").unwrap();
+    let unsigned = hook::run(&hooks[0], &alert, 1).await;
+    assert!(
+        matches!(&unsigned, Outcome::NotStarted(why) if why.contains("whsec_")),
+        "{unsigned:?}"
+    );
+    assert_eq!(hanging.got().len(), 1, "nothing goes out unsigned");
+}
+
+#[tokio::test]
+async fn a_webhook_is_sent_the_benchmarks_and_levels_that_it_asks_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let (one, all) = (Receiver::answering(&[200]), Receiver::answering(&[200]));
+    let tables = [
+        webhook(&one.url, "benchmarks = [\"5\"]"),
+        webhook(&all.url, "levels = [\"red\"]"),
+        webhook(&format!("{}&y", all.url), "levels = [\"yellow\"]"),
+    ];
+    let hooks = webhooks(folder.path(), &tables.concat());
+    let dispatcher = Dispatcher::start(&hooks, &quick(), Delivered::default());
+    dispatcher.offer(&alert("4", "4/red/1"));
+    dispatcher.offer(&alert("5", "5/red/1"));
+    assert_eq!(dispatcher.close(Duration::from_secs(20)).await, Some(0));
+    let keys = |receiver: &Receiver| -> BTreeSet<String> {
+        let got = receiver.got();
+        got.iter()
+            .map(|one| one.headers["webhook-id"].clone())
+            .collect()
+    };
+    assert_eq!(
+        keys(&one),
+        BTreeSet::from(["5/red/1/red/firing".to_owned()])
+    );
+    assert_eq!(all.got().len(), 2);
+    assert_eq!(keys(&all).len(), 2);
+}
+
+#[test]
+fn a_config_says_what_is_wrong_with_a_webhook() {
+    for (table, what) in [
+        (webhook("https://example.org/", ""), "TLS"),
+        (webhook("ftp://example.org/", ""), "is not http"),
+        (webhook("/path", ""), "is not http"),
+        (webhook("http://me:secret@example.org/", ""), "password"),
+        (
+            webhook("http://a/", "benchmarks = []"),
+            "webhook.benchmarks is empty",
+        ),
+        (
+            webhook("http://a/", "levels = [\"rot\"]"),
+            "webhook.levels has \"rot\"",
+        ),
+        (
+            webhook("http://a/", "").repeat(2),
+            "two webhooks \"http://a/\"",
+        ),
+        (
+            "[[webhook]]\nurl = \"http://a/\"\n".to_owned(),
+            "webhook.secret_file",
+        ),
+    ] {
+        let refused = config::parse(&text(&table), Path::new("site.toml")).expect_err(&table);
+        assert!(refused.to_string().contains(what), "{what}: {refused}");
+    }
+}
+
+#[test]
+fn hook_test_sends_a_drill_to_a_webhook_and_check_reads_its_secret() {
+    let folder = tempfile::tempdir().unwrap();
+    let receiver = Receiver::answering(&[200, 401]);
+    let table = webhook(&receiver.url, "name = \"control room\"");
+    std::fs::write(folder.path().join("site.toml"), text(&table)).unwrap();
+    let ask = |words: &[&str]| {
+        let output = Command::new(env!("CARGO_BIN_EXE_slipwatch"))
+            .args(words)
+            .current_dir(folder.path())
+            .output()
+            .unwrap();
+        let said = [&output.stdout[..], &output.stderr].concat();
+        (
+            output.status.code(),
+            String::from_utf8_lossy(&said).into_owned(),
+        )
+    };
+    let (_, said) = ask(&["check", "--config-only", "site.toml"]);
+    assert!(said.contains("cannot read the secret file"), "{said}");
+    std::fs::write(folder.path().join("secret"), SECRET).unwrap();
+    let (code, said) = ask(&["hook", "test", "--config", "site.toml"]);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("control room: done"), "{said}");
+    let body: serde_json::Value = serde_json::from_str(&receiver.got()[0].body).unwrap();
+    assert_eq!(body["status"], "Test");
+    let (code, said) = ask(&["hook", "test", "--config", "site.toml"]);
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains("answered with status 401"), "{said}");
+}
