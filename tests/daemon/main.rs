@@ -14,3 +14,4 @@ mod sandbox;
 mod serve;
 mod service;
 mod site;
+mod webhooks;

@@ -1,11 +1,5 @@
 //! Webhooks against real listeners: what they get, that it is signed, and how failures are tried again.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test fails by panicking"
-)]
-
 use slipwatch::alert::Level;
 use slipwatch::config::{self, HookConfig};
 use slipwatch::monitor::{AlertState, Event, EventKind};
