@@ -12,7 +12,7 @@ use super::outlook::forecast_change;
 use super::partition::partition_candidate;
 use super::ready::Ready;
 use super::remarks;
-use super::search::NO_READINGS;
+use super::search::Withheld;
 use super::tell::tell;
 use super::term::Scratch;
 use super::verdict::conclude;
@@ -115,9 +115,9 @@ fn look(
     };
     progress(0.05);
     let is_drawn = explanation
-        .flags
+        .faults
         .iter()
-        .any(|flag| flag == FaultKind::Interpolated.name());
+        .any(|fault| fault.kind == FaultKind::Interpolated && fault.channel.is_none());
     let search = ready.search(options, is_drawn);
     if let Some(mut found) = search.run(ready.plain.clone(), progress) {
         let ground = (
@@ -131,15 +131,16 @@ fn look(
             &mut found,
             (options.bic_margin, &mut scratch),
         );
+        let withheld = found.withheld;
         tell(explanation, ground, (found, verdict), options, &mut scratch);
         if is_drawn {
-            withhold(explanation);
+            withhold(explanation, withheld);
         }
     }
 }
 
 /// Of values that are no readings no noise is concluded, and what they would show if they were readings is a remark.
-fn withhold(explanation: &mut Explanation) {
+fn withhold(explanation: &mut Explanation, best: Option<Withheld>) {
     if explanation.verdict.effect == Kind::CorrelatedNoise {
         explanation.verdict = Effect::of(Kind::Unexplained);
         explanation.explained = Explained::None;
@@ -147,9 +148,6 @@ fn withhold(explanation: &mut Explanation) {
     explanation
         .also
         .retain(|also| also.effect != Kind::CorrelatedNoise);
-    let withheld = |one: &&Candidate| one.rejected_because.as_deref() == Some(NO_READINGS);
-    let best = explanation.candidates.iter().filter(withheld);
-    let best = best.max_by(|a, b| a.bic_gain.total_cmp(&b.bic_gain));
     let Some(best) = best else { return };
     if explanation.verdict.effect == Kind::None {
         explanation.verdict = Effect::of(Kind::Unexplained);
@@ -159,7 +157,7 @@ fn withhold(explanation: &mut Explanation) {
         .map_or(String::new(), |at| at.strftime(" of %Y-%m-%d").to_string());
     explanation.remarks.push(format!(
         "If the values were readings, {}{at} would be what explains them best; they are not, and nothing is concluded.",
-        best.effect
+        best.kind
     ));
 }
 

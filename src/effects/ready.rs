@@ -54,6 +54,7 @@ impl Ready {
             is_drawn,
             scratch: Scratch::default(),
             candidates: Vec::new(),
+            withheld: None,
         }
     }
 }

@@ -31,8 +31,7 @@ const LEAST_JUMP: f64 = 0.1;
 const ASTRONOMICAL: f64 = 20.0;
 
 /// Why nothing is concluded from a drawn or interpolated curve by its shape alone.
-pub(super) const NO_READINGS: &str =
-    "the values are no readings: they are smoother than any instrument's";
+const NO_READINGS: &str = "the values are no readings: they are smoother than any instrument's";
 
 /// One effect that was believed.
 #[derive(Debug, Clone)]
@@ -41,6 +40,14 @@ pub(super) struct Accepted {
     pub(super) p_value: f64,
     /// What would have done as well, by title.
     pub(super) ties: Vec<String>,
+}
+
+/// What would be believed of values that are no readings, were they readings.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Withheld {
+    pub(super) kind: Kind,
+    pub(super) at: Option<Timestamp>,
+    bic_gain: f64,
 }
 
 /// What a search came to.
@@ -53,6 +60,8 @@ pub(super) struct Found {
     /// By term of `full`.
     pub(super) accepted: Vec<Accepted>,
     pub(super) candidates: Vec<Candidate>,
+    /// What gains most, in the last round, of what was refused because the values are no readings.
+    pub(super) withheld: Option<Withheld>,
 }
 
 /// A search at work.
@@ -66,6 +75,7 @@ pub(super) struct Search<'a> {
     pub(super) is_drawn: bool,
     pub(super) scratch: Scratch,
     pub(super) candidates: Vec<Candidate>,
+    pub(super) withheld: Option<Withheld>,
 }
 
 /// A refitted candidate.
@@ -159,11 +169,13 @@ impl Search<'_> {
             full,
             accepted,
             candidates: self.candidates,
+            withheld: self.withheld,
         })
     }
 
     /// The best effect that may be added to `base`, refitted with it.
     fn one_more(&mut self, base: &Fitted, round: usize) -> Option<(Fitted, Accepted)> {
+        self.withheld = None;
         let mut refitted = self.refits(base, round)?;
         refitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         prefer_witnesses(&mut refitted, self.options.bic_margin);
@@ -235,6 +247,7 @@ impl Search<'_> {
             return (None, Some(reason));
         }
         if self.is_drawn && !has_witness(one.term.kind) {
+            self.withhold(one);
             return (None, Some(NO_READINGS.to_owned()));
         }
         // A jump, or the blur of a mean, says nothing of what comes.
@@ -242,6 +255,17 @@ impl Search<'_> {
             return (None, None);
         }
         self.held_out(base, one)
+    }
+
+    fn withhold(&mut self, one: &Refitted) {
+        if self.withheld.is_none_or(|best| best.bic_gain < one.gain) {
+            let at = one.term.at.and_then(|at| time_of(self.problem, at));
+            self.withheld = Some(Withheld {
+                kind: one.term.kind,
+                at,
+                bic_gain: one.gain,
+            });
+        }
     }
 
     /// The held-out error with `one` over that without, and why it speaks against it.

@@ -46,10 +46,8 @@ impl KeptForecast {
     /// Days from `now` to its median; `None` where it gives a failure less than one half.
     pub(super) fn left_days(&self, now: Timestamp) -> Option<f64> {
         let needed = 0.5 / self.share;
-        let index = self.days.iter().zip(1u32..);
-        let median = index
-            .filter(|(_, count)| f64::from(*count) >= needed)
-            .map(|(days, _)| *days);
-        Some(median.min_by(f64::total_cmp)? - days_since(self.time, now))
+        let mut counted = self.days.iter().zip(1u32..);
+        let (median, _) = counted.find(|(_, count)| f64::from(*count) >= needed)?;
+        Some(median - days_since(self.time, now))
     }
 }

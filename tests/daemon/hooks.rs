@@ -6,6 +6,7 @@
     reason = "a test fails by panicking"
 )]
 
+use crate::eventually::eventually;
 use slipwatch::alert::Level;
 use slipwatch::config::HookConfig;
 use slipwatch::monitor::{AlertState, Event, EventKind};
@@ -68,17 +69,6 @@ fn read(folder: &TempDir, name: &str) -> String {
 fn is_running(pid: &str) -> bool {
     let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
     !stat.is_empty() && !stat.contains(") Z ")
-}
-
-/// Waits until `claim` holds; how long that takes is not what is tested.
-async fn eventually(what: &str, mut claim: impl FnMut() -> bool) {
-    for _ in 0..3000 {
-        if claim() {
-            return;
-        }
-        tokio::time::sleep(Duration::from_millis(10)).await;
-    }
-    panic!("never: {what}");
 }
 
 async fn run(hook_config: &HookConfig, alert: &Alert) -> Outcome {

@@ -5,6 +5,7 @@
 mod browser;
 mod daemon;
 mod deploy;
+mod eventually;
 mod follow;
 mod hooks;
 mod mqtt;

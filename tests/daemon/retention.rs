@@ -261,7 +261,7 @@ fn size(folder: &Path) -> u64 {
 }
 
 #[test]
-#[ignore = "minutes: 3.5 million steps; cargo test --test retention -- --ignored --nocapture"]
+#[ignore = "minutes: 3.5 million steps; cargo test --test daemon retention:: -- --ignored --nocapture"]
 fn ten_years_of_forty_benchmarks_at_an_hour_stay_under_a_gibibyte() {
     let folder = tempfile::tempdir().unwrap();
     let benchmarks: Vec<BenchmarkId> = (0..40)

@@ -1,5 +1,6 @@
 //! Webhooks against real listeners: what they get, that it is signed, and how failures are tried again.
 
+use crate::eventually::eventually;
 use slipwatch::alert::Level;
 use slipwatch::config::{self, HookConfig};
 use slipwatch::monitor::{AlertState, Event, EventKind};
@@ -128,16 +129,6 @@ fn quick() -> Retry {
         longest_delay: Duration::from_millis(40),
         seed: 7,
     }
-}
-
-async fn eventually(what: &str, mut claim: impl FnMut() -> bool) {
-    for _ in 0..3000 {
-        if claim() {
-            return;
-        }
-        tokio::time::sleep(Duration::from_millis(10)).await;
-    }
-    panic!("never: {what}");
 }
 
 /// The signature as Python's own library makes it.
