@@ -21,6 +21,20 @@ impl Passage {
         Self::from_times(times.collect())
     }
 
+    /// The same, each chance within a time raised to `power`.
+    #[must_use]
+    pub fn raised(&self, power: f64) -> Self {
+        let mut within = 0.0_f64;
+        let times = self.times.iter().map(|(days, share)| {
+            let before = within.min(1.0).powf(power);
+            within += share;
+            (*days, within.min(1.0).powf(power) - before)
+        });
+        Self {
+            times: times.collect(),
+        }
+    }
+
     /// (days from now, probability), in increasing time; what is missing to 1 never passes.
     pub fn times(&self) -> &[(f64, f64)] {
         &self.times
@@ -48,6 +62,18 @@ impl Passage {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn raised_chances_keep_their_times_and_grow_within_each() {
+        let passage = Passage {
+            times: vec![(1.0, 0.04), (2.0, 0.12), (90.0, 0.84)],
+        };
+        let raised = passage.raised(0.5);
+        assert!((raised.chance_within(1.0) - 0.2).abs() < 1e-12);
+        assert!((raised.chance_within(2.0) - 0.4).abs() < 1e-12);
+        assert!((raised.chance_within(90.0) - 1.0).abs() < 1e-12);
+        assert_eq!(passage.raised(1.0).times().len(), 3);
+    }
 
     #[test]
     fn quantiles_are_unconditional_and_stop_at_the_horizon() {
