@@ -36,13 +36,18 @@ const LAST_VELOCITY: f64 = 93.0;
 const SLOWED: f64 = 0.5;
 /// How far the time of a collapse is the law's where the law is sure that one comes; set with Lanzada in view.
 const TIMED: f64 = 0.35;
-/// How far the growth of a slope that runs up departs from a straight line in inverse velocity, and over how many shorter
-/// scales it is looked for.
-const ROUGH: f64 = 0.8;
+/// Over how many shorter scales the growth of the velocity is looked for.
 const GROWN_SCALES: usize = 10;
-/// What is left of the chance where the velocity has stopped growing: half of the published failures paused or came in
+/// How far the growth of a slope that runs up departs from a straight line in inverse velocity, and what is left of the
+/// chance that levels go by where the velocity has stopped growing: half of the published failures paused or came in
 /// pieces (10 of 19), and most of what pauses does so for good. Set with Preonzo's pause in view.
+const ROUGH: f64 = 0.8;
 const PAUSED: f64 = 0.25;
+/// The same for the chance that is reported, where it is not sure that the slope accelerates; and the most, ln, that one
+/// scale can speak for growth.
+const UNEVEN: f64 = 0.4;
+const STEADY: f64 = 0.1;
+const ONE_SCALE: f64 = 3.0;
 /// The power of the chances within each time where a collapse is sure to come. Families of simulated slopes that taught
 /// a network nothing collapse sooner than it says (docs/families.md); chosen on these, with the measured series in view.
 const SOONER: f64 = 0.6;
@@ -115,9 +120,11 @@ impl Indicators {
     pub fn collapse_by(&self, network: &Network, members: &Members) -> Collapse {
         let (mut reached, mut sure) = (0.0_f64, 0.0_f64);
         let (mut all, mut counted) = (Vec::new(), Vec::new());
+        let accelerating = self.accelerating();
         for (power, days) in spans(&self.scales) {
             let chance = network.chance(&self.inputs(members, (power, days)));
-            reached = reached.max(chance);
+            let creeps = (1.0 - accelerating) * (1.0 - may_grow(&self.scales, power));
+            reached = reached.max(chance * (1.0 - creeps));
             let going = goes_on(&self.scales, power) * keeps_growing(&self.scales, power);
             sure = sure.max(self.most(days) * chance * going);
             all.push((days, reached));
@@ -225,22 +232,40 @@ fn goes_on(scales: &Scales, power: usize) -> f64 {
     counts(since) * counts(ever)
 }
 
-/// The share of the chance within the span of scale `power` that is left to a slope whose velocity does not grow as a
-/// collapse at the end of the span D would have it: by s / (D + 2 s) from one block of s days to the next, as a straight
-/// line in inverse velocity has it. The scale that speaks most against such growth counts.
+/// The share of the chance within the span of scale `power` that levels keep of a slope whose velocity may have stopped
+/// growing: the scale that speaks most against growth counts.
 fn keeps_growing(scales: &Scales, power: usize) -> f64 {
+    let least = growth(scales, power, ROUGH).fold(0.0, f64::min);
+    PAUSED + (1.0 - PAUSED) * share(least)
+}
+
+/// The share of the chance within the span of scale `power` that is reported of a slope that may creep steadily: all scales
+/// count together.
+fn may_grow(scales: &Scales, power: usize) -> f64 {
+    let each = growth(scales, power, UNEVEN).map(|ln| ln.min(ONE_SCALE));
+    STEADY + (1.0 - STEADY) * share(each.sum())
+}
+
+/// What an even chance becomes by a likelihood ratio under 1, over one half.
+fn share(ln_ratio: f64) -> f64 {
+    let ratio = ln_ratio.min(0.0).exp();
+    2.0 * ratio / (1.0 + ratio)
+}
+
+/// ln of the likelihood ratio of growth against none, at the scale `power` and each shorter one. A straight line in inverse
+/// velocity that meets zero after the span D grows by s / (D + 2 s) of itself from one block of s days to the next;
+/// `rough` is the standard deviation of that, as a share of it.
+fn growth(scales: &Scales, power: usize, rough: f64) -> impl Iterator<Item = f64> {
     let span = scales.base_days * 2.0_f64.powi(i32::try_from(power).unwrap_or(i32::MAX));
     let shorter = power.saturating_sub(GROWN_SCALES);
     let last = (power + 1).min(scales.each.len());
-    let ln_ratio = |scale: &Scale| {
+    let each = scales.each.get(shorter..last).unwrap_or_default().iter();
+    each.map(move |scale| {
         let moved = ln_above(scale.velocity, error(scale)).exp() * scale.days;
         let expected = moved * scale.days / (span + 2.0 * scale.days);
-        let deviation = scale.near.usual.hypot(ROUGH * expected);
+        let deviation = scale.near.usual.hypot(rough * expected);
         expected * (scale.near.newest - 0.5 * expected) / (deviation * deviation)
-    };
-    let each = scales.each.get(shorter..last).unwrap_or_default();
-    let ratio = each.iter().map(ln_ratio).fold(0.0, f64::min).exp();
-    PAUSED + (1.0 - PAUSED) * 2.0 * ratio / (1.0 + ratio)
+    })
 }
 
 fn spans(scales: &Scales) -> impl Iterator<Item = (usize, f64)> {
@@ -463,6 +488,7 @@ mod tests {
         assert!((2.5..11.0).contains(&median), "{median}");
         let steady = collapse(&readings(190, 0.5, |t| 12.0 * t));
         assert!(steady.sure.chance_within(30.0) < 0.1, "{steady:?}");
+        assert!(steady.passage.chance_within(400.0) < 0.2, "{steady:?}");
         assert!(steady.sure.chance_within(1.0) < 0.02, "{steady:?}");
     }
 
