@@ -2,7 +2,7 @@
 
 use crate::subjects::Subject;
 use crate::tables::{effect, error_cells, number, refused};
-use slipwatch::effects::{Explained, Explanation};
+use slipwatch::effects::{Explained, Explanation, Rival};
 use std::fmt::Write as _;
 
 /// A series with what was found in it.
@@ -90,7 +90,7 @@ fn section(out: &mut String, told: &Told) {
     };
     let _ = writeln!(out, "- Explained: {explained}.");
     if !explanation.cannot_separate_from.is_empty() {
-        let names = explanation.cannot_separate_from.join(", ");
+        let names = Rival::listed(&explanation.cannot_separate_from);
         let _ = writeln!(out, "- Cannot be separated from: {names}.");
     }
     let error = &explanation.error;

@@ -1,6 +1,6 @@
 //! Events as lines for people.
 
-use crate::effects::Kind;
+use crate::effects::{Kind, Rival};
 use crate::monitor::{
     AlertState, Event, EventKind, FailureTime, SharedFailure, Summary, Unexplained,
 };
@@ -228,7 +228,7 @@ fn effect_found(kind: &EventKind) -> String {
     } else {
         format!(
             ", cannot be separated from {}",
-            cannot_separate_from.join(", ")
+            Rival::listed(cannot_separate_from)
         )
     };
     let use_of = if *adopted {

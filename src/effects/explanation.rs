@@ -2,6 +2,7 @@
 
 use super::fuller::Fuller;
 use super::kind::{FaultKind, Form, Kind};
+use super::rival::Rival;
 use crate::reading::{BenchmarkId, Quantity, Timestamp, Unit};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -28,7 +29,7 @@ pub struct Explanation {
     /// The effects accepted after the verdict, in that order.
     pub also: Vec<Effect>,
     /// What explains the same within the margin: kinds, with the channel where there is one.
-    pub cannot_separate_from: Vec<String>,
+    pub cannot_separate_from: Vec<Rival>,
     /// What is wrong with the data themselves.
     pub faults: Vec<Fault>,
     /// Misfit before and after, on the same data and under the same noise model.

@@ -40,6 +40,25 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// All of them.
+    pub const ALL: [Self; 15] = [
+        Self::Hydrological,
+        Self::Seasonal,
+        Self::Tide,
+        Self::LoadStep,
+        Self::StateReset,
+        Self::FrictionChange,
+        Self::RateLimit,
+        Self::Geometry,
+        Self::Partition,
+        Self::Offset,
+        Self::Thermal,
+        Self::IntervalMean,
+        Self::CorrelatedNoise,
+        Self::Unexplained,
+        Self::None,
+    ];
+
     /// As it stands in output and config.
     pub fn name(self) -> &'static str {
         match self {

@@ -1,5 +1,6 @@
 //! From the residual to the effect that the law lacks: the search, the joint refit, before and after.
 
+mod by_clock;
 mod candidates;
 mod clock;
 mod diagnosis;
@@ -23,6 +24,7 @@ mod ready;
 mod refit;
 mod refits;
 mod response;
+mod rival;
 mod search;
 mod surrogate;
 mod tell;
@@ -32,7 +34,7 @@ mod verdict;
 mod watch;
 mod witnesses;
 
-pub use clock::Clock;
+pub use by_clock::ByClock;
 pub use explain::{Options, explain};
 pub use explanation::{
     Candidate, Change, Curves, Effect, ErrorChange, Explained, Explanation, Fault, ForecastChange,
@@ -43,6 +45,7 @@ pub use fuller::{Filtered, Fuller, Part, Wave};
 pub use given::{Cause, error_given};
 pub use kind::{FaultKind, Form, Kind};
 pub use partition::{Partition, partition, partition_candidate};
+pub use rival::Rival;
 pub use together::{Together, explain_together};
 pub use watch::{Residual, residual_structure};
 

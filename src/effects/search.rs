@@ -3,12 +3,13 @@
 use super::candidates;
 use super::explain::Options;
 use super::explanation::Candidate;
-use super::judge::{block, held_out, objection, step_errors, title};
+use super::judge::{block, held_out, named, objection, step_errors};
 use super::kind::Kind;
 use super::noise::{Noise, Whitener};
 use super::problem::Problem;
 use super::refit::{Fitted, Start, plain_starts, refit_every_memory, refit_from};
 use super::response::Driver;
+use super::rival::Rival;
 use super::surrogate::Vain;
 use super::term::{Act, Scratch, Term, event_node};
 use crate::reading::{Timestamp, after_days};
@@ -38,8 +39,8 @@ const NO_READINGS: &str = "the values are no readings: they are smoother than an
 pub(super) struct Accepted {
     pub(super) bic_gain: f64,
     pub(super) p_value: f64,
-    /// What would have done as well, by title.
-    pub(super) ties: Vec<String>,
+    /// What would have done as well.
+    pub(super) ties: Vec<Rival>,
 }
 
 /// What would be believed of values that are no readings, were they readings.
@@ -93,7 +94,7 @@ pub(super) struct Refitted {
 impl Refitted {
     /// What follows the year cannot be told from the season.
     fn with_season(&self, mut how: Accepted, problem: &Problem) -> Accepted {
-        let season = Kind::Seasonal.name().to_owned();
+        let season = Rival::from(Kind::Seasonal);
         let seen = !candidates::seasonal(problem).is_empty();
         if self.follows_season && seen && !how.ties.contains(&season) {
             how.ties.push(season);
@@ -179,7 +180,7 @@ impl Search<'_> {
         let mut refitted = self.refits(base, round)?;
         refitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         prefer_witnesses(&mut refitted, self.options.bic_margin);
-        let mut chosen: Option<(usize, Vec<String>)> = None;
+        let mut chosen: Option<(usize, Vec<Rival>)> = None;
         for (k, one) in refitted.iter().enumerate() {
             let (held, reason) = self.judged(base, one);
             let term = one.fitted.terms.last()?;
@@ -187,7 +188,7 @@ impl Search<'_> {
                 let best = &refitted[*first];
                 let same = best.term.kind == one.term.kind && best.term.channel == one.term.channel;
                 if one.gain > best.gain - self.options.bic_margin && !same {
-                    ties.push(title(term, self.drivers));
+                    ties.push(named(term, self.drivers));
                 }
             }
             let taken = chosen.is_none() && reason.is_none();
@@ -216,7 +217,7 @@ impl Search<'_> {
             .fitted
             .terms
             .last()
-            .map(|term| title(term, self.drivers));
+            .map(|term| named(term, self.drivers).to_string());
         let name = name.unwrap_or_default();
         let behind = best.gain - one.gain;
         if behind < self.options.bic_margin {

@@ -8,7 +8,7 @@ use super::explanation::{
     Change, Curves, Explained, Explanation, NoiseReport, ResidualTests, Structure,
 };
 use super::fuller::Fuller;
-use super::judge::{HeldOut, held_out, step_errors, title};
+use super::judge::{HeldOut, held_out, named, step_errors};
 use super::noise::{Memory, Noise, Whitener};
 use super::problem::Problem;
 use super::refit::{Fitted, Start, plain_starts, refit_from};
@@ -92,7 +92,7 @@ pub(super) fn tell(
     }
     curves(explanation, problem, (&found.plain, &after, held.as_ref()));
     for (index, term) in full.terms.iter().enumerate() {
-        let name = unique(&explanation.curves, title(term, drivers));
+        let name = unique(&explanation.curves, named(term, drivers).to_string());
         let added = contribution(problem, &full, index, scratch);
         let added = added.into_iter().map(|value| value / factor).collect();
         explanation.curves.contributions.insert(name.clone(), added);

@@ -4,6 +4,7 @@ use super::explain::{Options, explain};
 use super::explanation::{Candidate, Effect, Explained, Explanation};
 use super::kind::Kind;
 use super::partition::partition;
+use super::rival::Rival;
 use crate::reading::{BenchmarkId, Channel, Quantity, Series};
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
@@ -21,7 +22,7 @@ pub struct Together {
     /// Further effects that they have in common; each one's own stand in `each`.
     pub also: Vec<Effect>,
     /// What explains the same.
-    pub cannot_separate_from: Vec<String>,
+    pub cannot_separate_from: Vec<Rival>,
     /// What was tried on them together, with why it was refused.
     pub candidates: Vec<Candidate>,
     /// Each series alone, the others its neighbours.

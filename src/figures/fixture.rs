@@ -34,7 +34,7 @@ pub(crate) fn lake() -> Explanation {
         verdict: by_the_lake(),
         explained: Explained::Partly,
         also: vec![an_offset()],
-        cannot_separate_from: vec!["seasonal".to_owned()],
+        cannot_separate_from: vec![Kind::Seasonal.into()],
         faults: vec![a_reset()],
         error: ErrorChange {
             unit: Unit::MM,

@@ -1,7 +1,7 @@
 //! What the monitor says: one JSON object a line, in data time, nothing from the wall clock.
 
 use crate::alert::Level;
-use crate::effects::{Explained, Form, Kind};
+use crate::effects::{Explained, Form, Kind, Rival};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::regime::Regime;
 use serde::{Deserialize, Serialize};
@@ -102,7 +102,7 @@ pub enum EventKind {
         /// How much of the structure all effects together account for.
         explained: Explained,
         /// What would explain the same.
-        cannot_separate_from: Vec<String>,
+        cannot_separate_from: Vec<Rival>,
         /// Whether forecasts and levels go by it from here on.
         adopted: bool,
     },

@@ -5,7 +5,7 @@
 //! right before the benchmark's first reading that is no earlier than [`SearchJob::due`]. So the answer takes
 //! effect at a time that the data alone decide.
 
-use crate::effects::{Effect, Explained, Fuller, Kind, Options, explain};
+use crate::effects::{Effect, Explained, Fuller, Kind, Options, Rival, explain};
 use crate::reading::{BenchmarkId, Channel, Series, Timestamp};
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
@@ -42,7 +42,7 @@ pub struct Finding {
     /// How much of the structure they account for.
     pub explained: Explained,
     /// What would explain the same.
-    pub cannot_separate_from: Vec<String>,
+    pub cannot_separate_from: Vec<Rival>,
     /// The effects as forecasts use them.
     pub fuller: Fuller,
 }

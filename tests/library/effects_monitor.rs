@@ -314,7 +314,7 @@ fn what_another_kind_would_explain_as_well_and_a_step_that_only_the_motion_shows
         fails: None,
     };
     let rivalled = Finding {
-        cannot_separate_from: vec!["seasonal".to_owned()],
+        cannot_separate_from: vec![Kind::Seasonal.into()],
         ..found(STANDS)
     };
     let step = Finding {

@@ -4,7 +4,7 @@ use super::adopted::Adopted;
 use super::forecast::Forecast;
 use super::{Beside, Track};
 use crate::alert::{Cause, Policy};
-use crate::effects::{Effect, Fuller, Kind, residual_structure};
+use crate::effects::{Effect, Fuller, Kind, Rival, residual_structure};
 use crate::forecast::measurably_moves;
 use crate::monitor::event::{Event, EventKind, Unexplained};
 use crate::monitor::search::{Finding, MOST_READINGS, SearchJob};
@@ -117,11 +117,11 @@ impl Track {
 
     /// The readings as the law in force sees them: by the load's clock, where one is adopted.
     fn in_force(&self, beside: &Beside<'_>) -> Series {
-        let told = self.adopted.as_ref().map(|adopted| {
+        let by_clock = self.adopted.as_ref().and_then(|adopted| {
             let channels = beside.covariates.list();
             adopted.readings(&self.history, &channels)
         });
-        let observations = told.as_ref().unwrap_or(&self.history.observations);
+        let observations = by_clock.as_ref().unwrap_or(&self.history.observations);
         self.history
             .series(&self.benchmark, observations, MOST_LOOKED_AT)
     }
@@ -275,10 +275,9 @@ fn witnessed(finding: &Finding) -> Fuller {
 /// Whether the readings tell the effects from everything else: another covariate of the same kind that does as
 /// well means the same load so far, another kind does not.
 fn is_separable(finding: &Finding) -> bool {
-    let same_kind = |rival: &String| {
-        let kind = rival.split(' ').next().unwrap_or_default();
+    let same_kind = |rival: &Rival| {
         let mut effects = finding.effects.iter();
-        effects.any(|effect| effect.effect.name() == kind)
+        effects.any(|effect| effect.effect == rival.kind)
     };
     finding.cannot_separate_from.iter().all(same_kind)
 }
