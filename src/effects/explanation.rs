@@ -176,6 +176,20 @@ pub struct ErrorChange {
     pub caveat: Option<String>,
 }
 
+impl ErrorChange {
+    /// Nothing is known yet.
+    pub(super) fn none(unit: Unit) -> Self {
+        Self {
+            unit,
+            fit: Change::default(),
+            held_out: Change::default(),
+            held_out_step: Change::default(),
+            held_out_from: None,
+            caveat: None,
+        }
+    }
+}
+
 /// What the effects change in the regime and in the time of failure.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct ForecastChange {
@@ -211,7 +225,7 @@ pub struct Candidate {
 }
 
 /// Whether the residual passes for noise.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct ResidualTests {
     /// p-value of the runs test of the innovations.
     pub runs: Change,
@@ -239,7 +253,7 @@ pub struct Structure {
 }
 
 /// The noise model.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct NoiseReport {
     /// White noise of a reading, in its unit (for velocities read with a relative error, of the typical one).
     pub white: f64,

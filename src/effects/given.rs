@@ -1,16 +1,16 @@
 //! The law with causes that are known beforehand: what its error would be, and nothing judged.
 
 use super::candidates::{event_times, events, feedbacks, offset, seasonal, tides};
-use super::explain::Options;
 use super::explanation::{Change, ErrorChange};
 use super::faults::{Inspected, inspect};
+use super::findings::least_squares;
 use super::judge::{block, without_block};
 use super::kind::Kind;
+use super::options::Options;
 use super::problem::Problem;
 use super::ready::Ready;
 use super::refit::Fitted;
 use super::search::Search;
-use super::tell::least_squares;
 use super::term::{Scratch, Term};
 use super::trials::{Ground, Trial};
 use super::witnesses::distinct;

@@ -7,11 +7,13 @@ mod diagnosis;
 mod explain;
 mod explanation;
 mod faults;
+mod findings;
 mod frame;
 mod fuller;
 mod given;
 mod judge;
 mod kind;
+mod options;
 mod outlook;
 mod partition;
 pub mod remarks;
@@ -27,7 +29,6 @@ mod response;
 mod rival;
 mod search;
 mod surrogate;
-mod tell;
 mod term;
 mod trials;
 mod verdict;
@@ -35,7 +36,7 @@ mod watch;
 mod witnesses;
 
 pub use by_clock::ByClock;
-pub use explain::{Options, explain};
+pub use explain::explain;
 pub use explanation::{
     Candidate, Change, Curves, Effect, ErrorChange, Explained, Explanation, Fault, ForecastChange,
     NoiseReport, ResidualTests, SettingsReport, Structure,
@@ -44,6 +45,7 @@ pub use faults::{Inspected, inspect};
 pub use fuller::{Filtered, Fuller, Part, Wave};
 pub use given::{Cause, error_given};
 pub use kind::{FaultKind, Form, Kind};
+pub use options::Options;
 pub use partition::{Partition, partition, partition_candidate};
 pub use rival::Rival;
 pub use together::{Together, explain_together};

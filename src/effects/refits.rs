@@ -26,7 +26,11 @@ impl<'a> Search<'a> {
     where
         'a: 'b,
     {
-        let linear = Linear::about(self.problem, base, &mut self.scratch)?;
+        let linear = Linear::about(
+            self.problem,
+            (&base.terms, &base.parameters),
+            &mut self.scratch,
+        )?;
         let columns = jacobian(self.problem, base, &mut self.scratch);
         let residual = base.residual(self.problem);
         let bank = shortlist(&Frames::new(self.bank, &residual, &columns));

@@ -1,18 +1,18 @@
 //! The search: one effect after another, each refitted with the law and judged, while any earns its place.
 
 use super::candidates;
-use super::explain::Options;
 use super::explanation::Candidate;
 use super::judge::{block, held_out, named, objection, step_errors};
 use super::kind::Kind;
 use super::noise::{Noise, Whitener};
+use super::options::Options;
 use super::problem::Problem;
 use super::refit::{Fitted, Start, plain_starts, refit_every_memory, refit_from};
 use super::response::Driver;
 use super::rival::Rival;
 use super::surrogate::Vain;
-use super::term::{Act, Scratch, Term, event_node};
-use crate::reading::{Timestamp, after_days};
+use super::term::{Act, Scratch, Term, time_of};
+use crate::reading::Timestamp;
 
 /// Most effects in one law.
 const MOST_EFFECTS: usize = 10;
@@ -328,11 +328,6 @@ impl Search<'_> {
 /// Whether a covariate or the sky bears witness to a kind, and not the shape of the curve alone.
 fn has_witness(kind: Kind) -> bool {
     matches!(kind, Kind::Hydrological | Kind::Thermal | Kind::Tide)
-}
-
-/// When an event before reading `at` happened.
-pub(super) fn time_of(problem: &Problem, at: usize) -> Option<Timestamp> {
-    after_days(problem.epoch, problem.nodes[event_node(problem, at)])
 }
 
 /// Among what the BIC cannot separate from the best, an effect that a covariate bears witness to goes first, and then

@@ -1,8 +1,9 @@
 //! Several benchmarks explained together: do they part, and what does each show.
 
-use super::explain::{Options, explain};
+use super::explain::explain;
 use super::explanation::{Candidate, Effect, Explained, Explanation};
 use super::kind::Kind;
+use super::options::Options;
 use super::partition::partition;
 use super::rival::Rival;
 use crate::reading::{BenchmarkId, Channel, Quantity, Series};

@@ -9,8 +9,8 @@ use super::problem::Problem;
 use super::refit::{Fitted, jacobian};
 use super::response::Driver;
 use super::rival::Rival;
-use super::search::{Accepted, Found, time_of};
-use super::term::{Act, Scratch, Term};
+use super::search::{Accepted, Found};
+use super::term::{Act, Scratch, Term, time_of};
 use crate::reading::{Quantity, Unit};
 
 /// What the search is concluded to mean.
