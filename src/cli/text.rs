@@ -252,7 +252,7 @@ fn forecast(failure: &FailureTime) -> String {
     let horizon = failure.horizon_days;
     let bound = |time: Option<Timestamp>| time.map_or("later".to_owned(), minute);
     match failure.median.or(failure.low) {
-        None => format!("no failure foreseen ({chance:.0} % within {horizon:.0} days)"),
+        None => format!("no failure predicted ({chance:.0} % within {horizon:.0} days)"),
         Some(_) => format!(
             "failure {} ({} to {}, {chance:.0} % within {horizon:.0} days)",
             bound(failure.median),

@@ -6,7 +6,7 @@
 //! readings are given that clock's times, forecast as ever, and the forecast is brought back to the calendar.
 
 use super::clock::Clock;
-use super::fuller::Fuller;
+use super::known_load::KnownLoad;
 use crate::fit::Observations;
 use crate::forecast::Outlook;
 use crate::reading::{Channel, Timestamp, instant_after_days};
@@ -27,7 +27,7 @@ impl ByClock {
         observations: &Observations,
         epoch: Timestamp,
         channels: &[&Channel],
-        load: &Fuller,
+        load: &KnownLoad,
         usual: Option<f64>,
     ) -> Option<Self> {
         let newest_days = observations.values.last()?.t_days;

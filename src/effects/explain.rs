@@ -42,7 +42,7 @@ pub fn explain(
         .any(|fault| fault.kind == FaultKind::Interpolated && fault.channel.is_none());
     let (findings, of_search) = look((series, channels), is_drawn, options, progress);
     let critical = options.critical_velocity_mm_per_day;
-    let forecast = forecast_change(series, channels, &findings.fuller, critical);
+    let forecast = forecast_change(series, channels, &findings.known_load, critical);
     let findings = with_partition(findings, partition_candidate(series, neighbours, options));
     progress(1.0);
     let of_channels = remarks::of_channels(series, channels);
@@ -74,7 +74,7 @@ pub fn explain(
             data_hash,
         },
         curves: findings.curves,
-        fuller: findings.fuller,
+        known_load: findings.known_load,
     }
 }
 
@@ -112,7 +112,7 @@ fn look(
     let mut remarks = Vec::new();
     let none = Findings::none(series.unit);
     let Some(ready) = Ready::of(series, channels, &mut remarks) else {
-        remarks.push("There are too few readings to tell anything from noise.".to_owned());
+        remarks.push("There are too few readings to distinguish anything from noise.".to_owned());
         return (none, remarks);
     };
     progress(0.05);

@@ -1,7 +1,7 @@
 //! What an explanation says, key for key as scripts read it: what is unbounded or missing is null.
 
-use super::fuller::Fuller;
 use super::kind::{FaultKind, Form, Kind};
+use super::known_load::KnownLoad;
 use super::rival::Rival;
 use crate::reading::{BenchmarkId, Quantity, Timestamp, Unit};
 use serde::{Deserialize, Serialize};
@@ -53,7 +53,7 @@ pub struct Explanation {
     pub curves: Curves,
     /// The effects as a forecast uses them.
     #[serde(skip)]
-    pub fuller: Fuller,
+    pub known_load: KnownLoad,
 }
 
 /// One effect inside the law.
@@ -150,7 +150,7 @@ pub struct Fault {
     pub copy_of: Option<Timestamp>,
 }
 
-/// A figure of the plain law and of the fuller one.
+/// A figure of the plain law and of the law under the known load.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Change<T = Option<f64>> {
     /// Under the law with a constant load.
@@ -287,11 +287,11 @@ pub struct Curves {
     pub readings: Vec<f64>,
     /// The plain law.
     pub before: Vec<f64>,
-    /// The fuller law.
+    /// The law under the known load.
     pub after: Vec<f64>,
     /// The plain law fitted without the held-out block, over all times.
     pub before_held_out: Vec<f64>,
-    /// The fuller law fitted without it.
+    /// The law under the known load fitted without it.
     pub after_held_out: Vec<f64>,
     /// Posterior mean and standard deviation of the undeclared log-load before.
     pub load_before: Vec<(f64, f64)>,

@@ -7,9 +7,9 @@ use super::explanation::{
     Candidate, Change, Curves, Effect, ErrorChange, Explained, NoiseReport, ResidualTests,
     Structure,
 };
-use super::fuller::Fuller;
 use super::judge::{HeldOut, held_out, named, step_errors};
 use super::kind::Kind;
+use super::known_load::KnownLoad;
 use super::noise::{Memory, Noise, Whitener};
 use super::options::Options;
 use super::problem::Problem;
@@ -42,7 +42,7 @@ pub(super) struct Findings {
     pub(super) residual: ResidualTests,
     pub(super) noise: NoiseReport,
     pub(super) curves: Curves,
-    pub(super) fuller: Fuller,
+    pub(super) known_load: KnownLoad,
 }
 
 impl Findings {
@@ -58,7 +58,7 @@ impl Findings {
             residual: ResidualTests::default(),
             noise: NoiseReport::default(),
             curves: Curves::default(),
-            fuller: Fuller::default(),
+            known_load: KnownLoad::default(),
         }
     }
 }
@@ -105,7 +105,7 @@ pub(super) fn findings(
         residual,
         noise,
         curves,
-        fuller: Fuller::of(problem, &full, drivers),
+        known_load: KnownLoad::of(problem, &full, drivers),
     }
 }
 

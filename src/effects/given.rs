@@ -143,7 +143,7 @@ fn of_channel(ground: &Ground, cause: &Cause) -> Vec<Trial> {
 }
 
 /// The readings before which it may have happened: those that the search would try, or, where the time is known, all
-/// within what the search tells apart.
+/// within what the search distinguishes.
 fn times(problem: &Problem, at: Option<Timestamp>) -> Vec<usize> {
     let tried = event_times(problem);
     let Some(time) = at else { return tried };

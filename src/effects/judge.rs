@@ -1,4 +1,4 @@
-//! What an effect must show before it is believed: sign, memory, bounds, and a later block that it helps to foretell.
+//! What an effect must show before it is believed: sign, memory, bounds, and a later block that it helps to predict.
 
 use super::kind::{Form, Kind};
 use super::noise::{Noise, Whitener};

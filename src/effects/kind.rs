@@ -35,7 +35,7 @@ pub enum Kind {
     CorrelatedNoise,
     /// Structure is there, and nothing known explains it.
     Unexplained,
-    /// The residual cannot be told from noise.
+    /// The residual cannot be distinguished from noise.
     None,
 }
 

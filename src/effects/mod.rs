@@ -9,10 +9,10 @@ mod explanation;
 mod faults;
 mod findings;
 mod frame;
-mod fuller;
 mod given;
 mod judge;
 mod kind;
+mod known_load;
 mod options;
 mod outlook;
 mod partition;
@@ -42,9 +42,9 @@ pub use explanation::{
     NoiseReport, ResidualTests, SettingsReport, Structure,
 };
 pub use faults::{Inspected, inspect};
-pub use fuller::{Filtered, Fuller, Part, Wave};
 pub use given::{Cause, error_given};
 pub use kind::{FaultKind, Form, Kind};
+pub use known_load::{Filtered, KnownLoad, Part, Wave};
 pub use options::Options;
 pub use partition::{Partition, partition, partition_candidate};
 pub use rival::Rival;

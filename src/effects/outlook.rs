@@ -2,7 +2,7 @@
 
 use super::by_clock::ByClock;
 use super::explanation::{Change, ForecastChange};
-use super::fuller::Fuller;
+use super::known_load::KnownLoad;
 use crate::fit::Observations;
 use crate::forecast::{HORIZON_DAYS, Outlook, outlook};
 use crate::reading::{Channel, Series, after_days};
@@ -15,7 +15,7 @@ const UNSTABLE: [Regime; 2] = [Regime::UnstableAccelerating, Regime::UnstableDec
 pub(super) fn forecast_change(
     series: &Series,
     channels: &[Channel],
-    fuller: &Fuller,
+    known_load: &KnownLoad,
     critical: f64,
 ) -> ForecastChange {
     let observations = Observations::of(series);
@@ -23,11 +23,11 @@ pub(super) fn forecast_change(
         return ForecastChange::default();
     };
     let before = outlook(&observations, critical).map(|(outlook, _)| outlook);
-    let after = if fuller.parts.is_empty() {
+    let after = if known_load.parts.is_empty() {
         before.clone()
     } else {
         let channels: Vec<&Channel> = channels.iter().collect();
-        let by_clock = ByClock::new(&observations, epoch, &channels, fuller, None);
+        let by_clock = ByClock::new(&observations, epoch, &channels, known_load, None);
         by_clock.and_then(|one| {
             one.outlook(critical, |readings, critical| {
                 outlook(readings, critical).map(|(outlook, _)| outlook)

@@ -404,7 +404,7 @@ impl Point {
     }
 }
 
-/// Normal priors, weak, that keep what the readings cannot tell from wandering off.
+/// Normal priors, weak, that keep within bounds what the readings do not determine.
 struct Prior {
     centre: Vec<f64>,
     deviation: Vec<f64>,

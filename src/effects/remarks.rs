@@ -6,7 +6,7 @@ use jiff::SignedDuration;
 /// A turn counts when the covariate swings this share of its range after it.
 const SWING: f64 = 0.15;
 /// A swing whose ups and downs together are longer than this many times itself is none.
-const WANDERS: f64 = 1.5;
+const LONGEST_PATH: f64 = 1.5;
 /// Fewest velocities on either side of the turn.
 const FEWEST: usize = 5;
 /// Rank correlation from which two courses go the same way.
@@ -166,7 +166,7 @@ fn last_turn(samples: &[Sample]) -> Option<Turn> {
         .windows(2)
         .map(|two| (two[1].value - two[0].value).abs())
         .sum();
-    (path <= WANDERS * swing).then_some(Turn { start, at, until })
+    (path <= LONGEST_PATH * swing).then_some(Turn { start, at, until })
 }
 
 fn channel_at(samples: &[Sample], time: Timestamp) -> Option<f64> {

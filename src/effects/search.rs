@@ -10,7 +10,7 @@ use super::problem::Problem;
 use super::refit::{Fitted, Start, plain_starts, refit_every_memory, refit_from};
 use super::response::Driver;
 use super::rival::Rival;
-use super::surrogate::Vain;
+use super::surrogate::NullGains;
 use super::term::{Act, Scratch, Term, time_of};
 use crate::reading::Timestamp;
 
@@ -92,7 +92,7 @@ pub(super) struct Refitted {
 }
 
 impl Refitted {
-    /// What follows the year cannot be told from the season.
+    /// What follows the year cannot be distinguished from the season.
     fn with_season(&self, mut how: Accepted, problem: &Problem) -> Accepted {
         let season = Rival::from(Kind::Seasonal);
         let seen = !candidates::seasonal(problem).is_empty();
@@ -110,9 +110,9 @@ impl Refitted {
     }
 
     /// Two searches were made, and either could have spoken.
-    pub(super) fn judged_by(self, vain: &Vain, gain: f64) -> Self {
+    pub(super) fn judged_by(self, null_gains: &NullGains, gain: f64) -> Self {
         Self {
-            p_value: (2.0 * vain.p_value(gain)).min(1.0),
+            p_value: (2.0 * null_gains.p_value(gain)).min(1.0),
             ..self
         }
     }
@@ -239,7 +239,7 @@ impl Search<'_> {
         }
         if one.p_value >= SIGNIFICANT {
             let reason = format!(
-                "a search in vain gains as much in {:.0} % of cases",
+                "a search where there is nothing gains as much in {:.0} % of cases",
                 100.0 * one.p_value
             );
             return (None, Some(reason));

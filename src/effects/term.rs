@@ -123,7 +123,7 @@ impl Feedback {
     }
 }
 
-/// Bounds of ln(a span) and of p: beyond them nothing changes that readings could tell.
+/// Bounds of ln(a span) and of p: beyond them nothing changes that readings could show.
 const LN_A_SPAN: (f64, f64) = (-7.0, 6.0);
 const P: (f64, f64) = (-3.0, 0.95);
 

@@ -36,7 +36,7 @@ fn joined<S: Serializer>(benchmarks: &[BenchmarkId], serializer: S) -> Result<S:
 }
 
 /// Explains several series by what they show together and by what each shows; of a benchmark read as both
-/// displacement and velocity, the displacement stands for it among the others. `progress` hears the share
+/// displacement and velocity, the displacement stands for it among the others. `progress` is called with the share
 /// done, 0 to 1.
 pub fn explain_together(
     all: &[&Series],

@@ -66,7 +66,7 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// Whether the readings hold no motion that any law, or any regime, could be told from.
+    /// Whether the readings hold no motion that any law, or any regime, could be distinguished from.
     pub fn says_nothing(&self) -> bool {
         match self {
             Self::TooFew { .. } | Self::AllEqual | Self::NoForwardMotion => true,

@@ -179,7 +179,7 @@ impl<'a> Search<'a> {
         let mut near = Vec::new();
         for place in of_each(&chosen, breadth) {
             let mut place = self.descent.descend(merged, &place, &NEARLY, holds_m);
-            // What was merged may hold the very readings that tell basins apart.
+            // What was merged may hold the very readings that distinguish basins.
             let fineness = CLOSELY.fineness;
             place.cost = self
                 .descent
@@ -195,20 +195,20 @@ impl<'a> Search<'a> {
         close.dedup_by(|a, b| is_same_group(a, b) && a.cost - b.cost <= ONE_BASIN * b.cost);
         let floor = breadth.floor_within * self::lowest(&close, None);
         let may_fall_from = UNFINISHED_WITHIN * self::lowest(&close, None);
-        let mut settled: Vec<Place> = Vec::new();
+        let mut refined: Vec<Place> = Vec::new();
         let may_fall = |place: &&mut Place| !place.converged && place.cost <= may_fall_from;
         for place in close
             .iter_mut()
             .filter(|place| place.cost <= floor || may_fall(place))
         {
-            if settled
+            if refined
                 .iter()
                 .filter(|one| is_same_group(one, place))
                 .count()
                 < breadth.wholly
             {
-                settle(&mut self.descent, &self.full, place, holds_m);
-                settled.push(*place);
+                refine(&mut self.descent, &self.full, place, holds_m);
+                refined.push(*place);
             }
         }
         close
@@ -355,7 +355,7 @@ impl<'a> Search<'a> {
 
 /// Goes to the floor, and where m has run to its bound from the corner without a steady state too: an
 /// exponential lies there, at the end of a valley that hardly falls.
-fn settle(descent: &mut Descent, record: &Record, place: &mut Place, holds_m: bool) {
+fn refine(descent: &mut Descent, record: &Record, place: &mut Place, holds_m: bool) {
     go_down(descent, record, place, holds_m);
     if !holds_m && is_at_bound_of_m(place) {
         let mut corner = *place;

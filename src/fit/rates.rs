@@ -197,7 +197,7 @@ struct Place {
     readings: u32,
 }
 
-/// Displacements at times that are told apart, counted back from the newest: where readings are closer together than
+/// Displacements at times that are distinguished, counted back from the newest: where readings are closer together than
 /// [`FINEST_DAYS`] their mean, which their noise moves far less than any one of them.
 fn places(values: &[Observation]) -> Vec<Place> {
     let common = displacement_sigma(values);

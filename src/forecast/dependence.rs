@@ -5,7 +5,7 @@ use nalgebra::{Matrix4, Vector4};
 
 /// Correlation of the errors of forecasts where residuals show none: a load too slow to show in them.
 const UNSEEN: f64 = 0.25;
-/// That where too few rates overlap to tell; residuals of simulated masses that share their whole load
+/// That where too few rates overlap to estimate it; residuals of simulated masses that share their whole load
 /// correlate by .45, the errors of their forecasts by .2 to .5.
 const UNKNOWN: f64 = 0.6;
 /// Fewest rates in common, for the four coefficients that are fitted to each.

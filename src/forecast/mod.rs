@@ -25,5 +25,5 @@ pub use panel::{FEWEST_READINGS, HORIZON_DAYS, Outlook, Panel, by_the_law};
 pub(crate) use panel::{measurably_moves, outlook};
 pub use passage::Passage;
 pub use scales::{Change, Scale, Scales};
-pub use together::{Group, Look, Opinion, groups};
+pub use together::{FailureTimeLikelihood, Group, Snapshot, groups};
 pub use world::{Family, GaugeKind, Simulated};

@@ -72,7 +72,7 @@ impl<'a> LoadedLaw<'a> {
     /// `law` under `load`, from t = 0 on.
     ///
     /// # Errors
-    /// [`LawError`] where the law does not tell its healing rate a, which no constant load needs at m = 1.
+    /// [`LawError`] where the law does not determine its healing rate a, which no constant load needs at m = 1.
     pub fn new(law: &Law, load: &'a Load, accuracy: Accuracy) -> Result<Self, LawError> {
         if !(law.a.is_finite() && law.b.is_finite()) {
             return Err(LawError {

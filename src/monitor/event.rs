@@ -132,7 +132,7 @@ pub enum EventKind {
         /// Each of at least two benchmarks.
         groups: Vec<SharedFailure>,
     },
-    /// The monitor cannot rely on what it is told.
+    /// The monitor cannot rely on what it is given.
     Fault {
         /// `no-data`, `out-of-range`, `out-of-order`, ...
         kind: String,
@@ -245,14 +245,14 @@ pub enum Unexplained {
     },
 }
 
-/// The forecast of the law under a constant load, beside that of the fuller law.
+/// The forecast of the law under a constant load, beside that of the law under the known load.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Plain {
     /// Which regime, with what probability.
     pub regime: RegimeReport,
     /// When the critical velocity is passed.
     pub failure_time: FailureTime,
-    /// Whether the fuller law explains the present velocity. While it does not, the larger of both chances
+    /// Whether the law under the known load explains the present velocity. While it does not, the larger of both chances
     /// decides the level.
     pub is_explained: bool,
 }

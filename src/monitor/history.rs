@@ -255,7 +255,7 @@ impl History {
             averaging,
             readings: values.chunks(size).filter_map(block).collect(),
         };
-        series.settle();
+        series.put_in_order();
         series
     }
 

@@ -45,7 +45,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use together::Together;
 use track::{Beside, Track};
 
-/// What the monitor is told.
+/// What the monitor is given.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Input {
     /// A reading of a benchmark.
@@ -147,13 +147,13 @@ impl Watched {
     }
 }
 
-/// What is done about a residual that the law does not explain; it is watched and told in any case.
+/// What is done about a residual that the law does not explain; it is watched and reported in any case.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Explain {
-    /// The effect is searched for, told, and taken into the law that forecasts and levels go by.
+    /// The effect is searched for, reported, and taken into the law that forecasts and levels go by.
     #[default]
     Adopt,
-    /// It is searched for and told.
+    /// It is searched for and reported.
     Tell,
     /// Nothing.
     Off,

@@ -30,7 +30,7 @@ const OUTPUT_GRACE: Duration = Duration::from_millis(200);
 /// After the kill: how long the kernel may take to report the end.
 const KILL_GRACE: Duration = Duration::from_secs(5);
 
-/// The rule of an alert that tells of many benchmarks at once.
+/// The rule of an alert that reports many benchmarks at once.
 pub(super) const FLOOD: &str = "flood";
 
 /// Whether a message means what it says; CAP 1.2's words.
@@ -107,7 +107,7 @@ impl Alert {
         }
     }
 
-    /// Whether it tells of many benchmarks at once, each of which it stands for.
+    /// Whether it reports many benchmarks at once, each of which it stands for.
     pub fn is_flood(&self) -> bool {
         matches!(&self.event.kind, EventKind::Alert { rule, .. } if rule == FLOOD)
     }

@@ -122,11 +122,11 @@ fn start() -> SyncSender<Piece> {
 }
 
 fn write(pieces: &Receiver<Piece>) {
-    let mut told = 0;
+    let mut reported = 0;
     while let Ok(piece) = pieces.recv() {
         match piece {
             Piece::Line(line) => {
-                say_what_is_lost(&mut told);
+                report_lost_lines(&mut reported);
                 if io::stderr().write_all(&line).is_err() {
                     LOST.fetch_add(1, Ordering::Relaxed);
                 }
@@ -140,11 +140,17 @@ fn write(pieces: &Receiver<Piece>) {
 }
 
 /// Says in the log how many lines are missing from it, once for each number.
-fn say_what_is_lost(told: &mut u64) {
+fn report_lost_lines(reported: &mut u64) {
     let lost = lost();
-    if lost > *told && writeln!(io::stderr(), "{} lines of this log are lost", lost - *told).is_ok()
+    if lost > *reported
+        && writeln!(
+            io::stderr(),
+            "{} lines of this log are lost",
+            lost - *reported
+        )
+        .is_ok()
     {
-        *told = lost;
+        *reported = lost;
     }
 }
 

@@ -129,14 +129,14 @@ pub async fn replay(
         if shutdown.is_requested() {
             return Err(ReplayError::Interrupted);
         }
-        told(&site.take(arrival, arrival.time)?, each)?;
+        report_each(&site.take(arrival, arrival.time)?, each)?;
         site.commit(arrival.time)?;
     }
-    told(&site.pass(end), each)?;
+    report_each(&site.pass(end), each)?;
     site.commit(end)?;
     let (summary, counts) = (site.summary(), site.counts());
     let lost = site.close(end, DRAIN_LIMIT).await?;
-    told(summary.as_slice(), each)?;
+    report_each(summary.as_slice(), each)?;
     match lost {
         Some(0) => Ok(counts),
         Some(_) | None => Err(ReplayError::Undelivered),
@@ -167,15 +167,15 @@ pub fn replay_state(
             if shutdown.is_requested() {
                 return Err(ReplayError::Interrupted);
             }
-            told(&monitor.step(row.now, &row.input), each)?;
+            report_each(&monitor.step(row.now, &row.input), each)?;
             // Their findings are among the steps.
             monitor.searches();
         }
     }
-    told(monitor.summary().as_slice(), each)
+    report_each(monitor.summary().as_slice(), each)
 }
 
-fn told(
+fn report_each(
     events: &[Event],
     each: &mut (dyn FnMut(&Event) -> io::Result<()> + '_),
 ) -> Result<(), ReplayError> {

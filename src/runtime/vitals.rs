@@ -48,7 +48,7 @@ pub struct Health {
     pub held: u64,
     /// Lines of the log that could not be written.
     pub log_lines_lost: u64,
-    /// Alerts that people asked not to be told.
+    /// Alerts that people asked not to be notified of.
     pub silences: Vec<Mute>,
     /// Lines, records and files that could not be used, a source.
     pub quarantined: BTreeMap<String, u64>,
@@ -75,7 +75,7 @@ pub struct Point {
     pub newest: Option<Timestamp>,
     /// The level in force.
     pub level: Level,
-    /// Whether the monitor cannot tell: beside the level, never instead of it.
+    /// Whether the monitor cannot decide: beside the level, never instead of it.
     pub is_unknown: bool,
     /// How long the last reading that led to a refit took to be worked in, seconds.
     pub refit_seconds: Option<f64>,

@@ -214,7 +214,7 @@ fn the_load_that_forecasts_use_is_the_one_that_was_fitted() {
         &mut |_| {},
     );
     let channels: Vec<&Channel> = recording.channels.iter().collect();
-    let told = said.fuller.log_load(&channels, &said.curves.times);
+    let told = said.known_load.log_load(&channels, &said.curves.times);
     assert!(!said.curves.log_loads.is_empty());
     for (index, told) in told.into_iter().enumerate() {
         let fitted: f64 = said.curves.log_loads.values().map(|load| load[index]).sum();

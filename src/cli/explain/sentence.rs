@@ -14,7 +14,7 @@ pub(super) fn verdict(explanation: &Explanation) -> String {
     let benchmark = &explanation.benchmark;
     match effect.effect {
         Kind::None => format!(
-            "{benchmark}: the residual cannot be told from noise; these readings show nothing that the law lacks"
+            "{benchmark}: the residual cannot be distinguished from noise; these readings show nothing that the law lacks"
         ),
         Kind::Unexplained => format!(
             "{benchmark}: unexplained: the law lacks something here, and no effect that was tried explains it{}",

@@ -13,7 +13,7 @@ const SAME: f64 = 0.95;
 const MOVING: f64 = 0.5;
 /// Rounding of both channels, in steps of the coarser resolution.
 const ROUNDING: f64 = 1.5;
-/// A jump of the difference under this many roundings is not told from rounding.
+/// A jump of the difference under this many roundings is not distinguished from rounding.
 const JUMP: f64 = 2.5;
 /// Samples over which one jump may be spread: a mean taken over it.
 const STRADDLES: usize = 2;
@@ -29,7 +29,7 @@ pub(super) struct Twins {
     pub first_jumps: bool,
 }
 
-/// The jumps between two channels that otherwise tell the same to the last digit; `None` where they
+/// The jumps between two channels that otherwise give the same to the last digit; `None` where they
 /// do not, or never differ.
 pub(super) fn twins(first: &Trace, second: &Trace) -> Option<Twins> {
     let common = common_samples(first, second);

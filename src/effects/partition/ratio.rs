@@ -135,7 +135,7 @@ impl<'a> Pair<'a> {
         }
         let memory = lag_one(&fitted.left);
         if memory * count.sqrt() > WANDERING {
-            return Err("the ratio of the velocities wanders, break or not");
+            return Err("the ratio of the velocities drifts, break or not");
         }
         let inflation = ((1.0 + memory.max(0.0)) / (1.0 - memory.clamp(0.0, 0.9))).max(1.0);
         let near = scores
@@ -153,11 +153,11 @@ impl<'a> Pair<'a> {
         };
         let ratio = fitted.coefficients[1];
         let (first_change, change) = self.changes(best.1, best.2, &fitted.coefficients);
-        // What wanders bends anywhere, but jumps nowhere.
+        // What drifts bends anywhere, but jumps nowhere.
         if matches!(best.1, Shape::Relaxing(_))
             && apart((ratio + first_change) / ratio) < LEAST_JUMP
         {
-            return Err("the ratio of the velocities wanders, break or not");
+            return Err("the ratio of the velocities drifts, break or not");
         }
         let most = [first_change, change]
             .map(|change| (ratio + change) / ratio)

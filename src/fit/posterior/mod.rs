@@ -109,7 +109,7 @@ const ROUNDS: (u32, u32) = (6, 10);
 const FIRST_P: f64 = 0.3;
 /// asinh of kappa L when a search starts.
 const FIRST_KAPPAS: [f64; 2] = [0.5, 2.5];
-/// Fewer rates than this leave nothing over to tell the scatter from.
+/// Fewer rates than this leave nothing over to estimate the scatter from.
 const FEWEST_RATES: usize = 5;
 
 impl Posterior {
@@ -321,7 +321,7 @@ impl<'a> Lot<'a> {
     }
 
     /// Draws `number` more, weighs all anew against the mixture of the proposals that they came from
-    /// (Owen and Zhou 2000: no draw weighs more than any of them would make it), and learns from them.
+    /// (Owen and Zhou 2000: no draw weighs more than any of them would make it), and shapes the next proposal by them.
     fn draw(&mut self, bench: &mut Bench, textures: &[Texture], (first, number): (u32, u32)) {
         let one = |at| self.next.draw(bench, textures, first + at);
         let fresh: Vec<Draft> = (0..number).filter_map(one).collect();

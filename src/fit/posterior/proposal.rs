@@ -20,7 +20,7 @@ const SIZE: usize = 4;
 const WIDTHS: [(f64, f64); 2] = [(1.15, 0.75), (3.0, 0.25)];
 /// The share of draws that go to all textures evenly, whatever their evidence.
 const EVEN: f64 = 0.1;
-/// Draws that weights must be worth for a shape to be told from them.
+/// Draws that weights must be worth for a shape to be estimated from them.
 const WORTH: f64 = 20.0;
 /// Draws that say nothing of a shape if they are worth fewer.
 const LEAST_WORTH: f64 = 8.0;
@@ -174,7 +174,7 @@ impl<'a> Side<'a> {
 
     /// The same side with its proposal drawn up anew from what was drawn so far: where the weights lie, as
     /// one normal shape for all textures, each with its share. Weights are levelled until they are worth
-    /// enough draws to tell a shape from.
+    /// enough draws to estimate a shape from.
     pub(super) fn refitted(&self, drafts: &[Draft]) -> Option<Self> {
         let logs: Vec<f64> = drafts.iter().map(|draft| draft.log_weight).collect();
         let weights = levelled(&logs);

@@ -6,7 +6,7 @@ use super::shape::{BLOCKS, Block, LANES, Place};
 /// Rates that a law must explain, at least.
 const FEWEST_UNDER_THE_LAW: usize = 4;
 /// Standard deviations, for one rate after another, of a velocity that follows no law.
-const WANDERS: [f64; 3] = [0.05, 0.15, 0.4];
+const DRIFTS: [f64; 3] = [0.05, 0.15, 0.4];
 /// Starts this much less likely than the best, ln, are not counted.
 const NEGLIGIBLE: f64 = 10.0;
 
@@ -173,17 +173,17 @@ pub(super) fn misses(
     squares
 }
 
-/// ln of the evidence of the rates before each one, by a velocity that wanders as it likes.
+/// ln of the evidence of the rates before each one, by a velocity that is a random walk.
 pub(super) fn before_the_law(record: &Record, scatter: f64) -> Vec<f64> {
     let count = record.ln_velocity.len();
     let mut total = vec![0.0_f64; count];
-    let mut each = vec![[0.0_f64; WANDERS.len()]; count];
-    for (which, wander) in WANDERS.iter().enumerate() {
+    let mut each = vec![[0.0_f64; DRIFTS.len()]; count];
+    for (which, drift) in DRIFTS.iter().enumerate() {
         let (mut level, mut variance, mut ln) = (0.0, LEVEL_VARIANCE, 0.0);
         for (index, slot) in each.iter_mut().enumerate() {
             slot[which] = ln;
             if index > 0 {
-                variance += wander * wander;
+                variance += drift * drift;
             }
             let s = (variance + record.variance(index, scatter)).max(1e-12);
             let miss = record.ln_velocity[index] - level;
@@ -195,7 +195,7 @@ pub(super) fn before_the_law(record: &Record, scatter: f64) -> Vec<f64> {
     for (slot, each) in total.iter_mut().zip(&each) {
         let best = each.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let sum: f64 = each.iter().map(|ln| (ln - best).exp()).sum();
-        *slot = best + (sum / WANDERS.len() as f64).ln();
+        *slot = best + (sum / DRIFTS.len() as f64).ln();
     }
     total
 }

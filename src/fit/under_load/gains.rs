@@ -1,9 +1,9 @@
-//! The linear filter of ln v less the law, from the present into the past: how much each rate tells.
+//! The linear filter of ln v less the law, from the present into the past: how much each rate moves it.
 //!
 //! The state is the load f, the level l of ln v about the law, and two things of today that stay: ln v and
 //! f. Variances do not depend on what is read, so a table of gains serves every shape.
 
-use super::WANDER;
+use super::DRIFT;
 
 /// The rates as the filter sees them.
 #[derive(Debug, Clone)]
@@ -123,7 +123,7 @@ impl Gains {
             }
             p[0][0] = keep * p[0][0] + variance * (1.0 - keep * keep);
             (p[1][0], p[2][0], p[3][0]) = (p[0][1], p[0][2], p[0][3]);
-            p[1][1] += WANDER * WANDER * e_folds;
+            p[1][1] += DRIFT * DRIFT * e_folds;
             let error = record.variance(index, noise.scatter);
             let h: [f64; 4] = std::array::from_fn(|i| p[0][i] + p[1][i]);
             let s = (h[0] + h[1] + error - smoothed).max(error).max(1e-12);

@@ -1,7 +1,7 @@
 //! The law with the effects that were found, of one benchmark: its forecast, and whether it explains how fast the
 //! slope is now.
 
-use super::forecast::Fuller;
+use super::forecast::UnderKnownLoad;
 use super::motion::{fastest, is_new_highest, settled};
 use crate::effects::{self, ByClock};
 use crate::fit::{Observations, Rate};
@@ -21,10 +21,11 @@ const IN_A_ROW: u32 = 2;
 /// From this share of the critical velocity on no effect explains how fast it is.
 const TOO_FAST: f64 = 0.1;
 
-/// A fuller law in use.
+/// A law under a known load in use.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Adopted {
-    fuller: effects::Fuller,
+    #[serde(rename = "fuller")]
+    known_load: effects::KnownLoad,
     /// ln of the mean pace over the record in which it was found: the log-load that counts as none.
     usual: f64,
     /// Of the log-load over that record.
@@ -37,15 +38,15 @@ pub(super) struct Adopted {
 }
 
 impl Adopted {
-    /// Takes a fuller law into use; its expectation for the next reading rests on those in `history`.
+    /// Takes a law under a known load into use; its expectation for the next reading rests on those in `history`.
     pub(super) fn new(
-        fuller: effects::Fuller,
+        known_load: effects::KnownLoad,
         history: &History,
         channels: &[&Channel],
         critical: f64,
     ) -> Self {
         let mut adopted = Self {
-            fuller,
+            known_load,
             usual: 0.0,
             range: (0.0, 0.0),
             fastest: fastest(&history.rates()).unwrap_or(0.0),
@@ -53,7 +54,13 @@ impl Adopted {
             faster: 0,
         };
         let observations = &history.observations;
-        let by_clock = ByClock::new(observations, history.epoch, channels, &adopted.fuller, None);
+        let by_clock = ByClock::new(
+            observations,
+            history.epoch,
+            channels,
+            &adopted.known_load,
+            None,
+        );
         let Some(by_clock) = by_clock else {
             return adopted;
         };
@@ -68,17 +75,17 @@ impl Adopted {
         adopted
     }
 
-    pub(super) fn law(&self) -> &effects::Fuller {
-        &self.fuller
+    pub(super) fn law(&self) -> &effects::KnownLoad {
+        &self.known_load
     }
 
-    /// What it foretells after the newest reading of `history`, of which `rates` are the velocities.
+    /// What it predicts after the newest reading of `history`, of which `rates` are the velocities.
     pub(super) fn forecast(
         &mut self,
         history: &History,
         channels: &[&Channel],
         (critical, rates): (f64, &[Rate]),
-    ) -> Option<Fuller> {
+    ) -> Option<UnderKnownLoad> {
         let by_clock = self.by_clock(history, channels)?;
         let excess = self.panel.excess(by_clock.readings());
         self.faster = match excess {
@@ -90,14 +97,14 @@ impl Adopted {
             self.panel.update(readings, critical)
         })?;
         let width = BEYOND_RANGE * (self.range.1 - self.range.0);
-        let is_explained = self.fuller.reaches(channels, history.newest()?)
+        let is_explained = self.known_load.reaches(channels, history.newest()?)
             && (self.range.0 - width..=self.range.1 + width).contains(&load)
             && self.faster < IN_A_ROW
             && !is_new_highest(&outlook.rates)
             && settled(rates).is_some_and(|velocity| {
                 velocity < TOO_FAST * critical && velocity <= BEYOND_FASTEST * self.fastest
             });
-        Some(Fuller {
+        Some(UnderKnownLoad {
             outlook,
             is_explained,
         })
@@ -130,7 +137,7 @@ impl Adopted {
             &history.observations,
             history.epoch,
             channels,
-            &self.fuller,
+            &self.known_load,
             usual,
         )
     }

@@ -65,10 +65,10 @@ impl Track {
         }
         let transitions = self.latch.update(policy, &evidence);
         self.levels.note(time, self.latch.level());
-        let told = transitions
+        let reported = transitions
             .iter()
             .map(|change| self.alert_event(time, policy, (&evidence, ahead), change));
-        events.extend(told);
+        events.extend(reported);
         events
     }
 

@@ -111,11 +111,11 @@ impl Track {
     ) -> Event {
         let at = |days: Option<f64>| days.and_then(|days| after_days(self.history.epoch, days));
         let outlook = forecast.in_force(days(policy.outlook));
-        let plain = forecast.fuller.as_ref().map(|fuller| {
+        let plain = forecast.known_load.as_ref().map(|known_load| {
             Box::new(Plain {
                 regime: report(&forecast.plain),
                 failure_time: self.reported(forecast.plain.now_days, &forecast.plain.collapse),
-                is_explained: fuller.is_explained,
+                is_explained: known_load.is_explained,
             })
         });
         self.event(

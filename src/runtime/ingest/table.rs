@@ -21,7 +21,7 @@ pub(super) struct TableRows {
     filled: Vec<bool>,
     /// Columns that have held a number: what is no number in one of them is a fault, in others text.
     numeric: Vec<bool>,
-    /// What has been found out and not been told.
+    /// What has been found out and not been reported.
     remarks: Vec<Remark>,
 }
 

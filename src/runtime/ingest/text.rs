@@ -254,7 +254,7 @@ pub(super) fn read_text(
     })
 }
 
-/// A line that is no UTF-8, as Latin-1 where that can do no harm; which is told once.
+/// A line that is no UTF-8, as Latin-1 where that can do no harm; which is reported once.
 fn not_utf8(
     rows: &TextRows,
     file: &Path,

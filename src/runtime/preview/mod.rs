@@ -29,9 +29,9 @@ const PIECE: usize = 64 * 1024;
 
 /// Looks at the files of `config`.
 pub fn preview(config: &Config) -> Preview {
-    let mut look = Look {
+    let mut look = PreviewSoFar {
         accepted: config.settings.accepted.clone(),
-        ..Look::default()
+        ..PreviewSoFar::default()
     };
     for source in &config.sources {
         let view = look.source(source, &Decoder::new(source, &config.benchmarks));
@@ -62,7 +62,7 @@ struct Track {
 }
 
 #[derive(Debug, Default)]
-struct Look {
+struct PreviewSoFar {
     views: Vec<SourceView>,
     benchmarks: BTreeMap<(String, BenchmarkId, Quantity), Track>,
     covariates: BTreeMap<(String, String), CovariateView>,
@@ -74,7 +74,7 @@ struct Look {
 /// What is wrong with lines, by kind.
 type Refusals = BTreeMap<String, Refusal>;
 
-impl Look {
+impl PreviewSoFar {
     fn source(&mut self, source: &Source, decoder: &Decoder) -> SourceView {
         let mut view = SourceView {
             id: source.id.clone(),

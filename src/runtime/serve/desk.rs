@@ -22,7 +22,7 @@ const LOOK: Duration = Duration::from_secs(1);
 /// A stream ends after so many looks; whoever reads it asks again, from where it ended. So none holds a place for
 /// ever, and all end before [`super::Limits::request_time`].
 const LOOKS: u32 = 20;
-/// Events told at one look; after more of them the next look follows at once.
+/// Events sent in one round; after more of them the next round follows at once.
 const MOST_TOLD: usize = 500;
 
 /// The routes.
@@ -163,14 +163,14 @@ async fn changes(State(desk): State<Arc<Desk>>, Query(since): Query<Since>) -> R
     (headers, Body::from_stream(parts)).into_response()
 }
 
-/// How far a stream has told.
+/// How far a stream has been sent.
 struct Place {
     desk: Arc<Desk>,
-    /// The last event; `None`: only what comes from now on is told.
+    /// The last event; `None`: only what comes from now on is sent.
     event: Option<i64>,
     step: Option<i64>,
     looks: u32,
-    /// Whether there is more to tell than one look tells.
+    /// Whether there is more to send than one round sends.
     is_behind: bool,
 }
 
@@ -178,9 +178,9 @@ impl Place {
     /// What has changed since the last look; a comment where nothing has, so that a dead connection shows.
     fn look(&mut self) -> Result<String, StoreError> {
         let Heads { step, event } = self.desk.heads()?;
-        let told = self.event.unwrap_or(event);
-        let mut fresh = if event > told {
-            self.desk.events_after(told)?
+        let sent = self.event.unwrap_or(event);
+        let mut fresh = if event > sent {
+            self.desk.events_after(sent)?
         } else {
             Vec::new()
         };
@@ -190,14 +190,14 @@ impl Place {
         for (number, body) in &fresh {
             let _ = write!(text, "id: {number}\nevent: change\ndata: {body}\n\n");
         }
-        let told = fresh.last().map_or(event, |(number, _)| *number);
+        let sent = fresh.last().map_or(event, |(number, _)| *number);
         if self.step != Some(step) {
             let _ = write!(
                 text,
-                "id: {told}\nevent: progress\ndata: {{\"step\":{step},\"event\":{event}}}\n\n"
+                "id: {sent}\nevent: progress\ndata: {{\"step\":{step},\"event\":{event}}}\n\n"
             );
         }
-        (self.event, self.step) = (Some(told), Some(step));
+        (self.event, self.step) = (Some(sent), Some(step));
         Ok(if text.is_empty() {
             ": nothing new\n\n".to_owned()
         } else {

@@ -74,7 +74,7 @@ fn trouble(sheet: &mut Sheet<'_>, health: &Health) -> fmt::Result {
         ),
         (
             "silences",
-            "Orders in force by which alerts are not told",
+            "Orders in force by which alerts are not reported",
             health.silences.len() as f64,
         ),
     ];
@@ -82,7 +82,7 @@ fn trouble(sheet: &mut Sheet<'_>, health: &Health) -> fmt::Result {
         sheet.gauge(name, about, value)?;
     }
     if let Some(until) = health.silences.iter().map(|mute| mute.until).max() {
-        let about = "When the last order ends by which alerts are not told, Unix time";
+        let about = "When the last order ends by which alerts are not reported, Unix time";
         sheet.gauge("silenced_until_timestamp_seconds", about, seconds(until))?;
     }
     Ok(())
@@ -202,7 +202,7 @@ fn benchmarks(sheet: &mut Sheet<'_>, points: &[(BenchmarkId, Point)]) -> fmt::Re
         ),
         (
             "unknown",
-            "1 while the monitor cannot tell: no data, a sensor fault, a stale model",
+            "1 while the monitor cannot decide: no data, a sensor fault, a stale model",
             |point| Some(f64::from(u8::from(point.is_unknown))),
         ),
         (

@@ -59,8 +59,8 @@ pub(super) struct FileTail {
     pub(super) newest: Option<Timestamp>,
     /// From where a restart goes on.
     pub(super) safe: Saved,
-    /// As [`FileTail::moved`] last told it.
-    pub(super) told: Saved,
+    /// As [`FileTail::moved`] last reported it.
+    pub(super) reported: Saved,
 }
 
 #[derive(Debug)]
@@ -145,7 +145,7 @@ impl FileTail {
             is_restored: false,
             newest: None,
             safe: Saved::default(),
-            told: Saved::default(),
+            reported: Saved::default(),
         }
     }
 
@@ -227,7 +227,7 @@ impl FileTail {
             let is_read =
                 self.at > 0 && !matches!(self.content, Content::Refused | Content::Complete);
             if is_read && self.place == Some(glance.place) {
-                self.tell_gap(glance.size);
+                self.report_gap(glance.size);
             } else {
                 tracing::info!(file = %self.path.display(), at = self.at, "another file: read from its start");
             }
@@ -255,7 +255,7 @@ impl FileTail {
 
     /// The same file, and what we have read of it is no longer there: what was written after our last look and cut
     /// off before this one cannot be known.
-    fn tell_gap(&mut self, size: u64) {
+    fn report_gap(&mut self, size: u64) {
         let (file, at) = (self.path.display(), self.at);
         tracing::warn!(%file, at, size, "cut off while it was followed: read from its start, readings may be missing");
         let name = self.path.file_name().unwrap_or_default().to_string_lossy();

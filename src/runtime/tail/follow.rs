@@ -47,7 +47,7 @@ struct Followed {
     decoder: Arc<Decoder>,
     /// Where values wait for earlier ones.
     reorder: Option<Reorder>,
-    /// What could not be used in files that are gone, and of all its files what has been told.
+    /// What could not be used in files that are gone, and of all its files what has been reported.
     quarantined_in_gone: u64,
     quarantined_told: u64,
 }
@@ -66,7 +66,7 @@ pub struct Follower {
     gone: Vec<(usize, Position)>,
     /// What may be missing of files that are gone.
     lost: Vec<Arrival>,
-    /// Files whose names are no text, as they were told.
+    /// Files whose names are no text, as they were reported.
     not_text: BTreeSet<PathBuf>,
 }
 

@@ -4,7 +4,7 @@
 //! asynchronous shell that asks: when a watched folder changes, and every two seconds in any case,
 //! because a watch can be lost, overflow, or never work on a network's file system.
 //!
-//! A follower goes on from the positions that it told before and that were kept together with the values before
+//! A follower goes on from the positions that it reported before and that were kept together with the values before
 //! them; whoever takes the values drops what it has seen.
 
 mod decode;
@@ -98,7 +98,7 @@ struct Watch {
     watcher: Option<RecommendedWatcher>,
     unwatched: BTreeSet<PathBuf>,
     /// Of which it has been said that they cannot be watched.
-    told: BTreeSet<PathBuf>,
+    reported: BTreeSet<PathBuf>,
     wake: Arc<Notify>,
 }
 
@@ -117,7 +117,7 @@ impl Watch {
         Self {
             watcher,
             unwatched: folders,
-            told: BTreeSet::new(),
+            reported: BTreeSet::new(),
             wake,
         }
     }
@@ -130,8 +130,8 @@ impl Watch {
         self.unwatched.retain(|folder| {
             let watched = watcher.watch(folder, RecursiveMode::NonRecursive);
             let Err(error) = watched else { return false };
-            // A folder that is not there is told by whoever lists it.
-            if !matches!(error.kind, notify::ErrorKind::PathNotFound) && folder.is_dir() && self.told.insert(folder.clone()) {
+            // A folder that is not there is reported by whoever lists it.
+            if !matches!(error.kind, notify::ErrorKind::PathNotFound) && folder.is_dir() && self.reported.insert(folder.clone()) {
                 tracing::warn!(folder = %folder.display(), %error, "no watch: files are looked at in turn");
             }
             true

@@ -33,7 +33,7 @@ enum SavedContent {
 }
 
 impl FileTail {
-    /// The file as [`FileTail::moved`] told of it, perhaps to another process.
+    /// The file as [`FileTail::moved`] reported it, perhaps to another process.
     ///
     /// # Errors
     /// When this version, or this config, cannot go on from there.
@@ -65,19 +65,19 @@ impl FileTail {
         file.place = saved.place;
         file.mark.clone_from(&saved.mark);
         file.safe = saved.clone();
-        file.told = saved;
+        file.reported = saved;
         Ok(file)
     }
 
     /// From where a restart is to go on, if that is another place than when last asked.
     pub(super) fn moved(&mut self) -> Option<Vec<u8>> {
-        if self.told == self.safe {
+        if self.reported == self.safe {
             return None;
         }
         let body = rmp_serde::to_vec_named(&self.safe)
             .inspect_err(|error| tracing::error!(%error, "no position to go on from"))
             .ok()?;
-        self.told = self.safe.clone();
+        self.reported = self.safe.clone();
         Some(body)
     }
 

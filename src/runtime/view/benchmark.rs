@@ -153,7 +153,7 @@ pub struct BenchmarkView {
     pub alerts: Vec<Event>,
     /// Who has seen what is in force, on the whole site.
     pub acknowledged: Vec<Event>,
-    /// The orders in force by which alerts are not told, on the whole site.
+    /// The orders in force by which alerts are not reported, on the whole site.
     pub silences: Vec<Event>,
 }
 

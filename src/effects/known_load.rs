@@ -18,7 +18,7 @@ const LATEST: usize = 32;
 /// What is known besides the law under a constant load. Only what can be said of times to come is in it: a
 /// covariate's response, harmonics, a step of the load; a jump of the reading, temperature in it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Fuller {
+pub struct KnownLoad {
     /// In the order in which the search accepted them.
     pub parts: Vec<Part>,
 }
@@ -93,7 +93,7 @@ pub struct Wave {
     pub sine: f64,
 }
 
-impl Fuller {
+impl KnownLoad {
     /// What of `fitted` can be said of times to come.
     pub(super) fn of(problem: &Problem, fitted: &Fitted, drivers: &[(usize, Driver)]) -> Self {
         let own = |(index, term): (usize, &Term)| {
