@@ -1,7 +1,7 @@
 //! `doctor CONFIG`: whether this machine can carry the site.
 
 use super::args::{Format, OutputArgs};
-use super::exit::UsageError;
+use super::exit::{AsUser, UsageError};
 use crate::config;
 use crate::runtime::doctor::{self, Finding, Verdict};
 use anyhow::Context;
@@ -30,11 +30,6 @@ pub(super) struct Args {
 #[derive(Debug, thiserror::Error)]
 #[error("{0} wrong; see above")]
 struct Unfit(usize);
-
-/// What the process of another user ended with; it has said why.
-#[derive(Debug, thiserror::Error)]
-#[error("so it is for user {0}")]
-pub(super) struct AsUser(String, pub(super) Option<u8>);
 
 #[derive(Debug, Serialize)]
 struct Report {

@@ -7,7 +7,8 @@ use crate::config::{self, Config, HookConfig};
 use crate::monitor::{AlertState, Event, EventKind};
 use crate::reading::Timestamp;
 use crate::runtime::clock;
-use crate::runtime::hook::{self, Alert, Outcome, Status};
+use crate::runtime::deliver;
+use crate::runtime::hook::{Alert, Outcome, Status};
 use crate::runtime::log::{self, LogFormat};
 use crate::runtime::sandbox::{self, OURSELVES};
 use serde::Serialize;
@@ -109,7 +110,7 @@ fn test(args: &Test) -> anyhow::Result<()> {
         let Some(alert) = drill(&config, hook, level, now) else {
             continue;
         };
-        let outcome = runtime.block_on(hook::run(hook, &alert, 1));
+        let outcome = runtime.block_on(deliver::run(hook, &alert, 1));
         hooks.push(Drill {
             hook: hook.name(),
             level,

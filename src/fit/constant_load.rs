@@ -7,39 +7,9 @@ use super::chart::{Branch, HIGHEST_M, LEAST_LN_M, LOWEST_M};
 use super::global_search::{Found, Search};
 use super::lattice::Lattice;
 use super::point_readings::PointReadings;
+use super::solution::{EndOfSearch, Exponent, Solution};
 use crate::model::Law;
 use std::fmt;
-
-/// A law that fits, at a local minimum of the misfit.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Solution {
-    /// The law, t = 0 at the first reading, velocity in the readings' unit (a length's per day).
-    pub law: Law,
-    /// Modelled displacement at the first reading; 0 for velocities.
-    pub displacement_at_start: f64,
-    /// Root mean square of the residuals, in the readings' unit.
-    pub rms: f64,
-    /// Where the search ended: inside the box of m, or at its side.
-    pub place: Place,
-}
-
-/// Whether m is free where a search ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Place {
-    /// A minimum within the branch.
-    Inside,
-    /// The misfit still falls beyond the bound of m.
-    AtBoundOfM,
-}
-
-/// What is held in an inversion.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Exponent {
-    /// m is fitted.
-    Free,
-    /// m is this.
-    Fixed(f64),
-}
 
 /// Why an inversion ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -170,7 +140,7 @@ fn conclude(
     let outcome = match found.first() {
         None => Outcome::NoForwardMotion,
         Some(best) if !best.converged => Outcome::Stopped,
-        Some(best) if best.solution.place == Place::AtBoundOfM => {
+        Some(best) if best.solution.place == EndOfSearch::AtBoundOfM => {
             Outcome::AtBoundOfM(m_of(&best.solution))
         }
         Some(_) => Outcome::Converged,
@@ -211,7 +181,7 @@ fn prefer_unit_m(found: &mut [Found]) {
             a: f64::NAN,
             ..unit.solution.law
         };
-        one.solution.place = Place::Inside;
+        one.solution.place = EndOfSearch::Inside;
     }
     let gains = |one: &Found| one.solution.rms < unit_rms * (1.0 - GAIN_OVER_UNIT_M);
     if found.first().is_some_and(|best| !gains(best)) {
@@ -244,7 +214,7 @@ fn distinct(found: &[Found], flat: f64, exponent: Exponent) -> Vec<Solution> {
     for Found { solution, .. } in found {
         let first_of_side = kept.iter().all(|one| side(&one.law) != side(&solution.law));
         let same = |one: &Solution| {
-            let bound = solution.place == Place::AtBoundOfM && one.place == solution.place;
+            let bound = solution.place == EndOfSearch::AtBoundOfM && one.place == solution.place;
             let close = (one.rms - solution.rms).abs() <= SAME_RMS * solution.rms;
             (close || bound)
                 && branch(&one.law) == branch(&solution.law)

@@ -2,12 +2,12 @@
 //! the best of those on all readings, and last from whatever may still be the best of all.
 
 use super::chart::{Anchor, Branch, Chart, Direction};
-use super::constant_load::{Exponent, Place as Side, Solution};
 use super::curve::{Curve, Fineness, Window};
 use super::descent::{Descent, Effort, Place};
 use super::lattice::{self, Family, Lattice};
 use super::point_readings::PointReadings;
 use super::record::Record;
+use super::solution::{EndOfSearch, Exponent, Solution};
 use super::unit_m::{Line, Lines};
 use crate::reading::Quantity;
 
@@ -325,9 +325,9 @@ impl<'a> Search<'a> {
             Quantity::Displacement => projected.offset + slip,
         };
         let place = if self.holds_m() || !is_at_bound_of_m(end) {
-            Side::Inside
+            EndOfSearch::Inside
         } else {
-            Side::AtBoundOfM
+            EndOfSearch::AtBoundOfM
         };
         let solution = self
             .readings
@@ -344,7 +344,7 @@ impl<'a> Search<'a> {
         let (law, at_start) = self.lines.law(&self.full, line, length)?;
         let solution = self
             .readings
-            .solution(&law, at_start, line.cost, Side::Inside);
+            .solution(&law, at_start, line.cost, EndOfSearch::Inside);
         Some(Found {
             solution,
             cost: line.cost,

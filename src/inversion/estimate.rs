@@ -5,10 +5,44 @@
 //! probability stands in the outermost 5 % of the prior's range of p on that side, the others' where
 //! most of the tail beyond the bound does; those of `x_i`, T and D also where m may be on either side of 1.
 
-use super::report::{Estimate, Parameters};
 use super::{Inversion, law_in_mm_per_day};
 use crate::fit::{Exponent, LawSample, P_PRIOR, Posterior, Solution};
 use crate::model::{Accuracy, Law, Trajectory};
+use serde::Serialize;
+
+/// A best value and the bounds of 90 %.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Of the best fit; `None` where that law has none.
+    pub best: Option<f64>,
+    /// 5 % quantile; `None` where it is unbounded.
+    pub low: Option<f64>,
+    /// 95 % quantile; `None` where it is unbounded.
+    pub high: Option<f64>,
+}
+
+/// The law's parameters at the first reading.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Parameters {
+    /// m = B/A.
+    pub m: Estimate,
+    /// Initial state.
+    pub x_i: Estimate,
+    /// T, days.
+    pub t_unit_days: Estimate,
+    /// D, in the readings' velocity unit (for displacements, their length per day).
+    pub d: Estimate,
+    /// `D_c`, in the readings' length.
+    pub d_c: Estimate,
+    /// S `theta_i`.
+    pub s_theta_i: Estimate,
+    /// Velocity, in the unit of D.
+    pub v_i: Estimate,
+    /// Initial slope of the inverse-velocity plot, 1/day.
+    pub r_per_day: Estimate,
+    /// Its curvature, 1/day.
+    pub kappa_per_day: Estimate,
+}
 
 /// Quantiles that bound 90 %.
 const LOW: f64 = 0.05;

@@ -9,9 +9,9 @@ mod report;
 mod sweep;
 mod together;
 
+pub use estimate::{Estimate, Parameters};
 pub use report::{
-    Alternative, Alternatives, Estimate, FailureTime, FitReport, InverseVelocity, Parameters,
-    RegimeReport, UnderPrior,
+    Alternative, Alternatives, FailureTime, FitReport, InverseVelocity, RegimeReport, UnderPrior,
 };
 pub use sweep::{SweepOptions, SweepReport, SweepRow, sweep};
 pub use together::{ApartReport, GroupReport, TogetherReport, together};

@@ -6,11 +6,12 @@
 //! search may call this without allocating. Not in it: the direct response of the contacts to a change
 //! of normal stress (Linker and Dieterich, 1992).
 
+use super::accuracy::Accuracy;
 use super::coefficients::Coefficients;
 use super::law::{Law, LawError};
 use super::load::{Load, Stretch};
 use super::relaxation::Relaxation;
-use super::trajectory::{Accuracy, Motion};
+use super::trajectory::Motion;
 use std::ops::ControlFlow;
 
 /// The highest order of a step.

@@ -1,12 +1,12 @@
 //! The solution from t = 0 on, piece by piece: beside a steady state, Taylor segments, before failure.
 
+use super::accuracy::Accuracy;
 use super::coefficients::Coefficients;
 use super::law::Law;
 use super::relaxation::Relaxation;
 use super::scalar::Scalar;
 use super::tail;
 use super::taylor::Segment;
-use super::trajectory::Accuracy;
 
 /// Where the segments stop and the last stretch before failure begins: (y, `slip / v_i`) then.
 #[derive(Debug, Clone, Copy)]

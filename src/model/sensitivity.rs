@@ -3,12 +3,13 @@
 //! The same recurrences that solve the law carry its derivatives: exact, and through m = 1 as smooth as
 //! the solution. Where a law was made from the paper's parameters, a and b follow r, kappa and p.
 
+use super::accuracy::Accuracy;
 use super::coefficients::Coefficients;
 use super::law::Law;
 use super::path::{Path, Place};
 use super::scalar::Dual;
 use super::tail;
-use super::trajectory::{Accuracy, Motion};
+use super::trajectory::Motion;
 
 /// Derivatives by each parameter of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]

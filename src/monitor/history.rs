@@ -1,7 +1,7 @@
 //! The readings of one benchmark, in the science's units and in time order, bounded by count.
 
 use super::declared::Declarations;
-use super::track::settled;
+use super::motion::settled;
 use crate::fit::{Observation, Observations, Rate, RateOptions};
 use crate::reading::{
     BenchmarkId, Quantity, Reading, SECONDS_PER_DAY, Series, Timestamp, Unit, days_since,

@@ -8,6 +8,7 @@ mod drift;
 mod event;
 mod history;
 mod kept;
+mod motion;
 mod notice;
 mod order;
 mod saved;
@@ -25,12 +26,12 @@ pub use event::{
     AlertState, Event, EventKind, FailureTime, InverseVelocity, Plain, RegimeReport, SUSPECT,
     SUSPECT_ENDS, SharedFailure, Summary, Unexplained,
 };
+pub(crate) use motion::recent;
 pub use notice::{CLOCK_FAULT, Notice};
 pub use order::Order;
 pub use saved::{Part, SavedError};
 pub use search::{Finding, SearchJob};
 pub use site::SiteLevel;
-pub(crate) use track::recent;
 
 use crate::alert::{Level, Policy};
 use crate::reading::{BenchmarkId, Reading, Sample, Suspicion, Timestamp, Unit};

@@ -2,11 +2,11 @@
 //! slope is now.
 
 use super::forecast::UnderKnownLoad;
-use super::motion::{fastest, is_new_highest, settled};
 use crate::effects::{self, ByClock};
 use crate::fit::{Observations, Rate};
 use crate::forecast::Panel;
 use crate::monitor::history::History;
+use crate::monitor::motion::{fastest, is_new_highest, settled};
 use crate::reading::{Channel, Timestamp, after_days};
 use serde::{Deserialize, Serialize};
 

@@ -1,11 +1,13 @@
 //! From a refit to the level in force, and the words for it.
 
 use super::forecast::Forecast;
-use super::motion::{acceleration, displacement_mm, moves_backwards, newest_velocity, settled};
 use super::{Track, days};
 use crate::alert::{Cause, Entered, Evidence, Policy, Transition};
 use crate::fit::Rate;
 use crate::monitor::event::{AlertState, Event, EventKind};
+use crate::monitor::motion::{
+    acceleration, displacement_mm, moves_backwards, newest_velocity, settled,
+};
 use crate::reading::Timestamp;
 use jiff::SignedDuration;
 

@@ -6,7 +6,6 @@ mod call;
 mod declared;
 mod forecast;
 mod lookback;
-mod motion;
 mod pace;
 mod refit;
 mod sensor;
@@ -37,9 +36,6 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use unknown::{Reason, Unknown};
 use watch::Watch;
-
-pub(crate) use motion::recent;
-pub(super) use motion::settled;
 
 /// So many readings in a row with one value are a stuck sensor, or a resolution too coarse to show it.
 const STUCK: usize = 24;

@@ -1,7 +1,6 @@
 //! What a refit says: the regime, the failure time, and predicted times that moved.
 
 use super::forecast::Forecast;
-use super::recent;
 use super::{Track, days};
 use crate::alert::{Cause, Policy};
 use crate::forecast::{HORIZON_DAYS, InverseVelocityLine, Outlook, Passage};
@@ -9,6 +8,7 @@ use crate::monitor::drift;
 use crate::monitor::event::{
     Event, EventKind, FailureTime, InverseVelocity, Plain, RegimeReport, Unexplained,
 };
+use crate::monitor::recent;
 use crate::reading::{Timestamp, after_days};
 use crate::regime::{Regime, label};
 

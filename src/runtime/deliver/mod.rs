@@ -9,7 +9,7 @@
 mod runner;
 mod worker;
 
-pub use runner::{Processes, Run, Runner};
+pub use runner::{Processes, Run, Runner, run};
 
 use super::delivered::Delivered;
 use super::hook::Alert;

@@ -11,7 +11,7 @@
 use super::columns::Layout;
 use super::message::{AVERAGING, Fields, MessageError, Topic};
 use super::table::TableRows;
-use super::text::Taken;
+use super::taken::Taken;
 use super::{IngestError, Item, ReadOptions};
 use crate::reading::{BenchmarkId, MissingValues, Quantity, Unit};
 use ::csv::StringRecord;

@@ -1,13 +1,12 @@
 //! Follows one file: where we are in it, whether it is still the same, and what came.
 
 use super::decode::{Arrival, Decoder};
+use super::position::{Place, Saved};
 use super::records::{self, Channels, Frame, HEADER_BYTES, MAGIC, RawMessage};
-use super::saved::Saved;
 use super::text::{BadLine, Fed, TextReader, Unpacking};
 use crate::reading::Timestamp;
 use crate::runtime::ingest::{IngestError, Item, decode_message, is_packed};
 use crate::runtime::site::is_logged;
-use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use std::fs::{File, Metadata};
 use std::io;
@@ -88,22 +87,6 @@ impl Content {
                 channels: Channels::default(),
                 suspect: None,
             },
-        }
-    }
-}
-
-/// Which file it is, as the file system counts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub(in crate::runtime) struct Place {
-    device: u64,
-    inode: u64,
-}
-
-impl Place {
-    pub(super) fn of(metadata: &Metadata) -> Self {
-        Self {
-            device: metadata.dev(),
-            inode: metadata.ino(),
         }
     }
 }

@@ -1,7 +1,8 @@
 //! Follows the files of all sources and puts what they hold in the order of its measurement.
 
 use super::decode::{Arrival, Decoder};
-use super::file::{FileTail, Place};
+use super::file::FileTail;
+use super::position::Place;
 use super::reorder::Reorder;
 use crate::config::{Benchmark, FilePattern, Source};
 use crate::reading::Timestamp;

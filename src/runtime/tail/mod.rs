@@ -12,6 +12,7 @@ mod file;
 mod follow;
 mod gap;
 pub mod lines;
+mod position;
 pub mod records;
 mod reorder;
 mod saved;
