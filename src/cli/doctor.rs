@@ -32,7 +32,7 @@ pub(super) struct Args {
 struct Unfit(usize);
 
 #[derive(Debug, Serialize)]
-struct Report {
+struct DoctorReport {
     findings: Vec<Finding>,
 }
 
@@ -43,7 +43,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     let config = config::load(&args.config)?;
     let findings = doctor::examine(&config);
-    let report = Report { findings };
+    let report = DoctorReport { findings };
     args.output.print(&report, text)?;
     let is_wrong = |finding: &&Finding| finding.verdict == Verdict::Wrong;
     match report.findings.iter().filter(is_wrong).count() {
@@ -85,7 +85,7 @@ fn run_as(name: &str, args: &Args) -> anyhow::Result<()> {
     }
 }
 
-fn text(report: &Report) -> String {
+fn text(report: &DoctorReport) -> String {
     let mut text = String::new();
     for finding in &report.findings {
         let (verdict, check) = (finding.verdict.name(), finding.check);

@@ -16,7 +16,7 @@ use super::problem::Problem;
 use super::refit::{Fitted, Start, plain_starts, refit_from};
 use super::response::Driver;
 use super::rival::Rival;
-use super::search::Found;
+use super::search::SearchResult;
 use super::term::{Act, Scratch, Term};
 use super::verdict::{LARGEST_REST, Verdict, contribution};
 use crate::reading::{Unit, after_days};
@@ -29,7 +29,7 @@ const LEFT_OVER: f64 = 0.001;
 const MOST_STRETCHES: usize = 8;
 
 /// Readings, noise models, covariates.
-type Ground<'a> = (&'a Problem, &'a [Whitener], &'a [(usize, Driver)]);
+type SearchGround<'a> = (&'a Problem, &'a [Whitener], &'a [(usize, Driver)]);
 
 /// What a search found, with the figures, tests and curves that are reported of it.
 pub(super) struct Findings {
@@ -66,8 +66,8 @@ impl Findings {
 /// All that is reported of what was found and concluded, in `unit`.
 pub(super) fn findings(
     unit: Unit,
-    ground: Ground,
-    (found, verdict): (Found, Verdict),
+    ground: SearchGround,
+    (found, verdict): (SearchResult, Verdict),
     options: &Options,
     scratch: &mut Scratch,
 ) -> Findings {
@@ -184,7 +184,7 @@ fn confirmed(
 /// The curves with what each effect adds.
 fn with_effects(
     mut curves: Curves,
-    (problem, _, drivers): Ground,
+    (problem, _, drivers): SearchGround,
     full: &Fitted,
     unit: Unit,
     scratch: &mut Scratch,
@@ -304,7 +304,7 @@ struct Tests {
 
 /// The tests of the residual, the undeclared load left in it, and its autocorrelation, before and after.
 fn residual_tests(
-    (problem, bank, _): Ground,
+    (problem, bank, _): SearchGround,
     (null, full): (&Fitted, &Fitted),
     scratch: &mut Scratch,
 ) -> (ResidualTests, [Left; 2]) {

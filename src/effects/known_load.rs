@@ -114,7 +114,7 @@ impl KnownLoad {
         self.sum(channels, times, Part::in_reading)
     }
 
-    fn sum(&self, channels: &[&Channel], times: &[Timestamp], of: Of) -> Vec<f64> {
+    fn sum(&self, channels: &[&Channel], times: &[Timestamp], of: PartOf) -> Vec<f64> {
         let mut sum = vec![0.0; times.len()];
         for part in &self.parts {
             let Some(own) = of(part, channels, times) else {
@@ -146,7 +146,7 @@ impl KnownLoad {
     }
 }
 
-type Of = fn(&Part, &[&Channel], &[Timestamp]) -> Option<Vec<f64>>;
+type PartOf = fn(&Part, &[&Channel], &[Timestamp]) -> Option<Vec<f64>>;
 
 impl Part {
     /// Its kind.

@@ -52,7 +52,7 @@ pub(super) struct Withheld {
 }
 
 /// What a search came to.
-pub(super) struct Found {
+pub(super) struct SearchResult {
     /// The plain law by least squares, and under its likeliest noise.
     pub(super) plain: Fitted,
     pub(super) null: Fitted,
@@ -152,7 +152,11 @@ impl Search<'_> {
     }
 
     /// Adds effects to the plain law until none earns its place.
-    pub(super) fn run(mut self, plain: Fitted, progress: &mut dyn FnMut(f64)) -> Option<Found> {
+    pub(super) fn run(
+        mut self,
+        plain: Fitted,
+        progress: &mut dyn FnMut(f64),
+    ) -> Option<SearchResult> {
         let null = self.null(&plain)?;
         let mut full = null.clone();
         let mut accepted = Vec::new();
@@ -164,7 +168,7 @@ impl Search<'_> {
             full = next;
             accepted.push(how);
         }
-        Some(Found {
+        Some(SearchResult {
             plain,
             null,
             full,

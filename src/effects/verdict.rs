@@ -9,7 +9,7 @@ use super::problem::Problem;
 use super::refit::{Fitted, jacobian};
 use super::response::Driver;
 use super::rival::Rival;
-use super::search::{Accepted, Found};
+use super::search::{Accepted, SearchResult};
 use super::term::{Act, Scratch, Term, time_of};
 use crate::reading::{Quantity, Unit};
 
@@ -33,7 +33,7 @@ const NINETY: f64 = 1.645;
 pub(super) fn conclude(
     (problem, bank, drivers): (&Problem, &[Whitener], &[(usize, Driver)]),
     unit: Unit,
-    found: &mut Found,
+    found: &mut SearchResult,
     (margin, scratch): (f64, &mut Scratch),
 ) -> Verdict {
     let mut full = found.full.clone();

@@ -4,7 +4,7 @@
 //! curve, stretched and shifted in time. Nothing is random.
 
 use super::chart::{Branch, HIGHEST_M, LEAST_LN_M, LOWEST_M};
-use super::global_search::{Found, Search};
+use super::global_search::{FoundMinimum, GlobalSearch};
 use super::lattice::Lattice;
 use super::point_readings::PointReadings;
 use super::solution::{EndOfSearch, Exponent, Solution};
@@ -101,7 +101,7 @@ impl ConstantLoad {
                 outcome,
             };
         }
-        let mut search = Search::new(readings, exponent, lattice);
+        let mut search = GlobalSearch::new(readings, exponent, lattice);
         let found = search.run();
         conclude(&search, readings, found, exponent)
     }
@@ -130,9 +130,9 @@ fn refuse(readings: &PointReadings, exponent: Exponent) -> Option<Outcome> {
 
 /// Ranks what was found.
 fn conclude(
-    search: &Search,
+    search: &GlobalSearch,
     readings: &PointReadings,
-    mut found: Vec<Found>,
+    mut found: Vec<FoundMinimum>,
     exponent: Exponent,
 ) -> ConstantLoad {
     found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
@@ -159,7 +159,7 @@ fn m_of(solution: &Solution) -> f64 {
 
 /// Where a branch has only run into m = 1, that is the better account; what is left of the branch is
 /// the law next to it, whose `x_i`, T and D mean nothing.
-fn prefer_unit_m(found: &mut [Found]) {
+fn prefer_unit_m(found: &mut [FoundMinimum]) {
     let Some(unit) = found.iter().find(|one| one.solution.law.p == 0.0).copied() else {
         return;
     };
@@ -183,7 +183,7 @@ fn prefer_unit_m(found: &mut [Found]) {
         };
         one.solution.place = EndOfSearch::Inside;
     }
-    let gains = |one: &Found| one.solution.rms < unit_rms * (1.0 - GAIN_OVER_UNIT_M);
+    let gains = |one: &FoundMinimum| one.solution.rms < unit_rms * (1.0 - GAIN_OVER_UNIT_M);
     if found.first().is_some_and(|best| !gains(best)) {
         // Stable: only the best law with m = 1 moves, to the front.
         let at = found.iter().position(|one| one.solution.law.p == 0.0);
@@ -208,10 +208,10 @@ fn branch(law: &Law) -> Option<Branch> {
 }
 
 /// The minima that differ, best first, and the best of m > 1, m = 1 and m < 1 whatever their worth.
-fn distinct(found: &[Found], flat: f64, exponent: Exponent) -> Vec<Solution> {
+fn distinct(found: &[FoundMinimum], flat: f64, exponent: Exponent) -> Vec<Solution> {
     let best = found.first().map_or(0.0, |best| best.solution.rms);
     let mut kept: Vec<Solution> = Vec::new();
-    for Found { solution, .. } in found {
+    for FoundMinimum { solution, .. } in found {
         let first_of_side = kept.iter().all(|one| side(&one.law) != side(&solution.law));
         let same = |one: &Solution| {
             let bound = solution.place == EndOfSearch::AtBoundOfM && one.place == solution.place;

@@ -163,12 +163,12 @@ fn window(snapshots: &[Snapshot], last: usize) -> &[Snapshot] {
 
 /// Benchmarks taken as one, with what they say at each snapshot.
 #[derive(Debug, Clone)]
-struct Part {
+struct GroupPart {
     members: Vec<usize>,
     snapshots: Vec<Density>,
 }
 
-impl Part {
+impl GroupPart {
     fn of(window: &[Snapshot], dependence: &Dependence, mut members: Vec<usize>) -> Self {
         members.sort_unstable();
         let shared = dependence.among(&members);
@@ -240,9 +240,9 @@ fn agreement(a: &Density, b: &Density) -> f64 {
 }
 
 /// Parts that no merging makes more probable.
-fn partition(window: &[Snapshot], dependence: &Dependence, count: usize) -> Vec<Part> {
-    let mut parts: Vec<Part> = (0..count)
-        .map(|member| Part::of(window, dependence, vec![member]))
+fn partition(window: &[Snapshot], dependence: &Dependence, count: usize) -> Vec<GroupPart> {
+    let mut parts: Vec<GroupPart> = (0..count)
+        .map(|member| GroupPart::of(window, dependence, vec![member]))
         .collect();
     let mut ln_odds: Vec<Vec<f64>> = (0..count)
         .map(|i| (0..i).map(|j| parts[i].ln_odds(&parts[j])).collect())
@@ -259,7 +259,7 @@ fn partition(window: &[Snapshot], dependence: &Dependence, count: usize) -> Vec<
             row.remove(i);
         }
         let members = [parts[j].members.as_slice(), &gone.members].concat();
-        parts[j] = Part::of(window, dependence, members);
+        parts[j] = GroupPart::of(window, dependence, members);
         for other in (0..parts.len()).filter(|other| *other != j) {
             ln_odds[other.max(j)][other.min(j)] = parts[j].ln_odds(&parts[other]);
         }
@@ -267,7 +267,12 @@ fn partition(window: &[Snapshot], dependence: &Dependence, count: usize) -> Vec<
 }
 
 /// How probably each member belongs where it is.
-fn belonging(window: &[Snapshot], dependence: &Dependence, part: &Part, all: &[Part]) -> Vec<f64> {
+fn belonging(
+    window: &[Snapshot],
+    dependence: &Dependence,
+    part: &GroupPart,
+    all: &[GroupPart],
+) -> Vec<f64> {
     let probability = |ln_odds: f64| 1.0 / (1.0 + (-ln_odds).exp());
     if part.members.len() == 1 {
         let others = all.iter().filter(|other| other.members != part.members);
@@ -276,8 +281,8 @@ fn belonging(window: &[Snapshot], dependence: &Dependence, part: &Part, all: &[P
     }
     let members = part.members.iter().map(|member| {
         let rest = part.members.iter().filter(|other| *other != member);
-        let rest = Part::of(window, dependence, rest.copied().collect());
-        probability(Part::of(window, dependence, vec![*member]).ln_odds(&rest))
+        let rest = GroupPart::of(window, dependence, rest.copied().collect());
+        probability(GroupPart::of(window, dependence, vec![*member]).ln_odds(&rest))
     });
     members.collect()
 }

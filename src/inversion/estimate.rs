@@ -54,7 +54,7 @@ const MOST_AT_EDGE: f64 = 0.04;
 
 /// One set of parameters, in the units of the report.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Values {
+pub(super) struct ParameterValues {
     pub(super) m: Option<f64>,
     pub(super) x_i: Option<f64>,
     pub(super) t_unit_days: Option<f64>,
@@ -67,8 +67,8 @@ pub(super) struct Values {
 }
 
 /// The parameters of the best fit.
-pub(super) fn best(inversion: &Inversion, solution: Option<&Solution>) -> Values {
-    solution.map_or_else(Values::default, |solution| {
+pub(super) fn best(inversion: &Inversion, solution: Option<&Solution>) -> ParameterValues {
+    solution.map_or_else(ParameterValues::default, |solution| {
         values(inversion, &law_in_mm_per_day(inversion, solution))
     })
 }
@@ -90,10 +90,12 @@ pub(super) fn parameters(
     } else {
         of_m
     };
-    let with = |best: Option<f64>, of: &[Drawn], pick: &dyn Fn(&Values) -> Option<f64>| Estimate {
-        best,
-        low: bound(of, Side::Low, pick),
-        high: bound(of, Side::High, pick),
+    let with = |best: Option<f64>, of: &[Drawn], pick: &dyn Fn(&ParameterValues) -> Option<f64>| {
+        Estimate {
+            best,
+            low: bound(of, BoundSide::Low, pick),
+            high: bound(of, BoundSide::High, pick),
+        }
     };
     Parameters {
         m: exponent(inversion, best.m, of_m),
@@ -111,13 +113,13 @@ pub(super) fn parameters(
 /// A law of the posterior, at its onset.
 #[derive(Debug, Clone, Copy)]
 struct Drawn {
-    values: Values,
+    values: ParameterValues,
     weight: f64,
     at_edge: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Side {
+enum BoundSide {
     Low,
     High,
 }
@@ -153,14 +155,14 @@ fn stands_on_both_sides(samples: &[Drawn]) -> bool {
 }
 
 /// The parameters of a law whose velocity is in mm/day.
-fn values(inversion: &Inversion, law: &Law) -> Values {
+fn values(inversion: &Inversion, law: &Law) -> ParameterValues {
     let velocity = inversion.velocity_per_mm_per_day();
     let millimetres = inversion.length_unit().millimetres();
     let paper = law.paper();
     let finite = |value: f64| Some(value).filter(|value| value.is_finite());
     // Underflow is as little a value as overflow.
     let normal = |value: Option<f64>| value.filter(|value| value.is_normal());
-    Values {
+    ParameterValues {
         m: finite(paper.m),
         x_i: normal(paper.x_i),
         t_unit_days: normal(paper.t_unit_days),
@@ -190,13 +192,17 @@ fn exponent(inversion: &Inversion, best: Option<f64>, samples: &[Drawn]) -> Esti
     let quantile_of_m = |side| quantile(samples, side, &|values| values.m).map(|(m, _)| m);
     Estimate {
         best,
-        low: quantile_of_m(Side::Low).filter(|_| at_edge(false) <= MOST_AT_EDGE),
-        high: quantile_of_m(Side::High).filter(|_| at_edge(true) <= MOST_AT_EDGE),
+        low: quantile_of_m(BoundSide::Low).filter(|_| at_edge(false) <= MOST_AT_EDGE),
+        high: quantile_of_m(BoundSide::High).filter(|_| at_edge(true) <= MOST_AT_EDGE),
     }
 }
 
 /// One bound of 90 %, unless the tail beyond it is the prior's.
-fn bound(samples: &[Drawn], side: Side, pick: &dyn Fn(&Values) -> Option<f64>) -> Option<f64> {
+fn bound(
+    samples: &[Drawn],
+    side: BoundSide,
+    pick: &dyn Fn(&ParameterValues) -> Option<f64>,
+) -> Option<f64> {
     let (value, at_edge) = quantile(samples, side, pick)?;
     (at_edge <= 0.5).then_some(value)
 }
@@ -205,8 +211,8 @@ fn bound(samples: &[Drawn], side: Side, pick: &dyn Fn(&Values) -> Option<f64>) -
 /// Samples without the value (it lies beyond what a number can hold) count as beyond either bound.
 fn quantile(
     samples: &[Drawn],
-    side: Side,
-    pick: &dyn Fn(&Values) -> Option<f64>,
+    side: BoundSide,
+    pick: &dyn Fn(&ParameterValues) -> Option<f64>,
 ) -> Option<(f64, f64)> {
     let total: f64 = samples.iter().map(|one| one.weight).sum();
     let with = samples
@@ -214,11 +220,16 @@ fn quantile(
         .filter_map(|one| Some((pick(&one.values)?, one)));
     let mut sorted: Vec<(f64, &Drawn)> = with.collect();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
-    if side == Side::High {
+    if side == BoundSide::High {
         sorted.reverse();
     }
     let held: f64 = sorted.iter().map(|(_, one)| one.weight).sum();
-    let tail = total * if side == Side::Low { LOW } else { 1.0 - HIGH };
+    let tail = total
+        * if side == BoundSide::Low {
+            LOW
+        } else {
+            1.0 - HIGH
+        };
     let (mut reached, mut at_edge) = (total - held, 0.0);
     if reached >= tail || samples.is_empty() {
         return None;

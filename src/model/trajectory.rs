@@ -3,7 +3,7 @@
 use super::accuracy::Accuracy;
 use super::coefficients::Coefficients;
 use super::law::Law;
-use super::path::{Path, Place};
+use super::path::{PathPlace, SolutionPath};
 use super::tail;
 
 /// Position on a trajectory.
@@ -21,7 +21,7 @@ pub struct Motion {
 #[derive(Debug, Clone)]
 pub struct Trajectory {
     law: Law,
-    path: Path<f64>,
+    path: SolutionPath<f64>,
 }
 
 impl Trajectory {
@@ -29,7 +29,7 @@ impl Trajectory {
     pub fn solve(law: &Law, end_days: f64, accuracy: Accuracy) -> Self {
         let mut trajectory = Self {
             law: *law,
-            path: Path::empty(),
+            path: SolutionPath::empty(),
         };
         trajectory.solve_again(law, end_days, accuracy);
         trajectory
@@ -54,9 +54,9 @@ impl Trajectory {
     /// The motion `t` days after the start; `None` from the singularity on.
     pub fn at(&self, t: f64) -> Option<Motion> {
         match self.path.place(t) {
-            Place::At((y, slip)) => Some(self.motion(y, slip)),
-            Place::BeforeFailure(remaining) => self.before_failure(remaining),
-            Place::Nowhere => None,
+            PathPlace::At((y, slip)) => Some(self.motion(y, slip)),
+            PathPlace::BeforeFailure(remaining) => self.before_failure(remaining),
+            PathPlace::Nowhere => None,
         }
     }
 

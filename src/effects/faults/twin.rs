@@ -1,6 +1,6 @@
 //! Two channels that are one instrument but for jumps, as a raw logger beside its corrected values.
 
-use super::reset::Reset;
+use super::reset::ChannelReset;
 use super::trace::{Trace, extreme, resolution};
 
 /// Fewer common samples show nothing.
@@ -22,9 +22,9 @@ const STRADDLES: usize = 2;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Twins {
     /// The jumps of `first` less `second`, as resets of the first: indices are the first's.
-    pub of_first: Vec<Reset>,
+    pub of_first: Vec<ChannelReset>,
     /// The same, as resets of the second.
-    pub of_second: Vec<Reset>,
+    pub of_second: Vec<ChannelReset>,
     /// Whether the first is the one that jumps.
     pub first_jumps: bool,
 }
@@ -66,8 +66,8 @@ pub(super) fn twins(first: &Trace, second: &Trace) -> Option<Twins> {
         };
         jumps.iter().map(of_jump).sum()
     };
-    let of = |index: fn(&(usize, usize)) -> usize, sign: f64| -> Vec<Reset> {
-        let reset = |&(from, settled, size): &(usize, usize, f64)| Reset {
+    let of = |index: fn(&(usize, usize)) -> usize, sign: f64| -> Vec<ChannelReset> {
+        let reset = |&(from, settled, size): &(usize, usize, f64)| ChannelReset {
             from: index(&common[from]),
             settled: index(&common[settled]),
             size: sign * size,

@@ -1,7 +1,7 @@
 //! Readings, inverse velocity and the forecasts made at some dates, above the levels.
 
 use super::levels;
-use super::{Refit, Replayed, WIDTH};
+use super::{Replayed, ReplayedRefit, WIDTH};
 use crate::figures::day;
 use crate::figures::in_time::{dots, line, thinned};
 use crate::fit::Rate;
@@ -28,7 +28,7 @@ const FAR: f64 = 20.0;
 struct Dated {
     date: Timestamp,
     colour: &'static str,
-    refit: Option<Refit>,
+    refit: Option<ReplayedRefit>,
 }
 
 impl Replayed<'_> {
@@ -256,7 +256,7 @@ fn uprights(dated: &[Dated]) -> Vec<(String, Mark)> {
 
 /// The line of a refit, from the oldest of the velocities it goes through to zero; `None` where these rates do not
 /// give the line that the monitor reported.
-fn straight(rates: &[Rate], refit: &Refit) -> Option<Vec<(f64, f64)>> {
+fn straight(rates: &[Rate], refit: &ReplayedRefit) -> Option<Vec<(f64, f64)>> {
     let zero = day(refit.intercept?);
     InverseVelocityLine::segment(recent(rates), zero).map(Vec::from)
 }

@@ -24,7 +24,7 @@ pub struct Replayed<'a> {
 
 /// One forecast as it was made.
 #[derive(Debug, Clone, Copy)]
-struct Refit {
+struct ReplayedRefit {
     time: Timestamp,
     failure_time: FailureTime,
     /// Where the line through inverse velocity meets zero.
@@ -78,7 +78,7 @@ impl<'a> Replayed<'a> {
     }
 
     /// All forecasts, in the order in which they were made.
-    fn refits(&self) -> impl DoubleEndedIterator<Item = Refit> + 'a {
+    fn refits(&self) -> impl DoubleEndedIterator<Item = ReplayedRefit> + 'a {
         let id = &self.series.benchmark;
         let ours = self
             .events
@@ -96,7 +96,7 @@ impl<'a> Replayed<'a> {
             else {
                 return None;
             };
-            Some(Refit {
+            Some(ReplayedRefit {
                 time: event.time,
                 failure_time: *failure_time,
                 intercept: inverse_velocity.failure_time,
@@ -109,7 +109,7 @@ impl<'a> Replayed<'a> {
     }
 
     /// The newest forecast made until then.
-    fn refit_at(&self, time: Timestamp) -> Option<Refit> {
+    fn refit_at(&self, time: Timestamp) -> Option<ReplayedRefit> {
         self.refits().rev().find(|refit| refit.time <= time)
     }
 

@@ -7,7 +7,7 @@ use super::DRIFT;
 
 /// The rates as the filter sees them.
 #[derive(Debug, Clone)]
-pub(super) struct Record {
+pub(super) struct RateRecord {
     /// ln of the velocity less `centre`, oldest first, and its standard error.
     pub(super) ln_velocity: Vec<f64>,
     pub(super) error: Vec<f64>,
@@ -22,10 +22,10 @@ pub(super) struct Record {
 
 /// One guess at the load and at the scatter of the readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Noise {
+pub(super) struct LoadNoise {
     pub(super) scatter: f64,
     pub(super) sigma: f64,
-    /// Memory of the load, days.
+    /// LoadMemory of the load, days.
     pub(super) tau: f64,
     pub(super) ln_evidence: f64,
 }
@@ -56,7 +56,7 @@ pub(super) struct Gains {
     pub(super) today: Vec<[f64; 3]>,
 }
 
-impl Record {
+impl RateRecord {
     /// The variance of a rate's error.
     pub(super) fn variance(&self, index: usize, scatter: f64) -> f64 {
         (self.error[index].powi(2) + scatter * scatter) / self.trust[index]
@@ -65,16 +65,16 @@ impl Record {
 
 /// What a noise makes of the times of a record, whatever the law: newest rate first.
 #[derive(Debug, Clone)]
-pub(super) struct Memory {
-    noise: Noise,
+pub(super) struct LoadMemory {
+    noise: LoadNoise,
     /// The share of the load that is left from the rate after it.
     keep: Vec<f64>,
     /// What the load's variance loses in the mean over each rate.
     smoothed: Vec<f64>,
 }
 
-impl Memory {
-    pub(super) fn new(record: &Record, noise: &Noise) -> Self {
+impl LoadMemory {
+    pub(super) fn new(record: &RateRecord, noise: &LoadNoise) -> Self {
         let variance = noise.sigma * noise.sigma;
         let mut ago = 0.0;
         let (mut keep, mut smoothed) = (Vec::new(), Vec::new());
@@ -95,7 +95,7 @@ impl Memory {
 
 impl Gains {
     /// `u`: ln(1 + |r| t) at the middle of each rate, oldest first.
-    pub(super) fn new(record: &Record, memory: &Memory, u: &[f64]) -> Self {
+    pub(super) fn new(record: &RateRecord, memory: &LoadMemory, u: &[f64]) -> Self {
         let noise = &memory.noise;
         let count = record.middle.len();
         let variance = noise.sigma * noise.sigma;

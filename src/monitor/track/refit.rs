@@ -169,7 +169,7 @@ impl Track {
     fn drift_event(
         &self,
         time: Timestamp,
-        moved: drift::Moved,
+        moved: drift::MovedIntercept,
         kind: impl FnOnce(Timestamp, Timestamp) -> EventKind,
     ) -> Option<Event> {
         let from = after_days(self.history.epoch, moved.from_days)?;

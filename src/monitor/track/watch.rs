@@ -37,12 +37,12 @@ pub(super) struct Watch {
     /// The structure last reported.
     #[serde(rename = "told")]
     reported: Option<f64>,
-    known: Vec<Known>,
+    known: Vec<KnownEffect>,
 }
 
 /// An effect that has been reported.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Known {
+struct KnownEffect {
     kind: Kind,
     channel: Option<String>,
     at: Option<Timestamp>,
@@ -184,7 +184,7 @@ impl Track {
             self.adopted = Some(Adopted::new(known_load, &self.history, &channels, critical));
         }
         let mut events = self.dropped(time, before.as_ref().map(Adopted::law));
-        let known: Vec<Known> = finding
+        let known: Vec<KnownEffect> = finding
             .effects
             .iter()
             .map(|effect| self.known(effect))
@@ -198,10 +198,10 @@ impl Track {
         events
     }
 
-    fn known(&self, effect: &Effect) -> Known {
+    fn known(&self, effect: &Effect) -> KnownEffect {
         let law = self.adopted.as_ref().map(Adopted::law);
         let channel = effect.channel.as_deref();
-        Known {
+        KnownEffect {
             kind: effect.effect,
             channel: effect.channel.clone(),
             at: effect.at,
@@ -209,7 +209,7 @@ impl Track {
         }
     }
 
-    fn is_reported(&self, new: &Known) -> bool {
+    fn is_reported(&self, new: &KnownEffect) -> bool {
         let record = self
             .newest
             .map_or(0.0, |newest| days_since(self.history.epoch, newest));
@@ -220,7 +220,7 @@ impl Track {
                 (Some(_), None) | (None, Some(_)) => f64::INFINITY,
             };
             let at = new.at;
-            apart <= SAME_TIME * record && *new == Known { at, ..old.clone() }
+            apart <= SAME_TIME * record && *new == KnownEffect { at, ..old.clone() }
         })
     }
 

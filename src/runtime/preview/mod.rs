@@ -54,7 +54,7 @@ pub fn preview(config: &Config) -> Preview {
 }
 
 #[derive(Debug)]
-struct Track {
+struct PreviewTrack {
     view: BenchmarkView,
     /// Suspicions that people have looked into.
     accepted: BTreeSet<Suspicion>,
@@ -64,7 +64,7 @@ struct Track {
 #[derive(Debug, Default)]
 struct PreviewSoFar {
     views: Vec<SourceView>,
-    benchmarks: BTreeMap<(String, BenchmarkId, Quantity), Track>,
+    benchmarks: BTreeMap<(String, BenchmarkId, Quantity), PreviewTrack>,
     covariates: BTreeMap<(String, String), CovariateView>,
     unwatched: BTreeSet<BenchmarkId>,
     accepted: BTreeMap<BenchmarkId, BTreeSet<Suspicion>>,
@@ -266,7 +266,7 @@ impl PreviewSoFar {
             let key = (source.to_owned(), benchmark.clone(), unit.quantity());
             let here = (time, reading.value);
             let accepted = self.accepted.get(&benchmark).cloned().unwrap_or_default();
-            let track = self.benchmarks.entry(key).or_insert_with(|| Track {
+            let track = self.benchmarks.entry(key).or_insert_with(|| PreviewTrack {
                 view: BenchmarkView {
                     id: benchmark,
                     source: source.to_owned(),
@@ -361,7 +361,7 @@ impl PreviewSoFar {
 /// How a column comes to be a benchmark's.
 const NAME_THEM: &str = "name the column [ID_]displacement_UNIT or [ID_]velocity_UNIT, or say in [[benchmark]] its column and unit";
 
-impl Track {
+impl PreviewTrack {
     fn take(&mut self, here: (Timestamp, f64)) {
         let view = &mut self.view;
         view.readings += 1;

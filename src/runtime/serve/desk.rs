@@ -2,7 +2,7 @@
 
 use crate::monitor::Order;
 use crate::reading::Timestamp;
-use crate::runtime::view::{Asked, BenchmarkView, Desk, OrderError, SiteView, Window};
+use crate::runtime::view::{Asked, BenchmarkView, Desk, OrderError, SiteView, TimeWindow};
 use crate::store::{Heads, StoreError};
 use axum::body::Body;
 use axum::extract::{Query, State};
@@ -79,13 +79,13 @@ async fn blocking<T: Send + 'static>(
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Moment {
+struct StreamMoment {
     at: Option<Timestamp>,
 }
 
 async fn site(
     State(desk): State<Arc<Desk>>,
-    Query(moment): Query<Moment>,
+    Query(moment): Query<StreamMoment>,
 ) -> Result<Json<SiteView>, Failure> {
     blocking(move || Ok(desk.site(moment.at)?)).await.map(Json)
 }
@@ -104,7 +104,7 @@ async fn benchmark(
     State(desk): State<Arc<Desk>>,
     Query(asked): Query<OfBenchmark>,
 ) -> Result<Json<BenchmarkView>, Failure> {
-    let window = Window {
+    let window = TimeWindow {
         at: asked.at,
         from: asked.from,
         to: asked.to,
@@ -133,7 +133,7 @@ struct Since {
 
 /// Server-sent events: each event of the site with its number as id, and `progress` when anything was taken in.
 async fn changes(State(desk): State<Arc<Desk>>, Query(since): Query<Since>) -> Response {
-    let place = Place {
+    let place = StreamPosition {
         desk,
         event: since.since,
         step: None,
@@ -164,7 +164,7 @@ async fn changes(State(desk): State<Arc<Desk>>, Query(since): Query<Since>) -> R
 }
 
 /// How far a stream has been sent.
-struct Place {
+struct StreamPosition {
     desk: Arc<Desk>,
     /// The last event; `None`: only what comes from now on is sent.
     event: Option<i64>,
@@ -174,7 +174,7 @@ struct Place {
     is_behind: bool,
 }
 
-impl Place {
+impl StreamPosition {
     /// What has changed since the last look; a comment where nothing has, so that a dead connection shows.
     fn look(&mut self) -> Result<String, StoreError> {
         let Heads { step, event } = self.desk.heads()?;

@@ -2,7 +2,7 @@
 
 use crate::alert::Level;
 use crate::reading::{BenchmarkId, Timestamp};
-use crate::runtime::vitals::{Health, Point, Vitals};
+use crate::runtime::vitals::{Health, Vitals, VitalsPoint};
 use prometheus_client::collector::Collector;
 use prometheus_client::encoding::{DescriptorEncoder, EncodeMetric, text};
 use prometheus_client::metrics::MetricType;
@@ -187,8 +187,8 @@ fn counts(sheet: &mut Sheet<'_>, health: &Health) -> fmt::Result {
     Ok(())
 }
 
-fn benchmarks(sheet: &mut Sheet<'_>, points: &[(BenchmarkId, Point)]) -> fmt::Result {
-    type Figure = fn(&Point) -> Option<f64>;
+fn benchmarks(sheet: &mut Sheet<'_>, points: &[(BenchmarkId, VitalsPoint)]) -> fmt::Result {
+    type Figure = fn(&VitalsPoint) -> Option<f64>;
     let figures: [(&str, &str, Figure); 6] = [
         (
             "last_reading_timestamp_seconds",

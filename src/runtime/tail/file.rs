@@ -1,7 +1,7 @@
 //! Follows one file: where we are in it, whether it is still the same, and what came.
 
 use super::decode::{Arrival, Decoder};
-use super::position::{Place, Saved};
+use super::position::{FileId, Saved};
 use super::records::{self, Channels, Frame, HEADER_BYTES, MAGIC, RawMessage};
 use super::text::{BadLine, Fed, TextReader, Unpacking};
 use crate::reading::Timestamp;
@@ -37,7 +37,7 @@ pub(super) struct FileTail {
     pub(super) content: Content,
     /// Everything before this has been read.
     pub(super) at: u64,
-    pub(super) place: Option<Place>,
+    pub(super) place: Option<FileId>,
     /// The last bytes before `at`: another file of the same number and size has others.
     pub(super) mark: Vec<u8>,
     /// As of the last look that found nothing more; the file is opened only when it differs.
@@ -93,7 +93,7 @@ impl Content {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Glance {
-    place: Place,
+    place: FileId,
     size: u64,
     modified: (i64, i64),
 }
@@ -101,7 +101,7 @@ struct Glance {
 impl Glance {
     fn at(metadata: &Metadata) -> Self {
         Self {
-            place: Place::of(metadata),
+            place: FileId::of(metadata),
             size: metadata.size(),
             modified: (metadata.mtime(), metadata.mtime_nsec()),
         }
@@ -133,7 +133,7 @@ impl FileTail {
     }
 
     /// Whether this is no longer the file under its name.
-    pub(super) fn is_other_than(&self, place: Place) -> bool {
+    pub(super) fn is_other_than(&self, place: FileId) -> bool {
         self.place.is_some_and(|own| own != place)
     }
 
@@ -147,7 +147,7 @@ impl FileTail {
         let entries = std::fs::read_dir(self.path.parent()?).ok()?;
         let path = entries.flatten().find_map(|entry| {
             let metadata = entry.metadata().ok()?;
-            (Place::of(&metadata) == place).then(|| entry.path())
+            (FileId::of(&metadata) == place).then(|| entry.path())
         })?;
         self.left_at = Some(self.at);
         self.path.clone_from(&path);

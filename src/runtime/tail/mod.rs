@@ -54,7 +54,7 @@ pub async fn follow(
     batches: mpsc::Sender<Batch>,
     mut shutdown: Shutdown,
 ) -> Result<(), tokio::task::JoinError> {
-    let mut watch = Watch::new(follower.folders());
+    let mut watch = FolderWatch::new(follower.folders());
     let mut rescan = tokio::time::interval(RESCAN);
     rescan.set_missed_tick_behavior(MissedTickBehavior::Delay);
     while !shutdown.is_requested() {
@@ -95,7 +95,7 @@ pub async fn follow(
 
 /// One watcher for all folders.
 #[derive(Debug)]
-struct Watch {
+struct FolderWatch {
     watcher: Option<RecommendedWatcher>,
     unwatched: BTreeSet<PathBuf>,
     /// Of which it has been said that they cannot be watched.
@@ -103,7 +103,7 @@ struct Watch {
     wake: Arc<Notify>,
 }
 
-impl Watch {
+impl FolderWatch {
     fn new(folders: BTreeSet<PathBuf>) -> Self {
         let wake = Arc::new(Notify::new());
         let waker = Arc::clone(&wake);

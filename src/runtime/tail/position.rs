@@ -9,12 +9,12 @@ use std::path::PathBuf;
 
 /// Which file it is, as the file system counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub(in crate::runtime) struct Place {
+pub(in crate::runtime) struct FileId {
     device: u64,
     inode: u64,
 }
 
-impl Place {
+impl FileId {
     pub(super) fn of(metadata: &Metadata) -> Self {
         Self {
             device: metadata.dev(),
@@ -27,7 +27,7 @@ impl Place {
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Saved {
     pub(super) at: u64,
-    pub(super) place: Option<Place>,
+    pub(super) place: Option<FileId>,
     pub(super) mark: Vec<u8>,
     pub(super) content: SavedContent,
     /// The name under which it was found first, where it was renamed since.
