@@ -2,13 +2,14 @@
 //!
 //! The four share their onset, their time to failure and the whole of their load, and each has its own m,
 //! slip and readings. The truth is the median of the times at which they pass the critical velocity, which
-//! lie apart. Of pairs: how often benchmarks of one mass are told apart, and others taken together.
+//! lie apart. Of pairs: how often benchmarks of one mass are distinguished, and others taken together.
 
 #![expect(clippy::print_stdout, reason = "a table is what it is for")]
 
 use slipwatch::fit::Rate;
 use slipwatch::forecast::{
-    Dependence, Fate, Group, HORIZON_DAYS, Life, Look, Opinion, Panel, Passage, groups,
+    Dependence, FailureTimeLikelihood, Fate, Group, HORIZON_DAYS, Life, Panel, Passage, Snapshot,
+    groups,
 };
 
 const LEADS: [f64; 5] = [40.0, 20.0, 10.0, 5.0, 2.0];
@@ -25,7 +26,7 @@ fn main() -> anyhow::Result<()> {
         at_lead(masses, lead);
     }
     println!(
-        "\nlead d  of one mass, told apart  fails in 5 times that, taken together  stands, taken together"
+        "\nlead d  of one mass, distinguished  fails in 5 times that, taken together  stands, taken together"
     );
     for lead in LEADS {
         pairs(masses, lead);
@@ -33,14 +34,14 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What the readings up to a time foretell from then.
+/// What the readings up to a time predict from then.
 struct Seen {
     passage: Passage,
     rates: Vec<Rate>,
     now: f64,
 }
 
-/// What the readings up to `now` days foretell, from then.
+/// What the readings up to `now` days predict, from then.
 fn passage(life: &Life, now: f64) -> Option<Seen> {
     let outlook = Panel::default().update(&life.known(now), Life::CRITICAL_MM_PER_DAY)?;
     let later = now - outlook.now_days;
@@ -54,10 +55,12 @@ fn passage(life: &Life, now: f64) -> Option<Seen> {
 }
 
 fn one_look(seen: &[Seen]) -> Vec<Group> {
-    let opinions = seen.iter().map(|one| Some(Opinion::of(&one.passage, 0.0)));
-    let look = Look {
+    let likelihoods = seen
+        .iter()
+        .map(|one| Some(FailureTimeLikelihood::of(&one.passage, 0.0)));
+    let look = Snapshot {
         left_days: 1.0,
-        opinions: opinions.collect(),
+        likelihoods: likelihoods.collect(),
     };
     let rates: Vec<(&[Rate], f64)> = seen.iter().map(|one| (&*one.rates, one.now)).collect();
     groups(&[look], &Dependence::measured(&rates))

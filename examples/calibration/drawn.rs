@@ -109,7 +109,7 @@ fn law(rng: &mut Pcg64, length: f64, interval: f64) -> Option<Law> {
 }
 
 /// The relative deviation of the motion at each time.
-fn wander(rng: &mut Pcg64, times: &[f64], spread: f64, memory: f64) -> Vec<f64> {
+fn random_process(rng: &mut Pcg64, times: &[f64], spread: f64, memory: f64) -> Vec<f64> {
     let mut value = spread * normal(rng);
     let mut before = 0.0;
     let step = |time: &f64| {
@@ -184,7 +184,7 @@ fn measure(
 ) -> Vec<Observation> {
     let heavy = StudentT::new(7.0).ok();
     let white = |rng: &mut Pcg64| heavy.map_or(0.0, |t| t.sample(rng));
-    let deviation = wander(rng, times, size * slow.sqrt(), memory);
+    let deviation = random_process(rng, times, size * slow.sqrt(), memory);
     let count = times.len();
     let slip = clean[count - 1].1 - clean[0].1;
     let error = size * slip / (count - 1) as f64;

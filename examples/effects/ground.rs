@@ -244,7 +244,7 @@ fn outside(rng: &mut Pcg64, scene: &Scene) -> Option<Planned> {
             ("a chirp of the load", sampled(scene, fine, chirp))
         }
         _ => {
-            // A reservoir's year could be told from none of the table's.
+            // A reservoir's year could be distinguished from none of the table's.
             let covariate = one_of(rng, &Covariate::WATER_WITHOUT_A_YEAR);
             let hidden = Weather::draw(rng, covariate, length);
             let planned = driven(rng, scene, &hidden)?;

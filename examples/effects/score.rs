@@ -59,8 +59,8 @@ impl Outcome {
             there.channel.is_none() || said.channel == there.channel
         };
         let separable = |kind: &Kind| {
-            let named = |text: &String| text.split([' ', ':', '(']).next() == Some(kind.name());
-            explanation.cannot_separate_from.iter().any(named)
+            let rivals = &explanation.cannot_separate_from;
+            rivals.iter().any(|rival| rival.kind == *kind)
         };
         let grade = match right_kind {
             true if pairs.iter().all(through_channel) => Grade::Right,

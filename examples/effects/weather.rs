@@ -232,7 +232,7 @@ impl Grid {
         let phase = uniform(rng, 0.0, TAU);
         let (metres, own_share) = (log_uniform(rng, 3.0, 20.0), uniform(rng, 0.25, 0.7));
         let memory = log_uniform(rng, 4.0, 30.0);
-        let own = self.wander(rng, memory, 2);
+        let own = self.random_process(rng, memory, 2);
         (0..self.count)
             .map(|index| {
                 let level = self.season(index, phase) + 0.25 * self.season(2 * index, 2.0 * phase);
@@ -266,7 +266,7 @@ impl Grid {
     fn temperature(&self, rng: &mut Pcg64) -> Vec<f64> {
         let (yearly, daily) = (uniform(rng, 6.0, 12.0), uniform(rng, 2.0, 6.0));
         let memory = log_uniform(rng, 1.5, 5.0);
-        let weather = self.wander(rng, memory, 1);
+        let weather = self.random_process(rng, memory, 1);
         let (mean, spread) = (uniform(rng, 2.0, 12.0), uniform(rng, 2.0, 4.0));
         let (phase, hour) = (uniform(rng, 0.0, TAU), uniform(rng, 0.0, TAU));
         (0..self.count)
@@ -304,7 +304,7 @@ impl Grid {
     }
 
     /// Noise of unit variance smoothed by stores of `memory` days.
-    fn wander(&self, rng: &mut Pcg64, memory: f64, shape: usize) -> Vec<f64> {
+    fn random_process(&self, rng: &mut Pcg64, memory: f64, shape: usize) -> Vec<f64> {
         let noise: Vec<f64> = (0..self.count).map(|_| normal(rng)).collect();
         let response = Response {
             mean_delay: memory * shape as f64,

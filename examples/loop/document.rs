@@ -2,7 +2,7 @@
 
 use crate::subjects::Subject;
 use crate::tables::{effect, error_cells, number, refused};
-use slipwatch::effects::{Explained, Explanation};
+use slipwatch::effects::{Explained, Explanation, Rival};
 use std::fmt::Write as _;
 
 /// A series with what was found in it.
@@ -32,7 +32,7 @@ The law is the slider block of Helmstetter et al. (2004) in one regular equation
 3. Every kind of effect is tried inside the law, with every channel, as level and as rate, through exponential and gamma
    responses. The law's own parameters are refitted with it. The best one enters, and the search begins again (*after*).
 4. An effect is accepted only if the BIC falls by 10 or more, the sign is one that the ground allows, its memory is short against the
-   record, a search in vain on 399 surrogates gains as much in fewer than 1 % of cases, and a later block, held out, is predicted
+   record, a search where there is nothing on 399 surrogates gains as much in fewer than 1 % of cases, and a later block, held out, is predicted
    no worse: extrapolated over the whole block, or, where the law's own drift rules that, reading after reading; an extrapolation that
    grows by half is refused in any case. Everything else is listed with the reason.
 5. Effects within the margin of each other stand under *cannot be separated from*. Structure that is left is called so.
@@ -90,7 +90,7 @@ fn section(out: &mut String, told: &Told) {
     };
     let _ = writeln!(out, "- Explained: {explained}.");
     if !explanation.cannot_separate_from.is_empty() {
-        let names = explanation.cannot_separate_from.join(", ");
+        let names = Rival::listed(&explanation.cannot_separate_from);
         let _ = writeln!(out, "- Cannot be separated from: {names}.");
     }
     let error = &explanation.error;

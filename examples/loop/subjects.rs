@@ -137,7 +137,7 @@ pub(crate) const SUBJECTS: [Subject; 13] = [
         averaging_hours: None,
         until: None,
         figures: &["readings"],
-        comment: "The same rate model: 4.0 mm in the fit and 13.0 mm held out; here too the held-out error falls short of it. Whether the level or its rate of change acts cannot be told from this record alone: the two stand side by side among the candidates.",
+        comment: "The same rate model: 4.0 mm in the fit and 13.0 mm held out; here too the held-out error falls short of it. Whether the level or its rate of change acts cannot be distinguished from this record alone: the two stand side by side among the candidates.",
     },
     Subject {
         name: "bazimen",
@@ -149,7 +149,7 @@ pub(crate) const SUBJECTS: [Subject; 13] = [
         averaging_hours: None,
         until: None,
         figures: &["readings", "contributions"],
-        comment: "The gain is negative: a falling reservoir speeds the slope up. The reservoir is drawn down once a year, so a season cannot be told from it. Reading by reading the held-out error falls by a third; extrapolated over two years it does not, because the law's own drift rules it there.",
+        comment: "The gain is negative: a falling reservoir speeds the slope up. The reservoir is drawn down once a year, so a season cannot be distinguished from it. Reading by reading the held-out error falls by a third; extrapolated over two years it does not, because the law's own drift rules it there.",
     },
     Subject {
         name: "baishuihe",
@@ -269,6 +269,6 @@ pub(crate) const SUBJECTS: [Subject; 13] = [
         averaging_hours: None,
         until: None,
         figures: &[],
-        comment: "The step of 46 mm in the same storm is not explained: rain was refused because, learned before the storm, it foretells the storm worse. What is called correlated noise here is a label, and the candidates name the rain and the step.",
+        comment: "The step of 46 mm in the same storm is not explained: rain was refused because, learned before the storm, it predicts the storm worse. What is called correlated noise here is a label, and the candidates name the rain and the step.",
     },
 ];

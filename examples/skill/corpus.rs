@@ -69,7 +69,7 @@ pub(crate) struct Subject {
 
 /// When a forecast is made.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Look {
+pub(crate) struct Evaluation {
     /// At the last reading until then, days.
     pub(crate) at_days: f64,
     /// Days before the failure that were asked for; `None` of a look that is one of several spread over the record.
@@ -113,7 +113,7 @@ impl Subject {
     }
 
     /// When forecasts are made of it. A lead that a gap in the readings makes more than twice as long is left out.
-    pub(crate) fn looks(&self) -> Vec<Look> {
+    pub(crate) fn looks(&self) -> Vec<Evaluation> {
         let (end, leads) = match self.truth {
             Truth::FailedAt(failure) => (failure, &self.leads[..]),
             // At the end nothing can come any more that would score.
@@ -123,13 +123,13 @@ impl Subject {
             let values = &self.history.observations.values;
             let known = values.partition_point(|value| value.t_days <= end - lead + ROUNDING);
             let at_days = self.read(known)?;
-            (end - at_days <= 2.0 * lead).then_some(Look {
+            (end - at_days <= 2.0 * lead).then_some(Evaluation {
                 at_days,
                 lead_days: Some(*lead),
             })
         };
         let at_leads = leads.iter().filter_map(at_lead);
-        let at_spread = self.spread_days().into_iter().map(|at_days| Look {
+        let at_spread = self.spread_days().into_iter().map(|at_days| Evaluation {
             at_days,
             lead_days: None,
         });

@@ -76,8 +76,8 @@ may not be redistributed, and without them their sections are left out.
 - Intervals are 90 %, of a bootstrap over series: a slope with all its looks is drawn again, never a single look.
 
 *Measured* are instruments' readings. A *reconstruction* is made to fulfil what a publication states, and confirms nothing about its
-site. *Simulated* slopes obey the law that `slider-block` fits, which favours it and the panel; their load, noise, gaps and resets are
-known to no method."
+site. *Simulated* slopes follow the law that `slider-block` fits, which favours it and the panel; their load, noise, gaps and resets are
+told to nobody."
     );
     out
 }

@@ -1,4 +1,4 @@
-//! What each method foretold of La Clapière, which contemporaries expected to fall and which stands.
+//! What each method predicted of La Clapière, which contemporaries expected to fall and which stands.
 
 use crate::record::{Record, Told};
 use crate::sums::{PANEL, Scored, grid};
@@ -56,7 +56,7 @@ pub(crate) fn section(out: &mut String, scored: &Scored) {
     grid(out, &head, &rows);
     let _ = writeln!(
         out,
-        "\nLooks at which a method's median foretold a collapse before the end of the record, and in {} to {}, when its contemporaries expected one:",
+        "\nLooks at which a method's median predicted a collapse before the end of the record, and in {} to {}, when its contemporaries expected one:",
         FEARED[0], FEARED[1]
     );
     let head = ["method", "looks", "before the end", "in those years"];

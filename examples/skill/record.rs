@@ -1,6 +1,6 @@
 //! One forecast as it was made, in short.
 
-use crate::corpus::{Kind, Look, Subject};
+use crate::corpus::{Evaluation, Kind, Subject};
 use slipwatch::forecast::Passage;
 use slipwatch::reading::Timestamp;
 use slipwatch::score::{Known, Method, Outcome, is_covered, pit};
@@ -44,7 +44,7 @@ pub(crate) struct Record {
 
 impl Record {
     /// What `method` says at one look, of what is `known` by then.
-    pub(crate) fn of(subject: &Subject, look: &Look, known: &Known, method: &Method) -> Self {
+    pub(crate) fn of(subject: &Subject, look: &Evaluation, known: &Known, method: &Method) -> Self {
         let said = (method.forecast)(known);
         let outcome = subject.truth.from(known.now_days);
         let after = match outcome {

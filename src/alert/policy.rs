@@ -16,7 +16,7 @@ pub enum Level {
     Orange,
     /// Failure within the time that an evacuation takes cannot be excluded.
     Red,
-    /// The monitor cannot tell: no data, a sensor fault, a stale model.
+    /// The monitor cannot decide: no data, a sensor fault, a stale model.
     Unknown,
 }
 

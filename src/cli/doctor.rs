@@ -1,7 +1,7 @@
 //! `doctor CONFIG`: whether this machine can carry the site.
 
 use super::args::{Format, OutputArgs};
-use super::exit::UsageError;
+use super::exit::{AsUser, UsageError};
 use crate::config;
 use crate::runtime::doctor::{self, Finding, Verdict};
 use anyhow::Context;
@@ -31,13 +31,8 @@ pub(super) struct Args {
 #[error("{0} wrong; see above")]
 struct Unfit(usize);
 
-/// What the process of another user ended with; it has said why.
-#[derive(Debug, thiserror::Error)]
-#[error("so it is for user {0}")]
-pub(super) struct AsUser(String, pub(super) Option<u8>);
-
 #[derive(Debug, Serialize)]
-struct Report {
+struct DoctorReport {
     findings: Vec<Finding>,
 }
 
@@ -48,7 +43,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     let config = config::load(&args.config)?;
     let findings = doctor::examine(&config);
-    let report = Report { findings };
+    let report = DoctorReport { findings };
     args.output.print(&report, text)?;
     let is_wrong = |finding: &&Finding| finding.verdict == Verdict::Wrong;
     match report.findings.iter().filter(is_wrong).count() {
@@ -90,7 +85,7 @@ fn run_as(name: &str, args: &Args) -> anyhow::Result<()> {
     }
 }
 
-fn text(report: &Report) -> String {
+fn text(report: &DoctorReport) -> String {
     let mut text = String::new();
     for finding in &report.findings {
         let (verdict, check) = (finding.verdict.name(), finding.check);

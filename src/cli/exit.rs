@@ -1,6 +1,5 @@
 //! The exit codes, which error has which, and how an error is said.
 
-use super::doctor::AsUser;
 use crate::config::ConfigError;
 use crate::model::LawError;
 use crate::reading::{MergeError, SelectError};
@@ -29,6 +28,11 @@ const IO: u8 = 74;
 const CONFIG: u8 = 78;
 /// A hook cannot be run; the shell's code for it.
 const NOT_RUN: u8 = 126;
+
+/// What the process of another user ended with; it has said why.
+#[derive(Debug, thiserror::Error)]
+#[error("so it is for user {0}")]
+pub(super) struct AsUser(pub(super) String, pub(super) Option<u8>);
 
 /// A command line that parses and cannot be meant.
 #[derive(Debug, thiserror::Error)]

@@ -74,14 +74,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let Some(report) = together(&recording.series, &options) else {
         return Ok(());
     };
-    args.output.print(&Site { together: report }, |site| {
+    args.output.print(&SiteReport { together: report }, |site| {
         neighbours(&site.together)
     })
 }
 
 /// What is said after the benchmarks one by one.
 #[derive(Debug, Serialize)]
-struct Site {
+struct SiteReport {
     together: TogetherReport,
 }
 
@@ -246,9 +246,9 @@ fn other_priors(report: &FitReport) -> String {
     )
 }
 
-type Row<'a> = (&'static str, &'a Estimate, String);
+type EstimateRow<'a> = (&'static str, &'a Estimate, String);
 
-fn estimates(report: &FitReport) -> [Row<'_>; 9] {
+fn estimates(report: &FitReport) -> [EstimateRow<'_>; 9] {
     let velocity = match report.unit {
         unit @ Unit::Rate(..) => unit.to_string(),
         unit @ Unit::Length(_) => format!("{unit}/day"),

@@ -7,7 +7,8 @@ use crate::config::{self, Config, HookConfig};
 use crate::monitor::{AlertState, Event, EventKind};
 use crate::reading::Timestamp;
 use crate::runtime::clock;
-use crate::runtime::hook::{self, Alert, Outcome, Status};
+use crate::runtime::deliver;
+use crate::runtime::hook::{Alert, Outcome, Status};
 use crate::runtime::log::{self, LogFormat};
 use crate::runtime::sandbox::{self, OURSELVES};
 use serde::Serialize;
@@ -17,7 +18,7 @@ use std::path::{Path, PathBuf};
 
 /// Try a site's hooks
 #[derive(Debug, clap::Subcommand)]
-pub(super) enum Command {
+pub(super) enum HookCommand {
     /// Run a site's hooks once, as the daemon would, with an alert that is marked as a test
     Test(Test),
     /// Become a program that can write only where it is allowed to
@@ -68,16 +69,16 @@ struct Drill {
 }
 
 #[derive(Debug, Serialize)]
-struct Report {
+struct HookReport {
     status: &'static str,
     hooks: Vec<Drill>,
 }
 
 /// Runs the drill, or becomes the hook.
-pub(super) fn run(command: &Command) -> anyhow::Result<()> {
+pub(super) fn run(command: &HookCommand) -> anyhow::Result<()> {
     match command {
-        Command::Test(args) => test(args),
-        Command::Exec(Exec { writable, run }) => {
+        HookCommand::Test(args) => test(args),
+        HookCommand::Exec(Exec { writable, run }) => {
             if let Some((program, arguments)) = run.split_first() {
                 match sandbox::become_hook(writable, program, arguments)? {}
             }
@@ -109,7 +110,7 @@ fn test(args: &Test) -> anyhow::Result<()> {
         let Some(alert) = drill(&config, hook, level, now) else {
             continue;
         };
-        let outcome = runtime.block_on(hook::run(hook, &alert, 1));
+        let outcome = runtime.block_on(deliver::run(hook, &alert, 1));
         hooks.push(Drill {
             hook: hook.name(),
             level,
@@ -118,7 +119,7 @@ fn test(args: &Test) -> anyhow::Result<()> {
         });
     }
     let status = Status::Test.name();
-    let report = Report { status, hooks };
+    let report = HookReport { status, hooks };
     args.output.print(&report, text)?;
     let failed = report.hooks.iter().filter(|drill| !drill.is_taken).count();
     if failed > 0 {
@@ -167,7 +168,7 @@ fn said(outcome: &Outcome) -> String {
     }
 }
 
-fn text(report: &Report) -> String {
+fn text(report: &HookReport) -> String {
     let mut text = String::new();
     for drill in &report.hooks {
         let Drill {

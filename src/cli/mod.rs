@@ -61,7 +61,7 @@ enum Command {
     Simulate(simulate::Args),
     Convert(convert::Args),
     #[command(subcommand)]
-    Hook(hook::Command),
+    Hook(hook::HookCommand),
     Completions(completions::Args),
     Man(man::Args),
 }

@@ -22,7 +22,7 @@ pub(super) struct Args {
     readings: ReadingArgs,
     /// What to draw
     #[arg(long, value_enum, value_name = "KIND")]
-    kind: Kind,
+    kind: PlotKind,
     /// When the slope collapsed
     #[arg(long, value_name = "TIME", value_parser = instant)]
     failure_time: Option<Timestamp>,
@@ -39,7 +39,7 @@ pub(super) struct Args {
 
 /// What a plot shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Kind {
+enum PlotKind {
     /// Readings, inverse velocity, the forecasts made at some dates, levels
     InverseVelocity,
     /// The time of collapse that was forecast against the time at which it was
@@ -52,12 +52,12 @@ enum Kind {
 
 /// Replays the files and draws.
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
-    if args.kind != Kind::InverseVelocity && !args.at.is_empty() {
+    if args.kind != PlotKind::InverseVelocity && !args.at.is_empty() {
         let text =
             "--at chooses forecasts for --kind inverse-velocity; the other kinds draw all of them";
         bail!(UsageError(text.to_owned()));
     }
-    if args.kind == Kind::Residual {
+    if args.kind == PlotKind::Residual {
         return write(args, &residual(args)?);
     }
     let mut recording = args.readings.load()?.recording;
@@ -74,12 +74,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         collapse: args.failure_time,
     };
     let svg = match args.kind {
-        Kind::InverseVelocity if args.at.is_empty() => {
+        PlotKind::InverseVelocity if args.at.is_empty() => {
             replayed.inverse_velocity(&replayed.three_dates())
         }
-        Kind::InverseVelocity => replayed.inverse_velocity(&args.at),
-        Kind::Forecast => replayed.forecasts(),
-        Kind::Regime | Kind::Residual => replayed.regimes(),
+        PlotKind::InverseVelocity => replayed.inverse_velocity(&args.at),
+        PlotKind::Forecast => replayed.forecasts(),
+        PlotKind::Regime | PlotKind::Residual => replayed.regimes(),
     };
     write(args, &svg)
 }

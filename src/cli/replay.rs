@@ -8,7 +8,7 @@ use crate::config::{self, Config, value};
 use crate::monitor::{Event, Settings};
 use crate::reading::{BenchmarkId, Quantity, Recording, SelectError, Timestamp};
 use crate::runtime::log::{self, LogFormat};
-use crate::runtime::replay::{self, Pace, Plan};
+use crate::runtime::replay::{self, ReplayPace, ReplayPlan};
 use crate::runtime::sandbox::OURSELVES;
 use crate::runtime::shutdown::Shutdown;
 use crate::store::Store;
@@ -32,7 +32,7 @@ pub(super) struct Args {
     config: Option<PathBuf>,
     /// max, or how many seconds of data go by in a second
     #[arg(long, value_name = "max|N", default_value = "max", value_parser = pace)]
-    speed: Pace,
+    speed: ReplayPace,
     /// Play what the daemon of this state folder took in, in the order in which it did, instead of files
     #[arg(long, value_name = "DIR", conflicts_with_all = ["config", "hooks", "quantity"])]
     state: Option<PathBuf>,
@@ -69,7 +69,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         lend_averaging(&mut recording, config);
     }
     let settings = settings(args, config.as_ref());
-    let plan = Plan {
+    let plan = ReplayPlan {
         site: config.as_ref().map_or(NAMELESS, |config| &config.site.name),
         settings: &settings,
         hooks: config
@@ -130,11 +130,11 @@ pub(super) fn events(
     settings: &Settings,
     until: Option<Timestamp>,
 ) -> anyhow::Result<Vec<Event>> {
-    let plan = Plan {
+    let plan = ReplayPlan {
         site: NAMELESS,
         settings,
         hooks: &[],
-        pace: Pace::Max,
+        pace: ReplayPace::Max,
         until,
     };
     let mut events = Vec::new();
@@ -204,12 +204,12 @@ fn lend_averaging(recording: &mut Recording, config: &Config) {
     }
 }
 
-fn pace(text: &str) -> Result<Pace, String> {
+fn pace(text: &str) -> Result<ReplayPace, String> {
     if text == "max" {
-        return Ok(Pace::Max);
+        return Ok(ReplayPace::Max);
     }
     match text.parse::<f64>() {
-        Ok(times) if times.is_finite() && times > 0.0 => Ok(Pace::Times(times)),
+        Ok(times) if times.is_finite() && times > 0.0 => Ok(ReplayPace::Times(times)),
         Ok(_) | Err(_) => Err("expected max or a number above 0".to_owned()),
     }
 }

@@ -3,6 +3,7 @@
 use super::args::{Format, OutputArgs};
 use crate::config;
 use crate::runtime::log::{self, LogFormat};
+use crate::runtime::progress::Progress;
 use crate::runtime::run as daemon;
 use crate::runtime::sandbox::OURSELVES;
 use crate::runtime::shutdown::Shutdown;
@@ -35,7 +36,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     asynchronous()?.block_on(async {
         let shutdown = Shutdown::on_signals().context("cannot listen for signals")?;
-        let (progress, _) = tokio::sync::watch::channel(daemon::Progress::default());
+        let (progress, _) = tokio::sync::watch::channel(Progress::default());
         daemon::run(&config, shutdown, &progress).await?;
         Ok(())
     })

@@ -61,7 +61,7 @@ enum TableFormat {
 }
 
 #[derive(Debug, Serialize)]
-struct Row {
+struct MotionRow {
     t: f64,
     x: Option<f64>,
     velocity: Option<f64>,
@@ -73,7 +73,7 @@ struct Simulation {
     regime: Regime,
     failure_days: Option<f64>,
     transition_days: Option<f64>,
-    rows: Vec<Row>,
+    rows: Vec<MotionRow>,
 }
 
 /// Solves the law and prints it.
@@ -106,17 +106,17 @@ fn law(args: &Args) -> anyhow::Result<Law> {
 }
 
 /// The motion at each time asked for, and what the law says of itself.
-struct Solution {
+struct SimulatedLaw {
     motions: Vec<Option<Motion>>,
     failure_days: Option<f64>,
     transition_days: Option<f64>,
 }
 
 /// Under a constant load.
-fn unloaded(law: &Law, times: &[f64]) -> Solution {
+fn unloaded(law: &Law, times: &[f64]) -> SimulatedLaw {
     let end = times.iter().copied().fold(0.0, f64::max);
     let trajectory = Trajectory::solve(law, end, Accuracy::Full);
-    Solution {
+    SimulatedLaw {
         motions: times.iter().map(|t| trajectory.at(*t)).collect(),
         failure_days: trajectory.failure_days().filter(|days| days.is_finite()),
         transition_days: law.transition_days(),
@@ -124,7 +124,7 @@ fn unloaded(law: &Law, times: &[f64]) -> Solution {
 }
 
 /// Under a load: a failure is looked for up to the last of the times, and there is no one transition.
-fn loaded(law: &Law, load: &Load, times: &[f64]) -> anyhow::Result<Solution> {
+fn loaded(law: &Law, load: &Load, times: &[f64]) -> anyhow::Result<SimulatedLaw> {
     let loaded = LoadedLaw::new(law, load, Accuracy::Full)?;
     let mut order: Vec<usize> = (0..times.len()).collect();
     order.sort_by(|a, b| times[*a].total_cmp(&times[*b]));
@@ -135,7 +135,7 @@ fn loaded(law: &Law, load: &Load, times: &[f64]) -> anyhow::Result<Solution> {
     for (at, motion) in order.iter().zip(found) {
         motions[*at] = motion;
     }
-    Ok(Solution {
+    Ok(SimulatedLaw {
         motions,
         failure_days: loaded.failure_days(in_order.last().copied().unwrap_or(0.0)),
         transition_days: None,
@@ -157,7 +157,7 @@ fn simulate(law: &Law, load: Option<&Load>, times: &[f64]) -> anyhow::Result<Sim
             anyhow::bail!("the law could not be solved as far as day {t:?}");
         }
         let finite = |value: f64| Some(value).filter(|value| value.is_finite());
-        Ok(Row {
+        Ok(MotionRow {
             t,
             x: motion
                 .and_then(|motion| law.state(motion.y))
@@ -174,7 +174,7 @@ fn simulate(law: &Law, load: Option<&Load>, times: &[f64]) -> anyhow::Result<Sim
     })
 }
 
-fn write_csv(rows: &[Row], out: &mut impl Write) -> io::Result<()> {
+fn write_csv(rows: &[MotionRow], out: &mut impl Write) -> io::Result<()> {
     // Debug, unlike Display, writes large and small numbers with an exponent.
     let cell = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:?}"));
     writeln!(out, "t,x,velocity,displacement")?;

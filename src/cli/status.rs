@@ -40,7 +40,7 @@ const CLEAR: &str = "\u{1b}[H\u{1b}[2J";
 
 /// How one benchmark stands.
 #[derive(Debug, Serialize)]
-struct Standing {
+struct StatusStanding {
     benchmark: BenchmarkId,
     level: Level,
     /// Since when.
@@ -65,7 +65,7 @@ struct Standing {
 #[derive(Debug, Serialize)]
 struct SiteStatus {
     site: String,
-    benchmarks: Vec<Standing>,
+    benchmarks: Vec<StatusStanding>,
     steps: i64,
     alerts_waiting: usize,
     bytes: u64,
@@ -124,7 +124,7 @@ fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
     let read = store.benchmarks()?.into_iter();
     newest.extend(read.map(|(benchmark, time)| (benchmark, Some(time))));
     let each = newest.into_iter().map(|(benchmark, newest)| {
-        let standing = Standing {
+        let standing = StatusStanding {
             level: Level::Green,
             since: None,
             unknown_since: None,
@@ -162,10 +162,10 @@ fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
 }
 
 fn stands(
-    mut standing: Standing,
+    mut standing: StatusStanding,
     levels: &InForce,
     refits: &BTreeMap<BenchmarkId, EventKind>,
-) -> Standing {
+) -> StatusStanding {
     for ((place, level), event) in levels {
         if place.as_ref() != Some(&standing.benchmark) {
             continue;

@@ -17,7 +17,7 @@ pub(super) struct Args {
     inversion: InversionArgs,
     /// The first and the last `t_max`; either may be left out
     #[arg(long, value_name = "FIRST..LAST", value_parser = range, default_value = "..")]
-    t_max: Range,
+    t_max: SweepRange,
     /// How many rows
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = steps)]
     steps: usize,
@@ -26,7 +26,7 @@ pub(super) struct Args {
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Range {
+struct SweepRange {
     first: Option<Timestamp>,
     last: Option<Timestamp>,
 }
@@ -46,14 +46,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 /// `FIRST..LAST`.
-fn range(text: &str) -> Result<Range, String> {
+fn range(text: &str) -> Result<SweepRange, String> {
     let expected = || "expected FIRST..LAST, each an RFC 3339 time or nothing".to_owned();
     let (first, last) = text.split_once("..").ok_or_else(expected)?;
     let one = |part: &str| match part {
         "" => Ok(None),
         part => part.parse().map(Some).map_err(|_| expected()),
     };
-    Ok(Range {
+    Ok(SweepRange {
         first: one(first)?,
         last: one(last)?,
     })

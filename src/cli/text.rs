@@ -1,6 +1,6 @@
 //! Events as lines for people.
 
-use crate::effects::Kind;
+use crate::effects::{Kind, Rival};
 use crate::monitor::{
     AlertState, Event, EventKind, FailureTime, SharedFailure, Summary, Unexplained,
 };
@@ -228,7 +228,7 @@ fn effect_found(kind: &EventKind) -> String {
     } else {
         format!(
             ", cannot be separated from {}",
-            cannot_separate_from.join(", ")
+            Rival::listed(cannot_separate_from)
         )
     };
     let use_of = if *adopted {
@@ -252,7 +252,7 @@ fn forecast(failure: &FailureTime) -> String {
     let horizon = failure.horizon_days;
     let bound = |time: Option<Timestamp>| time.map_or("later".to_owned(), minute);
     match failure.median.or(failure.low) {
-        None => format!("no failure foreseen ({chance:.0} % within {horizon:.0} days)"),
+        None => format!("no failure predicted ({chance:.0} % within {horizon:.0} days)"),
         Some(_) => format!(
             "failure {} ({} to {}, {chance:.0} % within {horizon:.0} days)",
             bound(failure.median),

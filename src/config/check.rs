@@ -94,12 +94,12 @@ fn missing_program(hook: &HookConfig) -> Option<String> {
     })
 }
 
-/// Levels that no hook is told of: then nobody is.
+/// Levels that no hook is notified of: then nobody is.
 fn untold(config: &Config) -> Vec<String> {
     if config.hooks.is_empty() {
         return Vec::new();
     }
-    let told = |level| config.hooks.iter().any(|hook| hook.levels.contains(&level));
+    let is_notified = |level| config.hooks.iter().any(|hook| hook.levels.contains(&level));
     let mut lines = Vec::new();
     for (level, meaning) in [
         (Level::Red, "a failure is near"),
@@ -108,16 +108,16 @@ fn untold(config: &Config) -> Vec<String> {
             "a sensor is silent or at fault, or the clock is wrong",
         ),
     ] {
-        if !told(level) {
+        if !is_notified(level) {
             lines.push(format!(
-                "no hook has {level} among its levels: nobody is told that {meaning}"
+                "no hook has {level} among its levels: nobody is notified that {meaning}"
             ));
         }
     }
     lines
 }
 
-/// A hook of a benchmark whose name is mistyped would never be told.
+/// A hook of a benchmark whose name is mistyped would never be notified.
 fn unknown_benchmarks(config: &Config) -> impl Iterator<Item = String> {
     let is_known = |id: &BenchmarkId| config.benchmarks.iter().any(|one| one.id == *id);
     let asked = config.hooks.iter().flat_map(|hook| &hook.benchmarks);

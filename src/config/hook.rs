@@ -23,7 +23,7 @@ pub(super) fn hooks(root: &mut Section<'_>, base: &Path) -> Vec<HookConfig> {
     if hooks.is_empty() && !root.has("hook") && !root.has("webhook") {
         root.warning(
             root.at(),
-            "there is no [[hook]]: nobody is told of an alert".to_owned(),
+            "there is no [[hook]]: nobody is notified of an alert".to_owned(),
             "add [[hook]] with run = [\"./notify.sh\"]",
         );
     }

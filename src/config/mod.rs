@@ -159,9 +159,9 @@ pub struct HookConfig {
     pub webhook: Option<Webhook>,
     /// Which levels it is run for.
     pub levels: Vec<Level>,
-    /// Of which benchmarks it is told; none: of all.
+    /// Of which benchmarks it is notified; none: of all.
     pub benchmarks: BTreeSet<BenchmarkId>,
-    /// Whether it is told of the whole site's level, and of nothing else; of its benchmarks' else.
+    /// Whether it is notified of the whole site's level, and of nothing else; of its benchmarks' else.
     pub site: bool,
     /// After this it is killed.
     pub timeout: Duration,

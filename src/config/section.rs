@@ -1,6 +1,6 @@
 //! The tables of the site file, one function each.
 
-use super::table::{Placed, Section};
+use super::table::{Placed, Section, unique};
 use super::{Benchmark, Config, SiteConfig, alert, declared, hook, source, value, vector};
 use crate::alert::Policy;
 use crate::monitor::{Explain, Settings, SiteLevel, Watched};
@@ -121,21 +121,6 @@ fn explain(mut section: Section<'_>) -> Explain {
         (false, _) => Explain::Off,
         (true, Some(false)) => Explain::Tell,
         (true, Some(true) | None) => Explain::Adopt,
-    }
-}
-
-pub(super) fn unique(
-    section: &Section<'_>,
-    id: Option<&Placed<String>>,
-    taken: &mut BTreeSet<String>,
-) {
-    let Some(id) = id else { return };
-    if !taken.insert(id.value.clone()) {
-        section.error(
-            &id.at,
-            format!("{} = {:?} is there twice", section.path("id"), id.value),
-            "give each its own id",
-        );
     }
 }
 

@@ -1,7 +1,6 @@
 //! `[[source]]`: where readings come from, and how they are written there.
 
-use super::section::unique;
-use super::table::Section;
+use super::table::{Section, unique};
 use super::{Broker, FilePattern, Source, SourceKind, broker, value};
 use crate::reading::{
     Conventions, DecimalMark, Delimiter, Dialect, LocalClock, MissingValues, SummerTime, TimeFormat,

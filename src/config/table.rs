@@ -2,6 +2,7 @@
 
 use super::problem::Notebook;
 use std::cell::RefCell;
+use std::collections::BTreeSet;
 use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -330,5 +331,21 @@ fn number(value: &DeValue<'_>) -> Option<f64> {
         | DeValue::Datetime(_)
         | DeValue::Array(_)
         | DeValue::Table(_) => None,
+    }
+}
+
+/// Notes an id, and that it is there twice where it is.
+pub(super) fn unique(
+    section: &Section<'_>,
+    id: Option<&Placed<String>>,
+    taken: &mut BTreeSet<String>,
+) {
+    let Some(id) = id else { return };
+    if !taken.insert(id.value.clone()) {
+        section.error(
+            &id.at,
+            format!("{} = {:?} is there twice", section.path("id"), id.value),
+            "give each its own id",
+        );
     }
 }

@@ -24,7 +24,7 @@ const SEASONAL_SHARE: f64 = 0.5;
 const EVENT_TIMES: usize = 64;
 /// Jumps of the reading tried, the largest first.
 const JUMPS: usize = 24;
-/// No event within so many readings of either end: what happens there cannot be told from noise.
+/// No event within so many readings of either end: what happens there cannot be distinguished from noise.
 const EVENT_MARGIN: usize = 5;
 
 /// A term without covariate, response or time.
@@ -116,7 +116,7 @@ pub(super) fn seasonal(problem: &Problem) -> Vec<Term> {
         .collect()
 }
 
-/// The tide, where the sampling tells its periods and the record tells them from each other.
+/// The tide, where the sampling resolves its periods and the record distinguishes them.
 pub(super) fn tides(problem: &Problem) -> Vec<Term> {
     if problem.spacing > 0.2 || problem.span() < 2.0 {
         return Vec::new();

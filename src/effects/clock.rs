@@ -8,57 +8,57 @@ const TICKS: f64 = 1500.0;
 
 /// A clock that runs at the pace of the load.
 #[derive(Debug)]
-pub struct Clock {
+pub(super) struct Clock {
     /// Days by the calendar, increasing.
     days: Vec<f64>,
     /// The log-load then.
     log_load: Vec<f64>,
     /// Days by this clock, 0 at the first.
-    told: Vec<f64>,
+    own: Vec<f64>,
 }
 
 impl Clock {
     /// The pace leaves e^-4 to e^4 by a covariate's fault, not by any load.
-    pub const FARTHEST_LOAD: f64 = 4.0;
+    pub(super) const FARTHEST_LOAD: f64 = 4.0;
 
     /// `usual` is the log-load under which it keeps pace with the calendar.
-    pub fn new(days: Vec<f64>, log_load: Vec<f64>, usual: f64) -> Self {
+    pub(super) fn new(days: Vec<f64>, log_load: Vec<f64>, usual: f64) -> Self {
         let pace = |f: f64| {
             (f - usual)
                 .clamp(-Self::FARTHEST_LOAD, Self::FARTHEST_LOAD)
                 .exp()
         };
-        let mut told = Vec::with_capacity(days.len());
+        let mut own = Vec::with_capacity(days.len());
         let mut sum = 0.0;
         for (k, day) in days.iter().enumerate() {
             if k > 0 {
                 let mean = f64::midpoint(pace(log_load[k - 1]), pace(log_load[k]));
                 sum += (day - days[k - 1]) * mean;
             }
-            told.push(sum);
+            own.push(sum);
         }
         Self {
             days,
             log_load,
-            told,
+            own,
         }
     }
 
     /// Its time at a day within its range.
-    pub fn at(&self, day: f64) -> f64 {
+    pub(super) fn at(&self, day: f64) -> f64 {
         let k = self.days.partition_point(|known| *known < day);
         let k = k.clamp(1, self.days.len().max(2) - 1);
-        let (Some(d), Some(t)) = (self.days.get(k - 1..=k), self.told.get(k - 1..=k)) else {
+        let (Some(d), Some(t)) = (self.days.get(k - 1..=k), self.own.get(k - 1..=k)) else {
             return day;
         };
         t[0] + (t[1] - t[0]) * (day - d[0]) / (d[1] - d[0]).max(1e-12)
     }
 
-    /// The day by the calendar when it stands at `told`.
-    pub fn day(&self, told: f64) -> f64 {
-        let k = self.told.partition_point(|known| *known < told);
+    /// The day by the calendar when it stands at `own`.
+    pub(super) fn day(&self, own: f64) -> f64 {
+        let k = self.own.partition_point(|known| *known < own);
         let last = self.days.len().saturating_sub(1);
-        self.days.get(k.min(last)).copied().unwrap_or(told)
+        self.days.get(k.min(last)).copied().unwrap_or(own)
     }
 
     /// Its mean pace from one day to another, or at the instant.
@@ -68,11 +68,11 @@ impl Clock {
     }
 
     /// ln of its mean pace.
-    pub fn usual(&self) -> f64 {
+    pub(super) fn usual(&self) -> f64 {
         let (Some(first), Some(last)) = (self.days.first(), self.days.last()) else {
             return 0.0;
         };
-        let mean = self.told.last().copied().unwrap_or(0.0) / (last - first);
+        let mean = self.own.last().copied().unwrap_or(0.0) / (last - first);
         if mean.is_finite() && mean > 0.0 {
             mean.ln()
         } else {
@@ -81,12 +81,12 @@ impl Clock {
     }
 
     /// The log-load at its ticks.
-    pub fn log_load(&self) -> &[f64] {
+    pub(super) fn log_load(&self) -> &[f64] {
         &self.log_load
     }
 
     /// Readings by this clock, without what is no motion of the ground: `in_reading`, one for each.
-    pub fn told(&self, observations: &Observations, in_reading: &[f64]) -> Observations {
+    pub(super) fn readings(&self, observations: &Observations, in_reading: &[f64]) -> Observations {
         let span = observations.averaging_days;
         let value = |(one, apart): (&Observation, f64)| {
             let pace = match observations.quantity {
@@ -108,7 +108,7 @@ impl Clock {
     }
 
     /// Every reading's time, and times between them where they are far apart.
-    pub fn ticks(observations: &Observations) -> Vec<f64> {
+    pub(super) fn ticks(observations: &Observations) -> Vec<f64> {
         let values = &observations.values;
         let (Some(first), Some(last)) = (values.first(), values.last()) else {
             return Vec::new();

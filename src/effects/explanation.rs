@@ -1,7 +1,8 @@
 //! What an explanation says, key for key as scripts read it: what is unbounded or missing is null.
 
-use super::fuller::Fuller;
 use super::kind::{FaultKind, Form, Kind};
+use super::known_load::KnownLoad;
+use super::rival::Rival;
 use crate::reading::{BenchmarkId, Quantity, Timestamp, Unit};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -28,7 +29,7 @@ pub struct Explanation {
     /// The effects accepted after the verdict, in that order.
     pub also: Vec<Effect>,
     /// What explains the same within the margin: kinds, with the channel where there is one.
-    pub cannot_separate_from: Vec<String>,
+    pub cannot_separate_from: Vec<Rival>,
     /// What is wrong with the data themselves.
     pub faults: Vec<Fault>,
     /// Misfit before and after, on the same data and under the same noise model.
@@ -52,7 +53,7 @@ pub struct Explanation {
     pub curves: Curves,
     /// The effects as a forecast uses them.
     #[serde(skip)]
-    pub fuller: Fuller,
+    pub known_load: KnownLoad,
 }
 
 /// One effect inside the law.
@@ -149,7 +150,7 @@ pub struct Fault {
     pub copy_of: Option<Timestamp>,
 }
 
-/// A figure of the plain law and of the fuller one.
+/// A figure of the plain law and of the law under the known load.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Change<T = Option<f64>> {
     /// Under the law with a constant load.
@@ -173,6 +174,20 @@ pub struct ErrorChange {
     pub held_out_from: Option<Timestamp>,
     /// Why the held-out figure means little, where it does.
     pub caveat: Option<String>,
+}
+
+impl ErrorChange {
+    /// Nothing is known yet.
+    pub(super) fn none(unit: Unit) -> Self {
+        Self {
+            unit,
+            fit: Change::default(),
+            held_out: Change::default(),
+            held_out_step: Change::default(),
+            held_out_from: None,
+            caveat: None,
+        }
+    }
 }
 
 /// What the effects change in the regime and in the time of failure.
@@ -210,7 +225,7 @@ pub struct Candidate {
 }
 
 /// Whether the residual passes for noise.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct ResidualTests {
     /// p-value of the runs test of the innovations.
     pub runs: Change,
@@ -238,7 +253,7 @@ pub struct Structure {
 }
 
 /// The noise model.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct NoiseReport {
     /// White noise of a reading, in its unit (for velocities read with a relative error, of the typical one).
     pub white: f64,
@@ -272,11 +287,11 @@ pub struct Curves {
     pub readings: Vec<f64>,
     /// The plain law.
     pub before: Vec<f64>,
-    /// The fuller law.
+    /// The law under the known load.
     pub after: Vec<f64>,
     /// The plain law fitted without the held-out block, over all times.
     pub before_held_out: Vec<f64>,
-    /// The fuller law fitted without it.
+    /// The law under the known load fitted without it.
     pub after_held_out: Vec<f64>,
     /// Posterior mean and standard deviation of the undeclared log-load before.
     pub load_before: Vec<(f64, f64)>,

@@ -1,16 +1,16 @@
 //! The law with causes that are known beforehand: what its error would be, and nothing judged.
 
 use super::candidates::{event_times, events, feedbacks, offset, seasonal, tides};
-use super::explain::Options;
 use super::explanation::{Change, ErrorChange};
 use super::faults::{Inspected, inspect};
+use super::findings::least_squares;
 use super::judge::{block, without_block};
 use super::kind::Kind;
+use super::options::Options;
 use super::problem::Problem;
 use super::ready::Ready;
 use super::refit::Fitted;
 use super::search::Search;
-use super::tell::least_squares;
 use super::term::{Scratch, Term};
 use super::trials::{Ground, Trial};
 use super::witnesses::distinct;
@@ -143,7 +143,7 @@ fn of_channel(ground: &Ground, cause: &Cause) -> Vec<Trial> {
 }
 
 /// The readings before which it may have happened: those that the search would try, or, where the time is known, all
-/// within what the search tells apart.
+/// within what the search distinguishes.
 fn times(problem: &Problem, at: Option<Timestamp>) -> Vec<usize> {
     let tried = event_times(problem);
     let Some(time) = at else { return tried };

@@ -1,10 +1,11 @@
-//! What an effect must show before it is believed: sign, memory, bounds, and a later block that it helps to foretell.
+//! What an effect must show before it is believed: sign, memory, bounds, and a later block that it helps to predict.
 
 use super::kind::{Form, Kind};
 use super::noise::{Noise, Whitener};
 use super::problem::{Problem, median};
 use super::refit::{Fitted, Start, plain_starts, refit, refit_from};
 use super::response::Driver;
+use super::rival::Rival;
 use super::term::{Act, Scratch, Term, law_parameters};
 
 /// The later block has at least so many readings.
@@ -231,14 +232,14 @@ pub(super) fn step_errors(
     })
 }
 
-/// The plain-language name of a term: its kind, and its channel where there is one.
-pub(super) fn title(term: &Term, drivers: &[(usize, Driver)]) -> String {
+/// What a term is called: its kind, and its channel where there is one.
+pub(super) fn named(term: &Term, drivers: &[(usize, Driver)]) -> Rival {
     let channel = term
         .channel
         .and_then(|index| drivers.iter().find(|(own, _)| *own == index));
-    match channel {
-        Some((_, driver)) => format!("{} {}", term.kind, driver.name),
-        None => term.kind.name().to_owned(),
+    Rival {
+        kind: term.kind,
+        channel: channel.map(|(_, driver)| driver.name.clone()),
     }
 }
 

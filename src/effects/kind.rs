@@ -35,11 +35,30 @@ pub enum Kind {
     CorrelatedNoise,
     /// Structure is there, and nothing known explains it.
     Unexplained,
-    /// The residual cannot be told from noise.
+    /// The residual cannot be distinguished from noise.
     None,
 }
 
 impl Kind {
+    /// All of them.
+    pub const ALL: [Self; 15] = [
+        Self::Hydrological,
+        Self::Seasonal,
+        Self::Tide,
+        Self::LoadStep,
+        Self::StateReset,
+        Self::FrictionChange,
+        Self::RateLimit,
+        Self::Geometry,
+        Self::Partition,
+        Self::Offset,
+        Self::Thermal,
+        Self::IntervalMean,
+        Self::CorrelatedNoise,
+        Self::Unexplained,
+        Self::None,
+    ];
+
     /// As it stands in output and config.
     pub fn name(self) -> &'static str {
         match self {

@@ -1,7 +1,6 @@
 //! What a small effect would change in every reading: the law linearised about its fitted motion.
 
 use super::problem::Problem;
-use super::refit::Fitted;
 use super::term::{Act, Feedback, Scratch, Term, event_node, law, law_parameters};
 use crate::model::Driven;
 use crate::reading::Quantity;
@@ -30,12 +29,15 @@ pub(super) struct Linear {
 }
 
 impl Linear {
-    /// About `fitted`.
-    pub(super) fn about(problem: &Problem, fitted: &Fitted, scratch: &mut Scratch) -> Option<Self> {
-        if !scratch.predict(problem, &fitted.terms, &fitted.parameters) {
+    /// About the motion that these parameters lead to.
+    pub(super) fn about(
+        problem: &Problem,
+        (terms, parameters): (&[Term], &[f64]),
+        scratch: &mut Scratch,
+    ) -> Option<Self> {
+        if !scratch.predict(problem, terms, parameters) {
             return None;
         }
-        let (terms, parameters) = (&fitted.terms, &fitted.parameters);
         Some(Self::of(problem, (terms, parameters), &scratch.driven))
     }
 

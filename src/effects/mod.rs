@@ -1,16 +1,19 @@
 //! From the residual to the effect that the law lacks: the search, the joint refit, before and after.
 
+mod by_clock;
 mod candidates;
 mod clock;
 mod diagnosis;
 mod explain;
 mod explanation;
 mod faults;
+mod findings;
 mod frame;
-mod fuller;
 mod given;
 mod judge;
 mod kind;
+mod known_load;
+mod options;
 mod outlook;
 mod partition;
 pub mod remarks;
@@ -23,26 +26,28 @@ mod ready;
 mod refit;
 mod refits;
 mod response;
+mod rival;
 mod search;
 mod surrogate;
-mod tell;
 mod term;
 mod trials;
 mod verdict;
 mod watch;
 mod witnesses;
 
-pub use clock::Clock;
-pub use explain::{Options, explain};
+pub use by_clock::ByClock;
+pub use explain::explain;
 pub use explanation::{
     Candidate, Change, Curves, Effect, ErrorChange, Explained, Explanation, Fault, ForecastChange,
     NoiseReport, ResidualTests, SettingsReport, Structure,
 };
 pub use faults::{Inspected, inspect};
-pub use fuller::{Filtered, Fuller, Part, Wave};
 pub use given::{Cause, error_given};
 pub use kind::{FaultKind, Form, Kind};
+pub use known_load::{Filtered, KnownLoad, Part, Wave};
+pub use options::Options;
 pub use partition::{Partition, partition, partition_candidate};
+pub use rival::Rival;
 pub use together::{Together, explain_together};
 pub use watch::{Residual, residual_structure};
 

@@ -1,11 +1,11 @@
 //! What the effects change in the forecast: the outlook of the readings as they are, and by the load's clock.
 
-use super::clock::Clock;
+use super::by_clock::ByClock;
 use super::explanation::{Change, ForecastChange};
-use super::fuller::Fuller;
+use super::known_load::KnownLoad;
 use crate::fit::Observations;
 use crate::forecast::{HORIZON_DAYS, Outlook, outlook};
-use crate::reading::{Channel, Series, Timestamp, after_days};
+use crate::reading::{Channel, Series, after_days};
 use crate::regime::Regime;
 
 /// The regimes of m > 1.
@@ -15,7 +15,7 @@ const UNSTABLE: [Regime; 2] = [Regime::UnstableAccelerating, Regime::UnstableDec
 pub(super) fn forecast_change(
     series: &Series,
     channels: &[Channel],
-    fuller: &Fuller,
+    known_load: &KnownLoad,
     critical: f64,
 ) -> ForecastChange {
     let observations = Observations::of(series);
@@ -23,10 +23,16 @@ pub(super) fn forecast_change(
         return ForecastChange::default();
     };
     let before = outlook(&observations, critical).map(|(outlook, _)| outlook);
-    let after = if fuller.parts.is_empty() {
+    let after = if known_load.parts.is_empty() {
         before.clone()
     } else {
-        by_clock((&observations, epoch), channels, fuller, critical)
+        let channels: Vec<&Channel> = channels.iter().collect();
+        let by_clock = ByClock::new(&observations, epoch, &channels, known_load, None);
+        by_clock.and_then(|one| {
+            one.outlook(critical, |readings, critical| {
+                outlook(readings, critical).map(|(outlook, _)| outlook)
+            })
+        })
     };
     let both = |of: &dyn Fn(&Outlook) -> Option<f64>| Change {
         before: before.as_ref().and_then(of),
@@ -51,30 +57,4 @@ pub(super) fn forecast_change(
             after: median(&after),
         },
     }
-}
-
-/// The outlook by the load's clock, told back by the calendar: run on at the higher of the present pace and the usual.
-fn by_clock(
-    (observations, epoch): (&Observations, Timestamp),
-    channels: &[Channel],
-    fuller: &Fuller,
-    critical: f64,
-) -> Option<Outlook> {
-    let channels: Vec<&Channel> = channels.iter().collect();
-    let days = Clock::ticks(observations);
-    let times: Vec<Timestamp> = days.iter().filter_map(|t| after_days(epoch, *t)).collect();
-    let log_load = fuller.log_load(&channels, &times);
-    let usual = Clock::new(days.clone(), log_load.clone(), 0.0).usual();
-    let clock = Clock::new(days, log_load, usual);
-    let read = observations.values.iter();
-    let read: Vec<Timestamp> = read
-        .filter_map(|value| after_days(epoch, value.t_days))
-        .collect();
-    let told = clock.told(observations, &fuller.in_reading(&channels, &read));
-    let now = clock.log_load().last()? - usual;
-    let pace = now.clamp(0.0, Clock::FARTHEST_LOAD).exp();
-    let (outlook, _) = outlook(&told, critical / pace)?;
-    let mut outlook = outlook.sooner(pace);
-    outlook.now_days = observations.values.last()?.t_days;
-    Some(outlook)
 }

@@ -11,7 +11,7 @@ const NODES: f64 = 1500.0;
 const NODES_A_READING: f64 = 4.0;
 /// Readings about which the local line is drawn.
 const NEIGHBOURS: usize = 4;
-/// Share of the usual velocity under which a load has no hold on the noise: there the readings tell no velocity.
+/// Share of the usual velocity under which a load has no hold on the noise: there the readings give no velocity.
 const LEAST_SEEN: f64 = 0.1;
 
 /// One benchmark's readings.

@@ -1,7 +1,7 @@
 //! A series made ready for a search: its readings, its covariates, the plain law, and the noise models.
 
-use super::explain::Options;
 use super::noise::{Noise, Whitener};
+use super::options::Options;
 use super::problem::Problem;
 use super::refit::Fitted;
 use super::response::Driver;

@@ -180,7 +180,7 @@ pub(super) fn refit(
     bank: &[Whitener],
     scratch: &mut Scratch,
 ) -> Option<Fitted> {
-    let mut point = Point::at(problem, &start.terms, start.parameters.clone(), scratch)?;
+    let mut point = ParameterPoint::at(problem, &start.terms, start.parameters.clone(), scratch)?;
     let mut whitener = bank
         .iter()
         .find(|w| w.noise == start.noise)
@@ -226,7 +226,7 @@ pub(super) fn under_likeliest(
 /// Columns of the prediction by each parameter, at the fitted readings.
 pub(super) fn jacobian(problem: &Problem, fitted: &Fitted, scratch: &mut Scratch) -> Vec<Vec<f64>> {
     let parameters = fitted.parameters.clone();
-    let point = Point::at(problem, &fitted.terms, parameters, scratch);
+    let point = ParameterPoint::at(problem, &fitted.terms, parameters, scratch);
     // A fit has a motion.
     point.map_or_else(Vec::new, |point| {
         point.jacobian(problem, &fitted.terms, scratch)
@@ -235,13 +235,13 @@ pub(super) fn jacobian(problem: &Problem, fitted: &Fitted, scratch: &mut Scratch
 
 /// Parameters and what they predict.
 #[derive(Debug, Clone)]
-struct Point {
+struct ParameterPoint {
     parameters: Vec<f64>,
     prediction: Vec<f64>,
     driven: Driven,
 }
 
-impl Point {
+impl ParameterPoint {
     fn at(
         problem: &Problem,
         terms: &[Term],
@@ -404,7 +404,7 @@ impl Point {
     }
 }
 
-/// Normal priors, weak, that keep what the readings cannot tell from wandering off.
+/// Normal priors, weak, that keep within bounds what the readings do not determine.
 struct Prior {
     centre: Vec<f64>,
     deviation: Vec<f64>,

@@ -8,7 +8,7 @@ use super::noise::{Noise, Whitener};
 use super::refit::{Fitted, Start, jacobian, refit, under_likeliest};
 use super::response::Response;
 use super::search::{Refitted, SIGNIFICANT, Search};
-use super::surrogate::Vain;
+use super::surrogate::NullGains;
 use super::term::{Act, Term};
 use super::trials::{Ground, Trial, shortlist};
 
@@ -26,7 +26,11 @@ impl<'a> Search<'a> {
     where
         'a: 'b,
     {
-        let linear = Linear::about(self.problem, base, &mut self.scratch)?;
+        let linear = Linear::about(
+            self.problem,
+            (&base.terms, &base.parameters),
+            &mut self.scratch,
+        )?;
         let columns = jacobian(self.problem, base, &mut self.scratch);
         let residual = base.residual(self.problem);
         let bank = shortlist(&Frames::new(self.bank, &residual, &columns));
@@ -53,20 +57,20 @@ impl<'a> Search<'a> {
         covariates.truncate(MOST_COVARIATES);
         let covariates = self.refit_each(base, covariates);
         let (others, tried) = ground.of_itself();
-        let alone = ground.itself_in_vain(&tried, count, seed + 1);
+        let alone = ground.null_gains_of_noise(&tried, count, seed + 1);
         let mut all = Vec::new();
         if covariates
             .iter()
             .any(|one| one.gain > self.options.bic_margin)
         {
-            let vain = self.amplified(base, ground.covariates_in_vain(count, seed));
-            // The finds in vain have paid for nothing.
+            let null_gains = self.amplified(base, ground.null_gains_of_covariates(count, seed));
+            // The null gains have paid for nothing.
             let paid = |one: &Refitted| one.gain + ground.cost(&one.term);
             all.extend(covariates.into_iter().map(|one| {
                 let (gain, net) = (paid(&one), one.gain);
                 let follows = one.follows_season;
-                let one = one.judged_by(&vain, gain);
-                // Shifted by years, what follows the year is the same again: shifts cannot tell its time, and that noise
+                let one = one.judged_by(&null_gains, gain);
+                // Shifted by years, what follows the year is the same again: shifts cannot give its time, and that noise
                 // does not do as much has to be enough. The season stays a rival.
                 if follows && one.p_value >= SIGNIFICANT && one.p_value < AT_RANDOM {
                     return one.judged_by(&alone, net);
@@ -96,10 +100,10 @@ impl<'a> Search<'a> {
             .collect()
     }
 
-    /// The finds in vain by the law linearised, made as much larger as full refits of the largest of them are.
-    fn amplified(&mut self, base: &Fitted, mut vain: Vain) -> Vain {
+    /// The null gains by the law linearised, made as much larger as full refits of the largest of them are.
+    fn amplified(&mut self, base: &Fitted, mut null_gains: NullGains) -> NullGains {
         let mut most = 1.0_f64;
-        for (term, gain) in std::mem::take(&mut vain.largest) {
+        for (term, gain) in std::mem::take(&mut null_gains.largest) {
             let start = Start::at(base).joined(std::slice::from_ref(&term));
             let own = self.bank.iter();
             let own: Vec<Whitener> = own
@@ -112,7 +116,7 @@ impl<'a> Search<'a> {
                 most = most.max(full / gain.max(1.0));
             }
         }
-        vain.amplified(most)
+        null_gains.amplified(most)
     }
 
     /// The joint fit with one more term; its shape is refined where it promises something.

@@ -6,7 +6,7 @@ use jiff::SignedDuration;
 /// A turn counts when the covariate swings this share of its range after it.
 const SWING: f64 = 0.15;
 /// A swing whose ups and downs together are longer than this many times itself is none.
-const WANDERS: f64 = 1.5;
+const LONGEST_PATH: f64 = 1.5;
 /// Fewest velocities on either side of the turn.
 const FEWEST: usize = 5;
 /// Rank correlation from which two courses go the same way.
@@ -29,9 +29,9 @@ pub fn of_channels(series: &Series, channels: &[Channel]) -> Vec<String> {
 }
 
 /// When, and mm/day.
-type Velocities = Vec<(Timestamp, f64)>;
+type TimedVelocities = Vec<(Timestamp, f64)>;
 
-fn velocities(series: &Series) -> Velocities {
+fn velocities(series: &Series) -> TimedVelocities {
     let factor = series.unit.factor();
     let values = series
         .readings
@@ -44,7 +44,7 @@ fn velocities(series: &Series) -> Velocities {
         return Vec::new();
     };
     let least = RATE_SHARE * days_since(first.time, last.time);
-    let mut rates = Velocities::new();
+    let mut rates = TimedVelocities::new();
     let mut before = (first.time, factor * first.value);
     for (time, slip) in values.skip(1) {
         let days = days_since(before.0, time);
@@ -57,7 +57,7 @@ fn velocities(series: &Series) -> Velocities {
 }
 
 /// The sentence for one channel, where there is one to say.
-fn parting(velocities: &Velocities, channel: &Channel) -> Option<String> {
+fn parting(velocities: &TimedVelocities, channel: &Channel) -> Option<String> {
     let (first, last) = (velocities.first()?.0, velocities.last()?.0);
     let samples: Vec<Sample> = channel
         .samples
@@ -118,14 +118,14 @@ fn parting(velocities: &Velocities, channel: &Channel) -> Option<String> {
 
 /// Places among samples: where the run before the turn begins, the turn, and where the swing ends.
 #[derive(Debug, PartialEq)]
-struct Turn {
+struct TurningPoint {
     start: usize,
     at: usize,
     until: usize,
 }
 
 /// The last turn after which the values swing by [`SWING`] of their range, without turning back by as much.
-fn last_turn(samples: &[Sample]) -> Option<Turn> {
+fn last_turn(samples: &[Sample]) -> Option<TurningPoint> {
     let low = samples
         .iter()
         .map(|one| one.value)
@@ -166,7 +166,7 @@ fn last_turn(samples: &[Sample]) -> Option<Turn> {
         .windows(2)
         .map(|two| (two[1].value - two[0].value).abs())
         .sum();
-    (path <= WANDERS * swing).then_some(Turn { start, at, until })
+    (path <= LONGEST_PATH * swing).then_some(TurningPoint { start, at, until })
 }
 
 fn channel_at(samples: &[Sample], time: Timestamp) -> Option<f64> {
@@ -181,7 +181,7 @@ fn channel_at(samples: &[Sample], time: Timestamp) -> Option<f64> {
 }
 
 /// Scatter of a velocity about its neighbours' line, between two times, mm/day.
-fn noise(velocities: &Velocities, (from, to): (Timestamp, Timestamp)) -> f64 {
+fn noise(velocities: &TimedVelocities, (from, to): (Timestamp, Timestamp)) -> f64 {
     let inside: Vec<f64> = velocities
         .iter()
         .filter(|one| one.0 >= from && one.0 <= to)
@@ -251,7 +251,7 @@ mod tests {
         let turn = last_turn(&samples(&rising_then_falling)).unwrap();
         assert_eq!(
             turn,
-            Turn {
+            TurningPoint {
                 start: 0,
                 at: 14,
                 until: 19

@@ -1,17 +1,18 @@
 //! The search: one effect after another, each refitted with the law and judged, while any earns its place.
 
 use super::candidates;
-use super::explain::Options;
 use super::explanation::Candidate;
-use super::judge::{block, held_out, objection, step_errors, title};
+use super::judge::{block, held_out, named, objection, step_errors};
 use super::kind::Kind;
 use super::noise::{Noise, Whitener};
+use super::options::Options;
 use super::problem::Problem;
 use super::refit::{Fitted, Start, plain_starts, refit_every_memory, refit_from};
 use super::response::Driver;
-use super::surrogate::Vain;
-use super::term::{Act, Scratch, Term, event_node};
-use crate::reading::{Timestamp, after_days};
+use super::rival::Rival;
+use super::surrogate::NullGains;
+use super::term::{Act, Scratch, Term, time_of};
+use crate::reading::Timestamp;
 
 /// Most effects in one law.
 const MOST_EFFECTS: usize = 10;
@@ -38,8 +39,8 @@ const NO_READINGS: &str = "the values are no readings: they are smoother than an
 pub(super) struct Accepted {
     pub(super) bic_gain: f64,
     pub(super) p_value: f64,
-    /// What would have done as well, by title.
-    pub(super) ties: Vec<String>,
+    /// What would have done as well.
+    pub(super) ties: Vec<Rival>,
 }
 
 /// What would be believed of values that are no readings, were they readings.
@@ -51,7 +52,7 @@ pub(super) struct Withheld {
 }
 
 /// What a search came to.
-pub(super) struct Found {
+pub(super) struct SearchResult {
     /// The plain law by least squares, and under its likeliest noise.
     pub(super) plain: Fitted,
     pub(super) null: Fitted,
@@ -91,9 +92,9 @@ pub(super) struct Refitted {
 }
 
 impl Refitted {
-    /// What follows the year cannot be told from the season.
+    /// What follows the year cannot be distinguished from the season.
     fn with_season(&self, mut how: Accepted, problem: &Problem) -> Accepted {
-        let season = Kind::Seasonal.name().to_owned();
+        let season = Rival::from(Kind::Seasonal);
         let seen = !candidates::seasonal(problem).is_empty();
         if self.follows_season && seen && !how.ties.contains(&season) {
             how.ties.push(season);
@@ -109,9 +110,9 @@ impl Refitted {
     }
 
     /// Two searches were made, and either could have spoken.
-    pub(super) fn judged_by(self, vain: &Vain, gain: f64) -> Self {
+    pub(super) fn judged_by(self, null_gains: &NullGains, gain: f64) -> Self {
         Self {
-            p_value: (2.0 * vain.p_value(gain)).min(1.0),
+            p_value: (2.0 * null_gains.p_value(gain)).min(1.0),
             ..self
         }
     }
@@ -151,7 +152,11 @@ impl Search<'_> {
     }
 
     /// Adds effects to the plain law until none earns its place.
-    pub(super) fn run(mut self, plain: Fitted, progress: &mut dyn FnMut(f64)) -> Option<Found> {
+    pub(super) fn run(
+        mut self,
+        plain: Fitted,
+        progress: &mut dyn FnMut(f64),
+    ) -> Option<SearchResult> {
         let null = self.null(&plain)?;
         let mut full = null.clone();
         let mut accepted = Vec::new();
@@ -163,7 +168,7 @@ impl Search<'_> {
             full = next;
             accepted.push(how);
         }
-        Some(Found {
+        Some(SearchResult {
             plain,
             null,
             full,
@@ -179,7 +184,7 @@ impl Search<'_> {
         let mut refitted = self.refits(base, round)?;
         refitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         prefer_witnesses(&mut refitted, self.options.bic_margin);
-        let mut chosen: Option<(usize, Vec<String>)> = None;
+        let mut chosen: Option<(usize, Vec<Rival>)> = None;
         for (k, one) in refitted.iter().enumerate() {
             let (held, reason) = self.judged(base, one);
             let term = one.fitted.terms.last()?;
@@ -187,7 +192,7 @@ impl Search<'_> {
                 let best = &refitted[*first];
                 let same = best.term.kind == one.term.kind && best.term.channel == one.term.channel;
                 if one.gain > best.gain - self.options.bic_margin && !same {
-                    ties.push(title(term, self.drivers));
+                    ties.push(named(term, self.drivers));
                 }
             }
             let taken = chosen.is_none() && reason.is_none();
@@ -216,7 +221,7 @@ impl Search<'_> {
             .fitted
             .terms
             .last()
-            .map(|term| title(term, self.drivers));
+            .map(|term| named(term, self.drivers).to_string());
         let name = name.unwrap_or_default();
         let behind = best.gain - one.gain;
         if behind < self.options.bic_margin {
@@ -238,7 +243,7 @@ impl Search<'_> {
         }
         if one.p_value >= SIGNIFICANT {
             let reason = format!(
-                "a search in vain gains as much in {:.0} % of cases",
+                "a search where there is nothing gains as much in {:.0} % of cases",
                 100.0 * one.p_value
             );
             return (None, Some(reason));
@@ -327,11 +332,6 @@ impl Search<'_> {
 /// Whether a covariate or the sky bears witness to a kind, and not the shape of the curve alone.
 fn has_witness(kind: Kind) -> bool {
     matches!(kind, Kind::Hydrological | Kind::Thermal | Kind::Tide)
-}
-
-/// When an event before reading `at` happened.
-pub(super) fn time_of(problem: &Problem, at: usize) -> Option<Timestamp> {
-    after_days(problem.epoch, problem.nodes[event_node(problem, at)])
 }
 
 /// Among what the BIC cannot separate from the best, an effect that a covariate bears witness to goes first, and then

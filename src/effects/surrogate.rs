@@ -19,18 +19,18 @@ const FEWEST_EXCEEDANCES: usize = 5;
 /// No p-value is claimed below it.
 const LEAST_P: f64 = 1e-6;
 
-/// The best gains of many searches in vain.
+/// The null gains: the best gains of many searches where there is nothing to find.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Vain {
+pub(super) struct NullGains {
     gains: Vec<f64>,
     /// The terms behind the largest of them, with their gains, where covariates were searched.
     pub(super) largest: Vec<(Term, f64)>,
 }
 
-/// How many of the best finds in vain are refitted in full.
+/// How many of the largest null gains are refitted in full.
 const REFITTED: usize = 4;
 
-impl Vain {
+impl NullGains {
     /// The same gains `times` as large.
     pub(super) fn amplified(mut self, times: f64) -> Self {
         for gain in &mut self.gains {
@@ -39,13 +39,17 @@ impl Vain {
         self
     }
 
-    /// The chance that a search in vain gains as much: by rank, and beyond the largest by Gumbel's law for maxima.
+    /// The chance that a search where there is nothing gains as much: by rank, and beyond the largest by Gumbel's law for maxima.
     pub(super) fn p_value(&self, gain: f64) -> f64 {
         let n = self.gains.len() as f64;
         if self.gains.is_empty() {
             return 1.0;
         }
-        let above = self.gains.iter().filter(|vain| **vain >= gain).count();
+        let above = self
+            .gains
+            .iter()
+            .filter(|null_gains| **null_gains >= gain)
+            .count();
         if above >= FEWEST_EXCEEDANCES {
             return (above as f64 + 1.0) / (n + 1.0);
         }
@@ -67,7 +71,7 @@ pub(super) fn shifted_covariates(
     drivers: &[(usize, Driver)],
     (linear, frames): (&Linear, &Frames),
     (count, seed): (usize, u64),
-) -> Vain {
+) -> NullGains {
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     let before = frames.surprise();
     let finds = (0..count).filter_map(|k| {
@@ -89,7 +93,7 @@ pub(super) fn shifted_covariates(
     finds.sort_by(|a, b| b.1.total_cmp(&a.1));
     let gains = finds.iter().map(|(_, gain)| *gain).collect();
     finds.truncate(REFITTED);
-    Vain {
+    NullGains {
         gains,
         largest: finds,
     }
@@ -146,7 +150,11 @@ impl Tried {
 
 /// The whole search over what needs no covariate, on readings made of the likeliest noise: its own innovations in
 /// another order.
-pub(super) fn noise_alone(frames: &Frames, tried: &[Tried], (count, seed): (usize, u64)) -> Vain {
+pub(super) fn noise_alone(
+    frames: &Frames,
+    tried: &[Tried],
+    (count, seed): (usize, u64),
+) -> NullGains {
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     let best = &frames.each[frames.best()];
     let mut innovations = best.residual[..best.residual.len() - 1].to_vec();
@@ -169,7 +177,7 @@ pub(super) fn noise_alone(frames: &Frames, tried: &[Tried], (count, seed): (usiz
         let with = tried.iter().map(|one| one.surprise(frames, &left));
         before - with.fold(f64::INFINITY, f64::min)
     });
-    Vain {
+    NullGains {
         gains: gains.collect(),
         largest: Vec::new(),
     }

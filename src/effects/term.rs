@@ -4,7 +4,7 @@ use super::kind::Kind;
 use super::problem::Problem;
 use super::response::Response;
 use crate::model::{Drive, Driven, Event, Law};
-use crate::reading::Quantity;
+use crate::reading::{Quantity, Timestamp, after_days};
 
 /// One effect with its shape; its coefficients stand among the parameters.
 #[derive(Debug, Clone)]
@@ -123,7 +123,7 @@ impl Feedback {
     }
 }
 
-/// Bounds of ln(a span) and of p: beyond them nothing changes that readings could tell.
+/// Bounds of ln(a span) and of p: beyond them nothing changes that readings could show.
 const LN_A_SPAN: (f64, f64) = (-7.0, 6.0);
 const P: (f64, f64) = (-3.0, 0.95);
 
@@ -257,6 +257,11 @@ pub(super) fn read(problem: &Problem, driven: &Driven, averaging: f64, readings:
         }
     };
     readings.extend(problem.node_of.iter().map(value));
+}
+
+/// When an event before reading `at` happened.
+pub(super) fn time_of(problem: &Problem, at: usize) -> Option<Timestamp> {
+    after_days(problem.epoch, problem.nodes[event_node(problem, at)])
 }
 
 /// The node in the middle between a reading and the one before it.

@@ -1,9 +1,11 @@
 //! Several benchmarks explained together: do they part, and what does each show.
 
-use super::explain::{Options, explain};
+use super::explain::explain;
 use super::explanation::{Candidate, Effect, Explained, Explanation};
 use super::kind::Kind;
+use super::options::Options;
 use super::partition::partition;
+use super::rival::Rival;
 use crate::reading::{BenchmarkId, Channel, Quantity, Series};
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
@@ -21,7 +23,7 @@ pub struct Together {
     /// Further effects that they have in common; each one's own stand in `each`.
     pub also: Vec<Effect>,
     /// What explains the same.
-    pub cannot_separate_from: Vec<String>,
+    pub cannot_separate_from: Vec<Rival>,
     /// What was tried on them together, with why it was refused.
     pub candidates: Vec<Candidate>,
     /// Each series alone, the others its neighbours.
@@ -34,7 +36,7 @@ fn joined<S: Serializer>(benchmarks: &[BenchmarkId], serializer: S) -> Result<S:
 }
 
 /// Explains several series by what they show together and by what each shows; of a benchmark read as both
-/// displacement and velocity, the displacement stands for it among the others. `progress` hears the share
+/// displacement and velocity, the displacement stands for it among the others. `progress` is called with the share
 /// done, 0 to 1.
 pub fn explain_together(
     all: &[&Series],

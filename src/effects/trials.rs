@@ -10,7 +10,7 @@ use super::linear::Linear;
 use super::noise::{Memory, Whitener};
 use super::problem::Problem;
 use super::response::Driver;
-use super::surrogate::{Tried, Vain, noise_alone, shifted_covariates};
+use super::surrogate::{NullGains, Tried, noise_alone, shifted_covariates};
 use super::term::Term;
 
 /// A term with its linear gain.
@@ -131,14 +131,19 @@ impl Ground<'_> {
         (trials, tried)
     }
 
-    /// What the search over covariates finds in vain.
-    pub(super) fn covariates_in_vain(&self, count: usize, seed: u64) -> Vain {
+    /// What the search over covariates gains where there is nothing.
+    pub(super) fn null_gains_of_covariates(&self, count: usize, seed: u64) -> NullGains {
         let both = (&self.linear, &self.frames);
         shifted_covariates(self.problem, self.drivers, both, (count, seed))
     }
 
-    /// What the search without covariates finds in vain.
-    pub(super) fn itself_in_vain(&self, tried: &[Tried], count: usize, seed: u64) -> Vain {
+    /// What the search without covariates gains where there is nothing.
+    pub(super) fn null_gains_of_noise(
+        &self,
+        tried: &[Tried],
+        count: usize,
+        seed: u64,
+    ) -> NullGains {
         noise_alone(&self.frames, tried, (count, seed))
     }
 }

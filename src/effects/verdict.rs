@@ -2,21 +2,22 @@
 
 use super::diagnosis::Judged;
 use super::explanation::{Candidate, Effect, Explained};
-use super::judge::{coefficients, is_label, title};
+use super::judge::{coefficients, is_label, named};
 use super::kind::Kind;
 use super::noise::{Memory, Whitener};
 use super::problem::Problem;
 use super::refit::{Fitted, jacobian};
 use super::response::Driver;
-use super::search::{Accepted, Found, time_of};
-use super::term::{Act, Scratch, Term};
+use super::rival::Rival;
+use super::search::{Accepted, SearchResult};
+use super::term::{Act, Scratch, Term, time_of};
 use crate::reading::{Quantity, Unit};
 
 /// What the search is concluded to mean.
 pub(super) struct Verdict {
     pub(super) effects: Vec<Effect>,
     pub(super) explained: Explained,
-    pub(super) cannot_separate_from: Vec<String>,
+    pub(super) cannot_separate_from: Vec<Rival>,
     /// The law with the effects that stand.
     pub(super) full: Fitted,
 }
@@ -32,7 +33,7 @@ const NINETY: f64 = 1.645;
 pub(super) fn conclude(
     (problem, bank, drivers): (&Problem, &[Whitener], &[(usize, Driver)]),
     unit: Unit,
-    found: &mut Found,
+    found: &mut SearchResult,
     (margin, scratch): (f64, &mut Scratch),
 ) -> Verdict {
     let mut full = found.full.clone();
@@ -44,7 +45,7 @@ pub(super) fn conclude(
     if only_labels && (left || !accounts_for_all(problem, &full)) {
         left = true;
         for term in &full.terms {
-            cannot_separate_from.push(title(term, drivers));
+            cannot_separate_from.push(named(term, drivers));
             refuse(&mut found.candidates, term.kind);
         }
         full = found.null.clone();
@@ -67,7 +68,7 @@ pub(super) fn conclude(
     let remembers_alone = effects.is_empty() && full.noise.memory == Memory::Reading;
     if remembers_alone && !left && as_a_load {
         left = true;
-        cannot_separate_from.push(Kind::CorrelatedNoise.name().to_owned());
+        cannot_separate_from.push(Rival::from(Kind::CorrelatedNoise));
     }
     let memory_gain = judged.as_ref().map_or(0.0, Judged::memory_gain);
     let remembers = full.noise.memory == Memory::Reading && memory_gain > margin;

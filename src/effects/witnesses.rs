@@ -51,7 +51,7 @@ pub(super) fn is_temperature(channel: &Channel) -> bool {
     ["c", "f", "k"].contains(&unit) || name.contains("temp")
 }
 
-/// The covariates that cover the record; the others are told to the reader.
+/// The covariates that cover the record; the others are reported to the reader.
 pub(super) fn drivers(
     problem: &Problem,
     channels: &[Channel],

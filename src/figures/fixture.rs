@@ -34,7 +34,7 @@ pub(crate) fn lake() -> Explanation {
         verdict: by_the_lake(),
         explained: Explained::Partly,
         also: vec![an_offset()],
-        cannot_separate_from: vec!["seasonal".to_owned()],
+        cannot_separate_from: vec![Kind::Seasonal.into()],
         faults: vec![a_reset()],
         error: ErrorChange {
             unit: Unit::MM,
@@ -79,7 +79,7 @@ pub(crate) fn lake() -> Explanation {
             data_hash: "a1b2c3d4e5f60718".to_owned(),
         },
         curves: curves(times),
-        fuller: crate::effects::Fuller::default(),
+        known_load: crate::effects::KnownLoad::default(),
     }
 }
 
@@ -177,7 +177,7 @@ fn candidates() -> Vec<Candidate> {
 fn curves(times: Vec<Timestamp>) -> Curves {
     let of = |f: fn(f64) -> f64| (0..READINGS).map(|index| f(f64::from(index))).collect();
     let noise: Vec<f64> = of(|t| (7.3 * t).sin() + (12.9898 * t).sin());
-    let fuller: Vec<f64> = of(|t| 1.4 * t + 22.0 * (t / 58.0).sin());
+    let known_load: Vec<f64> = of(|t| 1.4 * t + 22.0 * (t / 58.0).sin());
     let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a + b).collect::<Vec<f64>>();
     let decays = |half: f64| {
         (0..30)
@@ -186,9 +186,9 @@ fn curves(times: Vec<Timestamp>) -> Curves {
     };
     Curves {
         times,
-        readings: sum(&fuller, &noise),
+        readings: sum(&known_load, &noise),
         before: of(|t| 1.4 * t + 5.0),
-        after: fuller.clone(),
+        after: known_load.clone(),
         before_held_out: of(|t| 1.6 * t - 10.0 + 0.001 * t * t),
         after_held_out: of(|t| 1.42 * t + 21.0 * (t / 58.0).sin()),
         load_before: of(|t| 0.5 * (t / 58.0).cos())

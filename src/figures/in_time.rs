@@ -160,7 +160,7 @@ pub(super) fn undeclared_load(explanation: &Explanation) -> Option<Picture> {
             legend: Legend::Above,
         });
     }
-    let caption = "The load that nobody declared, as the readings tell it, before and after: \
+    let caption = "The load that nobody declared, as the readings show it, before and after: \
                    the residual in the law's own terms.";
     (!panels.is_empty()).then(|| picture("undeclared-load", caption, PANEL, panels))
 }

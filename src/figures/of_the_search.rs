@@ -11,7 +11,7 @@ const WIDTH: f64 = 920.0;
 const HALF_OF_95: f64 = 1.96;
 /// No figure shows more rivals.
 const MOST_RIVALS: usize = 16;
-/// Lags under half a day are told in hours.
+/// Lags under half a day are reported in hours.
 const HALF_A_DAY: f64 = 0.5;
 
 /// The autocorrelation of the innovations with the band of white noise, before and after.

@@ -7,7 +7,7 @@
 //! is small the velocity has a knee, and the slope is given by the time of the knee: in the slope itself
 //! the misfit is a narrow, curved valley.
 
-use super::curve::Shape;
+use super::curve::CurveShape;
 use crate::model::Law;
 
 /// The largest m that is looked for; beyond it m > 1 is an exponential for any record.
@@ -71,7 +71,7 @@ enum Abscissa {
 }
 
 /// (slope or knee, ln |ln `y_s`|, ln |m|).
-pub(super) type Point = [f64; 3];
+pub(super) type ChartPoint = [f64; 3];
 
 /// One set of coordinates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -137,7 +137,7 @@ impl Chart {
         branch: Branch,
         direction: Direction,
         (slope, steady, ln_m): (f64, f64, f64),
-    ) -> (Self, Point) {
+    ) -> (Self, ChartPoint) {
         let has_knee = match (branch, direction) {
             (Branch::BelowOne, Direction::Accelerating) => true,
             (Branch::BelowZero, Direction::Decelerating) => {
@@ -177,7 +177,7 @@ impl Chart {
     }
 
     /// The law at a point, y = 1 at the anchor.
-    pub(super) fn shape(self, at: &Point) -> Shape {
+    pub(super) fn shape(self, at: &ChartPoint) -> CurveShape {
         let steady = at[1].exp();
         let size = match self.abscissa {
             Abscissa::Slope => at[0].exp(),
@@ -185,14 +185,14 @@ impl Chart {
         };
         // Away from the anchor the law relaxes.
         let sign = if self.y_falls() { -1.0 } else { 1.0 };
-        Shape {
+        CurveShape {
             slope: sign * size,
             ln_steady: sign * steady,
             p: self.branch.p(at[2]),
         }
     }
 
-    pub(super) fn chain(self, at: &Point) -> Chain {
+    pub(super) fn chain(self, at: &ChartPoint) -> Chain {
         let steady = at[1].exp();
         let sign = if self.y_falls() { -1.0 } else { 1.0 };
         let excess_by_second = -sign * steady;
@@ -218,7 +218,7 @@ impl Chart {
     }
 
     /// Lowest and highest corner of the chart.
-    pub(super) fn corners(self) -> (Point, Point) {
+    pub(super) fn corners(self) -> (ChartPoint, ChartPoint) {
         let ln_m = self.branch.ln_m();
         let (first, steady) = match self.abscissa {
             Abscissa::Slope => (LN_SLOPE, LN_STEADY),
@@ -229,7 +229,7 @@ impl Chart {
     }
 
     /// The corners of the chart beside a point, where it ends because `x_i` does.
-    pub(super) fn corners_beside(self, at: &Point) -> (Point, Point) {
+    pub(super) fn corners_beside(self, at: &ChartPoint) -> (ChartPoint, ChartPoint) {
         let (mut low, mut high) = self.corners();
         match self.branch {
             Branch::AboveOne => {
@@ -244,7 +244,7 @@ impl Chart {
     }
 
     /// The law of a shape on this chart, moved along to `ln_y`, with the velocity at its own anchor.
-    pub(super) fn law(self, shape: &Shape, velocity: f64, length_days: f64) -> Law {
+    pub(super) fn law(self, shape: &CurveShape, velocity: f64, length_days: f64) -> Law {
         let forwards = if self.anchor() == Anchor::Start {
             -1.0
         } else {

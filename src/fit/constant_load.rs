@@ -4,42 +4,12 @@
 //! curve, stretched and shifted in time. Nothing is random.
 
 use super::chart::{Branch, HIGHEST_M, LEAST_LN_M, LOWEST_M};
-use super::global_search::{Found, Search};
+use super::global_search::{FoundMinimum, GlobalSearch};
 use super::lattice::Lattice;
 use super::point_readings::PointReadings;
+use super::solution::{EndOfSearch, Exponent, Solution};
 use crate::model::Law;
 use std::fmt;
-
-/// A law that fits, at a local minimum of the misfit.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Solution {
-    /// The law, t = 0 at the first reading, velocity in the readings' unit (a length's per day).
-    pub law: Law,
-    /// Modelled displacement at the first reading; 0 for velocities.
-    pub displacement_at_start: f64,
-    /// Root mean square of the residuals, in the readings' unit.
-    pub rms: f64,
-    /// Where the search ended: inside the box of m, or at its side.
-    pub place: Place,
-}
-
-/// Whether m is free where a search ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Place {
-    /// A minimum within the branch.
-    Inside,
-    /// The misfit still falls beyond the bound of m.
-    AtBoundOfM,
-}
-
-/// What is held in an inversion.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Exponent {
-    /// m is fitted.
-    Free,
-    /// m is this.
-    Fixed(f64),
-}
 
 /// Why an inversion ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,7 +36,7 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// Whether the readings hold no motion that any law, or any regime, could be told from.
+    /// Whether the readings hold no motion that any law, or any regime, could be distinguished from.
     pub fn says_nothing(&self) -> bool {
         match self {
             Self::TooFew { .. } | Self::AllEqual | Self::NoForwardMotion => true,
@@ -131,7 +101,7 @@ impl ConstantLoad {
                 outcome,
             };
         }
-        let mut search = Search::new(readings, exponent, lattice);
+        let mut search = GlobalSearch::new(readings, exponent, lattice);
         let found = search.run();
         conclude(&search, readings, found, exponent)
     }
@@ -160,9 +130,9 @@ fn refuse(readings: &PointReadings, exponent: Exponent) -> Option<Outcome> {
 
 /// Ranks what was found.
 fn conclude(
-    search: &Search,
+    search: &GlobalSearch,
     readings: &PointReadings,
-    mut found: Vec<Found>,
+    mut found: Vec<FoundMinimum>,
     exponent: Exponent,
 ) -> ConstantLoad {
     found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
@@ -170,7 +140,7 @@ fn conclude(
     let outcome = match found.first() {
         None => Outcome::NoForwardMotion,
         Some(best) if !best.converged => Outcome::Stopped,
-        Some(best) if best.solution.place == Place::AtBoundOfM => {
+        Some(best) if best.solution.place == EndOfSearch::AtBoundOfM => {
             Outcome::AtBoundOfM(m_of(&best.solution))
         }
         Some(_) => Outcome::Converged,
@@ -189,7 +159,7 @@ fn m_of(solution: &Solution) -> f64 {
 
 /// Where a branch has only run into m = 1, that is the better account; what is left of the branch is
 /// the law next to it, whose `x_i`, T and D mean nothing.
-fn prefer_unit_m(found: &mut [Found]) {
+fn prefer_unit_m(found: &mut [FoundMinimum]) {
     let Some(unit) = found.iter().find(|one| one.solution.law.p == 0.0).copied() else {
         return;
     };
@@ -211,9 +181,9 @@ fn prefer_unit_m(found: &mut [Found]) {
             a: f64::NAN,
             ..unit.solution.law
         };
-        one.solution.place = Place::Inside;
+        one.solution.place = EndOfSearch::Inside;
     }
-    let gains = |one: &Found| one.solution.rms < unit_rms * (1.0 - GAIN_OVER_UNIT_M);
+    let gains = |one: &FoundMinimum| one.solution.rms < unit_rms * (1.0 - GAIN_OVER_UNIT_M);
     if found.first().is_some_and(|best| !gains(best)) {
         // Stable: only the best law with m = 1 moves, to the front.
         let at = found.iter().position(|one| one.solution.law.p == 0.0);
@@ -238,13 +208,13 @@ fn branch(law: &Law) -> Option<Branch> {
 }
 
 /// The minima that differ, best first, and the best of m > 1, m = 1 and m < 1 whatever their worth.
-fn distinct(found: &[Found], flat: f64, exponent: Exponent) -> Vec<Solution> {
+fn distinct(found: &[FoundMinimum], flat: f64, exponent: Exponent) -> Vec<Solution> {
     let best = found.first().map_or(0.0, |best| best.solution.rms);
     let mut kept: Vec<Solution> = Vec::new();
-    for Found { solution, .. } in found {
+    for FoundMinimum { solution, .. } in found {
         let first_of_side = kept.iter().all(|one| side(&one.law) != side(&solution.law));
         let same = |one: &Solution| {
-            let bound = solution.place == Place::AtBoundOfM && one.place == solution.place;
+            let bound = solution.place == EndOfSearch::AtBoundOfM && one.place == solution.place;
             let close = (one.rms - solution.rms).abs() <= SAME_RMS * solution.rms;
             (close || bound)
                 && branch(&one.law) == branch(&solution.law)

@@ -9,7 +9,7 @@ use crate::reading::Quantity;
 
 /// A law with velocity 1 at the anchor of its chart; times are in lengths of the record, away from the anchor.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Shape {
+pub(super) struct CurveShape {
     /// dy/dt at the anchor, where y = 1.
     pub(super) slope: f64,
     /// ln y of the steady state, of either sign but not 0.
@@ -18,7 +18,7 @@ pub(super) struct Shape {
     pub(super) p: f64,
 }
 
-impl Shape {
+impl CurveShape {
     /// F = dy/dt at ln y, and the part of it that goes with y^p.
     fn slope_at(&self, scale: f64, ln_y: f64) -> (f64, f64) {
         let q = self.p * (ln_y - self.ln_steady);
@@ -74,7 +74,7 @@ impl Fineness {
     pub(super) const EXACT: Self = Self(0.25);
 }
 
-/// More nodes than a curve within the charts needs; one bit each in [`Curve::known`].
+/// More nodes than a curve within the charts needs; one bit each in [`LawCurve::known`].
 const MOST_NODES: usize = 128;
 /// ln y is followed no further than this, where velocities have left every instrument's range.
 const FARTHEST_LN_Y: f64 = 300.0;
@@ -87,7 +87,7 @@ const SPENT: f64 = -40.0;
 
 /// The quantity at a node, with three derivatives in time (y itself for velocities).
 #[derive(Debug, Clone, Copy)]
-struct Node {
+struct CurveNode {
     t: f64,
     value: [f64; 4],
     /// ln of y over its steady value.
@@ -116,9 +116,9 @@ struct Approach {
 
 /// A solved curve; its memory is used again by the next.
 #[derive(Debug, Clone)]
-pub(super) struct Curve {
+pub(super) struct LawCurve {
     quantity: Quantity,
-    nodes: Vec<Node>,
+    nodes: Vec<CurveNode>,
     /// From each node to the next, where `known` has its bit.
     pieces: Vec<Piece>,
     known: u128,
@@ -186,13 +186,13 @@ fn between(h: f64, from: &[f64; 4], to: &[f64; 4]) -> f64 {
 
 /// A stretch of a curve laid over the record: curve time is `start + span * record time`.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Window {
+pub(super) struct CurveWindow {
     pub(super) first_node: usize,
     pub(super) start: f64,
     pub(super) span: f64,
 }
 
-impl Window {
+impl CurveWindow {
     /// The curve as it was solved.
     pub(super) const WHOLE: Self = Self {
         first_node: 0,
@@ -201,7 +201,7 @@ impl Window {
     };
 }
 
-impl Curve {
+impl LawCurve {
     pub(super) fn new(quantity: Quantity) -> Self {
         Self {
             quantity,
@@ -213,7 +213,7 @@ impl Curve {
     }
 
     /// Solves from y = 1 up to `end`; false where the law ends before, or leaves the range of numbers.
-    pub(super) fn solve(&mut self, shape: &Shape, end: f64, fineness: Fineness) -> bool {
+    pub(super) fn solve(&mut self, shape: &CurveShape, end: f64, fineness: Fineness) -> bool {
         let scale = shape.scale();
         let sign = shape.slope.signum();
         let ahead = sign * shape.ln_steady > 0.0;
@@ -243,7 +243,7 @@ impl Curve {
                 }
             }
             let ln_excess = ln_y - shape.ln_steady;
-            self.nodes.push(Node {
+            self.nodes.push(CurveNode {
                 t,
                 value: local.value(self.quantity, slip),
                 ln_excess,
@@ -297,7 +297,7 @@ impl Curve {
 
     /// The time at which ln of y over its steady value has this size, on a curve that approaches it.
     pub(super) fn time_at_excess(&self, size: f64) -> f64 {
-        let ln = |node: &Node| node.ln_excess.abs().ln();
+        let ln = |node: &CurveNode| node.ln_excess.abs().ln();
         for pair in self.nodes.windows(2) {
             let (far, near) = (&pair[0], &pair[1]);
             if near.ln_excess.abs() <= size {
@@ -312,7 +312,7 @@ impl Curve {
     /// derivatives in the curve's time where wanted.
     pub(super) fn follow(
         &mut self,
-        window: &Window,
+        window: &CurveWindow,
         times: &[f64],
         out: &mut [f64],
         rates: Option<&mut [f64]>,
@@ -332,7 +332,7 @@ impl Curve {
     /// One loop a case, because nearly all the time of a search is spent here.
     fn walk<const IS_VELOCITY: bool, const WITH_RATES: bool>(
         &mut self,
-        window: &Window,
+        window: &CurveWindow,
         times: &[f64],
         out: &mut [f64],
         rates: &mut [f64],
@@ -409,9 +409,9 @@ impl Curve {
     }
 
     /// ln y at the end of the record.
-    pub(super) fn last_ln_y(&mut self, shape: &Shape) -> f64 {
+    pub(super) fn last_ln_y(&mut self, shape: &CurveShape) -> f64 {
         let mut end = [0.0];
-        self.follow(&Window::WHOLE, &[1.0], &mut end, None);
+        self.follow(&CurveWindow::WHOLE, &[1.0], &mut end, None);
         debug_assert!(self.quantity == Quantity::Velocity);
         // The side of the steady state is kept, however near it is.
         let ln_y = -end[0].ln();
@@ -431,7 +431,7 @@ impl Piece {
         high: [0.0; 4],
     };
 
-    fn new(from: &Node, to: &Node) -> Self {
+    fn new(from: &CurveNode, to: &CurveNode) -> Self {
         let h = to.t - from.t;
         let scaled = |v: &[f64; 4]| [v[0], v[1] * h, v[2] * h * h / 2.0, v[3] * h * h * h / 6.0];
         let (c, d) = (scaled(&from.value), scaled(&to.value));

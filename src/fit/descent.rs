@@ -3,8 +3,8 @@
 //! The derivatives by slope and steady state follow from the curve itself, because all laws of one m are
 //! one curve, stretched and shifted in time; only that by m takes a second solution.
 
-use super::chart::{Chart, Point};
-use super::curve::{Curve, Fineness, Window};
+use super::chart::{Chart, ChartPoint};
+use super::curve::{CurveWindow, Fineness, LawCurve};
 use super::record::Record;
 use crate::reading::Quantity;
 
@@ -20,7 +20,7 @@ const TIGHTEN: f64 = 2.0;
 
 /// How far a descent goes.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Effort {
+pub(super) struct DescentEffort {
     pub(super) most_evaluations: usize,
     /// Gain of a step, as a share of the cost, at which it has converged.
     pub(super) least_gain: f64,
@@ -29,9 +29,9 @@ pub(super) struct Effort {
 
 /// Where a descent stands.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Place {
+pub(super) struct SearchPoint {
     pub(super) chart: Chart,
-    pub(super) at: Point,
+    pub(super) at: ChartPoint,
     /// Sum of squared residuals.
     pub(super) cost: f64,
     /// Whether it ended before its bound on evaluations.
@@ -41,7 +41,7 @@ pub(super) struct Place {
 /// Memory that every descent uses again.
 #[derive(Debug)]
 pub(super) struct Descent {
-    pub(super) curve: Curve,
+    pub(super) curve: LawCurve,
     pub(super) evaluations: usize,
     basis: Vec<f64>,
     rates: Vec<f64>,
@@ -51,14 +51,14 @@ pub(super) struct Descent {
 }
 
 /// J^T J and J^T r.
-type Normal = ([[f64; 3]; 3], [f64; 3]);
+type NormalEquations = ([[f64; 3]; 3], [f64; 3]);
 
 impl Descent {
     /// For records of at most `count` readings.
     pub(super) fn new(quantity: Quantity, count: usize) -> Self {
         let zeros = || vec![0.0; count];
         Self {
-            curve: Curve::new(quantity),
+            curve: LawCurve::new(quantity),
             evaluations: 0,
             basis: zeros(),
             rates: zeros(),
@@ -73,18 +73,18 @@ impl Descent {
         &mut self,
         record: &Record,
         chart: Chart,
-        at: &Point,
+        at: &ChartPoint,
         fineness: Fineness,
     ) -> f64 {
         self.evaluations += 1;
         if !self.curve.solve(&chart.shape(at), 1.0, fineness) {
             return f64::INFINITY;
         }
-        self.cost_of(record, chart, &Window::WHOLE)
+        self.cost_of(record, chart, &CurveWindow::WHOLE)
     }
 
     /// Sum of squared residuals of a stretch of the curve as it stands.
-    pub(super) fn cost_of(&mut self, record: &Record, chart: Chart, window: &Window) -> f64 {
+    pub(super) fn cost_of(&mut self, record: &Record, chart: Chart, window: &CurveWindow) -> f64 {
         let basis = &mut self.basis[..record.count()];
         let times = record.times(chart.anchor());
         self.curve.follow(window, times, basis, None);
@@ -96,10 +96,10 @@ impl Descent {
     pub(super) fn descend(
         &mut self,
         record: &Record,
-        start: &Place,
-        effort: &Effort,
+        start: &SearchPoint,
+        effort: &DescentEffort,
         holds_m: bool,
-    ) -> Place {
+    ) -> SearchPoint {
         let mut place = *start;
         place.at = inside(place.chart, &place.at, holds_m);
         place.cost = self.cost(record, place.chart, &place.at, effort.fineness);
@@ -143,15 +143,16 @@ impl Descent {
     fn linearise(
         &mut self,
         record: &Record,
-        place: &Place,
+        place: &SearchPoint,
         fineness: Fineness,
         holds_m: bool,
-    ) -> Option<Normal> {
+    ) -> Option<NormalEquations> {
         let (count, anchor) = (record.count(), place.chart.anchor());
         let shape = place.chart.shape(&place.at);
         let times = record.times(anchor);
         let (basis, rates) = (&mut self.basis[..count], &mut self.rates[..count]);
-        self.curve.follow(&Window::WHOLE, times, basis, Some(rates));
+        self.curve
+            .follow(&CurveWindow::WHOLE, times, basis, Some(rates));
         let projected = record.project(anchor, basis)?;
         let chain = place.chart.chain(&place.at);
         let (stretch, over_slope) = (-shape.stretch(), 1.0 / shape.slope);
@@ -179,7 +180,7 @@ impl Descent {
     }
 
     /// The derivative of the basis by ln |m|; 0 where the law next to it cannot be followed.
-    fn differentiate_by_m(&mut self, record: &Record, place: &Place, fineness: Fineness) {
+    fn differentiate_by_m(&mut self, record: &Record, place: &SearchPoint, fineness: Fineness) {
         let count = record.count();
         let mut at = place.at;
         let step = if at[2] + LN_M_STEP > place.chart.corners().1[2] {
@@ -195,13 +196,19 @@ impl Descent {
             return;
         }
         let (times, moved) = (record.times(place.chart.anchor()), &mut self.moved[..count]);
-        self.curve.follow(&Window::WHOLE, times, moved, None);
+        self.curve.follow(&CurveWindow::WHOLE, times, moved, None);
         for ((slot, there), here) in out.iter_mut().zip(moved).zip(&self.basis) {
             *slot = (*there - here) / step;
         }
     }
 
-    fn normal(&self, place: &Place, count: usize, columns: usize, holds_m: bool) -> Normal {
+    fn normal(
+        &self,
+        place: &SearchPoint,
+        count: usize,
+        columns: usize,
+        holds_m: bool,
+    ) -> NormalEquations {
         let dot = |a: &[f64], b: &[f64]| {
             let products = a[..count].iter().zip(&b[..count]).map(|(a, b)| a * b);
             products.sum::<f64>()
@@ -228,13 +235,13 @@ impl Descent {
 }
 
 /// What the linear model gains by a damped step.
-fn promised((normal, gradient): &Normal, step: &[f64; 3], damping: f64) -> f64 {
+fn promised((normal, gradient): &NormalEquations, step: &[f64; 3], damping: f64) -> f64 {
     let each = (0..3).map(|i| step[i] * (damping * normal[i][i] * step[i] - gradient[i]));
     each.sum()
 }
 
 /// Whether a coordinate stands at a bound that descent would cross.
-fn is_held(place: &Place, i: usize, gradient: f64, holds_m: bool) -> bool {
+fn is_held(place: &SearchPoint, i: usize, gradient: f64, holds_m: bool) -> bool {
     if i == 2 && holds_m {
         return true;
     }
@@ -243,7 +250,7 @@ fn is_held(place: &Place, i: usize, gradient: f64, holds_m: bool) -> bool {
 }
 
 /// The nearest point of the chart.
-pub(super) fn inside(chart: Chart, at: &Point, holds_m: bool) -> Point {
+pub(super) fn inside(chart: Chart, at: &ChartPoint, holds_m: bool) -> ChartPoint {
     let (low, high) = chart.corners_beside(at);
     let mut inside = [0, 1, 2].map(|i| at[i].clamp(low[i], high[i]));
     if holds_m {
@@ -254,7 +261,7 @@ pub(super) fn inside(chart: Chart, at: &Point, holds_m: bool) -> Point {
 
 /// The step of Levenberg and Marquardt, by Cramer's rule on columns of unit length; none where the
 /// matrix is singular.
-fn damped_step((normal, gradient): &Normal, damping: f64) -> [f64; 3] {
+fn damped_step((normal, gradient): &NormalEquations, damping: f64) -> [f64; 3] {
     let length = [0, 1, 2].map(|i| normal[i][i].sqrt().max(f64::MIN_POSITIVE));
     let mut a = [[0.0; 3]; 3];
     for i in 0..3 {
@@ -286,7 +293,7 @@ mod tests {
     use super::*;
     use crate::fit::chart::{Branch, Direction};
 
-    const EFFORT: Effort = Effort {
+    const EFFORT: DescentEffort = DescentEffort {
         most_evaluations: 200,
         least_gain: 1e-10,
         fineness: Fineness::EXACT,
@@ -301,7 +308,7 @@ mod tests {
         Record::new(quantity, &times, &values)
     }
 
-    fn places() -> Vec<(Chart, Point)> {
+    fn places() -> Vec<(Chart, ChartPoint)> {
         let mut places = Vec::new();
         for (branch, sizes) in [
             (Branch::AboveOne, [1.3, 8.0]),
@@ -326,7 +333,7 @@ mod tests {
             let mut descent = Descent::new(quantity, 40);
             let mut met = 0;
             for (chart, at) in places() {
-                let mut cost = |at: &Point| descent.cost(&record, chart, at, Fineness::EXACT);
+                let mut cost = |at: &ChartPoint| descent.cost(&record, chart, at, Fineness::EXACT);
                 if !cost(&at).is_finite() {
                     continue;
                 }
@@ -340,7 +347,7 @@ mod tests {
                     (cost(&moved(1e-4)) - cost(&moved(-1e-4))) / 2e-4
                 });
                 let here = cost(&at);
-                let place = Place {
+                let place = SearchPoint {
                     chart,
                     at,
                     cost: here,
@@ -367,7 +374,7 @@ mod tests {
         let mut descent = Descent::new(Quantity::Velocity, 40);
         for (chart, at) in places() {
             let before = descent.cost(&record, chart, &at, EFFORT.fineness);
-            let start = Place {
+            let start = SearchPoint {
                 chart,
                 at,
                 cost: before,

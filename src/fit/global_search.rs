@@ -2,29 +2,29 @@
 //! the best of those on all readings, and last from whatever may still be the best of all.
 
 use super::chart::{Anchor, Branch, Chart, Direction};
-use super::constant_load::{Exponent, Place as Side, Solution};
-use super::curve::{Curve, Fineness, Window};
-use super::descent::{Descent, Effort, Place};
-use super::lattice::{self, Family, Lattice};
+use super::curve::{CurveWindow, Fineness, LawCurve};
+use super::descent::{Descent, DescentEffort, SearchPoint};
+use super::lattice::{self, CurveFamily, Lattice};
 use super::point_readings::PointReadings;
 use super::record::Record;
-use super::unit_m::{Line, Lines};
+use super::solution::{EndOfSearch, Exponent, Solution};
+use super::unit_m::{UnitMLine, UnitMLines};
 use crate::reading::Quantity;
 
 /// On the merged readings: from the lattice to the floor of a basin, nearly.
-const NEARLY: Effort = Effort {
+const NEARLY: DescentEffort = DescentEffort {
     most_evaluations: 36,
     least_gain: 2e-3,
     fineness: Fineness::MIDDLE,
 };
 /// On all readings: enough to know which basins may hold the best.
-const CLOSELY: Effort = Effort {
+const CLOSELY: DescentEffort = DescentEffort {
     most_evaluations: 40,
     least_gain: 3e-6,
     fineness: Fineness::FINE,
 };
 /// To the floor.
-const WHOLLY: Effort = Effort {
+const WHOLLY: DescentEffort = DescentEffort {
     most_evaluations: 200,
     least_gain: 1e-9,
     fineness: Fineness::FINE,
@@ -99,23 +99,23 @@ const AT_BOUND: f64 = 1e-3;
 
 /// The end of a search.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Found {
+pub(super) struct FoundMinimum {
     pub(super) solution: Solution,
     pub(super) cost: f64,
     pub(super) converged: bool,
 }
 
 /// One search over one record.
-pub(super) struct Search<'a> {
+pub(super) struct GlobalSearch<'a> {
     readings: &'a PointReadings,
     exponent: Exponent,
     lattice: Lattice,
     full: Record,
     descent: Descent,
-    lines: Lines,
+    lines: UnitMLines,
 }
 
-impl<'a> Search<'a> {
+impl<'a> GlobalSearch<'a> {
     pub(super) fn new(readings: &'a PointReadings, exponent: Exponent, lattice: Lattice) -> Self {
         let full = readings.record();
         Self {
@@ -123,7 +123,7 @@ impl<'a> Search<'a> {
             exponent,
             lattice,
             descent: Descent::new(full.quantity, full.count()),
-            lines: Lines::new(full.count()),
+            lines: UnitMLines::new(full.count()),
             full,
         }
     }
@@ -139,7 +139,7 @@ impl<'a> Search<'a> {
     }
 
     /// The ends of all descents, in no order.
-    pub(super) fn run(&mut self) -> Vec<Found> {
+    pub(super) fn run(&mut self) -> Vec<FoundMinimum> {
         let merged = self.full.merged();
         let shift = self.lattice.shifts(usize::MAX)[0];
         let lines = Direction::BOTH.map(|direction| self.lines.minima(&merged, direction, shift));
@@ -162,7 +162,7 @@ impl<'a> Search<'a> {
     }
 
     /// The minima with m other than 1.
-    fn curved(&mut self, merged: &Record, lines: &[Vec<Line>; 2]) -> Vec<Place> {
+    fn curved(&mut self, merged: &Record, lines: &[Vec<UnitMLine>; 2]) -> Vec<SearchPoint> {
         let places = self.places(merged, lines);
         let lowest = lowest(&places, None);
         let breadth = if lowest > HARD * merged.cost_of_no_change() {
@@ -171,15 +171,15 @@ impl<'a> Search<'a> {
             EASY_BREADTH
         };
         let holds_m = self.holds_m();
-        let is_promising = |place: &Place| {
+        let is_promising = |place: &SearchPoint| {
             let direction = Some(place.chart.direction);
             self::lowest(&places, direction) <= PROMISING * lowest
         };
-        let chosen: Vec<Place> = places.iter().copied().filter(is_promising).collect();
+        let chosen: Vec<SearchPoint> = places.iter().copied().filter(is_promising).collect();
         let mut near = Vec::new();
         for place in of_each(&chosen, breadth) {
             let mut place = self.descent.descend(merged, &place, &NEARLY, holds_m);
-            // What was merged may hold the very readings that tell basins apart.
+            // What was merged may hold the very readings that distinguish basins.
             let fineness = CLOSELY.fineness;
             place.cost = self
                 .descent
@@ -195,27 +195,27 @@ impl<'a> Search<'a> {
         close.dedup_by(|a, b| is_same_group(a, b) && a.cost - b.cost <= ONE_BASIN * b.cost);
         let floor = breadth.floor_within * self::lowest(&close, None);
         let may_fall_from = UNFINISHED_WITHIN * self::lowest(&close, None);
-        let mut settled: Vec<Place> = Vec::new();
-        let may_fall = |place: &&mut Place| !place.converged && place.cost <= may_fall_from;
+        let mut refined: Vec<SearchPoint> = Vec::new();
+        let may_fall = |place: &&mut SearchPoint| !place.converged && place.cost <= may_fall_from;
         for place in close
             .iter_mut()
             .filter(|place| place.cost <= floor || may_fall(place))
         {
-            if settled
+            if refined
                 .iter()
                 .filter(|one| is_same_group(one, place))
                 .count()
                 < breadth.wholly
             {
-                settle(&mut self.descent, &self.full, place, holds_m);
-                settled.push(*place);
+                refine(&mut self.descent, &self.full, place, holds_m);
+                refined.push(*place);
             }
         }
         close
     }
 
     /// The best places of the lattice, best first.
-    fn places(&mut self, merged: &Record, lines: &[Vec<Line>; 2]) -> Vec<Place> {
+    fn places(&mut self, merged: &Record, lines: &[Vec<UnitMLine>; 2]) -> Vec<SearchPoint> {
         let mut places = Vec::new();
         match self.exponent {
             Exponent::Free => {
@@ -243,8 +243,8 @@ impl<'a> Search<'a> {
     fn scan(
         &mut self,
         merged: &Record,
-        families: impl Iterator<Item = Family>,
-        places: &mut Vec<Place>,
+        families: impl Iterator<Item = CurveFamily>,
+        places: &mut Vec<SearchPoint>,
     ) {
         let holds_m = self.holds_m();
         for family in families {
@@ -253,7 +253,7 @@ impl<'a> Search<'a> {
     }
 
     /// The laws that follow a straight line in inverse velocity until near its end.
-    fn beside(&mut self, merged: &Record, line: &Line, places: &mut Vec<Place>) {
+    fn beside(&mut self, merged: &Record, line: &UnitMLine, places: &mut Vec<SearchPoint>) {
         let slope = line.ln_slope.exp();
         let fall = slope.ln_1p();
         for (direction, branch, m) in LINE_LIKE {
@@ -277,7 +277,7 @@ impl<'a> Search<'a> {
                 let at = super::descent::inside(chart, &at, self.holds_m());
                 let cost = self.descent.cost(merged, chart, &at, Fineness::MIDDLE);
                 if cost.is_finite() {
-                    places.push(Place {
+                    places.push(SearchPoint {
                         chart,
                         at,
                         cost,
@@ -289,7 +289,7 @@ impl<'a> Search<'a> {
     }
 
     /// The law of the end of a descent, at the first reading.
-    fn found(&mut self, end: &Place) -> Option<Found> {
+    fn found(&mut self, end: &SearchPoint) -> Option<FoundMinimum> {
         let (record, length) = (&self.full, self.readings.length_days());
         let (chart, shape) = (end.chart, end.chart.shape(&end.at));
         let curve = &mut self.descent.curve;
@@ -298,7 +298,7 @@ impl<'a> Search<'a> {
         }
         let anchor = chart.anchor();
         let mut basis = vec![0.0; record.count()];
-        curve.follow(&Window::WHOLE, record.times(anchor), &mut basis, None);
+        curve.follow(&CurveWindow::WHOLE, record.times(anchor), &mut basis, None);
         let projected = record.project(anchor, &basis)?;
         let velocity = match record.quantity {
             Quantity::Velocity => projected.velocity,
@@ -308,7 +308,7 @@ impl<'a> Search<'a> {
         let (law, slip) = match anchor {
             Anchor::Start => (chart.law(&shape, velocity, length), 0.0),
             Anchor::End => {
-                let mut rates = Curve::new(Quantity::Velocity);
+                let mut rates = LawCurve::new(Quantity::Velocity);
                 if !rates.solve(&shape, 1.0, Fineness::FINE) {
                     return None;
                 }
@@ -325,27 +325,27 @@ impl<'a> Search<'a> {
             Quantity::Displacement => projected.offset + slip,
         };
         let place = if self.holds_m() || !is_at_bound_of_m(end) {
-            Side::Inside
+            EndOfSearch::Inside
         } else {
-            Side::AtBoundOfM
+            EndOfSearch::AtBoundOfM
         };
         let solution = self
             .readings
             .solution(&law, at_start, projected.cost, place);
-        Some(Found {
+        Some(FoundMinimum {
             solution,
             cost: projected.cost,
             converged: end.converged,
         })
     }
 
-    fn found_line(&mut self, line: &Line) -> Option<Found> {
+    fn found_line(&mut self, line: &UnitMLine) -> Option<FoundMinimum> {
         let length = self.readings.length_days();
         let (law, at_start) = self.lines.law(&self.full, line, length)?;
         let solution = self
             .readings
-            .solution(&law, at_start, line.cost, Side::Inside);
-        Some(Found {
+            .solution(&law, at_start, line.cost, EndOfSearch::Inside);
+        Some(FoundMinimum {
             solution,
             cost: line.cost,
             converged: true,
@@ -355,7 +355,7 @@ impl<'a> Search<'a> {
 
 /// Goes to the floor, and where m has run to its bound from the corner without a steady state too: an
 /// exponential lies there, at the end of a valley that hardly falls.
-fn settle(descent: &mut Descent, record: &Record, place: &mut Place, holds_m: bool) {
+fn refine(descent: &mut Descent, record: &Record, place: &mut SearchPoint, holds_m: bool) {
     go_down(descent, record, place, holds_m);
     if !holds_m && is_at_bound_of_m(place) {
         let mut corner = *place;
@@ -369,7 +369,7 @@ fn settle(descent: &mut Descent, record: &Record, place: &mut Place, holds_m: bo
 }
 
 /// Goes down, afresh as long as it gains: a curved valley stalls a descent before its floor.
-fn go_down(descent: &mut Descent, record: &Record, place: &mut Place, holds_m: bool) {
+fn go_down(descent: &mut Descent, record: &Record, place: &mut SearchPoint, holds_m: bool) {
     for _ in 0..MOST_RESTARTS {
         let next = descent.descend(record, place, &WHOLLY, holds_m);
         let gain = place.cost - next.cost;
@@ -383,25 +383,25 @@ fn go_down(descent: &mut Descent, record: &Record, place: &mut Place, holds_m: b
 }
 
 /// The lowest cost of all places, or of those in one direction.
-fn lowest(places: &[Place], direction: Option<Direction>) -> f64 {
-    let of = |place: &&Place| direction.is_none_or(|wanted| place.chart.direction == wanted);
+fn lowest(places: &[SearchPoint], direction: Option<Direction>) -> f64 {
+    let of = |place: &&SearchPoint| direction.is_none_or(|wanted| place.chart.direction == wanted);
     let costs = places.iter().filter(of).map(|place| place.cost);
     costs.fold(f64::INFINITY, f64::min)
 }
 
-fn sort(places: &mut Vec<Place>) {
+fn sort(places: &mut Vec<SearchPoint>) {
     places.retain(|place| place.cost.is_finite());
     places.sort_by(|a, b| a.cost.total_cmp(&b.cost));
 }
 
-fn is_same_group(a: &Place, b: &Place) -> bool {
+fn is_same_group(a: &SearchPoint, b: &SearchPoint) -> bool {
     (a.chart.branch, a.chart.direction) == (b.chart.branch, b.chart.direction)
 }
 
 /// The first places of each branch and direction, few of them from the same m: one bad valley must not
 /// take them all.
-fn of_each(places: &[Place], breadth: Breadth) -> Vec<Place> {
-    let mut taken: Vec<Place> = Vec::new();
+fn of_each(places: &[SearchPoint], breadth: Breadth) -> Vec<SearchPoint> {
+    let mut taken: Vec<SearchPoint> = Vec::new();
     for place in places {
         let group = || taken.iter().filter(|one| is_same_group(one, place));
         let same_m = group().filter(|one| one.at[2].total_cmp(&place.at[2]).is_eq());
@@ -413,10 +413,10 @@ fn of_each(places: &[Place], breadth: Breadth) -> Vec<Place> {
 }
 
 /// The places that may turn out best when all readings count, and the best on each side of m = 1.
-fn worth_all_readings(near: &[Place], breadth: Breadth) -> Vec<Place> {
+fn worth_all_readings(near: &[SearchPoint], breadth: Breadth) -> Vec<SearchPoint> {
     let lowest = lowest(near, None);
-    let is_above_one = |place: &Place| place.chart.branch == Branch::AboveOne;
-    let mut taken: Vec<Place> = Vec::new();
+    let is_above_one = |place: &SearchPoint| place.chart.branch == Branch::AboveOne;
+    let mut taken: Vec<SearchPoint> = Vec::new();
     for place in near {
         let has_side = taken
             .iter()
@@ -435,7 +435,7 @@ fn worth_all_readings(near: &[Place], breadth: Breadth) -> Vec<Place> {
     taken
 }
 
-fn is_at_bound_of_m(end: &Place) -> bool {
+fn is_at_bound_of_m(end: &SearchPoint) -> bool {
     let (low, high) = end.chart.corners_beside(&end.at);
     let side = end.at[2] <= low[2] + AT_BOUND || end.at[2] >= high[2] - AT_BOUND;
     side && end.at[2].abs() > AT_BOUND

@@ -2,8 +2,8 @@
 //! the record.
 
 use super::chart::{Branch, Chart, Direction};
-use super::curve::{Fineness, Shape, Window};
-use super::descent::{Descent, Place};
+use super::curve::{CurveShape, CurveWindow, Fineness};
+use super::descent::{Descent, SearchPoint};
 use super::quasi_random::halton;
 use super::record::Record;
 
@@ -61,35 +61,37 @@ impl Lattice {
 
 /// One curve and the direction in which it is followed.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Family {
+pub(super) struct CurveFamily {
     branch: Branch,
     m: f64,
     pub(super) direction: Direction,
 }
 
 /// The families that are looked at in any case.
-pub(super) fn first() -> impl Iterator<Item = Family> {
+pub(super) fn first() -> impl Iterator<Item = CurveFamily> {
     Direction::BOTH
         .into_iter()
         .flat_map(|direction| of(&FIRST, direction))
 }
 
 /// The rest of those of one direction.
-pub(super) fn more(direction: Direction) -> impl Iterator<Item = Family> {
+pub(super) fn more(direction: Direction) -> impl Iterator<Item = CurveFamily> {
     of(&MORE, direction)
 }
 
 /// The one family of a given m in each direction.
-pub(super) fn fixed(branch: Branch, m: f64) -> impl Iterator<Item = Family> {
-    Direction::BOTH.into_iter().map(move |direction| Family {
-        branch,
-        m,
-        direction,
-    })
+pub(super) fn fixed(branch: Branch, m: f64) -> impl Iterator<Item = CurveFamily> {
+    Direction::BOTH
+        .into_iter()
+        .map(move |direction| CurveFamily {
+            branch,
+            m,
+            direction,
+        })
 }
 
-fn of(list: &'static [(Branch, f64)], direction: Direction) -> impl Iterator<Item = Family> {
-    list.iter().map(move |(branch, m)| Family {
+fn of(list: &'static [(Branch, f64)], direction: Direction) -> impl Iterator<Item = CurveFamily> {
+    list.iter().map(move |(branch, m)| CurveFamily {
         branch: *branch,
         m: *m,
         direction,
@@ -99,11 +101,11 @@ fn of(list: &'static [(Branch, f64)], direction: Direction) -> impl Iterator<Ite
 /// A stretch of a curve and what it leaves.
 #[derive(Debug, Clone, Copy)]
 struct Laid {
-    window: Window,
+    window: CurveWindow,
     cost: f64,
 }
 
-impl Family {
+impl CurveFamily {
     /// The two best stretches that begin at different places.
     pub(super) fn scan(
         &self,
@@ -111,7 +113,7 @@ impl Family {
         record: &Record,
         lattice: Lattice,
         holds_m: bool,
-    ) -> Vec<Place> {
+    ) -> Vec<SearchPoint> {
         let seed = self.seed();
         let shift = if holds_m {
             0.0
@@ -125,7 +127,7 @@ impl Family {
             .p(if holds_m { self.m.abs().ln() } else { ln_m });
         let (chart, _) = Chart::locate(self.branch, self.direction, (1.0, 1.0, ln_m));
         let sign = chart.shape(&[0.0; 3]).slope.signum();
-        let shape = Shape {
+        let shape = CurveShape {
             slope: sign,
             ln_steady: sign * FARTHEST,
             p,
@@ -141,7 +143,7 @@ impl Family {
             let slope = descent.curve.growth(node) * laid.window.span;
             let excess = descent.curve.ln_excess(node).abs();
             let (chart, at) = Chart::locate(self.branch, self.direction, (slope, excess, ln_m));
-            Place {
+            SearchPoint {
                 chart,
                 at,
                 cost: laid.cost,
@@ -187,7 +189,7 @@ fn lay(
             &relaxations
         };
         for span in spans {
-            let window = Window {
+            let window = CurveWindow {
                 first_node,
                 start,
                 span: *span,

@@ -12,13 +12,15 @@ mod posterior;
 mod quasi_random;
 mod rates;
 mod record;
+mod solution;
 mod under_load;
 mod unit_m;
 
-pub use constant_load::{ConstantLoad, Exponent, Outcome, Place, Solution};
+pub use constant_load::{ConstantLoad, Outcome};
 pub use lattice::Lattice;
 pub use point_readings::PointReadings;
 pub use posterior::{Ensemble, Onset, OtherPrior, P_PRIOR, Posterior, Sample as LawSample};
 pub(crate) use rates::displacement_sigma;
 pub use rates::{FINEST_DAYS, Observation, Observations, Rate, RateOptions, ReadingError};
+pub use solution::{EndOfSearch, Exponent, Solution};
 pub use under_load::LoadPosterior;

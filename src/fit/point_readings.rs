@@ -1,7 +1,7 @@
 //! Point readings as they are given and as they are kept: from the first, about their mean, over their size.
 
-use super::constant_load::{Place, Solution};
 use super::record::Record;
+use super::solution::{EndOfSearch, Solution};
 use crate::model::Law;
 use crate::reading::Quantity;
 
@@ -95,7 +95,13 @@ impl PointReadings {
     }
 
     /// A solution in the readings' unit, from one in the values as they are kept.
-    pub(super) fn solution(&self, law: &Law, at_start: f64, cost: f64, place: Place) -> Solution {
+    pub(super) fn solution(
+        &self,
+        law: &Law,
+        at_start: f64,
+        cost: f64,
+        place: EndOfSearch,
+    ) -> Solution {
         let displacement_at_start = match self.quantity {
             Quantity::Velocity => 0.0,
             Quantity::Displacement => at_start * self.scale + self.centre,

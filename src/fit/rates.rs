@@ -189,7 +189,7 @@ pub(crate) fn displacement_sigma(values: &[Observation]) -> f64 {
 
 /// Readings that are one: their mean, and how far it may be off.
 #[derive(Debug, Clone, Copy)]
-struct Place {
+struct RatePlace {
     t_days: f64,
     value: f64,
     /// Standard error, mm.
@@ -197,9 +197,9 @@ struct Place {
     readings: u32,
 }
 
-/// Displacements at times that are told apart, counted back from the newest: where readings are closer together than
+/// Displacements at times that are distinguished, counted back from the newest: where readings are closer together than
 /// [`FINEST_DAYS`] their mean, which their noise moves far less than any one of them.
-fn places(values: &[Observation]) -> Vec<Place> {
+fn places(values: &[Observation]) -> Vec<RatePlace> {
     let common = displacement_sigma(values);
     let mut places = Vec::new();
     let mut means = Vec::new();
@@ -217,7 +217,7 @@ fn places(values: &[Observation]) -> Vec<Place> {
             [alone] => (alone.t_days, alone.value),
             _ => (mean(|one| one.t_days), mean(|one| one.value)),
         };
-        places.push(Place {
+        places.push(RatePlace {
             t_days,
             value,
             error: squares.sqrt() / count,
@@ -246,7 +246,7 @@ fn displacement_rates(values: &[Observation]) -> Vec<Rate> {
         return Vec::new();
     };
     let longest = (last.t_days - first.t_days) * LONGEST_SHARE;
-    let between = |earlier: &Place, later: &Place| {
+    let between = |earlier: &RatePlace, later: &RatePlace| {
         let span = later.t_days - earlier.t_days;
         Rate {
             from: earlier.t_days,

@@ -5,7 +5,7 @@ use crate::reading::Quantity;
 
 /// Readings over their length, seen from one end.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Side {
+pub(super) struct RecordSide {
     /// From the anchor, increasing, 0 to 1.
     pub(super) times: Vec<f64>,
     values: Vec<f64>,
@@ -15,7 +15,7 @@ pub(super) struct Side {
 #[derive(Debug, Clone)]
 pub(super) struct Record {
     pub(super) quantity: Quantity,
-    sides: [Side; 2],
+    sides: [RecordSide; 2],
     /// From either end.
     weights: [Vec<f64>; 2],
     /// Their roots, which residuals are scaled by.
@@ -54,11 +54,11 @@ impl Record {
     }
 
     fn of(quantity: Quantity, readings: &[Merged]) -> Self {
-        let forwards = Side {
+        let forwards = RecordSide {
             times: readings.iter().map(|one| one.0).collect(),
             values: readings.iter().map(|one| one.1).collect(),
         };
-        let backwards = Side {
+        let backwards = RecordSide {
             times: readings.iter().rev().map(|one| 1.0 - one.0).collect(),
             values: readings.iter().rev().map(|one| one.1).collect(),
         };

@@ -17,7 +17,7 @@ const MOST_HALVINGS: usize = 8;
 
 /// A straight line in inverse velocity.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Line {
+pub(super) struct UnitMLine {
     pub(super) direction: Direction,
     /// ln(|r| L) at the anchor.
     pub(super) ln_slope: f64,
@@ -34,14 +34,14 @@ pub(super) fn anchor(direction: Direction) -> Anchor {
 
 /// Searches lines; keeps its memory.
 #[derive(Debug)]
-pub(super) struct Lines {
+pub(super) struct UnitMLines {
     basis: Vec<f64>,
     column: Vec<f64>,
     residuals: Vec<f64>,
     pub(super) evaluations: usize,
 }
 
-impl Lines {
+impl UnitMLines {
     /// For records of at most `count` readings.
     pub(super) fn new(count: usize) -> Self {
         Self {
@@ -58,11 +58,11 @@ impl Lines {
         record: &Record,
         direction: Direction,
         shift: f64,
-    ) -> Vec<Line> {
+    ) -> Vec<UnitMLine> {
         let (lowest, step, count) = STARTS;
         let at = (0..count).map(|i| lowest + step * (f64::from(i) + shift));
-        let costs: Vec<Line> = at
-            .map(|ln_slope| Line {
+        let costs: Vec<UnitMLine> = at
+            .map(|ln_slope| UnitMLine {
                 direction,
                 ln_slope,
                 cost: self.cost(record, direction, ln_slope),
@@ -70,7 +70,7 @@ impl Lines {
             .collect();
         let cost = |i: usize| costs.get(i).map_or(f64::INFINITY, |line| line.cost);
         let is_low = |i: &usize| cost(*i) <= cost(i + 1) && cost(*i) <= cost(i.wrapping_sub(1));
-        let mut low: Vec<Line> = (0..costs.len()).filter(is_low).map(|i| costs[i]).collect();
+        let mut low: Vec<UnitMLine> = (0..costs.len()).filter(is_low).map(|i| costs[i]).collect();
         low.retain(|line| line.cost.is_finite());
         low.sort_by(|a, b| a.cost.total_cmp(&b.cost));
         low.truncate(FOLLOWED);
@@ -81,7 +81,7 @@ impl Lines {
     }
 
     /// The best line that descent from those finds.
-    pub(super) fn best(&mut self, record: &Record, from: &[Line]) -> Option<Line> {
+    pub(super) fn best(&mut self, record: &Record, from: &[UnitMLine]) -> Option<UnitMLine> {
         let ends = from.iter().map(|line| self.descend(record, *line));
         ends.min_by(|a, b| a.cost.total_cmp(&b.cost))
             .filter(|line| line.cost.is_finite())
@@ -101,7 +101,7 @@ impl Lines {
         projected.map_or(f64::INFINITY, |projected| projected.cost)
     }
 
-    fn descend(&mut self, record: &Record, start: Line) -> Line {
+    fn descend(&mut self, record: &Record, start: UnitMLine) -> UnitMLine {
         let bounds = slope_bounds();
         let mut line = start;
         line.cost = self.cost(record, line.direction, line.ln_slope);
@@ -127,7 +127,7 @@ impl Lines {
     }
 
     /// Gauss and Newton's step at a line.
-    fn step(&mut self, record: &Record, line: &Line) -> Option<f64> {
+    fn step(&mut self, record: &Record, line: &UnitMLine) -> Option<f64> {
         let anchor = anchor(line.direction);
         self.cost(record, line.direction, line.ln_slope);
         let count = record.count();
@@ -156,7 +156,7 @@ impl Lines {
     pub(super) fn law(
         &mut self,
         record: &Record,
-        line: &Line,
+        line: &UnitMLine,
         length_days: f64,
     ) -> Option<(Law, f64)> {
         let anchor = anchor(line.direction);

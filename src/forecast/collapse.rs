@@ -9,12 +9,10 @@
 
 use super::evidence;
 use super::learned::LEARNED;
-use super::network::Network;
+use super::network::{INPUTS, Network};
 use super::{InverseVelocityLine, Passage, Scale, Scales};
 use crate::fit::{LoadPosterior, Observations, Rate, RateOptions};
 
-/// Numbers that the network is given of one span.
-pub const INPUTS: usize = 54;
 /// The velocity whose passage by the law is one of them, mm/day: the same wherever a site draws its own line.
 const PASSED: f64 = 1000.0;
 /// Newest rates through whose inverses straight lines are drawn.

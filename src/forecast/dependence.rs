@@ -5,7 +5,7 @@ use nalgebra::{Matrix4, Vector4};
 
 /// Correlation of the errors of forecasts where residuals show none: a load too slow to show in them.
 const UNSEEN: f64 = 0.25;
-/// That where too few rates overlap to tell; residuals of simulated masses that share their whole load
+/// That where too few rates overlap to estimate it; residuals of simulated masses that share their whole load
 /// correlate by .45, the errors of their forecasts by .2 to .5.
 const UNKNOWN: f64 = 0.6;
 /// Fewest rates in common, for the four coefficients that are fitted to each.
@@ -20,12 +20,12 @@ pub struct Dependence {
 }
 
 /// (days ago, ln of the velocity), oldest first.
-type Motion = Vec<(f64, f64)>;
+type CommonMotion = Vec<(f64, f64)>;
 
 impl Dependence {
     /// From the rates of each benchmark, oldest first, with the present on their own clock, days.
     pub fn measured(benchmarks: &[(&[Rate], f64)]) -> Self {
-        let motions: Vec<Motion> = benchmarks
+        let motions: Vec<CommonMotion> = benchmarks
             .iter()
             .map(|(rates, now)| motion(rates, *now))
             .collect();
@@ -58,7 +58,7 @@ impl Dependence {
     }
 }
 
-fn motion(rates: &[Rate], now: f64) -> Motion {
+fn motion(rates: &[Rate], now: f64) -> CommonMotion {
     let clear = rates
         .iter()
         .filter(|rate| rate.velocity > 0.0 && rate.velocity > 2.0 * rate.sigma);
@@ -68,7 +68,7 @@ fn motion(rates: &[Rate], now: f64) -> Motion {
 }
 
 /// Of what is left of two motions when their curves are taken away, at the times of the sparser one.
-fn correlation(a: &Motion, b: &Motion) -> Option<f64> {
+fn correlation(a: &CommonMotion, b: &CommonMotion) -> Option<f64> {
     let (a, b) = if a.len() <= b.len() { (a, b) } else { (b, a) };
     let common: Vec<(f64, f64, f64)> = a
         .iter()
@@ -92,7 +92,7 @@ fn correlation(a: &Motion, b: &Motion) -> Option<f64> {
 }
 
 /// ln of the velocity at a time between two rates.
-fn at(motion: &Motion, ago: f64) -> Option<f64> {
+fn at(motion: &CommonMotion, ago: f64) -> Option<f64> {
     let after = motion.partition_point(|(days, _)| *days > ago);
     let later = motion.get(after)?;
     if later.0 >= ago {

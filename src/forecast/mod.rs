@@ -15,15 +15,15 @@ mod surprise;
 mod together;
 mod world;
 
-pub use collapse::{Collapse, INPUTS, Indicators, Members};
+pub use collapse::{Collapse, Indicators, Members};
 pub use dependence::Dependence;
 pub use evidence::RATE_PER_YEAR;
 pub use life::{Corpus, Fate, Life};
 pub use line::InverseVelocityLine;
-pub use network::{HIDDEN, Network};
+pub use network::{HIDDEN, INPUTS, Network};
 pub use panel::{FEWEST_READINGS, HORIZON_DAYS, Outlook, Panel, by_the_law};
 pub(crate) use panel::{measurably_moves, outlook};
 pub use passage::Passage;
 pub use scales::{Change, Scale, Scales};
-pub use together::{Group, Look, Opinion, groups};
+pub use together::{FailureTimeLikelihood, Group, Snapshot, groups};
 pub use world::{Family, GaugeKind, Simulated};

@@ -1,7 +1,7 @@
 //! A network of one hidden layer, whose weights are learnt elsewhere.
 
-use super::collapse::INPUTS;
-
+/// Numbers that the network is given of one span.
+pub const INPUTS: usize = 54;
 /// Hidden units: 32 of each of four networks that were taught apart, and whose mean is taken.
 pub const HIDDEN: usize = 4 * 32;
 

@@ -16,8 +16,8 @@ pub const FEWEST_READINGS: usize = 10;
 const FASTEST_CRITICAL: f64 = 5e4;
 /// The law's passages are followed so far, days.
 const FARTHEST_DAYS: f64 = 10.0 * HORIZON_DAYS;
-/// A reading is foreseen within so many standard deviations of where the law puts it.
-const FORESEEN: f64 = 4.0;
+/// A reading is predicted within so many standard deviations of where the law puts it.
+const WITHIN: f64 = 4.0;
 /// How far the forecast looks, days.
 pub const HORIZON_DAYS: f64 = 400.0;
 
@@ -93,7 +93,7 @@ impl Panel {
 
     /// Whether the newest reading lies where the most probable law of the last update puts it, within the noise and
     /// the law's own scatter. Without a law the slope is expected to stand still, without an update nothing is.
-    pub fn foresees(&self, observations: &Observations) -> bool {
+    pub fn predicts(&self, observations: &Observations) -> bool {
         let (Some(seen), Some(newest)) = (self.seen, observations.values.last()) else {
             return false;
         };
@@ -116,7 +116,7 @@ impl Panel {
             Quantity::Velocity => (0.0, velocity),
         };
         let spread = seen.noise.hypot(scatter * motion);
-        (newest.value - from - motion).abs() <= FORESEEN * spread
+        (newest.value - from - motion).abs() <= WITHIN * spread
     }
 
     fn surprise(&mut self, observations: &Observations) -> Option<f64> {

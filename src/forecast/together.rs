@@ -11,7 +11,7 @@
 //! counts forecasts by their sharpness, so that one that says little takes nothing from one that says much.
 //!
 //! The best partition is found by agglomeration from single benchmarks. A forecast wavers from one reading
-//! to the next, and membership does not: the ln of a Bayes factor is its mean over looks of late, late being
+//! to the next, and membership does not: the ln of a Bayes factor is its mean over snapshots of late, late being
 //! measured by the time that is left.
 
 use super::{Dependence, HORIZON_DAYS, Passage};
@@ -26,7 +26,7 @@ const DOUBT: f64 = 0.03;
 const NEVER: f64 = 0.5;
 /// Prior odds that two benchmarks of one site fail together.
 const ODDS: f64 = 4.0;
-/// An agreement is judged over the looks at which this many times as long was left, at most.
+/// An agreement is judged over the snapshots at which this many times as long was left, at most.
 const LATE: f64 = 1.4;
 /// The grid: its first time, days, the width of a cell in ln of the time, and as many cells as reach the
 /// horizon.
@@ -40,38 +40,39 @@ const REACH: usize = 10;
 /// With less than this chance that it has not failed yet, a forecast that is overtaken says nothing.
 const OVERTAKEN: f64 = 0.02;
 
-/// What one benchmark foretells: how likely its readings are for each failure time, the last for none.
+/// What one benchmark predicts: how likely its readings are for each failure time, the last for none.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Opinion {
-    likelihood: Vec<f64>,
+pub struct FailureTimeLikelihood {
+    /// By cell of the grid of failure times, the last for none.
+    of_each_time: Vec<f64>,
 }
 
-/// What all benchmarks of a site foretell at one time.
+/// What all benchmarks of a site predict at one time.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Look {
+pub struct Snapshot {
     /// From then to the failure that is expected by now, days.
     pub left_days: f64,
     /// One of every benchmark, where it has one.
-    pub opinions: Vec<Option<Opinion>>,
+    pub likelihoods: Vec<Option<FailureTimeLikelihood>>,
 }
 
 /// Benchmarks that fail together, or one alone.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Group {
-    /// Places of its benchmarks in a look, in order.
+    /// Places of its benchmarks in a snapshot, in order.
     pub members: Vec<usize>,
     /// Probability of each that it belongs there; of one alone, that it belongs to no other group.
     pub probabilities: Vec<f64>,
-    /// The first look from which on it has been just this group.
+    /// The first snapshot from which on it has been just this group.
     pub since: usize,
-    /// When it fails, from the last look.
+    /// When it fails, from the last snapshot.
     pub passage: Passage,
 }
 
 /// Probabilities of the cells, the last that of no failure.
 type Density = Vec<f64>;
 
-impl Opinion {
+impl FailureTimeLikelihood {
     /// That of `passage`, seen `later_days` after it was made without a failure.
     pub fn of(passage: &Passage, later_days: f64) -> Self {
         let mut density = vec![0.0; CELLS + 1];
@@ -92,15 +93,15 @@ impl Opinion {
             DOUBT + (1.0 - DOUBT) * share / total.max(f64::MIN_POSITIVE) / prior(index)
         });
         Self {
-            likelihood: likelihood.collect(),
+            of_each_time: likelihood.collect(),
         }
     }
 
     /// The same where it counts only with a probability.
     fn believed(&self, probability: f64) -> Self {
-        let likelihood = self.likelihood.iter();
+        let likelihood = self.of_each_time.iter();
         Self {
-            likelihood: likelihood
+            of_each_time: likelihood
                 .map(|one| 1.0 - probability + probability * one)
                 .collect(),
         }
@@ -109,37 +110,41 @@ impl Opinion {
     /// One that says nothing.
     fn nothing() -> Self {
         Self {
-            likelihood: vec![1.0; CELLS + 1],
+            of_each_time: vec![1.0; CELLS + 1],
         }
     }
 }
 
-/// The groups that the looks speak for, oldest look first, in the order of their first benchmarks.
-pub fn groups(looks: &[Look], dependence: &Dependence) -> Vec<Group> {
-    let Some(count) = looks.iter().map(|look| look.opinions.len()).min() else {
+/// The groups that the snapshots speak for, oldest snapshot first, in the order of their first benchmarks.
+pub fn groups(snapshots: &[Snapshot], dependence: &Dependence) -> Vec<Group> {
+    let Some(count) = snapshots
+        .iter()
+        .map(|snapshot| snapshot.likelihoods.len())
+        .min()
+    else {
         return Vec::new();
     };
-    let last = looks.len() - 1;
-    let found = partition(window(looks, last), dependence, count);
+    let last = snapshots.len() - 1;
+    let found = partition(window(snapshots, last), dependence, count);
     let mut groups: Vec<Group> = found
         .iter()
         .map(|part| Group {
             members: part.members.clone(),
-            probabilities: belonging(window(looks, last), dependence, part, &found),
+            probabilities: belonging(window(snapshots, last), dependence, part, &found),
             since: last,
-            passage: common_passage(&looks[last].opinions, dependence, &part.members),
+            passage: common_passage(&snapshots[last].likelihoods, dependence, &part.members),
         })
         .collect();
     let mut open = vec![true; groups.len()];
-    for look in (0..last).rev() {
+    for snapshot in (0..last).rev() {
         if open.iter().all(|open| !open) {
             break;
         }
-        let before = partition(window(looks, look), dependence, count);
+        let before = partition(window(snapshots, snapshot), dependence, count);
         for (group, open) in groups.iter_mut().zip(&mut open) {
             *open &= before.iter().any(|part| part.members == group.members);
             if *open {
-                group.since = look;
+                group.since = snapshot;
             }
         }
     }
@@ -147,50 +152,56 @@ pub fn groups(looks: &[Look], dependence: &Dependence) -> Vec<Group> {
     groups
 }
 
-/// The late looks as seen at one of them.
-fn window(looks: &[Look], last: usize) -> &[Look] {
-    let is_early = |look: &Look| look.left_days > LATE * looks[last].left_days;
-    let early = looks[..last].iter().take_while(|look| is_early(look));
-    &looks[early.count()..=last]
+/// The late snapshots as seen at one of them.
+fn window(snapshots: &[Snapshot], last: usize) -> &[Snapshot] {
+    let is_early = |snapshot: &Snapshot| snapshot.left_days > LATE * snapshots[last].left_days;
+    let early = snapshots[..last]
+        .iter()
+        .take_while(|snapshot| is_early(snapshot));
+    &snapshots[early.count()..=last]
 }
 
-/// Benchmarks taken as one, with what they say at each look.
+/// Benchmarks taken as one, with what they say at each snapshot.
 #[derive(Debug, Clone)]
-struct Part {
+struct GroupPart {
     members: Vec<usize>,
-    looks: Vec<Density>,
+    snapshots: Vec<Density>,
 }
 
-impl Part {
-    fn of(window: &[Look], dependence: &Dependence, mut members: Vec<usize>) -> Self {
+impl GroupPart {
+    fn of(window: &[Snapshot], dependence: &Dependence, mut members: Vec<usize>) -> Self {
         members.sort_unstable();
         let shared = dependence.among(&members);
-        let look = |look: &Look| {
-            let opinions = members
+        let snapshot = |snapshot: &Snapshot| {
+            let likelihoods = members
                 .iter()
-                .filter_map(|member| look.opinions[*member].as_ref());
-            combined(&opinions.collect::<Vec<_>>(), shared)
+                .filter_map(|member| snapshot.likelihoods[*member].as_ref());
+            combined(&likelihoods.collect::<Vec<_>>(), shared)
         };
         Self {
-            looks: window.iter().map(look).collect(),
+            snapshots: window.iter().map(snapshot).collect(),
             members,
         }
     }
 
     /// ln of the odds that these two are one.
     fn ln_odds(&self, other: &Self) -> f64 {
-        let each = self.looks.iter().zip(&other.looks);
+        let each = self.snapshots.iter().zip(&other.snapshots);
         let ln: f64 = each.map(|(a, b)| agreement(a, b).ln()).sum();
-        ODDS.ln() + ln / self.looks.len() as f64
+        ODDS.ln() + ln / self.snapshots.len() as f64
     }
 }
 
 /// When the benchmarks of `members` fail by what they say now. The sharpest is believed as it stands, each
 /// other as far as it is likely by now to share the failure of the rest: one that halts for a moment is not
 /// to talk the mass out of its failure.
-fn common_passage(now: &[Option<Opinion>], dependence: &Dependence, members: &[usize]) -> Passage {
+fn common_passage(
+    now: &[Option<FailureTimeLikelihood>],
+    dependence: &Dependence,
+    members: &[usize],
+) -> Passage {
     let shared = dependence.among(members);
-    let known: Vec<&Opinion> = members
+    let known: Vec<&FailureTimeLikelihood> = members
         .iter()
         .filter_map(|one| now[*one].as_ref())
         .collect();
@@ -202,11 +213,11 @@ fn common_passage(now: &[Option<Opinion>], dependence: &Dependence, members: &[u
             return known[index].clone();
         }
         let rest = (0..known.len()).filter(|other| *other != index);
-        let rest: Vec<&Opinion> = rest.map(|other| known[other]).collect();
+        let rest: Vec<&FailureTimeLikelihood> = rest.map(|other| known[other]).collect();
         let odds = ODDS * agreement(&alone[index], &combined(&rest, shared));
         known[index].believed(odds / (1.0 + odds))
     });
-    let believed: Vec<Opinion> = believed.collect();
+    let believed: Vec<FailureTimeLikelihood> = believed.collect();
     let common = combined(&believed.iter().collect::<Vec<_>>(), shared);
     // A cell's share is spread over it: a quantile is to be finer than the grid.
     let times = common[..CELLS]
@@ -229,9 +240,9 @@ fn agreement(a: &Density, b: &Density) -> f64 {
 }
 
 /// Parts that no merging makes more probable.
-fn partition(window: &[Look], dependence: &Dependence, count: usize) -> Vec<Part> {
-    let mut parts: Vec<Part> = (0..count)
-        .map(|member| Part::of(window, dependence, vec![member]))
+fn partition(window: &[Snapshot], dependence: &Dependence, count: usize) -> Vec<GroupPart> {
+    let mut parts: Vec<GroupPart> = (0..count)
+        .map(|member| GroupPart::of(window, dependence, vec![member]))
         .collect();
     let mut ln_odds: Vec<Vec<f64>> = (0..count)
         .map(|i| (0..i).map(|j| parts[i].ln_odds(&parts[j])).collect())
@@ -248,7 +259,7 @@ fn partition(window: &[Look], dependence: &Dependence, count: usize) -> Vec<Part
             row.remove(i);
         }
         let members = [parts[j].members.as_slice(), &gone.members].concat();
-        parts[j] = Part::of(window, dependence, members);
+        parts[j] = GroupPart::of(window, dependence, members);
         for other in (0..parts.len()).filter(|other| *other != j) {
             ln_odds[other.max(j)][other.min(j)] = parts[j].ln_odds(&parts[other]);
         }
@@ -256,7 +267,12 @@ fn partition(window: &[Look], dependence: &Dependence, count: usize) -> Vec<Part
 }
 
 /// How probably each member belongs where it is.
-fn belonging(window: &[Look], dependence: &Dependence, part: &Part, all: &[Part]) -> Vec<f64> {
+fn belonging(
+    window: &[Snapshot],
+    dependence: &Dependence,
+    part: &GroupPart,
+    all: &[GroupPart],
+) -> Vec<f64> {
     let probability = |ln_odds: f64| 1.0 / (1.0 + (-ln_odds).exp());
     if part.members.len() == 1 {
         let others = all.iter().filter(|other| other.members != part.members);
@@ -265,17 +281,17 @@ fn belonging(window: &[Look], dependence: &Dependence, part: &Part, all: &[Part]
     }
     let members = part.members.iter().map(|member| {
         let rest = part.members.iter().filter(|other| *other != member);
-        let rest = Part::of(window, dependence, rest.copied().collect());
-        probability(Part::of(window, dependence, vec![*member]).ln_odds(&rest))
+        let rest = GroupPart::of(window, dependence, rest.copied().collect());
+        probability(GroupPart::of(window, dependence, vec![*member]).ln_odds(&rest))
     });
     members.collect()
 }
 
-/// What all of `opinions` say under one failure time; `shared`: the correlation of their errors.
-fn combined(opinions: &[&Opinion], shared: f64) -> Density {
-    let sharpness = opinions
+/// What all of `likelihoods` say under one failure time; `shared`: the correlation of their errors.
+fn combined(likelihoods: &[&FailureTimeLikelihood], shared: f64) -> Density {
+    let sharpness = likelihoods
         .iter()
-        .map(|opinion| information(&posterior(&[opinion], 1.0)).exp());
+        .map(|likelihood| information(&posterior(&[likelihood], 1.0)).exp());
     let (sum, squares) = sharpness.fold((0.0, 0.0), |(sum, squares), s: f64| {
         (sum + s, squares + s * s)
     });
@@ -284,15 +300,15 @@ fn combined(opinions: &[&Opinion], shared: f64) -> Density {
     } else {
         1.0
     };
-    posterior(opinions, 1.0 / (1.0 + (count - 1.0) * shared))
+    posterior(likelihoods, 1.0 / (1.0 + (count - 1.0) * shared))
 }
 
 /// The prior times all likelihoods to the power `weight`, normalised.
-fn posterior(opinions: &[&Opinion], weight: f64) -> Density {
+fn posterior(likelihoods: &[&FailureTimeLikelihood], weight: f64) -> Density {
     let ln = |index: usize| {
-        let each = opinions
+        let each = likelihoods
             .iter()
-            .map(|opinion| opinion.likelihood[index].ln());
+            .map(|likelihood| likelihood.of_each_time[index].ln());
         prior(index).ln() + weight * each.sum::<f64>()
     };
     let ln: Vec<f64> = (0..=CELLS).map(ln).collect();
@@ -372,12 +388,14 @@ mod tests {
     }
 
     fn of_one_look(passages: &[Passage]) -> Vec<Group> {
-        let opinions = passages.iter().map(|one| Some(Opinion::of(one, 0.0)));
-        let look = Look {
+        let likelihoods = passages
+            .iter()
+            .map(|one| Some(FailureTimeLikelihood::of(one, 0.0)));
+        let snapshot = Snapshot {
             left_days: 10.0,
-            opinions: opinions.collect(),
+            likelihoods: likelihoods.collect(),
         };
-        groups(&[look], &Dependence::unknown(passages.len()))
+        groups(&[snapshot], &Dependence::unknown(passages.len()))
     }
 
     fn width(passage: &Passage) -> f64 {
@@ -425,7 +443,13 @@ mod tests {
 
     #[test]
     fn what_has_been_overtaken_says_nothing() {
-        assert_eq!(Opinion::of(&about(2.0, 0.5), 9.0), Opinion::nothing());
-        assert_ne!(Opinion::of(&about(2.0, 0.5), 1.0), Opinion::nothing());
+        assert_eq!(
+            FailureTimeLikelihood::of(&about(2.0, 0.5), 9.0),
+            FailureTimeLikelihood::nothing()
+        );
+        assert_ne!(
+            FailureTimeLikelihood::of(&about(2.0, 0.5), 1.0),
+            FailureTimeLikelihood::nothing()
+        );
     }
 }

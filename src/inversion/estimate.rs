@@ -5,10 +5,44 @@
 //! probability stands in the outermost 5 % of the prior's range of p on that side, the others' where
 //! most of the tail beyond the bound does; those of `x_i`, T and D also where m may be on either side of 1.
 
-use super::report::{Estimate, Parameters};
 use super::{Inversion, law_in_mm_per_day};
 use crate::fit::{Exponent, LawSample, P_PRIOR, Posterior, Solution};
 use crate::model::{Accuracy, Law, Trajectory};
+use serde::Serialize;
+
+/// A best value and the bounds of 90 %.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Of the best fit; `None` where that law has none.
+    pub best: Option<f64>,
+    /// 5 % quantile; `None` where it is unbounded.
+    pub low: Option<f64>,
+    /// 95 % quantile; `None` where it is unbounded.
+    pub high: Option<f64>,
+}
+
+/// The law's parameters at the first reading.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Parameters {
+    /// m = B/A.
+    pub m: Estimate,
+    /// Initial state.
+    pub x_i: Estimate,
+    /// T, days.
+    pub t_unit_days: Estimate,
+    /// D, in the readings' velocity unit (for displacements, their length per day).
+    pub d: Estimate,
+    /// `D_c`, in the readings' length.
+    pub d_c: Estimate,
+    /// S `theta_i`.
+    pub s_theta_i: Estimate,
+    /// Velocity, in the unit of D.
+    pub v_i: Estimate,
+    /// Initial slope of the inverse-velocity plot, 1/day.
+    pub r_per_day: Estimate,
+    /// Its curvature, 1/day.
+    pub kappa_per_day: Estimate,
+}
 
 /// Quantiles that bound 90 %.
 const LOW: f64 = 0.05;
@@ -20,7 +54,7 @@ const MOST_AT_EDGE: f64 = 0.04;
 
 /// One set of parameters, in the units of the report.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Values {
+pub(super) struct ParameterValues {
     pub(super) m: Option<f64>,
     pub(super) x_i: Option<f64>,
     pub(super) t_unit_days: Option<f64>,
@@ -33,8 +67,8 @@ pub(super) struct Values {
 }
 
 /// The parameters of the best fit.
-pub(super) fn best(inversion: &Inversion, solution: Option<&Solution>) -> Values {
-    solution.map_or_else(Values::default, |solution| {
+pub(super) fn best(inversion: &Inversion, solution: Option<&Solution>) -> ParameterValues {
+    solution.map_or_else(ParameterValues::default, |solution| {
         values(inversion, &law_in_mm_per_day(inversion, solution))
     })
 }
@@ -56,10 +90,12 @@ pub(super) fn parameters(
     } else {
         of_m
     };
-    let with = |best: Option<f64>, of: &[Drawn], pick: &dyn Fn(&Values) -> Option<f64>| Estimate {
-        best,
-        low: bound(of, Side::Low, pick),
-        high: bound(of, Side::High, pick),
+    let with = |best: Option<f64>, of: &[Drawn], pick: &dyn Fn(&ParameterValues) -> Option<f64>| {
+        Estimate {
+            best,
+            low: bound(of, BoundSide::Low, pick),
+            high: bound(of, BoundSide::High, pick),
+        }
     };
     Parameters {
         m: exponent(inversion, best.m, of_m),
@@ -77,13 +113,13 @@ pub(super) fn parameters(
 /// A law of the posterior, at its onset.
 #[derive(Debug, Clone, Copy)]
 struct Drawn {
-    values: Values,
+    values: ParameterValues,
     weight: f64,
     at_edge: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Side {
+enum BoundSide {
     Low,
     High,
 }
@@ -119,14 +155,14 @@ fn stands_on_both_sides(samples: &[Drawn]) -> bool {
 }
 
 /// The parameters of a law whose velocity is in mm/day.
-fn values(inversion: &Inversion, law: &Law) -> Values {
+fn values(inversion: &Inversion, law: &Law) -> ParameterValues {
     let velocity = inversion.velocity_per_mm_per_day();
     let millimetres = inversion.length_unit().millimetres();
     let paper = law.paper();
     let finite = |value: f64| Some(value).filter(|value| value.is_finite());
     // Underflow is as little a value as overflow.
     let normal = |value: Option<f64>| value.filter(|value| value.is_normal());
-    Values {
+    ParameterValues {
         m: finite(paper.m),
         x_i: normal(paper.x_i),
         t_unit_days: normal(paper.t_unit_days),
@@ -156,13 +192,17 @@ fn exponent(inversion: &Inversion, best: Option<f64>, samples: &[Drawn]) -> Esti
     let quantile_of_m = |side| quantile(samples, side, &|values| values.m).map(|(m, _)| m);
     Estimate {
         best,
-        low: quantile_of_m(Side::Low).filter(|_| at_edge(false) <= MOST_AT_EDGE),
-        high: quantile_of_m(Side::High).filter(|_| at_edge(true) <= MOST_AT_EDGE),
+        low: quantile_of_m(BoundSide::Low).filter(|_| at_edge(false) <= MOST_AT_EDGE),
+        high: quantile_of_m(BoundSide::High).filter(|_| at_edge(true) <= MOST_AT_EDGE),
     }
 }
 
 /// One bound of 90 %, unless the tail beyond it is the prior's.
-fn bound(samples: &[Drawn], side: Side, pick: &dyn Fn(&Values) -> Option<f64>) -> Option<f64> {
+fn bound(
+    samples: &[Drawn],
+    side: BoundSide,
+    pick: &dyn Fn(&ParameterValues) -> Option<f64>,
+) -> Option<f64> {
     let (value, at_edge) = quantile(samples, side, pick)?;
     (at_edge <= 0.5).then_some(value)
 }
@@ -171,8 +211,8 @@ fn bound(samples: &[Drawn], side: Side, pick: &dyn Fn(&Values) -> Option<f64>) -
 /// Samples without the value (it lies beyond what a number can hold) count as beyond either bound.
 fn quantile(
     samples: &[Drawn],
-    side: Side,
-    pick: &dyn Fn(&Values) -> Option<f64>,
+    side: BoundSide,
+    pick: &dyn Fn(&ParameterValues) -> Option<f64>,
 ) -> Option<(f64, f64)> {
     let total: f64 = samples.iter().map(|one| one.weight).sum();
     let with = samples
@@ -180,11 +220,16 @@ fn quantile(
         .filter_map(|one| Some((pick(&one.values)?, one)));
     let mut sorted: Vec<(f64, &Drawn)> = with.collect();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
-    if side == Side::High {
+    if side == BoundSide::High {
         sorted.reverse();
     }
     let held: f64 = sorted.iter().map(|(_, one)| one.weight).sum();
-    let tail = total * if side == Side::Low { LOW } else { 1.0 - HIGH };
+    let tail = total
+        * if side == BoundSide::Low {
+            LOW
+        } else {
+            1.0 - HIGH
+        };
     let (mut reached, mut at_edge) = (total - held, 0.0);
     if reached >= tail || samples.is_empty() {
         return None;

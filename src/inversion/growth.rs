@@ -3,7 +3,7 @@
 //! For alpha > 1, ln v = c - `ln(t_c` - t) / (alpha - 1); alpha = 1 is exponential growth, and below it
 //! ln v = c + ln(t - `t_0`) / (1 - alpha). alpha = 2 is the straight line through inverse velocity.
 
-use super::report::Estimate;
+use super::estimate::Estimate;
 use crate::fit::Rate;
 
 /// The exponents looked at: lowest, step, how many.

@@ -9,9 +9,9 @@ mod report;
 mod sweep;
 mod together;
 
+pub use estimate::{Estimate, Parameters};
 pub use report::{
-    Alternative, Alternatives, Estimate, FailureTime, FitReport, InverseVelocity, Parameters,
-    RegimeReport, UnderPrior,
+    Alternative, Alternatives, FailureTime, FitReport, InverseVelocity, RegimeReport, UnderPrior,
 };
 pub use sweep::{SweepOptions, SweepReport, SweepRow, sweep};
 pub use together::{ApartReport, GroupReport, TogetherReport, together};
@@ -85,7 +85,7 @@ impl Inversion {
             .filter(|reading| inside(reading.time) && reading.is_sound() && sound(reading.value))
             .copied()
             .collect();
-        chosen.settle();
+        chosen.put_in_order();
         let observations = Observations::of(&chosen);
         Self {
             series: chosen,
@@ -117,8 +117,10 @@ impl Inversion {
         let outlook = outlook(&self.observations, critical).map(|(outlook, _)| outlook);
         let rates = self.rates();
         // A stuck instrument's readings have a posterior too, and it would name a regime.
-        let tells = !least_squares.outcome.says_nothing();
-        let posterior = tells.then(|| Posterior::over_onsets(&rates)).flatten();
+        let is_informative = !least_squares.outcome.says_nothing();
+        let posterior = is_informative
+            .then(|| Posterior::over_onsets(&rates))
+            .flatten();
         let onset = posterior.as_ref().map(Posterior::onset);
         let regime = RegimeReport::of(posterior.as_ref());
         let best = least_squares.best();
@@ -145,7 +147,7 @@ impl Inversion {
             regime,
             regime_under_load: outlook
                 .as_ref()
-                .filter(|_| tells)
+                .filter(|_| is_informative)
                 .map(RegimeReport::under_load),
             rms: best.map(|best| best.rms).filter(|rms| rms.is_finite()),
             evaluations: least_squares.evaluations,

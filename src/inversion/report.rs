@@ -1,5 +1,6 @@
 //! The report of one inversion, key for key as scripts read it: what is unbounded or missing is null.
 
+use super::estimate::{self, Estimate, Parameters};
 use super::{Inversion, Options};
 use crate::fit::{ConstantLoad, Ensemble, OtherPrior, Posterior};
 use crate::forecast::{HORIZON_DAYS, Outlook, Passage};
@@ -70,40 +71,6 @@ pub struct UnderPrior {
     pub failure_median: Option<Timestamp>,
 }
 
-/// A best value and the bounds of 90 %.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub struct Estimate {
-    /// Of the best fit; `None` where that law has none.
-    pub best: Option<f64>,
-    /// 5 % quantile; `None` where it is unbounded.
-    pub low: Option<f64>,
-    /// 95 % quantile; `None` where it is unbounded.
-    pub high: Option<f64>,
-}
-
-/// The law's parameters at the first reading.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub struct Parameters {
-    /// m = B/A.
-    pub m: Estimate,
-    /// Initial state.
-    pub x_i: Estimate,
-    /// T, days.
-    pub t_unit_days: Estimate,
-    /// D, in the readings' velocity unit (for displacements, their length per day).
-    pub d: Estimate,
-    /// `D_c`, in the readings' length.
-    pub d_c: Estimate,
-    /// S `theta_i`.
-    pub s_theta_i: Estimate,
-    /// Velocity, in the unit of D.
-    pub v_i: Estimate,
-    /// Initial slope of the inverse-velocity plot, 1/day.
-    pub r_per_day: Estimate,
-    /// Its curvature, 1/day.
-    pub kappa_per_day: Estimate,
-}
-
 /// A minimum of the misfit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Alternative {
@@ -171,7 +138,7 @@ pub struct InverseVelocity {
 impl Alternatives {
     pub(super) fn of(inversion: &Inversion, least_squares: &ConstantLoad) -> Self {
         let one = |solution: &crate::fit::Solution| {
-            let best = super::estimate::best(inversion, Some(solution));
+            let best = estimate::best(inversion, Some(solution));
             Alternative {
                 m: best.m,
                 x_i: best.x_i,

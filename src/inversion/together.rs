@@ -4,12 +4,13 @@ use super::report::FailureTime;
 use super::{Inversion, Options};
 use crate::fit::{Rate, RateOptions};
 use crate::forecast::{
-    Dependence, FEWEST_READINGS, Look, Opinion, Passage, by_the_law, groups, measurably_moves,
+    Dependence, FEWEST_READINGS, FailureTimeLikelihood, Passage, Snapshot, by_the_law, groups,
+    measurably_moves,
 };
 use crate::reading::{BenchmarkId, Series, Timestamp, after_days, days_since};
 use serde::Serialize;
 
-/// Looks back over the time in which all benchmarks were read, by which "since" is told: evenly in ln of the
+/// Looks back over the time in which all benchmarks were read, by which "since" is reported: evenly in ln of the
 /// time to the failure that is expected now, as forecasts change.
 const LOOKS: usize = 24;
 /// That time over the time looked back on, within bounds that leave no step too coarse or too fine.
@@ -70,20 +71,20 @@ pub fn together(series: &[Series], options: &Options) -> Option<TogetherReport> 
     }
     let ends = each.iter().filter_map(|one| one.series.readings.last());
     let now = ends.map(|reading| reading.time).max()?;
-    let (heard, silent): (Vec<Inversion>, Vec<Inversion>) = each
+    let (current, silent): (Vec<Inversion>, Vec<Inversion>) = each
         .into_iter()
-        .partition(|one| is_heard(one, now) && opinion(one, now).is_some());
-    if heard.len() < 2 {
+        .partition(|one| is_current(one, now) && likelihood(one, now).is_some());
+    if current.len() < 2 {
         return None;
     }
-    let (times, looks) = looks(&heard, now)?;
-    let rates: Vec<(Vec<Rate>, f64)> = heard
+    let (times, looks) = looks(&current, now)?;
+    let rates: Vec<(Vec<Rate>, f64)> = current
         .iter()
         .map(|one| (one.rates(), one.days_at(now)))
         .collect();
     let rates: Vec<(&[Rate], f64)> = rates.iter().map(|one| (&*one.0, one.1)).collect();
     let dependence = Dependence::measured(&rates);
-    let name = |member: &usize| heard[*member].series.benchmark.clone();
+    let name = |member: &usize| current[*member].series.benchmark.clone();
     let (alone, together): (Vec<_>, Vec<_>) = groups(&looks, &dependence)
         .into_iter()
         .partition(|group| group.members.len() == 1);
@@ -119,7 +120,7 @@ impl Inversion {
 }
 
 /// Whether the newest reading is no further back than is usual.
-fn is_heard(inversion: &Inversion, now: Timestamp) -> bool {
+fn is_current(inversion: &Inversion, now: Timestamp) -> bool {
     let readings = &inversion.series.readings;
     let (Some(first), Some(last)) = (readings.first(), readings.last()) else {
         return false;
@@ -127,8 +128,8 @@ fn is_heard(inversion: &Inversion, now: Timestamp) -> bool {
     days_since(last.time, now) <= SILENT * days_since(first.time, last.time)
 }
 
-/// What the readings up to `time` foretell; `None` where too few do, or none that moves.
-fn foretold(inversion: &Inversion, time: Timestamp) -> Option<(Passage, f64)> {
+/// What the readings up to `time` predict; `None` where too few do, or none that moves.
+fn predicted(inversion: &Inversion, time: Timestamp) -> Option<(Passage, f64)> {
     let mut observations = inversion.observations.clone();
     let days = inversion.days_at(time);
     observations.values.retain(|value| value.t_days <= days);
@@ -140,7 +141,7 @@ fn foretold(inversion: &Inversion, time: Timestamp) -> Option<(Passage, f64)> {
 }
 
 /// The looks back and their times: all benchmarks have readings enough by the first, and the last is now.
-fn looks(inversions: &[Inversion], now: Timestamp) -> Option<(Vec<Timestamp>, Vec<Look>)> {
+fn looks(inversions: &[Inversion], now: Timestamp) -> Option<(Vec<Timestamp>, Vec<Snapshot>)> {
     let ready = inversions.iter().filter_map(|one| {
         let spaced = one.observations.spaced(FEWEST_READINGS);
         let days = spaced.last()?.t_days;
@@ -149,7 +150,7 @@ fn looks(inversions: &[Inversion], now: Timestamp) -> Option<(Vec<Timestamp>, Ve
     let first = ready.max()?;
     let span = days_since(first, now);
     let medians = inversions.iter().filter_map(|one| {
-        let (passage, later) = foretold(one, now)?;
+        let (passage, later) = predicted(one, now)?;
         Some(passage.quantile(0.5, f64::INFINITY)? - later)
     });
     let soonest = medians.fold(f64::INFINITY, f64::min);
@@ -166,15 +167,18 @@ fn looks(inversions: &[Inversion], now: Timestamp) -> Option<(Vec<Timestamp>, Ve
     };
     let mut times: Vec<Timestamp> = (0..LOOKS).rev().filter_map(at).collect();
     times.dedup();
-    let looks = times.iter().map(|time| Look {
+    let looks = times.iter().map(|time| Snapshot {
         left_days: left + days_since(*time, now),
-        opinions: inversions.iter().map(|one| opinion(one, *time)).collect(),
+        likelihoods: inversions
+            .iter()
+            .map(|one| likelihood(one, *time))
+            .collect(),
     });
     let looks = looks.collect();
     Some((times, looks))
 }
 
-fn opinion(inversion: &Inversion, time: Timestamp) -> Option<Opinion> {
-    let (passage, later) = foretold(inversion, time)?;
-    Some(Opinion::of(&passage, later))
+fn likelihood(inversion: &Inversion, time: Timestamp) -> Option<FailureTimeLikelihood> {
+    let (passage, later) = predicted(inversion, time)?;
+    Some(FailureTimeLikelihood::of(&passage, later))
 }

@@ -223,7 +223,7 @@ impl Friction {
             }
         }
         if self.per_slip != 0.0 {
-            // The step's own velocity is that of the slip as foreseen.
+            // The step's own velocity is that of the slip as predicted.
             state.speed = self.speed((state.ln_y, state.slip), to, state.speed);
         }
         Some(state)

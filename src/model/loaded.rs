@@ -6,11 +6,12 @@
 //! search may call this without allocating. Not in it: the direct response of the contacts to a change
 //! of normal stress (Linker and Dieterich, 1992).
 
+use super::accuracy::Accuracy;
 use super::coefficients::Coefficients;
 use super::law::{Law, LawError};
 use super::load::{Load, Stretch};
 use super::relaxation::Relaxation;
-use super::trajectory::{Accuracy, Motion};
+use super::trajectory::Motion;
 use std::ops::ControlFlow;
 
 /// The highest order of a step.
@@ -22,7 +23,7 @@ const LN_Y_OF_FAILURE: f64 = -37.0;
 /// Halvings that find a time inside a step to rounding.
 const HALVINGS: usize = 60;
 
-type Series = [f64; MAX_ORDER + 1];
+type PowerSeries = [f64; MAX_ORDER + 1];
 
 /// The law under a load.
 #[derive(Debug, Clone, Copy)]
@@ -36,7 +37,7 @@ pub struct LoadedLaw<'a> {
 
 /// Where the block is: its inverse velocity without the load's share, and its slip over `v_i`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Block {
+struct BlockState {
     t: f64,
     y: f64,
     slip: f64,
@@ -46,14 +47,14 @@ struct Block {
 
 /// One Taylor step: y and slip as polynomials in (t - start) / unit, f linear.
 #[derive(Debug, Clone, Copy)]
-struct Step {
+struct TaylorStep {
     start: f64,
     end: f64,
     unit: f64,
     stretch: Stretch,
     order: usize,
-    y: Series,
-    slip: Series,
+    y: PowerSeries,
+    slip: PowerSeries,
     /// In place of the series, where the block stays beside a steady state.
     relaxation: Option<Relaxation<f64>>,
 }
@@ -61,7 +62,7 @@ struct Step {
 /// What comes after a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Next {
-    Block(Block),
+    BlockState(BlockState),
     /// The singularity, at this day.
     Failure(f64),
     /// Out of what f64 resolves.
@@ -72,7 +73,7 @@ impl<'a> LoadedLaw<'a> {
     /// `law` under `load`, from t = 0 on.
     ///
     /// # Errors
-    /// [`LawError`] where the law does not tell its healing rate a, which no constant load needs at m = 1.
+    /// [`LawError`] where the law does not determine its healing rate a, which no constant load needs at m = 1.
     pub fn new(law: &Law, load: &'a Load, accuracy: Accuracy) -> Result<Self, LawError> {
         if !(law.a.is_finite() && law.b.is_finite()) {
             return Err(LawError {
@@ -135,8 +136,8 @@ impl<'a> LoadedLaw<'a> {
     }
 
     /// Gives every step from t = 0 to `end` to `see`, which may end it; the day of the failure, if met.
-    fn follow(&self, end: f64, mut see: impl FnMut(&Step) -> ControlFlow<()>) -> Option<f64> {
-        let mut block = Block {
+    fn follow(&self, end: f64, mut see: impl FnMut(&TaylorStep) -> ControlFlow<()>) -> Option<f64> {
+        let mut block = BlockState {
             t: 0.0,
             y: 1.0,
             slip: 0.0,
@@ -147,7 +148,8 @@ impl<'a> LoadedLaw<'a> {
             let (stretch, passed) = self.load.stretch(block.t, block.passed);
             steps = if passed == block.passed { steps + 1 } else { 0 };
             block.passed = passed;
-            let mut step = Step::expand(&self.law, (self.order, self.fraction), &block, stretch);
+            let mut step =
+                TaylorStep::expand(&self.law, (self.order, self.fraction), &block, stretch);
             if let Some(relaxation) = self.relaxation(&block, stretch) {
                 step.relaxation = Some(relaxation);
                 step.end = stretch.until;
@@ -157,16 +159,16 @@ impl<'a> LoadedLaw<'a> {
                 return None;
             }
             match step.next(&self.law, &block) {
-                Next::Block(next) if steps < MOST_STEPS => block = next,
+                Next::BlockState(next) if steps < MOST_STEPS => block = next,
                 Next::Failure(days) => return Some(days),
-                Next::Block(_) | Next::Lost => return None,
+                Next::BlockState(_) | Next::Lost => return None,
             }
         }
         None
     }
 
     /// The rest of a stretch whose load stands still, beside a steady state that attracts.
-    fn relaxation(&self, block: &Block, stretch: Stretch) -> Option<Relaxation<f64>> {
+    fn relaxation(&self, block: &BlockState, stretch: Stretch) -> Option<Relaxation<f64>> {
         if stretch.per_day != 0.0 {
             return None;
         }
@@ -177,7 +179,7 @@ impl<'a> LoadedLaw<'a> {
             .filter(|relaxation| relaxation.end.is_infinite())
     }
 
-    fn motion(&self, step: &Step, t: f64) -> Motion {
+    fn motion(&self, step: &TaylorStep, t: f64) -> Motion {
         let (y, slip) = step.at(t);
         Motion {
             y,
@@ -187,7 +189,7 @@ impl<'a> LoadedLaw<'a> {
     }
 
     /// When within the step the velocity first reaches `velocity`.
-    fn passage(&self, step: &Step, velocity: f64) -> Option<f64> {
+    fn passage(&self, step: &TaylorStep, velocity: f64) -> Option<f64> {
         let reaches = |t: f64| self.motion(step, t).velocity >= velocity;
         if reaches(step.start) {
             return Some(step.start);
@@ -199,12 +201,12 @@ impl<'a> LoadedLaw<'a> {
         };
         // Past the singularity y is not a number of the law.
         let passed = |t: f64| reaches(t) || step.at(t).0 <= 0.0;
-        passed(top).then(|| first(&Step { end: top, ..*step }, passed))
+        passed(top).then(|| first(&TaylorStep { end: top, ..*step }, passed))
     }
 }
 
 /// The first time within the step at which what holds at its end holds.
-fn first(step: &Step, holds: impl Fn(f64) -> bool) -> f64 {
+fn first(step: &TaylorStep, holds: impl Fn(f64) -> bool) -> f64 {
     let (mut before, mut after) = (step.start, step.end);
     for _ in 0..HALVINGS {
         let middle = f64::midpoint(before, after);
@@ -217,10 +219,15 @@ fn first(step: &Step, holds: impl Fn(f64) -> bool) -> f64 {
     after
 }
 
-impl Step {
+impl TaylorStep {
     /// Expands about the block. With W = y^p and G = e^f: y' = a W - b G, y W' = p W y', G' = f' G, and
     /// the slip's slope is V = G/y: y V = G.
-    fn expand(law: &Law, (order, fraction): (usize, f64), block: &Block, stretch: Stretch) -> Self {
+    fn expand(
+        law: &Law,
+        (order, fraction): (usize, f64),
+        block: &BlockState,
+        stretch: Stretch,
+    ) -> Self {
         let gain = stretch.log_load.exp();
         let (w_0, u_0) = ((law.p * block.y.ln()).exp(), 1.0 / block.y);
         let unit = unit_days(&[law.a * w_0 * u_0, law.b * gain * u_0, stretch.per_day]);
@@ -258,7 +265,7 @@ impl Step {
     }
 
     /// The block at the end of the step.
-    fn next(&self, law: &Law, block: &Block) -> Next {
+    fn next(&self, law: &Law, block: &BlockState) -> Next {
         let remaining = -self.y[0] / self.y[1] * self.unit;
         // Elsewhere y^p grows without bound as y falls, and stops it.
         let can_fail = remaining > 0.0 && (law.a == 0.0 || (0.0..1.0).contains(&law.p));
@@ -273,7 +280,7 @@ impl Step {
         if !(y > 0.0 && y.is_finite() && slip.is_finite()) {
             return Next::Lost;
         }
-        Next::Block(Block {
+        Next::BlockState(BlockState {
             t: self.end,
             y,
             slip,
@@ -328,7 +335,7 @@ fn unit_days(rates: &[f64]) -> f64 {
 }
 
 /// Estimates the radius of convergence from the two last coefficients.
-fn radius(c: &Series, order: usize) -> f64 {
+fn radius(c: &PowerSeries, order: usize) -> f64 {
     let one = |k: usize| (c[0] / c[k]).abs().powf(1.0 / k as f64);
     one(order).min(one(order - 1))
 }
@@ -348,7 +355,7 @@ mod tests {
     /// y and the slip after a day in equal steps of one order, all within one stretch.
     fn fixed_steps(law: &Law, order: usize, count: u32) -> (f64, f64) {
         let load = Load::new(vec![(0.0, 0.0), (10.0, 7.0)]).unwrap();
-        let mut block = Block {
+        let mut block = BlockState {
             t: 0.0,
             y: 1.0,
             slip: 0.0,
@@ -356,9 +363,9 @@ mod tests {
         };
         for k in 1..=count {
             let stretch = load.stretch(block.t, 0).0;
-            let mut step = Step::expand(law, (order, 1.0), &block, stretch);
+            let mut step = TaylorStep::expand(law, (order, 1.0), &block, stretch);
             step.end = f64::from(k) / f64::from(count);
-            let Next::Block(next) = step.next(law, &block) else {
+            let Next::BlockState(next) = step.next(law, &block) else {
                 panic!("lost");
             };
             block = next;

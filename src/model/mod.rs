@@ -3,9 +3,11 @@
 //! In the inverse velocity `y = v_i/v` and p = 1 - 1/m the law is one regular equation,
 //! `dy/dt = -r + kappa (y^p - 1)/p`, finite and smooth through m = 1.
 
+mod accuracy;
 mod coefficients;
 mod driven;
 mod law;
+mod law_in_time;
 mod load;
 mod loaded;
 mod path;
@@ -16,9 +18,10 @@ mod tail;
 mod taylor;
 mod trajectory;
 
+pub use accuracy::Accuracy;
 pub use driven::{Drive, Driven, Event};
 pub use law::{Law, LawError, PaperParameters, StateSense, SteadyState};
 pub use load::Load;
 pub use loaded::LoadedLaw;
 pub use sensitivity::{DaysWithGradient, Gradient, MotionWithGradients, Sensitivities};
-pub use trajectory::{Accuracy, Motion, Trajectory};
+pub use trajectory::{Motion, Trajectory};

@@ -1,12 +1,12 @@
 //! The solution from t = 0 on, piece by piece: beside a steady state, Taylor segments, before failure.
 
+use super::accuracy::Accuracy;
 use super::coefficients::Coefficients;
 use super::law::Law;
 use super::relaxation::Relaxation;
 use super::scalar::Scalar;
 use super::tail;
 use super::taylor::Segment;
-use super::trajectory::Accuracy;
 
 /// Where the segments stop and the last stretch before failure begins: (y, `slip / v_i`) then.
 #[derive(Debug, Clone, Copy)]
@@ -18,7 +18,7 @@ pub(super) struct Tail<S> {
 
 /// The pieces of a solution, in the order of time.
 #[derive(Debug, Clone)]
-pub(super) struct Path<S> {
+pub(super) struct SolutionPath<S> {
     departure: Option<Relaxation<S>>,
     segments: Vec<Segment<S>>,
     arrival: Option<Relaxation<S>>,
@@ -27,7 +27,7 @@ pub(super) struct Path<S> {
 
 /// What holds at a time asked for.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Place<S> {
+pub(super) enum PathPlace<S> {
     /// (y, `slip / v_i`).
     At((S, S)),
     /// So many days before the failure, on the tail.
@@ -36,7 +36,7 @@ pub(super) enum Place<S> {
     Nowhere,
 }
 
-impl<S: Scalar> Path<S> {
+impl<S: Scalar> SolutionPath<S> {
     /// Room for a solution; what a slope needs is under 30 segments as a rule.
     pub(super) fn empty() -> Self {
         Self {
@@ -102,14 +102,14 @@ impl<S: Scalar> Path<S> {
     }
 
     /// What holds `t` days after the start.
-    pub(super) fn place(&self, t: f64) -> Place<S> {
+    pub(super) fn place(&self, t: f64) -> PathPlace<S> {
         if let Some(tail) = &self.tail
             && t > tail.start
         {
             return if t < tail.failure_days {
-                Place::BeforeFailure(tail.failure_days - t)
+                PathPlace::BeforeFailure(tail.failure_days - t)
             } else {
-                Place::Nowhere
+                PathPlace::Nowhere
             };
         }
         let beside = self.departure.iter().chain(&self.arrival);
@@ -117,7 +117,7 @@ impl<S: Scalar> Path<S> {
             .into_iter()
             .find(|one| t >= one.start && t <= one.end)
         {
-            return Place::At(beside.at(t));
+            return PathPlace::At(beside.at(t));
         }
         let index = self
             .segments
@@ -127,12 +127,12 @@ impl<S: Scalar> Path<S> {
             Some(segment) if t <= segment.start + segment.span * (1.0 + 1e-9) => {
                 let at = segment.at(t);
                 if at.0.value() > 0.0 {
-                    Place::At(at)
+                    PathPlace::At(at)
                 } else {
-                    Place::Nowhere
+                    PathPlace::Nowhere
                 }
             }
-            _ => Place::Nowhere,
+            _ => PathPlace::Nowhere,
         }
     }
 }

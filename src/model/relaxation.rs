@@ -6,7 +6,7 @@
 
 use super::coefficients::Coefficients;
 use super::scalar::Scalar;
-use super::taylor::{MAX_ORDER, Series, radius, step_fraction};
+use super::taylor::{MAX_ORDER, TaylorSeries, radius, step_fraction};
 
 /// Beyond this |z - 1| max(1, |p - 1|) the series is not worth trying.
 const FARTHEST: f64 = 0.4;
@@ -23,8 +23,8 @@ pub(super) struct Relaxation<S> {
     departure: S,
     slip: S,
     order: usize,
-    z: Series<S>,
-    u: Series<S>,
+    z: TaylorSeries<S>,
+    u: TaylorSeries<S>,
 }
 
 impl<S: Scalar> Relaxation<S> {
@@ -87,7 +87,7 @@ impl<S: Scalar> Relaxation<S> {
 }
 
 /// z(E) and u = 1/z: k (k - 1) `z_k` is the sum over 0 < i < k of i (p (k - i) - i) `z_i z_(k-i)`.
-fn series<S: Scalar>(p: S, order: usize) -> (Series<S>, Series<S>) {
+fn series<S: Scalar>(p: S, order: usize) -> (TaylorSeries<S>, TaylorSeries<S>) {
     let (zero, one) = (S::constant(0.0), S::constant(1.0));
     let mut z = [zero; MAX_ORDER + 1];
     let mut u = [zero; MAX_ORDER + 1];
@@ -110,7 +110,7 @@ fn series<S: Scalar>(p: S, order: usize) -> (Series<S>, Series<S>) {
 }
 
 /// E with z(E) - 1 = `offset`, by Newton's method; the last step carries the derivatives.
-fn departure<S: Scalar>(z: &Series<S>, order: usize, offset: S) -> S {
+fn departure<S: Scalar>(z: &TaylorSeries<S>, order: usize, offset: S) -> S {
     let mut e = offset.value();
     for _ in 0..8 {
         let (mut sum, mut slope) = (0.0, 0.0);

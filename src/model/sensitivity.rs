@@ -3,12 +3,13 @@
 //! The same recurrences that solve the law carry its derivatives: exact, and through m = 1 as smooth as
 //! the solution. Where a law was made from the paper's parameters, a and b follow r, kappa and p.
 
+use super::accuracy::Accuracy;
 use super::coefficients::Coefficients;
 use super::law::Law;
-use super::path::{Path, Place};
+use super::path::{PathPlace, SolutionPath};
 use super::scalar::Dual;
 use super::tail;
-use super::trajectory::{Accuracy, Motion};
+use super::trajectory::Motion;
 
 /// Derivatives by each parameter of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,7 +48,7 @@ pub struct DaysWithGradient {
 #[derive(Debug, Clone)]
 pub struct Sensitivities {
     law: Law,
-    path: Path<Dual>,
+    path: SolutionPath<Dual>,
 }
 
 impl Sensitivities {
@@ -55,7 +56,7 @@ impl Sensitivities {
     pub fn solve(law: &Law, end_days: f64, accuracy: Accuracy) -> Self {
         let mut solution = Self {
             law: *law,
-            path: Path::empty(),
+            path: SolutionPath::empty(),
         };
         solution.solve_again(law, end_days, accuracy);
         solution
@@ -73,9 +74,9 @@ impl Sensitivities {
     /// singularity on.
     pub fn at(&self, t: f64) -> Option<MotionWithGradients> {
         match self.path.place(t) {
-            Place::At(at) => Some(self.motion(at)),
-            Place::BeforeFailure(remaining) => self.before_failure(remaining),
-            Place::Nowhere => None,
+            PathPlace::At(at) => Some(self.motion(at)),
+            PathPlace::BeforeFailure(remaining) => self.before_failure(remaining),
+            PathPlace::Nowhere => None,
         }
     }
 

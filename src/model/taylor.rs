@@ -7,7 +7,7 @@ use super::scalar::Scalar;
 pub(super) const MAX_ORDER: usize = 30;
 
 /// The coefficients of one polynomial.
-pub(super) type Series<S> = [S; MAX_ORDER + 1];
+pub(super) type TaylorSeries<S> = [S; MAX_ORDER + 1];
 
 /// y(t) and the slip over `v_i` from `start`, as polynomials in (t - start) / `unit`, good up to `span`.
 ///
@@ -19,8 +19,8 @@ pub(super) struct Segment<S> {
     pub(super) span: f64,
     unit: f64,
     order: usize,
-    y: Series<S>,
-    slip: Series<S>,
+    y: TaylorSeries<S>,
+    slip: TaylorSeries<S>,
 }
 
 impl<S: Scalar> Segment<S> {
@@ -104,7 +104,7 @@ fn unit_days<S: Scalar>(growth: S, curvature: S) -> f64 {
 }
 
 /// The sum of g_j g_(k-j) over 0 < j < k.
-fn square<S: Scalar>(g: &Series<S>, k: usize) -> S {
+fn square<S: Scalar>(g: &TaylorSeries<S>, k: usize) -> S {
     let mut half = S::constant(0.0);
     for j in 1..k.div_ceil(2) {
         half = half + g[j] * g[k - j];
@@ -118,7 +118,7 @@ fn square<S: Scalar>(g: &Series<S>, k: usize) -> S {
 }
 
 /// Estimates the radius of convergence from the two last coefficients.
-pub(super) fn radius<S: Scalar>(c: &Series<S>, order: usize) -> f64 {
+pub(super) fn radius<S: Scalar>(c: &TaylorSeries<S>, order: usize) -> f64 {
     let one = |k: usize| {
         let share = (c[0].value() / c[k].value()).abs();
         if c[k].value() == 0.0 {

@@ -1,44 +1,10 @@
 //! The solution of the law from t = 0 on: velocity and displacement at any time, and the failure.
 
+use super::accuracy::Accuracy;
 use super::coefficients::Coefficients;
 use super::law::Law;
-use super::path::{Path, Place};
+use super::path::{PathPlace, SolutionPath};
 use super::tail;
-
-/// How exact a solution is to be.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Accuracy {
-    /// Close to the limit of f64, for results that are shown.
-    Full,
-    /// About 1e-10 relative, for the many solutions inside a fit.
-    Fit,
-}
-
-impl Accuracy {
-    pub(super) fn order(self) -> usize {
-        match self {
-            Self::Full => 28,
-            Self::Fit => 16,
-        }
-    }
-
-    /// A bound on the work: more segments than a solution within f64's range needs, or than a fit can
-    /// use (a law that needs more is about to leave its domain).
-    pub(super) fn most_segments(self) -> usize {
-        match self {
-            Self::Full => 4000,
-            Self::Fit => 48,
-        }
-    }
-
-    /// ln y below which the last stretch before failure is solved by the time that remains.
-    pub(super) fn ln_y_of_tail(self) -> f64 {
-        match self {
-            Self::Full => -2.0,
-            Self::Fit => -5.0,
-        }
-    }
-}
 
 /// Position on a trajectory.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,7 +21,7 @@ pub struct Motion {
 #[derive(Debug, Clone)]
 pub struct Trajectory {
     law: Law,
-    path: Path<f64>,
+    path: SolutionPath<f64>,
 }
 
 impl Trajectory {
@@ -63,7 +29,7 @@ impl Trajectory {
     pub fn solve(law: &Law, end_days: f64, accuracy: Accuracy) -> Self {
         let mut trajectory = Self {
             law: *law,
-            path: Path::empty(),
+            path: SolutionPath::empty(),
         };
         trajectory.solve_again(law, end_days, accuracy);
         trajectory
@@ -88,9 +54,9 @@ impl Trajectory {
     /// The motion `t` days after the start; `None` from the singularity on.
     pub fn at(&self, t: f64) -> Option<Motion> {
         match self.path.place(t) {
-            Place::At((y, slip)) => Some(self.motion(y, slip)),
-            Place::BeforeFailure(remaining) => self.before_failure(remaining),
-            Place::Nowhere => None,
+            PathPlace::At((y, slip)) => Some(self.motion(y, slip)),
+            PathPlace::BeforeFailure(remaining) => self.before_failure(remaining),
+            PathPlace::Nowhere => None,
         }
     }
 

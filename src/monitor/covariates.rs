@@ -1,4 +1,4 @@
-//! The covariates of a site as the searches and the fuller laws see them, bounded by count.
+//! The covariates of a site as the searches and the laws under known loads see them, bounded by count.
 
 use crate::reading::{Channel, Sample, Timestamp};
 use serde::{Deserialize, Serialize};

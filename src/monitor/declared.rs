@@ -53,12 +53,13 @@ impl Declaration {
 pub(super) struct Declarations {
     /// By time.
     all: Vec<Declared>,
-    /// Those that have taken effect, and were told.
-    told: Vec<Declared>,
+    /// Those that have taken effect, and were reported.
+    #[serde(rename = "told")]
+    reported: Vec<Declared>,
 }
 
 impl Declarations {
-    /// What of `declared` concerns `benchmark`; `told` may hold more than that.
+    /// What of `declared` concerns `benchmark`; `reported` may hold more than that.
     pub(super) fn of(declared: &[Declared], benchmark: &BenchmarkId) -> Self {
         let here = |one: &&Declared| {
             let place = one.benchmark.as_ref();
@@ -68,7 +69,7 @@ impl Declarations {
         all.sort_by_key(|one| one.time);
         Self {
             all,
-            told: Vec::new(),
+            reported: Vec::new(),
         }
     }
 
@@ -78,7 +79,7 @@ impl Declarations {
             return None;
         }
         self.all = by.all;
-        self.told.retain(|one| self.all.contains(one));
+        self.reported.retain(|one| self.all.contains(one));
         Some(())
     }
 
@@ -137,9 +138,9 @@ impl Declarations {
         })
     }
 
-    /// What takes effect with the reading of `time`, the one before it being that of `before`, and was not told
-    /// yet. A reset is not among it: see [`Declarations::tell_reset`].
-    pub(super) fn tell(&mut self, before: Option<Timestamp>, time: Timestamp) -> Vec<Declared> {
+    /// What takes effect with the reading of `time`, the one before it being that of `before`, and was not reported
+    /// yet. A reset is not among it: see [`Declarations::take_resets`].
+    pub(super) fn take(&mut self, before: Option<Timestamp>, time: Timestamp) -> Vec<Declared> {
         let begins = |one: &&Declared| match one.kind {
             Declaration::Reset { .. } => false,
             Declaration::Maintenance { until } => {
@@ -150,20 +151,20 @@ impl Declarations {
                 (SignedDuration::ZERO..=BLAST_LASTS).contains(&age)
             }
         };
-        let fresh = |one: &&Declared| begins(one) && !self.told.contains(one);
+        let fresh = |one: &&Declared| begins(one) && !self.reported.contains(one);
         let fresh: Vec<Declared> = self.all.iter().filter(fresh).cloned().collect();
-        self.told.extend(fresh.iter().cloned());
+        self.reported.extend(fresh.iter().cloned());
         fresh
     }
 
-    /// The resets between two times, which were not told yet.
-    pub(super) fn tell_reset(&mut self, from: Timestamp, to: Timestamp) -> Vec<Declared> {
+    /// The resets between two times, which were not reported yet.
+    pub(super) fn take_resets(&mut self, from: Timestamp, to: Timestamp) -> Vec<Declared> {
         let is_it = |one: &&Declared| {
             let is_reset = matches!(one.kind, Declaration::Reset { .. });
-            is_reset && (from..=to).contains(&one.time) && !self.told.contains(one)
+            is_reset && (from..=to).contains(&one.time) && !self.reported.contains(one)
         };
         let fresh: Vec<Declared> = self.all.iter().filter(is_it).cloned().collect();
-        self.told.extend(fresh.iter().cloned());
+        self.reported.extend(fresh.iter().cloned());
         fresh
     }
 }

@@ -15,7 +15,7 @@ const FASTEST_EXPECTED: f64 = 10.0;
 
 /// A predicted time that moved.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Moved {
+pub(super) struct MovedIntercept {
     /// The time last announced, days.
     pub(super) from_days: f64,
     /// The time now, days.
@@ -42,7 +42,7 @@ impl Drift {
         t_max: f64,
         predicted: Option<f64>,
         least: f64,
-    ) -> Option<Moved> {
+    ) -> Option<MovedIntercept> {
         let Some(to_days) = predicted else {
             *self = Self::default();
             return None;
@@ -67,7 +67,7 @@ impl Drift {
         }
         self.agreeing = 0;
         self.announced = Some((t_max, to_days));
-        Some(Moved {
+        Some(MovedIntercept {
             from_days,
             to_days,
             drift_days_per_day: (to_days - from_days) / (t_max - since),

@@ -1,7 +1,7 @@
 //! What the monitor says: one JSON object a line, in data time, nothing from the wall clock.
 
 use crate::alert::Level;
-use crate::effects::{Explained, Form, Kind};
+use crate::effects::{Explained, Form, Kind, Rival};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::regime::Regime;
 use serde::{Deserialize, Serialize};
@@ -102,7 +102,7 @@ pub enum EventKind {
         /// How much of the structure all effects together account for.
         explained: Explained,
         /// What would explain the same.
-        cannot_separate_from: Vec<String>,
+        cannot_separate_from: Vec<Rival>,
         /// Whether forecasts and levels go by it from here on.
         adopted: bool,
     },
@@ -132,7 +132,7 @@ pub enum EventKind {
         /// Each of at least two benchmarks.
         groups: Vec<SharedFailure>,
     },
-    /// The monitor cannot rely on what it is told.
+    /// The monitor cannot rely on what it is given.
     Fault {
         /// `no-data`, `out-of-range`, `out-of-order`, ...
         kind: String,
@@ -245,14 +245,14 @@ pub enum Unexplained {
     },
 }
 
-/// The forecast of the law under a constant load, beside that of the fuller law.
+/// The forecast of the law under a constant load, beside that of the law under the known load.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Plain {
     /// Which regime, with what probability.
     pub regime: RegimeReport,
     /// When the critical velocity is passed.
     pub failure_time: FailureTime,
-    /// Whether the fuller law explains the present velocity. While it does not, the larger of both chances
+    /// Whether the law under the known load explains the present velocity. While it does not, the larger of both chances
     /// decides the level.
     pub is_explained: bool,
 }

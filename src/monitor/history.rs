@@ -1,10 +1,11 @@
 //! The readings of one benchmark, in the science's units and in time order, bounded by count.
 
 use super::declared::Declarations;
-use super::track::settled;
+use super::motion::settled;
 use crate::fit::{Observation, Observations, Rate, RateOptions};
 use crate::reading::{
     BenchmarkId, Quantity, Reading, SECONDS_PER_DAY, Series, Timestamp, Unit, days_since,
+    instant_after_days,
 };
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
@@ -216,17 +217,7 @@ impl History {
 
     /// The instant so many days after the epoch; `None` outside the calendar.
     pub(super) fn time(&self, days: f64) -> Option<Timestamp> {
-        let nanoseconds = (days * SECONDS_PER_DAY * 1e9).round();
-        if !nanoseconds.is_finite() {
-            return None;
-        }
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "a float fits, or is cut off far outside the calendar"
-        )]
-        let since = nanoseconds as i128;
-        let whole = self.epoch.as_nanosecond().checked_add(since)?;
-        Timestamp::from_nanosecond(whole).ok()
+        instant_after_days(self.epoch, days)
     }
 
     /// When the newest reading was taken.
@@ -264,7 +255,7 @@ impl History {
             averaging,
             readings: values.chunks(size).filter_map(block).collect(),
         };
-        series.settle();
+        series.put_in_order();
         series
     }
 

@@ -1,6 +1,6 @@
 //! The newest forecast of a benchmark, kept while a level is in force.
 
-use crate::forecast::{HORIZON_DAYS, Opinion, Passage};
+use crate::forecast::{FailureTimeLikelihood, HORIZON_DAYS, Passage};
 use crate::reading::{Timestamp, days_since};
 use serde::{Deserialize, Serialize};
 
@@ -30,9 +30,9 @@ impl KeptForecast {
     }
 
     /// What it says at `now`, without a failure since.
-    pub(super) fn opinion(&self, now: Timestamp) -> Opinion {
+    pub(super) fn likelihood(&self, now: Timestamp) -> FailureTimeLikelihood {
         let times = self.days.iter().map(|days| (*days, self.share));
-        Opinion::of(
+        FailureTimeLikelihood::of(
             &Passage::from_times(times.collect()),
             days_since(self.time, now),
         )

@@ -8,6 +8,7 @@ mod drift;
 mod event;
 mod history;
 mod kept;
+mod motion;
 mod notice;
 mod order;
 mod saved;
@@ -25,12 +26,12 @@ pub use event::{
     AlertState, Event, EventKind, FailureTime, InverseVelocity, Plain, RegimeReport, SUSPECT,
     SUSPECT_ENDS, SharedFailure, Summary, Unexplained,
 };
+pub(crate) use motion::recent;
 pub use notice::{CLOCK_FAULT, Notice};
 pub use order::Order;
 pub use saved::{Part, SavedError};
 pub use search::{Finding, SearchJob};
 pub use site::SiteLevel;
-pub(crate) use track::recent;
 
 use crate::alert::{Level, Policy};
 use crate::reading::{BenchmarkId, Reading, Sample, Suspicion, Timestamp, Unit};
@@ -45,7 +46,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use together::Together;
 use track::{Beside, Track};
 
-/// What the monitor is told.
+/// What the monitor is given.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Input {
     /// A reading of a benchmark.
@@ -147,13 +148,13 @@ impl Watched {
     }
 }
 
-/// What is done about a residual that the law does not explain; it is watched and told in any case.
+/// What is done about a residual that the law does not explain; it is watched and reported in any case.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Explain {
-    /// The effect is searched for, told, and taken into the law that forecasts and levels go by.
+    /// The effect is searched for, reported, and taken into the law that forecasts and levels go by.
     #[default]
     Adopt,
-    /// It is searched for and told.
+    /// It is searched for and reported.
     Tell,
     /// Nothing.
     Off,

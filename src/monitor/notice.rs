@@ -99,10 +99,10 @@ impl Monitor {
             .collect()
     }
 
-    /// Whether benchmarks of the config have given no reading, and nobody has been told.
+    /// Whether benchmarks of the config have given no reading, and nobody has been notified.
     pub fn misses_some(&self) -> bool {
-        let told: BTreeSet<&BenchmarkId> = self.awaited.benchmarks().collect();
-        self.never_read().iter().any(|id| !told.contains(id))
+        let awaited: BTreeSet<&BenchmarkId> = self.awaited.benchmarks().collect();
+        self.never_read().iter().any(|id| !awaited.contains(id))
     }
 
     fn settle(&mut self, now: Timestamp) -> Vec<Event> {

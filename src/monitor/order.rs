@@ -1,11 +1,11 @@
-//! What people tell the monitor: it keeps them as it keeps readings, so that a replay has them too.
+//! What people order of the monitor: it keeps them as it keeps readings, so that a replay has them too.
 
 use super::event::{Event, EventKind};
 use crate::reading::{BenchmarkId, Timestamp};
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
 
-/// An order from people. It changes who is told, never what is found.
+/// An order from people. It changes who is notified, never what is found.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "order", rename_all = "kebab-case")]
 pub enum Order {
@@ -16,7 +16,7 @@ pub enum Order {
         /// Who.
         by: Option<String>,
     },
-    /// The level in force at a benchmark, and lower ones, are not told until then; a higher one is, at once.
+    /// The level in force at a benchmark, and lower ones, are not reported until then; a higher one is, at once.
     Shelve {
         /// Where.
         benchmark: BenchmarkId,
@@ -26,7 +26,7 @@ pub enum Order {
         #[serde(default)]
         by: Option<String>,
     },
-    /// Nothing is told until then; what is in force at its end is told at its end.
+    /// Nothing is reported until then; what is in force at its end is reported at its end.
     Silence {
         /// Where; `None`: everywhere.
         benchmark: Option<BenchmarkId>,
@@ -36,7 +36,7 @@ pub enum Order {
         #[serde(default)]
         by: Option<String>,
     },
-    /// What was shelved or silenced is told again from now on.
+    /// What was shelved or silenced is reported again from now on.
     Unsilence {
         /// Where; `None`: everywhere.
         benchmark: Option<BenchmarkId>,
@@ -49,7 +49,7 @@ pub enum Order {
 impl Order {
     /// Nothing is shelved for longer than this.
     pub const LONGEST_SHELVE: SignedDuration = SignedDuration::from_hours(30 * 24);
-    /// Nothing is silenced for longer than this: a red is not told meanwhile.
+    /// Nothing is silenced for longer than this: a red is not reported meanwhile.
     pub const LONGEST_SILENCE: SignedDuration = SignedDuration::from_hours(7 * 24);
 
     /// That it was given.

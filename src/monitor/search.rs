@@ -5,7 +5,7 @@
 //! right before the benchmark's first reading that is no earlier than [`SearchJob::due`]. So the answer takes
 //! effect at a time that the data alone decide.
 
-use crate::effects::{Effect, Explained, Fuller, Kind, Options, explain};
+use crate::effects::{Effect, Explained, Kind, KnownLoad, Options, Rival, explain};
 use crate::reading::{BenchmarkId, Channel, Series, Timestamp};
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
@@ -42,9 +42,10 @@ pub struct Finding {
     /// How much of the structure they account for.
     pub explained: Explained,
     /// What would explain the same.
-    pub cannot_separate_from: Vec<String>,
+    pub cannot_separate_from: Vec<Rival>,
     /// The effects as forecasts use them.
-    pub fuller: Fuller,
+    #[serde(rename = "fuller")]
+    pub known_load: KnownLoad,
 }
 
 impl SearchJob {
@@ -79,18 +80,18 @@ impl SearchJob {
                 .collect(),
             explained: said.explained,
             cannot_separate_from: said.cannot_separate_from,
-            fuller: said.fuller,
+            known_load: said.known_load,
         }
     }
 
     /// The answer of a search that broke off.
-    pub fn in_vain(&self) -> Finding {
+    pub fn broken_off(&self) -> Finding {
         Finding {
             benchmark: self.benchmark.clone(),
             effects: Vec::new(),
             explained: Explained::None,
             cannot_separate_from: Vec::new(),
-            fuller: Fuller::default(),
+            known_load: KnownLoad::default(),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Sensors that say they have no value: each run of that is told once, and ends with a reading.
+//! Sensors that say they have no value: each run of that is reported once, and ends with a reading.
 
 use crate::reading::{BenchmarkId, Timestamp};
 use serde::{Deserialize, Serialize};

@@ -10,7 +10,7 @@ use std::ops::RangeInclusive;
 const FEWEST_EQUAL: usize = 6;
 /// Pairs of neighbours, before the equal ones, from which is learnt how often this sensor repeats a value.
 const PAIRS: RangeInclusive<usize> = 8..=200;
-/// A sensor that repeats more than this share of its values is too coarse to tell that it is stuck.
+/// A sensor that repeats more than this share of its values is too coarse to show that it is stuck.
 const COARSE: f64 = 0.1;
 /// The chance under which as many equal readings are no chance.
 const NO_CHANCE: f64 = 1e-6;
@@ -260,7 +260,7 @@ mod tests {
                 .map(|value| -value),
         );
         assert!(downwards.stands_at_the_end().is_some());
-        // As fast as the noise, nobody can tell.
+        // As fast as the noise, nobody can say.
         let creeping = history((0..36).map(|hour| f64::from(hour.min(30)) * 0.2 + noise(hour)));
         assert!(creeping.stands_at_the_end().is_none());
         for per_hour in [0.2_f64, 0.5, 0.8, 0.95] {

@@ -10,7 +10,7 @@ use super::kept::KeptForecast;
 use super::track::Track;
 use crate::alert::{Level, Policy};
 use crate::fit::Rate;
-use crate::forecast::{Dependence, Group, HORIZON_DAYS, Look, groups};
+use crate::forecast::{Dependence, Group, HORIZON_DAYS, Snapshot, groups};
 use crate::reading::{BenchmarkId, SECONDS_PER_DAY, Timestamp, after_days, days_since};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -81,14 +81,14 @@ impl Together {
             let medians = forecasts.values().filter_map(|one| one.left_days(time));
             medians.fold(HORIZON_DAYS, f64::min).max(0.0)
         };
-        let looks: Vec<Look> = self
+        let looks: Vec<Snapshot> = self
             .kept
             .iter()
-            .map(|(time, forecasts)| Look {
+            .map(|(time, forecasts)| Snapshot {
                 left_days: left(*time, forecasts),
-                opinions: compared
+                likelihoods: compared
                     .iter()
-                    .map(|id| forecasts.get(*id).map(|one| one.opinion(*time)))
+                    .map(|id| forecasts.get(*id).map(|one| one.likelihood(*time)))
                     .collect(),
             })
             .collect();

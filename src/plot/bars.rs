@@ -48,7 +48,7 @@ impl Bars {
         let height = TOP + BOTTOM + ROW * self.bars.len() as f64;
         let names = self.bars.iter().map(|bar| width_of(&bar.name));
         let left = names.fold(0.0, f64::max) + 2.0 * GAP;
-        let frame = Frame {
+        let frame = BarsFrame {
             left,
             width: SHARE * self.width,
             bottom: height - BOTTOM,
@@ -69,8 +69,8 @@ impl Bars {
         out
     }
 
-    fn grid(&self, frame: Frame, out: &mut String) {
-        let Frame {
+    fn grid(&self, frame: BarsFrame, out: &mut String) {
+        let BarsFrame {
             left,
             width,
             bottom,
@@ -92,7 +92,7 @@ impl Bars {
         );
     }
 
-    fn row(&self, frame: Frame, index: usize, bar: &Bar, out: &mut String) {
+    fn row(&self, frame: BarsFrame, index: usize, bar: &Bar, out: &mut String) {
         let middle = TOP + ROW * (index as f64 + 0.5);
         let (zero, end) = (frame.at(&self.axis, 0.0), frame.at(&self.axis, bar.value));
         let line = middle + 4.0;
@@ -121,7 +121,7 @@ impl Bars {
         );
     }
 
-    fn mark(&self, frame: Frame, out: &mut String) {
+    fn mark(&self, frame: BarsFrame, out: &mut String) {
         let zero = frame.at(&self.axis, 0.0);
         let x = frame.at(&self.axis, self.mark.0);
         let bottom = frame.bottom;
@@ -136,13 +136,13 @@ impl Bars {
 
 /// Where the bars stand on the sheet.
 #[derive(Debug, Clone, Copy)]
-struct Frame {
+struct BarsFrame {
     left: f64,
     width: f64,
     bottom: f64,
 }
 
-impl Frame {
+impl BarsFrame {
     /// Where a value stands; beyond the axis, at its end.
     fn at(self, axis: &Axis, value: f64) -> f64 {
         let share = axis.share(value).unwrap_or(0.0);

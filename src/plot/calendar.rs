@@ -5,36 +5,36 @@ use jiff::civil::{Date, date};
 
 /// From one tick to the next.
 #[derive(Debug, Clone, Copy)]
-enum Step {
+enum CalendarStep {
     Minutes(i16),
     Days(i16),
     Months(i16),
 }
 
 /// From fine to coarse; the last one serves whatever is longer.
-const STEPS: [Step; 22] = [
-    Step::Minutes(1),
-    Step::Minutes(5),
-    Step::Minutes(15),
-    Step::Minutes(30),
-    Step::Minutes(60),
-    Step::Minutes(180),
-    Step::Minutes(360),
-    Step::Minutes(720),
-    Step::Days(1),
-    Step::Days(2),
-    Step::Days(5),
-    Step::Days(10),
-    Step::Months(1),
-    Step::Months(2),
-    Step::Months(3),
-    Step::Months(6),
-    Step::Months(12),
-    Step::Months(24),
-    Step::Months(60),
-    Step::Months(120),
-    Step::Months(240),
-    Step::Months(1200),
+const STEPS: [CalendarStep; 22] = [
+    CalendarStep::Minutes(1),
+    CalendarStep::Minutes(5),
+    CalendarStep::Minutes(15),
+    CalendarStep::Minutes(30),
+    CalendarStep::Minutes(60),
+    CalendarStep::Minutes(180),
+    CalendarStep::Minutes(360),
+    CalendarStep::Minutes(720),
+    CalendarStep::Days(1),
+    CalendarStep::Days(2),
+    CalendarStep::Days(5),
+    CalendarStep::Days(10),
+    CalendarStep::Months(1),
+    CalendarStep::Months(2),
+    CalendarStep::Months(3),
+    CalendarStep::Months(6),
+    CalendarStep::Months(12),
+    CalendarStep::Months(24),
+    CalendarStep::Months(60),
+    CalendarStep::Months(120),
+    CalendarStep::Months(240),
+    CalendarStep::Months(1200),
 ];
 const MINUTES_PER_DAY: f64 = 1440.0;
 const DAYS_PER_MONTH: f64 = 30.44;
@@ -48,7 +48,7 @@ pub(super) fn ticks(from: f64, to: f64, length: f64) -> Vec<(f64, String)> {
     if !(from.is_finite() && to.is_finite() && to > from) {
         return Vec::new();
     }
-    let fits = |step: &&Step| {
+    let fits = |step: &&CalendarStep| {
         let count = (to - from) / step.days();
         count * (width_of(step.sample()) + GAP) <= length
     };
@@ -56,7 +56,7 @@ pub(super) fn ticks(from: f64, to: f64, length: f64) -> Vec<(f64, String)> {
     step.ticks(from, to)
 }
 
-impl Step {
+impl CalendarStep {
     fn days(self) -> f64 {
         match self {
             Self::Minutes(count) => f64::from(count) / MINUTES_PER_DAY,

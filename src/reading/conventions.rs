@@ -41,7 +41,7 @@ pub struct LocalClock {
 /// What becomes of a local time that the zone's clocks showed twice, or never.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum SummerTime {
-    /// It is refused: nobody can tell when that was.
+    /// It is refused: nobody can say when that was.
     #[default]
     Reject,
     /// The earlier of the two instants that it may mean.

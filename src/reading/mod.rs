@@ -69,3 +69,18 @@ pub fn after_days(epoch: Timestamp, days: f64) -> Option<Timestamp> {
         .checked_add(jiff::SignedDuration::from_secs(seconds))
         .ok()
 }
+
+/// The instant `days` after `epoch`, to the nanosecond; `None` outside the calendar.
+pub fn instant_after_days(epoch: Timestamp, days: f64) -> Option<Timestamp> {
+    let nanoseconds = (days * SECONDS_PER_DAY * 1e9).round();
+    if !nanoseconds.is_finite() {
+        return None;
+    }
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "a float fits, or is cut off far outside the calendar"
+    )]
+    let since = nanoseconds as i128;
+    let whole = epoch.as_nanosecond().checked_add(since)?;
+    Timestamp::from_nanosecond(whole).ok()
+}

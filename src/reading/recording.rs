@@ -121,19 +121,19 @@ impl Recording {
             channels: channels.into_values().collect(),
             provenance,
         };
-        let mut disorder = recording.settle();
+        let mut disorder = recording.put_in_order();
         disorder.out_of_order = 0;
         Ok((recording, disorder))
     }
 
     /// Puts every series and channel in time order, and these by name.
-    pub fn settle(&mut self) -> Disorder {
+    pub fn put_in_order(&mut self) -> Disorder {
         let mut disorder = Disorder::default();
         for series in &mut self.series {
-            disorder += series.settle();
+            disorder += series.put_in_order();
         }
         for channel in &mut self.channels {
-            disorder += channel.settle();
+            disorder += channel.put_in_order();
         }
         self.series
             .sort_by(|a, b| (&a.benchmark, a.quantity()).cmp(&(&b.benchmark, b.quantity())));

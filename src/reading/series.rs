@@ -46,7 +46,7 @@ impl Series {
 
     /// Puts rows that stand in order of arrival into strictly increasing time: an exact repeat is
     /// dropped, and of two values for one time the later to arrive stands.
-    pub fn settle(&mut self) -> Disorder {
+    pub fn put_in_order(&mut self) -> Disorder {
         settle_rows(&mut self.readings, |reading| reading.time)
     }
 }
@@ -72,8 +72,8 @@ pub struct Channel {
 }
 
 impl Channel {
-    /// Puts rows in order as [`Series::settle`] does.
-    pub fn settle(&mut self) -> Disorder {
+    /// Puts rows in order as [`Series::put_in_order`] does.
+    pub fn put_in_order(&mut self) -> Disorder {
         settle_rows(&mut self.samples, |sample| sample.time)
     }
 }
@@ -147,24 +147,24 @@ mod tests {
 
     #[test]
     fn rows_in_order_are_left_as_they_are() {
-        let mut settled = series(&[(1, 1.0), (2, 1.0), (3, 5.0)]);
-        assert_eq!(settled.settle(), Disorder::default());
-        assert_eq!(settled, series(&[(1, 1.0), (2, 1.0), (3, 5.0)]));
+        let mut ordered = series(&[(1, 1.0), (2, 1.0), (3, 5.0)]);
+        assert_eq!(ordered.put_in_order(), Disorder::default());
+        assert_eq!(ordered, series(&[(1, 1.0), (2, 1.0), (3, 5.0)]));
     }
 
     #[test]
     fn a_repeat_is_dropped_a_correction_stands_and_a_late_row_finds_its_place() {
-        let mut settled = series(&[(1, 1.0), (3, 3.0), (2, 2.0), (3, 3.0), (1, 9.0)]);
-        let disorder = settled.settle();
-        assert_eq!(settled, series(&[(1, 9.0), (2, 2.0), (3, 3.0)]));
+        let mut ordered = series(&[(1, 1.0), (3, 3.0), (2, 2.0), (3, 3.0), (1, 9.0)]);
+        let disorder = ordered.put_in_order();
+        assert_eq!(ordered, series(&[(1, 9.0), (2, 2.0), (3, 3.0)]));
         assert_eq!((disorder.repeated, disorder.corrected), (1, 1));
         assert_eq!(disorder.out_of_order, 2);
     }
 
     #[test]
     fn a_value_corrected_and_corrected_back_counts_twice() {
-        let mut settled = series(&[(1, 1.0), (1, 2.0), (1, 1.0)]);
-        assert_eq!(settled.settle().corrected, 2);
-        assert_eq!(settled, series(&[(1, 1.0)]));
+        let mut ordered = series(&[(1, 1.0), (1, 2.0), (1, 1.0)]);
+        assert_eq!(ordered.put_in_order().corrected, 2);
+        assert_eq!(ordered, series(&[(1, 1.0)]));
     }
 }

@@ -19,7 +19,7 @@ pub enum Regime {
     UnstableDecelerating,
     /// Slows down to a constant velocity (kappa < 0, r < 0).
     StableDecelerating,
-    /// The readings cannot tell.
+    /// The readings do not decide.
     Undetermined,
 }
 

@@ -1,12 +1,12 @@
-//! The daemon's work loop: takes what comes, lets time go by, obeys people, goes by another config when told.
+//! The daemon's work loop: takes what comes, lets time go by, carries out people's orders, takes up another config on request.
 
 use super::clock::Stopwatch;
 use super::deliver::{Dispatcher, Retry};
 use super::delivered::Delivered;
 use super::log;
 use super::mqtt;
+use super::progress::Progress;
 use super::pulse::Pulse;
-use super::run::Progress;
 use super::sandbox::{self, OURSELVES};
 use super::shutdown::Shutdown;
 use super::site::Site;
@@ -25,7 +25,7 @@ use tokio::sync::watch;
 
 /// How long the hooks may take to finish when the daemon stops, and those of a former config.
 pub(super) const DRAIN_LIMIT: Duration = Duration::from_secs(20);
-/// An alert that people are to be told of at once waits no longer than this for others.
+/// An alert that people are to be notified of at once waits no longer than this for others.
 const URGENT: Duration = Duration::from_secs(2);
 /// How often time is let pass when nothing arrives.
 const TICK: Duration = Duration::from_secs(1);
@@ -365,7 +365,7 @@ impl Daemon {
         Ok(())
     }
 
-    /// Waits for the hooks to finish. Were others told of the same meanwhile, people would be told twice.
+    /// Waits for the hooks to finish. Were others notified of the same meanwhile, people would be notified twice.
     async fn close_hooks(&mut self) {
         let Some(former) = self.site.unhook() else {
             return;

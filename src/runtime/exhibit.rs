@@ -2,7 +2,7 @@
 
 use super::clock;
 use super::hook::Status;
-use super::replay::{Pace, arrivals, wait};
+use super::replay::{ReplayPace, arrivals, wait};
 use super::serve::{Behind, Door, ListenError, Server};
 use super::shutdown::Shutdown;
 use super::site::{Sinks, Site};
@@ -26,7 +26,7 @@ pub struct Exhibit<'a> {
     /// How the monitor judges it.
     pub settings: Settings,
     /// How fast data time goes by.
-    pub pace: Pace,
+    pub pace: ReplayPace,
     /// What the page says of the site.
     pub facts: Facts,
     /// Where the page is.

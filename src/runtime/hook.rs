@@ -1,6 +1,6 @@
 //! Runs one hook once: cleaned environment, alert on stdin, own process group, killed at its timeout.
 
-use super::{sandbox, webhook};
+use super::sandbox;
 use crate::alert::Level;
 use crate::config::HookConfig;
 use crate::monitor::{AlertState, CLOCK_FAULT, Event, EventKind};
@@ -30,7 +30,7 @@ const OUTPUT_GRACE: Duration = Duration::from_millis(200);
 /// After the kill: how long the kernel may take to report the end.
 const KILL_GRACE: Duration = Duration::from_secs(5);
 
-/// The rule of an alert that tells of many benchmarks at once.
+/// The rule of an alert that reports many benchmarks at once.
 pub(super) const FLOOD: &str = "flood";
 
 /// Whether a message means what it says; CAP 1.2's words.
@@ -107,7 +107,7 @@ impl Alert {
         }
     }
 
-    /// Whether it tells of many benchmarks at once, each of which it stands for.
+    /// Whether it reports many benchmarks at once, each of which it stands for.
     pub fn is_flood(&self) -> bool {
         matches!(&self.event.kind, EventKind::Alert { rule, .. } if rule == FLOOD)
     }
@@ -137,7 +137,7 @@ impl Alert {
         ]
     }
 
-    fn body(&self, attempt: u32) -> Result<Vec<u8>, serde_json::Error> {
+    pub(super) fn body(&self, attempt: u32) -> Result<Vec<u8>, serde_json::Error> {
         #[derive(Serialize)]
         struct Body<'a> {
             #[serde(flatten)]
@@ -186,26 +186,8 @@ pub enum Outcome {
     NotStarted(String),
 }
 
-/// Runs `hook` for `alert`, or sends it where it is a webhook; `attempt` counts from 1.
-pub async fn run(hook: &HookConfig, alert: &Alert, attempt: u32) -> Outcome {
-    let Some(to) = &hook.webhook else {
-        return run_program(hook, alert, attempt).await;
-    };
-    let outcome = match alert.body(attempt) {
-        Ok(body) => webhook::send(to, alert, (body, hook.timeout)).await,
-        Err(error) => Outcome::NotStarted(error.to_string()),
-    };
-    tracing::info!(
-        webhook = to.name,
-        key = alert.key,
-        attempt,
-        ?outcome,
-        "webhook ended"
-    );
-    outcome
-}
-
-async fn run_program(hook: &HookConfig, alert: &Alert, attempt: u32) -> Outcome {
+/// Runs the program of `hook` for `alert`; `attempt` counts from 1.
+pub(super) async fn run_program(hook: &HookConfig, alert: &Alert, attempt: u32) -> Outcome {
     let run = run_name();
     let mut child = match start(hook, alert, (attempt, &run)) {
         Ok(child) => child,

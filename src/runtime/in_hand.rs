@@ -6,14 +6,14 @@ use crate::monitor::AlertState;
 use crate::reading::BenchmarkId;
 use std::collections::BTreeMap;
 
-/// What tells an alert from every other: its key, its level and its state.
+/// What distinguishes an alert from every other: its key, its level and its state.
 type Token = (String, Level, &'static str);
 
 #[derive(Debug)]
 struct Entry {
     benchmark: Option<BenchmarkId>,
     state: AlertState,
-    /// No other alert tells what it tells.
+    /// No other alert reports what it reports.
     stands_alone: bool,
     /// A hook's run for it has begun.
     is_tried: bool,
@@ -50,7 +50,7 @@ impl InHand {
         }
     }
 
-    /// Whether `alert` is the end of an `unknown` that has not been told: neither of them is then.
+    /// Whether `alert` is the end of an `unknown` that has not been reported: neither of them is then.
     pub(super) fn cancels(&mut self, alert: &Alert) -> bool {
         if alert.level != Level::Unknown || alert.state != AlertState::Resolved || alert.is_flood()
         {

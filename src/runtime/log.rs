@@ -18,7 +18,7 @@ const LAST_LINES: Duration = Duration::from_secs(1);
 /// Lines that were not written.
 static LOST: AtomicU64 = AtomicU64::new(0);
 /// The way to the thread that writes.
-static WRITER: OnceLock<SyncSender<Piece>> = OnceLock::new();
+static WRITER: OnceLock<SyncSender<LogPiece>> = OnceLock::new();
 
 /// How a line of the log looks.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -32,8 +32,8 @@ pub enum LogFormat {
 
 /// What is handed to the thread.
 #[derive(Debug)]
-enum Piece {
-    Line(Vec<u8>),
+enum LogPiece {
+    LogLine(Vec<u8>),
     /// To be answered when all before it has been written.
     Flush(SyncSender<()>),
 }
@@ -42,7 +42,7 @@ enum Piece {
 pub fn init(format: LogFormat) {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info"));
     let builder = tracing_subscriber::fmt()
-        .with_writer(|| Line)
+        .with_writer(|| LogLine)
         .with_env_filter(filter)
         // It would say on stderr that stderr cannot be written to, and end the process where that fails.
         .log_internal_errors(false)
@@ -63,7 +63,7 @@ pub fn lost() -> u64 {
 pub fn finish() {
     let Some(writer) = WRITER.get() else { return };
     let (done, wait) = sync_channel(1);
-    if writer.try_send(Piece::Flush(done)).is_ok() {
+    if writer.try_send(LogPiece::Flush(done)).is_ok() {
         // Whether in time or not, the process ends.
         let _: Result<(), RecvTimeoutError> = wait.recv_timeout(LAST_LINES);
     }
@@ -71,12 +71,12 @@ pub fn finish() {
 
 /// One line on its way.
 #[derive(Debug)]
-struct Line;
+struct LogLine;
 
-impl Write for Line {
+impl Write for LogLine {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let writer = WRITER.get_or_init(start);
-        match writer.try_send(Piece::Line(plain(bytes))) {
+        match writer.try_send(LogPiece::LogLine(plain(bytes))) {
             Ok(()) => {}
             Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => {
                 LOST.fetch_add(1, Ordering::Relaxed);
@@ -112,7 +112,7 @@ fn plain(bytes: &[u8]) -> Vec<u8> {
 }
 
 /// The thread that writes. It is not joined: where stderr stands still it never ends, and the process must.
-fn start() -> SyncSender<Piece> {
+fn start() -> SyncSender<LogPiece> {
     let (writer, pieces) = sync_channel(WAITING);
     // Without a thread every line is lost, and counted.
     let _ = std::thread::Builder::new()
@@ -121,17 +121,17 @@ fn start() -> SyncSender<Piece> {
     writer
 }
 
-fn write(pieces: &Receiver<Piece>) {
-    let mut told = 0;
+fn write(pieces: &Receiver<LogPiece>) {
+    let mut reported = 0;
     while let Ok(piece) = pieces.recv() {
         match piece {
-            Piece::Line(line) => {
-                say_what_is_lost(&mut told);
+            LogPiece::LogLine(line) => {
+                report_lost_lines(&mut reported);
                 if io::stderr().write_all(&line).is_err() {
                     LOST.fetch_add(1, Ordering::Relaxed);
                 }
             }
-            Piece::Flush(done) => {
+            LogPiece::Flush(done) => {
                 // Whoever waited may have gone.
                 let _ = done.try_send(());
             }
@@ -140,11 +140,17 @@ fn write(pieces: &Receiver<Piece>) {
 }
 
 /// Says in the log how many lines are missing from it, once for each number.
-fn say_what_is_lost(told: &mut u64) {
+fn report_lost_lines(reported: &mut u64) {
     let lost = lost();
-    if lost > *told && writeln!(io::stderr(), "{} lines of this log are lost", lost - *told).is_ok()
+    if lost > *reported
+        && writeln!(
+            io::stderr(),
+            "{} lines of this log are lost",
+            lost - *reported
+        )
+        .is_ok()
     {
-        *told = lost;
+        *reported = lost;
     }
 }
 

@@ -13,6 +13,7 @@ pub mod ingest;
 pub mod log;
 pub mod mqtt;
 pub mod preview;
+pub mod progress;
 pub mod pulse;
 pub mod replay;
 pub mod run;

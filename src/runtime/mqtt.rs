@@ -26,7 +26,7 @@ const LONGEST_PACKET: usize = 268_435_455 + 5;
 const LONGEST_SENT: usize = 1 << 20;
 /// Requests that may wait for the connection.
 const REQUESTS: usize = 64;
-/// How often we tell the broker that we live.
+/// How often we ping the broker.
 const KEEP_ALIVE: Duration = Duration::from_secs(30);
 /// First and longest wait before connecting again.
 const RECONNECT: (Duration, Duration) = (Duration::from_secs(1), Duration::from_secs(60));

@@ -28,7 +28,7 @@ pub struct Pulse {
 }
 
 impl Pulse {
-    /// Starts to listen, where the site does, and tells the service manager that we are up.
+    /// Starts to listen, where the site does, and notifies the service manager that we are up.
     ///
     /// # Errors
     /// [`PulseError`].

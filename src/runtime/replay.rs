@@ -21,7 +21,7 @@ const DRAIN_LIMIT: Duration = Duration::from_secs(600);
 
 /// How fast data time goes by.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Pace {
+pub enum ReplayPace {
     /// As fast as the monitor works.
     Max,
     /// So many seconds of data a second, a finite number above zero.
@@ -30,7 +30,7 @@ pub enum Pace {
 
 /// What a replay is to do.
 #[derive(Debug, Clone, Copy)]
-pub struct Plan<'a> {
+pub struct ReplayPlan<'a> {
     /// What hooks call the site.
     pub site: &'a str,
     /// The monitor's.
@@ -38,7 +38,7 @@ pub struct Plan<'a> {
     /// The hooks to run, as an exercise.
     pub hooks: &'a [HookConfig],
     /// How fast.
-    pub pace: Pace,
+    pub pace: ReplayPace,
     /// Where in data time to stop; the end of the recording if that comes first.
     pub until: Option<Timestamp>,
 }
@@ -104,7 +104,7 @@ pub fn arrivals(recording: &Recording) -> Vec<Arrival> {
 /// [`ReplayError`].
 pub async fn replay(
     recording: &Recording,
-    plan: &Plan<'_>,
+    plan: &ReplayPlan<'_>,
     mut shutdown: Shutdown,
     each: &mut (dyn FnMut(&Event) -> io::Result<()> + '_),
 ) -> Result<Counts, ReplayError> {
@@ -129,14 +129,14 @@ pub async fn replay(
         if shutdown.is_requested() {
             return Err(ReplayError::Interrupted);
         }
-        told(&site.take(arrival, arrival.time)?, each)?;
+        report_each(&site.take(arrival, arrival.time)?, each)?;
         site.commit(arrival.time)?;
     }
-    told(&site.pass(end), each)?;
+    report_each(&site.pass(end), each)?;
     site.commit(end)?;
     let (summary, counts) = (site.summary(), site.counts());
     let lost = site.close(end, DRAIN_LIMIT).await?;
-    told(summary.as_slice(), each)?;
+    report_each(summary.as_slice(), each)?;
     match lost {
         Some(0) => Ok(counts),
         Some(_) | None => Err(ReplayError::Undelivered),
@@ -167,15 +167,15 @@ pub fn replay_state(
             if shutdown.is_requested() {
                 return Err(ReplayError::Interrupted);
             }
-            told(&monitor.step(row.now, &row.input), each)?;
+            report_each(&monitor.step(row.now, &row.input), each)?;
             // Their findings are among the steps.
             monitor.searches();
         }
     }
-    told(monitor.summary().as_slice(), each)
+    report_each(monitor.summary().as_slice(), each)
 }
 
-fn told(
+fn report_each(
     events: &[Event],
     each: &mut (dyn FnMut(&Event) -> io::Result<()> + '_),
 ) -> Result<(), ReplayError> {
@@ -193,8 +193,8 @@ fn sinks(hooks: &[HookConfig]) -> Sinks {
 }
 
 /// How long after the start `time` is due; `None` for at once.
-pub(super) fn wait(pace: Pace, first: Timestamp, time: Timestamp) -> Option<Duration> {
-    let Pace::Times(times) = pace else {
+pub(super) fn wait(pace: ReplayPace, first: Timestamp, time: Timestamp) -> Option<Duration> {
+    let ReplayPace::Times(times) = pace else {
         return None;
     };
     let seconds = time.duration_since(first).as_secs_f64() / times;
@@ -256,10 +256,10 @@ mod tests {
 
     #[test]
     fn the_pace_divides_data_time() {
-        assert_eq!(wait(Pace::Max, at(0), at(100)), None);
-        let tenth = wait(Pace::Times(10.0), at(0), at(100));
+        assert_eq!(wait(ReplayPace::Max, at(0), at(100)), None);
+        let tenth = wait(ReplayPace::Times(10.0), at(0), at(100));
         assert_eq!(tenth, Some(Duration::from_secs(10)));
-        let slowest = wait(Pace::Times(1e-300), at(0), at(100));
+        let slowest = wait(ReplayPace::Times(1e-300), at(0), at(100));
         assert_eq!(slowest, Some(LONGEST_WAIT));
     }
 }

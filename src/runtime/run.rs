@@ -3,6 +3,7 @@
 use super::clock;
 use super::daemon::{DRAIN_LIMIT, Daemon, dispatcher};
 use super::hook::Status;
+use super::progress::Progress;
 use super::pulse::{Pulse, PulseError};
 use super::serve::Behind;
 use super::shutdown::{self, Shutdown};
@@ -14,15 +15,6 @@ use crate::store::{Store, StoreError};
 use std::path::PathBuf;
 use std::sync::Arc;
 use tokio::sync::watch;
-
-/// How far the daemon has come.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Progress {
-    /// What has been counted.
-    pub counts: Counts,
-    /// Whether the past has been read.
-    pub is_caught_up: bool,
-}
 
 /// Why the daemon ended other than by being asked to.
 #[derive(Debug, thiserror::Error)]

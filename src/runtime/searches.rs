@@ -58,7 +58,7 @@ impl Searches {
     pub(super) fn start(&mut self, job: SearchJob) {
         let (sender, answer) = channel();
         let queue = self.queue.get_or_insert_with(workers);
-        // With no thread to take it, the answer is in vain.
+        // With no thread to take it, the answer goes nowhere.
         let _ = queue.send((job.clone(), sender));
         self.asked
             .insert(job.benchmark.clone(), Asked { job, answer });
@@ -72,7 +72,7 @@ impl Searches {
         }
         let finding = match asked.answer.try_recv() {
             Ok(finding) => finding,
-            Err(TryRecvError::Disconnected) => asked.job.in_vain(),
+            Err(TryRecvError::Disconnected) => asked.job.broken_off(),
             Err(TryRecvError::Empty) => return None,
         };
         self.asked.remove(benchmark);
@@ -85,7 +85,7 @@ impl Searches {
             return None;
         }
         let Asked { job, answer } = self.asked.remove(benchmark)?;
-        Some(answer.recv().unwrap_or_else(|_| job.in_vain()))
+        Some(answer.recv().unwrap_or_else(|_| job.broken_off()))
     }
 }
 

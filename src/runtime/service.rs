@@ -1,4 +1,4 @@
-//! What the service manager is told: readiness, status, and that the work loop still turns.
+//! What the service manager is notified of: readiness, status, and that the work loop still turns.
 
 use super::clock::Stopwatch;
 use sd_notify::NotifyState;
@@ -7,7 +7,7 @@ use std::time::Duration;
 /// The service manager, where one has started us; otherwise every call does nothing.
 #[derive(Debug)]
 pub struct Service {
-    /// How often it wants to hear of us at least.
+    /// How often it expects a sign of life at least.
     watchdog: Option<Duration>,
     last_beat: Option<Stopwatch>,
 }
@@ -22,27 +22,27 @@ impl Service {
     }
 
     /// The daemon is at work. Said at once, not only when the past has been read: that may take
-    /// longer than a start may, and `/readyz` tells the two apart.
+    /// longer than a start may, and `/readyz` distinguishes the two.
     pub fn ready(&self, status: &str) {
-        tell(&[NotifyState::Ready, NotifyState::Status(status)]);
+        notify(&[NotifyState::Ready, NotifyState::Status(status)]);
     }
 
     /// One line for `systemctl status`.
     pub fn status(&self, status: &str) {
-        tell(&[NotifyState::Status(status)]);
+        notify(&[NotifyState::Status(status)]);
     }
 
     /// The config is being read again; [`Service::ready`] ends it.
     pub fn reloading(&self) {
         match NotifyState::monotonic_usec_now() {
-            Ok(now) => tell(&[NotifyState::Reloading, now]),
-            Err(_) => tell(&[NotifyState::Reloading]),
+            Ok(now) => notify(&[NotifyState::Reloading, now]),
+            Err(_) => notify(&[NotifyState::Reloading]),
         }
     }
 
     /// The daemon is on its way out.
     pub fn stopping(&self) {
-        tell(&[NotifyState::Stopping, NotifyState::Status("stopping")]);
+        notify(&[NotifyState::Stopping, NotifyState::Status("stopping")]);
     }
 
     /// The work loop has turned. Only the work loop calls this: a task of its own would go on
@@ -53,14 +53,14 @@ impl Service {
         };
         let is_due = |last: Stopwatch| last.elapsed() >= watchdog / 4;
         if self.last_beat.is_none_or(is_due) {
-            tell(&[NotifyState::Watchdog]);
+            notify(&[NotifyState::Watchdog]);
             self.last_beat = Some(Stopwatch::start());
         }
     }
 }
 
-fn tell(state: &[NotifyState<'_>]) {
+fn notify(state: &[NotifyState<'_>]) {
     if let Err(error) = sd_notify::notify(state) {
-        tracing::warn!(%error, ?state, "the service manager cannot be told");
+        tracing::warn!(%error, ?state, "the service manager cannot be notified");
     }
 }

@@ -1,4 +1,4 @@
-//! The wish to stop, handed down as an argument.
+//! The request to stop, handed down as an argument.
 
 use nix::sys::signal::Signal;
 use tokio::signal::unix::{SignalKind, signal};
@@ -8,11 +8,11 @@ use tokio::sync::watch;
 #[derive(Debug)]
 pub struct Trigger(watch::Sender<bool>);
 
-/// Whoever holds this learns of the wish.
+/// Whoever holds this learns of the request.
 #[derive(Debug, Clone)]
 pub struct Shutdown(watch::Receiver<bool>);
 
-/// A wish not yet made, and its two ends.
+/// A request not yet made, and its two ends.
 pub fn pair() -> (Trigger, Shutdown) {
     let (sender, receiver) = watch::channel(false);
     (Trigger(sender), Shutdown(receiver))
@@ -37,7 +37,7 @@ impl Shutdown {
         *self.0.borrow() || self.0.has_changed().is_err()
     }
 
-    /// The wish that SIGTERM and SIGINT make; needs a tokio runtime.
+    /// The request that SIGTERM and SIGINT make; needs a tokio runtime.
     ///
     /// # Errors
     /// When the signals cannot be listened for.

@@ -82,7 +82,7 @@ impl Sources {
         self.unacknowledged.len() < MESSAGES
     }
 
-    /// Everything that was taken is durable: tells the brokers.
+    /// Everything that was taken is durable: acknowledges to the brokers.
     pub(super) fn acknowledge(&mut self) {
         if self.unacknowledged.is_empty() {
             return;

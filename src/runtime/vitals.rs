@@ -48,7 +48,7 @@ pub struct Health {
     pub held: u64,
     /// Lines of the log that could not be written.
     pub log_lines_lost: u64,
-    /// Alerts that people asked not to be told.
+    /// Alerts that people asked not to be notified of.
     pub silences: Vec<Mute>,
     /// Lines, records and files that could not be used, a source.
     pub quarantined: BTreeMap<String, u64>,
@@ -70,12 +70,12 @@ pub struct Health {
 
 /// One benchmark.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Point {
+pub struct VitalsPoint {
     /// When its newest reading was measured.
     pub newest: Option<Timestamp>,
     /// The level in force.
     pub level: Level,
-    /// Whether the monitor cannot tell: beside the level, never instead of it.
+    /// Whether the monitor cannot decide: beside the level, never instead of it.
     pub is_unknown: bool,
     /// How long the last reading that led to a refit took to be worked in, seconds.
     pub refit_seconds: Option<f64>,
@@ -85,7 +85,7 @@ pub struct Point {
     pub velocity_mm_per_day: Option<f64>,
 }
 
-impl Default for Point {
+impl Default for VitalsPoint {
     fn default() -> Self {
         Self {
             newest: None,
@@ -98,7 +98,7 @@ impl Default for Point {
     }
 }
 
-impl Point {
+impl VitalsPoint {
     fn note(&mut self, kind: &EventKind) {
         match kind {
             EventKind::Refit {
@@ -144,7 +144,7 @@ pub struct Vitals {
     health: Mutex<Health>,
     /// Runs since the oldest value that is not durable yet was found.
     oldest: Mutex<Option<Stopwatch>>,
-    points: Mutex<BTreeMap<BenchmarkId, Point>>,
+    points: Mutex<BTreeMap<BenchmarkId, VitalsPoint>>,
     refits: Histogram,
 }
 
@@ -248,7 +248,7 @@ impl Vitals {
     }
 
     /// The first [`MOST_SHOWN`] benchmarks by name.
-    pub fn points(&self) -> BTreeMap<BenchmarkId, Point> {
+    pub fn points(&self) -> BTreeMap<BenchmarkId, VitalsPoint> {
         let points = locked(&self.points);
         let shown = points.iter().take(MOST_SHOWN);
         shown
@@ -267,7 +267,7 @@ impl Vitals {
             Level::Unknown,
         ]
         .map(|level| {
-            let stands = |point: &&Point| match level {
+            let stands = |point: &&VitalsPoint| match level {
                 Level::Unknown => point.is_unknown,
                 Level::Green | Level::Yellow | Level::Orange | Level::Red => point.level == level,
             };
@@ -281,7 +281,7 @@ impl Vitals {
     }
 }
 
-fn note_all(points: &mut BTreeMap<BenchmarkId, Point>, events: &[Event]) {
+fn note_all(points: &mut BTreeMap<BenchmarkId, VitalsPoint>, events: &[Event]) {
     for event in events {
         if let Some(benchmark) = &event.benchmark {
             points

@@ -19,7 +19,7 @@ use tokio::net::TcpStream;
 /// Who calls.
 const AGENT: &str = concat!("slipwatch/", env!("CARGO_PKG_VERSION"));
 
-/// What tells a message from every other, the same at each attempt: one key fires and is resolved. It may hold no full
+/// What distinguishes a message from every other, the same at each attempt: one key fires and is resolved. It may hold no full
 /// stop, which parts what is signed, and nothing that a header does not take.
 fn id(alert: &Alert) -> String {
     let plain = format!("{}/{}/{}", alert.key, alert.level, state_name(alert.state));

@@ -51,7 +51,7 @@ pub struct Card {
     /// Leads of a failure, longest first.
     pub leads: Vec<Lead>,
     /// Looks at a slope that stood, in order of time.
-    pub looks: Vec<Look>,
+    pub looks: Vec<Evaluation>,
 }
 
 /// At one lead.
@@ -69,7 +69,7 @@ pub struct Lead {
 
 /// At one look at a slope that stood.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Look {
+pub struct Evaluation {
     /// The latest measured-at time that any forecast here used.
     pub known_until: Timestamp,
     /// From there to the end of the record, days.
@@ -120,7 +120,7 @@ impl History {
     }
 }
 
-/// The scorecard of a history that began at `epoch`; `progress` is told after each look how many are done, of how
+/// The scorecard of a history that began at `epoch`; `progress` is called after each look with how many are done, of how
 /// many.
 pub fn card(
     history: &History,
@@ -152,7 +152,7 @@ pub fn card(
             Truth::Stood => {
                 let last = history.observations.values.last();
                 let stood_days = last.map_or(0.0, |last| last.t_days - known.now_days);
-                card.looks.push(Look {
+                card.looks.push(Evaluation {
                     known_until: at,
                     stood_days,
                     scores: scores(&known, at, Outcome::Stood(stood_days)),

@@ -7,7 +7,7 @@ mod measure;
 mod method;
 mod rivals;
 
-pub use card::{Card, LEADS_DAYS, Lead, Look, Score, Truth, card};
+pub use card::{Card, Evaluation, LEADS_DAYS, Lead, Score, Truth, card};
 pub use compare::{Interval, Sum, mean, ratio};
 pub use known::{History, Known};
 pub use measure::{

@@ -14,7 +14,8 @@ use slipwatch::reading::{BenchmarkId, Reading, Unit};
 use slipwatch::runtime::deliver::{Dispatcher, Retry};
 use slipwatch::runtime::delivered::Delivered;
 use slipwatch::runtime::hook::Status;
-use slipwatch::runtime::run::{Progress, RunError, run};
+use slipwatch::runtime::progress::Progress;
+use slipwatch::runtime::run::{RunError, run};
 use slipwatch::runtime::shutdown::{self, Shutdown};
 use slipwatch::runtime::site::{Counts, Sinks, Site};
 use slipwatch::runtime::tail::Arrival;
@@ -245,7 +246,7 @@ async fn the_end_of_what_was_told_is_told_however_late_it_comes_and_after_a_rest
     second.handle(&alert(noon() + hours(1), Level::Red, AlertState::Firing));
     let end = noon() + hours(2);
     second.handle(&alert(end, Level::Red, AlertState::Resolved));
-    // Of these nobody has heard.
+    // Of these nobody has been notified.
     second.handle(&alert(noon() + hours(3), Level::Red, AlertState::Firing));
     second.handle(&alert(noon() + hours(4), Level::Red, AlertState::Resolved));
     second.commit(wall).unwrap();

@@ -11,9 +11,9 @@ use slipwatch::alert::Level;
 use slipwatch::config::HookConfig;
 use slipwatch::monitor::{AlertState, Event, EventKind};
 use slipwatch::reading::BenchmarkId;
-use slipwatch::runtime::deliver::{Dispatcher, Retry};
+use slipwatch::runtime::deliver::{self, Dispatcher, Retry};
 use slipwatch::runtime::delivered::Delivered;
-use slipwatch::runtime::hook::{self, Alert, Outcome, Status};
+use slipwatch::runtime::hook::{Alert, Outcome, Status};
 use slipwatch::store::{Fate, Store};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -72,7 +72,7 @@ fn is_running(pid: &str) -> bool {
 }
 
 async fn run(hook_config: &HookConfig, alert: &Alert) -> Outcome {
-    tokio::time::timeout(LIMIT, hook::run(hook_config, alert, 1))
+    tokio::time::timeout(LIMIT, deliver::run(hook_config, alert, 1))
         .await
         .expect("the hook's run never ended")
 }

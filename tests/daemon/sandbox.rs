@@ -4,7 +4,8 @@ use slipwatch::alert::Level;
 use slipwatch::config::HookConfig;
 use slipwatch::monitor::{AlertState, Event, EventKind};
 use slipwatch::reading::BenchmarkId;
-use slipwatch::runtime::hook::{self, Alert, Outcome, Status};
+use slipwatch::runtime::deliver;
+use slipwatch::runtime::hook::{Alert, Outcome, Status};
 use slipwatch::runtime::sandbox::{self, Walls};
 use std::collections::BTreeSet;
 use std::fs;
@@ -78,7 +79,7 @@ async fn a_hook_writes_where_it_may_and_nowhere_else() {
     fs::write(at.join("own/hook.sh"), script).unwrap();
     let mut hook = walled(&at.join("own"), &["/bin/sh", "hook.sh"]);
     hook.writable = vec![at.join("allowed"), at.join("not-there")];
-    assert_eq!(hook::run(&hook, &alert(), 1).await, Outcome::Done);
+    assert_eq!(deliver::run(&hook, &alert(), 1).await, Outcome::Done);
     let read = |name: &str| fs::read_to_string(at.join(name)).unwrap_or_default();
     assert_eq!(read("own/done"), "", "written elsewhere");
     assert_eq!(read("own/there"), "after\n");
@@ -101,7 +102,7 @@ async fn walls_change_neither_the_arguments_nor_the_environment_nor_stdin() {
         if !launcher {
             hook.launcher = None;
         }
-        outcomes.push(hook::run(&hook, &alert(), 1).await);
+        outcomes.push(deliver::run(&hook, &alert(), 1).await);
         let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
         assert_eq!(read("args"), "--writable|--|a b|$(touch no)||");
         assert!(read("env").contains("SLIPWATCH_KEY=5/red/1"));
@@ -117,10 +118,13 @@ async fn walls_change_neither_the_arguments_nor_the_environment_nor_stdin() {
 async fn a_hook_within_walls_that_is_missing_fails_and_one_that_hangs_is_killed() {
     let folder = folder();
     let missing = walled(folder.path(), &["./not-there.sh"]);
-    assert_eq!(hook::run(&missing, &alert(), 1).await, Outcome::Failed(126));
+    assert_eq!(
+        deliver::run(&missing, &alert(), 1).await,
+        Outcome::Failed(126)
+    );
     let mut hanging = walled(folder.path(), &["/bin/sh", "-c", "sleep 300 & sleep 300"]);
     hanging.timeout = Duration::from_millis(500);
-    assert_eq!(hook::run(&hanging, &alert(), 1).await, Outcome::TimedOut);
+    assert_eq!(deliver::run(&hanging, &alert(), 1).await, Outcome::TimedOut);
 }
 
 #[tokio::test]
@@ -140,7 +144,7 @@ async fn a_hook_of_a_config_under_a_relative_path_is_found() {
         if !launcher {
             hook.launcher = None;
         }
-        assert_eq!(hook::run(&hook, &alert(), 1).await, Outcome::Done);
+        assert_eq!(deliver::run(&hook, &alert(), 1).await, Outcome::Done);
         fs::remove_file(folder.path().join("ran")).unwrap();
     }
 }

@@ -5,9 +5,9 @@ use slipwatch::alert::Level;
 use slipwatch::config::{self, HookConfig};
 use slipwatch::monitor::{AlertState, Event, EventKind};
 use slipwatch::reading::BenchmarkId;
-use slipwatch::runtime::deliver::{Dispatcher, Retry};
+use slipwatch::runtime::deliver::{self, Dispatcher, Retry};
 use slipwatch::runtime::delivered::Delivered;
-use slipwatch::runtime::hook::{self, Alert, Outcome, Status};
+use slipwatch::runtime::hook::{Alert, Outcome, Status};
 use slipwatch::store::{Fate, Store};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{BufRead, BufReader, Read, Write};
@@ -161,7 +161,7 @@ async fn a_webhook_gets_what_a_hook_gets_on_stdin_under_a_signature() {
     let receiver = Receiver::answering(&[204]);
     let hooks = webhooks(folder.path(), &webhook(&receiver.url, ""));
     let alert = alert("m\u{fc}hle", "m\u{fc}hle/red/1.5");
-    assert_eq!(hook::run(&hooks[0], &alert, 3).await, Outcome::Done);
+    assert_eq!(deliver::run(&hooks[0], &alert, 3).await, Outcome::Done);
     let got = receiver.got().remove(0);
     assert_eq!(got.line, "POST /alerts?x=1 HTTP/1.1");
     assert_eq!(got.headers["content-type"], "application/json");
@@ -255,14 +255,14 @@ async fn a_webhook_ends_at_its_timeout_and_says_why_it_cannot_be_sent() {
     ];
     let hooks = webhooks(folder.path(), &tables.concat());
     let alert = alert("5", "k");
-    assert_eq!(hook::run(&hooks[0], &alert, 1).await, Outcome::TimedOut);
-    let refused = hook::run(&hooks[1], &alert, 1).await;
+    assert_eq!(deliver::run(&hooks[0], &alert, 1).await, Outcome::TimedOut);
+    let refused = deliver::run(&hooks[1], &alert, 1).await;
     assert!(
         matches!(&refused, Outcome::NotStarted(why) if why.contains("refused")),
         "{refused:?}"
     );
     std::fs::write(folder.path().join("secret"), "guess me").unwrap();
-    let unsigned = hook::run(&hooks[0], &alert, 1).await;
+    let unsigned = deliver::run(&hooks[0], &alert, 1).await;
     assert!(
         matches!(&unsigned, Outcome::NotStarted(why) if why.contains("whsec_")),
         "{unsigned:?}"

@@ -104,12 +104,12 @@ fn a_ratio_that_drifts_all_the_time_is_no_partition() {
 fn a_partition_is_the_verdict_on_all_and_a_candidate_for_each() {
     let made = slope(Fate::Parted, 9, false);
     let all: Vec<&Series> = made.series.iter().collect();
-    let mut heard = 0.0;
-    let together = explain_together(&all, &[], &options(), &mut |share| heard = share);
+    let mut current = 0.0;
+    let together = explain_together(&all, &[], &options(), &mut |share| current = share);
     assert_eq!(together.verdict.effect, Kind::Partition);
     assert_ne!(together.explained, Explained::None);
     assert_eq!(together.each.len(), all.len());
-    assert!((heard - 1.0).abs() < 1e-12);
+    assert!((current - 1.0).abs() < 1e-12);
     let json = serde_json::to_value(&together).unwrap();
     assert_eq!(json["verdict"]["effect"], "partition");
     assert!(json["benchmark"].as_str().unwrap().starts_with("b0, b1"));

@@ -273,7 +273,7 @@ fn a_wrong_kind_is_left_open_where_the_right_one_could_not_be_separated() {
     assert_eq!(closed.grade, Grade::Wrong);
     assert!(!closed.exactly());
     assert_eq!(closed.called, Kind::StateReset);
-    said.cannot_separate_from = vec!["load-step".to_owned()];
+    said.cannot_separate_from = vec![Kind::LoadStep.into()];
     assert_eq!(score(family, &one, &said).grade, Grade::LeftOpen);
 }
 

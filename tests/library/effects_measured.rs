@@ -81,10 +81,10 @@ fn the_lake_drives(benchmark: &str, fit: f64, held_out: f64) {
     assert!(lake.p_value.unwrap() < 0.01);
     // No decoy after it, nor the same lake a second time.
     assert!(said.also.iter().all(|effect| effect.channel.is_none()));
-    let (fitted, foretold) = (&said.error.fit, &said.error.held_out);
+    let (fitted, predicted) = (&said.error.fit, &said.error.held_out);
     assert!(fitted.after.unwrap() < fit, "{fitted:?}");
-    assert!(foretold.after.unwrap() < held_out, "{foretold:?}");
-    assert!(foretold.after.unwrap() < 0.75 * foretold.before.unwrap());
+    assert!(predicted.after.unwrap() < held_out, "{predicted:?}");
+    assert!(predicted.after.unwrap() < 0.75 * predicted.before.unwrap());
 }
 
 /// Asked for were 3.3 and 11.3 mm: the held-out 12.7 mm falls short.

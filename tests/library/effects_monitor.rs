@@ -10,7 +10,7 @@
 use crate::loaded::{DELAY, Measured, RESERVOIR, Slope, flood, restless, start};
 use jiff::SignedDuration;
 use slipwatch::alert::{Level, Policy};
-use slipwatch::effects::{Effect, Explained, Filtered, Form, Fuller, Kind, Part};
+use slipwatch::effects::{Effect, Explained, Filtered, Form, Kind, KnownLoad, Part};
 use slipwatch::monitor::{
     AlertState, Event, EventKind, Explain, Finding, Input, Monitor, Settings, Unexplained,
 };
@@ -36,7 +36,7 @@ fn found(slope: Slope) -> Finding {
         effects: vec![effect],
         explained: Explained::Full,
         cannot_separate_from: Vec::new(),
-        fuller: Fuller {
+        known_load: KnownLoad {
             parts: vec![Part::Load {
                 filtered,
                 gain: slope.gain,
@@ -109,7 +109,7 @@ fn grave(events: &[Event], first: i64) -> Vec<(i64, Level, AlertState)> {
         .collect()
 }
 
-/// (day, chance within the outlook, whether the fuller law explains the present) by refit.
+/// (day, chance within the outlook, whether the law under the known load explains the present) by refit.
 fn chances(events: &[Event]) -> Vec<(i64, f64, Option<bool>)> {
     let one = |event: &Event| match &event.kind {
         EventKind::Refit {
@@ -295,7 +295,7 @@ fn an_effect_is_told_once_and_its_end_too() {
     assert_eq!(again, [], "known");
     let nothing = Finding {
         effects: Vec::new(),
-        fuller: Fuller::default(),
+        known_load: KnownLoad::default(),
         ..found(STANDS)
     };
     let gone = monitor.step(now, &Input::Found(nothing));
@@ -314,12 +314,12 @@ fn what_another_kind_would_explain_as_well_and_a_step_that_only_the_motion_shows
         fails: None,
     };
     let rivalled = Finding {
-        cannot_separate_from: vec!["seasonal".to_owned()],
+        cannot_separate_from: vec![Kind::Seasonal.into()],
         ..found(STANDS)
     };
     let step = Finding {
         effects: vec![Effect::of(Kind::LoadStep)],
-        fuller: Fuller {
+        known_load: KnownLoad {
             parts: vec![Part::Step {
                 at: wet.readings[40].time,
                 size: 1.0,
@@ -334,9 +334,9 @@ fn what_another_kind_would_explain_as_well_and_a_step_that_only_the_motion_shows
             _ => None,
         });
         assert_eq!(adopted, Some(false));
-        let fuller = chances(&events)
+        let known_load = chances(&events)
             .into_iter()
             .find(|(.., plain)| plain.is_some());
-        assert_eq!(fuller, None);
+        assert_eq!(known_load, None);
     }
 }

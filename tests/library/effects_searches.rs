@@ -14,8 +14,9 @@ use slipwatch::config;
 use slipwatch::effects::{Kind, Options, explain};
 use slipwatch::monitor::{Event, EventKind, Explain, Settings};
 use slipwatch::reading::{BenchmarkId, Channel, Recording, Series, Timestamp, Unit};
-use slipwatch::runtime::replay::{Pace, Plan, replay};
-use slipwatch::runtime::run::{Progress, run};
+use slipwatch::runtime::progress::Progress;
+use slipwatch::runtime::replay::{ReplayPace, ReplayPlan, replay};
+use slipwatch::runtime::run::run;
 use slipwatch::runtime::shutdown;
 use slipwatch::store::Store;
 use std::fmt::Write;
@@ -50,12 +51,12 @@ fn recording(measured: &Measured) -> Recording {
 }
 
 /// The events of a replay, one JSON object each, without the summary.
-async fn said(explain: Explain, pace: Pace, until: Option<Timestamp>) -> Vec<String> {
+async fn said(explain: Explain, pace: ReplayPace, until: Option<Timestamp>) -> Vec<String> {
     let settings = Settings {
         explain,
         ..Settings::default()
     };
-    let plan = Plan {
+    let plan = ReplayPlan {
         site: "Toc",
         settings: &settings,
         hooks: &[],
@@ -79,7 +80,7 @@ async fn said(explain: Explain, pace: Pace, until: Option<Timestamp>) -> Vec<Str
 /// Of a replay with adoption, as fast as it goes: made once for all tests.
 async fn adopted() -> &'static [String] {
     static ONCE: OnceCell<Vec<String>> = OnceCell::const_new();
-    ONCE.get_or_init(|| said(Explain::Adopt, Pace::Max, None))
+    ONCE.get_or_init(|| said(Explain::Adopt, ReplayPace::Max, None))
         .await
 }
 
@@ -161,11 +162,11 @@ async fn a_search_finds_the_reservoir_and_its_answer_comes_at_one_time_of_the_da
     assert_eq!(channel.as_deref(), Some(RESERVOIR));
     assert!(*adopted);
     // A day in 10 ms: the search takes longer than that, and is waited for.
-    let slow = said(Explain::Adopt, Pace::Times(8_640_000.0), None).await;
+    let slow = said(Explain::Adopt, ReplayPace::Times(8_640_000.0), None).await;
     assert!(fast == slow, "the pace changed the events");
     // What comes before the answer does not know of it.
     let until = start() + SignedDuration::from_hours(24 * (*day + 3));
-    let beginning = said(Explain::Adopt, Pace::Max, Some(until)).await;
+    let beginning = said(Explain::Adopt, ReplayPace::Max, Some(until)).await;
     assert!(fast.starts_with(&beginning), "no beginning of the whole");
     assert!(
         beginning.len() < fast.len() && beginning.iter().any(|line| line.contains("is_explained"))
@@ -189,8 +190,8 @@ async fn a_daemon_finds_what_a_replay_finds_though_its_search_holds_nothing_up()
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_search_that_is_switched_off_finds_nothing_and_one_that_only_tells_adopts_nothing() {
-    assert_eq!(found(&said(Explain::Off, Pace::Max, None).await), []);
-    let told = said(Explain::Tell, Pace::Max, None).await;
+    assert_eq!(found(&said(Explain::Off, ReplayPace::Max, None).await), []);
+    let told = said(Explain::Tell, ReplayPace::Max, None).await;
     let found = found(&told);
     assert!(
         !found.is_empty() && found.iter().all(|one| !one.3),
@@ -214,7 +215,7 @@ fn the_load_that_forecasts_use_is_the_one_that_was_fitted() {
         &mut |_| {},
     );
     let channels: Vec<&Channel> = recording.channels.iter().collect();
-    let told = said.fuller.log_load(&channels, &said.curves.times);
+    let told = said.known_load.log_load(&channels, &said.curves.times);
     assert!(!said.curves.log_loads.is_empty());
     for (index, told) in told.into_iter().enumerate() {
         let fitted: f64 = said.curves.log_loads.values().map(|load| load[index]).sum();

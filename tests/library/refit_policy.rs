@@ -70,7 +70,7 @@ fn an_old_record_is_refitted_each_quarter_of_an_hour_of_data_and_a_young_one_at_
         old.windows(2).all(|pair| pair[1] - pair[0] <= 15),
         "{old:?}"
     );
-    // One in 15, and hardly a reading that was not foreseen.
+    // One in 15, and hardly a reading that was not predicted.
     assert!((40..=44).contains(&old.len()), "{}", old.len());
 }
 

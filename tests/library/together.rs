@@ -1,4 +1,4 @@
-//! Benchmarks of one site that fail together share one forecast; those that do not are told apart.
+//! Benchmarks of one site that fail together share one forecast; those that do not are distinguished.
 
 use crate::measured::measured;
 use assert_cmd::Command;

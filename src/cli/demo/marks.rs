@@ -8,12 +8,12 @@ const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█']
 
 /// Marks, and what the lowest and the highest stand for.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Scale {
+pub(super) struct MarkScale {
     pub(super) marks: String,
     span: Option<(f64, f64)>,
 }
 
-impl Scale {
+impl MarkScale {
     /// The largest positive value of each part of the time `from` to `to`, on a logarithmic scale; blank where a part
     /// has none.
     pub(super) fn of(
@@ -103,12 +103,12 @@ mod tests {
     #[test]
     fn marks_rise_with_the_logarithm_and_are_blank_where_nothing_was_measured() {
         let points = vec![(hour(0), 1.0), (hour(1), 10.0), (hour(3), 100.0)];
-        let scale = Scale::of(points, (hour(0), hour(3)), 4);
+        let scale = MarkScale::of(points, (hour(0), hour(3)), 4);
         assert_eq!(
             (scale.marks.as_str(), scale.ends().as_str()),
             ("▁▄ █", "1.0-100")
         );
-        let none = Scale::of(Vec::new(), (hour(0), hour(3)), 4);
+        let none = MarkScale::of(Vec::new(), (hour(0), hour(3)), 4);
         assert_eq!(
             (none.marks.as_str(), none.ends().as_str()),
             ("    ", "none")

@@ -12,7 +12,7 @@ use crate::config::HookConfig;
 use crate::monitor::{Event, Settings};
 use crate::reading::Recording;
 use crate::runtime::ingest::{ReadOptions, read_files};
-use crate::runtime::replay::{self, Pace, Plan};
+use crate::runtime::replay::{self, ReplayPace, ReplayPlan};
 use crate::runtime::shutdown::Shutdown;
 use anyhow::Context;
 use crisis::{CRISES, Crisis};
@@ -148,7 +148,7 @@ async fn play(
     };
     let hooks = [sample_hook(folder)?];
     let arrivals = replay::arrivals(recording);
-    let plan = Plan {
+    let plan = ReplayPlan {
         site: crisis.site,
         settings: &settings,
         hooks: &hooks,
@@ -181,16 +181,16 @@ fn policy(crisis: &Crisis) -> Policy {
 }
 
 /// So many seconds of data a second that the whole crisis takes so long.
-fn pace(length: Duration, arrivals: &[crate::runtime::tail::Arrival]) -> Pace {
+fn pace(length: Duration, arrivals: &[crate::runtime::tail::Arrival]) -> ReplayPace {
     let (Some(first), Some(last)) = (arrivals.first(), arrivals.last()) else {
-        return Pace::Max;
+        return ReplayPace::Max;
     };
     let span = last.time.duration_since(first.time).as_secs_f64();
     let times = span / length.as_secs_f64();
     if times.is_finite() && times > 0.0 {
-        Pace::Times(times)
+        ReplayPace::Times(times)
     } else {
-        Pace::Max
+        ReplayPace::Max
     }
 }
 

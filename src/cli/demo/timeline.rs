@@ -1,6 +1,6 @@
 //! A crisis as it unfolds: a line for each change of a level, with its reason; then velocity, level and forecast as marks.
 
-use super::marks::{self, Scale};
+use super::marks::{self, MarkScale};
 use crate::alert::Level;
 use crate::cli::text::plain;
 use crate::monitor::{AlertState, Event, EventKind, FailureTime};
@@ -37,7 +37,7 @@ the most (logarithmic), blank where no collapse was likely.";
 
 /// What the monitor said with one reading.
 #[derive(Debug, Clone, Copy)]
-struct Moment {
+struct DemoMoment {
     time: Timestamp,
     velocity_mm_per_day: Option<f64>,
     within_evacuation: f64,
@@ -48,11 +48,11 @@ struct Moment {
 
 /// What became of one benchmark.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Record {
+pub(super) struct DemoRecord {
     pub(super) first: BTreeMap<Level, Timestamp>,
     level: Option<Level>,
     pub(super) forecasts: Vec<(Timestamp, FailureTime)>,
-    moments: Vec<Moment>,
+    moments: Vec<DemoMoment>,
     /// The end of a level, before it is known whether a lower one follows.
     fall: Option<Fall>,
 }
@@ -69,7 +69,7 @@ struct Fall {
 pub(in crate::cli) struct Timeline {
     lines: usize,
     left_out: usize,
-    pub(super) records: BTreeMap<BenchmarkId, Record>,
+    pub(super) records: BTreeMap<BenchmarkId, DemoRecord>,
 }
 
 impl Timeline {
@@ -94,7 +94,7 @@ impl Timeline {
         } = &event.kind
         {
             record.forecasts.push((event.time, *failure_time));
-            record.moments.push(Moment {
+            record.moments.push(DemoMoment {
                 time: event.time,
                 velocity_mm_per_day: *velocity_mm_per_day,
                 within_evacuation: *chance_within_evacuation_time,
@@ -187,7 +187,7 @@ impl Timeline {
     }
 }
 
-impl Record {
+impl DemoRecord {
     /// The level after an alert, where it is another or nothing can be said.
     fn changed(&mut self, level: Level, state: AlertState, time: Timestamp) -> Option<Level> {
         let shown = match state {
@@ -213,12 +213,12 @@ impl Record {
         let (Some(first), Some(last)) = (self.moments.first(), self.moments.last()) else {
             return;
         };
-        let over = |values: &dyn Fn(&Moment) -> Option<f64>| {
+        let over = |values: &dyn Fn(&DemoMoment) -> Option<f64>| {
             let points = self
                 .moments
                 .iter()
                 .filter_map(|one| Some((one.time, values(one)?)));
-            Scale::of(points.collect(), (first.time, last.time), MARKS)
+            MarkScale::of(points.collect(), (first.time, last.time), MARKS)
         };
         let velocity = over(&|one| one.velocity_mm_per_day.filter(|v| *v > 0.0));
         let left = over(&|one| {
@@ -244,7 +244,7 @@ impl Record {
 }
 
 /// Why a level was called: the velocity, and the chance that passed a threshold, or the rule in words.
-fn reason(rule: &str, text: &str, moment: Option<&Moment>) -> String {
+fn reason(rule: &str, text: &str, moment: Option<&DemoMoment>) -> String {
     let Some(moment) = moment.filter(|_| rule != "no-data") else {
         return words(rule);
     };

@@ -1,7 +1,7 @@
 //! The table at the end: what was called when, against what happened.
 
 use super::crisis::{Crisis, End};
-use super::timeline::{Record, day};
+use super::timeline::{DemoRecord, day};
 use crate::alert::Level;
 use crate::reading::{BenchmarkId, Timestamp, days_since};
 
@@ -12,7 +12,7 @@ pub(super) const HEAD: &str = concat!(
 );
 
 /// One benchmark's line of the table.
-pub(super) fn line(crisis: &Crisis, id: &BenchmarkId, record: &Record) -> String {
+pub(super) fn line(crisis: &Crisis, id: &BenchmarkId, record: &DemoRecord) -> String {
     let failed = crisis.failed();
     let first = |level: Level| match (record.first.get(&level), failed) {
         (Some(time), Some(failed)) => format!("{:.1}", days_since(*time, failed)),
@@ -41,7 +41,7 @@ pub(super) fn happened(crisis: &Crisis) -> String {
     format!("{}, {}: {end}", crisis.site, crisis.kind)
 }
 
-fn ten_days_before(failed: Timestamp, record: &Record) -> String {
+fn ten_days_before(failed: Timestamp, record: &DemoRecord) -> String {
     let made = record
         .forecasts
         .iter()

@@ -27,7 +27,7 @@ const STEPS: f64 = 1000.0;
 /// Trace a benchmark's residual to the effect that the law lacks, with the error before and after
 ///
 /// Nothing is declared beforehand: every known effect is tried inside the law, with every covariate
-/// there is, and accepted only if it also foretells a later block that the fit has not seen. An
+/// there is, and accepted only if it also predicts a later block that the fit has not seen. An
 /// effect is what the readings are consistent with, never what is proved to cause them.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {

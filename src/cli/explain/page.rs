@@ -1,6 +1,6 @@
 //! An explanation as one HTML file that needs no other: no network, no scripts.
 
-use super::sections::{Section, gained, grounds, subject};
+use super::sections::{PageSection, gained, grounds, subject};
 use super::sentence;
 use crate::effects::Explanation;
 use crate::figures::pictures;
@@ -94,7 +94,7 @@ pub(in crate::cli) fn part(explanation: &Explanation) -> String {
     out
 }
 
-fn element(section: &Section) -> String {
+fn element(section: &PageSection) -> String {
     format!(
         "<h2>{}</h2>\n<div class=\"wide\">{}</div>\n",
         escaped(section.heading),
@@ -150,7 +150,7 @@ mod tests {
     #[test]
     fn a_page_without_numbers_is_a_page_without_figures() {
         let page = page(&bare(Kind::None));
-        assert!(!page.contains("<svg") && page.contains("cannot be told from noise"));
+        assert!(!page.contains("<svg") && page.contains("cannot be distinguished from noise"));
     }
 
     #[test]

@@ -7,22 +7,22 @@ use crate::reading::Timestamp;
 
 /// A table under its heading.
 #[derive(Debug)]
-pub(super) struct Section {
+pub(super) struct PageSection {
     pub(super) heading: &'static str,
     pub(super) table: Table,
 }
 
 /// Before and after, in the readings and in the forecast.
-pub(super) fn gained(explanation: &Explanation) -> [Section; 2] {
+pub(super) fn gained(explanation: &Explanation) -> [PageSection; 2] {
     [
         ("Error", error(explanation)),
         ("What the effects change", forecast(explanation)),
     ]
-    .map(|(heading, table)| Section { heading, table })
+    .map(|(heading, table)| PageSection { heading, table })
 }
 
 /// What that rests on, where there is anything to see.
-pub(super) fn grounds(explanation: &Explanation) -> Vec<Section> {
+pub(super) fn grounds(explanation: &Explanation) -> Vec<PageSection> {
     let all = [
         ("Effects", effects(explanation)),
         ("Residual", Some(residual(explanation))),
@@ -34,7 +34,7 @@ pub(super) fn grounds(explanation: &Explanation) -> Vec<Section> {
     ];
     let present = all.into_iter();
     present
-        .filter_map(|(heading, table)| table.map(|table| Section { heading, table }))
+        .filter_map(|(heading, table)| table.map(|table| PageSection { heading, table }))
         .collect()
 }
 
@@ -121,7 +121,7 @@ fn forecast(explanation: &Explanation) -> Table {
 }
 
 /// What is said of an effect in one row.
-type Cell = fn(&Effect) -> String;
+type PageCell = fn(&Effect) -> String;
 
 /// A column each; what none of them has is left out.
 fn effects(explanation: &Explanation) -> Option<Table> {
@@ -133,7 +133,7 @@ fn effects(explanation: &Explanation) -> Option<Table> {
     let names = accepted.iter().map(|effect| effect.effect.to_string());
     let mut table = Table::headed([String::new()].into_iter().chain(names));
     let adds = format!("adds to the readings, rms {}", explanation.unit);
-    let rows: [(&str, Cell); 13] = [
+    let rows: [(&str, PageCell); 13] = [
         ("channel", |effect| {
             effect.channel.clone().unwrap_or_else(dash)
         }),

@@ -1,7 +1,7 @@
 //! What an explanation comes to, in sentences.
 
 use crate::cli::table::time;
-use crate::effects::{Effect, Explained, Explanation, Form, Kind, Structure, Together};
+use crate::effects::{Effect, Explained, Explanation, Form, Kind, Rival, Structure, Together};
 use crate::reading::BenchmarkId;
 
 const HOURS_PER_DAY: f64 = 24.0;
@@ -14,7 +14,7 @@ pub(super) fn verdict(explanation: &Explanation) -> String {
     let benchmark = &explanation.benchmark;
     match effect.effect {
         Kind::None => format!(
-            "{benchmark}: the residual cannot be told from noise; these readings show nothing that the law lacks"
+            "{benchmark}: the residual cannot be distinguished from noise; these readings show nothing that the law lacks"
         ),
         Kind::Unexplained => format!(
             "{benchmark}: unexplained: the law lacks something here, and no effect that was tried explains it{}",
@@ -71,7 +71,7 @@ pub(super) fn others(explanation: &Explanation) -> Vec<String> {
         said.push(format!("Also consistent with {}.", phrase(effect)));
     }
     if !explanation.cannot_separate_from.is_empty() {
-        let rivals = explanation.cannot_separate_from.join(", ");
+        let rivals = Rival::listed(&explanation.cannot_separate_from);
         said.push(format!("Cannot be separated from: {rivals}."));
     }
     said.extend(explanation.remarks.iter().cloned());

@@ -87,7 +87,7 @@ mod tests {
     fn the_two_honest_ends_claim_no_effect() {
         let none = text(&bare(Kind::None));
         assert!(
-            none.starts_with("BLKM: the residual cannot be told from noise"),
+            none.starts_with("BLKM: the residual cannot be distinguished from noise"),
             "{none}"
         );
         let unexplained = text(&bare(Kind::Unexplained));

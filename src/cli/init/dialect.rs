@@ -1,6 +1,6 @@
 //! How a table is written, by its cells; where they leave a choice, the flag that makes it.
 
-use super::times::{self, Found};
+use super::times::{self, FoundTimes};
 use crate::cli::args::DialectArgs;
 use crate::reading::{DecimalMark, Delimiter, Dialect};
 use crate::runtime::ingest::Survey;
@@ -27,7 +27,7 @@ pub(super) fn written(survey: &Survey, stated: &DialectArgs) -> Result<Written, 
     }
 }
 
-fn in_words(delimiter: Delimiter, decimal: DecimalMark, found: Found) -> Written {
+fn in_words(delimiter: Delimiter, decimal: DecimalMark, found: FoundTimes) -> Written {
     Written {
         dialect: Dialect {
             delimiter: Some(delimiter),

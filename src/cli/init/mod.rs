@@ -50,7 +50,7 @@ pub(super) struct Args {
 
 /// What the config will say.
 #[derive(Debug)]
-struct Plan {
+struct InitPlan {
     name: String,
     zone: Option<String>,
     dst: Option<String>,
@@ -98,7 +98,7 @@ fn usage(problem: String) -> anyhow::Error {
     UsageError(problem).into()
 }
 
-fn plan(args: &Args) -> anyhow::Result<Plan> {
+fn plan(args: &Args) -> anyhow::Result<InitPlan> {
     let mut problems = Vec::new();
     let (mut sources, mut benchmarks) = (Vec::new(), BTreeMap::new());
     for file in &args.files {
@@ -135,7 +135,7 @@ fn plan(args: &Args) -> anyhow::Result<Plan> {
     if !problems.is_empty() {
         return Err(usage(problems.join("\n")));
     }
-    Ok(Plan {
+    Ok(InitPlan {
         name: site_name(args),
         zone: args
             .file
@@ -334,7 +334,7 @@ fn site_name(args: &Args) -> String {
         .unwrap_or_else(|| "site".to_owned())
 }
 
-fn say_written(args: &Args, plan: &Plan) -> anyhow::Result<()> {
+fn say_written(args: &Args, plan: &InitPlan) -> anyhow::Result<()> {
     let mut stdout = std::io::stdout().lock();
     let config = args.output_config.display();
     match args.output.format {

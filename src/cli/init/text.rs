@@ -1,13 +1,13 @@
 //! The site file that is written: what was found, and what can be added, in comments.
 
-use super::Plan;
+use super::InitPlan;
 use super::times::word;
 use crate::config::SourceKind;
 use crate::reading::{DecimalMark, Delimiter, TimeFormat};
 use std::fmt::Write as _;
 
 /// The whole file.
-pub(super) fn config(plan: &Plan) -> String {
+pub(super) fn config(plan: &InitPlan) -> String {
     let mut text = format!(
         "# What slipwatch watches here. Paths are relative to this file. After a change: slipwatch check FILE\n\n\
          [site]\nname = {}\nstate_dir = \"state\"                # everything the daemon knows; created when missing\n\
@@ -45,7 +45,7 @@ pub(super) fn config(plan: &Plan) -> String {
     text
 }
 
-fn source_lines(text: &mut String, source: &super::PlannedSource, plan: &Plan) {
+fn source_lines(text: &mut String, source: &super::PlannedSource, plan: &InitPlan) {
     let _ = write!(
         text,
         "\n[[source]]\nid = {}\nkind = \"{}\"\npath = {}\n",
@@ -93,7 +93,7 @@ fn source_lines(text: &mut String, source: &super::PlannedSource, plan: &Plan) {
     }
 }
 
-fn alert_lines(text: &mut String, plan: &Plan) {
+fn alert_lines(text: &mut String, plan: &InitPlan) {
     let evacuation = match &plan.evacuation_time {
         Some(given) => format!("evacuation_time = {}", quoted(given)),
         None => "# evacuation_time = \"24h\"".to_owned(),

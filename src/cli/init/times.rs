@@ -31,7 +31,7 @@ const EARLIEST: Timestamp = Timestamp::constant(-2_524_608_000, 0);
 
 /// The time of a table.
 #[derive(Debug, Clone)]
-pub(super) struct Found {
+pub(super) struct FoundTimes {
     /// None for one that is named `time` or `t_days`.
     pub(super) columns: Vec<String>,
     pub(super) format: TimeFormat,
@@ -43,17 +43,17 @@ pub(super) fn find(
     survey: &Survey,
     stated: &DialectArgs,
     decimal: DecimalMark,
-) -> Result<Found, String> {
+) -> Result<FoundTimes, String> {
     let columns = match &stated.time_columns[..] {
         [] => match columns(survey, decimal)? {
-            Columns::Days => {
-                return Ok(Found {
+            TimeColumns::Days => {
+                return Ok(FoundTimes {
                     columns: Vec::new(),
                     format: TimeFormat::Rfc3339,
                     needs_zone: false,
                 });
             }
-            Columns::Times(columns) => columns,
+            TimeColumns::Times(columns) => columns,
         },
         stated => (stated.iter().map(|name| place(survey, name)))
             .collect::<Result<Vec<usize>, String>>()?,
@@ -72,7 +72,7 @@ pub(super) fn find(
     let names = columns.iter().map(|at| survey.names[*at].clone());
     let is_usual = |name: &String| name.eq_ignore_ascii_case("time");
     let names: Vec<String> = names.collect();
-    Ok(Found {
+    Ok(FoundTimes {
         needs_zone: needs_zone(&cells, &format, decimal),
         columns: match &names[..] {
             [only] if is_usual(only) => Vec::new(),
@@ -82,7 +82,7 @@ pub(super) fn find(
     })
 }
 
-enum Columns {
+enum TimeColumns {
     /// A column `t_days`.
     Days,
     Times(Vec<usize>),
@@ -98,7 +98,7 @@ fn place(survey: &Survey, name: &str) -> Result<usize, String> {
     })
 }
 
-fn columns(survey: &Survey, decimal: DecimalMark) -> Result<Columns, String> {
+fn columns(survey: &Survey, decimal: DecimalMark) -> Result<TimeColumns, String> {
     let named = |name: &str| {
         survey
             .names
@@ -108,11 +108,11 @@ fn columns(survey: &Survey, decimal: DecimalMark) -> Result<Columns, String> {
     if let Some(at) = named("time") {
         let is_a_part = survey.columns[at].iter().all(|cell| is_time_of_day(cell));
         if !is_a_part {
-            return Ok(Columns::Times(vec![at]));
+            return Ok(TimeColumns::Times(vec![at]));
         }
     }
     if named("t_days").is_some() {
-        return Ok(Columns::Days);
+        return Ok(TimeColumns::Days);
     }
     let all: Vec<usize> = (0..survey.names.len()).collect();
     let of_day: Vec<usize> = all
@@ -126,8 +126,8 @@ fn columns(survey: &Survey, decimal: DecimalMark) -> Result<Columns, String> {
         .filter(|at| is_dated(survey, *at, decimal));
     let dated: Vec<usize> = dated.collect();
     match (&dated[..], &of_day[..]) {
-        ([date], []) => Ok(Columns::Times(vec![*date])),
-        ([date], [time]) => Ok(Columns::Times(vec![*date, *time])),
+        ([date], []) => Ok(TimeColumns::Times(vec![*date])),
+        ([date], [time]) => Ok(TimeColumns::Times(vec![*date, *time])),
         ([], _) => Err(format!(
             "no column gives a time that is known; the first line has {:?}: give --time-column NAME (twice where date and \
              time stand in two), and --time-format, such as \"%d.%m.%Y %H:%M\"",

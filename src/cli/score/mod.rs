@@ -39,7 +39,7 @@ pub(super) struct Args {
 
 /// What is printed of one benchmark.
 #[derive(Debug, Serialize)]
-struct Report {
+struct ScoreReport {
     benchmark: String,
     failure_time: Option<Timestamp>,
     /// Where each method was published.
@@ -92,7 +92,7 @@ fn report(
     failure_time: Option<Timestamp>,
     (recording, series): (&Recording, &Series),
     policy: &Policy,
-) -> anyhow::Result<Report> {
+) -> anyhow::Result<ScoreReport> {
     let mut series = series.clone();
     let truth = match failure_time {
         None => Truth::Stood,
@@ -135,7 +135,7 @@ fn report(
         Truth::Stood => series.readings.last().map_or(epoch, |last| last.time),
     };
     let warning = warning::of(&series, &recording.channels, policy, until)?;
-    Ok(Report {
+    Ok(ScoreReport {
         benchmark: series.benchmark.to_string(),
         failure_time,
         sources: METHODS

@@ -1,6 +1,6 @@
 //! The scorecard for people.
 
-use super::{Report, hours};
+use super::{ScoreReport, hours};
 use crate::alert::Level;
 use crate::cli::table::{Table, time};
 use crate::reading::Timestamp;
@@ -11,7 +11,7 @@ use std::fmt::Write as _;
 /// Errors and scores of leads under this are given in hours.
 const HOURS_UNDER_DAYS: f64 = 2.0;
 
-pub(super) fn text(report: &Report) -> String {
+pub(super) fn text(report: &ScoreReport) -> String {
     let mut out = String::new();
     // Writing to a string cannot fail.
     let _ = match report.failure_time {
@@ -31,7 +31,7 @@ pub(super) fn text(report: &Report) -> String {
 }
 
 /// What the table's figures are.
-pub(super) fn meaning(report: &Report) -> String {
+pub(super) fn meaning(report: &ScoreReport) -> String {
     if report.failure_time.is_some() {
         "Median less failure, and in brackets the CRPS: above 0 the forecast is late, which is the unsafe side.".to_owned()
     } else {
@@ -43,7 +43,7 @@ pub(super) fn meaning(report: &Report) -> String {
 }
 
 /// The scores.
-pub(super) fn table(report: &Report) -> Table {
+pub(super) fn table(report: &ScoreReport) -> Table {
     if report.failure_time.is_some() {
         leads(report)
     } else {
@@ -52,7 +52,7 @@ pub(super) fn table(report: &Report) -> Table {
 }
 
 /// A row for each method, a column for each lead.
-fn leads(report: &Report) -> Table {
+fn leads(report: &ScoreReport) -> Table {
     let heads = report.card.leads.iter().map(|lead| {
         if lead.lead_days < HOURS_UNDER_DAYS {
             format!("{:.0} h before", 24.0 * lead.lead_days)
@@ -88,7 +88,7 @@ fn cell(score: &Score, factor: f64, unit: &str) -> String {
     }
 }
 
-fn looks(report: &Report) -> Table {
+fn looks(report: &ScoreReport) -> Table {
     let mut table = Table::headed(["method", "CRPS", "highest chance", "said"]);
     for method in &report.card.methods {
         let of = |look: &BTreeMap<&'static str, Score>| look.get(method).cloned();
@@ -115,7 +115,7 @@ fn looks(report: &Report) -> Table {
     table
 }
 
-fn warning(report: &Report) -> String {
+fn warning(report: &ScoreReport) -> String {
     let warning = &report.warning;
     let mut out = String::new();
     let firsts: [(Level, Option<Timestamp>); 3] = [

@@ -60,8 +60,8 @@ fn noise_that_remembers_is_told_from_white_noise_with_and_without_gaps() {
             (stoffer_toloi, 0.95),
         ] {
             let p = p_values(&problem, 0.4, test);
-            let told = p.iter().filter(|p| **p < 0.05).count() as f64 / p.len() as f64;
-            assert!(told > power, "{told}");
+            let rejected = p.iter().filter(|p| **p < 0.05).count() as f64 / p.len() as f64;
+            assert!(rejected > power, "{rejected}");
         }
     }
 }

@@ -20,7 +20,7 @@ use super::kind::FaultKind;
 use crate::reading::{Channel, Series, Timestamp, days_since};
 use copies::Copied;
 use nature::Nature;
-use reset::Reset;
+use reset::ChannelReset;
 use smooth::Smoothness;
 use std::ops::Range;
 use trace::{Trace, median};
@@ -43,7 +43,7 @@ pub struct Inspected {
 
 /// Looks for faults of the data in `series` and in each of `channels`, and takes out what can be.
 pub fn inspect(series: &Series, channels: &[Channel]) -> Inspected {
-    let mut bench = Bench {
+    let mut bench = FaultBench {
         series: series.clone(),
         natures: channels.iter().map(Nature::of).collect(),
         channels: channels.to_vec(),
@@ -77,7 +77,7 @@ enum Source {
 }
 
 /// Data on the way from as they came to as they are believed.
-struct Bench {
+struct FaultBench {
     series: Series,
     channels: Vec<Channel>,
     natures: Vec<Nature>,
@@ -86,7 +86,7 @@ struct Bench {
     twins: Vec<(String, String)>,
 }
 
-impl Bench {
+impl FaultBench {
     fn sources(&self) -> Vec<Source> {
         let channels = (0..self.channels.len()).map(Source::Channel);
         [Source::Benchmark].into_iter().chain(channels).collect()
@@ -235,7 +235,7 @@ impl Bench {
     /// channel's reset makes likely.
     fn take_out_resets(&mut self) {
         self.take_out_resets_of_twins();
-        let mut found: Vec<(usize, Vec<Reset>)> = Vec::new();
+        let mut found: Vec<(usize, Vec<ChannelReset>)> = Vec::new();
         for index in 0..self.channels.len() {
             let trace = self.trace(Source::Channel(index));
             let resets = reset::resets(&trace, self.natures[index]);
@@ -304,7 +304,7 @@ impl Bench {
     }
 
     /// Names the resets of a channel and shifts what follows each back to the zero before.
-    fn take_out_resets_of(&mut self, index: usize, resets: &[Reset]) {
+    fn take_out_resets_of(&mut self, index: usize, resets: &[ChannelReset]) {
         let source = Source::Channel(index);
         let trace = self.trace(source);
         for (place, reset) in resets.iter().enumerate() {

@@ -131,7 +131,7 @@ fn stands_out(trace: &Trace, inside: Range<usize>, far: f64, usual: f64) -> bool
     let low = start.saturating_sub(BESIDE);
     let high = (after + BESIDE).min(trace.len());
     let neighbours: Vec<usize> = (low..start).chain(after..high).collect();
-    let line = Line::through(trace, &neighbours);
+    let line = RobustLine::through(trace, &neighbours);
     let off = |index: usize| values[index] - line.at(trace.days[index]);
     let offs: Vec<f64> = neighbours.iter().map(|&index| off(index)).collect();
     let deviation = usual.max(1.4826 * median(&absolute(&offs)));
@@ -147,13 +147,13 @@ fn absolute(values: &[f64]) -> Vec<f64> {
 }
 
 /// A line that outliers do not turn: the median of all slopes (Theil and Sen).
-struct Line {
+struct RobustLine {
     day: f64,
     value: f64,
     slope: f64,
 }
 
-impl Line {
+impl RobustLine {
     fn through(trace: &Trace, indices: &[usize]) -> Self {
         let day = indices.first().map_or(0.0, |&index| trace.days[index]);
         let mut slopes = Vec::with_capacity(indices.len() * indices.len() / 2);

@@ -36,7 +36,7 @@ const CHANCE: f64 = 0.02;
 
 /// A jump of a channel's zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Reset {
+pub(super) struct ChannelReset {
     /// The first sample that is off.
     pub from: usize,
     /// The first one wholly on the new zero; those between straddle the reset.
@@ -46,7 +46,7 @@ pub(super) struct Reset {
 }
 
 /// The resets that one channel shows by itself, in time order.
-pub(super) fn resets(trace: &Trace, nature: Nature) -> Vec<Reset> {
+pub(super) fn resets(trace: &Trace, nature: Nature) -> Vec<ChannelReset> {
     if nature.has_peaks() {
         return Vec::new();
     }
@@ -54,7 +54,7 @@ pub(super) fn resets(trace: &Trace, nature: Nature) -> Vec<Reset> {
     let mut jumps = peaks(trace, scatter);
     jumps.sort_by(|a, b| b.prominence.total_cmp(&a.prominence));
     let count = standing_alone(&jumps);
-    let mut found: Vec<Reset> = jumps[..count]
+    let mut found: Vec<ChannelReset> = jumps[..count]
         .iter()
         .filter(|jump| jump.reset.size.abs() > OUT_OF_SCATTER * scatter)
         .filter(|jump| persists(trace, &jump.reset))
@@ -66,7 +66,7 @@ pub(super) fn resets(trace: &Trace, nature: Nature) -> Vec<Reset> {
 
 /// The largest jump of `trace` that begins within one sampling interval of `days` (on the trace's
 /// own clock), held to less: for channels beside one that was reset then.
-pub(super) fn reset_near(trace: &Trace, nature: Nature, days: f64) -> Option<Reset> {
+pub(super) fn reset_near(trace: &Trace, nature: Nature, days: f64) -> Option<ChannelReset> {
     if nature.has_peaks() {
         return None;
     }
@@ -87,7 +87,7 @@ pub(super) fn reset_near(trace: &Trace, nature: Nature, days: f64) -> Option<Res
 
 /// Takes the jumps out: what follows is shifted back, and the samples that straddle a reset, which
 /// belong to neither zero, are marked.
-pub(super) fn corrected(values: &[f64], resets: &[Reset]) -> (Vec<f64>, Vec<bool>) {
+pub(super) fn corrected(values: &[f64], resets: &[ChannelReset]) -> (Vec<f64>, Vec<bool>) {
     let mut values = values.to_vec();
     let mut straddles = vec![false; values.len()];
     for reset in resets {
@@ -107,7 +107,7 @@ fn scatter(trace: &Trace) -> f64 {
 /// A reset and how far it stands above the steps about it.
 #[derive(Debug, Clone, Copy)]
 struct Jump {
-    reset: Reset,
+    reset: ChannelReset,
     prominence: f64,
 }
 
@@ -178,7 +178,7 @@ fn measured(
     } else {
         0.0
     };
-    let reset = Reset {
+    let reset = ChannelReset {
         from,
         settled,
         size,
@@ -214,7 +214,7 @@ fn standing_alone(jumps: &[Jump]) -> usize {
 }
 
 /// Whether the new level stays, and is no return from a short flood.
-fn persists(trace: &Trace, reset: &Reset) -> bool {
+fn persists(trace: &Trace, reset: &ChannelReset) -> bool {
     let values = &trace.values;
     let (size, sign) = (reset.size.abs(), reset.size.signum());
     let earlier = &values[reset.from.saturating_sub(PULSE_BEFORE)..reset.from];

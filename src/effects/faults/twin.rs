@@ -1,6 +1,6 @@
 //! Two channels that are one instrument but for jumps, as a raw logger beside its corrected values.
 
-use super::reset::Reset;
+use super::reset::ChannelReset;
 use super::trace::{Trace, extreme, resolution};
 
 /// Fewer common samples show nothing.
@@ -13,7 +13,7 @@ const SAME: f64 = 0.95;
 const MOVING: f64 = 0.5;
 /// Rounding of both channels, in steps of the coarser resolution.
 const ROUNDING: f64 = 1.5;
-/// A jump of the difference under this many roundings is not told from rounding.
+/// A jump of the difference under this many roundings is not distinguished from rounding.
 const JUMP: f64 = 2.5;
 /// Samples over which one jump may be spread: a mean taken over it.
 const STRADDLES: usize = 2;
@@ -22,14 +22,14 @@ const STRADDLES: usize = 2;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Twins {
     /// The jumps of `first` less `second`, as resets of the first: indices are the first's.
-    pub of_first: Vec<Reset>,
+    pub of_first: Vec<ChannelReset>,
     /// The same, as resets of the second.
-    pub of_second: Vec<Reset>,
+    pub of_second: Vec<ChannelReset>,
     /// Whether the first is the one that jumps.
     pub first_jumps: bool,
 }
 
-/// The jumps between two channels that otherwise tell the same to the last digit; `None` where they
+/// The jumps between two channels that otherwise give the same to the last digit; `None` where they
 /// do not, or never differ.
 pub(super) fn twins(first: &Trace, second: &Trace) -> Option<Twins> {
     let common = common_samples(first, second);
@@ -66,8 +66,8 @@ pub(super) fn twins(first: &Trace, second: &Trace) -> Option<Twins> {
         };
         jumps.iter().map(of_jump).sum()
     };
-    let of = |index: fn(&(usize, usize)) -> usize, sign: f64| -> Vec<Reset> {
-        let reset = |&(from, settled, size): &(usize, usize, f64)| Reset {
+    let of = |index: fn(&(usize, usize)) -> usize, sign: f64| -> Vec<ChannelReset> {
+        let reset = |&(from, settled, size): &(usize, usize, f64)| ChannelReset {
             from: index(&common[from]),
             settled: index(&common[settled]),
             size: sign * size,

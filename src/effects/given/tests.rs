@@ -1,4 +1,4 @@
-//! A cause that is there takes the error down, where it is told; one that is not does not.
+//! A cause that is there takes the error down, where it is given; one that is not does not.
 
 use super::*;
 use crate::effects::fixture::{channel, daily, generator, normals, series};

@@ -31,7 +31,7 @@ pub(super) struct Alignment {
 }
 
 /// (days, mm)
-type Path = Vec<(f64, f64)>;
+type AlignmentPath = Vec<(f64, f64)>;
 
 impl Alignment {
     /// Of the series that have a record in common; `None` where it is shorter than [`FEWEST_TIMES`].
@@ -41,8 +41,8 @@ impl Alignment {
             .filter_map(|one| one.readings.first())
             .min_by(|a, b| a.time.cmp(&b.time))?;
         let epoch = epoch.time;
-        let paths: Vec<Path> = series.iter().map(|one| path(one, epoch)).collect();
-        let span = |path: &Path| match (path.first(), path.last()) {
+        let paths: Vec<AlignmentPath> = series.iter().map(|one| path(one, epoch)).collect();
+        let span = |path: &AlignmentPath| match (path.first(), path.last()) {
             (Some(first), Some(last)) => last.0 - first.0,
             _ => 0.0,
         };
@@ -55,7 +55,7 @@ impl Alignment {
         if members.len() < 2 {
             return None;
         }
-        let kept: Vec<&Path> = members.iter().map(|one| &paths[*one]).collect();
+        let kept: Vec<&AlignmentPath> = members.iter().map(|one| &paths[*one]).collect();
         let (days, rows) = at_common_times(&kept)?;
         let mut aligned = Self {
             days,
@@ -69,7 +69,7 @@ impl Alignment {
 }
 
 /// The displacement by days; of velocities, what they add up to.
-fn path(series: &Series, epoch: Timestamp) -> Path {
+fn path(series: &Series, epoch: Timestamp) -> AlignmentPath {
     let factor = series.unit.factor();
     let values = series
         .readings
@@ -84,7 +84,7 @@ fn path(series: &Series, epoch: Timestamp) -> Path {
                 .averaging
                 .map_or(0.0, |span| 0.5 * span.as_secs_f64() / SECONDS_PER_DAY);
             let mut slip = 0.0;
-            let mut path: Path = Vec::with_capacity(values.len());
+            let mut path: AlignmentPath = Vec::with_capacity(values.len());
             for (index, (day, velocity)) in values.iter().enumerate() {
                 if let Some((before, slower)) = index.checked_sub(1).map(|one| values[one]) {
                     slip += 0.5 * (velocity + slower) * (day - before);
@@ -97,7 +97,7 @@ fn path(series: &Series, epoch: Timestamp) -> Path {
 }
 
 /// Drops single readings that stand far outside both of their neighbours.
-fn without_strays(path: &Path) -> Path {
+fn without_strays(path: &AlignmentPath) -> AlignmentPath {
     let bend = |three: &[(f64, f64)]| {
         let share = (three[1].0 - three[0].0) / (three[2].0 - three[0].0).max(f64::MIN_POSITIVE);
         three[1].1 - three[0].1 - share * (three[2].1 - three[0].1)
@@ -117,7 +117,7 @@ fn without_strays(path: &Path) -> Path {
 }
 
 /// Evenly spaced times at which every path is known.
-fn at_common_times(paths: &[&Path]) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
+fn at_common_times(paths: &[&AlignmentPath]) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
     let from = paths
         .iter()
         .map(|path| path[0].0)
@@ -126,7 +126,7 @@ fn at_common_times(paths: &[&Path]) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
         .iter()
         .map(|path| path[path.len() - 1].0)
         .fold(f64::INFINITY, f64::min);
-    let readings = |path: &&Path| {
+    let readings = |path: &&AlignmentPath| {
         path.iter()
             .filter(|one| one.0 >= from && one.0 <= to)
             .count()
@@ -153,7 +153,7 @@ fn at_common_times(paths: &[&Path]) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
 
 /// The displacement on a day: a straight line through the readings about it, the nearer the heavier; across
 /// a short gap, the line between its ends.
-fn at(path: &Path, day: f64, step: f64) -> Option<f64> {
+fn at(path: &AlignmentPath, day: f64, step: f64) -> Option<f64> {
     let after = path.partition_point(|one| one.0 < day);
     let later = *path.get(after.min(path.len() - 1))?;
     let earlier = if later.0 <= day {

@@ -8,9 +8,9 @@ mod ratio;
 mod scan;
 mod surrogate;
 
-use super::explain::Options;
 use super::explanation::{Candidate, Effect};
 use super::kind::Kind;
+use super::options::Options;
 use crate::reading::{BenchmarkId, Series, Timestamp, after_days};
 use alignment::Alignment;
 use ratio::Pair;

@@ -1,6 +1,6 @@
 //! How the velocity of one group against another's runs in time: constant, a break, or a drift.
 
-use super::scan::{Break, Noise, SHORTEST, Scan, apart};
+use super::scan::{Break, SHORTEST, Scan, ScanNoise, apart};
 use nalgebra::{DMatrix, DVector};
 
 /// Fall of the BIC by which a break must beat a drift without one.
@@ -27,12 +27,12 @@ pub(super) struct Pair<'a> {
     days: &'a [f64],
     reference: Vec<f64>,
     other: Vec<f64>,
-    noise: &'a Noise,
+    noise: &'a ScanNoise,
 }
 
 /// What the ratio does at the break.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Shape {
+enum RatioShape {
     /// It takes another value.
     Step,
     /// It begins to drift.
@@ -44,7 +44,7 @@ enum Shape {
 
 /// The break as the ratio shows it.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Course {
+pub(super) struct RatioCourse {
     /// When, days.
     pub(super) at: f64,
     /// 90 %, days.
@@ -58,7 +58,7 @@ pub(super) struct Course {
 }
 
 #[derive(Debug)]
-struct Fitted {
+struct FittedRatio {
     /// n ln(misfit), and the coefficients: offset, ratio, and those of the shapes.
     score: f64,
     coefficients: DVector<f64>,
@@ -106,17 +106,17 @@ impl<'a> Pair<'a> {
     }
 
     /// Where the ratio breaks; or why it does not.
-    pub(super) fn course(&self) -> Result<Course, &'static str> {
+    pub(super) fn course(&self) -> Result<RatioCourse, &'static str> {
         let count = (self.days.len() - 1) as f64;
-        let mut scores: Vec<(f64, Shape, usize)> = Vec::new();
+        let mut scores: Vec<(f64, RatioShape, usize)> = Vec::new();
         for index in SHORTEST..self.days.len() - SHORTEST {
-            for shape in [Shape::Step, Shape::Hinge] {
+            for shape in [RatioShape::Step, RatioShape::Hinge] {
                 if let Some(fitted) = self.broken(shape, index, &[]) {
                     scores.push((fitted.score + Self::price(shape) * count.ln(), shape, index));
                 }
             }
         }
-        let least = |scores: &[(f64, Shape, usize)]| {
+        let least = |scores: &[(f64, RatioShape, usize)]| {
             let each = scores.iter().copied();
             each.min_by(|a, b| a.0.total_cmp(&b.0))
                 .ok_or("the ratio of the velocities is not determined")
@@ -135,7 +135,7 @@ impl<'a> Pair<'a> {
         }
         let memory = lag_one(&fitted.left);
         if memory * count.sqrt() > WANDERING {
-            return Err("the ratio of the velocities wanders, break or not");
+            return Err("the ratio of the velocities drifts, break or not");
         }
         let inflation = ((1.0 + memory.max(0.0)) / (1.0 - memory.clamp(0.0, 0.9))).max(1.0);
         let near = scores
@@ -146,24 +146,24 @@ impl<'a> Pair<'a> {
             (low.min(one), high.max(one))
         });
         let at = match best.1 {
-            Shape::Step | Shape::Relaxing(_) => {
+            RatioShape::Step | RatioShape::Relaxing(_) => {
                 f64::midpoint(self.days[best.2 - 1], self.days[best.2])
             }
-            Shape::Hinge => self.days[best.2],
+            RatioShape::Hinge => self.days[best.2],
         };
         let ratio = fitted.coefficients[1];
         let (first_change, change) = self.changes(best.1, best.2, &fitted.coefficients);
-        // What wanders bends anywhere, but jumps nowhere.
-        if matches!(best.1, Shape::Relaxing(_))
+        // What drifts bends anywhere, but jumps nowhere.
+        if matches!(best.1, RatioShape::Relaxing(_))
             && apart((ratio + first_change) / ratio) < LEAST_JUMP
         {
-            return Err("the ratio of the velocities wanders, break or not");
+            return Err("the ratio of the velocities drifts, break or not");
         }
         let most = [first_change, change]
             .map(|change| (ratio + change) / ratio)
             .into_iter()
             .max_by(|a, b| apart(*a).total_cmp(&apart(*b)));
-        Ok(Course {
+        Ok(RatioCourse {
             at,
             interval: (
                 self.days[first - 1],
@@ -176,7 +176,7 @@ impl<'a> Pair<'a> {
     }
 
     /// Relaxing breaks about the time `near`, each with its score.
-    fn relaxing(&self, near: usize) -> Vec<(f64, Shape, usize)> {
+    fn relaxing(&self, near: usize) -> Vec<(f64, RatioShape, usize)> {
         let count = (self.days.len() - 1) as f64;
         let first = near.saturating_sub(NEAR).max(SHORTEST);
         let end = (near + NEAR + 1).min(self.days.len() - SHORTEST);
@@ -184,7 +184,7 @@ impl<'a> Pair<'a> {
         for index in first..end {
             let left = self.days[self.days.len() - 1] - self.days[index];
             for share in RELAXATIONS {
-                let shape = Shape::Relaxing(share * left);
+                let shape = RatioShape::Relaxing(share * left);
                 if let Some(fitted) = self.broken(shape, index, &[]) {
                     scores.push((fitted.score + Self::price(shape) * count.ln(), shape, index));
                 }
@@ -195,11 +195,11 @@ impl<'a> Pair<'a> {
 
     /// Whether a drift that goes on all along does as well as a break of that score; against one that relaxes, it
     /// may bend as often as that has parameters.
-    fn drifts(&self, score: f64, shape: Shape) -> bool {
+    fn drifts(&self, score: f64, shape: RatioShape) -> bool {
         let count = (self.days.len() - 1) as f64;
         let most = match shape {
-            Shape::Step | Shape::Hinge => 2,
-            Shape::Relaxing(_) => 5,
+            RatioShape::Step | RatioShape::Hinge => 2,
+            RatioShape::Relaxing(_) => 5,
         };
         let drifts: Vec<Vec<f64>> = (1..=most).map(|power| self.drift(power)).collect();
         (1..=drifts.len()).any(|powers| {
@@ -210,13 +210,13 @@ impl<'a> Pair<'a> {
     }
 
     /// What a break adds to the ratio at once, and by the end of the record.
-    fn changes(&self, shape: Shape, index: usize, coefficients: &DVector<f64>) -> (f64, f64) {
+    fn changes(&self, shape: RatioShape, index: usize, coefficients: &DVector<f64>) -> (f64, f64) {
         let left = self.days[self.days.len() - 1] - self.days[index];
         let step = coefficients[2];
         match shape {
-            Shape::Step => (step, step),
-            Shape::Hinge => (0.0, step * left),
-            Shape::Relaxing(days) => {
+            RatioShape::Step => (step, step),
+            RatioShape::Hinge => (0.0, step * left),
+            RatioShape::Relaxing(days) => {
                 let passing = coefficients[4];
                 (step + passing, step + passing * (-left / days).exp())
             }
@@ -224,15 +224,15 @@ impl<'a> Pair<'a> {
     }
 
     /// Parameters of a break, with its time; that of a step lies anywhere in its interval, which is one more.
-    fn price(shape: Shape) -> f64 {
+    fn price(shape: RatioShape) -> f64 {
         match shape {
-            Shape::Step => 3.0,
-            Shape::Hinge => 2.0,
-            Shape::Relaxing(_) => 5.0,
+            RatioShape::Step => 3.0,
+            RatioShape::Hinge => 2.0,
+            RatioShape::Relaxing(_) => 5.0,
         }
     }
 
-    fn broken(&self, shape: Shape, index: usize, more: &[&Vec<f64>]) -> Option<Fitted> {
+    fn broken(&self, shape: RatioShape, index: usize, more: &[&Vec<f64>]) -> Option<FittedRatio> {
         let course = self.course_of(shape, index);
         let middle = f64::midpoint(self.days[index - 1], self.days[index]);
         let width = self.days[index] - self.days[index - 1];
@@ -244,7 +244,7 @@ impl<'a> Pair<'a> {
             }
         });
         let mut shapes = vec![&course];
-        if shape != Shape::Hinge {
+        if shape != RatioShape::Hinge {
             shapes.push(&within);
         }
         let passing = self.passing(shape, index);
@@ -254,23 +254,23 @@ impl<'a> Pair<'a> {
     }
 
     /// Displacement of the reference, its velocity times the shape.
-    fn course_of(&self, shape: Shape, index: usize) -> Vec<f64> {
+    fn course_of(&self, shape: RatioShape, index: usize) -> Vec<f64> {
         let at = self.days[index];
         match shape {
-            Shape::Step | Shape::Relaxing(_) => self.course_of_days(|day| {
+            RatioShape::Step | RatioShape::Relaxing(_) => self.course_of_days(|day| {
                 if day > f64::midpoint(self.days[index - 1], at) {
                     1.0
                 } else {
                     0.0
                 }
             }),
-            Shape::Hinge => self.course_of_days(|day| (day - at).max(0.0)),
+            RatioShape::Hinge => self.course_of_days(|day| (day - at).max(0.0)),
         }
     }
 
     /// What passes after a relaxing break; `None` where nothing does.
-    fn passing(&self, shape: Shape, index: usize) -> Option<Vec<f64>> {
-        let Shape::Relaxing(days) = shape else {
+    fn passing(&self, shape: RatioShape, index: usize) -> Option<Vec<f64>> {
+        let RatioShape::Relaxing(days) = shape else {
             return None;
         };
         let from = f64::midpoint(self.days[index - 1], self.days[index]);
@@ -290,7 +290,7 @@ impl<'a> Pair<'a> {
     }
 
     /// Whether the ratio drifts before the break, by a share of what it changes there.
-    fn had_changed(&self, shape: Shape, index: usize, score: f64) -> bool {
+    fn had_changed(&self, shape: RatioShape, index: usize, score: f64) -> bool {
         let at = self.days[index];
         let before = self.course_of_days(|day| (at - day).max(0.0));
         let Some(more) = self.broken(shape, index, &[&before]) else {
@@ -319,7 +319,7 @@ impl<'a> Pair<'a> {
     }
 
     /// Least squares of the other group's innovations on the reference's.
-    fn fit(&self, shapes: &[&Vec<f64>]) -> Option<Fitted> {
+    fn fit(&self, shapes: &[&Vec<f64>]) -> Option<FittedRatio> {
         let ones = vec![1.0; self.days.len()];
         let mut columns: Vec<Vec<f64>> =
             vec![self.noise.whiten(&ones), self.noise.whiten(&self.reference)];
@@ -345,7 +345,7 @@ impl<'a> Pair<'a> {
         let floor = 1e-18 * y.norm_squared();
         let score = y.len() as f64 * left.norm_squared().max(floor).max(f64::MIN_POSITIVE).ln();
         let coefficients = DVector::from_fn(solved.len(), |index, _| solved[index] / size(index));
-        Some(Fitted {
+        Some(FittedRatio {
             score,
             coefficients,
             left,

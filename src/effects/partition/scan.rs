@@ -19,13 +19,13 @@ const LEAST_NOISE: f64 = 0.2;
 
 /// How the noise of the displacements runs on, and whether it grows with the velocity.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Noise {
+pub(super) struct ScanNoise {
     memory: f64,
     /// What each innovation is divided by.
     sizes: Vec<f64>,
 }
 
-impl Noise {
+impl ScanNoise {
     /// The innovations of a displacement.
     pub(super) fn whiten(&self, row: &[f64]) -> Vec<f64> {
         let pairs = row.windows(2).zip(&self.sizes);
@@ -48,7 +48,7 @@ pub(super) struct Scan {
     /// What a row of displacements was divided by, mm.
     pub(super) scales: Vec<f64>,
     /// Of the displacements.
-    pub(super) noise: Noise,
+    pub(super) noise: ScanNoise,
 }
 
 /// A break at which the loadings change most.
@@ -102,8 +102,8 @@ impl Scan {
     pub(super) fn strongest(&self) -> Option<Break> {
         let count = self.columns.ncols();
         let is_centred = self.noise.keeps_offsets();
-        let mut before = Moments::none(self.columns.nrows());
-        let mut after = Moments::of(&self.columns, 0..count);
+        let mut before = ScanMoments::none(self.columns.nrows());
+        let mut after = ScanMoments::of(&self.columns, 0..count);
         let mut best: Option<(f64, usize)> = None;
         let mut guess = DVector::from_element(self.columns.nrows(), 1.0);
         for column in 0..count.saturating_sub(SHORTEST) {
@@ -127,7 +127,7 @@ impl Scan {
 
     /// The grams of the columns before and after one.
     fn sides(&self, column: usize) -> (DMatrix<f64>, DMatrix<f64>) {
-        let gram = |range| Moments::of(&self.columns, range).gram(self.noise.keeps_offsets());
+        let gram = |range| ScanMoments::of(&self.columns, range).gram(self.noise.keeps_offsets());
         (gram(0..column), gram(column + 1..self.columns.ncols()))
     }
 
@@ -316,13 +316,13 @@ fn in_order(labels: &[usize]) -> Vec<usize> {
 
 /// Sums over columns from which a gram comes.
 #[derive(Debug, Clone)]
-struct Moments {
+struct ScanMoments {
     count: f64,
     sum: DVector<f64>,
     squares: DMatrix<f64>,
 }
 
-impl Moments {
+impl ScanMoments {
     fn none(rows: usize) -> Self {
         Self {
             count: 0.0,
@@ -448,9 +448,9 @@ fn scales(rows: &[Vec<f64>]) -> Option<Vec<f64>> {
 }
 
 /// The models of noise that are tried: additive of several memories, and in proportion to the velocity.
-fn noises(scaled: &[Vec<f64>]) -> Vec<Noise> {
+fn noises(scaled: &[Vec<f64>]) -> Vec<ScanNoise> {
     let count = scaled[0].len() - 1;
-    let additive = MEMORIES.iter().map(|memory| Noise {
+    let additive = MEMORIES.iter().map(|memory| ScanNoise {
         memory: *memory,
         sizes: vec![1.0; count],
     });
@@ -465,28 +465,28 @@ fn noises(scaled: &[Vec<f64>]) -> Vec<Noise> {
     let typical = (speed.iter().map(|x| x * x).sum::<f64>() / count as f64)
         .sqrt()
         .max(f64::MIN_POSITIVE);
-    let relative = [0.3, 0.03].map(|floor: f64| Noise {
+    let relative = [0.3, 0.03].map(|floor: f64| ScanNoise {
         memory: 1.0,
         sizes: speed.iter().map(|x| (x / typical).hypot(floor)).collect(),
     });
     additive.chain(relative).collect()
 }
 
-fn matrix(scaled: &[Vec<f64>], noise: &Noise) -> DMatrix<f64> {
+fn matrix(scaled: &[Vec<f64>], noise: &ScanNoise) -> DMatrix<f64> {
     let rows: Vec<Vec<f64>> = scaled.iter().map(|row| noise.whiten(row)).collect();
     DMatrix::from_fn(rows.len(), rows[0].len(), |row, column| rows[row][column])
 }
 
 /// Minus twice the log-likelihood of a noise, up to a constant: loadings are free in every block, so that
 /// a partition is no noise.
-fn score(columns: &DMatrix<f64>, noise: &Noise) -> f64 {
+fn score(columns: &DMatrix<f64>, noise: &ScanNoise) -> f64 {
     let (rows, count) = (columns.nrows(), columns.ncols());
     let mut misfit = 0.0;
     let mut free = 0.0;
     for block in 0..BLOCKS {
         let range = block * count / BLOCKS..(block + 1) * count / BLOCKS;
         free += range.len() as f64 - 1.0 - if noise.keeps_offsets() { 1.0 } else { 0.0 };
-        let gram = Moments::of(columns, range).gram(noise.keeps_offsets());
+        let gram = ScanMoments::of(columns, range).gram(noise.keeps_offsets());
         let total = gram.trace();
         misfit +=
             (total - largest(&gram, &DVector::from_element(rows, 1.0)).0).max(ROUNDING * total);

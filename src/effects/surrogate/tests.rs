@@ -1,4 +1,4 @@
-//! A search in vain is judged by what other searches in vain find.
+//! A search where there is nothing is judged by what other searches find where there is nothing.
 
 use super::*;
 use crate::effects::fixture::{channel, daily, generator, normals, series};
@@ -15,8 +15,8 @@ fn gains(random: &mut rand_pcg::Pcg64, count: usize, tries: usize) -> Vec<f64> {
     (0..count).map(|_| best()).collect()
 }
 
-fn vain(gains: Vec<f64>) -> Vain {
-    Vain {
+fn null_gains(gains: Vec<f64>) -> NullGains {
+    NullGains {
         gains,
         largest: Vec::new(),
     }
@@ -25,9 +25,9 @@ fn vain(gains: Vec<f64>) -> Vain {
 #[test]
 fn a_larger_gain_never_has_a_larger_p_value() {
     for seed in 0..20 {
-        let vain = vain(gains(&mut generator(seed), 99, 30));
+        let null_gains = null_gains(gains(&mut generator(seed), 99, 30));
         let p: Vec<f64> = (0..4000)
-            .map(|k| vain.p_value(f64::from(k) * 0.01))
+            .map(|k| null_gains.p_value(f64::from(k) * 0.01))
             .collect();
         assert!(p.windows(2).all(|pair| pair[1] <= pair[0]), "{seed}");
         assert!(p.iter().all(|p| (LEAST_P..=1.0).contains(p)), "{seed}");
@@ -37,11 +37,11 @@ fn a_larger_gain_never_has_a_larger_p_value() {
 
 #[test]
 fn where_many_searches_in_vain_gain_as_much_the_p_value_is_the_rank() {
-    let vain = vain((0..99).map(f64::from).collect());
-    assert!((vain.p_value(50.0) - 0.5).abs() < 1e-12);
-    assert!((vain.p_value(94.0) - 0.06).abs() < 1e-12);
-    assert!((vain.p_value(-1.0) - 1.0).abs() < 1e-12);
-    assert!(Vain::default().p_value(1e9) >= 1.0);
+    let null_gains = null_gains((0..99).map(f64::from).collect());
+    assert!((null_gains.p_value(50.0) - 0.5).abs() < 1e-12);
+    assert!((null_gains.p_value(94.0) - 0.06).abs() < 1e-12);
+    assert!((null_gains.p_value(-1.0) - 1.0).abs() < 1e-12);
+    assert!(NullGains::default().p_value(1e9) >= 1.0);
 }
 
 #[test]
@@ -49,8 +49,8 @@ fn one_more_search_in_vain_has_a_p_value_as_small_as_chance_has_it() {
     let mut random = generator(7);
     let mut p: Vec<f64> = Vec::new();
     for _ in 0..2000 {
-        let vain = vain(gains(&mut random, 99, 30));
-        p.push(vain.p_value(gains(&mut random, 1, 30)[0]));
+        let null_gains = null_gains(gains(&mut random, 99, 30));
+        p.push(null_gains.p_value(gains(&mut random, 1, 30)[0]));
     }
     let share = |most: f64| p.iter().filter(|p| **p <= most).count() as f64 / 2000.0;
     for most in [0.5, 0.2, 0.1, 0.05] {
@@ -67,7 +67,7 @@ fn one_more_search_in_vain_has_a_p_value_as_small_as_chance_has_it() {
 
 #[test]
 fn gains_that_full_refits_show_to_be_larger_make_a_find_less_rare() {
-    let plain = vain(gains(&mut generator(8), 99, 30));
+    let plain = null_gains(gains(&mut generator(8), 99, 30));
     assert!(plain.clone().amplified(1.5).p_value(12.0) > 1.5 * plain.p_value(12.0));
 }
 

@@ -1,6 +1,6 @@
 //! When each forecast said that the slope would collapse, against when it was made, above the levels.
 
-use super::{Refit, Replayed, WIDTH, levels};
+use super::{Replayed, ReplayedRefit, WIDTH, levels};
 use crate::figures::day;
 use crate::figures::in_time::{dots, every_few, line};
 use crate::plot::{Axis, BLACK, BLUE, GREY, Legend, Mark, Panel, Stack};
@@ -14,7 +14,7 @@ impl Replayed<'_> {
     /// The figure, one SVG text.
     pub fn forecasts(&self) -> String {
         let x = self.dates("forecast made");
-        let refits: Vec<Refit> = every_few(self.refits().collect());
+        let refits: Vec<ReplayedRefit> = every_few(self.refits().collect());
         let title = self.title("forecasts of the collapse");
         Stack {
             description: format!(
@@ -31,7 +31,7 @@ impl Replayed<'_> {
         .svg()
     }
 
-    fn times_panel(&self, x: &Axis, refits: &[Refit]) -> Panel {
+    fn times_panel(&self, x: &Axis, refits: &[ReplayedRefit]) -> Panel {
         let later = self.end() + LATER * (self.end() - self.start());
         let first = refits.first().map_or(x.from, |refit| day(refit.time));
         let y = Axis::dates("collapse forecast", first, later.max(x.to));
@@ -67,7 +67,7 @@ impl Replayed<'_> {
         }
     }
 
-    fn chances_panel(&self, x: &Axis, refits: &[Refit]) -> Panel {
+    fn chances_panel(&self, x: &Axis, refits: &[ReplayedRefit]) -> Panel {
         let chances = refits
             .iter()
             .map(|refit| (day(refit.time), refit.failure_time.probability));

@@ -1,7 +1,7 @@
 //! Readings, inverse velocity and the forecasts made at some dates, above the levels.
 
 use super::levels;
-use super::{Refit, Replayed, WIDTH};
+use super::{Replayed, ReplayedRefit, WIDTH};
 use crate::figures::day;
 use crate::figures::in_time::{dots, line, thinned};
 use crate::fit::Rate;
@@ -28,7 +28,7 @@ const FAR: f64 = 20.0;
 struct Dated {
     date: Timestamp,
     colour: &'static str,
-    refit: Option<Refit>,
+    refit: Option<ReplayedRefit>,
 }
 
 impl Replayed<'_> {
@@ -203,13 +203,13 @@ impl Replayed<'_> {
         let end = bar.map_or(at, |(_, high, _)| high);
         marks.push((
             String::new(),
-            beside((at, end), y, self.told(&failure), colour),
+            beside((at, end), y, self.described(&failure), colour),
         ));
         marks
     }
 
     /// A forecast in words.
-    fn told(&self, failure: &FailureTime) -> String {
+    fn described(&self, failure: &FailureTime) -> String {
         let chance = format!("chance {:.2}", failure.probability);
         if failure.low.is_none() {
             return chance;
@@ -219,11 +219,11 @@ impl Replayed<'_> {
             ("median", failure.median),
             ("95 %", failure.high),
         ];
-        let told = bounds.map(|(name, time)| match time {
+        let described = bounds.map(|(name, time)| match time {
             Some(time) => format!("{name} {}", self.short(time)),
             None => format!("{name} never"),
         });
-        format!("{}; {chance}", told.join(", "))
+        format!("{}; {chance}", described.join(", "))
     }
 }
 
@@ -255,8 +255,8 @@ fn uprights(dated: &[Dated]) -> Vec<(String, Mark)> {
 }
 
 /// The line of a refit, from the oldest of the velocities it goes through to zero; `None` where these rates do not
-/// give the line that the monitor told of.
-fn straight(rates: &[Rate], refit: &Refit) -> Option<Vec<(f64, f64)>> {
+/// give the line that the monitor reported.
+fn straight(rates: &[Rate], refit: &ReplayedRefit) -> Option<Vec<(f64, f64)>> {
     let zero = day(refit.intercept?);
     InverseVelocityLine::segment(recent(rates), zero).map(Vec::from)
 }

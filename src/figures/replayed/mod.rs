@@ -24,7 +24,7 @@ pub struct Replayed<'a> {
 
 /// One forecast as it was made.
 #[derive(Debug, Clone, Copy)]
-struct Refit {
+struct ReplayedRefit {
     time: Timestamp,
     failure_time: FailureTime,
     /// Where the line through inverse velocity meets zero.
@@ -43,7 +43,7 @@ const WIDTH: f64 = 900.0;
 const AHEAD: f64 = 0.14;
 /// Dates are chosen in the last half of the record, at so many equal steps.
 const STEPS: f64 = 4.0;
-/// Of a record shorter than this, days, times are told to the minute.
+/// Of a record shorter than this, days, times are reported to the minute.
 const SHORT_RECORD_DAYS: f64 = 14.0;
 
 impl<'a> Replayed<'a> {
@@ -78,7 +78,7 @@ impl<'a> Replayed<'a> {
     }
 
     /// All forecasts, in the order in which they were made.
-    fn refits(&self) -> impl DoubleEndedIterator<Item = Refit> + 'a {
+    fn refits(&self) -> impl DoubleEndedIterator<Item = ReplayedRefit> + 'a {
         let id = &self.series.benchmark;
         let ours = self
             .events
@@ -96,7 +96,7 @@ impl<'a> Replayed<'a> {
             else {
                 return None;
             };
-            Some(Refit {
+            Some(ReplayedRefit {
                 time: event.time,
                 failure_time: *failure_time,
                 intercept: inverse_velocity.failure_time,
@@ -109,7 +109,7 @@ impl<'a> Replayed<'a> {
     }
 
     /// The newest forecast made until then.
-    fn refit_at(&self, time: Timestamp) -> Option<Refit> {
+    fn refit_at(&self, time: Timestamp) -> Option<ReplayedRefit> {
         self.refits().rev().find(|refit| refit.time <= time)
     }
 
@@ -271,7 +271,7 @@ mod tests {
             alert(30, Level::Red, AlertState::Resolved),
         ];
         let (levels, unknown) = stretches(&replayed(&series, &events));
-        let told: Vec<(Level, Timestamp, Timestamp)> = levels
+        let described: Vec<(Level, Timestamp, Timestamp)> = levels
             .iter()
             .map(|stretch| (stretch.level, stretch.from, stretch.to))
             .collect();
@@ -281,7 +281,7 @@ mod tests {
             (Level::Red, at(20), at(30)),
             (Level::Green, at(30), at(40)),
         ];
-        assert_eq!(told, expected);
+        assert_eq!(described, expected);
         assert_eq!(unknown.len(), 1);
         assert_eq!((unknown[0].from, unknown[0].to), (at(15), at(22)));
     }

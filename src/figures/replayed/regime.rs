@@ -1,6 +1,6 @@
 //! How sure the law was of instability and of acceleration, over time, above the levels.
 
-use super::{Refit, Replayed, WIDTH, levels};
+use super::{Replayed, ReplayedRefit, WIDTH, levels};
 use crate::figures::day;
 use crate::figures::in_time::{every_few, line};
 use crate::plot::{Axis, BLUE, GREY, Legend, Mark, Panel, RED, Stack};
@@ -12,9 +12,9 @@ impl Replayed<'_> {
     /// The figure, one SVG text.
     pub fn regimes(&self) -> String {
         let x = self.dates("");
-        let refits: Vec<Refit> = every_few(self.refits().collect());
+        let refits: Vec<ReplayedRefit> = every_few(self.refits().collect());
         let title = self.title("regime");
-        let over_time = |of: fn(&Refit) -> f64| -> Vec<(f64, f64)> {
+        let over_time = |of: fn(&ReplayedRefit) -> f64| -> Vec<(f64, f64)> {
             refits
                 .iter()
                 .map(|refit| (day(refit.time), of(refit)))

@@ -22,9 +22,9 @@ pub use sensitivity::OtherPrior;
 
 use super::rates::Rate;
 use crate::model::Law;
-use mode::{Bench, LN_V, Mode, Point, Problem, Sign};
-use onset::Start;
-use past::Shape;
+use mode::{LN_V, Mode, ModeBench, ModeProblem, Point, Sign};
+use onset::OnsetStart;
+use past::PastShape;
 use proposal::{Side, Whole};
 use scatter::Texture;
 use serde::{Deserialize, Serialize};
@@ -55,7 +55,7 @@ pub struct Ensemble {
 pub struct Posterior {
     /// The laws.
     pub ensemble: Ensemble,
-    /// Start of the first rate used, days.
+    /// OnsetStart of the first rate used, days.
     pub from_days: f64,
     /// How far back from the present each law holds, days, in the order of the samples.
     pub spans_days: Vec<f64>,
@@ -109,7 +109,7 @@ const ROUNDS: (u32, u32) = (6, 10);
 const FIRST_P: f64 = 0.3;
 /// asinh of kappa L when a search starts.
 const FIRST_KAPPAS: [f64; 2] = [0.5, 2.5];
-/// Fewer rates than this leave nothing over to tell the scatter from.
+/// Fewer rates than this leave nothing over to estimate the scatter from.
 const FEWEST_RATES: usize = 5;
 
 impl Posterior {
@@ -118,8 +118,8 @@ impl Posterior {
     pub fn fit(rates: &[Rate]) -> Option<Self> {
         let window = window_of(rates)?;
         let textures = scatter::textures(&window);
-        let mut bench = Bench::new(rates.len());
-        let start = Start::first(&window);
+        let mut bench = ModeBench::new(rates.len());
+        let start = OnsetStart::first(&window);
         let sides = Sign::BOTH
             .into_iter()
             .filter_map(|sign| {
@@ -139,9 +139,9 @@ impl Posterior {
         let window = window_of(rates)?;
         let textures = scatter::textures(&window);
         let few = scatter::few(&textures);
-        let mut bench = Bench::new(rates.len());
-        let mut screened: Vec<(Problem<'_>, Summit, f64)> = Vec::new();
-        for start in Start::candidates(&window) {
+        let mut bench = ModeBench::new(rates.len());
+        let mut screened: Vec<(ModeProblem<'_>, Summit, f64)> = Vec::new();
+        for start in OnsetStart::candidates(&window) {
             for sign in Sign::BOTH {
                 let problem = start.problem(&window, sign);
                 let starts = starts(&problem, rates);
@@ -217,15 +217,15 @@ fn window_of(rates: &[Rate]) -> Option<Window> {
 /// The most probable law on one side with white scatter, and ln of the size of that.
 #[derive(Debug, Clone, Copy)]
 struct Summit {
-    shape: Shape,
+    shape: PastShape,
     ln_v: f64,
     log_size: f64,
 }
 
 /// Finds the mode of one side, and draws up the proposal about it.
 fn side<'a>(
-    problem: Problem<'a>,
-    bench: &mut Bench,
+    problem: ModeProblem<'a>,
+    bench: &mut ModeBench,
     textures: &[Texture],
     (starts, log_size): &(Vec<Point>, f64),
 ) -> Option<(Summit, Side<'a>)> {
@@ -251,7 +251,7 @@ fn side<'a>(
 
 /// Where to look from, and ln of the size of the scatter there: a line through the recent and the older
 /// velocity with some kappas.
-fn starts(problem: &Problem<'_>, rates: &[Rate]) -> (Vec<Point>, f64) {
+fn starts(problem: &ModeProblem<'_>, rates: &[Rate]) -> (Vec<Point>, f64) {
     let (low, high) = problem.sign.p_range();
     let (ln_v, change) = line(problem, rates);
     let p = low + (high - low) * FIRST_P;
@@ -264,7 +264,7 @@ fn starts(problem: &Problem<'_>, rates: &[Rate]) -> (Vec<Point>, f64) {
 }
 
 /// ln of the recent velocity, and asinh of the slope of a line through it and the older one.
-fn line(problem: &Problem<'_>, rates: &[Rate]) -> (f64, f64) {
+fn line(problem: &ModeProblem<'_>, rates: &[Rate]) -> (f64, f64) {
     let from = problem.window.now_days - problem.span_days;
     let count = rates.iter().filter(|rate| rate.to > from).count().max(1);
     let rates = &rates[rates.len() - count..];
@@ -281,7 +281,7 @@ fn line(problem: &Problem<'_>, rates: &[Rate]) -> (f64, f64) {
 
 /// Draws laws from each side in rounds, every round from a proposal that the ones before have taught.
 fn draw(
-    bench: &mut Bench,
+    bench: &mut ModeBench,
     textures: &[Texture],
     (sides, effort): (Vec<Side<'_>>, &Effort),
 ) -> Vec<Draft> {
@@ -321,8 +321,8 @@ impl<'a> Lot<'a> {
     }
 
     /// Draws `number` more, weighs all anew against the mixture of the proposals that they came from
-    /// (Owen and Zhou 2000: no draw weighs more than any of them would make it), and learns from them.
-    fn draw(&mut self, bench: &mut Bench, textures: &[Texture], (first, number): (u32, u32)) {
+    /// (Owen and Zhou 2000: no draw weighs more than any of them would make it), and shapes the next proposal by them.
+    fn draw(&mut self, bench: &mut ModeBench, textures: &[Texture], (first, number): (u32, u32)) {
         let one = |at| self.next.draw(bench, textures, first + at);
         let fresh: Vec<Draft> = (0..number).filter_map(one).collect();
         self.drafts.extend(fresh);

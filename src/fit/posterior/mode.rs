@@ -1,6 +1,6 @@
 //! Where a posterior is highest on one side of kappa = 0, and how it falls off there.
 
-use super::past::{Past, Shape};
+use super::past::{Past, PastShape};
 use super::prior::{P_PRIOR, SLOPE_PER_INTERVAL, log_cauchy};
 use super::scatter::Texture;
 use super::window::Window;
@@ -26,7 +26,7 @@ pub(super) enum Sign {
 
 /// The laws with one sign of kappa that hold for `span_days` back from the present of a window.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Problem<'a> {
+pub(super) struct ModeProblem<'a> {
     pub(super) window: &'a Window,
     pub(super) span_days: f64,
     pub(super) sign: Sign,
@@ -38,7 +38,7 @@ pub(super) struct Problem<'a> {
 
 /// Buffers that every evaluation uses again.
 #[derive(Debug)]
-pub(super) struct Bench {
+pub(super) struct ModeBench {
     past: Past,
     pub(super) residuals: Vec<f64>,
     there: Vec<f64>,
@@ -83,7 +83,7 @@ impl Sign {
     }
 }
 
-impl Bench {
+impl ModeBench {
     pub(super) fn new(count: usize) -> Self {
         Self {
             past: Past::default(),
@@ -105,18 +105,18 @@ fn change_per_slope(kappa_length: f64) -> f64 {
     }
 }
 
-impl Problem<'_> {
+impl ModeProblem<'_> {
     /// The point of a law of this shape and velocity now.
-    pub(super) fn point(&self, shape: Shape, ln_v: f64) -> Point {
+    pub(super) fn point(&self, shape: PastShape, ln_v: f64) -> Point {
         let kappa_length = shape.kappa * self.span_days;
         let change = shape.r * self.span_days * change_per_slope(kappa_length);
         Point::new(shape.p, kappa_length.asinh(), change.asinh(), ln_v)
     }
 
-    pub(super) fn shape(&self, at: &Point) -> Shape {
+    pub(super) fn shape(&self, at: &Point) -> PastShape {
         let kappa_length = at[KAPPA].sinh();
         let r_length = at[CHANGE].sinh() / change_per_slope(kappa_length);
-        Shape {
+        PastShape {
             r: r_length / self.span_days,
             kappa: kappa_length / self.span_days,
             p: at[P],
@@ -124,12 +124,12 @@ impl Problem<'_> {
     }
 
     /// Fills the bench's residuals; false outside the prior's range.
-    pub(super) fn evaluate(&self, bench: &mut Bench, at: &Point) -> bool {
+    pub(super) fn evaluate(&self, bench: &mut ModeBench, at: &Point) -> bool {
         self.evaluate_over(bench, at, self.span_days)
     }
 
     /// The same, where the law of that point has held for another span.
-    pub(super) fn evaluate_over(&self, bench: &mut Bench, at: &Point, span_days: f64) -> bool {
+    pub(super) fn evaluate_over(&self, bench: &mut ModeBench, at: &Point, span_days: f64) -> bool {
         bench.evaluations += 1;
         let shape = self.shape(at);
         // b and m have one sign: where the law would need S < 0 there is none.
@@ -184,7 +184,7 @@ impl Problem<'_> {
     }
 
     /// Derivatives of the residuals, which the bench holds for `at`.
-    fn differentiate(&self, bench: &mut Bench, at: &Point) {
+    fn differentiate(&self, bench: &mut ModeBench, at: &Point) {
         for axis in 0..4 {
             let mut taken = 0.0;
             for step in [JACOBIAN_STEP, -JACOBIAN_STEP] {
@@ -222,7 +222,7 @@ impl Problem<'_> {
     /// prior's range.
     pub(super) fn search(
         &self,
-        bench: &mut Bench,
+        bench: &mut ModeBench,
         start: Point,
         (texture, size): (&Texture, f64),
         rounds: u32,

@@ -4,7 +4,7 @@
 //! so every candidate explains the same readings, and their evidences compare.
 
 use super::Posterior;
-use super::mode::{Problem, Sign};
+use super::mode::{ModeProblem, Sign};
 use super::prior::FROM_THE_FIRST;
 use super::window::Window;
 
@@ -27,13 +27,13 @@ pub struct Onset {
 
 /// A range of starts: how far back the law holds in its middle, and ln of its prior probability.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Start {
+pub(super) struct OnsetStart {
     span_days: f64,
     reach: f64,
     log_prior: f64,
 }
 
-impl Start {
+impl OnsetStart {
     /// The first reading, for certain.
     pub(super) fn first(window: &Window) -> Self {
         Self {
@@ -68,8 +68,8 @@ impl Start {
     }
 
     /// The laws of one sign that hold from this start on.
-    pub(super) fn problem<'a>(&self, window: &'a Window, sign: Sign) -> Problem<'a> {
-        Problem {
+    pub(super) fn problem<'a>(&self, window: &'a Window, sign: Sign) -> ModeProblem<'a> {
+        ModeProblem {
             window,
             span_days: self.span_days,
             sign,

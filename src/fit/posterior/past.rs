@@ -23,7 +23,7 @@ const NODES: [(f64, f64); 4] = [
 
 /// The law's shape: r and kappa at the present in 1/day, and p.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Shape {
+pub(super) struct PastShape {
     pub(super) r: f64,
     pub(super) kappa: f64,
     pub(super) p: f64,
@@ -32,7 +32,7 @@ pub(super) struct Shape {
 /// One solution; its buffers are used again by the next.
 #[derive(Debug, Default)]
 pub(super) struct Past {
-    panels: Vec<Panel>,
+    panels: Vec<PastPanel>,
     last: Node,
 }
 
@@ -47,7 +47,7 @@ struct Node {
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Panel {
+struct PastPanel {
     ago: f64,
     span: f64,
     ln_y: [f64; 6],
@@ -57,7 +57,7 @@ struct Panel {
 impl Past {
     /// Solves over `span` days ago; false where the velocity left the prior's range within them.
     /// Before that the slope creeps at the velocity it had then.
-    pub(super) fn solve(&mut self, shape: Shape, span: f64) -> bool {
+    pub(super) fn solve(&mut self, shape: PastShape, span: f64) -> bool {
         self.panels.clear();
         let mut node = shape.node(0.0, 0.0, 0.0);
         let toward = shape.r.signum();
@@ -84,7 +84,7 @@ impl Past {
             if !next.ago.is_finite() || next.ago < node.ago {
                 return false;
             }
-            self.panels.push(Panel::between(&node, &next));
+            self.panels.push(PastPanel::between(&node, &next));
             node = next;
             if node.ln_y.abs() > MOST_LN_Y && node.ago < span {
                 return false;
@@ -126,7 +126,7 @@ impl Past {
     }
 }
 
-impl Shape {
+impl PastShape {
     /// exp(p ln y) and -d ln y / d(days ago) times y: r - kappa bc(y; p).
     fn pull(&self, ln_y: f64) -> (f64, f64) {
         if self.p == 0.0 {
@@ -180,7 +180,7 @@ impl Shape {
     }
 }
 
-impl Panel {
+impl PastPanel {
     fn between(from: &Node, to: &Node) -> Self {
         let span = to.ago - from.ago;
         let fast = |node: &Node| (-node.ln_y).exp();
@@ -239,7 +239,7 @@ mod tests {
         for r in [-3.0, -0.9, -0.3, -1e-4, 0.0, 1e-4, 0.5, 4.0, 60.0] {
             for kappa in [-8.0, -1.0, -0.05, 0.0, 0.05, 1.0, 8.0, 100.0] {
                 for p in [-0.9, -0.2, 0.0, 0.2, 0.55] {
-                    let shape = Shape { r, kappa, p };
+                    let shape = PastShape { r, kappa, p };
                     if !past.solve(shape, 1.0) {
                         continue;
                     }

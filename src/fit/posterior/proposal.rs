@@ -2,7 +2,7 @@
 //! texture of the scatter, each ending where p or kappa leaves its range.
 
 use super::Draft;
-use super::mode::{Bench, CHANGE, KAPPA, LN_V, P, Point, Problem, Sign};
+use super::mode::{CHANGE, KAPPA, LN_V, ModeBench, ModeProblem, P, Point, Sign};
 use super::prior;
 use super::scatter::Texture;
 use crate::fit::quasi_random::{kronecker, normal_quantile, normal_share};
@@ -20,7 +20,7 @@ const SIZE: usize = 4;
 const WIDTHS: [(f64, f64); 2] = [(1.15, 0.75), (3.0, 0.25)];
 /// The share of draws that go to all textures evenly, whatever their evidence.
 const EVEN: f64 = 0.1;
-/// Draws that weights must be worth for a shape to be told from them.
+/// Draws that weights must be worth for a shape to be estimated from them.
 const WORTH: f64 = 20.0;
 /// Draws that say nothing of a shape if they are worth fewer.
 const LEAST_WORTH: f64 = 8.0;
@@ -34,7 +34,7 @@ const LN_ROOT_2_PI: f64 = 0.918_938_533_204_672_8;
 /// The laws on one side of kappa = 0.
 #[derive(Debug, Clone)]
 pub(super) struct Side<'a> {
-    pub(super) problem: Problem<'a>,
+    pub(super) problem: ModeProblem<'a>,
     components: Vec<Component>,
     /// Where in the range of the span draws are made, in units of its reach.
     spans: (f64, f64),
@@ -53,13 +53,13 @@ struct Component {
 
 /// A range of a standard normal number, and the probability of it.
 #[derive(Debug, Clone, Copy)]
-struct Stretch {
+struct NormalStretch {
     low: f64,
     high: f64,
     mass: f64,
 }
 
-impl Stretch {
+impl NormalStretch {
     fn new((low, high): (f64, f64), mean: f64, spread: f64) -> Self {
         let (low, high) = ((low - mean) / spread, (high - mean) / spread);
         // In the tail where the numbers are small: shares near 1 have no digits left.
@@ -89,8 +89,8 @@ impl Stretch {
 impl<'a> Side<'a> {
     /// The approximations about the mode at `at`, whose residuals and derivatives the bench holds.
     pub(super) fn new(
-        problem: Problem<'a>,
-        bench: &Bench,
+        problem: ModeProblem<'a>,
+        bench: &ModeBench,
         at: Point,
         (textures, log_size): (&[Texture], f64),
     ) -> Option<Self> {
@@ -118,7 +118,7 @@ impl<'a> Side<'a> {
     /// The `index`-th law; `None` where the prior has none.
     pub(super) fn draw(
         &self,
-        bench: &mut Bench,
+        bench: &mut ModeBench,
         textures: &[Texture],
         index: u32,
     ) -> Option<Draft> {
@@ -174,7 +174,7 @@ impl<'a> Side<'a> {
 
     /// The same side with its proposal drawn up anew from what was drawn so far: where the weights lie, as
     /// one normal shape for all textures, each with its share. Weights are levelled until they are worth
-    /// enough draws to tell a shape from.
+    /// enough draws to estimate a shape from.
     pub(super) fn refitted(&self, drafts: &[Draft]) -> Option<Self> {
         let logs: Vec<f64> = drafts.iter().map(|draft| draft.log_weight).collect();
         let weights = levelled(&logs);
@@ -245,7 +245,7 @@ impl<'a> Side<'a> {
     }
 }
 
-impl Problem<'_> {
+impl ModeProblem<'_> {
     /// ln of the prior density of p and of the span.
     fn log_prior_of_rest(&self) -> f64 {
         let (low, high) = self.sign.p_range();
@@ -255,8 +255,8 @@ impl Problem<'_> {
 
 impl Component {
     fn new(
-        problem: &Problem<'_>,
-        bench: &Bench,
+        problem: &ModeProblem<'_>,
+        bench: &ModeBench,
         at: Point,
         (texture, log_size): (&Texture, f64),
     ) -> Option<Self> {
@@ -313,14 +313,14 @@ impl Component {
         curved + line + 3.0 * LN_ROOT_2_PI
     }
 
-    fn p_stretch(&self, sign: Sign, width: f64) -> Stretch {
-        Stretch::new(sign.p_range(), self.centre[P], width * self.root[(0, 0)])
+    fn p_stretch(&self, sign: Sign, width: f64) -> NormalStretch {
+        NormalStretch::new(sign.p_range(), self.centre[P], width * self.root[(0, 0)])
     }
 
     /// The stretch of kappa, given the deviate of p.
-    fn kappa_stretch(&self, sign: Sign, width: f64, z_p: f64) -> Stretch {
+    fn kappa_stretch(&self, sign: Sign, width: f64, z_p: f64) -> NormalStretch {
         let mean = self.centre[KAPPA] + self.root[(1, 0)] * z_p;
-        Stretch::new(sign.kappa_range(), mean, width * self.root[(1, 1)])
+        NormalStretch::new(sign.kappa_range(), mean, width * self.root[(1, 1)])
     }
 
     fn log_masses(&self, sign: Sign, width: f64, z_p: f64) -> f64 {

@@ -19,7 +19,7 @@ use nalgebra::{Matrix4, Vector4};
 const STUDENT: f64 = 7.0;
 /// Squares of standardised innovations end here: beyond, all are the same outlier.
 const FARTHEST: f64 = 1e8;
-/// Step of the derivatives in ln size, and the least curvature that a step there assumes.
+/// ScatterStep of the derivatives in ln size, and the least curvature that a step there assumes.
 const SIZE_STEP: f64 = 0.1;
 const LEAST_SIZE_BEND: f64 = 1.0;
 /// Rates whose densities are multiplied before the logarithm: the least is 1e-18, the most 1e8.
@@ -33,12 +33,12 @@ pub(super) struct Texture {
     /// The slow part's share of the variance.
     pub(super) slow: f64,
     pub(super) log_prior: f64,
-    steps: Vec<Step>,
+    steps: Vec<ScatterStep>,
 }
 
 /// What happens to the slow part between two rates, and how it enters the rate.
 #[derive(Debug, Clone, Copy)]
-struct Step {
+struct ScatterStep {
     keep: f64,
     load: f64,
 }
@@ -76,7 +76,7 @@ struct Belief {
 
 /// What the filter does with one rate.
 #[derive(Debug, Clone, Copy)]
-struct Gain {
+struct ScatterGain {
     variance: f64,
     slow: f64,
     end: f64,
@@ -84,7 +84,7 @@ struct Gain {
 
 /// The normal equations of a Gauss-Newton step, J^T W J and J^T W e.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Normal {
+pub(super) struct NormalMoments {
     pub(super) information: Matrix4<f64>,
     pub(super) gradient: Vector4<f64>,
 }
@@ -92,7 +92,7 @@ pub(super) struct Normal {
 impl Texture {
     fn new(window: &Window, slow: f64, memory_days: f64, prior: f64) -> Self {
         let mut before: Option<f64> = None;
-        let step = |rate: &super::window::Seen| {
+        let step = |rate: &super::window::SeenRate| {
             let middle = f64::midpoint(rate.older, rate.newer);
             let gap = before.map_or(f64::INFINITY, |before| (before - middle).max(0.0));
             before = Some(middle);
@@ -103,7 +103,7 @@ impl Texture {
             } else {
                 1.0
             };
-            Step {
+            ScatterStep {
                 keep: (-gap / memory_days).exp(),
                 load: rate.load * mean.sqrt(),
             }
@@ -147,7 +147,7 @@ impl Texture {
         residuals: &[f64],
         columns: &[Vec<f64>; 4],
         size: f64,
-    ) -> Normal {
+    ) -> NormalMoments {
         let mut information = Matrix4::zeros();
         let mut gradient = Vector4::zeros();
         let mut means = [[0.0; 2]; 5];
@@ -184,7 +184,7 @@ impl Texture {
                 information[(j, i)] = information[(i, j)];
             }
         }
-        Normal {
+        NormalMoments {
             information,
             gradient,
         }
@@ -225,7 +225,13 @@ impl Belief {
         }
     }
 
-    fn predict(&mut self, rate: &super::window::Seen, step: &Step, size2: f64, slow: f64) -> Gain {
+    fn predict(
+        &mut self,
+        rate: &super::window::SeenRate,
+        step: &ScatterStep,
+        size2: f64,
+        slow: f64,
+    ) -> ScatterGain {
         let renewed = size2 * slow * (1.0 - step.keep * step.keep);
         self.slow = step.keep * step.keep * self.slow + renewed;
         self.slow_end *= step.keep;
@@ -235,14 +241,14 @@ impl Belief {
         let white = size2 * (1.0 - slow) * rate.white;
         let variance = remembered + ends * ends * (self.end + 1.0) + white + rate.own;
         let variance = variance.max(1e-18);
-        Gain {
+        ScatterGain {
             variance,
             slow: from_slow / variance,
             end: ends / variance,
         }
     }
 
-    fn update(&mut self, gain: &Gain, weight: f64) {
+    fn update(&mut self, gain: &ScatterGain, weight: f64) {
         let share = weight * gain.variance;
         self.slow -= gain.slow * gain.slow * share;
         self.end = 1.0 - gain.end * gain.end * share;

@@ -4,7 +4,7 @@
 //! error and v itself where it does not: so zero and backward velocities are readings like all others,
 //! and the scale is the data's alone, the same for every law.
 
-use super::past::{Past, Shape};
+use super::past::{Past, PastShape};
 use crate::fit::rates::{Rate, ReadingError};
 
 /// A velocity this many of its own standard errors large is half-way from v to ln v.
@@ -17,7 +17,7 @@ const NEIGHBOURS: usize = 3;
 
 /// One rate.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Seen {
+pub(super) struct SeenRate {
     /// Days from its start and from its end to the present.
     pub(super) older: f64,
     pub(super) newer: f64,
@@ -44,7 +44,7 @@ pub(super) struct Window {
     /// The newest sampling interval, days.
     pub(super) interval_days: f64,
     /// Oldest first.
-    pub(super) seen: Vec<Seen>,
+    pub(super) seen: Vec<SeenRate>,
     spacing_days: f64,
 }
 
@@ -68,7 +68,7 @@ impl Window {
             seen: rates
                 .iter()
                 .zip(about(rates))
-                .map(|(rate, about)| Seen::new(rate, last.to, (about, floor)))
+                .map(|(rate, about)| SeenRate::new(rate, last.to, (about, floor)))
                 .collect(),
             spacing_days: spacing.max(1e-6 * length),
         })
@@ -85,7 +85,7 @@ impl Window {
     pub(super) fn residuals(
         &self,
         past: &mut Past,
-        (ln_v, shape): (f64, Shape),
+        (ln_v, shape): (f64, PastShape),
         span: f64,
         out: &mut [f64],
     ) -> bool {
@@ -117,7 +117,7 @@ impl Window {
     }
 }
 
-impl Seen {
+impl SeenRate {
     fn new(rate: &Rate, now_days: f64, (about, floor): (f64, f64)) -> Self {
         let sigma = rate.sigma.max(floor);
         let scale = BEND * sigma;

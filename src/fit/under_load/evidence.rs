@@ -1,18 +1,18 @@
 //! The evidence of four shapes of the law at one slope, summed over every start that the law may have.
 
-use super::gains::{Gains, LEVEL_VARIANCE, Record};
-use super::shape::{BLOCKS, Block, LANES, Place};
+use super::gains::{Gains, LEVEL_VARIANCE, RateRecord};
+use super::shape::{BLOCKS, Block, LANES, TablePlace};
 
 /// Rates that a law must explain, at least.
 const FEWEST_UNDER_THE_LAW: usize = 4;
 /// Standard deviations, for one rate after another, of a velocity that follows no law.
-const WANDERS: [f64; 3] = [0.05, 0.15, 0.4];
+const DRIFTS: [f64; 3] = [0.05, 0.15, 0.4];
 /// Starts this much less likely than the best, ln, are not counted.
 const NEGLIGIBLE: f64 = 10.0;
 
 /// The times of a record in units of one slope's time to failure.
 #[derive(Debug, Clone)]
-pub(super) struct Slope {
+pub(super) struct SlopeTable {
     /// |r|, 1/day.
     pub(super) r: f64,
     /// ln(1 + |r| t) at the middle of each rate.
@@ -31,7 +31,7 @@ pub(super) struct Room {
 
 /// What the readings say of one law.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Evidence {
+pub(super) struct ShapeEvidence {
     pub(super) ln: f64,
     /// ln v less the record's centre, and the load, of today.
     pub(super) ln_velocity: f64,
@@ -40,16 +40,16 @@ pub(super) struct Evidence {
     pub(super) today: [f64; 3],
 }
 
-impl Slope {
+impl SlopeTable {
     /// `blocks`: those that are asked about.
-    pub(super) fn new(r: f64, record: &Record, blocks: &[bool]) -> Self {
+    pub(super) fn new(r: f64, record: &RateRecord, blocks: &[bool]) -> Self {
         let u = |days: &f64| (r * days).ln_1p();
         let places = record.from.iter().zip(&record.middle).zip(&record.to);
-        let places: Vec<[Place; 3]> = places
-            .map(|((from, middle), to)| [from, middle, to].map(|days| Place::of(u(days))))
+        let places: Vec<[TablePlace; 3]> = places
+            .map(|((from, middle), to)| [from, middle, to].map(|days| TablePlace::of(u(days))))
             .collect();
         let predicted = BLOCKS.iter().zip(blocks).map(|(block, is_asked)| {
-            let places: &[[Place; 3]] = if *is_asked { &places } else { &[] };
+            let places: &[[TablePlace; 3]] = if *is_asked { &places } else { &[] };
             predict(block, places)
         });
         Self {
@@ -60,8 +60,8 @@ impl Slope {
     }
 }
 
-fn predict(block: &Block, places: &[[Place; 3]]) -> Vec<[f64; LANES]> {
-    let mean = |[from, middle, to]: &[Place; 3]| {
+fn predict(block: &Block, places: &[[TablePlace; 3]]) -> Vec<[f64; LANES]> {
+    let mean = |[from, middle, to]: &[TablePlace; 3]| {
         let (from, middle, to) = (block.ln_y(*from), block.ln_y(*middle), block.ln_y(*to));
         std::array::from_fn(|lane| {
             // ln of the mean of e^x over an x that falls evenly: ln(sinh(h)/h) above the middle.
@@ -79,12 +79,12 @@ fn predict(block: &Block, places: &[[Place; 3]]) -> Vec<[f64; LANES]> {
 
 /// The evidence of each shape of the block of that index; `before`: that of what came before each rate, by no law.
 pub(super) fn weigh(
-    record: &Record,
-    (block, slope): (usize, &Slope),
+    record: &RateRecord,
+    (block, slope): (usize, &SlopeTable),
     gains: &Gains,
     before: &[f64],
     room: &mut Room,
-) -> [Evidence; LANES] {
+) -> [ShapeEvidence; LANES] {
     let predicted = &slope.predicted[block];
     room.ln_evidence.clear();
     room.today.clear();
@@ -111,7 +111,7 @@ pub(super) fn weigh(
     std::array::from_fn(|lane| over_starts(record, gains, room, lane))
 }
 
-fn over_starts(record: &Record, gains: &Gains, room: &Room, lane: usize) -> Evidence {
+fn over_starts(record: &RateRecord, gains: &Gains, room: &Room, lane: usize) -> ShapeEvidence {
     let count = record.ln_velocity.len();
     let least = FEWEST_UNDER_THE_LAW.min(count) - 1;
     let starts = &room.ln_evidence[least..];
@@ -120,7 +120,7 @@ fn over_starts(record: &Record, gains: &Gains, room: &Room, lane: usize) -> Evid
         .map(|ln| ln[lane])
         .fold(f64::NEG_INFINITY, f64::max);
     let mut sum = 0.0;
-    let mut mean = Evidence {
+    let mut mean = ShapeEvidence {
         ln: f64::NEG_INFINITY,
         ln_velocity: 0.0,
         load: 0.0,
@@ -142,7 +142,7 @@ fn over_starts(record: &Record, gains: &Gains, room: &Room, lane: usize) -> Evid
             *slot += weight * variance;
         }
     }
-    Evidence {
+    ShapeEvidence {
         ln: best + f64::ln(sum),
         ln_velocity: mean.ln_velocity / sum,
         load: mean.load / sum,
@@ -153,8 +153,8 @@ fn over_starts(record: &Record, gains: &Gains, room: &Room, lane: usize) -> Evid
 /// How far each rate misses the law of one lane, as z squared of its error as it was before any doubt; the
 /// law over the whole record.
 pub(super) fn misses(
-    record: &Record,
-    (block, slope): (usize, &Slope),
+    record: &RateRecord,
+    (block, slope): (usize, &SlopeTable),
     (lane, scatter): (usize, f64),
     gains: &Gains,
 ) -> Vec<f64> {
@@ -173,17 +173,17 @@ pub(super) fn misses(
     squares
 }
 
-/// ln of the evidence of the rates before each one, by a velocity that wanders as it likes.
-pub(super) fn before_the_law(record: &Record, scatter: f64) -> Vec<f64> {
+/// ln of the evidence of the rates before each one, by a velocity that is a random walk.
+pub(super) fn before_the_law(record: &RateRecord, scatter: f64) -> Vec<f64> {
     let count = record.ln_velocity.len();
     let mut total = vec![0.0_f64; count];
-    let mut each = vec![[0.0_f64; WANDERS.len()]; count];
-    for (which, wander) in WANDERS.iter().enumerate() {
+    let mut each = vec![[0.0_f64; DRIFTS.len()]; count];
+    for (which, drift) in DRIFTS.iter().enumerate() {
         let (mut level, mut variance, mut ln) = (0.0, LEVEL_VARIANCE, 0.0);
         for (index, slot) in each.iter_mut().enumerate() {
             slot[which] = ln;
             if index > 0 {
-                variance += wander * wander;
+                variance += drift * drift;
             }
             let s = (variance + record.variance(index, scatter)).max(1e-12);
             let miss = record.ln_velocity[index] - level;
@@ -195,7 +195,7 @@ pub(super) fn before_the_law(record: &Record, scatter: f64) -> Vec<f64> {
     for (slot, each) in total.iter_mut().zip(&each) {
         let best = each.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let sum: f64 = each.iter().map(|ln| (ln - best).exp()).sum();
-        *slot = best + (sum / WANDERS.len() as f64).ln();
+        *slot = best + (sum / DRIFTS.len() as f64).ln();
     }
     total
 }

@@ -1,12 +1,12 @@
-//! When a velocity will be passed: each law run on, its load and its own wandering drawn on the way.
+//! When a velocity will be passed: each law run on, its load and its drift drawn on the way.
 
-use super::{Cell, LoadPosterior, WANDER};
+use super::{Cell, DRIFT, LoadPosterior};
 use crate::fit::quasi_random::{halton, normal_quantile};
 use std::sync::LazyLock;
 
 /// Draws of a cell: one for each of this share of the probability, so many at most.
 const DRAWS: (f64, usize) = (400.0, 64);
-/// How much of the wandering of an e-fold shows in the time that remains.
+/// How much of the drift of an e-fold shows in the time that remains.
 const IN_TIME: f64 = 0.3;
 /// Rounds of the search for the time at which the load has let enough of the law pass.
 const ROUNDS: usize = 6;
@@ -66,7 +66,7 @@ impl Cell {
         };
         let left = (of_load - along * self.covariance).max(0.0);
         let load = self.load + along * (now - self.ln_velocity) + left.sqrt() * z[1];
-        let pace = (IN_TIME * WANDER * z[4]).exp();
+        let pace = (IN_TIME * DRIFT * z[4]).exp();
         let mut days = shape.days_to(ln_velocity - (now - load)) / self.r;
         for _ in 0..ROUNDS {
             let memories = if days.is_finite() {

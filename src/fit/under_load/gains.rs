@@ -1,13 +1,13 @@
-//! The linear filter of ln v less the law, from the present into the past: how much each rate tells.
+//! The linear filter of ln v less the law, from the present into the past: how much each rate moves it.
 //!
 //! The state is the load f, the level l of ln v about the law, and two things of today that stay: ln v and
 //! f. Variances do not depend on what is read, so a table of gains serves every shape.
 
-use super::WANDER;
+use super::DRIFT;
 
 /// The rates as the filter sees them.
 #[derive(Debug, Clone)]
-pub(super) struct Record {
+pub(super) struct RateRecord {
     /// ln of the velocity less `centre`, oldest first, and its standard error.
     pub(super) ln_velocity: Vec<f64>,
     pub(super) error: Vec<f64>,
@@ -22,10 +22,10 @@ pub(super) struct Record {
 
 /// One guess at the load and at the scatter of the readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Noise {
+pub(super) struct LoadNoise {
     pub(super) scatter: f64,
     pub(super) sigma: f64,
-    /// Memory of the load, days.
+    /// LoadMemory of the load, days.
     pub(super) tau: f64,
     pub(super) ln_evidence: f64,
 }
@@ -56,7 +56,7 @@ pub(super) struct Gains {
     pub(super) today: Vec<[f64; 3]>,
 }
 
-impl Record {
+impl RateRecord {
     /// The variance of a rate's error.
     pub(super) fn variance(&self, index: usize, scatter: f64) -> f64 {
         (self.error[index].powi(2) + scatter * scatter) / self.trust[index]
@@ -65,16 +65,16 @@ impl Record {
 
 /// What a noise makes of the times of a record, whatever the law: newest rate first.
 #[derive(Debug, Clone)]
-pub(super) struct Memory {
-    noise: Noise,
+pub(super) struct LoadMemory {
+    noise: LoadNoise,
     /// The share of the load that is left from the rate after it.
     keep: Vec<f64>,
     /// What the load's variance loses in the mean over each rate.
     smoothed: Vec<f64>,
 }
 
-impl Memory {
-    pub(super) fn new(record: &Record, noise: &Noise) -> Self {
+impl LoadMemory {
+    pub(super) fn new(record: &RateRecord, noise: &LoadNoise) -> Self {
         let variance = noise.sigma * noise.sigma;
         let mut ago = 0.0;
         let (mut keep, mut smoothed) = (Vec::new(), Vec::new());
@@ -95,7 +95,7 @@ impl Memory {
 
 impl Gains {
     /// `u`: ln(1 + |r| t) at the middle of each rate, oldest first.
-    pub(super) fn new(record: &Record, memory: &Memory, u: &[f64]) -> Self {
+    pub(super) fn new(record: &RateRecord, memory: &LoadMemory, u: &[f64]) -> Self {
         let noise = &memory.noise;
         let count = record.middle.len();
         let variance = noise.sigma * noise.sigma;
@@ -123,7 +123,7 @@ impl Gains {
             }
             p[0][0] = keep * p[0][0] + variance * (1.0 - keep * keep);
             (p[1][0], p[2][0], p[3][0]) = (p[0][1], p[0][2], p[0][3]);
-            p[1][1] += WANDER * WANDER * e_folds;
+            p[1][1] += DRIFT * DRIFT * e_folds;
             let error = record.variance(index, noise.scatter);
             let h: [f64; 4] = std::array::from_fn(|i| p[0][i] + p[1][i]);
             let s = (h[0] + h[1] + error - smoothed).max(error).max(1e-12);

@@ -4,9 +4,9 @@
 //! The velocity is that of the law times e^f. Beside the law's parameters, three things are uncertain:
 //!
 //! - the log-load f, Ornstein-Uhlenbeck with a standard deviation and a memory of its own;
-//! - the law itself: seen from the present, ln v wanders off by [`WANDER`] for each e-fold of the time to
+//! - the law itself: seen from the present, ln v drifts off by [`DRIFT`] for each e-fold of the time to
 //!   failure that one looks back, so that old readings cannot outvote new ones;
-//! - where the law begins: before its start, which may be any reading, the velocity wanders as it likes.
+//! - where the law begins: before its start, which may be any reading, the velocity is a random walk.
 //!
 //! The law is taken in the coordinates of the present. Its shape, p and the ratio of healing to
 //! acceleration, runs over a table (`shape`); its slope r over a grid of ln r; the velocity and the load
@@ -36,15 +36,15 @@ use std::collections::BTreeMap;
 
 /// Standard deviation of ln v about the law for each e-fold of the time to failure: learnt on Lanzada
 /// 2025, whose inverse velocity bends, and no narrower for simulated slopes that keep the law exactly.
-const WANDER: f64 = 0.2;
+const DRIFT: f64 = 0.2;
 /// Prior probability of m > 1.
 const UNSTABLE: f64 = 0.65;
 /// Prior of what a stable slope will keep: mm/day, and the standard deviation of ln v above it.
 const KEPT: (f64, f64) = (2.0, 1.0);
 /// Fewest rates.
 const FEWEST: usize = 5;
-/// Laws that stand for all of them where one by one they are asked something.
-const SPOKESMEN: usize = 64;
+/// The heaviest laws, by which a next reading is predicted.
+const HEAVIEST: usize = 64;
 
 /// A law, with what the readings say of the velocity and of the load of today.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -114,7 +114,7 @@ impl LoadPosterior {
     pub fn ensemble(&self) -> Ensemble {
         let mut heaviest: Vec<&Cell> = self.cells.iter().collect();
         heaviest.sort_by(|a, b| b.weight.total_cmp(&a.weight));
-        heaviest.truncate(SPOKESMEN);
+        heaviest.truncate(HEAVIEST);
         let total: f64 = heaviest.iter().map(|cell| cell.weight).sum();
         let variance = |cell: &&Cell| {
             cell.weight * (cell.variances.0 + cell.scatter.powi(2) + 0.5 * cell.sigma.powi(2))

@@ -1,7 +1,7 @@
 //! The search over slopes, shapes and noises: coarse, then fine where the evidence is.
 
-use super::evidence::{self, Evidence, Room, Slope, weigh};
-use super::gains::{Gains, Memory, Noise, Record};
+use super::evidence::{self, Room, ShapeEvidence, SlopeTable, weigh};
+use super::gains::{Gains, LoadMemory, LoadNoise, RateRecord};
 use super::shape::{BLOCKS, SHAPES};
 use super::{Cell, KEPT};
 use crate::fit::Rate;
@@ -39,7 +39,7 @@ const CENTRE: usize = 9;
 
 /// The laws that the rates leave open; `None` where none has an evidence.
 pub(super) fn cells(rates: &[Rate]) -> Option<Vec<Cell>> {
-    let mut search = Search::new(rates);
+    let mut search = GridSearch::new(rates);
     let all = vec![true; BLOCKS.len()];
     let coarse = search.slopes((search.lowest, search.highest), search.coarse, &all);
     let mut noises = noises(rates);
@@ -63,8 +63,8 @@ struct Scored {
     slope: usize,
 }
 
-struct Search {
-    record: Record,
+struct GridSearch {
+    record: RateRecord,
     interval: f64,
     lowest: f64,
     highest: f64,
@@ -72,7 +72,7 @@ struct Search {
     room: Room,
 }
 
-impl Search {
+impl GridSearch {
     fn new(rates: &[Rate]) -> Self {
         let record = record(rates);
         let length = record.from[0];
@@ -103,18 +103,23 @@ impl Search {
     }
 
     /// `count` slopes at the middles of equal steps of ln r, to be asked about `blocks`.
-    fn slopes(&self, (lowest, highest): (f64, f64), count: usize, blocks: &[bool]) -> Vec<Slope> {
+    fn slopes(
+        &self,
+        (lowest, highest): (f64, f64),
+        count: usize,
+        blocks: &[bool],
+    ) -> Vec<SlopeTable> {
         let at = |index: usize| (index as f64 + 0.5) / count as f64;
         (0..count)
             .map(|index| {
                 let r = lowest * (highest / lowest).powf(at(index));
-                Slope::new(r, &self.record, blocks)
+                SlopeTable::new(r, &self.record, blocks)
             })
             .collect()
     }
 
     /// Prior of a shape at a slope, with the velocity that it is found to have.
-    fn ln_prior(&self, shape: usize, r: f64, evidence: &Evidence) -> f64 {
+    fn ln_prior(&self, shape: usize, r: f64, evidence: &ShapeEvidence) -> f64 {
         let shape = &SHAPES[shape];
         let resolved = r * self.interval / SLOPE_PER_INTERVAL;
         let kept = shape.ln_kept().map_or(0.0, |growth| {
@@ -135,9 +140,9 @@ impl Search {
     }
 
     /// Every shape at every slope under one noise, best first.
-    fn sweep(&mut self, slopes: &[Slope], noise: &Noise) -> Vec<Scored> {
+    fn sweep(&mut self, slopes: &[SlopeTable], noise: &LoadNoise) -> Vec<Scored> {
         let before = evidence::before_the_law(&self.record, noise.scatter);
-        let memory = Memory::new(&self.record, noise);
+        let memory = LoadMemory::new(&self.record, noise);
         let mut scored = Vec::with_capacity(slopes.len() * SHAPES.len());
         for (index, slope) in slopes.iter().enumerate() {
             let gains = Gains::new(&self.record, &memory, &slope.u);
@@ -167,9 +172,13 @@ impl Search {
     }
 
     /// Doubts the rates that the best law cannot explain.
-    fn doubt(&mut self, slopes: &[Slope], best: &Scored, noise: &Noise) {
+    fn doubt(&mut self, slopes: &[SlopeTable], best: &Scored, noise: &LoadNoise) {
         let slope = &slopes[best.slope];
-        let gains = Gains::new(&self.record, &Memory::new(&self.record, noise), &slope.u);
+        let gains = Gains::new(
+            &self.record,
+            &LoadMemory::new(&self.record, noise),
+            &slope.u,
+        );
         let law = (best.block, slope);
         let squares = evidence::misses(&self.record, law, (best.lane, noise.scatter), &gains);
         for (trust, square) in self.record.trust.iter_mut().zip(squares) {
@@ -178,7 +187,7 @@ impl Search {
     }
 
     /// Orders the noises by their evidence under the best law of each of the best few shapes.
-    fn compare(&mut self, slopes: &[Slope], scored: &[Scored], noises: &mut [Noise]) {
+    fn compare(&mut self, slopes: &[SlopeTable], scored: &[Scored], noises: &mut [LoadNoise]) {
         let mut chosen: Vec<Scored> = Vec::new();
         for one in scored {
             let new = |other: &Scored| (other.block, other.lane) != (one.block, one.lane);
@@ -192,7 +201,7 @@ impl Search {
         let befores = self.befores();
         for noise in noises.iter_mut() {
             let before = &befores[&noise.scatter.to_bits()];
-            let memory = Memory::new(&self.record, noise);
+            let memory = LoadMemory::new(&self.record, noise);
             let evidence = chosen.iter().map(|one| {
                 let slope = &slopes[one.slope];
                 let gains = Gains::new(&self.record, &memory, &slope.u);
@@ -206,7 +215,7 @@ impl Search {
     }
 
     /// The cells that count, with weights that sum to 1.
-    fn fine(&mut self, scored: &[Scored], noises: &[Noise]) -> Vec<Cell> {
+    fn fine(&mut self, scored: &[Scored], noises: &[LoadNoise]) -> Vec<Cell> {
         let best = scored.first().map_or(f64::NEG_INFINITY, |one| one.ln);
         let counts = |one: &&Scored| one.ln > best - LEFT_OUT.0;
         let blocks: Vec<bool> = (0..BLOCKS.len())
@@ -227,7 +236,7 @@ impl Search {
         let befores = self.befores();
         for noise in likely.take(MOST.2) {
             let before = &befores[&noise.scatter.to_bits()];
-            let memory = Memory::new(&self.record, noise);
+            let memory = LoadMemory::new(&self.record, noise);
             for slope in &slopes {
                 let gains = Gains::new(&self.record, &memory, &slope.u);
                 for block in (0..BLOCKS.len()).filter(|block| blocks[*block]) {
@@ -243,7 +252,13 @@ impl Search {
     }
 
     /// A cell whose weight is still the ln of what it is to be.
-    fn cell(&self, shape: usize, slope: &Slope, noise: &Noise, evidence: &Evidence) -> Cell {
+    fn cell(
+        &self,
+        shape: usize,
+        slope: &SlopeTable,
+        noise: &LoadNoise,
+        evidence: &ShapeEvidence,
+    ) -> Cell {
         Cell {
             shape,
             r: slope.r,
@@ -276,13 +291,13 @@ fn normalise(mut cells: Vec<Cell>) -> Vec<Cell> {
 }
 
 /// Every point of the grids; the middle one first, to begin with.
-fn noises(rates: &[Rate]) -> Vec<Noise> {
+fn noises(rates: &[Rate]) -> Vec<LoadNoise> {
     let span = rates[rates.len() - 1].to - rates[rates.len() / 2].from;
     let mut noises = Vec::new();
     for scatter in SCATTERS {
         for sigma in SIGMAS {
             for memory in MEMORIES {
-                noises.push(Noise {
+                noises.push(LoadNoise {
                     scatter,
                     sigma,
                     tau: (memory * span).max(1e-9),
@@ -299,7 +314,7 @@ fn noises(rates: &[Rate]) -> Vec<Noise> {
 /// Rates as logarithms. One within its noise is read as little more than "no faster than its error": half
 /// of v + sqrt(v^2 + 4 s^2) is v where it is clear of its error s, and s at rest. One at rest or backward
 /// whose error is not known is read as half of the slowest that moved, give or take e^1.5.
-fn record(rates: &[Rate]) -> Record {
+fn record(rates: &[Rate]) -> RateRecord {
     let now = rates.last().map_or(0.0, |rate| rate.to);
     let moving = rates.iter().map(|rate| rate.velocity).filter(|v| *v > 0.0);
     let at_rest = 0.5 * moving.fold(f64::INFINITY, f64::min);
@@ -317,7 +332,7 @@ fn record(rates: &[Rate]) -> Record {
     let mut newest: Vec<f64> = rates.iter().rev().take(CENTRE).map(forward).collect();
     newest.sort_by(f64::total_cmp);
     let centre = newest[newest.len() / 2].ln();
-    Record {
+    RateRecord {
         ln_velocity: rates
             .iter()
             .map(|rate| forward(rate).ln() - centre)

@@ -51,7 +51,7 @@ pub(super) struct Block {
 
 /// A place in the tables of the past.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Place {
+pub(super) struct TablePlace {
     index: u32,
     share: f64,
 }
@@ -199,7 +199,7 @@ fn place(at: f64, length: usize) -> (usize, f64) {
     (index, (at - index as f64).min(1.0))
 }
 
-impl Place {
+impl TablePlace {
     /// Where u = ln(1 + |r| t) stands.
     pub(super) fn of(u: f64) -> Self {
         let (index, share) = place(u / PAST_STEP, PAST);
@@ -212,7 +212,7 @@ impl Place {
 
 impl Block {
     /// ln y of its shapes there.
-    pub(super) fn ln_y(&self, place: Place) -> [f64; LANES] {
+    pub(super) fn ln_y(&self, place: TablePlace) -> [f64; LANES] {
         let index = place.index as usize;
         let (before, after) = (&self.past[index], &self.past[index + 1]);
         std::array::from_fn(|lane| before[lane] + place.share * (after[lane] - before[lane]))
@@ -240,7 +240,7 @@ mod tests {
                     if motion.y < 0.05 {
                         continue;
                     }
-                    let ln_y = block.ln_y(Place::of((0.02_f64 * ago).ln_1p()))[lane];
+                    let ln_y = block.ln_y(TablePlace::of((0.02_f64 * ago).ln_1p()))[lane];
                     assert!(
                         (ln_y - motion.y.ln()).abs() < 0.05,
                         "{shape:?} {ago}: {ln_y}"

@@ -26,7 +26,7 @@ struct Displaced {
 /// What the instrument stands on, and moves by itself; now and then it is hit.
 struct Monument {
     /// Standard deviation of the part that forgets, mm, and the days over which it does.
-    wander: f64,
+    drift: f64,
     memory: f64,
     /// Of the part that does not, mm/√day.
     walk: f64,
@@ -37,7 +37,7 @@ struct Monument {
 /// Where the monument has moved to, mm.
 #[derive(Default)]
 struct Moved {
-    wander: f64,
+    drift: f64,
     walk: f64,
 }
 
@@ -105,7 +105,7 @@ impl Instrument {
     fn unsettle(&mut self, (end, slip): (f64, f64), generator: &mut impl Rng) {
         self.noise = slip / end * self.interval * log_uniform(generator, 5.0, 20.0);
         self.monument = Some(Monument {
-            wander: self.noise * generator.random_range(0.3..1.0),
+            drift: self.noise * generator.random_range(0.3..1.0),
             memory: log_uniform(generator, 1.0, 50.0),
             walk: self.noise * log_uniform(generator, 0.02, 0.2),
             outliers: generator.random_range(0.01..0.05),
@@ -147,10 +147,10 @@ impl Instrument {
     /// What the monument adds to the next reading, mm.
     fn unsettled(&self, monument: &Monument, moved: &mut Moved, generator: &mut impl Rng) -> f64 {
         let keep = f64::exp(-self.interval / monument.memory);
-        let fresh = monument.wander * f64::sqrt(1.0 - keep * keep);
-        moved.wander = moved.wander * keep + fresh * normal(generator);
+        let fresh = monument.drift * f64::sqrt(1.0 - keep * keep);
+        moved.drift = moved.drift * keep + fresh * normal(generator);
         moved.walk += monument.walk * self.interval.sqrt() * normal(generator);
-        let mut error = moved.wander + moved.walk;
+        let mut error = moved.drift + moved.walk;
         if generator.random::<f64>() < monument.outliers {
             // A tail of index 2: the variance is infinite but for the cap.
             let far = 5.0 / f64::sqrt(1.0 - generator.random::<f64>());

@@ -40,7 +40,7 @@ fn add(knots: &mut [(f64, f64)], more: impl Fn(f64) -> f64) {
     }
 }
 
-/// (days, log-load) of a load that wanders, under a weak season on every second slope.
+/// (days, log-load) of a load that is a random process, under a weak season on every second slope.
 pub(super) fn undeclared(end: f64, generator: &mut impl Rng) -> Vec<(f64, f64)> {
     let sigma = generator.random_range(0.0..0.25);
     let memory = log_uniform(generator, 3.0, 40.0);
@@ -51,17 +51,17 @@ pub(super) fn undeclared(end: f64, generator: &mut impl Rng) -> Vec<(f64, f64)> 
     };
     let phase = generator.random_range(0.0..std::f64::consts::TAU);
     let keep = f64::exp(-STEP_DAYS / memory);
-    let mut wander = sigma * normal(generator);
+    let mut load = sigma * normal(generator);
     let mut knots = Vec::new();
     let mut index = 0_u32;
     loop {
         let days = STEP_DAYS * f64::from(index);
         let seasonal = season * (std::f64::consts::TAU * days / YEAR + phase).sin();
-        knots.push((days, wander + seasonal));
+        knots.push((days, load + seasonal));
         if days > end {
             return knots;
         }
-        wander = wander * keep + sigma * f64::sqrt(1.0 - keep * keep) * normal(generator);
+        load = load * keep + sigma * f64::sqrt(1.0 - keep * keep) * normal(generator);
         index += 1;
     }
 }

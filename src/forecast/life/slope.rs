@@ -15,7 +15,7 @@ pub(super) struct Slope {
     pub(super) end: f64,
 }
 
-/// Knots in the windows whose mean velocities tell a season, 30 days, and a step, one day.
+/// Knots in the windows whose mean velocities show a season, 30 days, and a step, one day.
 const SEASON: usize = 300;
 const DAY: usize = 10;
 

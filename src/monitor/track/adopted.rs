@@ -1,16 +1,12 @@
-//! The fuller law of one benchmark: its forecast, and whether it explains how fast the slope is now.
-//!
-//! Under a known log-load f the law reads v = v_i e^f / y, dy/dt = a y^p - b e^f. In the time of a clock that runs
-//! at the pace e^f it is the law under a constant load, exactly so where a = 0 (the inverse-velocity line; else
-//! the contacts age by the calendar, which the undeclared load of the forecast is left to make up for). So the
-//! readings are told in that clock's time, forecast as ever, and the times told back.
+//! The law with the effects that were found, of one benchmark: its forecast, and whether it explains how fast the
+//! slope is now.
 
-use super::forecast::Fuller;
-use super::motion::{fastest, is_new_highest, settled};
-use crate::effects::{self, Clock};
+use super::forecast::UnderKnownLoad;
+use crate::effects::{self, ByClock};
 use crate::fit::{Observations, Rate};
-use crate::forecast::{Outlook, Panel};
+use crate::forecast::Panel;
 use crate::monitor::history::History;
+use crate::monitor::motion::{fastest, is_new_highest, settled};
 use crate::reading::{Channel, Timestamp, after_days};
 use serde::{Deserialize, Serialize};
 
@@ -25,10 +21,11 @@ const IN_A_ROW: u32 = 2;
 /// From this share of the critical velocity on no effect explains how fast it is.
 const TOO_FAST: f64 = 0.1;
 
-/// A fuller law in use.
+/// A law under a known load in use.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Adopted {
-    fuller: effects::Fuller,
+    #[serde(rename = "fuller")]
+    known_load: effects::KnownLoad,
     /// ln of the mean pace over the record in which it was found: the log-load that counts as none.
     usual: f64,
     /// Of the log-load over that record.
@@ -41,87 +38,86 @@ pub(super) struct Adopted {
 }
 
 impl Adopted {
-    /// Takes a fuller law into use; its expectation for the next reading rests on those in `history`.
+    /// Takes a law under a known load into use; its expectation for the next reading rests on those in `history`.
     pub(super) fn new(
-        fuller: effects::Fuller,
+        known_load: effects::KnownLoad,
         history: &History,
         channels: &[&Channel],
         critical: f64,
     ) -> Self {
         let mut adopted = Self {
-            fuller,
+            known_load,
             usual: 0.0,
             range: (0.0, 0.0),
             fastest: fastest(&history.rates()).unwrap_or(0.0),
             panel: Panel::default(),
             faster: 0,
         };
-        let clock = adopted.clock(history, channels);
-        adopted.usual = clock.usual();
-        let each = clock.log_load().iter();
-        adopted.range = each.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), f| {
-            (low.min(f - adopted.usual), high.max(f - adopted.usual))
+        let observations = &history.observations;
+        let by_clock = ByClock::new(
+            observations,
+            history.epoch,
+            channels,
+            &adopted.known_load,
+            None,
+        );
+        let Some(by_clock) = by_clock else {
+            return adopted;
+        };
+        adopted.usual = by_clock.usual();
+        let none = (f64::INFINITY, f64::NEG_INFINITY);
+        adopted.range = by_clock
+            .above_usual()
+            .fold(none, |(low, high), f| (low.min(f), high.max(f)));
+        by_clock.outlook(critical, |readings, critical| {
+            adopted.panel.update(readings, critical)
         });
-        let clock = adopted.clock(history, channels);
-        let readings = adopted.told(&clock, history, channels);
-        adopted.outlook(history, (&clock, &readings), critical);
         adopted
     }
 
-    pub(super) fn law(&self) -> &effects::Fuller {
-        &self.fuller
+    pub(super) fn law(&self) -> &effects::KnownLoad {
+        &self.known_load
     }
 
-    /// What it foretells after the newest reading of `history`, of which `rates` are the velocities.
+    /// What it predicts after the newest reading of `history`, of which `rates` are the velocities.
     pub(super) fn forecast(
         &mut self,
         history: &History,
         channels: &[&Channel],
         (critical, rates): (f64, &[Rate]),
-    ) -> Option<Fuller> {
-        let clock = self.clock(history, channels);
-        let readings = self.told(&clock, history, channels);
-        let excess = self.panel.excess(&readings);
+    ) -> Option<UnderKnownLoad> {
+        let by_clock = self.by_clock(history, channels)?;
+        let excess = self.panel.excess(by_clock.readings());
         self.faster = match excess {
             Some(excess) if excess <= FASTER => 0,
             Some(_) | None => self.faster + 1,
         };
-        let load = clock.log_load().last()? - self.usual;
-        let outlook = self.outlook(history, (&clock, &readings), critical)?;
+        let load = by_clock.now()?;
+        let outlook = by_clock.outlook(critical, |readings, critical| {
+            self.panel.update(readings, critical)
+        })?;
         let width = BEYOND_RANGE * (self.range.1 - self.range.0);
-        let is_explained = self.fuller.reaches(channels, history.newest()?)
+        let is_explained = self.known_load.reaches(channels, history.newest()?)
             && (self.range.0 - width..=self.range.1 + width).contains(&load)
             && self.faster < IN_A_ROW
             && !is_new_highest(&outlook.rates)
             && settled(rates).is_some_and(|velocity| {
                 velocity < TOO_FAST * critical && velocity <= BEYOND_FASTEST * self.fastest
             });
-        Some(Fuller {
+        Some(UnderKnownLoad {
             outlook,
             is_explained,
         })
     }
 
-    /// The forecast in calendar time. A load that is high now may stay, and one that is low may be gone tomorrow:
-    /// the slope is run on at the higher of the present pace and the usual one.
-    fn outlook(
-        &mut self,
-        history: &History,
-        (clock, readings): (&Clock, &Observations),
-        critical: f64,
-    ) -> Option<Outlook> {
-        let now = clock.log_load().last()? - self.usual;
-        let pace = now.clamp(0.0, Clock::FARTHEST_LOAD).exp();
-        let outlook = self.panel.update(readings, critical / pace)?;
-        Some(Outlook {
-            now_days: history.observations.values.last()?.t_days,
-            ..outlook.sooner(pace)
-        })
-    }
-
     /// The readings by the load's clock, without what in them is no motion.
-    pub(super) fn readings(&self, history: &History, channels: &[&Channel]) -> Observations {
-        self.told(&self.clock(history, channels), history, channels)
+    pub(super) fn readings(
+        &self,
+        history: &History,
+        channels: &[&Channel],
+    ) -> Option<Observations> {
+        let by_clock = self.by_clock(history, channels)?;
+        Some(by_clock.readings().clone())
     }
 
     /// The calendar's time when the load's clock stands at `time`.
@@ -131,23 +127,18 @@ impl Adopted {
         channels: &[&Channel],
         time: Timestamp,
     ) -> Option<Timestamp> {
-        let told = history.days(time);
-        after_days(history.epoch, self.clock(history, channels).day(told))
+        let by_clock = self.by_clock(history, channels)?;
+        after_days(history.epoch, by_clock.calendar_day(history.days(time)))
     }
 
-    fn told(&self, clock: &Clock, history: &History, channels: &[&Channel]) -> Observations {
-        let observations = &history.observations;
-        let times = observations.values.iter();
-        let times: Vec<_> = times
-            .filter_map(|value| history.time(value.t_days))
-            .collect();
-        clock.told(observations, &self.fuller.in_reading(channels, &times))
-    }
-
-    fn clock(&self, history: &History, channels: &[&Channel]) -> Clock {
-        let days = Clock::ticks(&history.observations);
-        let times: Vec<_> = days.iter().filter_map(|t| history.time(*t)).collect();
-        let log_load = self.fuller.log_load(channels, &times);
-        Clock::new(days, log_load, self.usual)
+    fn by_clock(&self, history: &History, channels: &[&Channel]) -> Option<ByClock> {
+        let usual = Some(self.usual);
+        ByClock::new(
+            &history.observations,
+            history.epoch,
+            channels,
+            &self.known_load,
+            usual,
+        )
     }
 }

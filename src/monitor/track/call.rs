@@ -1,11 +1,13 @@
 //! From a refit to the level in force, and the words for it.
 
 use super::forecast::Forecast;
-use super::motion::{acceleration, displacement_mm, moves_backwards, newest_velocity, settled};
 use super::{Track, days};
 use crate::alert::{Cause, Entered, Evidence, Policy, Transition};
 use crate::fit::Rate;
 use crate::monitor::event::{AlertState, Event, EventKind};
+use crate::monitor::motion::{
+    acceleration, displacement_mm, moves_backwards, newest_velocity, settled,
+};
 use crate::reading::Timestamp;
 use jiff::SignedDuration;
 
@@ -65,10 +67,10 @@ impl Track {
         }
         let transitions = self.latch.update(policy, &evidence);
         self.levels.note(time, self.latch.level());
-        let told = transitions
+        let reported = transitions
             .iter()
             .map(|change| self.alert_event(time, policy, (&evidence, ahead), change));
-        events.extend(told);
+        events.extend(reported);
         events
     }
 

@@ -12,9 +12,10 @@ impl Track {
     /// What takes effect with the reading of `time`.
     pub(super) fn declared_with(&mut self, time: Timestamp) -> Vec<Event> {
         let before = self.silence.newest();
-        let told = self.declared.tell(before, time);
+        let reported = self.declared.take(before, time);
         let now = self.newest.map_or(time, |newest| newest.max(time));
-        told.iter()
+        reported
+            .iter()
             .map(|one| one.event(now, &self.benchmark, None))
             .collect()
     }
@@ -32,8 +33,8 @@ impl Track {
             .newest
             .map_or(reading.time, |newest| newest.max(reading.time));
         let (from, to) = self.history.span(reading.time);
-        let told = self.declared.tell_reset(from, to);
-        let mut events: Vec<Event> = told
+        let reported = self.declared.take_resets(from, to);
+        let mut events: Vec<Event> = reported
             .iter()
             .map(|one| one.event(now, &self.benchmark, None))
             .collect();
@@ -45,11 +46,11 @@ impl Track {
     pub(super) fn reset(&mut self, now: Timestamp) -> Vec<Event> {
         let mut events = Vec::new();
         for (time, jump) in self.history.reset(&self.declared) {
-            let told = self.declared.tell_reset(time, time);
-            let told = told
+            let reported = self.declared.take_resets(time, time);
+            let reported = reported
                 .iter()
                 .map(|one| one.event(now, &self.benchmark, Some(jump)));
-            events.extend(told);
+            events.extend(reported);
         }
         events
     }

@@ -1,4 +1,4 @@
-//! What one benchmark is forecast to do: by the law under a constant load, and by the fuller one beside it.
+//! What one benchmark is forecast to do: by the law under a constant load, and by the law under the known load beside it.
 
 use super::days;
 use crate::alert::Policy;
@@ -16,12 +16,12 @@ const MOST_INTERVALS: f64 = 2.0;
 pub(super) struct Forecast {
     pub(super) plain: Outlook,
     /// Where an effect is adopted.
-    pub(super) fuller: Option<Fuller>,
+    pub(super) known_load: Option<UnderKnownLoad>,
 }
 
-/// The fuller law's forecast.
+/// The law under the known load's forecast.
 #[derive(Debug)]
-pub(super) struct Fuller {
+pub(super) struct UnderKnownLoad {
     pub(super) outlook: Outlook,
     /// Whether it explains how fast the slope is now.
     pub(super) is_explained: bool,
@@ -42,17 +42,17 @@ impl Forecast {
         reach.max(policy.evacuation_time).min(policy.outlook)
     }
 
-    /// The forecast that people are told: the fuller law's where it explains the present, else that of whichever
+    /// The forecast that people are given: the known load's where it explains the present, else that of whichever
     /// gives failure the larger chance within `days`.
     pub(super) fn in_force(&self, days: f64) -> &Outlook {
-        match &self.fuller {
-            Some(fuller) if fuller.is_explained => &fuller.outlook,
-            Some(fuller) => {
+        match &self.known_load {
+            Some(known_load) if known_load.is_explained => &known_load.outlook,
+            Some(known_load) => {
                 let chance = |passage: &Passage| passage.chance_within(days);
-                if chance(&self.plain.chances) > chance(&fuller.outlook.chances) {
+                if chance(&self.plain.chances) > chance(&known_load.outlook.chances) {
                     &self.plain
                 } else {
-                    &fuller.outlook
+                    &known_load.outlook
                 }
             }
             None => &self.plain,
@@ -65,14 +65,14 @@ impl Forecast {
         to_the_next_reading(&self.plain, evacuation)
     }
 
-    /// Chance of a collapse within `days`, as the level takes it: what the fuller law does not explain, it cannot
+    /// Chance of a collapse within `days`, as the level takes it: what the law under the known load does not explain, it cannot
     /// talk away either.
     pub(super) fn chance_within(&self, days: f64) -> f64 {
         let plain = self.plain.chances.chance_within(days);
-        match &self.fuller {
-            Some(fuller) => {
-                let chance = fuller.outlook.chances.chance_within(days);
-                if fuller.is_explained {
+        match &self.known_load {
+            Some(known_load) => {
+                let chance = known_load.outlook.chances.chance_within(days);
+                if known_load.is_explained {
                     chance
                 } else {
                     chance.max(plain)
@@ -84,10 +84,10 @@ impl Forecast {
 
     /// How unexpected the newest reading was to the law that knows most, ln.
     pub(super) fn surprise_nats(&self) -> Option<f64> {
-        self.fuller
+        self.known_load
             .as_ref()
-            .map_or(self.plain.surprise_nats, |fuller| {
-                fuller.outlook.surprise_nats
+            .map_or(self.plain.surprise_nats, |known_load| {
+                known_load.outlook.surprise_nats
             })
     }
 }

@@ -1,13 +1,13 @@
 //! Looking back after late readings: would another level have been called?
 
 use super::forecast::to_the_next_reading;
-use super::motion::{acceleration, displacement_mm, newest_velocity, settled};
 use super::{Track, days};
 use crate::alert::{Evidence, Latch, Level, Policy};
 use crate::fit::Observations;
 use crate::forecast::Panel;
 use crate::monitor::event::{Event, EventKind};
 use crate::monitor::history::History;
+use crate::monitor::motion::{acceleration, displacement_mm, newest_velocity, settled};
 use crate::reading::Timestamp;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;

@@ -6,7 +6,6 @@ mod call;
 mod declared;
 mod forecast;
 mod lookback;
-mod motion;
 mod pace;
 mod refit;
 mod sensor;
@@ -38,10 +37,7 @@ use std::collections::BTreeSet;
 use unknown::{Reason, Unknown};
 use watch::Watch;
 
-pub(crate) use motion::recent;
-pub(super) use motion::settled;
-
-/// So many readings in a row with one value are a stuck sensor, or a resolution too coarse to tell.
+/// So many readings in a row with one value are a stuck sensor, or a resolution too coarse to show it.
 const STUCK: usize = 24;
 
 /// What lies beside a benchmark's readings.
@@ -74,7 +70,7 @@ pub(super) struct Track {
     #[serde(default)]
     pace: Pace,
     watch: Watch,
-    /// The fuller law that forecasts and levels go by.
+    /// The law under the known load that forecasts and levels go by.
     adopted: Option<Adopted>,
     /// What people declare for it.
     #[serde(default)]
@@ -284,15 +280,15 @@ impl Track {
         self.reads_again(time, time)
     }
 
-    /// What the laws foretell after the newest reading.
+    /// What the laws predict after the newest reading.
     fn forecast(&mut self, critical: f64, beside: &Beside<'_>) -> Option<Forecast> {
         let plain = self.panel.update(&self.history.observations, critical)?;
         let history = &self.history;
-        let fuller = self.adopted.as_mut().and_then(|adopted| {
+        let known_load = self.adopted.as_mut().and_then(|adopted| {
             let channels = beside.covariates.list();
             adopted.forecast(history, &channels, (critical, &plain.rates))
         });
-        Some(Forecast { plain, fuller })
+        Some(Forecast { plain, known_load })
     }
 
     /// What is wrong with a reading, where something is.

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 /// A record of no more readings than this is young: each of them leads to a refit.
 const YOUNG: u64 = 1000;
-/// An older one is refitted so many times an evacuation time, and in between where a reading was not foreseen.
+/// An older one is refitted so many times an evacuation time, and in between where a reading was not predicted.
 const REFITS_AN_EVACUATION: i32 = 96;
 
 /// Where the last refits were.
@@ -31,7 +31,7 @@ impl Track {
         if taken == Taken::Newest {
             let is_due = is_young
                 || is_far_from(self.pace.newest)
-                || !self.panel.foresees(&self.history.observations);
+                || !self.panel.predicts(&self.history.observations);
             if is_due {
                 (self.pace.newest, self.pace.past) = (Some(time), None);
             }

@@ -1,7 +1,6 @@
 //! What a refit says: the regime, the failure time, and predicted times that moved.
 
 use super::forecast::Forecast;
-use super::recent;
 use super::{Track, days};
 use crate::alert::{Cause, Policy};
 use crate::forecast::{HORIZON_DAYS, InverseVelocityLine, Outlook, Passage};
@@ -9,6 +8,7 @@ use crate::monitor::drift;
 use crate::monitor::event::{
     Event, EventKind, FailureTime, InverseVelocity, Plain, RegimeReport, Unexplained,
 };
+use crate::monitor::recent;
 use crate::reading::{Timestamp, after_days};
 use crate::regime::{Regime, label};
 
@@ -111,11 +111,11 @@ impl Track {
     ) -> Event {
         let at = |days: Option<f64>| days.and_then(|days| after_days(self.history.epoch, days));
         let outlook = forecast.in_force(days(policy.outlook));
-        let plain = forecast.fuller.as_ref().map(|fuller| {
+        let plain = forecast.known_load.as_ref().map(|known_load| {
             Box::new(Plain {
                 regime: report(&forecast.plain),
                 failure_time: self.reported(forecast.plain.now_days, &forecast.plain.collapse),
-                is_explained: fuller.is_explained,
+                is_explained: known_load.is_explained,
             })
         });
         self.event(
@@ -169,7 +169,7 @@ impl Track {
     fn drift_event(
         &self,
         time: Timestamp,
-        moved: drift::Moved,
+        moved: drift::MovedIntercept,
         kind: impl FnOnce(Timestamp, Timestamp) -> EventKind,
     ) -> Option<Event> {
         let from = after_days(self.history.epoch, moved.from_days)?;

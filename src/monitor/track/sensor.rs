@@ -8,7 +8,7 @@ use crate::monitor::event::Event;
 use crate::reading::{Suspicion, Timestamp};
 use jiff::SignedDuration;
 
-/// Readings of a second quantity in a row that are told, where the first quantity has hardly been read.
+/// Readings of a second quantity in a row that are reported, where the first quantity has hardly been read.
 const FEW_OTHERS: u32 = 3;
 /// And where it has.
 const MANY_OTHERS: u32 = 24;

@@ -116,7 +116,7 @@ impl Track {
         ))
     }
 
-    /// When it began is part of the key, so that each time is told anew.
+    /// When it began is part of the key, so that each time is reported anew.
     fn unknown_alert(
         &self,
         (time, since): (Timestamp, Timestamp),

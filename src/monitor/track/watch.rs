@@ -4,7 +4,7 @@ use super::adopted::Adopted;
 use super::forecast::Forecast;
 use super::{Beside, Track};
 use crate::alert::{Cause, Policy};
-use crate::effects::{Effect, Fuller, Kind, residual_structure};
+use crate::effects::{Effect, Kind, KnownLoad, Rival, residual_structure};
 use crate::forecast::measurably_moves;
 use crate::monitor::event::{Event, EventKind, Unexplained};
 use crate::monitor::search::{Finding, MOST_READINGS, SearchJob};
@@ -20,7 +20,7 @@ const MOST_LOOKED_AT: usize = 400;
 const STRUCTURE: f64 = 20.0;
 /// A load of less than this, e-folds of velocity, is worth a search but nobody's attention: a third more or less
 /// of a slope's velocity is what slopes do.
-const WORTH_TELLING: f64 = 0.3;
+const WORTH_REPORTING: f64 = 0.3;
 /// Two finds of one event lie no further apart than this share of the record.
 const SAME_TIME: f64 = 0.05;
 
@@ -34,14 +34,15 @@ pub(super) struct Watch {
     is_searching: bool,
     /// As of the last look.
     has_structure: bool,
-    /// The structure last told.
-    told: Option<f64>,
-    known: Vec<Known>,
+    /// The structure last reported.
+    #[serde(rename = "told")]
+    reported: Option<f64>,
+    known: Vec<KnownEffect>,
 }
 
-/// An effect that has been told.
+/// An effect that has been reported.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Known {
+struct KnownEffect {
     kind: Kind,
     channel: Option<String>,
     at: Option<Timestamp>,
@@ -67,17 +68,17 @@ impl Watch {
         self.taken
     }
 
-    /// Whether structure of this size is to be told: when it is new, or has doubled since.
-    fn tells(&mut self, structure: Option<f64>) -> bool {
+    /// Whether structure of this size is to be reported: when it is new, or has doubled since.
+    fn is_news(&mut self, structure: Option<f64>) -> bool {
         let Some(gain) = structure else {
-            self.told = None;
+            self.reported = None;
             return false;
         };
-        let tells = self.told.is_none_or(|told| gain >= 2.0 * told);
-        if tells {
-            self.told = Some(gain);
+        let is_news = self.reported.is_none_or(|reported| gain >= 2.0 * reported);
+        if is_news {
+            self.reported = Some(gain);
         }
-        tells
+        is_news
     }
 }
 
@@ -101,8 +102,8 @@ impl Track {
         };
         let found = found.filter(|found| found.bic_gain >= STRUCTURE);
         self.watch.has_structure = found.is_some();
-        let worth = found.filter(|found| found.load_sd >= WORTH_TELLING);
-        if !self.watch.tells(worth.map(|found| found.bic_gain)) {
+        let worth = found.filter(|found| found.load_sd >= WORTH_REPORTING);
+        if !self.watch.is_news(worth.map(|found| found.bic_gain)) {
             return None;
         }
         let found = worth?;
@@ -117,11 +118,11 @@ impl Track {
 
     /// The readings as the law in force sees them: by the load's clock, where one is adopted.
     fn in_force(&self, beside: &Beside<'_>) -> Series {
-        let told = self.adopted.as_ref().map(|adopted| {
+        let by_clock = self.adopted.as_ref().and_then(|adopted| {
             let channels = beside.covariates.list();
             adopted.readings(&self.history, &channels)
         });
-        let observations = told.as_ref().unwrap_or(&self.history.observations);
+        let observations = by_clock.as_ref().unwrap_or(&self.history.observations);
         self.history
             .series(&self.benchmark, observations, MOST_LOOKED_AT)
     }
@@ -166,7 +167,7 @@ impl Track {
         Some(SearchJob::new(series, channels, asked, critical))
     }
 
-    /// Takes what a search came to: tells the effects, and goes by them where the site wants that.
+    /// Takes what a search came to: reports the effects, and forecasts by them where the site wants that.
     pub(in crate::monitor) fn found(
         &mut self,
         critical: f64,
@@ -176,19 +177,20 @@ impl Track {
     ) -> Vec<Event> {
         self.watch.is_searching = false;
         let before = self.adopted.take();
-        let fuller = witnessed(finding);
-        if beside.explain == Explain::Adopt && !fuller.parts.is_empty() && is_separable(finding) {
+        let known_load = witnessed(finding);
+        if beside.explain == Explain::Adopt && !known_load.parts.is_empty() && is_separable(finding)
+        {
             let channels = beside.covariates.list();
-            self.adopted = Some(Adopted::new(fuller, &self.history, &channels, critical));
+            self.adopted = Some(Adopted::new(known_load, &self.history, &channels, critical));
         }
         let mut events = self.dropped(time, before.as_ref().map(Adopted::law));
-        let known: Vec<Known> = finding
+        let known: Vec<KnownEffect> = finding
             .effects
             .iter()
             .map(|effect| self.known(effect))
             .collect();
         for (effect, known) in finding.effects.iter().zip(&known) {
-            if !self.is_told(known) {
+            if !self.is_reported(known) {
                 events.push(self.effect_event(time, effect, (finding, known.is_adopted)));
             }
         }
@@ -196,10 +198,10 @@ impl Track {
         events
     }
 
-    fn known(&self, effect: &Effect) -> Known {
+    fn known(&self, effect: &Effect) -> KnownEffect {
         let law = self.adopted.as_ref().map(Adopted::law);
         let channel = effect.channel.as_deref();
-        Known {
+        KnownEffect {
             kind: effect.effect,
             channel: effect.channel.clone(),
             at: effect.at,
@@ -207,7 +209,7 @@ impl Track {
         }
     }
 
-    fn is_told(&self, new: &Known) -> bool {
+    fn is_reported(&self, new: &KnownEffect) -> bool {
         let record = self
             .newest
             .map_or(0.0, |newest| days_since(self.history.epoch, newest));
@@ -218,11 +220,11 @@ impl Track {
                 (Some(_), None) | (None, Some(_)) => f64::INFINITY,
             };
             let at = new.at;
-            apart <= SAME_TIME * record && *new == Known { at, ..old.clone() }
+            apart <= SAME_TIME * record && *new == KnownEffect { at, ..old.clone() }
         })
     }
 
-    fn dropped(&self, time: Timestamp, before: Option<&Fuller>) -> Vec<Event> {
+    fn dropped(&self, time: Timestamp, before: Option<&KnownLoad>) -> Vec<Event> {
         let law = self.adopted.as_ref().map(Adopted::law);
         let parts = before.map_or(&[][..], |law| &law.parts);
         let gone = parts
@@ -262,9 +264,9 @@ impl Track {
 
 /// The effects that something besides the motion bears witness to: a covariate, the calendar, the instrument. A
 /// step of the load that only the motion shows may as well be the failure's own beginning.
-fn witnessed(finding: &Finding) -> Fuller {
-    let parts = finding.fuller.parts.iter();
-    Fuller {
+fn witnessed(finding: &Finding) -> KnownLoad {
+    let parts = finding.known_load.parts.iter();
+    KnownLoad {
         parts: parts
             .filter(|part| part.kind() != Kind::LoadStep)
             .cloned()
@@ -272,13 +274,12 @@ fn witnessed(finding: &Finding) -> Fuller {
     }
 }
 
-/// Whether the readings tell the effects from everything else: another covariate of the same kind that does as
+/// Whether the readings distinguish the effects from everything else: another covariate of the same kind that does as
 /// well means the same load so far, another kind does not.
 fn is_separable(finding: &Finding) -> bool {
-    let same_kind = |rival: &String| {
-        let kind = rival.split(' ').next().unwrap_or_default();
+    let same_kind = |rival: &Rival| {
         let mut effects = finding.effects.iter();
-        effects.any(|effect| effect.effect.name() == kind)
+        effects.any(|effect| effect.effect == rival.kind)
     };
     finding.cannot_separate_from.iter().all(same_kind)
 }

@@ -1,7 +1,7 @@
 //! Takes alerts to the hooks: a worker and a bounded queue each, retries that hold nothing up.
 //!
 //! The gravest goes first, whatever waits before it; of one benchmark one alert at a time. What has been superseded
-//! while it waited is not told any more.
+//! while it waited is not reported any more.
 //!
 //! Orange, red and unknown are tried until the hook takes them, they are resolved or superseded, or
 //! the daemon stops; the next start then offers them again. Whatever else is given up in the end.
@@ -9,7 +9,7 @@
 mod runner;
 mod worker;
 
-pub use runner::{Processes, Run, Runner};
+pub use runner::{Processes, Run, Runner, run};
 
 use super::delivered::Delivered;
 use super::hook::Alert;
@@ -148,7 +148,7 @@ impl Dispatcher {
         }
     }
 
-    /// What `alert` supersedes or resolves is not tried again, whether a hook is told of `alert` or not.
+    /// What `alert` supersedes or resolves is not tried again, whether a hook is notified of `alert` or not.
     pub fn supersede(&self, alert: &Alert) {
         for way in &self.hooks {
             locked(&way.in_hand).supersede(alert);
@@ -167,7 +167,7 @@ impl Dispatcher {
         // In hand first: a worker notes the receipt before it lets go.
         let mut in_hand = locked(&way.in_hand);
         if in_hand.cancels(alert) {
-            tracing::debug!(hook = name, key, "over before it was told");
+            tracing::debug!(hook = name, key, "over before it was reported");
             if let Err(error) = locked(&self.delivered).note(alert, &name, Fate::Over) {
                 tracing::warn!(hook = name, key, %error, "no receipt: a restart may send it");
             }
@@ -214,7 +214,7 @@ impl HookConfig {
         own.unwrap_or_else(|| self.run.join(" "))
     }
 
-    /// Whether it is told of an alert of this level, at a benchmark or the whole site. What tells of many benchmarks
+    /// Whether it is notified of an alert of this level, at a benchmark or the whole site. What reports many benchmarks
     /// at once stands for theirs; that the clock is wrong concerns everyone.
     fn asks_for(&self, alert: &Alert) -> bool {
         let is_of_the_site = alert.event.benchmark.is_none() && !alert.is_flood();

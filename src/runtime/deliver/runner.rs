@@ -2,6 +2,7 @@
 
 use crate::config::HookConfig;
 use crate::runtime::hook::{self, Alert, Outcome};
+use crate::runtime::webhook;
 use std::fmt::Debug;
 use std::pin::Pin;
 use std::sync::Arc;
@@ -21,6 +22,25 @@ pub struct Processes;
 
 impl Runner for Processes {
     fn run(&self, hook: Arc<HookConfig>, alert: Alert, attempt: u32) -> Run {
-        Box::pin(async move { hook::run(&hook, &alert, attempt).await })
+        Box::pin(async move { run(&hook, &alert, attempt).await })
     }
+}
+
+/// Runs `hook` for `alert`, or sends it where it is a webhook; `attempt` counts from 1.
+pub async fn run(hook: &HookConfig, alert: &Alert, attempt: u32) -> Outcome {
+    let Some(to) = &hook.webhook else {
+        return hook::run_program(hook, alert, attempt).await;
+    };
+    let outcome = match alert.body(attempt) {
+        Ok(body) => webhook::send(to, alert, (body, hook.timeout)).await,
+        Err(error) => Outcome::NotStarted(error.to_string()),
+    };
+    tracing::info!(
+        webhook = to.name,
+        key = alert.key,
+        attempt,
+        ?outcome,
+        "webhook ended"
+    );
+    outcome
 }

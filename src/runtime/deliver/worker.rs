@@ -43,7 +43,7 @@ fn gravity(alert: &Alert) -> u8 {
     }
 }
 
-/// What is told by one run at a time, so that its order stays.
+/// What is reported by one run at a time, so that its order stays.
 fn place(alert: &Alert) -> Option<&BenchmarkId> {
     alert.event.benchmark.as_ref()
 }
@@ -111,14 +111,14 @@ impl Worker {
                 },
                 (run, outcome) = finished(&mut self.running), if !self.running.is_empty() => {
                     let run = self.running.swap_remove(run);
-                    self.settle(&run.waiting, outcome.as_ref(), open);
+                    self.note_outcome(&run.waiting, outcome.as_ref(), open);
                 }
                 () = until(due), if !is_full && due.is_some() => {}
             }
         }
     }
 
-    /// When the next one is due whose benchmark nothing is being told of.
+    /// When the next one is due whose benchmark nothing is being reported.
     fn next_due(&self) -> Option<Instant> {
         let mut free = self.waiting.iter().filter(|(_, one)| self.is_free(one));
         free.next().map(|((due, _), _)| *due)
@@ -167,7 +167,7 @@ impl Worker {
             if waiting.is_new {
                 self.untried -= 1;
                 let (hook, key) = (self.hook.name(), &waiting.alert.key);
-                tracing::info!(hook, key, "superseded before it was told");
+                tracing::info!(hook, key, "superseded before it was reported");
                 self.let_go(&waiting.alert, Fate::Over);
             } else {
                 self.drop_over(&waiting.alert);
@@ -175,7 +175,7 @@ impl Worker {
         }
     }
 
-    fn settle(&mut self, waiting: &Waiting, outcome: Option<&Outcome>, open: bool) {
+    fn note_outcome(&mut self, waiting: &Waiting, outcome: Option<&Outcome>, open: bool) {
         let (hook, key) = (self.hook.name(), waiting.alert.key.clone());
         let attempt = waiting.attempt;
         let goes_on = waiting.alert.must_arrive() || attempt < self.retry.attempts;

@@ -21,7 +21,7 @@ pub(super) fn findings(config: &Config) -> Vec<Finding> {
     findings
 }
 
-/// Whoever may do everything learns nothing of what the daemon may do.
+/// Whoever may do everything shows nothing of what the daemon may do.
 fn user() -> Finding {
     if geteuid().is_root() {
         let text = "looked at as root, who may do everything: what the daemon's own user may do is shown by \

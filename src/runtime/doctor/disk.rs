@@ -18,7 +18,7 @@ const SYNCS: usize = 20;
 const SLOW: Duration = Duration::from_millis(100);
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum DiskKind {
     Local,
     /// Changes made elsewhere raise no event, and locks may not hold.
     Network,
@@ -29,26 +29,26 @@ enum Kind {
 }
 
 /// The numbers of `statfs(2)` and of the kernel's `magic.h`.
-const FILE_SYSTEMS: [(i64, &str, Kind); 19] = [
-    (0xEF53, "ext4", Kind::Local),
-    (0x5846_5342, "xfs", Kind::Local),
-    (0x9123_683E, "btrfs", Kind::Local),
-    (0xF2F5_2010, "f2fs", Kind::Local),
-    (0x2FC1_2FC1, "zfs", Kind::Local),
-    (0x4D44, "vfat", Kind::Local),
-    (0x2011_BAB0, "exfat", Kind::Local),
-    (0x794C_7630, "overlayfs", Kind::Local),
-    (0x0102_1994, "tmpfs", Kind::Memory),
-    (0x8584_58F6, "ramfs", Kind::Memory),
-    (0x6969, "nfs", Kind::Network),
-    (0xFF53_4D42, "cifs", Kind::Network),
-    (0xFE53_4D42, "smb2", Kind::Network),
-    (0x517B, "smb", Kind::Network),
-    (0x0102_1997, "9p", Kind::Network),
-    (0x00C3_6400, "ceph", Kind::Network),
-    (0x5346_414F, "afs", Kind::Network),
-    (0x0BD0_0BD0, "lustre", Kind::Network),
-    (0x6573_5546, "fuse", Kind::Unsure),
+const FILE_SYSTEMS: [(i64, &str, DiskKind); 19] = [
+    (0xEF53, "ext4", DiskKind::Local),
+    (0x5846_5342, "xfs", DiskKind::Local),
+    (0x9123_683E, "btrfs", DiskKind::Local),
+    (0xF2F5_2010, "f2fs", DiskKind::Local),
+    (0x2FC1_2FC1, "zfs", DiskKind::Local),
+    (0x4D44, "vfat", DiskKind::Local),
+    (0x2011_BAB0, "exfat", DiskKind::Local),
+    (0x794C_7630, "overlayfs", DiskKind::Local),
+    (0x0102_1994, "tmpfs", DiskKind::Memory),
+    (0x8584_58F6, "ramfs", DiskKind::Memory),
+    (0x6969, "nfs", DiskKind::Network),
+    (0xFF53_4D42, "cifs", DiskKind::Network),
+    (0xFE53_4D42, "smb2", DiskKind::Network),
+    (0x517B, "smb", DiskKind::Network),
+    (0x0102_1997, "9p", DiskKind::Network),
+    (0x00C3_6400, "ceph", DiskKind::Network),
+    (0x5346_414F, "afs", DiskKind::Network),
+    (0x0BD0_0BD0, "lustre", DiskKind::Network),
+    (0x6573_5546, "fuse", DiskKind::Unsure),
 ];
 
 /// A finding for the state folder and one for each source.
@@ -65,19 +65,19 @@ fn state(folder: &Path) -> Finding {
     let place = format!("state folder {}", folder.display());
     let (verdict, text) = match kind(folder) {
         Err(error) => (Verdict::Unknown, error.to_string()),
-        Ok((name, Kind::Local)) => (Verdict::Good, format!("on {name}")),
-        Ok((name, Kind::Memory)) => (
+        Ok((name, DiskKind::Local)) => (Verdict::Good, format!("on {name}")),
+        Ok((name, DiskKind::Memory)) => (
             Verdict::Doubtful,
             format!("on {name}, lost when the machine restarts; move it to a disk"),
         ),
-        Ok((name, Kind::Network)) => (
+        Ok((name, DiskKind::Network)) => (
             Verdict::Wrong,
             format!(
                 "on {name}, a network file system, whose locks and syncs cannot be relied on; \
                      move it to a local disk"
             ),
         ),
-        Ok((name, Kind::Unsure)) => (
+        Ok((name, DiskKind::Unsure)) => (
             Verdict::Unknown,
             format!("on {name}; see that it is a local disk"),
         ),
@@ -88,8 +88,8 @@ fn state(folder: &Path) -> Finding {
 fn of_source(place: &str, folder: &Path) -> Finding {
     let (verdict, text) = match kind(folder) {
         Err(error) => (Verdict::Unknown, error.to_string()),
-        Ok((name, Kind::Local | Kind::Memory)) => (Verdict::Good, format!("on {name}")),
-        Ok((name, Kind::Network | Kind::Unsure)) => (
+        Ok((name, DiskKind::Local | DiskKind::Memory)) => (Verdict::Good, format!("on {name}")),
+        Ok((name, DiskKind::Network | DiskKind::Unsure)) => (
             Verdict::Doubtful,
             format!(
                 "on {name}: what others write there raises no event, so the files are looked \
@@ -105,7 +105,7 @@ fn of_source(place: &str, folder: &Path) -> Finding {
 }
 
 /// Of `folder`, or where it would be created.
-fn kind(folder: &Path) -> nix::Result<(String, Kind)> {
+fn kind(folder: &Path) -> nix::Result<(String, DiskKind)> {
     let there = folder.ancestors().find(|path| path.exists());
     let there = there.filter(|path| !path.as_os_str().is_empty());
     let magic = statfs(there.unwrap_or(Path::new(".")))?.filesystem_type().0;
@@ -116,7 +116,7 @@ fn kind(folder: &Path) -> nix::Result<(String, Kind)> {
         Some((_, name, kind)) => ((*name).to_owned(), *kind),
         None => (
             format!("a file system unknown to us ({magic:#x})"),
-            Kind::Unsure,
+            DiskKind::Unsure,
         ),
     })
 }

@@ -42,14 +42,14 @@ fn runnable(program: &Path) -> Result<String, String> {
     access(&found, AccessFlags::X_OK)
         .map_err(|error| format!("{name} cannot be executed ({error}); chmod +x it"))?;
     let words = match start(&found).map_err(|error| format!("{name}: {error}"))? {
-        Start::Binary => return Ok(format!("{name} can be run")),
-        Start::Windows => {
+        HookStart::Binary => return Ok(format!("{name} can be run")),
+        HookStart::Windows => {
             return Err(format!(
                 "{name}: its lines end as on Windows, so that the kernel finds no such interpreter; \
                  write them anew with sed -i 's/\\r$//' {name}"
             ));
         }
-        Start::Script(words) => words,
+        HookStart::Script(words) => words,
     };
     for word in &words {
         let there = find(word).filter(|path| access(path, AccessFlags::X_OK).is_ok());
@@ -70,7 +70,7 @@ fn find(program: &Path) -> Option<PathBuf> {
 }
 
 /// How a program begins.
-enum Start {
+enum HookStart {
     Binary,
     /// What its first line names, and for `env` what that would start.
     Script(Vec<PathBuf>),
@@ -78,17 +78,17 @@ enum Start {
     Windows,
 }
 
-fn start(program: &Path) -> std::io::Result<Start> {
+fn start(program: &Path) -> std::io::Result<HookStart> {
     let mut start = Vec::new();
     File::open(program)?
         .take(FIRST_LINE_BYTES)
         .read_to_end(&mut start)?;
     let Some(line) = start.strip_prefix(b"#!") else {
-        return Ok(Start::Binary);
+        return Ok(HookStart::Binary);
     };
     let line = line.split(|byte| *byte == b'\n').next().unwrap_or(line);
     if line.ends_with(b"\r") {
-        return Ok(Start::Windows);
+        return Ok(HookStart::Windows);
     }
     let mut words = line
         .split(u8::is_ascii_whitespace)
@@ -98,7 +98,7 @@ fn start(program: &Path) -> std::io::Result<Start> {
     let is_env = first.iter().any(|path| path.ends_with("env"));
     let options = |word: &PathBuf| word.as_os_str().as_bytes().starts_with(b"-");
     let second = words.find(|word| is_env && !options(word));
-    Ok(Start::Script(first.into_iter().chain(second).collect()))
+    Ok(HookStart::Script(first.into_iter().chain(second).collect()))
 }
 
 /// Whether the kernel would hold the walls, where a hook is to have some.

@@ -21,7 +21,7 @@ pub enum Verdict {
     Doubtful,
     /// Alerts or readings would be lost.
     Wrong,
-    /// It cannot be told from here.
+    /// It cannot be distinguished from here.
     Unknown,
 }
 

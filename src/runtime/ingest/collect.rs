@@ -77,7 +77,7 @@ impl Collector {
             channels: self.channels.into_values().collect(),
             provenance,
         };
-        let mut disorder = recording.settle();
+        let mut disorder = recording.put_in_order();
         disorder.missing = self.missing;
         (recording, disorder)
     }

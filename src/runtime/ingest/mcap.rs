@@ -19,7 +19,7 @@ use std::io::Read;
 use std::path::Path;
 
 /// The longest record or decompressed chunk, in bytes: a damaged length must not become an
-/// allocation. Writers make chunks of about one megabyte unless told otherwise.
+/// allocation. Writers make chunks of about one megabyte unless set otherwise.
 const RECORD_LENGTH_LIMIT: usize = 64 << 20;
 
 /// Reads one file.

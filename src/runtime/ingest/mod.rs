@@ -17,6 +17,7 @@ mod split;
 mod survey;
 mod table;
 mod table_write;
+mod taken;
 mod text;
 mod toa5;
 mod units;
@@ -33,7 +34,8 @@ pub use message::{MessageError, decode_message};
 pub use ndjson_write::write_ndjson;
 pub use survey::{Survey, survey};
 pub use table_write::{write_csv, write_toa5};
-pub use text::{Looked, Remark, Taken, TextFormat, TextRows, look_through};
+pub use taken::{Remark, Taken};
+pub use text::{Looked, TextFormat, TextRows, look_through};
 pub use units::FileUnits;
 pub use vector::VectorMap;
 

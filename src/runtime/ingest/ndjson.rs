@@ -11,7 +11,7 @@
 use super::columns::Layout;
 use super::message::{AVERAGING, Fields, MessageError, Topic};
 use super::table::TableRows;
-use super::text::Taken;
+use super::taken::Taken;
 use super::{IngestError, Item, ReadOptions};
 use crate::reading::{BenchmarkId, MissingValues, Quantity, Unit};
 use ::csv::StringRecord;
@@ -30,12 +30,12 @@ type Object = Map<String, Value>;
 
 /// What a message is about.
 #[derive(Clone, Copy)]
-enum Kind {
+enum MessageKind {
     Benchmark,
     Channel,
 }
 
-impl Kind {
+impl MessageKind {
     /// How the topic of such a message begins in MCAP.
     fn folder(self) -> &'static str {
         match self {
@@ -95,8 +95,8 @@ impl NdjsonRows {
 
     fn object(&mut self, line: u64, object: &Object) -> Result<Vec<Item>, IngestError> {
         let (name, kind) = match (object.get("benchmark"), object.get("channel")) {
-            (Some(name), _) => (name, Kind::Benchmark),
-            (None, Some(name)) => (name, Kind::Channel),
+            (Some(name), _) => (name, MessageKind::Benchmark),
+            (None, Some(name)) => (name, MessageKind::Channel),
             (None, None) => return self.cells(line, object),
         };
         self.message(object, name, kind)
@@ -108,7 +108,12 @@ impl NdjsonRows {
             })
     }
 
-    fn message(&self, object: &Object, name: &Value, kind: Kind) -> Result<Item, MessageError> {
+    fn message(
+        &self,
+        object: &Object,
+        name: &Value,
+        kind: MessageKind,
+    ) -> Result<Item, MessageError> {
         let fields = Fields::new(format!("{}{name}", kind.folder()), object);
         let name = match name {
             Value::String(name) if !name.trim().is_empty() => name.clone(),
@@ -125,8 +130,8 @@ impl NdjsonRows {
             .map_err(|fault| fields.fail("time", format!("{text:?}"), fault.expected()))?;
         let value = object.get("value");
         let topic = match kind {
-            Kind::Channel => Topic::Channel(name),
-            Kind::Benchmark => {
+            MessageKind::Channel => Topic::Channel(name),
+            MessageKind::Benchmark => {
                 let benchmark = BenchmarkId::new(name);
                 if let Some(what) = value.and_then(|value| missing(&conventions.missing, value)) {
                     return Ok(Item::Missing {

@@ -7,20 +7,20 @@ use std::io::{self, Read};
 /// A CSV parser that is fed line by line.
 #[derive(Debug)]
 pub(super) struct Splitter {
-    reader: ::csv::Reader<Line>,
+    reader: ::csv::Reader<SplitLine>,
     delimiter: Delimiter,
 }
 
 /// The line to be split, as a stream that ends with it.
 #[derive(Debug, Default)]
-struct Line {
+struct SplitLine {
     text: Vec<u8>,
     read: usize,
     /// Whether more was asked for than the line holds.
     exhausted: bool,
 }
 
-impl Read for Line {
+impl Read for SplitLine {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let read = (&self.text[self.read..]).read(buffer)?;
         self.read += read;
@@ -38,7 +38,7 @@ impl Splitter {
             .trim(Trim::All)
             // Only what ends our lines: a stray carriage return is part of its cell.
             .terminator(Terminator::Any(b'\n'))
-            .from_reader(Line::default());
+            .from_reader(SplitLine::default());
         Self { reader, delimiter }
     }
 

@@ -21,7 +21,7 @@ pub(super) struct TableRows {
     filled: Vec<bool>,
     /// Columns that have held a number: what is no number in one of them is a fault, in others text.
     numeric: Vec<bool>,
-    /// What has been found out and not been told.
+    /// What has been found out and not been reported.
     remarks: Vec<Remark>,
 }
 
@@ -58,7 +58,7 @@ impl TableRows {
                 expected,
             });
         }
-        let row = Row {
+        let row = TableRow {
             rows: self,
             cells,
             line,
@@ -151,20 +151,20 @@ struct Met {
 }
 
 /// What stands in a cell.
-enum Cell {
+enum TableCell {
     Empty,
     /// A mark that the sensor gave no value.
     Missing,
     Number(f64),
 }
 
-struct Row<'a> {
+struct TableRow<'a> {
     rows: &'a TableRows,
     cells: &'a StringRecord,
     line: u64,
 }
 
-impl Row<'_> {
+impl TableRow<'_> {
     fn items(&self) -> Result<Met, IngestError> {
         let layout = &self.rows.layout;
         let time = self.time()?;
@@ -179,7 +179,7 @@ impl Row<'_> {
                     .items
                     .extend(self.reading(time, index, benchmark, (*unit, *sigma))?),
                 Column::Channel { unit } => match self.cell(index) {
-                    Ok(Cell::Number(value)) => {
+                    Ok(TableCell::Number(value)) => {
                         met.numbers
                             .extend((!self.rows.numeric[index]).then_some(index));
                         met.items.push(Item::Sample {
@@ -188,7 +188,7 @@ impl Row<'_> {
                             sample: Sample { time, value },
                         });
                     }
-                    Ok(Cell::Empty | Cell::Missing) => {}
+                    Ok(TableCell::Empty | TableCell::Missing) => {}
                     Err(fault) if self.rows.numeric[index] => return Err(fault),
                     Err(_) => met.texts.push(index),
                 },
@@ -218,9 +218,9 @@ impl Row<'_> {
         let (mut value, mut absent) = (0.0, Vec::new());
         for &(index, part) in &vector.components {
             match self.cell(index)? {
-                Cell::Number(component) => value += part * component,
-                Cell::Empty => absent.push(&names[index]),
-                Cell::Missing => {
+                TableCell::Number(component) => value += part * component,
+                TableCell::Empty => absent.push(&names[index]),
+                TableCell::Missing => {
                     let what = format!("{} in {}", &self.cells[index], names[index]);
                     return Ok(missing(what));
                 }
@@ -254,13 +254,13 @@ impl Row<'_> {
     ) -> Result<Option<Item>, IngestError> {
         let sigma = sigma.map_or(Ok(None), |sigma| self.sigma(sigma, unit))?;
         Ok(match self.cell(index)? {
-            Cell::Empty => None,
-            Cell::Missing => Some(Item::Missing {
+            TableCell::Empty => None,
+            TableCell::Missing => Some(Item::Missing {
                 benchmark: benchmark.clone(),
                 time,
                 what: self.cells[index].to_owned(),
             }),
-            Cell::Number(value) => Some(Item::Reading {
+            TableCell::Number(value) => Some(Item::Reading {
                 benchmark: benchmark.clone(),
                 unit,
                 averaging: self.rows.options.averaging_of(unit, None),
@@ -274,8 +274,8 @@ impl Row<'_> {
         let index = layout.time[0];
         if layout.columns[index] == Column::Days {
             let days = match self.cell(index)? {
-                Cell::Number(days) => after_days(options.epoch, days),
-                Cell::Empty | Cell::Missing => None,
+                TableCell::Number(days) => after_days(options.epoch, days),
+                TableCell::Empty | TableCell::Missing => None,
             };
             return days.ok_or_else(|| self.fail(index, "a number of days within the calendar"));
         }
@@ -297,16 +297,16 @@ impl Row<'_> {
         })
     }
 
-    fn cell(&self, index: usize) -> Result<Cell, IngestError> {
+    fn cell(&self, index: usize) -> Result<TableCell, IngestError> {
         let cell = &self.cells[index];
         if cell.is_empty() {
-            return Ok(Cell::Empty);
+            return Ok(TableCell::Empty);
         }
         let marks = &self.rows.options.conventions.missing;
         match self.rows.options.dialect.number(cell) {
-            Some(value) if value.is_finite() && marks.has_number(value) => Ok(Cell::Missing),
-            Some(value) if value.is_finite() => Ok(Cell::Number(value)),
-            _ if marks.has(cell) => Ok(Cell::Missing),
+            Some(value) if value.is_finite() && marks.has_number(value) => Ok(TableCell::Missing),
+            Some(value) if value.is_finite() => Ok(TableCell::Number(value)),
+            _ if marks.has(cell) => Ok(TableCell::Missing),
             _ => Err(self.fail(index, self.a_number())),
         }
     }
@@ -325,7 +325,7 @@ impl Row<'_> {
 
     /// The standard error in the reading's own unit.
     fn sigma(&self, column: SigmaColumn, unit: Unit) -> Result<Option<f64>, IngestError> {
-        let Cell::Number(sigma) = self.cell(column.index)? else {
+        let TableCell::Number(sigma) = self.cell(column.index)? else {
             return Ok(None);
         };
         let converted = if column.unit == unit {

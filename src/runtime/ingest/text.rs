@@ -7,6 +7,7 @@ use super::csv::CsvRows;
 use super::encoding::{Transcoder, latin1};
 use super::ndjson::NdjsonRows;
 use super::table::TableRows;
+use super::taken::{Remark, Taken};
 use super::toa5::Toa5Rows;
 use super::{IngestError, Item, ReadOptions};
 use crate::reading::{BenchmarkId, Disorder, Recording, Unit};
@@ -23,26 +24,6 @@ pub enum TextFormat {
     Ndjson,
     /// A Campbell logger's table.
     Toa5,
-}
-
-/// What came of one line.
-#[derive(Debug, Default)]
-pub struct Taken {
-    /// What it holds.
-    pub items: Vec<Item>,
-    /// What of it cannot be used, and why.
-    pub fault: Option<IngestError>,
-    /// What has been found out about the file, each once.
-    pub remarks: Vec<Remark>,
-}
-
-/// Something that a person should know of a file of which nothing is lost by it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Remark {
-    /// The column, or what else it is about; one remark about each is enough.
-    pub about: String,
-    /// What there is to know.
-    pub text: String,
 }
 
 impl Remark {
@@ -68,21 +49,6 @@ impl Remark {
 impl fmt::Display for Remark {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: {}", self.about, self.text)
-    }
-}
-
-impl From<Result<Vec<Item>, IngestError>> for Taken {
-    fn from(taken: Result<Vec<Item>, IngestError>) -> Self {
-        match taken {
-            Ok(items) => Self {
-                items,
-                ..Self::default()
-            },
-            Err(fault) => Self {
-                fault: Some(fault),
-                ..Self::default()
-            },
-        }
     }
 }
 
@@ -254,7 +220,7 @@ pub(super) fn read_text(
     })
 }
 
-/// A line that is no UTF-8, as Latin-1 where that can do no harm; which is told once.
+/// A line that is no UTF-8, as Latin-1 where that can do no harm; which is reported once.
 fn not_utf8(
     rows: &TextRows,
     file: &Path,

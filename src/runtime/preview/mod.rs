@@ -29,9 +29,9 @@ const PIECE: usize = 64 * 1024;
 
 /// Looks at the files of `config`.
 pub fn preview(config: &Config) -> Preview {
-    let mut look = Look {
+    let mut look = PreviewSoFar {
         accepted: config.settings.accepted.clone(),
-        ..Look::default()
+        ..PreviewSoFar::default()
     };
     for source in &config.sources {
         let view = look.source(source, &Decoder::new(source, &config.benchmarks));
@@ -54,7 +54,7 @@ pub fn preview(config: &Config) -> Preview {
 }
 
 #[derive(Debug)]
-struct Track {
+struct PreviewTrack {
     view: BenchmarkView,
     /// Suspicions that people have looked into.
     accepted: BTreeSet<Suspicion>,
@@ -62,9 +62,9 @@ struct Track {
 }
 
 #[derive(Debug, Default)]
-struct Look {
+struct PreviewSoFar {
     views: Vec<SourceView>,
-    benchmarks: BTreeMap<(String, BenchmarkId, Quantity), Track>,
+    benchmarks: BTreeMap<(String, BenchmarkId, Quantity), PreviewTrack>,
     covariates: BTreeMap<(String, String), CovariateView>,
     unwatched: BTreeSet<BenchmarkId>,
     accepted: BTreeMap<BenchmarkId, BTreeSet<Suspicion>>,
@@ -74,7 +74,7 @@ struct Look {
 /// What is wrong with lines, by kind.
 type Refusals = BTreeMap<String, Refusal>;
 
-impl Look {
+impl PreviewSoFar {
     fn source(&mut self, source: &Source, decoder: &Decoder) -> SourceView {
         let mut view = SourceView {
             id: source.id.clone(),
@@ -266,7 +266,7 @@ impl Look {
             let key = (source.to_owned(), benchmark.clone(), unit.quantity());
             let here = (time, reading.value);
             let accepted = self.accepted.get(&benchmark).cloned().unwrap_or_default();
-            let track = self.benchmarks.entry(key).or_insert_with(|| Track {
+            let track = self.benchmarks.entry(key).or_insert_with(|| PreviewTrack {
                 view: BenchmarkView {
                     id: benchmark,
                     source: source.to_owned(),
@@ -361,7 +361,7 @@ impl Look {
 /// How a column comes to be a benchmark's.
 const NAME_THEM: &str = "name the column [ID_]displacement_UNIT or [ID_]velocity_UNIT, or say in [[benchmark]] its column and unit";
 
-impl Track {
+impl PreviewTrack {
     fn take(&mut self, here: (Timestamp, f64)) {
         let view = &mut self.view;
         view.readings += 1;

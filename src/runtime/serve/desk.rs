@@ -2,7 +2,7 @@
 
 use crate::monitor::Order;
 use crate::reading::Timestamp;
-use crate::runtime::view::{Asked, BenchmarkView, Desk, OrderError, SiteView, Window};
+use crate::runtime::view::{Asked, BenchmarkView, Desk, OrderError, SiteView, TimeWindow};
 use crate::store::{Heads, StoreError};
 use axum::body::Body;
 use axum::extract::{Query, State};
@@ -22,7 +22,7 @@ const LOOK: Duration = Duration::from_secs(1);
 /// A stream ends after so many looks; whoever reads it asks again, from where it ended. So none holds a place for
 /// ever, and all end before [`super::Limits::request_time`].
 const LOOKS: u32 = 20;
-/// Events told at one look; after more of them the next look follows at once.
+/// Events sent in one round; after more of them the next round follows at once.
 const MOST_TOLD: usize = 500;
 
 /// The routes.
@@ -79,13 +79,13 @@ async fn blocking<T: Send + 'static>(
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Moment {
+struct StreamMoment {
     at: Option<Timestamp>,
 }
 
 async fn site(
     State(desk): State<Arc<Desk>>,
-    Query(moment): Query<Moment>,
+    Query(moment): Query<StreamMoment>,
 ) -> Result<Json<SiteView>, Failure> {
     blocking(move || Ok(desk.site(moment.at)?)).await.map(Json)
 }
@@ -104,7 +104,7 @@ async fn benchmark(
     State(desk): State<Arc<Desk>>,
     Query(asked): Query<OfBenchmark>,
 ) -> Result<Json<BenchmarkView>, Failure> {
-    let window = Window {
+    let window = TimeWindow {
         at: asked.at,
         from: asked.from,
         to: asked.to,
@@ -133,7 +133,7 @@ struct Since {
 
 /// Server-sent events: each event of the site with its number as id, and `progress` when anything was taken in.
 async fn changes(State(desk): State<Arc<Desk>>, Query(since): Query<Since>) -> Response {
-    let place = Place {
+    let place = StreamPosition {
         desk,
         event: since.since,
         step: None,
@@ -163,24 +163,24 @@ async fn changes(State(desk): State<Arc<Desk>>, Query(since): Query<Since>) -> R
     (headers, Body::from_stream(parts)).into_response()
 }
 
-/// How far a stream has told.
-struct Place {
+/// How far a stream has been sent.
+struct StreamPosition {
     desk: Arc<Desk>,
-    /// The last event; `None`: only what comes from now on is told.
+    /// The last event; `None`: only what comes from now on is sent.
     event: Option<i64>,
     step: Option<i64>,
     looks: u32,
-    /// Whether there is more to tell than one look tells.
+    /// Whether there is more to send than one round sends.
     is_behind: bool,
 }
 
-impl Place {
+impl StreamPosition {
     /// What has changed since the last look; a comment where nothing has, so that a dead connection shows.
     fn look(&mut self) -> Result<String, StoreError> {
         let Heads { step, event } = self.desk.heads()?;
-        let told = self.event.unwrap_or(event);
-        let mut fresh = if event > told {
-            self.desk.events_after(told)?
+        let sent = self.event.unwrap_or(event);
+        let mut fresh = if event > sent {
+            self.desk.events_after(sent)?
         } else {
             Vec::new()
         };
@@ -190,14 +190,14 @@ impl Place {
         for (number, body) in &fresh {
             let _ = write!(text, "id: {number}\nevent: change\ndata: {body}\n\n");
         }
-        let told = fresh.last().map_or(event, |(number, _)| *number);
+        let sent = fresh.last().map_or(event, |(number, _)| *number);
         if self.step != Some(step) {
             let _ = write!(
                 text,
-                "id: {told}\nevent: progress\ndata: {{\"step\":{step},\"event\":{event}}}\n\n"
+                "id: {sent}\nevent: progress\ndata: {{\"step\":{step},\"event\":{event}}}\n\n"
             );
         }
-        (self.event, self.step) = (Some(told), Some(step));
+        (self.event, self.step) = (Some(sent), Some(step));
         Ok(if text.is_empty() {
             ": nothing new\n\n".to_owned()
         } else {

@@ -2,7 +2,7 @@
 
 use crate::alert::Level;
 use crate::reading::{BenchmarkId, Timestamp};
-use crate::runtime::vitals::{Health, Point, Vitals};
+use crate::runtime::vitals::{Health, Vitals, VitalsPoint};
 use prometheus_client::collector::Collector;
 use prometheus_client::encoding::{DescriptorEncoder, EncodeMetric, text};
 use prometheus_client::metrics::MetricType;
@@ -74,7 +74,7 @@ fn trouble(sheet: &mut Sheet<'_>, health: &Health) -> fmt::Result {
         ),
         (
             "silences",
-            "Orders in force by which alerts are not told",
+            "Orders in force by which alerts are not reported",
             health.silences.len() as f64,
         ),
     ];
@@ -82,7 +82,7 @@ fn trouble(sheet: &mut Sheet<'_>, health: &Health) -> fmt::Result {
         sheet.gauge(name, about, value)?;
     }
     if let Some(until) = health.silences.iter().map(|mute| mute.until).max() {
-        let about = "When the last order ends by which alerts are not told, Unix time";
+        let about = "When the last order ends by which alerts are not reported, Unix time";
         sheet.gauge("silenced_until_timestamp_seconds", about, seconds(until))?;
     }
     Ok(())
@@ -187,8 +187,8 @@ fn counts(sheet: &mut Sheet<'_>, health: &Health) -> fmt::Result {
     Ok(())
 }
 
-fn benchmarks(sheet: &mut Sheet<'_>, points: &[(BenchmarkId, Point)]) -> fmt::Result {
-    type Figure = fn(&Point) -> Option<f64>;
+fn benchmarks(sheet: &mut Sheet<'_>, points: &[(BenchmarkId, VitalsPoint)]) -> fmt::Result {
+    type Figure = fn(&VitalsPoint) -> Option<f64>;
     let figures: [(&str, &str, Figure); 6] = [
         (
             "last_reading_timestamp_seconds",
@@ -202,7 +202,7 @@ fn benchmarks(sheet: &mut Sheet<'_>, points: &[(BenchmarkId, Point)]) -> fmt::Re
         ),
         (
             "unknown",
-            "1 while the monitor cannot tell: no data, a sensor fault, a stale model",
+            "1 while the monitor cannot decide: no data, a sensor fault, a stale model",
             |point| Some(f64::from(u8::from(point.is_unknown))),
         ),
         (

@@ -2,7 +2,7 @@
 
 use super::{Behind, Door, desk, metrics, page};
 use crate::config::Token;
-use crate::runtime::vitals::{Health, Point, Vitals};
+use crate::runtime::vitals::{Health, Vitals, VitalsPoint};
 use axum::extract::{DefaultBodyLimit, Query, Request, State};
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::middleware::{Next, from_fn, from_fn_with_state};
@@ -201,7 +201,7 @@ struct Status {
     health: Health,
     /// How many benchmarks stand at each level.
     levels: BTreeMap<&'static str, usize>,
-    benchmarks: BTreeMap<String, Point>,
+    benchmarks: BTreeMap<String, VitalsPoint>,
 }
 
 async fn status(State(vitals): State<Arc<Vitals>>) -> Json<Status> {
@@ -218,14 +218,14 @@ async fn status(State(vitals): State<Arc<Vitals>>) -> Json<Status> {
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Range {
+struct ByteRange {
     since: Option<String>,
     limit: Option<usize>,
 }
 
 async fn events(
     State(archive): State<Arc<dyn Archive>>,
-    Query(range): Query<Range>,
+    Query(range): Query<ByteRange>,
 ) -> Result<Response, ArchiveError> {
     let limit = range.limit.unwrap_or(MOST_EVENTS).min(MOST_EVENTS);
     let page = tokio::task::spawn_blocking(move || archive.events(range.since.as_deref(), limit))

@@ -76,8 +76,8 @@ impl Decoder {
 
     /// Whether no file of the source has been remarked on for this before.
     pub(super) fn is_news(&self, remark: &Remark) -> bool {
-        let mut told = self.remarked.lock().unwrap_or_else(PoisonError::into_inner);
-        told.insert(remark.about.clone())
+        let mut reported = self.remarked.lock().unwrap_or_else(PoisonError::into_inner);
+        reported.insert(remark.about.clone())
     }
 
     /// The reader of the lines of `file`; `None` for recordings.

@@ -1,13 +1,12 @@
 //! Follows one file: where we are in it, whether it is still the same, and what came.
 
 use super::decode::{Arrival, Decoder};
+use super::position::{FileId, Saved};
 use super::records::{self, Channels, Frame, HEADER_BYTES, MAGIC, RawMessage};
-use super::saved::Saved;
 use super::text::{BadLine, Fed, TextReader, Unpacking};
 use crate::reading::Timestamp;
 use crate::runtime::ingest::{IngestError, Item, decode_message, is_packed};
 use crate::runtime::site::is_logged;
-use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use std::fs::{File, Metadata};
 use std::io;
@@ -38,7 +37,7 @@ pub(super) struct FileTail {
     pub(super) content: Content,
     /// Everything before this has been read.
     pub(super) at: u64,
-    pub(super) place: Option<Place>,
+    pub(super) place: Option<FileId>,
     /// The last bytes before `at`: another file of the same number and size has others.
     pub(super) mark: Vec<u8>,
     /// As of the last look that found nothing more; the file is opened only when it differs.
@@ -59,8 +58,8 @@ pub(super) struct FileTail {
     pub(super) newest: Option<Timestamp>,
     /// From where a restart goes on.
     pub(super) safe: Saved,
-    /// As [`FileTail::moved`] last told it.
-    pub(super) told: Saved,
+    /// As [`FileTail::moved`] last reported it.
+    pub(super) reported: Saved,
 }
 
 #[derive(Debug)]
@@ -92,25 +91,9 @@ impl Content {
     }
 }
 
-/// Which file it is, as the file system counts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub(in crate::runtime) struct Place {
-    device: u64,
-    inode: u64,
-}
-
-impl Place {
-    pub(super) fn of(metadata: &Metadata) -> Self {
-        Self {
-            device: metadata.dev(),
-            inode: metadata.ino(),
-        }
-    }
-}
-
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Glance {
-    place: Place,
+    place: FileId,
     size: u64,
     modified: (i64, i64),
 }
@@ -118,7 +101,7 @@ struct Glance {
 impl Glance {
     fn at(metadata: &Metadata) -> Self {
         Self {
-            place: Place::of(metadata),
+            place: FileId::of(metadata),
             size: metadata.size(),
             modified: (metadata.mtime(), metadata.mtime_nsec()),
         }
@@ -145,12 +128,12 @@ impl FileTail {
             is_restored: false,
             newest: None,
             safe: Saved::default(),
-            told: Saved::default(),
+            reported: Saved::default(),
         }
     }
 
     /// Whether this is no longer the file under its name.
-    pub(super) fn is_other_than(&self, place: Place) -> bool {
+    pub(super) fn is_other_than(&self, place: FileId) -> bool {
         self.place.is_some_and(|own| own != place)
     }
 
@@ -164,7 +147,7 @@ impl FileTail {
         let entries = std::fs::read_dir(self.path.parent()?).ok()?;
         let path = entries.flatten().find_map(|entry| {
             let metadata = entry.metadata().ok()?;
-            (Place::of(&metadata) == place).then(|| entry.path())
+            (FileId::of(&metadata) == place).then(|| entry.path())
         })?;
         self.left_at = Some(self.at);
         self.path.clone_from(&path);
@@ -227,7 +210,7 @@ impl FileTail {
             let is_read =
                 self.at > 0 && !matches!(self.content, Content::Refused | Content::Complete);
             if is_read && self.place == Some(glance.place) {
-                self.tell_gap(glance.size);
+                self.report_gap(glance.size);
             } else {
                 tracing::info!(file = %self.path.display(), at = self.at, "another file: read from its start");
             }
@@ -255,7 +238,7 @@ impl FileTail {
 
     /// The same file, and what we have read of it is no longer there: what was written after our last look and cut
     /// off before this one cannot be known.
-    fn tell_gap(&mut self, size: u64) {
+    fn report_gap(&mut self, size: u64) {
         let (file, at) = (self.path.display(), self.at);
         tracing::warn!(%file, at, size, "cut off while it was followed: read from its start, readings may be missing");
         let name = self.path.file_name().unwrap_or_default().to_string_lossy();

@@ -1,7 +1,8 @@
 //! Follows the files of all sources and puts what they hold in the order of its measurement.
 
 use super::decode::{Arrival, Decoder};
-use super::file::{FileTail, Place};
+use super::file::FileTail;
+use super::position::FileId;
 use super::reorder::Reorder;
 use crate::config::{Benchmark, FilePattern, Source};
 use crate::reading::Timestamp;
@@ -34,10 +35,10 @@ pub struct Batch {
 }
 
 /// A source's number and a path.
-type Key = (usize, PathBuf);
+type FileKey = (usize, PathBuf);
 
 /// The [`Arrival::rank`] of a file's next value, and the file.
-type Head = (Timestamp, bool, String, Key);
+type Head = (Timestamp, bool, String, FileKey);
 
 /// One source.
 #[derive(Debug)]
@@ -47,7 +48,7 @@ struct Followed {
     decoder: Arc<Decoder>,
     /// Where values wait for earlier ones.
     reorder: Option<Reorder>,
-    /// What could not be used in files that are gone, and of all its files what has been told.
+    /// What could not be used in files that are gone, and of all its files what has been reported.
     quarantined_in_gone: u64,
     quarantined_told: u64,
 }
@@ -56,7 +57,7 @@ struct Followed {
 #[derive(Debug)]
 pub struct Follower {
     sources: Vec<Followed>,
-    files: BTreeMap<Key, FileTail>,
+    files: BTreeMap<FileKey, FileTail>,
     /// The earliest pending value of each file; between two rounds there is none.
     heads: BTreeSet<Head>,
     missing: BTreeSet<PathBuf>,
@@ -66,7 +67,7 @@ pub struct Follower {
     gone: Vec<(usize, Position)>,
     /// What may be missing of files that are gone.
     lost: Vec<Arrival>,
-    /// Files whose names are no text, as they were told.
+    /// Files whose names are no text, as they were reported.
     not_text: BTreeSet<PathBuf>,
 }
 
@@ -220,11 +221,11 @@ impl Follower {
     /// Looks for files that have come or gone.
     fn rescan(&mut self) {
         let present = self.list();
-        let is_gone = |key: &Key, file: &FileTail| match present.get(key) {
+        let is_gone = |key: &FileKey, file: &FileTail| match present.get(key) {
             None => true,
             Some(place) => file.is_other_than(*place),
         };
-        let gone: Vec<Key> = self
+        let gone: Vec<FileKey> = self
             .files
             .iter()
             .filter(|(key, file)| is_gone(key, file))
@@ -259,7 +260,7 @@ impl Follower {
         }
     }
 
-    fn list(&mut self) -> BTreeMap<Key, Place> {
+    fn list(&mut self) -> BTreeMap<FileKey, FileId> {
         let mut present = BTreeMap::new();
         for (index, source) in self.sources.iter_mut().enumerate() {
             let pattern = &source.pattern;
@@ -292,7 +293,7 @@ impl Follower {
 
 /// The file as it was left, unless its source is no longer there or its bytes mean nothing to this version: it is then
 /// read from its start, and what is known of it dropped.
-fn restored(sources: &[Followed], name: &str, body: &[u8]) -> Option<(Key, FileTail)> {
+fn restored(sources: &[Followed], name: &str, body: &[u8]) -> Option<(FileKey, FileTail)> {
     let (id, path) = name.split_once(':')?;
     let index = sources.iter().position(|source| source.id == id)?;
     let path = PathBuf::from(path);
@@ -305,7 +306,7 @@ fn restored(sources: &[Followed], name: &str, body: &[u8]) -> Option<(Key, FileT
     }
 }
 
-fn head(key: Key, file: &FileTail) -> Option<Head> {
+fn head(key: FileKey, file: &FileTail) -> Option<Head> {
     let (time, is_reading, name) = file.pending.front()?.rank();
     Some((time, is_reading, name.to_owned(), key))
 }
@@ -316,7 +317,7 @@ fn name(source: &str, path: &Path) -> String {
 }
 
 /// Files, and what has a name that is no text.
-pub(in crate::runtime) type Listed = (Vec<(PathBuf, Place)>, Vec<PathBuf>);
+pub(in crate::runtime) type Listed = (Vec<(PathBuf, FileId)>, Vec<PathBuf>);
 
 /// The files of the pattern, packed ones among them where the source has text; and those that would be, if their names
 /// were text.
@@ -341,7 +342,7 @@ pub(in crate::runtime) fn list(pattern: &FilePattern, decoder: &Decoder) -> io::
         if let Ok(metadata) = std::fs::metadata(entry.path())
             && metadata.is_file()
         {
-            files.push((entry.path(), Place::of(&metadata)));
+            files.push((entry.path(), FileId::of(&metadata)));
         }
     }
     Ok((files, not_text))

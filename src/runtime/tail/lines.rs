@@ -8,7 +8,7 @@ pub const LONGEST_LINE: usize = 64 * 1024;
 
 /// A whole line, without its newline.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Line {
+pub struct TailLine {
     /// Its number, from 1.
     pub number: u64,
     /// Its text, or why it cannot be one.
@@ -47,7 +47,7 @@ pub struct Lines {
 
 impl Lines {
     /// Takes the next bytes of the file and returns the lines that they complete.
-    pub fn feed(&mut self, bytes: &[u8]) -> Vec<Line> {
+    pub fn feed(&mut self, bytes: &[u8]) -> Vec<TailLine> {
         if self.number > 0 || !self.partial.is_empty() {
             self.transcoder.go_on();
         }
@@ -82,7 +82,7 @@ impl Lines {
         }
     }
 
-    fn complete(&mut self) -> Line {
+    fn complete(&mut self) -> TailLine {
         self.number += 1;
         let bytes = std::mem::take(&mut self.partial);
         let text = if std::mem::take(&mut self.too_long) {
@@ -95,7 +95,7 @@ impl Lines {
                 latin1: latin1(error.as_bytes()),
             })
         };
-        Line {
+        TailLine {
             number: self.number,
             text: text.map(|text| text.trim_end_matches('\r').to_owned()),
         }
@@ -110,7 +110,7 @@ fn shown(bytes: &[u8]) -> String {
 mod tests {
     use super::*;
 
-    fn texts(lines: Vec<Line>) -> Vec<String> {
+    fn texts(lines: Vec<TailLine>) -> Vec<String> {
         lines.into_iter().map(|line| line.text.unwrap()).collect()
     }
 
@@ -120,7 +120,7 @@ mod tests {
         let whole = Lines::default().feed(text.as_bytes());
         for step in 1..text.len() {
             let mut lines = Lines::default();
-            let split: Vec<Line> = text
+            let split: Vec<TailLine> = text
                 .as_bytes()
                 .chunks(step)
                 .flat_map(|part| lines.feed(part))

@@ -4,7 +4,7 @@
 //! asynchronous shell that asks: when a watched folder changes, and every two seconds in any case,
 //! because a watch can be lost, overflow, or never work on a network's file system.
 //!
-//! A follower goes on from the positions that it told before and that were kept together with the values before
+//! A follower goes on from the positions that it reported before and that were kept together with the values before
 //! them; whoever takes the values drops what it has seen.
 
 mod decode;
@@ -12,6 +12,7 @@ mod file;
 mod follow;
 mod gap;
 pub mod lines;
+mod position;
 pub mod records;
 mod reorder;
 mod saved;
@@ -53,7 +54,7 @@ pub async fn follow(
     batches: mpsc::Sender<Batch>,
     mut shutdown: Shutdown,
 ) -> Result<(), tokio::task::JoinError> {
-    let mut watch = Watch::new(follower.folders());
+    let mut watch = FolderWatch::new(follower.folders());
     let mut rescan = tokio::time::interval(RESCAN);
     rescan.set_missed_tick_behavior(MissedTickBehavior::Delay);
     while !shutdown.is_requested() {
@@ -94,15 +95,15 @@ pub async fn follow(
 
 /// One watcher for all folders.
 #[derive(Debug)]
-struct Watch {
+struct FolderWatch {
     watcher: Option<RecommendedWatcher>,
     unwatched: BTreeSet<PathBuf>,
     /// Of which it has been said that they cannot be watched.
-    told: BTreeSet<PathBuf>,
+    reported: BTreeSet<PathBuf>,
     wake: Arc<Notify>,
 }
 
-impl Watch {
+impl FolderWatch {
     fn new(folders: BTreeSet<PathBuf>) -> Self {
         let wake = Arc::new(Notify::new());
         let waker = Arc::clone(&wake);
@@ -117,7 +118,7 @@ impl Watch {
         Self {
             watcher,
             unwatched: folders,
-            told: BTreeSet::new(),
+            reported: BTreeSet::new(),
             wake,
         }
     }
@@ -130,8 +131,8 @@ impl Watch {
         self.unwatched.retain(|folder| {
             let watched = watcher.watch(folder, RecursiveMode::NonRecursive);
             let Err(error) = watched else { return false };
-            // A folder that is not there is told by whoever lists it.
-            if !matches!(error.kind, notify::ErrorKind::PathNotFound) && folder.is_dir() && self.told.insert(folder.clone()) {
+            // A folder that is not there is reported by whoever lists it.
+            if !matches!(error.kind, notify::ErrorKind::PathNotFound) && folder.is_dir() && self.reported.insert(folder.clone()) {
                 tracing::warn!(folder = %folder.display(), %error, "no watch: files are looked at in turn");
             }
             true

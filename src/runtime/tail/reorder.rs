@@ -13,7 +13,7 @@ const MOST_HELD: usize = 100_000;
 const MOST_POSITIONS: usize = 1024;
 
 /// By time, where that is the same covariates first, and then in the order in which they came.
-type Key = (Timestamp, bool, u64);
+type OrderKey = (Timestamp, bool, u64);
 
 /// The values of one source that wait.
 #[derive(Debug)]
@@ -21,15 +21,15 @@ pub(super) struct Reorder {
     window: SignedDuration,
     /// How many have come.
     came: u64,
-    held: BTreeMap<Key, Arrival>,
+    held: BTreeMap<OrderKey, Arrival>,
     /// The numbers of the held.
     numbers: BTreeSet<u64>,
     /// When the held ones came, and some that have gone out, in that order.
-    arrivals: VecDeque<(Timestamp, Key)>,
+    arrivals: VecDeque<(Timestamp, OrderKey)>,
     /// The newest time measured, as far as it is not ahead of the wall clock.
     newest: Option<Timestamp>,
     /// Everything up to here is to go out.
-    due: Option<Key>,
+    due: Option<OrderKey>,
     /// Each may be acknowledged once everything below its number has gone out.
     positions: VecDeque<(u64, Position)>,
 }

@@ -1,39 +1,15 @@
-//! Where a restart goes on in a file.
+//! A file put back to where a restart goes on in it, and that place as it moves.
 
 use super::decode::Decoder;
-use super::file::{Content, FileTail, Place};
-use super::records::Channels;
-use super::text::{SavedText, TextReader};
-use serde::{Deserialize, Serialize};
+use super::file::{Content, FileTail};
+use super::position::{Saved, SavedContent};
+use super::text::TextReader;
 use std::error::Error;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// What a restart goes on from: everything before has been handed out.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct Saved {
-    at: u64,
-    place: Option<Place>,
-    mark: Vec<u8>,
-    content: SavedContent,
-    /// The name under which it was found first, where it was renamed since.
-    #[serde(default)]
-    origin: Option<PathBuf>,
-}
-
-/// What of [`Content`] a restart needs.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
-enum SavedContent {
-    Text(SavedText),
-    Mcap(Channels),
-    Complete,
-    /// From its start.
-    #[default]
-    Anew,
-}
-
 impl FileTail {
-    /// The file as [`FileTail::moved`] told of it, perhaps to another process.
+    /// The file as [`FileTail::moved`] reported it, perhaps to another process.
     ///
     /// # Errors
     /// When this version, or this config, cannot go on from there.
@@ -65,19 +41,19 @@ impl FileTail {
         file.place = saved.place;
         file.mark.clone_from(&saved.mark);
         file.safe = saved.clone();
-        file.told = saved;
+        file.reported = saved;
         Ok(file)
     }
 
     /// From where a restart is to go on, if that is another place than when last asked.
     pub(super) fn moved(&mut self) -> Option<Vec<u8>> {
-        if self.told == self.safe {
+        if self.reported == self.safe {
             return None;
         }
         let body = rmp_serde::to_vec_named(&self.safe)
             .inspect_err(|error| tracing::error!(%error, "no position to go on from"))
             .ok()?;
-        self.told = self.safe.clone();
+        self.reported = self.safe.clone();
         Some(body)
     }
 

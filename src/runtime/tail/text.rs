@@ -30,7 +30,7 @@ pub(in crate::runtime) struct Fed {
     pub(in crate::runtime) remarks: Vec<Remark>,
 }
 
-type Fault = Box<dyn Error + Send + Sync>;
+type DecodeFault = Box<dyn Error + Send + Sync>;
 
 /// Where we are in a text.
 #[derive(Debug)]
@@ -106,7 +106,7 @@ impl TextReader {
         fed
     }
 
-    fn line(&mut self, number: u64, text: String, fed: &mut Fed) -> (String, Option<Fault>) {
+    fn line(&mut self, number: u64, text: String, fed: &mut Fed) -> (String, Option<DecodeFault>) {
         let taken = self.rows.take(number, &text);
         let mut items = taken.items;
         items.sort_by(|a, b| order(a).cmp(&order(b)));

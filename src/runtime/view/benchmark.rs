@@ -1,7 +1,7 @@
 //! One benchmark at a moment: its readings, every forecast until then, what was found and called.
 
 use super::site::Standing;
-use super::thin::{self, Point};
+use super::thin::{self, ThinPoint};
 use super::{Desk, EARLIEST, LATEST, held, read};
 use crate::fit::{Observations, Rate, RateOptions};
 use crate::forecast::InverseVelocityLine;
@@ -39,7 +39,7 @@ const MARKED: [&str; 10] = [
 
 /// What is asked for.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Window {
+pub struct TimeWindow {
     /// The moment; `None`: now.
     pub at: Option<Timestamp>,
     /// From when on; `None`: all.
@@ -52,15 +52,15 @@ pub struct Window {
 
 /// A series by columns: seconds since 1970, and values.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct Columns {
+pub struct ViewColumns {
     /// Seconds since 1970.
     pub t: Vec<f64>,
     /// Values.
     pub v: Vec<f64>,
 }
 
-impl Columns {
-    fn of(points: &[Point], buckets: usize) -> Self {
+impl ViewColumns {
+    fn of(points: &[ThinPoint], buckets: usize) -> Self {
         let kept = thin::min_max(points, buckets);
         Self {
             t: kept.iter().map(|point| point.0).collect(),
@@ -78,12 +78,12 @@ pub struct Covariate {
     pub unit: Option<String>,
     /// Its samples.
     #[serde(flatten)]
-    pub samples: Columns,
+    pub samples: ViewColumns,
 }
 
 /// One forecast, short.
 #[derive(Debug, Clone, Serialize)]
-pub struct Forecast {
+pub struct ForecastView {
     /// When it was made.
     pub time: Timestamp,
     /// When the slope collapses.
@@ -132,13 +132,13 @@ pub struct BenchmarkView {
     /// Whether there are earlier readings in the window than could be looked at.
     pub is_cut: bool,
     /// Readings, mm or mm/day.
-    pub readings: Columns,
+    pub readings: ViewColumns,
     /// Velocities in them, mm/day.
-    pub velocities: Columns,
+    pub velocities: ViewColumns,
     /// The straight line through the newest inverse velocities, from (seconds, day/mm) to zero.
-    pub line: Option<[Point; 2]>,
+    pub line: Option<[ThinPoint; 2]>,
     /// Every forecast, thinned.
-    pub forecasts: Vec<Forecast>,
+    pub forecasts: Vec<ForecastView>,
     /// The newest refit whole.
     pub latest: Option<Event>,
     /// The levels in force.
@@ -153,7 +153,7 @@ pub struct BenchmarkView {
     pub alerts: Vec<Event>,
     /// Who has seen what is in force, on the whole site.
     pub acknowledged: Vec<Event>,
-    /// The orders in force by which alerts are not told, on the whole site.
+    /// The orders in force by which alerts are not reported, on the whole site.
     pub silences: Vec<Event>,
 }
 
@@ -165,7 +165,7 @@ impl Desk {
     pub fn benchmark(
         &self,
         name: &str,
-        window: Window,
+        window: TimeWindow,
     ) -> Result<Option<BenchmarkView>, StoreError> {
         let id = BenchmarkId::new(name);
         if !self.known()?.contains(&id) {
@@ -208,7 +208,7 @@ impl Desk {
             collapse: self.facts.collapse,
             quantity: all.quantity(),
             is_cut,
-            readings: Columns::of(&points(&shown), buckets),
+            readings: ViewColumns::of(&points(&shown), buckets),
             velocities: velocities(&shown, VELOCITIES),
             line: line(&all, latest.as_ref()),
             forecasts: self.forecasts(name, (from, to), buckets)?,
@@ -273,14 +273,14 @@ impl Desk {
                 known,
                 most: MOST_READINGS,
             })?;
-            let points: Vec<Point> = samples
+            let points: Vec<ThinPoint> = samples
                 .iter()
                 .map(|sample| (seconds(sample.time), sample.value))
                 .collect();
             covariates.push(Covariate {
                 name,
                 unit,
-                samples: Columns::of(&points, buckets),
+                samples: ViewColumns::of(&points, buckets),
             });
         }
         Ok(covariates)
@@ -292,7 +292,7 @@ impl Desk {
         name: &str,
         span: (Timestamp, Timestamp),
         buckets: usize,
-    ) -> Result<Vec<Forecast>, StoreError> {
+    ) -> Result<Vec<ForecastView>, StoreError> {
         let (mut all, mut failure) = (Vec::new(), None);
         self.store
             .events_within((name, "refit"), span, &mut |body| match read(body) {
@@ -336,7 +336,7 @@ fn seconds(time: Timestamp) -> f64 {
     time.as_millisecond() as f64 / 1e3
 }
 
-fn points(series: &Series) -> Vec<Point> {
+fn points(series: &Series) -> Vec<ThinPoint> {
     let readings = series.readings.iter();
     readings
         .map(|reading| (seconds(reading.time), reading.value))
@@ -351,16 +351,16 @@ fn within(series: &Series, (from, to): (Timestamp, Timestamp)) -> Series {
 }
 
 /// Velocities in the readings, `most` at most; of readings that are velocities the readings themselves.
-fn velocities(series: &Series, most: usize) -> Columns {
+fn velocities(series: &Series, most: usize) -> ViewColumns {
     if series.quantity() == Quantity::Velocity {
-        return Columns::of(&points(series), most / 4);
+        return ViewColumns::of(&points(series), most / 4);
     }
     let Some(first) = series.readings.first() else {
-        return Columns::default();
+        return ViewColumns::default();
     };
     let rates = rates(series, RateOptions { most });
     let second = |rate: &Rate| SECONDS_PER_DAY.mul_add(rate.middle(), seconds(first.time));
-    Columns {
+    ViewColumns {
         t: rates.iter().map(second).collect(),
         v: rates.iter().map(|rate| rate.velocity).collect(),
     }
@@ -373,7 +373,7 @@ fn rates(series: &Series, options: RateOptions) -> Vec<Rate> {
 }
 
 /// The line of the newest refit, where these readings give it.
-fn line(series: &Series, latest: Option<&Event>) -> Option<[Point; 2]> {
+fn line(series: &Series, latest: Option<&Event>) -> Option<[ThinPoint; 2]> {
     let latest = latest?;
     let EventKind::Refit {
         inverse_velocity,
@@ -391,7 +391,7 @@ fn line(series: &Series, latest: Option<&Event>) -> Option<[Point; 2]> {
     Some(segment.map(|(day, height)| (SECONDS_PER_DAY.mul_add(day, seconds(start)), height)))
 }
 
-fn forecast(event: &Event) -> Option<Forecast> {
+fn forecast(event: &Event) -> Option<ForecastView> {
     let EventKind::Refit {
         regime,
         failure_time,
@@ -404,7 +404,7 @@ fn forecast(event: &Event) -> Option<Forecast> {
     else {
         return None;
     };
-    Some(Forecast {
+    Some(ForecastView {
         time: event.time,
         failure_time: *failure_time,
         chance_within_evacuation_time: *chance_within_evacuation_time,
@@ -417,14 +417,14 @@ fn forecast(event: &Event) -> Option<Forecast> {
     })
 }
 
-fn thinned(all: Vec<Forecast>, buckets: usize) -> Vec<Forecast> {
+fn thinned(all: Vec<ForecastView>, buckets: usize) -> Vec<ForecastView> {
     if all.len() <= 2 * buckets {
         return all;
     }
     let size = all.len().div_ceil(buckets);
     let mut kept = Vec::new();
     for part in all.chunks(size) {
-        let chance = |one: &&Forecast| one.chance_within_evacuation_time;
+        let chance = |one: &&ForecastView| one.chance_within_evacuation_time;
         let greatest = part
             .iter()
             .rev()

@@ -5,7 +5,7 @@ mod order;
 mod site;
 mod thin;
 
-pub use benchmark::{BenchmarkView, Window};
+pub use benchmark::{BenchmarkView, TimeWindow};
 pub use order::{Asked, OrderError};
 pub use site::{SiteView, Standing};
 

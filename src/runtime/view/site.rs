@@ -77,7 +77,7 @@ pub struct SiteView {
     pub alerts: Vec<Event>,
     /// Who has seen them.
     pub acknowledged: Vec<Event>,
-    /// The orders in force by which alerts are not told.
+    /// The orders in force by which alerts are not reported.
     pub silences: Vec<Event>,
     /// What was said last, newest first: alerts, faults, orders.
     pub log: Vec<Event>,
@@ -120,7 +120,7 @@ impl Desk {
         })
     }
 
-    /// Who had seen what was in force, and what was not told, at `moment`.
+    /// Who had seen what was in force, and what was not reported, at `moment`.
     pub(super) fn orders(
         &self,
         levels: &InForce,

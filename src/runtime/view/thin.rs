@@ -2,10 +2,10 @@
 //! the last.
 
 /// A point: seconds since 1970, and a value.
-pub(super) type Point = (f64, f64);
+pub(super) type ThinPoint = (f64, f64);
 
 /// At most `4 * buckets` of `points`, which are in order of time.
-pub(super) fn min_max(points: &[Point], buckets: usize) -> Vec<Point> {
+pub(super) fn min_max(points: &[ThinPoint], buckets: usize) -> Vec<ThinPoint> {
     let (Some(first), Some(last)) = (points.first(), points.last()) else {
         return Vec::new();
     };
@@ -29,7 +29,7 @@ pub(super) fn min_max(points: &[Point], buckets: usize) -> Vec<Point> {
     kept
 }
 
-fn keep_extremes(points: &[Point], kept: &mut Vec<Point>) {
+fn keep_extremes(points: &[ThinPoint], kept: &mut Vec<ThinPoint>) {
     let Some(last) = points.len().checked_sub(1) else {
         return;
     };
@@ -53,7 +53,7 @@ mod tests {
 
     #[test]
     fn a_spike_of_one_reading_among_a_hundred_thousand_is_kept() {
-        let mut points: Vec<Point> = (0..100_000).map(|i| (f64::from(i), 1.0)).collect();
+        let mut points: Vec<ThinPoint> = (0..100_000).map(|i| (f64::from(i), 1.0)).collect();
         points[43_211].1 = 50.0;
         points[77_777].1 = -50.0;
         let kept = min_max(&points, 500);
@@ -65,7 +65,7 @@ mod tests {
 
     #[test]
     fn few_points_stay_as_they_are_and_none_are_none() {
-        let points: Vec<Point> = (0..10).map(|i| (f64::from(i), 0.0)).collect();
+        let points: Vec<ThinPoint> = (0..10).map(|i| (f64::from(i), 0.0)).collect();
         assert_eq!(min_max(&points, 500), points);
         assert_eq!(min_max(&[], 500), []);
         let same_time = vec![(5.0, 1.0); 50];

@@ -56,7 +56,7 @@ pub(in crate::score) fn forecast(known: &Known) -> Option<Passage> {
     let newest = path.last()?.0;
     let share = 1.0 / WINDOWS.len() as f64;
     let times = WINDOWS.iter().filter_map(|part| {
-        let window = Window::of(&path, *part)?;
+        let window = FitWindow::of(&path, *part)?;
         let left_days = window.qualified()? * window.length_days;
         Some(((newest + left_days - known.now_days).max(0.0), share))
     });
@@ -64,7 +64,7 @@ pub(in crate::score) fn forecast(known: &Known) -> Option<Passage> {
 }
 
 /// The newest part of a path, its time from -1 to 0 and its displacement from 0 to 1.
-struct Window {
+struct FitWindow {
     points: Vec<(f64, f64)>,
     length_days: f64,
 }
@@ -79,7 +79,7 @@ struct Solved {
     cost: f64,
 }
 
-impl Window {
+impl FitWindow {
     fn of(path: &[(f64, f64)], part: f64) -> Option<Self> {
         #[expect(
             clippy::cast_possible_truncation,
@@ -214,7 +214,7 @@ mod tests {
             let path: Vec<(f64, f64)> = (0..93)
                 .map(|day| (f64::from(day), slip(f64::from(day))))
                 .collect();
-            let window = Window::of(&path, 1.0).unwrap();
+            let window = FitWindow::of(&path, 1.0).unwrap();
             window.passes(&[(8.0_f64 / 92.0).ln(), exponent, omega])
         };
         assert!(passes(0.5, 11.0, 0.04));

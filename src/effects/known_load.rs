@@ -5,8 +5,7 @@ use super::kind::{Form, Kind};
 use super::problem::Problem;
 use super::refit::Fitted;
 use super::response::{Driver, Response};
-use super::search::time_of;
-use super::term::Term;
+use super::term::{Term, time_of};
 use super::{candidates, term::Act};
 use crate::reading::{Channel, Timestamp, days_since};
 use serde::{Deserialize, Serialize};
@@ -19,7 +18,7 @@ const LATEST: usize = 32;
 /// What is known besides the law under a constant load. Only what can be said of times to come is in it: a
 /// covariate's response, harmonics, a step of the load; a jump of the reading, temperature in it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Fuller {
+pub struct KnownLoad {
     /// In the order in which the search accepted them.
     pub parts: Vec<Part>,
 }
@@ -94,7 +93,7 @@ pub struct Wave {
     pub sine: f64,
 }
 
-impl Fuller {
+impl KnownLoad {
     /// What of `fitted` can be said of times to come.
     pub(super) fn of(problem: &Problem, fitted: &Fitted, drivers: &[(usize, Driver)]) -> Self {
         let own = |(index, term): (usize, &Term)| {
@@ -115,7 +114,7 @@ impl Fuller {
         self.sum(channels, times, Part::in_reading)
     }
 
-    fn sum(&self, channels: &[&Channel], times: &[Timestamp], of: Of) -> Vec<f64> {
+    fn sum(&self, channels: &[&Channel], times: &[Timestamp], of: PartOf) -> Vec<f64> {
         let mut sum = vec![0.0; times.len()];
         for part in &self.parts {
             let Some(own) = of(part, channels, times) else {
@@ -147,7 +146,7 @@ impl Fuller {
     }
 }
 
-type Of = fn(&Part, &[&Channel], &[Timestamp]) -> Option<Vec<f64>>;
+type PartOf = fn(&Part, &[&Channel], &[Timestamp]) -> Option<Vec<f64>>;
 
 impl Part {
     /// Its kind.

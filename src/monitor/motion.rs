@@ -32,7 +32,7 @@ pub(super) fn moves_backwards(rates: &[Rate]) -> bool {
 }
 
 /// The median of the latest rates, mm/day.
-pub(in crate::monitor) fn settled(rates: &[Rate]) -> Option<f64> {
+pub(super) fn settled(rates: &[Rate]) -> Option<f64> {
     let mut latest: Vec<f64> = rates
         .iter()
         .rev()

@@ -1,0 +1,385 @@
+//! What is reported of a search: figures before and after, tests, and the curves behind them.
+
+use super::diagnosis::{
+    Judged, autocorrelation, innovations, is_clear, load_sd, runs, stoffer_toloi, undeclared_load,
+};
+use super::explanation::{
+    Candidate, Change, Curves, Effect, ErrorChange, Explained, NoiseReport, ResidualTests,
+    Structure,
+};
+use super::judge::{HeldOut, held_out, named, step_errors};
+use super::kind::Kind;
+use super::known_load::KnownLoad;
+use super::noise::{Memory, Noise, Whitener};
+use super::options::Options;
+use super::problem::Problem;
+use super::refit::{Fitted, Start, plain_starts, refit_from};
+use super::response::Driver;
+use super::rival::Rival;
+use super::search::SearchResult;
+use super::term::{Act, Scratch, Term};
+use super::verdict::{LARGEST_REST, Verdict, contribution};
+use crate::reading::{Unit, after_days};
+use std::collections::BTreeMap;
+
+/// What is left is no noise where a test gives it less than this p-value.
+const LEFT_OVER: f64 = 0.001;
+
+/// Most stretches of structure that are reported.
+const MOST_STRETCHES: usize = 8;
+
+/// Readings, noise models, covariates.
+type SearchGround<'a> = (&'a Problem, &'a [Whitener], &'a [(usize, Driver)]);
+
+/// What a search found, with the figures, tests and curves that are reported of it.
+pub(super) struct Findings {
+    pub(super) verdict: Effect,
+    pub(super) explained: Explained,
+    pub(super) also: Vec<Effect>,
+    pub(super) cannot_separate_from: Vec<Rival>,
+    pub(super) error: ErrorChange,
+    pub(super) candidates: Vec<Candidate>,
+    pub(super) residual: ResidualTests,
+    pub(super) noise: NoiseReport,
+    pub(super) curves: Curves,
+    pub(super) known_load: KnownLoad,
+}
+
+impl Findings {
+    /// Where there was nothing to search, or no law to start from.
+    pub(super) fn none(unit: Unit) -> Self {
+        Self {
+            verdict: Effect::of(Kind::None),
+            explained: Explained::None,
+            also: Vec::new(),
+            cannot_separate_from: Vec::new(),
+            error: ErrorChange::none(unit),
+            candidates: Vec::new(),
+            residual: ResidualTests::default(),
+            noise: NoiseReport::default(),
+            curves: Curves::default(),
+            known_load: KnownLoad::default(),
+        }
+    }
+}
+
+/// All that is reported of what was found and concluded, in `unit`.
+pub(super) fn findings(
+    unit: Unit,
+    ground: SearchGround,
+    (found, verdict): (SearchResult, Verdict),
+    options: &Options,
+    scratch: &mut Scratch,
+) -> Findings {
+    let (problem, _, drivers) = ground;
+    let Verdict {
+        mut effects,
+        explained,
+        cannot_separate_from,
+        full,
+    } = verdict;
+    let noise = noise_report(&full, unit);
+    // Errors are those of least squares, before and after.
+    let after = least_squares(problem, &full, scratch).unwrap_or_else(|| found.plain.clone());
+    let held = held_out(problem, (&[], &full), options.held_out_share, scratch);
+    let both = (&found.null, &full);
+    let error = ErrorChange {
+        held_out_step: held.as_ref().map_or_else(Change::default, |held| {
+            by_steps(problem, both, held, unit, scratch)
+        }),
+        ..errors(problem, (&found.plain, &after), held.as_ref(), unit)
+    };
+    let (residual, left) = residual_tests(ground, both, scratch);
+    let explained = confirmed(explained, (&full, &noise), &error, &residual);
+    let curves = curves(problem, (&found.plain, &after, held.as_ref()), unit, left);
+    let curves = with_effects(curves, ground, &full, unit, scratch);
+    let mut candidates = found.candidates;
+    candidates.sort_by(|a, b| b.bic_gain.total_cmp(&a.bic_gain));
+    Findings {
+        verdict: effects.remove(0),
+        explained,
+        also: effects,
+        cannot_separate_from,
+        error,
+        candidates,
+        residual,
+        noise,
+        curves,
+        known_load: KnownLoad::of(problem, &full, drivers),
+    }
+}
+
+fn noise_report(full: &Fitted, unit: Unit) -> NoiseReport {
+    let factor = unit.factor();
+    let noise = full.noise;
+    let remembers = noise.memory == Memory::Reading;
+    NoiseReport {
+        white: full.sigma / factor,
+        correlated: if remembers {
+            noise.ratio * full.sigma / factor
+        } else {
+            0.0
+        },
+        memory_days: (remembers && noise.days.is_finite()).then_some(noise.days),
+    }
+}
+
+/// Errors of the fit, and over the later block extrapolated over all of it.
+fn errors(
+    problem: &Problem,
+    (before, after): (&Fitted, &Fitted),
+    held: Option<&HeldOut>,
+    unit: Unit,
+) -> ErrorChange {
+    let factor = unit.factor();
+    let n = problem.t.len();
+    let held_out = held.map(|held| held.errors(problem));
+    ErrorChange {
+        fit: Change {
+            before: Some(before.rms(problem, 0..n) / factor),
+            after: Some(after.rms(problem, 0..n) / factor),
+        },
+        held_out: Change {
+            before: held_out.map(|(before, _)| before / factor),
+            after: held_out.map(|(_, after)| after / factor),
+        },
+        held_out_from: held.and_then(|held| after_days(problem.epoch, problem.t[held.from])),
+        ..ErrorChange::none(unit)
+    }
+}
+
+/// Errors over the later block, each reading predicted from those before it.
+fn by_steps(
+    problem: &Problem,
+    both: (&Fitted, &Fitted),
+    held: &HeldOut,
+    unit: Unit,
+    scratch: &mut Scratch,
+) -> Change {
+    let learned: usize = both.1.terms.iter().map(Term::coefficients).sum();
+    let steps = step_errors(problem, both, (held.from, learned), scratch);
+    Change {
+        before: steps.map(|steps| steps.before / unit.factor()),
+        after: steps.map(|steps| steps.after / unit.factor()),
+    }
+}
+
+/// What was concluded to be explained in full is so only where the figures and the tests say nothing else.
+fn confirmed(
+    explained: Explained,
+    (full, noise): (&Fitted, &NoiseReport),
+    error: &ErrorChange,
+    residual: &ResidualTests,
+) -> Explained {
+    // What remembers in the residual may pass for an instrument's only while it is small.
+    let rest = error.fit.after.unwrap_or(0.0);
+    let is_large = !full.terms.is_empty() && rest > LARGEST_REST * noise.white;
+    if explained == Explained::Full && (is_large || is_contradicted(residual)) {
+        Explained::Partly
+    } else {
+        explained
+    }
+}
+
+/// The curves with what each effect adds.
+fn with_effects(
+    mut curves: Curves,
+    (problem, _, drivers): SearchGround,
+    full: &Fitted,
+    unit: Unit,
+    scratch: &mut Scratch,
+) -> Curves {
+    for (index, term) in full.terms.iter().enumerate() {
+        let name = unique(&curves, named(term, drivers).to_string());
+        let added = contribution(problem, full, index, scratch);
+        let added = added.into_iter().map(|value| value / unit.factor());
+        curves.contributions.insert(name.clone(), added.collect());
+        if let Some(load) = log_load(problem, full, index) {
+            curves.log_loads.insert(name, load);
+        }
+    }
+    curves
+}
+
+/// Whether a test of what is left says that it is no noise.
+fn is_contradicted(residual: &ResidualTests) -> bool {
+    let values = [residual.runs.after, residual.stoffer_toloi.after];
+    values.into_iter().flatten().any(|p| p < LEFT_OVER)
+}
+
+/// The law with the effects of `full`, by least squares over all readings.
+pub(super) fn least_squares(
+    problem: &Problem,
+    full: &Fitted,
+    scratch: &mut Scratch,
+) -> Option<Fitted> {
+    let white = [Whitener::new(problem, Noise::WHITE)];
+    let starts = plain_starts(problem).into_iter();
+    let mut starts: Vec<Start> = starts.map(|start| start.joined(&full.terms)).collect();
+    starts.push(Start::at(full));
+    refit_from(problem, &starts, &white, scratch)
+}
+
+/// A name that no curve has yet.
+fn unique(curves: &Curves, name: String) -> String {
+    let taken = |name: &String| curves.contributions.contains_key(name);
+    if !taken(&name) {
+        return name;
+    }
+    let mut count = 2;
+    while taken(&format!("{name} {count}")) {
+        count += 1;
+    }
+    format!("{name} {count}")
+}
+
+/// What a term adds to the log-load at the readings, where it acts there.
+fn log_load(problem: &Problem, full: &Fitted, index: usize) -> Option<Vec<f64>> {
+    let own = super::judge::coefficients(problem, full, index);
+    let term: &Term = &full.terms[index];
+    let at = |node: usize| match &term.act {
+        Act::Load(columns) => {
+            let each = columns.iter().zip(own);
+            Some(each.map(|(column, gain)| gain * column[node]).sum())
+        }
+        Act::Step => {
+            let from = super::term::event_node(problem, term.at?);
+            Some(if node >= from { own[0] } else { 0.0 })
+        }
+        Act::Reset
+        | Act::Friction(_)
+        | Act::PerVelocity
+        | Act::PerSlip
+        | Act::Reading(_)
+        | Act::Averaging => None,
+    };
+    problem.node_of.iter().map(|&node| at(node)).collect()
+}
+
+fn curves(
+    problem: &Problem,
+    (before, after, held): (&Fitted, &Fitted, Option<&HeldOut>),
+    unit: Unit,
+    left: [Left; 2],
+) -> Curves {
+    let scaled = |values: &[f64]| values.iter().map(|value| value / unit.factor()).collect();
+    let times = problem.t.iter();
+    let [left_before, left_after] = left;
+    Curves {
+        times: times
+            .filter_map(|t| after_days(problem.epoch, *t))
+            .collect(),
+        readings: scaled(&problem.y),
+        before: scaled(&before.prediction),
+        after: scaled(&after.prediction),
+        before_held_out: held.map_or_else(Vec::new, |held| scaled(&held.before.prediction)),
+        after_held_out: held.map_or_else(Vec::new, |held| scaled(&held.after.prediction)),
+        load_before: left_before.load,
+        load_after: left_after.load,
+        autocorrelation: Change {
+            before: left_before.autocorrelation,
+            after: left_after.autocorrelation,
+        },
+        lag_days: problem.spacing,
+        contributions: BTreeMap::new(),
+        log_loads: BTreeMap::new(),
+    }
+}
+
+/// What is left of the readings under one law, as it is drawn.
+#[derive(Debug, Default)]
+struct Left {
+    load: Vec<(f64, f64)>,
+    autocorrelation: Vec<f64>,
+}
+
+/// The tests of what one law leaves.
+#[derive(Debug, Default)]
+struct Tests {
+    runs: Option<f64>,
+    stoffer_toloi: Option<f64>,
+    load_gain: Option<f64>,
+    load_sd: Option<f64>,
+}
+
+/// The tests of the residual, the undeclared load left in it, and its autocorrelation, before and after.
+fn residual_tests(
+    (problem, bank, _): SearchGround,
+    (null, full): (&Fitted, &Fitted),
+    scratch: &mut Scratch,
+) -> (ResidualTests, [Left; 2]) {
+    let [(before, left_before), (after, left_after)] = [null, full]
+        .map(|fitted| {
+            let judged = Judged::of((problem, fitted), bank, scratch)?;
+            let innovations = innovations(problem, fitted, judged.plain);
+            let load = judged
+                .load
+                .map(|(whitener, _)| undeclared_load(problem, fitted, whitener));
+            let load = load.unwrap_or_default();
+            let tests = Tests {
+                runs: runs(&innovations),
+                stoffer_toloi: stoffer_toloi(problem, &innovations),
+                load_gain: Some(judged.load_gain()),
+                load_sd: Some(load_sd(&load)),
+            };
+            let autocorrelation = autocorrelation(problem, &innovations);
+            Some((
+                tests,
+                Left {
+                    load,
+                    autocorrelation,
+                },
+            ))
+        })
+        .map(Option::unwrap_or_default);
+    let has_structure = after.load_gain.is_some_and(|gain| gain > 0.0);
+    let tests = ResidualTests {
+        runs: change(before.runs, after.runs),
+        stoffer_toloi: change(before.stoffer_toloi, after.stoffer_toloi),
+        undeclared_load_bic_gain: change(before.load_gain, after.load_gain),
+        undeclared_load_sd: change(before.load_sd, after.load_sd),
+        structure: if has_structure {
+            structure(problem, &left_after.load)
+        } else {
+            Vec::new()
+        },
+    };
+    (tests, [left_before, left_after])
+}
+
+fn change(before: Option<f64>, after: Option<f64>) -> Change {
+    Change { before, after }
+}
+
+/// Where the undeclared load stands clear of nothing, the clearest stretches first.
+fn structure(problem: &Problem, load: &[(f64, f64)]) -> Vec<Structure> {
+    let mut stretches: Vec<Structure> = Vec::new();
+    let mut i = 0;
+    while i < load.len() {
+        if !is_clear(load[i]) {
+            i += 1;
+            continue;
+        }
+        let from = i;
+        let sign = load[i].0.signum();
+        let mut peak = i;
+        while i < load.len() && is_clear(load[i]) && load[i].0 * sign > 0.0 {
+            if load[i].0.abs() > load[peak].0.abs() {
+                peak = i;
+            }
+            i += 1;
+        }
+        let time = |k: usize| after_days(problem.epoch, problem.t[k]);
+        if let (Some(from), Some(until)) = (time(from), time(i - 1)) {
+            stretches.push(Structure {
+                from,
+                until,
+                log_load: load[peak].0,
+                z: load[peak].0 / load[peak].1,
+            });
+        }
+    }
+    stretches.sort_by(|a, b| b.z.abs().total_cmp(&a.z.abs()));
+    stretches.truncate(MOST_STRETCHES);
+    stretches
+}

@@ -1,0 +1,47 @@
+//! Where a restart goes on in a file, as it is kept.
+
+use super::records::Channels;
+use super::text::SavedText;
+use serde::{Deserialize, Serialize};
+use std::fs::Metadata;
+use std::os::unix::fs::MetadataExt;
+use std::path::PathBuf;
+
+/// Which file it is, as the file system counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub(in crate::runtime) struct FileId {
+    device: u64,
+    inode: u64,
+}
+
+impl FileId {
+    pub(super) fn of(metadata: &Metadata) -> Self {
+        Self {
+            device: metadata.dev(),
+            inode: metadata.ino(),
+        }
+    }
+}
+
+/// What a restart goes on from: everything before has been handed out.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Saved {
+    pub(super) at: u64,
+    pub(super) place: Option<FileId>,
+    pub(super) mark: Vec<u8>,
+    pub(super) content: SavedContent,
+    /// The name under which it was found first, where it was renamed since.
+    #[serde(default)]
+    pub(super) origin: Option<PathBuf>,
+}
+
+/// What of a file's content a restart needs.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) enum SavedContent {
+    Text(SavedText),
+    Mcap(Channels),
+    Complete,
+    /// From its start.
+    #[default]
+    Anew,
+}
