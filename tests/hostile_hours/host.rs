@@ -32,7 +32,7 @@ const MOST_LOOKS: usize = 64;
 /// Messages that the daemon's channel holds.
 const CHANNEL: usize = 64;
 /// No file can grow beyond this while the disk is full.
-const FULL: u64 = 8192;
+pub(crate) const FULL: u64 = 8192;
 
 /// A daemon that runs.
 struct Running {
