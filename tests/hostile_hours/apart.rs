@@ -22,7 +22,7 @@ pub(crate) fn own_seeds() -> Option<Range<u64>> {
 }
 
 /// Lives them one after the other, and says what each has seen.
-pub(crate) fn live_all(seeds: Range<u64>, hook: Mood) {
+pub(crate) fn live_all(seeds: Range<u64>, hook: &Mood) {
     for seed in seeds {
         match std::panic::catch_unwind(|| live_with(seed, hook.clone())) {
             Ok(seen) => println!("\n{SEEN}{}", serde_json::to_string(&seen).unwrap()),

@@ -78,7 +78,7 @@ fn in_hostile_hours_no_reading_is_lost_no_red_is_kept_from_people_and_no_benchma
  {
     const NAME: &str = "in_hostile_hours_no_reading_is_lost_no_red_is_kept_from_people_and_no_benchmark_waits_for_another";
     if let Some(seeds) = apart::own_seeds() {
-        return apart::live_all(seeds, Mood::Works);
+        return apart::live_all(seeds, &Mood::Works);
     }
     let lives = number("HOSTILE_HOURS", HOURS).div_ceil(LIFE_HOURS);
     let first = number("HOSTILE_SEED", 0);
@@ -95,7 +95,7 @@ fn in_hostile_hours_no_reading_is_lost_no_red_is_kept_from_people_and_no_benchma
 #[test]
 fn what_seeds_have_found_is_mended() {
     if let Some(seeds) = apart::own_seeds() {
-        return apart::live_all(seeds, Mood::Works);
+        return apart::live_all(seeds, &Mood::Works);
     }
     for (seed, what) in FOUND {
         println!("seed {seed}: {what}");
@@ -107,7 +107,7 @@ fn what_seeds_have_found_is_mended() {
 #[should_panic(expected = "has not been told")]
 fn a_hook_that_loses_red_is_found() {
     if let Some(seeds) = apart::own_seeds() {
-        return apart::live_all(seeds, Mood::LosesRed);
+        return apart::live_all(seeds, &Mood::LosesRed);
     }
     apart::live_in_processes("a_hook_that_loses_red_is_found", 0..1);
 }
@@ -116,18 +116,18 @@ fn a_hook_that_loses_red_is_found() {
 fn the_full_disk_is_the_daemons_and_not_that_of_what_the_tests_write() {
     const NAME: &str = "the_full_disk_is_the_daemons_and_not_that_of_what_the_tests_write";
     if let Some(seeds) = apart::own_seeds() {
-        return apart::live_all(seeds, Mood::Works);
+        return apart::live_all(seeds, &Mood::Works);
     }
     let is_full = |seed: &u64| {
         let plan = Plan::drawn(*seed);
         let mut troubles = plan.troubles.iter();
         troubles.any(|(_, _, trouble)| *trouble == Trouble::FullDisk)
     };
-    let seed = (0..).find(is_full).unwrap();
+    let seed = (0..100).find(is_full).unwrap();
     let life = std::thread::spawn(move || apart::live_in_processes(NAME, seed..seed + 1));
     // As a log to which everything that is tested has been written.
     let mut log = tempfile::tempfile().unwrap();
-    log.write_all(&[b'.'; 3 * FULL as usize]).unwrap();
+    log.write_all(&vec![b'.'; 3 * FULL as usize]).unwrap();
     while !life.is_finished() {
         log.write_all(b"test ... ok\n").unwrap();
         std::thread::sleep(Duration::from_millis(1));
