@@ -186,9 +186,12 @@ impl Inner {
         let mut latest = BTreeMap::new();
         for (step, event) in &batch.events {
             last_event += 1;
+            let is_past = batch.steps[*step].1.makes_up(event);
             let step = *steps + 1 + i64::try_from(*step).unwrap_or(0);
             let body = insert_event(&transaction, (last_event, step), event)?;
-            if let Some(benchmark) = &event.benchmark {
+            if let Some(benchmark) = &event.benchmark
+                && !is_past
+            {
                 latest.insert((benchmark, event.kind.name()), body);
             }
         }

@@ -8,6 +8,7 @@ mod forecast;
 mod lookback;
 mod motion;
 mod pace;
+mod past;
 mod refit;
 mod sensor;
 mod suspicion;
@@ -39,6 +40,7 @@ use unknown::{Reason, Unknown};
 use watch::Watch;
 
 pub(crate) use motion::recent;
+pub(super) use past::Walk;
 pub(super) use motion::settled;
 
 /// So many readings in a row with one value are a stuck sensor, or a resolution too coarse to tell.
@@ -53,6 +55,8 @@ pub(super) struct Beside<'a> {
     pub(super) now: Timestamp,
     /// Whether what comes late is judged when all that came with it has been taken.
     pub(super) settles: bool,
+    /// Whether the past is being read: nothing is judged until it has been.
+    pub(super) is_past: bool,
 }
 
 /// Everything the monitor knows of one benchmark.
@@ -215,6 +219,9 @@ impl Track {
         }
         let is_owed = beside.settles && taken != Taken::Newest;
         self.owes |= is_owed;
+        if beside.is_past {
+            return events;
+        }
         let is_stuck = self.unknown.has(Reason::Stuck);
         if is_owed || is_stuck || !self.is_refit_due(policy, taken, reading.time) {
             events.extend(self.raise(policy, time));

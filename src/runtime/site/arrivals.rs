@@ -16,6 +16,9 @@ const CLOCKLESS: std::ops::Range<Timestamp> =
 const NEAR: SignedDuration = SignedDuration::from_hours(24);
 /// A reading that lies further behind is one of a backlog; how late that comes is noted again after this time.
 const NOTED_FOR: SignedDuration = SignedDuration::from_mins(30);
+/// Calls of [`Site::judge_current`] before the first start counts as caught up; what is left is judged when nothing
+/// else waits.
+const MOST_JUDGED: usize = 8;
 /// So many values of a kind that are set aside are logged one by one; then each time their number has doubled.
 const LOGGED: u64 = 16;
 
@@ -256,6 +259,9 @@ impl Site {
         if !self.monitor.settles() {
             self.step(self.now.unwrap_or(DAWN), &Input::Notice(Notice::Settles));
         }
+        if self.newest.is_empty() && !self.monitor.reads_past() {
+            self.step(self.now.unwrap_or(DAWN), &Input::Notice(Notice::Past));
+        }
     }
 
     /// Everything there is has been read: what comes from now on is live, and what has given no reading is unknown.
@@ -264,11 +270,28 @@ impl Site {
             self.at_rest = self.newest.keys().cloned().collect();
         }
         self.prove(wall);
+        let mut events = Vec::new();
+        for _ in 0..MOST_JUDGED {
+            if self.monitor.owes_current() {
+                events.extend(self.judge_current());
+            }
+        }
         if self.sinks.store.is_none() || !self.monitor.misses_some() {
-            return Vec::new();
+            return events;
         }
         let now = self.now.unwrap_or_else(|| self.keeper.now(wall));
-        self.step(now, &Input::Notice(Notice::Watching))
+        events.extend(self.step(now, &Input::Notice(Notice::Watching)));
+        events
+    }
+
+    /// Judges the newest readings of benchmarks of which only the past has been read.
+    fn judge_current(&mut self) -> Vec<Event> {
+        let now = self.now.unwrap_or(DAWN);
+        let events = self.step(now, &Input::Notice(Notice::Current));
+        for job in self.monitor.searches() {
+            self.searches.start(job);
+        }
+        events
     }
 
     /// Lets data time pass, as far as time has passed at the site while the host's clock says `wall`, and says where
@@ -313,18 +336,26 @@ impl Site {
         }
     }
 
-    /// Whether something that came late is still to be looked back on.
+    /// Whether something is still to be looked back on: what came late, or the past before a first start.
     pub fn owes_look_back(&self) -> bool {
-        self.monitor.late().is_some()
+        let owes_past = self.monitor.owes_current() || self.monitor.owes_past();
+        self.monitor.late().is_some() || owes_past && !self.monitor.reads_past()
     }
 
-    /// Looks back on what came late at one benchmark.
+    /// Looks back on what came late at one benchmark, or goes on through the past. What follows for the present.
     pub fn look_back(&mut self) -> Vec<Event> {
-        match (self.now, self.monitor.late().cloned()) {
-            (Some(now), Some(benchmark)) => {
-                self.step(now, &Input::Notice(Notice::LookBack(benchmark)))
-            }
-            (None, _) | (_, None) => Vec::new(),
+        let Some(now) = self.now else {
+            return Vec::new();
+        };
+        if let Some(benchmark) = self.monitor.late().cloned() {
+            return self.step(now, &Input::Notice(Notice::LookBack(benchmark)));
         }
+        if self.monitor.owes_current() {
+            return self.judge_current();
+        }
+        let further = Input::Notice(Notice::Retrace);
+        let mut events = self.step(now, &further);
+        events.retain(|event| !further.makes_up(event));
+        events
     }
 }

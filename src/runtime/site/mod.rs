@@ -247,7 +247,9 @@ impl Site {
         }
         let events = self.monitor.step(now, input);
         for event in &events {
-            self.handle(event);
+            if !input.makes_up(event) {
+                self.handle(event);
+            }
         }
         events
     }
