@@ -42,7 +42,8 @@ impl Past {
 impl Input {
     /// Whether an event that followed from this is a refit of the past, made after newer ones.
     pub fn makes_up(&self, event: &Event) -> bool {
-        matches!(self, Self::Notice(Notice::Retrace)) && matches!(event.kind, EventKind::Refit { .. })
+        matches!(self, Self::Notice(Notice::Retrace))
+            && matches!(event.kind, EventKind::Refit { .. })
     }
 }
 

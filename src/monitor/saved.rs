@@ -6,8 +6,8 @@
 use super::awaited::Awaited;
 use super::covariates::Covariates;
 use super::event::Summary;
-use super::search::SearchJob;
 use super::past::Past;
+use super::search::SearchJob;
 use super::sensor::Sensors;
 use super::site::SiteAlert;
 use super::together::Together;

@@ -147,6 +147,9 @@ impl Daemon {
             self.commit_what_is_urgent()?;
         }
         self.positions.extend(batch.positions);
+        if batch.caught_up {
+            self.decide();
+        }
         self.release()?;
         self.settle();
         self.commit()?;
@@ -192,6 +195,9 @@ impl Daemon {
                 .then(|| self.sources.deliveries.try_recv().ok())
                 .flatten();
         }
+        if self.is_up_to_date {
+            self.decide();
+        }
         self.settle();
         self.commit()
     }
@@ -200,13 +206,24 @@ impl Daemon {
     fn release(&mut self) -> Result<(), StoreError> {
         let events = self.site.release((self.wall)())?;
         self.pulse.vitals.note(&events);
-        if self.site.held() == 0 {
+        if self.holds_nothing() {
             let positions = std::mem::take(&mut self.positions);
             self.site.note_positions(positions);
         } else {
             keep_latest(&mut self.positions);
         }
         Ok(())
+    }
+
+    /// All that came together has been seen.
+    fn decide(&mut self) {
+        let events = self.site.decide((self.wall)());
+        self.pulse.vitals.note(&events);
+    }
+
+    /// Whether all that was read has been taken, or is known not to count.
+    fn holds_nothing(&self) -> bool {
+        self.site.held() == 0 && !self.site.is_undecided()
     }
 
     fn settle(&mut self) {
@@ -260,7 +277,7 @@ impl Daemon {
         self.since_commit = Stopwatch::start();
         let committed = self.site.commit((self.wall)());
         let is_waiting = self.site.is_waiting();
-        if committed.is_ok() && !is_waiting && self.site.held() == 0 {
+        if committed.is_ok() && !is_waiting && self.holds_nothing() {
             self.pulse.vitals.has_taken();
             self.sources.acknowledge();
         }
@@ -346,6 +363,9 @@ impl Daemon {
         if self.is_caught_up {
             let events = self.site.live(now);
             self.pulse.vitals.note(&events);
+        }
+        if self.is_up_to_date {
+            self.decide();
         }
         self.release()?;
         self.settle();

@@ -196,6 +196,10 @@ impl Life<'_> {
             self.seen.restarts += u64::from(self.host.start());
         }
         self.measure(is_calm);
+        for (_, name) in plan.corrections.iter().filter(|(at, _)| *at == step) {
+            let corrected = self.logger(name).correct();
+            self.is_readable(name, corrected.into_iter().collect());
+        }
         let was_well = self.is_machine_well();
         let sent = self.host.turn(&mut self.radio, &mut self.random);
         self.is_readable("m", sent);

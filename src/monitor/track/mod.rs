@@ -40,8 +40,8 @@ use unknown::{Reason, Unknown};
 use watch::Watch;
 
 pub(crate) use motion::recent;
-pub(super) use past::Walk;
 pub(super) use motion::settled;
+pub(super) use past::Walk;
 
 /// So many readings in a row with one value are a stuck sensor, or a resolution too coarse to tell.
 const STUCK: usize = 24;

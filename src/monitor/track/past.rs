@@ -122,17 +122,18 @@ impl Track {
         (events, values.len() - from > MOST_READINGS)
     }
 
-    /// The past has been gone through: goes on as it leads to. A level from there that has not ended is called.
-    pub(in crate::monitor) fn go_on_from(&mut self, now: Timestamp, past: Walk) -> Option<Event> {
+    /// The past has been gone through: goes on as it leads to. A level from there that has not ended is called, as of
+    /// when it began.
+    pub(in crate::monitor) fn go_on_from(&mut self, now: Timestamp, past: Walk) -> Vec<Event> {
         let past = past.track;
         self.panel = past.panel;
         self.regime = past.regime;
         (self.intercept, self.transition) = (past.intercept, past.transition);
         self.pace = past.pace;
-        if past.latch.level() <= self.latch.level() {
-            return None;
-        }
-        let (level, since) = past.latch.in_force()?;
+        let in_force = past.latch.in_force();
+        let Some((level, since)) = in_force.filter(|(level, _)| *level > self.latch.level()) else {
+            return Vec::new();
+        };
         (self.latch, self.levels, self.look) = (past.latch, past.levels, past.look);
         let text = format!(
             "benchmark {}: {level} since {since}, found in the readings from before the first start; nothing since has ended it",
@@ -145,7 +146,10 @@ impl Track {
             rule: "past".to_owned(),
             text,
         };
-        Some(self.event(now, kind))
+        let mut events = vec![self.event(since, kind)];
+        // What a sensor at the end of its range gives is told by the level.
+        events.extend(self.judge_sensor(now));
+        events
     }
 
     /// Where the readings come from as they are kept.

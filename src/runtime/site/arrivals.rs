@@ -5,7 +5,7 @@ use crate::monitor::{Event, Input, Notice};
 use crate::reading::{BenchmarkId, Timestamp, suspicion};
 use crate::runtime::clock;
 use crate::runtime::tail::Arrival;
-use crate::store::StoreError;
+use crate::store::{Known, StoreError};
 use jiff::SignedDuration;
 
 /// The first day of 1970, UTC: where a logger starts whose clock is not set. No reading of a site that is watched now
@@ -57,16 +57,28 @@ impl Site {
         }
         if let Some(store) = &self.sinks.store
             && !self.is_latest(arrival)
-            && store.has(&self.batch, &arrival.input)?
         {
-            self.counts.repeated += 1;
-            return Ok(Vec::new());
+            let known = store.has(&self.batch, &arrival.input)?;
+            if known == Known::Corrected && self.returned.waits(arrival) {
+                self.counts.repeated += 1;
+                return Ok(Vec::new());
+            }
+            self.returned.comes(arrival);
+            if known == Known::Yes {
+                self.counts.repeated += 1;
+                return Ok(Vec::new());
+            }
         }
+        Ok(self.take_new(arrival, wall))
+    }
+
+    /// Takes a value that has not been taken, or is the last of its time again.
+    pub(super) fn take_new(&mut self, arrival: &Arrival, wall: Timestamp) -> Vec<Event> {
         self.counts.taken += 1;
         if let Some(now) = self.now
             && self.has_leapt(arrival, (now, wall))
         {
-            return Ok(self.step(now, &arrival.input));
+            return self.step(now, &arrival.input);
         }
         self.keep_time(arrival, wall);
         let mut events = self.pass(arrival.time);
@@ -81,7 +93,7 @@ impl Site {
         for job in self.monitor.searches() {
             self.searches.start(job);
         }
-        Ok(events)
+        events
     }
 
     fn answer(

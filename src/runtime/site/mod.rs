@@ -9,12 +9,14 @@ mod arrivals;
 mod flood;
 mod memory;
 mod mute;
+mod returned;
 mod timekeeper;
 mod unproven;
 
 pub(super) use arrivals::is_logged;
 pub use mute::Mute;
 
+use returned::Returned;
 use timekeeper::Timekeeper;
 use unproven::Unproven;
 
@@ -126,6 +128,8 @@ pub struct Site {
     at_rest: BTreeSet<BenchmarkId>,
     /// Values that wait, unacknowledged, until the host's clock is right.
     held: VecDeque<Arrival>,
+    /// Values that were taken before, and corrected: until all that came with them has been seen.
+    returned: Returned,
     /// Of which silent benchmarks it is known how late their readings come, and what time it was then.
     behind: BTreeMap<BenchmarkId, Timestamp>,
 }
@@ -155,6 +159,7 @@ impl Site {
             unproven: Unproven::default(),
             at_rest: BTreeSet::new(),
             held: VecDeque::new(),
+            returned: Returned::default(),
             behind: BTreeMap::new(),
         }
     }
