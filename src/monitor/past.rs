@@ -4,14 +4,16 @@
 use super::Monitor;
 use super::event::{Event, EventKind};
 use super::notice::Notice;
-use super::track::Beside;
+use super::track::{Beside, PAST};
 use super::{Input, Track};
+use crate::alert::{Level, Policy};
 use crate::reading::{BenchmarkId, Timestamp};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Benchmarks that one [`Notice::Current`] judges at most.
-const AT_ONCE: usize = 16;
+/// Benchmarks that one [`Notice::Current`] judges at most, and refits that it makes.
+const AT_ONCE: usize = 2048;
+const MOST_REFITS: usize = 16;
 
 /// What of the past is still to be done.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -40,10 +42,26 @@ impl Past {
 }
 
 impl Input {
-    /// Whether an event that followed from this is a refit of the past, made after newer ones.
+    /// Whether an event that followed from this says what would have been said in the past: it changes nothing of the
+    /// present, and nobody is told.
     pub fn makes_up(&self, event: &Event) -> bool {
-        matches!(self, Self::Notice(Notice::Retrace))
-            && matches!(event.kind, EventKind::Refit { .. })
+        let is_past = match &event.kind {
+            EventKind::Refit { .. } => true,
+            EventKind::Alert { level, rule, .. } => *level != Level::Unknown && rule != PAST,
+            EventKind::RegimeFlip { .. }
+            | EventKind::InterceptDrift { .. }
+            | EventKind::TransitionDrift { .. }
+            | EventKind::UnexplainedResidual(_)
+            | EventKind::EffectFound { .. }
+            | EventKind::EffectDropped { .. }
+            | EventKind::Together { .. }
+            | EventKind::Fault { .. }
+            | EventKind::Declared { .. }
+            | EventKind::Correction { .. }
+            | EventKind::Order { .. }
+            | EventKind::Summary(_) => false,
+        };
+        matches!(self, Self::Notice(Notice::Retrace)) && is_past
     }
 }
 
@@ -68,8 +86,11 @@ impl Monitor {
         if std::mem::take(&mut self.past.is_open) {
             self.past.current = self.tracks.keys().cloned().collect();
         }
-        let mut events = Vec::new();
+        let (mut events, mut refits) = (Vec::new(), 0);
         for _ in 0..AT_ONCE {
+            if refits >= MOST_REFITS {
+                break;
+            }
             let Some(id) = self.past.current.pop_first() else {
                 break;
             };
@@ -85,6 +106,8 @@ impl Monitor {
                 continue;
             };
             let (newest, judged) = track.judge_newest(policy, &beside);
+            let is_refit = |event: &&Event| matches!(event.kind, EventKind::Refit { .. });
+            refits += judged.iter().filter(is_refit).count();
             events.extend(judged);
             let critical = policy.critical_velocity_mm_per_day;
             self.searches.extend(track.search(critical, &beside));
@@ -133,7 +156,7 @@ impl Track {
     /// Judges the newest reading, whenever it came.
     fn judge_newest(
         &mut self,
-        policy: &crate::alert::Policy,
+        policy: &Policy,
         beside: &Beside<'_>,
     ) -> (Option<Timestamp>, Vec<Event>) {
         let newest = self.newest();

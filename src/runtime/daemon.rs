@@ -157,8 +157,9 @@ impl Daemon {
         self.thin()?;
         self.is_up_to_date = batch.caught_up;
         if self.is_up_to_date {
+            let stopwatch = Stopwatch::start();
             let events = self.site.caught_up((self.wall)())?;
-            self.pulse.vitals.note(&events);
+            self.pulse.vitals.judged(&events, stopwatch.elapsed());
         }
         if self.is_up_to_date && !self.is_caught_up {
             self.is_caught_up = true;
@@ -231,13 +232,17 @@ impl Daemon {
         self.pulse.vitals.note(&events);
     }
 
-    /// Looks back on what came late at one benchmark.
+    /// Looks back on what came late at one benchmark, or goes on through the past before a first start.
     ///
     /// # Errors
     /// When the state cannot be used any more.
     pub fn look_back(&mut self) -> Result<(), StoreError> {
+        let (stopwatch, owed_past) = (Stopwatch::start(), self.site.owes_past());
         let events = self.site.look_back();
-        self.pulse.vitals.note(&events);
+        self.pulse.vitals.judged(&events, stopwatch.elapsed());
+        if owed_past && !self.site.owes_past() {
+            tracing::info!("the past before the first start has been gone through");
+        }
         self.commit()
     }
 

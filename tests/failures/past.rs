@@ -45,7 +45,7 @@ fn history() -> Site {
 fn refits(site: &Site) -> Vec<(String, String)> {
     let said = site.events();
     let events = said.lines().map(|line| serde_json::from_str(line).unwrap());
-    let refits = events.filter(|event: &serde_json::Value| event["kind"] == "refit");
+    let refits = events.filter(|event: &serde_json::Value| event["event"] == "refit");
     let of = |event: serde_json::Value| {
         let text = |name: &str| event[name].as_str().unwrap().to_owned();
         (text("benchmark"), text("time"))
@@ -88,7 +88,7 @@ fn site_newest(site: &Site) -> BTreeMap<String, String> {
     newest.collect()
 }
 
-/// Ten hours at ten times the threshold, and ten of creep: no evacuation time yet.
+/// Ten hours at twice the threshold, and twenty of creep: no evacuation time yet.
 #[test]
 fn a_red_of_the_past_that_nothing_has_ended_is_told_after_a_first_start() {
     let site = Site::new(
@@ -98,7 +98,7 @@ fn a_red_of_the_past_that_nothing_has_ended_is_told_after_a_first_start() {
     let start = clock::now() - SignedDuration::from_hours(59);
     let rows: String = (0..60_i64)
         .map(|hour| {
-            let crisis = 10.0 * (hour.clamp(40, 50) - 40) as f64;
+            let crisis = 10.0 * (hour.clamp(30, 40) - 30) as f64;
             let jitter = ((hour * 37) % 11) as f64 / 50.0;
             let time = start + SignedDuration::from_hours(hour);
             format!("{time},{:.3}\n", 0.1 * hour as f64 + crisis + jitter)

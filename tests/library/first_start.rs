@@ -112,8 +112,8 @@ fn what_is_current_is_judged_first_and_the_refits_of_the_past_are_those_of_a_dae
 
 #[test]
 fn a_red_of_the_past_that_nothing_has_ended_is_called_after_a_first_start_as_of_then() {
-    // Ten hours of 240 mm/day, and ten of creep: not yet an evacuation time.
-    let crisis = |hour: i64| 10.0 * (hour.clamp(40, 50) - 40) as f64;
+    // Ten hours of 240 mm/day, and twenty of creep: not yet an evacuation time.
+    let crisis = |hour: i64| 10.0 * (hour.clamp(30, 40) - 30) as f64;
     let mut late = monitor();
     let (current, past) = first_start(&mut late, &history(60, crisis));
     let red = |event: &Event| match &event.kind {
@@ -126,7 +126,7 @@ fn a_red_of_the_past_that_nothing_has_ended_is_called_after_a_first_start_as_of_
     };
     assert_eq!(current.iter().find_map(red), None);
     let called = past.iter().find_map(red).unwrap();
-    assert!(called > at(40) && called <= at(51), "{called}");
+    assert!(called > at(30) && called <= at(41), "{called}");
     assert_eq!(late.level(&BenchmarkId::new("a")), Some(Level::Red));
     assert_eq!(late.level(&BenchmarkId::new("b")), Some(Level::Green));
 }

@@ -41,7 +41,7 @@ use watch::Watch;
 
 pub(crate) use motion::recent;
 pub(super) use motion::settled;
-pub(super) use past::Walk;
+pub(super) use past::{PAST, Walk};
 
 /// So many readings in a row with one value are a stuck sensor, or a resolution too coarse to tell.
 const STUCK: usize = 24;

@@ -2,7 +2,7 @@
 //! been judged as it came.
 
 use super::{Beside, Reason, Track};
-use crate::alert::Policy;
+use crate::alert::{Level, Policy};
 use crate::monitor::declared::Declarations;
 use crate::monitor::event::{AlertState, Event, EventKind};
 use crate::monitor::history::Source;
@@ -16,6 +16,8 @@ const MOST_READINGS: usize = 2000;
 /// Of refits that lie further back than this from the first that was judged, the first of each day is told: the state
 /// keeps no more.
 const ALL_FOR: SignedDuration = SignedDuration::from_hours(90 * 24);
+/// The rule of a level that comes from the past.
+pub(in crate::monitor) const PAST: &str = "past";
 const DAY: SignedDuration = SignedDuration::from_hours(24);
 
 /// A benchmark's past, as far as it has been gone through.
@@ -29,6 +31,9 @@ pub(in crate::monitor) struct Walk {
     until: Timestamp,
     /// The day of the last refit that was told, of those that are told once a day.
     day: Option<i64>,
+    /// Alerts since the level was last green: they are told together when it is again, so that what is over never
+    /// looks as if it were in force.
+    episode: Vec<Event>,
 }
 
 impl Walk {
@@ -79,10 +84,11 @@ impl Track {
             at_days: None,
             until,
             day: None,
+            episode: Vec::new(),
         }
     }
 
-    /// Goes on through the past; the refits that are told, and whether there is more of it.
+    /// Goes on through the past; its refits and alerts that are told, and whether there is more of it.
     pub(in crate::monitor) fn walk(
         &self,
         walk: &mut Walk,
@@ -116,23 +122,30 @@ impl Track {
                 if matches!(event.kind, EventKind::Refit { .. }) {
                     refits += 1;
                     events.extend(walk.tells(event.time).then_some(event));
+                } else if is_of_a_level(&event) && event.time < walk.until {
+                    walk.episode.push(event);
                 }
+            }
+            if walk.track.latch.level() == Level::Green {
+                events.append(&mut walk.episode);
             }
         }
         (events, values.len() - from > MOST_READINGS)
     }
 
-    /// The past has been gone through: goes on as it leads to. A level from there that has not ended is called, as of
-    /// when it began.
+    /// The past has been gone through: goes on as it leads to. A level from there that has not ended is called.
     pub(in crate::monitor) fn go_on_from(&mut self, now: Timestamp, past: Walk) -> Vec<Event> {
-        let past = past.track;
+        let (past, mut events) = (past.track, past.episode);
         self.panel = past.panel;
         self.regime = past.regime;
         (self.intercept, self.transition) = (past.intercept, past.transition);
         self.pace = past.pace;
         let in_force = past.latch.in_force();
         let Some((level, since)) = in_force.filter(|(level, _)| *level > self.latch.level()) else {
-            return Vec::new();
+            if self.latch.level() == Level::Green {
+                events.extend(events.last().and_then(|last| ended(now, last)));
+            }
+            return events;
         };
         (self.latch, self.levels, self.look) = (past.latch, past.levels, past.look);
         let text = format!(
@@ -143,10 +156,10 @@ impl Track {
             level,
             state: AlertState::Firing,
             key: format!("{}/{level}/{since}", self.benchmark),
-            rule: "past".to_owned(),
+            rule: PAST.to_owned(),
             text,
         };
-        let mut events = vec![self.event(since, kind)];
+        events.push(self.event(now, kind));
         // What a sensor at the end of its range gives is told by the level.
         events.extend(self.judge_sensor(now));
         events
@@ -163,4 +176,22 @@ impl Track {
             averaging: self.history.averaging(),
         }
     }
+}
+
+/// Whether it enters or leaves a level; that nothing can be said is not told of the past.
+fn is_of_a_level(event: &Event) -> bool {
+    matches!(event.kind, EventKind::Alert { level, .. } if level != Level::Unknown)
+}
+
+/// The end of what `last` says, where that is the beginning of a level: it ended while the past was gone through.
+fn ended(now: Timestamp, last: &Event) -> Option<Event> {
+    let mut event = last.clone();
+    event.time = now;
+    if let EventKind::Alert { state, .. } = &mut event.kind
+        && *state == AlertState::Firing
+    {
+        *state = AlertState::Resolved;
+        return Some(event);
+    }
+    None
 }

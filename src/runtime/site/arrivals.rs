@@ -350,8 +350,13 @@ impl Site {
 
     /// Whether something is still to be looked back on: what came late, or the past before a first start.
     pub fn owes_look_back(&self) -> bool {
+        self.monitor.late().is_some() || self.owes_past()
+    }
+
+    /// Whether the past before a first start has been read and is still to be gone through.
+    pub fn owes_past(&self) -> bool {
         let owes_past = self.monitor.owes_current() || self.monitor.owes_past();
-        self.monitor.late().is_some() || owes_past && !self.monitor.reads_past()
+        owes_past && !self.monitor.reads_past()
     }
 
     /// Looks back on what came late at one benchmark, or goes on through the past. What follows for the present.
