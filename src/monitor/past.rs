@@ -46,12 +46,12 @@ impl Input {
     /// present, and nobody is told.
     pub fn makes_up(&self, event: &Event) -> bool {
         let is_past = match &event.kind {
-            EventKind::Refit { .. } => true,
-            EventKind::Alert { level, rule, .. } => *level != Level::Unknown && rule != PAST,
-            EventKind::RegimeFlip { .. }
+            EventKind::Refit { .. }
+            | EventKind::RegimeFlip { .. }
             | EventKind::InterceptDrift { .. }
-            | EventKind::TransitionDrift { .. }
-            | EventKind::UnexplainedResidual(_)
+            | EventKind::TransitionDrift { .. } => true,
+            EventKind::Alert { level, rule, .. } => *level != Level::Unknown && rule != PAST,
+            EventKind::UnexplainedResidual(_)
             | EventKind::EffectFound { .. }
             | EventKind::EffectDropped { .. }
             | EventKind::Together { .. }

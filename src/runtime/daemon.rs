@@ -182,8 +182,9 @@ impl Daemon {
     /// # Errors
     /// When the state cannot be used any more.
     pub fn take_messages(&mut self, first: mqtt::Delivery) -> Result<(), StoreError> {
-        let mut next = Some(first);
+        let (mut next, mut came) = (Some(first), 0);
         while let Some(delivery) = next {
+            came += 1;
             let vitals = &self.pulse.vitals;
             vitals.takes(delivery.found);
             vitals.quarantined(&delivery.source, delivery.quarantined);
@@ -196,6 +197,7 @@ impl Daemon {
                 .then(|| self.sources.deliveries.try_recv().ok())
                 .flatten();
         }
+        self.site.messages_came(came);
         if self.is_up_to_date {
             self.decide();
         }

@@ -109,6 +109,9 @@ pub(super) struct Track {
     /// Suspicions that people have looked into, and that do not hold.
     #[serde(default)]
     accepted: BTreeSet<Suspicion>,
+    /// Its past has not been gone through.
+    #[serde(default)]
+    owes_past: bool,
 }
 
 impl Track {
@@ -129,6 +132,7 @@ impl Track {
             owes: false,
             kept: None,
             accepted: BTreeSet::new(),
+            owes_past: false,
             benchmark,
             history: History::new(source, epoch),
             panel: Panel::default(),
@@ -166,6 +170,9 @@ impl Track {
     ) -> Vec<Event> {
         let mut events = self.judge_ahead(policy, reading.time, beside);
         events.extend(self.take_one(policy, source, reading, beside));
+        if self.owes_past {
+            events.retain(|event| !past::is_of_the_record(event));
+        }
         events
     }
 

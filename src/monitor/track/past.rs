@@ -66,10 +66,13 @@ impl Track {
         time: Timestamp,
         beside: &Beside<'_>,
     ) -> Vec<Event> {
+        self.owes_past = true;
         if self.unknown.has(Reason::Stuck) {
             return Vec::new();
         }
-        self.judge(policy, time, beside)
+        let mut events = self.judge(policy, time, beside);
+        events.retain(|event| !is_of_the_record(event));
+        events
     }
 
     /// The past of this benchmark up to `until`, at its beginning.
@@ -122,6 +125,8 @@ impl Track {
                 if matches!(event.kind, EventKind::Refit { .. }) {
                     refits += 1;
                     events.extend(walk.tells(event.time).then_some(event));
+                } else if is_of_the_record(&event) {
+                    events.push(event);
                 } else if is_of_a_level(&event) && event.time < walk.until {
                     walk.episode.push(event);
                 }
@@ -140,6 +145,7 @@ impl Track {
         self.regime = past.regime;
         (self.intercept, self.transition) = (past.intercept, past.transition);
         self.pace = past.pace;
+        self.owes_past = false;
         let in_force = past.latch.in_force();
         let Some((level, since)) = in_force.filter(|(level, _)| *level > self.latch.level()) else {
             if self.latch.level() == Level::Green {
@@ -176,6 +182,16 @@ impl Track {
             averaging: self.history.averaging(),
         }
     }
+}
+
+/// Whether it says what has changed over the whole record, which only who has gone through it knows.
+pub(super) fn is_of_the_record(event: &Event) -> bool {
+    matches!(
+        event.kind,
+        EventKind::RegimeFlip { .. }
+            | EventKind::InterceptDrift { .. }
+            | EventKind::TransitionDrift { .. }
+    )
 }
 
 /// Whether it enters or leaves a level; that nothing can be said is not told of the past.

@@ -283,8 +283,10 @@ impl Site {
         }
         self.prove(wall);
         let mut events = Vec::new();
+        // Before the first reading there is no past that could be over.
+        let is_read = !self.newest.is_empty() && !self.is_crowded();
         for _ in 0..MOST_JUDGED {
-            if self.monitor.owes_current() {
+            if is_read && self.monitor.owes_current() {
                 events.extend(self.judge_current());
             }
         }

@@ -6,6 +6,7 @@
 
 mod alerts;
 mod arrivals;
+mod crowd;
 mod flood;
 mod memory;
 mod mute;
@@ -16,6 +17,7 @@ mod unproven;
 pub(super) use arrivals::is_logged;
 pub use mute::Mute;
 
+use crowd::Crowd;
 use returned::Returned;
 use timekeeper::Timekeeper;
 use unproven::Unproven;
@@ -130,6 +132,8 @@ pub struct Site {
     held: VecDeque<Arrival>,
     /// Values that were taken before, and corrected: until all that came with them has been seen.
     returned: Returned,
+    /// Messages that come so fast that the past is not over yet.
+    crowd: Crowd,
     /// Of which silent benchmarks it is known how late their readings come, and what time it was then.
     behind: BTreeMap<BenchmarkId, Timestamp>,
 }
@@ -160,6 +164,7 @@ impl Site {
             at_rest: BTreeSet::new(),
             held: VecDeque::new(),
             returned: Returned::default(),
+            crowd: Crowd::default(),
             behind: BTreeMap::new(),
         }
     }

@@ -1,0 +1,43 @@
+//! Whether messages come in such a crowd that they are a broker's backlog: on a first start they belong to the past.
+
+use super::Site;
+use crate::runtime::clock::Stopwatch;
+use std::time::Duration;
+
+/// So many messages within [`WINDOW`] are a crowd.
+const CROWD: usize = 100;
+const WINDOW: Duration = Duration::from_secs(1);
+/// However long a crowd lasts, what came is judged after so long.
+const LONGEST: Duration = Duration::from_secs(60);
+
+/// The messages of late.
+#[derive(Debug, Default)]
+pub(super) struct Crowd {
+    /// Since when they are counted, and how many came since then.
+    counted: Option<(Stopwatch, usize)>,
+    /// When the first and the last crowd came.
+    came: Option<(Stopwatch, Stopwatch)>,
+}
+
+impl Site {
+    /// So many messages have come together.
+    pub fn messages_came(&mut self, more: usize) {
+        let now = Stopwatch::start();
+        let counted = self.crowd.counted;
+        let (since, before) = counted
+            .filter(|(since, _)| since.elapsed() <= WINDOW)
+            .unwrap_or((now, 0));
+        let count = before + more;
+        self.crowd.counted = Some((since, count));
+        if count >= CROWD {
+            let first = self.crowd.came.map_or(now, |(first, _)| first);
+            self.crowd.came = Some((first, now));
+        }
+    }
+
+    /// Whether more are to be expected at once.
+    pub(super) fn is_crowded(&self) -> bool {
+        let came = self.crowd.came;
+        came.is_some_and(|(first, last)| last.elapsed() <= WINDOW && first.elapsed() <= LONGEST)
+    }
+}
