@@ -222,11 +222,7 @@ impl Inner {
             }
         }
         for ((benchmark, kind), body) in latest {
-            transaction
-                .prepare_cached(
-                    "INSERT OR REPLACE INTO latest (benchmark, kind, body) VALUES (?1, ?2, ?3)",
-                )?
-                .execute(params![benchmark.as_str(), kind, body])?;
+            keep_latest(&transaction, (benchmark.as_str(), kind), &body)?;
         }
         for (name, body) in &batch.positions {
             keep(&transaction, "position", name, body.as_deref())?;
@@ -325,6 +321,19 @@ fn insert_event(
         )?
         .execute(params![seq, step, time, kind, benchmark, body, sum])?;
     Ok(body)
+}
+
+fn keep_latest(
+    connection: &Connection,
+    (benchmark, kind): (&str, &str),
+    body: &str,
+) -> Result<(), StoreError> {
+    connection
+        .prepare_cached(
+            "INSERT OR REPLACE INTO latest (benchmark, kind, body) VALUES (?1, ?2, ?3)",
+        )?
+        .execute(params![benchmark, kind, body])?;
+    Ok(())
 }
 
 fn write_memory(connection: &Connection, parts: &[Part], step: i64) -> Result<(), StoreError> {

@@ -116,13 +116,16 @@ fn a_red_of_the_past_that_nothing_has_ended_is_called_after_a_first_start_as_of_
     let crisis = |hour: i64| 10.0 * (hour.clamp(30, 40) - 30) as f64;
     let mut late = monitor();
     let (current, past) = first_start(&mut late, &history(60, crisis));
-    let red = |event: &Event| match &event.kind {
-        EventKind::Alert {
-            level: Level::Red,
-            state: AlertState::Firing,
-            ..
-        } => Some(event.time),
-        _ => None,
+    let red = |event: &Event| {
+        let is_red = matches!(
+            event.kind,
+            EventKind::Alert {
+                level: Level::Red,
+                state: AlertState::Firing,
+                ..
+            }
+        );
+        is_red.then_some(event.time)
     };
     assert_eq!(current.iter().find_map(red), None);
     let called = past.iter().find_map(red).unwrap();

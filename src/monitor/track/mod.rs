@@ -34,6 +34,7 @@ use forecast::Forecast;
 use jiff::SignedDuration;
 use lookback::{Levels, Lookback};
 use pace::Pace;
+use past::Record;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use unknown::{Reason, Unknown};
@@ -109,9 +110,9 @@ pub(super) struct Track {
     /// Suspicions that people have looked into, and that do not hold.
     #[serde(default)]
     accepted: BTreeSet<Suspicion>,
-    /// Its past has not been gone through.
+    /// Whether its past has been gone through.
     #[serde(default)]
-    owes_past: bool,
+    record: Record,
 }
 
 impl Track {
@@ -132,7 +133,7 @@ impl Track {
             owes: false,
             kept: None,
             accepted: BTreeSet::new(),
-            owes_past: false,
+            record: Record::Known,
             benchmark,
             history: History::new(source, epoch),
             panel: Panel::default(),
@@ -170,7 +171,7 @@ impl Track {
     ) -> Vec<Event> {
         let mut events = self.judge_ahead(policy, reading.time, beside);
         events.extend(self.take_one(policy, source, reading, beside));
-        if self.owes_past {
+        if self.record == Record::Owed {
             events.retain(|event| !past::is_of_the_record(event));
         }
         events

@@ -20,11 +20,19 @@ const ALL_FOR: SignedDuration = SignedDuration::from_hours(90 * 24);
 pub(in crate::monitor) const PAST: &str = "past";
 const DAY: SignedDuration = SignedDuration::from_hours(24);
 
+/// Whether the readings from before a first start have been gone through.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) enum Record {
+    #[default]
+    Known,
+    Owed,
+}
+
 /// A benchmark's past, as far as it has been gone through.
 #[derive(Debug, Serialize, Deserialize)]
 pub(in crate::monitor) struct Walk {
     /// As it would stand by now.
-    track: Track,
+    track: Box<Track>,
     /// The last reading, days since the epoch.
     at_days: Option<f64>,
     /// The reading that was judged first: its refit and those after it have been told.
@@ -66,7 +74,7 @@ impl Track {
         time: Timestamp,
         beside: &Beside<'_>,
     ) -> Vec<Event> {
-        self.owes_past = true;
+        self.record = Record::Owed;
         if self.unknown.has(Reason::Stuck) {
             return Vec::new();
         }
@@ -83,7 +91,7 @@ impl Track {
         let mut track = Self::new(self.benchmark.clone(), source, epoch, declared);
         track.accepted.clone_from(&self.accepted);
         Walk {
-            track,
+            track: Box::new(track),
             at_days: None,
             until,
             day: None,
@@ -140,12 +148,12 @@ impl Track {
 
     /// The past has been gone through: goes on as it leads to. A level from there that has not ended is called.
     pub(in crate::monitor) fn go_on_from(&mut self, now: Timestamp, past: Walk) -> Vec<Event> {
-        let (past, mut events) = (past.track, past.episode);
+        let (past, mut events) = (*past.track, past.episode);
         self.panel = past.panel;
         self.regime = past.regime;
         (self.intercept, self.transition) = (past.intercept, past.transition);
         self.pace = past.pace;
-        self.owes_past = false;
+        self.record = Record::Known;
         let in_force = past.latch.in_force();
         let Some((level, since)) = in_force.filter(|(level, _)| *level > self.latch.level()) else {
             if self.latch.level() == Level::Green {
