@@ -149,6 +149,9 @@ impl Daemon {
         self.positions.extend(batch.positions);
         if batch.caught_up {
             self.decide();
+        } else {
+            let events = self.site.judge_meanwhile();
+            self.pulse.vitals.note(&events);
         }
         self.release()?;
         self.settle();

@@ -111,6 +111,31 @@ fn what_is_current_is_judged_first_and_the_refits_of_the_past_are_those_of_a_dae
 }
 
 #[test]
+fn a_past_in_which_the_current_is_judged_meanwhile_gives_no_other_refits() {
+    let inputs = history(60, |_| 0.0);
+    let mut there = monitor();
+    let told: Vec<Event> = inputs
+        .iter()
+        .flat_map(|(now, input)| there.step(*now, input))
+        .collect();
+    let mut late = monitor();
+    let mut said = Vec::new();
+    for half in [&inputs[..80], &inputs[80..]] {
+        notice(&mut late, Notice::Past);
+        for (now, input) in half {
+            late.step(*now, input);
+        }
+        said.extend(notice(&mut late, Notice::Current));
+    }
+    while late.owes_past() {
+        said.extend(notice(&mut late, Notice::Retrace));
+    }
+    let mut made = refits(&said);
+    made.dedup();
+    assert_eq!(made, refits(&told));
+}
+
+#[test]
 fn a_red_of_the_past_that_nothing_has_ended_is_called_after_a_first_start_as_of_then() {
     // Ten hours of 240 mm/day, and twenty of creep: not yet an evacuation time.
     let crisis = |hour: i64| 10.0 * (hour.clamp(30, 40) - 30) as f64;

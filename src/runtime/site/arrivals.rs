@@ -299,7 +299,7 @@ impl Site {
     }
 
     /// Judges the newest readings of benchmarks of which only the past has been read.
-    fn judge_current(&mut self) -> Vec<Event> {
+    pub(super) fn judge_current(&mut self) -> Vec<Event> {
         let now = self.now.unwrap_or(DAWN);
         let events = self.step(now, &Input::Notice(Notice::Current));
         for job in self.monitor.searches() {

@@ -1,6 +1,7 @@
 //! Whether messages come in such a crowd that they are a broker's backlog: on a first start they belong to the past.
 
-use super::Site;
+use super::{DAWN, Site};
+use crate::monitor::{Event, Input, Notice};
 use crate::runtime::clock::Stopwatch;
 use std::time::Duration;
 
@@ -17,6 +18,8 @@ pub(super) struct Crowd {
     counted: Option<(Stopwatch, usize)>,
     /// When the first and the last crowd came.
     came: Option<(Stopwatch, Stopwatch)>,
+    /// Since when the past is being read without what is current being judged.
+    reads_past: Option<Stopwatch>,
 }
 
 impl Site {
@@ -33,6 +36,25 @@ impl Site {
             let first = self.crowd.came.map_or(now, |(first, _)| first);
             self.crowd.came = Some((first, now));
         }
+    }
+
+    /// While the past is still being read: judges what is current now and then, however long that takes.
+    pub fn judge_meanwhile(&mut self) -> Vec<Event> {
+        let mut events = Vec::new();
+        if !self.monitor.reads_past() {
+            return events;
+        }
+        let since = *self.crowd.reads_past.get_or_insert_with(Stopwatch::start);
+        if since.elapsed() < LONGEST {
+            return events;
+        }
+        while self.monitor.owes_current() {
+            events.extend(self.judge_current());
+        }
+        self.crowd.reads_past = None;
+        let now = self.now.unwrap_or(DAWN);
+        self.step(now, &Input::Notice(Notice::Past));
+        events
     }
 
     /// Whether more are to be expected at once.
