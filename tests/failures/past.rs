@@ -8,19 +8,19 @@ use std::collections::BTreeMap;
 use std::fs;
 
 const HEADER: &str = "time,displacement_mm\n";
-const BENCHMARKS: usize = 6;
-const ROWS: usize = 120;
+const BENCHMARKS: i32 = 6;
+const ROWS: i32 = 120;
 
 /// Hourly creep of each benchmark, and eight covariates.
 fn history() -> Site {
     let site = Site::new("");
-    let start = clock::now() - SignedDuration::from_hours(ROWS as i64);
-    let time = |row: usize| start + SignedDuration::from_hours(row as i64);
+    let start = clock::now() - SignedDuration::from_hours(i64::from(ROWS));
+    let time = |row: i32| start + SignedDuration::from_hours(i64::from(row));
     for benchmark in 0..BENCHMARKS {
         let rows: String = (0..ROWS)
             .map(|row| {
-                let jitter = ((row * 37 + benchmark) % 11) as f64 / 50.0;
-                format!("{},{:.3}\n", time(row), 0.1 * row as f64 + jitter)
+                let jitter = f64::from((row * 37 + benchmark) % 11) / 50.0;
+                format!("{},{:.3}\n", time(row), 0.1 * f64::from(row) + jitter)
             })
             .collect();
         site.append(
@@ -61,14 +61,17 @@ fn a_first_start_judges_what_is_current_before_it_makes_the_refits_of_the_past_a
     let newest: BTreeMap<String, String> = site_newest(&site);
     let program = site.caught_up();
     eventually("some refits of the past", || {
-        refits(&site).len() > BENCHMARKS + 20
+        refits(&site).len() > BENCHMARKS as usize + 20
     });
-    let first: BTreeMap<String, String> = refits(&site).into_iter().take(BENCHMARKS).collect();
+    let first: BTreeMap<String, String> = refits(&site)
+        .into_iter()
+        .take(BENCHMARKS as usize)
+        .collect();
     assert_eq!(first, newest);
     drop(program);
     let program = site.start(&[]);
     // From the tenth reading on each leads to one.
-    let all = BENCHMARKS * (ROWS - 9);
+    let all = (BENCHMARKS * (ROWS - 9)) as usize;
     eventually("all refits of the past", || refits(&site).len() == all);
     program.stop();
     let mut once = refits(&site);
