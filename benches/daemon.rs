@@ -1,6 +1,6 @@
-//! What the daemon holds: a steady load, a backlog, many benchmarks. The program itself on real files, with a real hook.
+//! What the daemon holds: a steady load, a first start, a backlog, many benchmarks. The program itself on real files, with a real hook.
 //!
-//!     cargo bench --bench daemon -- load [--seconds 60] | catchup [--readings 100000] | memory [--most 10000]
+//!     cargo bench --bench daemon -- load [--seconds 60] | first | catchup [--readings 100000] | memory [--most 10000]
 
 #![expect(clippy::unwrap_used, reason = "a bench fails by panicking")]
 #![expect(clippy::print_stdout, reason = "its figures")]
@@ -10,7 +10,7 @@ use jiff::{SignedDuration, Timestamp};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
-use slipwatch::config;
+use slipwatch::config::{self, Config};
 use slipwatch::runtime::tail::Follower;
 use slipwatch::store::{Batch, Store};
 use std::fmt::Write as _;
@@ -41,10 +41,13 @@ fn main() {
     let number = |flag, default: usize| after(flag).map_or(default, |text| text.parse().unwrap());
     let all = !args
         .iter()
-        .any(|arg| ["load", "catchup", "memory"].contains(&arg.as_str()));
+        .any(|arg| ["load", "first", "catchup", "memory"].contains(&arg.as_str()));
     let wants = |name: &str| all || args.iter().any(|arg| arg == name);
     if wants("load") {
         held_load(u32::try_from(number("--seconds", 60)).unwrap());
+    }
+    if wants("first") {
+        first_start(30, 300, 8);
     }
     if wants("catchup") {
         let readings = number("--readings", 100_000);
@@ -251,10 +254,8 @@ fn held_load(seconds: u32) {
     );
 }
 
-fn catch_up(what: &str, benchmarks: usize, each: usize, seconds: i64) {
-    let readings = benchmarks * each;
-    let folder = site(benchmarks, each, seconds);
-    let config = config::load(&folder.path().join("site.toml")).unwrap();
+/// Values a second of parsing alone, and of parsing and SQLite without the monitor.
+fn floor(config: &Config, values: usize) -> (f64, f64) {
     let pass = |store: Option<&Store>| {
         let began = Instant::now();
         let mut follower = Follower::new(&config.sources, &config.benchmarks, &[]);
@@ -273,13 +274,67 @@ fn catch_up(what: &str, benchmarks: usize, each: usize, seconds: i64) {
                 batch.clear();
             }
             if found.caught_up {
-                return readings as f64 / began.elapsed().as_secs_f64();
+                return values as f64 / began.elapsed().as_secs_f64();
             }
         }
     };
     let parsed = pass(None);
     let other = tempfile::tempdir().unwrap();
-    let stored = pass(Some(&Store::open(other.path()).unwrap()));
+    (parsed, pass(Some(&Store::open(other.path()).unwrap())))
+}
+
+/// A first start on hourly rows of many benchmarks and their covariates.
+fn first_start(benchmarks: usize, rows: usize, covariates: usize) {
+    let folder = site(benchmarks, rows, 3600);
+    let first = Timestamp::now().as_second() - i64::try_from(rows).unwrap() * 3600;
+    let mut text = "time".to_owned();
+    for number in 0..covariates {
+        write!(text, ",c{number}_mm").unwrap();
+    }
+    let mut generator = Pcg64::seed_from_u64(8);
+    let mut walk = vec![0.0; covariates];
+    for row in 0..rows {
+        let time = first + i64::try_from(row).unwrap() * 3600;
+        write!(text, "\n{}", Timestamp::from_second(time).unwrap()).unwrap();
+        for value in &mut walk {
+            let noise: f64 = generator.sample(StandardNormal);
+            *value = 0.9 * *value + noise;
+            write!(text, ",{value:.2}").unwrap();
+        }
+    }
+    fs::write(folder.path().join("incoming/weather.csv"), text + "\n").unwrap();
+    let config = config::load(&folder.path().join("site.toml")).unwrap();
+    let values = (benchmarks + covariates) * rows;
+    let (parsed, stored) = floor(&config, values);
+    let began = Instant::now();
+    let daemon = Daemon::start(&folder);
+    wait_for(&folder, values);
+    let (taken, processor) = (began.elapsed().as_secs_f64(), daemon.processor());
+    let refits = i64::try_from(benchmarks * (rows - 9)).unwrap();
+    let said = || {
+        let store = Store::look(&folder.path().join("state"));
+        store.map_or(0, |store| store.heads().unwrap().event)
+    };
+    while said() < refits {
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    println!(
+        "first start: {benchmarks} benchmarks, {rows} rows, {covariates} covariates, {values} values\n  \
+         parsing alone {:.3} s; parsing and SQLite {:.3} s; the daemon {taken:.3} s ({:.1} times that), {processor:.2} s of the processor\n  \
+         the {refits} refits of the past: after {:.1} s, {:.1} s of the processor",
+        values as f64 / parsed,
+        values as f64 / stored,
+        taken * stored / values as f64,
+        began.elapsed().as_secs_f64(),
+        daemon.processor(),
+    );
+}
+
+fn catch_up(what: &str, benchmarks: usize, each: usize, seconds: i64) {
+    let readings = benchmarks * each;
+    let folder = site(benchmarks, each, seconds);
+    let config = config::load(&folder.path().join("site.toml")).unwrap();
+    let (parsed, stored) = floor(&config, readings);
     let began = Instant::now();
     let daemon = Daemon::start(&folder);
     wait_for(&folder, readings);

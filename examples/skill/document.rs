@@ -77,7 +77,7 @@ may not be redistributed, and without them their sections are left out.
 
 *Measured* are instruments' readings. A *reconstruction* is made to fulfil what a publication states, and confirms nothing about its
 site. *Simulated* slopes follow the law that `slider-block` fits, which favours it and the panel; their load, noise, gaps and resets are
-told to nobody."
+known to no method."
     );
     out
 }

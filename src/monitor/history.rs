@@ -89,6 +89,11 @@ impl History {
         }
     }
 
+    /// For velocities, the span of the mean.
+    pub(super) fn averaging(&self) -> Option<SignedDuration> {
+        self.averaging
+    }
+
     /// What resets have taken off a reading of that day.
     fn taken_off(&self, t_days: f64) -> f64 {
         let before = self.resets.iter().filter(|reset| reset.t_days <= t_days);

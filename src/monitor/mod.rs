@@ -11,6 +11,7 @@ mod kept;
 mod motion;
 mod notice;
 mod order;
+mod past;
 mod saved;
 mod search;
 mod sensor;
@@ -39,12 +40,13 @@ use awaited::Awaited;
 use covariates::Covariates;
 use declared::Declarations;
 use jiff::SignedDuration;
+use past::Past;
 use sensor::Sensors;
 use serde::{Deserialize, Serialize};
 use site::SiteAlert;
 use std::collections::{BTreeMap, BTreeSet};
 use together::Together;
-use track::{Beside, Track};
+use track::{Beside, Track, Walk};
 
 /// What the monitor is given.
 #[derive(Debug, Clone, PartialEq)]
@@ -194,6 +196,9 @@ pub struct Monitor {
     settles: bool,
     /// Since when the host's clock is wrong.
     clock_wrong: Option<Timestamp>,
+    /// What of the past is still to be done, and the benchmark whose past is being gone through.
+    past: Past,
+    walk: Option<Walk>,
     summary: Summary,
     last_time: Option<Timestamp>,
 }
@@ -215,6 +220,8 @@ impl Monitor {
             late: BTreeSet::new(),
             settles: false,
             clock_wrong: None,
+            past: Past::default(),
+            walk: None,
             summary: Summary::default(),
             last_time: None,
         }
@@ -301,6 +308,7 @@ impl Monitor {
             explain: self.settings.explain,
             now,
             settles: self.settles,
+            is_past: self.past.is_open(),
         };
         let policy = self.settings.policy(benchmark);
         let track = self.tracks.entry(benchmark.clone()).or_insert_with(|| {
@@ -365,6 +373,7 @@ impl Monitor {
             explain: self.settings.explain,
             now,
             settles: self.settles,
+            is_past: self.past.is_open(),
         };
         let mut moved = Vec::new();
         for (id, track) in &mut self.tracks {
@@ -400,6 +409,8 @@ impl Monitor {
             }
             self.searches.retain(|job| job.benchmark != id);
             self.late.remove(&id);
+            self.past.forget(&id);
+            self.walk.take_if(|walk| *walk.benchmark() == id);
             self.changed.insert(id);
         }
         events
@@ -432,6 +443,7 @@ impl Monitor {
             explain: self.settings.explain,
             now,
             settles: self.settles,
+            is_past: self.past.is_open(),
         };
         let policy = self.settings.policy(&finding.benchmark);
         let critical = policy.critical_velocity_mm_per_day;

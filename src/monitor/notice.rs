@@ -17,6 +17,12 @@ pub const CLOCK_FAULT: &str = "clock-fault";
 pub enum Notice {
     /// The past has been read: a benchmark of the config that has given no reading is unknown from now on.
     Watching,
+    /// The past is about to be read: readings are taken, and judged once it has been.
+    Past,
+    /// The past has been read: the newest readings of the next benchmarks are judged.
+    Current,
+    /// The past of a benchmark is gone through a little further.
+    Retrace,
     /// What came late or was corrected is judged only when [`Notice::Settle`] says so, and not reading by reading.
     Settles,
     /// Everything that came together has been taken: what came late is judged now, once.
@@ -63,6 +69,12 @@ impl Monitor {
                 self.settles = true;
                 Vec::new()
             }
+            Notice::Past => {
+                self.past.open();
+                Vec::new()
+            }
+            Notice::Current => self.judge_current(now),
+            Notice::Retrace => self.retrace(now),
             Notice::Settle => self.settle(now),
             Notice::LookBack(benchmark) => self.look_back(now, benchmark),
             Notice::Behind { benchmark, time } => {
@@ -107,12 +119,16 @@ impl Monitor {
 
     fn settle(&mut self, now: Timestamp) -> Vec<Event> {
         let mut events = Vec::new();
+        if self.past.is_open() {
+            return events;
+        }
         for id in self.late.clone() {
             let beside = Beside {
                 covariates: &self.covariates,
                 explain: self.settings.explain,
                 now,
                 settles: self.settles,
+                is_past: self.past.is_open(),
             };
             let policy = self.settings.policy(&id);
             if let Some(track) = self.tracks.get_mut(&id) {

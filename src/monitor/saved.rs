@@ -6,11 +6,12 @@
 use super::awaited::Awaited;
 use super::covariates::Covariates;
 use super::event::Summary;
+use super::past::Past;
 use super::search::SearchJob;
 use super::sensor::Sensors;
 use super::site::SiteAlert;
 use super::together::Together;
-use super::track::Track;
+use super::track::{Track, Walk};
 use super::{Monitor, Settings};
 use crate::reading::{BenchmarkId, Timestamp};
 use serde::{Deserialize, Serialize};
@@ -18,6 +19,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// The part that belongs to no benchmark.
 const REST: &str = "";
+/// The part of the benchmark whose past is being gone through.
+const WALK: &str = "\0past";
 
 /// One piece of a monitor's memory.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -70,6 +73,8 @@ struct Rest {
     settles: bool,
     #[serde(default)]
     clock_wrong: Option<Timestamp>,
+    #[serde(default)]
+    past: Past,
     summary: Summary,
     last_time: Option<Timestamp>,
 }
@@ -99,9 +104,14 @@ impl Monitor {
             late: self.late.clone(),
             settles: self.settles,
             clock_wrong: self.clock_wrong,
+            past: self.past.clone(),
             summary: self.summary,
             last_time: self.last_time,
         };
+        let walk = self.walk.as_ref();
+        let body = walk.map(|walk| bytes(WALK, walk)).transpose()?;
+        let name = WALK.to_owned();
+        parts.push(Part { name, body });
         let body = Some(bytes(REST, &rest)?);
         let name = REST.to_owned();
         parts.push(Part { name, body });
@@ -118,11 +128,13 @@ impl Monitor {
     /// # Errors
     /// [`SavedError`] when they are not all there, or from a version that remembered something else.
     pub fn restore(parts: &[Part]) -> Result<Self, SavedError> {
-        let (mut rest, mut tracks) = (None, BTreeMap::new());
+        let (mut rest, mut walk, mut tracks) = (None, None, BTreeMap::new());
         for Part { name, body } in parts {
             let Some(body) = body else { continue };
             if name == REST {
                 rest = Some(value::<Rest>(name, body)?);
+            } else if name == WALK {
+                walk = Some(value::<Walk>(name, body)?);
             } else {
                 let track: Track = value(name, body)?;
                 tracks.insert(BenchmarkId::new(name.as_str()), track);
@@ -144,6 +156,8 @@ impl Monitor {
             late: rest.late,
             settles: rest.settles,
             clock_wrong: rest.clock_wrong,
+            past: rest.past,
+            walk,
             summary: rest.summary,
             last_time: rest.last_time,
         })

@@ -147,6 +147,12 @@ impl Daemon {
             self.commit_what_is_urgent()?;
         }
         self.positions.extend(batch.positions);
+        if batch.caught_up {
+            self.decide();
+        } else {
+            let events = self.site.judge_meanwhile();
+            self.pulse.vitals.note(&events);
+        }
         self.release()?;
         self.settle();
         self.commit()?;
@@ -154,8 +160,9 @@ impl Daemon {
         self.thin()?;
         self.is_up_to_date = batch.caught_up;
         if self.is_up_to_date {
+            let stopwatch = Stopwatch::start();
             let events = self.site.caught_up((self.wall)())?;
-            self.pulse.vitals.note(&events);
+            self.pulse.vitals.judged(&events, stopwatch.elapsed());
         }
         if self.is_up_to_date && !self.is_caught_up {
             self.is_caught_up = true;
@@ -178,8 +185,9 @@ impl Daemon {
     /// # Errors
     /// When the state cannot be used any more.
     pub fn take_messages(&mut self, first: mqtt::Delivery) -> Result<(), StoreError> {
-        let mut next = Some(first);
+        let (mut next, mut came) = (Some(first), 0);
         while let Some(delivery) = next {
+            came += 1;
             let vitals = &self.pulse.vitals;
             vitals.takes(delivery.found);
             vitals.quarantined(&delivery.source, delivery.quarantined);
@@ -192,6 +200,10 @@ impl Daemon {
                 .then(|| self.sources.deliveries.try_recv().ok())
                 .flatten();
         }
+        self.site.messages_came(came);
+        if self.is_up_to_date {
+            self.decide();
+        }
         self.settle();
         self.commit()
     }
@@ -200,7 +212,7 @@ impl Daemon {
     fn release(&mut self) -> Result<(), StoreError> {
         let events = self.site.release((self.wall)())?;
         self.pulse.vitals.note(&events);
-        if self.site.held() == 0 {
+        if self.holds_nothing() {
             let positions = std::mem::take(&mut self.positions);
             self.site.note_positions(positions);
         } else {
@@ -209,18 +221,33 @@ impl Daemon {
         Ok(())
     }
 
+    /// All that came together has been seen.
+    fn decide(&mut self) {
+        let events = self.site.decide((self.wall)());
+        self.pulse.vitals.note(&events);
+    }
+
+    /// Whether all that was read has been taken, or is known not to count.
+    fn holds_nothing(&self) -> bool {
+        self.site.held() == 0 && !self.site.is_undecided()
+    }
+
     fn settle(&mut self) {
         let events = self.site.settle();
         self.pulse.vitals.note(&events);
     }
 
-    /// Looks back on what came late at one benchmark.
+    /// Looks back on what came late at one benchmark, or goes on through the past before a first start.
     ///
     /// # Errors
     /// When the state cannot be used any more.
     pub fn look_back(&mut self) -> Result<(), StoreError> {
+        let (stopwatch, owed_past) = (Stopwatch::start(), self.site.owes_past());
         let events = self.site.look_back();
-        self.pulse.vitals.note(&events);
+        self.pulse.vitals.judged(&events, stopwatch.elapsed());
+        if owed_past && !self.site.owes_past() {
+            tracing::info!("the past before the first start has been gone through");
+        }
         self.commit()
     }
 
@@ -260,7 +287,7 @@ impl Daemon {
         self.since_commit = Stopwatch::start();
         let committed = self.site.commit((self.wall)());
         let is_waiting = self.site.is_waiting();
-        if committed.is_ok() && !is_waiting && self.site.held() == 0 {
+        if committed.is_ok() && !is_waiting && self.holds_nothing() {
             self.pulse.vitals.has_taken();
             self.sources.acknowledge();
         }
@@ -346,6 +373,9 @@ impl Daemon {
         if self.is_caught_up {
             let events = self.site.live(now);
             self.pulse.vitals.note(&events);
+        }
+        if self.is_up_to_date {
+            self.decide();
         }
         self.release()?;
         self.settle();

@@ -15,7 +15,10 @@ pub type InForce = BTreeMap<(Option<BenchmarkId>, Level), Event>;
 /// [`StoreError`].
 pub fn in_force(store: &Store, until: Option<Timestamp>) -> Result<InForce, StoreError> {
     let mut standing = InForce::new();
-    for event in every(store, "alert")? {
+    let mut alerts = every(store, "alert")?;
+    // Those of the past before a first start come after those of the present.
+    alerts.sort_by_key(|event| event.time);
+    for event in alerts {
         if until.is_some_and(|until| event.time > until) {
             continue;
         }

@@ -227,6 +227,16 @@ impl Vitals {
         note_all(&mut points, events);
     }
 
+    /// What followed for benchmarks whose newest readings were judged together, which took so long.
+    pub fn judged(&self, events: &[Event], took: Duration) {
+        let is_refit = |event: &&Event| matches!(event.kind, EventKind::Refit { .. });
+        let refits = events.iter().filter(is_refit).count();
+        for _ in 0..refits {
+            self.refits.observe(took.as_secs_f64() / refits as f64);
+        }
+        self.note(events);
+    }
+
     /// How a benchmark stood when the daemon last stopped.
     pub fn resume(
         &self,

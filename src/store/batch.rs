@@ -29,6 +29,8 @@ pub struct Batch {
     events: Vec<(usize, Event)>,
     /// The values of the steps: what is known although it is not written yet.
     values: BTreeMap<(Series, Timestamp), f64>,
+    /// Values that were corrected within this batch.
+    former: BTreeMap<(Series, Timestamp), Vec<f64>>,
     positions: BTreeMap<String, Option<Vec<u8>>>,
     memory: Option<Vec<Part>>,
     outbox: Vec<super::Delivery>,
@@ -41,7 +43,10 @@ impl Batch {
     /// Notes a step and the events that followed from it.
     pub fn step(&mut self, now: Timestamp, input: &Input, events: &[Event]) {
         if let (Some(series), Some((time, value, _))) = (Series::of(input), value(input)) {
-            self.values.insert((series, time), value);
+            let place = (series, time);
+            if let Some(former) = self.values.insert(place.clone(), value) {
+                self.former.entry(place).or_default().push(former);
+            }
         }
         self.steps.push((now, input.clone()));
         let step = self.steps.len() - 1;
@@ -95,10 +100,24 @@ impl Batch {
             && self.commands.is_empty()
     }
 
-    /// The value that this batch has for the same series and time.
-    fn known(&self, series: &Series, time: Timestamp) -> Option<f64> {
-        self.values.get(&(series.clone(), time)).copied()
+    /// The values that this batch has for the same series and time, the newest first.
+    fn known(&self, series: &Series, time: Timestamp) -> Vec<f64> {
+        let place = (series.clone(), time);
+        let former = self.former.get(&place).into_iter().flatten().rev();
+        let newest = self.values.get(&place).into_iter();
+        newest.chain(former).copied().collect()
     }
+}
+
+/// Whether a value is known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Known {
+    /// It has not been taken.
+    No,
+    /// It has, and another one of its time was taken after it: either a file is read again, or it was corrected back.
+    Corrected,
+    /// It has, and is the last of its time.
+    Yes,
 }
 
 impl Store {
@@ -120,32 +139,39 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn has(&self, batch: &Batch, input: &Input) -> Result<bool, StoreError> {
+    pub fn has(&self, batch: &Batch, input: &Input) -> Result<Known, StoreError> {
         let (Some(series), Some((time, value, _))) = (Series::of(input), value(input)) else {
-            return Ok(false);
+            return Ok(Known::No);
         };
-        if let Some(known) = batch.known(&series, time) {
-            return Ok(known.to_bits() == value.to_bits());
+        let in_batch = batch.known(&series, time);
+        if (in_batch.first()).is_some_and(|known| known.to_bits() == value.to_bits()) {
+            return Ok(Known::Yes);
         }
         let inner = self.inner();
         let factor = match &series {
             Series::Benchmark(_, unit, _) => unit.factor(),
             Series::Channel(..) => 1.0,
         };
-        let mut newest: Option<(i64, f64)> = None;
+        let mut written: Vec<(i64, f64)> = Vec::new();
         for (number, own) in inner.catalogue.alike(&series) {
-            let mut query = inner.connection.prepare_cached(
-                "SELECT seq, value FROM step WHERE series = ?1 AND time = ?2 ORDER BY seq DESC LIMIT 1",
-            )?;
+            let mut query = inner
+                .connection
+                .prepare_cached("SELECT seq, value FROM step WHERE series = ?1 AND time = ?2")?;
             let mut rows = query.query(params![number, nanoseconds(time)?])?;
-            if let Some(row) = rows.next()? {
-                let (seq, value): (i64, f64) = (row.get(0)?, row.get(1)?);
-                if newest.is_none_or(|(before, _)| seq > before) {
-                    newest = Some((seq, value * own));
-                }
+            while let Some(row) = rows.next()? {
+                let value: f64 = row.get(1)?;
+                written.push((row.get(0)?, value * own));
             }
         }
-        Ok(newest.is_some_and(|(_, known)| known.to_bits() == (value * factor).to_bits()))
+        written.sort_by_key(|(seq, _)| std::cmp::Reverse(*seq));
+        let in_batch = in_batch.into_iter().map(|known| known * factor);
+        let mut all = in_batch.chain(written.into_iter().map(|(_, known)| known));
+        let is_it = |known: f64| known.to_bits() == (value * factor).to_bits();
+        Ok(match all.position(is_it) {
+            None => Known::No,
+            Some(0) => Known::Yes,
+            Some(_) => Known::Corrected,
+        })
     }
 }
 
@@ -186,18 +212,17 @@ impl Inner {
         let mut latest = BTreeMap::new();
         for (step, event) in &batch.events {
             last_event += 1;
+            let is_past = batch.steps[*step].1.makes_up(event);
             let step = *steps + 1 + i64::try_from(*step).unwrap_or(0);
             let body = insert_event(&transaction, (last_event, step), event)?;
-            if let Some(benchmark) = &event.benchmark {
+            if let Some(benchmark) = &event.benchmark
+                && !is_past
+            {
                 latest.insert((benchmark, event.kind.name()), body);
             }
         }
         for ((benchmark, kind), body) in latest {
-            transaction
-                .prepare_cached(
-                    "INSERT OR REPLACE INTO latest (benchmark, kind, body) VALUES (?1, ?2, ?3)",
-                )?
-                .execute(params![benchmark.as_str(), kind, body])?;
+            keep_latest(&transaction, (benchmark.as_str(), kind), &body)?;
         }
         for (name, body) in &batch.positions {
             keep(&transaction, "position", name, body.as_deref())?;
@@ -296,6 +321,19 @@ fn insert_event(
         )?
         .execute(params![seq, step, time, kind, benchmark, body, sum])?;
     Ok(body)
+}
+
+fn keep_latest(
+    connection: &Connection,
+    (benchmark, kind): (&str, &str),
+    body: &str,
+) -> Result<(), StoreError> {
+    connection
+        .prepare_cached(
+            "INSERT OR REPLACE INTO latest (benchmark, kind, body) VALUES (?1, ?2, ?3)",
+        )?
+        .execute(params![benchmark, kind, body])?;
+    Ok(())
 }
 
 fn write_memory(connection: &Connection, parts: &[Part], step: i64) -> Result<(), StoreError> {

@@ -15,7 +15,7 @@ mod sealed;
 mod series;
 mod sum;
 
-pub use batch::{Batch, Position};
+pub use batch::{Batch, Known, Position};
 pub use outbox::{Delivery, Fate};
 pub use past::{Heads, Value, Values};
 pub use read::{Recorded, StepRow};

@@ -1,6 +1,7 @@
 //! What the hooks are to be told: written with the events that say so, ticked off when a hook has taken it.
 
 use super::sealed::{seal, unseal};
+use super::sum::sum;
 use super::{Inner, Store, StoreError, nanoseconds, timestamp};
 use crate::reading::Timestamp;
 use rusqlite::types::ValueRef;
@@ -56,8 +57,8 @@ impl Fate {
 impl Delivery {
     pub(super) fn insert(&self, connection: &Connection, status: &str) -> Result<(), StoreError> {
         let mut insert = connection.prepare_cached(
-            "INSERT OR IGNORE INTO outbox (key, level, state, hook, status, time, body)
-             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
+            "INSERT OR IGNORE INTO outbox (key, level, state, hook, status, time, body, sum)
+             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
         )?;
         let Self {
             key,
@@ -76,7 +77,8 @@ impl Delivery {
             ValueRef::Integer(time),
         ];
         let body = seal(&beside, body);
-        insert.execute(params![key, level, state, hook, status, time, body])?;
+        let sum = standing_sum(status, 0);
+        insert.execute(params![key, level, state, hook, status, time, body, sum])?;
         Ok(())
     }
 }
@@ -209,9 +211,10 @@ impl Store {
     /// # Errors
     /// [`StoreError`].
     pub fn redeliver(&self) -> Result<usize, StoreError> {
-        let again = "UPDATE outbox SET status = 'waiting', attempts = 0
+        let again = "UPDATE outbox SET status = ?1, attempts = 0, sum = ?2
                      WHERE status IN ('dead', 'closed')";
-        Ok(self.inner().connection.execute(again, [])?)
+        let sum = standing_sum(WAITING, 0);
+        Ok((self.inner().connection).execute(again, params![WAITING, sum])?)
     }
 
     /// Notes what became of deliveries; with those that were not noted before.
@@ -234,6 +237,65 @@ pub(super) fn body(row: &Row<'_>) -> Result<Option<Vec<u8>>, StoreError> {
     Ok(unseal(&beside, &sealed).map(<[u8]>::to_vec))
 }
 
+/// Whether the status and the attempts of a row, which stand with their sum behind what [`body`] takes, are what was
+/// written.
+pub(super) fn stands_as_written(row: &Row<'_>) -> Result<bool, StoreError> {
+    let (status, attempts): (String, i64) = (row.get(7)?, row.get(8)?);
+    let written: Option<i64> = row.get(9)?;
+    Ok(written.is_none_or(|written| written == standing_sum(&status, attempts)))
+}
+
+fn standing_sum(status: &str, attempts: i64) -> i64 {
+    sum(&[
+        ValueRef::Text(status.as_bytes()),
+        ValueRef::Integer(attempts),
+    ])
+}
+
+/// How a delivery stands.
+struct Standing {
+    id: i64,
+    status: String,
+    attempts: i64,
+}
+
+impl Standing {
+    /// Of this delivery, where it was noted.
+    fn of(connection: &Connection, delivery: &Delivery) -> Result<Option<Self>, StoreError> {
+        let mut query = connection.prepare_cached(
+            "SELECT id, status, attempts FROM outbox WHERE key = ?1 AND level = ?2 AND state = ?3 AND hook = ?4",
+        )?;
+        let Delivery {
+            key,
+            level,
+            state,
+            hook,
+            ..
+        } = delivery;
+        let mut rows = query.query(params![key, level, state, hook])?;
+        let Some(row) = rows.next()? else {
+            return Ok(None);
+        };
+        Ok(Some(Self {
+            id: row.get(0)?,
+            status: row.get(1)?,
+            attempts: row.get(2)?,
+        }))
+    }
+
+    fn becomes(
+        &self,
+        connection: &Connection,
+        (fate, attempts): (Fate, i64),
+    ) -> Result<(), StoreError> {
+        let sum = standing_sum(fate.name(), attempts);
+        connection
+            .prepare_cached("UPDATE outbox SET status = ?2, attempts = ?3, sum = ?4 WHERE id = ?1")?
+            .execute(params![self.id, fate.name(), attempts, sum])?;
+        Ok(())
+    }
+}
+
 impl Inner {
     fn close_deliveries(
         &mut self,
@@ -245,12 +307,10 @@ impl Inner {
             delivery.insert(&transaction, WAITING)?;
         }
         for one in ended {
-            transaction
-                .prepare_cached(
-                    "UPDATE outbox SET status = 'closed'
-                     WHERE key = ?1 AND level = ?2 AND state = ?3 AND hook = ?4 AND status = 'waiting'",
-                )?
-                .execute(params![one.key, one.level, one.state, one.hook])?;
+            let standing = Standing::of(&transaction, one)?;
+            if let Some(row) = standing.filter(|row| row.status == WAITING) {
+                row.becomes(&transaction, (Fate::Closed, row.attempts))?;
+            }
         }
         transaction.commit()?;
         Ok(())
@@ -260,19 +320,10 @@ impl Inner {
         let transaction = self.connection.transaction()?;
         for (delivery, fate) in settled {
             delivery.insert(&transaction, WAITING)?;
-            let Delivery {
-                key,
-                level,
-                state,
-                hook,
-                ..
-            } = delivery;
-            transaction
-                .prepare_cached(
-                    "UPDATE outbox SET status = ?5, attempts = attempts + 1
-                     WHERE key = ?1 AND level = ?2 AND state = ?3 AND hook = ?4 AND status != 'delivered'",
-                )?
-                .execute(params![key, level, state, hook, fate.name()])?;
+            let standing = Standing::of(&transaction, delivery)?;
+            if let Some(row) = standing.filter(|row| row.status != Fate::Delivered.name()) {
+                row.becomes(&transaction, (*fate, row.attempts + 1))?;
+            }
         }
         transaction.commit()?;
         Ok(())

@@ -7,7 +7,7 @@ use rusqlite::Connection;
 const APPLICATION: i32 = 0x736c_6970;
 
 /// One step for each version: `MIGRATIONS[n]` leads from version n to n + 1.
-const MIGRATIONS: [&str; 3] = ["
+const MIGRATIONS: [&str; 4] = ["
     CREATE TABLE series (
         id INTEGER PRIMARY KEY,
         -- 0: a covariate; 1: readings of a benchmark
@@ -95,6 +95,10 @@ const MIGRATIONS: [&str; 3] = ["
 // What was said of a benchmark at a moment is looked up, however many events there are.
 "
     CREATE INDEX event_at ON event (benchmark, kind, time);
+",
+// Of how a delivery stands: its status and attempts; null in rows of the version before.
+"
+    ALTER TABLE outbox ADD COLUMN sum INTEGER;
 "];
 
 /// The version that this program writes.

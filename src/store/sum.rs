@@ -29,8 +29,9 @@ const TABLES: [(&str, &str, IsWhole); 3] = [
     ),
     (
         "outbox",
-        "SELECT id, key, level, state, hook, time, body FROM outbox WHERE id > ?1 ORDER BY id LIMIT ?2",
-        |row| Ok(outbox::body(row)?.is_some()),
+        "SELECT id, key, level, state, hook, time, body, status, attempts, sum FROM outbox
+         WHERE id > ?1 ORDER BY id LIMIT ?2",
+        |row| Ok(outbox::body(row)?.is_some() && outbox::stands_as_written(row)?),
     ),
 ];
 

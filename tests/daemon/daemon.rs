@@ -182,7 +182,7 @@ async fn what_was_given_up_is_made_to_wait_again_and_told_at_the_next_start() {
     close(first, noon()).await;
     let database = rusqlite::Connection::open(config.site.state_dir.join("slipwatch.db")).unwrap();
     database
-        .execute("UPDATE outbox SET status = 'dead'", [])
+        .execute("UPDATE outbox SET status = 'dead', sum = NULL", [])
         .unwrap();
     drop(database);
     close(site(&config), noon()).await;

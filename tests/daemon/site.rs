@@ -45,6 +45,12 @@ impl Site {
             process: None,
         };
         site.run();
+        let start = Stopwatch::start();
+        let log = || fs::read_to_string(site.folder.path().join("log")).unwrap();
+        while !log().contains("has been gone through") {
+            assert!(start.elapsed() < LIMIT, "{}", log());
+            std::thread::sleep(Duration::from_millis(100));
+        }
         site
     }
 
@@ -108,7 +114,8 @@ impl Site {
         serde_json::from_str(&body).unwrap()
     }
 
-    /// The events of a kind, as the command line gives them.
+    /// The events of a kind, as the command line gives them, by their time: those of the past before the first start
+    /// come after that of the present.
     pub(crate) fn events(&self, kind: &str) -> Vec<Value> {
         let output = Command::new(PROGRAM)
             .args(["events", "--config", "site.toml", "--format", "json"])
@@ -118,9 +125,12 @@ impl Site {
             .unwrap();
         let text = String::from_utf8(output.stdout).unwrap();
         let lines = text.lines();
-        lines
+        let mut events: Vec<Value> = lines
             .map(|line| serde_json::from_str(line).unwrap())
-            .collect()
+            .collect();
+        let time = |event: &Value| event["time"].as_str().unwrap().parse::<jiff::Timestamp>();
+        events.sort_by_key(|event| time(event).unwrap());
+        events
     }
 }
 

@@ -101,7 +101,8 @@ impl Loggers {
     }
 }
 
-/// The refits, flips and drifts of one benchmark.
+/// The refits, flips and drifts of one benchmark, by their time: those of the past before the first start come after
+/// that of the present.
 fn findings(events: &str, benchmark: &str) -> Vec<String> {
     let is_ours = |line: &&str| {
         let event: Value = serde_json::from_str(line).unwrap();
@@ -113,9 +114,15 @@ fn findings(events: &str, benchmark: &str) -> Vec<String> {
         ];
         event["benchmark"] == benchmark && kinds.contains(&event["event"].as_str().unwrap())
     };
-    (events.lines().filter(is_ours))
+    let mut ours: Vec<String> = (events.lines().filter(is_ours))
         .map(str::to_owned)
-        .collect()
+        .collect();
+    let time = |event: &String| {
+        let event: Value = serde_json::from_str(event).unwrap();
+        text(&event["time"]).parse::<jiff::Timestamp>().unwrap()
+    };
+    ours.sort_by_key(time);
+    ours
 }
 
 /// The daemon has taken everything and is stopped: nothing is missing, nothing is there twice, everybody was told.
@@ -124,9 +131,6 @@ fn settle(site: &Site, loggers: &mut Loggers) {
     let program = site.caught_up();
     let expected = loggers.expected();
     eventually("all readings", || site.values().len() >= expected.len());
-    program.stop();
-    assert_eq!(site.values(), expected);
-    let events = site.proven_events();
     let files = ["incoming/crown.csv", "incoming/recording.mcap"];
     let plain = site.printed(&[
         "replay",
@@ -137,6 +141,14 @@ fn settle(site: &Site, loggers: &mut Loggers) {
         "--format",
         "json",
     ]);
+    eventually("the past gone through", || {
+        let events = site.events();
+        let of = |events: &str| ["crown", "toe"].map(|one| findings(events, one).len());
+        of(&events) == of(&plain)
+    });
+    program.stop();
+    assert_eq!(site.values(), expected);
+    let events = site.proven_events();
     for benchmark in ["crown", "toe"] {
         let ours = findings(&events, benchmark);
         assert!(ours.len() > loggers.rows / 2, "{}", ours.len());

@@ -29,6 +29,7 @@
 //! | 27 | backlogs, corrections, silences, slow hooks, hooks of the site | `telling`; tests/daemon/hooks.rs |
 //! | 28 | what an operator is to see: what never read, restarts, a state that is gone, forged names | `view` |
 //! | 29 | much of it at once, for ten thousand hours | tests/hostile_hours |
+//! | 30 | a first start on history; a row and its correction, read again | `past`; tests/library/first_start.rs |
 //!
 //! docs/failure-modes.md says the same for operators.
 //!
@@ -58,6 +59,7 @@ mod log;
 mod machine;
 mod model;
 mod orders;
+mod past;
 mod sensors;
 mod site;
 mod telling;

@@ -20,7 +20,7 @@ use slipwatch::runtime::shutdown;
 use slipwatch::runtime::site::{Sinks, Site};
 use slipwatch::runtime::sources::Sources;
 use slipwatch::runtime::tail::Follower;
-use slipwatch::store::{Batch, Store};
+use slipwatch::store::{Batch, Known, Store};
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::runtime::Runtime;
@@ -32,7 +32,7 @@ const MOST_LOOKS: usize = 64;
 /// Messages that the daemon's channel holds.
 const CHANNEL: usize = 64;
 /// No file can grow beyond this while the disk is full.
-const FULL: u64 = 8192;
+pub(crate) const FULL: u64 = 8192;
 
 /// A daemon that runs.
 struct Running {
@@ -202,7 +202,7 @@ impl<'a> Host<'a> {
             },
         };
         let store = self.store().expect("the daemon runs");
-        store.has(&Batch::default(), &input).unwrap()
+        store.has(&Batch::default(), &input).unwrap() != Known::No
     }
 }
 

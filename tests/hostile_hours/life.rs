@@ -11,12 +11,12 @@ use crate::state::{is_over, is_what_a_replay_says, readings};
 use jiff::{SignedDuration, Timestamp};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
+use serde::{Deserialize, Serialize};
 use slipwatch::alert::Level;
 use slipwatch::config::{self, Config};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 use tempfile::TempDir;
 
@@ -28,12 +28,11 @@ pub(crate) const STEPS: usize = 500;
 /// Within so much time in which the daemon runs and the hook works, people are told: a turn, and the longest wait
 /// between two attempts at a hook.
 pub(crate) const BOUND: SignedDuration = SignedDuration::from_mins(45);
-static ALONE: Mutex<()> = Mutex::new(());
 /// Steps without trouble at the end: what was held, kept or refused comes in.
 const CALM: usize = 24;
 
 /// What a life has seen.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Seen {
     hours: u64,
     readings: usize,
@@ -89,15 +88,9 @@ struct Life<'a> {
     seen: Seen,
 }
 
-/// Lives through what the seed draws.
-pub(crate) fn live(seed: u64) -> Seen {
-    live_with(seed, Mood::Works)
-}
-
-/// The same with a hook that does this while nothing else is the matter with it.
+/// Lives through what the seed draws, with a hook that does this while nothing else is the matter with it. One life of
+/// a process at a time: the limit that stands for a full disk is the process's.
 pub(crate) fn live_with(seed: u64, hook: Mood) -> Seen {
-    // The limit that stands for a full disk is that of the whole process: one life at a time.
-    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     // In memory, where there is such a place: what the disk of the machine costs is not what is tested.
     let shared = Path::new("/dev/shm");
     let folder = if shared.is_dir() {
@@ -203,6 +196,10 @@ impl Life<'_> {
             self.seen.restarts += u64::from(self.host.start());
         }
         self.measure(is_calm);
+        for (_, name) in plan.corrections.iter().filter(|(at, _)| *at == step) {
+            let corrected = self.logger(name).correct();
+            self.is_readable(name, corrected.into_iter().collect());
+        }
         let was_well = self.is_machine_well();
         let sent = self.host.turn(&mut self.radio, &mut self.random);
         self.is_readable("m", sent);

@@ -54,6 +54,8 @@ pub(crate) enum Mishap {
 pub(crate) struct Plan {
     pub(crate) troubles: Vec<(usize, usize, Trouble)>,
     pub(crate) mishaps: Vec<(usize, Mishap)>,
+    /// When a logger corrects its last row: drawn by themselves, so that all else stays what a seed drew before.
+    pub(crate) corrections: Vec<(usize, &'static str)>,
 }
 
 /// The benchmarks with files that have trouble of their own.
@@ -80,7 +82,17 @@ impl Plan {
             mishaps.push((random.random_range(4..STEPS), mishap(&mut random)));
         }
         mishaps.sort_by_key(|(step, _)| *step);
-        Self { troubles, mishaps }
+        let mut random = Pcg64::seed_from_u64(seed ^ 0xc0_44ec);
+        let correction = |_| {
+            let file = FILES[random.random_range(0..FILES.len())];
+            (random.random_range(4..STEPS), file)
+        };
+        let corrections = (0..6).map(correction).collect();
+        Self {
+            troubles,
+            mishaps,
+            corrections,
+        }
     }
 }
 

@@ -12,6 +12,7 @@ mod effects_lives;
 mod effects_measured;
 mod effects_monitor;
 mod effects_searches;
+mod first_start;
 mod global_minimum;
 mod hostile;
 mod ingest;

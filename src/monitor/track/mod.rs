@@ -7,6 +7,7 @@ mod declared;
 mod forecast;
 mod lookback;
 mod pace;
+mod past;
 mod refit;
 mod sensor;
 mod suspicion;
@@ -32,10 +33,13 @@ use forecast::Forecast;
 use jiff::SignedDuration;
 use lookback::{Levels, Lookback};
 use pace::Pace;
+use past::Record;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use unknown::{Reason, Unknown};
 use watch::Watch;
+
+pub(super) use past::{PAST, Walk};
 
 /// So many readings in a row with one value are a stuck sensor, or a resolution too coarse to show it.
 const STUCK: usize = 24;
@@ -49,6 +53,8 @@ pub(super) struct Beside<'a> {
     pub(super) now: Timestamp,
     /// Whether what comes late is judged when all that came with it has been taken.
     pub(super) settles: bool,
+    /// Whether the past is being read: nothing is judged until it has been.
+    pub(super) is_past: bool,
 }
 
 /// Everything the monitor knows of one benchmark.
@@ -101,6 +107,9 @@ pub(super) struct Track {
     /// Suspicions that people have looked into, and that do not hold.
     #[serde(default)]
     accepted: BTreeSet<Suspicion>,
+    /// Whether its past has been gone through.
+    #[serde(default)]
+    record: Record,
 }
 
 impl Track {
@@ -121,6 +130,7 @@ impl Track {
             owes: false,
             kept: None,
             accepted: BTreeSet::new(),
+            record: Record::Known,
             benchmark,
             history: History::new(source, epoch),
             panel: Panel::default(),
@@ -158,6 +168,9 @@ impl Track {
     ) -> Vec<Event> {
         let mut events = self.judge_ahead(policy, reading.time, beside);
         events.extend(self.take_one(policy, source, reading, beside));
+        if self.record == Record::Owed {
+            events.retain(|event| !past::is_of_the_record(event));
+        }
         events
     }
 
@@ -211,6 +224,9 @@ impl Track {
         }
         let is_owed = beside.settles && taken != Taken::Newest;
         self.owes |= is_owed;
+        if beside.is_past {
+            return events;
+        }
         let is_stuck = self.unknown.has(Reason::Stuck);
         if is_owed || is_stuck || !self.is_refit_due(policy, taken, reading.time) {
             events.extend(self.raise(policy, time));

@@ -105,6 +105,7 @@ impl Worker {
             let due = self.next_due();
             let is_full = self.running.len() >= MOST_AT_ONCE;
             tokio::select! {
+                biased;
                 alert = queue.recv(), if open && self.untried < QUEUE => match alert {
                     Some(alert) => self.begin(alert),
                     None => open = false,

@@ -5,7 +5,7 @@ use crate::monitor::{Event, Input, Notice};
 use crate::reading::{BenchmarkId, Timestamp, suspicion};
 use crate::runtime::clock;
 use crate::runtime::tail::Arrival;
-use crate::store::StoreError;
+use crate::store::{Known, StoreError};
 use jiff::SignedDuration;
 
 /// The first day of 1970, UTC: where a logger starts whose clock is not set. No reading of a site that is watched now
@@ -16,6 +16,9 @@ const CLOCKLESS: std::ops::Range<Timestamp> =
 const NEAR: SignedDuration = SignedDuration::from_hours(24);
 /// A reading that lies further behind is one of a backlog; how late that comes is noted again after this time.
 const NOTED_FOR: SignedDuration = SignedDuration::from_mins(30);
+/// Calls of [`Site::judge_current`] before the first start counts as caught up; what is left is judged when nothing
+/// else waits.
+const MOST_JUDGED: usize = 8;
 /// So many values of a kind that are set aside are logged one by one; then each time their number has doubled.
 const LOGGED: u64 = 16;
 
@@ -54,16 +57,28 @@ impl Site {
         }
         if let Some(store) = &self.sinks.store
             && !self.is_latest(arrival)
-            && store.has(&self.batch, &arrival.input)?
         {
-            self.counts.repeated += 1;
-            return Ok(Vec::new());
+            let known = store.has(&self.batch, &arrival.input)?;
+            if known == Known::Corrected && self.returned.waits(arrival) {
+                self.counts.repeated += 1;
+                return Ok(Vec::new());
+            }
+            self.returned.comes(arrival);
+            if known == Known::Yes {
+                self.counts.repeated += 1;
+                return Ok(Vec::new());
+            }
         }
+        Ok(self.take_new(arrival, wall))
+    }
+
+    /// Takes a value that has not been taken, or is the last of its time again.
+    pub(super) fn take_new(&mut self, arrival: &Arrival, wall: Timestamp) -> Vec<Event> {
         self.counts.taken += 1;
         if let Some(now) = self.now
             && self.has_leapt(arrival, (now, wall))
         {
-            return Ok(self.step(now, &arrival.input));
+            return self.step(now, &arrival.input);
         }
         self.keep_time(arrival, wall);
         let mut events = self.pass(arrival.time);
@@ -78,7 +93,7 @@ impl Site {
         for job in self.monitor.searches() {
             self.searches.start(job);
         }
-        Ok(events)
+        events
     }
 
     fn answer(
@@ -256,6 +271,9 @@ impl Site {
         if !self.monitor.settles() {
             self.step(self.now.unwrap_or(DAWN), &Input::Notice(Notice::Settles));
         }
+        if self.newest.is_empty() && !self.monitor.reads_past() {
+            self.step(self.now.unwrap_or(DAWN), &Input::Notice(Notice::Past));
+        }
     }
 
     /// Everything there is has been read: what comes from now on is live, and what has given no reading is unknown.
@@ -264,11 +282,30 @@ impl Site {
             self.at_rest = self.newest.keys().cloned().collect();
         }
         self.prove(wall);
+        let mut events = Vec::new();
+        // Before the first reading there is no past that could be over.
+        let is_read = !self.newest.is_empty() && !self.is_crowded();
+        for _ in 0..MOST_JUDGED {
+            if is_read && self.monitor.owes_current() {
+                events.extend(self.judge_current());
+            }
+        }
         if self.sinks.store.is_none() || !self.monitor.misses_some() {
-            return Vec::new();
+            return events;
         }
         let now = self.now.unwrap_or_else(|| self.keeper.now(wall));
-        self.step(now, &Input::Notice(Notice::Watching))
+        events.extend(self.step(now, &Input::Notice(Notice::Watching)));
+        events
+    }
+
+    /// Judges the newest readings of benchmarks of which only the past has been read.
+    pub(super) fn judge_current(&mut self) -> Vec<Event> {
+        let now = self.now.unwrap_or(DAWN);
+        let events = self.step(now, &Input::Notice(Notice::Current));
+        for job in self.monitor.searches() {
+            self.searches.start(job);
+        }
+        events
     }
 
     /// Lets data time pass, as far as time has passed at the site while the host's clock says `wall`, and says where
@@ -313,18 +350,31 @@ impl Site {
         }
     }
 
-    /// Whether something that came late is still to be looked back on.
+    /// Whether something is still to be looked back on: what came late, or the past before a first start.
     pub fn owes_look_back(&self) -> bool {
-        self.monitor.late().is_some()
+        self.monitor.late().is_some() || self.owes_past()
     }
 
-    /// Looks back on what came late at one benchmark.
+    /// Whether the past before a first start has been read and is still to be gone through.
+    pub fn owes_past(&self) -> bool {
+        let owes_past = self.monitor.owes_current() || self.monitor.owes_past();
+        owes_past && !self.monitor.reads_past()
+    }
+
+    /// Looks back on what came late at one benchmark, or goes on through the past. What follows for the present.
     pub fn look_back(&mut self) -> Vec<Event> {
-        match (self.now, self.monitor.late().cloned()) {
-            (Some(now), Some(benchmark)) => {
-                self.step(now, &Input::Notice(Notice::LookBack(benchmark)))
-            }
-            (None, _) | (_, None) => Vec::new(),
+        let Some(now) = self.now else {
+            return Vec::new();
+        };
+        if let Some(benchmark) = self.monitor.late().cloned() {
+            return self.step(now, &Input::Notice(Notice::LookBack(benchmark)));
         }
+        if self.monitor.owes_current() {
+            return self.judge_current();
+        }
+        let further = Input::Notice(Notice::Retrace);
+        let mut events = self.step(now, &further);
+        events.retain(|event| !further.makes_up(event));
+        events
     }
 }

@@ -6,15 +6,19 @@
 
 mod alerts;
 mod arrivals;
+mod crowd;
 mod flood;
 mod memory;
 mod mute;
+mod returned;
 mod timekeeper;
 mod unproven;
 
 pub(super) use arrivals::is_logged;
 pub use mute::Mute;
 
+use crowd::Crowd;
+use returned::Returned;
 use timekeeper::Timekeeper;
 use unproven::Unproven;
 
@@ -126,6 +130,10 @@ pub struct Site {
     at_rest: BTreeSet<BenchmarkId>,
     /// Values that wait, unacknowledged, until the host's clock is right.
     held: VecDeque<Arrival>,
+    /// Values that were taken before, and corrected: until all that came with them has been seen.
+    returned: Returned,
+    /// Messages that come so fast that the past is not over yet.
+    crowd: Crowd,
     /// Of which silent benchmarks it is known how late their readings come, and what time it was then.
     behind: BTreeMap<BenchmarkId, Timestamp>,
 }
@@ -155,6 +163,8 @@ impl Site {
             unproven: Unproven::default(),
             at_rest: BTreeSet::new(),
             held: VecDeque::new(),
+            returned: Returned::default(),
+            crowd: Crowd::default(),
             behind: BTreeMap::new(),
         }
     }
@@ -247,7 +257,9 @@ impl Site {
         }
         let events = self.monitor.step(now, input);
         for event in &events {
-            self.handle(event);
+            if !input.makes_up(event) {
+                self.handle(event);
+            }
         }
         events
     }

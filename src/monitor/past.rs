@@ -1,0 +1,166 @@
+//! A first start on a site's history: the readings are taken at once, what is current is judged, and the refits of the
+//! past are made after it, a few at a time.
+
+use super::Monitor;
+use super::event::{Event, EventKind};
+use super::notice::Notice;
+use super::track::{Beside, PAST};
+use super::{Input, Track};
+use crate::alert::{Level, Policy};
+use crate::reading::{BenchmarkId, Timestamp};
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Benchmarks that one [`Notice::Current`] judges at most, and refits that it makes.
+const AT_ONCE: usize = 2048;
+const MOST_REFITS: usize = 16;
+
+/// What of the past is still to be done.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub(super) struct Past {
+    /// The past is being read: readings are taken, and none is judged.
+    is_open: bool,
+    /// Benchmarks whose newest reading is still to be judged.
+    current: BTreeSet<BenchmarkId>,
+    /// Those whose past is still to be gone through, and the reading that was judged first.
+    owed: BTreeMap<BenchmarkId, Timestamp>,
+}
+
+impl Past {
+    pub(super) fn is_open(&self) -> bool {
+        self.is_open
+    }
+
+    pub(super) fn open(&mut self) {
+        self.is_open = true;
+    }
+
+    pub(super) fn forget(&mut self, benchmark: &BenchmarkId) {
+        self.current.remove(benchmark);
+        self.owed.remove(benchmark);
+    }
+}
+
+impl Input {
+    /// Whether an event that followed from this says what would have been said in the past: it changes nothing of the
+    /// present, and nobody is told.
+    pub fn makes_up(&self, event: &Event) -> bool {
+        let is_past = match &event.kind {
+            EventKind::Refit { .. }
+            | EventKind::RegimeFlip { .. }
+            | EventKind::InterceptDrift { .. }
+            | EventKind::TransitionDrift { .. } => true,
+            EventKind::Alert { level, rule, .. } => *level != Level::Unknown && rule != PAST,
+            EventKind::UnexplainedResidual(_)
+            | EventKind::EffectFound { .. }
+            | EventKind::EffectDropped { .. }
+            | EventKind::Together { .. }
+            | EventKind::Fault { .. }
+            | EventKind::Declared { .. }
+            | EventKind::Correction { .. }
+            | EventKind::Order { .. }
+            | EventKind::Summary(_) => false,
+        };
+        matches!(self, Self::Notice(Notice::Retrace)) && is_past
+    }
+}
+
+impl Monitor {
+    /// Whether readings are taken without being judged, until [`Notice::Current`] says that the past has been read.
+    pub fn reads_past(&self) -> bool {
+        self.past.is_open
+    }
+
+    /// Whether there are benchmarks whose newest reading [`Notice::Current`] is to judge.
+    pub fn owes_current(&self) -> bool {
+        self.past.is_open || !self.past.current.is_empty()
+    }
+
+    /// Whether there are benchmarks whose past [`Notice::Retrace`] is to go through.
+    pub fn owes_past(&self) -> bool {
+        self.walk.is_some() || !self.past.owed.is_empty()
+    }
+
+    /// The past has been read: judges the newest reading of the next benchmarks.
+    pub(super) fn judge_current(&mut self, now: Timestamp) -> Vec<Event> {
+        if std::mem::take(&mut self.past.is_open) {
+            self.past.current = self.tracks.keys().cloned().collect();
+        }
+        let (mut events, mut refits) = (Vec::new(), 0);
+        for _ in 0..AT_ONCE {
+            if refits >= MOST_REFITS {
+                break;
+            }
+            let Some(id) = self.past.current.pop_first() else {
+                break;
+            };
+            let beside = Beside {
+                covariates: &self.covariates,
+                explain: self.settings.explain,
+                now,
+                settles: self.settles,
+                is_past: false,
+            };
+            let policy = self.settings.policy(&id);
+            let Some(track) = self.tracks.get_mut(&id) else {
+                continue;
+            };
+            let (newest, judged) = track.judge_newest(policy, &beside);
+            let is_refit = |event: &&Event| matches!(event.kind, EventKind::Refit { .. });
+            refits += judged.iter().filter(is_refit).count();
+            events.extend(judged);
+            let critical = policy.critical_velocity_mm_per_day;
+            self.searches.extend(track.search(critical, &beside));
+            if let Some(newest) = newest {
+                self.past.owed.insert(id.clone(), newest);
+            }
+            self.changed.insert(id);
+        }
+        events
+    }
+
+    /// Goes on through the past of a benchmark.
+    pub(super) fn retrace(&mut self, now: Timestamp) -> Vec<Event> {
+        if self.walk.is_none()
+            && let Some((id, until)) = self.past.owed.pop_first()
+        {
+            self.walk = self.tracks.get(&id).map(|track| track.past(until));
+        }
+        let Some(mut walk) = self.walk.take() else {
+            return Vec::new();
+        };
+        let id = walk.benchmark().clone();
+        let beside = Beside {
+            covariates: &self.covariates,
+            explain: self.settings.explain,
+            now,
+            settles: self.settles,
+            is_past: false,
+        };
+        let policy = self.settings.policy(&id);
+        let Some(track) = self.tracks.get_mut(&id) else {
+            return Vec::new();
+        };
+        let (mut events, has_more) = track.walk(&mut walk, policy, &beside);
+        if has_more {
+            self.walk = Some(walk);
+        } else {
+            events.extend(track.go_on_from(now, walk));
+            self.changed.insert(id);
+        }
+        events
+    }
+}
+
+impl Track {
+    /// Judges the newest reading, whenever it came.
+    fn judge_newest(
+        &mut self,
+        policy: &Policy,
+        beside: &Beside<'_>,
+    ) -> (Option<Timestamp>, Vec<Event>) {
+        let newest = self.newest();
+        let events = newest.map_or_else(Vec::new, |newest| self.judge_now(policy, newest, beside));
+        (newest, events)
+    }
+}

@@ -1,0 +1,221 @@
+//! A benchmark's past, gone through after its newest reading has been judged: what would have been, had each reading
+//! been judged as it came.
+
+use super::{Beside, Reason, Track};
+use crate::alert::{Level, Policy};
+use crate::monitor::declared::Declarations;
+use crate::monitor::event::{AlertState, Event, EventKind};
+use crate::monitor::history::Source;
+use crate::reading::{BenchmarkId, Quantity, Reading, Timestamp, Unit};
+use jiff::SignedDuration;
+use serde::{Deserialize, Serialize};
+
+/// Refits and readings of one turn at most.
+const MOST_REFITS: usize = 16;
+const MOST_READINGS: usize = 2000;
+/// Of refits that lie further back than this from the first that was judged, the first of each day is told: the state
+/// keeps no more.
+const ALL_FOR: SignedDuration = SignedDuration::from_hours(90 * 24);
+/// The rule of a level that comes from the past.
+pub(in crate::monitor) const PAST: &str = "past";
+const DAY: SignedDuration = SignedDuration::from_hours(24);
+
+/// Whether the readings from before a first start have been gone through.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) enum Record {
+    #[default]
+    Known,
+    Owed,
+}
+
+/// A benchmark's past, as far as it has been gone through.
+#[derive(Debug, Serialize, Deserialize)]
+pub(in crate::monitor) struct Walk {
+    /// As it would stand by now.
+    track: Box<Track>,
+    /// The last reading, days since the epoch.
+    at_days: Option<f64>,
+    /// The reading that was judged first: its refit and those after it have been told.
+    until: Timestamp,
+    /// The day of the last refit that was told, of those that are told once a day.
+    day: Option<i64>,
+    /// Alerts since the level was last green: they are told together when it is again, so that what is over never
+    /// looks as if it were in force.
+    episode: Vec<Event>,
+}
+
+impl Walk {
+    pub(in crate::monitor) fn benchmark(&self) -> &BenchmarkId {
+        &self.track.benchmark
+    }
+
+    /// Whether a refit of `time` is told.
+    fn tells(&mut self, time: Timestamp) -> bool {
+        if time >= self.until {
+            return false;
+        }
+        if self.until.duration_since(time) <= ALL_FOR {
+            return true;
+        }
+        let day = time.as_second().div_euclid(DAY.as_secs());
+        self.day.replace(day) != Some(day)
+    }
+}
+
+impl Track {
+    pub(in crate::monitor) fn newest(&self) -> Option<Timestamp> {
+        self.newest
+    }
+
+    /// Judges the newest reading, of `time`.
+    pub(in crate::monitor) fn judge_now(
+        &mut self,
+        policy: &Policy,
+        time: Timestamp,
+        beside: &Beside<'_>,
+    ) -> Vec<Event> {
+        self.record = Record::Owed;
+        if self.unknown.has(Reason::Stuck) {
+            return Vec::new();
+        }
+        let mut events = self.judge(policy, time, beside);
+        events.retain(|event| !is_of_the_record(event));
+        events
+    }
+
+    /// The past of this benchmark up to `until`, at its beginning.
+    pub(in crate::monitor) fn past(&self, until: Timestamp) -> Walk {
+        // Declared resets are taken off what is kept.
+        let declared = Declarations::default();
+        let (source, epoch) = (self.source(), self.history.epoch);
+        let mut track = Self::new(self.benchmark.clone(), source, epoch, declared);
+        track.accepted.clone_from(&self.accepted);
+        Walk {
+            track: Box::new(track),
+            at_days: None,
+            until,
+            day: None,
+            episode: Vec::new(),
+        }
+    }
+
+    /// Goes on through the past; its refits and alerts that are told, and whether there is more of it.
+    pub(in crate::monitor) fn walk(
+        &self,
+        walk: &mut Walk,
+        policy: &Policy,
+        beside: &Beside<'_>,
+    ) -> (Vec<Event>, bool) {
+        let values = &self.history.observations.values;
+        let from = walk
+            .at_days
+            .map_or(0, |at| values.partition_point(|one| one.t_days <= at));
+        let (mut events, mut refits) = (Vec::new(), 0);
+        for one in values.iter().skip(from).take(MOST_READINGS) {
+            if refits == MOST_REFITS {
+                return (events, true);
+            }
+            walk.at_days = Some(one.t_days);
+            let Some(time) = self.history.time(one.t_days) else {
+                continue;
+            };
+            let reading = Reading {
+                time,
+                value: one.value,
+                sigma: one.sigma,
+            };
+            let beside = Beside {
+                now: time,
+                ..*beside
+            };
+            let said = walk.track.take(policy, self.source(), &reading, &beside);
+            for event in said {
+                if matches!(event.kind, EventKind::Refit { .. }) {
+                    refits += 1;
+                    events.extend(walk.tells(event.time).then_some(event));
+                } else if is_of_the_record(&event) {
+                    events.push(event);
+                } else if is_of_a_level(&event) && event.time < walk.until {
+                    walk.episode.push(event);
+                }
+            }
+            if walk.track.latch.level() == Level::Green {
+                events.append(&mut walk.episode);
+            }
+        }
+        (events, values.len() - from > MOST_READINGS)
+    }
+
+    /// The past has been gone through: goes on as it leads to. A level from there that has not ended is called.
+    pub(in crate::monitor) fn go_on_from(&mut self, now: Timestamp, past: Walk) -> Vec<Event> {
+        let (past, mut events) = (*past.track, past.episode);
+        self.panel = past.panel;
+        self.regime = past.regime;
+        (self.intercept, self.transition) = (past.intercept, past.transition);
+        self.pace = past.pace;
+        self.record = Record::Known;
+        let in_force = past.latch.in_force();
+        let Some((level, since)) = in_force.filter(|(level, _)| *level > self.latch.level()) else {
+            if self.latch.level() == Level::Green {
+                events.extend(events.last().and_then(|last| ended(now, last)));
+            }
+            return events;
+        };
+        (self.latch, self.levels, self.look) = (past.latch, past.levels, past.look);
+        let text = format!(
+            "benchmark {}: {level} since {since}, found in the readings from before the first start; nothing since has ended it",
+            self.benchmark
+        );
+        let kind = EventKind::Alert {
+            level,
+            state: AlertState::Firing,
+            key: format!("{}/{level}/{since}", self.benchmark),
+            rule: PAST.to_owned(),
+            text,
+        };
+        events.push(self.event(now, kind));
+        // What a sensor at the end of its range gives is told by the level.
+        events.extend(self.judge_sensor(now));
+        events
+    }
+
+    /// Where the readings come from as they are kept.
+    fn source(&self) -> Source {
+        let unit = match self.history.observations.quantity {
+            Quantity::Displacement => Unit::MM,
+            Quantity::Velocity => Unit::MM_PER_DAY,
+        };
+        Source {
+            unit,
+            averaging: self.history.averaging(),
+        }
+    }
+}
+
+/// Whether it says what has changed over the whole record, which only who has gone through it knows.
+pub(super) fn is_of_the_record(event: &Event) -> bool {
+    matches!(
+        event.kind,
+        EventKind::RegimeFlip { .. }
+            | EventKind::InterceptDrift { .. }
+            | EventKind::TransitionDrift { .. }
+    )
+}
+
+/// Whether it enters or leaves a level; that nothing can be said is not told of the past.
+fn is_of_a_level(event: &Event) -> bool {
+    matches!(event.kind, EventKind::Alert { level, .. } if level != Level::Unknown)
+}
+
+/// The end of what `last` says, where that is the beginning of a level: it ended while the past was gone through.
+fn ended(now: Timestamp, last: &Event) -> Option<Event> {
+    let mut event = last.clone();
+    event.time = now;
+    if let EventKind::Alert { state, .. } = &mut event.kind
+        && *state == AlertState::Firing
+    {
+        *state = AlertState::Resolved;
+        return Some(event);
+    }
+    None
+}

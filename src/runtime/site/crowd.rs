@@ -1,0 +1,65 @@
+//! Whether messages come in such a crowd that they are a broker's backlog: on a first start they belong to the past.
+
+use super::{DAWN, Site};
+use crate::monitor::{Event, Input, Notice};
+use crate::runtime::clock::Stopwatch;
+use std::time::Duration;
+
+/// So many messages within [`WINDOW`] are a crowd.
+const CROWD: usize = 100;
+const WINDOW: Duration = Duration::from_secs(1);
+/// However long a crowd lasts, what came is judged after so long.
+const LONGEST: Duration = Duration::from_secs(60);
+
+/// The messages of late.
+#[derive(Debug, Default)]
+pub(super) struct Crowd {
+    /// Since when they are counted, and how many came since then.
+    counted: Option<(Stopwatch, usize)>,
+    /// When the first and the last crowd came.
+    came: Option<(Stopwatch, Stopwatch)>,
+    /// Since when the past is being read without what is current being judged.
+    reads_past: Option<Stopwatch>,
+}
+
+impl Site {
+    /// So many messages have come together.
+    pub fn messages_came(&mut self, more: usize) {
+        let now = Stopwatch::start();
+        let counted = self.crowd.counted;
+        let (since, before) = counted
+            .filter(|(since, _)| since.elapsed() <= WINDOW)
+            .unwrap_or((now, 0));
+        let count = before + more;
+        self.crowd.counted = Some((since, count));
+        if count >= CROWD {
+            let first = self.crowd.came.map_or(now, |(first, _)| first);
+            self.crowd.came = Some((first, now));
+        }
+    }
+
+    /// While the past is still being read: judges what is current now and then, however long that takes.
+    pub fn judge_meanwhile(&mut self) -> Vec<Event> {
+        let mut events = Vec::new();
+        if !self.monitor.reads_past() {
+            return events;
+        }
+        let since = *self.crowd.reads_past.get_or_insert_with(Stopwatch::start);
+        if since.elapsed() < LONGEST {
+            return events;
+        }
+        while self.monitor.owes_current() {
+            events.extend(self.judge_current());
+        }
+        self.crowd.reads_past = None;
+        let now = self.now.unwrap_or(DAWN);
+        self.step(now, &Input::Notice(Notice::Past));
+        events
+    }
+
+    /// Whether more are to be expected at once.
+    pub(super) fn is_crowded(&self) -> bool {
+        let came = self.crowd.came;
+        came.is_some_and(|(first, last)| last.elapsed() <= WINDOW && first.elapsed() <= LONGEST)
+    }
+}

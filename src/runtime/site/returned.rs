@@ -1,0 +1,71 @@
+//! Values that come again although another one of their time was taken after them.
+//!
+//! Either a file is read again from its start, which has the correction too, further on; or the value was corrected back.
+//! Which of both it is shows when all that came together has been seen.
+
+use super::Site;
+use crate::monitor::{Event, Input};
+use crate::reading::{Quantity, Timestamp};
+use crate::runtime::tail::Arrival;
+use std::collections::BTreeMap;
+
+/// So many wait at most; those beyond it count at once.
+const MOST: usize = 10_000;
+
+/// What a value is of, and when it was measured.
+type Place = (String, Option<Quantity>, Timestamp);
+
+/// The values that wait, by their place.
+#[derive(Debug, Default)]
+pub(super) struct Returned(BTreeMap<Place, Arrival>);
+
+fn place(arrival: &Arrival) -> Place {
+    let quantity = match &arrival.input {
+        Input::Reading { unit, .. } => Some(unit.quantity()),
+        Input::Sample { .. }
+        | Input::Missing { .. }
+        | Input::Trouble { .. }
+        | Input::Settings(_)
+        | Input::Order(_)
+        | Input::Found(_)
+        | Input::Notice(_)
+        | Input::Tick => None,
+    };
+    let name = super::arrivals::name(&arrival.input).to_owned();
+    (name, quantity, arrival.time)
+}
+
+impl Returned {
+    /// A value came whose correction is known; whether it waits.
+    pub(super) fn waits(&mut self, arrival: &Arrival) -> bool {
+        let has_room = self.0.len() < MOST;
+        if has_room {
+            self.0.insert(place(arrival), arrival.clone());
+        }
+        has_room
+    }
+
+    /// A value came that is the last of its time: whatever waited there has been corrected again.
+    pub(super) fn comes(&mut self, arrival: &Arrival) {
+        if !self.0.is_empty() {
+            self.0.remove(&place(arrival));
+        }
+    }
+}
+
+impl Site {
+    /// Whether it is still to be seen what some values are.
+    pub fn is_undecided(&self) -> bool {
+        !self.returned.0.is_empty()
+    }
+
+    /// All that came together has been seen: what is left was corrected back.
+    pub fn decide(&mut self, wall: Timestamp) -> Vec<Event> {
+        let mut events = Vec::new();
+        for arrival in std::mem::take(&mut self.returned.0).into_values() {
+            self.counts.repeated = self.counts.repeated.saturating_sub(1);
+            events.extend(self.take_new(&arrival, wall));
+        }
+        events
+    }
+}

@@ -1,0 +1,139 @@
+//! A first start on history, and rows that are read again.
+
+use crate::site::{Site, eventually};
+use crate::telling::failing;
+use jiff::SignedDuration;
+use slipwatch::runtime::clock;
+use std::collections::BTreeMap;
+use std::fs;
+
+const HEADER: &str = "time,displacement_mm\n";
+const BENCHMARKS: i32 = 6;
+const ROWS: i32 = 120;
+
+/// Hourly creep of each benchmark, and eight covariates.
+fn history() -> Site {
+    let site = Site::new("");
+    let start = clock::now() - SignedDuration::from_hours(i64::from(ROWS));
+    let time = |row: i32| start + SignedDuration::from_hours(i64::from(row));
+    for benchmark in 0..BENCHMARKS {
+        let rows: String = (0..ROWS)
+            .map(|row| {
+                let jitter = f64::from((row * 37 + benchmark) % 11) / 50.0;
+                format!("{},{:.3}\n", time(row), 0.1 * f64::from(row) + jitter)
+            })
+            .collect();
+        site.append(
+            &format!("incoming/{benchmark}.csv"),
+            &format!("{HEADER}{rows}"),
+        );
+    }
+    let names: String = (0..8).map(|one| format!(",c{one}_mm")).collect();
+    let rows: String = (0..ROWS)
+        .map(|row| {
+            let values: String = (0..8)
+                .map(|one| format!(",{}", (row * (7 + one)) % 13))
+                .collect();
+            format!("{}{values}\n", time(row))
+        })
+        .collect();
+    site.append("incoming/weather.csv", &format!("time{names}\n{rows}"));
+    site
+}
+
+/// The benchmark and the time of each refit, in the order in which they were said.
+fn refits(site: &Site) -> Vec<(String, String)> {
+    let said = site.events();
+    let events = said.lines().map(|line| serde_json::from_str(line).unwrap());
+    let refits = events.filter(|event: &serde_json::Value| event["event"] == "refit");
+    let of = |event: serde_json::Value| {
+        let text = |name: &str| event[name].as_str().unwrap().to_owned();
+        (text("benchmark"), text("time"))
+    };
+    refits.map(of).collect()
+}
+
+/// 24. What is current comes first; the refits of the past come after it, also through kills.
+#[test]
+fn a_first_start_judges_what_is_current_before_it_makes_the_refits_of_the_past_and_makes_them_all()
+{
+    let site = history();
+    let newest: BTreeMap<String, String> = site_newest(&site);
+    let program = site.caught_up();
+    eventually("some refits of the past", || {
+        refits(&site).len() > BENCHMARKS as usize + 20
+    });
+    let first: BTreeMap<String, String> = refits(&site)
+        .into_iter()
+        .take(BENCHMARKS as usize)
+        .collect();
+    assert_eq!(first, newest);
+    drop(program);
+    let program = site.start(&[]);
+    // From the tenth reading on each leads to one.
+    let all = (BENCHMARKS * (ROWS - 9)) as usize;
+    eventually("all refits of the past", || refits(&site).len() == all);
+    program.stop();
+    let mut once = refits(&site);
+    once.sort();
+    once.dedup();
+    assert_eq!(once.len(), all, "made twice");
+    site.proven_events();
+}
+
+fn site_newest(site: &Site) -> BTreeMap<String, String> {
+    let newest = (0..BENCHMARKS).map(|benchmark| {
+        let text = fs::read_to_string(site.path(&format!("incoming/{benchmark}.csv"))).unwrap();
+        let last = text.lines().last().unwrap();
+        let (time, _) = last.split_once(',').unwrap();
+        (benchmark.to_string(), time.to_owned())
+    });
+    newest.collect()
+}
+
+/// Ten hours at twice the threshold, and twenty of creep: no evacuation time yet.
+#[test]
+fn a_red_of_the_past_that_nothing_has_ended_is_told_after_a_first_start() {
+    let site = Site::new(
+        "[alert]\nevacuation_time = \"24h\"\n\
+         [[alert.threshold]]\nlevel = \"red\"\nvelocity = \"100 mm/day\"\n",
+    );
+    let start = clock::now() - SignedDuration::from_hours(59);
+    let rows: String = (0..60_i64)
+        .map(|hour| {
+            let crisis = 10.0 * (hour.clamp(30, 40) - 30) as f64;
+            let jitter = ((hour * 37) % 11) as f64 / 50.0;
+            let time = start + SignedDuration::from_hours(hour);
+            format!("{time},{:.3}\n", 0.1 * hour as f64 + crisis + jitter)
+        })
+        .collect();
+    site.append("incoming/5.csv", &format!("{HEADER}{rows}"));
+    let program = site.caught_up();
+    let is_told = |line: &String| line.starts_with("5/red/") && line.ends_with("firing");
+    eventually("the red told", || site.lines("told").iter().any(is_told));
+    program.stop();
+    site.proven_events();
+}
+
+/// A file with a row and its correction, read again; and a row that is corrected back.
+#[test]
+fn a_row_and_its_correction_that_are_read_again_are_taken_once_and_a_value_corrected_back_counts() {
+    let site = Site::new("");
+    let rows: Vec<String> = failing(0..20).lines().map(str::to_owned).collect();
+    let (time, _) = rows[19].split_once(',').unwrap();
+    let text = format!("{HEADER}{}\n{time},77.5\n", rows.join("\n"));
+    site.append("incoming/5.csv", &text);
+    let program = site.caught_up();
+    eventually("all rows", || site.values().len() == 21);
+    // The same in another file, put in its place: read from its start.
+    fs::write(site.path("new"), &text).unwrap();
+    fs::rename(site.path("new"), site.path("incoming/5.csv")).unwrap();
+    let next = clock::now();
+    site.append("incoming/5.csv", &format!("{next},78\n"));
+    eventually("the next row", || site.values().len() >= 22);
+    assert_eq!(site.values().len(), 22, "taken twice");
+    site.append("incoming/5.csv", &format!("{}\n", rows[19]));
+    eventually("the value corrected back", || site.values().len() == 23);
+    program.stop();
+    site.proven_events();
+}

@@ -1,0 +1,181 @@
+//! A first start on history: what is current is judged first, and the refits of the past come after, as they would have come.
+
+use jiff::{SignedDuration, Timestamp, ToSpan};
+use slipwatch::alert::{Level, Policy, Threshold};
+use slipwatch::monitor::{AlertState, Event, EventKind, Input, Monitor, Notice, Settings};
+use slipwatch::reading::{BenchmarkId, Reading, Unit};
+
+fn at(hour: i64) -> Timestamp {
+    let start: Timestamp = "2026-01-01T00:00:00Z".parse().unwrap();
+    start + hour.hours()
+}
+
+fn reading(benchmark: &str, hour: i64, value: f64) -> (Timestamp, Input) {
+    let input = Input::Reading {
+        benchmark: BenchmarkId::new(benchmark),
+        unit: Unit::MM,
+        averaging: None,
+        reading: Reading {
+            time: at(hour),
+            value,
+            sigma: None,
+        },
+    };
+    (at(hour), input)
+}
+
+/// Creep with a jitter, hourly, of two benchmarks; `more` is added to that of the first.
+fn history(hours: i64, more: impl Fn(i64) -> f64) -> Vec<(Timestamp, Input)> {
+    (0..hours)
+        .flat_map(|hour| {
+            let jitter = 0.05 * ((hour * 37 % 11) as f64 - 5.0);
+            let creep = 0.1 * hour as f64 + jitter;
+            [
+                reading("a", hour, creep + more(hour)),
+                reading("b", hour, 0.5 * creep),
+            ]
+        })
+        .collect()
+}
+
+fn monitor() -> Monitor {
+    let policy = Policy {
+        thresholds: vec![Threshold {
+            level: Level::Red,
+            velocity_mm_per_day: Some(100.0),
+            displacement_mm: None,
+            acceleration_mm_per_day2: None,
+        }],
+        evacuation_time: SignedDuration::from_hours(24),
+        ..Policy::default()
+    };
+    Monitor::new(Settings {
+        policy,
+        ..Settings::default()
+    })
+}
+
+fn notice(monitor: &mut Monitor, notice: Notice) -> Vec<Event> {
+    let now = at(10_000);
+    monitor.step(now, &Input::Notice(notice))
+}
+
+/// What a first start says: of the present, and then of the past.
+fn first_start(monitor: &mut Monitor, inputs: &[(Timestamp, Input)]) -> (Vec<Event>, Vec<Event>) {
+    assert!(notice(monitor, Notice::Past).is_empty());
+    for (now, input) in inputs {
+        let said = monitor.step(*now, input);
+        assert!(!said.iter().any(|event| refit(event).is_some()), "{said:?}");
+    }
+    let (mut current, mut past) = (Vec::new(), Vec::new());
+    while monitor.owes_current() {
+        current.extend(notice(monitor, Notice::Current));
+    }
+    while monitor.owes_past() {
+        past.extend(notice(monitor, Notice::Retrace));
+    }
+    (current, past)
+}
+
+/// The benchmark, the time and the words of a refit.
+fn refit(event: &Event) -> Option<(String, Timestamp, String)> {
+    let is_refit = matches!(event.kind, EventKind::Refit { .. });
+    let benchmark = event.benchmark.as_ref()?.to_string();
+    is_refit.then(|| (benchmark, event.time, serde_json::to_string(event).unwrap()))
+}
+
+fn refits(events: &[Event]) -> Vec<(String, Timestamp, String)> {
+    let mut all: Vec<_> = events.iter().filter_map(refit).collect();
+    all.sort();
+    all
+}
+
+#[test]
+fn what_is_current_is_judged_first_and_the_refits_of_the_past_are_those_of_a_daemon_that_was_there()
+{
+    let inputs = history(60, |_| 0.0);
+    let mut there = monitor();
+    let told: Vec<Event> = inputs
+        .iter()
+        .flat_map(|(now, input)| there.step(*now, input))
+        .collect();
+    let mut late = monitor();
+    let (current, past) = first_start(&mut late, &inputs);
+    let newest: Vec<Timestamp> = refits(&current).iter().map(|(_, time, _)| *time).collect();
+    assert_eq!(newest, [at(59), at(59)]);
+    assert_eq!(refits(&[current, past].concat()), refits(&told));
+    // And they go on alike.
+    let (now, next) = reading("a", 60, 6.0);
+    let (told, said) = (there.step(now, &next), late.step(now, &next));
+    assert_eq!(refits(&said), refits(&told));
+}
+
+#[test]
+fn a_past_in_which_the_current_is_judged_meanwhile_gives_no_other_refits() {
+    let inputs = history(60, |_| 0.0);
+    let mut there = monitor();
+    let told: Vec<Event> = inputs
+        .iter()
+        .flat_map(|(now, input)| there.step(*now, input))
+        .collect();
+    let mut late = monitor();
+    let mut said = Vec::new();
+    for half in [&inputs[..80], &inputs[80..]] {
+        notice(&mut late, Notice::Past);
+        for (now, input) in half {
+            late.step(*now, input);
+        }
+        said.extend(notice(&mut late, Notice::Current));
+    }
+    while late.owes_past() {
+        said.extend(notice(&mut late, Notice::Retrace));
+    }
+    let mut made = refits(&said);
+    made.dedup();
+    assert_eq!(made, refits(&told));
+}
+
+#[test]
+fn a_red_of_the_past_that_nothing_has_ended_is_called_after_a_first_start_as_of_then() {
+    // Ten hours of 240 mm/day, and twenty of creep: not yet an evacuation time.
+    let crisis = |hour: i64| 10.0 * (hour.clamp(30, 40) - 30) as f64;
+    let mut late = monitor();
+    let (current, past) = first_start(&mut late, &history(60, crisis));
+    let red = |event: &Event| {
+        let is_red = matches!(
+            event.kind,
+            EventKind::Alert {
+                level: Level::Red,
+                state: AlertState::Firing,
+                ..
+            }
+        );
+        is_red.then_some(event.time)
+    };
+    assert_eq!(current.iter().find_map(red), None);
+    let called = past.iter().find_map(red).unwrap();
+    assert!(called > at(30) && called <= at(41), "{called}");
+    assert_eq!(late.level(&BenchmarkId::new("a")), Some(Level::Red));
+    assert_eq!(late.level(&BenchmarkId::new("b")), Some(Level::Green));
+}
+
+#[test]
+fn a_memory_saved_half_way_through_the_past_goes_on_from_there() {
+    let inputs = history(60, |_| 0.0);
+    let (mut one, mut other) = (monitor(), monitor());
+    let (_, whole) = first_start(&mut one, &inputs);
+    notice(&mut other, Notice::Past);
+    for (now, input) in &inputs {
+        other.step(*now, input);
+    }
+    let mut said = Vec::new();
+    notice(&mut other, Notice::Current);
+    for _ in 0..2 {
+        said.extend(notice(&mut other, Notice::Retrace));
+    }
+    let mut restored = Monitor::restore(&other.save().unwrap()).unwrap();
+    while restored.owes_past() {
+        said.extend(notice(&mut restored, Notice::Retrace));
+    }
+    assert_eq!(refits(&said), refits(&whole));
+}
