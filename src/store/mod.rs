@@ -14,12 +14,13 @@ mod schema;
 mod sealed;
 mod series;
 mod sum;
+mod verify;
 
 pub use batch::{Batch, Known, Position};
 pub use outbox::{Delivery, Fate};
 pub use past::{Heads, Value, Values};
 pub use read::{Recorded, StepRow};
-pub use sum::Verified;
+pub use verify::Verified;
 
 use crate::reading::Timestamp;
 use rusqlite::{Connection, ErrorCode, OpenFlags, ffi};

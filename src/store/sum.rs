@@ -1,39 +1,10 @@
-//! A sum over each row of what was taken in, said and is to be told: a bit that flips on the disk is seen.
+//! The sum of a row's values: a bit that flips on the disk is seen.
 
-use super::{Store, StoreError, outbox};
 use rusqlite::types::ValueRef;
-use rusqlite::{Connection, Row};
 
-/// Rows that are looked at in one go.
-const PIECE: i64 = 2000;
 /// FNV-1a, 64 bits: its offset and its prime.
 const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
 const PRIME: u64 = 0x0000_0100_0000_01b3;
-
-/// Whether a row is what was written.
-type IsWhole = fn(&Row<'_>) -> Result<bool, StoreError>;
-
-/// The rows of each table, and how they are looked at.
-const TABLES: [(&str, &str, IsWhole); 3] = [
-    (
-        "step",
-        "SELECT seq, now, series, time, value, sigma, body, sum FROM step
-         WHERE seq > ?1 AND sum IS NOT NULL ORDER BY seq LIMIT ?2",
-        |row| is_whole(row, 7),
-    ),
-    (
-        "event",
-        "SELECT seq, step, time, kind, benchmark, body, sum FROM event
-         WHERE seq > ?1 AND sum IS NOT NULL ORDER BY seq LIMIT ?2",
-        |row| is_whole(row, 6),
-    ),
-    (
-        "outbox",
-        "SELECT id, key, level, state, hook, time, body, status, attempts, sum FROM outbox
-         WHERE id > ?1 ORDER BY id LIMIT ?2",
-        |row| Ok(outbox::body(row)?.is_some() && outbox::stands_as_written(row)?),
-    ),
-];
 
 /// The sum of a row's values.
 pub(super) fn sum(values: &[ValueRef<'_>]) -> i64 {
@@ -63,56 +34,4 @@ pub(super) fn sum(values: &[ValueRef<'_>]) -> i64 {
         }
     }
     hash.cast_signed()
-}
-
-/// How far the rows have been looked at.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Verified {
-    table: usize,
-    after: i64,
-}
-
-impl Store {
-    /// Looks at the next rows, from the beginning again where it came to the end; whether it did.
-    ///
-    /// # Errors
-    /// [`StoreError::Damaged`] where a row is not what was written.
-    pub fn verify(&self, verified: &mut Verified) -> Result<bool, StoreError> {
-        let inner = self.inner();
-        let (table, ..) = TABLES[verified.table];
-        if let Some(after) = piece(&inner.connection, *verified)? {
-            verified.after = after;
-            return Ok(false);
-        }
-        let is_last = table == TABLES[TABLES.len() - 1].0;
-        *verified = Verified {
-            table: if is_last { 0 } else { verified.table + 1 },
-            after: 0,
-        };
-        Ok(is_last)
-    }
-}
-
-/// The number of the last row of the next piece; `None` at the end.
-fn piece(connection: &Connection, verified: Verified) -> Result<Option<i64>, StoreError> {
-    let (table, query, is_whole) = TABLES[verified.table];
-    let mut query = connection.prepare_cached(query)?;
-    let mut rows = query.query([verified.after, PIECE])?;
-    let mut last = None;
-    while let Some(row) = rows.next()? {
-        let number = row.get_ref(0)?;
-        if !is_whole(row)? {
-            let detail = format!("row {number:?} of the table {table} is not what was written");
-            return Err(StoreError::Damaged { detail });
-        }
-        last = Some(row.get(0)?);
-    }
-    Ok(last)
-}
-
-/// Whether the sum, which stands behind so many values, is theirs.
-fn is_whole(row: &Row<'_>, values: usize) -> Result<bool, StoreError> {
-    let all = (0..values).map(|index| row.get_ref(index));
-    let all: Vec<ValueRef<'_>> = all.collect::<Result<_, _>>()?;
-    Ok(row.get_ref(values)? == ValueRef::Integer(sum(&all)))
 }

@@ -481,12 +481,15 @@ fn a_running_daemon_tells_how_long_values_wait_what_it_cannot_use_and_what_no_ho
         metrics = get(daemon.address, "/metrics", "").body;
     }
     // Those of the first start are taken without being judged one by one; these are not.
-    fs::write(folder.path().join("incoming/a.csv"), text + &backlog).unwrap();
-    for _ in 0..1000 {
+    let file = folder.path().join("incoming/a.csv");
+    let mut growing = fs::OpenOptions::new().append(true).open(file).unwrap();
+    growing.write_all(backlog.as_bytes()).unwrap();
+    for _ in 0..3000 {
         metrics = get(daemon.address, "/metrics", "").body;
         lag = lag.max(figure(&metrics, "slipwatch_lag_seconds"));
         if figure(&metrics, "slipwatch_caught_up") > 0.0
             && figure(&metrics, "slipwatch_outbox_alerts") > 0.0
+            && figure(&metrics, "slipwatch_readings_total") >= 600.0
         {
             break;
         }

@@ -19,7 +19,8 @@ use slipwatch::runtime::replay::{ReplayPace, ReplayPlan, replay};
 use slipwatch::runtime::run::run;
 use slipwatch::runtime::shutdown;
 use slipwatch::store::Store;
-use std::fmt::Write;
+use std::io::Write;
+use std::path::Path;
 use std::time::Duration;
 use tokio::sync::{OnceCell, watch};
 
@@ -89,11 +90,14 @@ async fn said_by_a_daemon() -> Vec<String> {
     let folder = tempfile::tempdir().unwrap();
     std::fs::create_dir(folder.path().join("incoming")).unwrap();
     let measured = half_a_year();
-    let mut text = format!("time,{RESERVOIR},a_displacement_mm\n");
-    for (sample, reading) in measured.samples.iter().zip(&measured.readings) {
-        writeln!(text, "{},{},{}", sample.time, sample.value, reading.value).unwrap();
-    }
-    std::fs::write(folder.path().join("incoming/logger.csv"), text).unwrap();
+    let rows = measured.samples.iter().zip(&measured.readings);
+    let rows = rows
+        .map(|(sample, reading)| format!("{},{},{}\n", sample.time, sample.value, reading.value));
+    let rows: Vec<String> = rows.collect();
+    let (past, live) = rows.split_at(rows.len() - LIVE);
+    let text = format!("time,{RESERVOIR},a_displacement_mm\n{}", past.concat());
+    let logger = folder.path().join("incoming/logger.csv");
+    std::fs::write(&logger, text).unwrap();
     let site = "[site]\nname = \"Toc\"\nstate_dir = \"state\"\n\
                 [[source]]\nid = \"logger\"\nkind = \"csv\"\npath = \"incoming/*.csv\"\n\
                 [[hook]]\nrun = [\"/bin/true\"]\n";
@@ -109,26 +113,46 @@ async fn said_by_a_daemon() -> Vec<String> {
         .await
         .unwrap()
         .unwrap();
+    // A search's answer takes effect at the first reading after it has come.
+    let mut growing = std::fs::OpenOptions::new()
+        .append(true)
+        .open(&logger)
+        .unwrap();
+    for row in live {
+        growing.write_all(row.as_bytes()).unwrap();
+        tokio::time::sleep(Duration::from_secs(2)).await;
+        let events = events_of(&config.site.state_dir);
+        if events.iter().any(|line| line.contains("effect-found")) {
+            break;
+        }
+    }
     trigger.pull();
     task.await.unwrap().unwrap();
-    let store = Store::look(&config.site.state_dir).unwrap();
-    let mut events = Vec::new();
-    while let Some(some) = Some(
-        store
-            .events(events.last().map_or(0, |(seq, _)| *seq), None, None)
-            .unwrap(),
-    )
-    .filter(|some| !some.is_empty())
-    {
-        events.extend(some);
-    }
     let last = measured.readings.last().unwrap().time;
-    let events = events.into_iter().map(|(_, line)| line).filter(|line| {
+    let events = events_of(&config.site.state_dir).into_iter();
+    let events = events.filter(|line| {
         let event: Event = serde_json::from_str(line).unwrap();
         // A replay without a config has no level of the whole site.
         event.time <= last && event.benchmark.is_some()
     });
     events.collect()
+}
+
+/// Readings that come after the first start, at most.
+const LIVE: usize = 30;
+
+/// The events of a daemon's state.
+fn events_of(state: &Path) -> Vec<String> {
+    let store = Store::look(state).unwrap();
+    let mut events: Vec<(i64, String)> = Vec::new();
+    loop {
+        let after = events.last().map_or(0, |(seq, _)| *seq);
+        let some = store.events(after, None, None).unwrap();
+        if some.is_empty() {
+            return events.into_iter().map(|(_, line)| line).collect();
+        }
+        events.extend(some);
+    }
 }
 
 /// (day, kind, channel, adopted) of every effect found.

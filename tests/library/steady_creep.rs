@@ -55,5 +55,7 @@ fn steady_creep_and_rest_are_never_orange_or_red() {
         let crisis = Crisis::play(&slope(of, seed), &policy(24));
         let calls = [Level::Orange, Level::Red].map(|level| crisis.first(level));
         assert_eq!(calls, [None, None], "{of:?}, seed {seed}");
+        let median = crisis.refits().last().unwrap().median;
+        assert_eq!(median, None, "{of:?}, seed {seed}");
     }
 }
