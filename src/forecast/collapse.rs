@@ -121,9 +121,9 @@ impl Indicators {
         let accelerating = self.accelerating();
         for (power, days) in spans(&self.scales) {
             let chance = network.chance(&self.inputs(members, (power, days)));
-            let creeps = (1.0 - accelerating) * (1.0 - may_grow(&self.scales, power));
+            let creeps = (1.0 - accelerating) * (1.0 - may_grow(&self.scales, (power, days)));
             reached = reached.max(chance * (1.0 - creeps));
-            let going = goes_on(&self.scales, power) * keeps_growing(&self.scales, power);
+            let going = goes_on(&self.scales, power) * keeps_growing(&self.scales, (power, days));
             sure = sure.max(self.most(days) * chance * going);
             all.push((days, reached));
             counted.push((days, sure));
@@ -230,17 +230,17 @@ fn goes_on(scales: &Scales, power: usize) -> f64 {
     counts(since) * counts(ever)
 }
 
-/// The share of the chance within the span of scale `power` that levels keep of a slope whose velocity may have stopped
+/// The share of the chance within the span of a scale and so many days that levels keep of a slope whose velocity may have stopped
 /// growing: the scale that speaks most against growth counts.
-fn keeps_growing(scales: &Scales, power: usize) -> f64 {
-    let least = growth(scales, power, ROUGH).fold(0.0, f64::min);
+fn keeps_growing(scales: &Scales, span: (usize, f64)) -> f64 {
+    let least = growth(scales, span, ROUGH).fold(0.0, f64::min);
     PAUSED + (1.0 - PAUSED) * share(least)
 }
 
-/// The share of the chance within the span of scale `power` that is reported of a slope that may creep steadily: all scales
+/// The share of the chance within such a span that is reported of a slope that may creep steadily: all scales
 /// count together.
-fn may_grow(scales: &Scales, power: usize) -> f64 {
-    let each = growth(scales, power, UNEVEN).map(|ln| ln.min(ONE_SCALE));
+fn may_grow(scales: &Scales, span: (usize, f64)) -> f64 {
+    let each = growth(scales, span, UNEVEN).map(|ln| ln.min(ONE_SCALE));
     STEADY + (1.0 - STEADY) * share(each.sum())
 }
 
@@ -250,11 +250,10 @@ fn share(ln_ratio: f64) -> f64 {
     2.0 * ratio / (1.0 + ratio)
 }
 
-/// ln of the likelihood ratio of growth against none, at the scale `power` and each shorter one. A straight line in inverse
+/// ln of the likelihood ratio of growth against none, at the scale `power`, whose span is `span` days, and each shorter one. A straight line in inverse
 /// velocity that meets zero after the span D grows by s / (D + 2 s) of itself from one block of s days to the next;
 /// `rough` is the standard deviation of that, as a share of it.
-fn growth(scales: &Scales, power: usize, rough: f64) -> impl Iterator<Item = f64> {
-    let span = scales.base_days * 2.0_f64.powi(i32::try_from(power).unwrap_or(i32::MAX));
+fn growth(scales: &Scales, (power, span): (usize, f64), rough: f64) -> impl Iterator<Item = f64> {
     let shorter = power.saturating_sub(GROWN_SCALES);
     let last = (power + 1).min(scales.each.len());
     let each = scales.each.get(shorter..last).unwrap_or_default().iter();

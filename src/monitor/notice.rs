@@ -2,7 +2,7 @@
 
 use super::Monitor;
 use super::event::{AlertState, Event, EventKind};
-use super::track::{Beside, Track};
+use super::track::Track;
 use crate::alert::Level;
 use crate::reading::{BenchmarkId, Timestamp};
 use serde::{Deserialize, Serialize};
@@ -123,15 +123,7 @@ impl Monitor {
             return events;
         }
         for id in self.late.clone() {
-            let beside = Beside {
-                covariates: &self.covariates,
-                explain: self.settings.explain,
-                now,
-                settles: self.settles,
-                is_past: self.past.is_open(),
-            };
-            let policy = self.settings.policy(&id);
-            if let Some(track) = self.tracks.get_mut(&id) {
+            if let Some((track, policy, beside)) = self.track_at(&id, now) {
                 events.extend(track.settle(policy, &beside));
                 self.changed.insert(id);
             }

@@ -43,7 +43,7 @@ impl Past {
 
 impl Input {
     /// Whether an event that followed from this says what would have been said in the past: it changes nothing of the
-    /// present, and nobody is told.
+    /// present, and nobody is notified.
     pub fn makes_up(&self, event: &Event) -> bool {
         let is_past = match &event.kind {
             EventKind::Refit { .. }
@@ -94,23 +94,15 @@ impl Monitor {
             let Some(id) = self.past.current.pop_first() else {
                 break;
             };
-            let beside = Beside {
-                covariates: &self.covariates,
-                explain: self.settings.explain,
-                now,
-                settles: self.settles,
-                is_past: false,
-            };
-            let policy = self.settings.policy(&id);
-            let Some(track) = self.tracks.get_mut(&id) else {
+            let Some((track, policy, beside)) = self.track_at(&id, now) else {
                 continue;
             };
             let (newest, judged) = track.judge_newest(policy, &beside);
+            let search = track.search(policy.critical_velocity_mm_per_day, &beside);
             let is_refit = |event: &&Event| matches!(event.kind, EventKind::Refit { .. });
             refits += judged.iter().filter(is_refit).count();
             events.extend(judged);
-            let critical = policy.critical_velocity_mm_per_day;
-            self.searches.extend(track.search(critical, &beside));
+            self.searches.extend(search);
             if let Some(newest) = newest {
                 self.past.owed.insert(id.clone(), newest);
             }
@@ -130,16 +122,12 @@ impl Monitor {
             return Vec::new();
         };
         let id = walk.benchmark().clone();
-        let beside = Beside {
-            covariates: &self.covariates,
-            explain: self.settings.explain,
-            now,
-            settles: self.settles,
-            is_past: false,
-        };
-        let policy = self.settings.policy(&id);
-        let Some(track) = self.tracks.get_mut(&id) else {
+        let Some((track, policy, beside)) = self.track_at(&id, now) else {
             return Vec::new();
+        };
+        let beside = Beside {
+            is_past: false,
+            ..beside
         };
         let (mut events, has_more) = track.walk(&mut walk, policy, &beside);
         if has_more {

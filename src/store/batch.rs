@@ -111,7 +111,7 @@ impl Batch {
 
 /// Whether a value is known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Known {
+pub enum Presence {
     /// It has not been taken.
     No,
     /// It has, and another one of its time was taken after it: either a file is read again, or it was corrected back.
@@ -139,13 +139,13 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn has(&self, batch: &Batch, input: &Input) -> Result<Known, StoreError> {
+    pub fn has(&self, batch: &Batch, input: &Input) -> Result<Presence, StoreError> {
         let (Some(series), Some((time, value, _))) = (Series::of(input), value(input)) else {
-            return Ok(Known::No);
+            return Ok(Presence::No);
         };
         let in_batch = batch.known(&series, time);
         if (in_batch.first()).is_some_and(|known| known.to_bits() == value.to_bits()) {
-            return Ok(Known::Yes);
+            return Ok(Presence::Yes);
         }
         let inner = self.inner();
         let factor = match &series {
@@ -168,9 +168,9 @@ impl Store {
         let mut all = in_batch.chain(written.into_iter().map(|(_, known)| known));
         let is_it = |known: f64| known.to_bits() == (value * factor).to_bits();
         Ok(match all.position(is_it) {
-            None => Known::No,
-            Some(0) => Known::Yes,
-            Some(_) => Known::Corrected,
+            None => Presence::No,
+            Some(0) => Presence::Yes,
+            Some(_) => Presence::Corrected,
         })
     }
 }

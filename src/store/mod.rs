@@ -16,7 +16,7 @@ mod series;
 mod sum;
 mod verify;
 
-pub use batch::{Batch, Known, Position};
+pub use batch::{Batch, Position, Presence};
 pub use outbox::{Delivery, Fate};
 pub use past::{Heads, Value, Values};
 pub use read::{Recorded, StepRow};

@@ -253,13 +253,13 @@ fn standing_sum(status: &str, attempts: i64) -> i64 {
 }
 
 /// How a delivery stands.
-struct Standing {
+struct DeliveryState {
     id: i64,
     status: String,
     attempts: i64,
 }
 
-impl Standing {
+impl DeliveryState {
     /// Of this delivery, where it was noted.
     fn of(connection: &Connection, delivery: &Delivery) -> Result<Option<Self>, StoreError> {
         let mut query = connection.prepare_cached(
@@ -307,7 +307,7 @@ impl Inner {
             delivery.insert(&transaction, WAITING)?;
         }
         for one in ended {
-            let standing = Standing::of(&transaction, one)?;
+            let standing = DeliveryState::of(&transaction, one)?;
             if let Some(row) = standing.filter(|row| row.status == WAITING) {
                 row.becomes(&transaction, (Fate::Closed, row.attempts))?;
             }
@@ -320,7 +320,7 @@ impl Inner {
         let transaction = self.connection.transaction()?;
         for (delivery, fate) in settled {
             delivery.insert(&transaction, WAITING)?;
-            let standing = Standing::of(&transaction, delivery)?;
+            let standing = DeliveryState::of(&transaction, delivery)?;
             if let Some(row) = standing.filter(|row| row.status != Fate::Delivered.name()) {
                 row.becomes(&transaction, (*fate, row.attempts + 1))?;
             }

@@ -20,7 +20,7 @@ use slipwatch::runtime::shutdown;
 use slipwatch::runtime::site::{Sinks, Site};
 use slipwatch::runtime::sources::Sources;
 use slipwatch::runtime::tail::Follower;
-use slipwatch::store::{Batch, Known, Store};
+use slipwatch::store::{Batch, Presence, Store};
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::runtime::Runtime;
@@ -202,7 +202,7 @@ impl<'a> Host<'a> {
             },
         };
         let store = self.store().expect("the daemon runs");
-        store.has(&Batch::default(), &input).unwrap() != Known::No
+        store.has(&Batch::default(), &input).unwrap() != Presence::No
     }
 }
 

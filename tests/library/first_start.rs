@@ -84,6 +84,15 @@ fn refit(event: &Event) -> Option<(String, Timestamp, String)> {
     is_refit.then(|| (benchmark, event.time, serde_json::to_string(event).unwrap()))
 }
 
+/// A monitor that was given each input as it came, and its events.
+fn as_it_came(inputs: &[(Timestamp, Input)]) -> (Monitor, Vec<Event>) {
+    let mut there = monitor();
+    let steps = inputs.iter();
+    let events = steps.flat_map(|(now, input)| there.step(*now, input));
+    let events = events.collect();
+    (there, events)
+}
+
 fn refits(events: &[Event]) -> Vec<(String, Timestamp, String)> {
     let mut all: Vec<_> = events.iter().filter_map(refit).collect();
     all.sort();
@@ -94,30 +103,22 @@ fn refits(events: &[Event]) -> Vec<(String, Timestamp, String)> {
 fn what_is_current_is_judged_first_and_the_refits_of_the_past_are_those_of_a_daemon_that_was_there()
 {
     let inputs = history(60, |_| 0.0);
-    let mut there = monitor();
-    let told: Vec<Event> = inputs
-        .iter()
-        .flat_map(|(now, input)| there.step(*now, input))
-        .collect();
+    let (mut there, given) = as_it_came(&inputs);
     let mut late = monitor();
     let (current, past) = first_start(&mut late, &inputs);
     let newest: Vec<Timestamp> = refits(&current).iter().map(|(_, time, _)| *time).collect();
     assert_eq!(newest, [at(59), at(59)]);
-    assert_eq!(refits(&[current, past].concat()), refits(&told));
+    assert_eq!(refits(&[current, past].concat()), refits(&given));
     // And they go on alike.
     let (now, next) = reading("a", 60, 6.0);
-    let (told, said) = (there.step(now, &next), late.step(now, &next));
-    assert_eq!(refits(&said), refits(&told));
+    let (given, said) = (there.step(now, &next), late.step(now, &next));
+    assert_eq!(refits(&said), refits(&given));
 }
 
 #[test]
 fn a_past_in_which_the_current_is_judged_meanwhile_gives_no_other_refits() {
     let inputs = history(60, |_| 0.0);
-    let mut there = monitor();
-    let told: Vec<Event> = inputs
-        .iter()
-        .flat_map(|(now, input)| there.step(*now, input))
-        .collect();
+    let (_, given) = as_it_came(&inputs);
     let mut late = monitor();
     let mut said = Vec::new();
     for half in [&inputs[..80], &inputs[80..]] {
@@ -132,7 +133,7 @@ fn a_past_in_which_the_current_is_judged_meanwhile_gives_no_other_refits() {
     }
     let mut made = refits(&said);
     made.dedup();
-    assert_eq!(made, refits(&told));
+    assert_eq!(made, refits(&given));
 }
 
 #[test]

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 /// Refits and readings of one turn at most.
 const MOST_REFITS: usize = 16;
 const MOST_READINGS: usize = 2000;
-/// Of refits that lie further back than this from the first that was judged, the first of each day is told: the state
+/// Of refits that lie further back than this from the first that was judged, the first of each day is reported: the state
 /// keeps no more.
 const ALL_FOR: SignedDuration = SignedDuration::from_hours(90 * 24);
 /// The rule of a level that comes from the past.
@@ -35,11 +35,11 @@ pub(in crate::monitor) struct Walk {
     track: Box<Track>,
     /// The last reading, days since the epoch.
     at_days: Option<f64>,
-    /// The reading that was judged first: its refit and those after it have been told.
+    /// The reading that was judged first: its refit and those after it have been reported.
     until: Timestamp,
-    /// The day of the last refit that was told, of those that are told once a day.
+    /// The day of the last refit that was reported, of those that are reported once a day.
     day: Option<i64>,
-    /// Alerts since the level was last green: they are told together when it is again, so that what is over never
+    /// Alerts since the level was last green: they are reported together when it is again, so that what is over never
     /// looks as if it were in force.
     episode: Vec<Event>,
 }
@@ -49,8 +49,8 @@ impl Walk {
         &self.track.benchmark
     }
 
-    /// Whether a refit of `time` is told.
-    fn tells(&mut self, time: Timestamp) -> bool {
+    /// Whether a refit of `time` is reported.
+    fn reports(&mut self, time: Timestamp) -> bool {
         if time >= self.until {
             return false;
         }
@@ -99,7 +99,7 @@ impl Track {
         }
     }
 
-    /// Goes on through the past; its refits and alerts that are told, and whether there is more of it.
+    /// Goes on through the past; its refits and alerts that are reported, and whether there is more of it.
     pub(in crate::monitor) fn walk(
         &self,
         walk: &mut Walk,
@@ -132,7 +132,7 @@ impl Track {
             for event in said {
                 if matches!(event.kind, EventKind::Refit { .. }) {
                     refits += 1;
-                    events.extend(walk.tells(event.time).then_some(event));
+                    events.extend(walk.reports(event.time).then_some(event));
                 } else if is_of_the_record(&event) {
                     events.push(event);
                 } else if is_of_a_level(&event) && event.time < walk.until {
@@ -174,7 +174,7 @@ impl Track {
             text,
         };
         events.push(self.event(now, kind));
-        // What a sensor at the end of its range gives is told by the level.
+        // What a sensor at the end of its range gives is judged by the level.
         events.extend(self.judge_sensor(now));
         events
     }
@@ -202,7 +202,7 @@ pub(super) fn is_of_the_record(event: &Event) -> bool {
     )
 }
 
-/// Whether it enters or leaves a level; that nothing can be said is not told of the past.
+/// Whether it enters or leaves a level; that nothing can be said is not reported of the past.
 fn is_of_a_level(event: &Event) -> bool {
     matches!(event.kind, EventKind::Alert { level, .. } if level != Level::Unknown)
 }

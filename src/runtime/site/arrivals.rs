@@ -1,11 +1,11 @@
 //! What becomes of a value that arrives: it is taken, known already, held while the host's clock is wrong, or set aside.
 
-use super::{DAWN, MOST_UNWRITTEN, Site};
+use super::{BEFORE_ALL, MOST_UNWRITTEN, Site};
 use crate::monitor::{Event, Input, Notice};
 use crate::reading::{BenchmarkId, Timestamp, suspicion};
 use crate::runtime::clock;
 use crate::runtime::tail::Arrival;
-use crate::store::{Known, StoreError};
+use crate::store::{Presence, StoreError};
 use jiff::SignedDuration;
 
 /// The first day of 1970, UTC: where a logger starts whose clock is not set. No reading of a site that is watched now
@@ -50,7 +50,7 @@ impl Site {
     /// When the state cannot be asked whether the value is known.
     pub fn take(&mut self, arrival: &Arrival, wall: Timestamp) -> Result<Vec<Event>, StoreError> {
         if matches!(arrival.input, Input::Trouble { .. }) {
-            return Ok(self.step(self.now.unwrap_or(DAWN), &arrival.input));
+            return Ok(self.step(self.data_now(), &arrival.input));
         }
         if self.is_set_aside(arrival, wall) {
             return Ok(Vec::new());
@@ -59,12 +59,12 @@ impl Site {
             && !self.is_latest(arrival)
         {
             let known = store.has(&self.batch, &arrival.input)?;
-            if known == Known::Corrected && self.returned.waits(arrival) {
+            if known == Presence::Corrected && self.returned.waits(arrival) {
                 self.counts.repeated += 1;
                 return Ok(Vec::new());
             }
             self.returned.comes(arrival);
-            if known == Known::Yes {
+            if known == Presence::Yes {
                 self.counts.repeated += 1;
                 return Ok(Vec::new());
             }
@@ -121,13 +121,13 @@ impl Site {
             self.set_aside(arrival);
             return true;
         }
-        if self.sinks.store.is_none() || (time >= DAWN && !CLOCKLESS.contains(&time)) {
+        if self.sinks.store.is_none() || (time >= BEFORE_ALL && !CLOCKLESS.contains(&time)) {
             return false;
         }
         self.counts.without_clock += 1;
         let total = self.counts.without_clock;
         if !is_logged(total) {
-        } else if time < DAWN {
+        } else if time < BEFORE_ALL {
             tracing::warn!(%time, what = name(&arrival.input), "measured before 1678: quarantined");
         } else {
             tracing::warn!(%time, what = name(&arrival.input), total, "measured on the first day of 1970, as by a logger whose clock is not set: quarantined");
@@ -269,10 +269,10 @@ impl Site {
             self.keeper.knows(*time, false);
         }
         if !self.monitor.settles() {
-            self.step(self.now.unwrap_or(DAWN), &Input::Notice(Notice::Settles));
+            self.step(self.data_now(), &Input::Notice(Notice::Settles));
         }
         if self.newest.is_empty() && !self.monitor.reads_past() {
-            self.step(self.now.unwrap_or(DAWN), &Input::Notice(Notice::Past));
+            self.step(self.data_now(), &Input::Notice(Notice::Past));
         }
     }
 
@@ -300,7 +300,7 @@ impl Site {
 
     /// Judges the newest readings of benchmarks of which only the past has been read.
     pub(super) fn judge_current(&mut self) -> Vec<Event> {
-        let now = self.now.unwrap_or(DAWN);
+        let now = self.data_now();
         let events = self.step(now, &Input::Notice(Notice::Current));
         for job in self.monitor.searches() {
             self.searches.start(job);

@@ -1,6 +1,6 @@
 //! Whether messages come in such a crowd that they are a broker's backlog: on a first start they belong to the past.
 
-use super::{DAWN, Site};
+use super::Site;
 use crate::monitor::{Event, Input, Notice};
 use crate::runtime::clock::Stopwatch;
 use std::time::Duration;
@@ -52,7 +52,7 @@ impl Site {
             events.extend(self.judge_current());
         }
         self.crowd.reads_past = None;
-        let now = self.now.unwrap_or(DAWN);
+        let now = self.data_now();
         self.step(now, &Input::Notice(Notice::Past));
         events
     }

@@ -50,7 +50,7 @@ const STEPS_A_BENCHMARK: usize = 20;
 /// The site's own part of the memory, beside those of the monitor.
 const OWN: &str = "\0site";
 /// Before all readings.
-const DAWN: Timestamp = Timestamp::constant(-9_223_372_036, 0);
+const BEFORE_ALL: Timestamp = Timestamp::constant(-9_223_372_036, 0);
 
 /// Where a site's events go.
 #[derive(Debug)]
@@ -183,10 +183,15 @@ impl Site {
         }
     }
 
+    /// The data time so far.
+    fn data_now(&self) -> Timestamp {
+        self.now.unwrap_or(BEFORE_ALL)
+    }
+
     /// Goes by other settings from here on.
     pub fn resettle(&mut self, settings: Settings) -> Vec<Event> {
         self.settings = settings.clone();
-        let now = self.now.unwrap_or(DAWN);
+        let now = self.data_now();
         self.step(now, &Input::Settings(Box::new(settings)))
     }
 
@@ -213,7 +218,7 @@ impl Site {
     pub fn order(&mut self, number: i64, order: Order) -> Vec<Event> {
         self.batch.taken(number);
         tracing::warn!(?order, "people ask for something");
-        let now = self.now.unwrap_or(DAWN);
+        let now = self.data_now();
         self.step(now, &Input::Order(order))
     }
 
