@@ -281,6 +281,19 @@ mod tests {
     }
 
     #[test]
+    fn who_looks_on_while_a_daemon_writes_reads_benchmarks_that_have_come_since() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open(folder.path()).unwrap();
+        let beside = Store::look(folder.path()).unwrap();
+        let mut batch = Batch::default();
+        batch.step(at(100), &reading(100, 1.0), &[]);
+        store.commit(&batch).unwrap();
+        let steps = beside.steps(0).unwrap();
+        assert_eq!(steps.len(), 1);
+        assert_eq!(steps[0].input, reading(100, 1.0));
+    }
+
+    #[test]
     fn what_came_late_or_was_corrected_is_known_only_from_then_on() {
         let folder = tempfile::tempdir().unwrap();
         let store = Store::open(folder.path()).unwrap();

@@ -1,7 +1,7 @@
 //! What a restart, a replay of the stored input, and people who ask read back.
 
 use super::sealed::unseal;
-use super::series::Series;
+use super::series::{Catalogue, Series};
 use super::{Store, StoreError, timestamp};
 use crate::monitor::{Finding, Input, Notice, Order, Part, Settings};
 use crate::reading::{BenchmarkId, Reading, Sample, Timestamp};
@@ -151,6 +151,8 @@ impl Store {
         )?;
         let mut rows = query.query(params![after, CHUNK])?;
         let mut steps = Vec::new();
+        // Whoever looks on while a daemon writes meets series that it has added since.
+        let mut newer: Option<Catalogue> = None;
         while let Some(row) = rows.next()? {
             let (seq, now): (i64, Option<i64>) = (row.get(0)?, row.get(1)?);
             let (now, input) = match row.get::<_, Option<i64>>(2)? {
@@ -159,7 +161,12 @@ impl Store {
                     (timestamp(now)?, decode(row.get(6)?)?)
                 }
                 Some(number) => {
-                    let series = inner.catalogue.get(number).ok_or_else(|| lost(seq))?;
+                    if inner.catalogue.get(number).is_none() && newer.is_none() {
+                        newer = Some(Catalogue::load(&inner.connection)?);
+                    }
+                    let added = || newer.as_ref()?.get(number);
+                    let series = inner.catalogue.get(number).or_else(added);
+                    let series = series.ok_or_else(|| lost(seq))?;
                     let time = timestamp(row.get(3)?)?;
                     let input = input(series, time, row.get(4)?, row.get(5)?);
                     (now.map_or(Ok(time), timestamp)?, input)
