@@ -77,12 +77,13 @@ fn predict(block: &Block, places: &[[TablePlace; 3]]) -> Vec<[f64; LANES]> {
     places.iter().map(mean).collect()
 }
 
-/// The evidence of each shape of the block of that index; `before`: that of what came before each rate, by no law.
+/// The evidence of each shape of the block of that index; `before`: that of what came before each rate, by no law. A shape
+/// whose evidence, ln, cannot reach `least` has none.
 pub(super) fn weigh(
     record: &RateRecord,
     (block, slope): (usize, &SlopeTable),
-    gains: &Gains,
-    before: &[f64],
+    (gains, before): (&Gains, &[f64]),
+    least: f64,
     room: &mut Room,
 ) -> [ShapeEvidence; LANES] {
     let predicted = &slope.predicted[block];
@@ -108,13 +109,13 @@ pub(super) fn weigh(
         room.ln_evidence.push(total);
         room.today.push([velocity_now, load_now]);
     }
-    std::array::from_fn(|lane| over_starts(record, gains, room, lane))
+    std::array::from_fn(|lane| over_starts(gains, room, lane, least))
 }
 
-fn over_starts(record: &RateRecord, gains: &Gains, room: &Room, lane: usize) -> ShapeEvidence {
-    let count = record.ln_velocity.len();
-    let least = FEWEST_UNDER_THE_LAW.min(count) - 1;
-    let starts = &room.ln_evidence[least..];
+fn over_starts(gains: &Gains, room: &Room, lane: usize, least: f64) -> ShapeEvidence {
+    let count = room.ln_evidence.len();
+    let first = FEWEST_UNDER_THE_LAW.min(count) - 1;
+    let starts = &room.ln_evidence[first..];
     let best = starts
         .iter()
         .map(|ln| ln[lane])
@@ -126,14 +127,15 @@ fn over_starts(record: &RateRecord, gains: &Gains, room: &Room, lane: usize) -> 
         load: 0.0,
         today: [0.0; 3],
     };
-    if !best.is_finite() {
+    // Their sum is no more than all of them at the best.
+    if !best.is_finite() || best + (starts.len() as f64).ln() < least {
         return mean;
     }
     for (offset, ln) in starts.iter().enumerate() {
         if ln[lane] < best - NEGLIGIBLE {
             continue;
         }
-        let (step, weight) = (least + offset, (ln[lane] - best).exp());
+        let (step, weight) = (first + offset, (ln[lane] - best).exp());
         let [velocity_now, load_now] = &room.today[step];
         sum += weight;
         mean.ln_velocity += weight * velocity_now[lane];

@@ -74,12 +74,16 @@ impl Cell {
             } else {
                 f64::INFINITY
             };
-            let mean = self.mean_load(load, memories, z[2]);
             let keep = (-memories).exp();
+            let mean = self.mean_load(load, (memories, keep), z[2]);
             let at_the_end =
                 load * keep + self.sigma * (1.0 - keep * keep).sqrt() * (0.6 * z[2] + 0.8 * z[3]);
             let law = shape.days_to(ln_velocity - (now - load) - at_the_end) / self.r;
             let next = law * (-mean).exp() / pace;
+            // A law that never gets there under its lasting load: each round would find the same.
+            if days.is_infinite() && next.is_infinite() {
+                return None;
+            }
             if (next - days).abs() <= CLOSE * days {
                 return Some(next);
             }
@@ -92,15 +96,14 @@ impl Cell {
         days.is_finite().then_some(days)
     }
 
-    /// The mean load over the next `memories` of its own, from `load` now.
-    fn mean_load(&self, load: f64, memories: f64, z: f64) -> f64 {
+    /// The mean load over the next `memories` of its own, after which the share `keep` of it is left, from `load` now.
+    fn mean_load(&self, load: f64, (memories, keep): (f64, f64), z: f64) -> f64 {
         if memories < 1e-3 {
             return load;
         }
         if memories.is_infinite() {
             return 0.0;
         }
-        let keep = (-memories).exp();
         let variance = (2.0 * memories - 3.0 + 4.0 * keep - keep * keep) / (memories * memories);
         load * (1.0 - keep) / memories + self.sigma * variance.max(0.0).sqrt() * z
     }

@@ -112,9 +112,18 @@ impl LoadPosterior {
 
     /// The heaviest laws, with their share, under today's load; t = 0 is the present.
     pub fn ensemble(&self) -> Ensemble {
-        let mut heaviest: Vec<&Cell> = self.cells.iter().collect();
-        heaviest.sort_by(|a, b| b.weight.total_cmp(&a.weight));
-        heaviest.truncate(HEAVIEST);
+        let mut heaviest: Vec<(usize, &Cell)> = self.cells.iter().enumerate().collect();
+        let order = |one: &(usize, &Cell), other: &(usize, &Cell)| {
+            let by_weight = other.1.weight.total_cmp(&one.1.weight);
+            by_weight.then(one.0.cmp(&other.0))
+        };
+        // Of thousands of cells these few alone are to be in order.
+        if heaviest.len() > HEAVIEST {
+            heaviest.select_nth_unstable_by(HEAVIEST, order);
+            heaviest.truncate(HEAVIEST);
+        }
+        heaviest.sort_unstable_by(order);
+        let heaviest: Vec<&Cell> = heaviest.into_iter().map(|(_, cell)| cell).collect();
         let total: f64 = heaviest.iter().map(|cell| cell.weight).sum();
         let variance = |cell: &&Cell| {
             cell.weight * (cell.variances.0 + cell.scatter.powi(2) + 0.5 * cell.sigma.powi(2))

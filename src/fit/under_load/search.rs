@@ -2,7 +2,7 @@
 
 use super::evidence::{self, Room, ShapeEvidence, SlopeTable, weigh};
 use super::gains::{Gains, LoadMemory, LoadNoise, RateRecord};
-use super::shape::{BLOCKS, SHAPES};
+use super::shape::{BLOCKS, LANES, SHAPES};
 use super::{Cell, KEPT};
 use crate::fit::Rate;
 use std::collections::BTreeMap;
@@ -129,6 +129,16 @@ impl GridSearch {
         shape.ln_prior - RARE * r.ln() - 0.5 * (resolved * resolved + kept * kept)
     }
 
+    /// The most that the prior of a shape of the block can be at a slope, whatever velocity it is found to have.
+    fn most_ln_prior(&self, block: usize, r: f64) -> f64 {
+        let first = BLOCKS[block].first;
+        let each = SHAPES[first..first + LANES].iter();
+        let most = each
+            .map(|shape| shape.ln_prior)
+            .fold(f64::NEG_INFINITY, f64::max);
+        most - RARE * r.ln()
+    }
+
     /// The evidence of what came before each rate, by no law, for each scatter of the readings.
     fn befores(&self) -> BTreeMap<u64, Vec<f64>> {
         SCATTERS
@@ -147,13 +157,9 @@ impl GridSearch {
         for (index, slope) in slopes.iter().enumerate() {
             let gains = Gains::new(&self.record, &memory, &slope.u);
             for (block, of) in BLOCKS.iter().enumerate() {
-                let found = weigh(
-                    &self.record,
-                    (block, slope),
-                    &gains,
-                    &before,
-                    &mut self.room,
-                );
+                let law = (block, slope);
+                let given = (&gains, &before[..]);
+                let found = weigh(&self.record, law, given, f64::NEG_INFINITY, &mut self.room);
                 for (lane, evidence) in found.iter().enumerate() {
                     let ln = evidence.ln + self.ln_prior(of.first + lane, slope.r, evidence);
                     if ln.is_finite() {
@@ -206,7 +212,8 @@ impl GridSearch {
                 let slope = &slopes[one.slope];
                 let gains = Gains::new(&self.record, &memory, &slope.u);
                 let law = (one.block, slope);
-                let found = weigh(&self.record, law, &gains, before, &mut self.room);
+                let given = (&gains, &before[..]);
+                let found = weigh(&self.record, law, given, f64::NEG_INFINITY, &mut self.room);
                 found[one.lane].ln + SHAPES[BLOCKS[one.block].first + one.lane].ln_prior
             });
             noise.ln_evidence = evidence.fold(f64::NEG_INFINITY, f64::max);
@@ -232,7 +239,7 @@ impl GridSearch {
         let slopes = self.slopes(range, count, &blocks);
         let likely = noises[0].ln_evidence - LEFT_OUT.1;
         let likely = noises.iter().take_while(|noise| noise.ln_evidence > likely);
-        let mut cells = Vec::new();
+        let (mut cells, mut heaviest) = (Vec::new(), f64::NEG_INFINITY);
         let befores = self.befores();
         for noise in likely.take(MOST.2) {
             let before = &befores[&noise.scatter.to_bits()];
@@ -241,9 +248,15 @@ impl GridSearch {
                 let gains = Gains::new(&self.record, &memory, &slope.u);
                 for block in (0..BLOCKS.len()).filter(|block| blocks[*block]) {
                     let law = (block, slope);
-                    let found = weigh(&self.record, law, &gains, before, &mut self.room);
+                    let least = heaviest - LEFT_OUT.2 - self.most_ln_prior(block, slope.r);
+                    let given = (&gains, &before[..]);
+                    let found = weigh(&self.record, law, given, least, &mut self.room);
                     for (lane, evidence) in found.iter().enumerate() {
-                        cells.push(self.cell(BLOCKS[block].first + lane, slope, noise, evidence));
+                        let cell = self.cell(BLOCKS[block].first + lane, slope, noise, evidence);
+                        if cell.weight > heaviest - LEFT_OUT.2 {
+                            heaviest = heaviest.max(cell.weight);
+                            cells.push(cell);
+                        }
                     }
                 }
             }
@@ -348,7 +361,6 @@ fn record(rates: &[Rate]) -> RateRecord {
 
 #[cfg(test)]
 mod tests {
-    use super::super::shape::LANES;
     use super::*;
 
     #[test]
