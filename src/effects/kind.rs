@@ -80,6 +80,14 @@ impl Kind {
         }
     }
 
+    /// Whether it happens once, and in the ground.
+    pub(super) fn is_event_of_the_ground(self) -> bool {
+        matches!(
+            self,
+            Self::LoadStep | Self::StateReset | Self::FrictionChange
+        )
+    }
+
     /// Whether it lies in the instrument or its noise and not in the ground.
     pub fn is_of_the_reading(self) -> bool {
         matches!(

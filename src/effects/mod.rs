@@ -1,5 +1,6 @@
 //! From the residual to the effect that the law lacks: the search, the joint refit, before and after.
 
+mod blur;
 mod by_clock;
 mod candidates;
 mod clock;

@@ -82,7 +82,8 @@ impl<'a> Search<'a> {
         }
         let mut best = best_of_each_kind(others);
         best.truncate(MOST_OTHERS);
-        let others = self.refit_each(base, best);
+        let mut others = self.refit_each(base, best);
+        self.events_at_one_time(base, &mut others);
         if others.iter().any(|one| one.gain > self.options.bic_margin) {
             all.extend(others.into_iter().map(|one| {
                 let gain = one.gain;
@@ -92,6 +93,35 @@ impl<'a> Search<'a> {
             all.extend(others);
         }
         Some(all)
+    }
+
+    /// The kinds of what happens once are compared at one time: where the best of them was found, each other one is tried
+    /// too. The law linearised seldom has a large event of every kind at its right time.
+    fn events_at_one_time(&mut self, base: &Fitted, others: &mut [Refitted]) {
+        let events = others
+            .iter()
+            .filter(|one| one.term.kind.is_event_of_the_ground());
+        let Some(best) = events.max_by(|a, b| a.gain.total_cmp(&b.gain)) else {
+            return;
+        };
+        if best.gain < self.options.bic_margin {
+            return;
+        }
+        let at = best.term.at;
+        for one in others.iter_mut() {
+            if !one.term.kind.is_event_of_the_ground() || one.term.at == at {
+                continue;
+            }
+            let term = Term {
+                at,
+                ..one.term.clone()
+            };
+            if let Some(there) = self.refitted(base, &term)
+                && there.gain > one.gain
+            {
+                *one = there;
+            }
+        }
     }
 
     fn refit_each(&mut self, base: &Fitted, trials: Vec<Trial>) -> Vec<Refitted> {

@@ -166,7 +166,7 @@ impl Search<'_> {
                 break;
             };
             full = next;
-            accepted.push(how);
+            accepted.extend(how);
         }
         Some(SearchResult {
             plain,
@@ -178,10 +178,21 @@ impl Search<'_> {
         })
     }
 
-    /// The best effect that may be added to `base`, refitted with it.
-    fn one_more(&mut self, base: &Fitted, round: usize) -> Option<(Fitted, Accepted)> {
+    /// The best effect that may be added to `base`, refitted with it; an event and the mean that it is seen through are
+    /// added together.
+    fn one_more(&mut self, base: &Fitted, round: usize) -> Option<(Fitted, Vec<Accepted>)> {
         self.withheld = None;
         let mut refitted = self.refits(base, round)?;
+        if let Some((both, how)) = self.averaged_event(base, &refitted) {
+            let (held, reason) = self.judged(base, &both);
+            let is_taken = reason.is_none();
+            for term in &both.fitted.terms[base.terms.len()..] {
+                self.note(term, &both, held, reason.clone());
+            }
+            if is_taken {
+                return Some((both.fitted, how));
+            }
+        }
         refitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         prefer_witnesses(&mut refitted, self.options.bic_margin);
         let mut chosen: Option<(usize, Vec<Rival>)> = None;
@@ -213,7 +224,7 @@ impl Search<'_> {
             ties,
         };
         let how = one.with_season(how, self.problem);
-        Some((one.fitted, how))
+        Some((one.fitted, vec![how]))
     }
 
     fn beaten_by(&self, best: &Refitted, one: &Refitted) -> String {
@@ -293,7 +304,8 @@ impl Search<'_> {
         if ratio <= 1.0 {
             return (Some(ratio), None);
         }
-        let newest = one.fitted.terms.last().map_or(0, Term::coefficients);
+        let newest = one.fitted.terms[base.terms.len()..].iter();
+        let newest = newest.map(Term::coefficients).sum();
         let both = (base, &one.fitted);
         let steps = step_errors(self.problem, both, (held.from, newest), &mut self.scratch);
         let is_no_worse = steps.is_some_and(|steps| {

@@ -5,6 +5,10 @@
 //! right before the benchmark's first reading that is no earlier than [`SearchJob::due`]. So the answer takes
 //! effect at a time that the data alone decide.
 
+use super::Monitor;
+use super::event::Event;
+use super::track::{Beside, Track};
+use crate::alert::Policy;
 use crate::effects::{Effect, Explained, Kind, KnownLoad, Options, Rival, explain};
 use crate::reading::{BenchmarkId, Channel, Series, Timestamp};
 use jiff::SignedDuration;
@@ -46,6 +50,39 @@ pub struct Finding {
     /// The effects as forecasts use them.
     #[serde(rename = "fuller")]
     pub known_load: KnownLoad,
+}
+
+impl Monitor {
+    pub(super) fn found(&mut self, now: Timestamp, finding: &Finding) -> Vec<Event> {
+        self.changed.insert(finding.benchmark.clone());
+        let Some((track, policy, beside)) = self.track_at(&finding.benchmark, now) else {
+            return Vec::new();
+        };
+        track.found(policy.critical_velocity_mm_per_day, now, finding, &beside)
+    }
+
+    /// A benchmark that has given readings, its policy, and what lies beside its readings.
+    pub(super) fn track_at(
+        &mut self,
+        benchmark: &BenchmarkId,
+        now: Timestamp,
+    ) -> Option<(&mut Track, &Policy, Beside<'_>)> {
+        let beside = Beside {
+            covariates: &self.covariates,
+            explain: self.settings.explain,
+            now,
+            settles: self.settles,
+            is_past: self.past.is_open(),
+        };
+        let policy = self.settings.policy(benchmark);
+        Some((self.tracks.get_mut(benchmark)?, policy, beside))
+    }
+
+    /// The searches asked for since the last call, one a benchmark at most; each is to be answered by an
+    /// [`Input::Found`], and the benchmark asks for no other one until then.
+    pub fn searches(&mut self) -> Vec<SearchJob> {
+        std::mem::take(&mut self.searches)
+    }
 }
 
 impl SearchJob {

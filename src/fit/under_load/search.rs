@@ -129,16 +129,6 @@ impl GridSearch {
         shape.ln_prior - RARE * r.ln() - 0.5 * (resolved * resolved + kept * kept)
     }
 
-    /// The most that the prior of a shape of the block can be at a slope, whatever velocity it is found to have.
-    fn most_ln_prior(&self, block: usize, r: f64) -> f64 {
-        let first = BLOCKS[block].first;
-        let each = SHAPES[first..first + LANES].iter();
-        let most = each
-            .map(|shape| shape.ln_prior)
-            .fold(f64::NEG_INFINITY, f64::max);
-        most - RARE * r.ln()
-    }
-
     /// The evidence of what came before each rate, by no law, for each scatter of the readings.
     fn befores(&self) -> BTreeMap<u64, Vec<f64>> {
         SCATTERS
@@ -248,7 +238,7 @@ impl GridSearch {
                 let gains = Gains::new(&self.record, &memory, &slope.u);
                 for block in (0..BLOCKS.len()).filter(|block| blocks[*block]) {
                     let law = (block, slope);
-                    let least = heaviest - LEFT_OUT.2 - self.most_ln_prior(block, slope.r);
+                    let least = heaviest - LEFT_OUT.2 - most_ln_prior(block, slope.r);
                     let given = (&gains, &before[..]);
                     let found = weigh(&self.record, law, given, least, &mut self.room);
                     for (lane, evidence) in found.iter().enumerate() {
@@ -285,6 +275,16 @@ impl GridSearch {
             weight: evidence.ln + self.ln_prior(shape, slope.r, evidence),
         }
     }
+}
+
+/// The most that the prior of a shape of the block can be at a slope, whatever velocity it is found to have.
+fn most_ln_prior(block: usize, r: f64) -> f64 {
+    let first = BLOCKS[block].first;
+    let each = SHAPES[first..first + LANES].iter();
+    let most = each
+        .map(|shape| shape.ln_prior)
+        .fold(f64::NEG_INFINITY, f64::max);
+    most - RARE * r.ln()
 }
 
 fn normalise(mut cells: Vec<Cell>) -> Vec<Cell> {

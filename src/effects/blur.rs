@@ -1,0 +1,112 @@
+//! What happens at once, seen in velocities that are means over some time: a step of the load rises as slowly as a change
+//! of the friction would, and neither the step nor the mean gains much without the other. Both are tried together.
+
+use super::candidates;
+use super::judge::coefficients;
+use super::kind::Kind;
+use super::noise::Whitener;
+use super::refit::{Fitted, Start, refit};
+use super::search::{Accepted, Refitted, SIGNIFICANT, Search};
+use super::term::Term;
+
+/// A mean over less than this many spacings cannot be distinguished from none.
+const SHORTEST: f64 = 0.5;
+
+impl Search<'_> {
+    /// The best event as a mean over some time shows it, both refitted with the law; `None` where it gains no more than
+    /// what was found one by one (`single`) by the margin, or where the readings may be no such means.
+    pub(super) fn averaged_event(
+        &mut self,
+        base: &Fitted,
+        single: &[Refitted],
+    ) -> Option<(Refitted, Vec<Accepted>)> {
+        let margin = self.options.bic_margin;
+        let events = single.iter();
+        let events = events.filter(|one| one.term.kind.is_event_of_the_ground());
+        let alone = events.max_by(|a, b| a.gain.total_cmp(&b.gain))?;
+        // That something happened is known; what the mean adds has the margin of the best of them to pass.
+        if alone.gain < margin || alone.p_value >= SIGNIFICANT {
+            return None;
+        }
+        let mut feedbacks = candidates::feedbacks(self.problem).into_iter();
+        let mean = feedbacks.find(|term| term.kind == Kind::IntervalMean)?;
+        if base.terms.iter().any(|term| term.kind == mean.kind) {
+            return None;
+        }
+        let mut best: Option<Refitted> = None;
+        for spacings in mean.starts() {
+            for one in self.under_a_mean(base, &mean, *spacings) {
+                if best.as_ref().is_none_or(|best| one.gain > best.gain) {
+                    best = Some(one);
+                }
+            }
+        }
+        let best = best?;
+        let most = single.iter().map(|one| one.gain).fold(alone.gain, f64::max);
+        if best.gain < most + margin {
+            return None;
+        }
+        let p_value = alone.p_value;
+        let share = |bic_gain: f64| Accepted {
+            bic_gain,
+            p_value,
+            ties: Vec::new(),
+        };
+        // The event at the time at which the mean let it be seen may need no mean.
+        let event = self.refitted(base, &best.term)?;
+        let spacings = coefficients(self.problem, &best.fitted, base.terms.len());
+        if best.gain < event.gain + margin || spacings[0] < SHORTEST {
+            let is_better = event.gain > most + margin;
+            let shares = vec![share(event.gain)];
+            return is_better.then_some((Refitted { p_value, ..event }, shares));
+        }
+        let shares = vec![share(best.gain - event.gain), share(event.gain)];
+        Some((Refitted { p_value, ..best }, shares))
+    }
+
+    /// The best event of each kind where every reading is a mean over so many spacings to begin with.
+    fn under_a_mean(&mut self, base: &Fitted, mean: &Term, spacings: f64) -> Vec<Refitted> {
+        let own = self.bank.iter();
+        let own: Vec<Whitener> = own
+            .filter(|whitener| whitener.noise == base.noise)
+            .cloned()
+            .collect();
+        let start = Start {
+            frozen: 1,
+            ..Start::at(base).with_size(mean, spacings)
+        };
+        let Some(averaged) = refit(self.problem, &start, &own, &mut self.scratch) else {
+            return Vec::new();
+        };
+        let mut terms: Vec<(f64, Term)> = Vec::new();
+        if let Some(ground) = self.ground(&averaged) {
+            for at in candidates::event_times(self.problem) {
+                let each = candidates::events(at).into_iter();
+                for term in each.filter(|term| jumps(term.kind)) {
+                    let trial = ground.trial(term);
+                    match terms
+                        .iter_mut()
+                        .find(|(_, own)| own.kind == trial.term.kind)
+                    {
+                        Some(known) if known.0 >= trial.gain => {}
+                        Some(known) => *known = (trial.gain, trial.term),
+                        None => terms.push((trial.gain, trial.term)),
+                    }
+                }
+            }
+        }
+        let problem = self.problem;
+        let each = terms.into_iter();
+        let each = each.filter_map(|(_, term)| self.refitted(&averaged, &term));
+        each.map(|one| Refitted {
+            gain: base.bic(problem) - one.fitted.bic(problem),
+            ..one
+        })
+        .collect()
+    }
+}
+
+/// Whether the velocity jumps by it.
+fn jumps(kind: Kind) -> bool {
+    matches!(kind, Kind::LoadStep | Kind::StateReset)
+}
