@@ -12,6 +12,7 @@ mod in_hand;
 pub mod ingest;
 pub mod log;
 pub mod mqtt;
+pub mod origin;
 pub mod preview;
 pub mod progress;
 pub mod pulse;

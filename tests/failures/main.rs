@@ -60,6 +60,7 @@ mod machine;
 mod model;
 mod orders;
 mod past;
+mod record;
 mod sensors;
 mod site;
 mod telling;
