@@ -20,6 +20,7 @@ pub(super) fn hooks(root: &mut Section<'_>, base: &Path) -> Vec<HookConfig> {
     for section in root.tables("webhook", "webhook") {
         hooks.extend(webhook(section, base, &mut taken));
     }
+    unlike(root, &hooks);
     if hooks.is_empty() && !root.has("hook") && !root.has("webhook") {
         root.warning(
             root.at(),
@@ -30,12 +31,31 @@ pub(super) fn hooks(root: &mut Section<'_>, base: &Path) -> Vec<HookConfig> {
     hooks
 }
 
+/// The outbox knows a hook by its command line: one that is run at once and again later needs two.
+fn unlike(root: &Section<'_>, hooks: &[HookConfig]) {
+    let later = hooks.iter().filter(|hook| hook.escalate_after.is_some());
+    for hook in later.filter(|hook| hook.webhook.is_none()) {
+        if hooks.iter().filter(|one| one.run == hook.run).count() > 1 {
+            root.error(
+                root.at(),
+                format!(
+                    "two hooks run {:?}, one of them with escalate_after: they cannot be told apart",
+                    hook.run.join(" ")
+                ),
+                "give one of them an argument of its own, as in run = [\"./notify.sh\", \"escalation\"]",
+            );
+            return;
+        }
+    }
+}
+
 /// What a program and a webhook have in common.
 struct Common {
     levels: Vec<Level>,
     benchmarks: BTreeSet<BenchmarkId>,
     site: bool,
     timeout: Duration,
+    escalate_after: Option<Duration>,
 }
 
 fn common(section: &mut Section<'_>) -> Common {
@@ -54,6 +74,7 @@ fn common(section: &mut Section<'_>) -> Common {
     }
     let benchmarks = benchmarks.map_or_else(Vec::new, |given| given.value);
     let timeout = section.parsed("timeout", value::duration);
+    let escalate_after = section.parsed("escalate_after", value::duration);
     Common {
         levels: levels(section),
         benchmarks: (benchmarks.into_iter())
@@ -61,6 +82,7 @@ fn common(section: &mut Section<'_>) -> Common {
             .collect(),
         site: section.switch("site").unwrap_or(false),
         timeout: timeout.map_or(TIMEOUT, |given| given.value.unsigned_abs()),
+        escalate_after: escalate_after.map(|given| given.value.unsigned_abs()),
     }
 }
 
@@ -93,6 +115,7 @@ fn program(mut section: Section<'_>, base: &Path) -> Option<HookConfig> {
         benchmarks: common.benchmarks,
         site: common.site,
         timeout: common.timeout,
+        escalate_after: common.escalate_after,
         folder: base.to_owned(),
         sandbox,
         writable: (writable.iter().map(|path| base.join(&path.value))).collect(),
@@ -110,6 +133,16 @@ fn webhook(
     let address = url.as_ref().and_then(|url| address(&section, url));
     let name = section.text("name");
     let secret = section.required("secret_file", "\"webhook.secret\"");
+    let ca_file = section.text("ca_file");
+    if let Some(given) = &ca_file
+        && address.as_ref().and_then(hyper::Uri::scheme_str) == Some("http")
+    {
+        section.error(
+            &given.at,
+            "webhook.ca_file without TLS trusts nobody".to_owned(),
+            "leave it out, or write url = \"https://...\"",
+        );
+    }
     let common = common(&mut section);
     if let Some(one) = name.as_ref().or(url.as_ref())
         && !taken.insert(one.value.clone())
@@ -127,12 +160,14 @@ fn webhook(
         webhook: Some(Webhook {
             name: name.map_or(url, |given| given.value),
             address,
+            ca_file: ca_file.map(|given| base.join(given.value)),
             secret_file: base.join(secret?.value),
         }),
         levels: common.levels,
         benchmarks: common.benchmarks,
         site: common.site,
         timeout: common.timeout,
+        escalate_after: common.escalate_after,
         folder: base.to_owned(),
         sandbox: false,
         writable: Vec::new(),
@@ -150,15 +185,10 @@ fn address(section: &Section<'_>, url: &Placed<String>) -> Option<hyper::Uri> {
         return refuse("is no address", "write it as in \"http://host:port/path\"");
     };
     match address.scheme_str() {
-        Some("http") => {}
-        Some("https") => {
-            return refuse(
-                "asks for TLS, which webhooks do not have yet",
-                "send to a relay on this machine over http, or use a [[hook]] that calls curl",
-            );
-        }
+        Some("http" | "https") => {}
         Some(_) | None => {
-            return refuse("is not http", "write it as in \"http://host:port/path\"");
+            let fix = "write it as in \"https://host/path\" or \"http://host:port/path\"";
+            return refuse("is neither http nor https", fix);
         }
     }
     let has_user = (address.authority()).is_some_and(|one| one.as_str().contains('@'));

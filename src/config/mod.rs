@@ -144,8 +144,10 @@ pub struct Benchmark {
 pub struct Webhook {
     /// What logs and receipts call it.
     pub name: String,
-    /// Where to, over plain HTTP.
+    /// Where to, by `http` or `https`.
     pub address: hyper::Uri,
+    /// The certificate authorities that are trusted instead of the machine's own, PEM.
+    pub ca_file: Option<PathBuf>,
     /// The file with the secret that signs what is sent.
     pub secret_file: PathBuf,
 }
@@ -163,6 +165,8 @@ pub struct HookConfig {
     pub benchmarks: BTreeSet<BenchmarkId>,
     /// Whether it is notified of the whole site's level, and of nothing else; of its benchmarks' else.
     pub site: bool,
+    /// It is notified only of what nobody has acknowledged within this time; `None`: of everything, at once.
+    pub escalate_after: Option<Duration>,
     /// After this it is killed.
     pub timeout: Duration,
     /// Where it runs: the config's folder.

@@ -28,6 +28,7 @@ pub mod site;
 pub mod sources;
 pub mod standing;
 pub mod tail;
+mod tls;
 pub mod view;
 pub mod vitals;
 mod webhook;

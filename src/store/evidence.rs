@@ -28,7 +28,7 @@ pub struct DeliveryRow {
     pub level: String,
     /// `firing` or `resolved`.
     pub state: String,
-    /// `waiting`, `delivered`, `over`, `dead` or `closed`.
+    /// `waiting`, `delivered`, `over`, `dead`, `closed` or `acknowledged`.
     pub status: String,
     /// Attempts that have ended.
     pub attempts: u32,

@@ -1,6 +1,7 @@
 //! Webhooks against real listeners: what they get, that it is signed, and how failures are tried again.
 
 use crate::eventually::eventually;
+use rcgen::{BasicConstraints, CertificateParams, CertifiedIssuer, IsCa, KeyPair};
 use slipwatch::alert::Level;
 use slipwatch::config::{self, HookConfig};
 use slipwatch::monitor::{AlertState, Event, EventKind};
@@ -16,6 +17,8 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
+use tokio_rustls::rustls;
+use tokio_rustls::rustls::pki_types::PrivateKeyDer;
 
 const SECRET: &str = "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw";
 
@@ -62,7 +65,7 @@ impl Receiver {
     }
 }
 
-fn request(stream: &std::net::TcpStream) -> Got {
+fn request(stream: impl Read) -> Got {
     let mut reader = BufReader::new(stream);
     let mut next = || {
         let mut line = String::new();
@@ -298,12 +301,116 @@ async fn a_webhook_is_sent_the_benchmarks_and_levels_that_it_asks_for() {
     assert_eq!(keys(&all).len(), 2);
 }
 
+/// An authority of our own and a receiver at `localhost` that has a certificate of it.
+struct Secured {
+    authority: String,
+    receiver: Receiver,
+}
+
+impl Secured {
+    fn answering(status: u16) -> Self {
+        let mut params = CertificateParams::new(Vec::new()).unwrap();
+        params.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
+        let authority = CertifiedIssuer::self_signed(params, KeyPair::generate().unwrap()).unwrap();
+        let key = KeyPair::generate().unwrap();
+        let params = CertificateParams::new(vec!["localhost".to_owned()]).unwrap();
+        let own = params.signed_by(&key, &authority).unwrap();
+        let provider = Arc::new(rustls::crypto::ring::default_provider());
+        let config = rustls::ServerConfig::builder_with_provider(provider)
+            .with_safe_default_protocol_versions()
+            .unwrap()
+            .with_no_client_auth()
+            .with_single_cert(
+                vec![own.der().clone()],
+                PrivateKeyDer::try_from(key.serialize_der()).unwrap(),
+            )
+            .unwrap();
+        let config = Arc::new(config);
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let port = listener.local_addr().unwrap().port();
+        let got = Arc::new(Mutex::new(Vec::new()));
+        let seen = Arc::clone(&got);
+        std::thread::spawn(move || {
+            for stream in listener.incoming() {
+                let mut stream = stream.unwrap();
+                let mut server = rustls::ServerConnection::new(Arc::clone(&config)).unwrap();
+                // Whoever does not trust us hangs up.
+                if server.complete_io(&mut stream).is_err() || server.is_handshaking() {
+                    continue;
+                }
+                let mut tls = rustls::StreamOwned::new(server, stream);
+                seen.lock().unwrap().push(request(&mut tls));
+                let answer = format!("HTTP/1.1 {status} Said\r\ncontent-length: 2\r\n\r\nok");
+                tls.write_all(answer.as_bytes()).unwrap();
+            }
+        });
+        let url = format!("https://localhost:{port}/alerts");
+        Self {
+            authority: authority.pem(),
+            receiver: Receiver { url, got },
+        }
+    }
+}
+
+#[tokio::test]
+async fn an_alert_goes_over_tls_to_who_can_prove_its_name_by_a_trusted_authority_and_to_nobody_else()
+ {
+    let folder = tempfile::tempdir().unwrap();
+    let secured = Secured::answering(204);
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("ca.pem", &secured.authority);
+    write("other.pem", &Secured::answering(204).authority);
+    write("empty.pem", "");
+    let url = &secured.receiver.url;
+    let with = |url: &str, more: &str| webhooks(folder.path(), &webhook(url, more)).remove(0);
+    let send =
+        |hook: HookConfig| async move { deliver::run(&hook, &alert("5", "5/red/1"), 1).await };
+
+    assert_eq!(send(with(url, "ca_file = \"ca.pem\"")).await, Outcome::Done);
+    let got = secured.receiver.got();
+    assert_eq!(
+        (got.len(), got[0].line.as_str()),
+        (1, "POST /alerts HTTP/1.1")
+    );
+    assert!(got[0].headers["webhook-signature"].starts_with("v1,"));
+    match signature_by_python(&got[0]) {
+        Some(expected) => assert_eq!(got[0].headers["webhook-signature"], expected),
+        None => eprintln!("skipped: the signature, without python3"),
+    }
+
+    let by_address = url.replace("localhost", "127.0.0.1");
+    for (hook, why) in [
+        (with(url, "ca_file = \"other.pem\""), "no TLS"),
+        (with(&by_address, "ca_file = \"ca.pem\""), "no TLS"),
+        (
+            with(url, "ca_file = \"empty.pem\""),
+            "it holds no certificate",
+        ),
+        (with(url, "ca_file = \"absent.pem\""), "ca_file"),
+        // The machine's own authorities.
+        (with(url, ""), ""),
+    ] {
+        let outcome = send(hook).await;
+        assert!(
+            matches!(&outcome, Outcome::NotStarted(said) if said.contains(why)),
+            "{why}: {outcome:?}"
+        );
+    }
+    assert_eq!(secured.receiver.got().len(), 1);
+}
+
 #[test]
 fn a_config_says_what_is_wrong_with_a_webhook() {
     for (table, what) in [
-        (webhook("https://example.org/", ""), "TLS"),
-        (webhook("ftp://example.org/", ""), "is not http"),
-        (webhook("/path", ""), "is not http"),
+        (
+            webhook("ftp://example.org/", ""),
+            "is neither http nor https",
+        ),
+        (webhook("/path", ""), "is neither http nor https"),
+        (
+            webhook("http://a/", "ca_file = \"ca.pem\""),
+            "webhook.ca_file without TLS",
+        ),
         (webhook("http://me:secret@example.org/", ""), "password"),
         (
             webhook("http://a/", "benchmarks = []"),

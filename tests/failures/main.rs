@@ -52,6 +52,7 @@
 mod crowd;
 mod database;
 mod disk;
+mod escalation;
 mod feeds;
 mod files;
 mod killed;

@@ -151,6 +151,8 @@ fn deliveries(rows: &[DeliveryRow]) -> String {
     let mut out = "deliveries\n".to_owned();
     for row in rows {
         let meaning = match row.status.as_str() {
+            "waiting" if row.attempts == 0 => "has not been run yet",
+            "acknowledged" => "was not run: somebody acknowledged it in time",
             "waiting" => "is still tried",
             "delivered" => "has taken it",
             "over" => "did not get it: it was over, superseded or told together with others",

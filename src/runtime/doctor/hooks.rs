@@ -3,6 +3,7 @@
 use super::{Finding, Verdict};
 use crate::config::{HookConfig, Secret};
 use crate::runtime::sandbox::{self, Walls};
+use crate::runtime::tls;
 use nix::unistd::{AccessFlags, access};
 use std::ffi::OsStr;
 use std::fs::File;
@@ -17,7 +18,9 @@ const FIRST_LINE_BYTES: u64 = 256;
 pub(super) fn finding(hook: &HookConfig) -> Finding {
     if let Some(webhook) = &hook.webhook {
         let name = &webhook.name;
-        let (verdict, text) = match Secret::read(&webhook.secret_file) {
+        let secret = Secret::read(&webhook.secret_file).map_err(|error| error.to_string());
+        let trusted = webhook.ca_file.as_deref().map(tls::own).transpose();
+        let (verdict, text) = match secret.and_then(|_| trusted) {
             Ok(_) => (
                 Verdict::Good,
                 format!("{name} has its secret; hook test sends to it"),
