@@ -82,7 +82,8 @@ fn missing_folder(source: &Source) -> Option<String> {
 
 fn missing_program(hook: &HookConfig) -> Option<String> {
     if let Some(webhook) = &hook.webhook {
-        let secret = Secret::read(&webhook.secret_file).err();
+        let secret = webhook.secret_file.as_deref();
+        let secret = secret.and_then(|file| Secret::read(file).err());
         let secret = secret.map(|error| error.to_string());
         let unreadable = |file: &PathBuf| {
             let error = std::fs::File::open(file).err()?;
@@ -93,6 +94,10 @@ fn missing_program(hook: &HookConfig) -> Option<String> {
         };
         let error = secret.or_else(|| webhook.ca_file.as_ref().and_then(unreadable))?;
         return Some(format!("webhook: {error}; alerts would go nowhere"));
+    }
+    if hook.cap.is_some() {
+        // It is made when the first message is written.
+        return None;
     }
     let program = hook.program();
     let named_by_path = program.components().count() > 1;

@@ -1,7 +1,7 @@
-//! `[[hook]]` and `[[webhook]]`: whom alerts are sent to, and which.
+//! `[[hook]]`, `[[webhook]]` and `[[cap]]`: whom alerts are sent to, and which.
 
 use super::table::{Placed, Section};
-use super::{HookConfig, Webhook, value};
+use super::{CapFolder, HookConfig, Webhook, WebhookFormat, value};
 use crate::alert::Level;
 use crate::reading::BenchmarkId;
 use std::collections::BTreeSet;
@@ -20,8 +20,11 @@ pub(super) fn hooks(root: &mut Section<'_>, base: &Path) -> Vec<HookConfig> {
     for section in root.tables("webhook", "webhook") {
         hooks.extend(webhook(section, base, &mut taken));
     }
+    for section in root.tables("cap", "cap") {
+        hooks.extend(cap(section, base, &mut taken));
+    }
     unlike(root, &hooks);
-    if hooks.is_empty() && !root.has("hook") && !root.has("webhook") {
+    if hooks.is_empty() && ["hook", "webhook", "cap"].iter().all(|key| !root.has(key)) {
         root.warning(
             root.at(),
             "there is no [[hook]]: nobody is notified of an alert".to_owned(),
@@ -34,7 +37,7 @@ pub(super) fn hooks(root: &mut Section<'_>, base: &Path) -> Vec<HookConfig> {
 /// The outbox knows a hook by its command line: one that is run at once and again later needs two.
 fn unlike(root: &Section<'_>, hooks: &[HookConfig]) {
     let later = hooks.iter().filter(|hook| hook.escalate_after.is_some());
-    for hook in later.filter(|hook| hook.webhook.is_none()) {
+    for hook in later.filter(|hook| !hook.run.is_empty()) {
         if hooks.iter().filter(|one| one.run == hook.run).count() > 1 {
             root.error(
                 root.at(),
@@ -111,6 +114,7 @@ fn program(mut section: Section<'_>, base: &Path) -> Option<HookConfig> {
     Some(HookConfig {
         run: run?.value.into_iter().map(|word| word.value).collect(),
         webhook: None,
+        cap: None,
         levels: common.levels,
         benchmarks: common.benchmarks,
         site: common.site,
@@ -132,7 +136,13 @@ fn webhook(
     let url = section.required("url", example);
     let address = url.as_ref().and_then(|url| address(&section, url));
     let name = section.text("name");
-    let secret = section.required("secret_file", "\"webhook.secret\"");
+    let format = section.parsed("format", WebhookFormat::parse);
+    let format = format.map_or(WebhookFormat::Slipwatch, |given| given.value);
+    let secret = match format {
+        WebhookFormat::Slipwatch => section.required("secret_file", "\"webhook.secret\""),
+        // It checks no signature.
+        WebhookFormat::Alertmanager => section.text("secret_file"),
+    };
     let ca_file = section.text("ca_file");
     if let Some(given) = &ca_file
         && address.as_ref().and_then(hyper::Uri::scheme_str) == Some("http")
@@ -161,7 +171,55 @@ fn webhook(
             name: name.map_or(url, |given| given.value),
             address,
             ca_file: ca_file.map(|given| base.join(given.value)),
-            secret_file: base.join(secret?.value),
+            format,
+            secret_file: secret.map(|given| base.join(given.value)),
+        }),
+        cap: None,
+        levels: common.levels,
+        benchmarks: common.benchmarks,
+        site: common.site,
+        timeout: common.timeout,
+        escalate_after: common.escalate_after,
+        folder: base.to_owned(),
+        sandbox: false,
+        writable: Vec::new(),
+        launcher: None,
+    })
+}
+
+fn cap(mut section: Section<'_>, base: &Path, taken: &mut BTreeSet<String>) -> Option<HookConfig> {
+    let folder = section.required("folder", "\"cap\"");
+    let sender = section.required("sender", "\"slipwatch@example.org\"");
+    let area = section.required("area", "\"the north slope of Monte Toc\"");
+    let polygon = section.parsed("polygon", polygon);
+    let common = common(&mut section);
+    if let Some(one) = &folder
+        && !taken.insert(format!("cap {}", one.value))
+    {
+        section.error(
+            &one.at,
+            format!("there are two [[cap]] with the folder {:?}", one.value),
+            "give each its own folder",
+        );
+    }
+    if let Some(one) = &sender
+        && (one.value.is_empty() || one.value.contains([' ', ',', '<', '&']))
+    {
+        section.error(
+            &one.at,
+            format!("cap.sender = {:?} has a blank, a comma, < or &", one.value),
+            "write it as in \"slipwatch@example.org\"",
+        );
+    }
+    section.finish();
+    Some(HookConfig {
+        run: Vec::new(),
+        webhook: None,
+        cap: Some(CapFolder {
+            folder: base.join(folder?.value),
+            sender: sender?.value,
+            area: area?.value,
+            polygon: polygon.map(|given| given.value),
         }),
         levels: common.levels,
         benchmarks: common.benchmarks,
@@ -173,6 +231,27 @@ fn webhook(
         writable: Vec::new(),
         launcher: None,
     })
+}
+
+/// An outline as CAP writes it.
+fn polygon(text: &str) -> Result<String, String> {
+    let fix = || {
+        "write four or more pairs of latitude,longitude in degrees, the first one again at the end: \
+         \"46.27,12.33 46.28,12.35 46.26,12.36 46.27,12.33\""
+            .to_owned()
+    };
+    let point = |pair: &str| {
+        let (latitude, longitude) = pair.split_once(',')?;
+        let (latitude, longitude): (f64, f64) = (latitude.parse().ok()?, longitude.parse().ok()?);
+        (latitude.abs() <= 90.0 && longitude.abs() <= 180.0).then_some((latitude, longitude))
+    };
+    let pairs: Vec<&str> = text.split_whitespace().collect();
+    let is_closed = pairs.len() >= 4 && pairs.first() == pairs.last();
+    if is_closed && pairs.iter().all(|pair| point(pair).is_some()) {
+        Ok(pairs.join(" "))
+    } else {
+        Err(fix())
+    }
 }
 
 fn address(section: &Section<'_>, url: &Placed<String>) -> Option<hyper::Uri> {

@@ -72,7 +72,10 @@ fn written(cap: &CapFolder, alert: &Alert, now: Timestamp) -> io::Result<()> {
             chain.clear();
         }
         if is_cancel && chain.is_empty() {
-            tracing::info!(key = alert.key, "the end of what no CAP message has reported");
+            tracing::info!(
+                key = alert.key,
+                "the end of what no CAP message has reported"
+            );
             return Ok(());
         }
         chain.push(Message {
@@ -86,8 +89,15 @@ fn written(cap: &CapFolder, alert: &Alert, now: Timestamp) -> io::Result<()> {
         chain.len() - 1
     };
     let (message, before) = (&chain[at], &chain[..at]);
-    let name = format!("{}-{}.xml", message.sent.strftime("%Y%m%dT%H%M%SZ"), message.identifier);
-    replace(&cap.folder.join(name), xml(cap, alert, (message, before)).as_bytes())
+    let name = format!(
+        "{}-{}.xml",
+        message.sent.strftime("%Y%m%dT%H%M%SZ"),
+        message.identifier
+    );
+    replace(
+        &cap.folder.join(name),
+        xml(cap, alert, (message, before)).as_bytes(),
+    )
 }
 
 /// What a chain belongs to: a place and whether it is known; what reports many benchmarks stands for itself. A drill is no part of
@@ -126,7 +136,8 @@ fn replace(file: &Path, bytes: &[u8]) -> io::Result<()> {
     out.write_all(bytes)?;
     out.sync_all()?;
     fs::rename(&partial, file)?;
-    file.parent().map_or(Ok(()), |folder| File::open(folder)?.sync_all())
+    file.parent()
+        .map_or(Ok(()), |folder| File::open(folder)?.sync_all())
 }
 
 fn xml(cap: &CapFolder, alert: &Alert, (message, before): (&Message, &[Message])) -> String {
@@ -153,7 +164,10 @@ fn xml(cap: &CapFolder, alert: &Alert, (message, before): (&Message, &[Message])
     element(
         &mut out,
         1,
-        ("restriction", "For those who decide whether the public is warned"),
+        (
+            "restriction",
+            "For those who decide whether the public is warned",
+        ),
     );
     if !before.is_empty() {
         let each = before
@@ -189,11 +203,19 @@ fn info(out: &mut String, cap: &CapFolder, (alert, kind): (&Alert, MessageType))
     element(out, 2, ("language", "en"));
     element(out, 2, ("category", "Geo"));
     element(out, 2, ("event", "Landslide"));
-    element(out, 2, ("responseType", if is_over { "Assess" } else { response }));
+    element(
+        out,
+        2,
+        ("responseType", if is_over { "Assess" } else { response }),
+    );
     element(out, 2, ("urgency", urgency));
     element(out, 2, ("severity", severity));
     element(out, 2, ("certainty", certainty(alert.level, rule)));
-    element(out, 2, ("senderName", &format!("slipwatch at {}", alert.site)));
+    element(
+        out,
+        2,
+        ("senderName", &format!("slipwatch at {}", alert.site)),
+    );
     element(out, 2, ("headline", &headline));
     element(out, 2, ("description", text));
     let instruction = if is_over {
@@ -241,7 +263,13 @@ fn certainty(level: Level, rule: &str) -> &'static str {
 
 fn element(out: &mut String, depth: usize, (name, text): (&str, &str)) {
     // Writing to a string cannot fail.
-    let _ = writeln!(out, "{:1$}<{name}>{2}</{name}>", "", 2 * depth, escaped(text));
+    let _ = writeln!(
+        out,
+        "{:1$}<{name}>{2}</{name}>",
+        "",
+        2 * depth,
+        escaped(text)
+    );
 }
 
 /// Text as XML 1.0 takes it; what it takes in no form becomes U+FFFD.

@@ -1,6 +1,8 @@
 //! The thin shell around the monitor: clock, files, signals, hooks.
 
+mod alertmanager;
 mod archive;
+mod cap;
 pub mod clock;
 pub mod daemon;
 pub mod deliver;

@@ -70,21 +70,27 @@ fn request(
     alert: &Alert,
     body: Vec<u8>,
 ) -> Result<Request<Full<Bytes>>, String> {
-    let key = Secret::read(&webhook.secret_file).map_err(|error| error.to_string())?;
     let (id, timestamp) = (id(alert), clock::now().as_second());
-    let signature =
-        signature(key.bytes(), (&id, timestamp), &body).ok_or("the secret is unusable")?;
+    let signed = webhook.secret_file.as_deref().map(|file| {
+        let key = Secret::read(file).map_err(|error| error.to_string())?;
+        signature(key.bytes(), (&id, timestamp), &body)
+            .ok_or_else(|| "the secret is unusable".to_owned())
+    });
+    let signed = signed.transpose()?;
     let address = &webhook.address;
     let path = address.path_and_query().map_or("/", |path| path.as_str());
     let host = address.authority().map_or("", |one| one.as_str());
-    Request::post(path)
+    let mut request = Request::post(path);
+    if let Some(signature) = signed {
+        request = request.header("webhook-signature", signature);
+    }
+    request
         .header(header::HOST, host)
         .header(header::USER_AGENT, AGENT)
         .header(header::CONTENT_TYPE, "application/json")
         .header(header::CONNECTION, "close")
         .header("webhook-id", id)
         .header("webhook-timestamp", timestamp)
-        .header("webhook-signature", signature)
         .body(Full::new(Bytes::from(body)))
         .map_err(|error| error.to_string())
 }

@@ -50,6 +50,7 @@ fn hook(script: &str) -> (TempDir, HookConfig) {
     let config = HookConfig {
         site: false,
         webhook: None,
+        cap: None,
         escalate_after: None,
         benchmarks: BTreeSet::new(),
         run: vec!["/bin/sh".to_owned(), "hook.sh".to_owned()],

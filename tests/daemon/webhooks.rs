@@ -399,6 +399,104 @@ async fn an_alert_goes_over_tls_to_who_can_prove_its_name_by_a_trusted_authority
     assert_eq!(secured.receiver.got().len(), 1);
 }
 
+fn ended(mut alert: Alert, time: &str) -> Alert {
+    alert.state = AlertState::Resolved;
+    alert.event.time = time.parse().unwrap();
+    alert
+}
+
+const KEY: &str = "5/red/2017-06-06T17:00:00Z";
+
+#[tokio::test]
+async fn alertmanager_gets_a_list_with_the_same_labels_when_an_alert_fires_and_when_it_ends() {
+    let folder = tempfile::tempdir().unwrap();
+    let receiver = Receiver::answering(&[200]);
+    let table = format!(
+        "[[webhook]]\nurl = \"{}\"\nformat = \"alertmanager\"\n",
+        receiver.url
+    );
+    let hook = webhooks(folder.path(), &table).remove(0);
+    let end = ended(alert("5", KEY), "2017-06-09T05:00:00Z");
+    for alert in [&alert("5", KEY), &end] {
+        assert_eq!(deliver::run(&hook, alert, 1).await, Outcome::Done);
+    }
+    let got = receiver.got();
+    assert!(!got[0].headers.contains_key("webhook-signature"));
+    let bodies = got
+        .iter()
+        .map(|one| serde_json::from_str(&one.body).unwrap());
+    let bodies: Vec<serde_json::Value> = bodies.collect();
+    let (fires, ends) = (&bodies[0][0], &bodies[1][0]);
+    assert_eq!(fires["labels"], ends["labels"]);
+    assert_eq!(fires["labels"]["benchmark"], "5");
+    assert_eq!(fires["labels"]["level"], "red");
+    assert_eq!(fires["labels"]["status"], "Actual");
+    for one in [fires, ends] {
+        assert_eq!(one["startsAt"], "2017-06-06T17:00:00Z");
+    }
+    // Without an end it would be over five minutes later.
+    assert_eq!(fires["endsAt"], "2018-06-06T17:00:00Z");
+    assert_eq!(ends["endsAt"], "2017-06-09T05:00:00Z");
+}
+
+#[tokio::test]
+#[cfg_attr(not(has_alertmanager), ignore = "there is no prometheus-alertmanager")]
+async fn a_real_alertmanager_has_the_alert_in_force_until_its_end_comes() {
+    let folder = tempfile::tempdir().unwrap();
+    let free = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = free.local_addr().unwrap().to_string();
+    drop(free);
+    let config = "route: {receiver: nobody}\nreceivers: [{name: nobody}]\n";
+    std::fs::write(folder.path().join("am.yml"), config).unwrap();
+    let mut program = Command::new("prometheus-alertmanager")
+        .args([
+            "--config.file=am.yml",
+            "--storage.path=am",
+            "--cluster.listen-address=",
+        ])
+        .arg(format!("--web.listen-address={address}"))
+        .current_dir(folder.path())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    eventually("that it listens", || {
+        std::net::TcpStream::connect(&address).is_ok()
+    })
+    .await;
+    let table = format!(
+        "[[webhook]]\nurl = \"http://{address}/api/v2/alerts\"\nformat = \"alertmanager\"\n"
+    );
+    let hook = webhooks(folder.path(), &table).remove(0);
+    let in_force = || {
+        let mut stream = std::net::TcpStream::connect(&address).unwrap();
+        let ask = "GET /api/v2/alerts?active=true HTTP/1.0\r\nHost: localhost\r\n\r\n";
+        stream.write_all(ask.as_bytes()).unwrap();
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).unwrap();
+        let body = answer.split_once("\r\n\r\n").unwrap().1.to_owned();
+        let alerts: serde_json::Value = serde_json::from_str(&body).unwrap();
+        let alerts = alerts.as_array().unwrap().clone();
+        alerts
+            .into_iter()
+            .map(|one| one["labels"]["key"].clone())
+            .collect::<Vec<_>>()
+    };
+    // It takes what is in force by its own clock.
+    let now = slipwatch::runtime::clock::now();
+    let mut fires = alert("5", &format!("5/red/{now}"));
+    fires.event.time = now;
+    let end = ended(fires.clone(), &now.to_string());
+    let outcome = deliver::run(&hook, &fires, 1).await;
+    let held = in_force();
+    let ended = deliver::run(&hook, &end, 1).await;
+    eventually("that it is over", || in_force().is_empty()).await;
+    program.kill().unwrap();
+    program.wait().unwrap();
+    assert_eq!((outcome, ended), (Outcome::Done, Outcome::Done));
+    assert_eq!(held, [format!("5/red/{now}")]);
+}
+
 #[test]
 fn a_config_says_what_is_wrong_with_a_webhook() {
     for (table, what) in [
@@ -424,6 +522,7 @@ fn a_config_says_what_is_wrong_with_a_webhook() {
             webhook("http://a/", "").repeat(2),
             "two webhooks \"http://a/\"",
         ),
+        (webhook("http://a/", "format = \"xml\""), "webhook.format"),
         (
             "[[webhook]]\nurl = \"http://a/\"\n".to_owned(),
             "webhook.secret_file",

@@ -271,10 +271,11 @@ impl Dispatcher {
 }
 
 impl HookConfig {
-    /// What logs and receipts call it: its command line, or the webhook's name.
+    /// What logs and receipts call it: its command line, the webhook's name, or `cap` and the folder.
     pub fn name(&self) -> String {
-        let own = self.webhook.as_ref().map(|webhook| webhook.name.clone());
-        own.unwrap_or_else(|| self.run.join(" "))
+        let webhook = self.webhook.as_ref().map(|webhook| webhook.name.clone());
+        let cap = (self.cap.as_ref()).map(|cap| format!("cap {}", cap.folder.display()));
+        webhook.or(cap).unwrap_or_else(|| self.run.join(" "))
     }
 
     /// Whether it is notified only of what nobody acknowledges in time.
