@@ -263,12 +263,9 @@ fn address(section: &Section<'_>, url: &Placed<String>) -> Option<hyper::Uri> {
     let Ok(address) = url.value.parse::<hyper::Uri>() else {
         return refuse("is no address", "write it as in \"http://host:port/path\"");
     };
-    match address.scheme_str() {
-        Some("http" | "https") => {}
-        Some(_) | None => {
-            let fix = "write it as in \"https://host/path\" or \"http://host:port/path\"";
-            return refuse("is neither http nor https", fix);
-        }
+    if !matches!(address.scheme_str(), Some("http" | "https")) {
+        let fix = "write it as in \"https://host/path\" or \"http://host:port/path\"";
+        return refuse("is neither http nor https", fix);
     }
     let has_user = (address.authority()).is_some_and(|one| one.as_str().contains('@'));
     if address.host().is_none_or(str::is_empty) {

@@ -100,7 +100,7 @@ fn ordered(node: Node<'_, '_>, order: &[&str]) {
     let elements = node.children().filter(Node::is_element);
     let names = elements.map(|one| one.tag_name().name().to_owned());
     let known = names.filter(|name| !["info", "area"].contains(&name.as_str()));
-    let places = known.map(|name| order.iter().position(|one| *one == name).expect(&name));
+    let places = known.map(|name| order.iter().position(|one| *one == name).unwrap());
     assert!(places.is_sorted(), "{node:?}");
 }
 

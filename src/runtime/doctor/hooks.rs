@@ -21,7 +21,7 @@ pub(super) fn finding(hook: &HookConfig) -> Finding {
         let secret = webhook.secret_file.as_deref().map(Secret::read).transpose();
         let secret = secret.map_err(|error| error.to_string());
         let trusted = webhook.ca_file.as_deref().map(tls::own).transpose();
-        let (verdict, text) = match secret.and_then(|_| trusted) {
+        let (verdict, text) = match secret.and(trusted) {
             Ok(_) => (
                 Verdict::Good,
                 format!("{name} has what it needs; hook test sends to it"),

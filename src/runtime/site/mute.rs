@@ -58,11 +58,11 @@ impl Site {
                 benchmark, until, ..
             } => {
                 let level = self.monitor.level(benchmark).unwrap_or(Level::Green);
-                self.mute(Some(benchmark.clone()), Some(level), *until);
+                self.mute(Some(benchmark), Some(level), *until);
             }
             Order::Silence {
                 benchmark, until, ..
-            } => self.mute(benchmark.clone(), None, *until),
+            } => self.mute(benchmark.as_ref(), None, *until),
             Order::Unsilence { benchmark, .. } => {
                 let ends = |mute: &Mute| benchmark.is_none() || mute.benchmark == *benchmark;
                 self.mutes.retain(|mute| !ends(mute));
@@ -70,15 +70,15 @@ impl Site {
         }
     }
 
-    fn mute(&mut self, benchmark: Option<BenchmarkId>, up_to: Option<Level>, until: Timestamp) {
+    fn mute(&mut self, benchmark: Option<&BenchmarkId>, up_to: Option<Level>, until: Timestamp) {
         self.mutes.push(Mute {
-            benchmark: benchmark.clone(),
+            benchmark: benchmark.cloned(),
             up_to,
             until,
         });
         let excess = self.mutes.len().saturating_sub(MOST);
         self.mutes.drain(..excess);
-        self.spare_what_is_muted(benchmark.as_ref(), up_to);
+        self.spare_what_is_muted(benchmark, up_to);
     }
 
     /// Whoever has an alert shelved or silenced sees to it: it is not escalated.
