@@ -14,7 +14,11 @@ use std::process::{Command, Stdio};
 const MEASURED: &str = "../shared/data";
 
 /// The name of a condition, and commands of which one must succeed.
-const TOOLS: [(&str, &[&[&str]]); 8] = [
+const TOOLS: [(&str, &[&[&str]]); 9] = [
+    (
+        "has_alertmanager",
+        &[&["prometheus-alertmanager", "--version"]],
+    ),
     (
         "has_cargo_deb",
         &[&["sh", "-c", "cargo-deb --version && dpkg-deb --version"]],
@@ -80,6 +84,12 @@ fn main() {
     let mut libraries = named.split(':').chain(LIBRARIES);
     let has_plugin = libraries.any(|folder| watched(&Path::new(folder).join(BROKER_PLUGIN)));
     condition("has_mosquitto_plugin", has_mosquitto && has_plugin);
+    // The schema is OASIS's and is not redistributed here.
+    println!("cargo::rerun-if-env-changed=SLIPWATCH_CAP_SCHEMA");
+    let schema = env::var_os("SLIPWATCH_CAP_SCHEMA").map(PathBuf::from);
+    let has_schema = schema.is_some_and(|file| watched(&file));
+    let has_xmllint = succeeds(&["xmllint", "--version"]);
+    condition("has_cap_schema", has_schema && has_xmllint);
     let is_root = fs::metadata("/proc/self").is_ok_and(|process| process.uid() == 0);
     condition("is_root", is_root);
     // Whether a tracer may attach to a process that it has not started.

@@ -2,6 +2,7 @@
 //!
 //! This module never sees a parameter of the law, only chances and observed motion.
 
+mod advice;
 mod latch;
 mod policy;
 mod rules;

@@ -1,5 +1,6 @@
 //! The commands, their flags and their exit codes.
 
+mod alerts;
 pub mod args;
 mod check;
 mod completions;
@@ -49,7 +50,7 @@ enum Command {
     Replay(replay::Args),
     Status(status::StatusArgs),
     Events(state::EventsArgs),
-    Alerts(state::AlertsArgs),
+    Alerts(alerts::AlertsArgs),
     Backup(state::BackupArgs),
     Fit(fit::Args),
     Sweep(sweep::Args),
@@ -78,7 +79,7 @@ pub fn main() -> ExitCode {
             Command::Replay(args) => replay::run(&args),
             Command::Status(args) => status::status(&args),
             Command::Events(args) => state::events(&args),
-            Command::Alerts(args) => state::alerts(&args),
+            Command::Alerts(args) => alerts::run(&args),
             Command::Backup(args) => state::backup(&args),
             Command::Fit(args) => fit::run(&args),
             Command::Sweep(args) => sweep::run(&args),

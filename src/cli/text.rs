@@ -2,7 +2,7 @@
 
 use crate::effects::{Kind, Rival};
 use crate::monitor::{
-    AlertState, Event, EventKind, FailureTime, SharedFailure, Summary, Unexplained,
+    AlertState, Event, EventKind, FailureTime, Given, SharedFailure, Summary, Unexplained,
 };
 use crate::reading::{BenchmarkId, Timestamp};
 use jiff::tz::TimeZone;
@@ -146,7 +146,11 @@ fn what(kind: &EventKind) -> String {
         EventKind::Fault { kind, text } => format!("fault {kind}: {text}"),
         EventKind::Declared { text, .. } => format!("declared: {text}"),
         EventKind::Correction { text, .. } => format!("correction: {text}"),
-        EventKind::Order { order, until, by } => ordered(order, *until, by.as_deref()),
+        EventKind::Order {
+            order,
+            until,
+            given,
+        } => ordered(order, *until, given),
         EventKind::Summary(Summary {
             readings,
             refits,
@@ -167,10 +171,11 @@ fn together(groups: &[SharedFailure]) -> String {
     format!("failure times: {}", each.collect::<Vec<_>>().join("; "))
 }
 
-fn ordered(order: &str, until: Option<Timestamp>, by: Option<&str>) -> String {
+fn ordered(order: &str, until: Option<Timestamp>, given: &Given) -> String {
     let until = until.map_or_else(String::new, |until| format!(" until {}", minute(until)));
-    let by = by.map_or_else(String::new, |by| format!(" by {by}"));
-    format!("{order}{by}{until}")
+    let by = (given.by.as_ref()).map_or_else(String::new, |by| format!(" by {by}"));
+    let why = (given.why.as_ref()).map_or_else(String::new, |why| format!(": {why}"));
+    format!("{order}{by}{until}{why}")
 }
 
 fn unexplained(what: &Unexplained) -> String {

@@ -56,6 +56,7 @@ pub fn check(file: &Path) -> Result<Summary, ConfigError> {
             .chain(slow_sampling(&config))
             .chain(untold(&config))
             .chain(unknown_benchmarks(&config))
+            .chain(only_escalated(&config))
             .map(|what| format!("{place}: warning: {what}")),
     );
     Ok(Summary {
@@ -81,8 +82,22 @@ fn missing_folder(source: &Source) -> Option<String> {
 
 fn missing_program(hook: &HookConfig) -> Option<String> {
     if let Some(webhook) = &hook.webhook {
-        let error = Secret::read(&webhook.secret_file).err()?;
+        let secret = webhook.secret_file.as_deref();
+        let secret = secret.and_then(|file| Secret::read(file).err());
+        let secret = secret.map(|error| error.to_string());
+        let unreadable = |file: &PathBuf| {
+            let error = std::fs::File::open(file).err()?;
+            Some(format!(
+                "cannot read the ca_file {}: {error}",
+                file.display()
+            ))
+        };
+        let error = secret.or_else(|| webhook.ca_file.as_ref().and_then(unreadable))?;
         return Some(format!("webhook: {error}; alerts would go nowhere"));
+    }
+    if hook.cap.is_some() {
+        // It is made when the first message is written.
+        return None;
     }
     let program = hook.program();
     let named_by_path = program.components().count() > 1;
@@ -111,6 +126,25 @@ fn untold(config: &Config) -> Vec<String> {
         if !is_notified(level) {
             lines.push(format!(
                 "no hook has {level} among its levels: nobody is notified that {meaning}"
+            ));
+        }
+    }
+    lines
+}
+
+/// Levels of which the first notification comes only when nobody has acknowledged what nobody was notified of.
+fn only_escalated(config: &Config) -> Vec<String> {
+    let mut lines = Vec::new();
+    for level in [Level::Yellow, Level::Orange, Level::Red, Level::Unknown] {
+        let asked = || {
+            config
+                .hooks
+                .iter()
+                .filter(|hook| hook.levels.contains(&level))
+        };
+        if asked().count() > 0 && asked().all(|hook| hook.escalate_after.is_some()) {
+            lines.push(format!(
+                "every hook that has {level} among its levels has escalate_after: nobody is notified of it at once"
             ));
         }
     }

@@ -1,7 +1,7 @@
-//! `[[hook]]` and `[[webhook]]`: whom alerts are sent to, and which.
+//! `[[hook]]`, `[[webhook]]` and `[[cap]]`: whom alerts are sent to, and which.
 
 use super::table::{Placed, Section};
-use super::{HookConfig, Webhook, value};
+use super::{CapFolder, HookConfig, Webhook, WebhookFormat, value};
 use crate::alert::Level;
 use crate::reading::BenchmarkId;
 use std::collections::BTreeSet;
@@ -20,7 +20,11 @@ pub(super) fn hooks(root: &mut Section<'_>, base: &Path) -> Vec<HookConfig> {
     for section in root.tables("webhook", "webhook") {
         hooks.extend(webhook(section, base, &mut taken));
     }
-    if hooks.is_empty() && !root.has("hook") && !root.has("webhook") {
+    for section in root.tables("cap", "cap") {
+        hooks.extend(cap(section, base, &mut taken));
+    }
+    unlike(root, &hooks);
+    if hooks.is_empty() && ["hook", "webhook", "cap"].iter().all(|key| !root.has(key)) {
         root.warning(
             root.at(),
             "there is no [[hook]]: nobody is notified of an alert".to_owned(),
@@ -30,12 +34,31 @@ pub(super) fn hooks(root: &mut Section<'_>, base: &Path) -> Vec<HookConfig> {
     hooks
 }
 
+/// The outbox knows a hook by its command line: one that is run at once and again later needs two.
+fn unlike(root: &Section<'_>, hooks: &[HookConfig]) {
+    let later = hooks.iter().filter(|hook| hook.escalate_after.is_some());
+    for hook in later.filter(|hook| !hook.run.is_empty()) {
+        if hooks.iter().filter(|one| one.run == hook.run).count() > 1 {
+            root.error(
+                root.at(),
+                format!(
+                    "two hooks run {:?}, one of them with escalate_after: they cannot be told apart",
+                    hook.run.join(" ")
+                ),
+                "give one of them an argument of its own, as in run = [\"./notify.sh\", \"escalation\"]",
+            );
+            return;
+        }
+    }
+}
+
 /// What a program and a webhook have in common.
 struct Common {
     levels: Vec<Level>,
     benchmarks: BTreeSet<BenchmarkId>,
     site: bool,
     timeout: Duration,
+    escalate_after: Option<Duration>,
 }
 
 fn common(section: &mut Section<'_>) -> Common {
@@ -54,6 +77,7 @@ fn common(section: &mut Section<'_>) -> Common {
     }
     let benchmarks = benchmarks.map_or_else(Vec::new, |given| given.value);
     let timeout = section.parsed("timeout", value::duration);
+    let escalate_after = section.parsed("escalate_after", value::duration);
     Common {
         levels: levels(section),
         benchmarks: (benchmarks.into_iter())
@@ -61,6 +85,7 @@ fn common(section: &mut Section<'_>) -> Common {
             .collect(),
         site: section.switch("site").unwrap_or(false),
         timeout: timeout.map_or(TIMEOUT, |given| given.value.unsigned_abs()),
+        escalate_after: escalate_after.map(|given| given.value.unsigned_abs()),
     }
 }
 
@@ -89,10 +114,12 @@ fn program(mut section: Section<'_>, base: &Path) -> Option<HookConfig> {
     Some(HookConfig {
         run: run?.value.into_iter().map(|word| word.value).collect(),
         webhook: None,
+        cap: None,
         levels: common.levels,
         benchmarks: common.benchmarks,
         site: common.site,
         timeout: common.timeout,
+        escalate_after: common.escalate_after,
         folder: base.to_owned(),
         sandbox,
         writable: (writable.iter().map(|path| base.join(&path.value))).collect(),
@@ -109,7 +136,23 @@ fn webhook(
     let url = section.required("url", example);
     let address = url.as_ref().and_then(|url| address(&section, url));
     let name = section.text("name");
-    let secret = section.required("secret_file", "\"webhook.secret\"");
+    let format = section.parsed("format", WebhookFormat::parse);
+    let format = format.map_or(WebhookFormat::Slipwatch, |given| given.value);
+    let secret = match format {
+        WebhookFormat::Slipwatch => section.required("secret_file", "\"webhook.secret\""),
+        // It checks no signature.
+        WebhookFormat::Alertmanager => section.text("secret_file"),
+    };
+    let ca_file = section.text("ca_file");
+    if let Some(given) = &ca_file
+        && address.as_ref().and_then(hyper::Uri::scheme_str) == Some("http")
+    {
+        section.error(
+            &given.at,
+            "webhook.ca_file without TLS trusts nobody".to_owned(),
+            "leave it out, or write url = \"https://...\"",
+        );
+    }
     let common = common(&mut section);
     if let Some(one) = name.as_ref().or(url.as_ref())
         && !taken.insert(one.value.clone())
@@ -127,17 +170,88 @@ fn webhook(
         webhook: Some(Webhook {
             name: name.map_or(url, |given| given.value),
             address,
-            secret_file: base.join(secret?.value),
+            ca_file: ca_file.map(|given| base.join(given.value)),
+            format,
+            secret_file: secret.map(|given| base.join(given.value)),
         }),
+        cap: None,
         levels: common.levels,
         benchmarks: common.benchmarks,
         site: common.site,
         timeout: common.timeout,
+        escalate_after: common.escalate_after,
         folder: base.to_owned(),
         sandbox: false,
         writable: Vec::new(),
         launcher: None,
     })
+}
+
+fn cap(mut section: Section<'_>, base: &Path, taken: &mut BTreeSet<String>) -> Option<HookConfig> {
+    let folder = section.required("folder", "\"cap\"");
+    let sender = section.required("sender", "\"slipwatch@example.org\"");
+    let area = section.required("area", "\"the north slope of Monte Toc\"");
+    let polygon = section.parsed("polygon", polygon);
+    let common = common(&mut section);
+    if let Some(one) = &folder
+        && !taken.insert(format!("cap {}", one.value))
+    {
+        section.error(
+            &one.at,
+            format!("there are two [[cap]] with the folder {:?}", one.value),
+            "give each its own folder",
+        );
+    }
+    if let Some(one) = &sender
+        && (one.value.is_empty() || one.value.contains([' ', ',', '<', '&']))
+    {
+        section.error(
+            &one.at,
+            format!("cap.sender = {:?} has a blank, a comma, < or &", one.value),
+            "write it as in \"slipwatch@example.org\"",
+        );
+    }
+    section.finish();
+    Some(HookConfig {
+        run: Vec::new(),
+        webhook: None,
+        cap: Some(CapFolder {
+            folder: base.join(folder?.value),
+            sender: sender?.value,
+            area: area?.value,
+            polygon: polygon.map(|given| given.value),
+        }),
+        levels: common.levels,
+        benchmarks: common.benchmarks,
+        site: common.site,
+        timeout: common.timeout,
+        escalate_after: common.escalate_after,
+        folder: base.to_owned(),
+        sandbox: false,
+        writable: Vec::new(),
+        launcher: None,
+    })
+}
+
+/// An outline as CAP writes it.
+fn polygon(text: &str) -> Result<String, String> {
+    let fix = || {
+        "write four or more pairs of latitude,longitude in degrees, the first one again at the end: \
+         \"46.27,12.33 46.28,12.35 46.26,12.36 46.27,12.33\""
+            .to_owned()
+    };
+    let point = |pair: &str| {
+        let (latitude, longitude) = pair.split_once(',')?;
+        let (latitude, longitude): (f64, f64) = (latitude.parse().ok()?, longitude.parse().ok()?);
+        (latitude.abs() <= 90.0 && longitude.abs() <= 180.0).then_some((latitude, longitude))
+    };
+    let pairs: Vec<&str> = text.split_whitespace().collect();
+    let is_closed = pairs.len() >= 4 && pairs.first() == pairs.last();
+    if is_closed && pairs.iter().all(|pair| point(pair).is_some()) {
+        Ok(pairs.join(" "))
+    } else {
+        Err(fix())
+    }
 }
 
 fn address(section: &Section<'_>, url: &Placed<String>) -> Option<hyper::Uri> {
@@ -149,17 +263,9 @@ fn address(section: &Section<'_>, url: &Placed<String>) -> Option<hyper::Uri> {
     let Ok(address) = url.value.parse::<hyper::Uri>() else {
         return refuse("is no address", "write it as in \"http://host:port/path\"");
     };
-    match address.scheme_str() {
-        Some("http") => {}
-        Some("https") => {
-            return refuse(
-                "asks for TLS, which webhooks do not have yet",
-                "send to a relay on this machine over http, or use a [[hook]] that calls curl",
-            );
-        }
-        Some(_) | None => {
-            return refuse("is not http", "write it as in \"http://host:port/path\"");
-        }
+    if !matches!(address.scheme_str(), Some("http" | "https")) {
+        let fix = "write it as in \"https://host/path\" or \"http://host:port/path\"";
+        return refuse("is neither http nor https", fix);
     }
     let has_user = (address.authority()).is_some_and(|one| one.as_str().contains('@'));
     if address.host().is_none_or(str::is_empty) {

@@ -52,7 +52,7 @@ pub struct Config {
     pub benchmarks: Vec<Benchmark>,
     /// `[alert]` and the benchmarks' own, `[explain]` and `[[event]]`, as the monitor takes them.
     pub settings: Settings,
-    /// `[[hook]]` and `[[webhook]]`.
+    /// `[[hook]]`, `[[webhook]]` and `[[cap]]`.
     pub hooks: Vec<HookConfig>,
     /// What is doubtful, but not refused.
     pub warnings: Vec<Problem>,
@@ -144,25 +144,66 @@ pub struct Benchmark {
 pub struct Webhook {
     /// What logs and receipts call it.
     pub name: String,
-    /// Where to, over plain HTTP.
+    /// Where to, by `http` or `https`.
     pub address: hyper::Uri,
-    /// The file with the secret that signs what is sent.
-    pub secret_file: PathBuf,
+    /// The certificate authorities that are trusted instead of the machine's own, PEM.
+    pub ca_file: Option<PathBuf>,
+    /// What is sent.
+    pub format: WebhookFormat,
+    /// The file with the secret that signs what is sent; never absent of our own format.
+    pub secret_file: Option<PathBuf>,
 }
 
-/// `[[hook]]`: a program to run when a level is entered or left; or `[[webhook]]`.
+/// What a webhook sends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WebhookFormat {
+    /// The JSON that hooks get.
+    Slipwatch,
+    /// What Prometheus Alertmanager takes at `/api/v2/alerts`.
+    Alertmanager,
+}
+
+impl WebhookFormat {
+    /// By the word in the config.
+    fn parse(word: &str) -> Result<Self, String> {
+        match word {
+            "slipwatch" => Ok(Self::Slipwatch),
+            "alertmanager" => Ok(Self::Alertmanager),
+            _ => Err("write \"slipwatch\" or \"alertmanager\"".to_owned()),
+        }
+    }
+}
+
+/// `[[cap]]`: a folder for messages of the Common Alerting Protocol.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CapFolder {
+    /// The folder.
+    pub folder: PathBuf,
+    /// Who sends: a name that is unique in the world, such as an address.
+    pub sender: String,
+    /// What the area is called.
+    pub area: String,
+    /// Its outline, as CAP writes it: pairs of latitude and longitude, the first one again at the end.
+    pub polygon: Option<String>,
+}
+
+/// `[[hook]]`: a program to run when a level is entered or left; or `[[webhook]]`, or `[[cap]]`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct HookConfig {
     /// The program and its arguments; none of a webhook.
     pub run: Vec<String>,
     /// Where to send to instead of running a program.
     pub webhook: Option<Webhook>,
+    /// Where to write messages to instead of running a program.
+    pub cap: Option<CapFolder>,
     /// Which levels it is run for.
     pub levels: Vec<Level>,
     /// Of which benchmarks it is notified; none: of all.
     pub benchmarks: BTreeSet<BenchmarkId>,
     /// Whether it is notified of the whole site's level, and of nothing else; of its benchmarks' else.
     pub site: bool,
+    /// It is notified only of what nobody has acknowledged within this time; `None`: of everything, at once.
+    pub escalate_after: Option<Duration>,
     /// After this it is killed.
     pub timeout: Duration,
     /// Where it runs: the config's folder.

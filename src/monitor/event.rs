@@ -1,5 +1,6 @@
 //! What the monitor says: one JSON object a line, in data time, nothing from the wall clock.
 
+use super::given::Given;
 use crate::alert::Level;
 use crate::effects::{Explained, Form, Kind, Rival};
 use crate::reading::{BenchmarkId, Timestamp};
@@ -171,8 +172,9 @@ pub enum EventKind {
         order: String,
         /// Until when, by the wall clock.
         until: Option<Timestamp>,
-        /// Who.
-        by: Option<String>,
+        /// Who, why, over which door.
+        #[serde(flatten)]
+        given: Given,
     },
     /// The end of a replay.
     Summary(Summary),

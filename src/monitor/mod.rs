@@ -6,6 +6,7 @@ mod covariates;
 mod declared;
 mod drift;
 mod event;
+mod given;
 mod history;
 mod kept;
 mod motion;
@@ -27,6 +28,7 @@ pub use event::{
     AlertState, Event, EventKind, FailureTime, InverseVelocity, Plain, RegimeReport, SUSPECT,
     SUSPECT_ENDS, SharedFailure, Summary, Unexplained,
 };
+pub use given::{Door, Given};
 pub(crate) use motion::recent;
 pub use notice::{CLOCK_FAULT, Notice};
 pub use order::Order;

@@ -1,6 +1,7 @@
 //! What people order of the monitor: it keeps them as it keeps readings, so that a replay has them too.
 
 use super::event::{Event, EventKind};
+use super::given::Given;
 use crate::reading::{BenchmarkId, Timestamp};
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
@@ -13,8 +14,9 @@ pub enum Order {
     Acknowledge {
         /// Where; `None`: everywhere.
         benchmark: Option<BenchmarkId>,
-        /// Who.
-        by: Option<String>,
+        /// Who, why, over which door.
+        #[serde(flatten)]
+        given: Given,
     },
     /// The level in force at a benchmark, and lower ones, are not reported until then; a higher one is, at once.
     Shelve {
@@ -22,9 +24,9 @@ pub enum Order {
         benchmark: BenchmarkId,
         /// Until when, by the wall clock.
         until: Timestamp,
-        /// Who.
-        #[serde(default)]
-        by: Option<String>,
+        /// Who, why, over which door.
+        #[serde(flatten)]
+        given: Given,
     },
     /// Nothing is reported until then; what is in force at its end is reported at its end.
     Silence {
@@ -32,17 +34,17 @@ pub enum Order {
         benchmark: Option<BenchmarkId>,
         /// Until when, by the wall clock.
         until: Timestamp,
-        /// Who.
-        #[serde(default)]
-        by: Option<String>,
+        /// Who, why, over which door.
+        #[serde(flatten)]
+        given: Given,
     },
     /// What was shelved or silenced is reported again from now on.
     Unsilence {
         /// Where; `None`: everywhere.
         benchmark: Option<BenchmarkId>,
-        /// Who.
-        #[serde(default)]
-        by: Option<String>,
+        /// Who, why, over which door.
+        #[serde(flatten)]
+        given: Given,
     },
 }
 
@@ -54,11 +56,11 @@ impl Order {
 
     /// That it was given.
     pub(super) fn event(&self, time: Timestamp) -> Event {
-        let (order, until, by) = match self {
-            Self::Acknowledge { by, .. } => ("acknowledge", None, by),
-            Self::Shelve { until, by, .. } => ("shelve", Some(*until), by),
-            Self::Silence { until, by, .. } => ("silence", Some(*until), by),
-            Self::Unsilence { by, .. } => ("unsilence", None, by),
+        let (order, until, given) = match self {
+            Self::Acknowledge { given, .. } => ("acknowledge", None, given),
+            Self::Shelve { until, given, .. } => ("shelve", Some(*until), given),
+            Self::Silence { until, given, .. } => ("silence", Some(*until), given),
+            Self::Unsilence { given, .. } => ("unsilence", None, given),
         };
         Event {
             time,
@@ -66,7 +68,7 @@ impl Order {
             kind: EventKind::Order {
                 order: order.to_owned(),
                 until,
-                by: by.clone(),
+                given: given.clone(),
             },
         }
     }

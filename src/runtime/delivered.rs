@@ -1,8 +1,10 @@
 //! Which alerts have reached which hook: as it stands in the state, and what found no room there yet.
 
+use super::clock;
 use super::hook::{Alert, state_name};
 use crate::store::{Delivery, Fate, Store, StoreError};
-use std::collections::BTreeSet;
+use jiff::Timestamp;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Receipts that may wait for room on the disk.
@@ -14,8 +16,8 @@ type Receipt = (String, &'static str, &'static str, String);
 /// The receipts of all hooks: in the state or, for a replay, only in memory.
 #[derive(Debug, Default)]
 pub struct Delivered {
-    /// What was taken while this program ran.
-    taken: BTreeSet<Receipt>,
+    /// What came to its end while this program ran: taken, or acknowledged in time.
+    ended: BTreeMap<Receipt, Fate>,
     unwritten: Vec<(Delivery, Fate)>,
     store: Option<Arc<Store>>,
 }
@@ -32,6 +34,7 @@ pub(super) fn delivery(alert: &Alert, hook: &str) -> Result<Delivery, StoreError
         state: state_name(alert.state).to_owned(),
         hook: hook.to_owned(),
         time: alert.event.time,
+        noted: clock::now(),
         body: body.map_err(|error| StoreError::Unreadable(error.to_string()))?,
     })
 }
@@ -45,22 +48,37 @@ impl Delivered {
         }
     }
 
-    /// Whether `hook` has taken this alert.
+    /// Whether `hook` has taken this alert, or is not to get it because somebody acknowledged it in time.
     pub fn has(&self, alert: &Alert, hook: &str) -> bool {
+        self.was_told(alert, hook) || self.stands(alert, hook, Fate::Acknowledged)
+    }
+
+    /// Whether `hook` has taken this alert.
+    pub(super) fn was_told(&self, alert: &Alert, hook: &str) -> bool {
+        self.stands(alert, hook, Fate::Delivered)
+    }
+
+    /// When `hook` was first to get this alert, by the host's clock; `None` where no state says it.
+    pub(super) fn noted(&self, alert: &Alert, hook: &str) -> Option<Timestamp> {
+        let identity = (
+            alert.key.as_str(),
+            alert.level.name(),
+            state_name(alert.state),
+        );
+        self.store.as_ref()?.noted(identity, hook).ok()?
+    }
+
+    /// Whether this alert has come to this end at `hook`.
+    fn stands(&self, alert: &Alert, hook: &str, fate: Fate) -> bool {
         let (level, state) = (alert.level.name(), state_name(alert.state));
-        if self
-            .taken
-            .contains(&(alert.key.clone(), level, state, hook.to_owned()))
-        {
-            return true;
+        let receipt = (alert.key.clone(), level, state, hook.to_owned());
+        if let Some(ended) = self.ended.get(&receipt) {
+            return *ended == fate;
         }
-        let stored = self.store.as_ref().map(|store| {
-            store.is_noted(
-                (&alert.key, level, state),
-                Some(hook),
-                Some(Fate::Delivered),
-            )
-        });
+        let stored = self
+            .store
+            .as_ref()
+            .map(|store| store.is_noted((&alert.key, level, state), Some(hook), Some(fate)));
         // Twice is better than never.
         stored.is_some_and(|stored| stored.unwrap_or(false))
     }
@@ -83,10 +101,10 @@ impl Delivered {
     /// # Errors
     /// When that cannot be made durable; the alert may then be sent once more, after a restart, with the same key.
     pub fn note(&mut self, alert: &Alert, hook: &str, fate: Fate) -> Result<(), StoreError> {
-        if fate == Fate::Delivered {
+        if matches!(fate, Fate::Delivered | Fate::Acknowledged) {
             let (level, state) = (alert.level.name(), state_name(alert.state));
-            self.taken
-                .insert((alert.key.clone(), level, state, hook.to_owned()));
+            self.ended
+                .insert((alert.key.clone(), level, state, hook.to_owned()), fate);
         }
         if self.store.is_some() && self.unwritten.len() < MOST_UNWRITTEN {
             self.unwritten.push((delivery(alert, hook)?, fate));

@@ -13,8 +13,8 @@ type Token = (String, Level, &'static str);
 struct Entry {
     benchmark: Option<BenchmarkId>,
     state: AlertState,
-    /// No other alert reports what it reports.
-    stands_alone: bool,
+    /// The alert itself where it reports many benchmarks at once: no other one reports what it reports.
+    of_many: Option<Box<Alert>>,
     /// A hook's run for it has begun.
     is_tried: bool,
     /// Superseded, or resolved: not worth another attempt.
@@ -35,12 +35,25 @@ impl InHand {
         let entry = Entry {
             benchmark: alert.event.benchmark.clone(),
             state: alert.state,
-            stands_alone: alert.is_flood(),
+            of_many: alert.is_flood().then(|| Box::new(alert.clone())),
             is_tried: false,
             is_over: false,
         };
         self.0.insert(token, entry);
         true
+    }
+
+    /// Whether a run for it has begun.
+    pub(super) fn was_tried(&self, alert: &Alert) -> bool {
+        self.0
+            .get(&token(alert))
+            .is_some_and(|entry| entry.is_tried)
+    }
+
+    /// The alerts that report many benchmarks at once.
+    pub(super) fn of_many(&self) -> Vec<Alert> {
+        let of_many = self.0.values().filter_map(|entry| entry.of_many.as_deref());
+        of_many.cloned().collect()
     }
 
     /// A run for it begins.
@@ -92,7 +105,11 @@ impl InHand {
         if alert.is_flood() {
             return;
         }
-        for (token, entry) in self.0.iter_mut().filter(|(_, entry)| !entry.stands_alone) {
+        for (token, entry) in self
+            .0
+            .iter_mut()
+            .filter(|(_, entry)| entry.of_many.is_none())
+        {
             let same_place = entry.benchmark == alert.event.benchmark
                 && (token.1 == Level::Unknown) == (alert.level == Level::Unknown);
             // An end does not make an earlier end untrue; a new beginning does.

@@ -1,6 +1,8 @@
 //! The thin shell around the monitor: clock, files, signals, hooks.
 
+mod alertmanager;
 mod archive;
+mod cap;
 pub mod clock;
 pub mod daemon;
 pub mod deliver;
@@ -12,6 +14,7 @@ mod in_hand;
 pub mod ingest;
 pub mod log;
 pub mod mqtt;
+pub mod origin;
 pub mod preview;
 pub mod progress;
 pub mod pulse;
@@ -27,6 +30,7 @@ pub mod site;
 pub mod sources;
 pub mod standing;
 pub mod tail;
+mod tls;
 pub mod view;
 pub mod vitals;
 mod webhook;

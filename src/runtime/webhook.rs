@@ -2,6 +2,7 @@
 
 use super::clock;
 use super::hook::{Alert, Outcome, state_name};
+use super::tls;
 use crate::config::{Secret, Webhook};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -14,6 +15,7 @@ use hyper_util::rt::TokioIo;
 use sha2::Sha256;
 use std::fmt::Write as _;
 use std::time::Duration;
+use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::TcpStream;
 
 /// Who calls.
@@ -68,21 +70,27 @@ fn request(
     alert: &Alert,
     body: Vec<u8>,
 ) -> Result<Request<Full<Bytes>>, String> {
-    let key = Secret::read(&webhook.secret_file).map_err(|error| error.to_string())?;
     let (id, timestamp) = (id(alert), clock::now().as_second());
-    let signature =
-        signature(key.bytes(), (&id, timestamp), &body).ok_or("the secret is unusable")?;
+    let signed = webhook.secret_file.as_deref().map(|file| {
+        let key = Secret::read(file).map_err(|error| error.to_string())?;
+        signature(key.bytes(), (&id, timestamp), &body)
+            .ok_or_else(|| "the secret is unusable".to_owned())
+    });
+    let signed = signed.transpose()?;
     let address = &webhook.address;
     let path = address.path_and_query().map_or("/", |path| path.as_str());
     let host = address.authority().map_or("", |one| one.as_str());
-    Request::post(path)
+    let mut request = Request::post(path);
+    if let Some(signature) = signed {
+        request = request.header("webhook-signature", signature);
+    }
+    request
         .header(header::HOST, host)
         .header(header::USER_AGENT, AGENT)
         .header(header::CONTENT_TYPE, "application/json")
         .header(header::CONNECTION, "close")
         .header("webhook-id", id)
         .header("webhook-timestamp", timestamp)
-        .header("webhook-signature", signature)
         .body(Full::new(Bytes::from(body)))
         .map_err(|error| error.to_string())
 }
@@ -92,11 +100,26 @@ async fn answer(webhook: &Webhook, request: Request<Full<Bytes>>) -> Result<u16,
     let address = &webhook.address;
     let host = address.host().unwrap_or_default();
     let host = host.trim_start_matches('[').trim_end_matches(']');
-    let port = address.port_u16().unwrap_or(80);
+    let is_secured = address.scheme_str() == Some("https");
+    let port = address
+        .port_u16()
+        .unwrap_or(if is_secured { 443 } else { 80 });
     let unreachable = |error: &dyn std::fmt::Display| format!("{}: {error}", webhook.name);
     let stream = (TcpStream::connect((host, port)).await).map_err(|error| unreachable(&error))?;
-    let (mut sender, connection) =
-        (http1::handshake(TokioIo::new(stream)).await).map_err(|error| unreachable(&error))?;
+    if is_secured {
+        let secured = tls::secured(stream, host, webhook.ca_file.as_deref()).await;
+        exchange(secured.map_err(|error| unreachable(&error))?, request).await
+    } else {
+        exchange(stream, request).await
+    }
+    .map_err(|error| unreachable(&error))
+}
+
+async fn exchange<S: AsyncRead + AsyncWrite + Unpin + Send + 'static>(
+    stream: S,
+    request: Request<Full<Bytes>>,
+) -> hyper::Result<u16> {
+    let (mut sender, connection) = http1::handshake(TokioIo::new(stream)).await?;
     let exchange = async {
         let response = sender.send_request(request).await;
         response.map(|response| response.status().as_u16())
@@ -104,11 +127,11 @@ async fn answer(webhook: &Webhook, request: Request<Full<Bytes>>) -> Result<u16,
     let mut exchange = std::pin::pin!(exchange);
     // The connection does the work; it ends with this call.
     tokio::select! {
-        status = &mut exchange => status.map_err(|error| unreachable(&error)),
+        status = &mut exchange => status,
         ended = connection => match ended {
             // The answer may have come with the end.
-            Ok(()) => exchange.await.map_err(|error| unreachable(&error)),
-            Err(error) => Err(unreachable(&error)),
+            Ok(()) => exchange.await,
+            Err(error) => Err(error),
         },
     }
 }

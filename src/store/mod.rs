@@ -6,6 +6,7 @@
 
 mod batch;
 mod checkpoint;
+mod evidence;
 mod outbox;
 mod past;
 mod read;
@@ -17,6 +18,7 @@ mod sum;
 mod verify;
 
 pub use batch::{Batch, Position, Presence};
+pub use evidence::{DeliveryRow, PlacedEvent};
 pub use outbox::{Delivery, Fate};
 pub use past::{Heads, Value, Values};
 pub use read::{Recorded, StepRow};

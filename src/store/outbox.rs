@@ -23,6 +23,8 @@ pub struct Delivery {
     pub hook: String,
     /// When it was called, data time.
     pub time: Timestamp,
+    /// When it was noted, by the host's clock.
+    pub noted: Timestamp,
     /// The alert itself.
     pub body: Vec<u8>,
 }
@@ -40,9 +42,19 @@ pub enum Fate {
     Dead,
     /// The config has no such hook any more, or that hook does not ask for it any more.
     Closed,
+    /// Somebody acknowledged it before this hook, which is an escalation, was due.
+    Acknowledged,
 }
 
 impl Fate {
+    /// Whether an attempt led to it, as a number.
+    fn attempt(self) -> i64 {
+        match self {
+            Self::Waiting | Self::Delivered | Self::Dead => 1,
+            Self::Over | Self::Closed | Self::Acknowledged => 0,
+        }
+    }
+
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Waiting => WAITING,
@@ -50,6 +62,7 @@ impl Fate {
             Self::Over => "over",
             Self::Dead => "dead",
             Self::Closed => "closed",
+            Self::Acknowledged => "acknowledged",
         }
     }
 }
@@ -57,8 +70,8 @@ impl Fate {
 impl Delivery {
     pub(super) fn insert(&self, connection: &Connection, status: &str) -> Result<(), StoreError> {
         let mut insert = connection.prepare_cached(
-            "INSERT OR IGNORE INTO outbox (key, level, state, hook, status, time, body, sum)
-             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+            "INSERT OR IGNORE INTO outbox (key, level, state, hook, status, time, body, sum, noted)
+             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
         )?;
         let Self {
             key,
@@ -67,8 +80,9 @@ impl Delivery {
             hook,
             time,
             body,
+            noted,
         } = self;
-        let time = nanoseconds(*time)?;
+        let (time, noted) = (nanoseconds(*time)?, nanoseconds(*noted)?);
         let beside = [
             ValueRef::Text(key.as_bytes()),
             ValueRef::Text(level.as_bytes()),
@@ -78,7 +92,9 @@ impl Delivery {
         ];
         let body = seal(&beside, body);
         let sum = standing_sum(status, 0);
-        insert.execute(params![key, level, state, hook, status, time, body, sum])?;
+        insert.execute(params![
+            key, level, state, hook, status, time, body, sum, noted
+        ])?;
         Ok(())
     }
 }
@@ -205,6 +221,24 @@ impl Store {
         Ok(rows.next()?.map_or(Ok(0), |row| row.get(0))?)
     }
 
+    /// When a hook's delivery was noted, by the host's clock; `None` where it was not, or by an earlier version.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn noted(
+        &self,
+        (key, level, state): (&str, &str, &str),
+        hook: &str,
+    ) -> Result<Option<Timestamp>, StoreError> {
+        let inner = self.inner();
+        let mut query = inner.connection.prepare_cached(
+            "SELECT noted FROM outbox WHERE key = ?1 AND level = ?2 AND state = ?3 AND hook = ?4",
+        )?;
+        let mut rows = query.query(params![key, level, state, hook])?;
+        let noted: Option<i64> = rows.next()?.map_or(Ok(None), |row| row.get(0))?;
+        noted.map(timestamp).transpose()
+    }
+
     /// Has what was given up, or closed, wait again, as if it had never been tried; says how many deliveries that are. The daemon
     /// takes them at its next start, or when it takes its config again.
     ///
@@ -321,8 +355,11 @@ impl Inner {
         for (delivery, fate) in settled {
             delivery.insert(&transaction, WAITING)?;
             let standing = DeliveryState::of(&transaction, delivery)?;
-            if let Some(row) = standing.filter(|row| row.status != Fate::Delivered.name()) {
-                row.becomes(&transaction, (*fate, row.attempts + 1))?;
+            let is_done = |row: &DeliveryState| {
+                row.status == Fate::Delivered.name() || row.status == Fate::Acknowledged.name()
+            };
+            if let Some(row) = standing.filter(|row| !is_done(row)) {
+                row.becomes(&transaction, (*fate, row.attempts + fate.attempt()))?;
             }
         }
         transaction.commit()?;

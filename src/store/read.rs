@@ -67,7 +67,7 @@ pub(super) fn encode(input: &Input) -> Result<Option<Vec<u8>>, StoreError> {
         .map_err(|error| StoreError::Unreadable(error.to_string()))
 }
 
-fn decode(body: Option<Vec<u8>>) -> Result<Input, StoreError> {
+pub(super) fn decode(body: Option<Vec<u8>>) -> Result<Input, StoreError> {
     let Some(body) = body else {
         return Ok(Input::Tick);
     };

@@ -7,7 +7,7 @@ use rusqlite::Connection;
 const APPLICATION: i32 = 0x736c_6970;
 
 /// One step for each version: `MIGRATIONS[n]` leads from version n to n + 1.
-const MIGRATIONS: [&str; 4] = ["
+const MIGRATIONS: [&str; 5] = ["
     CREATE TABLE series (
         id INTEGER PRIMARY KEY,
         -- 0: a covariate; 1: readings of a benchmark
@@ -63,7 +63,7 @@ const MIGRATIONS: [&str; 4] = ["
         level TEXT NOT NULL,
         state TEXT NOT NULL,
         hook TEXT NOT NULL,
-        -- waiting, delivered, over, dead, closed
+        -- waiting, delivered, over, dead, closed, acknowledged
         status TEXT NOT NULL,
         attempts INTEGER NOT NULL DEFAULT 0,
         -- of the alert
@@ -99,6 +99,11 @@ const MIGRATIONS: [&str; 4] = ["
 // Of how a delivery stands: its status and attempts; null in rows of the version before.
 "
     ALTER TABLE outbox ADD COLUMN sum INTEGER;
+",
+// When it was noted, nanoseconds since 1970 by the host's clock: what an escalation is counted from; null in rows of the
+// version before.
+"
+    ALTER TABLE outbox ADD COLUMN noted INTEGER;
 "];
 
 /// The version that this program writes.

@@ -143,7 +143,7 @@ fn an_unknown_key_is_refused_with_the_known_ones() {
     assert_eq!(
         problem("[allert]\n"),
         "site.toml:10:2: error: unknown key allert; known here: site, source, alert, explain, \
-         benchmark, event, hook, webhook"
+         benchmark, event, hook, webhook, cap"
     );
 }
 

@@ -50,6 +50,8 @@ fn hook(script: &str) -> (TempDir, HookConfig) {
     let config = HookConfig {
         site: false,
         webhook: None,
+        cap: None,
+        escalate_after: None,
         benchmarks: BTreeSet::new(),
         run: vec!["/bin/sh".to_owned(), "hook.sh".to_owned()],
         levels: vec![Level::Orange, Level::Red],
@@ -209,6 +211,41 @@ async fn a_hook_that_fails_is_tried_again_with_the_same_key() {
         read(&folder, "calls"),
         "1 toc/5/red/1\n2 toc/5/red/1\n3 toc/5/red/1\n"
     );
+}
+
+/// The end of an alert goes to those who were notified of its beginning.
+#[tokio::test]
+async fn an_escalation_reports_the_end_of_what_it_has_reported_and_nothing_of_what_ended_in_time() {
+    let (folder, mut config) = hook("echo $SLIPWATCH_KEY $SLIPWATCH_STATE >> calls");
+    let store = Arc::new(Store::open(&folder.path().join("state")).unwrap());
+    let ended = |key: &str| {
+        let mut alert = alert_of(Level::Red, key, "");
+        alert.state = AlertState::Resolved;
+        alert
+    };
+    for (after, key, expected) in [
+        (Duration::from_secs(3600), "in time", ""),
+        (
+            Duration::from_millis(1),
+            "late",
+            "late firing\nlate resolved\n",
+        ),
+    ] {
+        config.escalate_after = Some(after);
+        let delivered = Delivered::of(Arc::clone(&store));
+        let hooks = std::slice::from_ref(&config);
+        let dispatcher = Dispatcher::start(hooks, &quick_retry(), delivered);
+        dispatcher.offer(&alert_of(Level::Red, key, ""));
+        if !expected.is_empty() {
+            eventually("the first call", || read(&folder, "calls").contains(key)).await;
+        }
+        dispatcher.offer(&ended(key));
+        assert_eq!(dispatcher.close(LIMIT).await, Some(0));
+        assert_eq!(read(&folder, "calls"), expected);
+        let is_over = |state| store.is_noted((key, "red", state), None, Some(Fate::Over));
+        assert_eq!(is_over("firing").unwrap(), expected.is_empty());
+    }
+    assert!(store.waiting().unwrap().is_empty());
 }
 
 #[tokio::test]

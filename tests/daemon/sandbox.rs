@@ -49,6 +49,8 @@ fn walled(folder: &Path, run: &[&str]) -> HookConfig {
     HookConfig {
         site: false,
         webhook: None,
+        cap: None,
+        escalate_after: None,
         benchmarks: BTreeSet::new(),
         run: run.iter().map(|word| (*word).to_owned()).collect(),
         levels: vec![Level::Red],

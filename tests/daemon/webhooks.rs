@@ -1,6 +1,7 @@
 //! Webhooks against real listeners: what they get, that it is signed, and how failures are tried again.
 
 use crate::eventually::eventually;
+use rcgen::{BasicConstraints, CertificateParams, CertifiedIssuer, IsCa, KeyPair};
 use slipwatch::alert::Level;
 use slipwatch::config::{self, HookConfig};
 use slipwatch::monitor::{AlertState, Event, EventKind};
@@ -16,6 +17,8 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
+use tokio_rustls::rustls;
+use tokio_rustls::rustls::pki_types::PrivateKeyDer;
 
 const SECRET: &str = "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw";
 
@@ -62,7 +65,7 @@ impl Receiver {
     }
 }
 
-fn request(stream: &std::net::TcpStream) -> Got {
+fn request(stream: impl Read) -> Got {
     let mut reader = BufReader::new(stream);
     let mut next = || {
         let mut line = String::new();
@@ -298,12 +301,214 @@ async fn a_webhook_is_sent_the_benchmarks_and_levels_that_it_asks_for() {
     assert_eq!(keys(&all).len(), 2);
 }
 
+/// An authority of our own and a receiver at `localhost` that has a certificate of it.
+struct Secured {
+    authority: String,
+    receiver: Receiver,
+}
+
+impl Secured {
+    fn answering(status: u16) -> Self {
+        let mut params = CertificateParams::new(Vec::new()).unwrap();
+        params.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
+        let authority = CertifiedIssuer::self_signed(params, KeyPair::generate().unwrap()).unwrap();
+        let key = KeyPair::generate().unwrap();
+        let params = CertificateParams::new(vec!["localhost".to_owned()]).unwrap();
+        let own = params.signed_by(&key, &authority).unwrap();
+        let provider = Arc::new(rustls::crypto::ring::default_provider());
+        let config = rustls::ServerConfig::builder_with_provider(provider)
+            .with_safe_default_protocol_versions()
+            .unwrap()
+            .with_no_client_auth()
+            .with_single_cert(
+                vec![own.der().clone()],
+                PrivateKeyDer::try_from(key.serialize_der()).unwrap(),
+            )
+            .unwrap();
+        let config = Arc::new(config);
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let port = listener.local_addr().unwrap().port();
+        let got = Arc::new(Mutex::new(Vec::new()));
+        let seen = Arc::clone(&got);
+        std::thread::spawn(move || {
+            for stream in listener.incoming() {
+                let mut stream = stream.unwrap();
+                let mut server = rustls::ServerConnection::new(Arc::clone(&config)).unwrap();
+                // Whoever does not trust us hangs up.
+                if server.complete_io(&mut stream).is_err() || server.is_handshaking() {
+                    continue;
+                }
+                let mut tls = rustls::StreamOwned::new(server, stream);
+                seen.lock().unwrap().push(request(&mut tls));
+                let answer = format!("HTTP/1.1 {status} Said\r\ncontent-length: 2\r\n\r\nok");
+                tls.write_all(answer.as_bytes()).unwrap();
+            }
+        });
+        let url = format!("https://localhost:{port}/alerts");
+        Self {
+            authority: authority.pem(),
+            receiver: Receiver { url, got },
+        }
+    }
+}
+
+#[tokio::test]
+async fn an_alert_goes_over_tls_to_who_can_prove_its_name_by_a_trusted_authority_and_to_nobody_else()
+ {
+    let folder = tempfile::tempdir().unwrap();
+    let secured = Secured::answering(204);
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("ca.pem", &secured.authority);
+    write("other.pem", &Secured::answering(204).authority);
+    write("empty.pem", "");
+    let url = &secured.receiver.url;
+    let with = |url: &str, more: &str| webhooks(folder.path(), &webhook(url, more)).remove(0);
+    let send =
+        |hook: HookConfig| async move { deliver::run(&hook, &alert("5", "5/red/1"), 1).await };
+
+    assert_eq!(send(with(url, "ca_file = \"ca.pem\"")).await, Outcome::Done);
+    let got = secured.receiver.got();
+    assert_eq!(
+        (got.len(), got[0].line.as_str()),
+        (1, "POST /alerts HTTP/1.1")
+    );
+    assert!(got[0].headers["webhook-signature"].starts_with("v1,"));
+    match signature_by_python(&got[0]) {
+        Some(expected) => assert_eq!(got[0].headers["webhook-signature"], expected),
+        None => eprintln!("skipped: the signature, without python3"),
+    }
+
+    let by_address = url.replace("localhost", "127.0.0.1");
+    for (hook, why) in [
+        (with(url, "ca_file = \"other.pem\""), "no TLS"),
+        (with(&by_address, "ca_file = \"ca.pem\""), "no TLS"),
+        (
+            with(url, "ca_file = \"empty.pem\""),
+            "it holds no certificate",
+        ),
+        (with(url, "ca_file = \"absent.pem\""), "ca_file"),
+        // The machine's own authorities.
+        (with(url, ""), ""),
+    ] {
+        let outcome = send(hook).await;
+        assert!(
+            matches!(&outcome, Outcome::NotStarted(said) if said.contains(why)),
+            "{why}: {outcome:?}"
+        );
+    }
+    assert_eq!(secured.receiver.got().len(), 1);
+}
+
+fn ended(mut alert: Alert, time: &str) -> Alert {
+    alert.state = AlertState::Resolved;
+    alert.event.time = time.parse().unwrap();
+    alert
+}
+
+const KEY: &str = "5/red/2017-06-06T17:00:00Z";
+
+#[tokio::test]
+async fn alertmanager_gets_a_list_with_the_same_labels_when_an_alert_fires_and_when_it_ends() {
+    let folder = tempfile::tempdir().unwrap();
+    let receiver = Receiver::answering(&[200]);
+    let table = format!(
+        "[[webhook]]\nurl = \"{}\"\nformat = \"alertmanager\"\n",
+        receiver.url
+    );
+    let hook = webhooks(folder.path(), &table).remove(0);
+    let end = ended(alert("5", KEY), "2017-06-09T05:00:00Z");
+    for alert in [&alert("5", KEY), &end] {
+        assert_eq!(deliver::run(&hook, alert, 1).await, Outcome::Done);
+    }
+    let got = receiver.got();
+    assert!(!got[0].headers.contains_key("webhook-signature"));
+    let bodies = got
+        .iter()
+        .map(|one| serde_json::from_str(&one.body).unwrap());
+    let bodies: Vec<serde_json::Value> = bodies.collect();
+    let (fires, ends) = (&bodies[0][0], &bodies[1][0]);
+    assert_eq!(fires["labels"], ends["labels"]);
+    assert_eq!(fires["labels"]["benchmark"], "5");
+    assert_eq!(fires["labels"]["level"], "red");
+    assert_eq!(fires["labels"]["status"], "Actual");
+    for one in [fires, ends] {
+        assert_eq!(one["startsAt"], "2017-06-06T17:00:00Z");
+    }
+    // Without an end it would be over five minutes later.
+    assert_eq!(fires["endsAt"], "2018-06-06T17:00:00Z");
+    assert_eq!(ends["endsAt"], "2017-06-09T05:00:00Z");
+}
+
+#[tokio::test]
+#[cfg_attr(not(has_alertmanager), ignore = "there is no prometheus-alertmanager")]
+async fn a_real_alertmanager_has_the_alert_in_force_until_its_end_comes() {
+    let folder = tempfile::tempdir().unwrap();
+    let free = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = free.local_addr().unwrap().to_string();
+    drop(free);
+    let config = "route: {receiver: nobody}\nreceivers: [{name: nobody}]\n";
+    std::fs::write(folder.path().join("am.yml"), config).unwrap();
+    let mut program = Command::new("prometheus-alertmanager")
+        .args([
+            "--config.file=am.yml",
+            "--storage.path=am",
+            "--cluster.listen-address=",
+        ])
+        .arg(format!("--web.listen-address={address}"))
+        .current_dir(folder.path())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    eventually("that it listens", || {
+        std::net::TcpStream::connect(&address).is_ok()
+    })
+    .await;
+    let table = format!(
+        "[[webhook]]\nurl = \"http://{address}/api/v2/alerts\"\nformat = \"alertmanager\"\n"
+    );
+    let hook = webhooks(folder.path(), &table).remove(0);
+    let in_force = || {
+        let mut stream = std::net::TcpStream::connect(&address).unwrap();
+        let ask = "GET /api/v2/alerts?active=true HTTP/1.0\r\nHost: localhost\r\n\r\n";
+        stream.write_all(ask.as_bytes()).unwrap();
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).unwrap();
+        let body = answer.split_once("\r\n\r\n").unwrap().1.to_owned();
+        let alerts: serde_json::Value = serde_json::from_str(&body).unwrap();
+        let alerts = alerts.as_array().unwrap().clone();
+        alerts
+            .into_iter()
+            .map(|one| one["labels"]["key"].clone())
+            .collect::<Vec<_>>()
+    };
+    // It takes what is in force by its own clock.
+    let now = slipwatch::runtime::clock::now();
+    let mut fires = alert("5", &format!("5/red/{now}"));
+    fires.event.time = now;
+    let end = ended(fires.clone(), &now.to_string());
+    let outcome = deliver::run(&hook, &fires, 1).await;
+    let held = in_force();
+    let ended = deliver::run(&hook, &end, 1).await;
+    eventually("that it is over", || in_force().is_empty()).await;
+    program.kill().unwrap();
+    program.wait().unwrap();
+    assert_eq!((outcome, ended), (Outcome::Done, Outcome::Done));
+    assert_eq!(held, [format!("5/red/{now}")]);
+}
+
 #[test]
 fn a_config_says_what_is_wrong_with_a_webhook() {
     for (table, what) in [
-        (webhook("https://example.org/", ""), "TLS"),
-        (webhook("ftp://example.org/", ""), "is not http"),
-        (webhook("/path", ""), "is not http"),
+        (
+            webhook("ftp://example.org/", ""),
+            "is neither http nor https",
+        ),
+        (webhook("/path", ""), "is neither http nor https"),
+        (
+            webhook("http://a/", "ca_file = \"ca.pem\""),
+            "webhook.ca_file without TLS",
+        ),
         (webhook("http://me:secret@example.org/", ""), "password"),
         (
             webhook("http://a/", "benchmarks = []"),
@@ -317,6 +522,7 @@ fn a_config_says_what_is_wrong_with_a_webhook() {
             webhook("http://a/", "").repeat(2),
             "two webhooks \"http://a/\"",
         ),
+        (webhook("http://a/", "format = \"xml\""), "webhook.format"),
         (
             "[[webhook]]\nurl = \"http://a/\"\n".to_owned(),
             "webhook.secret_file",

@@ -52,6 +52,7 @@
 mod crowd;
 mod database;
 mod disk;
+mod escalation;
 mod feeds;
 mod files;
 mod killed;
@@ -60,6 +61,7 @@ mod machine;
 mod model;
 mod orders;
 mod past;
+mod record;
 mod sensors;
 mod site;
 mod telling;

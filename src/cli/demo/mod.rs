@@ -203,6 +203,8 @@ fn sample_hook(folder: &Path) -> anyhow::Result<HookConfig> {
     Ok(HookConfig {
         site: false,
         webhook: None,
+        cap: None,
+        escalate_after: None,
         benchmarks: BTreeSet::new(),
         run: vec![script.display().to_string(), WRITTEN.to_owned()],
         levels: vec![Level::Orange, Level::Red, Level::Unknown],

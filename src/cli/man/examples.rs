@@ -1,7 +1,7 @@
 //! Examples of every command, for its page.
 
 /// By command.
-pub(super) const ALL: [(&str, &[&str]); 29] = [
+pub(super) const ALL: [(&str, &[&str]); 30] = [
     (
         "",
         &[
@@ -58,8 +58,15 @@ pub(super) const ALL: [(&str, &[&str]); 29] = [
     ("alerts", &["slipwatch alerts list --config site.toml"]),
     ("alerts list", &["slipwatch alerts list --config site.toml"]),
     (
+        "alerts show",
+        &[
+            "slipwatch alerts show P1/red --config site.toml",
+            "slipwatch alerts show P1/red --config site.toml --bundle P1.zip",
+        ],
+    ),
+    (
         "alerts ack",
-        &["slipwatch alerts ack --config site.toml --benchmark P1 --by Ada"],
+        &["slipwatch alerts ack --config site.toml --benchmark P1 --by Ada --why \"on the way\""],
     ),
     (
         "alerts shelve",

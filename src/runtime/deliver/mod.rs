@@ -15,6 +15,7 @@ use super::delivered::Delivered;
 use super::hook::Alert;
 use super::in_hand::InHand;
 use crate::config::HookConfig;
+use crate::monitor::AlertState;
 use crate::store::Fate;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -155,17 +156,79 @@ impl Dispatcher {
         }
     }
 
-    /// Somebody has seen `alert`: it is not tried again.
+    /// Somebody has seen `alert`: it is not tried again, and an escalation that was not due yet is not made.
     pub fn end(&self, alert: &Alert) {
         for way in &self.hooks {
             locked(&way.in_hand).end(alert);
+            self.call_off(way, alert);
         }
+    }
+
+    /// Somebody sees to `alert`: an escalation that was not due yet is not made.
+    pub fn spare(&self, alert: &Alert) {
+        for way in self.hooks.iter().filter(|way| way.hook.escalates()) {
+            self.call_off(way, alert);
+        }
+    }
+
+    /// Somebody has seen everything: what reports many benchmarks at once too.
+    pub fn end_those_of_many(&self) {
+        for way in &self.hooks {
+            let of_many = locked(&way.in_hand).of_many();
+            for alert in &of_many {
+                locked(&way.in_hand).end(alert);
+                self.call_off(way, alert);
+            }
+        }
+    }
+
+    /// Notes durably that an escalation is not made, where it has not begun.
+    fn call_off(&self, way: &Way, alert: &Alert) {
+        let name = way.hook.name();
+        let mut in_hand = locked(&way.in_hand);
+        if !way.hook.escalates() || !way.hook.asks_for(alert) || in_hand.was_tried(alert) {
+            return;
+        }
+        let mut delivered = locked(&self.delivered);
+        if delivered.has(alert, &name) || delivered.attempts(alert, &name) > 0 {
+            return;
+        }
+        in_hand.end(alert);
+        let key = &alert.key;
+        tracing::info!(hook = name, key, "acknowledged in time: not escalated");
+        if let Err(error) = delivered.note(alert, &name, Fate::Acknowledged) {
+            tracing::warn!(hook = name, key, %error, "no receipt: a restart may escalate it");
+        }
+    }
+
+    /// Whether this is the end of what an escalation has never reported: neither of them is then.
+    fn ends_unescalated(&self, way: &Way, in_hand: &mut InHand, alert: &Alert) -> bool {
+        if !way.hook.escalates() || alert.state != AlertState::Resolved {
+            return false;
+        }
+        let (name, mut firing) = (way.hook.name(), alert.clone());
+        firing.state = AlertState::Firing;
+        let mut delivered = locked(&self.delivered);
+        if delivered.was_told(&firing, &name) || in_hand.was_tried(&firing) {
+            return false;
+        }
+        in_hand.end(&firing);
+        for one in [&firing, alert] {
+            if let Err(error) = delivered.note(one, &name, Fate::Over) {
+                let key = &alert.key;
+                tracing::warn!(hook = name, key, %error, "no receipt: a restart may send it");
+            }
+        }
+        true
     }
 
     fn offer_to(&self, way: &Way, alert: &Alert) -> bool {
         let (name, key) = (way.hook.name(), &alert.key);
         // In hand first: a worker notes the receipt before it lets go.
         let mut in_hand = locked(&way.in_hand);
+        if self.ends_unescalated(way, &mut in_hand, alert) {
+            return true;
+        }
         if in_hand.cancels(alert) {
             tracing::debug!(hook = name, key, "over before it was reported");
             if let Err(error) = locked(&self.delivered).note(alert, &name, Fate::Over) {
@@ -208,10 +271,16 @@ impl Dispatcher {
 }
 
 impl HookConfig {
-    /// What logs and receipts call it: its command line, or the webhook's name.
+    /// What logs and receipts call it: its command line, the webhook's name, or `cap` and the folder.
     pub fn name(&self) -> String {
-        let own = self.webhook.as_ref().map(|webhook| webhook.name.clone());
-        own.unwrap_or_else(|| self.run.join(" "))
+        let webhook = self.webhook.as_ref().map(|webhook| webhook.name.clone());
+        let cap = (self.cap.as_ref()).map(|cap| format!("cap {}", cap.folder.display()));
+        webhook.or(cap).unwrap_or_else(|| self.run.join(" "))
+    }
+
+    /// Whether it is notified only of what nobody acknowledges in time.
+    fn escalates(&self) -> bool {
+        self.escalate_after.is_some()
     }
 
     /// Whether it is notified of an alert of this level, at a benchmark or the whole site. What reports many benchmarks

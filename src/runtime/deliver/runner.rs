@@ -1,8 +1,8 @@
 //! How a hook is run: as a process, or by whoever simulates one.
 
-use crate::config::HookConfig;
+use crate::config::{HookConfig, WebhookFormat};
 use crate::runtime::hook::{self, Alert, Outcome};
-use crate::runtime::webhook;
+use crate::runtime::{alertmanager, cap, webhook};
 use std::fmt::Debug;
 use std::pin::Pin;
 use std::sync::Arc;
@@ -26,12 +26,27 @@ impl Runner for Processes {
     }
 }
 
-/// Runs `hook` for `alert`, or sends it where it is a webhook; `attempt` counts from 1.
+/// Runs `hook` for `alert`, or sends or writes it where it is a webhook or a folder; `attempt` counts from 1.
 pub async fn run(hook: &HookConfig, alert: &Alert, attempt: u32) -> Outcome {
+    if let Some(folder) = hook.cap.clone() {
+        let (name, key, alert) = (hook.name(), alert.key.clone(), alert.clone());
+        // A disk may hang: the worker does not wait with it.
+        let writing = tokio::task::spawn_blocking(move || cap::write(&folder, &alert));
+        let outcome = match tokio::time::timeout(hook.timeout, writing).await {
+            Ok(written) => written.unwrap_or_else(|error| Outcome::NotStarted(error.to_string())),
+            Err(_elapsed) => Outcome::TimedOut,
+        };
+        tracing::info!(hook = name, key, attempt, ?outcome, "CAP message ended");
+        return outcome;
+    }
     let Some(to) = &hook.webhook else {
         return hook::run_program(hook, alert, attempt).await;
     };
-    let outcome = match alert.body(attempt) {
+    let body = match to.format {
+        WebhookFormat::Slipwatch => alert.body(attempt),
+        WebhookFormat::Alertmanager => alertmanager::body(alert),
+    };
+    let outcome = match body {
         Ok(body) => webhook::send(to, alert, (body, hook.timeout)).await,
         Err(error) => Outcome::NotStarted(error.to_string()),
     };

@@ -29,6 +29,8 @@ struct Waiting {
     attempt: u32,
     /// Not tried since the start.
     is_new: bool,
+    /// It waits for an acknowledgement: until it is due it is not sent on the way out either.
+    is_held: bool,
 }
 
 /// How grave it is: of two that are due the higher goes first.
@@ -136,6 +138,7 @@ impl Worker {
         let now = clock::later(Duration::ZERO);
         let due = self.waiting.iter();
         let due = due.take_while(|((due, _), _)| !open || *due <= now);
+        let due = due.filter(|((due, _), waiting)| !waiting.is_held || *due <= now);
         let free = due.filter(|(_, waiting)| self.is_free(waiting));
         let next = free.max_by_key(|((due, number), waiting)| {
             (gravity(&waiting.alert), std::cmp::Reverse((*due, *number)))
@@ -158,7 +161,10 @@ impl Worker {
     fn drop_what_is_over(&mut self, open: bool) {
         let now = clock::later(Duration::ZERO);
         let due = self.waiting.iter();
-        let due = due.take_while(|((due, _), _)| !open || *due <= now);
+        // An escalation that is called off does not wait for its time.
+        let looks_ahead = !open || self.hook.escalate_after.is_some();
+        let due = due.take_while(|((due, _), _)| looks_ahead || *due <= now);
+        let due = due.filter(|((due, _), waiting)| !open || waiting.is_held || *due <= now);
         let over = due.filter(|(_, waiting)| self.is_over(&waiting.alert));
         let over: Vec<Turn> = over.map(|(turn, _)| *turn).collect();
         for turn in over {
@@ -200,6 +206,7 @@ impl Worker {
                 alert: waiting.alert.clone(),
                 attempt: attempt.saturating_add(1),
                 is_new: false,
+                is_held: false,
             };
             self.wait(again, clock::later(delay));
         } else {
@@ -238,12 +245,32 @@ impl Worker {
 
     fn begin(&mut self, alert: Alert) {
         let before = locked(&self.delivered).attempts(&alert, &self.hook.name());
+        let held = if before == 0 {
+            self.held(&alert)
+        } else {
+            Duration::ZERO
+        };
         let waiting = Waiting {
             alert,
             attempt: before.saturating_add(1),
             is_new: true,
+            is_held: held > Duration::ZERO,
         };
-        self.wait(waiting, clock::later(Duration::ZERO));
+        self.wait(waiting, clock::later(held));
+    }
+
+    /// How long an escalation still waits for an acknowledgement. It is counted from when the alert came into the outbox, by
+    /// the host's clock: a restart neither loses nor renews the time. Whatever that clock does, it is never longer than
+    /// the whole.
+    fn held(&self, alert: &Alert) -> Duration {
+        let (Some(after), AlertState::Firing) = (self.hook.escalate_after, alert.state) else {
+            return Duration::ZERO;
+        };
+        let noted = locked(&self.delivered).noted(alert, &self.hook.name());
+        let gone = noted.map(|noted| clock::now().duration_since(noted));
+        // Before the beginning there is only a clock that was set back.
+        let gone = gone.and_then(|gone| Duration::try_from(gone).ok());
+        after.saturating_sub(gone.unwrap_or(Duration::ZERO))
     }
 
     fn wait(&mut self, waiting: Waiting, due: Instant) {

@@ -3,6 +3,7 @@
 use super::{Finding, Verdict};
 use crate::config::{HookConfig, Secret};
 use crate::runtime::sandbox::{self, Walls};
+use crate::runtime::tls;
 use nix::unistd::{AccessFlags, access};
 use std::ffi::OsStr;
 use std::fs::File;
@@ -17,10 +18,13 @@ const FIRST_LINE_BYTES: u64 = 256;
 pub(super) fn finding(hook: &HookConfig) -> Finding {
     if let Some(webhook) = &hook.webhook {
         let name = &webhook.name;
-        let (verdict, text) = match Secret::read(&webhook.secret_file) {
+        let secret = webhook.secret_file.as_deref().map(Secret::read).transpose();
+        let secret = secret.map_err(|error| error.to_string());
+        let trusted = webhook.ca_file.as_deref().map(tls::own).transpose();
+        let (verdict, text) = match secret.and(trusted) {
             Ok(_) => (
                 Verdict::Good,
-                format!("{name} has its secret; hook test sends to it"),
+                format!("{name} has what it needs; hook test sends to it"),
             ),
             Err(error) => (
                 Verdict::Wrong,
@@ -29,11 +33,34 @@ pub(super) fn finding(hook: &HookConfig) -> Finding {
         };
         return Finding::new("webhook", verdict, text);
     }
+    if let Some(cap) = &hook.cap {
+        let folder = cap.folder.display();
+        let (verdict, text) = match writable(&cap.folder) {
+            Ok(()) => (
+                Verdict::Good,
+                format!("{folder} can be written to; hook test writes a message"),
+            ),
+            Err(error) => (
+                Verdict::Wrong,
+                format!("{folder}: {error}: alerts would go nowhere"),
+            ),
+        };
+        return Finding::new("cap", verdict, text);
+    }
     let (verdict, text) = match runnable(&hook.program()) {
         Ok(text) => (Verdict::Good, text),
         Err(text) => (Verdict::Wrong, format!("{text}: alerts would go nowhere")),
     };
     Finding::new("hook", verdict, text)
+}
+
+/// Whether a message could be written there, or the folder be made.
+fn writable(folder: &Path) -> nix::Result<()> {
+    let there = folder.ancestors().find(|folder| folder.is_dir());
+    access(
+        there.unwrap_or(folder),
+        AccessFlags::W_OK | AccessFlags::X_OK,
+    )
 }
 
 fn runnable(program: &Path) -> Result<String, String> {

@@ -2,7 +2,9 @@
 
 use crate::monitor::Order;
 use crate::reading::Timestamp;
-use crate::runtime::view::{Asked, BenchmarkView, Desk, OrderError, SiteView, TimeWindow};
+use crate::runtime::view::{
+    AlertView, Asked, BenchmarkView, Desk, OrderError, SiteView, TimeWindow,
+};
 use crate::store::{Heads, StoreError};
 use axum::body::Body;
 use axum::extract::{Query, State};
@@ -30,6 +32,7 @@ pub(super) fn router(desk: Arc<Desk>) -> Router {
     Router::new()
         .route("/api/site", get(site))
         .route("/api/benchmark", get(benchmark))
+        .route("/api/alert", get(alert))
         .route("/api/stream", get(changes))
         .route("/api/orders", post(ask))
         .with_state(desk)
@@ -62,7 +65,7 @@ impl IntoResponse for Failure {
                 };
                 (status, error.to_string())
             }
-            Self::NoSuch(name) => (StatusCode::NOT_FOUND, format!("no benchmark {name:?}")),
+            Self::NoSuch(what) => (StatusCode::NOT_FOUND, format!("no {what}")),
             Self::Broken(what) => (StatusCode::INTERNAL_SERVER_ERROR, what),
         };
         (status, text + "\n").into_response()
@@ -112,7 +115,24 @@ async fn benchmark(
     };
     let found = blocking(move || {
         let view = desk.benchmark(&asked.id, window)?;
-        view.ok_or(Failure::NoSuch(asked.id))
+        view.ok_or_else(|| Failure::NoSuch(format!("benchmark {:?}", asked.id)))
+    });
+    found.await.map(Json)
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OfAlert {
+    key: String,
+}
+
+async fn alert(
+    State(desk): State<Arc<Desk>>,
+    Query(asked): Query<OfAlert>,
+) -> Result<Json<AlertView>, Failure> {
+    let found = blocking(move || {
+        let view = desk.alert(&asked.key)?;
+        view.ok_or_else(|| Failure::NoSuch(format!("alert {:?}", asked.key)))
     });
     found.await.map(Json)
 }

@@ -50,16 +50,19 @@ impl Site {
                         alerts.end(&one.alert);
                     }
                 }
+                if let (None, Some(alerts)) = (benchmark, &self.sinks.alerts) {
+                    alerts.end_those_of_many();
+                }
             }
             Order::Shelve {
                 benchmark, until, ..
             } => {
                 let level = self.monitor.level(benchmark).unwrap_or(Level::Green);
-                self.mute(Some(benchmark.clone()), Some(level), *until);
+                self.mute(Some(benchmark), Some(level), *until);
             }
             Order::Silence {
                 benchmark, until, ..
-            } => self.mute(benchmark.clone(), None, *until),
+            } => self.mute(benchmark.as_ref(), None, *until),
             Order::Unsilence { benchmark, .. } => {
                 let ends = |mute: &Mute| benchmark.is_none() || mute.benchmark == *benchmark;
                 self.mutes.retain(|mute| !ends(mute));
@@ -67,14 +70,28 @@ impl Site {
         }
     }
 
-    fn mute(&mut self, benchmark: Option<BenchmarkId>, up_to: Option<Level>, until: Timestamp) {
+    fn mute(&mut self, benchmark: Option<&BenchmarkId>, up_to: Option<Level>, until: Timestamp) {
         self.mutes.push(Mute {
-            benchmark,
+            benchmark: benchmark.cloned(),
             up_to,
             until,
         });
         let excess = self.mutes.len().saturating_sub(MOST);
         self.mutes.drain(..excess);
+        self.spare_what_is_muted(benchmark, up_to);
+    }
+
+    /// Whoever has an alert shelved or silenced sees to it: it is not escalated.
+    fn spare_what_is_muted(&self, benchmark: Option<&BenchmarkId>, up_to: Option<Level>) {
+        let Some(alerts) = &self.sinks.alerts else {
+            return;
+        };
+        for ((place, _), one) in &self.standing {
+            let is_here = benchmark.is_none() || place.as_ref() == benchmark;
+            if is_here && up_to.is_none_or(|up_to| one.alert.level <= up_to) {
+                alerts.spare(&one.alert);
+            }
+        }
     }
 
     /// Who is not to be told of what while the host's clock says `wall`.

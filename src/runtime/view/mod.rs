@@ -1,10 +1,12 @@
 //! What the page shows: the site and its benchmarks at any moment, as they were known then.
 
+mod alert;
 mod benchmark;
 mod order;
 mod site;
 mod thin;
 
+pub use alert::{AlertLife, AlertView, alert};
 pub use benchmark::{BenchmarkView, TimeWindow};
 pub use order::{Asked, OrderError};
 pub use site::{SiteView, Standing};

@@ -1,14 +1,17 @@
 //! An order that was given on the page, and whether it is taken.
 
 use super::{Desk, EARLIEST};
-use crate::monitor::Order;
+use crate::monitor::{Door, Given, Order};
 use crate::reading::BenchmarkId;
+use crate::runtime::clock;
 use crate::store::StoreError;
 use jiff::SignedDuration;
 use serde::Deserialize;
 
 /// Longest name of whoever gives an order, bytes.
 const LONGEST_NAME: usize = 100;
+/// Longest reason, bytes.
+const LONGEST_REASON: usize = 500;
 
 /// What is asked for.
 #[derive(Debug, Clone, Deserialize)]
@@ -20,6 +23,8 @@ pub struct Asked {
     pub benchmark: Option<String>,
     /// Who asks.
     pub by: String,
+    /// Why.
+    pub why: Option<String>,
     /// For how long, of a shelve or a silence.
     pub seconds: Option<i64>,
 }
@@ -63,7 +68,17 @@ impl Desk {
         if name.is_empty() || name.len() > LONGEST_NAME || name.chars().any(char::is_control) {
             return wrong(format!("by: a name of 1 to {LONGEST_NAME} bytes is needed"));
         }
-        let by = Some(name.to_owned());
+        let why = asked.why.as_deref().map(str::trim);
+        let why = why.filter(|why| !why.is_empty());
+        if why.is_some_and(|why| why.len() > LONGEST_REASON || why.chars().any(char::is_control)) {
+            return wrong(format!("why: one line of {LONGEST_REASON} bytes at most"));
+        }
+        let given = Given {
+            by: Some(name.to_owned()),
+            why: why.map(str::to_owned),
+            door: Some(Door::Http),
+            given_at: Some(clock::now()),
+        };
         let benchmark = asked.benchmark.as_ref().map(BenchmarkId::new);
         let until = |longest: SignedDuration| {
             let span = asked.seconds.map(SignedDuration::from_secs);
@@ -75,14 +90,14 @@ impl Desk {
             }
         };
         Ok(match (asked.order.as_str(), benchmark) {
-            ("acknowledge", benchmark) => Order::Acknowledge { benchmark, by },
-            ("unsilence", benchmark) => Order::Unsilence { benchmark, by },
+            ("acknowledge", benchmark) => Order::Acknowledge { benchmark, given },
+            ("unsilence", benchmark) => Order::Unsilence { benchmark, given },
             ("silence", benchmark) => {
                 let until = until(Order::LONGEST_SILENCE)?;
                 Order::Silence {
                     benchmark,
                     until,
-                    by,
+                    given,
                 }
             }
             ("shelve", Some(benchmark)) => {
@@ -90,7 +105,7 @@ impl Desk {
                 Order::Shelve {
                     benchmark,
                     until,
-                    by,
+                    given,
                 }
             }
             ("shelve", None) => return wrong("benchmark: only one can be shelved".to_owned()),

@@ -1,0 +1,103 @@
+//! What each level asks people to do, in words; the site's own emergency plan says how.
+
+use super::policy::{Level, Policy};
+
+impl Level {
+    /// What is recommended while it is in force.
+    pub fn recommended(self) -> &'static str {
+        match self {
+            Self::Green => "Nothing beyond the usual watch.",
+            Self::Yellow => {
+                "Look at the readings and at the slope, and find out what has changed. \
+                 Check that those who would have to act can be reached."
+            }
+            Self::Orange => {
+                "Prepare an evacuation: inform those who decide, measure more often, \
+                 and close what cannot be cleared quickly."
+            }
+            Self::Red => {
+                "Evacuate the area that the slope can reach, as the site's plan says, and close it. \
+                 Nobody goes back in before the alert has ended and people have looked at the slope."
+            }
+            Self::Unknown => {
+                "Nothing can be said of the slope: treat it as not watched. \
+                 Watch it by other means until readings come again."
+            }
+        }
+    }
+}
+
+impl Policy {
+    /// The condition of a rule with its figures, as words; `None` for a rule that the policy has no figure for.
+    pub fn condition(&self, rule: &str, level: Level) -> Option<String> {
+        let hours = |span: jiff::SignedDuration| span.as_secs() / 3600;
+        let threshold = |figure: &dyn Fn(&super::Threshold) -> Option<f64>| {
+            let own = self.thresholds.iter().filter(|one| one.level == level);
+            own.filter_map(figure).reduce(f64::min)
+        };
+        Some(match (rule, level) {
+            ("critical-velocity", _) => format!(
+                "settled velocity of {} mm/day or more",
+                self.critical_velocity_mm_per_day
+            ),
+            ("chance-within-evacuation-time", _) => format!(
+                "chance of collapse of {} or more within the evacuation time of {} h and until the next reading",
+                self.red_chance,
+                hours(self.evacuation_time)
+            ),
+            ("chance-within-outlook", level) => {
+                let chance = if level == Level::Yellow {
+                    self.yellow_chance
+                } else {
+                    self.orange_chance
+                };
+                format!(
+                    "chance of collapse of {chance} or more within the outlook of {} h",
+                    hours(self.outlook)
+                )
+            }
+            ("velocity-threshold", _) => format!(
+                "velocity of {} mm/day or more",
+                threshold(&|one| one.velocity_mm_per_day)?
+            ),
+            ("displacement-threshold", _) => format!(
+                "displacement since the first reading of {} mm or more",
+                threshold(&|one| one.displacement_mm)?
+            ),
+            ("acceleration-threshold", _) => format!(
+                "acceleration of {} mm/day per day or more",
+                threshold(&|one| one.acceleration_mm_per_day2)?
+            ),
+            ("regime-flip", _) => "the regime turned unstable".to_owned(),
+            ("intercept-drifting-in", _) => {
+                "the inverse-velocity line's intercept comes nearer".to_owned()
+            }
+            ("transition-drifting-in", _) => "the transition time comes nearer".to_owned(),
+            ("unexplained-residual", _) => {
+                "readings that the law in force does not explain".to_owned()
+            }
+            ("moves-backwards", _) => "the slope moves upslope".to_owned(),
+            _ => return None,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_condition_has_the_figures_of_the_policy() {
+        let policy = Policy::default();
+        let condition = |rule, level| policy.condition(rule, level).unwrap();
+        assert_eq!(
+            condition("chance-within-evacuation-time", Level::Red),
+            "chance of collapse of 0.05 or more within the evacuation time of 24 h and until the next reading"
+        );
+        let outlook = |level| condition("chance-within-outlook", level);
+        assert!(outlook(Level::Orange).contains("of 0.5 or more within the outlook of 720 h"));
+        assert!(outlook(Level::Yellow).contains("of 0.1 or more"));
+        assert_eq!(policy.condition("velocity-threshold", Level::Red), None);
+        assert_eq!(policy.condition("no-data", Level::Unknown), None);
+    }
+}

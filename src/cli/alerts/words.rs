@@ -1,0 +1,187 @@
+//! One alert in plain words.
+
+use crate::cli::text;
+use crate::monitor::{Event, EventKind, FailureTime};
+use crate::reading::Timestamp;
+use crate::runtime::view::{AlertLife, AlertView};
+use crate::store::DeliveryRow;
+use jiff::tz::TimeZone;
+use std::fmt::Write as _;
+
+/// All of it, a paragraph each.
+pub(super) fn shown(alert: &AlertView, zone: &TimeZone) -> String {
+    let clock = |time: Timestamp| text::clock(time, zone);
+    let place = match &alert.benchmark {
+        Some(benchmark) => format!("benchmark {}", text::plain(benchmark.as_str())),
+        None => "the whole site".to_owned(),
+    };
+    let mut out = String::new();
+    let mut line = |name: &str, what: &str| {
+        // Writing to a string cannot fail.
+        let _ = writeln!(out, "{name:<13}{what}");
+    };
+    line("alert", &text::plain(&alert.key));
+    line("site", &text::plain(&alert.site));
+    line("where", &place);
+    line("level", alert.level.name());
+    line("state", &state(alert, &clock));
+    line("said", &text::local(&text::plain(&alert.text), zone));
+    let condition = alert.condition.as_ref();
+    let condition = condition.map_or_else(String::new, |condition| format!(": {condition}"));
+    line("rule", &format!("{}{condition}", alert.rule));
+    for found in evidence(alert, &clock) {
+        line("evidence", &found);
+    }
+    line("recommended", alert.recommended);
+    line("valid until", &valid(alert, &clock));
+    let settings = &alert.settings;
+    let policy = (alert.benchmark.as_ref()).map_or(&settings.policy, |one| settings.policy(one));
+    let hours = policy.evacuation_time.as_secs() / 3600;
+    line(
+        "evacuation",
+        &format!("takes {hours} h, by the settings then"),
+    );
+    out += &deliveries(&alert.deliveries);
+    out += if alert.is_acknowledged {
+        "acknowledged yes\n"
+    } else {
+        "acknowledged no\n"
+    };
+    out += "audit trail\n";
+    for event in &alert.audit {
+        let _ = writeln!(out, "  {}{}", text::line(event, zone), door(event, &clock));
+    }
+    out
+}
+
+fn state(alert: &AlertView, clock: &dyn Fn(Timestamp) -> String) -> String {
+    let since = clock(alert.since);
+    let ended = alert.ended.map(clock).unwrap_or_default();
+    match alert.state {
+        AlertLife::Firing => format!("in force since {since}"),
+        AlertLife::Superseded => {
+            format!("in force from {since}, superseded by a higher level at {ended}")
+        }
+        AlertLife::Resolved => format!("in force from {since}, ended at {ended}"),
+    }
+}
+
+fn evidence(alert: &AlertView, clock: &dyn Fn(Timestamp) -> String) -> Vec<String> {
+    if alert.benchmark.is_none() {
+        let keys = alert.members.iter().map(|key| text::plain(key));
+        return vec![format!("alerts {}", keys.collect::<Vec<_>>().join(", "))];
+    }
+    let Some(Event {
+        time,
+        kind:
+            EventKind::Refit {
+                regime,
+                failure_time,
+                inverse_velocity,
+                velocity_mm_per_day,
+                chance_within_evacuation_time,
+                chance_within_outlook,
+                ..
+            },
+        ..
+    }) = &alert.evidence
+    else {
+        return vec!["no refit had been made".to_owned()];
+    };
+    let percent = |chance: f64| format!("{:.1} %", 100.0 * chance);
+    let mut found = vec![format!("refit with the readings until {}", clock(*time))];
+    if let Some(velocity) = velocity_mm_per_day {
+        found.push(format!("velocity {velocity:.3} mm/day"));
+    }
+    found.push(format!(
+        "chance of collapse within the evacuation time {}, within the outlook {}",
+        percent(*chance_within_evacuation_time),
+        percent(*chance_within_outlook)
+    ));
+    found.push(format!(
+        "regime {}, unstable with probability {}",
+        regime.label,
+        percent(regime.probability_unstable)
+    ));
+    found.push(collapse(failure_time, clock));
+    if let Some(intercept) = inverse_velocity.failure_time {
+        found.push(format!(
+            "the inverse-velocity line meets zero at {}",
+            clock(intercept)
+        ));
+    }
+    found
+}
+
+fn collapse(failure: &FailureTime, clock: &dyn Fn(Timestamp) -> String) -> String {
+    let bound = |time: Option<Timestamp>| {
+        time.map_or_else(
+            || format!("not within {:.0} days", failure.horizon_days),
+            clock,
+        )
+    };
+    format!(
+        "time of collapse: 5 % {}, median {}, 95 % {}; {:.1} % within {:.0} days",
+        bound(failure.low),
+        bound(failure.median),
+        bound(failure.high),
+        100.0 * failure.probability,
+        failure.horizon_days
+    )
+}
+
+fn valid(alert: &AlertView, clock: &dyn Fn(Timestamp) -> String) -> String {
+    match (alert.state, alert.valid_until) {
+        (AlertLife::Firing, Some(until)) => format!(
+            "{} for its figures, which each refit renews; the level stands until it is ended",
+            clock(until)
+        ),
+        (AlertLife::Firing, None) => "readings come again".to_owned(),
+        (AlertLife::Superseded | AlertLife::Resolved, until) => {
+            format!("{}: it is over", until.map(clock).unwrap_or_default())
+        }
+    }
+}
+
+fn deliveries(rows: &[DeliveryRow]) -> String {
+    if rows.is_empty() {
+        return "deliveries   none: no hook asks for it, or they have been removed with time\n"
+            .to_owned();
+    }
+    let mut out = "deliveries\n".to_owned();
+    for row in rows {
+        let meaning = match row.status.as_str() {
+            "waiting" if row.attempts == 0 => "has not been run yet",
+            "acknowledged" => "was not run: somebody acknowledged it in time",
+            "waiting" => "is still tried",
+            "delivered" => "has taken it",
+            "over" => "did not get it: it was over, superseded or told together with others",
+            "dead" => "was given up",
+            "closed" => "was closed: the config has no such hook any more",
+            _ => "",
+        };
+        let attempts = row.attempts;
+        let plural = if attempts == 1 { "" } else { "s" };
+        let _ = writeln!(
+            out,
+            "  {} {}: {} {meaning} ({}, {attempts} attempt{plural})",
+            row.level,
+            row.state,
+            text::plain(&row.hook),
+            row.status
+        );
+    }
+    out
+}
+
+/// Over which door an order came, and when by the host's clock.
+fn door(event: &Event, clock: &dyn Fn(Timestamp) -> String) -> String {
+    let EventKind::Order { given, .. } = &event.kind else {
+        return String::new();
+    };
+    let door = (given.door).map_or_else(String::new, |door| format!(", over {}", door.name()));
+    let at = given
+        .given_at
+        .map_or_else(String::new, |at| format!(", given at {}", clock(at)));
+    format!("{door}{at}")
+}

@@ -1,0 +1,41 @@
+//! Who gave an order, when, why and over which door: the audit trail of what people did.
+
+use crate::reading::Timestamp;
+use serde::{Deserialize, Serialize};
+
+/// Who gave an order, and how.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Given {
+    /// Who.
+    #[serde(default)]
+    pub by: Option<String>,
+    /// Why.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub why: Option<String>,
+    /// Over which door.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub door: Option<Door>,
+    /// When, by the host's clock.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub given_at: Option<Timestamp>,
+}
+
+/// The way by which an order came in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Door {
+    /// `slipwatch alerts`, on the machine itself.
+    CommandLine,
+    /// The page, or another caller of the HTTP API.
+    Http,
+}
+
+impl Door {
+    /// The word for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::CommandLine => "command line",
+            Self::Http => "HTTP",
+        }
+    }
+}

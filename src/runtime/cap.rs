@@ -1,0 +1,289 @@
+//! Writes one alert as a message of the Common Alerting Protocol 1.2 (OASIS): a file each, in a folder.
+//!
+//! Of each place the messages make a chain: an Alert, an Update for each change of level that follows on it, a Cancel at the end;
+//! each names all that came before it. The chain stands beside the messages and is written first, so that a second
+//! attempt writes the same file again.
+
+use super::clock;
+use super::hook::{Alert, Outcome, state_name};
+use crate::alert::Level;
+use crate::config::CapFolder;
+use crate::monitor::{AlertState, EventKind};
+use crate::reading::Timestamp;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use std::fmt::Write as _;
+use std::fs::{self, File};
+use std::io::{self, Write as _};
+use std::path::Path;
+
+/// Messages that a chain names; the oldest go.
+const LONGEST_CHAIN: usize = 50;
+/// As the schema has a time: no letter for the zone.
+const TIME: &str = "%Y-%m-%dT%H:%M:%S-00:00";
+
+/// One message of a chain.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+struct Message {
+    identifier: String,
+    sent: Timestamp,
+    is_cancel: bool,
+}
+
+/// What a message is to those before it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum MessageType {
+    Alert,
+    Update,
+    Cancel,
+}
+
+/// Writes `alert` into the folder; where its file is there already it is written anew, the same.
+pub(super) fn write(cap: &CapFolder, alert: &Alert) -> Outcome {
+    match written(cap, alert, clock::now()) {
+        Ok(()) => Outcome::Done,
+        Err(error) => Outcome::NotStarted(format!("{}: {error}", cap.folder.display())),
+    }
+}
+
+fn written(cap: &CapFolder, alert: &Alert, now: Timestamp) -> io::Result<()> {
+    let chains = cap.folder.join("chains");
+    fs::create_dir_all(&chains)?;
+    let place = chains.join(format!("{}.json", short(&place(alert))));
+    let mut chain = read(&place)?;
+    let identifier = format!(
+        "slipwatch-{}",
+        short(&format!(
+            "{}\n{}\n{}\n{}\n{}",
+            alert.site,
+            alert.key,
+            alert.level,
+            state_name(alert.state),
+            alert.status.name()
+        ))
+    );
+    let is_cancel = alert.state == AlertState::Resolved;
+    let known = chain.iter().position(|one| one.identifier == identifier);
+    let at = if let Some(at) = known {
+        at
+    } else {
+        // After its end a place begins anew.
+        if chain.last().is_some_and(|last| last.is_cancel) {
+            chain.clear();
+        }
+        if is_cancel && chain.is_empty() {
+            tracing::info!(
+                key = alert.key,
+                "the end of what no CAP message has reported"
+            );
+            return Ok(());
+        }
+        chain.push(Message {
+            identifier,
+            sent: now,
+            is_cancel,
+        });
+        let excess = chain.len().saturating_sub(LONGEST_CHAIN);
+        chain.drain(..excess);
+        replace(&place, &serde_json::to_vec(&chain)?)?;
+        chain.len() - 1
+    };
+    let (message, before) = (&chain[at], &chain[..at]);
+    let name = format!(
+        "{}-{}.xml",
+        message.sent.strftime("%Y%m%dT%H%M%SZ"),
+        message.identifier
+    );
+    replace(
+        &cap.folder.join(name),
+        xml(cap, alert, (message, before)).as_bytes(),
+    )
+}
+
+/// What a chain belongs to: a place and whether it is known; what reports many benchmarks stands for itself. A drill is no part of
+/// a chain of what is meant.
+fn place(alert: &Alert) -> String {
+    let status = alert.status.name();
+    if alert.is_flood() {
+        return format!("{status}\nmany\n{}", alert.key);
+    }
+    let benchmark = alert.event.benchmark.as_ref();
+    let benchmark = benchmark.map_or("site\n", |one| one.as_str());
+    format!("{status}\n{}\n{benchmark}", alert.level == Level::Unknown)
+}
+
+fn short(text: &str) -> String {
+    let mut hex = String::new();
+    for byte in &Sha256::digest(text.as_bytes())[..12] {
+        // Writing to a string cannot fail.
+        let _ = write!(hex, "{byte:02x}");
+    }
+    hex
+}
+
+fn read(file: &Path) -> io::Result<Vec<Message>> {
+    match fs::read(file) {
+        Ok(bytes) => Ok(serde_json::from_slice(&bytes)?),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Vec::new()),
+        Err(error) => Err(error),
+    }
+}
+
+/// Nobody sees half of it, and it is on the disk when this returns.
+fn replace(file: &Path, bytes: &[u8]) -> io::Result<()> {
+    let partial = file.with_extension("partial");
+    let mut out = File::create(&partial)?;
+    out.write_all(bytes)?;
+    out.sync_all()?;
+    fs::rename(&partial, file)?;
+    file.parent()
+        .map_or(Ok(()), |folder| File::open(folder)?.sync_all())
+}
+
+fn xml(cap: &CapFolder, alert: &Alert, (message, before): (&Message, &[Message])) -> String {
+    let kind = match (alert.state, before.is_empty()) {
+        (AlertState::Resolved, _) => MessageType::Cancel,
+        (AlertState::Firing, true) => MessageType::Alert,
+        (AlertState::Firing, false) => MessageType::Update,
+    };
+    let mut out = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
+                   <alert xmlns=\"urn:oasis:names:tc:emergency:cap:1.2\">\n"
+        .to_owned();
+    let sent = |one: &Message| one.sent.strftime(TIME).to_string();
+    element(&mut out, 1, ("identifier", &message.identifier));
+    element(&mut out, 1, ("sender", &cap.sender));
+    element(&mut out, 1, ("sent", &sent(message)));
+    element(&mut out, 1, ("status", alert.status.name()));
+    let kind_name = match kind {
+        MessageType::Alert => "Alert",
+        MessageType::Update => "Update",
+        MessageType::Cancel => "Cancel",
+    };
+    element(&mut out, 1, ("msgType", kind_name));
+    element(&mut out, 1, ("scope", "Restricted"));
+    element(
+        &mut out,
+        1,
+        (
+            "restriction",
+            "For those who decide whether the public is warned",
+        ),
+    );
+    if !before.is_empty() {
+        let each = before
+            .iter()
+            .map(|one| format!("{},{},{}", cap.sender, one.identifier, sent(one)));
+        let references = each.collect::<Vec<_>>().join(" ");
+        element(&mut out, 1, ("references", &references));
+    }
+    info(&mut out, cap, (alert, kind));
+    out += "</alert>\n";
+    out
+}
+
+fn info(out: &mut String, cap: &CapFolder, (alert, kind): (&Alert, MessageType)) {
+    let EventKind::Alert { rule, text, .. } = &alert.event.kind else {
+        return;
+    };
+    let is_over = kind == MessageType::Cancel;
+    let (response, urgency, severity) = match alert.level {
+        Level::Red => ("Evacuate", "Immediate", "Extreme"),
+        Level::Orange => ("Prepare", "Future", "Severe"),
+        Level::Yellow => ("Monitor", "Future", "Moderate"),
+        Level::Green => ("None", "Past", "Minor"),
+        Level::Unknown => ("Monitor", "Unknown", "Unknown"),
+    };
+    let place = alert.event.benchmark.as_ref().map_or_else(
+        || "the whole site".to_owned(),
+        |benchmark| format!("benchmark {benchmark}"),
+    );
+    let ends = if is_over { " ends" } else { "" };
+    let headline = format!("{}, {place}: {}{ends}", alert.site, alert.level);
+    *out += "  <info>\n";
+    element(out, 2, ("language", "en"));
+    element(out, 2, ("category", "Geo"));
+    element(out, 2, ("event", "Landslide"));
+    element(
+        out,
+        2,
+        ("responseType", if is_over { "Assess" } else { response }),
+    );
+    element(out, 2, ("urgency", urgency));
+    element(out, 2, ("severity", severity));
+    element(out, 2, ("certainty", certainty(alert.level, rule)));
+    element(
+        out,
+        2,
+        ("senderName", &format!("slipwatch at {}", alert.site)),
+    );
+    element(out, 2, ("headline", &headline));
+    element(out, 2, ("description", text));
+    let instruction = if is_over {
+        "The level has ended. People look at the slope before anybody goes back."
+    } else {
+        alert.level.recommended()
+    };
+    element(out, 2, ("instruction", instruction));
+    let median = alert.failure_time.map(|time| time.to_string());
+    let parameters = [
+        ("level", Some(alert.level.name().to_owned())),
+        ("state", Some(state_name(alert.state).to_owned())),
+        ("rule", Some(rule.clone())),
+        ("key", Some(alert.key.clone())),
+        ("called-at", Some(alert.event.time.to_string())),
+        ("failure-time-median", median),
+    ];
+    for (name, value) in parameters {
+        let Some(value) = value else { continue };
+        *out += "    <parameter>\n";
+        element(out, 3, ("valueName", name));
+        element(out, 3, ("value", &value));
+        *out += "    </parameter>\n";
+    }
+    *out += "    <area>\n";
+    element(out, 3, ("areaDesc", &cap.area));
+    if let Some(polygon) = &cap.polygon {
+        element(out, 3, ("polygon", polygon));
+    }
+    *out += "    </area>\n  </info>\n";
+}
+
+/// CAP's words: observed; likely, over one half; possible, less.
+fn certainty(level: Level, rule: &str) -> &'static str {
+    if level == Level::Unknown {
+        "Unknown"
+    } else if rule == "critical-velocity" || rule.ends_with("-threshold") {
+        "Observed"
+    } else if level == Level::Orange {
+        "Likely"
+    } else {
+        "Possible"
+    }
+}
+
+fn element(out: &mut String, depth: usize, (name, text): (&str, &str)) {
+    // Writing to a string cannot fail.
+    let _ = writeln!(
+        out,
+        "{:1$}<{name}>{2}</{name}>",
+        "",
+        2 * depth,
+        escaped(text)
+    );
+}
+
+/// Text as XML 1.0 takes it; what it takes in no form becomes U+FFFD.
+fn escaped(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for letter in text.chars() {
+        match letter {
+            '&' => out += "&amp;",
+            '<' => out += "&lt;",
+            '>' => out += "&gt;",
+            '\t' | '\n' | '\r' => out.push(' '),
+            '\u{0}'..='\u{1f}' | '\u{fffe}' | '\u{ffff}' => out.push('\u{fffd}'),
+            other => out.push(other),
+        }
+    }
+    out
+}

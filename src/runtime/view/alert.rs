@@ -1,0 +1,280 @@
+//! Everything of one alert: what called it, on which evidence, what it asks for, who got it, and who did what about it.
+
+use super::{Desk, read};
+use crate::alert::{Level, Policy};
+use crate::monitor::{AlertState, Event, EventKind, Settings};
+use crate::reading::{BenchmarkId, Timestamp};
+use crate::runtime::standing::{every, in_force};
+use crate::store::{DeliveryRow, Store, StoreError};
+use serde::Serialize;
+
+/// Where an alert is in its life.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum AlertLife {
+    /// In force.
+    Firing,
+    /// A higher level of the same place has taken its place.
+    Superseded,
+    /// Ended.
+    Resolved,
+}
+
+/// One alert.
+#[derive(Debug, Clone, Serialize)]
+pub struct AlertView {
+    /// Its idempotency key.
+    pub key: String,
+    /// The site's name.
+    pub site: String,
+    /// Where; `None`: the whole site.
+    pub benchmark: Option<BenchmarkId>,
+    /// Its level.
+    pub level: Level,
+    /// Whether it is in force.
+    pub state: AlertLife,
+    /// When it was called, data time.
+    pub since: Timestamp,
+    /// When it ended or was superseded, data time.
+    pub ended: Option<Timestamp>,
+    /// The rule that called it.
+    pub rule: String,
+    /// That rule's condition with the figures of the settings that were in force.
+    pub condition: Option<String>,
+    /// The alert's own line.
+    pub text: String,
+    /// The refit that it rests on: the newest one of its benchmark when it was called.
+    pub evidence: Option<Event>,
+    /// Of the whole site: the keys of the benchmarks' alerts that were in force with it.
+    pub members: Vec<String>,
+    /// What people are asked to do.
+    pub recommended: &'static str,
+    /// Until when its figures hold: an evacuation time after the newest refit of its benchmark. The level stands until it is
+    /// ended, whatever the time. `None` of what is unknown.
+    pub valid_until: Option<Timestamp>,
+    /// Who was to get it.
+    pub deliveries: Vec<DeliveryRow>,
+    /// Whether somebody has acknowledged it.
+    pub is_acknowledged: bool,
+    /// What happened to it and what people did about it, oldest first.
+    pub audit: Vec<Event>,
+    /// The number of the step that called it, in the state.
+    pub step: i64,
+    /// The settings that were in force.
+    #[serde(skip)]
+    pub settings: Settings,
+    /// The event that called it, as it stands in the state.
+    #[serde(skip)]
+    pub decision: String,
+}
+
+impl Desk {
+    /// Everything of the alert with this key, or of the newest one whose key begins with it; `None` without one.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn alert(&self, key: &str) -> Result<Option<AlertView>, StoreError> {
+        alert(&self.store, &self.facts.name, key)
+    }
+}
+
+/// A change of the alert, with its place in the state.
+struct Call {
+    event: Event,
+    step: i64,
+    body: String,
+}
+
+/// As [`Desk::alert`], for those who have the state at hand.
+///
+/// # Errors
+/// [`StoreError`].
+pub fn alert(store: &Store, site: &str, key: &str) -> Result<Option<AlertView>, StoreError> {
+    let Some(call) = call(store, key)? else {
+        return Ok(None);
+    };
+    let EventKind::Alert {
+        level,
+        key,
+        rule,
+        text,
+        ..
+    } = call.event.kind.clone()
+    else {
+        return Ok(None);
+    };
+    let (since, benchmark) = (call.event.time, call.event.benchmark.clone());
+    let alerts = every(store, "alert")?;
+    let (state, ended) = end(&alerts, &call.event);
+    let settings = store.settings_at(call.step)?.unwrap_or_default();
+    let policy = benchmark
+        .as_ref()
+        .map_or(&settings.policy, |one| settings.policy(one));
+    let audit = audit(store, &alerts, (&call.event, ended))?;
+    let is_ack = |event: &Event| matches!(&event.kind, EventKind::Order { order, .. } if order == "acknowledge");
+    let members = if benchmark.is_none() {
+        members(store, level, since)?
+    } else {
+        Vec::new()
+    };
+    Ok(Some(AlertView {
+        site: site.to_owned(),
+        level,
+        state,
+        since,
+        ended,
+        condition: policy.condition(&rule, level),
+        rule,
+        text,
+        evidence: refit(store, benchmark.as_ref(), since)?,
+        members,
+        recommended: level.recommended(),
+        valid_until: valid_until(store, (level, ended), (benchmark.as_ref(), since), policy)?,
+        deliveries: store.deliveries_of(&key)?,
+        is_acknowledged: audit.iter().any(is_ack),
+        audit,
+        step: call.step,
+        settings,
+        decision: call.body,
+        benchmark,
+        key,
+    }))
+}
+
+/// The event that called the alert: that of the key, or the newest whose key goes on with a slash.
+fn call(store: &Store, asked: &str) -> Result<Option<Call>, StoreError> {
+    let mut found: Option<Call> = None;
+    for placed in store.placed_events("alert")? {
+        let event: Event = read(&placed.body)?;
+        let EventKind::Alert { key, state, .. } = &event.kind else {
+            continue;
+        };
+        let is_it = key == asked;
+        let begins = key
+            .strip_prefix(asked)
+            .is_some_and(|rest| rest.starts_with('/'));
+        if *state != AlertState::Firing || !is_it && !begins {
+            continue;
+        }
+        let is_newer = found
+            .as_ref()
+            .is_none_or(|had| had.event.time <= event.time);
+        if is_it || is_newer {
+            found = Some(Call {
+                event,
+                step: placed.step,
+                body: placed.body,
+            });
+        }
+        if is_it {
+            break;
+        }
+    }
+    Ok(found)
+}
+
+/// How the alert stands by now, and since when it is over.
+fn end(alerts: &[Event], call: &Event) -> (AlertLife, Option<Timestamp>) {
+    let EventKind::Alert {
+        key: own_key,
+        level: own_level,
+        ..
+    } = &call.kind
+    else {
+        return (AlertLife::Resolved, None);
+    };
+    let mut superseded: Option<Timestamp> = None;
+    for event in alerts {
+        let EventKind::Alert {
+            key, level, state, ..
+        } = &event.kind
+        else {
+            continue;
+        };
+        if key == own_key && *state == AlertState::Resolved {
+            return (AlertLife::Resolved, Some(event.time));
+        }
+        let is_beside = (*level == Level::Unknown) != (*own_level == Level::Unknown);
+        let replaces = event.benchmark == call.benchmark
+            && !is_beside
+            && *state == AlertState::Firing
+            && key != own_key
+            && event.time >= call.time
+            && level > own_level;
+        if replaces {
+            superseded = Some(superseded.map_or(event.time, |known| known.min(event.time)));
+        }
+    }
+    match superseded {
+        Some(time) => (AlertLife::Superseded, Some(time)),
+        None => (AlertLife::Firing, None),
+    }
+}
+
+/// Changes of the alert, orders that concern it and corrections of what it rests on.
+fn audit(
+    store: &Store,
+    alerts: &[Event],
+    (call, ended): (&Event, Option<Timestamp>),
+) -> Result<Vec<Event>, StoreError> {
+    let EventKind::Alert { key: own_key, .. } = &call.kind else {
+        return Ok(Vec::new());
+    };
+    let is_own =
+        |event: &&Event| matches!(&event.kind, EventKind::Alert { key, .. } if key == own_key);
+    let mut audit: Vec<Event> = alerts.iter().filter(is_own).cloned().collect();
+    let is_in_time =
+        |event: &Event| event.time >= call.time && ended.is_none_or(|ended| event.time <= ended);
+    for event in every(store, "order")? {
+        let concerns = event.benchmark.is_none() || event.benchmark == call.benchmark;
+        if concerns && is_in_time(&event) {
+            audit.push(event);
+        }
+    }
+    for event in every(store, "correction")? {
+        if event.benchmark == call.benchmark && event.time >= call.time {
+            audit.push(event);
+        }
+    }
+    audit.sort_by_key(|event| event.time);
+    Ok(audit)
+}
+
+fn members(store: &Store, level: Level, since: Timestamp) -> Result<Vec<String>, StoreError> {
+    let standing = in_force(store, Some(since))?;
+    let of_benchmarks = standing.into_iter().filter(|((place, own), _)| {
+        place.is_some() && (*own == Level::Unknown) == (level == Level::Unknown) && *own >= level
+    });
+    let mut keys = Vec::new();
+    for (_, event) in of_benchmarks {
+        if let EventKind::Alert { key, .. } = event.kind {
+            keys.push(key);
+        }
+    }
+    Ok(keys)
+}
+
+fn refit(
+    store: &Store,
+    benchmark: Option<&BenchmarkId>,
+    until: Timestamp,
+) -> Result<Option<Event>, StoreError> {
+    let Some(benchmark) = benchmark else {
+        return Ok(None);
+    };
+    let body = store.event_at(benchmark.as_str(), "refit", until)?;
+    body.as_deref().map(read).transpose()
+}
+
+fn valid_until(
+    store: &Store,
+    (level, ended): (Level, Option<Timestamp>),
+    (benchmark, since): (Option<&BenchmarkId>, Timestamp),
+    policy: &Policy,
+) -> Result<Option<Timestamp>, StoreError> {
+    if ended.is_some() || level == Level::Unknown {
+        return Ok(ended);
+    }
+    let newest = refit(store, benchmark, super::LATEST)?.map_or(since, |event| event.time);
+    Ok(newest.max(since).checked_add(policy.evacuation_time).ok())
+}

@@ -1,0 +1,115 @@
+//! What one alert rests on: the step that called it, the settings in force then, who got it, and the state up to it.
+
+use super::read::decode;
+use super::{Store, StoreError};
+use crate::monitor::{Input, Settings};
+use rusqlite::{Connection, params};
+use serde::Serialize;
+use std::fs::File;
+use std::path::Path;
+
+/// An event with its place in the state.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PlacedEvent {
+    /// Its number.
+    pub seq: i64,
+    /// The number of the step that it followed from.
+    pub step: i64,
+    /// Its JSON.
+    pub body: String,
+}
+
+/// How far one hook has got with one change of an alert.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct DeliveryRow {
+    /// The hook's or webhook's name.
+    pub hook: String,
+    /// The level that was reported.
+    pub level: String,
+    /// `firing` or `resolved`.
+    pub state: String,
+    /// `waiting`, `delivered`, `over`, `dead`, `closed` or `acknowledged`.
+    pub status: String,
+    /// Attempts that have ended.
+    pub attempts: u32,
+}
+
+impl Store {
+    /// Every event of `kind` but refits, oldest first, with its place.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn placed_events(&self, kind: &str) -> Result<Vec<PlacedEvent>, StoreError> {
+        let inner = self.inner();
+        // The second condition lets SQLite use the index of all events but refits.
+        let mut query = inner.connection.prepare_cached(
+            "SELECT seq, step, body FROM event WHERE kind = ?1 AND kind != 'refit' ORDER BY seq",
+        )?;
+        let rows = query.query_map([kind], |row| {
+            Ok(PlacedEvent {
+                seq: row.get(0)?,
+                step: row.get(1)?,
+                body: row.get(2)?,
+            })
+        })?;
+        Ok(rows.collect::<Result<_, _>>()?)
+    }
+
+    /// The settings that were in force at a step; `None` where none had been given yet.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn settings_at(&self, step: i64) -> Result<Option<Settings>, StoreError> {
+        let inner = self.inner();
+        let mut query = inner.connection.prepare_cached(
+            "SELECT body FROM step WHERE seq <= ?1 AND body IS NOT NULL ORDER BY seq DESC",
+        )?;
+        let mut rows = query.query([step])?;
+        while let Some(row) = rows.next()? {
+            if let Input::Settings(settings) = decode(row.get(0)?)? {
+                return Ok(Some(*settings));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Who is to get an alert, and how far that has come, in the order in which it was noted.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn deliveries_of(&self, key: &str) -> Result<Vec<DeliveryRow>, StoreError> {
+        let inner = self.inner();
+        let mut query = inner.connection.prepare_cached(
+            "SELECT hook, level, state, status, attempts FROM outbox WHERE key = ?1 ORDER BY id",
+        )?;
+        let rows = query.query_map(params![key], |row| {
+            Ok(DeliveryRow {
+                hook: row.get(0)?,
+                level: row.get(1)?,
+                state: row.get(2)?,
+                status: row.get(3)?,
+                attempts: row.get(4)?,
+            })
+        })?;
+        Ok(rows.collect::<Result<_, _>>()?)
+    }
+
+    /// Writes to `file`, which is not there yet, a state that holds the steps up to number `step` and nothing else: what a replay
+    /// of the state needs to come to the same events.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn copy_steps(&self, step: i64, file: &Path) -> Result<(), StoreError> {
+        self.backup(file)?;
+        let copy = Connection::open(file)?;
+        copy.execute("DELETE FROM step WHERE seq > ?1", [step])?;
+        copy.execute_batch(
+            "DELETE FROM event; DELETE FROM latest; DELETE FROM position; DELETE FROM memory;
+             DELETE FROM outbox; DELETE FROM thinned; DELETE FROM command; DELETE FROM meta;
+             VACUUM;",
+        )?;
+        drop(copy);
+        File::open(file)?.sync_all()?;
+        Ok(())
+    }
+}
