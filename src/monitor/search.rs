@@ -79,7 +79,7 @@ impl Monitor {
     }
 
     /// The searches asked for since the last call, one a benchmark at most; each is to be answered by an
-    /// [`Input::Found`], and the benchmark asks for no other one until then.
+    /// [`Input::Found`](super::Input::Found), and the benchmark asks for no other one until then.
     pub fn searches(&mut self) -> Vec<SearchJob> {
         std::mem::take(&mut self.searches)
     }
