@@ -132,7 +132,9 @@ struct Daemon(Child);
 
 impl Daemon {
     fn start(folder: &TempDir) -> Self {
-        let child = Command::new(env!("CARGO_BIN_EXE_slipwatch"))
+        // Another build of the program, to compare with.
+        let named = std::env::var("SLIPWATCH");
+        let child = Command::new(named.as_deref().unwrap_or(env!("CARGO_BIN_EXE_slipwatch")))
             .arg("run")
             .arg(folder.path().join("site.toml"))
             .env("RUST_LOG", "error")

@@ -210,13 +210,14 @@ impl Daemon {
         if self.is_up_to_date {
             self.decide();
         }
-        // Durable and acknowledged first: the broker sends more only then.
         if self.site.queues() {
+            // Durable and acknowledged first: the broker sends more only then.
             self.commit()?;
+            if self.site.may_queue_on() {
+                return Ok(());
+            }
         }
-        if !self.site.may_queue_on() {
-            self.settle()?;
-        }
+        self.settle()?;
         self.commit()
     }
 
@@ -404,7 +405,9 @@ impl Daemon {
             self.decide();
         }
         self.release()?;
-        self.settle()?;
+        if !self.site.may_queue_on() {
+            self.settle()?;
+        }
         self.commit()?;
         if self.is_up_to_date {
             let events = self.site.caught_up(now)?;

@@ -11,9 +11,10 @@ const CROWD: usize = 100;
 const WINDOW: Duration = Duration::from_secs(1);
 /// However long a crowd lasts, the past that came is judged after so long.
 const LONGEST: Duration = Duration::from_secs(60);
-/// So many values that queued, or so long a queue, are judged while more come.
-const MOST_QUEUED: u64 = 4096;
-const LONGEST_QUEUE: Duration = Duration::from_secs(1);
+/// So many values that queued, or so long a queue, are judged while more come: as long as an alert that people are to be
+/// notified of at once may wait for others.
+const MOST_QUEUED: u64 = 16_384;
+const LONGEST_QUEUE: Duration = Duration::from_secs(2);
 
 /// The messages of late.
 #[derive(Debug, Default)]
