@@ -1,6 +1,6 @@
 //! Readings that come faster than they can be judged: each is taken, thresholds act at each, and the newest is judged.
 
-use crate::first_start::{as_it_came, at, history, monitor, refits};
+use crate::first_start::{as_it_came, at, history, refits};
 use jiff::Timestamp;
 use slipwatch::alert::Level;
 use slipwatch::monitor::{AlertState, Event, EventKind, Input, Monitor, Notice};
