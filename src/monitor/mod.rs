@@ -13,6 +13,7 @@ mod motion;
 mod notice;
 mod order;
 mod past;
+mod queue;
 mod saved;
 mod search;
 mod sensor;
@@ -43,6 +44,7 @@ use covariates::Covariates;
 use declared::Declarations;
 use jiff::SignedDuration;
 use past::Past;
+use queue::Queue;
 use sensor::Sensors;
 use serde::{Deserialize, Serialize};
 use site::SiteAlert;
@@ -201,6 +203,7 @@ pub struct Monitor {
     /// What of the past is still to be done, and the benchmark whose past is being gone through.
     past: Past,
     walk: Option<Walk>,
+    queue: Queue,
     summary: Summary,
     last_time: Option<Timestamp>,
 }
@@ -224,6 +227,7 @@ impl Monitor {
             clock_wrong: None,
             past: Past::default(),
             walk: None,
+            queue: Queue::default(),
             summary: Summary::default(),
             last_time: None,
         }
@@ -311,6 +315,7 @@ impl Monitor {
             now,
             settles: self.settles,
             is_past: self.past.is_open(),
+            is_queue: self.queue.is_open(),
         };
         let policy = self.settings.policy(benchmark);
         let track = self.tracks.entry(benchmark.clone()).or_insert_with(|| {
@@ -328,6 +333,7 @@ impl Monitor {
         if self.settles && track.owes_look_back() {
             self.late.insert(benchmark.clone());
         }
+        self.queue.note(benchmark, track);
         let critical = policy.critical_velocity_mm_per_day;
         self.searches.extend(track.search(critical, &beside));
         let after = track.deadline();
@@ -376,6 +382,7 @@ impl Monitor {
             now,
             settles: self.settles,
             is_past: self.past.is_open(),
+            is_queue: self.queue.is_open(),
         };
         let mut moved = Vec::new();
         for (id, track) in &mut self.tracks {
@@ -412,6 +419,7 @@ impl Monitor {
             self.searches.retain(|job| job.benchmark != id);
             self.late.remove(&id);
             self.past.forget(&id);
+            self.queue.forget(&id);
             self.walk.take_if(|walk| *walk.benchmark() == id);
             self.changed.insert(id);
         }

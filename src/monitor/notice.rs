@@ -25,7 +25,11 @@ pub enum Notice {
     Retrace,
     /// What came late or was corrected is judged only when [`Notice::Settle`] says so, and not reading by reading.
     Settles,
-    /// Everything that came together has been taken: what came late is judged now, once.
+    /// Readings come faster than they can be judged one by one: each benchmark is judged for its newest at
+    /// [`Notice::Settle`], and at least once in an evacuation time of its readings.
+    Queue,
+    /// Everything that came together has been taken: what came late is judged now, once, and so are the next of the
+    /// benchmarks whose readings queued.
     Settle,
     /// Whether late readings of this benchmark would have called another level is looked into now.
     LookBack(BenchmarkId),
@@ -75,6 +79,10 @@ impl Monitor {
             }
             Notice::Current => self.judge_current(now),
             Notice::Retrace => self.retrace(now),
+            Notice::Queue => {
+                self.queue.open();
+                Vec::new()
+            }
             Notice::Settle => self.settle(now),
             Notice::LookBack(benchmark) => self.look_back(now, benchmark),
             Notice::Behind { benchmark, time } => {
@@ -128,6 +136,7 @@ impl Monitor {
                 self.changed.insert(id);
             }
         }
+        events.extend(self.judge_queued(now));
         events
     }
 

@@ -127,6 +127,7 @@ impl Monitor {
         };
         let beside = Beside {
             is_past: false,
+            is_queue: false,
             ..beside
         };
         let (mut events, has_more) = track.walk(&mut walk, policy, &beside);

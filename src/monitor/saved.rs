@@ -7,6 +7,7 @@ use super::awaited::Awaited;
 use super::covariates::Covariates;
 use super::event::Summary;
 use super::past::Past;
+use super::queue::Queue;
 use super::search::SearchJob;
 use super::sensor::Sensors;
 use super::site::SiteAlert;
@@ -75,6 +76,8 @@ struct Rest {
     clock_wrong: Option<Timestamp>,
     #[serde(default)]
     past: Past,
+    #[serde(default)]
+    queue: Queue,
     summary: Summary,
     last_time: Option<Timestamp>,
 }
@@ -105,6 +108,7 @@ impl Monitor {
             settles: self.settles,
             clock_wrong: self.clock_wrong,
             past: self.past.clone(),
+            queue: self.queue.clone(),
             summary: self.summary,
             last_time: self.last_time,
         };
@@ -157,6 +161,7 @@ impl Monitor {
             settles: rest.settles,
             clock_wrong: rest.clock_wrong,
             past: rest.past,
+            queue: rest.queue,
             walk,
             summary: rest.summary,
             last_time: rest.last_time,

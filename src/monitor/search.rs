@@ -73,6 +73,7 @@ impl Monitor {
             now,
             settles: self.settles,
             is_past: self.past.is_open(),
+            is_queue: self.queue.is_open(),
         };
         let policy = self.settings.policy(benchmark);
         Some((self.tracks.get_mut(benchmark)?, policy, beside))

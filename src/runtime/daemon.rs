@@ -27,6 +27,8 @@ use tokio::sync::watch;
 pub(super) const DRAIN_LIMIT: Duration = Duration::from_secs(20);
 /// An alert that people are to be notified of at once waits no longer than this for others.
 const URGENT: Duration = Duration::from_secs(2);
+/// When nothing has come for this long, what queued is judged.
+const QUIET: Duration = Duration::from_millis(50);
 /// How often time is let pass when nothing arrives.
 const TICK: Duration = Duration::from_secs(1);
 
@@ -112,6 +114,9 @@ impl Daemon {
                     tokio::task::block_in_place(|| self.take_messages(delivery))?;
                 }
                 _ = tick.tick() => tokio::task::block_in_place(|| self.tick())?,
+                () = tokio::time::sleep(QUIET), if self.site.queues() => {
+                    tokio::task::block_in_place(|| self.judge_queued())?;
+                }
                 // Last, so that it keeps nothing else waiting.
                 () = std::future::ready(()), if self.site.owes_look_back() => {
                     tokio::task::block_in_place(|| self.look_back())?;
@@ -154,7 +159,7 @@ impl Daemon {
             self.pulse.vitals.note(&events);
         }
         self.release()?;
-        self.settle();
+        self.settle()?;
         self.commit()?;
         // Also while years of backlog come in: the state is not to hold all of their refits at once.
         self.thin()?;
@@ -186,6 +191,7 @@ impl Daemon {
     /// When the state cannot be used any more.
     pub fn take_messages(&mut self, first: mqtt::Delivery) -> Result<(), StoreError> {
         let (mut next, mut came) = (Some(first), 0);
+        self.site.queue();
         while let Some(delivery) = next {
             came += 1;
             let vitals = &self.pulse.vitals;
@@ -204,7 +210,14 @@ impl Daemon {
         if self.is_up_to_date {
             self.decide();
         }
-        self.settle();
+        if self.site.queues() {
+            // Durable and acknowledged first: the broker sends more only then.
+            self.commit()?;
+            if self.site.may_queue_on() {
+                return Ok(());
+            }
+        }
+        self.settle()?;
         self.commit()
     }
 
@@ -232,9 +245,23 @@ impl Daemon {
         self.site.held() == 0 && !self.site.is_undecided()
     }
 
-    fn settle(&mut self) {
-        let events = self.site.settle();
-        self.pulse.vitals.note(&events);
+    /// Judges what came late and what queued. No alert waits for the rest.
+    fn settle(&mut self) -> Result<(), StoreError> {
+        loop {
+            let stopwatch = Stopwatch::start();
+            let events = self.site.settle();
+            self.pulse.vitals.judged(&events, stopwatch.elapsed());
+            if !self.site.queues() {
+                return Ok(());
+            }
+            self.commit_what_is_urgent()?;
+            self.pulse.turn();
+        }
+    }
+
+    fn judge_queued(&mut self) -> Result<(), StoreError> {
+        self.settle()?;
+        self.commit()
     }
 
     /// Looks back on what came late at one benchmark, or goes on through the past before a first start.
@@ -378,7 +405,9 @@ impl Daemon {
             self.decide();
         }
         self.release()?;
-        self.settle();
+        if !self.site.may_queue_on() {
+            self.settle()?;
+        }
         self.commit()?;
         if self.is_up_to_date {
             let events = self.site.caught_up(now)?;

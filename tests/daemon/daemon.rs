@@ -150,6 +150,28 @@ async fn an_alert_is_told_and_after_a_restart_not_again() {
     assert!(taken.unwrap());
 }
 
+#[tokio::test(start_paused = true)]
+async fn while_a_long_past_is_read_what_is_current_is_judged_once_a_minute() {
+    let (_folder, config) = site_folder();
+    let mut site = site(&config);
+    let mut judged = Vec::new();
+    for minute in 0..5_i64 {
+        for hour in 0..20 {
+            let time = noon() + hours(20 * minute + hour);
+            let value = 0.1 * (20 * minute + hour) as f64 + ((hour * 37) % 11) as f64 / 50.0;
+            let said = site.take(&reading(time, value), noon() + hours(200));
+            assert_eq!(said.unwrap(), []);
+            judged.extend(site.judge_meanwhile());
+        }
+        tokio::time::advance(Duration::from_secs(30)).await;
+    }
+    let refits = (judged.iter()).filter(|event| matches!(event.kind, EventKind::Refit { .. }));
+    // The first of each batch of twenty that came a minute after what was judged before.
+    let times: Vec<Timestamp> = refits.map(|event| event.time).collect();
+    assert_eq!(times, [40, 80].map(|hour| noon() + hours(hour)));
+    close(site, noon() + hours(200)).await;
+}
+
 #[tokio::test]
 async fn attempts_are_counted_over_restarts() {
     let (folder, config) = site_folder();

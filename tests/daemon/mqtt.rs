@@ -404,3 +404,140 @@ async fn a_broker_that_refuses_the_subscription_is_told_and_its_benchmark_is_unk
     }
     panic!("{}\n{}", daemon.text("told"), daemon.text("log"));
 }
+
+/// The benchmarks of a backlog, the readings of each that a daemon knows before it, and those that queue, an hour apart.
+const BENCHMARKS: usize = 10;
+const KNOWN: usize = 20;
+const QUEUED: usize = 300;
+
+/// Readings of all benchmarks, by time: creep with a jitter, up to now.
+fn backlog(readings: std::ops::Range<usize>) -> Vec<String> {
+    let spacing = jiff::SignedDuration::from_hours(1);
+    let all = i32::try_from(KNOWN + QUEUED).unwrap();
+    let now = slipwatch::runtime::clock::now().as_second() / 86_400 * 86_400;
+    let first = jiff::Timestamp::from_second(now).unwrap() - spacing * all;
+    let message = |reading: usize, benchmark: usize| {
+        let time = first + spacing * i32::try_from(reading).unwrap();
+        let jitter = ((reading * 37 + benchmark) % 11) as f64 / 50.0;
+        let value = 0.1 * reading as f64 + jitter;
+        format!(r#"{{"benchmark":"b{benchmark}","time":"{time}","value":{value:.3},"unit":"mm"}}"#)
+    };
+    readings
+        .flat_map(|reading| (0..BENCHMARKS).map(move |benchmark| message(reading, benchmark)))
+        .collect()
+}
+
+impl Daemon {
+    /// Kills it, and starts it again on the same state.
+    fn restart(&mut self) {
+        self.1.kill().unwrap();
+        self.1.wait().unwrap();
+        let process = Command::new(PROGRAM)
+            .args(["run", "site.toml"])
+            .current_dir(self.0.path())
+            .stderr(Stdio::null())
+            .stdout(Stdio::null())
+            .spawn();
+        self.1 = process.unwrap();
+    }
+
+    /// Readings that are durable, and how many of them differ in benchmark or time.
+    fn durable(&self) -> (usize, usize) {
+        let count = || -> rusqlite::Result<(i64, i64)> {
+            let database = rusqlite::Connection::open(self.0.path().join("state/slipwatch.db"))?;
+            let query = "SELECT count(*), count(DISTINCT series || ' ' || time) FROM step WHERE series IS NOT NULL";
+            database.query_row(query, [], |row| Ok((row.get(0)?, row.get(1)?)))
+        };
+        let (all, distinct) = count().unwrap_or_default();
+        (
+            usize::try_from(all).unwrap(),
+            usize::try_from(distinct).unwrap(),
+        )
+    }
+
+    fn printed(&self, words: &[&str]) -> String {
+        let output = Command::new(PROGRAM)
+            .args(words)
+            .current_dir(self.0.path())
+            .output();
+        String::from_utf8(output.unwrap().stdout).unwrap()
+    }
+
+    fn events(&self) -> String {
+        self.printed(&["events", "--config", "site.toml", "--format", "json"])
+    }
+
+    fn refits(&self) -> usize {
+        let said = self.events();
+        let is_refit = |line: &&str| line.contains(r#""event":"refit""#);
+        said.lines().filter(is_refit).count()
+    }
+
+    fn wait(&self, what: &str, claim: impl Fn(&Self) -> bool) {
+        for _ in 0..1200 {
+            if claim(self) {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        panic!("{what}: {:?}, {} refits", self.durable(), self.refits());
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+#[cfg_attr(not(has_mosquitto), ignore = "Mosquitto was not found by build.rs")]
+async fn messages_that_queue_are_judged_together_and_kills_in_the_midst_lose_and_repeat_nothing() {
+    let broker = Mosquitto::start_with(|_| "max_queued_messages 0\n".to_owned());
+    tokio::time::sleep(Duration::from_millis(500)).await;
+    let mut daemon = Daemon::start(&broker);
+    daemon.wait("connected", |one| one.text("log").contains("connected"));
+    tokio::time::sleep(Duration::from_millis(1500)).await;
+    for some in backlog(0..KNOWN).chunks(50) {
+        broker.publish(some).await;
+    }
+    // From the tenth reading on each leads to one.
+    let known = BENCHMARKS * (KNOWN - 9);
+    daemon.wait("the first start", |one| one.refits() == known);
+    daemon.1.kill().unwrap();
+    for some in backlog(KNOWN..KNOWN + QUEUED).chunks(50) {
+        broker.publish(some).await;
+    }
+    let all = BENCHMARKS * (KNOWN + QUEUED);
+    let mut midst = 0;
+    for least in [BENCHMARKS * KNOWN + 150, all / 3, 2 * all / 3] {
+        daemon.restart();
+        daemon.wait("more taken", |one| one.durable().0 >= least);
+        midst += usize::from(daemon.durable().0 < all);
+    }
+    daemon.restart();
+    assert!(midst > 0, "each kill came after the end");
+    let last = backlog(KNOWN + QUEUED - 1..KNOWN + QUEUED);
+    let newest = last.iter().map(|line| {
+        let message: serde_json::Value = serde_json::from_str(line).unwrap();
+        let name = |key: &str| message[key].as_str().unwrap().to_owned();
+        (name("benchmark"), name("time"))
+    });
+    let newest: Vec<(String, String)> = newest.collect();
+    daemon.wait("the newest of each judged", |one| {
+        let said = one.events();
+        let events = said.lines().map(|line| serde_json::from_str(line).unwrap());
+        let refits = events.filter(|event: &serde_json::Value| event["event"] == "refit");
+        let refits: Vec<serde_json::Value> = refits.collect();
+        (newest.iter()).all(|(benchmark, time)| {
+            refits
+                .iter()
+                .any(|one| one["benchmark"] == **benchmark && one["time"] == **time)
+        })
+    });
+    daemon.1.kill().unwrap();
+    daemon.1.wait().unwrap();
+    assert_eq!(daemon.durable(), (all, all));
+    let replayed = daemon.printed(&["replay", "--state", "state", "--format", "json"]);
+    let (replayed, _summary) = replayed.trim_end().rsplit_once('\n').unwrap();
+    assert!(
+        daemon.events().trim_end() == replayed,
+        "other than a replay"
+    );
+    let refits = daemon.refits() - known;
+    assert!(3 * refits < BENCHMARKS * QUEUED, "{refits}");
+}

@@ -5,7 +5,7 @@ use slipwatch::alert::{Level, Policy, Threshold};
 use slipwatch::monitor::{AlertState, Event, EventKind, Input, Monitor, Notice, Settings};
 use slipwatch::reading::{BenchmarkId, Reading, Unit};
 
-fn at(hour: i64) -> Timestamp {
+pub(crate) fn at(hour: i64) -> Timestamp {
     let start: Timestamp = "2026-01-01T00:00:00Z".parse().unwrap();
     start + hour.hours()
 }
@@ -25,7 +25,7 @@ fn reading(benchmark: &str, hour: i64, value: f64) -> (Timestamp, Input) {
 }
 
 /// Creep with a jitter, hourly, of two benchmarks; `more` is added to that of the first.
-fn history(hours: i64, more: impl Fn(i64) -> f64) -> Vec<(Timestamp, Input)> {
+pub(crate) fn history(hours: i64, more: impl Fn(i64) -> f64) -> Vec<(Timestamp, Input)> {
     (0..hours)
         .flat_map(|hour| {
             let jitter = 0.05 * ((hour * 37 % 11) as f64 - 5.0);
@@ -38,7 +38,7 @@ fn history(hours: i64, more: impl Fn(i64) -> f64) -> Vec<(Timestamp, Input)> {
         .collect()
 }
 
-fn monitor() -> Monitor {
+pub(crate) fn monitor() -> Monitor {
     let policy = Policy {
         thresholds: vec![Threshold {
             level: Level::Red,
@@ -85,7 +85,7 @@ fn refit(event: &Event) -> Option<(String, Timestamp, String)> {
 }
 
 /// A monitor that was given each input as it came, and its events.
-fn as_it_came(inputs: &[(Timestamp, Input)]) -> (Monitor, Vec<Event>) {
+pub(crate) fn as_it_came(inputs: &[(Timestamp, Input)]) -> (Monitor, Vec<Event>) {
     let mut there = monitor();
     let steps = inputs.iter();
     let events = steps.flat_map(|(now, input)| there.step(*now, input));
@@ -93,7 +93,7 @@ fn as_it_came(inputs: &[(Timestamp, Input)]) -> (Monitor, Vec<Event>) {
     (there, events)
 }
 
-fn refits(events: &[Event]) -> Vec<(String, Timestamp, String)> {
+pub(crate) fn refits(events: &[Event]) -> Vec<(String, Timestamp, String)> {
     let mut all: Vec<_> = events.iter().filter_map(refit).collect();
     all.sort();
     all

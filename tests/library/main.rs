@@ -30,6 +30,7 @@ mod made_up;
 mod measured;
 mod monitor;
 mod mutated_files;
+mod queue;
 mod reconstructions;
 mod recordings;
 mod refit_policy;

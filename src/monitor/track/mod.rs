@@ -55,6 +55,8 @@ pub(super) struct Beside<'a> {
     pub(super) settles: bool,
     /// Whether the past is being read: nothing is judged until it has been.
     pub(super) is_past: bool,
+    /// Whether readings come faster than they can be judged: each benchmark is judged for its newest.
+    pub(super) is_queue: bool,
 }
 
 /// Everything the monitor knows of one benchmark.
@@ -101,6 +103,9 @@ pub(super) struct Track {
     /// Something came late and has not been judged.
     #[serde(default)]
     owes: bool,
+    /// The first reading of a queue that has not been judged, nor has one after it.
+    #[serde(default)]
+    queued_since: Option<Timestamp>,
     /// The newest forecast, while a level is in force.
     #[serde(default)]
     kept: Option<KeptForecast>,
@@ -128,6 +133,7 @@ impl Track {
             spoilt_by: None,
             others: 0,
             owes: false,
+            queued_since: None,
             kept: None,
             accepted: BTreeSet::new(),
             record: Record::Known,
@@ -228,7 +234,11 @@ impl Track {
             return events;
         }
         let is_stuck = self.unknown.has(Reason::Stuck);
-        if is_owed || is_stuck || !self.is_refit_due(policy, taken, reading.time) {
+        if is_owed
+            || is_stuck
+            || !self.is_refit_due(policy, taken, reading.time)
+            || beside.is_queue && self.waits(policy, time)
+        {
             events.extend(self.raise(policy, time));
             return events;
         }
@@ -239,7 +249,7 @@ impl Track {
     /// What follows from the readings as they are now.
     fn judge(&mut self, policy: &Policy, time: Timestamp, beside: &Beside<'_>) -> Vec<Event> {
         let mut events = Vec::new();
-        self.owes = false;
+        (self.owes, self.queued_since) = (false, None);
         let forecast = self.forecast(policy.critical_velocity_mm_per_day, beside);
         if let Some(forecast) = &forecast {
             events.extend(self.refit(policy, time, forecast));
@@ -272,12 +282,32 @@ impl Track {
         (self.history.rates(), now_days)
     }
 
-    /// Everything that came together has been taken: judges what of it came late.
+    /// Everything that came together has been taken: judges what of it came late, or queued.
     pub(super) fn settle(&mut self, policy: &Policy, beside: &Beside<'_>) -> Vec<Event> {
-        match self.newest {
-            Some(time) if self.owes => self.judge(policy, time, beside),
-            Some(_) | None => Vec::new(),
+        let is_owed = self.owes || self.is_queued();
+        let Some(time) = self.newest.filter(|_| is_owed) else {
+            return Vec::new();
+        };
+        if self.unknown.has(Reason::Stuck) {
+            (self.owes, self.queued_since) = (false, None);
+            return Vec::new();
         }
+        let mut events = self.judge(policy, time, beside);
+        if self.record == Record::Owed {
+            events.retain(|event| !past::is_of_the_record(event));
+        }
+        events
+    }
+
+    /// Whether a reading of a queue is judged later: not where the first that was not lies an evacuation time back.
+    fn waits(&mut self, policy: &Policy, time: Timestamp) -> bool {
+        let since = *self.queued_since.get_or_insert(time);
+        time.duration_since(since) < policy.evacuation_time
+    }
+
+    /// Whether a reading of a queue is still to be judged.
+    pub(super) fn is_queued(&self) -> bool {
+        self.queued_since.is_some()
     }
 
     /// What comes now was measured long before `time`, which it is by the clock.

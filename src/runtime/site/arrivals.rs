@@ -340,14 +340,23 @@ impl Site {
         self.monitor.clock_wrong().is_some()
     }
 
-    /// All that came together has been taken: judges what of it came late, once.
+    /// All that came together has been taken: judges what of it came late, once, and the next of what queued; to be
+    /// repeated while [`Site::queues`].
     pub fn settle(&mut self) -> Vec<Event> {
-        match self.now {
-            Some(now) if self.monitor.late().is_some() => {
-                self.step(now, &Input::Notice(Notice::Settle))
-            }
-            Some(_) | None => Vec::new(),
+        let is_owed = self.monitor.late().is_some() || self.monitor.queues();
+        let Some(now) = self.now.filter(|_| is_owed) else {
+            return Vec::new();
+        };
+        let events = self.step(now, &Input::Notice(Notice::Settle));
+        for job in self.monitor.searches() {
+            self.searches.start(job);
         }
+        events
+    }
+
+    /// Whether values that came faster than they can be judged are still to be.
+    pub fn queues(&self) -> bool {
+        self.monitor.queues()
     }
 
     /// Whether something is still to be looked back on: what came late, or the past before a first start.

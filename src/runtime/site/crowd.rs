@@ -1,4 +1,5 @@
-//! Whether messages come in such a crowd that they are a broker's backlog: on a first start they belong to the past.
+//! Whether messages come in such a crowd that they are a broker's backlog: on a first start they belong to the past, later
+//! they are judged together.
 
 use super::Site;
 use crate::monitor::{Event, Input, Notice};
@@ -8,8 +9,12 @@ use std::time::Duration;
 /// So many messages within [`WINDOW`] are a crowd.
 const CROWD: usize = 100;
 const WINDOW: Duration = Duration::from_secs(1);
-/// However long a crowd lasts, what came is judged after so long.
+/// However long a crowd lasts, the past that came is judged after so long.
 const LONGEST: Duration = Duration::from_secs(60);
+/// So many values that queued, or so long a queue, are judged while more come: as long as an alert that people are to be
+/// notified of at once may wait for others.
+const MOST_QUEUED: u64 = 16_384;
+const LONGEST_QUEUE: Duration = Duration::from_secs(2);
 
 /// The messages of late.
 #[derive(Debug, Default)]
@@ -20,6 +25,8 @@ pub(super) struct Crowd {
     came: Option<(Stopwatch, Stopwatch)>,
     /// Since when the past is being read without what is current being judged.
     reads_past: Option<Stopwatch>,
+    /// Since when values queue, and how many had been taken then.
+    queues: Option<(Stopwatch, u64)>,
 }
 
 impl Site {
@@ -36,6 +43,28 @@ impl Site {
             let first = self.crowd.came.map_or(now, |(first, _)| first);
             self.crowd.came = Some((first, now));
         }
+    }
+
+    /// Messages are about to be taken: where they come in a crowd, what they hold is judged when [`Site::settle`] says so.
+    pub fn queue(&mut self) {
+        if self.monitor.queues() || self.monitor.reads_past() || !self.comes_crowded() {
+            return;
+        }
+        self.crowd.queues = Some((Stopwatch::start(), self.counts.taken));
+        self.step(self.data_now(), &Input::Notice(Notice::Queue));
+    }
+
+    /// Whether values have queued and may queue further.
+    pub fn may_queue_on(&self) -> bool {
+        let queues = self.crowd.queues.filter(|_| self.monitor.queues());
+        queues.is_some_and(|(since, taken)| {
+            since.elapsed() < LONGEST_QUEUE && self.counts.taken - taken < MOST_QUEUED
+        })
+    }
+
+    fn comes_crowded(&self) -> bool {
+        let came = self.crowd.came;
+        came.is_some_and(|(_, last)| last.elapsed() <= WINDOW)
     }
 
     /// While the past is still being read: judges what is current now and then, however long that takes.
@@ -60,6 +89,6 @@ impl Site {
     /// Whether more are to be expected at once.
     pub(super) fn is_crowded(&self) -> bool {
         let came = self.crowd.came;
-        came.is_some_and(|(first, last)| last.elapsed() <= WINDOW && first.elapsed() <= LONGEST)
+        self.comes_crowded() && came.is_some_and(|(first, _)| first.elapsed() <= LONGEST)
     }
 }

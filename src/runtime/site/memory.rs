@@ -1,7 +1,9 @@
 //! What a restart goes on from: the memory last saved, and the steps since.
 
 use super::mute::Mute;
-use super::{Counts, OWN, Place, STEPS_A_BENCHMARK, STEPS_A_MEMORY, Sinks, Site, Standing};
+use super::{
+    Counts, OWN, Place, STEPS_A_BENCHMARK, STEPS_A_MEMORY, STEPS_UNJUDGED, Sinks, Site, Standing,
+};
 use crate::alert::Level;
 use crate::monitor::{Input, Monitor, Part, SavedError, SearchJob, Settings};
 use crate::reading::{BenchmarkId, Timestamp};
@@ -205,7 +207,10 @@ impl Site {
 
     /// The memory as of the last step, where it is time to save it.
     pub(super) fn memory(&self) -> Option<Vec<Part>> {
-        let many = STEPS_A_MEMORY.max(STEPS_A_BENCHMARK * self.newest.len());
+        let mut many = STEPS_A_MEMORY.max(STEPS_A_BENCHMARK * self.newest.len());
+        if self.monitor.reads_past() || self.monitor.queues() {
+            many *= STEPS_UNJUDGED;
+        }
         if self.steps_since_memory < many {
             return None;
         }

@@ -47,6 +47,8 @@ const MOST_UNWRITTEN: usize = 20_000;
 /// After so many steps the monitor's memory is saved, or after so many for each benchmark if that is more.
 const STEPS_A_MEMORY: usize = 2_000;
 const STEPS_A_BENCHMARK: usize = 20;
+/// After so many times more where readings are taken without being judged: to take them again costs little.
+const STEPS_UNJUDGED: usize = 10;
 /// The site's own part of the memory, beside those of the monitor.
 const OWN: &str = "\0site";
 /// Before all readings.

@@ -1,10 +1,13 @@
 //! What the daemon holds: a steady load, a first start, a backlog, many benchmarks. The program itself on real files, with a real hook.
 //!
-//!     cargo bench --bench daemon -- load [--seconds 60] | first | catchup [--readings 100000] | memory [--most 10000]
+//!     cargo bench --bench daemon -- load [--seconds 60] | first | messages [--messages 100000] |
+//!     catchup [--readings 100000] | memory [--most 10000]
 
 #![expect(clippy::unwrap_used, reason = "a bench fails by panicking")]
 #![expect(clippy::print_stdout, reason = "its figures")]
 #![expect(clippy::disallowed_methods, reason = "it measures by the clock")]
+
+mod broker;
 
 use jiff::{SignedDuration, Timestamp};
 use rand::{RngExt, SeedableRng};
@@ -41,13 +44,16 @@ fn main() {
     let number = |flag, default: usize| after(flag).map_or(default, |text| text.parse().unwrap());
     let all = !args
         .iter()
-        .any(|arg| ["load", "first", "catchup", "memory"].contains(&arg.as_str()));
+        .any(|arg| ["load", "first", "messages", "catchup", "memory"].contains(&arg.as_str()));
     let wants = |name: &str| all || args.iter().any(|arg| arg == name);
     if wants("load") {
         held_load(u32::try_from(number("--seconds", 60)).unwrap());
     }
     if wants("first") {
         first_start(30, 300, 8);
+    }
+    if wants("messages") {
+        broker::backlog(100, number("--messages", 100_000));
     }
     if wants("catchup") {
         let readings = number("--readings", 100_000);
@@ -126,7 +132,9 @@ struct Daemon(Child);
 
 impl Daemon {
     fn start(folder: &TempDir) -> Self {
-        let child = Command::new(env!("CARGO_BIN_EXE_slipwatch"))
+        // Another build of the program, to compare with.
+        let named = std::env::var("SLIPWATCH");
+        let child = Command::new(named.as_deref().unwrap_or(env!("CARGO_BIN_EXE_slipwatch")))
             .arg("run")
             .arg(folder.path().join("site.toml"))
             .env("RUST_LOG", "error")
