@@ -16,7 +16,7 @@ const CLOSE: f64 = 1e-4;
 /// The first of the normal deviates, in the order in which they are drawn.
 static DEVIATES: LazyLock<Vec<[f64; 5]>> =
     LazyLock::new(|| (1..=KEPT_DEVIATES).map(deviates).collect());
-const KEPT_DEVIATES: u32 = 8192;
+const KEPT_DEVIATES: u32 = 2048;
 
 fn deviates(index: u32) -> [f64; 5] {
     halton(index).map(normal_quantile)
