@@ -225,6 +225,22 @@ fn what_is_dumped_reads_back_as_what_was_drawn() {
     );
 }
 
+#[test]
+fn a_step_seen_through_a_mean_is_named_with_the_mean_and_a_step_read_at_once_without_it() {
+    let named = |kind: Kind, index: u64| -> Vec<Kind> {
+        let one = drawn(Family::Of(kind), Range::Dev, index).unwrap();
+        let options = Options::default();
+        let said = explain(&one.series, &one.channels, &[], &options, &mut |_| {});
+        let all = std::iter::once(&said.verdict).chain(&said.also);
+        all.map(|effect| effect.effect).collect()
+    };
+    for index in [0, 1] {
+        let kinds = named(Kind::IntervalMean, index);
+        assert_eq!(kinds, [Kind::IntervalMean, Kind::LoadStep], "{index}");
+    }
+    assert_eq!(named(Kind::LoadStep, 1), [Kind::LoadStep]);
+}
+
 /// An explanation that names what is given and no more.
 fn saying(one: &Drawn, named: Vec<Effect>) -> Explanation {
     let mut short = one.series.clone();
