@@ -18,7 +18,7 @@ use tokio::sync::mpsc;
 /// Readings of each benchmark that a daemon knows before the backlog.
 const KNOWN: usize = 30;
 /// Messages that one commit takes at most where there is no monitor.
-const AT_ONCE: usize = 64;
+const AT_ONCE: usize = 1024;
 
 /// Its process, its port, and the folder of its config.
 struct Mosquitto(

@@ -190,10 +190,10 @@ impl Daemon {
     /// # Errors
     /// When the state cannot be used any more.
     pub fn take_messages(&mut self, first: mqtt::Delivery) -> Result<(), StoreError> {
-        let (mut next, mut came) = (Some(first), 0);
-        self.site.queue();
+        let mut next = Some(first);
         while let Some(delivery) = next {
-            came += 1;
+            self.site.messages_come(self.sources.deliveries.len());
+            self.site.queue();
             let vitals = &self.pulse.vitals;
             vitals.takes(delivery.found);
             vitals.quarantined(&delivery.source, delivery.quarantined);
@@ -206,7 +206,6 @@ impl Daemon {
                 .then(|| self.sources.deliveries.try_recv().ok())
                 .flatten();
         }
-        self.site.messages_came(came);
         if self.is_up_to_date {
             self.decide();
         }

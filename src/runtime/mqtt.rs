@@ -3,31 +3,23 @@
 //! The session is kept under a stable name and acknowledgements are ours to give: what was not
 //! acknowledged when the process or the connection ended comes again.
 
+mod session;
+
+pub(super) use session::MOST_UNACKNOWLEDGED;
+
 use super::clock::Stopwatch;
 use super::ingest::FileUnits;
 use super::shutdown::Shutdown;
 use super::site::is_logged;
 use super::tail::{Arrival, Decoder};
 use crate::config::{Benchmark, Broker};
-use rumqttc::{
-    AsyncClient, ClientError, Event, EventLoop, MqttOptions, Packet, Publish, QoS,
-    SubscribeReasonCode,
-};
+use session::{Came, Message, NoConnection, Session};
 use std::path::Path;
 use std::time::Duration;
 use tokio::sync::mpsc;
 
 /// Longest message whose lines are read, bytes.
 const LONGEST_MESSAGE: usize = 1 << 20;
-/// Longest packet that is taken from the broker at all, bytes: the longest there can be. What is too long is set aside
-/// and acknowledged; refused, it would come again for ever, and nothing behind it.
-const LONGEST_PACKET: usize = 268_435_455 + 5;
-/// Longest packet that we send, bytes.
-const LONGEST_SENT: usize = 1 << 20;
-/// Requests that may wait for the connection.
-const REQUESTS: usize = 64;
-/// How often we ping the broker.
-const KEEP_ALIVE: Duration = Duration::from_secs(30);
 /// First and longest wait before connecting again.
 const RECONNECT: (Duration, Duration) = (Duration::from_secs(1), Duration::from_secs(60));
 
@@ -53,7 +45,7 @@ pub struct Receipt(Of);
 /// What is acknowledged.
 #[derive(Debug)]
 enum Of {
-    Message(Box<(AsyncClient, Publish)>),
+    Message(Box<Message>),
     Number(u64, mpsc::UnboundedSender<u64>),
 }
 
@@ -67,10 +59,10 @@ impl Receipt {
     /// [`follow`].
     ///
     /// # Errors
-    /// When that task has ended; the message comes again.
-    pub async fn acknowledge(self) -> Result<(), ClientError> {
+    /// When that task, or the connection that the message came by, has ended; the message comes again.
+    pub async fn acknowledge(self) -> Result<(), NoConnection> {
         match self.0 {
-            Of::Message(of) => of.0.ack(&of.1).await,
+            Of::Message(message) => message.acknowledge().await,
             Of::Number(number, acknowledged) => {
                 // Whoever does not listen any more needs no answer.
                 let _ = acknowledged.send(number);
@@ -90,12 +82,11 @@ pub async fn follow(
     deliveries: mpsc::Sender<Delivery>,
     mut shutdown: Shutdown,
 ) {
-    let (client, mut connection) = AsyncClient::new(options(&broker, client_id), REQUESTS);
+    let mut session = Session::new(broker.clone(), client_id);
     let mut reader = Reader {
         source: broker.id.clone(),
         decoder: Decoder::of_messages(&broker, &benchmarks),
         units: FileUnits::default(),
-        client,
         quarantined: 0,
     };
     let mut wait = RECONNECT.0;
@@ -103,35 +94,34 @@ pub async fn follow(
         tokio::select! {
             biased;
             () = shutdown.requested() => return,
-            came = next(&mut connection) => match came {
-                Ok(Some(Packet::ConnAck(_))) => {
-                    tracing::info!(source = broker.id, ?broker.address, "connected");
+            came = session.next() => match came {
+                Ok(Came::Connected) => {
+                    let version = session.version();
+                    tracing::info!(source = broker.id, ?broker.address, version, "connected");
                     wait = RECONNECT.0;
                     // Again each time: a broker that lost its sessions has forgotten it.
-                    if let Err(error) = reader.client.try_subscribe(&broker.topic, QoS::AtLeastOnce) {
+                    if let Err(error) = session.subscribe(&broker.topic) {
                         tracing::error!(source = broker.id, %error, "cannot subscribe");
                     }
                 }
-                Ok(Some(Packet::Publish(message))) => {
-                    let delivery = reader.read(message);
+                Ok(Came::Message(message)) => {
+                    let delivery = reader.delivery(message);
                     tokio::select! {
                         sent = deliveries.send(delivery) => if sent.is_err() { return },
                         () = shutdown.requested() => return,
                     }
                 }
-                Ok(Some(Packet::SubAck(answer))) => {
-                    if answer.return_codes.contains(&SubscribeReasonCode::Failure) {
-                        let (source, topic) = (&broker.id, &broker.topic);
-                        tracing::error!(source, topic, ?RECONNECT, "the broker refuses the subscription: nothing comes from it");
-                        // Asked again after a while: its rules may be others then.
-                        let _ = reader.client.try_disconnect();
-                        tokio::select! {
-                            () = tokio::time::sleep(RECONNECT.1) => {}
-                            () = shutdown.requested() => return,
-                        }
+                Ok(Came::SubscriptionRefused) => {
+                    let (source, topic) = (&broker.id, &broker.topic);
+                    tracing::error!(source, topic, ?RECONNECT, "the broker refuses the subscription: nothing comes from it");
+                    // Asked again after a while: its rules may be others then.
+                    session.disconnect();
+                    tokio::select! {
+                        () = tokio::time::sleep(RECONNECT.1) => {}
+                        () = shutdown.requested() => return,
                     }
                 }
-                Ok(Some(_) | None) => {}
+                Ok(Came::Nothing) => {}
                 Err(error) => {
                     tracing::warn!(source = broker.id, %error, ?wait, "no connection; will connect again");
                     tokio::select! {
@@ -145,43 +135,34 @@ pub async fn follow(
     }
 }
 
-async fn next(connection: &mut EventLoop) -> Result<Option<Packet>, rumqttc::ConnectionError> {
-    Ok(match connection.poll().await? {
-        Event::Incoming(packet) => Some(packet),
-        Event::Outgoing(_) => None,
-    })
-}
-
-fn options(broker: &Broker, client_id: String) -> MqttOptions {
-    let address = &broker.address;
-    let mut options = MqttOptions::new(client_id, &address.host, address.port);
-    options
-        .set_clean_session(false)
-        .set_manual_acks(true)
-        .set_keep_alive(KEEP_ALIVE)
-        .set_max_packet_size(LONGEST_PACKET, LONGEST_SENT);
-    if let Some((user, password)) = &address.login {
-        options.set_credentials(user, password);
-    }
-    options
-}
-
 struct Reader {
     source: String,
     decoder: Decoder,
     units: FileUnits,
-    client: AsyncClient,
     /// Lines and whole messages that could not be used.
     quarantined: u64,
 }
 
 impl Reader {
-    fn read(&mut self, message: Publish) -> Delivery {
+    fn delivery(&mut self, mut message: Message) -> Delivery {
         let found = Stopwatch::start();
+        let (arrivals, quarantined) = self.read(&message.topic(), message.payload());
+        message.forget_payload();
+        Delivery {
+            arrivals,
+            source: self.source.clone(),
+            found,
+            quarantined,
+            receipt: Receipt(Of::Message(Box::new(message))),
+        }
+    }
+
+    /// The values of a message, and the lines of it that cannot be used.
+    fn read(&mut self, topic: &str, payload: &[u8]) -> (Vec<Arrival>, u64) {
         let mut arrivals = Vec::new();
         let mut faults: Vec<Box<dyn std::error::Error>> = Vec::new();
-        let rows = self.decoder.text_rows(Path::new(&message.topic));
-        match (rows, text(&message.payload)) {
+        let rows = self.decoder.text_rows(Path::new(topic));
+        match (rows, text(payload)) {
             (Some(mut rows), Ok(text)) => {
                 for (line, number) in text.lines().zip(1..) {
                     let taken = rows.take(number, line);
@@ -200,16 +181,10 @@ impl Reader {
             self.quarantined += 1;
             let total = self.quarantined;
             if is_logged(total) {
-                tracing::warn!(topic = message.topic, %error, total, "message, or line of one, quarantined");
+                tracing::warn!(topic, %error, total, "message, or line of one, quarantined");
             }
         }
-        Delivery {
-            arrivals,
-            source: self.source.clone(),
-            found,
-            quarantined: faults.len() as u64,
-            receipt: Receipt(Of::Message(Box::new((self.client.clone(), message)))),
-        }
+        (arrivals, faults.len() as u64)
     }
 }
 
@@ -249,18 +224,15 @@ mod tests {
                     url = \"mqtt://127.0.0.1:1883\"\ntopic = \"site/+/displacement\"\n[[benchmark]]\nid = \"P1\"\n";
         let config = config::parse(site, Path::new("site.toml")).unwrap();
         let broker = &config.brokers[0];
-        let (client, _connection) = AsyncClient::new(options(broker, "test".to_owned()), 1);
         let mut reader = Reader {
             source: broker.id.clone(),
             decoder: Decoder::of_messages(broker, &config.benchmarks),
             units: FileUnits::default(),
-            client,
             quarantined: 0,
         };
-        let message = Publish::new("site/P1/displacement", QoS::AtLeastOnce, payload);
-        let delivery = reader.read(message);
-        assert_eq!(reader.quarantined, delivery.quarantined);
-        (delivery.arrivals.len(), delivery.quarantined)
+        let (arrivals, quarantined) = reader.read("site/P1/displacement", payload.as_bytes());
+        assert_eq!(reader.quarantined, quarantined);
+        (arrivals.len(), quarantined)
     }
 
     #[test]

@@ -11,7 +11,7 @@ use tokio::task::{JoinError, JoinHandle};
 /// Batches between the files and the monitor.
 const BATCHES: usize = 4;
 /// Messages that may wait to be taken, or to be acknowledged.
-pub(super) const MESSAGES: usize = 64;
+pub(super) const MESSAGES: usize = mqtt::MOST_UNACKNOWLEDGED as usize;
 
 /// The sources at work.
 #[derive(Debug)]

@@ -13,8 +13,11 @@ use slipwatch::runtime::shutdown::{self, Trigger};
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 use tempfile::TempDir;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::sync::mpsc::{self, Receiver};
 use tokio::task::JoinHandle;
 
@@ -73,15 +76,6 @@ impl Mosquitto {
         self.process = spawn(&self.program, &self.folder);
     }
 
-    fn config(&self) -> Config {
-        let text = format!(
-            "[site]\nname = \"Toc\"\nstate_dir = \"state\"\n[[source]]\nid = \"radio\"\n\
-             kind = \"mqtt\"\nurl = \"mqtt://127.0.0.1:{}\"\ntopic = \"site/+/displacement\"\n",
-            self.port
-        );
-        config::parse(&text, Path::new("site.toml")).unwrap()
-    }
-
     /// Publishes and waits until the broker has it all.
     async fn publish(&self, payloads: &[String]) {
         let options = MqttOptions::new("writer", "127.0.0.1", self.port);
@@ -129,6 +123,15 @@ impl Drop for Mosquitto {
     }
 }
 
+/// Of a site that reaches its broker at this port.
+fn config_at(port: u16) -> Config {
+    let text = format!(
+        "[site]\nname = \"Toc\"\nstate_dir = \"state\"\n[[source]]\nid = \"radio\"\n\
+         kind = \"mqtt\"\nurl = \"mqtt://127.0.0.1:{port}\"\ntopic = \"site/+/displacement\"\n"
+    );
+    config::parse(&text, Path::new("site.toml")).unwrap()
+}
+
 /// A daemon's source at work.
 struct Source {
     deliveries: Receiver<Delivery>,
@@ -138,7 +141,11 @@ struct Source {
 
 impl Source {
     fn start(broker: &Mosquitto) -> Self {
-        let config = broker.config();
+        Self::start_at(broker.port)
+    }
+
+    fn start_at(port: u16) -> Self {
+        let config = config_at(port);
         let (sender, deliveries) = mpsc::channel(8);
         let (stop, stopped) = shutdown::pair();
         let radio = config.brokers[0].clone();
@@ -244,6 +251,75 @@ async fn a_message_that_is_too_long_is_set_aside_and_what_comes_after_it_is_take
     assert_eq!(values(&delivery), [1.0]);
     delivery.receipt.acknowledge().await.unwrap();
     writer.abort();
+    source.end().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+#[cfg_attr(not(has_mosquitto), ignore = "Mosquitto was not found by build.rs")]
+async fn a_backlog_comes_without_waiting_for_the_acknowledgement_of_each_twenty() {
+    let broker = Mosquitto::start();
+    let mut source = Source::start(&broker);
+    tokio::time::sleep(Duration::from_millis(1500)).await;
+    broker
+        .publish(&(1..=28).map(message).collect::<Vec<_>>())
+        .await;
+    let mut waiting = Vec::new();
+    for day in 1..=28_u32 {
+        let delivery = source.next().await;
+        assert_eq!(values(&delivery), [f64::from(day)]);
+        waiting.push(delivery);
+    }
+    source.end().await;
+    // The connection has ended: each comes again, and by then its number may be another's.
+    for delivery in waiting {
+        assert!(delivery.receipt.acknowledge().await.is_err());
+    }
+}
+
+/// Stands before a broker and refuses MQTT 5, as a broker does that knows only 3.1.1; which Debian does not have any more.
+/// Gives its port and counts whom it refused.
+async fn refusing_version_5(port: u16) -> (u16, Arc<AtomicUsize>) {
+    let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let own = listener.local_addr().unwrap().port();
+    let refused = Arc::new(AtomicUsize::new(0));
+    let count = Arc::clone(&refused);
+    tokio::spawn(async move {
+        while let Ok((mut client, _)) = listener.accept().await {
+            let mut first = vec![0; 1024];
+            let length = client.read(&mut first).await.unwrap();
+            // A header of two bytes, then the protocol's name with its length, and its version.
+            assert_eq!(first[4..8], *b"MQTT");
+            if first[8] == 5 {
+                count.fetch_add(1, Ordering::Relaxed);
+                let unacceptable_version = [0x20, 2, 0, 1];
+                client.write_all(&unacceptable_version).await.unwrap();
+                continue;
+            }
+            let broker = tokio::net::TcpStream::connect(("127.0.0.1", port));
+            let mut broker = broker.await.unwrap();
+            broker.write_all(&first[..length]).await.unwrap();
+            tokio::spawn(async move {
+                let _ = tokio::io::copy_bidirectional(&mut client, &mut broker).await;
+            });
+        }
+    });
+    (own, refused)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+#[cfg_attr(not(has_mosquitto), ignore = "Mosquitto was not found by build.rs")]
+async fn a_broker_that_does_not_know_mqtt_5_is_spoken_to_in_3_1_1() {
+    let broker = Mosquitto::start();
+    let (port, refused) = refusing_version_5(broker.port).await;
+    let mut source = Source::start_at(port);
+    tokio::time::sleep(Duration::from_secs(4)).await;
+    broker.publish(&[message(1), message(2)]).await;
+    for day in [1.0, 2.0] {
+        let delivery = source.next().await;
+        assert_eq!(values(&delivery), [day]);
+        delivery.receipt.acknowledge().await.unwrap();
+    }
+    assert_eq!(refused.load(Ordering::Relaxed), 1);
     source.end().await;
 }
 

@@ -30,22 +30,22 @@ pub(super) struct Crowd {
 }
 
 impl Site {
-    /// So many messages have come together.
-    pub fn messages_came(&mut self, more: usize) {
+    /// A message is about to be taken, and so many wait behind it.
+    pub fn messages_come(&mut self, waiting: usize) {
         let now = Stopwatch::start();
         let counted = self.crowd.counted;
         let (since, before) = counted
             .filter(|(since, _)| since.elapsed() <= WINDOW)
             .unwrap_or((now, 0));
-        let count = before + more;
+        let count = before + 1;
         self.crowd.counted = Some((since, count));
-        if count >= CROWD {
+        if count + waiting >= CROWD {
             let first = self.crowd.came.map_or(now, |(first, _)| first);
             self.crowd.came = Some((first, now));
         }
     }
 
-    /// Messages are about to be taken: where they come in a crowd, what they hold is judged when [`Site::settle`] says so.
+    /// Where messages come in a crowd, what they hold from here on is judged when [`Site::settle`] says so.
     pub fn queue(&mut self) {
         if self.monitor.queues() || self.monitor.reads_past() || !self.comes_crowded() {
             return;

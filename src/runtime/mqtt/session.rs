@@ -1,0 +1,288 @@
+//! One kept session with a broker: in MQTT 5, and in MQTT 3.1.1 where the broker does not know that.
+//!
+//! In MQTT 5 a client states how many messages it takes before it acknowledges them; in 3.1.1 the broker decides it, and
+//! 20 are usual: each twenty messages then wait for a commit.
+
+use crate::config::Broker;
+use rumqttc::v5::mqttbytes::QoS as QoS5;
+use rumqttc::v5::mqttbytes::v5 as packet5;
+use rumqttc::v5::{self, mqttbytes::v5::ConnectReturnCode};
+use rumqttc::{self as v3, QoS, SubscribeReasonCode};
+use std::borrow::Cow;
+use std::error::Error;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+/// Messages that a broker may send before the first of them is acknowledged.
+pub(crate) const MOST_UNACKNOWLEDGED: u16 = 1024;
+/// Longest packet that is taken from the broker at all, bytes: the longest there can be. What is too long is set aside
+/// and acknowledged; refused, it would come again for ever, and nothing behind it.
+const LONGEST_PACKET: u32 = 268_435_455 + 5;
+/// Longest packet that we send, bytes.
+const LONGEST_SENT: usize = 1 << 20;
+/// Requests that may wait for the connection.
+const REQUESTS: usize = 64;
+/// How often we ping the broker.
+const KEEP_ALIVE: Duration = Duration::from_secs(30);
+
+/// Why there is no connection.
+pub(super) type NoConnection = Box<dyn Error + Send + Sync>;
+
+/// The session, connected or not.
+pub(super) struct Session {
+    broker: Broker,
+    client_id: String,
+    link: Link,
+    /// Whether a broker has accepted this version of the protocol.
+    is_accepted: bool,
+    /// Connections that have ended.
+    ended: Arc<AtomicU64>,
+}
+
+enum Link {
+    Five(v5::AsyncClient, Box<v5::EventLoop>),
+    Three(v3::AsyncClient, Box<v3::EventLoop>),
+}
+
+/// What came from the broker.
+pub(super) enum Came<M = Message> {
+    Connected,
+    Message(M),
+    SubscriptionRefused,
+    Nothing,
+}
+
+/// A message, to be acknowledged over the connection that it came by.
+#[derive(Debug)]
+pub(super) struct Message {
+    of: Published,
+    /// Connections that had ended when it came, and that have ended by now.
+    came_after: u64,
+    ended: Arc<AtomicU64>,
+}
+
+#[derive(Debug)]
+enum Published {
+    Five(v5::AsyncClient, packet5::Publish),
+    Three(v3::AsyncClient, v3::Publish),
+}
+
+impl Message {
+    pub(super) fn topic(&self) -> Cow<'_, str> {
+        match &self.of {
+            Published::Five(_, publish) => String::from_utf8_lossy(&publish.topic),
+            Published::Three(_, publish) => Cow::from(&publish.topic),
+        }
+    }
+
+    pub(super) fn payload(&self) -> &[u8] {
+        match &self.of {
+            Published::Five(_, publish) => &publish.payload,
+            Published::Three(_, publish) => &publish.payload,
+        }
+    }
+
+    /// The content has been read: many messages may wait to be acknowledged.
+    pub(super) fn forget_payload(&mut self) {
+        match &mut self.of {
+            Published::Five(_, publish) => publish.payload.clear(),
+            Published::Three(_, publish) => publish.payload.clear(),
+        }
+    }
+
+    /// Tells the broker that it need not come again. On a later connection that is void: the message comes again there, and
+    /// its number may be another's.
+    pub(super) async fn acknowledge(self) -> Result<(), NoConnection> {
+        if self.ended.load(Ordering::Relaxed) != self.came_after {
+            return Err("the connection that the message came by has ended".into());
+        }
+        match self.of {
+            Published::Five(client, publish) => client.ack(&publish).await?,
+            Published::Three(client, publish) => client.ack(&publish).await?,
+        }
+        Ok(())
+    }
+}
+
+impl Session {
+    /// Connects when it is first asked for what came.
+    pub(super) fn new(broker: Broker, client_id: String) -> Self {
+        Self {
+            link: five(&broker, &client_id),
+            broker,
+            client_id,
+            is_accepted: false,
+            ended: Arc::default(),
+        }
+    }
+
+    /// The version of the protocol that is spoken, or tried.
+    pub(super) fn version(&self) -> &'static str {
+        match self.link {
+            Link::Five(..) => "5",
+            Link::Three(..) => "3.1.1",
+        }
+    }
+
+    /// The next that comes; connects where there is no connection.
+    pub(super) async fn next(&mut self) -> Result<Came, NoConnection> {
+        let came = match &mut self.link {
+            Link::Five(client, connection) => match connection.poll().await {
+                Ok(v5::Event::Incoming(packet)) => Ok(came_by_five(client, packet)),
+                Ok(v5::Event::Outgoing(_)) => Ok(Came::Nothing),
+                Err(error) => Err((may_be_another_version(&error), error.into())),
+            },
+            Link::Three(client, connection) => match connection.poll().await {
+                Ok(v3::Event::Incoming(packet)) => Ok(came_by_three(client, packet)),
+                Ok(v3::Event::Outgoing(_)) => Ok(Came::Nothing),
+                Err(error) => Err((!matches!(error, v3::ConnectionError::Io(_)), error.into())),
+            },
+        };
+        match came {
+            Ok(Came::Message(of)) => Ok(Came::Message(Message {
+                of,
+                came_after: self.ended.load(Ordering::Relaxed),
+                ended: Arc::clone(&self.ended),
+            })),
+            Ok(Came::Connected) => {
+                self.is_accepted = true;
+                Ok(Came::Connected)
+            }
+            Ok(Came::SubscriptionRefused) => Ok(Came::SubscriptionRefused),
+            Ok(Came::Nothing) => Ok(Came::Nothing),
+            Err((may_be_another_version, error)) => {
+                self.ended.fetch_add(1, Ordering::Relaxed);
+                if may_be_another_version && !self.is_accepted {
+                    self.try_another_version();
+                }
+                Err(error)
+            }
+        }
+    }
+
+    fn try_another_version(&mut self) {
+        self.link = match self.link {
+            Link::Five(..) => three(&self.broker, &self.client_id),
+            Link::Three(..) => five(&self.broker, &self.client_id),
+        };
+    }
+
+    /// Asks for the messages of a topic, each at least once.
+    pub(super) fn subscribe(&self, topic: &str) -> Result<(), NoConnection> {
+        match &self.link {
+            Link::Five(client, _) => client.try_subscribe(topic, QoS5::AtLeastOnce)?,
+            Link::Three(client, _) => client.try_subscribe(topic, QoS::AtLeastOnce)?,
+        }
+        Ok(())
+    }
+
+    /// Ends the connection; the session is kept.
+    pub(super) fn disconnect(&self) {
+        // Where requests queue already, the connection is no better than none.
+        let _ = match &self.link {
+            Link::Five(client, _) => client.try_disconnect().is_ok(),
+            Link::Three(client, _) => client.try_disconnect().is_ok(),
+        };
+    }
+}
+
+fn five(broker: &Broker, client_id: &str) -> Link {
+    let address = &broker.address;
+    let mut options = v5::MqttOptions::new(client_id, &address.host, address.port);
+    options
+        .set_clean_start(false)
+        .set_session_expiry_interval(Some(u32::MAX))
+        .set_receive_maximum(Some(MOST_UNACKNOWLEDGED))
+        .set_max_packet_size(Some(LONGEST_PACKET))
+        .set_manual_acks(true)
+        .set_keep_alive(KEEP_ALIVE);
+    if let Some((user, password)) = &address.login {
+        options.set_credentials(user, password);
+    }
+    let (client, connection) = v5::AsyncClient::new(options, REQUESTS);
+    Link::Five(client, Box::new(connection))
+}
+
+fn three(broker: &Broker, client_id: &str) -> Link {
+    let address = &broker.address;
+    let mut options = v3::MqttOptions::new(client_id, &address.host, address.port);
+    options
+        .set_clean_session(false)
+        .set_manual_acks(true)
+        .set_keep_alive(KEEP_ALIVE)
+        .set_max_packet_size(LONGEST_PACKET as usize, LONGEST_SENT);
+    if let Some((user, password)) = &address.login {
+        options.set_credentials(user, password);
+    }
+    let (client, connection) = v3::AsyncClient::new(options, REQUESTS);
+    Link::Three(client, Box::new(connection))
+}
+
+fn came_by_five(client: &v5::AsyncClient, packet: packet5::Packet) -> Came<Published> {
+    match packet {
+        packet5::Packet::ConnAck(_) => Came::Connected,
+        packet5::Packet::Publish(publish) => {
+            Came::Message(Published::Five(client.clone(), publish))
+        }
+        packet5::Packet::SubAck(answer) => {
+            let is_granted = |code| matches!(code, &packet5::SubscribeReasonCode::Success(_));
+            if answer.return_codes.iter().all(is_granted) {
+                Came::Nothing
+            } else {
+                Came::SubscriptionRefused
+            }
+        }
+        packet5::Packet::Auth(_)
+        | packet5::Packet::Connect(..)
+        | packet5::Packet::PubAck(_)
+        | packet5::Packet::PingReq(_)
+        | packet5::Packet::PingResp(_)
+        | packet5::Packet::Subscribe(_)
+        | packet5::Packet::PubRec(_)
+        | packet5::Packet::PubRel(_)
+        | packet5::Packet::PubComp(_)
+        | packet5::Packet::Unsubscribe(_)
+        | packet5::Packet::UnsubAck(_)
+        | packet5::Packet::Disconnect(_) => Came::Nothing,
+    }
+}
+
+fn came_by_three(client: &v3::AsyncClient, packet: v3::Packet) -> Came<Published> {
+    match packet {
+        v3::Packet::ConnAck(_) => Came::Connected,
+        v3::Packet::Publish(publish) => Came::Message(Published::Three(client.clone(), publish)),
+        v3::Packet::SubAck(answer)
+            if answer.return_codes.contains(&SubscribeReasonCode::Failure) =>
+        {
+            Came::SubscriptionRefused
+        }
+        v3::Packet::Connect(_)
+        | v3::Packet::PubAck(_)
+        | v3::Packet::PubRec(_)
+        | v3::Packet::PubRel(_)
+        | v3::Packet::PubComp(_)
+        | v3::Packet::Subscribe(_)
+        | v3::Packet::SubAck(_)
+        | v3::Packet::Unsubscribe(_)
+        | v3::Packet::UnsubAck(_)
+        | v3::Packet::PingReq
+        | v3::Packet::PingResp
+        | v3::Packet::Disconnect => Came::Nothing,
+    }
+}
+
+/// Whether a broker was reached and may know no MQTT 5: it says so, or answers what cannot be read, or nothing.
+fn may_be_another_version(error: &v5::ConnectionError) -> bool {
+    match error {
+        v5::ConnectionError::Io(_) | v5::ConnectionError::RequestsDone => false,
+        v5::ConnectionError::ConnectionRefused(code) => matches!(
+            code,
+            ConnectReturnCode::RefusedProtocolVersion
+                | ConnectReturnCode::UnsupportedProtocolVersion
+        ),
+        v5::ConnectionError::MqttState(_)
+        | v5::ConnectionError::Timeout(_)
+        | v5::ConnectionError::NotConnAck(_) => true,
+    }
+}
