@@ -1,6 +1,7 @@
 //! What each level asks people to do, in words; the site's own emergency plan says how.
 
 use super::policy::{Level, Policy};
+use super::rules::Cause;
 
 impl Level {
     /// What is recommended while it is in force.
@@ -68,16 +69,11 @@ impl Policy {
                 "acceleration of {} mm/day per day or more",
                 threshold(&|one| one.acceleration_mm_per_day2)?
             ),
-            ("regime-flip", _) => "the regime turned unstable".to_owned(),
-            ("intercept-drifting-in", _) => {
-                "the inverse-velocity line's intercept comes nearer".to_owned()
-            }
-            ("transition-drifting-in", _) => "the transition time comes nearer".to_owned(),
-            ("unexplained-residual", _) => {
-                "readings that the law in force does not explain".to_owned()
-            }
-            ("moves-backwards", _) => "the slope moves upslope".to_owned(),
-            _ => return None,
+            (rule, _) => match (self.declared_rule(rule), Cause::named(rule)) {
+                (Some(declared), _) => declared.words(None),
+                (None, Some(cause)) => cause.words().to_owned(),
+                (None, None) => return None,
+            },
         })
     }
 }

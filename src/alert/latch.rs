@@ -9,6 +9,7 @@ use super::rules::{Call, Evidence};
 use crate::reading::Timestamp;
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
 /// A change of the level in force.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -20,7 +21,7 @@ pub struct Transition {
     /// When the level was entered: with the benchmark and the level, the alert's identity.
     pub since: Timestamp,
     /// The rule behind it.
-    pub rule: &'static str,
+    pub rule: Cow<'static, str>,
 }
 
 /// Whether a transition enters its level or leaves it.
@@ -177,7 +178,7 @@ impl Latch {
             level: call.level,
             entered: Entered::Yes,
             since: evidence.now,
-            rule: call.rule,
+            rule: call.rule.clone(),
         }
     }
 
@@ -187,7 +188,7 @@ impl Latch {
             level: self.level,
             entered: Entered::No,
             since: self.since.unwrap_or(now),
-            rule,
+            rule: rule.into(),
         };
         if call.level == Level::Green {
             self.begin(evidence, Level::Green);
@@ -221,9 +222,7 @@ mod tests {
             chance_within_outlook: Some(chance),
             velocity_mm_per_day: Some(velocity),
             settled_velocity_mm_per_day: Some(velocity),
-            displacement_mm: None,
-            acceleration_mm_per_day2: None,
-            causes: Vec::new(),
+            ..Evidence::default()
         }
     }
 
@@ -256,7 +255,7 @@ mod tests {
             );
         }
         let fall = latch.update(&policy, &evidence(25, 0.0, 30.0));
-        assert_eq!((fall[0].level, fall[0].rule), (Level::Red, "decelerated"));
+        assert_eq!((fall[0].level, &*fall[0].rule), (Level::Red, "decelerated"));
         assert_eq!(latch.level(), Level::Green);
     }
 
@@ -299,7 +298,7 @@ mod tests {
         let mut latch = Latch::default();
         let rise = latch.update(&policy, &evidence(0, 0.0, 60.0));
         assert_eq!(
-            (rise[0].level, rise[0].rule),
+            (rise[0].level, &*rise[0].rule),
             (Level::Orange, "velocity-threshold")
         );
         assert_eq!(

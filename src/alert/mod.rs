@@ -3,10 +3,12 @@
 //! This module never sees a parameter of the law, only chances and observed motion.
 
 mod advice;
+mod declared;
 mod latch;
 mod policy;
 mod rules;
 
+pub use declared::{Combination, Condition, DeclaredRule, Held};
 pub use latch::{Entered, Latch, Transition};
 pub use policy::{Level, Policy, Threshold};
 pub use rules::{Call, Cause, Evidence};

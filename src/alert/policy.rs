@@ -1,5 +1,6 @@
 //! What a site asks for: the levels, their rules and the figures in them.
 
+use super::declared::DeclaredRule;
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -69,6 +70,9 @@ pub struct Policy {
     pub yellow_chance: f64,
     /// Plain thresholds beside the model.
     pub thresholds: Vec<Threshold>,
+    /// Rules of the site's own, beside the model too.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub rules: Vec<DeclaredRule>,
     /// How long a slope must hold a steady velocity before its level falls.
     pub steady_for: SignedDuration,
 }
@@ -83,6 +87,7 @@ impl Default for Policy {
             orange_chance: 0.5,
             yellow_chance: 0.1,
             thresholds: Vec::new(),
+            rules: Vec::new(),
             steady_for: SignedDuration::from_hours(7 * 24),
         }
     }

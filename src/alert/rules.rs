@@ -2,10 +2,12 @@
 
 use super::policy::{Level, Policy, Threshold};
 use crate::reading::Timestamp;
+use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
 /// What is known of one benchmark after a reading.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Evidence {
     /// Data time.
     pub now: Timestamp,
@@ -23,6 +25,18 @@ pub struct Evidence {
     pub acceleration_mm_per_day2: Option<f64>,
     /// What else asks for a look: a flip to instability, an intercept drifting in.
     pub causes: Vec<Cause>,
+    /// Chances of a collapse within other spans, that declared rules ask for.
+    pub chances: Vec<(SignedDuration, f64)>,
+    /// Declared rules whose conditions have held for long enough, by their place in the policy.
+    pub due: Vec<usize>,
+}
+
+impl Evidence {
+    /// Chance of a collapse within a span that a declared rule asks for.
+    pub(super) fn chance_within(&self, span: SignedDuration) -> Option<f64> {
+        let own = self.chances.iter().find(|(within, _)| *within == span);
+        own.map(|(_, chance)| *chance)
+    }
 }
 
 /// What asks for a look although no chance is large.
@@ -42,6 +56,15 @@ pub enum Cause {
 }
 
 impl Cause {
+    /// Each.
+    pub const ALL: [Self; 5] = [
+        Self::RegimeFlip,
+        Self::InterceptDriftingIn,
+        Self::TransitionDriftingIn,
+        Self::UnexplainedResidual,
+        Self::MovesBackwards,
+    ];
+
     /// The rule's name in an alert.
     pub fn name(self) -> &'static str {
         match self {
@@ -52,6 +75,23 @@ impl Cause {
             Self::MovesBackwards => "moves-backwards",
         }
     }
+
+    /// What has happened, in words.
+    pub(super) fn words(self) -> &'static str {
+        match self {
+            Self::RegimeFlip => "the regime turned unstable",
+            Self::InterceptDriftingIn => "the inverse-velocity line's intercept comes nearer",
+            Self::TransitionDriftingIn => "the transition time comes nearer",
+            Self::UnexplainedResidual => "readings that the law in force does not explain",
+            Self::MovesBackwards => "the slope moves upslope",
+        }
+    }
+
+    /// The cause of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        let mut all = Self::ALL.into_iter();
+        all.find(|cause| cause.name() == name)
+    }
 }
 
 /// The level that the evidence calls for, and why.
@@ -60,7 +100,7 @@ pub struct Call {
     /// The level.
     pub level: Level,
     /// The rule's short name.
-    pub rule: &'static str,
+    pub rule: Cow<'static, str>,
 }
 
 impl Policy {
@@ -74,32 +114,32 @@ impl Policy {
         let mut call = if is_past {
             Call {
                 level: Level::Red,
-                rule: "critical-velocity",
+                rule: "critical-velocity".into(),
             }
         } else if reaches(evidence.chance_within_evacuation_time, self.red_chance) {
             Call {
                 level: Level::Red,
-                rule: "chance-within-evacuation-time",
+                rule: "chance-within-evacuation-time".into(),
             }
         } else if reaches(evidence.chance_within_outlook, self.orange_chance) {
             Call {
                 level: Level::Orange,
-                rule: "chance-within-outlook",
+                rule: "chance-within-outlook".into(),
             }
         } else if reaches(evidence.chance_within_outlook, self.yellow_chance) {
             Call {
                 level: Level::Yellow,
-                rule: "chance-within-outlook",
+                rule: "chance-within-outlook".into(),
             }
         } else if let Some(cause) = evidence.causes.first() {
             Call {
                 level: Level::Yellow,
-                rule: cause.name(),
+                rule: cause.name().into(),
             }
         } else {
             Call {
                 level: Level::Green,
-                rule: "quiet",
+                rule: "quiet".into(),
             }
         };
         for threshold in &self.thresholds {
@@ -108,7 +148,15 @@ impl Policy {
             {
                 call = Call {
                     level: threshold.level,
-                    rule,
+                    rule: rule.into(),
+                };
+            }
+        }
+        for rule in evidence.due.iter().filter_map(|at| self.rules.get(*at)) {
+            if rule.level > call.level {
+                call = Call {
+                    level: rule.level,
+                    rule: rule.id().into(),
                 };
             }
         }

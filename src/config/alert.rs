@@ -1,5 +1,6 @@
 //! `[alert]`: the figures in the level rules, the site's and a benchmark's own.
 
+use super::rule;
 use super::table::{Placed, Section};
 use super::value;
 use crate::alert::{Level, Policy, Threshold};
@@ -25,6 +26,7 @@ pub(super) fn policy(mut section: Section<'_>, base: &Policy) -> Policy {
             .unwrap_or(base.yellow_chance),
         steady_for: given(steady_for.as_ref(), base.steady_for),
         thresholds: thresholds(&mut section, base),
+        rules: rule::rules(&mut section, &base.rules),
     };
     doubts(&section, &policy, evacuation_time.as_ref());
     section.finish();

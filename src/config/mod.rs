@@ -7,6 +7,7 @@ mod declared;
 mod hook;
 mod pattern;
 mod problem;
+mod rule;
 mod secret;
 mod section;
 mod source;

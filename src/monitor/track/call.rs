@@ -65,6 +65,13 @@ impl Track {
             self.look_until(policy, time, Cause::MovesBackwards);
             evidence.causes.push(Cause::MovesBackwards);
         }
+        let chances = policy.spans().filter_map(|span| {
+            let forecast = forecast?;
+            let chance = forecast.chance_within(days(forecast.to_the_next_reading(span)));
+            Some((span, chance))
+        });
+        evidence.chances = chances.collect();
+        self.held.update(policy, &mut evidence);
         let transitions = self.latch.update(policy, &evidence);
         self.levels.note(time, self.latch.level());
         let reported = transitions
@@ -74,21 +81,29 @@ impl Track {
         events
     }
 
-    /// Between two refits: the plain thresholds act at every reading. They may raise the level; it falls only where
-    /// there is a forecast too.
+    /// Between two refits: plain thresholds and the site's own rules act at every reading. They may raise the level; it
+    /// falls only where there is a forecast too.
     pub(super) fn raise(&mut self, policy: &Policy, time: Timestamp) -> Option<Event> {
-        if policy.thresholds.is_empty() {
+        if policy.thresholds.is_empty() && policy.rules.is_empty() {
             return None;
         }
         // The rates are those of the whole record: only where they can matter.
-        let needs_rates = policy.thresholds.iter().any(|threshold| {
-            threshold.velocity_mm_per_day.is_some() || threshold.acceleration_mm_per_day2.is_some()
-        });
-        let by_displacement = policy.call(&self.observed(time, &[]));
-        if !needs_rates && by_displacement.level <= self.latch.level() {
+        let needs_rates = policy.needs_rates();
+        let mut evidence = if needs_rates {
+            self.observed(time, &self.history.rates())
+        } else {
+            self.observed(time, &[])
+        };
+        self.held.update(policy, &mut evidence);
+        if policy.call(&evidence).level <= self.latch.level() {
             return None;
         }
-        let evidence = self.observed(time, &self.history.rates());
+        if !needs_rates {
+            evidence = Evidence {
+                due: evidence.due,
+                ..self.observed(time, &self.history.rates())
+            };
+        }
         let change = self.latch.raise(policy, &evidence)?;
         Some(self.alert_event(time, policy, (&evidence, Ahead::of(policy, None)), &change))
     }
@@ -98,15 +113,13 @@ impl Track {
         let shown = &self.history.observations;
         Evidence {
             now: time,
-            chance_within_evacuation_time: None,
-            chance_within_outlook: None,
             velocity_mm_per_day: rates
                 .last()
                 .map_or_else(|| newest_velocity(shown), |rate| Some(rate.velocity)),
             settled_velocity_mm_per_day: settled(rates),
             displacement_mm: displacement_mm(shown),
             acceleration_mm_per_day2: acceleration(rates),
-            causes: Vec::new(),
+            ..Evidence::default()
         }
     }
 
@@ -129,7 +142,7 @@ impl Track {
                 level: change.level,
                 state,
                 key,
-                rule: change.rule.to_owned(),
+                rule: change.rule.clone().into_owned(),
                 text,
             },
         )
@@ -150,6 +163,7 @@ impl Track {
             .map_or_else(String::new, |velocity| {
                 format!("; velocity {velocity:.3} mm/day")
             });
+        let grounds = grounds(policy, evidence, &change.rule);
         let chance = |name: &str, chance: Option<f64>, span: SignedDuration| {
             chance.map_or_else(String::new, |chance| {
                 let hours = span.as_secs() / 3600;
@@ -165,7 +179,7 @@ impl Track {
             "the outlook".to_owned()
         };
         format!(
-            "benchmark {}: {}{verb} ({}){}{}{velocity}; the critical velocity is {} mm/day",
+            "benchmark {}: {}{verb} ({}){grounds}{}{}{velocity}; the critical velocity is {} mm/day",
             self.benchmark,
             change.level,
             change.rule,
@@ -177,5 +191,26 @@ impl Track {
             chance(&outlook, evidence.chance_within_outlook, ahead.orange),
             policy.critical_velocity_mm_per_day,
         )
+    }
+}
+
+/// The figures that a rule rests on, where the text has them nowhere else.
+fn grounds(policy: &Policy, evidence: &Evidence, rule: &str) -> String {
+    let figure = |name: &str, value: Option<f64>, unit: &str| {
+        value.map_or_else(String::new, |value| format!("; {name} {value:.3} {unit}"))
+    };
+    match (rule, policy.declared_rule(rule)) {
+        (_, Some(declared)) => format!("; {}", declared.words(Some(evidence))),
+        ("displacement-threshold", None) => figure(
+            "displacement since the first reading",
+            evidence.displacement_mm,
+            "mm",
+        ),
+        ("acceleration-threshold", None) => figure(
+            "acceleration",
+            evidence.acceleration_mm_per_day2,
+            "mm/day per day",
+        ),
+        _ => String::new(),
     }
 }

@@ -2,7 +2,7 @@
 
 use super::forecast::to_the_next_reading;
 use super::{Track, days};
-use crate::alert::{Evidence, Latch, Level, Policy};
+use crate::alert::{Evidence, Held, Latch, Level, Policy};
 use crate::fit::Observations;
 use crate::forecast::Panel;
 use crate::monitor::event::{Event, EventKind};
@@ -120,7 +120,7 @@ fn highest(
     let first = values.partition_point(|one| one.t_days < since);
     let all: Vec<usize> = (first..values.len()).collect();
     let every = all.len().div_ceil(MOST_FORECASTS).max(1);
-    let mut latch = Latch::default();
+    let (mut latch, mut held) = (Latch::default(), Held::default());
     let mut highest = Level::Green;
     // Counted from the newest on, which has the most to say.
     for index in all.iter().rev().step_by(every).rev() {
@@ -131,7 +131,9 @@ fn highest(
         let Some(now) = history.time(values[*index].t_days) else {
             continue;
         };
-        latch.update(policy, &evidence(policy, &known, now));
+        let mut evidence = evidence(policy, &known, now);
+        held.update(policy, &mut evidence);
+        latch.update(policy, &evidence);
         highest = highest.max(latch.level());
     }
     highest
@@ -145,8 +147,13 @@ fn evidence(policy: &Policy, observations: &Observations, now: Timestamp) -> Evi
     let ahead = outlook.as_ref().map_or(evacuation, |outlook| {
         to_the_next_reading(outlook, evacuation)
     });
+    let chance = |span| {
+        let outlook = outlook.as_ref()?;
+        Some((span, within(to_the_next_reading(outlook, span))?))
+    };
     Evidence {
         now,
+        chances: policy.spans().filter_map(chance).collect(),
         chance_within_evacuation_time: within(ahead),
         chance_within_outlook: within(policy.outlook),
         velocity_mm_per_day: rates
@@ -155,6 +162,6 @@ fn evidence(policy: &Policy, observations: &Observations, now: Timestamp) -> Evi
         settled_velocity_mm_per_day: settled(rates),
         displacement_mm: displacement_mm(observations),
         acceleration_mm_per_day2: acceleration(rates),
-        causes: Vec::new(),
+        ..Evidence::default()
     }
 }

@@ -22,7 +22,7 @@ use super::event::{AlertState, Event, EventKind};
 use super::history::{History, Source, Taken};
 use super::kept::KeptForecast;
 use super::silence::Silence;
-use crate::alert::{Cause, Latch, Level, Policy};
+use crate::alert::{Cause, Held, Latch, Level, Policy};
 use crate::fit::Rate;
 use crate::forecast::Panel;
 use crate::reading::{BenchmarkId, Reading, SECONDS_PER_DAY, Suspicion, Timestamp, days_since};
@@ -69,6 +69,9 @@ pub(super) struct Track {
     intercept: Drift,
     transition: Drift,
     latch: Latch,
+    /// Since when the site's own rules have held.
+    #[serde(default)]
+    held: Held,
     silence: Silence,
     /// Until when something that happened asks for a look, and what.
     look: Option<(Timestamp, Cause)>,
@@ -144,6 +147,7 @@ impl Track {
             intercept: Drift::default(),
             transition: Drift::default(),
             latch: Latch::default(),
+            held: Held::default(),
             silence: Silence::default(),
             look: None,
             faulted: false,
