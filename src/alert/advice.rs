@@ -1,7 +1,8 @@
 //! What each level asks people to do, in words; the site's own emergency plan says how.
 
-use super::policy::{Level, Policy};
-use super::rules::Cause;
+use super::evidence::Cause;
+use super::level::Level;
+use super::policy::Policy;
 
 impl Level {
     /// What is recommended while it is in force.

@@ -4,8 +4,10 @@
 //! highest velocity seen at this level, without gaining, for a whole evacuation time in which the evidence
 //! called for less; or it has held a velocity under the critical one, without gaining, for the stated time.
 
-use super::policy::{Level, Policy};
-use super::rules::{Call, Evidence};
+use super::evidence::Evidence;
+use super::level::Level;
+use super::policy::Policy;
+use super::rules::Call;
 use crate::reading::Timestamp;
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};

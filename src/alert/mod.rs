@@ -4,11 +4,17 @@
 
 mod advice;
 mod declared;
+mod evidence;
+mod held;
 mod latch;
+mod level;
 mod policy;
 mod rules;
 
-pub use declared::{Combination, Condition, DeclaredRule, Held};
+pub use declared::{Combination, Condition, DeclaredRule};
+pub use evidence::{Cause, Evidence};
+pub use held::Held;
 pub use latch::{Entered, Latch, Transition};
-pub use policy::{Level, Policy, Threshold};
-pub use rules::{Call, Cause, Evidence};
+pub use level::Level;
+pub use policy::{Policy, Threshold};
+pub use rules::Call;

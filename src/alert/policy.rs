@@ -1,44 +1,9 @@
 //! What a site asks for: the levels, their rules and the figures in them.
 
 use super::declared::DeclaredRule;
+use super::level::Level;
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
-use std::fmt;
-
-/// How grave an alert is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Level {
-    /// Nothing to report.
-    Green,
-    /// Something has changed: look.
-    Yellow,
-    /// Failure is more likely than not within the outlook.
-    Orange,
-    /// Failure within the time that an evacuation takes cannot be excluded.
-    Red,
-    /// The monitor cannot decide: no data, a sensor fault, a stale model.
-    Unknown,
-}
-
-impl Level {
-    /// The word in events, config and hooks.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Green => "green",
-            Self::Yellow => "yellow",
-            Self::Orange => "orange",
-            Self::Red => "red",
-            Self::Unknown => "unknown",
-        }
-    }
-}
-
-impl fmt::Display for Level {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
 
 /// Plain thresholds, a floor beside the model: the level is at least `level` while one is exceeded.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

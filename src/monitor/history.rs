@@ -306,6 +306,14 @@ impl History {
         read.collect()
     }
 
+    /// The values of the same readings.
+    pub(super) fn values_as_read(&self, unit: Unit, most: usize) -> Vec<f64> {
+        let values = &self.observations.values;
+        let newest = &values[values.len().saturating_sub(most)..];
+        let factor = unit.factor();
+        newest.iter().map(|one| one.value / factor).collect()
+    }
+
     /// Whether a reading has the value of the newest one, or one of a sensor that stands at the end of its range, and
     /// comes after it.
     pub(super) fn is_repeated_by(&self, source: Source, reading: &Reading) -> bool {

@@ -79,6 +79,41 @@ pub fn ahead(newest: Timestamp, now: Timestamp) -> Option<Evidence> {
     })
 }
 
+/// Whether readings of these values give no rise to any suspicion, as far as it can be known without sorting them; what
+/// comes with each new reading is to cost little.
+pub fn is_plain(values: &[f64], quantity: Quantity, unit: &str) -> bool {
+    if values.len() < FEWEST {
+        return true;
+    }
+    let is_mark = |value: f64| MARKS.iter().any(|mark| same(value.abs(), *mark));
+    if values.iter().any(|value| is_mark(*value)) {
+        return false;
+    }
+    quantity != Quantity::Displacement
+        || !may_have_fallen(values) && !may_have_another_scale(values, unit)
+}
+
+/// A fall is more than [`LEAP`] times the median size of a step below the usual one, which is not larger than that median: so
+/// the median size is less than the deepest fall over [`LEAP`] less one.
+fn may_have_fallen(values: &[f64]) -> bool {
+    let steps = || values.windows(2).map(|pair| pair[1] - pair[0]);
+    let deepest = steps().fold(0.0, f64::min);
+    let least = -deepest / (LEAP - 1.0);
+    let count = values.len() - 1;
+    let large = steps().filter(|step| step.abs() >= least).count();
+    large < count - count / 2
+}
+
+fn may_have_another_scale(values: &[f64], unit: &str) -> bool {
+    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    match unit {
+        "m" => high - low > LARGE_M,
+        "mm" => high - low < SMALL_MM,
+        _ => false,
+    }
+}
+
 /// What the values of readings in `unit`, in order of time, give rise to.
 pub fn of_values(readings: &[(Timestamp, f64)], quantity: Quantity, unit: &str) -> Vec<Evidence> {
     let mut readings = readings.to_vec();
@@ -201,4 +236,59 @@ fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     }
     let (_, median, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
     Some(*median)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64;
+
+    /// Creep with noise of its own size, and now and then a fall, a mark or readings of another unit.
+    fn drawn(rng: &mut Pcg64) -> Vec<f64> {
+        let length = rng.random_range(5..220);
+        let scale = 10_f64.powf(rng.random_range(-4.0..2.0));
+        let (pace, noise) = (rng.random_range(0.0..1.0), rng.random_range(0.0..2.0));
+        let fall = scale * 10_f64.powf(rng.random_range(0.0..3.0));
+        let at = rng.random_range(0..2 * length);
+        let marked = rng.random_range(0..3 * length);
+        let value = |index: usize, rng: &mut Pcg64| {
+            let creep = scale * (index as f64 * pace + noise * rng.random_range(-1.0..1.0));
+            let value = if index >= at { creep - fall } else { creep };
+            let value = (value * 1e3).round() / 1e3;
+            if index == marked { -9999.0 } else { value }
+        };
+        (0..length).map(|index| value(index, rng)).collect()
+    }
+
+    #[test]
+    fn what_gives_rise_to_a_suspicion_is_never_plain() {
+        let mut rng = Pcg64::seed_from_u64(1);
+        let mut found = [0; 3];
+        let (mut plain, count) = (0, 20_000);
+        for _ in 0..count {
+            let values = drawn(&mut rng);
+            let unit = ["mm", "m", "cm"][rng.random_range(0..3)];
+            let time = |index: usize| {
+                let hours = i64::try_from(index).unwrap();
+                Timestamp::UNIX_EPOCH + SignedDuration::from_hours(hours)
+            };
+            let readings: Vec<(Timestamp, f64)> = (values.iter().enumerate())
+                .map(|(index, value)| (time(index), *value))
+                .collect();
+            let quantity = Quantity::Displacement;
+            let suspicions = of_values(&readings, quantity, unit);
+            let is_plain = is_plain(&values, quantity, unit);
+            assert!(
+                suspicions.is_empty() || !is_plain,
+                "{suspicions:?} of {values:?}"
+            );
+            plain += usize::from(is_plain);
+            for one in suspicions {
+                found[one.kind as usize - 1] += 1;
+            }
+        }
+        assert!(found.iter().all(|count| *count > 100), "{found:?}");
+        assert!(plain > count / 4, "{plain}");
+    }
 }

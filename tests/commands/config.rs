@@ -65,11 +65,74 @@ fn the_example_config_is_right_and_says_what_it_means() {
     assert!((policy.critical_velocity_mm_per_day - 1000.0).abs() < 1e-9);
     assert_eq!(policy.thresholds.len(), 2);
     assert_eq!(policy.thresholds[1].acceleration_mm_per_day2, Some(5.0));
+    let rules = &policy.rules;
+    assert_eq!(rules.len(), 2);
+    assert_eq!(
+        rules[0].words(None),
+        "velocity of 30 mm/day or more and chance of collapse of 0.02 or more within 12h and until the next reading, for 2h"
+    );
+    assert_eq!(
+        (rules[1].level, rules[1].lasting.is_zero()),
+        (Level::Orange, true)
+    );
     let own = &config.settings.benchmarks[&BenchmarkId::new("upper")];
+    assert_eq!(own.rules, policy.rules, "inherited");
     assert_eq!(own.evacuation_time.as_hours(), 6);
     assert_eq!(own.thresholds, policy.thresholds, "inherited");
     assert!(config.hooks[0].levels.contains(&Level::Unknown));
     assert!(config.hooks[0].program().is_file(), "the sample hook");
+}
+
+#[test]
+fn a_rule_that_cannot_be_meant_is_refused_where_it_stands() {
+    let rule = |lines: &str| format!("[[alert.rule]]\nname = \"near\"\nlevel = \"red\"\n{lines}\n");
+    for (text, parts) in [
+        (
+            rule("all = [\"velocity 20\"]"),
+            [
+                "site.toml:13:8",
+                "\"velocity 20\" is no condition of an alert.rule",
+                "50 mm/day",
+            ],
+        ),
+        (
+            rule("all = [\"chance 5 within 12h\"]"),
+            [
+                "site.toml:13:8",
+                "\"chance 5 within 12h\"",
+                "over 0 and up to 1",
+            ],
+        ),
+        (
+            rule("any = [\"rain 20 mm\"]"),
+            ["site.toml:13:8", "\"rain 20 mm\"", "unexplained-residual"],
+        ),
+        (
+            rule(""),
+            ["site.toml:10", "under either all or any", "add all ="],
+        ),
+        (
+            rule("all = [\"velocity 2 mm/day\"]\nany = [\"velocity 2 mm/day\"]"),
+            ["site.toml:10", "under either all or any", "add all ="],
+        ),
+        (
+            rule("all = [\"velocity 2 mm/day\"]").replace("near", "near one"),
+            [
+                "site.toml:11:8",
+                "\"near one\" cannot stand in an alert",
+                "letters",
+            ],
+        ),
+        (
+            rule("all = [\"velocity 2 mm/day\"]").repeat(2),
+            ["site.toml:15:8", "\"near\" is there twice", "own name"],
+        ),
+    ] {
+        let said = problem(&text);
+        for part in parts {
+            assert!(said.contains(part), "{text}{said}");
+        }
+    }
 }
 
 #[test]
@@ -138,7 +201,7 @@ fn an_unknown_key_is_refused_with_the_known_ones() {
     assert_eq!(
         problem("[alert]\nevacuation_tme = \"12h\"\n"),
         "site.toml:11:1: error: unknown key alert.evacuation_tme; known here: evacuation_time, \
-         outlook, critical_velocity, steady_for, red_chance, orange_chance, yellow_chance, threshold"
+         outlook, critical_velocity, steady_for, red_chance, orange_chance, yellow_chance, threshold, rule"
     );
     assert_eq!(
         problem("[allert]\n"),

@@ -10,7 +10,7 @@
 use jiff::{SignedDuration, ToSpan};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use slipwatch::alert::{Level, Policy, Threshold};
+use slipwatch::alert::{Combination, Condition, DeclaredRule, Level, Policy, Threshold};
 use slipwatch::model::{Accuracy, Law, Trajectory};
 use slipwatch::monitor::{AlertState, Event, EventKind, Input, Monitor, Settings};
 use slipwatch::reading::{BenchmarkId, Reading, Timestamp, Unit};
@@ -340,4 +340,64 @@ fn a_value_beyond_any_slope_is_refused_by_name() {
             .count(),
         20
     );
+}
+
+#[test]
+fn a_rule_of_the_site_fires_when_its_conditions_have_held_for_as_long_as_it_asks_and_says_its_figures()
+ {
+    let hours = SignedDuration::from_hours;
+    let rule = DeclaredRule {
+        name: "fast".to_owned(),
+        level: Level::Red,
+        combination: Combination::All,
+        conditions: vec![
+            Condition::Velocity(50.0),
+            Condition::Displacement(100.0),
+            Condition::Chance {
+                at_least: 1e-9,
+                within: hours(12),
+            },
+        ],
+        lasting: hours(3),
+    };
+    let mut monitor = monitor(Policy {
+        red_chance: 1.0,
+        rules: vec![rule],
+        ..Policy::default()
+    });
+    // 24 mm/day for four days, then 96.
+    let value = |hour: i64| hour as f64 + 3.0 * (hour - 96).max(0) as f64;
+    let readings: Vec<(Timestamp, f64)> = (0..120)
+        .map(|hour| (start() + hour.hours(), value(hour)))
+        .collect();
+    let events = play(&mut monitor, &readings);
+    let reds: Vec<(Timestamp, &String, &String)> = (events.iter())
+        .filter_map(|event| match &event.kind {
+            EventKind::Alert {
+                level: Level::Red,
+                rule,
+                text,
+                ..
+            } => Some((event.time, rule, text)),
+            _ => None,
+        })
+        .collect();
+    let [(time, rule, text)] = reds[..] else {
+        panic!("{reds:?}");
+    };
+    assert_eq!(rule, "rule:fast");
+    // The displacement is reached at the 97th hour.
+    let since_change = time.duration_since(start() + 97.hours());
+    assert!(
+        since_change >= hours(3) && since_change <= hours(6),
+        "{since_change:?}"
+    );
+    for part in [
+        "red (rule:fast); velocity of 50 mm/day or more (",
+        " mm/day) and displacement since the first reading of 100 mm or more (1",
+        " mm) and chance of collapse of 0.000000001 or more within 12h and until the next reading (",
+        ", for 3h; chance ",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
 }

@@ -18,12 +18,19 @@ impl Track {
     /// After the newest reading, of `time`.
     pub(super) fn suspect(&mut self, source: Source, time: Timestamp) -> Vec<Event> {
         let unit = source.unit;
-        let readings = self.history.as_read(unit, LOOKED_AT);
-        let since = readings.len().checked_sub(CALM);
-        let is_late = |one: &Evidence| since.is_none_or(|since| one.at >= readings[since].0);
         let quantity = self.history.observations.quantity;
-        let found = suspicion::of_values(&readings, quantity, &unit.to_string());
-        let found: Vec<Evidence> = found.into_iter().filter(is_late).collect();
+        let (values, name) = (
+            self.history.values_as_read(unit, LOOKED_AT),
+            unit.to_string(),
+        );
+        let mut found = Vec::new();
+        if !suspicion::is_plain(&values, quantity, &name) {
+            let readings = self.history.as_read(unit, LOOKED_AT);
+            let since = readings.len().checked_sub(CALM);
+            let is_late = |one: &Evidence| since.is_none_or(|since| one.at >= readings[since].0);
+            found = suspicion::of_values(&readings, quantity, &name);
+            found.retain(is_late);
+        }
         let mut events = Vec::new();
         for kind in [Suspicion::Mark, Suspicion::Fall, Suspicion::Scale] {
             let evidence = found.iter().find(|one| one.kind == kind);

@@ -1,0 +1,93 @@
+//! What is known of one benchmark after a reading, and what has happened there.
+
+use crate::reading::Timestamp;
+use jiff::SignedDuration;
+use serde::{Deserialize, Serialize};
+
+/// What is known of one benchmark after a reading.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Evidence {
+    /// Data time.
+    pub now: Timestamp,
+    /// Chance of a collapse before an evacuation that the next reading calls would end, where there is a forecast.
+    pub chance_within_evacuation_time: Option<f64>,
+    /// The same within the outlook.
+    pub chance_within_outlook: Option<f64>,
+    /// Latest observed velocity, mm/day; `None` before the second reading.
+    pub velocity_mm_per_day: Option<f64>,
+    /// The median of the latest few, which neither an outlier nor a reset moves: what a level falls by.
+    pub settled_velocity_mm_per_day: Option<f64>,
+    /// Displacement since the first reading, mm, for benchmarks that measure it.
+    pub displacement_mm: Option<f64>,
+    /// Latest observed acceleration, mm/day per day.
+    pub acceleration_mm_per_day2: Option<f64>,
+    /// What else asks for a look: a flip to instability, an intercept drifting in.
+    pub causes: Vec<Cause>,
+    /// Chances of a collapse within other spans, that declared rules ask for.
+    pub chances: Vec<(SignedDuration, f64)>,
+    /// Declared rules whose conditions have held for long enough, by their place in the policy.
+    pub due: Vec<usize>,
+}
+
+impl Evidence {
+    /// Chance of a collapse within a span that a declared rule asks for.
+    pub(super) fn chance_within(&self, span: SignedDuration) -> Option<f64> {
+        let own = self.chances.iter().find(|(within, _)| *within == span);
+        own.map(|(_, chance)| *chance)
+    }
+}
+
+/// What asks for a look although no chance is large.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Cause {
+    /// The regime turned unstable.
+    RegimeFlip,
+    /// The inverse-velocity intercept comes nearer.
+    InterceptDriftingIn,
+    /// The transition time comes nearer.
+    TransitionDriftingIn,
+    /// Readings that the law in force does not explain.
+    UnexplainedResidual,
+    /// The slope moves upslope: its sign may be wrong.
+    MovesBackwards,
+}
+
+impl Cause {
+    /// Each.
+    pub const ALL: [Self; 5] = [
+        Self::RegimeFlip,
+        Self::InterceptDriftingIn,
+        Self::TransitionDriftingIn,
+        Self::UnexplainedResidual,
+        Self::MovesBackwards,
+    ];
+
+    /// The rule's name in an alert.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::RegimeFlip => "regime-flip",
+            Self::InterceptDriftingIn => "intercept-drifting-in",
+            Self::TransitionDriftingIn => "transition-drifting-in",
+            Self::UnexplainedResidual => "unexplained-residual",
+            Self::MovesBackwards => "moves-backwards",
+        }
+    }
+
+    /// What has happened, in words.
+    pub(super) fn words(self) -> &'static str {
+        match self {
+            Self::RegimeFlip => "the regime turned unstable",
+            Self::InterceptDriftingIn => "the inverse-velocity line's intercept comes nearer",
+            Self::TransitionDriftingIn => "the transition time comes nearer",
+            Self::UnexplainedResidual => "readings that the law in force does not explain",
+            Self::MovesBackwards => "the slope moves upslope",
+        }
+    }
+
+    /// The cause of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        let mut all = Self::ALL.into_iter();
+        all.find(|cause| cause.name() == name)
+    }
+}
