@@ -1,7 +1,7 @@
 //! `[[hook]]`, `[[webhook]]` and `[[cap]]`: whom alerts are sent to, and which.
 
-use super::table::{Placed, Section};
-use super::{CapFolder, HookConfig, Webhook, WebhookFormat, value};
+use super::table::Section;
+use super::{CapFolder, HookConfig, Webhook, WebhookFormat, address, value};
 use crate::alert::Level;
 use crate::reading::BenchmarkId;
 use std::collections::BTreeSet;
@@ -134,7 +134,7 @@ fn webhook(
 ) -> Option<HookConfig> {
     let example = "\"http://127.0.0.1:9000/alerts\"";
     let url = section.required("url", example);
-    let address = url.as_ref().and_then(|url| address(&section, url));
+    let address = url.as_ref().and_then(|url| address::of(&section, url));
     let name = section.text("name");
     let format = section.parsed("format", WebhookFormat::parse);
     let format = format.map_or(WebhookFormat::Slipwatch, |given| given.value);
@@ -143,16 +143,7 @@ fn webhook(
         // It checks no signature.
         WebhookFormat::Alertmanager => section.text("secret_file"),
     };
-    let ca_file = section.text("ca_file");
-    if let Some(given) = &ca_file
-        && address.as_ref().and_then(hyper::Uri::scheme_str) == Some("http")
-    {
-        section.error(
-            &given.at,
-            "webhook.ca_file without TLS trusts nobody".to_owned(),
-            "leave it out, or write url = \"https://...\"",
-        );
-    }
+    let ca_file = address::ca_file(&mut section, address.as_ref());
     let common = common(&mut section);
     if let Some(one) = name.as_ref().or(url.as_ref())
         && !taken.insert(one.value.clone())
@@ -170,7 +161,7 @@ fn webhook(
         webhook: Some(Webhook {
             name: name.map_or(url, |given| given.value),
             address,
-            ca_file: ca_file.map(|given| base.join(given.value)),
+            ca_file: ca_file.map(|given| base.join(given)),
             format,
             secret_file: secret.map(|given| base.join(given.value)),
         }),
@@ -252,32 +243,6 @@ fn polygon(text: &str) -> Result<String, String> {
     } else {
         Err(fix())
     }
-}
-
-fn address(section: &Section<'_>, url: &Placed<String>) -> Option<hyper::Uri> {
-    let refuse = |why: &str, fix: &str| {
-        let what = format!("webhook.url = {:?} {why}", url.value);
-        section.error(&url.at, what, fix);
-        None
-    };
-    let Ok(address) = url.value.parse::<hyper::Uri>() else {
-        return refuse("is no address", "write it as in \"http://host:port/path\"");
-    };
-    if !matches!(address.scheme_str(), Some("http" | "https")) {
-        let fix = "write it as in \"https://host/path\" or \"http://host:port/path\"";
-        return refuse("is neither http nor https", fix);
-    }
-    let has_user = (address.authority()).is_some_and(|one| one.as_str().contains('@'));
-    if address.host().is_none_or(str::is_empty) {
-        return refuse("names no host", "write it as in \"http://host:port/path\"");
-    }
-    if has_user {
-        return refuse(
-            "holds a password, which logs would show",
-            "leave it out; the receiver checks the signature",
-        );
-    }
-    Some(address)
 }
 
 fn levels(section: &mut Section<'_>) -> Vec<Level> {

@@ -1,9 +1,11 @@
 //! The site file: TOML with units, unknown keys refused, all problems reported together.
 
+mod address;
 mod alert;
 mod broker;
 mod check;
 mod declared;
+mod heartbeat;
 mod hook;
 mod pattern;
 mod problem;
@@ -18,6 +20,7 @@ mod vector;
 
 pub use broker::{Broker, BrokerAddress};
 pub use check::{Summary, check};
+pub use heartbeat::Heartbeat;
 pub use pattern::FilePattern;
 pub use problem::{ConfigError, Problem, Severity};
 pub use secret::{Secret, SecretError};
@@ -55,6 +58,8 @@ pub struct Config {
     pub settings: Settings,
     /// `[[hook]]`, `[[webhook]]` and `[[cap]]`.
     pub hooks: Vec<HookConfig>,
+    /// `[[heartbeat]]`.
+    pub heartbeats: Vec<Heartbeat>,
     /// What is doubtful, but not refused.
     pub warnings: Vec<Problem>,
 }

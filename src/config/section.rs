@@ -1,7 +1,9 @@
 //! The tables of the site file, one function each.
 
 use super::table::{Placed, Section, unique};
-use super::{Benchmark, Config, SiteConfig, alert, declared, hook, source, value, vector};
+use super::{
+    Benchmark, Config, SiteConfig, alert, declared, heartbeat, hook, source, value, vector,
+};
 use crate::alert::Policy;
 use crate::monitor::{Explain, Settings, SiteLevel, Watched};
 use crate::reading::{BenchmarkId, Quantity, Suspicion, Unit};
@@ -30,6 +32,7 @@ pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
     let declared = declared::events(root, &benchmarks);
     let watched = watched(&known, &benchmarks);
     let hooks = hook::hooks(root, base);
+    let heartbeats = heartbeat::heartbeats(root, base);
     Some(Config {
         file: file.to_owned(),
         site: site?,
@@ -46,6 +49,7 @@ pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
             accepted: own.accepted,
         },
         hooks,
+        heartbeats,
         warnings: Vec::new(),
     })
 }

@@ -452,8 +452,11 @@ impl Daemon {
         };
         if fresh.site.state_dir != self.config.site.state_dir
             || fresh.site.listen != self.config.site.listen
+            || fresh.heartbeats != self.config.heartbeats
         {
-            tracing::error!("the config is not taken: another state_dir or listen needs a restart");
+            tracing::error!(
+                "the config is not taken: another state_dir, listen or heartbeat needs a restart"
+            );
             return Ok(());
         }
         self.pulse.service.reloading();

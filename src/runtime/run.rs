@@ -2,6 +2,7 @@
 
 use super::clock;
 use super::daemon::{DRAIN_LIMIT, Daemon, dispatcher};
+use super::heartbeat;
 use super::hook::Status;
 use super::progress::Progress;
 use super::pulse::{Pulse, PulseError};
@@ -73,6 +74,7 @@ pub async fn run(
     for (source, count) in store.quarantined().map_err(fail)? {
         pulse.vitals.quarantined(&source, count);
     }
+    let mut heartbeats = heartbeat::start(&config.heartbeats, &pulse.vitals, &shutdown);
     let sources = Sources::start(config, &store).map_err(fail)?;
     let mut daemon = Daemon::new(config, store, site, (sources, pulse), clock::now);
     tracing::info!(site = name, state = %config.site.state_dir.display(), "started");
@@ -84,6 +86,7 @@ pub async fn run(
         ..
     } = daemon;
     sources.stop();
+    heartbeats.shutdown().await;
     pulse.stop().await;
     let counts = site.counts();
     let closed = site.close(clock::now(), DRAIN_LIMIT).await;

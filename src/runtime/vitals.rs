@@ -64,8 +64,29 @@ pub struct Health {
     pub outbox_closed: usize,
     /// Searches for an effect that are at work.
     pub searches: usize,
+    /// Heartbeats that were taken, and that were not, since the start.
+    pub heartbeats: u64,
+    /// See [`Health::heartbeats`].
+    pub heartbeats_failed: u64,
     /// Size of the database, bytes.
     pub database_bytes: Option<u64>,
+}
+
+impl Health {
+    /// Why the site is not watched as it should be, where it is not.
+    pub fn not_ready(&self) -> Option<&'static str> {
+        if !self.is_caught_up {
+            Some("still reading the past")
+        } else if self.is_paused || !self.is_store_writable {
+            Some("the state folder cannot be written to")
+        } else if self.is_store_damaged {
+            Some("the state is damaged: restore a backup")
+        } else if self.is_clock_wrong {
+            Some("the host's clock is wrong: readings that are known lie after it")
+        } else {
+            None
+        }
+    }
 }
 
 /// One benchmark.

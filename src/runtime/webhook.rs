@@ -2,24 +2,17 @@
 
 use super::clock;
 use super::hook::{Alert, Outcome, state_name};
-use super::tls;
+use super::http;
 use crate::config::{Secret, Webhook};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use hmac::{Hmac, KeyInit, Mac};
 use http_body_util::Full;
 use hyper::body::Bytes;
-use hyper::client::conn::http1;
-use hyper::{Request, header};
-use hyper_util::rt::TokioIo;
+use hyper::{Method, Request, header};
 use sha2::Sha256;
 use std::fmt::Write as _;
 use std::time::Duration;
-use tokio::io::{AsyncRead, AsyncWrite};
-use tokio::net::TcpStream;
-
-/// Who calls.
-const AGENT: &str = concat!("slipwatch/", env!("CARGO_PKG_VERSION"));
 
 /// What distinguishes a message from every other, the same at each attempt: one key fires and is resolved. It may hold no full
 /// stop, which parts what is signed, and nothing that a header does not take.
@@ -56,10 +49,16 @@ pub(super) async fn send(
         Ok(request) => request,
         Err(why) => return Outcome::NotStarted(why),
     };
-    match tokio::time::timeout(limit, answer(webhook, request)).await {
+    let address = &webhook.address;
+    match tokio::time::timeout(
+        limit,
+        http::answer(address, webhook.ca_file.as_deref(), request),
+    )
+    .await
+    {
         Ok(Ok(status)) if (200..300).contains(&status) => Outcome::Done,
         Ok(Ok(status)) => Outcome::Refused(status),
-        Ok(Err(why)) => Outcome::NotStarted(why),
+        Ok(Err(why)) => Outcome::NotStarted(format!("{}: {why}", webhook.name)),
         Err(_elapsed) => Outcome::TimedOut,
     }
 }
@@ -77,63 +76,16 @@ fn request(
             .ok_or_else(|| "the secret is unusable".to_owned())
     });
     let signed = signed.transpose()?;
-    let address = &webhook.address;
-    let path = address.path_and_query().map_or("/", |path| path.as_str());
-    let host = address.authority().map_or("", |one| one.as_str());
-    let mut request = Request::post(path);
+    let mut request = http::head(Method::POST, &webhook.address);
     if let Some(signature) = signed {
         request = request.header("webhook-signature", signature);
     }
     request
-        .header(header::HOST, host)
-        .header(header::USER_AGENT, AGENT)
         .header(header::CONTENT_TYPE, "application/json")
-        .header(header::CONNECTION, "close")
         .header("webhook-id", id)
         .header("webhook-timestamp", timestamp)
         .body(Full::new(Bytes::from(body)))
         .map_err(|error| error.to_string())
-}
-
-/// The status that the receiver answers with. A redirection is not followed: what it leads to nobody has allowed.
-async fn answer(webhook: &Webhook, request: Request<Full<Bytes>>) -> Result<u16, String> {
-    let address = &webhook.address;
-    let host = address.host().unwrap_or_default();
-    let host = host.trim_start_matches('[').trim_end_matches(']');
-    let is_secured = address.scheme_str() == Some("https");
-    let port = address
-        .port_u16()
-        .unwrap_or(if is_secured { 443 } else { 80 });
-    let unreachable = |error: &dyn std::fmt::Display| format!("{}: {error}", webhook.name);
-    let stream = (TcpStream::connect((host, port)).await).map_err(|error| unreachable(&error))?;
-    if is_secured {
-        let secured = tls::secured(stream, host, webhook.ca_file.as_deref()).await;
-        exchange(secured.map_err(|error| unreachable(&error))?, request).await
-    } else {
-        exchange(stream, request).await
-    }
-    .map_err(|error| unreachable(&error))
-}
-
-async fn exchange<S: AsyncRead + AsyncWrite + Unpin + Send + 'static>(
-    stream: S,
-    request: Request<Full<Bytes>>,
-) -> hyper::Result<u16> {
-    let (mut sender, connection) = http1::handshake(TokioIo::new(stream)).await?;
-    let exchange = async {
-        let response = sender.send_request(request).await;
-        response.map(|response| response.status().as_u16())
-    };
-    let mut exchange = std::pin::pin!(exchange);
-    // The connection does the work; it ends with this call.
-    tokio::select! {
-        status = &mut exchange => status,
-        ended = connection => match ended {
-            // The answer may have come with the end.
-            Ok(()) => exchange.await,
-            Err(error) => Err(error),
-        },
-    }
 }
 
 #[cfg(test)]

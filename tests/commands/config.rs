@@ -84,6 +84,33 @@ fn the_example_config_is_right_and_says_what_it_means() {
 }
 
 #[test]
+fn a_heartbeat_is_checked_as_a_webhook_is() {
+    for (lines, parts) in [
+        (
+            "url = \"ftp://a/b\"",
+            [
+                "site.toml:11:7",
+                "heartbeat.url = \"ftp://a/b\" is neither http nor https",
+            ],
+        ),
+        (
+            "url = \"http://a/b\"\nevery = \"1ms\"",
+            ["site.toml:12:9", "a second or more"],
+        ),
+        (
+            "url = \"http://a/b\"\nca_file = \"a.pem\"",
+            ["site.toml:12:11", "heartbeat.ca_file without TLS"],
+        ),
+        ("every = \"1m\"", ["site.toml:10", "heartbeat.url"]),
+    ] {
+        let said = problem(&format!("[[heartbeat]]\n{lines}\n"));
+        for part in parts {
+            assert!(said.contains(part), "{lines}: {said}");
+        }
+    }
+}
+
+#[test]
 fn a_rule_that_cannot_be_meant_is_refused_where_it_stands() {
     let rule = |lines: &str| format!("[[alert.rule]]\nname = \"near\"\nlevel = \"red\"\n{lines}\n");
     for (text, parts) in [
@@ -206,7 +233,7 @@ fn an_unknown_key_is_refused_with_the_known_ones() {
     assert_eq!(
         problem("[allert]\n"),
         "site.toml:10:2: error: unknown key allert; known here: site, source, alert, explain, \
-         benchmark, event, hook, webhook, cap"
+         benchmark, event, hook, webhook, cap, heartbeat"
     );
 }
 

@@ -81,7 +81,8 @@ fn request(stream: impl Read) -> Got {
         };
         headers.insert(name.to_ascii_lowercase(), value.to_owned());
     }
-    let mut body = vec![0; headers["content-length"].parse().unwrap()];
+    let length = headers.get("content-length");
+    let mut body = vec![0; length.map_or(0, |length| length.parse().unwrap())];
     reader.read_exact(&mut body).unwrap();
     let body = String::from_utf8(body).unwrap();
     Got {
@@ -562,4 +563,87 @@ fn hook_test_sends_a_drill_to_a_webhook_and_check_reads_its_secret() {
     let (code, said) = ask(&["hook", "test", "--config", "site.toml"]);
     assert_eq!(code, Some(1), "{said}");
     assert!(said.contains("answered with status 401"), "{said}");
+}
+
+/// A daemon at work over a file that is growing; killed with the test.
+struct Watching(std::process::Child);
+
+impl Drop for Watching {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn heartbeats_come_for_as_long_as_the_site_is_watched_and_no_longer() {
+    let taking = Receiver::answering(&[200]);
+    let refusing = Receiver::answering(&[500]);
+    let folder = tempfile::tempdir().unwrap();
+    let heartbeat = |url: &str| format!("[[heartbeat]]\nurl = \"{url}\"\nevery = \"1s\"\n");
+    let free = TcpListener::bind("127.0.0.1:0").unwrap();
+    let listen = free.local_addr().unwrap();
+    drop(free);
+    let tables = heartbeat(&taking.url) + &heartbeat(&refusing.url);
+    let site = text(&tables).replace("[[source]]", &format!("listen = \"{listen}\"\n[[source]]"));
+    std::fs::write(folder.path().join("site.toml"), site).unwrap();
+    let now = slipwatch::runtime::clock::now();
+    let rows: Vec<String> = (0..20)
+        .map(|row| {
+            format!(
+                "{},{row}\n",
+                now - jiff::SignedDuration::from_hours(20 - row)
+            )
+        })
+        .collect();
+    let csv = format!("time,P1_displacement_mm\n{}", rows.concat());
+    std::fs::write(folder.path().join("slope.csv"), csv).unwrap();
+    let log = std::fs::File::create(folder.path().join("log")).unwrap();
+    let daemon = Command::new(env!("CARGO_BIN_EXE_slipwatch"))
+        .args(["run", "site.toml"])
+        .current_dir(folder.path())
+        .stdout(Stdio::null())
+        .stderr(log)
+        .spawn();
+    let daemon = Watching(daemon.unwrap());
+    eventually("both are asked", || {
+        taking.got().len() >= 3 && refusing.got().len() >= 3
+    })
+    .await;
+    assert!(taking.got()[0].line.starts_with("GET /alerts?x=1 "));
+    let metrics = {
+        let mut stream = std::net::TcpStream::connect(listen).unwrap();
+        let request =
+            format!("GET /metrics HTTP/1.1\r\nHost: {listen}\r\nConnection: close\r\n\r\n");
+        stream.write_all(request.as_bytes()).unwrap();
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).unwrap();
+        answer
+    };
+    let count = |name: &str| -> u64 {
+        let line = metrics.lines().find(|line| line.starts_with(name)).unwrap();
+        line.split(' ').next_back().unwrap().parse().unwrap()
+    };
+    assert!(count("slipwatch_heartbeats_total ") >= 3, "{metrics}");
+    assert!(
+        count("slipwatch_heartbeats_failed_total ") >= 3,
+        "{metrics}"
+    );
+    let log = std::fs::read_to_string(folder.path().join("log")).unwrap();
+    assert!(
+        log.contains("a heartbeat has not been taken") && log.contains("status 500"),
+        "{log}"
+    );
+    // The state cannot be written any more: the readings are not safe, and others are to look.
+    std::fs::rename(folder.path().join("state"), folder.path().join("gone")).unwrap();
+    let mut before = usize::MAX;
+    eventually("heartbeats end", || {
+        let count = taking.got().len();
+        std::thread::sleep(Duration::from_millis(2500));
+        before = taking.got().len();
+        before == count
+    })
+    .await;
+    drop(daemon);
+    assert_eq!(taking.got().len(), before);
 }

@@ -172,6 +172,16 @@ fn counts(sheet: &mut Sheet<'_>, health: &Health) -> fmt::Result {
             "Lines of the log that could not be written",
             health.log_lines_lost,
         ),
+        (
+            "heartbeats",
+            "Reports that the site is watched, taken",
+            health.heartbeats,
+        ),
+        (
+            "heartbeats_failed",
+            "Reports that the site is watched, not taken",
+            health.heartbeats_failed,
+        ),
     ];
     for (name, about, count) in counters {
         sheet.whole(name, about, &ConstCounter::new(count))?;

@@ -153,23 +153,9 @@ async fn healthy(State((vitals, longest)): State<(Arc<Vitals>, Duration)>) -> (S
 async fn ready(State(vitals): State<Arc<Vitals>>) -> (StatusCode, String) {
     let health = vitals.health();
     let refused = refused(&health);
-    match not_ready(&health) {
+    match health.not_ready() {
         Some(why) => (StatusCode::SERVICE_UNAVAILABLE, format!("{why}\n{refused}")),
         None => (StatusCode::OK, format!("ready\n{refused}")),
-    }
-}
-
-fn not_ready(health: &Health) -> Option<&'static str> {
-    if !health.is_caught_up {
-        Some("still reading the past")
-    } else if health.is_paused || !health.is_store_writable {
-        Some("the state folder cannot be written to")
-    } else if health.is_store_damaged {
-        Some("the state is damaged: restore a backup")
-    } else if health.is_clock_wrong {
-        Some("the host's clock is wrong: readings that are known lie after it")
-    } else {
-        None
     }
 }
 

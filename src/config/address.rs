@@ -1,0 +1,40 @@
+//! Addresses that the daemon speaks to over HTTP, and whom it trusts there.
+
+use super::table::{Placed, Section};
+
+/// The address in `url`.
+pub(super) fn of(section: &Section<'_>, url: &Placed<String>) -> Option<hyper::Uri> {
+    let refuse = |why: &str, fix: &str| {
+        let what = format!("{} = {:?} {why}", section.path("url"), url.value);
+        section.error(&url.at, what, fix);
+        None
+    };
+    let Ok(address) = url.value.parse::<hyper::Uri>() else {
+        return refuse("is no address", "write it as in \"http://host:port/path\"");
+    };
+    if !matches!(address.scheme_str(), Some("http" | "https")) {
+        let fix = "write it as in \"https://host/path\" or \"http://host:port/path\"";
+        return refuse("is neither http nor https", fix);
+    }
+    let has_user = (address.authority()).is_some_and(|one| one.as_str().contains('@'));
+    if address.host().is_none_or(str::is_empty) {
+        return refuse("names no host", "write it as in \"http://host:port/path\"");
+    }
+    if has_user {
+        return refuse("holds a password, which logs would show", "leave it out");
+    }
+    Some(address)
+}
+
+/// `ca_file`, as it stands there; refused where the address has no TLS.
+pub(super) fn ca_file(section: &mut Section<'_>, address: Option<&hyper::Uri>) -> Option<String> {
+    let given = section.text("ca_file")?;
+    if address.and_then(hyper::Uri::scheme_str) == Some("http") {
+        section.error(
+            &given.at,
+            format!("{} without TLS trusts nobody", section.path("ca_file")),
+            "leave it out, or write url = \"https://...\"",
+        );
+    }
+    Some(given.value)
+}
