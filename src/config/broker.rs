@@ -2,6 +2,7 @@
 
 use super::table::Section;
 use crate::reading::Conventions;
+use std::path::{Path, PathBuf};
 
 /// Topics of an MQTT broker, on which NDJSON lines come.
 #[derive(Debug, Clone, PartialEq)]
@@ -10,6 +11,8 @@ pub struct Broker {
     pub id: String,
     /// Where it is.
     pub address: BrokerAddress,
+    /// The certificate authorities that are trusted instead of the machine's own, PEM.
+    pub ca_file: Option<PathBuf>,
     /// The filter of topics: `site/+/displacement`.
     pub topic: String,
     /// How times and missing values are written in the messages.
@@ -23,6 +26,8 @@ pub struct BrokerAddress {
     pub host: String,
     /// Its port.
     pub port: u16,
+    /// Whether it is spoken to over TLS.
+    pub is_secured: bool,
     /// User and password.
     pub login: Option<(String, String)>,
 }
@@ -35,10 +40,16 @@ impl std::fmt::Debug for BrokerAddress {
 }
 
 impl BrokerAddress {
-    /// Parses `mqtt://[USER:PASSWORD@]HOST[:PORT]`.
+    /// Parses `mqtt://[USER:PASSWORD@]HOST[:PORT]`, or `mqtts://` for TLS.
     fn parse(url: &str) -> Result<Self, String> {
-        let fix = || "write it as in \"mqtt://127.0.0.1:1883\" (TLS is not supported)".to_owned();
-        let rest = url.strip_prefix("mqtt://").ok_or_else(fix)?;
+        let fix = || {
+            "write it as in \"mqtt://127.0.0.1:1883\", or \"mqtts://broker.example.org:8883\" for TLS"
+                .to_owned()
+        };
+        let (rest, is_secured) = match url.strip_prefix("mqtts://") {
+            Some(rest) => (rest, true),
+            None => (url.strip_prefix("mqtt://").ok_or_else(fix)?, false),
+        };
         let rest = rest.strip_suffix('/').unwrap_or(rest);
         let (login, place) = match rest.rsplit_once('@') {
             None => (None, rest),
@@ -47,7 +58,7 @@ impl BrokerAddress {
         let is_port = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
         let (host, port) = match place.rsplit_once(':') {
             Some((host, port)) if is_port(port) => (host, port.parse().map_err(|_| fix())?),
-            Some(_) | None => (place, 1883),
+            Some(_) | None => (place, if is_secured { 8883 } else { 1883 }),
         };
         if host.is_empty() || host.contains(['/', ' ']) {
             return Err(fix());
@@ -55,6 +66,7 @@ impl BrokerAddress {
         Ok(Self {
             host: host.to_owned(),
             port,
+            is_secured,
             login: login.map(|(user, password)| (user.to_owned(), password.to_owned())),
         })
     }
@@ -65,6 +77,7 @@ pub(super) fn broker(
     section: &mut Section<'_>,
     id: Option<String>,
     conventions: Conventions,
+    base: &Path,
 ) -> Option<Broker> {
     let address = section
         .required("url", "\"mqtt://127.0.0.1:1883\"")
@@ -72,8 +85,19 @@ pub(super) fn broker(
     let topic = section
         .required("topic", "\"site/+/displacement\"")
         .and_then(|_| section.parsed("topic", topic));
+    let ca_file = section.text("ca_file");
+    if let Some(given) = &ca_file
+        && address.as_ref().is_some_and(|one| !one.value.is_secured)
+    {
+        section.error(
+            &given.at,
+            "source.ca_file without TLS trusts nobody".to_owned(),
+            "leave it out, or write url = \"mqtts://...\"",
+        );
+    }
     Some(Broker {
         id: id?,
+        ca_file: ca_file.map(|given| base.join(given.value)),
         address: address?.value,
         topic: topic?.value,
         conventions,

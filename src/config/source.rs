@@ -56,7 +56,7 @@ fn source(mut section: Section<'_>, base: &Path, taken: &mut BTreeSet<String>) -
         .map(|given| given.value);
     if kind == Some(Kind::Mqtt) {
         let conventions = conventions(&mut section, kind);
-        let broker = broker::broker(&mut section, id, conventions);
+        let broker = broker::broker(&mut section, id, conventions, base);
         section.finish();
         return broker.map(Origin::Topics);
     }

@@ -109,7 +109,11 @@ fn may_have_another_scale(values: &[f64], unit: &str) -> bool {
     let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     match unit {
         "m" => high - low > LARGE_M,
-        "mm" => high - low < SMALL_MM,
+        "mm" => {
+            let steps = values.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+            let small = steps.filter(|step| *step <= SMALL_STEP_MM).count();
+            high - low < SMALL_MM && small > (values.len() - 1) / 2
+        }
         _ => false,
     }
 }

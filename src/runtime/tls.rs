@@ -19,6 +19,14 @@ pub(super) async fn secured(
 ) -> Result<TlsStream<TcpStream>, String> {
     let name = ServerName::try_from(host.to_owned())
         .map_err(|error| format!("{host:?} can have no certificate: {error}"))?;
+    let connected = TlsConnector::from(config(ca_file)?)
+        .connect(name, stream)
+        .await;
+    connected.map_err(|error| format!("no TLS: {error}"))
+}
+
+/// What a handshake goes by: TLS 1.2 or 1.3, and the authorities that are trusted.
+pub(super) fn config(ca_file: Option<&Path>) -> Result<Arc<ClientConfig>, String> {
     let roots = match ca_file {
         Some(file) => own(file)?,
         None => of_the_machine()?,
@@ -28,10 +36,7 @@ pub(super) async fn secured(
         .map_err(|error| error.to_string())?
         .with_root_certificates(roots)
         .with_no_client_auth();
-    let connected = TlsConnector::from(Arc::new(config))
-        .connect(name, stream)
-        .await;
-    connected.map_err(|error| format!("no TLS: {error}"))
+    Ok(Arc::new(config))
 }
 
 /// The authorities in a PEM file.

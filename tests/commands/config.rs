@@ -453,7 +453,7 @@ fn a_broker_is_read_its_password_never_logged_and_a_wrong_address_refused() {
         "a password in a log"
     );
     for (right, wrong) in [
-        ("mqtt://", "mqtts://"),
+        ("mqtt://", "mqttt://"),
         ("local\"", "local:99999\""),
         ("site/+", "site/a+"),
     ] {

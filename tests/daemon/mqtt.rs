@@ -5,6 +5,7 @@
     reason = "a test fails by panicking"
 )]
 
+use rcgen::{BasicConstraints, CertificateParams, CertifiedIssuer, IsCa, KeyPair};
 use rumqttc::{AsyncClient, Event, MqttOptions, Packet, QoS};
 use slipwatch::config::{self, Config};
 use slipwatch::monitor::Input;
@@ -125,9 +126,14 @@ impl Drop for Mosquitto {
 
 /// Of a site that reaches its broker at this port.
 fn config_at(port: u16) -> Config {
+    config_of(&format!("url = \"mqtt://127.0.0.1:{port}\""))
+}
+
+/// Of a site with these lines of its broker.
+fn config_of(lines: &str) -> Config {
     let text = format!(
         "[site]\nname = \"Toc\"\nstate_dir = \"state\"\n[[source]]\nid = \"radio\"\n\
-         kind = \"mqtt\"\nurl = \"mqtt://127.0.0.1:{port}\"\ntopic = \"site/+/displacement\"\n"
+         kind = \"mqtt\"\n{lines}\ntopic = \"site/+/displacement\"\n"
     );
     config::parse(&text, Path::new("site.toml")).unwrap()
 }
@@ -145,12 +151,19 @@ impl Source {
     }
 
     fn start_at(port: u16) -> Self {
-        let config = config_at(port);
+        Self::of(config_at(port))
+    }
+
+    fn of(config: Config) -> Self {
+        Self::of_session(config, "slipwatch-toc-radio")
+    }
+
+    fn of_session(config: Config, id: &str) -> Self {
         let (sender, deliveries) = mpsc::channel(8);
         let (stop, stopped) = shutdown::pair();
         let radio = config.brokers[0].clone();
-        let id = "slipwatch-toc-radio".to_owned();
-        let task = tokio::spawn(follow(radio, config.benchmarks, id, sender, stopped));
+        let follow = follow(radio, config.benchmarks, id.to_owned(), sender, stopped);
+        let task = tokio::spawn(follow);
         Self {
             deliveries,
             stop,
@@ -274,6 +287,56 @@ async fn a_backlog_comes_without_waiting_for_the_acknowledgement_of_each_twenty(
     for delivery in waiting {
         assert!(delivery.receipt.acknowledge().await.is_err());
     }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+#[cfg_attr(not(has_mosquitto), ignore = "Mosquitto was not found by build.rs")]
+async fn readings_come_over_tls_from_a_broker_that_proves_its_name_and_from_no_other() {
+    let mut params = CertificateParams::new(Vec::new()).unwrap();
+    params.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
+    let authority = CertifiedIssuer::self_signed(params, KeyPair::generate().unwrap()).unwrap();
+    let key = KeyPair::generate().unwrap();
+    let params = CertificateParams::new(vec!["localhost".to_owned()]).unwrap();
+    let own = params.signed_by(&key, &authority).unwrap();
+    let stranger = CertifiedIssuer::self_signed(
+        CertificateParams::new(Vec::new()).unwrap(),
+        KeyPair::generate().unwrap(),
+    )
+    .unwrap();
+    let free = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = free.local_addr().unwrap().port();
+    drop(free);
+    let broker = Mosquitto::start_with(|folder| {
+        let place = |name: &str, text: String| {
+            let file = folder.join(name);
+            std::fs::write(&file, text).unwrap();
+            file.display().to_string()
+        };
+        place("authority.pem", authority.pem());
+        place("stranger.pem", stranger.pem());
+        format!(
+            "listener {port} 127.0.0.1\nallow_anonymous true\ncertfile {}\nkeyfile {}\n",
+            place("own.pem", own.pem()),
+            place("own.key", key.serialize_pem())
+        )
+    });
+    let secured = |authority: &str| {
+        let file = broker.folder.path().join(authority);
+        let lines = format!("url = \"mqtts://localhost:{port}\"\nca_file = {file:?}");
+        config_of(&lines)
+    };
+    let mut trusting = Source::of(secured("authority.pem"));
+    let mut doubting = Source::of_session(secured("stranger.pem"), "another");
+    tokio::time::sleep(Duration::from_secs(3)).await;
+    broker.publish(&[message(1), message(2)]).await;
+    for day in [1.0, 2.0] {
+        let delivery = trusting.next().await;
+        assert_eq!(values(&delivery), [day]);
+        delivery.receipt.acknowledge().await.unwrap();
+    }
+    assert!(doubting.deliveries.try_recv().is_err());
+    trusting.end().await;
+    doubting.end().await;
 }
 
 /// Stands before a broker and refuses MQTT 5, as a broker does that knows only 3.1.1; which Debian does not have any more.

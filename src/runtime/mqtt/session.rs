@@ -4,10 +4,11 @@
 //! 20 are usual: each twenty messages then wait for a commit.
 
 use crate::config::Broker;
+use crate::runtime::tls;
 use rumqttc::v5::mqttbytes::QoS as QoS5;
 use rumqttc::v5::mqttbytes::v5 as packet5;
 use rumqttc::v5::{self, mqttbytes::v5::ConnectReturnCode};
-use rumqttc::{self as v3, QoS, SubscribeReasonCode};
+use rumqttc::{self as v3, QoS, SubscribeReasonCode, TlsConfiguration, Transport};
 use std::borrow::Cow;
 use std::error::Error;
 use std::sync::Arc;
@@ -33,11 +34,20 @@ pub(super) type NoConnection = Box<dyn Error + Send + Sync>;
 pub(super) struct Session {
     broker: Broker,
     client_id: String,
-    link: Link,
+    version: Version,
+    /// Made with the first connection; over TLS anew with each, so that other authorities hold from the next one on.
+    link: Option<Link>,
     /// Whether a broker has accepted this version of the protocol.
     is_accepted: bool,
     /// Connections that have ended.
     ended: Arc<AtomicU64>,
+}
+
+/// The versions of the protocol.
+#[derive(Clone, Copy)]
+enum Version {
+    Five,
+    Three,
 }
 
 enum Link {
@@ -109,9 +119,10 @@ impl Session {
     /// Connects when it is first asked for what came.
     pub(super) fn new(broker: Broker, client_id: String) -> Self {
         Self {
-            link: five(&broker, &client_id),
             broker,
             client_id,
+            version: Version::Five,
+            link: None,
             is_accepted: false,
             ended: Arc::default(),
         }
@@ -119,15 +130,19 @@ impl Session {
 
     /// The version of the protocol that is spoken, or tried.
     pub(super) fn version(&self) -> &'static str {
-        match self.link {
-            Link::Five(..) => "5",
-            Link::Three(..) => "3.1.1",
+        match self.version {
+            Version::Five => "5",
+            Version::Three => "3.1.1",
         }
     }
 
     /// The next that comes; connects where there is no connection.
     pub(super) async fn next(&mut self) -> Result<Came, NoConnection> {
-        let came = match &mut self.link {
+        let link = match &mut self.link {
+            Some(link) => link,
+            none => none.insert(open(self.version, &self.broker, &self.client_id)?),
+        };
+        let came = match link {
             Link::Five(client, connection) => match connection.poll().await {
                 Ok(v5::Event::Incoming(packet)) => Ok(came_by_five(client, packet)),
                 Ok(v5::Event::Outgoing(_)) => Ok(Came::Nothing),
@@ -136,7 +151,13 @@ impl Session {
             Link::Three(client, connection) => match connection.poll().await {
                 Ok(v3::Event::Incoming(packet)) => Ok(came_by_three(client, packet)),
                 Ok(v3::Event::Outgoing(_)) => Ok(Came::Nothing),
-                Err(error) => Err((!matches!(error, v3::ConnectionError::Io(_)), error.into())),
+                Err(error) => {
+                    let is_unreached = matches!(
+                        error,
+                        v3::ConnectionError::Io(_) | v3::ConnectionError::Tls(_)
+                    );
+                    Err((!is_unreached, error.into()))
+                }
             },
         };
         match came {
@@ -153,26 +174,27 @@ impl Session {
             Ok(Came::Nothing) => Ok(Came::Nothing),
             Err((may_be_another_version, error)) => {
                 self.ended.fetch_add(1, Ordering::Relaxed);
-                if may_be_another_version && !self.is_accepted {
-                    self.try_another_version();
+                let is_other = may_be_another_version && !self.is_accepted;
+                if is_other {
+                    self.version = match self.version {
+                        Version::Five => Version::Three,
+                        Version::Three => Version::Five,
+                    };
+                }
+                if is_other || self.broker.address.is_secured {
+                    self.link = None;
                 }
                 Err(error)
             }
         }
     }
 
-    fn try_another_version(&mut self) {
-        self.link = match self.link {
-            Link::Five(..) => three(&self.broker, &self.client_id),
-            Link::Three(..) => five(&self.broker, &self.client_id),
-        };
-    }
-
     /// Asks for the messages of a topic, each at least once.
     pub(super) fn subscribe(&self, topic: &str) -> Result<(), NoConnection> {
         match &self.link {
-            Link::Five(client, _) => client.try_subscribe(topic, QoS5::AtLeastOnce)?,
-            Link::Three(client, _) => client.try_subscribe(topic, QoS::AtLeastOnce)?,
+            Some(Link::Five(client, _)) => client.try_subscribe(topic, QoS5::AtLeastOnce)?,
+            Some(Link::Three(client, _)) => client.try_subscribe(topic, QoS::AtLeastOnce)?,
+            None => return Err("there is no connection".into()),
         }
         Ok(())
     }
@@ -181,13 +203,28 @@ impl Session {
     pub(super) fn disconnect(&self) {
         // Where requests queue already, the connection is no better than none.
         let _ = match &self.link {
-            Link::Five(client, _) => client.try_disconnect().is_ok(),
-            Link::Three(client, _) => client.try_disconnect().is_ok(),
+            Some(Link::Five(client, _)) => client.try_disconnect().is_ok(),
+            Some(Link::Three(client, _)) => client.try_disconnect().is_ok(),
+            None => false,
         };
     }
 }
 
-fn five(broker: &Broker, client_id: &str) -> Link {
+/// Ready to connect.
+fn open(version: Version, broker: &Broker, client_id: &str) -> Result<Link, NoConnection> {
+    let transport = if broker.address.is_secured {
+        let config = tls::config(broker.ca_file.as_deref())?;
+        Transport::tls_with_config(TlsConfiguration::Rustls(config))
+    } else {
+        Transport::tcp()
+    };
+    Ok(match version {
+        Version::Five => five(broker, client_id, transport),
+        Version::Three => three(broker, client_id, transport),
+    })
+}
+
+fn five(broker: &Broker, client_id: &str, transport: Transport) -> Link {
     let address = &broker.address;
     let mut options = v5::MqttOptions::new(client_id, &address.host, address.port);
     options
@@ -196,7 +233,8 @@ fn five(broker: &Broker, client_id: &str) -> Link {
         .set_receive_maximum(Some(MOST_UNACKNOWLEDGED))
         .set_max_packet_size(Some(LONGEST_PACKET))
         .set_manual_acks(true)
-        .set_keep_alive(KEEP_ALIVE);
+        .set_keep_alive(KEEP_ALIVE)
+        .set_transport(transport);
     if let Some((user, password)) = &address.login {
         options.set_credentials(user, password);
     }
@@ -204,14 +242,15 @@ fn five(broker: &Broker, client_id: &str) -> Link {
     Link::Five(client, Box::new(connection))
 }
 
-fn three(broker: &Broker, client_id: &str) -> Link {
+fn three(broker: &Broker, client_id: &str, transport: Transport) -> Link {
     let address = &broker.address;
     let mut options = v3::MqttOptions::new(client_id, &address.host, address.port);
     options
         .set_clean_session(false)
         .set_manual_acks(true)
         .set_keep_alive(KEEP_ALIVE)
-        .set_max_packet_size(LONGEST_PACKET as usize, LONGEST_SENT);
+        .set_max_packet_size(LONGEST_PACKET as usize, LONGEST_SENT)
+        .set_transport(transport);
     if let Some((user, password)) = &address.login {
         options.set_credentials(user, password);
     }
@@ -275,7 +314,9 @@ fn came_by_three(client: &v3::AsyncClient, packet: v3::Packet) -> Came<Published
 /// Whether a broker was reached and may know no MQTT 5: it says so, or answers what cannot be read, or nothing.
 fn may_be_another_version(error: &v5::ConnectionError) -> bool {
     match error {
-        v5::ConnectionError::Io(_) | v5::ConnectionError::RequestsDone => false,
+        v5::ConnectionError::Io(_)
+        | v5::ConnectionError::Tls(_)
+        | v5::ConnectionError::RequestsDone => false,
         v5::ConnectionError::ConnectionRefused(code) => matches!(
             code,
             ConnectReturnCode::RefusedProtocolVersion
