@@ -50,6 +50,29 @@ fn unlike(root: &Section<'_>, hooks: &[HookConfig]) {
             return;
         }
     }
+    for (place, hook) in hooks.iter().enumerate() {
+        let mut before = hooks[..place].iter();
+        if !hook.run.is_empty() && before.any(|one| one.run == hook.run && overlap(one, hook)) {
+            root.warning(
+                root.at(),
+                format!(
+                    "two hooks run {:?} and ask for the same alerts: it is run once for each of these",
+                    hook.run.join(" ")
+                ),
+                "leave one of them out, or give one an argument of its own",
+            );
+            return;
+        }
+    }
+}
+
+/// Whether there may be an alert that both ask for.
+fn overlap(one: &HookConfig, other: &HookConfig) -> bool {
+    let levels = one.levels.iter().any(|level| other.levels.contains(level));
+    let benchmarks = one.benchmarks.is_empty()
+        || other.benchmarks.is_empty()
+        || !one.benchmarks.is_disjoint(&other.benchmarks);
+    levels && benchmarks && one.site == other.site
 }
 
 /// What a program and a webhook have in common.

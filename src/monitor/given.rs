@@ -34,7 +34,7 @@ impl Door {
     /// The word for people.
     pub fn name(self) -> &'static str {
         match self {
-            Self::CommandLine => "command line",
+            Self::CommandLine => "the command line",
             Self::Http => "HTTP",
         }
     }

@@ -111,6 +111,23 @@ fn a_heartbeat_is_checked_as_a_webhook_is() {
 }
 
 #[test]
+fn check_doubts_two_hooks_that_run_the_same_for_the_same_alerts() {
+    let doubts = |levels: &str| {
+        let more =
+            format!("levels = [\"red\"]\n[[hook]]\nrun = [\"./notify.sh\"]\nlevels = [{levels}]\n");
+        let config = config::parse(&format!("{RIGHT}{more}"), Path::new("site.toml")).unwrap();
+        config
+            .warnings
+            .iter()
+            .map(ToString::to_string)
+            .collect::<String>()
+    };
+    let said = doubts("\"orange\", \"red\"");
+    assert!(said.contains("it is run once for each of these"), "{said}");
+    assert_eq!(doubts("\"orange\", \"unknown\""), "");
+}
+
+#[test]
 fn a_rule_that_cannot_be_meant_is_refused_where_it_stands() {
     let rule = |lines: &str| format!("[[alert.rule]]\nname = \"near\"\nlevel = \"red\"\n{lines}\n");
     for (text, parts) in [

@@ -88,7 +88,7 @@ fn an_alert_says_what_called_it_who_has_it_and_who_has_seen_it_why_and_over_whic
         " mm/day",
         "red firing: /bin/sh hook.sh has taken it (delivered, 1 attempt)",
         "acknowledged yes",
-        "acknowledge by Ada: the road is closed, over command line, given at ",
+        "acknowledge by Ada: the road is closed, over the command line, given at ",
     ] {
         assert!(text.contains(words), "{words:?} is not in\n{text}");
     }
