@@ -15,11 +15,14 @@ use super::tail::{Arrival, Decoder};
 use crate::config::{Benchmark, Broker};
 use session::{Came, Message, NoConnection, Session};
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
-use tokio::sync::mpsc;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
 
 /// Longest message whose lines are read, bytes.
 const LONGEST_MESSAGE: usize = 1 << 20;
+/// Values of one broker's messages that may wait to be taken; what one message holds beyond that waits too, alone.
+const MOST_VALUES: u32 = 1 << 16;
 /// First and longest wait before connecting again.
 const RECONNECT: (Duration, Duration) = (Duration::from_secs(1), Duration::from_secs(60));
 
@@ -36,6 +39,8 @@ pub struct Delivery {
     pub quarantined: u64,
     /// To be given back once that is durable.
     pub receipt: Receipt,
+    /// Its share of what may wait to be taken.
+    pub room: Option<OwnedSemaphorePermit>,
 }
 
 /// The acknowledgement that a message waits for.
@@ -89,6 +94,7 @@ pub async fn follow(
         units: FileUnits::default(),
         quarantined: 0,
     };
+    let room = Arc::new(Semaphore::new(MOST_VALUES as usize));
     let mut wait = RECONNECT.0;
     loop {
         tokio::select! {
@@ -107,7 +113,7 @@ pub async fn follow(
                 Ok(Came::Message(message)) => {
                     let delivery = reader.delivery(message);
                     tokio::select! {
-                        sent = deliveries.send(delivery) => if sent.is_err() { return },
+                        sent = send(delivery, &room, &deliveries) => if sent.is_err() { return },
                         () = shutdown.requested() => return,
                     }
                 }
@@ -135,6 +141,19 @@ pub async fn follow(
     }
 }
 
+/// Sends it when there is room for its values.
+async fn send(
+    mut delivery: Delivery,
+    room: &Arc<Semaphore>,
+    deliveries: &mpsc::Sender<Delivery>,
+) -> Result<(), mpsc::error::SendError<Delivery>> {
+    let values = u32::try_from(delivery.arrivals.len()).unwrap_or(MOST_VALUES);
+    let share = Arc::clone(room).acquire_many_owned(values.min(MOST_VALUES));
+    // It is never closed.
+    delivery.room = share.await.ok();
+    deliveries.send(delivery).await
+}
+
 struct Reader {
     source: String,
     decoder: Decoder,
@@ -154,6 +173,7 @@ impl Reader {
             found,
             quarantined,
             receipt: Receipt(Of::Message(Box::new(message))),
+            room: None,
         }
     }
 

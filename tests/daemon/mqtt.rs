@@ -5,6 +5,7 @@
     reason = "a test fails by panicking"
 )]
 
+use crate::eventually::eventually;
 use rcgen::{BasicConstraints, CertificateParams, CertifiedIssuer, IsCa, KeyPair};
 use rumqttc::{AsyncClient, Event, MqttOptions, Packet, QoS};
 use slipwatch::config::{self, Config};
@@ -79,7 +80,8 @@ impl Mosquitto {
 
     /// Publishes and waits until the broker has it all.
     async fn publish(&self, payloads: &[String]) {
-        let options = MqttOptions::new("writer", "127.0.0.1", self.port);
+        let mut options = MqttOptions::new("writer", "127.0.0.1", self.port);
+        options.set_max_packet_size(1 << 20, 1 << 20);
         let (client, mut connection) = AsyncClient::new(options, 100);
         for payload in payloads {
             client
@@ -337,6 +339,38 @@ async fn readings_come_over_tls_from_a_broker_that_proves_its_name_and_from_no_o
     assert!(doubting.deliveries.try_recv().is_err());
     trusting.end().await;
     doubting.end().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+#[cfg_attr(not(has_mosquitto), ignore = "Mosquitto was not found by build.rs")]
+async fn messages_of_many_lines_wait_at_the_broker_until_those_before_have_been_taken() {
+    let broker = Mosquitto::start();
+    let (sender, mut deliveries) = mpsc::channel(64);
+    let (stop, stopped) = shutdown::pair();
+    let config = config_at(broker.port);
+    let radio = config.brokers[0].clone();
+    let task = tokio::spawn(follow(
+        radio,
+        config.benchmarks,
+        "wide".to_owned(),
+        sender,
+        stopped,
+    ));
+    tokio::time::sleep(Duration::from_millis(1500)).await;
+    // More values in ten messages than may wait.
+    let lines: Vec<String> = (0..8000).map(|line| message(1 + line % 28)).collect();
+    broker.publish(&vec![lines.join("\n"); 10]).await;
+    eventually("what may wait is there", || deliveries.len() == 8).await;
+    tokio::time::sleep(Duration::from_millis(500)).await;
+    assert_eq!(deliveries.len(), 8);
+    for _ in 0..10 {
+        let delivery = deliveries.recv().await.unwrap();
+        assert_eq!(delivery.arrivals.len(), 8000);
+        drop(delivery.room);
+        delivery.receipt.acknowledge().await.unwrap();
+    }
+    stop.pull();
+    task.await.unwrap();
 }
 
 /// Stands before a broker and refuses MQTT 5, as a broker does that knows only 3.1.1; which Debian does not have any more.

@@ -107,5 +107,6 @@ fn delivery(number: u64, measured: &Measured, sender: &UnboundedSender<u64>) -> 
         found: Stopwatch::start(),
         quarantined: 0,
         receipt: Receipt::numbered(number, sender.clone()),
+        room: None,
     }
 }
