@@ -14,7 +14,7 @@ use std::process::{Command, Stdio};
 const MEASURED: &str = "../shared/data";
 
 /// The name of a condition, and commands of which one must succeed.
-const TOOLS: [(&str, &[&[&str]]); 9] = [
+const TOOLS: [(&str, &[&[&str]]); 11] = [
     (
         "has_alertmanager",
         &[&["prometheus-alertmanager", "--version"]],
@@ -23,6 +23,7 @@ const TOOLS: [(&str, &[&[&str]]); 9] = [
         "has_cargo_deb",
         &[&["sh", "-c", "cargo-deb --version && dpkg-deb --version"]],
     ),
+    ("has_curl", &[&["curl", "--version"]]),
     ("has_dev_shm", &[&["test", "-d", "/dev/shm"]]),
     (
         "has_landlock",
@@ -37,6 +38,7 @@ const TOOLS: [(&str, &[&[&str]]); 9] = [
     ),
     ("has_prlimit", &[&["prlimit", "--version"]]),
     ("has_promtool", &[&["promtool", "--version"]]),
+    ("has_python3", &[&["python3", "--version"]]),
     ("has_strace", &[&["strace", "-o", "/dev/null", "true"]]),
     ("has_systemd_analyze", &[&["systemd-analyze", "--version"]]),
 ];

@@ -12,6 +12,7 @@ mod hooks;
 mod mqtt;
 mod page;
 mod retention;
+mod sample_hooks;
 mod sandbox;
 mod serve;
 mod service;

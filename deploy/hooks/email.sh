@@ -1,0 +1,29 @@
+#!/bin/sh
+# Hook: an e-mail through the machine's own sendmail.
+#   run = ["/etc/slipwatch/hooks/email.sh", "duty@example.org", "office@example.org"]
+# The alert's JSON is attached to the text, so that whoever gets it has every figure. A mailer that needs its setgid bit (Postfix,
+# Exim) also needs sandbox = false. Another mailer: SENDMAIL=/path/to/program, which takes -t -i. Exits as the mailer does, so
+# that the daemon tries again where it fails.
+set -eu
+if [ $# -eq 0 ]; then
+    echo "email.sh: name at least one address" >&2
+    exit 2
+fi
+recipients=$(printf '%s, ' "$@")
+# One line, whatever a benchmark is called.
+plain() { printf '%s' "$1" | tr -d '\000-\037\177'; }
+place=$(plain "${SLIPWATCH_BENCHMARK:-(site)}")
+site=$(plain "$SLIPWATCH_SITE")
+{
+    printf 'To: %s\n' "${recipients%, }"
+    printf 'Subject: [%s] %s: %s %s at %s\n' "$SLIPWATCH_STATUS" "$site" "$SLIPWATCH_LEVEL" "$SLIPWATCH_STATE" "$place"
+    printf 'MIME-Version: 1.0\nContent-Type: text/plain; charset=utf-8\nContent-Transfer-Encoding: 8bit\n'
+    # The same at each attempt: a mail program shows a repetition as what it is.
+    printf 'X-Slipwatch-Key: %s\n\n' "$(plain "$SLIPWATCH_KEY")"
+    printf '%s: %s (%s) at %s since %s\n' "$site" "$SLIPWATCH_LEVEL" "$SLIPWATCH_STATE" "$place" "$SLIPWATCH_TIME"
+    if [ -n "${SLIPWATCH_FAILURE_TIME:-}" ]; then
+        printf 'median forecast of the collapse: %s\n' "$SLIPWATCH_FAILURE_TIME"
+    fi
+    printf 'attempt %s, key %s\n\n' "$SLIPWATCH_ATTEMPT" "$(plain "$SLIPWATCH_KEY")"
+    cat
+} | "${SENDMAIL:-/usr/sbin/sendmail}" -t -i

@@ -1,0 +1,27 @@
+#!/bin/sh
+# Hook: a push message to telephones over ntfy (https://ntfy.sh, or a server of one's own), with curl.
+#   run = ["/etc/slipwatch/hooks/ntfy.sh", "https://ntfy.example.org/monte-toc"]
+# A topic on a public server can be read by whoever knows its name. An access token stands in a file beside this one, ntfy.token.
+set -eu
+if [ $# -ne 1 ]; then
+    echo "ntfy.sh: name the address of the topic" >&2
+    exit 2
+fi
+cat >/dev/null
+case "$SLIPWATCH_LEVEL/$SLIPWATCH_STATE" in
+red/firing) priority=5 ;;
+orange/firing | unknown/firing) priority=4 ;;
+*) priority=3 ;;
+esac
+# One line, whatever a benchmark is called.
+plain() { printf '%s' "$1" | tr -d '\000-\037\177'; }
+place=$(plain "${SLIPWATCH_BENCHMARK:-(site)}")
+title="[$SLIPWATCH_STATUS] $(plain "$SLIPWATCH_SITE"): $SLIPWATCH_LEVEL $SLIPWATCH_STATE"
+text="$place, $SLIPWATCH_TIME${SLIPWATCH_FAILURE_TIME:+; median forecast of the collapse $SLIPWATCH_FAILURE_TIME}"
+token_file="$(dirname "$0")/ntfy.token"
+if [ -r "$token_file" ]; then
+    # Over standard input: the command line can be read by everyone on the machine.
+    printf 'header = "Authorization: Bearer %s"\n' "$(tr -d '\r\n' <"$token_file")"
+fi | curl --config - --fail --silent --show-error --max-time 8 --output /dev/null \
+    --header "Title: $title" --header "Priority: $priority" --header "Tags: slipwatch,$SLIPWATCH_LEVEL" \
+    --data-binary "$text" "$1"

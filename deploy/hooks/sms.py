@@ -1,0 +1,94 @@
+#!/usr/bin/env python3
+"""Hook: a text message by a modem's AT commands.
+
+    run = ["/etc/slipwatch/hooks/sms.py", "/dev/ttyUSB0", "+390123456789"]
+    writable = ["/dev/ttyUSB0"]
+    timeout = "60s"
+
+Needs Python's standard library alone. The daemon's user must be in the modem's group (dialout). One message to each
+number; exits 1 where the modem refuses one or does not answer, and the daemon tries again.
+"""
+
+import json
+import os
+import sys
+import termios
+import time
+import tty
+
+ANSWER_S = 20.0
+LONGEST = 160
+
+
+class Refused(Exception):
+    """The modem refused, or gave no answer."""
+
+
+def wait(modem, wanted):
+    """Reads until one of `wanted` has come."""
+    said = b""
+    until = time.monotonic() + ANSWER_S
+    while time.monotonic() < until:
+        part = os.read(modem, 256)
+        said += part
+        if b"ERROR" in said:
+            raise Refused(f"the modem answers {said.decode(errors='replace').strip()!r}")
+        if any(word in said for word in wanted):
+            return
+    raise Refused(f"no answer within {ANSWER_S:.0f} s")
+
+
+def command(modem, text, wanted):
+    os.write(modem, text.encode("ascii"))
+    wait(modem, wanted)
+
+
+def opened(path):
+    modem = os.open(path, os.O_RDWR | os.O_NOCTTY)
+    tty.setraw(modem)
+    settings = termios.tcgetattr(modem)
+    # A read returns after a second at the latest.
+    settings[6][termios.VMIN] = 0
+    settings[6][termios.VTIME] = 10
+    settings[4] = settings[5] = termios.B115200
+    termios.tcsetattr(modem, termios.TCSANOW, settings)
+    return modem
+
+
+def message(environment, alert):
+    """What fits into one message, in letters that every modem has."""
+    place = environment.get("SLIPWATCH_BENCHMARK") or "site"
+    words = [
+        f"[{environment['SLIPWATCH_STATUS']}]",
+        f"{environment['SLIPWATCH_SITE']}:",
+        environment["SLIPWATCH_LEVEL"].upper(),
+        environment["SLIPWATCH_STATE"],
+        f"at {place},",
+        environment["SLIPWATCH_TIME"],
+    ]
+    words.append(alert.get("text", ""))
+    text = " ".join(words).encode("ascii", "replace").decode()
+    return "".join(letter if letter.isprintable() else " " for letter in text)[:LONGEST]
+
+
+def main():
+    if len(sys.argv) < 3:
+        print("sms.py: name the modem and at least one number", file=sys.stderr)
+        return 2
+    alert = json.load(sys.stdin)
+    text = message(os.environ, alert)
+    try:
+        modem = opened(sys.argv[1])
+        command(modem, "AT\r", [b"OK"])
+        command(modem, "AT+CMGF=1\r", [b"OK"])
+        for number in sys.argv[2:]:
+            command(modem, f'AT+CMGS="{number}"\r', [b">"])
+            command(modem, f"{text}\x1a", [b"+CMGS:"])
+    except (OSError, Refused) as error:
+        print(f"sms.py: {sys.argv[1]}: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
