@@ -145,6 +145,7 @@ impl Alert {
             site: &'a str,
             failure_time: Option<Timestamp>,
             status: Status,
+            recommended: Option<&'static str>,
             attempt: u32,
             schema_version: u32,
         }
@@ -153,6 +154,7 @@ impl Alert {
             site: &self.site,
             failure_time: self.failure_time,
             status: self.status,
+            recommended: (self.state == AlertState::Firing).then(|| self.level.recommended()),
             attempt,
             schema_version: 1,
         })?;

@@ -122,6 +122,11 @@ async fn a_hook_gets_the_documented_environment_and_the_alert_on_stdin() {
         assert_eq!(body[key], value, "{key}");
     }
     assert_eq!(body["attempt"], 1);
+    let recommended = body["recommended"].as_str().unwrap();
+    assert!(
+        recommended.starts_with("Evacuate the area"),
+        "{recommended}"
+    );
 }
 
 #[tokio::test]
