@@ -79,6 +79,35 @@ fn a_machine_that_can_carry_the_site_is_good_in_what_can_be_seen() {
 }
 
 #[test]
+fn a_broker_is_tried_and_so_are_the_authorities_that_it_has_to_prove_itself_by() {
+    let folder = site("#!/bin/sh\n");
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = listener.local_addr().unwrap().port();
+    let file = folder.path().join("site.toml");
+    let before = fs::read_to_string(&file).unwrap();
+    let said = |scheme: &str, more: &str| {
+        let broker = format!(
+            "[[source]]\nid = \"radio\"\nkind = \"mqtt\"\nurl = \"{scheme}://127.0.0.1:{port}\"\n\
+             topic = \"site/#\"\n{more}"
+        );
+        fs::write(&file, format!("{before}{broker}")).unwrap();
+        let mut found = findings("source", folder.path());
+        found.retain(|(_, text)| text.starts_with("\"radio\""));
+        found.remove(0)
+    };
+    assert_eq!(said("mqtt", "").0, "good");
+    let (verdict, text) = said("mqtts", "ca_file = \"authority.pem\"\n");
+    assert_eq!(verdict, "wrong");
+    assert!(text.contains("authority.pem"), "{text}");
+    drop(listener);
+    let (verdict, text) = said("mqtt", "");
+    assert!(
+        verdict == "wrong" && text.contains("cannot be reached"),
+        "{text}"
+    );
+}
+
+#[test]
 fn a_hook_that_cannot_run_is_wrong_before_it_is_needed() {
     let wrong = |folder: &TempDir, why: &str| {
         let (verdict, text) = finding("hook", folder.path());

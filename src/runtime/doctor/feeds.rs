@@ -3,6 +3,7 @@
 use super::{Finding, Verdict};
 use crate::config::{Broker, Config, Source};
 use crate::runtime::tail::{Decoder, list};
+use crate::runtime::tls;
 use std::fs::File;
 use std::io::{self, Read};
 use std::net::{TcpStream, ToSocketAddrs};
@@ -62,9 +63,14 @@ fn broker(broker: &Broker) -> Finding {
         let none = || io::Error::other("the name has no address");
         TcpStream::connect_timeout(&places.next().ok_or_else(none)?, ANSWER)
     });
-    let (verdict, text) = match answer {
-        Ok(_) => (Verdict::Good, "answers".to_owned()),
-        Err(error) => (Verdict::Wrong, format!("cannot be reached: {error}")),
+    let trusted = address
+        .is_secured
+        .then(|| tls::config(broker.ca_file.as_deref()))
+        .transpose();
+    let (verdict, text) = match (answer, trusted) {
+        (Ok(_), Ok(_)) => (Verdict::Good, "answers".to_owned()),
+        (Err(error), _) => (Verdict::Wrong, format!("cannot be reached: {error}")),
+        (Ok(_), Err(why)) => (Verdict::Wrong, format!("can prove nothing: {why}")),
     };
     Finding::new(
         SOURCE,
