@@ -84,6 +84,26 @@ struct Common {
     escalate_after: Option<Duration>,
 }
 
+impl Common {
+    /// All but the program, the address or the folder.
+    fn without_a_way_out(self, base: &Path) -> HookConfig {
+        HookConfig {
+            run: Vec::new(),
+            webhook: None,
+            cap: None,
+            levels: self.levels,
+            benchmarks: self.benchmarks,
+            site: self.site,
+            timeout: self.timeout,
+            escalate_after: self.escalate_after,
+            folder: base.to_owned(),
+            sandbox: false,
+            writable: Vec::new(),
+            launcher: None,
+        }
+    }
+}
+
 fn common(section: &mut Section<'_>) -> Common {
     let benchmarks = section.texts("benchmarks");
     if let Some(given) = &benchmarks
@@ -136,17 +156,9 @@ fn program(mut section: Section<'_>, base: &Path) -> Option<HookConfig> {
     section.finish();
     Some(HookConfig {
         run: run?.value.into_iter().map(|word| word.value).collect(),
-        webhook: None,
-        cap: None,
-        levels: common.levels,
-        benchmarks: common.benchmarks,
-        site: common.site,
-        timeout: common.timeout,
-        escalate_after: common.escalate_after,
-        folder: base.to_owned(),
         sandbox,
         writable: (writable.iter().map(|path| base.join(&path.value))).collect(),
-        launcher: None,
+        ..common.without_a_way_out(base)
     })
 }
 
@@ -180,7 +192,6 @@ fn webhook(
     section.finish();
     let (url, address) = (url?.value, address?);
     Some(HookConfig {
-        run: Vec::new(),
         webhook: Some(Webhook {
             name: name.map_or(url, |given| given.value),
             address,
@@ -188,16 +199,7 @@ fn webhook(
             format,
             secret_file: secret.map(|given| base.join(given.value)),
         }),
-        cap: None,
-        levels: common.levels,
-        benchmarks: common.benchmarks,
-        site: common.site,
-        timeout: common.timeout,
-        escalate_after: common.escalate_after,
-        folder: base.to_owned(),
-        sandbox: false,
-        writable: Vec::new(),
-        launcher: None,
+        ..common.without_a_way_out(base)
     })
 }
 
@@ -227,23 +229,13 @@ fn cap(mut section: Section<'_>, base: &Path, taken: &mut BTreeSet<String>) -> O
     }
     section.finish();
     Some(HookConfig {
-        run: Vec::new(),
-        webhook: None,
         cap: Some(CapFolder {
             folder: base.join(folder?.value),
             sender: sender?.value,
             area: area?.value,
             polygon: polygon.map(|given| given.value),
         }),
-        levels: common.levels,
-        benchmarks: common.benchmarks,
-        site: common.site,
-        timeout: common.timeout,
-        escalate_after: common.escalate_after,
-        folder: base.to_owned(),
-        sandbox: false,
-        writable: Vec::new(),
-        launcher: None,
+        ..common.without_a_way_out(base)
     })
 }
 

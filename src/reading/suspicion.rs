@@ -85,7 +85,6 @@ pub fn is_plain(values: &[f64], quantity: Quantity, unit: &str) -> bool {
     if values.len() < FEWEST {
         return true;
     }
-    let is_mark = |value: f64| MARKS.iter().any(|mark| same(value.abs(), *mark));
     if values.iter().any(|value| is_mark(*value)) {
         return false;
     }
@@ -136,13 +135,16 @@ pub fn of_values(readings: &[(Timestamp, f64)], quantity: Quantity, unit: &str) 
     found
 }
 
+fn is_mark(value: f64) -> bool {
+    MARKS.iter().any(|mark| same(value.abs(), *mark))
+}
+
 fn same(one: f64, other: f64) -> bool {
     (one - other).abs() < 1e-9
 }
 
 /// A number that marks no value elsewhere, far from all others, or from the one before it.
 fn mark(readings: &[(Timestamp, f64)]) -> Option<(f64, Evidence)> {
-    let is_mark = |value: f64| MARKS.iter().any(|mark| same(value.abs(), *mark));
     let index = readings.iter().position(|(_, value)| is_mark(*value))?;
     let (first, value) = readings[index];
     let others: Vec<(Timestamp, f64)> = readings
