@@ -2,9 +2,10 @@
 
 use super::args::{Format, OutputArgs};
 use super::{exit, preview as text};
-use crate::config::{self, ConfigError, Summary};
+use crate::config::{self, ConfigError, Problem, Summary};
 use crate::runtime::preview::{Preview, preview};
 use crate::runtime::sampling;
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -32,12 +33,20 @@ struct Unwatched {
     what: Vec<String>,
 }
 
-#[derive(Debug, Serialize)]
-struct Shown<'a> {
+/// What a config that is right amounts to.
+#[derive(Debug, JsonSchema, Serialize)]
+pub(super) struct Shown<'a> {
     #[serde(flatten)]
     summary: &'a Summary,
     /// None where the files were not looked at.
     preview: Option<&'a Preview>,
+}
+
+/// What is wrong with a config that is refused.
+#[derive(Debug, JsonSchema, Serialize)]
+pub(super) struct Refused<'a> {
+    /// In the order of the file.
+    problems: &'a [Problem],
 }
 
 /// Says what the site file amounts to. Warnings and problems go to stderr; with JSON the problems
@@ -79,8 +88,8 @@ pub(super) fn check(file: &Path, output: OutputArgs, looks_at_files: bool) -> an
         }
         Err(error) => {
             if json && let ConfigError::Invalid { problems } = &error {
-                let problems = serde_json::json!({ "problems": problems });
-                writeln!(stdout, "{problems}")?;
+                let refused = Refused { problems };
+                writeln!(stdout, "{}", serde_json::to_string(&refused)?)?;
             }
             Err(error.into())
         }

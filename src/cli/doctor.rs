@@ -6,6 +6,7 @@ use crate::config;
 use crate::runtime::doctor::{self, Finding, Verdict};
 use anyhow::Context;
 use nix::unistd::{Uid, User};
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::os::unix::process::CommandExt;
@@ -31,8 +32,9 @@ pub(super) struct Args {
 #[error("{0} wrong; see above")]
 struct Unfit(usize);
 
-#[derive(Debug, Serialize)]
-struct DoctorReport {
+#[derive(Debug, JsonSchema, Serialize)]
+pub(super) struct DoctorReport {
+    /// Each thing that was looked at.
     findings: Vec<Finding>,
 }
 

@@ -1,6 +1,7 @@
 //! `fit FILE`: one inversion.
 
 use super::args::{OutputArgs, ReadingArgs};
+use super::bar;
 use super::table::{Table, number, time};
 use crate::alert::Policy;
 use crate::config::value;
@@ -10,6 +11,7 @@ use crate::inversion::{
 };
 use crate::reading::{BenchmarkId, Quantity, Series, Timestamp, Unit};
 use crate::runtime::clock::Stopwatch;
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::fmt::Write as _;
 
@@ -65,13 +67,20 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let mut recording = args.readings.load()?.recording;
     args.readings.narrow(&mut recording)?;
     let options = args.inversion.options(&args.readings);
+    let count = recording.series.len() as u64;
+    let bar = bar::counted(count + 1, "{bar:40} {pos}/{len} inversions, {elapsed}");
     for (index, series) in recording.series.iter().enumerate() {
         let report = report(series, &options);
+        bar.inc(1);
         let blank = if index == 0 { "" } else { "\n" };
-        args.output
-            .print(&report, |report| format!("{blank}{}", text(report)))?;
+        bar.suspend(|| {
+            args.output
+                .print(&report, |report| format!("{blank}{}", text(report)))
+        })?;
     }
-    let Some(report) = together(&recording.series, &options) else {
+    let report = together(&recording.series, &options);
+    bar.finish_and_clear();
+    let Some(report) = report else {
         return Ok(());
     };
     args.output.print(&SiteReport { together: report }, |site| {
@@ -80,8 +89,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 /// What is said after the benchmarks one by one.
-#[derive(Debug, Serialize)]
-struct SiteReport {
+#[derive(Debug, JsonSchema, Serialize)]
+pub(super) struct SiteReport {
+    /// Which of them fail together, and when.
     together: TogetherReport,
 }
 

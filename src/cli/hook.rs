@@ -11,6 +11,7 @@ use crate::runtime::deliver;
 use crate::runtime::hook::{Alert, Outcome, Status};
 use crate::runtime::log::{self, LogFormat};
 use crate::runtime::sandbox::{self, OURSELVES};
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::ffi::OsString;
 use std::fmt::Write as _;
@@ -60,17 +61,23 @@ enum Failed {
 }
 
 /// What became of one hook's drill.
-#[derive(Debug, Serialize)]
-struct Drill {
+#[derive(Debug, JsonSchema, Serialize)]
+pub(super) struct Drill {
+    /// The hook's name.
     hook: String,
+    /// The level that it was run with.
     level: Level,
+    /// Whether it took the alert.
     is_taken: bool,
+    /// How it ended, for a person.
     outcome: String,
 }
 
-#[derive(Debug, Serialize)]
-struct HookReport {
+#[derive(Debug, JsonSchema, Serialize)]
+pub(super) struct HookReport {
+    /// That it was a test.
     status: &'static str,
+    /// Each hook that was run.
     hooks: Vec<Drill>,
 }
 

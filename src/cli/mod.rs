@@ -2,6 +2,7 @@
 
 mod alerts;
 pub mod args;
+mod bar;
 mod check;
 mod completions;
 mod convert;
@@ -14,11 +15,13 @@ mod hook;
 mod init;
 mod load;
 mod man;
+mod picture;
 mod plot;
 mod preview;
 mod replay;
 mod report;
 mod run;
+mod schema;
 mod score;
 mod simulate;
 mod state;
@@ -63,6 +66,7 @@ enum Command {
     Convert(convert::Args),
     #[command(subcommand)]
     Hook(hook::HookCommand),
+    Schema(schema::Args),
     Completions(completions::Args),
     Man(man::Args),
 }
@@ -90,6 +94,7 @@ pub fn main() -> ExitCode {
             Command::Simulate(args) => simulate::run(&args),
             Command::Convert(args) => convert::run(&args),
             Command::Hook(command) => hook::run(&command),
+            Command::Schema(args) => schema::run(&args),
             Command::Completions(args) => completions::run(&args),
             Command::Man(args) => man::run(&args),
         },

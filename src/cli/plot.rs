@@ -1,8 +1,8 @@
-//! `plot FILE...`: one benchmark's crisis as one SVG, drawn from a replay.
+//! `plot FILE...`: one benchmark's crisis as one SVG or PNG, drawn from a replay.
 
 use super::args::ReadingArgs;
 use super::exit::UsageError;
-use super::{explain, replay};
+use super::{explain, picture, replay};
 use crate::alert::Policy;
 use crate::figures::{Replayed, pictures};
 use crate::monitor::{Event, Settings};
@@ -13,7 +13,7 @@ use jiff::tz::TimeZone;
 use std::io::Write;
 use std::path::PathBuf;
 
-/// Draw a benchmark's crisis as one SVG: readings, forecasts as they were made, levels as they were called
+/// Draw a benchmark's crisis as one SVG or PNG: readings, forecasts as they were made, levels as they were called
 ///
 /// All forecasts and levels are those of a replay of the same files. Times may be dates alone: midnight UTC.
 #[derive(Debug, clap::Args)]
@@ -32,7 +32,7 @@ pub(super) struct Args {
     /// Stop at this time of the data
     #[arg(long, value_name = "TIME", value_parser = instant)]
     until: Option<Timestamp>,
-    /// The file to write, replaced when it is there; stdout when not given
+    /// The file to write, replaced when it is there: PNG where its name ends in .png, else SVG; SVG on stdout when not given
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
 }
@@ -86,10 +86,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
 
 fn write(args: &Args, svg: &str) -> anyhow::Result<()> {
     match &args.output {
-        Some(file) => {
-            std::fs::write(file, svg)
-                .with_context(|| format!("cannot write {}", file.display()))?;
-        }
+        Some(file) => picture::write(file, svg)?,
         None => std::io::stdout().lock().write_all(svg.as_bytes())?,
     }
     Ok(())

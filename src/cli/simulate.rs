@@ -4,6 +4,7 @@ use super::exit::UsageError;
 use super::load::read_load;
 use crate::model::{Accuracy, Law, Load, LoadedLaw, Motion, Trajectory};
 use crate::regime::Regime;
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::io::{self, Write};
 use std::path::PathBuf;
@@ -60,19 +61,27 @@ enum TableFormat {
     Csv,
 }
 
-#[derive(Debug, Serialize)]
-struct MotionRow {
+#[derive(Debug, JsonSchema, Serialize)]
+pub(super) struct MotionRow {
+    /// Days.
     t: f64,
+    /// The state; at m = 1 `theta/theta_i`. `None` from the singularity on, as the others.
     x: Option<f64>,
+    /// In units of the scale, a day.
     velocity: Option<f64>,
+    /// In units of the scale.
     displacement: Option<f64>,
 }
 
-#[derive(Debug, Serialize)]
-struct Simulation {
+#[derive(Debug, JsonSchema, Serialize)]
+pub(super) struct Simulation {
+    /// Of the law.
     regime: Regime,
+    /// From the beginning to the singularity; `None` without one.
     failure_days: Option<f64>,
+    /// From the beginning to the inflection of the velocity; `None` without one.
     transition_days: Option<f64>,
+    /// The motion at each time that was asked for.
     rows: Vec<MotionRow>,
 }
 

@@ -7,6 +7,8 @@ use crate::monitor::EventKind;
 use crate::store::Store;
 use anyhow::Context;
 use clap::builder::PossibleValuesParser;
+use schemars::JsonSchema;
+use serde::Serialize;
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -58,16 +60,27 @@ pub(super) struct BackupArgs {
     site: SiteArgs,
 }
 
+/// A file that was written.
+#[derive(Debug, JsonSchema, Serialize)]
+pub(super) struct FileWritten {
+    /// Which.
+    pub(super) file: PathBuf,
+    /// Its size.
+    pub(super) bytes: u64,
+}
+
 /// Copies the state.
 pub(super) fn backup(args: &BackupArgs) -> anyhow::Result<()> {
     let (_, store) = args.site.open()?;
     store
         .backup(&args.file)
         .with_context(|| format!("cannot write {}", args.file.display()))?;
-    let said =
-        serde_json::json!({ "file": args.file, "bytes": std::fs::metadata(&args.file)?.len() });
-    args.site.output.print(&said, |said| {
-        format!("{}: {} bytes\n", args.file.display(), said["bytes"])
+    let written = FileWritten {
+        file: args.file.clone(),
+        bytes: std::fs::metadata(&args.file)?.len(),
+    };
+    args.site.output.print(&written, |written| {
+        format!("{}: {} bytes\n", written.file.display(), written.bytes)
     })
 }
 

@@ -13,6 +13,7 @@ use crate::runtime::preview::{Preview, preview};
 use crate::runtime::standing::{InForce, acknowledged, closed, every, in_force, orders, silences};
 use crate::store::Store;
 use jiff::tz::TimeZone;
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -35,13 +36,17 @@ pub(super) struct StatusArgs {
 
 /// How often `--watch` looks.
 const LOOK: Duration = Duration::from_secs(2);
+/// Of the table, in characters: that of the terminals on which it is read.
+const WIDTH: usize = 80;
 /// Puts a terminal's cursor at the top of an empty screen.
 const CLEAR: &str = "\u{1b}[H\u{1b}[2J";
 
 /// How one benchmark stands.
-#[derive(Debug, Serialize)]
-struct StatusStanding {
+#[derive(Debug, JsonSchema, Serialize)]
+pub(super) struct StatusStanding {
+    /// Which.
     benchmark: BenchmarkId,
+    /// The level in force.
     level: Level,
     /// Since when.
     since: Option<Timestamp>,
@@ -49,10 +54,15 @@ struct StatusStanding {
     unknown_since: Option<Timestamp>,
     /// Whether nothing can be said of it now; so it is before its first reading.
     is_unknown: bool,
+    /// When its newest reading was measured.
     newest_reading: Option<Timestamp>,
+    /// The regime at the newest refit.
     regime: Option<String>,
+    /// The velocity then.
     velocity_mm_per_day: Option<f64>,
+    /// The median of the forecast of collapse then.
     failure_time: Option<Timestamp>,
+    /// The chance of collapse within the evacuation time then.
     chance_within_evacuation_time: Option<f64>,
     /// Why it is at its level.
     reason: Option<String>,
@@ -62,12 +72,18 @@ struct StatusStanding {
     suspicions: Vec<String>,
 }
 
-#[derive(Debug, Serialize)]
-struct SiteStatus {
+/// How a site stands.
+#[derive(Debug, JsonSchema, Serialize)]
+pub(super) struct SiteStatus {
+    /// Its name.
     site: String,
+    /// Each benchmark.
     benchmarks: Vec<StatusStanding>,
+    /// Inputs taken.
     steps: i64,
+    /// Alerts that wait for a hook.
     alerts_waiting: usize,
+    /// Size of the state on the disk.
     bytes: u64,
     /// Since when nothing can be said of the site: too many benchmarks are unknown, or the clock is wrong.
     site_unknown_since: Option<Timestamp>,
@@ -256,6 +272,7 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
             .map(|event| text::line(event, zone) + "\n")
             .collect()
     };
+    let table = table.within(WIDTH);
     let dead = if status.is_running {
         ""
     } else {

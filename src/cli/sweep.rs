@@ -1,9 +1,10 @@
 //! `sweep FILE`: the inversion over growing `t_max`, a row each.
 
 use super::args::{OutputArgs, ReadingArgs};
+use super::bar;
 use super::fit::InversionArgs;
 use super::table::{Table, number, time};
-use crate::inversion::{SweepOptions, SweepReport, SweepRow, sweep};
+use crate::inversion::{SweepOptions, SweepReport, SweepRow, sweep_showing};
 use crate::reading::Timestamp;
 
 /// Invert one benchmark's readings up to one `t_max` after another
@@ -41,7 +42,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         last: args.t_max.last,
         steps: args.steps,
     };
-    let report = sweep(series, &options, &steps);
+    let bar = bar::shared();
+    let report = sweep_showing(series, &options, &steps, &mut |share| {
+        bar::share(&bar, share)
+    });
+    bar.finish_and_clear();
     args.output.print(&report, text)
 }
 

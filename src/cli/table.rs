@@ -51,21 +51,50 @@ impl Table {
         out.push_str("</table>");
         out
     }
+
+    /// The width of each column, in characters.
+    fn widths(&self) -> Vec<usize> {
+        let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
+        let width = |column: usize| {
+            // What stands alone on its line is in no column.
+            let rows = self.rows.iter().filter(|row| row.len() > 1 || columns == 1);
+            let cells = rows.filter_map(|row| row.get(column));
+            cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
+        };
+        (0..columns).map(width).collect()
+    }
+
+    /// The same in so many characters, as far as the other columns allow: a first cell that is too long for that stands on
+    /// a line of its own above its row.
+    pub(super) fn within(self, characters: usize) -> Self {
+        let others: usize = self.widths().iter().skip(1).map(|width| width + GAP).sum();
+        let room = characters.saturating_sub(others);
+        let mut fitted = Self {
+            rows: Vec::new(),
+            ..self
+        };
+        for mut row in self.rows {
+            let is_long = row.first().is_some_and(|cell| cell.chars().count() > room);
+            if is_long && row.len() > 1 {
+                fitted.rows.push(vec![std::mem::take(&mut row[0])]);
+            }
+            fitted.rows.push(row);
+        }
+        fitted
+    }
 }
+
+/// Blanks between two columns.
+const GAP: usize = 2;
 
 impl fmt::Display for Table {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
-        let width = |column: usize| {
-            let cells = self.rows.iter().filter_map(|row| row.get(column));
-            cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
-        };
-        let widths: Vec<usize> = (0..columns).map(width).collect();
+        let widths = self.widths();
         for row in &self.rows {
             let mut line = String::new();
             for (cell, width) in row.iter().zip(&widths) {
                 line.push_str(cell);
-                let gap = (width + 2).saturating_sub(cell.chars().count());
+                let gap = (width + GAP).saturating_sub(cell.chars().count());
                 line.extend(std::iter::repeat_n(' ', gap));
             }
             writeln!(f, "{}", line.trim_end())?;
@@ -99,4 +128,23 @@ pub(super) fn number(value: Option<f64>) -> String {
 pub(super) fn time(time: Option<Timestamp>) -> String {
     let minute = |time: Timestamp| time.strftime("%Y-%m-%dT%H:%MZ").to_string();
     time.map_or("-".to_owned(), minute)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_that_is_too_long_stands_above_its_row_and_nothing_is_lost() {
+        let mut table = Table::headed(["benchmark", "level", "newest"]);
+        table.row(["5", "green", "2020-01-31"]);
+        table.row(["the upper extensometer in the scar", "red", "2020-01-30"]);
+        let text = table.clone().within(30).to_string();
+        assert_eq!(
+            text,
+            "benchmark  level  newest\n5          green  2020-01-31\n\
+             the upper extensometer in the scar\n           red    2020-01-30\n"
+        );
+        assert_eq!(table.clone().within(80).to_string(), table.to_string());
+    }
 }

@@ -4,13 +4,14 @@ use super::{Config, ConfigError, HookConfig, Secret, SiteConfig, Source, Token, 
 use crate::alert::Level;
 use crate::reading::{BenchmarkId, Quantity};
 use jiff::SignedDuration;
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::fmt;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
 /// What a right config amounts to.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, JsonSchema, Serialize)]
 pub struct Summary {
     /// The site's name.
     pub site: String,

@@ -7,6 +7,7 @@ mod check;
 mod declared;
 mod heartbeat;
 mod hook;
+mod keys;
 mod pattern;
 mod problem;
 mod rule;
@@ -21,6 +22,7 @@ mod vector;
 pub use broker::{Broker, BrokerAddress};
 pub use check::{Summary, check};
 pub use heartbeat::Heartbeat;
+pub use keys::{Key, Keys, Shape};
 pub use pattern::FilePattern;
 pub use problem::{ConfigError, Problem, Severity};
 pub use secret::{Secret, SecretError};
@@ -249,6 +251,26 @@ fn read(file: &Path) -> io::Result<String> {
 /// # Errors
 /// [`ConfigError::Invalid`] with every problem found.
 pub fn parse(text: &str, file: &Path) -> Result<Config, ConfigError> {
+    let (config, notebook) = taken(text, file);
+    let problems = notebook.close();
+    let refused = problems
+        .iter()
+        .any(|problem| problem.severity == Severity::Error);
+    match config {
+        Some(config) if !refused => Ok(Config {
+            warnings: problems,
+            ..config
+        }),
+        Some(_) | None => Err(ConfigError::Invalid { problems }),
+    }
+}
+
+/// The keys that the reader of a site file asks for in the tables that `text` has, whether they are there or not.
+pub fn keys(text: &str) -> Keys {
+    taken(text, Path::new("")).1.keys
+}
+
+fn taken(text: &str, file: &Path) -> (Option<Config>, Notebook) {
     let notebook = RefCell::new(Notebook::new(file, text));
     let (document, syntax) = toml::de::DeTable::parse_recoverable(text);
     for error in &syntax {
@@ -266,15 +288,5 @@ pub fn parse(text: &str, file: &Path) -> Result<Config, ConfigError> {
     } else {
         None
     };
-    let problems = notebook.into_inner().close();
-    let refused = problems
-        .iter()
-        .any(|problem| problem.severity == Severity::Error);
-    match config {
-        Some(config) if !refused => Ok(Config {
-            warnings: problems,
-            ..config
-        }),
-        Some(_) | None => Err(ConfigError::Invalid { problems }),
-    }
+    (config, notebook.into_inner())
 }

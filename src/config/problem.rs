@@ -1,12 +1,14 @@
 //! What is wrong with a site file: where, what, and how to put it right.
 
+use super::keys::Keys;
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::fmt;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Whether the daemon may start with it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, JsonSchema, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
     /// The file is refused.
@@ -16,7 +18,7 @@ pub enum Severity {
 }
 
 /// One thing that is wrong with a site file.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, JsonSchema, Serialize)]
 pub struct Problem {
     /// The site file.
     pub file: PathBuf,
@@ -83,6 +85,8 @@ pub(super) struct Notebook {
     file: PathBuf,
     text: String,
     problems: Vec<Problem>,
+    /// What was asked of each table.
+    pub(super) keys: Keys,
 }
 
 impl Notebook {
@@ -91,6 +95,7 @@ impl Notebook {
             file: file.to_owned(),
             text: text.to_owned(),
             problems: Vec::new(),
+            keys: Keys::default(),
         }
     }
 

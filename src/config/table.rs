@@ -1,5 +1,6 @@
 //! Typed reading of one TOML table: every key asked for is known, every other one is a problem.
 
+use super::keys::{Key, Shape};
 use super::problem::Notebook;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -20,7 +21,7 @@ pub(super) struct Section<'t> {
     name: &'static str,
     table: Option<&'t DeTable<'t>>,
     at: Range<usize>,
-    asked: Vec<&'static str>,
+    asked: Vec<Key>,
     notebook: &'t RefCell<Notebook>,
 }
 
@@ -63,11 +64,19 @@ impl<'t> Section<'t> {
         }
     }
 
-    fn get(&mut self, key: &'static str) -> Option<&'t Spanned<DeValue<'t>>> {
-        if !self.asked.contains(&key) {
-            self.asked.push(key);
-        }
+    fn get(&mut self, key: &'static str, shape: Shape) -> Option<&'t Spanned<DeValue<'t>>> {
+        self.ask(key, shape);
         self.table?.get(key)
+    }
+
+    fn ask(&mut self, name: &'static str, shape: Shape) {
+        if self.asked.iter().all(|known| known.name != name) {
+            self.asked.push(Key {
+                name,
+                shape,
+                is_required: false,
+            });
+        }
     }
 
     fn wrong_type(&self, key: &str, value: &Spanned<DeValue<'_>>, wanted: &str, example: &str) {
@@ -81,7 +90,7 @@ impl<'t> Section<'t> {
 
     /// A string.
     pub(super) fn text(&mut self, key: &'static str) -> Option<Placed<String>> {
-        let value = self.get(key)?;
+        let value = self.get(key, Shape::Text)?;
         let Some(text) = value.get_ref().as_str() else {
             self.wrong_type(key, value, "a string", &format!("{key} = \"...\""));
             return None;
@@ -94,8 +103,10 @@ impl<'t> Section<'t> {
 
     /// A string that must be there and not be empty.
     pub(super) fn required(&mut self, key: &'static str, example: &str) -> Option<Placed<String>> {
+        self.ask(key, Shape::Text);
+        let asked = self.asked.iter_mut().find(|known| known.name == key);
+        asked.into_iter().for_each(|known| known.is_required = true);
         if !self.has(key) {
-            self.asked.push(key);
             self.error(
                 &self.at,
                 format!("{} is missing", self.path(key)),
@@ -137,7 +148,7 @@ impl<'t> Section<'t> {
 
     /// true or false.
     pub(super) fn switch(&mut self, key: &'static str) -> Option<bool> {
-        let value = self.get(key)?;
+        let value = self.get(key, Shape::Switch)?;
         let DeValue::Boolean(switch) = value.get_ref() else {
             self.wrong_type(key, value, "true or false", &format!("{key} = true"));
             return None;
@@ -147,7 +158,7 @@ impl<'t> Section<'t> {
 
     /// Any number that is finite.
     pub(super) fn number(&mut self, key: &'static str) -> Option<Placed<f64>> {
-        let value = self.get(key)?;
+        let value = self.get(key, Shape::Number)?;
         let Some(number) = number(value.get_ref()).filter(|number| number.is_finite()) else {
             self.wrong_type(key, value, "a number", &format!("{key} = 74.0"));
             return None;
@@ -160,7 +171,7 @@ impl<'t> Section<'t> {
 
     /// A number strictly between 0 and 1.
     pub(super) fn chance(&mut self, key: &'static str) -> Option<f64> {
-        let value = self.get(key)?;
+        let value = self.get(key, Shape::Chance)?;
         match number(value.get_ref()) {
             Some(number) if number > 0.0 && number < 1.0 => Some(number),
             Some(_) | None => {
@@ -181,12 +192,17 @@ impl<'t> Section<'t> {
             text.or_else(|| number(value).map(|number| number.to_string()))
         };
         let example = format!("{key} = [-7999, \"NAN\"]");
-        self.list(key, ("a number or a string", &example), mark)
+        let kind = (Shape::Marks, "a number or a string", example.as_str());
+        self.list(key, kind, mark)
     }
 
     /// A string, or a list of them, of which none is empty.
     pub(super) fn text_or_texts(&mut self, key: &'static str) -> Option<Placed<Vec<String>>> {
-        let is_list = self.get(key)?.get_ref().as_array().is_some();
+        let is_list = self
+            .get(key, Shape::TextOrTexts)?
+            .get_ref()
+            .as_array()
+            .is_some();
         if !is_list {
             let text = self.text(key)?;
             return Some(Placed {
@@ -204,16 +220,16 @@ impl<'t> Section<'t> {
     /// A list of numbers.
     pub(super) fn numbers(&mut self, key: &'static str) -> Option<Placed<Vec<f64>>> {
         let example = format!("{key} = [0.7, 0.6, -0.4]");
-        self.list(key, ("a number", &example), number)
+        self.list(key, (Shape::Numbers, "a number", &example), number)
     }
 
     fn list<T>(
         &mut self,
         key: &'static str,
-        (wanted, example): (&str, &str),
+        (shape, wanted, example): (Shape, &str, &str),
         read: impl Fn(&DeValue<'_>) -> Option<T>,
     ) -> Option<Placed<Vec<T>>> {
-        let value = self.get(key)?;
+        let value = self.get(key, shape)?;
         let Some(array) = value.get_ref().as_array() else {
             self.wrong_type(key, value, "a list", example);
             return None;
@@ -233,7 +249,7 @@ impl<'t> Section<'t> {
 
     /// A list of strings.
     pub(super) fn texts(&mut self, key: &'static str) -> Option<Placed<Vec<Placed<String>>>> {
-        let value = self.get(key)?;
+        let value = self.get(key, Shape::Texts)?;
         let example = format!("{key} = [\"...\"]");
         let Some(array) = value.get_ref().as_array() else {
             self.wrong_type(key, value, "a list of strings", &example);
@@ -257,7 +273,7 @@ impl<'t> Section<'t> {
 
     /// The table under `key`; one without keys where the file has none.
     pub(super) fn table(&mut self, key: &'static str, name: &'static str) -> Section<'t> {
-        let (table, at) = match self.get(key) {
+        let (table, at) = match self.get(key, Shape::Table(name)) {
             None => (None, self.at.clone()),
             Some(value) => {
                 let table = value.get_ref().as_table();
@@ -272,7 +288,7 @@ impl<'t> Section<'t> {
 
     /// The tables under `key`, in the order of the file.
     pub(super) fn tables(&mut self, key: &'static str, name: &'static str) -> Vec<Section<'t>> {
-        let Some(value) = self.get(key) else {
+        let Some(value) = self.get(key, Shape::Tables(name)) else {
             return Vec::new();
         };
         let example = format!("[[{name}]]");
@@ -307,14 +323,16 @@ impl<'t> Section<'t> {
 
     /// Reports the keys that nothing asked for.
     pub(super) fn finish(self) {
+        self.notebook.borrow_mut().keys.add(self.name, &self.asked);
         let Some(table) = self.table else { return };
         for (key, _) in table {
             let name: &str = key.get_ref();
-            if !self.asked.contains(&name) {
+            if self.asked.iter().all(|known| known.name != name) {
+                let known: Vec<&str> = self.asked.iter().map(|known| known.name).collect();
                 self.error(
                     &key.span(),
                     format!("unknown key {}", self.path(name)),
-                    format!("known here: {}", self.asked.join(", ")),
+                    format!("known here: {}", known.join(", ")),
                 );
             }
         }

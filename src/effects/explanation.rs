@@ -4,11 +4,12 @@ use super::kind::{FaultKind, Form, Kind};
 use super::known_load::KnownLoad;
 use super::rival::Rival;
 use crate::reading::{BenchmarkId, Quantity, Timestamp, Unit};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// From a benchmark's residual to the effect that its law lacks.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
 pub struct Explanation {
     /// Whose readings.
     pub benchmark: BenchmarkId,
@@ -57,7 +58,7 @@ pub struct Explanation {
 }
 
 /// One effect inside the law.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize, Deserialize)]
 pub struct Effect {
     /// Its kind.
     pub effect: Kind,
@@ -118,7 +119,7 @@ impl Effect {
 }
 
 /// How much of the structure is accounted for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Explained {
     /// The residual after it passes for noise.
@@ -130,7 +131,7 @@ pub enum Explained {
 }
 
 /// A fault of the data.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
 pub struct Fault {
     /// Its kind.
     pub kind: FaultKind,
@@ -151,7 +152,7 @@ pub struct Fault {
 }
 
 /// A figure of the plain law and of the law under the known load.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, JsonSchema, Serialize)]
 pub struct Change<T = Option<f64>> {
     /// Under the law with a constant load.
     pub before: T,
@@ -160,7 +161,7 @@ pub struct Change<T = Option<f64>> {
 }
 
 /// Root mean square errors.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
 pub struct ErrorChange {
     /// The readings' unit.
     pub unit: Unit,
@@ -191,7 +192,7 @@ impl ErrorChange {
 }
 
 /// What the effects change in the regime and in the time of failure.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, JsonSchema, Serialize)]
 pub struct ForecastChange {
     /// Probability of m > 1, the load free; null with too few readings.
     pub probability_unstable: Change,
@@ -202,7 +203,7 @@ pub struct ForecastChange {
 }
 
 /// One thing tried.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
 pub struct Candidate {
     /// Its kind.
     pub effect: Kind,
@@ -225,7 +226,7 @@ pub struct Candidate {
 }
 
 /// Whether the residual passes for noise.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, JsonSchema, Serialize)]
 pub struct ResidualTests {
     /// p-value of the runs test of the innovations.
     pub runs: Change,
@@ -240,7 +241,7 @@ pub struct ResidualTests {
 }
 
 /// A stretch in which the undeclared load stands clear of its error.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
 pub struct Structure {
     /// From when.
     pub from: Timestamp,
@@ -253,7 +254,7 @@ pub struct Structure {
 }
 
 /// The noise model.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, JsonSchema, Serialize)]
 pub struct NoiseReport {
     /// White noise of a reading, in its unit (for velocities read with a relative error, of the typical one).
     pub white: f64,
@@ -264,7 +265,7 @@ pub struct NoiseReport {
 }
 
 /// What makes a run repeatable.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
 pub struct SettingsReport {
     /// Of slipwatch.
     pub version: String,

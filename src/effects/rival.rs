@@ -1,11 +1,12 @@
 //! What would explain the same as an effect that was found: a kind of effect and the covariate it works through.
 
 use super::kind::Kind;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// A kind of effect, with its covariate where it has one. In output it is its name: `hydrological lake_level_m`.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, JsonSchema, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub struct Rival {
     /// Its kind.

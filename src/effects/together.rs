@@ -7,14 +7,16 @@ use super::options::Options;
 use super::partition::partition;
 use super::rival::Rival;
 use crate::reading::{BenchmarkId, Channel, Quantity, Series};
+use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 
 /// What benchmarks show together, key for key as scripts read it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
 pub struct Together {
     /// Their names, in the order given.
     #[serde(rename = "benchmark", serialize_with = "joined")]
+    #[schemars(with = "String")]
     pub benchmarks: Vec<BenchmarkId>,
     /// The partition, or none.
     pub verdict: Effect,

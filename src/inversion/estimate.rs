@@ -8,10 +8,11 @@
 use super::{Inversion, law_in_mm_per_day};
 use crate::fit::{Exponent, LawSample, P_PRIOR, Posterior, Solution};
 use crate::model::{Accuracy, Law, Trajectory};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// A best value and the bounds of 90 %.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, JsonSchema, Serialize)]
 pub struct Estimate {
     /// Of the best fit; `None` where that law has none.
     pub best: Option<f64>,
@@ -22,7 +23,7 @@ pub struct Estimate {
 }
 
 /// The law's parameters at the first reading.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, JsonSchema, Serialize)]
 pub struct Parameters {
     /// m = B/A.
     pub m: Estimate,

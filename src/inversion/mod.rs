@@ -13,7 +13,7 @@ pub use estimate::{Estimate, Parameters};
 pub use report::{
     Alternative, Alternatives, FailureTime, FitReport, InverseVelocity, RegimeReport, UnderPrior,
 };
-pub use sweep::{SweepOptions, SweepReport, SweepRow, sweep};
+pub use sweep::{SweepOptions, SweepReport, SweepRow, sweep, sweep_showing};
 pub use together::{ApartReport, GroupReport, TogetherReport, together};
 
 use crate::fit::{

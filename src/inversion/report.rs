@@ -6,11 +6,12 @@ use crate::fit::{ConstantLoad, Ensemble, OtherPrior, Posterior};
 use crate::forecast::{HORIZON_DAYS, Outlook, Passage};
 use crate::reading::{BenchmarkId, Quantity, SECONDS_PER_DAY, Timestamp, Unit, after_days};
 use crate::regime::{Regime, label};
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// One inversion.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
 pub struct FitReport {
     /// Whose readings.
     pub benchmark: BenchmarkId,
@@ -59,7 +60,7 @@ pub struct FitReport {
 }
 
 /// What the constant-load law's posterior says under one prior; the panel's forecast is not in it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
 pub struct UnderPrior {
     /// The prior, in words.
     pub prior: &'static str,
@@ -72,7 +73,7 @@ pub struct UnderPrior {
 }
 
 /// A minimum of the misfit.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, JsonSchema, Serialize)]
 pub struct Alternative {
     /// m = B/A.
     pub m: Option<f64>,
@@ -89,12 +90,12 @@ pub struct Alternative {
 }
 
 /// The minima, best first.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, JsonSchema, Serialize)]
 #[serde(transparent)]
 pub struct Alternatives(pub Vec<Alternative>);
 
 /// The regime by the posterior.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
 pub struct RegimeReport {
     /// The regime, or `undetermined` under 60 %.
     pub label: Regime,
@@ -107,7 +108,7 @@ pub struct RegimeReport {
 }
 
 /// First passage of the critical velocity; quantiles are unconditional.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, JsonSchema, Serialize)]
 pub struct FailureTime {
     /// 5 % quantile.
     pub low: Option<Timestamp>,
@@ -125,7 +126,7 @@ pub struct FailureTime {
 }
 
 /// The straight line through 1/v, and the exponent that would straighten it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, JsonSchema, Serialize)]
 pub struct InverseVelocity {
     /// Where the line through the trailing quarter meets zero.
     pub failure_time: Option<Timestamp>,

@@ -3,6 +3,7 @@
 use super::report::{Alternatives, FailureTime, InverseVelocity, RegimeReport};
 use super::{FitReport, Inversion, Options};
 use crate::reading::{BenchmarkId, Quantity, SECONDS_PER_DAY, Series, Timestamp, Unit};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// Where `t_max` runs.
@@ -32,7 +33,7 @@ const MOST_STEPS: usize = 1000;
 const FEWEST: usize = 8;
 
 /// A sweep.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
 pub struct SweepReport {
     /// Whose readings.
     pub benchmark: BenchmarkId,
@@ -47,7 +48,7 @@ pub struct SweepReport {
 }
 
 /// The inversion up to one `t_max`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
 pub struct SweepRow {
     /// No later reading was used.
     pub t_max: Timestamp,
@@ -75,9 +76,20 @@ pub struct SweepRow {
 
 /// Inverts `series` up to each `t_max` in turn.
 pub fn sweep(series: &Series, options: &Options, steps: &SweepOptions) -> SweepReport {
+    sweep_showing(series, options, steps, &mut |_| {})
+}
+
+/// The same; `progress` is called with the share done, 0 to 1.
+pub fn sweep_showing(
+    series: &Series,
+    options: &Options,
+    steps: &SweepOptions,
+    progress: &mut dyn FnMut(f64),
+) -> SweepReport {
     let whole = Inversion::new(series, options);
     let t_maxes = t_maxes(whole.series(), steps);
-    let rows = t_maxes.iter().map(|t_max| {
+    let rows = t_maxes.iter().enumerate().map(|(index, t_max)| {
+        progress(index as f64 / t_maxes.len() as f64);
         let upto = Options {
             until: Some(*t_max),
             ..*options

@@ -8,6 +8,7 @@ use crate::forecast::{
     measurably_moves,
 };
 use crate::reading::{BenchmarkId, Series, Timestamp, after_days, days_since};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// Looks back over the time in which all benchmarks were read, by which "since" is reported: evenly in ln of the
@@ -19,7 +20,7 @@ const LEFT: (f64, f64) = (0.02, 1.0);
 const SILENT: f64 = 1.0 / 3.0;
 
 /// What the benchmarks of one site say together.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
 pub struct TogetherReport {
     /// Benchmarks that share one failure time.
     pub groups: Vec<GroupReport>,
@@ -34,7 +35,7 @@ pub struct TogetherReport {
 }
 
 /// Benchmarks that share one failure time.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
 pub struct GroupReport {
     /// Which.
     pub benchmarks: Vec<BenchmarkId>,
@@ -47,7 +48,7 @@ pub struct GroupReport {
 }
 
 /// A benchmark on its own.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
 pub struct ApartReport {
     /// Which.
     pub benchmark: BenchmarkId,

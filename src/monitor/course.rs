@@ -3,10 +3,11 @@
 use super::event::{AlertState, Event, EventKind};
 use crate::alert::Level;
 use crate::reading::{BenchmarkId, Timestamp};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// A level and how long it was in force.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, JsonSchema, Serialize)]
 pub struct Stretch {
     /// The level.
     pub level: Level,

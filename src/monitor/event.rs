@@ -5,11 +5,12 @@ use crate::alert::Level;
 use crate::effects::{Explained, Form, Kind, Rival};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::regime::Regime;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// One thing that the monitor says.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize, Deserialize)]
 pub struct Event {
     /// Data time: the measured-at time of the reading that caused it.
     pub time: Timestamp,
@@ -22,7 +23,7 @@ pub struct Event {
 }
 
 /// The kinds of event.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "kebab-case")]
 pub enum EventKind {
     /// The law was fitted again with a larger `t_max`.
@@ -118,7 +119,7 @@ pub enum EventKind {
     Alert {
         /// The level.
         level: Level,
-        /// Firing, recovering or resolved.
+        /// Firing or resolved.
         state: AlertState,
         /// Stable over retries, restarts and replays.
         key: String,
@@ -226,7 +227,7 @@ impl EventKind {
 }
 
 /// What is not explained.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, JsonSchema, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Unexplained {
     /// The newest reading is one that nobody expected: a step, a load that was not declared, a fault.
@@ -248,7 +249,7 @@ pub enum Unexplained {
 }
 
 /// The forecast of the law under a constant load, beside that of the law under the known load.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize, Deserialize)]
 pub struct Plain {
     /// Which regime, with what probability.
     pub regime: RegimeReport,
@@ -260,7 +261,7 @@ pub struct Plain {
 }
 
 /// Where an alert is in its life.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum AlertState {
     /// The level is in force.
@@ -270,7 +271,7 @@ pub enum AlertState {
 }
 
 /// The regime's label and all probabilities.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize, Deserialize)]
 pub struct RegimeReport {
     /// The regime, or `undetermined`.
     pub label: Regime,
@@ -283,7 +284,7 @@ pub struct RegimeReport {
 }
 
 /// The time of a collapse, or of the first passage of the critical velocity; quantiles are unconditional.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, JsonSchema, Serialize, Deserialize)]
 pub struct FailureTime {
     /// 5 % quantile, `None` when not reached within the horizon.
     pub low: Option<Timestamp>,
@@ -298,7 +299,7 @@ pub struct FailureTime {
 }
 
 /// Benchmarks that share one failure time.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize, Deserialize)]
 pub struct SharedFailure {
     /// Which.
     pub benchmarks: Vec<BenchmarkId>,
@@ -311,7 +312,7 @@ pub struct SharedFailure {
 }
 
 /// The straight line through 1/v.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, JsonSchema, Serialize, Deserialize)]
 pub struct InverseVelocity {
     /// Where the line meets zero, `None` when it does not fall.
     pub failure_time: Option<Timestamp>,
@@ -320,7 +321,7 @@ pub struct InverseVelocity {
 }
 
 /// Counts at the end of a replay.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, JsonSchema, Serialize, Deserialize)]
 pub struct Summary {
     /// Readings taken in.
     pub readings: u64,

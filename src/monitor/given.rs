@@ -1,10 +1,11 @@
 //! Who gave an order, when, why and over which door: the audit trail of what people did.
 
 use crate::reading::Timestamp;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Who gave an order, and how.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, JsonSchema, Serialize, Deserialize)]
 pub struct Given {
     /// Who.
     #[serde(default)]
@@ -21,7 +22,7 @@ pub struct Given {
 }
 
 /// The way by which an order came in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Door {
     /// `slipwatch alerts`, on the machine itself.

@@ -4,10 +4,11 @@ use super::event::{Event, EventKind};
 use super::given::Given;
 use crate::reading::{BenchmarkId, Timestamp};
 use jiff::SignedDuration;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// An order from people. It changes who is notified, never what is found.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, JsonSchema, Serialize, Deserialize)]
 #[serde(tag = "order", rename_all = "kebab-case")]
 pub enum Order {
     /// Somebody has seen what is in force: it is not tried any further.

@@ -18,6 +18,7 @@ pub use series::{Channel, Disorder, Reading, Sample, Series};
 pub use suspicion::Suspicion;
 pub use unit::{LengthUnit, Quantity, TimeUnit, Unit, UnitError};
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -25,7 +26,9 @@ use std::fmt;
 pub const SECONDS_PER_DAY: f64 = 86_400.0;
 
 /// The name of one measured point on a slope.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, JsonSchema, Serialize, Deserialize,
+)]
 #[serde(transparent)]
 pub struct BenchmarkId(String);
 

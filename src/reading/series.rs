@@ -2,6 +2,7 @@
 
 use super::{BenchmarkId, Quantity, Timestamp, Unit};
 use jiff::SignedDuration;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 
@@ -79,7 +80,7 @@ impl Channel {
 }
 
 /// What putting rows in order met.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, JsonSchema, Serialize)]
 pub struct Disorder {
     /// Rows that repeated an earlier row exactly.
     pub repeated: usize,

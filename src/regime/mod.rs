@@ -4,11 +4,14 @@ mod tracker;
 
 pub use tracker::{Flip, Tracker, label, leader};
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// The regimes of the law, read from the signs of r and kappa.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, JsonSchema, Serialize, Deserialize,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum Regime {
     /// Accelerates to failure in finite time (kappa > 0, r > 0).

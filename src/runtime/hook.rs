@@ -7,6 +7,7 @@ use crate::monitor::{AlertState, CLOCK_FAULT, Event, EventKind};
 use crate::reading::Timestamp;
 use nix::sys::signal::{Signal, kill, killpg};
 use nix::unistd::Pid;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::os::unix::process::ExitStatusExt;
 use std::process::{ExitStatus, Stdio};
@@ -34,7 +35,7 @@ const KILL_GRACE: Duration = Duration::from_secs(5);
 pub(super) const FLOOD: &str = "flood";
 
 /// Whether a message means what it says; CAP 1.2's words.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema, Serialize, Deserialize)]
 pub enum Status {
     /// The daemon's own.
     Actual,
@@ -72,6 +73,25 @@ pub struct Alert {
     pub failure_time: Option<Timestamp>,
     /// Whether it means what it says.
     pub status: Status,
+}
+
+/// What hooks and webhooks get: the event of the alert, and what goes with it.
+#[derive(Debug, JsonSchema, Serialize)]
+pub struct HookBody<'a> {
+    #[serde(flatten)]
+    event: &'a Event,
+    /// The site's name.
+    site: &'a str,
+    /// The benchmark's forecast of failure when the alert was called, its median.
+    failure_time: Option<Timestamp>,
+    /// Whether it means what it says.
+    status: Status,
+    /// What people are asked to do; null at the end of an alert.
+    recommended: Option<&'static str>,
+    /// Which attempt this is, from 1.
+    attempt: u32,
+    /// Of this form, 1.
+    schema_version: u32,
 }
 
 impl Alert {
@@ -138,18 +158,7 @@ impl Alert {
     }
 
     pub(super) fn body(&self, attempt: u32) -> Result<Vec<u8>, serde_json::Error> {
-        #[derive(Serialize)]
-        struct Body<'a> {
-            #[serde(flatten)]
-            event: &'a Event,
-            site: &'a str,
-            failure_time: Option<Timestamp>,
-            status: Status,
-            recommended: Option<&'static str>,
-            attempt: u32,
-            schema_version: u32,
-        }
-        let mut body = serde_json::to_vec(&Body {
+        let mut body = serde_json::to_vec(&HookBody {
             event: &self.event,
             site: &self.site,
             failure_time: self.failure_time,

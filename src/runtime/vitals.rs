@@ -6,6 +6,7 @@ use crate::alert::Level;
 use crate::monitor::{AlertState, Event, EventKind, Unexplained};
 use crate::reading::{BenchmarkId, Timestamp};
 use prometheus_client::metrics::histogram::Histogram;
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -18,7 +19,7 @@ pub const MOST_SHOWN: usize = 2000;
 const REFIT_SECONDS: [f64; 10] = [0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0];
 
 /// The site as a whole.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, JsonSchema, Serialize)]
 #[expect(
     clippy::struct_excessive_bools,
     reason = "each is a key of its own in the answer"
@@ -90,7 +91,7 @@ impl Health {
 }
 
 /// One benchmark.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
 pub struct VitalsPoint {
     /// When its newest reading was measured.
     pub newest: Option<Timestamp>,

@@ -5,6 +5,7 @@ use super::{History, Known, METHODS};
 use crate::fit::Observations;
 use crate::forecast::{FEWEST_READINGS, HORIZON_DAYS, Passage};
 use crate::reading::{Channel, Series, Timestamp, after_days, days_since};
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -44,7 +45,7 @@ pub enum Truth {
 }
 
 /// How the methods did on one benchmark.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
 pub struct Card {
     /// Names, the program's own first.
     pub methods: Vec<&'static str>,
@@ -55,7 +56,7 @@ pub struct Card {
 }
 
 /// At one lead.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
 pub struct Lead {
     /// The lead that was asked for, days.
     pub lead_days: f64,
@@ -68,7 +69,7 @@ pub struct Lead {
 }
 
 /// At one look at a slope that stood.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
 pub struct Evaluation {
     /// The latest measured-at time that any forecast here used.
     pub known_until: Timestamp,
@@ -79,7 +80,7 @@ pub struct Evaluation {
 }
 
 /// How one forecast did.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
 pub struct Score {
     /// Median less failure, days: above 0 is late, and unsafe; `None` where no median, or no failure, came.
     pub error_days: Option<f64>,

@@ -4,6 +4,7 @@ use super::read::decode;
 use super::{Store, StoreError};
 use crate::monitor::{Input, Settings};
 use rusqlite::{Connection, params};
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::fs::File;
 use std::path::Path;
@@ -20,7 +21,7 @@ pub struct PlacedEvent {
 }
 
 /// How far one hook has got with one change of an alert.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, JsonSchema, Serialize)]
 pub struct DeliveryRow {
     /// The hook's or webhook's name.
     pub hook: String,

@@ -13,4 +13,5 @@ mod first_site;
 mod office;
 mod plot_cli;
 mod report_cli;
+mod schema;
 mod score_cli;

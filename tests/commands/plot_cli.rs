@@ -275,3 +275,38 @@ fn the_picture_that_is_shown_is_well_formed() {
     check_xml(&svg);
     assert!(svg.contains("collapse 2012-05-15 01:30Z"));
 }
+
+#[test]
+fn a_file_whose_name_ends_in_png_is_a_picture_with_lines_and_letters() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("e3.PNG");
+    plot(&[
+        &PREONZO,
+        &INVERSE,
+        &COLLAPSE,
+        &["-o", file.to_str().unwrap()],
+    ])
+    .success();
+    let bytes = fs::read(&file).unwrap();
+    let picture = resvg::tiny_skia::Pixmap::decode_png(&bytes).unwrap();
+    let svg = drawn(&[&PREONZO, &INVERSE, &COLLAPSE]);
+    let tree = roxmltree::Document::parse(&svg).unwrap();
+    let size = |name: &str| {
+        tree.root_element()
+            .attribute(name)
+            .unwrap()
+            .parse::<u32>()
+            .unwrap()
+    };
+    assert_eq!(picture.width(), 2 * size("width"));
+    assert_eq!(picture.height(), 2 * size("height"));
+    let has = |red: u8, green: u8, blue: u8| {
+        let is_it = |one: &resvg::tiny_skia::PremultipliedColorU8| {
+            (one.red(), one.green(), one.blue()) == (red, green, blue)
+        };
+        picture.pixels().iter().any(is_it)
+    };
+    assert!(has(255, 255, 255), "the ground");
+    assert!(has(0, 0x72, 0xb2), "the readings");
+    assert!(has(0x11, 0x11, 0x11), "letters");
+}

@@ -16,6 +16,8 @@ use crate::runtime::standing::{acknowledged, closed, in_force, orders, silences}
 use anyhow::Context;
 use clap::Subcommand;
 use jiff::SignedDuration;
+use schemars::JsonSchema;
+use serde::Serialize;
 use std::io::Write;
 
 /// List the alerts in force, acknowledge them, or have no hook run for a time
@@ -188,13 +190,20 @@ fn limit(span: SignedDuration, longest: SignedDuration) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// What `redeliver` has done.
+#[derive(Debug, JsonSchema, Serialize)]
+pub(super) struct Redelivered {
+    /// Deliveries that wait again.
+    deliveries: usize,
+}
+
 fn redeliver(site: &SiteArgs) -> anyhow::Result<()> {
     let (_, store) = site.open()?;
-    let said = serde_json::json!({ "deliveries": store.redeliver()? });
-    site.output.print(&said, |said| {
-        let count = &said["deliveries"];
+    let deliveries = store.redeliver()?;
+    site.output.print(&Redelivered { deliveries }, |again| {
         format!(
-            "{count} deliveries wait again; the daemon makes them at its next start or reload\n"
+            "{} deliveries wait again; the daemon makes them at its next start or reload\n",
+            again.deliveries
         )
     })
 }

@@ -6,6 +6,7 @@ mod serve;
 pub(super) mod timeline;
 mod verdict;
 
+use super::bar;
 use super::run::asynchronous;
 use crate::alert::{Level, Policy};
 use crate::config::HookConfig;
@@ -16,7 +17,6 @@ use crate::runtime::replay::{self, ReplayPace, ReplayPlan};
 use crate::runtime::shutdown::Shutdown;
 use anyhow::Context;
 use crisis::{CRISES, Crisis};
-use indicatif::{ProgressBar, ProgressStyle};
 use jiff::SignedDuration;
 use std::collections::BTreeSet;
 use std::io::{self, Write};
@@ -155,7 +155,10 @@ async fn play(
         pace: pace(args.pace.unwrap_or(PACE), &arrivals),
         until: None,
     };
-    let bar = bar(arrivals.len());
+    let bar = bar::counted(
+        arrivals.len() as u64,
+        "{bar:40} {pos}/{len} values, {elapsed}",
+    );
     let shutdown = Shutdown::on_signals().context("cannot listen for signals")?;
     let mut show = |event: &Event| {
         bar.set_position(arrivals.partition_point(|arrival| arrival.time <= event.time) as u64);
@@ -164,13 +167,6 @@ async fn play(
     replay::replay(recording, &plan, shutdown, &mut show).await?;
     bar.finish_and_clear();
     Ok(())
-}
-
-/// The bar hides itself where stderr is no terminal.
-fn bar(length: usize) -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} values, {elapsed}").ok();
-    let bar = ProgressBar::new(length as u64);
-    style.map_or(bar.clone(), |style| bar.with_style(style))
 }
 
 fn policy(crisis: &Crisis) -> Policy {

@@ -8,21 +8,18 @@ mod text;
 pub(super) use page::{STYLE, part};
 
 use super::args::{OutputArgs, ReadingArgs};
-use super::exit;
+use super::{bar, exit};
 use crate::alert::Policy;
 use crate::config::value;
 use crate::effects::{self, Explanation, Options};
 use crate::reading::{Channel, Recording, SelectError, Series, Timestamp};
 use anyhow::Context;
-use indicatif::{ProgressBar, ProgressStyle};
 use std::path::PathBuf;
 
 /// Fewer surrogates cannot give a p-value that an effect is accepted for.
 const FEWEST_SURROGATES: usize = 99;
 /// More show nothing and take for ever.
 const MOST_SURROGATES: usize = 9999;
-/// Steps of the progress bar.
-const STEPS: f64 = 1000.0;
 
 /// Trace a benchmark's residual to the effect that the law lacks, with the error before and after
 ///
@@ -89,8 +86,8 @@ fn together(args: &Args, recording: &mut Recording) -> anyhow::Result<()> {
         ));
     }
     let all: Vec<&Series> = recording.series.iter().collect();
-    let bar = bar();
-    let mut progress = |share: f64| move_to(&bar, share);
+    let bar = bar::shared();
+    let mut progress = |share: f64| bar::share(&bar, share);
     let channels = &recording.channels;
     let mut found = effects::explain_together(&all, channels, &options(args), &mut progress);
     bar.finish_and_clear();
@@ -130,33 +127,12 @@ fn search(series: &Series, recording: &Recording, options: &Options) -> Explanat
     let neighbours: Vec<&Series> = others
         .filter(|other| other.benchmark != series.benchmark)
         .collect();
-    let bar = bar();
-    let mut progress = |share: f64| move_to(&bar, share);
+    let bar = bar::shared();
+    let mut progress = |share: f64| bar::share(&bar, share);
     let channels = &recording.channels;
     let explanation = effects::explain(series, channels, &neighbours, options, &mut progress);
     bar.finish_and_clear();
     explanation
-}
-
-fn move_to(bar: &ProgressBar, share: f64) {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "clamped to the bar"
-    )]
-    bar.set_position((share * STEPS).clamp(0.0, STEPS) as u64);
-}
-
-/// The bar hides itself where stderr is no terminal.
-fn bar() -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:40} {percent} %, {elapsed}").ok();
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a small constant"
-    )]
-    let bar = ProgressBar::new(STEPS as u64);
-    style.map_or(bar.clone(), |style| bar.with_style(style))
 }
 
 /// Leaves out what is not asked for. A covariate from before the first reading still acts after it.

@@ -15,6 +15,8 @@ use crate::runtime::ingest::{
 };
 use dialect::Written;
 use jiff::SignedDuration;
+use schemars::JsonSchema;
+use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -334,6 +336,17 @@ fn site_name(args: &Args) -> String {
         .unwrap_or_else(|| "site".to_owned())
 }
 
+/// What was written; the answer of `check` follows.
+#[derive(Debug, JsonSchema, Serialize)]
+pub(super) struct ConfigWritten<'a> {
+    /// The file.
+    config: &'a Path,
+    /// The benchmarks in it.
+    benchmarks: Vec<&'a str>,
+    /// What to do next: each command, and why.
+    next: Vec<(String, &'static str)>,
+}
+
 fn say_written(args: &Args, plan: &InitPlan) -> anyhow::Result<()> {
     let mut stdout = std::io::stdout().lock();
     let config = args.output_config.display();
@@ -350,9 +363,12 @@ fn say_written(args: &Args, plan: &InitPlan) -> anyhow::Result<()> {
                 .benchmarks
                 .iter()
                 .map(|benchmark| benchmark.id.as_str());
-            let ids: Vec<&str> = ids.collect();
-            let written = serde_json::json!({ "config": args.output_config, "benchmarks": ids, "next": next(args) });
-            writeln!(stdout, "{written}")?;
+            let written = ConfigWritten {
+                config: &args.output_config,
+                benchmarks: ids.collect(),
+                next: next(args),
+            };
+            writeln!(stdout, "{}", serde_json::to_string(&written)?)?;
         }
     }
     Ok(())

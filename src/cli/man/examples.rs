@@ -1,7 +1,7 @@
 //! Examples of every command, for its page.
 
 /// By command.
-pub(super) const ALL: [(&str, &[&str]); 30] = [
+pub(super) const ALL: [(&str, &[&str]); 31] = [
     (
         "",
         &[
@@ -39,6 +39,7 @@ pub(super) const ALL: [(&str, &[&str]); 30] = [
             "slipwatch replay slope.csv --config site.toml",
             "zcat slope.csv.gz | slipwatch replay - --until 2017-06-06T17:00:00Z --format json",
             "slipwatch replay --state state --benchmark P1",
+            "slipwatch replay slope.csv --config site.toml --record crisis.mcap",
         ],
     ),
     (
@@ -109,7 +110,10 @@ pub(super) const ALL: [(&str, &[&str]); 30] = [
     ),
     (
         "plot",
-        &["slipwatch plot slope.csv --benchmark P1 --kind inverse-velocity -o slope.svg"],
+        &[
+            "slipwatch plot slope.csv --benchmark P1 --kind inverse-velocity -o slope.svg",
+            "slipwatch plot slope.csv --benchmark P1 --kind forecast -o slope.png",
+        ],
     ),
     (
         "report",
@@ -121,6 +125,10 @@ pub(super) const ALL: [(&str, &[&str]); 30] = [
     (
         "simulate",
         &["slipwatch simulate --m 1.35 --x-i 0.6 --times 0,0.5,1,1.25"],
+    ),
+    (
+        "schema",
+        &["slipwatch schema fit", "slipwatch schema -o schema"],
     ),
     ("convert", &["slipwatch convert slope.csv slope.mcap"]),
     ("hook", &["slipwatch hook test --config site.toml"]),

@@ -6,6 +6,7 @@ mod sections;
 
 use super::args::{OutputArgs, ReadingArgs};
 use super::exit::UsageError;
+use super::state::FileWritten;
 use crate::config::value;
 use crate::reading::Timestamp;
 use anyhow::{Context, bail};
@@ -62,7 +63,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         .with_context(|| format!("cannot make the folder {}", folder.display()))?;
     let file = folder.join(name);
     std::fs::write(&file, &page).with_context(|| format!("cannot write {}", file.display()))?;
-    let said = serde_json::json!({ "file": file, "bytes": page.len() });
-    args.output
-        .print(&said, |_| format!("{}\n", file.display()))
+    let bytes = page.len() as u64;
+    args.output.print(&FileWritten { file, bytes }, |written| {
+        format!("{}\n", written.file.display())
+    })
 }

@@ -4,13 +4,13 @@ mod text;
 mod warning;
 
 use super::args::{OutputArgs, ReadingArgs};
-use super::exit;
+use super::{bar, exit, picture};
 use crate::alert::Policy;
 use crate::figures;
 use crate::reading::{Recording, Series, Timestamp, days_since};
 use crate::score::{Card, History, METHODS, Truth, card};
 use anyhow::{Context, ensure};
-use indicatif::{ProgressBar, ProgressStyle};
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::path::PathBuf;
 use warning::Warning;
@@ -30,7 +30,7 @@ pub(super) struct Args {
     /// It had not failed when the record ended
     #[arg(long, conflicts_with = "failure_time")]
     no_failure: bool,
-    /// Draw when each forecast said that the slope would fail, as SVG
+    /// Draw when each forecast said that the slope would fail, as PNG where the name ends in .png, else as SVG
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
     #[command(flatten)]
@@ -38,14 +38,17 @@ pub(super) struct Args {
 }
 
 /// What is printed of one benchmark.
-#[derive(Debug, Serialize)]
-struct ScoreReport {
+#[derive(Debug, JsonSchema, Serialize)]
+pub(super) struct ScoreReport {
+    /// Which.
     benchmark: String,
+    /// When the slope failed; `None`: it had not.
     failure_time: Option<Timestamp>,
     /// Where each method was published.
     sources: Vec<&'static str>,
     #[serde(flatten)]
     card: Card,
+    /// The levels that a replay called.
     warning: Warning,
 }
 
@@ -63,8 +66,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         let report = report(args.failure_time, (&recording, series), &policy)?;
         if let Some(file) = &args.plot {
             let svg = figures::life_expectancy(&report.card, report.failure_time);
-            std::fs::write(file, svg)
-                .with_context(|| format!("cannot write {}", file.display()))?;
+            picture::write(file, &svg)?;
         }
         let blank = if index == 0 { "" } else { "\n" };
         args.output
@@ -121,7 +123,8 @@ fn report(
         &recording.channels,
         policy.critical_velocity_mm_per_day,
     );
-    let bar = bar(series.benchmark.as_str());
+    let template = "{msg} {bar:40} {pos}/{len} looks, {elapsed}";
+    let bar = bar::counted(0, template).with_message(format!("benchmark {}", series.benchmark));
     let mut card = card(&history, epoch, truth, &mut |done, count| {
         bar.set_length(count);
         bar.set_position(done);
@@ -157,13 +160,6 @@ fn leave_out_rivers(card: &mut Card) {
     for scores in of_leads.chain(of_looks) {
         scores.retain(|name, _| !is_of_a_river(name));
     }
-}
-
-/// The bar hides itself where stderr is no terminal.
-fn bar(benchmark: &str) -> ProgressBar {
-    let style = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} looks, {elapsed}").ok();
-    let bar = ProgressBar::new(0).with_message(format!("benchmark {benchmark}"));
-    style.map_or(bar.clone(), |style| bar.with_style(style))
 }
 
 /// Hours between two times.

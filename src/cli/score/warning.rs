@@ -5,6 +5,7 @@ use crate::alert::{Level, Policy};
 use crate::cli::replay;
 use crate::monitor::{AlertState, EventKind, Settings};
 use crate::reading::{Channel, Recording, Series, Timestamp};
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -12,11 +13,13 @@ use std::collections::BTreeMap;
 const YEAR_HOURS: f64 = 365.25 * 24.0;
 
 /// The levels in force over a record, up to the failure where there was one.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, JsonSchema, Serialize)]
 pub(super) struct Warning {
     /// When each was first called.
     pub(super) first_yellow: Option<Timestamp>,
+    /// See `first_yellow`.
     pub(super) first_orange: Option<Timestamp>,
+    /// See `first_yellow`.
     pub(super) first_red: Option<Timestamp>,
     /// Hours each was in force.
     pub(super) hours_at: BTreeMap<Level, f64>,

@@ -9,10 +9,11 @@ mod recordings;
 mod watches;
 
 use crate::config::Config;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// How something stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
     /// As it should be.
@@ -38,7 +39,7 @@ impl Verdict {
 }
 
 /// One thing that was looked at.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, JsonSchema, Serialize)]
 pub struct Finding {
     /// What: `user`, `state`, `token`, `listen`, `inotify`, `file-system`, `clock`, `fsync`, `hook`, `webhook`, `sandbox`, `source`, `recording`.
     pub check: &'static str,

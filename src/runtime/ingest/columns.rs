@@ -2,6 +2,7 @@
 
 use super::{IngestError, ReadOptions, Remark};
 use crate::reading::{BenchmarkId, Dialect, Unit};
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::path::Path;
 use std::str::FromStr;
@@ -100,7 +101,7 @@ pub(super) enum Column {
 }
 
 /// What a column is taken for, for a person to see.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, JsonSchema, Serialize)]
 #[serde(tag = "is", rename_all = "kebab-case")]
 pub enum Meaning {
     /// When a row was measured, or a part of that.

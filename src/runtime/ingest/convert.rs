@@ -7,12 +7,13 @@ use super::{
 };
 use crate::reading::{BenchmarkId, Disorder, Quantity, Recording, Unit};
 use anyhow::Context;
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::io::BufWriter;
 use std::path::Path;
 
 /// What was converted.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
 pub struct ConvertReport {
     /// The series written.
     pub series: Vec<SeriesCount>,
@@ -25,7 +26,7 @@ pub struct ConvertReport {
 }
 
 /// How much of a series was written.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
 pub struct SeriesCount {
     /// Whose readings.
     pub benchmark: BenchmarkId,
@@ -38,7 +39,7 @@ pub struct SeriesCount {
 }
 
 /// How much of a channel was written.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
 pub struct ChannelCount {
     /// The channel's name.
     pub name: String,

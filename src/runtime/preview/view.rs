@@ -2,12 +2,13 @@
 
 use crate::reading::{BenchmarkId, Quantity, Timestamp};
 use crate::runtime::ingest::Meaning;
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 /// What lies in the files of a site now.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, JsonSchema, Serialize)]
 pub struct Preview {
     /// The sources that are files.
     pub sources: Vec<SourceView>,
@@ -24,7 +25,7 @@ pub struct Preview {
 }
 
 /// One source and its files.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct SourceView {
     /// Its id.
     pub id: String,
@@ -45,7 +46,7 @@ pub struct SourceView {
 }
 
 /// The columns of one file or of several.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct LayoutView {
     /// The first file that has them.
     pub file: PathBuf,
@@ -56,7 +57,7 @@ pub struct LayoutView {
 }
 
 /// One column.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, JsonSchema, Serialize)]
 pub struct ColumnView {
     /// Its name.
     pub name: String,
@@ -66,7 +67,7 @@ pub struct ColumnView {
 }
 
 /// Rows of one kind that cannot be used.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, JsonSchema, Serialize)]
 pub struct Refusal {
     /// How many.
     pub rows: u64,
@@ -75,7 +76,7 @@ pub struct Refusal {
 }
 
 /// One quantity of a benchmark.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct BenchmarkView {
     /// Its id.
     pub id: BenchmarkId,
@@ -98,7 +99,7 @@ pub struct BenchmarkView {
 }
 
 /// One covariate.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct CovariateView {
     /// Its name.
     pub name: String,
@@ -115,7 +116,7 @@ pub struct CovariateView {
 }
 
 /// A benchmark of the config without a reading, or a source without a benchmark.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, JsonSchema, Serialize)]
 pub struct Unfed {
     /// The benchmark; none where a source was to give whatever benchmarks it has.
     pub benchmark: Option<BenchmarkId>,

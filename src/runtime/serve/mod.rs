@@ -7,7 +7,7 @@ mod page;
 mod routes;
 
 pub use metrics::CONTENT_TYPE;
-pub use routes::{Archive, ArchiveError, Page};
+pub use routes::{Archive, ArchiveError, DaemonStatus, Page};
 
 use super::shutdown::{self, Trigger};
 use super::view::Desk;

@@ -9,6 +9,7 @@ use axum::middleware::{Next, from_fn, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use axum::{Json, Router};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::{Debug, Write as _};
@@ -179,21 +180,25 @@ async fn expose(State(vitals): State<Arc<Vitals>>) -> Response {
     }
 }
 
-#[derive(Debug, Serialize)]
-struct Status {
+/// What `/api/status` answers: how the daemon does.
+#[derive(Debug, JsonSchema, Serialize)]
+pub struct DaemonStatus {
+    /// The daemon's version.
     version: &'static str,
+    /// Since its start.
     uptime_seconds: u64,
     #[serde(flatten)]
     health: Health,
     /// How many benchmarks stand at each level.
     levels: BTreeMap<&'static str, usize>,
+    /// Single figures, of at most 2,000 benchmarks.
     benchmarks: BTreeMap<String, VitalsPoint>,
 }
 
-async fn status(State(vitals): State<Arc<Vitals>>) -> Json<Status> {
+async fn status(State(vitals): State<Arc<Vitals>>) -> Json<DaemonStatus> {
     let levels = vitals.levels().map(|(level, count)| (level.name(), count));
     let points = vitals.points().into_iter();
-    Json(Status {
+    Json(DaemonStatus {
         version: env!("CARGO_PKG_VERSION"),
         uptime_seconds: vitals.uptime().as_secs(),
         health: vitals.health(),

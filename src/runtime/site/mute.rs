@@ -7,13 +7,14 @@ use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::clock::TOLERANCE;
 use crate::runtime::hook::Alert;
 use jiff::SignedDuration;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Orders in force at most; the oldest goes.
 const MOST: usize = 256;
 
 /// Alerts that are not told for a time.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, JsonSchema, Serialize, Deserialize)]
 pub struct Mute {
     /// `None`: of the whole site.
     pub benchmark: Option<BenchmarkId>,

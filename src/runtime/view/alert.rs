@@ -6,10 +6,11 @@ use crate::monitor::{AlertState, Event, EventKind, Settings};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::standing::{every, in_force};
 use crate::store::{DeliveryRow, Store, StoreError};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// Where an alert is in its life.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum AlertLife {
     /// In force.
@@ -21,7 +22,7 @@ pub enum AlertLife {
 }
 
 /// One alert.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct AlertView {
     /// Its idempotency key.
     pub key: String,

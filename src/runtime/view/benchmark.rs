@@ -11,6 +11,7 @@ use crate::reading::{
 };
 use crate::runtime::standing::in_force;
 use crate::store::{StoreError, Value, Values};
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::VecDeque;
 
@@ -51,7 +52,7 @@ pub struct TimeWindow {
 }
 
 /// A series by columns: seconds since 1970, and values.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, JsonSchema, Serialize)]
 pub struct ViewColumns {
     /// Seconds since 1970.
     pub t: Vec<f64>,
@@ -70,7 +71,7 @@ impl ViewColumns {
 }
 
 /// A covariate.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Covariate {
     /// Its name.
     pub name: String,
@@ -82,7 +83,7 @@ pub struct Covariate {
 }
 
 /// One forecast, short.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct ForecastView {
     /// When it was made.
     pub time: Timestamp,
@@ -105,7 +106,7 @@ pub struct ForecastView {
 }
 
 /// One benchmark.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct BenchmarkView {
     /// The site's name.
     pub site: String,

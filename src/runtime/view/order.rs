@@ -6,6 +6,7 @@ use crate::reading::BenchmarkId;
 use crate::runtime::clock;
 use crate::store::StoreError;
 use jiff::SignedDuration;
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 /// Longest name of whoever gives an order, bytes.
@@ -14,7 +15,7 @@ const LONGEST_NAME: usize = 100;
 const LONGEST_REASON: usize = 500;
 
 /// What is asked for.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, JsonSchema, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Asked {
     /// `acknowledge`, `shelve`, `silence` or `unsilence`.

@@ -7,6 +7,7 @@ use crate::reading::{BenchmarkId, Timestamp};
 use crate::regime::Regime;
 use crate::runtime::standing::{InForce, acknowledged, in_force, orders, silences};
 use crate::store::StoreError;
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeSet;
 
@@ -14,7 +15,7 @@ use std::collections::BTreeSet;
 const LISTED: usize = 60;
 
 /// How one benchmark stands.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Standing {
     /// Its name.
     pub benchmark: BenchmarkId,
@@ -47,7 +48,7 @@ pub struct Standing {
 }
 
 /// The site.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct SiteView {
     /// Its name.
     pub site: String,
