@@ -14,7 +14,7 @@ use std::process::{Command, Stdio};
 const MEASURED: &str = "../shared/data";
 
 /// The name of a condition, and commands of which one must succeed.
-const TOOLS: [(&str, &[&[&str]]); 11] = [
+const TOOLS: [(&str, &[&[&str]]); 12] = [
     (
         "has_alertmanager",
         &[&["prometheus-alertmanager", "--version"]],
@@ -39,6 +39,11 @@ const TOOLS: [(&str, &[&[&str]]); 11] = [
     ("has_prlimit", &[&["prlimit", "--version"]]),
     ("has_promtool", &[&["promtool", "--version"]]),
     ("has_python3", &[&["python3", "--version"]]),
+    // pip install mcap
+    (
+        "has_python_mcap",
+        &[&["python3", "-c", "import mcap.reader"]],
+    ),
     ("has_strace", &[&["strace", "-o", "/dev/null", "true"]]),
     ("has_systemd_analyze", &[&["systemd-analyze", "--version"]]),
 ];

@@ -1,20 +1,22 @@
 //! `replay FILE...`: the monitor over recorded readings, in data time.
 
 use super::args::{Format, OutputArgs, ReadingArgs};
+use super::bar::BarInTime;
 use super::demo::timeline::Timeline;
 use super::run::asynchronous;
 use super::{exit, text};
 use crate::config::{self, Config, value};
 use crate::monitor::{Event, Settings};
-use crate::reading::{BenchmarkId, Quantity, Recording, SelectError, Timestamp};
+use crate::reading::{BenchmarkId, Quantity, Recording, SelectError, Series, Timestamp};
 use crate::runtime::log::{self, LogFormat};
+use crate::runtime::record;
 use crate::runtime::replay::{self, ReplayPace, ReplayPlan};
 use crate::runtime::sandbox::OURSELVES;
 use crate::runtime::shutdown::Shutdown;
 use crate::store::Store;
 use anyhow::Context;
 use jiff::tz::TimeZone;
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 /// What a site without a config is called.
@@ -39,6 +41,9 @@ pub(super) struct Args {
     /// Stop at this time of the data
     #[arg(long, value_name = "TIME", value_parser = value::instant)]
     until: Option<Timestamp>,
+    /// Also write the readings and what was said of them into this MCAP file: for Foxglove, or to be replayed again
+    #[arg(long, value_name = "OUT.mcap", value_parser = mcap_file)]
+    record: Option<PathBuf>,
     /// Run the hooks of --config, marked as an exercise
     #[arg(long, requires = "config")]
     hooks: bool,
@@ -82,13 +87,32 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let zone = config
         .as_ref()
         .map_or(TimeZone::UTC, |config| config.site.time_zone.clone());
-    let mut printer = Printer::new(args.output.format, zone);
+    let mut printer = Printer::new(args.output.format, zone, args.record.is_some());
     asynchronous()?.block_on(async {
         let shutdown = Shutdown::on_signals().context("cannot listen for signals")?;
-        let mut print = |event: &Event| printer.print(event);
+        // Where the lines are seen they say how far it has come.
+        let is_seen = io::stdout().is_terminal();
+        let bar = (!is_seen).then(|| BarInTime::of(&recording, args.until));
+        let mut print = |event: &Event| {
+            bar.iter().for_each(|bar| bar.moved(event.time));
+            printer.print(event)
+        };
         anyhow::Ok(replay::replay(&recording, &plan, shutdown, &mut print).await?)
     })?;
-    Ok(printer.end()?)
+    if let Some(until) = args.until {
+        cut(&mut recording, until);
+    }
+    printer.end(args.record.as_deref(), || Ok(recording))
+}
+
+/// Leaves what had been measured until then.
+fn cut(recording: &mut Recording, until: Timestamp) {
+    for series in &mut recording.series {
+        series.readings.retain(|reading| reading.time <= until);
+    }
+    for channel in &mut recording.channels {
+        channel.samples.retain(|sample| sample.time <= until);
+    }
 }
 
 /// Prints the events of the stored input; with `--benchmark` those of one benchmark and of the site as a whole.
@@ -108,7 +132,7 @@ fn run_state(args: &Args, folder: &Path) -> anyhow::Result<()> {
     }
     let is_wanted =
         |event: &Event| wanted.is_none() || event.benchmark.is_none() || event.benchmark == wanted;
-    let mut printer = Printer::new(args.output.format, TimeZone::UTC);
+    let mut printer = Printer::new(args.output.format, TimeZone::UTC, args.record.is_some());
     asynchronous()?.block_on(async {
         let shutdown = Shutdown::on_signals().context("cannot listen for signals")?;
         let mut print = |event: &Event| {
@@ -121,7 +145,13 @@ fn run_state(args: &Args, folder: &Path) -> anyhow::Result<()> {
             &store, args.until, &shutdown, &mut print,
         )?)
     })?;
-    Ok(printer.end()?)
+    printer.end(args.record.as_deref(), || {
+        let mut taken = record::taken_in(&store, args.until)?;
+        let is_wanted =
+            |series: &Series| wanted.as_ref().is_none_or(|one| series.benchmark == *one);
+        taken.series.retain(is_wanted);
+        Ok(taken)
+    })
 }
 
 /// The events of a recording, for those who do not print them.
@@ -140,7 +170,9 @@ pub(super) fn events(
     let mut events = Vec::new();
     asynchronous()?.block_on(async {
         let shutdown = Shutdown::on_signals().context("cannot listen for signals")?;
+        let bar = BarInTime::of(recording, until);
         let mut keep = |event: &Event| {
+            bar.moved(event.time);
             events.push(event.clone());
             Ok(())
         };
@@ -156,19 +188,25 @@ struct Printer {
     format: Format,
     zone: TimeZone,
     timeline: Timeline,
+    /// All of them, where they are to be recorded.
+    kept: Option<Vec<Event>>,
 }
 
 impl Printer {
-    fn new(format: Format, zone: TimeZone) -> Self {
+    fn new(format: Format, zone: TimeZone, keeps: bool) -> Self {
         Self {
             out: io::stdout().lock(),
             format,
             zone,
             timeline: Timeline::new(),
+            kept: keeps.then(Vec::new),
         }
     }
 
     fn print(&mut self, event: &Event) -> io::Result<()> {
+        if let Some(kept) = &mut self.kept {
+            kept.push(event.clone());
+        }
         let line = match self.format {
             Format::Json => serde_json::to_string(event)?,
             Format::Text => {
@@ -179,8 +217,18 @@ impl Printer {
         writeln!(self.out, "{line}")
     }
 
-    fn end(mut self) -> io::Result<()> {
-        write!(self.out, "{}", self.timeline.bands())
+    /// Prints what comes after the events, and records them with the readings that they rest on, where that is asked for.
+    fn end(
+        mut self,
+        file: Option<&Path>,
+        readings: impl FnOnce() -> anyhow::Result<Recording>,
+    ) -> anyhow::Result<()> {
+        write!(self.out, "{}", self.timeline.bands())?;
+        if let (Some(file), Some(events)) = (file, &self.kept) {
+            let words = |event: &Event| text::line(event, &self.zone);
+            record::write(file, &readings()?, events, &words)?;
+        }
+        Ok(())
     }
 }
 
@@ -202,6 +250,17 @@ fn lend_averaging(recording: &mut Recording, config: &Config) {
             series.averaging = ours.and_then(|benchmark| benchmark.averaging);
         }
     }
+}
+
+/// Only by its ending is it read as what it is.
+fn mcap_file(text: &str) -> Result<PathBuf, String> {
+    let file = PathBuf::from(text);
+    let is_mcap = file
+        .extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("mcap"));
+    is_mcap
+        .then_some(file)
+        .ok_or_else(|| "expected a name that ends in .mcap".to_owned())
 }
 
 fn pace(text: &str) -> Result<ReplayPace, String> {

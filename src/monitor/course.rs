@@ -18,10 +18,10 @@ pub struct Stretch {
 }
 
 /// Every stretch of one level within `first` and `last`; then those in which it was unknown, which stand beside
-/// the level.
+/// the level. `None`: of the whole site.
 pub fn levels_in(
     events: &[Event],
-    benchmark: &BenchmarkId,
+    benchmark: Option<&BenchmarkId>,
     (first, last): (Timestamp, Timestamp),
 ) -> (Vec<Stretch>, Vec<Stretch>) {
     let mut levels = Course::new(Level::Green, first);
@@ -30,7 +30,7 @@ pub fn levels_in(
         let EventKind::Alert { level, state, .. } = &event.kind else {
             continue;
         };
-        if event.benchmark.as_ref() != Some(benchmark) {
+        if event.benchmark.as_ref() != benchmark {
             continue;
         }
         let course = match level {

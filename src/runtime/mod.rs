@@ -20,6 +20,7 @@ pub mod origin;
 pub mod preview;
 pub mod progress;
 pub mod pulse;
+pub mod record;
 pub mod replay;
 pub mod run;
 pub mod sampling;

@@ -12,6 +12,7 @@ mod first_day;
 mod first_site;
 mod office;
 mod plot_cli;
+mod record;
 mod report_cli;
 mod schema;
 mod score_cli;

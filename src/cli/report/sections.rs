@@ -19,7 +19,7 @@ const HOURS: f64 = 24.0;
 /// One sentence that says how the benchmark stands at the end.
 pub(super) fn summary(material: &Material, series: &Series) -> String {
     let (first, last) = span(series);
-    let (levels, unknown) = levels_in(&material.events, &series.benchmark, (first, last));
+    let (levels, unknown) = levels_in(&material.events, Some(&series.benchmark), (first, last));
     let level = levels.last().map_or(Level::Green, |stretch| stretch.level);
     let beside = unknown.last().is_some_and(|stretch| stretch.to >= last);
     let beside = if beside { " and unknown" } else { "" };
@@ -118,7 +118,7 @@ pub(super) fn in_order(material: &Material, series: &Series) -> Table {
 
 /// When each level was first in force, for how long, and how long before the failure.
 pub(super) fn levels(args: &Args, material: &Material, series: &Series) -> Table {
-    let (levels, unknown) = levels_in(&material.events, &series.benchmark, span(series));
+    let (levels, unknown) = levels_in(&material.events, Some(&series.benchmark), span(series));
     let mut table = Table::headed([
         "level",
         "first",

@@ -15,7 +15,7 @@ const WHITE: &str = "#ffffff";
 /// stand beside the level.
 pub(super) fn stretches(replayed: &Replayed) -> (Vec<Stretch>, Vec<Stretch>) {
     replayed.span().map_or_else(Default::default, |span| {
-        levels_in(replayed.events, &replayed.series.benchmark, span)
+        levels_in(replayed.events, Some(&replayed.series.benchmark), span)
     })
 }
 

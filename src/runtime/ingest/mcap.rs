@@ -7,7 +7,7 @@
 use super::bytes::{is_stdin, stdin};
 use super::collect::Collector;
 use super::mcap_write::PROVENANCE;
-use super::message::{MessageError, Topic, decode_message};
+use super::message::{MessageError, Topic, decode_message, is_said};
 use super::{IngestError, Item, ReadOptions};
 use crate::reading::{Disorder, Recording};
 use ::mcap::McapError;
@@ -104,7 +104,8 @@ impl<'a> Contents<'a> {
                 if known.is_some_and(|known| *known != channel) {
                     return Err(self.damaged(McapError::ConflictingChannels(channel.topic)));
                 }
-                if known.is_none() && Topic::parse(&channel.topic).is_none() {
+                let is_known = known.is_some() || is_said(&channel.topic);
+                if !is_known && Topic::parse(&channel.topic).is_none() {
                     tracing::info!(file = %self.file.display(), topic = channel.topic, "left out: neither a benchmark nor a channel");
                 }
                 self.channels.insert(channel.id, channel);

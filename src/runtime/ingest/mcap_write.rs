@@ -1,5 +1,5 @@
-//! Writes a recording as MCAP: a topic for each series and channel, zstd chunks with checksums, a
-//! summary with statistics, and an index of messages.
+//! Writes a recording as MCAP: a topic for each series and channel, and for what was said of them where that is
+//! given; zstd chunks with checksums, a summary with statistics, and an index of messages.
 //!
 //! A converted file has no arrival times: `log_time` and `publish_time` both carry when a value was
 //! measured. MCAP times are unsigned nanoseconds, so nothing before 1970 can stand there: if the
@@ -10,9 +10,10 @@
 use super::IngestError;
 use super::atomic::write_atomically;
 use super::message::{AVERAGING, Payload, SINCE, TIME_BASE, Topic, UNIX};
-use crate::reading::{Channel, Reading, Recording, Series, Timestamp};
+use crate::reading::{Channel, Reading, Recording, Sample, Series, Timestamp};
 use ::mcap::records::{MessageHeader, Metadata};
 use ::mcap::{Compression, McapError, WriteOptions, Writer};
+use serde_json::Value;
 use std::collections::BTreeMap;
 use std::io::{self, BufWriter, Seek, Write};
 use std::path::Path;
@@ -37,28 +38,66 @@ pub fn write_mcap(recording: &Recording, file: &Path) -> Result<(), IngestError>
 /// [`IngestError::Unwritable`] for a value that is not finite or a time out of MCAP's range,
 /// [`IngestError::Write`] when `out` fails.
 pub fn encode_mcap(recording: &Recording, out: impl Write + Seek) -> Result<(), IngestError> {
-    let outgoing = outgoing(recording)?;
-    encode(recording, &outgoing, BufWriter::new(out)).map_err(|error| IngestError::Write {
+    let outgoing = outgoing(recording, &[])?;
+    encode(recording, &outgoing, BufWriter::new(out)).map_err(unwritten)
+}
+
+/// A topic that holds no readings, but what was said of them. Readers of readings leave it out.
+#[derive(Debug, Clone)]
+pub(in crate::runtime) struct SaidTopic {
+    /// The topic, no benchmark's and no channel's.
+    pub(in crate::runtime) name: String,
+    /// The schema's name and its text.
+    pub(in crate::runtime) schema: (&'static str, String),
+    /// What was said, and when, in order.
+    pub(in crate::runtime) messages: Vec<(Timestamp, Value)>,
+}
+
+/// Writes a recording, and what was said of it, into a file, which is wholly there afterwards or untouched.
+///
+/// # Errors
+/// As [`write_mcap`].
+pub(in crate::runtime) fn write_mcap_with(
+    recording: &Recording,
+    said: &[SaidTopic],
+    file: &Path,
+) -> Result<(), IngestError> {
+    let outgoing = outgoing(recording, said)?;
+    write_atomically(file, |out| {
+        encode(recording, &outgoing, BufWriter::new(out)).map_err(unwritten)
+    })
+}
+
+fn unwritten(error: McapError) -> IngestError {
+    IngestError::Write {
         file: "the MCAP output".into(),
         source: io::Error::other(error),
-    })
+    }
 }
 
 /// One topic on its way out.
 struct Outgoing {
-    topic: Topic,
+    name: String,
+    schema: (&'static str, String),
     unit: Option<String>,
     metadata: BTreeMap<String, String>,
-    rows: Vec<(u64, Reading)>,
+    rows: Vec<(u64, Row)>,
 }
 
-fn outgoing(recording: &Recording) -> Result<Vec<Outgoing>, IngestError> {
+/// One message of it.
+enum Row {
+    Measured(Reading),
+    Said(Value),
+}
+
+fn outgoing(recording: &Recording, said: &[SaidTopic]) -> Result<Vec<Outgoing>, IngestError> {
     let series = recording.series.iter().map(from_series);
     let channels = recording.channels.iter().map(from_channel);
-    let topics: Vec<_> = series.chain(channels).collect();
+    let said = said.iter().map(from_said);
+    let topics: Vec<_> = series.chain(channels).chain(said).collect();
     let times = topics
         .iter()
-        .flat_map(|(_, rows)| rows.iter().map(|row| row.time));
+        .flat_map(|(_, rows)| rows.iter().map(|(time, _)| *time));
     let first = times.min().unwrap_or(Timestamp::UNIX_EPOCH);
     let (base, time_base) = if first < Timestamp::UNIX_EPOCH {
         (first, format!("{SINCE}{first}"))
@@ -78,7 +117,19 @@ fn outgoing(recording: &Recording) -> Result<Vec<Outgoing>, IngestError> {
         .collect()
 }
 
-fn from_series(series: &Series) -> (Outgoing, Vec<Reading>) {
+fn from_said(said: &SaidTopic) -> (Outgoing, Vec<(Timestamp, Row)>) {
+    let topic = Outgoing {
+        name: said.name.clone(),
+        schema: said.schema.clone(),
+        unit: None,
+        metadata: BTreeMap::new(),
+        rows: Vec::new(),
+    };
+    let row = |(time, value): &(Timestamp, Value)| (*time, Row::Said(value.clone()));
+    (topic, said.messages.iter().map(row).collect())
+}
+
+fn from_series(series: &Series) -> (Outgoing, Vec<(Timestamp, Row)>) {
     let mut metadata = BTreeMap::new();
     if let Some(span) = series.averaging {
         let seconds = if span.subsec_nanos() == 0 {
@@ -89,46 +140,52 @@ fn from_series(series: &Series) -> (Outgoing, Vec<Reading>) {
         metadata.insert(AVERAGING.to_owned(), seconds);
     }
     let topic = Outgoing {
-        topic: Topic::Benchmark(series.benchmark.clone(), series.quantity()),
+        name: Topic::Benchmark(series.benchmark.clone(), series.quantity()).name(),
+        schema: ("slipwatch.Reading", READING_SCHEMA.to_owned()),
         unit: Some(series.unit.to_string()),
         metadata,
         rows: Vec::new(),
     };
-    (topic, series.readings.clone())
+    let row = |reading: &Reading| (reading.time, Row::Measured(*reading));
+    (topic, series.readings.iter().map(row).collect())
 }
 
-fn from_channel(channel: &Channel) -> (Outgoing, Vec<Reading>) {
+fn from_channel(channel: &Channel) -> (Outgoing, Vec<(Timestamp, Row)>) {
     let topic = Outgoing {
-        topic: Topic::Channel(channel.name.clone()),
+        name: Topic::Channel(channel.name.clone()).name(),
+        schema: ("slipwatch.Sample", SAMPLE_SCHEMA.to_owned()),
         unit: channel.unit.clone(),
         metadata: BTreeMap::new(),
         rows: Vec::new(),
     };
-    let as_reading = |sample: &crate::reading::Sample| Reading {
-        time: sample.time,
-        value: sample.value,
-        sigma: None,
+    let row = |sample: &Sample| {
+        let reading = Reading {
+            time: sample.time,
+            value: sample.value,
+            sigma: None,
+        };
+        (sample.time, Row::Measured(reading))
     };
-    (topic, channel.samples.iter().map(as_reading).collect())
+    (topic, channel.samples.iter().map(row).collect())
 }
 
 fn timed(
     topic: &Outgoing,
-    rows: Vec<Reading>,
+    rows: Vec<(Timestamp, Row)>,
     base: Timestamp,
-) -> Result<Vec<(u64, Reading)>, IngestError> {
+) -> Result<Vec<(u64, Row)>, IngestError> {
     let fail = |problem, expected| IngestError::Unwritable {
-        name: topic.topic.name(),
+        name: topic.name.clone(),
         problem,
         expected,
     };
     rows.into_iter()
-        .map(|row| {
-            if !row.is_sound() {
+        .map(|(time, row)| {
+            if matches!(&row, Row::Measured(reading) if !reading.is_sound()) {
                 let expected = "finite values, and standard errors above zero";
                 return Err(fail("a value that is not finite", expected));
             }
-            let nanoseconds = row.time.as_nanosecond() - base.as_nanosecond();
+            let nanoseconds = time.as_nanosecond() - base.as_nanosecond();
             u64::try_from(nanoseconds)
                 .map(|time| (time, row))
                 .map_err(|_| fail("a time too late for MCAP", "less than 584 years in all"))
@@ -169,12 +226,14 @@ fn encode(
     order.sort_unstable();
     for (time, which, row) in order {
         let one = &outgoing[which];
-        let reading = one.rows[row].1;
-        let payload = Payload {
-            time: reading.time,
-            value: reading.value,
-            unit: one.unit.as_deref(),
-            sigma: reading.sigma,
+        let json = match &one.rows[row].1 {
+            Row::Said(value) => serde_json::to_vec(value),
+            Row::Measured(reading) => serde_json::to_vec(&Payload {
+                time: reading.time,
+                value: reading.value,
+                unit: one.unit.as_deref(),
+                sigma: reading.sigma,
+            }),
         };
         let header = MessageHeader {
             channel_id: ids[which],
@@ -182,8 +241,7 @@ fn encode(
             log_time: time,
             publish_time: time,
         };
-        let json = serde_json::to_vec(&payload).map_err(io::Error::from)?;
-        writer.write_to_known_channel(&header, &json)?;
+        writer.write_to_known_channel(&header, &json.map_err(io::Error::from)?)?;
     }
     writer.finish()?;
     writer.into_inner().flush()?;
@@ -191,10 +249,7 @@ fn encode(
 }
 
 fn declare<W: Write + Seek>(writer: &mut Writer<W>, one: &Outgoing) -> Result<u16, McapError> {
-    let (name, schema) = match one.topic {
-        Topic::Benchmark(..) => ("slipwatch.Reading", READING_SCHEMA),
-        Topic::Channel(_) => ("slipwatch.Sample", SAMPLE_SCHEMA),
-    };
+    let (name, schema) = &one.schema;
     let schema = writer.add_schema(name, "jsonschema", schema.as_bytes())?;
-    writer.add_channel(schema, &one.topic.name(), "json", &one.metadata)
+    writer.add_channel(schema, &one.name, "json", &one.metadata)
 }

@@ -68,7 +68,17 @@ impl Topic {
     }
 }
 
-fn escape(name: &str) -> String {
+/// Whether a topic is one that a replay writes beside its readings: what was said of them.
+pub(super) fn is_said(topic: &str) -> bool {
+    let of_a_benchmark = topic.starts_with("/benchmarks/")
+        && ["/fit", "/forecast", "/level"]
+            .iter()
+            .any(|end| topic.ends_with(end));
+    of_a_benchmark || ["/alerts", "/log", "/site/level"].contains(&topic)
+}
+
+/// The name as a topic has it.
+pub(in crate::runtime) fn escape(name: &str) -> String {
     let one = |byte: u8| {
         if byte.is_ascii_alphanumeric() || b"-_.~".contains(&byte) {
             char::from(byte).to_string()

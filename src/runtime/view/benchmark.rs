@@ -187,7 +187,7 @@ impl Desk {
         let course = all
             .readings
             .first()
-            .map(|first| levels_in(&alerts, &id, (first.time, moment)));
+            .map(|first| levels_in(&alerts, Some(&id), (first.time, moment)));
         let (levels, unknown) = course.unwrap_or_default();
         alerts.reverse();
         alerts.truncate(MOST_EVENTS);
