@@ -94,7 +94,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         let is_seen = io::stdout().is_terminal();
         let bar = (!is_seen).then(|| BarInTime::of(&recording, args.until));
         let mut print = |event: &Event| {
-            bar.iter().for_each(|bar| bar.moved(event.time));
+            if let Some(bar) = &bar {
+                bar.moved(event.time);
+            }
             printer.print(event)
         };
         anyhow::Ok(replay::replay(&recording, &plan, shutdown, &mut print).await?)

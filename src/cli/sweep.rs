@@ -44,7 +44,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     };
     let bar = bar::shared();
     let report = sweep_showing(series, &options, &steps, &mut |share| {
-        bar::share(&bar, share)
+        bar::share(&bar, share);
     });
     bar.finish_and_clear();
     args.output.print(&report, text)

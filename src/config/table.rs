@@ -104,8 +104,9 @@ impl<'t> Section<'t> {
     /// A string that must be there and not be empty.
     pub(super) fn required(&mut self, key: &'static str, example: &str) -> Option<Placed<String>> {
         self.ask(key, Shape::Text);
-        let asked = self.asked.iter_mut().find(|known| known.name == key);
-        asked.into_iter().for_each(|known| known.is_required = true);
+        if let Some(asked) = self.asked.iter_mut().find(|known| known.name == key) {
+            asked.is_required = true;
+        }
         if !self.has(key) {
             self.error(
                 &self.at,

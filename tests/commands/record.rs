@@ -77,7 +77,7 @@ fn by_the_official_reader(file: &Path) -> BTreeMap<String, Topic> {
     for line in lines.lines() {
         let (topic, schema, text, time, message): (String, String, Value, u64, Value) =
             serde_json::from_str(line).unwrap();
-        let topic = topics.entry(topic).or_insert(Topic {
+        let topic = topics.entry(topic).or_insert_with(|| Topic {
             schema,
             text,
             messages: Vec::new(),
@@ -93,7 +93,7 @@ fn by_the_official_reader(file: &Path) -> BTreeMap<String, Topic> {
     ignore = "python3 with mcap was not found by build.rs"
 )]
 fn the_official_reader_finds_readings_fits_forecasts_levels_and_alerts_as_their_schemas_say() {
-    let (_folder, file, events) = recorded();
+    let (_folder, file, _) = recorded();
     let topics = by_the_official_reader(&file);
     let schemas: Vec<(&str, &str)> = topics
         .iter()
@@ -110,7 +110,11 @@ fn the_official_reader_finds_readings_fits_forecasts_levels_and_alerts_as_their_
             ("/log", "foxglove.Log"),
         ]
     );
-    for (name, topic) in &topics {
+    each_message_is_as_its_schema_says(&topics);
+}
+
+fn each_message_is_as_its_schema_says(topics: &BTreeMap<String, Topic>) {
+    for (name, topic) in topics {
         let mut closed = topic.text.clone();
         closed["additionalProperties"] = false.into();
         let validator = jsonschema::options()
@@ -125,6 +129,16 @@ fn the_official_reader_finds_readings_fits_forecasts_levels_and_alerts_as_their_
             assert!(wrong.is_empty(), "{name}: {wrong:?}\n{message}");
         }
     }
+}
+
+#[test]
+#[cfg_attr(
+    not(has_python_mcap),
+    ignore = "python3 with mcap was not found by build.rs"
+)]
+fn what_is_recorded_is_what_was_said() {
+    let (_folder, file, events) = recorded();
+    let topics = by_the_official_reader(&file);
     let events: Vec<Value> = events
         .lines()
         .map(|line| serde_json::from_str(line).unwrap())
@@ -181,10 +195,16 @@ fn strings<'a>(value: &'a Value, key: &str, found: &mut Vec<&'a str>) {
     match value {
         Value::Object(members) => {
             found.extend(members.get(key).and_then(Value::as_str));
-            members.values().for_each(|one| strings(one, key, found));
+            for one in members.values() {
+                strings(one, key, found);
+            }
         }
-        Value::Array(items) => items.iter().for_each(|one| strings(one, key, found)),
-        _ => {}
+        Value::Array(items) => {
+            for one in items {
+                strings(one, key, found);
+            }
+        }
+        Value::Null | Value::Bool(_) | Value::Number(_) | Value::String(_) => {}
     }
 }
 
@@ -223,4 +243,50 @@ fn all_that_the_layout_shows_is_in_the_recorded_file() {
         .collect();
     known.sort_unstable();
     assert_eq!(shown, known);
+}
+
+#[test]
+fn what_a_daemon_took_in_can_be_recorded_beside_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let readings = (1..=31).map(|day| {
+        let slip = f64::from(day * day) * 0.5;
+        format!("2020-01-{day:02}T00:00:00Z,{slip},{}\n", day % 4)
+    });
+    let text = "time,displacement_mm,rain_mm\n".to_owned() + &readings.collect::<String>();
+    std::fs::write(folder.path().join("upper.csv"), text).unwrap();
+    let config = "[site]\nname = \"Toc\"\nstate_dir = \"state\"\n\
+                  [[source]]\nid = \"logger\"\nkind = \"csv\"\npath = \"upper.csv\"\n";
+    std::fs::write(folder.path().join("site.toml"), config).unwrap();
+    let slipwatch = |words: &[&str]| {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_slipwatch"));
+        command.current_dir(&folder).args(words);
+        command
+    };
+    let mut daemon = slipwatch(&["run", "site.toml"])
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    let said = |words: &[&str]| {
+        let done = slipwatch(words).output().unwrap();
+        String::from_utf8(done.stdout).unwrap()
+    };
+    let record = [
+        "replay", "--state", "state", "--record", "out.mcap", "--format", "json",
+    ];
+    let mut events = String::new();
+    for _ in 0..1200 {
+        events = said(&record);
+        if events.contains("\"readings\":31") {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(50));
+    }
+    daemon.kill().unwrap();
+    daemon.wait().unwrap();
+    assert!(events.contains("\"readings\":31"), "{events}");
+    let as_csv = |file: &str| {
+        said(&["convert", file, "copy.csv"]);
+        std::fs::read_to_string(folder.path().join("copy.csv")).unwrap()
+    };
+    assert_eq!(as_csv("out.mcap"), as_csv("upper.csv"));
 }

@@ -53,14 +53,16 @@ fn references_beside_properties(schema: &Value, found: &mut BTreeSet<String>) {
             {
                 found.insert(reference.rsplit('/').next().unwrap().to_owned());
             }
-            members
-                .values()
-                .for_each(|one| references_beside_properties(one, found));
+            for one in members.values() {
+                references_beside_properties(one, found);
+            }
         }
-        Value::Array(items) => items
-            .iter()
-            .for_each(|one| references_beside_properties(one, found)),
-        _ => {}
+        Value::Array(items) => {
+            for one in items {
+                references_beside_properties(one, found);
+            }
+        }
+        Value::Null | Value::Bool(_) | Value::Number(_) | Value::String(_) => {}
     }
 }
 
@@ -148,10 +150,16 @@ fn without_words(schema: &Value, bare: &mut Vec<String>) {
                     }
                 }
             }
-            members.values().for_each(|one| without_words(one, bare));
+            for one in members.values() {
+                without_words(one, bare);
+            }
         }
-        Value::Array(items) => items.iter().for_each(|one| without_words(one, bare)),
-        _ => {}
+        Value::Array(items) => {
+            for one in items {
+                without_words(one, bare);
+            }
+        }
+        Value::Null | Value::Bool(_) | Value::Number(_) | Value::String(_) => {}
     }
 }
 
@@ -277,6 +285,9 @@ fn the_schema_of_the_config_takes_what_the_reader_takes() {
     let mut wrong = right.clone();
     wrong["site"]["listen"] = json!(8642);
     assert!(!config.is_valid(&wrong));
+    let mut wrong = right.clone();
+    wrong.as_object_mut().unwrap().remove("site");
+    assert!(!config.is_valid(&wrong));
     let mut wrong = right;
     wrong["site"].as_object_mut().unwrap().remove("name");
     assert!(!config.is_valid(&wrong));
@@ -374,11 +385,11 @@ fn asked(address: SocketAddr, head: &str, body: &str) -> Option<(u16, String)> {
 
 /// A site with an alert, a hook that keeps what it gets, and a page.
 fn watched_site(folder: &Path) -> (PathBuf, SocketAddr) {
-    let mut readings = "time,displacement_mm,rain_mm\n".to_owned();
-    for day in 1..=30 {
+    let rows = (1..=30).map(|day| {
         let slip = f64::from(day * day) * 0.5;
-        readings += &format!("2020-01-{day:02}T00:00:00Z,{slip},{}\n", day % 4);
-    }
+        format!("2020-01-{day:02}T00:00:00Z,{slip},{}\n", day % 4)
+    });
+    let readings = "time,displacement_mm,rain_mm\n".to_owned() + &rows.collect::<String>();
     std::fs::write(folder.join("logger.csv"), readings).unwrap();
     std::fs::write(folder.join("token"), TOKEN).unwrap();
     let free = TcpListener::bind("127.0.0.1:0").unwrap();

@@ -27,7 +27,15 @@ pub(super) fn schema() -> anyhow::Result<(Value, Map<String, Value>)> {
 fn table(name: &str, keys: &Keys, notes: &[Note]) -> anyhow::Result<Value> {
     let known = keys.tables.get(name);
     let known = known.with_context(|| format!("the example has no table {name}"))?;
-    let required = known.iter().filter(|key| key.is_required);
+    // Without a table the keys that it must have are missing too.
+    let must_have = |table: &str| {
+        let keys = keys.tables.get(table).into_iter().flatten();
+        keys.copied().any(|key| key.is_required)
+    };
+    let is_required = |key: &&Key| {
+        key.is_required || matches!(key.shape, Shape::Table(table) if must_have(table))
+    };
+    let required = known.iter().filter(is_required);
     let required: Vec<&str> = required.map(|key| key.name).collect();
     let properties = known
         .iter()

@@ -68,23 +68,20 @@ fn write(folder: &Path) -> anyhow::Result<()> {
 
 /// The schema of that name, as a file.
 fn text(name: &str) -> anyhow::Result<String> {
-    let schema = match OUTPUTS.iter().find(|output| output.name == name) {
-        Some(output) => {
-            let settings = SchemaSettings::draft2020_12();
-            let settings = if output.is_taken {
-                settings.for_deserialize()
-            } else {
-                settings.for_serialize()
-            };
-            let mut generator = settings.into_generator();
-            let schema = (output.schema)(&mut generator);
-            let definitions = generator.take_definitions(true);
-            titled((output.name, output.says), schema.to_value(), definitions)
-        }
-        None => {
-            let (schema, definitions) = config::schema()?;
-            titled(CONFIG, schema, definitions)
-        }
+    let schema = if let Some(output) = OUTPUTS.iter().find(|output| output.name == name) {
+        let settings = SchemaSettings::draft2020_12();
+        let settings = if output.is_taken {
+            settings.for_deserialize()
+        } else {
+            settings.for_serialize()
+        };
+        let mut generator = settings.into_generator();
+        let schema = (output.schema)(&mut generator);
+        let definitions = generator.take_definitions(true);
+        titled((output.name, output.says), schema.to_value(), definitions)
+    } else {
+        let (schema, definitions) = config::schema()?;
+        titled(CONFIG, schema, definitions)
     };
     Ok(serde_json::to_string_pretty(&schema)? + "\n")
 }

@@ -9,9 +9,10 @@ pub(super) fn plain(schema: &mut Value) {
         Value::Object(members) => {
             members.shift_remove("default");
             for (key, value) in members {
-                match value {
-                    Value::String(text) if key == "description" => *text = reworded(text),
-                    _ => plain(value),
+                if let (Value::String(text), "description") = (&mut *value, key.as_str()) {
+                    *text = reworded(text);
+                } else {
+                    plain(value);
                 }
             }
         }
