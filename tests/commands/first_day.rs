@@ -382,11 +382,10 @@ fn the_readme_says_of_which_commands_the_output_has_a_format() {
     let office = Office::with(&[]);
     let readme = Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md");
     let readme = fs::read_to_string(readme).unwrap();
-    let without = ["demo", "plot", "completions", "man"];
-    assert!(
-        readme
-            .contains("All but `demo`, `plot`, `completions` and `man` take `--format text|json`")
-    );
+    let without = ["demo", "plot", "schema", "completions", "man"];
+    let said =
+        "All but `demo`, `plot`, `schema`, `completions` and `man` take `--format text|json`";
+    assert!(readme.contains(said));
     let all = [
         "demo",
         "init",
@@ -406,6 +405,7 @@ fn the_readme_says_of_which_commands_the_output_has_a_format() {
         "simulate",
         "convert",
         "hook test",
+        "schema",
         "completions",
         "man",
     ];
