@@ -150,6 +150,7 @@ fn what(kind: &EventKind) -> String {
             order,
             until,
             given,
+            ..
         } => ordered(order, *until, given),
         EventKind::Summary(Summary {
             readings,

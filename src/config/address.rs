@@ -4,8 +4,13 @@ use super::table::{Placed, Section};
 
 /// The address in `url`.
 pub(super) fn of(section: &Section<'_>, url: &Placed<String>) -> Option<hyper::Uri> {
+    of_key(section, "url", url)
+}
+
+/// The address under `key`.
+pub(super) fn of_key(section: &Section<'_>, key: &str, url: &Placed<String>) -> Option<hyper::Uri> {
     let refuse = |why: &str, fix: &str| {
-        let what = format!("{} = {:?} {why}", section.path("url"), url.value);
+        let what = format!("{} = {:?} {why}", section.path(key), url.value);
         section.error(&url.at, what, fix);
         None
     };

@@ -96,6 +96,7 @@ impl Common {
             site: self.site,
             timeout: self.timeout,
             escalate_after: self.escalate_after,
+            links: None,
             folder: base.to_owned(),
             sandbox: false,
             writable: Vec::new(),

@@ -7,6 +7,7 @@ mod check;
 mod declared;
 mod heartbeat;
 mod hook;
+mod link;
 mod pattern;
 mod problem;
 mod rule;
@@ -21,6 +22,7 @@ mod vector;
 pub use broker::{Broker, BrokerAddress};
 pub use check::{Summary, check};
 pub use heartbeat::Heartbeat;
+pub use link::Links;
 pub use pattern::FilePattern;
 pub use problem::{ConfigError, Problem, Severity};
 pub use secret::{Secret, SecretError};
@@ -76,6 +78,8 @@ pub struct SiteConfig {
     /// The file with the secret that whoever asks must know; never absent where others than this
     /// machine can reach `listen`.
     pub token_file: Option<PathBuf>,
+    /// By which links in the messages alerts are acknowledged; `None`: by none.
+    pub links: Option<Links>,
     /// The zone that people there live in.
     pub time_zone: jiff::tz::TimeZone,
     /// Data time for which every refit is kept; of older ones the first of each UTC day and benchmark is.
@@ -210,6 +214,8 @@ pub struct HookConfig {
     pub site: bool,
     /// It is notified only of what nobody has acknowledged within this time; `None`: of everything, at once.
     pub escalate_after: Option<Duration>,
+    /// By which links its alerts are acknowledged; `None`: by none.
+    pub links: Option<Links>,
     /// After this it is killed.
     pub timeout: Duration,
     /// Where it runs: the config's folder.

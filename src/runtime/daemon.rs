@@ -452,10 +452,11 @@ impl Daemon {
         };
         if fresh.site.state_dir != self.config.site.state_dir
             || fresh.site.listen != self.config.site.listen
+            || fresh.site.links != self.config.site.links
             || fresh.heartbeats != self.config.heartbeats
         {
             tracing::error!(
-                "the config is not taken: another state_dir, listen or heartbeat needs a restart"
+                "the config is not taken: another state_dir, listen, public_url, acknowledge_within or heartbeat needs a restart"
             );
             return Ok(());
         }

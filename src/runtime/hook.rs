@@ -117,7 +117,7 @@ impl Alert {
         matches!(&self.event.kind, EventKind::Alert { rule, .. } if rule == CLOCK_FAULT)
     }
 
-    fn variables(&self, attempt: u32) -> [(&'static str, String); 10] {
+    fn variables(&self, attempt: u32, link: Option<&str>) -> [(&'static str, String); 11] {
         let benchmark = self.event.benchmark.as_ref();
         let optional_time = self.failure_time.map(|time| time.to_string());
         [
@@ -134,10 +134,19 @@ impl Alert {
             ("SLIPWATCH_FAILURE_TIME", optional_time.unwrap_or_default()),
             ("SLIPWATCH_ATTEMPT", attempt.to_string()),
             ("SLIPWATCH_STATUS", self.status.name().to_owned()),
+            (
+                "SLIPWATCH_ACKNOWLEDGE_URL",
+                link.unwrap_or_default().to_owned(),
+            ),
         ]
     }
 
-    pub(super) fn body(&self, attempt: u32) -> Result<Vec<u8>, serde_json::Error> {
+    /// What a hook gets on stdin; `link`: by which it is acknowledged.
+    pub(super) fn body(
+        &self,
+        attempt: u32,
+        link: Option<&str>,
+    ) -> Result<Vec<u8>, serde_json::Error> {
         #[derive(Serialize)]
         struct Body<'a> {
             #[serde(flatten)]
@@ -146,6 +155,7 @@ impl Alert {
             failure_time: Option<Timestamp>,
             status: Status,
             recommended: Option<&'static str>,
+            acknowledge_url: Option<&'a str>,
             attempt: u32,
             schema_version: u32,
         }
@@ -155,6 +165,7 @@ impl Alert {
             failure_time: self.failure_time,
             status: self.status,
             recommended: (self.state == AlertState::Firing).then(|| self.level.recommended()),
+            acknowledge_url: link,
             attempt,
             schema_version: 1,
         })?;
@@ -189,13 +200,17 @@ pub enum Outcome {
 }
 
 /// Runs the program of `hook` for `alert`; `attempt` counts from 1.
-pub(super) async fn run_program(hook: &HookConfig, alert: &Alert, attempt: u32) -> Outcome {
+pub(super) async fn run_program(
+    hook: &HookConfig,
+    alert: &Alert,
+    (attempt, link): (u32, Option<&str>),
+) -> Outcome {
     let run = run_name();
-    let mut child = match start(hook, alert, (attempt, &run)) {
+    let mut child = match start(hook, &alert.variables(attempt, link), &run) {
         Ok(child) => child,
         Err(reason) => return Outcome::NotStarted(reason),
     };
-    let body = match alert.body(attempt) {
+    let body = match alert.body(attempt, link) {
         Ok(body) => body,
         Err(error) => return Outcome::NotStarted(error.to_string()),
     };
@@ -264,7 +279,7 @@ fn kill_all_of(run: &str) {
     }
 }
 
-fn start(hook: &HookConfig, alert: &Alert, (attempt, run): (u32, &str)) -> Result<Child, String> {
+fn start(hook: &HookConfig, variables: &[(&str, String)], run: &str) -> Result<Child, String> {
     let program = hook.program();
     let mut command = sandbox::command(hook);
     command
@@ -282,8 +297,8 @@ fn start(hook: &HookConfig, alert: &Alert, (attempt, run): (u32, &str)) -> Resul
             command.env(name, value);
         }
     }
-    for (name, value) in alert.variables(attempt) {
-        command.env(name, capped(&value));
+    for (name, value) in variables {
+        command.env(name, capped(value));
     }
     command.env(RUN, run);
     command

@@ -14,6 +14,7 @@ pub mod hook;
 mod http;
 mod in_hand;
 pub mod ingest;
+mod link;
 pub mod log;
 pub mod mqtt;
 pub mod origin;

@@ -4,6 +4,7 @@ use super::clock;
 use super::daemon::{DRAIN_LIMIT, Daemon, dispatcher};
 use super::heartbeat;
 use super::hook::Status;
+use super::link;
 use super::progress::Progress;
 use super::pulse::{Pulse, PulseError};
 use super::serve::Behind;
@@ -57,6 +58,7 @@ pub async fn run(
     if let Err(error) = shutdown::survive_the_file_limit() {
         tracing::warn!(%error, "a limit on the length of files would end this process");
     }
+    make_secret(config);
     let behind = Behind {
         archive: Some(Arc::new(super::archive::Events::of(Arc::clone(&store)))),
         desk: desk(config),
@@ -95,6 +97,15 @@ pub async fn run(
     worked.and(closed.map(drop)).map_err(fail)?;
     followed?;
     Ok(counts)
+}
+
+/// Alerts go out in any case, then without a link.
+fn make_secret(config: &Config) {
+    if let Some(links) = &config.site.links
+        && let Err(error) = link::make_secret(&links.secret_file)
+    {
+        tracing::error!(%error, "no message will have a link to acknowledge it by");
+    }
 }
 
 /// What the page asks, where the site listens. A page that cannot be shown is no reason not to watch.

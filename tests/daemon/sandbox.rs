@@ -47,6 +47,7 @@ fn folder_outside_tmp() -> Option<TempDir> {
 
 fn walled(folder: &Path, run: &[&str]) -> HookConfig {
     HookConfig {
+        links: None,
         site: false,
         webhook: None,
         cap: None,

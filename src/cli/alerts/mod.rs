@@ -123,7 +123,12 @@ pub(super) fn run(args: &AlertsArgs) -> anyhow::Result<()> {
             site,
         } => {
             let (benchmark, given) = (benchmark.as_ref().map(BenchmarkId::new), given.given());
-            (site, Order::Acknowledge { benchmark, given })
+            let order = Order::Acknowledge {
+                benchmark,
+                alert: None,
+                given,
+            };
+            (site, order)
         }
         Action::Shelve {
             benchmark,

@@ -2,7 +2,7 @@
 
 use crate::config::{HookConfig, WebhookFormat};
 use crate::runtime::hook::{self, Alert, Outcome};
-use crate::runtime::{alertmanager, cap, webhook};
+use crate::runtime::{alertmanager, cap, link, webhook};
 use std::fmt::Debug;
 use std::pin::Pin;
 use std::sync::Arc;
@@ -39,12 +39,13 @@ pub async fn run(hook: &HookConfig, alert: &Alert, attempt: u32) -> Outcome {
         tracing::info!(hook = name, key, attempt, ?outcome, "CAP message ended");
         return outcome;
     }
+    let link = link::of(hook, alert).await;
     let Some(to) = &hook.webhook else {
-        return hook::run_program(hook, alert, attempt).await;
+        return hook::run_program(hook, alert, (attempt, link.as_deref())).await;
     };
     let body = match to.format {
-        WebhookFormat::Slipwatch => alert.body(attempt),
-        WebhookFormat::Alertmanager => alertmanager::body(alert),
+        WebhookFormat::Slipwatch => alert.body(attempt, link.as_deref()),
+        WebhookFormat::Alertmanager => alertmanager::body(alert, link.as_deref()),
     };
     let outcome = match body {
         Ok(body) => webhook::send(to, alert, (body, hook.timeout)).await,

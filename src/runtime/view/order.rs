@@ -9,7 +9,7 @@ use jiff::SignedDuration;
 use serde::Deserialize;
 
 /// Longest name of whoever gives an order, bytes.
-const LONGEST_NAME: usize = 100;
+pub(super) const LONGEST_NAME: usize = 100;
 /// Longest reason, bytes.
 const LONGEST_REASON: usize = 500;
 
@@ -90,7 +90,11 @@ impl Desk {
             }
         };
         Ok(match (asked.order.as_str(), benchmark) {
-            ("acknowledge", benchmark) => Order::Acknowledge { benchmark, given },
+            ("acknowledge", benchmark) => Order::Acknowledge {
+                benchmark,
+                alert: None,
+                given,
+            },
             ("unsilence", benchmark) => Order::Unsilence { benchmark, given },
             ("silence", benchmark) => {
                 let until = until(Order::LONGEST_SILENCE)?;
