@@ -82,6 +82,7 @@ struct Common {
     site: bool,
     timeout: Duration,
     escalate_after: Option<Duration>,
+    drills: bool,
 }
 
 impl Common {
@@ -96,6 +97,7 @@ impl Common {
             site: self.site,
             timeout: self.timeout,
             escalate_after: self.escalate_after,
+            drills: self.drills,
             links: None,
             folder: base.to_owned(),
             sandbox: false,
@@ -128,6 +130,7 @@ fn common(section: &mut Section<'_>) -> Common {
             .map(|word| BenchmarkId::new(word.value))
             .collect(),
         site: section.switch("site").unwrap_or(false),
+        drills: section.switch("drills").unwrap_or(false),
         timeout: timeout.map_or(TIMEOUT, |given| given.value.unsigned_abs()),
         escalate_after: escalate_after.map(|given| given.value.unsigned_abs()),
     }

@@ -5,6 +5,7 @@ mod alert;
 mod broker;
 mod check;
 mod declared;
+mod drill;
 mod heartbeat;
 mod hook;
 mod link;
@@ -21,6 +22,7 @@ mod vector;
 
 pub use broker::{Broker, BrokerAddress};
 pub use check::{Summary, check};
+pub use drill::{Drill, EXERCISE};
 pub use heartbeat::Heartbeat;
 pub use link::Links;
 pub use pattern::FilePattern;
@@ -62,6 +64,8 @@ pub struct Config {
     pub hooks: Vec<HookConfig>,
     /// `[[heartbeat]]`.
     pub heartbeats: Vec<Heartbeat>,
+    /// `[drill]`.
+    pub drill: Option<Drill>,
     /// What is doubtful, but not refused.
     pub warnings: Vec<Problem>,
 }
@@ -214,6 +218,8 @@ pub struct HookConfig {
     pub site: bool,
     /// It is notified only of what nobody has acknowledged within this time; `None`: of everything, at once.
     pub escalate_after: Option<Duration>,
+    /// Whether drills reach it.
+    pub drills: bool,
     /// By which links its alerts are acknowledged; `None`: by none.
     pub links: Option<Links>,
     /// After this it is killed.

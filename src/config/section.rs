@@ -2,7 +2,8 @@
 
 use super::table::{Placed, Section, unique};
 use super::{
-    Benchmark, Config, SiteConfig, alert, declared, heartbeat, hook, link, source, value, vector,
+    Benchmark, Config, SiteConfig, alert, declared, drill, heartbeat, hook, link, source, value,
+    vector,
 };
 use crate::alert::Policy;
 use crate::monitor::{Explain, Settings, SiteLevel, Watched};
@@ -33,10 +34,11 @@ pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
     let watched = watched(&known, &benchmarks);
     let mut hooks = hook::hooks(root, base);
     let links = site.as_ref().and_then(|site| site.links.as_ref());
-    hooks
-        .iter_mut()
-        .for_each(|hook| hook.links = links.cloned());
+    for hook in &mut hooks {
+        hook.links = links.cloned();
+    }
     let heartbeats = heartbeat::heartbeats(root, base);
+    let drill = drill::drill(root, &hooks, &benchmarks);
     Some(Config {
         file: file.to_owned(),
         site: site?,
@@ -54,6 +56,7 @@ pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
         },
         hooks,
         heartbeats,
+        drill,
         warnings: Vec::new(),
     })
 }

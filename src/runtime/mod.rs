@@ -2,12 +2,14 @@
 
 mod alertmanager;
 mod archive;
+mod beside;
 mod cap;
 pub mod clock;
 pub mod daemon;
 pub mod deliver;
 pub mod delivered;
 pub mod doctor;
+pub mod drill;
 pub mod exhibit;
 mod heartbeat;
 pub mod hook;

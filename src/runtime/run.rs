@@ -1,8 +1,8 @@
 //! The daemon: files to the monitor, everything to the state folder, alerts to the hooks.
 
+use super::beside::Beside;
 use super::clock;
 use super::daemon::{DRAIN_LIMIT, Daemon, dispatcher};
-use super::heartbeat;
 use super::hook::Status;
 use super::link;
 use super::progress::Progress;
@@ -76,19 +76,23 @@ pub async fn run(
     for (source, count) in store.quarantined().map_err(fail)? {
         pulse.vitals.quarantined(&source, count);
     }
-    let mut heartbeats = heartbeat::start(&config.heartbeats, &pulse.vitals, &shutdown);
+    let beside = Beside::start(config, &store, (&pulse.vitals, &shutdown));
     let sources = Sources::start(config, &store).map_err(fail)?;
     let mut daemon = Daemon::new(config, store, site, (sources, pulse), clock::now);
+    daemon.beside = Some(beside);
     tracing::info!(site = name, state = %config.site.state_dir.display(), "started");
     let worked = daemon.work(shutdown, progress).await;
     let Daemon {
         site,
         sources,
         pulse,
+        beside,
         ..
     } = daemon;
     sources.stop();
-    heartbeats.shutdown().await;
+    if let Some(beside) = beside {
+        beside.stop().await;
+    }
     pulse.stop().await;
     let counts = site.counts();
     let closed = site.close(clock::now(), DRAIN_LIMIT).await;

@@ -48,6 +48,7 @@ fn hook(script: &str) -> (TempDir, HookConfig) {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("hook.sh"), script).unwrap();
     let config = HookConfig {
+        drills: false,
         links: None,
         site: false,
         webhook: None,

@@ -47,6 +47,7 @@ fn folder_outside_tmp() -> Option<TempDir> {
 
 fn walled(folder: &Path, run: &[&str]) -> HookConfig {
     HookConfig {
+        drills: false,
         links: None,
         site: false,
         webhook: None,

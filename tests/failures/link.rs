@@ -140,6 +140,7 @@ fn the_link_in_a_message_acknowledges_its_alert_once_and_only_when_its_button_is
     eventually("that it is called off", || {
         standing(&site) == "acknowledged"
     });
+    eventually("that it stands in the log", || orders(&site).len() == 1);
     for again in [
         post(&address, &path, (OURS, "by=Bert")),
         get(&address, &path),

@@ -31,6 +31,7 @@
 //! | 29 | much of it at once, for ten thousand hours | tests/hostile_hours |
 //! | 30 | a first start on history; a row and its correction, read again | `past`; tests/library/first_start.rs |
 //! | 31 | links in messages that are followed, forged, used again | `link` |
+//! | 32 | an alert's whole way breaks without anybody seeing it | `drill` |
 //!
 //! docs/failure-modes.md says the same for operators.
 //!
@@ -53,6 +54,7 @@
 mod crowd;
 mod database;
 mod disk;
+mod drill;
 mod escalation;
 mod feeds;
 mod files;

@@ -201,6 +201,7 @@ fn sample_hook(folder: &Path) -> anyhow::Result<HookConfig> {
         .and_then(|()| std::fs::set_permissions(&script, std::fs::Permissions::from_mode(0o755)))
         .with_context(|| format!("cannot write {}", script.display()))?;
     Ok(HookConfig {
+        drills: false,
         links: None,
         site: false,
         webhook: None,

@@ -153,7 +153,15 @@ fn page_of(page: &LinkPage, zone: &TimeZone) -> Shown {
             let text = format!("<p>{}: nothing has happened.</p>", status.name());
             (StatusCode::OK, "The drill is acknowledged", text)
         }
-        LinkPage::Used(_) | LinkPage::Seen(_) | LinkPage::Over(_) => no_longer(page, zone),
+        LinkPage::Used(alert) => {
+            let words = ("This link has been used", "It can be used once.");
+            gone(words, alert.as_deref(), zone)
+        }
+        LinkPage::Seen(alert) => {
+            let words = ("This alert has been acknowledged", "");
+            gone(words, Some(alert), zone)
+        }
+        LinkPage::Over(alert) => over(alert, zone),
         LinkPage::Expired(until) => {
             let until = local(*until, zone);
             let text = format!("<p>It was good until {until}. {UNCHANGED}</p>");
@@ -177,33 +185,20 @@ fn page_of(page: &LinkPage, zone: &TimeZone) -> Shown {
 }
 
 /// What there is no more to acknowledge.
-fn no_longer(page: &LinkPage, zone: &TimeZone) -> Shown {
-    let (title, why, alert) = match page {
-        LinkPage::Seen(alert) => ("This alert has been acknowledged", "", Some(alert)),
-        LinkPage::Over(alert) if alert.state == AlertLife::Superseded => (
-            "This alert is over",
-            "A higher level has taken its place; that has a message of its own.",
-            Some(alert),
-        ),
-        LinkPage::Over(alert) => (
-            "This alert is over",
-            "It has ended. That is no all-clear.",
-            Some(alert),
-        ),
-        _ => (
-            "This link has been used",
-            "It can be used once.",
-            match page {
-                LinkPage::Used(alert) => alert.as_ref(),
-                _ => None,
-            },
-        ),
-    };
-    let mut text = format!("<p>{why} {UNCHANGED}</p>");
-    if let Some(alert) = alert {
-        text += &described(alert, zone);
-    }
+fn gone((title, why): (&'static str, &str), alert: Option<&AlertView>, zone: &TimeZone) -> Shown {
+    let described = alert.map_or_else(String::new, |alert| described(alert, zone));
+    let text = format!("<p>{why} {UNCHANGED}</p>{described}");
     (StatusCode::GONE, title, text)
+}
+
+fn over(alert: &AlertView, zone: &TimeZone) -> Shown {
+    let why = match alert.state {
+        AlertLife::Superseded => {
+            "A higher level has taken its place; that has a message of its own."
+        }
+        AlertLife::Resolved | AlertLife::Firing => "It has ended. That is no all-clear.",
+    };
+    gone(("This alert is over", why), Some(alert), zone)
 }
 
 /// The alert for people, and who has acknowledged it.

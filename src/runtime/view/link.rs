@@ -2,9 +2,9 @@
 
 use super::order::LONGEST_NAME;
 use super::{AlertLife, AlertView, Desk};
-use crate::config::Links;
+use crate::config::{EXERCISE, Links};
 use crate::monitor::{Door, EventKind, Given, Order};
-use crate::reading::Timestamp;
+use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::clock;
 use crate::runtime::hook::Status;
 use crate::runtime::link::{self, AskedLink, SignedLink};
@@ -84,9 +84,9 @@ impl Desk {
     /// # Errors
     /// [`StoreError`].
     pub fn acknowledge(&self, asked: &AskedLink, by: &str) -> Result<LinkPage, StoreError> {
-        let meant = match self.link(asked)? {
-            LinkPage::Open(meant) => meant,
-            closed => return Ok(closed),
+        let found = self.link(asked)?;
+        let LinkPage::Open(meant) = found else {
+            return Ok(found);
         };
         let by = by.trim();
         if by.len() > LONGEST_NAME || by.chars().any(char::is_control) {
@@ -96,19 +96,22 @@ impl Desk {
             return Ok(LinkPage::Forged);
         };
         let now = clock::now();
-        let order = match &meant {
-            Meant::Alert(alert) => Some(Order::Acknowledge {
-                benchmark: alert.benchmark.clone(),
-                alert: Some(alert.key.clone()),
-                given: Given {
-                    by: (!by.is_empty()).then(|| by.to_owned()),
-                    why: None,
-                    door: Some(Door::Link),
-                    given_at: Some(now),
-                },
-            }),
+        let place = match &meant {
+            Meant::Alert(alert) => Some(alert.benchmark.clone()),
+            // The drill, which waits for it, finds it in the site's log.
+            Meant::Drill(Status::Exercise) => Some(Some(BenchmarkId::new(EXERCISE))),
             Meant::Drill(_) => None,
         };
+        let order = place.map(|benchmark| Order::Acknowledge {
+            benchmark,
+            alert: Some(signed.key.clone()),
+            given: Given {
+                by: (!by.is_empty()).then(|| by.to_owned()),
+                why: None,
+                door: Some(Door::Link),
+                given_at: Some(now),
+            },
+        });
         // Other messages of the same alert have links that are good for longer.
         let within = (self.facts.links.as_ref()).map_or(SignedDuration::ZERO, |one| one.within);
         let forgotten = now.saturating_add(within).unwrap_or(signed.until);
@@ -151,11 +154,12 @@ fn name(signed: &SignedLink) -> String {
 impl AlertView {
     /// The newest acknowledgement: when, by the host's clock, and by whom.
     pub fn acknowledged(&self) -> Option<(Option<Timestamp>, Option<&str>)> {
-        self.audit.iter().rev().find_map(|event| match &event.kind {
-            EventKind::Order { order, given, .. } if order == "acknowledge" => {
-                Some((given.given_at, given.by.as_deref()))
-            }
-            _ => None,
+        self.audit.iter().rev().find_map(|event| {
+            let EventKind::Order { order, given, .. } = &event.kind else {
+                return None;
+            };
+            let acknowledged = (given.given_at, given.by.as_deref());
+            (order == "acknowledge").then_some(acknowledged)
         })
     }
 }

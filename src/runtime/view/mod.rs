@@ -46,6 +46,8 @@ pub struct Facts {
     pub positions: BTreeMap<BenchmarkId, Vec<f64>>,
     /// Whether orders are taken: whoever gives one must know a secret.
     pub takes_orders: bool,
+    /// Whether there are drills, which somebody may acknowledge.
+    pub has_drills: bool,
     /// By which links in the messages alerts are acknowledged; `None`: by none.
     pub links: Option<Links>,
     /// What time it is.
@@ -71,6 +73,7 @@ impl Facts {
                 .filter_map(|one| Some((one.id.clone(), one.position.clone()?)))
                 .collect(),
             takes_orders: config.site.token_file.is_some(),
+            has_drills: config.drill.is_some(),
             links: config.site.links.clone(),
             now: Now::Wall,
             collapse: None,
