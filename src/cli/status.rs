@@ -9,7 +9,7 @@ use crate::alert::Level;
 use crate::monitor::{Event, EventKind, SUSPECT, SUSPECT_ENDS};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::clock;
-use crate::runtime::drill::Record;
+use crate::runtime::drilled::Record;
 use crate::runtime::preview::{Preview, preview};
 use crate::runtime::standing::{InForce, acknowledged, closed, every, in_force, orders, silences};
 use crate::store::Store;

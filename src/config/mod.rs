@@ -9,6 +9,7 @@ mod drill;
 mod heartbeat;
 mod hook;
 mod link;
+mod mqtt_out;
 mod pattern;
 mod problem;
 mod rule;
@@ -25,6 +26,7 @@ pub use check::{Summary, check};
 pub use drill::{Drill, EXERCISE};
 pub use heartbeat::Heartbeat;
 pub use link::Links;
+pub use mqtt_out::MqttTopic;
 pub use pattern::FilePattern;
 pub use problem::{ConfigError, Problem, Severity};
 pub use secret::{Secret, SecretError};
@@ -60,7 +62,7 @@ pub struct Config {
     pub benchmarks: Vec<Benchmark>,
     /// `[alert]` and the benchmarks' own, `[explain]` and `[[event]]`, as the monitor takes them.
     pub settings: Settings,
-    /// `[[hook]]`, `[[webhook]]` and `[[cap]]`.
+    /// `[[hook]]`, `[[webhook]]`, `[[cap]]` and `[[mqtt_out]]`.
     pub hooks: Vec<HookConfig>,
     /// `[[heartbeat]]`.
     pub heartbeats: Vec<Heartbeat>,
@@ -201,7 +203,7 @@ pub struct CapFolder {
     pub polygon: Option<String>,
 }
 
-/// `[[hook]]`: a program to run when a level is entered or left; or `[[webhook]]`, or `[[cap]]`.
+/// `[[hook]]`: a program to run when a level is entered or left; or `[[webhook]]`, `[[cap]]` or `[[mqtt_out]]`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct HookConfig {
     /// The program and its arguments; none of a webhook.
@@ -210,6 +212,8 @@ pub struct HookConfig {
     pub webhook: Option<Webhook>,
     /// Where to write messages to instead of running a program.
     pub cap: Option<CapFolder>,
+    /// Where to publish to instead of running a program.
+    pub mqtt: Option<MqttTopic>,
     /// Which levels it is run for.
     pub levels: Vec<Level>,
     /// Of which benchmarks it is notified; none: of all.

@@ -1,7 +1,7 @@
 //! What the daemon knows of its own health; the work loop writes it, whoever asks reads it.
 
 use super::clock::Stopwatch;
-use super::drill::Record;
+use super::drilled::Record;
 use super::site::Mute;
 use crate::alert::Level;
 use crate::monitor::{AlertState, Event, EventKind, Unexplained};

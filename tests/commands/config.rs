@@ -178,6 +178,36 @@ fn a_link_that_nobody_could_follow_is_refused() {
 }
 
 #[test]
+fn a_topic_that_alerts_cannot_be_published_to_is_refused() {
+    for (lines, parts) in [
+        (
+            "url = \"mqtt://a:1\"",
+            ["site.toml:10", "mqtt_out.topic is missing"],
+        ),
+        (
+            "url = \"http://a\"\ntopic = \"a\"",
+            [
+                "site.toml:11:7",
+                "mqtt_out.url = \"http://a\" cannot be used",
+            ],
+        ),
+        (
+            "url = \"mqtt://a:1\"\ntopic = \"a/+\"",
+            ["site.toml:12:9", "without + and #"],
+        ),
+        (
+            "url = \"mqtt://a:1\"\ntopic = \"a\"\nca_file = \"b\"",
+            ["site.toml:13:11", "mqtt_out.ca_file without TLS"],
+        ),
+    ] {
+        let said = problem(&format!("[[mqtt_out]]\n{lines}\n"));
+        for part in parts {
+            assert!(said.contains(part), "{said}");
+        }
+    }
+}
+
+#[test]
 fn a_drill_that_reaches_nobody_or_never_ends_is_refused() {
     let hook = "[[hook]]\nrun = [\"./drilled.sh\"]\ndrills = true\n";
     for (lines, parts) in [
@@ -336,7 +366,7 @@ fn an_unknown_key_is_refused_with_the_known_ones() {
     assert_eq!(
         problem("[allert]\n"),
         "site.toml:10:2: error: unknown key allert; known here: site, source, alert, explain, \
-         benchmark, event, hook, webhook, cap, heartbeat, drill"
+         benchmark, event, hook, webhook, cap, mqtt_out, heartbeat, drill"
     );
 }
 

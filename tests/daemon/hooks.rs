@@ -53,6 +53,7 @@ fn hook(script: &str) -> (TempDir, HookConfig) {
         site: false,
         webhook: None,
         cap: None,
+        mqtt: None,
         escalate_after: None,
         benchmarks: BTreeSet::new(),
         run: vec!["/bin/sh".to_owned(), "hook.sh".to_owned()],

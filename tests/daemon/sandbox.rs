@@ -52,6 +52,7 @@ fn walled(folder: &Path, run: &[&str]) -> HookConfig {
         site: false,
         webhook: None,
         cap: None,
+        mqtt: None,
         escalate_after: None,
         benchmarks: BTreeSet::new(),
         run: run.iter().map(|word| (*word).to_owned()).collect(),

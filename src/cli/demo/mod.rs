@@ -206,6 +206,7 @@ fn sample_hook(folder: &Path) -> anyhow::Result<HookConfig> {
         site: false,
         webhook: None,
         cap: None,
+        mqtt: None,
         escalate_after: None,
         benchmarks: BTreeSet::new(),
         run: vec![script.display().to_string(), WRITTEN.to_owned()],

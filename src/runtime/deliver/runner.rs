@@ -2,7 +2,7 @@
 
 use crate::config::{HookConfig, WebhookFormat};
 use crate::runtime::hook::{self, Alert, Outcome};
-use crate::runtime::{alertmanager, cap, link, webhook};
+use crate::runtime::{alertmanager, cap, link, mqtt, webhook};
 use std::fmt::Debug;
 use std::pin::Pin;
 use std::sync::Arc;
@@ -40,6 +40,15 @@ pub async fn run(hook: &HookConfig, alert: &Alert, attempt: u32) -> Outcome {
         return outcome;
     }
     let link = link::of(hook, alert).await;
+    if let Some(to) = &hook.mqtt {
+        let outcome = match alert.body(attempt, link.as_deref()) {
+            Ok(body) => mqtt::publish(to, body, hook.timeout).await,
+            Err(error) => Outcome::NotStarted(error.to_string()),
+        };
+        let (name, key) = (&to.name, &alert.key);
+        tracing::info!(name, key, attempt, ?outcome, "MQTT message ended");
+        return outcome;
+    }
     let Some(to) = &hook.webhook else {
         return hook::run_program(hook, alert, (attempt, link.as_deref())).await;
     };

@@ -1,7 +1,6 @@
 //! One drill: a site of its own follows a file of its own, in which a made-up slope runs away.
 
 use super::Office;
-use super::record::folder;
 use super::runner::Watched;
 use crate::alert::Level;
 use crate::config::{self, Config, Drill, EXERCISE, HookConfig};
@@ -11,6 +10,7 @@ use crate::runtime::clock::{self, Stopwatch};
 use crate::runtime::daemon::Daemon;
 use crate::runtime::deliver::{Dispatcher, Retry, Runner};
 use crate::runtime::delivered::Delivered;
+use crate::runtime::drilled::{Passed, folder};
 use crate::runtime::hook::{Outcome, Status};
 use crate::runtime::pulse::Pulse;
 use crate::runtime::shutdown::Shutdown;
@@ -40,13 +40,6 @@ const APPENDED: Range<i32> = 30..114;
 const COLLAPSE_HOURS: f64 = 120.0;
 /// Displacement over the time in which the time left falls to 1/e, mm.
 const SCALE_MM: f64 = 200.0;
-
-/// What a drill that passed took.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Passed {
-    pub(super) latency: Duration,
-    pub(super) acknowledged: Option<Duration>,
-}
 
 /// A drill under way.
 struct Exercise {

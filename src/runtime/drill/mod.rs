@@ -4,12 +4,10 @@
 //! site's monitor, its levels or its replay.
 
 mod exercise;
-mod record;
 mod runner;
 
-pub use record::Record;
-
 use super::clock;
+use super::drilled::Record;
 use super::shutdown::Shutdown;
 use super::vitals::Vitals;
 use crate::config::{Config, Drill};

@@ -3,7 +3,7 @@
 use crate::alert::Level;
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::clock;
-use crate::runtime::drill::Record;
+use crate::runtime::drilled::Record;
 use crate::runtime::vitals::{Health, Vitals, VitalsPoint};
 use prometheus_client::collector::Collector;
 use prometheus_client::encoding::{DescriptorEncoder, EncodeMetric, text};

@@ -1,14 +1,21 @@
 //! How drills stand: what became of the last one, kept in the state folder over restarts.
 
-use super::exercise::Passed;
 use crate::reading::Timestamp;
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// In the folder of the drills.
 const FILE: &str = "last.json";
+
+/// What a drill that passed took.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Passed {
+    pub(super) latency: Duration,
+    pub(super) acknowledged: Option<Duration>,
+}
 
 /// How drills stand.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
