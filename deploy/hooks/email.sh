@@ -24,6 +24,9 @@ site=$(plain "$SLIPWATCH_SITE")
     if [ -n "${SLIPWATCH_FAILURE_TIME:-}" ]; then
         printf 'median forecast of the collapse: %s\n' "$SLIPWATCH_FAILURE_TIME"
     fi
+    if [ -n "${SLIPWATCH_ACKNOWLEDGE_URL:-}" ]; then
+        printf 'acknowledge it, once: %s\n' "$(plain "$SLIPWATCH_ACKNOWLEDGE_URL")"
+    fi
     printf 'attempt %s, key %s\n\n' "$SLIPWATCH_ATTEMPT" "$(plain "$SLIPWATCH_KEY")"
     cat
 } | "${SENDMAIL:-/usr/sbin/sendmail}" -t -i

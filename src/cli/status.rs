@@ -9,6 +9,7 @@ use crate::alert::Level;
 use crate::monitor::{Event, EventKind, SUSPECT, SUSPECT_ENDS};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::clock;
+use crate::runtime::drilled::Record;
 use crate::runtime::preview::{Preview, preview};
 use crate::runtime::standing::{InForce, acknowledged, closed, every, in_force, orders, silences};
 use crate::store::Store;
@@ -99,6 +100,10 @@ pub(super) struct SiteStatus {
     closed: Vec<Event>,
     /// Lines, records and files that could not be used, a source.
     quarantined: BTreeMap<String, u64>,
+    /// How drills stand, where they are held.
+    drill: Option<Record>,
+    /// Whether no drill has passed for too long.
+    is_drill_overdue: bool,
     /// What the files hold, where that was asked for.
     preview: Option<Preview>,
 }
@@ -158,6 +163,10 @@ fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
         stands(standing, &levels, &refits)
     });
     let preview = args.sources.then(|| preview(&config));
+    let drill = config
+        .drill
+        .as_ref()
+        .and_then(|_| Record::read(&config.site.state_dir));
     let zone = config.site.time_zone;
     let status = SiteStatus {
         site: config.site.name,
@@ -172,6 +181,10 @@ fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
         closed: closed(&store, &levels)?,
         quarantined: store.quarantined()?,
         alerts: levels.into_values().collect(),
+        is_drill_overdue: drill
+            .as_ref()
+            .is_some_and(|drill| drill.is_overdue(clock::now())),
+        drill,
         preview,
     };
     Ok((status, zone))
@@ -296,7 +309,7 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
         alerts => format!("\nin force:\n{}", lines(alerts)),
     };
     format!(
-        "{dead}{}: {} inputs taken, {} alerts wait for a hook\n{}{}{}{refused}{suspicions}\n{table}\
+        "{dead}{}: {} inputs taken, {} alerts wait for a hook\n{}{}{}{}{refused}{suspicions}\n{table}\
          collapse: median of the forecast; chance: of collapse within the evacuation time\n{force}",
         text::plain(&status.site),
         status.steps,
@@ -304,7 +317,33 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
         lines(&status.silences),
         lines(&status.acknowledged),
         lines(&status.closed),
+        drilled(status, zone),
     )
+}
+
+/// What became of the newest drill; nothing where none has been held yet and none is overdue.
+fn drilled(status: &SiteStatus, zone: &TimeZone) -> String {
+    let Some(drill) = &status.drill else {
+        return String::new();
+    };
+    let overdue = if status.is_drill_overdue {
+        format!(
+            "DRILL OVERDUE since {}\n",
+            text::clock(drill.overdue_after, zone)
+        )
+    } else {
+        String::new()
+    };
+    let newest = match (&drill.failure, drill.passed_at) {
+        (Some(why), _) => format!("DRILL FAILED: {}\n", text::plain(why)),
+        (None, Some(at)) => format!(
+            "last drill: passed {}, {:.1} s from the readings to the hook\n",
+            text::clock(at, zone),
+            drill.latency_seconds.unwrap_or_default()
+        ),
+        (None, None) => String::new(),
+    };
+    newest + &overdue
 }
 
 fn chance(chance: Option<f64>) -> String {

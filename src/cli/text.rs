@@ -2,7 +2,7 @@
 
 use crate::effects::{Kind, Rival};
 use crate::monitor::{
-    AlertState, Event, EventKind, FailureTime, Given, SharedFailure, Summary, Unexplained,
+    AlertState, Event, EventKind, FailureTime, SharedFailure, Summary, Unexplained,
 };
 use crate::reading::{BenchmarkId, Timestamp};
 use jiff::tz::TimeZone;
@@ -146,11 +146,7 @@ fn what(kind: &EventKind) -> String {
         EventKind::Fault { kind, text } => format!("fault {kind}: {text}"),
         EventKind::Declared { text, .. } => format!("declared: {text}"),
         EventKind::Correction { text, .. } => format!("correction: {text}"),
-        EventKind::Order {
-            order,
-            until,
-            given,
-        } => ordered(order, *until, given),
+        EventKind::Order { .. } => ordered(kind),
         EventKind::Summary(Summary {
             readings,
             refits,
@@ -171,7 +167,16 @@ fn together(groups: &[SharedFailure]) -> String {
     format!("failure times: {}", each.collect::<Vec<_>>().join("; "))
 }
 
-fn ordered(order: &str, until: Option<Timestamp>, given: &Given) -> String {
+fn ordered(kind: &EventKind) -> String {
+    let EventKind::Order {
+        order,
+        until,
+        given,
+        ..
+    } = kind
+    else {
+        return String::new();
+    };
     let until = until.map_or_else(String::new, |until| format!(" until {}", minute(until)));
     let by = (given.by.as_ref()).map_or_else(String::new, |by| format!(" by {by}"));
     let why = (given.why.as_ref()).map_or_else(String::new, |why| format!(": {why}"));

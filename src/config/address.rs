@@ -4,8 +4,13 @@ use super::table::{Placed, Section};
 
 /// The address in `url`.
 pub(super) fn of(section: &Section<'_>, url: &Placed<String>) -> Option<hyper::Uri> {
+    of_key(section, "url", url)
+}
+
+/// The address under `key`.
+pub(super) fn of_key(section: &Section<'_>, key: &str, url: &Placed<String>) -> Option<hyper::Uri> {
     let refuse = |why: &str, fix: &str| {
-        let what = format!("{} = {:?} {why}", section.path("url"), url.value);
+        let what = format!("{} = {:?} {why}", section.path(key), url.value);
         section.error(&url.at, what, fix);
         None
     };
@@ -28,12 +33,18 @@ pub(super) fn of(section: &Section<'_>, url: &Placed<String>) -> Option<hyper::U
 
 /// `ca_file`, as it stands there; refused where the address has no TLS.
 pub(super) fn ca_file(section: &mut Section<'_>, address: Option<&hyper::Uri>) -> Option<String> {
+    let is_plain = address.and_then(hyper::Uri::scheme_str) == Some("http");
+    ca_file_where(section, !is_plain)
+}
+
+/// The same, where it is known whether the address has TLS.
+pub(super) fn ca_file_where(section: &mut Section<'_>, is_secured: bool) -> Option<String> {
     let given = section.text("ca_file")?;
-    if address.and_then(hyper::Uri::scheme_str) == Some("http") {
+    if !is_secured {
         section.error(
             &given.at,
             format!("{} without TLS trusts nobody", section.path("ca_file")),
-            "leave it out, or write url = \"https://...\"",
+            "leave it out, or write an address with TLS: https:// or mqtts://",
         );
     }
     Some(given.value)

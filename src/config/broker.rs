@@ -41,7 +41,7 @@ impl std::fmt::Debug for BrokerAddress {
 
 impl BrokerAddress {
     /// Parses `mqtt://[USER:PASSWORD@]HOST[:PORT]`, or `mqtts://` for TLS.
-    fn parse(url: &str) -> Result<Self, String> {
+    pub(super) fn parse(url: &str) -> Result<Self, String> {
         let fix = || {
             "write it as in \"mqtt://127.0.0.1:1883\", or \"mqtts://broker.example.org:8883\" for TLS"
                 .to_owned()

@@ -96,6 +96,14 @@ fn missing_program(hook: &HookConfig) -> Option<String> {
         let error = secret.or_else(|| webhook.ca_file.as_ref().and_then(unreadable))?;
         return Some(format!("webhook: {error}; alerts would go nowhere"));
     }
+    if let Some(topic) = &hook.mqtt {
+        let file = topic.ca_file.as_ref()?;
+        let error = std::fs::File::open(file).err()?;
+        return Some(format!(
+            "mqtt_out: cannot read the ca_file {}: {error}; alerts would go nowhere",
+            file.display()
+        ));
+    }
     if hook.cap.is_some() {
         // It is made when the first message is written.
         return None;

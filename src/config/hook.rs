@@ -1,7 +1,7 @@
-//! `[[hook]]`, `[[webhook]]` and `[[cap]]`: whom alerts are sent to, and which.
+//! `[[hook]]`, `[[webhook]]`, `[[cap]]` and `[[mqtt_out]]`: whom alerts are sent to, and which.
 
 use super::table::Section;
-use super::{CapFolder, HookConfig, Webhook, WebhookFormat, address, value};
+use super::{CapFolder, HookConfig, Webhook, WebhookFormat, address, mqtt_out, value};
 use crate::alert::Level;
 use crate::reading::BenchmarkId;
 use std::collections::BTreeSet;
@@ -23,8 +23,15 @@ pub(super) fn hooks(root: &mut Section<'_>, base: &Path) -> Vec<HookConfig> {
     for section in root.tables("cap", "cap") {
         hooks.extend(cap(section, base, &mut taken));
     }
+    for section in root.tables("mqtt_out", "mqtt_out") {
+        hooks.extend(mqtt(section, base, &mut taken));
+    }
     unlike(root, &hooks);
-    if hooks.is_empty() && ["hook", "webhook", "cap"].iter().all(|key| !root.has(key)) {
+    if hooks.is_empty()
+        && ["hook", "webhook", "cap", "mqtt_out"]
+            .iter()
+            .all(|key| !root.has(key))
+    {
         root.warning(
             root.at(),
             "there is no [[hook]]: nobody is notified of an alert".to_owned(),
@@ -82,6 +89,7 @@ struct Common {
     site: bool,
     timeout: Duration,
     escalate_after: Option<Duration>,
+    drills: bool,
 }
 
 impl Common {
@@ -91,11 +99,14 @@ impl Common {
             run: Vec::new(),
             webhook: None,
             cap: None,
+            mqtt: None,
             levels: self.levels,
             benchmarks: self.benchmarks,
             site: self.site,
             timeout: self.timeout,
             escalate_after: self.escalate_after,
+            drills: self.drills,
+            links: None,
             folder: base.to_owned(),
             sandbox: false,
             writable: Vec::new(),
@@ -127,6 +138,7 @@ fn common(section: &mut Section<'_>) -> Common {
             .map(|word| BenchmarkId::new(word.value))
             .collect(),
         site: section.switch("site").unwrap_or(false),
+        drills: section.switch("drills").unwrap_or(false),
         timeout: timeout.map_or(TIMEOUT, |given| given.value.unsigned_abs()),
         escalate_after: escalate_after.map(|given| given.value.unsigned_abs()),
     }
@@ -235,6 +247,25 @@ fn cap(mut section: Section<'_>, base: &Path, taken: &mut BTreeSet<String>) -> O
             area: area?.value,
             polygon: polygon.map(|given| given.value),
         }),
+        ..common.without_a_way_out(base)
+    })
+}
+
+fn mqtt(mut section: Section<'_>, base: &Path, taken: &mut BTreeSet<String>) -> Option<HookConfig> {
+    let topic = mqtt_out::topic(&mut section, base);
+    let common = common(&mut section);
+    if let Some(one) = &topic
+        && !taken.insert(one.name.clone())
+    {
+        section.error(
+            section.at(),
+            format!("there are two ways out {:?}", one.name),
+            "give each its own name: name = \"control room\"",
+        );
+    }
+    section.finish();
+    Some(HookConfig {
+        mqtt: Some(topic?),
         ..common.without_a_way_out(base)
     })
 }

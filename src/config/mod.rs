@@ -5,9 +5,12 @@ mod alert;
 mod broker;
 mod check;
 mod declared;
+mod drill;
 mod heartbeat;
 mod hook;
 mod keys;
+mod link;
+mod mqtt_out;
 mod pattern;
 mod problem;
 mod rule;
@@ -21,8 +24,11 @@ mod vector;
 
 pub use broker::{Broker, BrokerAddress};
 pub use check::{Summary, check};
+pub use drill::{Drill, EXERCISE};
 pub use heartbeat::Heartbeat;
 pub use keys::{Key, Keys, Shape};
+pub use link::Links;
+pub use mqtt_out::MqttTopic;
 pub use pattern::FilePattern;
 pub use problem::{ConfigError, Problem, Severity};
 pub use secret::{Secret, SecretError};
@@ -58,10 +64,12 @@ pub struct Config {
     pub benchmarks: Vec<Benchmark>,
     /// `[alert]` and the benchmarks' own, `[explain]` and `[[event]]`, as the monitor takes them.
     pub settings: Settings,
-    /// `[[hook]]`, `[[webhook]]` and `[[cap]]`.
+    /// `[[hook]]`, `[[webhook]]`, `[[cap]]` and `[[mqtt_out]]`.
     pub hooks: Vec<HookConfig>,
     /// `[[heartbeat]]`.
     pub heartbeats: Vec<Heartbeat>,
+    /// `[drill]`.
+    pub drill: Option<Drill>,
     /// What is doubtful, but not refused.
     pub warnings: Vec<Problem>,
 }
@@ -78,6 +86,8 @@ pub struct SiteConfig {
     /// The file with the secret that whoever asks must know; never absent where others than this
     /// machine can reach `listen`.
     pub token_file: Option<PathBuf>,
+    /// By which links in the messages alerts are acknowledged; `None`: by none.
+    pub links: Option<Links>,
     /// The zone that people there live in.
     pub time_zone: jiff::tz::TimeZone,
     /// Data time for which every refit is kept; of older ones the first of each UTC day and benchmark is.
@@ -195,7 +205,7 @@ pub struct CapFolder {
     pub polygon: Option<String>,
 }
 
-/// `[[hook]]`: a program to run when a level is entered or left; or `[[webhook]]`, or `[[cap]]`.
+/// `[[hook]]`: a program to run when a level is entered or left; or `[[webhook]]`, `[[cap]]` or `[[mqtt_out]]`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct HookConfig {
     /// The program and its arguments; none of a webhook.
@@ -204,6 +214,8 @@ pub struct HookConfig {
     pub webhook: Option<Webhook>,
     /// Where to write messages to instead of running a program.
     pub cap: Option<CapFolder>,
+    /// Where to publish to instead of running a program.
+    pub mqtt: Option<MqttTopic>,
     /// Which levels it is run for.
     pub levels: Vec<Level>,
     /// Of which benchmarks it is notified; none: of all.
@@ -212,6 +224,10 @@ pub struct HookConfig {
     pub site: bool,
     /// It is notified only of what nobody has acknowledged within this time; `None`: of everything, at once.
     pub escalate_after: Option<Duration>,
+    /// Whether drills reach it.
+    pub drills: bool,
+    /// By which links its alerts are acknowledged; `None`: by none.
+    pub links: Option<Links>,
     /// After this it is killed.
     pub timeout: Duration,
     /// Where it runs: the config's folder.

@@ -2,7 +2,8 @@
 
 use super::table::{Placed, Section, unique};
 use super::{
-    Benchmark, Config, SiteConfig, alert, declared, heartbeat, hook, source, value, vector,
+    Benchmark, Config, SiteConfig, alert, declared, drill, heartbeat, hook, link, source, value,
+    vector,
 };
 use crate::alert::Policy;
 use crate::monitor::{Explain, Settings, SiteLevel, Watched};
@@ -31,8 +32,13 @@ pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
     let (benchmarks, own) = benchmarks(root, &known, &policy);
     let declared = declared::events(root, &benchmarks);
     let watched = watched(&known, &benchmarks);
-    let hooks = hook::hooks(root, base);
+    let mut hooks = hook::hooks(root, base);
+    let links = site.as_ref().and_then(|site| site.links.as_ref());
+    for hook in &mut hooks {
+        hook.links = links.cloned();
+    }
     let heartbeats = heartbeat::heartbeats(root, base);
+    let drill = drill::drill(root, &hooks, &benchmarks);
     Some(Config {
         file: file.to_owned(),
         site: site?,
@@ -50,6 +56,7 @@ pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
         },
         hooks,
         heartbeats,
+        drill,
         warnings: Vec::new(),
     })
 }
@@ -65,10 +72,13 @@ fn site(mut section: Section<'_>, base: &Path) -> Option<SiteConfig> {
     refuse_open_door(&section, listen.as_ref(), token_file.is_some());
     let time_zone = section.parsed("time_zone", value::time_zone);
     let keep_refits = section.parsed("keep_refits", value::duration);
+    let state_dir = state_dir.map(|given| base.join(given.value));
+    let links = link::links(&mut section, listen.is_some(), state_dir.as_deref());
     section.finish();
     Some(SiteConfig {
         name: name?.value,
-        state_dir: base.join(state_dir?.value),
+        state_dir: state_dir?,
+        links,
         listen: listen.map(|given| given.value),
         token_file: token_file.map(|given| base.join(given.value)),
         time_zone: time_zone.map_or(TimeZone::UTC, |given| given.value),

@@ -173,6 +173,9 @@ pub enum EventKind {
         order: String,
         /// Until when, by the wall clock.
         until: Option<Timestamp>,
+        /// The key of the only alert that it is of; `None`: of everything in its place.
+        #[serde(skip_serializing_if = "Option::is_none", default)]
+        alert: Option<String>,
         /// Who, why, over which door.
         #[serde(flatten)]
         given: Given,

@@ -29,6 +29,8 @@ pub enum Door {
     CommandLine,
     /// The page, or another caller of the HTTP API.
     Http,
+    /// The signed link in the alert's own message.
+    Link,
 }
 
 impl Door {
@@ -37,6 +39,7 @@ impl Door {
         match self {
             Self::CommandLine => "the command line",
             Self::Http => "HTTP",
+            Self::Link => "the link in its message",
         }
     }
 }

@@ -13,8 +13,11 @@ use serde::{Deserialize, Serialize};
 pub enum Order {
     /// Somebody has seen what is in force: it is not tried any further.
     Acknowledge {
-        /// Where; `None`: everywhere.
+        /// Where; `None`: everywhere, or the whole site's where there is `alert`.
         benchmark: Option<BenchmarkId>,
+        /// The key of the only alert that has been seen; `None`: all that is in force there.
+        #[serde(skip_serializing_if = "Option::is_none", default)]
+        alert: Option<String>,
         /// Who, why, over which door.
         #[serde(flatten)]
         given: Given,
@@ -63,12 +66,17 @@ impl Order {
             Self::Silence { until, given, .. } => ("silence", Some(*until), given),
             Self::Unsilence { given, .. } => ("unsilence", None, given),
         };
+        let alert = match self {
+            Self::Acknowledge { alert, .. } => alert.clone(),
+            Self::Shelve { .. } | Self::Silence { .. } | Self::Unsilence { .. } => None,
+        };
         Event {
             time,
             benchmark: self.benchmark().cloned(),
             kind: EventKind::Order {
                 order: order.to_owned(),
                 until,
+                alert,
                 given: given.clone(),
             },
         }

@@ -11,7 +11,7 @@ use serde_json::json;
 const STANDS_FOR: SignedDuration = SignedDuration::from_hours(365 * 24);
 
 /// A list of this one alert. Its labels are the same when it fires and when it ends: by these it is known.
-pub(super) fn body(alert: &Alert) -> Result<Vec<u8>, serde_json::Error> {
+pub(super) fn body(alert: &Alert, link: Option<&str>) -> Result<Vec<u8>, serde_json::Error> {
     let (mut rule, mut text) = ("", "");
     if let EventKind::Alert {
         rule: own_rule,
@@ -42,6 +42,7 @@ pub(super) fn body(alert: &Alert) -> Result<Vec<u8>, serde_json::Error> {
             "summary": text,
             "rule": rule,
             "recommended": alert.level.recommended(),
+            "acknowledge_url": link.unwrap_or_default(),
             "failure_time": alert.failure_time.map(|time| time.to_string()).unwrap_or_default(),
         },
         "startsAt": starts_at,

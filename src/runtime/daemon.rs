@@ -1,5 +1,8 @@
 //! The daemon's work loop: takes what comes, lets time go by, carries out people's orders, takes up another config on request.
 
+mod reload;
+
+use super::beside::Beside;
 use super::clock::Stopwatch;
 use super::deliver::{Dispatcher, Retry};
 use super::delivered::Delivered;
@@ -7,21 +10,21 @@ use super::log;
 use super::mqtt;
 use super::progress::Progress;
 use super::pulse::Pulse;
-use super::sandbox::{self, OURSELVES};
+use super::sandbox;
 use super::shutdown::Shutdown;
 use super::site::Site;
 use super::sources::Sources;
 use super::tail::{Arrival, Batch};
-use crate::config::{self, Config};
+use crate::config::Config;
 use crate::monitor::Input;
 use crate::reading::Timestamp;
 use crate::store::{Position, Store, StoreError, Verified};
 use std::collections::BTreeMap;
-use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::watch;
+use tokio::time::{Interval, MissedTickBehavior};
 
 /// How long the hooks may take to finish when the daemon stops, and those of a former config.
 pub(super) const DRAIN_LIMIT: Duration = Duration::from_secs(20);
@@ -56,6 +59,8 @@ pub struct Daemon {
     quarantined: BTreeMap<String, u64>,
     /// How far the rows of the state have been looked at.
     verified: Verified,
+    /// What works beside it; nothing in a simulation.
+    pub(super) beside: Option<Beside>,
 }
 
 /// The way to the hooks of `config`.
@@ -87,40 +92,28 @@ impl Daemon {
             since_commit: Stopwatch::start(),
             quarantined: BTreeMap::new(),
             verified: Verified::default(),
+            beside: None,
         }
     }
 
     /// Works until the stop is asked for or the source has ended.
     pub(super) async fn work(
         &mut self,
-        mut shutdown: Shutdown,
+        shutdown: Shutdown,
         progress: &watch::Sender<Progress>,
     ) -> Result<(), StoreError> {
         self.note_closed()?;
         let mut hangup = signal(SignalKind::hangup())?;
-        let mut tick = tokio::time::interval(TICK);
-        tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+        let (mut tick, mut asked) = (Self::ticks(), shutdown.clone());
         loop {
             self.pulse.turn();
             tokio::select! {
                 biased;
-                () = shutdown.requested() => return Ok(()),
+                () = asked.requested() => return Ok(()),
                 _ = hangup.recv() => self.reload(&shutdown).await?,
-                batch = self.sources.batches.recv(), if !self.site.is_stalled() => {
-                    let Some(batch) = batch else { return Ok(()) };
-                    tokio::task::block_in_place(|| self.take_batch(batch, &shutdown))?;
-                }
-                Some(delivery) = self.sources.deliveries.recv(), if !self.site.is_stalled() && self.sources.has_room() => {
-                    tokio::task::block_in_place(|| self.take_messages(delivery))?;
-                }
-                _ = tick.tick() => tokio::task::block_in_place(|| self.tick())?,
-                () = tokio::time::sleep(QUIET), if self.site.queues() => {
-                    tokio::task::block_in_place(|| self.judge_queued())?;
-                }
-                // Last, so that it keeps nothing else waiting.
-                () = std::future::ready(()), if self.site.owes_look_back() => {
-                    tokio::task::block_in_place(|| self.look_back())?;
-                }
+                goes_on = self.take_next(&mut tick, &shutdown) => if !goes_on? {
+                    return Ok(());
+                },
             }
             let (counts, is_caught_up) = (self.site.counts(), self.is_caught_up);
             progress.send_replace(Progress {
@@ -128,6 +121,40 @@ impl Daemon {
                 is_caught_up,
             });
         }
+    }
+
+    /// When time is let pass where nothing comes.
+    pub(super) fn ticks() -> Interval {
+        let mut tick = tokio::time::interval(TICK);
+        tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        tick
+    }
+
+    /// Takes what comes next, or lets time go by; `false` when the source has ended.
+    pub(super) async fn take_next(
+        &mut self,
+        tick: &mut Interval,
+        shutdown: &Shutdown,
+    ) -> Result<bool, StoreError> {
+        tokio::select! {
+            biased;
+            batch = self.sources.batches.recv(), if !self.site.is_stalled() => {
+                let Some(batch) = batch else { return Ok(false) };
+                tokio::task::block_in_place(|| self.take_batch(batch, shutdown))?;
+            }
+            Some(delivery) = self.sources.deliveries.recv(), if !self.site.is_stalled() && self.sources.has_room() => {
+                tokio::task::block_in_place(|| self.take_messages(delivery))?;
+            }
+            _ = tick.tick() => tokio::task::block_in_place(|| self.tick())?,
+            () = tokio::time::sleep(QUIET), if self.site.queues() => {
+                tokio::task::block_in_place(|| self.judge_queued())?;
+            }
+            // Last, so that it keeps nothing else waiting.
+            () = std::future::ready(()), if self.site.owes_look_back() => {
+                tokio::task::block_in_place(|| self.look_back())?;
+            }
+        }
+        Ok(true)
     }
 
     /// Steps the monitor through a batch; a stop that is asked for half-way ends it after a value, and the rest of
@@ -420,66 +447,6 @@ impl Daemon {
             (health.outbox, health.outbox_oldest) = (outbox, oldest);
             health.database_bytes = Some(bytes);
         });
-        Ok(())
-    }
-
-    /// Waits for the hooks to finish. Were others notified of the same meanwhile, people would be notified twice.
-    async fn close_hooks(&mut self) {
-        let Some(former) = self.site.unhook() else {
-            return;
-        };
-        let mut closing = std::pin::pin!(former.close(DRAIN_LIMIT));
-        loop {
-            tokio::select! {
-                _ = &mut closing => return,
-                // Bounded, so it is no way of keeping a daemon that stands still alive.
-                () = tokio::time::sleep(TICK) => self.pulse.turn(),
-            }
-        }
-    }
-
-    /// Goes by the config file as it is now, all of it or nothing.
-    async fn reload(&mut self, shutdown: &Shutdown) -> Result<(), StoreError> {
-        let fresh = match config::load(&self.config.file) {
-            Ok(mut fresh) => {
-                fresh.wall_in_hooks(Path::new(OURSELVES));
-                fresh
-            }
-            Err(error) => {
-                tracing::error!(%error, "the config is not taken: the old one stays in force");
-                return Ok(());
-            }
-        };
-        if fresh.site.state_dir != self.config.site.state_dir
-            || fresh.site.listen != self.config.site.listen
-            || fresh.heartbeats != self.config.heartbeats
-        {
-            tracing::error!(
-                "the config is not taken: another state_dir, listen or heartbeat needs a restart"
-            );
-            return Ok(());
-        }
-        self.pulse.service.reloading();
-        // What has been read already is taken under the old config.
-        self.sources.stop();
-        while let Some(batch) = self.sources.batches.recv().await {
-            tokio::task::block_in_place(|| self.take_batch(batch, shutdown))?;
-            // Cut short half-way: what lies behind must not move the files' positions beyond it.
-            if shutdown.is_requested() {
-                return Ok(());
-            }
-        }
-        let events = self.site.resettle(fresh.settings.clone());
-        self.pulse.vitals.note(&events);
-        self.site.show(&self.pulse.vitals);
-        self.commit()?;
-        self.close_hooks().await;
-        self.site.rehook(dispatcher(&fresh, &self.store))?;
-        self.note_closed()?;
-        self.sources = Sources::start(&fresh, &self.store)?;
-        (self.is_up_to_date, self.config) = (false, fresh);
-        self.pulse.service.ready("watching");
-        tracing::info!(file = %self.config.file.display(), "the config is taken");
         Ok(())
     }
 }

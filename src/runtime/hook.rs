@@ -88,6 +88,8 @@ pub struct HookBody<'a> {
     status: Status,
     /// What people are asked to do; null at the end of an alert.
     recommended: Option<&'static str>,
+    /// By which this alert, and no other, is acknowledged once; null where the site has no public address.
+    acknowledge_url: Option<&'a str>,
     /// Which attempt this is, from 1.
     attempt: u32,
     /// Of this form, 1.
@@ -137,7 +139,7 @@ impl Alert {
         matches!(&self.event.kind, EventKind::Alert { rule, .. } if rule == CLOCK_FAULT)
     }
 
-    fn variables(&self, attempt: u32) -> [(&'static str, String); 10] {
+    fn variables(&self, attempt: u32, link: Option<&str>) -> [(&'static str, String); 11] {
         let benchmark = self.event.benchmark.as_ref();
         let optional_time = self.failure_time.map(|time| time.to_string());
         [
@@ -154,16 +156,26 @@ impl Alert {
             ("SLIPWATCH_FAILURE_TIME", optional_time.unwrap_or_default()),
             ("SLIPWATCH_ATTEMPT", attempt.to_string()),
             ("SLIPWATCH_STATUS", self.status.name().to_owned()),
+            (
+                "SLIPWATCH_ACKNOWLEDGE_URL",
+                link.unwrap_or_default().to_owned(),
+            ),
         ]
     }
 
-    pub(super) fn body(&self, attempt: u32) -> Result<Vec<u8>, serde_json::Error> {
+    /// What a hook gets on stdin; `link`: by which it is acknowledged.
+    pub(super) fn body(
+        &self,
+        attempt: u32,
+        link: Option<&str>,
+    ) -> Result<Vec<u8>, serde_json::Error> {
         let mut body = serde_json::to_vec(&HookBody {
             event: &self.event,
             site: &self.site,
             failure_time: self.failure_time,
             status: self.status,
             recommended: (self.state == AlertState::Firing).then(|| self.level.recommended()),
+            acknowledge_url: link,
             attempt,
             schema_version: 1,
         })?;
@@ -198,13 +210,17 @@ pub enum Outcome {
 }
 
 /// Runs the program of `hook` for `alert`; `attempt` counts from 1.
-pub(super) async fn run_program(hook: &HookConfig, alert: &Alert, attempt: u32) -> Outcome {
+pub(super) async fn run_program(
+    hook: &HookConfig,
+    alert: &Alert,
+    (attempt, link): (u32, Option<&str>),
+) -> Outcome {
     let run = run_name();
-    let mut child = match start(hook, alert, (attempt, &run)) {
+    let mut child = match start(hook, &alert.variables(attempt, link), &run) {
         Ok(child) => child,
         Err(reason) => return Outcome::NotStarted(reason),
     };
-    let body = match alert.body(attempt) {
+    let body = match alert.body(attempt, link) {
         Ok(body) => body,
         Err(error) => return Outcome::NotStarted(error.to_string()),
     };
@@ -273,7 +289,7 @@ fn kill_all_of(run: &str) {
     }
 }
 
-fn start(hook: &HookConfig, alert: &Alert, (attempt, run): (u32, &str)) -> Result<Child, String> {
+fn start(hook: &HookConfig, variables: &[(&str, String)], run: &str) -> Result<Child, String> {
     let program = hook.program();
     let mut command = sandbox::command(hook);
     command
@@ -291,8 +307,8 @@ fn start(hook: &HookConfig, alert: &Alert, (attempt, run): (u32, &str)) -> Resul
             command.env(name, value);
         }
     }
-    for (name, value) in alert.variables(attempt) {
-        command.env(name, capped(&value));
+    for (name, value) in variables {
+        command.env(name, capped(value));
     }
     command.env(RUN, run);
     command

@@ -2,18 +2,22 @@
 
 mod alertmanager;
 mod archive;
+mod beside;
 mod cap;
 pub mod clock;
 pub mod daemon;
 pub mod deliver;
 pub mod delivered;
 pub mod doctor;
+mod drill;
+pub mod drilled;
 pub mod exhibit;
 mod heartbeat;
 pub mod hook;
 mod http;
 mod in_hand;
 pub mod ingest;
+mod link;
 pub mod log;
 pub mod mqtt;
 pub mod origin;

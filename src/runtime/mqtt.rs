@@ -3,8 +3,10 @@
 //! The session is kept under a stable name and acknowledgements are ours to give: what was not
 //! acknowledged when the process or the connection ended comes again.
 
+mod publish;
 mod session;
 
+pub(super) use publish::publish;
 pub(super) use session::MOST_UNACKNOWLEDGED;
 
 use super::clock::Stopwatch;

@@ -54,6 +54,15 @@ impl Pulse {
         })
     }
 
+    /// Of what works beside the daemon: nobody is let in, and no service manager is notified.
+    pub(super) fn inward() -> Self {
+        Self {
+            vitals: Arc::new(Vitals::default()),
+            service: Service::none(),
+            server: None,
+        }
+    }
+
     /// The work loop has turned; also called between two values, because a batch may take long.
     pub fn turn(&mut self) {
         self.vitals.turned();

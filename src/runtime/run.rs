@@ -1,9 +1,10 @@
 //! The daemon: files to the monitor, everything to the state folder, alerts to the hooks.
 
+use super::beside::Beside;
 use super::clock;
 use super::daemon::{DRAIN_LIMIT, Daemon, dispatcher};
-use super::heartbeat;
 use super::hook::Status;
+use super::link;
 use super::progress::Progress;
 use super::pulse::{Pulse, PulseError};
 use super::serve::Behind;
@@ -57,6 +58,7 @@ pub async fn run(
     if let Err(error) = shutdown::survive_the_file_limit() {
         tracing::warn!(%error, "a limit on the length of files would end this process");
     }
+    make_secret(config);
     let behind = Behind {
         archive: Some(Arc::new(super::archive::Events::of(Arc::clone(&store)))),
         desk: desk(config),
@@ -74,19 +76,23 @@ pub async fn run(
     for (source, count) in store.quarantined().map_err(fail)? {
         pulse.vitals.quarantined(&source, count);
     }
-    let mut heartbeats = heartbeat::start(&config.heartbeats, &pulse.vitals, &shutdown);
+    let beside = Beside::start(config, &store, (&pulse.vitals, &shutdown));
     let sources = Sources::start(config, &store).map_err(fail)?;
     let mut daemon = Daemon::new(config, store, site, (sources, pulse), clock::now);
+    daemon.beside = Some(beside);
     tracing::info!(site = name, state = %config.site.state_dir.display(), "started");
     let worked = daemon.work(shutdown, progress).await;
     let Daemon {
         site,
         sources,
         pulse,
+        beside,
         ..
     } = daemon;
     sources.stop();
-    heartbeats.shutdown().await;
+    if let Some(beside) = beside {
+        beside.stop().await;
+    }
     pulse.stop().await;
     let counts = site.counts();
     let closed = site.close(clock::now(), DRAIN_LIMIT).await;
@@ -95,6 +101,15 @@ pub async fn run(
     worked.and(closed.map(drop)).map_err(fail)?;
     followed?;
     Ok(counts)
+}
+
+/// Alerts go out in any case, then without a link.
+fn make_secret(config: &Config) {
+    if let Some(links) = &config.site.links
+        && let Err(error) = link::make_secret(&links.secret_file)
+    {
+        tracing::error!(%error, "no message will have a link to acknowledge it by");
+    }
 }
 
 /// What the page asks, where the site listens. A page that cannot be shown is no reason not to watch.

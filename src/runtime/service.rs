@@ -10,6 +10,8 @@ pub struct Service {
     /// How often it expects a sign of life at least.
     watchdog: Option<Duration>,
     last_beat: Option<Stopwatch>,
+    /// Whether anything is said at all.
+    is_silent: bool,
 }
 
 impl Service {
@@ -18,31 +20,47 @@ impl Service {
         Self {
             watchdog: sd_notify::watchdog_enabled(),
             last_beat: None,
+            is_silent: false,
+        }
+    }
+
+    /// None: of what works beside the daemon the service manager is not notified.
+    pub fn none() -> Self {
+        Self {
+            watchdog: None,
+            last_beat: None,
+            is_silent: true,
+        }
+    }
+
+    fn notify(&self, state: &[NotifyState<'_>]) {
+        if !self.is_silent {
+            notify(state);
         }
     }
 
     /// The daemon is at work. Said at once, not only when the past has been read: that may take
     /// longer than a start may, and `/readyz` distinguishes the two.
     pub fn ready(&self, status: &str) {
-        notify(&[NotifyState::Ready, NotifyState::Status(status)]);
+        self.notify(&[NotifyState::Ready, NotifyState::Status(status)]);
     }
 
     /// One line for `systemctl status`.
     pub fn status(&self, status: &str) {
-        notify(&[NotifyState::Status(status)]);
+        self.notify(&[NotifyState::Status(status)]);
     }
 
     /// The config is being read again; [`Service::ready`] ends it.
     pub fn reloading(&self) {
         match NotifyState::monotonic_usec_now() {
-            Ok(now) => notify(&[NotifyState::Reloading, now]),
-            Err(_) => notify(&[NotifyState::Reloading]),
+            Ok(now) => self.notify(&[NotifyState::Reloading, now]),
+            Err(_) => self.notify(&[NotifyState::Reloading]),
         }
     }
 
     /// The daemon is on its way out.
     pub fn stopping(&self) {
-        notify(&[NotifyState::Stopping, NotifyState::Status("stopping")]);
+        self.notify(&[NotifyState::Stopping, NotifyState::Status("stopping")]);
     }
 
     /// The work loop has turned. Only the work loop calls this: a task of its own would go on
@@ -53,7 +71,7 @@ impl Service {
         };
         let is_due = |last: Stopwatch| last.elapsed() >= watchdog / 4;
         if self.last_beat.is_none_or(is_due) {
-            notify(&[NotifyState::Watchdog]);
+            self.notify(&[NotifyState::Watchdog]);
             self.last_beat = Some(Stopwatch::start());
         }
     }

@@ -88,7 +88,8 @@ pub fn silences(orders: &[Event], now: Timestamp) -> Vec<Event> {
 /// Who has seen what is in force: acknowledgements since its alert was called.
 pub fn acknowledged(orders: &[Event], in_force: &InForce) -> Vec<Event> {
     let is_of = |ack: &Event, place: &Option<BenchmarkId>, alert: &Event| {
-        (ack.benchmark.is_none() || ack.benchmark == *place) && ack.time >= alert.time
+        let is_here = ack.benchmark.is_none() || ack.benchmark == *place;
+        is_here && ack.time >= alert.time && may_be_of(ack, alert)
     };
     let is_one = |event: &&Event| {
         let is_ack =
@@ -99,6 +100,19 @@ pub fn acknowledged(orders: &[Event], in_force: &InForce) -> Vec<Event> {
                 .any(|((place, _), alert)| is_of(event, place, alert))
     };
     orders.iter().filter(is_one).cloned().collect()
+}
+
+/// Whether an order names this alert, or none.
+pub(super) fn may_be_of(order: &Event, alert: &Event) -> bool {
+    match (&order.kind, &alert.kind) {
+        (
+            EventKind::Order {
+                alert: Some(only), ..
+            },
+            EventKind::Alert { key, .. },
+        ) => only == key,
+        _ => true,
+    }
 }
 
 /// The alerts in force that a hook did not take and will not: it left the config, or does not ask for them any more.

@@ -7,6 +7,7 @@
 mod batch;
 mod checkpoint;
 mod evidence;
+mod link;
 mod outbox;
 mod past;
 mod read;

@@ -7,7 +7,7 @@ use rusqlite::Connection;
 const APPLICATION: i32 = 0x736c_6970;
 
 /// One step for each version: `MIGRATIONS[n]` leads from version n to n + 1.
-const MIGRATIONS: [&str; 5] = ["
+const MIGRATIONS: [&str; 6] = ["
     CREATE TABLE series (
         id INTEGER PRIMARY KEY,
         -- 0: a covariate; 1: readings of a benchmark
@@ -104,6 +104,13 @@ const MIGRATIONS: [&str; 5] = ["
 // version before.
 "
     ALTER TABLE outbox ADD COLUMN noted INTEGER;
+",
+// Links that somebody has acknowledged an alert by, each until it would have expired, nanoseconds since 1970.
+"
+    CREATE TABLE used_link (
+        link TEXT PRIMARY KEY,
+        until INTEGER NOT NULL
+    ) STRICT, WITHOUT ROWID;
 "];
 
 /// The version that this program writes.

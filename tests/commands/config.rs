@@ -128,6 +128,122 @@ fn check_doubts_two_hooks_that_run_the_same_for_the_same_alerts() {
 }
 
 #[test]
+fn a_link_that_nobody_could_follow_is_refused() {
+    let said = |lines: &str| {
+        let text = RIGHT.replace("name =", &format!("{lines}\nname ="));
+        problems(&text).join("\n")
+    };
+    let listen = "listen = \"127.0.0.1:8642\"\n";
+    for (lines, parts) in [
+        (
+            "public_url = \"https://a.example\"",
+            ["site.toml:2:14", "without site.listen"],
+        ),
+        (
+            "public_url = \"a.example\"",
+            [
+                "site.toml:2:14",
+                "site.public_url = \"a.example\" is neither http nor https",
+            ],
+        ),
+        (
+            &format!("public_url = \"https://a.example/?b=1\"\n{listen}"),
+            ["site.toml:2:14", "has more than a path"],
+        ),
+        (
+            "acknowledge_within = \"soon\"",
+            [
+                "site.toml:2:22",
+                "site.acknowledge_within = \"soon\" cannot be used",
+            ],
+        ),
+    ] {
+        let said = said(lines);
+        for part in parts {
+            assert!(said.contains(part), "{said}");
+        }
+    }
+    let text = RIGHT.replace(
+        "name =",
+        &format!("{listen}public_url = \"http://a.example/b/\"\nname ="),
+    );
+    let config = config::parse(&text, Path::new("site.toml")).unwrap();
+    let links = config.hooks[0].links.as_ref().unwrap();
+    assert_eq!(links.public_url, "http://a.example/b");
+    assert!(
+        config.warnings[0].to_string().contains("without TLS"),
+        "{:?}",
+        config.warnings
+    );
+}
+
+#[test]
+fn a_topic_that_alerts_cannot_be_published_to_is_refused() {
+    for (lines, parts) in [
+        (
+            "url = \"mqtt://a:1\"",
+            ["site.toml:10", "mqtt_out.topic is missing"],
+        ),
+        (
+            "url = \"http://a\"\ntopic = \"a\"",
+            [
+                "site.toml:11:7",
+                "mqtt_out.url = \"http://a\" cannot be used",
+            ],
+        ),
+        (
+            "url = \"mqtt://a:1\"\ntopic = \"a/+\"",
+            ["site.toml:12:9", "without + and #"],
+        ),
+        (
+            "url = \"mqtt://a:1\"\ntopic = \"a\"\nca_file = \"b\"",
+            ["site.toml:13:11", "mqtt_out.ca_file without TLS"],
+        ),
+    ] {
+        let said = problem(&format!("[[mqtt_out]]\n{lines}\n"));
+        for part in parts {
+            assert!(said.contains(part), "{said}");
+        }
+    }
+}
+
+#[test]
+fn a_drill_that_reaches_nobody_or_never_ends_is_refused() {
+    let hook = "[[hook]]\nrun = [\"./drilled.sh\"]\ndrills = true\n";
+    for (lines, parts) in [
+        (
+            "[drill]\nevery = \"7d\"".to_owned(),
+            ["site.toml:10", "no hook has drills = true"],
+        ),
+        (
+            format!("{hook}[drill]\nevery = \"1s\""),
+            ["site.toml:14:9", "drill.every = \"1s\" cannot be used"],
+        ),
+        (
+            format!("{hook}[drill]\nat = \"10:00\""),
+            ["site.toml:13", "drill.every is missing"],
+        ),
+        (
+            format!("{hook}[drill]\nevery = \"7d\"\nat = \"ten\""),
+            ["site.toml:15:6", "drill.at = \"ten\" cannot be used"],
+        ),
+        (
+            format!("{hook}[drill]\nevery = \"1h\"\nacknowledge_within = \"2h\""),
+            ["site.toml:15:22", "not shorter than every"],
+        ),
+        (
+            format!("{hook}[drill]\nevery = \"7d\"\n[[benchmark]]\nid = \"exercise\""),
+            ["site.toml:13", "\"exercise\" is a benchmark"],
+        ),
+    ] {
+        let said = problem(&format!("{lines}\n"));
+        for part in parts {
+            assert!(said.contains(part), "{said}");
+        }
+    }
+}
+
+#[test]
 fn a_rule_that_cannot_be_meant_is_refused_where_it_stands() {
     let rule = |lines: &str| format!("[[alert.rule]]\nname = \"near\"\nlevel = \"red\"\n{lines}\n");
     for (text, parts) in [
@@ -250,7 +366,7 @@ fn an_unknown_key_is_refused_with_the_known_ones() {
     assert_eq!(
         problem("[allert]\n"),
         "site.toml:10:2: error: unknown key allert; known here: site, source, alert, explain, \
-         benchmark, event, hook, webhook, cap, heartbeat"
+         benchmark, event, hook, webhook, cap, mqtt_out, heartbeat, drill"
     );
 }
 

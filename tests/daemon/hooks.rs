@@ -48,9 +48,12 @@ fn hook(script: &str) -> (TempDir, HookConfig) {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("hook.sh"), script).unwrap();
     let config = HookConfig {
+        drills: false,
+        links: None,
         site: false,
         webhook: None,
         cap: None,
+        mqtt: None,
         escalate_after: None,
         benchmarks: BTreeSet::new(),
         run: vec!["/bin/sh".to_owned(), "hook.sh".to_owned()],

@@ -10,6 +10,7 @@ mod eventually;
 mod follow;
 mod hooks;
 mod mqtt;
+mod mqtt_out;
 mod page;
 mod retention;
 mod sample_hooks;

@@ -26,20 +26,20 @@ use tokio::task::JoinHandle;
 const LIMIT: Duration = Duration::from_secs(30);
 
 /// A broker of our own, on a port of its own.
-struct Mosquitto {
+pub(crate) struct Mosquitto {
     program: PathBuf,
-    folder: TempDir,
-    port: u16,
-    process: Child,
+    pub(crate) folder: TempDir,
+    pub(crate) port: u16,
+    pub(crate) process: Child,
 }
 
 impl Mosquitto {
-    fn start() -> Self {
+    pub(crate) fn start() -> Self {
         Self::start_with(|_| String::new())
     }
 
     /// With more in its config.
-    fn start_with(more: impl Fn(&Path) -> String) -> Self {
+    pub(crate) fn start_with(more: impl Fn(&Path) -> String) -> Self {
         let installed = [
             "/usr/sbin/mosquitto",
             "/usr/bin/mosquitto",
@@ -75,6 +75,11 @@ impl Mosquitto {
         let id = self.process.id().to_string();
         assert!(Command::new("kill").arg(id).status().unwrap().success());
         self.process.wait().unwrap();
+        self.start_again();
+    }
+
+    /// Starts it after its end.
+    pub(crate) fn start_again(&mut self) {
         self.process = spawn(&self.program, &self.folder);
     }
 

@@ -47,9 +47,12 @@ fn folder_outside_tmp() -> Option<TempDir> {
 
 fn walled(folder: &Path, run: &[&str]) -> HookConfig {
     HookConfig {
+        drills: false,
+        links: None,
         site: false,
         webhook: None,
         cap: None,
+        mqtt: None,
         escalate_after: None,
         benchmarks: BTreeSet::new(),
         run: run.iter().map(|word| (*word).to_owned()).collect(),

@@ -100,7 +100,7 @@ fn webhooks(folder: &Path, tables: &str) -> Vec<HookConfig> {
         .hooks
 }
 
-fn text(tables: &str) -> String {
+pub(crate) fn text(tables: &str) -> String {
     format!(
         "[site]\nname = \"Monte Toc\"\nstate_dir = \"state\"\n\
          [[source]]\nid = \"logger\"\nkind = \"csv\"\npath = \"*.csv\"\n{tables}"
@@ -111,7 +111,7 @@ fn webhook(url: &str, more: &str) -> String {
     format!("[[webhook]]\nurl = \"{url}\"\nsecret_file = \"secret\"\n{more}\n")
 }
 
-fn alert(benchmark: &str, key: &str) -> Alert {
+pub(crate) fn alert(benchmark: &str, key: &str) -> Alert {
     let event = Event {
         time: "2017-06-06T17:00:00Z".parse().unwrap(),
         benchmark: Some(BenchmarkId::new(benchmark)),
@@ -126,7 +126,7 @@ fn alert(benchmark: &str, key: &str) -> Alert {
     Alert::new(&event, "Monte Toc", None, Status::Actual).unwrap()
 }
 
-fn quick() -> Retry {
+pub(crate) fn quick() -> Retry {
     Retry {
         attempts: 3,
         first_delay: Duration::from_millis(20),

@@ -30,6 +30,8 @@
 //! | 28 | what an operator is to see: what never read, restarts, a state that is gone, forged names | `view` |
 //! | 29 | much of it at once, for ten thousand hours | tests/hostile_hours |
 //! | 30 | a first start on history; a row and its correction, read again | `past`; tests/library/first_start.rs |
+//! | 31 | links in messages that are followed, forged, used again | `link` |
+//! | 32 | an alert's whole way breaks without anybody seeing it | `drill` |
 //!
 //! docs/failure-modes.md says the same for operators.
 //!
@@ -52,10 +54,12 @@
 mod crowd;
 mod database;
 mod disk;
+mod drill;
 mod escalation;
 mod feeds;
 mod files;
 mod killed;
+mod link;
 mod log;
 mod machine;
 mod model;

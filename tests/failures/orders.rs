@@ -182,3 +182,39 @@ fn an_alert_that_no_hook_asks_for_any_more_is_closed_at_the_next_start_and_can_b
     });
     program.stop();
 }
+
+/// Another address of a heartbeat is asked from the reload on, and the old one no more.
+#[test]
+fn another_heartbeat_begins_with_the_config_that_names_it() {
+    let listeners = [(); 2].map(|()| std::net::TcpListener::bind("127.0.0.1:0").unwrap());
+    let heartbeat = |listener: &std::net::TcpListener| {
+        let address = listener.local_addr().unwrap();
+        format!("{POLICY}[[heartbeat]]\nurl = \"http://{address}/\"\nevery = \"1s\"\n")
+    };
+    let comes = |listener: &std::net::TcpListener| {
+        use std::io::{Read, Write};
+        let (mut stream, _) = listener.accept().unwrap();
+        let mut request = [0; 1024];
+        let length = stream.read(&mut request).unwrap();
+        assert!(request[..length].starts_with(b"GET / "));
+        let answer = b"HTTP/1.1 204 No Content\r\nconnection: close\r\n\r\n";
+        stream.write_all(answer).unwrap();
+    };
+    let site = Site::new(&heartbeat(&listeners[0]));
+    site.append("incoming/5.csv", &failing("5"));
+    let program = site.caught_up();
+    comes(&listeners[0]);
+    site.configure(&heartbeat(&listeners[1]));
+    program.signal(Signal::SIGHUP);
+    comes(&listeners[1]);
+    eventually("that it is taken", || {
+        site.log().contains("the config is taken")
+    });
+    // What had come before the reload may still wait; after it nothing more comes.
+    listeners[0].set_nonblocking(true).unwrap();
+    while listeners[0].accept().is_ok() {}
+    comes(&listeners[1]);
+    comes(&listeners[1]);
+    assert!(listeners[0].accept().is_err(), "the old one is still asked");
+    program.stop();
+}

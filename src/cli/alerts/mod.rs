@@ -8,7 +8,7 @@ use super::args::Format;
 use super::exit::UsageError;
 use super::state::SiteArgs;
 use super::text;
-use crate::config::value;
+use crate::config::{Config, EXERCISE, value};
 use crate::monitor::{Door, Given, Order};
 use crate::reading::BenchmarkId;
 use crate::runtime::clock;
@@ -125,7 +125,12 @@ pub(super) fn run(args: &AlertsArgs) -> anyhow::Result<()> {
             site,
         } => {
             let (benchmark, given) = (benchmark.as_ref().map(BenchmarkId::new), given.given());
-            (site, Order::Acknowledge { benchmark, given })
+            let order = Order::Acknowledge {
+                benchmark,
+                alert: None,
+                given,
+            };
+            (site, order)
         }
         Action::Shelve {
             benchmark,
@@ -168,6 +173,7 @@ pub(super) fn run(args: &AlertsArgs) -> anyhow::Result<()> {
     let is_known =
         |benchmark: &BenchmarkId| config.benchmarks.iter().any(|one| one.id == *benchmark);
     if let Some(benchmark) = order.benchmark()
+        && !is_of_a_drill(&config, &order)
         && !is_known(benchmark)
         && !store.benchmarks()?.contains_key(benchmark)
     {
@@ -177,6 +183,13 @@ pub(super) fn run(args: &AlertsArgs) -> anyhow::Result<()> {
     site.output.print(&order, |_| {
         "noted; the daemon takes it within a second, or at its next start\n".to_owned()
     })
+}
+
+/// A drill waits for the acknowledgement of its own benchmark.
+fn is_of_a_drill(config: &Config, order: &Order) -> bool {
+    let is_acknowledged = matches!(order, Order::Acknowledge { .. });
+    let place = order.benchmark().map(BenchmarkId::as_str);
+    config.drill.is_some() && is_acknowledged && place == Some(EXERCISE)
 }
 
 /// Nobody is to be left without alerts for ever by one order.

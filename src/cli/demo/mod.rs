@@ -197,9 +197,12 @@ fn sample_hook(folder: &Path) -> anyhow::Result<HookConfig> {
         .and_then(|()| std::fs::set_permissions(&script, std::fs::Permissions::from_mode(0o755)))
         .with_context(|| format!("cannot write {}", script.display()))?;
     Ok(HookConfig {
+        drills: false,
+        links: None,
         site: false,
         webhook: None,
         cap: None,
+        mqtt: None,
         escalate_after: None,
         benchmarks: BTreeSet::new(),
         run: vec![script.display().to_string(), WRITTEN.to_owned()],

@@ -32,6 +32,8 @@ pub(super) fn serve(args: &Args, listen: SocketAddr, folder: &Path) -> anyhow::R
         },
         pace: pace(args.pace.unwrap_or(PACE), &arrivals),
         facts: Facts {
+            has_drills: false,
+            links: None,
             name: crisis.site.to_owned(),
             time_zone: "Europe/Zurich".to_owned(),
             named: Vec::new(),

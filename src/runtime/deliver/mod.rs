@@ -271,11 +271,15 @@ impl Dispatcher {
 }
 
 impl HookConfig {
-    /// What logs and receipts call it: its command line, the webhook's name, or `cap` and the folder.
+    /// What logs and receipts call it: its command line, the name of the webhook or topic, or `cap` and the folder.
     pub fn name(&self) -> String {
         let webhook = self.webhook.as_ref().map(|webhook| webhook.name.clone());
         let cap = (self.cap.as_ref()).map(|cap| format!("cap {}", cap.folder.display()));
-        webhook.or(cap).unwrap_or_else(|| self.run.join(" "))
+        let mqtt = self.mqtt.as_ref().map(|topic| topic.name.clone());
+        webhook
+            .or(cap)
+            .or(mqtt)
+            .unwrap_or_else(|| self.run.join(" "))
     }
 
     /// Whether it is notified only of what nobody acknowledges in time.

@@ -2,7 +2,7 @@
 
 use crate::config::{HookConfig, WebhookFormat};
 use crate::runtime::hook::{self, Alert, Outcome};
-use crate::runtime::{alertmanager, cap, webhook};
+use crate::runtime::{alertmanager, cap, link, mqtt, webhook};
 use std::fmt::Debug;
 use std::pin::Pin;
 use std::sync::Arc;
@@ -39,12 +39,22 @@ pub async fn run(hook: &HookConfig, alert: &Alert, attempt: u32) -> Outcome {
         tracing::info!(hook = name, key, attempt, ?outcome, "CAP message ended");
         return outcome;
     }
+    let link = link::of(hook, alert).await;
+    if let Some(to) = &hook.mqtt {
+        let outcome = match alert.body(attempt, link.as_deref()) {
+            Ok(body) => mqtt::publish(to, body, hook.timeout).await,
+            Err(error) => Outcome::NotStarted(error.to_string()),
+        };
+        let (name, key) = (&to.name, &alert.key);
+        tracing::info!(name, key, attempt, ?outcome, "MQTT message ended");
+        return outcome;
+    }
     let Some(to) = &hook.webhook else {
-        return hook::run_program(hook, alert, attempt).await;
+        return hook::run_program(hook, alert, (attempt, link.as_deref())).await;
     };
     let body = match to.format {
-        WebhookFormat::Slipwatch => alert.body(attempt),
-        WebhookFormat::Alertmanager => alertmanager::body(alert),
+        WebhookFormat::Slipwatch => alert.body(attempt, link.as_deref()),
+        WebhookFormat::Alertmanager => alertmanager::body(alert, link.as_deref()),
     };
     let outcome = match body {
         Ok(body) => webhook::send(to, alert, (body, hook.timeout)).await,

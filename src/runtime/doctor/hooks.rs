@@ -33,6 +33,21 @@ pub(super) fn finding(hook: &HookConfig) -> Finding {
         };
         return Finding::new("webhook", verdict, text);
     }
+    if let Some(topic) = &hook.mqtt {
+        let trusted = topic.ca_file.as_deref().map(tls::own).transpose();
+        let name = &topic.name;
+        let (verdict, text) = match trusted {
+            Ok(_) => (
+                Verdict::Good,
+                format!("{name} has what it needs; hook test publishes to it"),
+            ),
+            Err(error) => (
+                Verdict::Wrong,
+                format!("{name}: {error}: alerts would go nowhere"),
+            ),
+        };
+        return Finding::new("mqtt_out", verdict, text);
+    }
     if let Some(cap) = &hook.cap {
         let folder = cap.folder.display();
         let (verdict, text) = match writable(&cap.folder) {

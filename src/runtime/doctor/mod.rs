@@ -41,7 +41,7 @@ impl Verdict {
 /// One thing that was looked at.
 #[derive(Debug, Clone, PartialEq, Eq, JsonSchema, Serialize)]
 pub struct Finding {
-    /// What: `user`, `state`, `token`, `listen`, `inotify`, `file-system`, `clock`, `fsync`, `hook`, `webhook`, `sandbox`, `source`, `recording`.
+    /// What: `user`, `state`, `token`, `listen`, `inotify`, `file-system`, `clock`, `fsync`, `hook`, `webhook`, `cap`, `mqtt_out`, `sandbox`, `source`, `recording`.
     pub check: &'static str,
     /// How it stands.
     pub verdict: Verdict,

@@ -3,7 +3,7 @@
 //! In MQTT 5 a client states how many messages it takes before it acknowledges them; in 3.1.1 the broker decides it, and
 //! 20 are usual: each twenty messages then wait for a commit.
 
-use crate::config::Broker;
+use crate::config::{Broker, BrokerAddress};
 use crate::runtime::tls;
 use rumqttc::v5::mqttbytes::QoS as QoS5;
 use rumqttc::v5::mqttbytes::v5 as packet5;
@@ -11,6 +11,7 @@ use rumqttc::v5::{self, mqttbytes::v5::ConnectReturnCode};
 use rumqttc::{self as v3, QoS, SubscribeReasonCode, TlsConfiguration, Transport};
 use std::borrow::Cow;
 use std::error::Error;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
@@ -212,16 +213,23 @@ impl Session {
 
 /// Ready to connect.
 fn open(version: Version, broker: &Broker, client_id: &str) -> Result<Link, NoConnection> {
-    let transport = if broker.address.is_secured {
-        let config = tls::config(broker.ca_file.as_deref())?;
-        Transport::tls_with_config(TlsConfiguration::Rustls(config))
-    } else {
-        Transport::tcp()
-    };
+    let transport = transport(&broker.address, broker.ca_file.as_deref())?;
     Ok(match version {
         Version::Five => five(broker, client_id, transport),
         Version::Three => three(broker, client_id, transport),
     })
+}
+
+/// Over TLS where the address says so.
+pub(super) fn transport(
+    address: &BrokerAddress,
+    ca_file: Option<&Path>,
+) -> Result<Transport, String> {
+    if !address.is_secured {
+        return Ok(Transport::tcp());
+    }
+    let config = tls::config(ca_file)?;
+    Ok(Transport::tls_with_config(TlsConfiguration::Rustls(config)))
 }
 
 fn five(broker: &Broker, client_id: &str, transport: Transport) -> Link {
@@ -312,7 +320,7 @@ fn came_by_three(client: &v3::AsyncClient, packet: v3::Packet) -> Came<Published
 }
 
 /// Whether a broker was reached and may know no MQTT 5: it says so, or answers what cannot be read, or nothing.
-fn may_be_another_version(error: &v5::ConnectionError) -> bool {
+pub(super) fn may_be_another_version(error: &v5::ConnectionError) -> bool {
     match error {
         v5::ConnectionError::Io(_)
         | v5::ConnectionError::Tls(_)

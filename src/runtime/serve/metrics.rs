@@ -2,6 +2,8 @@
 
 use crate::alert::Level;
 use crate::reading::{BenchmarkId, Timestamp};
+use crate::runtime::clock;
+use crate::runtime::drilled::Record;
 use crate::runtime::vitals::{Health, Vitals, VitalsPoint};
 use prometheus_client::collector::Collector;
 use prometheus_client::encoding::{DescriptorEncoder, EncodeMetric, text};
@@ -39,6 +41,7 @@ impl Collector for Vitals {
         state(&mut sheet, &health)?;
         trouble(&mut sheet, &health)?;
         counts(&mut sheet, &health)?;
+        drills(&mut sheet, health.drill.as_ref())?;
         let about = "Time to work in a reading that led to a refit";
         sheet.whole("refit_seconds", about, self.refits())?;
         let levels = self
@@ -86,6 +89,27 @@ fn trouble(sheet: &mut Sheet<'_>, health: &Health) -> fmt::Result {
         sheet.gauge("silenced_until_timestamp_seconds", about, seconds(until))?;
     }
     Ok(())
+}
+
+/// All zero where no drills are held.
+fn drills(sheet: &mut Sheet<'_>, drill: Option<&Record>) -> fmt::Result {
+    let count = |one: fn(&Record) -> u64| ConstCounter::new(drill.map_or(0, one));
+    let about = "Drills in which every hook took the alert, and somebody acknowledged it where that is asked for";
+    sheet.whole("drills", about, &count(|drill| drill.passed))?;
+    let about = "Drills that failed";
+    sheet.whole("drills_failed", about, &count(|drill| drill.failed))?;
+    let failed = drill.is_some_and(|drill| drill.failure.is_some());
+    sheet.gauge(
+        "drill_failed",
+        "1 when the newest drill failed",
+        flag(failed),
+    )?;
+    let overdue = drill.is_some_and(|drill| drill.is_overdue(clock::now()));
+    let about = "1 when no drill has passed for half as long again as from one to the next";
+    sheet.gauge("drill_overdue", about, flag(overdue))?;
+    let latency = drill.and_then(|drill| drill.latency_seconds).unwrap_or(0.0);
+    let about = "From the readings of the last drill that passed being in their file to the first hook's start";
+    sheet.gauge("drill_latency_seconds", about, latency)
 }
 
 fn state(sheet: &mut Sheet<'_>, health: &Health) -> fmt::Result {

@@ -1,5 +1,6 @@
 //! Answers over HTTP: whether the daemon lives and is ready, its metrics, its status, its events, its page.
 
+mod acknowledge;
 mod connections;
 mod desk;
 mod metrics;

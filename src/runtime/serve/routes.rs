@@ -1,6 +1,6 @@
 //! What is answered to which request, and to whom.
 
-use super::{Behind, Door, desk, metrics, page};
+use super::{Behind, Door, acknowledge, desk, metrics, page};
 use crate::config::Token;
 use crate::runtime::vitals::{Health, Vitals, VitalsPoint};
 use axum::extract::{DefaultBodyLimit, Query, Request, State};
@@ -64,7 +64,7 @@ impl IntoResponse for ArchiveError {
 }
 
 /// All routes; every one but `/healthz` and the page's own files, which say nothing of the site, asks for the token,
-/// where there is one.
+/// where there is one. Whoever follows the link in a message knows its signature instead.
 pub(super) fn router(door: Door, vitals: Arc<Vitals>, behind: Behind) -> Router {
     let mut guarded = Router::new()
         .route("/readyz", get(ready))
@@ -82,6 +82,7 @@ pub(super) fn router(door: Door, vitals: Arc<Vitals>, behind: Behind) -> Router 
         .route("/healthz", get(healthy))
         .with_state((vitals, door.limits.turn_time));
     if let Some(desk) = behind.desk {
+        open = open.merge(acknowledge::router(Arc::clone(&desk)));
         guarded = guarded.merge(desk::router(desk));
         open = open.merge(page::router());
     }
@@ -120,7 +121,11 @@ fn is_named_as_this_machine(request: &Request) -> bool {
     let Some(host) = request.headers().get(header::HOST) else {
         return true;
     };
-    let host = host.to_str().unwrap_or_default();
+    is_this_machine(host.to_str().unwrap_or_default())
+}
+
+/// Whether a host, with its port or without, is a name of the machine itself.
+pub(super) fn is_this_machine(host: &str) -> bool {
     let name = host.rsplit_once(':').map_or(
         host,
         |(name, port)| {

@@ -40,18 +40,22 @@ impl Site {
     /// Does what people ask for, as far as it concerns who is told.
     pub(super) fn obey(&mut self, order: &Order) {
         match order {
-            Order::Acknowledge { benchmark, .. } => {
-                let seen = self
-                    .standing
-                    .iter_mut()
-                    .filter(|((place, _), _)| benchmark.is_none() || place == benchmark);
+            Order::Acknowledge {
+                benchmark, alert, ..
+            } => {
+                let is_seen = |place: &Option<BenchmarkId>, key: &str| match alert {
+                    Some(only) => key == only,
+                    None => benchmark.is_none() || place == benchmark,
+                };
+                let all = self.standing.iter_mut();
+                let seen = all.filter(|((place, _), one)| is_seen(place, &one.alert.key));
                 for (_, one) in seen {
                     (one.is_sent, one.was_told) = (true, true);
                     if let Some(alerts) = &self.sinks.alerts {
                         alerts.end(&one.alert);
                     }
                 }
-                if let (None, Some(alerts)) = (benchmark, &self.sinks.alerts) {
+                if let (None, None, Some(alerts)) = (benchmark, alert, &self.sinks.alerts) {
                     alerts.end_those_of_many();
                 }
             }

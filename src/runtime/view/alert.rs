@@ -4,7 +4,7 @@ use super::{Desk, read};
 use crate::alert::{Level, Policy};
 use crate::monitor::{AlertState, Event, EventKind, Settings};
 use crate::reading::{BenchmarkId, Timestamp};
-use crate::runtime::standing::{every, in_force};
+use crate::runtime::standing::{every, in_force, may_be_of};
 use crate::store::{DeliveryRow, Store, StoreError};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -228,7 +228,7 @@ fn audit(
         |event: &Event| event.time >= call.time && ended.is_none_or(|ended| event.time <= ended);
     for event in every(store, "order")? {
         let concerns = event.benchmark.is_none() || event.benchmark == call.benchmark;
-        if concerns && is_in_time(&event) {
+        if concerns && is_in_time(&event) && may_be_of(&event, call) {
             audit.push(event);
         }
     }

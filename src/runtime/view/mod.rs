@@ -2,17 +2,19 @@
 
 mod alert;
 mod benchmark;
+mod link;
 mod order;
 mod site;
 mod thin;
 
 pub use alert::{AlertLife, AlertView, alert};
 pub use benchmark::{BenchmarkView, TimeWindow};
+pub use link::{LinkPage, Meant};
 pub use order::{Asked, OrderError};
 pub use site::{SiteView, Standing};
 
 use super::clock;
-use crate::config::Config;
+use crate::config::{Config, Links};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::store::{Heads, Store, StoreError};
 use std::collections::BTreeMap;
@@ -44,6 +46,10 @@ pub struct Facts {
     pub positions: BTreeMap<BenchmarkId, Vec<f64>>,
     /// Whether orders are taken: whoever gives one must know a secret.
     pub takes_orders: bool,
+    /// Whether there are drills, which somebody may acknowledge.
+    pub has_drills: bool,
+    /// By which links in the messages alerts are acknowledged; `None`: by none.
+    pub links: Option<Links>,
     /// What time it is.
     pub now: Now,
     /// In a replay: when the slope collapsed.
@@ -67,6 +73,8 @@ impl Facts {
                 .filter_map(|one| Some((one.id.clone(), one.position.clone()?)))
                 .collect(),
             takes_orders: config.site.token_file.is_some(),
+            has_drills: config.drill.is_some(),
+            links: config.site.links.clone(),
             now: Now::Wall,
             collapse: None,
         }

@@ -1,0 +1,108 @@
+//! Sends one alert to a broker's topic: a connection of its own, QoS 1, done when the broker has acknowledged it.
+//!
+//! In MQTT 5 a broker says where it does not let us publish; one that knows 3.1.1 only acknowledges that too, and drops the message.
+
+use super::session::{NoConnection, may_be_another_version, transport};
+use crate::config::MqttTopic;
+use crate::runtime::hook::Outcome;
+use rumqttc::v5::mqttbytes::QoS as QoS5;
+use rumqttc::v5::mqttbytes::v5::{Packet as Packet5, PubAckReason};
+use rumqttc::{self as v3, QoS, v5};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+/// Longest packet, bytes: far more than an alert.
+const LONGEST_PACKET: u32 = 1 << 20;
+/// Requests of one connection: the message, and its end.
+const REQUESTS: usize = 2;
+
+/// Publishes `body` within `limit`.
+pub(in crate::runtime) async fn publish(to: &MqttTopic, body: Vec<u8>, limit: Duration) -> Outcome {
+    match tokio::time::timeout(limit, published(to, body)).await {
+        Ok(Ok(())) => Outcome::Done,
+        Ok(Err(error)) => Outcome::NotStarted(format!("{}: {error}", to.name)),
+        Err(_elapsed) => Outcome::TimedOut,
+    }
+}
+
+async fn published(to: &MqttTopic, body: Vec<u8>) -> Result<(), NoConnection> {
+    match by_five(to, body.clone()).await {
+        Err(Refused::Version) => by_three(to, body).await,
+        Err(Refused::Otherwise(error)) => Err(error),
+        Ok(()) => Ok(()),
+    }
+}
+
+/// Why nothing was published.
+enum Refused {
+    /// The broker may know no MQTT 5.
+    Version,
+    Otherwise(NoConnection),
+}
+
+impl<E: Into<NoConnection>> From<E> for Refused {
+    fn from(error: E) -> Self {
+        Self::Otherwise(error.into())
+    }
+}
+
+async fn by_five(to: &MqttTopic, body: Vec<u8>) -> Result<(), Refused> {
+    let address = &to.address;
+    let mut options = v5::MqttOptions::new(client_id(), &address.host, address.port);
+    options
+        .set_clean_start(true)
+        .set_max_packet_size(Some(LONGEST_PACKET))
+        .set_transport(transport(address, to.ca_file.as_deref())?);
+    if let Some((user, password)) = &address.login {
+        options.set_credentials(user, password);
+    }
+    let (client, mut connection) = v5::AsyncClient::new(options, REQUESTS);
+    client.try_publish(&to.topic, QoS5::AtLeastOnce, to.is_retained, body)?;
+    loop {
+        match connection.poll().await {
+            Ok(v5::Event::Incoming(Packet5::PubAck(answer))) => {
+                // The alert is there; how the connection ends does not matter any more.
+                let _ = client.try_disconnect().is_ok() && connection.poll().await.is_ok();
+                let is_taken = matches!(
+                    answer.reason,
+                    PubAckReason::Success | PubAckReason::NoMatchingSubscribers
+                );
+                return if is_taken {
+                    Ok(())
+                } else {
+                    Err(format!("the broker does not take it: {:?}", answer.reason).into())
+                };
+            }
+            Ok(_) => {}
+            Err(error) if may_be_another_version(&error) => return Err(Refused::Version),
+            Err(error) => return Err(error.into()),
+        }
+    }
+}
+
+async fn by_three(to: &MqttTopic, body: Vec<u8>) -> Result<(), NoConnection> {
+    let address = &to.address;
+    let mut options = v3::MqttOptions::new(client_id(), &address.host, address.port);
+    options
+        .set_clean_session(true)
+        .set_max_packet_size(LONGEST_PACKET as usize, LONGEST_PACKET as usize)
+        .set_transport(transport(address, to.ca_file.as_deref())?);
+    if let Some((user, password)) = &address.login {
+        options.set_credentials(user, password);
+    }
+    let (client, mut connection) = v3::AsyncClient::new(options, REQUESTS);
+    client.try_publish(&to.topic, QoS::AtLeastOnce, to.is_retained, body)?;
+    loop {
+        if let v3::Event::Incoming(v3::Packet::PubAck(_)) = connection.poll().await? {
+            let _ = client.try_disconnect().is_ok() && connection.poll().await.is_ok();
+            return Ok(());
+        }
+    }
+}
+
+/// Never that of another connection of ours: a broker would end the other one.
+fn client_id() -> String {
+    static SENT: AtomicU64 = AtomicU64::new(0);
+    let number = SENT.fetch_add(1, Ordering::Relaxed);
+    format!("slipwatch-out-{}-{number}", std::process::id())
+}
