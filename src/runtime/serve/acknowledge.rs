@@ -1,6 +1,6 @@
 //! The page behind the link in an alert's message: it shows the alert, and its button acknowledges it. Plain HTML, no script.
 
-use super::routes::is_this_machine;
+use super::is_this_machine;
 use crate::config::Links;
 use crate::reading::Timestamp;
 use crate::runtime::link::AskedLink;

@@ -1,6 +1,6 @@
 //! What is answered to which request, and to whom.
 
-use super::{Behind, Door, acknowledge, desk, metrics, page};
+use super::{Behind, Door, acknowledge, desk, is_this_machine, metrics, page};
 use crate::config::Token;
 use crate::runtime::vitals::{Health, Vitals, VitalsPoint};
 use axum::extract::{DefaultBodyLimit, Query, Request, State};
@@ -122,19 +122,6 @@ fn is_named_as_this_machine(request: &Request) -> bool {
         return true;
     };
     is_this_machine(host.to_str().unwrap_or_default())
-}
-
-/// Whether a host, with its port or without, is a name of the machine itself.
-pub(super) fn is_this_machine(host: &str) -> bool {
-    let name = host.rsplit_once(':').map_or(
-        host,
-        |(name, port)| {
-            if port.ends_with(']') { host } else { name }
-        },
-    );
-    let bare = name.trim_start_matches('[').trim_end_matches(']');
-    let is_loopback = |ip: std::net::IpAddr| ip.is_loopback();
-    bare.eq_ignore_ascii_case("localhost") || bare.parse().is_ok_and(is_loopback)
 }
 
 async fn refuse_long_bodies(request: Request, next: Next) -> Response {
