@@ -1,6 +1,7 @@
 //! How drills stand: what became of the last one, kept in the state folder over restarts.
 
 use crate::reading::Timestamp;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -18,7 +19,8 @@ pub(super) struct Passed {
 }
 
 /// How drills stand.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize, Deserialize)]
+#[schemars(rename = "Drills")]
 pub struct Record {
     /// Since when there are drills.
     pub since: Timestamp,
