@@ -7,10 +7,11 @@ use serde_json::{Map, Value, json};
 /// The config with every key, as it is tested; in lines that begin with `# ` stands what may be added.
 const EXAMPLE: &str = include_str!("../../../config/example.toml");
 /// Where a table says nothing of a key, this one may.
-const LIKE: [(&str, &str); 3] = [
+const LIKE: [(&str, &str); 4] = [
     ("benchmark.alert", "alert"),
     ("webhook", "hook"),
     ("cap", "hook"),
+    ("mqtt_out", "hook"),
 ];
 
 /// The schema of the whole file and, by name, those of its tables.
@@ -147,7 +148,7 @@ fn header(line: &str) -> Option<&str> {
         .unwrap_or(name);
     let is_name = name
         .bytes()
-        .all(|byte| byte.is_ascii_lowercase() || byte == b'.');
+        .all(|byte| byte.is_ascii_lowercase() || matches!(byte, b'.' | b'_'));
     is_name.then_some(name)
 }
 
