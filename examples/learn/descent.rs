@@ -30,7 +30,8 @@ pub(crate) struct Row {
 /// One of the networks.
 #[derive(Debug, Clone)]
 struct One {
-    hidden: [[f32; INPUTS]; UNITS],
+    /// For each input those of all units, so that the compiler takes several units at once.
+    hidden: [[f32; UNITS]; INPUTS],
     output: [f32; UNITS],
     direct: [f32; INPUTS],
 }
@@ -49,9 +50,9 @@ pub(crate) fn teach(rows: &[Row], passes: usize, networks: usize) -> Network {
     let mut mean = Network::silent();
     let share = 1.0 / networks as f32;
     for (one, first) in each.iter().zip((0..).step_by(UNITS)) {
-        for (unit, weights) in one.hidden.iter().enumerate() {
-            mean.hidden[first + unit] = *weights;
-            mean.output[first + unit] = share * one.output[unit];
+        for (unit, output) in one.output.iter().enumerate() {
+            mean.hidden[first + unit] = one.hidden.map(|weights| weights[unit]);
+            mean.output[first + unit] = share * output;
         }
         for (slot, weight) in mean.direct.iter_mut().zip(&one.direct) {
             *slot += share * weight;
@@ -96,33 +97,39 @@ fn one(rows: &[Row], passes: usize, seed: u64) -> One {
 
 fn nothing() -> One {
     One {
-        hidden: [[0.0; INPUTS]; UNITS],
+        hidden: [[0.0; UNITS]; INPUTS],
         output: [0.0; UNITS],
         direct: [0.0; INPUTS],
     }
 }
 
-fn product(weights: &[f32; INPUTS], inputs: &[f32; INPUTS]) -> f32 {
-    weights.iter().zip(inputs).map(|(a, b)| a * b).sum()
-}
-
 /// Adds the gradient of one row.
 fn add(network: &One, row: &Row, gradient: &mut One) {
-    let units: [f32; UNITS] =
-        std::array::from_fn(|unit| product(&network.hidden[unit], &row.inputs).tanh());
-    let through: f32 = units.iter().zip(&network.output).map(|(a, b)| a * b).sum();
-    let ln_odds = through + product(&network.direct, &row.inputs);
+    let (mut units, mut ln_odds) = ([0.0_f32; UNITS], 0.0);
+    let of_inputs = network.hidden.iter().zip(&network.direct);
+    for ((weights, direct), input) in of_inputs.zip(&row.inputs) {
+        for (unit, weight) in units.iter_mut().zip(weights) {
+            *unit += weight * input;
+        }
+        ln_odds += direct * input;
+    }
+    for (unit, output) in units.iter_mut().zip(&network.output) {
+        *unit = unit.tanh();
+        ln_odds += *unit * output;
+    }
     let chance = 1.0 / (1.0 + (-ln_odds).exp());
     let error = (chance - if row.came { 1.0 } else { 0.0 }) * row.weight;
+    let mut back = [0.0_f32; UNITS];
     for (unit, value) in units.iter().enumerate() {
         gradient.output[unit] += error * value;
-        let back = error * network.output[unit] * (1.0 - value * value);
-        for (slot, input) in gradient.hidden[unit].iter_mut().zip(&row.inputs) {
+        back[unit] = error * network.output[unit] * (1.0 - value * value);
+    }
+    let of_inputs = gradient.hidden.iter_mut().zip(&mut gradient.direct);
+    for ((slots, direct), input) in of_inputs.zip(&row.inputs) {
+        for (slot, back) in slots.iter_mut().zip(&back) {
             *slot += back * input;
         }
-    }
-    for (slot, input) in gradient.direct.iter_mut().zip(&row.inputs) {
-        *slot += error * input;
+        *direct += error * input;
     }
 }
 

@@ -80,9 +80,29 @@ pub(crate) fn family(family: Family, network: &Network) -> Judged {
         family,
         leads,
         replays: in_two(&seeds, |seed| {
-            vec![replay(&Simulated::draw(family, *seed), network)]
+            vec![replay(&Simulated::draw(family, *seed), network, MOST_ASKED)]
         }),
     }
+}
+
+/// Samplings of years, with the years of each family, and how often a year is looked at, at most.
+pub(crate) const YEARS: [(f64, &str, u64); 3] = [
+    (1.0 / 144.0, "10 min", 6),
+    (1.0 / 24.0, "1 h", 24),
+    (1.0, "1 d", 80),
+];
+const LOOKS_A_YEAR: usize = 8766;
+
+/// Years of slopes of a family that stands, for each of [`YEARS`].
+pub(crate) fn years(family: Family, network: &Network) -> Vec<Vec<Replay>> {
+    let each = YEARS.iter().map(|(interval, _, years)| {
+        let seeds: Vec<u64> = (0..*years).map(|index| 3 * FIRST_SEED + index).collect();
+        in_two(&seeds, |seed| {
+            let slope = Simulated::year(family, *interval, *seed);
+            vec![replay(&slope, network, LOOKS_A_YEAR)]
+        })
+    });
+    each.collect()
 }
 
 fn leads(slope: &Simulated, seed: u64, network: &Network) -> Vec<Lead> {
@@ -141,7 +161,8 @@ fn chances(observations: &Observations, network: &Network) -> Option<[f64; EVACU
     }))
 }
 
-fn replay(slope: &Simulated, network: &Network) -> Replay {
+/// One life, asked at each reading, or at so many of them evenly.
+fn replay(slope: &Simulated, network: &Network, most_asked: usize) -> Replay {
     let values = &slope.observations.values;
     let mut reds: [Vec<f64>; EVACUATIONS.len()] = Default::default();
     let mut result = Replay {
@@ -155,7 +176,7 @@ fn replay(slope: &Simulated, network: &Network) -> Replay {
         in_time: [None; EVACUATIONS.len()],
     };
     let mut last = (f64::NEG_INFINITY, f64::NEG_INFINITY);
-    let step = values.len().div_ceil(MOST_ASKED);
+    let step = values.len().div_ceil(most_asked);
     for count in (FEWEST..=values.len()).step_by(step) {
         let Some(chances) = chances(&first(&slope.observations, count), network) else {
             continue;

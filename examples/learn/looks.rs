@@ -5,6 +5,7 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use slipwatch::fit::Observations;
 use slipwatch::forecast::{Family, INPUTS, Indicators, Members, Network, Simulated};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Fewest readings before a look.
 const FEWEST: usize = 12;
@@ -56,17 +57,27 @@ pub(crate) fn of_families(slopes: u64) -> Vec<Look> {
     })
 }
 
-/// What `work` makes of each job, on two threads, in the order of the jobs.
+/// What `work` makes of each job, on two threads that each take the next one, in the order of the jobs.
 pub(crate) fn in_two<J: Sync, T: Send>(jobs: &[J], work: impl Fn(&J) -> Vec<T> + Sync) -> Vec<T> {
-    let (one, other) = jobs.split_at(jobs.len() / 2);
-    std::thread::scope(|scope| {
-        let beside = scope.spawn(|| other.iter().flat_map(&work).collect::<Vec<T>>());
-        let mut all: Vec<T> = one.iter().flat_map(&work).collect();
-        if let Ok(rest) = beside.join() {
-            all.extend(rest);
+    let next = AtomicUsize::new(0);
+    let take = || {
+        let mut made = Vec::new();
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some(job) = jobs.get(index) else {
+                return made;
+            };
+            made.push((index, work(job)));
         }
-        all
-    })
+    };
+    let mut made = std::thread::scope(|scope| {
+        let beside = scope.spawn(take);
+        let mut made = take();
+        made.extend(beside.join().unwrap_or_default());
+        made
+    });
+    made.sort_by_key(|(index, _)| *index);
+    made.into_iter().flat_map(|(_, each)| each).collect()
 }
 
 /// The rows that one look teaches: a span each, as far as it is known whether a collapse came within it.
@@ -96,6 +107,7 @@ fn weight(family: Family) -> f32 {
         | Family::LogPeriodic
         | Family::Paused
         | Family::Pieces
+        | Family::Levelled
         | Family::Steady
         | Family::TwoRates
         | Family::Season

@@ -4,6 +4,8 @@
 //! - `learn --left-out [SLOPES]` teaches one network for each family on all the others, judges each family by the network
 //!   that never saw it, and writes docs/families.md.
 //!
+//! - `learn --years` follows years of standing slopes by the network in force and writes docs/false-alarms.md.
+//!
 //! Slopes that teach have seeds from 0 on, those that judge from 1,000,000 on.
 
 #![expect(clippy::print_stderr, reason = "progress is what it prints")]
@@ -17,19 +19,23 @@ mod judge;
 mod looks;
 mod source;
 mod table;
+mod years;
 
 use descent::{NETWORKS, Row, teach};
 use looks::Look;
 use slipwatch::forecast::{Family, Network};
 
 /// Slopes of each family that teach, unless another number is given.
-const SLOPES: u64 = 400;
+const SLOPES: u64 = 1000;
 /// Passes over the looks: a first network finds the looks that mislead it, the second is taught on those too.
 const PASSES: (usize, usize) = (6, 12);
 fn main() -> anyhow::Result<()> {
     let mut arguments: Vec<String> = std::env::args().skip(1).collect();
     let is_left_out = arguments.iter().any(|one| one == "--left-out");
     arguments.retain(|one| one != "--left-out");
+    if arguments.iter().any(|one| one == "--years") {
+        return years::write(&source::in_force()?);
+    }
     let slopes = arguments.first().map_or(Ok(SLOPES), |text| text.parse())?;
     let material = Material {
         looks: looks::of_families(slopes),

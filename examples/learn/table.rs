@@ -106,7 +106,7 @@ fn in_time(out: &mut String, families: &[Judged]) -> anyhow::Result<()> {
     Ok(())
 }
 
-const HEAD: &str = "| years | reds a year | oranges a year | time at red | time at orange or above |\n|---|---|---|---|---|---|";
+pub(crate) const HEAD: &str = "| years | reds a year | oranges a year | time at red | time at orange or above |\n|---|---|---|---|---|---|";
 
 fn standing(out: &mut String, families: &[Judged]) -> anyhow::Result<()> {
     writeln!(
@@ -157,7 +157,7 @@ fn by_sampling(out: &mut String, families: &[Judged]) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn alarms(out: &mut String, name: &str, replays: &[&Replay]) -> anyhow::Result<()> {
+pub(crate) fn alarms(out: &mut String, name: &str, replays: &[&Replay]) -> anyhow::Result<()> {
     let sum = |of: &dyn Fn(&Replay) -> f64| replays.iter().map(|replay| of(replay)).sum::<f64>();
     let years = sum(&|replay| replay.years);
     writeln!(

@@ -7,7 +7,7 @@
 //! less: what it says counts for them as far as the slope is sure to accelerate at all ([`super::evidence`]), because
 //! they are asked at every reading; of the rest a small part is left, so that nothing is called impossible.
 
-use super::evidence;
+use super::evidence::{self, Evidence};
 use super::learned::LEARNED;
 use super::network::{INPUTS, Network};
 use super::{InverseVelocityLine, Passage, Scale, Scales};
@@ -65,7 +65,7 @@ pub struct Collapse {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Indicators {
     scales: Scales,
-    ln_odds: f64,
+    evidence: Evidence,
 }
 
 /// What others expect, which the network weighs.
@@ -82,13 +82,13 @@ impl Indicators {
     /// Those of `observations`; `None` with too few of them.
     pub fn of(observations: &Observations) -> Option<Self> {
         let scales = Scales::of(observations)?;
-        let ln_odds = evidence::ln_odds(observations, &scales);
-        Some(Self { scales, ln_odds })
+        let evidence = Evidence::of(observations, &scales);
+        Some(Self { scales, evidence })
     }
 
     /// Probability that the slope accelerates, against steady motion under its usual fluctuations.
     pub fn accelerating(&self) -> f64 {
-        evidence::probability(self.ln_odds)
+        evidence::probability(self.evidence.ln_odds())
     }
 
     /// Median of the newest spans between readings, days.
@@ -98,7 +98,7 @@ impl Indicators {
 
     /// The most that levels may be given of a chance within `days`, whatever is expected.
     pub fn most(&self, days: f64) -> f64 {
-        let accelerating = self.accelerating();
+        let accelerating = evidence::probability(self.evidence.ln_odds_within(days));
         accelerating + (1.0 - accelerating) * UNSEEN * days / (days + UNSEEN_DAYS)
     }
 
@@ -146,18 +146,25 @@ impl Indicators {
 
     /// What the chance of a collapse within the span of scale `power`, which may lie beyond the scales, rests on.
     fn inputs(&self, members: &Members, (power, days): (usize, f64)) -> [f64; INPUTS] {
-        let view = View::at(&self.scales, power);
-        let mut inputs = Vec::with_capacity(INPUTS);
-        inputs.push(1.0);
-        motion(&view, &mut inputs);
-        novelty(&view, &mut inputs);
-        setting(&view, self.ln_odds, &mut inputs);
-        members.expect(days, &mut inputs);
+        let inputs = self.listed(members, (power, days));
         let mut all = [0.0; INPUTS];
         for (slot, value) in all.iter_mut().zip(inputs) {
             *slot = if value.is_finite() { value } else { 0.0 };
         }
         all
+    }
+
+    fn listed(&self, members: &Members, (power, days): (usize, f64)) -> Vec<f64> {
+        let view = View::at(&self.scales, power);
+        let mut inputs = Vec::with_capacity(INPUTS);
+        inputs.push(1.0);
+        motion(&view, &mut inputs);
+        novelty(&view, &mut inputs);
+        setting(&view, self.evidence.ln_odds(), &mut inputs);
+        members.expect(days, &mut inputs);
+        let shown = self.evidence.ln_odds_within(days);
+        inputs.push((0.2 * shown).clamp(-MOST, MOST));
+        inputs
     }
 }
 
@@ -466,13 +473,8 @@ mod tests {
 
     #[test]
     fn every_input_has_its_place() {
-        let scales = Scales::of(&readings(400, 0.25, |t| t)).unwrap();
-        let view = View::at(&scales, 3);
-        let mut all = vec![1.0];
-        motion(&view, &mut all);
-        novelty(&view, &mut all);
-        setting(&view, 0.0, &mut all);
-        Members::default().expect(1.0, &mut all);
+        let indicators = Indicators::of(&readings(400, 0.25, |t| t)).unwrap();
+        let all = indicators.listed(&Members::default(), (3, 2.0));
         assert_eq!(all.len(), INPUTS);
     }
 

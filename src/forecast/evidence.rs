@@ -24,24 +24,60 @@ const ONE_READING: f64 = 2.5;
 /// no more than the first figure plus the second one a day.
 const DAILY_BLOCKS: (f64, f64) = (1.0 / 12.0, 2.0);
 const DAILY_FREEDOM: (f64, f64) = (2.0, 1.5);
+/// Blocks of so many times a span show an acceleration that ends within it.
+const SHOWN: f64 = 4.0;
 /// ln of a Bayes factor beyond which nothing changes.
 const SURE: f64 = 600.0;
-
-/// ln of the odds that the slope accelerates, after all of `observations`, of which `scales` are the scales.
-pub(super) fn ln_odds(observations: &Observations, scales: &Scales) -> f64 {
-    let with = of(scales);
-    let before = Scales::at(observations, observations.values.len().saturating_sub(1));
-    before.map_or(with, |before| with.min(of(&before) + ONE_READING))
-}
 
 /// The probability of odds whose logarithm is `ln_odds`.
 pub(super) fn probability(ln_odds: f64) -> f64 {
     1.0 / (1.0 + (-ln_odds).exp())
 }
 
-fn of(scales: &Scales) -> f64 {
-    let each = scales.each.iter().map(|scale| odds(scales, scale));
-    each.sum::<f64>().max(f64::MIN_POSITIVE).ln()
+/// ln of the odds that the slope accelerates, by the scales of a record.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Evidence {
+    /// (block, days; ln of the odds by this scale and all shorter ones), shortest first.
+    up_to: Vec<(f64, f64)>,
+}
+
+impl Evidence {
+    /// After all of `observations`, of which `scales` are the scales.
+    pub(super) fn of(observations: &Observations, scales: &Scales) -> Self {
+        let mut up_to = summed(scales);
+        let before = Scales::at(observations, observations.values.len().saturating_sub(1));
+        let before = before.map_or_else(Vec::new, |before| summed(&before));
+        for (index, (_, ln_odds)) in up_to.iter_mut().enumerate() {
+            if let Some((_, before)) = before.get(index).or(before.last()) {
+                *ln_odds = ln_odds.min(before + ONE_READING);
+            }
+        }
+        Self { up_to }
+    }
+
+    /// By all scales.
+    pub(super) fn ln_odds(&self) -> f64 {
+        self.up_to.last().map_or(f64::NEG_INFINITY, |(_, ln)| *ln)
+    }
+
+    /// By the scales at which an acceleration shows that ends within `days`: a line in inverse velocity that meets zero then
+    /// has doubled its velocity within the same span before. What only longer blocks show is not over so soon.
+    pub(super) fn ln_odds_within(&self, days: f64) -> f64 {
+        let count = self
+            .up_to
+            .partition_point(|(block, _)| *block <= SHOWN * days);
+        let last = self.up_to.get(count.saturating_sub(1));
+        last.map_or(f64::NEG_INFINITY, |(_, ln)| *ln)
+    }
+}
+
+/// For each scale the ln of the sum of the odds up to it.
+fn summed(scales: &Scales) -> Vec<(f64, f64)> {
+    let each = scales.each.iter().scan(0.0_f64, |sum, scale| {
+        *sum += odds(scales, scale);
+        Some((scale.days, sum.max(f64::MIN_POSITIVE).ln()))
+    });
+    each.collect()
 }
 
 fn odds(scales: &Scales, scale: &Scale) -> f64 {

@@ -268,10 +268,11 @@ impl Blocks {
             .collect();
         // The one next to the newest shares a block with it.
         let highest = before.iter().skip(1).copied().fold(0.0, f64::max);
+        let velocity = (means[0] - means[1]) / self.days;
         let middle = before.len() / 2;
         Some(Scale {
             days: self.days,
-            velocity: (means[0] - means[1]) / self.days,
+            velocity,
             highest_velocity: highest,
             median_velocity: *before.select_nth_unstable_by(middle, f64::total_cmp).1,
             near,

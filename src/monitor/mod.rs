@@ -350,7 +350,8 @@ impl Monitor {
         for id in due {
             if let Some(track) = self.tracks.get_mut(&id) {
                 let before = track.deadline();
-                events.extend(track.pass(now, self.sensors.fault(&id)));
+                let policy = self.settings.policy(&id);
+                events.extend(track.pass(policy, now, self.sensors.fault(&id)));
                 let after = track.deadline();
                 self.changed.insert(id.clone());
                 self.expect((before, after), id);

@@ -36,6 +36,7 @@ mod recordings;
 mod refit_policy;
 mod score_methods;
 mod seed;
+mod silent_slope;
 mod site_level;
 mod site_together;
 mod slopes;

@@ -4,8 +4,8 @@ use super::{Cell, DRIFT, LoadPosterior};
 use crate::fit::quasi_random::{halton, normal_quantile};
 use std::sync::LazyLock;
 
-/// Draws of a cell: one for each of this share of the probability, so many at most.
-const DRAWS: (f64, usize) = (400.0, 64);
+/// Draws of all cells together: each has its share of them by its weight, the remainder carried from cell to cell.
+const DRAWS: usize = 1024;
 /// How much of the drift of an e-fold shows in the time that remains.
 const IN_TIME: f64 = 0.3;
 /// Rounds of the search for the time at which the load has let enough of the law pass.
@@ -27,24 +27,25 @@ impl LoadPosterior {
     /// within `horizon` days.
     pub fn passages(&self, velocity: f64, horizon: f64) -> Vec<(f64, f64)> {
         let mut passages = Vec::new();
-        let mut index = 0;
+        let (mut drawn, mut reached) = (0_u32, 0.0);
         for cell in &self.cells {
+            reached += cell.weight;
             #[expect(
                 clippy::cast_possible_truncation,
                 clippy::cast_sign_loss,
-                reason = "a small positive number"
+                reason = "a share of a count, from 0 up"
             )]
-            let draws = ((cell.weight * DRAWS.0) as usize + 1).min(DRAWS.1);
-            for _ in 0..draws {
-                index += 1;
-                let kept = DEVIATES.get(index as usize - 1).copied();
-                let z = kept.unwrap_or_else(|| deviates(index));
+            let due = (reached * DRAWS as f64 + 0.5) as u32;
+            for index in drawn..due {
+                let kept = DEVIATES.get(index as usize).copied();
+                let z = kept.unwrap_or_else(|| deviates(index + 1));
                 if let Some(days) = cell.days_to(velocity.ln(), z)
                     && days <= horizon
                 {
-                    passages.push((days, cell.weight / draws as f64));
+                    passages.push((days, 1.0 / DRAWS as f64));
                 }
             }
+            drawn = due.max(drawn);
         }
         passages
     }

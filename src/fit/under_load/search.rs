@@ -144,15 +144,18 @@ impl GridSearch {
         let before = evidence::before_the_law(&self.record, noise.scatter);
         let memory = LoadMemory::new(&self.record, noise);
         let mut scored = Vec::with_capacity(slopes.len() * SHAPES.len());
+        let mut best = f64::NEG_INFINITY;
         for (index, slope) in slopes.iter().enumerate() {
             let gains = Gains::new(&self.record, &memory, &slope.u);
             for (block, of) in BLOCKS.iter().enumerate() {
                 let law = (block, slope);
                 let given = (&gains, &before[..]);
-                let found = weigh(&self.record, law, given, f64::NEG_INFINITY, &mut self.room);
+                let least = best - LEFT_OUT.0 - most_ln_prior(block, slope.r);
+                let found = weigh(&self.record, law, given, least, &mut self.room);
                 for (lane, evidence) in found.iter().enumerate() {
                     let ln = evidence.ln + self.ln_prior(of.first + lane, slope.r, evidence);
-                    if ln.is_finite() {
+                    if ln > best - LEFT_OUT.0 {
+                        best = best.max(ln);
                         scored.push(Scored {
                             ln,
                             block,

@@ -2,7 +2,7 @@
 
 use super::gauge::Gauge;
 use super::{Family, between, happens, log_uniform, normal};
-use rand::Rng;
+use rand::{Rng, RngExt};
 
 /// Velocity last read before a collapse: median, mm/day, and decades; and its bounds. The published ones are mostly of
 /// daily surveys; who reads more often sees more of the last hours (Brienz 40 m/day, Lanzada ten times as fast within
@@ -90,6 +90,26 @@ impl Course {
         let readings = log_uniform(generator, STANDING_READINGS.0, STANDING_READINGS.1);
         let end = (gauge.interval * readings).clamp(STANDING_DAYS.0, STANDING_DAYS.1);
         Some(Self::standing(family, end, generator))
+    }
+
+    /// Of a slope that stands, a year long; one that accelerates does so once, at any time of it.
+    pub(super) fn year(family: Family, gauge: &Gauge, generator: &mut impl Rng) -> Option<Self> {
+        const DAYS: f64 = 365.25;
+        if !matches!(family, Family::Stopped | Family::Plateau) {
+            return Some(Self::standing(family, DAYS, generator));
+        }
+        let mut course = Self::accelerating(family, gauge, generator)?;
+        let later = (DAYS - course.end).max(0.0) * generator.random::<f64>();
+        for stretch in &mut course.stretches {
+            stretch.from += later;
+            stretch.to += later;
+        }
+        let quiet = straight((0.0, later), (course.creep, course.creep));
+        course.stretches.insert(0, quiet);
+        course.onset += later;
+        course.stops = course.stops.map(|days| days + later);
+        course.end = DAYS;
+        Some(course)
     }
 
     pub(super) fn velocity(&self, days: f64) -> f64 {
@@ -230,6 +250,7 @@ impl Acceleration {
                 let velocities = (self.last, kept.min(0.5 * self.last));
                 stretches.push(relaxing((to, to + rest), velocities, memory));
             }
+            Family::Levelled => self.levelled(stretches, generator),
             Family::Plateau => self.to_a_plateau(stretches, generator),
             Family::Voight
             | Family::Law
@@ -326,6 +347,19 @@ impl Acceleration {
             self.alpha,
             SMOOTH,
         ));
+    }
+
+    /// As the Birch glacier did for its last three days and a pit wall for its last hours (failures come from such a velocity
+    /// as well as from a growing one).
+    fn levelled(&self, stretches: &mut Vec<Stretch>, generator: &mut impl Rng) {
+        let rest = self.duration * log_uniform(generator, 0.03, 0.5);
+        let to = self.from + self.duration - rest;
+        let top = self.last * between(generator, 0.7, 1.1);
+        let velocities = (self.first, top);
+        stretches.push(voight((self.from, to), velocities, self.alpha, SMOOTH));
+        let memory = rest * between(generator, 0.1, 1.0);
+        let kept = (top, self.last);
+        stretches.push(relaxing((to, to + rest), kept, memory));
     }
 
     fn to_a_plateau(&self, stretches: &mut Vec<Stretch>, generator: &mut impl Rng) {

@@ -126,6 +126,27 @@ impl Gauge {
         gauge
     }
 
+    /// The same instrument read each `interval` days; `None` where its kind is not read so often or so seldom.
+    pub(super) fn read_each(mut self, interval: f64) -> Option<Self> {
+        const ROUNDING: f64 = 1e-9;
+        let (shortest, longest) = match self.kind {
+            GaugeKind::Radar => (4.0 * MINUTE, 30.0 * MINUTE),
+            GaugeKind::GnssDaily => (1.0, 1.0),
+            GaugeKind::GnssHourly => (10.0 * MINUTE, 0.25),
+            GaugeKind::TotalStation => (1.0 / 24.0, 1.0),
+            GaugeKind::Crackmeter => (5.0 * MINUTE, 0.25),
+            GaugeKind::Extensometer => (10.0 * MINUTE, 1.0),
+            GaugeKind::Survey => (1.0, 30.0),
+            GaugeKind::Plain => (MINUTE, 10.0),
+            GaugeKind::VelocityColumn => (5.0 * MINUTE, 1.0),
+        };
+        self.averaging *= interval / self.interval;
+        self.interval = interval;
+        (shortest - ROUNDING..=longest + ROUNDING)
+            .contains(&interval)
+            .then_some(self)
+    }
+
     /// The same instrument at its best: every error so many times as large.
     fn finer(&mut self, share: f64) {
         let errors = [

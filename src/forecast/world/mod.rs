@@ -25,6 +25,9 @@ use rand_pcg::Pcg64;
 /// The share of records that begin within an acceleration, or anywhere in a life without one, and how far on, at most.
 const BEGUN: (f64, f64) = (0.3, 0.7);
 
+/// Seeds of years differ by this from those of lives.
+const YEARS: u64 = 0x59_4541_5253;
+
 /// How a slope moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Family {
@@ -40,6 +43,8 @@ pub enum Family {
     Paused,
     /// Fails in pieces: a burst and a slowing before the last.
     Pieces,
+    /// Accelerates to a velocity that it keeps, and fails from that.
+    Levelled,
     /// Fails by the slider block's law under an undeclared load: [`Life`].
     Law,
     /// Creeps at one velocity.
@@ -66,13 +71,14 @@ pub enum Family {
 
 impl Family {
     /// All of them, those that fail first.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::Voight,
         Self::Exponential,
         Self::Handover,
         Self::LogPeriodic,
         Self::Paused,
         Self::Pieces,
+        Self::Levelled,
         Self::Law,
         Self::Steady,
         Self::TwoRates,
@@ -85,6 +91,14 @@ impl Family {
         Self::StickSlip,
         Self::Resets,
     ];
+
+    /// What the seeds of its slopes differ by from those of other families; no slope changes when a family is added.
+    fn seed(self) -> u64 {
+        let others = Self::ALL.iter().filter(|other| **other != Self::Levelled);
+        let mut others = others.zip(0..);
+        let found = others.find(|(other, _)| **other == self);
+        found.map_or(17, |(_, seed)| seed)
+    }
 
     /// Whether its slopes collapse.
     pub fn fails(self) -> bool {
@@ -120,12 +134,28 @@ impl Simulated {
         if family == Family::Law {
             return Self::by_the_law(seed);
         }
-        let index = Family::ALL.iter().position(|other| *other == family);
-        let index = index.unwrap_or(0) as u64;
-        let mut generator = Pcg64::seed_from_u64(seed.wrapping_mul(31).wrapping_add(index));
+        let mut generator = Pcg64::seed_from_u64(seed.wrapping_mul(31).wrapping_add(family.seed()));
         loop {
             if let Some(drawn) = Self::attempt(family, &mut generator) {
                 return drawn;
+            }
+        }
+    }
+
+    /// A year of a slope that stands, read each `interval_days` by an instrument that is read so often.
+    pub fn year(family: Family, interval_days: f64, seed: u64) -> Self {
+        let index = seed.wrapping_mul(31).wrapping_add(family.seed());
+        let mut generator = Pcg64::seed_from_u64(index ^ YEARS);
+        loop {
+            let gauge = Gauge::draw(family, &mut generator);
+            let gauge = gauge.read_each(interval_days);
+            let course = gauge
+                .as_ref()
+                .and_then(|gauge| Course::year(family, gauge, &mut generator));
+            if let (Some(gauge), Some(course)) = (gauge, course) {
+                let path = onward::path(&course, family, gauge.interval, &mut generator);
+                let readings = gauge.read(&path, family, &mut generator);
+                return Self::of(family, (&gauge, &course), readings, 0.0);
             }
         }
     }
@@ -170,23 +200,33 @@ impl Simulated {
         let gauge = Gauge::draw(family, generator);
         let course = Course::draw(family, &gauge, generator)?;
         let path = onward::path(&course, family, gauge.interval, generator);
-        let error = gauge.error();
-        let visible_days = path.visible(&course, error);
+        let visible_days = path.visible(&course, gauge.error());
         if family.fails() && course.end - visible_days < 4.0 * gauge.interval {
             return None;
         }
-        let mut readings = gauge.read(&path, family, generator);
+        let readings = gauge.read(&path, family, generator);
         // Many a record begins when somebody has seen the slope move.
         let begins = if happens(generator, BEGUN.0) {
             course.onset + between(generator, 0.0, BEGUN.1) * (course.end - course.onset)
         } else {
             0.0
         };
-        readings.retain(|(days, _)| *days >= begins);
-        if readings.len() < FEWEST {
-            return None;
-        }
-        let values = readings.into_iter().map(|(t_days, value)| Observation {
+        let drawn = Self {
+            visible_days: visible_days.max(begins),
+            ..Self::of(family, (&gauge, &course), readings, begins)
+        };
+        (drawn.observations.values.len() >= FEWEST).then_some(drawn)
+    }
+
+    /// The readings of `course` by `gauge`, from `begins` days on.
+    fn of(
+        family: Family,
+        (gauge, course): (&Gauge, &Course),
+        readings: Vec<(f64, f64)>,
+        begins: f64,
+    ) -> Self {
+        let known = readings.into_iter().filter(|(days, _)| *days >= begins);
+        let values = known.map(|(t_days, value)| Observation {
             t_days,
             value,
             sigma: None,
@@ -196,8 +236,7 @@ impl Simulated {
         } else {
             Quantity::Displacement
         };
-        let ends = course.stops.filter(|_| !family.fails());
-        Some(Self {
+        Self {
             family,
             gauge: gauge.kind,
             observations: Observations {
@@ -207,10 +246,10 @@ impl Simulated {
             },
             interval_days: gauge.interval,
             collapse_days: family.fails().then_some(course.end),
-            stopped_days: ends,
-            visible_days: visible_days.max(begins),
+            stopped_days: course.stops.filter(|_| !family.fails()),
+            visible_days: begins,
             end_days: course.end,
-        })
+        }
     }
 }
 

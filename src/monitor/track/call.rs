@@ -130,22 +130,23 @@ impl Track {
         (evidence, ahead): (&Evidence, Ahead),
         change: &Transition,
     ) -> Event {
+        let text = self.text(policy, (evidence, ahead), change);
+        self.alert_of(time, change, text)
+    }
+
+    pub(super) fn alert_of(&self, time: Timestamp, change: &Transition, text: String) -> Event {
         let state = match change.entered {
             Entered::Yes => AlertState::Firing,
             Entered::No => AlertState::Resolved,
         };
-        let key = format!("{}/{}/{}", self.benchmark, change.level, change.since);
-        let text = self.text(policy, (evidence, ahead), change);
-        self.event(
-            time,
-            EventKind::Alert {
-                level: change.level,
-                state,
-                key,
-                rule: change.rule.clone().into_owned(),
-                text,
-            },
-        )
+        let kind = EventKind::Alert {
+            level: change.level,
+            state,
+            key: format!("{}/{}/{}", self.benchmark, change.level, change.since),
+            rule: change.rule.clone().into_owned(),
+            text,
+        };
+        self.event(time, kind)
     }
 
     fn text(

@@ -6,6 +6,7 @@ mod call;
 mod declared;
 mod forecast;
 mod lookback;
+mod overdue;
 mod pace;
 mod past;
 mod refit;
@@ -32,6 +33,7 @@ use ahead::Ahead;
 use forecast::Forecast;
 use jiff::SignedDuration;
 use lookback::{Levels, Lookback};
+use overdue::Overdue;
 use pace::Pace;
 use past::Record;
 use serde::{Deserialize, Serialize};
@@ -112,6 +114,9 @@ pub(super) struct Track {
     /// The newest forecast, while a level is in force.
     #[serde(default)]
     kept: Option<KeptForecast>,
+    /// What that leaves to the time after it.
+    #[serde(default)]
+    overdue: Option<Overdue>,
     /// Suspicions that people have looked into, and that do not hold.
     #[serde(default)]
     accepted: BTreeSet<Suspicion>,
@@ -138,6 +143,7 @@ impl Track {
             owes: false,
             queued_since: None,
             kept: None,
+            overdue: None,
             accepted: BTreeSet::new(),
             record: Record::Known,
             benchmark,
@@ -164,6 +170,11 @@ impl Track {
     }
 
     pub(super) fn deadline(&self) -> Option<Timestamp> {
+        let each = [self.silent_at(), self.overdue_at()];
+        each.into_iter().flatten().min()
+    }
+
+    fn silent_at(&self) -> Option<Timestamp> {
         let (newest, due) = (self.silence.newest()?, self.silence.deadline()?);
         Some(self.declared.put_off(newest, due))
     }
@@ -267,6 +278,10 @@ impl Track {
             return events;
         }
         events.extend(called);
+        match &forecast {
+            Some(forecast) => self.await_red(policy, time, forecast),
+            None => self.overdue = None,
+        }
         let is_kept = self.latch.level() > Level::Green;
         self.kept = forecast.filter(|_| is_kept).map(|forecast| {
             let outlook = forecast.in_force(days(policy.outlook));
@@ -388,10 +403,20 @@ impl Track {
     }
 
     /// Data time has come to `now` without a reading; `fault` is what the sensor gives instead.
-    pub(super) fn pass(&mut self, now: Timestamp, fault: Option<&str>) -> Vec<Event> {
-        if self.deadline().is_none_or(|deadline| now < deadline) {
-            return Vec::new();
+    pub(super) fn pass(
+        &mut self,
+        policy: &Policy,
+        now: Timestamp,
+        fault: Option<&str>,
+    ) -> Vec<Event> {
+        let mut events: Vec<Event> = self.judge_overdue(policy, now).into_iter().collect();
+        if self.silent_at().is_some_and(|due| due <= now) {
+            events.extend(self.falls_silent(now, fault));
         }
+        events
+    }
+
+    fn falls_silent(&mut self, now: Timestamp, fault: Option<&str>) -> Vec<Event> {
         let Some(newest) = self.silence.begins() else {
             return Vec::new();
         };

@@ -1,0 +1,96 @@
+//! A benchmark whose next reading does not come is judged again as time passes: a collapse that was forecast comes nearer
+//! without readings too.
+
+use super::forecast::Forecast;
+use super::{Track, days};
+use crate::alert::{Evidence, Level, Policy};
+use crate::monitor::event::Event;
+use crate::monitor::kept::KeptForecast;
+use crate::reading::{SECONDS_PER_DAY, Timestamp};
+use jiff::SignedDuration;
+use serde::{Deserialize, Serialize};
+
+/// Looks an evacuation time.
+const LOOKS: i32 = 8;
+/// Looks at most, however long the outlook is beside the evacuation time.
+const MOST_LOOKS: i32 = 2000;
+
+/// What the newest forecast leaves to the time after it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Overdue {
+    /// The chances that levels go by.
+    chances: KeptForecast,
+    /// Between readings.
+    interval: SignedDuration,
+    /// From when on the chance within an evacuation time calls red, if no collapse has come by then.
+    red_from: Timestamp,
+}
+
+impl Overdue {
+    /// `None` where the forecast never comes to that within the outlook.
+    fn of(policy: &Policy, time: Timestamp, forecast: &Forecast) -> Option<Self> {
+        let outlook = forecast.in_force(days(policy.outlook));
+        let chances = KeptForecast::of(time, &outlook.chances);
+        let interval = outlook.interval_days * SECONDS_PER_DAY;
+        let interval = SignedDuration::try_from_secs_f64(interval).ok()?;
+        let is_red = |now: Timestamp| {
+            chances.chance_within(now, days(policy.evacuation_time)) >= policy.red_chance
+        };
+        let looks = (1..=MOST_LOOKS).map_while(|look| {
+            let after = policy.evacuation_time.checked_mul(look)? / LOOKS;
+            let now = time.checked_add(interval.checked_add(after)?).ok()?;
+            (after <= policy.outlook).then_some(now)
+        });
+        let red_from = looks.into_iter().find(|now| is_red(*now))?;
+        Some(Self {
+            chances,
+            interval,
+            red_from,
+        })
+    }
+
+    /// When red is due, if no reading comes after the one of `newest`.
+    fn due(&self, newest: Timestamp) -> Timestamp {
+        let next = newest.checked_add(self.interval).unwrap_or(newest);
+        self.red_from.max(next)
+    }
+}
+
+impl Track {
+    /// Keeps what the forecast of `time` leaves to the time after it, while a level below red is in force.
+    pub(super) fn await_red(&mut self, policy: &Policy, time: Timestamp, forecast: &Forecast) {
+        let may_rise = matches!(self.latch.level(), Level::Yellow | Level::Orange);
+        self.overdue = may_rise
+            .then(|| Overdue::of(policy, time, forecast))
+            .flatten();
+    }
+
+    /// When red is due, if no reading comes.
+    pub(super) fn overdue_at(&self) -> Option<Timestamp> {
+        let newest = self.newest?;
+        let due = self.overdue.as_ref()?.due(newest);
+        Some(self.declared.put_off(newest, due))
+    }
+
+    /// Red, where `now` has come to when it is due without a reading.
+    pub(super) fn judge_overdue(&mut self, policy: &Policy, now: Timestamp) -> Option<Event> {
+        self.overdue_at().filter(|due| *due <= now)?;
+        let (newest, overdue) = (self.newest?, self.overdue.take()?);
+        let chance = overdue
+            .chances
+            .chance_within(now, days(policy.evacuation_time));
+        let evidence = Evidence {
+            now,
+            chance_within_evacuation_time: Some(chance),
+            ..Evidence::default()
+        };
+        let change = self.latch.raise(policy, &evidence)?;
+        self.levels.note(now, change.level);
+        let hours = policy.evacuation_time.as_secs() / 3600;
+        let text = format!(
+            "benchmark {}: {} ({}); no reading since {newest}; if no collapse has come since, chance {chance:.2} within the evacuation time ({hours} h) from now on",
+            self.benchmark, change.level, change.rule
+        );
+        Some(self.alert_of(now, &change, text))
+    }
+}

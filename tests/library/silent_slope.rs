@@ -1,0 +1,70 @@
+//! A slope whose readings end is judged again as time passes.
+
+use crate::crisis::policy;
+use slipwatch::alert::Level;
+use slipwatch::monitor::{AlertState, EventKind, Input, Monitor, Settings};
+use slipwatch::reading::{BenchmarkId, Reading, Timestamp, Unit, after_days, days_since};
+
+/// Six-hourly displacements until `last` days, then none until `end` days; when each level was entered, days.
+fn levels(mm: impl Fn(f64) -> f64, last: f64, end: f64) -> Vec<(f64, Level, String)> {
+    let start: Timestamp = "2020-01-01T00:00:00Z".parse().unwrap();
+    let mut monitor = Monitor::new(Settings {
+        policy: policy(24),
+        ..Settings::default()
+    });
+    let mut events = Vec::new();
+    let mut at = 0.0;
+    while at <= last {
+        let time = after_days(start, at).unwrap();
+        // Whole tenths of mm, as an instrument gives them.
+        let value = (mm(at) * 10.0).round() / 10.0;
+        let input = Input::Reading {
+            benchmark: BenchmarkId::new("P"),
+            unit: Unit::MM,
+            averaging: None,
+            reading: Reading {
+                time,
+                value,
+                sigma: None,
+            },
+        };
+        events.extend(monitor.step(time, &input));
+        at += 0.25;
+    }
+    let end = after_days(start, end).unwrap();
+    while let Some(due) = monitor.next_deadline().filter(|due| *due <= end) {
+        events.extend(monitor.step(due, &Input::Tick));
+    }
+    let entered = events.into_iter().filter_map(|event| {
+        let EventKind::Alert {
+            level, state, text, ..
+        } = event.kind
+        else {
+            return None;
+        };
+        let is_own = state == AlertState::Firing && event.benchmark.is_some();
+        is_own.then(|| (days_since(start, event.time), level, text))
+    });
+    entered.collect()
+}
+
+#[test]
+fn a_failing_slope_whose_sensor_is_lost_becomes_red_before_its_collapse_without_a_reading() {
+    // A straight line in inverse velocity that meets zero at 80 days; read until 7 days before.
+    let failing = |t: f64| -60.0 * (1.0 - t / 80.0).ln();
+    let entered = levels(failing, 73.0, 90.0);
+    let while_read = |(at, level, _): &&(f64, Level, String)| *at <= 73.0 && *level == Level::Red;
+    assert_eq!(entered.iter().find(while_read), None, "red before: no test");
+    let red = entered.iter().find(|(_, level, _)| *level == Level::Red);
+    let (at, _, text) = red.unwrap_or_else(|| panic!("{entered:?}"));
+    assert!((73.0..80.0).contains(at), "{entered:?}");
+    assert!(text.contains("no reading since 2020-03-14"), "{text}");
+    assert!(entered.iter().any(|(_, level, _)| *level == Level::Unknown));
+}
+
+#[test]
+fn a_slope_that_creeps_becomes_unknown_and_not_red_when_its_sensor_is_lost() {
+    let entered = levels(|t| 2.0 * t, 73.0, 400.0);
+    let called: Vec<Level> = entered.iter().map(|(_, level, _)| *level).collect();
+    assert_eq!(called, [Level::Unknown], "{entered:?}");
+}
