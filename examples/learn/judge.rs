@@ -87,9 +87,9 @@ pub(crate) fn family(family: Family, network: &Network) -> Judged {
 
 /// Samplings of years, with the years of each family, and how often a year is looked at, at most.
 pub(crate) const YEARS: [(f64, &str, u64); 3] = [
-    (1.0 / 144.0, "10 min", 6),
-    (1.0 / 24.0, "1 h", 24),
-    (1.0, "1 d", 80),
+    (1.0 / 144.0, "10 min", 2),
+    (1.0 / 24.0, "1 h", 10),
+    (1.0, "1 d", 60),
 ];
 const LOOKS_A_YEAR: usize = 8766;
 

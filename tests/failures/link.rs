@@ -17,7 +17,7 @@ const TOKEN: &str = "0123456789abcdef-of-the-test";
 fn site() -> (Site, String) {
     let site = Site::new(
         "[[benchmark]]\nid = \"5\"\nsource = \"logger\"\n[alert]\nevacuation_time = \"3h\"\n\
-         [[alert.threshold]]\nlevel = \"orange\"\ndisplacement = \"100 mm\"\n\
+         [[alert.threshold]]\nlevel = \"orange\"\ndisplacement = \"10 mm\"\n\
          [[hook]]\nrun = [\"/bin/sh\", \"next.sh\"]\nlevels = [\"red\"]\nescalate_after = \"1h\"\n",
     );
     fs::write(site.path("next.sh"), "echo $SLIPWATCH_KEY >> escalated\n").unwrap();
@@ -121,11 +121,10 @@ fn the_link_in_a_message_acknowledges_its_alert_once_and_only_when_its_button_is
     let path = link(&site, "5/red/");
     let secret = fs::metadata(site.path("state/link.secret")).unwrap();
     assert_eq!(secret.permissions().mode() & 0o777, 0o600);
-    let bodies = fs::read_to_string(site.path("bodies")).unwrap();
-    assert!(
-        bodies.contains(&format!("\"acknowledge_url\":\"{PUBLIC}{path}\"")),
-        "{bodies}"
-    );
+    eventually("the link in the message", || {
+        let bodies = fs::read_to_string(site.path("bodies")).unwrap_or_default();
+        bodies.contains(&format!("\"acknowledge_url\":\"{PUBLIC}{path}\""))
+    });
     // A scanner of mail follows it, more than once.
     for _ in 0..2 {
         let page = get(&address, &path);
@@ -179,9 +178,10 @@ fn the_link_in_a_message_acknowledges_its_alert_once_and_only_when_its_button_is
 #[test]
 fn a_link_that_is_forged_expired_foreign_or_over_changes_nothing() {
     let (site, address) = site();
-    let program = started(&site, 0..80);
+    // Too few readings for a forecast: orange by the threshold alone.
+    let program = started(&site, 0..8);
     let orange = link(&site, "5/orange/");
-    site.append("incoming/5.csv", &failing(80..114));
+    site.append("incoming/5.csv", &failing(8..114));
     let red = link(&site, "5/red/");
     let key = site
         .lines("told")

@@ -126,7 +126,7 @@ fn a_silence_has_a_longest_time_and_an_end_and_is_seen_everywhere() {
     let listen = site.listen();
     site.append(
         "incoming/5.csv",
-        &format!("time,displacement_mm\n{}", failing(0..60)),
+        &format!("time,displacement_mm\n{}", failing(0..8)),
     );
     let program = site.caught_up();
     let alerts = |words: &[&str]| {
@@ -147,7 +147,7 @@ fn a_silence_has_a_longest_time_and_an_end_and_is_seen_everywhere() {
         let said = site.printed(&[words, &["--config", "site.toml"]].concat());
         assert!(said.contains("silence until"), "{said}");
     }
-    site.append("incoming/5.csv", &failing(60..114));
+    site.append("incoming/5.csv", &failing(8..114));
     eventually("a red", || site.events().contains("\"level\":\"red\""));
     std::thread::sleep(Duration::from_secs(2));
     assert_eq!(told(&site, "5/red/", "firing"), 0, "it was silenced");
