@@ -91,7 +91,7 @@ pub(crate) const YEARS: [(f64, &str, u64); 3] = [
     (1.0 / 24.0, "1 h", 10),
     (1.0, "1 d", 60),
 ];
-const LOOKS_A_YEAR: usize = 8766;
+const LOOKS_A_YEAR: usize = 1461;
 
 /// Years of slopes of a family that stands, for each of [`YEARS`].
 pub(crate) fn years(family: Family, network: &Network) -> Vec<Vec<Replay>> {
