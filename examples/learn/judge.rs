@@ -20,11 +20,11 @@ pub(crate) const EVACUATIONS: [f64; 3] = [0.5, 1.0, 3.0];
 /// A slope is to be read so often in an evacuation time.
 const READ: f64 = 4.0;
 /// Chances that call red and orange, and the outlook, days.
-const RED: f64 = 0.05;
-const ORANGE: (f64, f64) = (0.5, 30.0);
+pub(crate) const RED: f64 = 0.05;
+pub(crate) const ORANGE: (f64, f64) = (0.5, 30.0);
 /// Levels stay: another entry within so many days is the same alarm.
 const SAME_ALARM_DAYS: f64 = 3.0;
-const FEWEST: usize = 12;
+pub(crate) const FEWEST: usize = 12;
 /// Readings of a life that are looked at, at most.
 const MOST_ASKED: usize = 1500;
 
@@ -147,7 +147,10 @@ fn ahead(evacuation: f64, indicators: &Indicators) -> f64 {
 }
 
 /// Chances that levels go by, within each span; none where the evidence leaves none that could call a level.
-fn chances(observations: &Observations, network: &Network) -> Option<[f64; EVACUATIONS.len() + 1]> {
+pub(crate) fn chances(
+    observations: &Observations,
+    network: &Network,
+) -> Option<[f64; EVACUATIONS.len() + 1]> {
     let indicators = Indicators::of(observations)?;
     let spans = EVACUATIONS.map(|days| ahead(days, &indicators));
     let is_quiet = spans.iter().all(|days| indicators.most(*days) < RED);

@@ -5,6 +5,8 @@
 //!   that never saw it, and writes docs/families.md.
 //!
 //! - `learn --years` follows years of standing slopes by the network in force and writes docs/false-alarms.md.
+//! - `learn --steady [SERIES]` follows so many series of steady creep, and of a rate that doubles and stays, and writes
+//!   docs/steady-creep.md.
 //!
 //! Slopes that teach have seeds from 0 on, those that judge from 1,000,000 on.
 
@@ -18,6 +20,7 @@ mod descent;
 mod judge;
 mod looks;
 mod source;
+mod steady;
 mod table;
 mod years;
 
@@ -27,6 +30,8 @@ use slipwatch::forecast::{Family, Network};
 
 /// Slopes of each family that teach, unless another number is given.
 const SLOPES: u64 = 1000;
+/// Steady series, unless another number is given.
+const STEADY: u64 = 500;
 /// Passes over the looks: a first network finds the looks that mislead it, the second is taught on those too.
 const PASSES: (usize, usize) = (6, 12);
 fn main() -> anyhow::Result<()> {
@@ -35,6 +40,10 @@ fn main() -> anyhow::Result<()> {
     arguments.retain(|one| one != "--left-out");
     if arguments.iter().any(|one| one == "--years") {
         return years::write(&source::in_force()?);
+    }
+    if arguments.first().is_some_and(|one| one == "--steady") {
+        let series = arguments.get(1).map_or(Ok(STEADY), |text| text.parse())?;
+        return steady::write(&source::in_force()?, series);
     }
     let slopes = arguments.first().map_or(Ok(SLOPES), |text| text.parse())?;
     let material = Material {

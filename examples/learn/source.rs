@@ -1,19 +1,31 @@
-//! The file that holds what was learnt.
+//! The files that are written: what was learnt, and documents.
 
 use anyhow::Context;
 use slipwatch::forecast::Network;
+use std::path::{Path, PathBuf};
+
+const LEARNED: &str = "src/forecast/learned.txt";
 
 /// Writes src/forecast/learned.txt.
 pub(crate) fn write(network: &Network) -> anyhow::Result<()> {
-    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/src/forecast/learned.txt");
-    std::fs::write(file, network.text()).with_context(|| file.to_owned())?;
-    eprintln!("wrote {file}");
-    Ok(())
+    document(LEARNED, &network.text())
 }
 
 /// The network that src/forecast/learned.txt holds.
 pub(crate) fn in_force() -> anyhow::Result<Network> {
-    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/src/forecast/learned.txt");
-    let text = std::fs::read_to_string(file).with_context(|| file.to_owned())?;
+    let file = at(LEARNED);
+    let text = std::fs::read_to_string(&file).with_context(|| file.display().to_string())?;
     Ok(Network::from_text(&text))
+}
+
+/// Writes the file of that name in the source tree.
+pub(crate) fn document(name: &str, text: &str) -> anyhow::Result<()> {
+    let file = at(name);
+    std::fs::write(&file, text).with_context(|| file.display().to_string())?;
+    eprintln!("wrote {}", file.display());
+    Ok(())
+}
+
+fn at(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
 }

@@ -1,16 +1,13 @@
 //! docs/families.md: each family by the network that never saw it.
 
 use crate::judge::{EVACUATIONS, Judged, Lead, Replay};
-use anyhow::Context;
+use crate::source;
 use slipwatch::forecast::GaugeKind;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 pub(crate) fn write(families: &[Judged], slopes: u64) -> anyhow::Result<()> {
-    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/families.md");
-    std::fs::write(file, text(families, slopes)?).with_context(|| file.to_owned())?;
-    eprintln!("wrote {file}");
-    Ok(())
+    source::document("docs/families.md", &text(families, slopes)?)
 }
 
 fn text(families: &[Judged], slopes: u64) -> anyhow::Result<String> {

@@ -1,8 +1,8 @@
 //! docs/false-alarms.md: years of slopes that stand, as people count alarms.
 
 use crate::judge::{self, Replay, YEARS};
+use crate::source;
 use crate::table::{HEAD, alarms};
-use anyhow::Context;
 use slipwatch::forecast::{Family, GaugeKind, Network};
 use std::fmt::Write as _;
 
@@ -13,10 +13,7 @@ pub(crate) fn write(network: &Network) -> anyhow::Result<()> {
         families.push((*family, judge::years(*family, network)));
         eprintln!("followed {family:?}");
     }
-    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/false-alarms.md");
-    std::fs::write(file, text(&families)?).with_context(|| file.to_owned())?;
-    eprintln!("wrote {file}");
-    Ok(())
+    source::document("docs/false-alarms.md", &text(&families)?)
 }
 
 fn text(families: &[(Family, Vec<Vec<Replay>>)]) -> anyhow::Result<String> {

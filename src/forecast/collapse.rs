@@ -38,9 +38,10 @@ const TIMED: f64 = 0.35;
 const GROWN_SCALES: usize = 10;
 /// How far the growth of a slope that runs up departs from a straight line in inverse velocity, and what is left of the
 /// chance that levels go by where the velocity has stopped growing: half of the published failures paused or came in
-/// pieces (10 of 19), and most of what pauses does so for good. Set with Preonzo's pause in view.
+/// pieces (10 of 19), and most of what pauses does so for good. Set on simulated slopes: with a quarter left, and by the one
+/// scale alone that speaks most against growth, a rate that doubles and stays was red for weeks.
 const ROUGH: f64 = 0.8;
-const PAUSED: f64 = 0.25;
+const PAUSED: f64 = 0.1;
 /// The same for the chance that is reported, where it is not sure that the slope accelerates; and the most, ln, that one
 /// scale can speak for growth.
 const UNEVEN: f64 = 0.4;
@@ -238,10 +239,11 @@ fn goes_on(scales: &Scales, power: usize) -> f64 {
 }
 
 /// The share of the chance within the span of a scale and so many days that levels keep of a slope whose velocity may have stopped
-/// growing: the scale that speaks most against growth counts.
+/// growing: every scale that speaks against growth counts, and none for it, because after a step of the rate the scales that
+/// hold the step show growth that is over.
 fn keeps_growing(scales: &Scales, span: (usize, f64)) -> f64 {
-    let least = growth(scales, span, ROUGH).fold(0.0, f64::min);
-    PAUSED + (1.0 - PAUSED) * share(least)
+    let against = growth(scales, span, ROUGH).map(|ln| ln.min(0.0));
+    PAUSED + (1.0 - PAUSED) * share(against.sum())
 }
 
 /// The share of the chance within such a span that is reported of a slope that may creep steadily: all scales
