@@ -8,7 +8,7 @@ use slipwatch::runtime::ingest::{
     Item, ReadOptions, TextFormat, TextRows, decode_message, read_files,
 };
 use slipwatch::runtime::tail::lines::Lines;
-use slipwatch::runtime::tail::records::{Channels, Frame, HEADER_BYTES, MAGIC, frame};
+use slipwatch::runtime::tail::records::{Channels, HEADER_BYTES, MAGIC, NextRecord, frame};
 use std::path::Path;
 
 /// Bytes as a CSV file.
@@ -55,9 +55,9 @@ pub(crate) fn mcap(bytes: &[u8]) {
     let mut channels = Channels::default();
     while let Some((header, after)) = rest.split_first_chunk::<HEADER_BYTES>() {
         let (opcode, length) = match frame(*header, after.len() as u64) {
-            Frame::Read { opcode, length } => (Some(opcode), length),
-            Frame::Skip { length } => (None, length),
-            Frame::Wait | Frame::End | Frame::Damaged { .. } => return,
+            NextRecord::Read { opcode, length } => (Some(opcode), length),
+            NextRecord::Skip { length } => (None, length),
+            NextRecord::Wait | NextRecord::End | NextRecord::Damaged { .. } => return,
         };
         let (body, next) = after.split_at(usize::try_from(length).expect("it fits the file"));
         rest = next;

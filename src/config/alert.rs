@@ -96,7 +96,7 @@ fn doubts(
         );
     }
     for (name, quantity) in [
-        ("velocity", (|t| t.velocity_mm_per_day) as Figure),
+        ("velocity", (|t| t.velocity_mm_per_day) as ThresholdField),
         ("displacement", |t| t.displacement_mm),
         ("acceleration", |t| t.acceleration_mm_per_day2),
     ] {
@@ -110,10 +110,10 @@ fn doubts(
     }
 }
 
-type Figure = fn(&Threshold) -> Option<f64>;
+type ThresholdField = fn(&Threshold) -> Option<f64>;
 
 /// A level and a graver one that begins below it.
-fn inverted(thresholds: &[Threshold], figure: Figure) -> Option<(Level, Level)> {
+fn inverted(thresholds: &[Threshold], figure: ThresholdField) -> Option<(Level, Level)> {
     let mut pairs = thresholds
         .iter()
         .flat_map(|low| thresholds.iter().map(move |high| (low, high)));

@@ -23,14 +23,14 @@ pub(crate) mod value;
 mod vector;
 
 pub use broker::{Broker, BrokerAddress};
-pub use check::{Summary, check};
+pub use check::{ConfigSummary, check};
 pub use drill::{Drill, EXERCISE};
 pub use heartbeat::Heartbeat;
-pub use keys::{Key, Keys, Shape};
+pub use keys::{Key, Keys, ValueShape};
 pub use link::Links;
 pub use mqtt_out::MqttTopic;
 pub use pattern::FilePattern;
-pub use problem::{ConfigError, Problem, Severity};
+pub use problem::{ConfigError, ConfigProblem, Severity};
 pub use secret::{Secret, SecretError};
 pub use token::{Token, TokenError};
 pub use vector::Vector;
@@ -57,7 +57,7 @@ pub struct Config {
     /// `[site]`.
     pub site: SiteConfig,
     /// `[[source]]`s that are files; there is at least one of these or of the brokers.
-    pub sources: Vec<Source>,
+    pub sources: Vec<FileSource>,
     /// `[[source]]`s that are topics of an MQTT broker.
     pub brokers: Vec<Broker>,
     /// `[[benchmark]]`; with none, whatever benchmarks the files name are taken.
@@ -71,7 +71,7 @@ pub struct Config {
     /// `[drill]`.
     pub drill: Option<Drill>,
     /// What is doubtful, but not refused.
-    pub warnings: Vec<Problem>,
+    pub warnings: Vec<ConfigProblem>,
 }
 
 /// `[site]`.
@@ -121,7 +121,7 @@ impl SourceKind {
 
 /// `[[source]]`: files that readings come from.
 #[derive(Debug, Clone)]
-pub struct Source {
+pub struct FileSource {
     /// What benchmarks call it.
     pub id: String,
     /// What the files hold.

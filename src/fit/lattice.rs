@@ -5,7 +5,7 @@ use super::chart::{Branch, Chart, Direction};
 use super::curve::{CurveShape, CurveWindow, Fineness};
 use super::descent::{Descent, SearchPoint};
 use super::quasi_random::halton;
-use super::record::Record;
+use super::record::WeightedRecord;
 
 /// The m's that are looked at in any case, and those that are where a direction shows promise.
 const FIRST: [(Branch, f64); 3] = [
@@ -110,7 +110,7 @@ impl CurveFamily {
     pub(super) fn scan(
         &self,
         descent: &mut Descent,
-        record: &Record,
+        record: &WeightedRecord,
         lattice: Lattice,
         holds_m: bool,
     ) -> Vec<SearchPoint> {
@@ -163,7 +163,7 @@ impl CurveFamily {
 /// Lays the curve over the record in all ways and keeps the two best that differ.
 fn lay(
     descent: &mut Descent,
-    record: &Record,
+    record: &WeightedRecord,
     chart: Chart,
     (p, lattice, seed): (f64, Lattice, usize),
 ) -> Vec<Laid> {

@@ -1,7 +1,7 @@
 //! Which benchmarks of one site fail together, since when it is seen, and when they fail.
 
-use super::report::FailureTime;
-use super::{Inversion, Options};
+use super::report::FittedFailureTime;
+use super::{Inversion, InversionOptions};
 use crate::fit::{Rate, RateOptions};
 use crate::forecast::{
     Dependence, FEWEST_READINGS, FailureTimeLikelihood, Passage, Snapshot, by_the_law, groups,
@@ -44,7 +44,7 @@ pub struct GroupReport {
     /// The look from which on they have been a group; [`TogetherReport::judged_from`]: from the first.
     pub since: Timestamp,
     /// When they pass the critical velocity together, by the law.
-    pub failure_time: FailureTime,
+    pub failure_time: FittedFailureTime,
 }
 
 /// A benchmark on its own.
@@ -60,7 +60,7 @@ pub struct ApartReport {
 
 /// Judges the benchmarks of `series`, by the first series of each, with what `options` let be used; `None`
 /// where fewer than two have a forecast.
-pub fn together(series: &[Series], options: &Options) -> Option<TogetherReport> {
+pub fn together(series: &[Series], options: &InversionOptions) -> Option<TogetherReport> {
     let mut each: Vec<Inversion> = Vec::new();
     for one in series {
         if each
@@ -93,7 +93,7 @@ pub fn together(series: &[Series], options: &Options) -> Option<TogetherReport> 
         benchmarks: group.members.iter().map(name).collect(),
         probabilities: group.probabilities.clone(),
         since: times[group.since],
-        failure_time: FailureTime::from_passage(options, Some((now, &group.passage))),
+        failure_time: FittedFailureTime::from_passage(options, Some((now, &group.passage))),
     });
     let apart = alone.iter().flat_map(|group| {
         let members = group.members.iter().zip(&group.probabilities);

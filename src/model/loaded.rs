@@ -9,7 +9,7 @@
 use super::accuracy::Accuracy;
 use super::coefficients::Coefficients;
 use super::law::{Law, LawError};
-use super::load::{Load, Stretch};
+use super::load::{Load, LoadStretch};
 use super::relaxation::Relaxation;
 use super::trajectory::Motion;
 use std::ops::ControlFlow;
@@ -51,7 +51,7 @@ struct TaylorStep {
     start: f64,
     end: f64,
     unit: f64,
-    stretch: Stretch,
+    stretch: LoadStretch,
     order: usize,
     y: PowerSeries,
     slip: PowerSeries,
@@ -168,7 +168,7 @@ impl<'a> LoadedLaw<'a> {
     }
 
     /// The rest of a stretch whose load stands still, beside a steady state that attracts.
-    fn relaxation(&self, block: &BlockState, stretch: Stretch) -> Option<Relaxation<f64>> {
+    fn relaxation(&self, block: &BlockState, stretch: LoadStretch) -> Option<Relaxation<f64>> {
         if stretch.per_day != 0.0 {
             return None;
         }
@@ -226,7 +226,7 @@ impl TaylorStep {
         law: &Law,
         (order, fraction): (usize, f64),
         block: &BlockState,
-        stretch: Stretch,
+        stretch: LoadStretch,
     ) -> Self {
         let gain = stretch.log_load.exp();
         let (w_0, u_0) = ((law.p * block.y.ln()).exp(), 1.0 / block.y);

@@ -176,7 +176,7 @@ pub enum EventKind {
         /// The key of the only alert that it is of; `None`: of everything in its place.
         #[serde(skip_serializing_if = "Option::is_none", default)]
         alert: Option<String>,
-        /// Who, why, over which door.
+        /// Who, why, by which way.
         #[serde(flatten)]
         given: Given,
     },

@@ -23,18 +23,18 @@ mod suspect;
 mod together;
 mod track;
 
-pub use course::{Stretch, levels_in};
+pub use course::{LevelStretch, levels_in};
 pub use declared::{Declaration, Declared};
 pub use event::{
     AlertState, Event, EventKind, FailureTime, InverseVelocity, Plain, RegimeReport, SUSPECT,
     SUSPECT_ENDS, SharedFailure, Summary, Unexplained,
 };
-pub use given::{Door, Given};
+pub use given::{Given, OrderedBy};
 pub(crate) use motion::recent;
 pub use notice::{CLOCK_FAULT, Notice};
 pub use order::Order;
-pub use saved::{Part, SavedError};
-pub use search::{Finding, SearchJob};
+pub use saved::{MemoryPart, SavedError};
+pub use search::{SearchFinding, SearchJob};
 pub use site::SiteLevel;
 
 use crate::alert::{Level, Policy};
@@ -49,8 +49,8 @@ use sensor::Sensors;
 use serde::{Deserialize, Serialize};
 use site::SiteAlert;
 use std::collections::{BTreeMap, BTreeSet};
-use together::Together;
-use track::{Beside, Track, Walk};
+use together::FailureComparisons;
+use track::{StepContext, Track, Walk};
 
 /// What the monitor is given.
 #[derive(Debug, Clone, PartialEq)]
@@ -96,7 +96,7 @@ pub enum Input {
     /// What people ask for.
     Order(Order),
     /// What a search came to; to be handed in before the first reading that is no earlier than it was due.
-    Found(Finding),
+    Found(SearchFinding),
     /// How the watch goes on.
     Notice(Notice),
     /// Time has passed and nothing came.
@@ -191,7 +191,7 @@ pub struct Monitor {
     sensors: Sensors,
     searches: Vec<SearchJob>,
     site: SiteAlert,
-    together: Together,
+    together: FailureComparisons,
     /// Benchmarks of the config that have given no reading.
     awaited: Awaited,
     /// Benchmarks with late readings that are to be looked back on.
@@ -220,7 +220,7 @@ impl Monitor {
             sensors: Sensors::default(),
             searches: Vec::new(),
             site: SiteAlert::default(),
-            together: Together::default(),
+            together: FailureComparisons::default(),
             awaited: Awaited::default(),
             late: BTreeSet::new(),
             settles: false,
@@ -243,7 +243,7 @@ impl Monitor {
                 averaging,
                 reading,
             } => {
-                let source = history::Source {
+                let source = history::MeasuredAs {
                     unit: *unit,
                     averaging: *averaging,
                 };
@@ -303,13 +303,13 @@ impl Monitor {
         &mut self,
         now: Timestamp,
         benchmark: &BenchmarkId,
-        source: history::Source,
+        source: history::MeasuredAs,
         reading: &Reading,
     ) -> Vec<Event> {
         self.summary.readings += 1;
         self.sensors.reads(benchmark, reading.time);
         self.changed.insert(benchmark.clone());
-        let beside = Beside {
+        let beside = StepContext {
             covariates: &self.covariates,
             explain: self.settings.explain,
             now,
@@ -377,7 +377,7 @@ impl Monitor {
     fn resettle(&mut self, now: Timestamp, settings: &Settings) -> Vec<Event> {
         let former = std::mem::replace(&mut self.settings, settings.clone());
         let mut events = self.unwatch(now, &former.watched);
-        let beside = Beside {
+        let beside = StepContext {
             covariates: &self.covariates,
             explain: self.settings.explain,
             now,

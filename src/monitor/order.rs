@@ -18,7 +18,7 @@ pub enum Order {
         /// The key of the only alert that has been seen; `None`: all that is in force there.
         #[serde(skip_serializing_if = "Option::is_none", default)]
         alert: Option<String>,
-        /// Who, why, over which door.
+        /// Who, why, by which way.
         #[serde(flatten)]
         given: Given,
     },
@@ -28,7 +28,7 @@ pub enum Order {
         benchmark: BenchmarkId,
         /// Until when, by the wall clock.
         until: Timestamp,
-        /// Who, why, over which door.
+        /// Who, why, by which way.
         #[serde(flatten)]
         given: Given,
     },
@@ -38,7 +38,7 @@ pub enum Order {
         benchmark: Option<BenchmarkId>,
         /// Until when, by the wall clock.
         until: Timestamp,
-        /// Who, why, over which door.
+        /// Who, why, by which way.
         #[serde(flatten)]
         given: Given,
     },
@@ -46,7 +46,7 @@ pub enum Order {
     Unsilence {
         /// Where; `None`: everywhere.
         benchmark: Option<BenchmarkId>,
-        /// Who, why, over which door.
+        /// Who, why, by which way.
         #[serde(flatten)]
         given: Given,
     },

@@ -4,7 +4,7 @@
 use super::Monitor;
 use super::event::{Event, EventKind};
 use super::notice::Notice;
-use super::track::{Beside, PAST};
+use super::track::{PAST, StepContext};
 use super::{Input, Track};
 use crate::alert::{Level, Policy};
 use crate::reading::{BenchmarkId, Timestamp};
@@ -125,7 +125,7 @@ impl Monitor {
         let Some((track, policy, beside)) = self.track_at(&id, now) else {
             return Vec::new();
         };
-        let beside = Beside {
+        let beside = StepContext {
             is_past: false,
             is_queue: false,
             ..beside
@@ -146,7 +146,7 @@ impl Track {
     fn judge_newest(
         &mut self,
         policy: &Policy,
-        beside: &Beside<'_>,
+        beside: &StepContext<'_>,
     ) -> (Option<Timestamp>, Vec<Event>) {
         let newest = self.newest();
         let events = newest.map_or_else(Vec::new, |newest| self.judge_now(policy, newest, beside));

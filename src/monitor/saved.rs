@@ -11,7 +11,7 @@ use super::queue::Queue;
 use super::search::SearchJob;
 use super::sensor::Sensors;
 use super::site::SiteAlert;
-use super::together::Together;
+use super::together::FailureComparisons;
 use super::track::{Track, Walk};
 use super::{Monitor, Settings};
 use crate::reading::{BenchmarkId, Timestamp};
@@ -25,7 +25,7 @@ const WALK: &str = "\0past";
 
 /// One piece of a monitor's memory.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Part {
+pub struct MemoryPart {
     /// Whose it is: a benchmark's id, or empty for what belongs to none.
     pub name: String,
     /// What is remembered; `None`: this benchmark is no longer known.
@@ -65,7 +65,7 @@ struct Rest {
     #[serde(default)]
     site: SiteAlert,
     #[serde(default)]
-    together: Together,
+    together: FailureComparisons,
     #[serde(default)]
     awaited: Awaited,
     #[serde(default)]
@@ -88,13 +88,13 @@ impl Monitor {
     ///
     /// # Errors
     /// [`SavedError::Unwritable`].
-    pub fn save(&self) -> Result<Vec<Part>, SavedError> {
+    pub fn save(&self) -> Result<Vec<MemoryPart>, SavedError> {
         let mut parts = Vec::with_capacity(self.changed.len() + 1);
         for id in &self.changed {
             let track = self.tracks.get(id);
             let body = track.map(|track| bytes(id.as_str(), track)).transpose()?;
             let name = id.as_str().to_owned();
-            parts.push(Part { name, body });
+            parts.push(MemoryPart { name, body });
         }
         let rest = Rest {
             settings: self.settings.clone(),
@@ -115,10 +115,10 @@ impl Monitor {
         let walk = self.walk.as_ref();
         let body = walk.map(|walk| bytes(WALK, walk)).transpose()?;
         let name = WALK.to_owned();
-        parts.push(Part { name, body });
+        parts.push(MemoryPart { name, body });
         let body = Some(bytes(REST, &rest)?);
         let name = REST.to_owned();
-        parts.push(Part { name, body });
+        parts.push(MemoryPart { name, body });
         Ok(parts)
     }
 
@@ -131,9 +131,9 @@ impl Monitor {
     ///
     /// # Errors
     /// [`SavedError`] when they are not all there, or from a version that remembered something else.
-    pub fn restore(parts: &[Part]) -> Result<Self, SavedError> {
+    pub fn restore(parts: &[MemoryPart]) -> Result<Self, SavedError> {
         let (mut rest, mut walk, mut tracks) = (None, None, BTreeMap::new());
-        for Part { name, body } in parts {
+        for MemoryPart { name, body } in parts {
             let Some(body) = body else { continue };
             if name == REST {
                 rest = Some(value::<Rest>(name, body)?);

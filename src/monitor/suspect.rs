@@ -200,14 +200,14 @@ fn is_first_day(time: Timestamp) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::history::Source;
+    use super::super::history::MeasuredAs;
     use super::*;
     use crate::reading::{Reading, Unit};
     use jiff::ToSpan;
 
     fn history(values: impl IntoIterator<Item = f64>) -> History {
         let start: Timestamp = "2020-01-01T00:00:00Z".parse().unwrap();
-        let source = Source {
+        let source = MeasuredAs {
             unit: Unit::MM,
             averaging: None,
         };
@@ -313,7 +313,7 @@ mod tests {
     #[test]
     fn what_an_unset_clock_gave_is_left_out_and_a_record_that_begins_there_is_not() {
         let start: Timestamp = "2000-01-01T00:00:00Z".parse().unwrap();
-        let source = Source {
+        let source = MeasuredAs {
             unit: Unit::MM,
             averaging: None,
         };

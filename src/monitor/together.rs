@@ -32,13 +32,13 @@ const LEAST: Level = Level::Orange;
 
 /// What has been compared and reported.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Together {
+pub(super) struct FailureComparisons {
     /// Forecasts at the newest comparisons, oldest first.
     kept: Vec<(Timestamp, BTreeMap<BenchmarkId, KeptForecast>)>,
     reported: Vec<SharedFailure>,
 }
 
-impl Together {
+impl FailureComparisons {
     /// Takes the newest forecasts; says which benchmarks share a failure time where that is other than last reported.
     pub(super) fn update(
         &mut self,

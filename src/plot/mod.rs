@@ -8,7 +8,7 @@ mod mark;
 mod panel;
 mod stack;
 
-pub use axis::{Axis, Scale};
+pub use axis::{Axis, AxisScale};
 pub use bars::{Bar, Bars};
 pub use figure::Figure;
 pub use mark::Mark;

@@ -10,7 +10,7 @@ use tokio::task::JoinSet;
 
 /// The tasks, and what they need.
 #[derive(Debug)]
-pub(super) struct Beside {
+pub(super) struct SideTasks {
     config: Config,
     store: Arc<Store>,
     vitals: Arc<Vitals>,
@@ -19,7 +19,7 @@ pub(super) struct Beside {
     drills: JoinSet<()>,
 }
 
-impl Beside {
+impl SideTasks {
     /// Starts what `config` asks for; it ends with the shutdown.
     pub(super) fn start(
         config: &Config,

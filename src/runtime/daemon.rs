@@ -2,19 +2,19 @@
 
 mod reload;
 
-use super::beside::Beside;
+use super::beside::SideTasks;
 use super::clock::Stopwatch;
 use super::deliver::{Dispatcher, Retry};
 use super::delivered::Delivered;
 use super::log;
 use super::mqtt;
 use super::progress::Progress;
-use super::pulse::Pulse;
+use super::pulse::Reporting;
 use super::sandbox;
 use super::shutdown::Shutdown;
 use super::site::Site;
 use super::sources::Sources;
-use super::tail::{Arrival, Batch};
+use super::tail::{Arrival, ArrivalBatch};
 use crate::config::Config;
 use crate::monitor::Input;
 use crate::reading::Timestamp;
@@ -45,7 +45,7 @@ pub struct Daemon {
     /// What feeds it.
     pub sources: Sources,
     /// What shows how it is.
-    pub pulse: Pulse,
+    pub pulse: Reporting,
     /// The host's clock.
     wall: fn() -> Timestamp,
     /// Once, and as of the last batch: a logger that was away hands in its backlog in several.
@@ -60,7 +60,7 @@ pub struct Daemon {
     /// How far the rows of the state have been looked at.
     verified: Verified,
     /// What works beside it; nothing in a simulation.
-    pub(super) beside: Option<Beside>,
+    pub(super) beside: Option<SideTasks>,
 }
 
 /// The way to the hooks of `config`.
@@ -76,7 +76,7 @@ impl Daemon {
         config: &Config,
         store: Arc<Store>,
         site: Site,
-        (sources, pulse): (Sources, Pulse),
+        (sources, pulse): (Sources, Reporting),
         wall: fn() -> Timestamp,
     ) -> Self {
         Self {
@@ -162,7 +162,11 @@ impl Daemon {
     ///
     /// # Errors
     /// When the state cannot be used any more.
-    pub fn take_batch(&mut self, batch: Batch, shutdown: &Shutdown) -> Result<(), StoreError> {
+    pub fn take_batch(
+        &mut self,
+        batch: ArrivalBatch,
+        shutdown: &Shutdown,
+    ) -> Result<(), StoreError> {
         let vitals = &self.pulse.vitals;
         batch
             .found
@@ -216,7 +220,7 @@ impl Daemon {
     ///
     /// # Errors
     /// When the state cannot be used any more.
-    pub fn take_messages(&mut self, first: mqtt::Delivery) -> Result<(), StoreError> {
+    pub fn take_messages(&mut self, first: mqtt::ReceivedMessage) -> Result<(), StoreError> {
         let mut next = Some(first);
         while let Some(delivery) = next {
             self.site.messages_come(self.sources.deliveries.len());

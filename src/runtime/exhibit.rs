@@ -3,7 +3,7 @@
 use super::clock;
 use super::hook::Status;
 use super::replay::{ReplayPace, arrivals, wait};
-use super::serve::{Behind, Door, ListenError, Server};
+use super::serve::{Behind, ListenError, ListenOptions, Server};
 use super::shutdown::Shutdown;
 use super::site::{Sinks, Site};
 use super::view::{Desk, Facts};
@@ -30,7 +30,7 @@ pub struct Exhibit<'a> {
     /// What the page says of the site.
     pub facts: Facts,
     /// Where the page is.
-    pub door: Door,
+    pub options: ListenOptions,
 }
 
 /// Why nothing is shown.
@@ -61,7 +61,7 @@ pub async fn show(
     let vitals = Arc::new(Vitals::default());
     vitals.update(|health| (health.is_caught_up, health.is_store_writable) = (true, true));
     let behind = Behind { archive, desk };
-    let server = Server::open(exhibit.door.clone(), Arc::clone(&vitals), behind).await?;
+    let server = Server::open(exhibit.options.clone(), Arc::clone(&vitals), behind).await?;
     opened(server.address());
     let sinks = Sinks {
         store: Some(Arc::clone(&store)),

@@ -15,7 +15,7 @@ use super::shutdown::Shutdown;
 use super::site::is_logged;
 use super::tail::{Arrival, Decoder};
 use crate::config::{Benchmark, Broker};
-use session::{Came, Message, NoConnection, Session};
+use session::{BrokerMessage, Came, NoConnection, Session};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -30,7 +30,7 @@ const RECONNECT: (Duration, Duration) = (Duration::from_secs(1), Duration::from_
 
 /// One message, on its way to be made durable.
 #[derive(Debug)]
-pub struct Delivery {
+pub struct ReceivedMessage {
     /// What it holds; nothing where it cannot be used.
     pub arrivals: Vec<Arrival>,
     /// The source that it is from.
@@ -52,7 +52,7 @@ pub struct Receipt(Of);
 /// What is acknowledged.
 #[derive(Debug)]
 enum Of {
-    Message(Box<Message>),
+    Message(Box<BrokerMessage>),
     Number(u64, mpsc::UnboundedSender<u64>),
 }
 
@@ -86,7 +86,7 @@ pub async fn follow(
     broker: Broker,
     benchmarks: Vec<Benchmark>,
     client_id: String,
-    deliveries: mpsc::Sender<Delivery>,
+    deliveries: mpsc::Sender<ReceivedMessage>,
     mut shutdown: Shutdown,
 ) {
     let mut session = Session::new(broker.clone(), client_id);
@@ -145,10 +145,10 @@ pub async fn follow(
 
 /// Sends it when there is room for its values.
 async fn send(
-    mut delivery: Delivery,
+    mut delivery: ReceivedMessage,
     room: &Arc<Semaphore>,
-    deliveries: &mpsc::Sender<Delivery>,
-) -> Result<(), mpsc::error::SendError<Delivery>> {
+    deliveries: &mpsc::Sender<ReceivedMessage>,
+) -> Result<(), mpsc::error::SendError<ReceivedMessage>> {
     let values = u32::try_from(delivery.arrivals.len()).unwrap_or(MOST_VALUES);
     let share = Arc::clone(room).acquire_many_owned(values.min(MOST_VALUES));
     // It is never closed.
@@ -165,11 +165,11 @@ struct Reader {
 }
 
 impl Reader {
-    fn delivery(&mut self, mut message: Message) -> Delivery {
+    fn delivery(&mut self, mut message: BrokerMessage) -> ReceivedMessage {
         let found = Stopwatch::start();
         let (arrivals, quarantined) = self.read(&message.topic(), message.payload());
         message.forget_payload();
-        Delivery {
+        ReceivedMessage {
             arrivals,
             source: self.source.clone(),
             found,

@@ -2,7 +2,7 @@
 
 use super::ingest::is_packed;
 use super::tail::{Decoder, TextReader, list};
-use crate::config::{Config, Source};
+use crate::config::{Config, FileSource};
 use crate::monitor::Input;
 use crate::reading::Timestamp;
 use std::collections::BTreeMap;
@@ -16,7 +16,7 @@ const MOST_LINES: u64 = 2_000_000;
 const LONGEST_LINE: u64 = 1 << 20;
 
 /// A value by name, time and the bits of the number as it stands in the file.
-type Token = (String, Timestamp, u64);
+type ValueIdentity = (String, Timestamp, u64);
 
 /// A line of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -31,7 +31,7 @@ pub struct Origin {
 /// file has changed or gone since, is not among them.
 #[derive(Debug, Default)]
 pub struct Origins {
-    lines: BTreeMap<Token, Origin>,
+    lines: BTreeMap<ValueIdentity, Origin>,
     looked_at: u64,
 }
 
@@ -50,7 +50,7 @@ impl Origins {
         self.lines.get(&token(input)?)
     }
 
-    fn source(&mut self, source: &Source, decoder: &Decoder) {
+    fn source(&mut self, source: &FileSource, decoder: &Decoder) {
         let Ok((mut files, _)) = list(&source.pattern, decoder) else {
             return;
         };
@@ -94,7 +94,7 @@ impl Origins {
     }
 }
 
-fn token(input: &Input) -> Option<Token> {
+fn token(input: &Input) -> Option<ValueIdentity> {
     match input {
         Input::Reading {
             benchmark, reading, ..

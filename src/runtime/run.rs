@@ -1,12 +1,12 @@
 //! The daemon: files to the monitor, everything to the state folder, alerts to the hooks.
 
-use super::beside::Beside;
+use super::beside::SideTasks;
 use super::clock;
 use super::daemon::{DRAIN_LIMIT, Daemon, dispatcher};
 use super::hook::Status;
 use super::link;
 use super::progress::Progress;
-use super::pulse::{Pulse, PulseError};
+use super::pulse::{Reporting, ReportingError};
 use super::serve::Behind;
 use super::shutdown::{self, Shutdown};
 use super::site::{Counts, Sinks, Site};
@@ -31,7 +31,7 @@ pub enum RunError {
     },
     /// Nobody could be let in to ask.
     #[error(transparent)]
-    Pulse(#[from] PulseError),
+    Pulse(#[from] ReportingError),
     /// The part that follows the files broke off.
     #[error("following the files broke off: {0}")]
     Follow(#[from] tokio::task::JoinError),
@@ -63,7 +63,7 @@ pub async fn run(
         archive: Some(Arc::new(super::archive::Events::of(Arc::clone(&store)))),
         desk: desk(config),
     };
-    let mut pulse = Pulse::start(&config.site, behind).await?;
+    let mut pulse = Reporting::start(&config.site, behind).await?;
     let sinks = Sinks {
         store: Some(Arc::clone(&store)),
         alerts: Some(dispatcher(config, &store)),
@@ -76,7 +76,7 @@ pub async fn run(
     for (source, count) in store.quarantined().map_err(fail)? {
         pulse.vitals.quarantined(&source, count);
     }
-    let beside = Beside::start(config, &store, (&pulse.vitals, &shutdown));
+    let beside = SideTasks::start(config, &store, (&pulse.vitals, &shutdown));
     let sources = Sources::start(config, &store).map_err(fail)?;
     let mut daemon = Daemon::new(config, store, site, (sources, pulse), clock::now);
     daemon.beside = Some(beside);

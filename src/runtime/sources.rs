@@ -1,8 +1,8 @@
 //! Where a daemon's values come from: files that are followed, brokers that are listened to.
 
-use super::mqtt::{self, Delivery, Receipt};
+use super::mqtt::{self, Receipt, ReceivedMessage};
 use super::shutdown::{self, Shutdown, Trigger};
-use super::tail::{self, Batch, Follower};
+use super::tail::{self, ArrivalBatch, Follower};
 use crate::config::Config;
 use crate::store::{Store, StoreError};
 use tokio::sync::mpsc;
@@ -17,13 +17,13 @@ pub(super) const MESSAGES: usize = mqtt::MOST_UNACKNOWLEDGED as usize;
 #[derive(Debug)]
 pub struct Sources {
     /// What files hold.
-    pub batches: mpsc::Receiver<Batch>,
+    pub batches: mpsc::Receiver<ArrivalBatch>,
     /// What brokers send.
-    pub deliveries: mpsc::Receiver<Delivery>,
+    pub deliveries: mpsc::Receiver<ReceivedMessage>,
     /// What has been taken and is not durable yet.
     unacknowledged: Vec<Receipt>,
     /// Held, so that without a broker the other end waits.
-    _messages: mpsc::Sender<Delivery>,
+    _messages: mpsc::Sender<ReceivedMessage>,
     /// Stops them, also when it is dropped.
     stop: Trigger,
     task: JoinHandle<Result<(), JoinError>>,
@@ -45,7 +45,10 @@ impl Sources {
 
     /// Messages that somebody else brings, and no files; needs a tokio runtime.
     pub fn of(
-        (messages, deliveries): (mpsc::Sender<Delivery>, mpsc::Receiver<Delivery>),
+        (messages, deliveries): (
+            mpsc::Sender<ReceivedMessage>,
+            mpsc::Receiver<ReceivedMessage>,
+        ),
         stop: Trigger,
     ) -> Self {
         let (_, batches) = mpsc::channel(1);
@@ -103,7 +106,7 @@ impl Sources {
 fn listen(
     config: &Config,
     instance: i64,
-    (messages, stopped): (&mpsc::Sender<Delivery>, &Shutdown),
+    (messages, stopped): (&mpsc::Sender<ReceivedMessage>, &Shutdown),
 ) {
     for broker in &config.brokers {
         // One session for each state and source, found again after a restart. Two daemons of one site's name would

@@ -1,7 +1,7 @@
 //! What the daemon knows of its own health; the work loop writes it, whoever asks reads it.
 
 use super::clock::Stopwatch;
-use super::drilled::Record;
+use super::drilled::DrillRecord;
 use super::site::Mute;
 use crate::alert::Level;
 use crate::monitor::{AlertState, Event, EventKind, Unexplained};
@@ -71,7 +71,7 @@ pub struct Health {
     /// See [`Health::heartbeats`].
     pub heartbeats_failed: u64,
     /// How drills stand; `None` where none are held.
-    pub drill: Option<Record>,
+    pub drill: Option<DrillRecord>,
     /// Size of the database, bytes.
     pub database_bytes: Option<u64>,
 }

@@ -1,7 +1,7 @@
 //! Sends one alert to an address once: POST of what a hook gets on stdin, signed as Standard Webhooks asks.
 
 use super::clock;
-use super::hook::{Alert, Outcome, state_name};
+use super::hook::{Alert, HookOutcome, state_name};
 use super::http;
 use crate::config::{Secret, Webhook};
 use base64::Engine;
@@ -44,10 +44,10 @@ pub(super) async fn send(
     webhook: &Webhook,
     alert: &Alert,
     (body, limit): (Vec<u8>, Duration),
-) -> Outcome {
+) -> HookOutcome {
     let request = match request(webhook, alert, body) {
         Ok(request) => request,
-        Err(why) => return Outcome::NotStarted(why),
+        Err(why) => return HookOutcome::NotStarted(why),
     };
     let address = &webhook.address;
     match tokio::time::timeout(
@@ -56,10 +56,10 @@ pub(super) async fn send(
     )
     .await
     {
-        Ok(Ok(status)) if (200..300).contains(&status) => Outcome::Done,
-        Ok(Ok(status)) => Outcome::Refused(status),
-        Ok(Err(why)) => Outcome::NotStarted(format!("{}: {why}", webhook.name)),
-        Err(_elapsed) => Outcome::TimedOut,
+        Ok(Ok(status)) if (200..300).contains(&status) => HookOutcome::Done,
+        Ok(Ok(status)) => HookOutcome::Refused(status),
+        Ok(Err(why)) => HookOutcome::NotStarted(format!("{}: {why}", webhook.name)),
+        Err(_elapsed) => HookOutcome::TimedOut,
     }
 }
 

@@ -1,7 +1,7 @@
 //! The scorecard of one benchmark: what each method said at each lead, and how that compares with what came.
 
 use super::measure::{Outcome, crps_days, is_covered, log_score, scored_days};
-use super::{History, Known, METHODS};
+use super::{Known, METHODS, WholeRecord};
 use crate::fit::Observations;
 use crate::forecast::{FEWEST_READINGS, HORIZON_DAYS, Passage};
 use crate::reading::{Channel, Series, Timestamp, after_days, days_since};
@@ -102,7 +102,7 @@ pub struct Score {
     pub said: bool,
 }
 
-impl History {
+impl WholeRecord {
     /// The readings of a series, with the first channel beside it that is a river's flow.
     pub fn of(series: &Series, channels: &[Channel], critical_mm_per_day: f64) -> Self {
         let epoch = series.readings.first().map(|reading| reading.time);
@@ -124,7 +124,7 @@ impl History {
 /// The scorecard of a history that began at `epoch`; `progress` is called after each look with how many are done, of how
 /// many.
 pub fn card(
-    history: &History,
+    history: &WholeRecord,
     epoch: Timestamp,
     truth: Truth,
     progress: &mut dyn FnMut(u64, u64),
@@ -166,7 +166,7 @@ pub fn card(
 }
 
 /// What is known at each lead or look, with the lead.
-fn looks(history: &History, epoch: Timestamp, truth: Truth) -> Vec<(f64, Known)> {
+fn looks(history: &WholeRecord, epoch: Timestamp, truth: Truth) -> Vec<(f64, Known)> {
     let enough =
         |known: &Known| known.observations.spaced(FEWEST_READINGS).len() >= FEWEST_READINGS;
     match truth {
@@ -236,13 +236,13 @@ mod tests {
     use crate::reading::Quantity;
 
     /// 1/v falls in a line to zero at day 60; read daily.
-    fn history(days: u32) -> History {
+    fn history(days: u32) -> WholeRecord {
         let values = (0..days).map(|day| Observation {
             t_days: f64::from(day),
             value: -100.0 * (1.0 - f64::from(day) / 60.0).ln(),
             sigma: None,
         });
-        History {
+        WholeRecord {
             observations: Observations {
                 quantity: Quantity::Displacement,
                 averaging_days: 0.0,

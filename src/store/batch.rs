@@ -1,11 +1,11 @@
 //! One commit: the steps, what follows from them, and how far the files have been read.
 
-use super::outbox::{Fate, WAITING};
+use super::outbox::{DeliveryOutcome, WAITING};
 use super::sealed::seal;
-use super::series::{self, Series};
+use super::series::{self, StoredSeries};
 use super::sum::sum;
 use super::{Inner, Store, StoreError, nanoseconds};
-use crate::monitor::{Event, Input, Part};
+use crate::monitor::{Event, Input, MemoryPart};
 use crate::reading::Timestamp;
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, params};
@@ -28,11 +28,11 @@ pub struct Batch {
     /// Each with the number of its step in this batch.
     events: Vec<(usize, Event)>,
     /// The values of the steps: what is known although it is not written yet.
-    values: BTreeMap<(Series, Timestamp), f64>,
+    values: BTreeMap<(StoredSeries, Timestamp), f64>,
     /// Values that were corrected within this batch.
-    former: BTreeMap<(Series, Timestamp), Vec<f64>>,
+    former: BTreeMap<(StoredSeries, Timestamp), Vec<f64>>,
     positions: BTreeMap<String, Option<Vec<u8>>>,
-    memory: Option<Vec<Part>>,
+    memory: Option<Vec<MemoryPart>>,
     outbox: Vec<super::Delivery>,
     /// What a hook is told by another alert.
     told: Vec<super::Delivery>,
@@ -42,7 +42,7 @@ pub struct Batch {
 impl Batch {
     /// Notes a step and the events that followed from it.
     pub fn step(&mut self, now: Timestamp, input: &Input, events: &[Event]) {
-        if let (Some(series), Some((time, value, _))) = (Series::of(input), value(input)) {
+        if let (Some(series), Some((time, value, _))) = (StoredSeries::of(input), value(input)) {
             let place = (series, time);
             if let Some(former) = self.values.insert(place.clone(), value) {
                 self.former.entry(place).or_default().push(former);
@@ -60,7 +60,7 @@ impl Batch {
     }
 
     /// Notes the monitor's memory as of the last step, where it is to be saved.
-    pub fn memory(&mut self, parts: Option<Vec<Part>>) {
+    pub fn memory(&mut self, parts: Option<Vec<MemoryPart>>) {
         self.memory = parts;
     }
 
@@ -101,7 +101,7 @@ impl Batch {
     }
 
     /// The values that this batch has for the same series and time, the newest first.
-    fn known(&self, series: &Series, time: Timestamp) -> Vec<f64> {
+    fn known(&self, series: &StoredSeries, time: Timestamp) -> Vec<f64> {
         let place = (series.clone(), time);
         let former = self.former.get(&place).into_iter().flatten().rev();
         let newest = self.values.get(&place).into_iter();
@@ -140,7 +140,7 @@ impl Store {
     /// # Errors
     /// [`StoreError`].
     pub fn has(&self, batch: &Batch, input: &Input) -> Result<Presence, StoreError> {
-        let (Some(series), Some((time, value, _))) = (Series::of(input), value(input)) else {
+        let (Some(series), Some((time, value, _))) = (StoredSeries::of(input), value(input)) else {
             return Ok(Presence::No);
         };
         let in_batch = batch.known(&series, time);
@@ -149,8 +149,8 @@ impl Store {
         }
         let inner = self.inner();
         let factor = match &series {
-            Series::Benchmark(_, unit, _) => unit.factor(),
-            Series::Channel(..) => 1.0,
+            StoredSeries::Benchmark(_, unit, _) => unit.factor(),
+            StoredSeries::Channel(..) => 1.0,
         };
         let mut written: Vec<(i64, f64)> = Vec::new();
         for (number, own) in inner.catalogue.alike(&series) {
@@ -187,11 +187,11 @@ impl Inner {
         } = self;
         let transaction =
             connection.transaction_with_behavior(rusqlite::TransactionBehavior::Immediate)?;
-        let mut fresh: BTreeMap<Series, i64> = BTreeMap::new();
+        let mut fresh: BTreeMap<StoredSeries, i64> = BTreeMap::new();
         for series in batch
             .steps
             .iter()
-            .filter_map(|(_, input)| Series::of(input))
+            .filter_map(|(_, input)| StoredSeries::of(input))
         {
             if catalogue.number(&series).is_none() && !fresh.contains_key(&series) {
                 let number = catalogue.next() + i64::try_from(fresh.len()).unwrap_or(i64::MAX);
@@ -199,7 +199,7 @@ impl Inner {
                 fresh.insert(series, number);
             }
         }
-        let number = |series: &Series| {
+        let number = |series: &StoredSeries| {
             catalogue
                 .number(series)
                 .or_else(|| fresh.get(series).copied())
@@ -234,7 +234,7 @@ impl Inner {
             delivery.insert(&transaction, WAITING)?;
         }
         for delivery in &batch.told {
-            delivery.insert(&transaction, Fate::Over.name())?;
+            delivery.insert(&transaction, DeliveryOutcome::Over.name())?;
         }
         for command in &batch.commands {
             transaction.execute("DELETE FROM command WHERE id = ?1", [command])?;
@@ -267,13 +267,14 @@ fn insert_step(
     connection: &Connection,
     (seq, now): (i64, Timestamp),
     input: &Input,
-    number: &dyn Fn(&Series) -> Option<i64>,
+    number: &dyn Fn(&StoredSeries) -> Option<i64>,
 ) -> Result<(), StoreError> {
     let mut insert = connection.prepare_cached(
         "INSERT INTO step (seq, now, series, time, value, sigma, body, sum) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
     )?;
     let (own, number, time, value, sigma, body) =
-        if let (Some(series), Some((time, value, sigma))) = (Series::of(input), value(input)) {
+        if let (Some(series), Some((time, value, sigma))) = (StoredSeries::of(input), value(input))
+        {
             let own = (now != time).then(|| nanoseconds(now)).transpose()?;
             let time = nanoseconds(time)?;
             (own, number(&series), Some(time), Some(value), sigma, None)
@@ -336,8 +337,12 @@ fn keep_latest(
     Ok(())
 }
 
-fn write_memory(connection: &Connection, parts: &[Part], step: i64) -> Result<(), StoreError> {
-    for Part { name, body } in parts {
+fn write_memory(
+    connection: &Connection,
+    parts: &[MemoryPart],
+    step: i64,
+) -> Result<(), StoreError> {
+    for MemoryPart { name, body } in parts {
         keep(connection, "memory", name, body.as_deref())?;
     }
     connection.execute(

@@ -20,7 +20,7 @@ mod verify;
 
 pub use batch::{Batch, Position, Presence};
 pub use evidence::{DeliveryRow, PlacedEvent};
-pub use outbox::{Delivery, Fate};
+pub use outbox::{Delivery, DeliveryOutcome};
 pub use past::{Heads, Value, Values};
 pub use read::{Recorded, StepRow};
 pub use verify::Verified;

@@ -1,9 +1,9 @@
 //! What a restart, a replay of the stored input, and people who ask read back.
 
 use super::sealed::unseal;
-use super::series::{Catalogue, Series};
+use super::series::{Catalogue, StoredSeries};
 use super::{Store, StoreError, timestamp};
-use crate::monitor::{Finding, Input, Notice, Order, Part, Settings};
+use crate::monitor::{Input, MemoryPart, Notice, Order, SearchFinding, Settings};
 use crate::reading::{BenchmarkId, Reading, Sample, Timestamp};
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, params};
@@ -31,7 +31,7 @@ pub struct StepRow {
 #[derive(Debug, Default)]
 pub struct Recorded {
     /// The monitor's memory; empty where there is none.
-    pub parts: Vec<Part>,
+    pub parts: Vec<MemoryPart>,
     /// As of which step.
     pub step: i64,
 }
@@ -40,7 +40,7 @@ pub struct Recorded {
 #[derive(Serialize, Deserialize)]
 enum Told {
     Settings(Box<Settings>),
-    Found(Box<Finding>),
+    Found(Box<SearchFinding>),
     Order(Order),
     Missing(BenchmarkId, Timestamp, String),
     Trouble(String, String),
@@ -109,7 +109,7 @@ impl Store {
                 );
                 return Ok(Recorded::default());
             }
-            parts.push(Part { name, body });
+            parts.push(MemoryPart { name, body });
         }
         let step = meta(&inner.connection, "memory_step")?.unwrap_or(0);
         Ok(Recorded { parts, step })
@@ -324,14 +324,14 @@ fn lost(seq: i64) -> StoreError {
     }
 }
 
-fn input(series: &Series, time: Timestamp, value: f64, sigma: Option<f64>) -> Input {
+fn input(series: &StoredSeries, time: Timestamp, value: f64, sigma: Option<f64>) -> Input {
     match series {
-        Series::Channel(channel, unit) => Input::Sample {
+        StoredSeries::Channel(channel, unit) => Input::Sample {
             channel: channel.clone(),
             unit: unit.clone(),
             sample: Sample { time, value },
         },
-        Series::Benchmark(benchmark, unit, averaging) => Input::Reading {
+        StoredSeries::Benchmark(benchmark, unit, averaging) => Input::Reading {
             benchmark: benchmark.clone(),
             unit: *unit,
             averaging: *averaging,

@@ -10,7 +10,7 @@ use rcgen::{BasicConstraints, CertificateParams, CertifiedIssuer, IsCa, KeyPair}
 use rumqttc::{AsyncClient, Event, MqttOptions, Packet, QoS};
 use slipwatch::config::{self, Config};
 use slipwatch::monitor::Input;
-use slipwatch::runtime::mqtt::{Delivery, follow};
+use slipwatch::runtime::mqtt::{ReceivedMessage, follow};
 use slipwatch::runtime::shutdown::{self, Trigger};
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
@@ -147,7 +147,7 @@ fn config_of(lines: &str) -> Config {
 
 /// A daemon's source at work.
 struct Source {
-    deliveries: Receiver<Delivery>,
+    deliveries: Receiver<ReceivedMessage>,
     stop: Trigger,
     task: JoinHandle<()>,
 }
@@ -178,7 +178,7 @@ impl Source {
         }
     }
 
-    async fn next(&mut self) -> Delivery {
+    async fn next(&mut self) -> ReceivedMessage {
         let came = tokio::time::timeout(LIMIT, self.deliveries.recv()).await;
         came.expect("in time").expect("a delivery")
     }
@@ -193,7 +193,7 @@ fn message(day: usize) -> String {
     format!(r#"{{"benchmark":"5","time":"2017-06-{day:02}T00:00:00Z","value":{day},"unit":"mm"}}"#)
 }
 
-fn values(delivery: &Delivery) -> Vec<f64> {
+fn values(delivery: &ReceivedMessage) -> Vec<f64> {
     let value = |input: &Input| match input {
         Input::Reading { reading, .. } => reading.value,
         Input::Sample { .. }

@@ -8,8 +8,8 @@ use rumqttc::{AsyncClient, Event, MqttOptions, Packet, Publish, QoS};
 use slipwatch::config::{self, HookConfig};
 use slipwatch::runtime::deliver::{self, Dispatcher};
 use slipwatch::runtime::delivered::Delivered;
-use slipwatch::runtime::hook::Outcome;
-use slipwatch::store::{Fate, Store};
+use slipwatch::runtime::hook::HookOutcome;
+use slipwatch::store::{DeliveryOutcome, Store};
 use std::net::TcpListener;
 use std::path::Path;
 use std::sync::Arc;
@@ -49,11 +49,11 @@ async fn next_of(broker: &Mosquitto, topic: &str) -> Publish {
 }
 
 /// Runs it until the broker is up.
-async fn sent(hook: &HookConfig) -> Outcome {
+async fn sent(hook: &HookConfig) -> HookOutcome {
     for _ in 0..200 {
         let outcome = deliver::run(hook, &alert("5", "5/red/1"), 2).await;
         let is_away =
-            matches!(&outcome, Outcome::NotStarted(why) if why.contains("refused (os error"));
+            matches!(&outcome, HookOutcome::NotStarted(why) if why.contains("refused (os error"));
         if !is_away {
             return outcome;
         }
@@ -71,7 +71,7 @@ async fn a_topic_gets_what_a_hook_gets_and_keeps_it_where_that_is_asked_for() {
         hooks[0].name(),
         format!("mqtt 127.0.0.1:{} toc/alerts", broker.port)
     );
-    assert_eq!(sent(&hooks[0]).await, Outcome::Done);
+    assert_eq!(sent(&hooks[0]).await, HookOutcome::Done);
     // Whoever comes later gets it too.
     let message = next_of(&broker, "toc/#").await;
     assert_eq!(
@@ -102,7 +102,7 @@ async fn an_alert_waits_for_a_broker_that_is_away_and_one_that_is_not_let_in_is_
     let denied = way(&broker, "topic = \"elsewhere\"");
     let outcome = sent(&denied[0]).await;
     assert!(
-        matches!(&outcome, Outcome::NotStarted(why) if why.contains("NotAuthorized")),
+        matches!(&outcome, HookOutcome::NotStarted(why) if why.contains("NotAuthorized")),
         "{outcome:?}"
     );
     let hooks = way(&broker, "topic = \"toc/alerts\"\nretain = true");
@@ -117,13 +117,13 @@ async fn an_alert_waits_for_a_broker_that_is_away_and_one_that_is_not_let_in_is_
     eventually("attempts", || store.attempts(identity, &name).unwrap() >= 2).await;
     assert!(
         !store
-            .is_noted(identity, Some(&name), Some(Fate::Delivered))
+            .is_noted(identity, Some(&name), Some(DeliveryOutcome::Delivered))
             .unwrap()
     );
     broker.start_again();
     eventually("its delivery", || {
         store
-            .is_noted(identity, Some(&name), Some(Fate::Delivered))
+            .is_noted(identity, Some(&name), Some(DeliveryOutcome::Delivered))
             .unwrap()
     })
     .await;
@@ -166,11 +166,11 @@ async fn an_alert_goes_over_tls_to_a_broker_that_proves_its_name_and_to_no_other
         );
         ways(&lines)
     };
-    assert_eq!(sent(&secured("authority.pem")[0]).await, Outcome::Done);
+    assert_eq!(sent(&secured("authority.pem")[0]).await, HookOutcome::Done);
     assert!(!next_of(&broker, "toc/alerts").await.payload.is_empty());
     let outcome = sent(&secured("stranger.pem")[0]).await;
     assert!(
-        matches!(&outcome, Outcome::NotStarted(why) if why.contains("certificate")),
+        matches!(&outcome, HookOutcome::NotStarted(why) if why.contains("certificate")),
         "{outcome:?}"
     );
 }

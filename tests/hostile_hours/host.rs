@@ -13,8 +13,8 @@ use slipwatch::runtime::daemon::Daemon;
 use slipwatch::runtime::deliver::{Dispatcher, Retry, Runner};
 use slipwatch::runtime::delivered::Delivered;
 use slipwatch::runtime::hook::Status;
-use slipwatch::runtime::mqtt::Delivery;
-use slipwatch::runtime::pulse::Pulse;
+use slipwatch::runtime::mqtt::ReceivedMessage;
+use slipwatch::runtime::pulse::Reporting;
 use slipwatch::runtime::serve::Behind;
 use slipwatch::runtime::shutdown;
 use slipwatch::runtime::site::{Sinks, Site};
@@ -39,7 +39,7 @@ struct Running {
     daemon: Daemon,
     follower: Follower,
     store: Arc<Store>,
-    messages: Sender<Delivery>,
+    messages: Sender<ReceivedMessage>,
     stopped: shutdown::Shutdown,
     _stop: shutdown::Trigger,
 }
@@ -98,7 +98,7 @@ impl<'a> Host<'a> {
         let site = Site::resume(&self.config.site.name, settings, sinks, &mut || {}).unwrap();
         let pulse = self
             .runtime
-            .block_on(Pulse::start(&self.config.site, Behind::default()))
+            .block_on(Reporting::start(&self.config.site, Behind::default()))
             .unwrap();
         site.show(&pulse.vitals);
         let (stop, stopped) = shutdown::pair();
@@ -221,7 +221,7 @@ impl Running {
         }
     }
 
-    fn listen(&mut self, sent: impl Iterator<Item = Delivery>) {
+    fn listen(&mut self, sent: impl Iterator<Item = ReceivedMessage>) {
         for delivery in sent {
             // What finds no room comes again over the next connection.
             if self.messages.try_send(delivery).is_err() {

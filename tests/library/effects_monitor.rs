@@ -12,12 +12,12 @@ use jiff::SignedDuration;
 use slipwatch::alert::{Level, Policy};
 use slipwatch::effects::{Effect, Explained, Filtered, Form, Kind, KnownLoad, Part};
 use slipwatch::monitor::{
-    AlertState, Event, EventKind, Explain, Finding, Input, Monitor, Settings, Unexplained,
+    AlertState, Event, EventKind, Explain, Input, Monitor, SearchFinding, Settings, Unexplained,
 };
 use slipwatch::reading::{BenchmarkId, Timestamp, Unit};
 
 /// What a search that found the truth would hand in.
-fn found(slope: Slope) -> Finding {
+fn found(slope: Slope) -> SearchFinding {
     let effect = Effect {
         channel: Some(RESERVOIR.to_owned()),
         form: Some(Form::Level),
@@ -31,7 +31,7 @@ fn found(slope: Slope) -> Finding {
         mean: 0.0,
         deviation: 1.0,
     };
-    Finding {
+    SearchFinding {
         benchmark: BenchmarkId::new("a"),
         effects: vec![effect],
         explained: Explained::Full,
@@ -61,7 +61,7 @@ fn monitor(explain: Explain) -> Monitor {
 fn play(
     monitor: &mut Monitor,
     measured: &Measured,
-    found: Option<&(usize, Finding)>,
+    found: Option<&(usize, SearchFinding)>,
 ) -> Vec<Event> {
     let mut events = Vec::new();
     for (index, (sample, reading)) in measured.samples.iter().zip(&measured.readings).enumerate() {
@@ -293,7 +293,7 @@ fn an_effect_is_told_once_and_its_end_too() {
     let now = part.readings[59].time;
     let again = monitor.step(now, &Input::Found(found(STANDS)));
     assert_eq!(again, [], "known");
-    let nothing = Finding {
+    let nothing = SearchFinding {
         effects: Vec::new(),
         known_load: KnownLoad::default(),
         ..found(STANDS)
@@ -313,11 +313,11 @@ fn what_another_kind_would_explain_as_well_and_a_step_that_only_the_motion_shows
         samples: wet.samples[..60].to_vec(),
         fails: None,
     };
-    let rivalled = Finding {
+    let rivalled = SearchFinding {
         cannot_separate_from: vec![Kind::Seasonal.into()],
         ..found(STANDS)
     };
-    let step = Finding {
+    let step = SearchFinding {
         effects: vec![Effect::of(Kind::LoadStep)],
         known_load: KnownLoad {
             parts: vec![Part::Step {

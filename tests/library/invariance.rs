@@ -7,7 +7,7 @@ use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 use slipwatch::alert::Level;
 use slipwatch::fit::{Observation, Observations};
-use slipwatch::forecast::{Outlook, Panel};
+use slipwatch::forecast::{LawForecaster, Outlook};
 use slipwatch::reading::{
     BenchmarkId, Quantity, Reading, Series, Timestamp, Unit, after_days, days_since,
 };
@@ -57,7 +57,7 @@ fn observations(readings: &[(f64, f64)]) -> Observations {
 }
 
 fn outlook(readings: &[(f64, f64)]) -> Outlook {
-    let mut panel = Panel::default();
+    let mut panel = LawForecaster::default();
     panel.update(&observations(readings), CRITICAL).unwrap()
 }
 

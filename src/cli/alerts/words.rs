@@ -174,7 +174,7 @@ fn deliveries(rows: &[DeliveryRow]) -> String {
     out
 }
 
-/// Over which door an order came, and when by the host's clock.
+/// By which way an order came, and when by the host's clock.
 fn door(event: &Event, clock: &dyn Fn(Timestamp) -> String) -> String {
     let EventKind::Order { given, .. } = &event.kind else {
         return String::new();

@@ -4,7 +4,7 @@ mod dialect;
 mod text;
 mod times;
 
-use super::args::{FileArgs, Format, OutputArgs};
+use super::args::{FileArgs, OutputArgs, OutputFormat};
 use super::check;
 use super::exit::{self, UsageError};
 use crate::config::{SourceKind, value};
@@ -351,14 +351,14 @@ fn say_written(args: &Args, plan: &InitPlan) -> anyhow::Result<()> {
     let mut stdout = std::io::stdout().lock();
     let config = args.output_config.display();
     match args.output.format {
-        Format::Text => {
+        OutputFormat::Text => {
             let (sources, benchmarks) = (plan.sources.len(), plan.benchmarks.len());
             writeln!(
                 stdout,
                 "wrote {config} (sources: {sources}, benchmarks: {benchmarks}); it is checked now\n"
             )?;
         }
-        Format::Json => {
+        OutputFormat::Json => {
             let ids = plan
                 .benchmarks
                 .iter()
@@ -375,7 +375,7 @@ fn say_written(args: &Args, plan: &InitPlan) -> anyhow::Result<()> {
 }
 
 fn say_next(args: &Args) -> anyhow::Result<()> {
-    if args.output.format == Format::Json {
+    if args.output.format == OutputFormat::Json {
         return Ok(());
     }
     let mut stdout = std::io::stdout().lock();

@@ -8,7 +8,7 @@ use super::{bar, exit, picture};
 use crate::alert::Policy;
 use crate::figures;
 use crate::reading::{Recording, Series, Timestamp, days_since};
-use crate::score::{Card, History, METHODS, Truth, card};
+use crate::score::{Card, METHODS, Truth, WholeRecord, card};
 use anyhow::{Context, ensure};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -118,7 +118,7 @@ fn report(
             series.benchmark
         )
     })?;
-    let history = History::of(
+    let history = WholeRecord::of(
         &series,
         &recording.channels,
         policy.critical_velocity_mm_per_day,

@@ -1,6 +1,6 @@
 //! Where a posterior is highest on one side of kappa = 0, and how it falls off there.
 
-use super::past::{Past, PastShape};
+use super::past::{PastShape, PastSolution};
 use super::prior::{P_PRIOR, SLOPE_PER_INTERVAL, log_cauchy};
 use super::scatter::Texture;
 use super::window::Window;
@@ -39,7 +39,7 @@ pub(super) struct ModeProblem<'a> {
 /// Buffers that every evaluation uses again.
 #[derive(Debug)]
 pub(super) struct ModeBench {
-    past: Past,
+    past: PastSolution,
     pub(super) residuals: Vec<f64>,
     there: Vec<f64>,
     pub(super) columns: [Vec<f64>; 4],
@@ -86,7 +86,7 @@ impl Sign {
 impl ModeBench {
     pub(super) fn new(count: usize) -> Self {
         Self {
-            past: Past::default(),
+            past: PastSolution::default(),
             residuals: vec![0.0; count],
             there: vec![0.0; count],
             columns: [(); 4].map(|()| vec![0.0; count]),

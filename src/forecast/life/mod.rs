@@ -19,7 +19,7 @@ use instrument::Instrument;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
-use slope::{Path, Slope};
+use slope::{DisplacementPath, Slope};
 
 /// How a life goes, and ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -92,7 +92,7 @@ impl Life {
         Self::draw_with_path(fate, seed).0
     }
 
-    fn draw_with_path(fate: Fate, seed: u64) -> (Self, Path) {
+    fn draw_with_path(fate: Fate, seed: u64) -> (Self, DisplacementPath) {
         let mut generator = Pcg64::seed_from_u64(seed);
         loop {
             if let Some(drawn) = Self::attempt(fate, &mut generator) {
@@ -128,7 +128,7 @@ impl Life {
         }
     }
 
-    fn attempt(fate: Fate, generator: &mut impl Rng) -> Option<(Self, Path)> {
+    fn attempt(fate: Fate, generator: &mut impl Rng) -> Option<(Self, DisplacementPath)> {
         let (onset, duration) = slope::span(fate, generator);
         let law = slope::law(fate, duration, generator);
         let knots = load::of(fate, onset + 1.5 * duration, generator);
@@ -141,7 +141,7 @@ impl Life {
         (onset, duration): (f64, f64),
         knots: &[(f64, f64)],
         generator: &mut impl Rng,
-    ) -> Option<(Self, Path)> {
+    ) -> Option<(Self, DisplacementPath)> {
         let end = onset + 1.5 * duration;
         let (path, failure_days) = Slope { law, onset, end }.path(knots)?;
         let ends_as_it_should = match (fate, failure_days) {

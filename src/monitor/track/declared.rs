@@ -1,11 +1,11 @@
 //! What people declare, as it acts on one benchmark.
 
 use super::unknown::Reason;
-use super::{Beside, Track};
+use super::{StepContext, Track};
 use crate::alert::Policy;
 use crate::monitor::declared::Declarations;
 use crate::monitor::event::Event;
-use crate::monitor::history::Source;
+use crate::monitor::history::MeasuredAs;
 use crate::reading::{Reading, Timestamp};
 
 impl Track {
@@ -21,7 +21,7 @@ impl Track {
     }
 
     /// Keeps a reading that is not to count: one during maintenance, or a velocity that is a mean over a reset.
-    pub(super) fn leave_out(&mut self, source: Source, reading: &Reading) -> Vec<Event> {
+    pub(super) fn leave_out(&mut self, source: MeasuredAs, reading: &Reading) -> Vec<Event> {
         if !self.history.set_aside(source, reading) {
             return Vec::new();
         }
@@ -73,7 +73,7 @@ impl Track {
         &mut self,
         policy: &Policy,
         declared: Declarations,
-        beside: &Beside<'_>,
+        beside: &StepContext<'_>,
     ) -> Vec<Event> {
         if self.declared.replace(declared).is_none() {
             return Vec::new();

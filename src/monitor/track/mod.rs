@@ -20,22 +20,22 @@ use super::covariates::Covariates;
 use super::declared::Declarations;
 use super::drift::Drift;
 use super::event::{AlertState, Event, EventKind};
-use super::history::{History, Source, Taken};
+use super::history::{History, MeasuredAs, Taken};
 use super::kept::KeptForecast;
 use super::silence::Silence;
-use crate::alert::{Cause, Held, Latch, Level, Policy};
+use crate::alert::{AlertCause, Held, Latch, Level, Policy};
 use crate::fit::Rate;
-use crate::forecast::Panel;
+use crate::forecast::LawForecaster;
 use crate::reading::{BenchmarkId, Reading, SECONDS_PER_DAY, Suspicion, Timestamp, days_since};
 use crate::regime::Tracker;
 use adopted::Adopted;
-use ahead::Ahead;
+use ahead::HeldReading;
 use forecast::Forecast;
 use jiff::SignedDuration;
 use lookback::{Levels, Lookback};
 use overdue::Overdue;
 use pace::Pace;
-use past::Record;
+use past::PastReview;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use unknown::{Reason, Unknown};
@@ -48,7 +48,7 @@ const STUCK: usize = 24;
 
 /// What lies beside a benchmark's readings.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Beside<'a> {
+pub(super) struct StepContext<'a> {
     pub(super) covariates: &'a Covariates,
     pub(super) explain: Explain,
     /// Data time.
@@ -66,7 +66,7 @@ pub(super) struct Beside<'a> {
 pub(super) struct Track {
     benchmark: BenchmarkId,
     history: History,
-    panel: Panel,
+    panel: LawForecaster,
     regime: Tracker,
     intercept: Drift,
     transition: Drift,
@@ -76,7 +76,7 @@ pub(super) struct Track {
     held: Held,
     silence: Silence,
     /// Until when something that happened asks for a look, and what.
-    look: Option<(Timestamp, Cause)>,
+    look: Option<(Timestamp, AlertCause)>,
     faulted: bool,
     backwards: bool,
     newest: Option<Timestamp>,
@@ -98,7 +98,7 @@ pub(super) struct Track {
     unknown: Unknown,
     /// A reading that lies far ahead of all others.
     #[serde(default)]
-    ahead: Option<Ahead>,
+    ahead: Option<HeldReading>,
     /// By how much its readings jump to and fro, where they are spoilt.
     #[serde(default)]
     spoilt_by: Option<f64>,
@@ -122,13 +122,13 @@ pub(super) struct Track {
     accepted: BTreeSet<Suspicion>,
     /// Whether its past has been gone through.
     #[serde(default)]
-    record: Record,
+    record: PastReview,
 }
 
 impl Track {
     pub(super) fn new(
         benchmark: BenchmarkId,
-        source: Source,
+        source: MeasuredAs,
         epoch: Timestamp,
         declared: Declarations,
     ) -> Self {
@@ -145,10 +145,10 @@ impl Track {
             kept: None,
             overdue: None,
             accepted: BTreeSet::new(),
-            record: Record::Known,
+            record: PastReview::Known,
             benchmark,
             history: History::new(source, epoch),
-            panel: Panel::default(),
+            panel: LawForecaster::default(),
             regime: Tracker::default(),
             intercept: Drift::default(),
             transition: Drift::default(),
@@ -183,13 +183,13 @@ impl Track {
     pub(super) fn take(
         &mut self,
         policy: &Policy,
-        source: Source,
+        source: MeasuredAs,
         reading: &Reading,
-        beside: &Beside<'_>,
+        beside: &StepContext<'_>,
     ) -> Vec<Event> {
         let mut events = self.judge_ahead(policy, reading.time, beside);
         events.extend(self.take_one(policy, source, reading, beside));
-        if self.record == Record::Owed {
+        if self.record == PastReview::Owed {
             events.retain(|event| !past::is_of_the_record(event));
         }
         events
@@ -198,9 +198,9 @@ impl Track {
     fn take_one(
         &mut self,
         policy: &Policy,
-        source: Source,
+        source: MeasuredAs,
         reading: &Reading,
-        beside: &Beside<'_>,
+        beside: &StepContext<'_>,
     ) -> Vec<Event> {
         let mut events = self.declared_with(reading.time);
         if self.history.is_left_out(&self.declared, reading.time) {
@@ -262,7 +262,7 @@ impl Track {
     }
 
     /// What follows from the readings as they are now.
-    fn judge(&mut self, policy: &Policy, time: Timestamp, beside: &Beside<'_>) -> Vec<Event> {
+    fn judge(&mut self, policy: &Policy, time: Timestamp, beside: &StepContext<'_>) -> Vec<Event> {
         let mut events = Vec::new();
         (self.owes, self.queued_since) = (false, None);
         let forecast = self.forecast(policy.critical_velocity_mm_per_day, beside);
@@ -302,7 +302,7 @@ impl Track {
     }
 
     /// Everything that came together has been taken: judges what of it came late, or queued.
-    pub(super) fn settle(&mut self, policy: &Policy, beside: &Beside<'_>) -> Vec<Event> {
+    pub(super) fn settle(&mut self, policy: &Policy, beside: &StepContext<'_>) -> Vec<Event> {
         let is_owed = self.owes || self.is_queued();
         let Some(time) = self.newest.filter(|_| is_owed) else {
             return Vec::new();
@@ -312,7 +312,7 @@ impl Track {
             return Vec::new();
         }
         let mut events = self.judge(policy, time, beside);
-        if self.record == Record::Owed {
+        if self.record == PastReview::Owed {
             events.retain(|event| !past::is_of_the_record(event));
         }
         events
@@ -346,7 +346,7 @@ impl Track {
     }
 
     /// What the laws predict after the newest reading.
-    fn forecast(&mut self, critical: f64, beside: &Beside<'_>) -> Option<Forecast> {
+    fn forecast(&mut self, critical: f64, beside: &StepContext<'_>) -> Option<Forecast> {
         let plain = self.panel.update(&self.history.observations, critical)?;
         let history = &self.history;
         let known_load = self.adopted.as_mut().and_then(|adopted| {
@@ -453,7 +453,7 @@ impl Track {
         events
     }
 
-    fn look_until(&mut self, policy: &Policy, time: Timestamp, cause: Cause) {
+    fn look_until(&mut self, policy: &Policy, time: Timestamp, cause: AlertCause) {
         self.look = time
             .checked_add(policy.steady_for)
             .ok()

@@ -3,7 +3,7 @@
 
 use super::forecast::Forecast;
 use super::{Track, days};
-use crate::alert::{Evidence, Level, Policy};
+use crate::alert::{AlertEvidence, Level, Policy};
 use crate::monitor::event::Event;
 use crate::monitor::kept::KeptForecast;
 use crate::reading::{SECONDS_PER_DAY, Timestamp};
@@ -79,10 +79,10 @@ impl Track {
         let chance = overdue
             .chances
             .chance_within(now, days(policy.evacuation_time));
-        let evidence = Evidence {
+        let evidence = AlertEvidence {
             now,
             chance_within_evacuation_time: Some(chance),
-            ..Evidence::default()
+            ..AlertEvidence::default()
         };
         let change = self.latch.raise(policy, &evidence)?;
         self.levels.note(now, change.level);

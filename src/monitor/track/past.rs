@@ -1,11 +1,11 @@
 //! A benchmark's past, gone through after its newest reading has been judged: what would have been, had each reading
 //! been judged as it came.
 
-use super::{Beside, Reason, Track};
+use super::{Reason, StepContext, Track};
 use crate::alert::{Level, Policy};
 use crate::monitor::declared::Declarations;
 use crate::monitor::event::{AlertState, Event, EventKind};
-use crate::monitor::history::Source;
+use crate::monitor::history::MeasuredAs;
 use crate::reading::{BenchmarkId, Quantity, Reading, Timestamp, Unit};
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
@@ -22,7 +22,7 @@ const DAY: SignedDuration = SignedDuration::from_hours(24);
 
 /// Whether the readings from before a first start have been gone through.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) enum Record {
+pub(super) enum PastReview {
     #[default]
     Known,
     Owed,
@@ -72,9 +72,9 @@ impl Track {
         &mut self,
         policy: &Policy,
         time: Timestamp,
-        beside: &Beside<'_>,
+        beside: &StepContext<'_>,
     ) -> Vec<Event> {
-        self.record = Record::Owed;
+        self.record = PastReview::Owed;
         if self.unknown.has(Reason::Stuck) {
             return Vec::new();
         }
@@ -104,7 +104,7 @@ impl Track {
         &self,
         walk: &mut Walk,
         policy: &Policy,
-        beside: &Beside<'_>,
+        beside: &StepContext<'_>,
     ) -> (Vec<Event>, bool) {
         let values = &self.history.observations.values;
         let from = walk
@@ -124,7 +124,7 @@ impl Track {
                 value: one.value,
                 sigma: one.sigma,
             };
-            let beside = Beside {
+            let beside = StepContext {
                 now: time,
                 ..*beside
             };
@@ -153,7 +153,7 @@ impl Track {
         self.regime = past.regime;
         (self.intercept, self.transition) = (past.intercept, past.transition);
         self.pace = past.pace;
-        self.record = Record::Known;
+        self.record = PastReview::Known;
         let in_force = past.latch.in_force();
         let Some((level, since)) = in_force.filter(|(level, _)| *level > self.latch.level()) else {
             if self.latch.level() == Level::Green {
@@ -180,12 +180,12 @@ impl Track {
     }
 
     /// Where the readings come from as they are kept.
-    fn source(&self) -> Source {
+    fn source(&self) -> MeasuredAs {
         let unit = match self.history.observations.quantity {
             Quantity::Displacement => Unit::MM,
             Quantity::Velocity => Unit::MM_PER_DAY,
         };
-        Source {
+        MeasuredAs {
             unit,
             averaging: self.history.averaging(),
         }

@@ -2,7 +2,7 @@
 
 use super::forecast::Forecast;
 use super::{Track, days};
-use crate::alert::{Cause, Policy};
+use crate::alert::{AlertCause, Policy};
 use crate::forecast::{HORIZON_DAYS, InverseVelocityLine, Outlook, Passage};
 use crate::monitor::drift;
 use crate::monitor::event::{
@@ -53,7 +53,7 @@ impl Track {
         if self.declared.is_shaken(time) {
             return None;
         }
-        self.look_until(policy, time, Cause::UnexplainedResidual);
+        self.look_until(policy, time, AlertCause::UnexplainedResidual);
         let unexplained = Unexplained::Reading {
             surprise_nats,
             velocity_mm_per_day: forecast.plain.rates.last().map(|rate| rate.velocity),
@@ -76,7 +76,7 @@ impl Track {
                 .law
                 .and_then(|law| drift::expected_by_the_law(&law, recent(&outlook.rates), now));
             if moved.to_days < moved.from_days {
-                self.look_until(policy, time, Cause::InterceptDriftingIn);
+                self.look_until(policy, time, AlertCause::InterceptDriftingIn);
             }
             events.extend(
                 self.drift_event(time, moved, |from, to| EventKind::InterceptDrift {
@@ -89,7 +89,7 @@ impl Track {
         }
         if let Some(moved) = self.transition.update(now, transition, 2.0 * least) {
             if moved.to_days < moved.from_days {
-                self.look_until(policy, time, Cause::TransitionDriftingIn);
+                self.look_until(policy, time, AlertCause::TransitionDriftingIn);
             }
             events.extend(
                 self.drift_event(time, moved, |from, to| EventKind::TransitionDrift {
@@ -156,7 +156,7 @@ impl Track {
     fn flip(&mut self, policy: &Policy, time: Timestamp, outlook: &Outlook) -> Option<Event> {
         let flip = self.regime.update(&outlook.regimes)?;
         if flip.to == Regime::UnstableAccelerating && flip.from != Regime::Undetermined {
-            self.look_until(policy, time, Cause::RegimeFlip);
+            self.look_until(policy, time, AlertCause::RegimeFlip);
         }
         let kind = EventKind::RegimeFlip {
             from: flip.from,

@@ -2,12 +2,12 @@
 
 use super::adopted::Adopted;
 use super::forecast::Forecast;
-use super::{Beside, Track};
-use crate::alert::{Cause, Policy};
+use super::{StepContext, Track};
+use crate::alert::{AlertCause, Policy};
 use crate::effects::{Effect, Kind, KnownLoad, Rival, residual_structure};
 use crate::forecast::measurably_moves;
 use crate::monitor::event::{Event, EventKind, Unexplained};
-use crate::monitor::search::{Finding, MOST_READINGS, SearchJob};
+use crate::monitor::search::{MOST_READINGS, SearchFinding, SearchJob};
 use crate::monitor::{Explain, search};
 use crate::reading::{Series, Timestamp, days_since};
 use serde::{Deserialize, Serialize};
@@ -89,7 +89,7 @@ impl Track {
         policy: &Policy,
         time: Timestamp,
         forecast: &Forecast,
-        beside: &Beside<'_>,
+        beside: &StepContext<'_>,
     ) -> Option<Event> {
         if self.declared.is_shaken(time) || !self.watch.is_due() {
             return None;
@@ -107,7 +107,7 @@ impl Track {
             return None;
         }
         let found = worth?;
-        self.look_until(policy, time, Cause::UnexplainedResidual);
+        self.look_until(policy, time, AlertCause::UnexplainedResidual);
         let kind = Unexplained::Structure {
             bic_gain: found.bic_gain,
             load_sd: found.load_sd,
@@ -117,7 +117,7 @@ impl Track {
     }
 
     /// The readings as the law in force sees them: by the load's clock, where one is adopted.
-    fn in_force(&self, beside: &Beside<'_>) -> Series {
+    fn in_force(&self, beside: &StepContext<'_>) -> Series {
         let by_clock = self.adopted.as_ref().and_then(|adopted| {
             let channels = beside.covariates.list();
             adopted.readings(&self.history, &channels)
@@ -128,7 +128,7 @@ impl Track {
     }
 
     /// When that was, of a time by the clock of the law in force.
-    fn by_calendar(&self, time: Timestamp, beside: &Beside<'_>) -> Timestamp {
+    fn by_calendar(&self, time: Timestamp, beside: &StepContext<'_>) -> Timestamp {
         let channels = beside.covariates.list();
         let adopted = self.adopted.as_ref();
         adopted
@@ -149,7 +149,7 @@ impl Track {
     pub(in crate::monitor) fn search(
         &mut self,
         critical: f64,
-        beside: &Beside<'_>,
+        beside: &StepContext<'_>,
     ) -> Option<SearchJob> {
         if !self.wants_search(beside.explain) {
             return None;
@@ -172,8 +172,8 @@ impl Track {
         &mut self,
         critical: f64,
         time: Timestamp,
-        finding: &Finding,
-        beside: &Beside<'_>,
+        finding: &SearchFinding,
+        beside: &StepContext<'_>,
     ) -> Vec<Event> {
         self.watch.is_searching = false;
         let before = self.adopted.take();
@@ -244,7 +244,7 @@ impl Track {
         &self,
         time: Timestamp,
         effect: &Effect,
-        (finding, adopted): (&Finding, bool),
+        (finding, adopted): (&SearchFinding, bool),
     ) -> Event {
         let kind = EventKind::EffectFound {
             effect: effect.effect,
@@ -264,7 +264,7 @@ impl Track {
 
 /// The effects that something besides the motion bears witness to: a covariate, the calendar, the instrument. A
 /// step of the load that only the motion shows may as well be the failure's own beginning.
-fn witnessed(finding: &Finding) -> KnownLoad {
+fn witnessed(finding: &SearchFinding) -> KnownLoad {
     let parts = finding.known_load.parts.iter();
     KnownLoad {
         parts: parts
@@ -276,7 +276,7 @@ fn witnessed(finding: &Finding) -> KnownLoad {
 
 /// Whether the readings distinguish the effects from everything else: another covariate of the same kind that does as
 /// well means the same load so far, another kind does not.
-fn is_separable(finding: &Finding) -> bool {
+fn is_separable(finding: &SearchFinding) -> bool {
     let same_kind = |rival: &Rival| {
         let mut effects = finding.effects.iter();
         effects.any(|effect| effect.effect == rival.kind)

@@ -1,18 +1,18 @@
 //! One drill: a site of its own follows a file of its own, in which a made-up slope runs away.
 
 use super::Office;
-use super::runner::Watched;
+use super::runner::DrillObserver;
 use crate::alert::Level;
 use crate::config::{self, Config, Drill, EXERCISE, HookConfig};
-use crate::monitor::{EventKind, Given, Order, Settings, Watched as WatchedBenchmarks};
+use crate::monitor::{EventKind, Given, Order, Settings, Watched};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::clock::{self, Stopwatch};
 use crate::runtime::daemon::Daemon;
 use crate::runtime::deliver::{Dispatcher, Retry, Runner};
 use crate::runtime::delivered::Delivered;
-use crate::runtime::drilled::{Passed, folder};
-use crate::runtime::hook::{Outcome, Status};
-use crate::runtime::pulse::Pulse;
+use crate::runtime::drilled::{PassedDrill, folder};
+use crate::runtime::hook::{HookOutcome, Status};
+use crate::runtime::pulse::Reporting;
 use crate::runtime::shutdown::Shutdown;
 use crate::runtime::site::{Sinks, Site};
 use crate::runtime::sources::Sources;
@@ -44,7 +44,7 @@ const SCALE_MM: f64 = 200.0;
 /// A drill under way.
 struct Exercise {
     daemon: Daemon,
-    watched: Watched,
+    watched: DrillObserver,
     tick: Interval,
     shutdown: Shutdown,
 }
@@ -57,7 +57,7 @@ pub(super) async fn hold(
     office: &Office,
     drill: &Drill,
     shutdown: &Shutdown,
-) -> Result<Passed, String> {
+) -> Result<PassedDrill, String> {
     let started = clock::now();
     let file = made(office, started).map_err(|error| format!("its folder: {error}"))?;
     let hooks = hooks(&office.config);
@@ -132,7 +132,7 @@ impl Exercise {
         );
         let config = config::parse(&text, &folder.join("drill.toml"))?;
         let store = Arc::new(Store::open(&config.site.state_dir)?);
-        let watched = Watched::default();
+        let watched = DrillObserver::default();
         let runner: Arc<dyn Runner> = Arc::new(watched.clone());
         let delivered = Delivered::of(Arc::clone(&store));
         let sinks = Sinks {
@@ -148,7 +148,13 @@ impl Exercise {
         let name = &office.config.site.name;
         let site = Site::resume(name, config.settings.clone(), sinks, &mut || {})?;
         let sources = Sources::start(&config, &store)?;
-        let daemon = Daemon::new(&config, store, site, (sources, Pulse::inward()), clock::now);
+        let daemon = Daemon::new(
+            &config,
+            store,
+            site,
+            (sources, Reporting::inward()),
+            clock::now,
+        );
         Ok(Self {
             daemon,
             watched,
@@ -162,7 +168,7 @@ impl Exercise {
         (file, started): (&Path, Timestamp),
         hooks: usize,
         (office, drill): (&Office, &Drill),
-    ) -> Result<Passed, String> {
+    ) -> Result<PassedDrill, String> {
         self.until(LIMIT, "its past was not read", |daemon, _| {
             daemon.pulse.vitals.health().is_caught_up
         })
@@ -172,9 +178,12 @@ impl Exercise {
         }
         self.watched.seen().appended = Some(Stopwatch::start());
         append(file, &rows(APPENDED, started)).map_err(|error| format!("its file: {error}"))?;
-        let taken = |_: &Daemon, watched: &Watched| {
+        let taken = |_: &Daemon, watched: &DrillObserver| {
             let seen = watched.seen();
-            let done = seen.outcomes.values().filter(|one| **one == Outcome::Done);
+            let done = seen
+                .outcomes
+                .values()
+                .filter(|one| **one == HookOutcome::Done);
             done.count() == hooks
         };
         let reached = self
@@ -186,7 +195,7 @@ impl Exercise {
             Some(within) => Some(self.acknowledged(office, (started, within)).await?),
             None => None,
         };
-        Ok(Passed {
+        Ok(PassedDrill {
             latency,
             acknowledged,
         })
@@ -197,7 +206,7 @@ impl Exercise {
         &mut self,
         limit: Duration,
         what: &str,
-        is_so: impl Fn(&Daemon, &Watched) -> bool,
+        is_so: impl Fn(&Daemon, &DrillObserver) -> bool,
     ) -> Result<(), String> {
         let begun = Stopwatch::start();
         while !is_so(&self.daemon, &self.watched) {
@@ -221,12 +230,12 @@ impl Exercise {
         let failed = seen
             .outcomes
             .iter()
-            .filter(|(_, one)| **one != Outcome::Done);
+            .filter(|(_, one)| **one != HookOutcome::Done);
         let failed = failed.map(|(name, outcome)| format!("{name}: {outcome:?}"));
         format!("{why}: {}", failed.collect::<Vec<_>>().join("; "))
     }
 
-    /// Waits for somebody to acknowledge it: the order stands in the site's own log, whatever the door.
+    /// Waits for somebody to acknowledge it: the order stands in the site's own log, whatever way it came by.
     async fn acknowledged(
         &mut self,
         office: &Office,
@@ -258,7 +267,7 @@ impl Exercise {
     /// The benchmark is watched no more, which ends its alert; the hooks get that end too.
     async fn end(mut self, hooks: usize) {
         let settings = Settings {
-            watched: WatchedBenchmarks {
+            watched: Watched {
                 named: BTreeSet::new(),
                 is_open: false,
             },
@@ -266,7 +275,7 @@ impl Exercise {
         };
         self.daemon.site.resettle(settings);
         if self.watched.seen().begun.is_some() {
-            let ended = |_: &Daemon, watched: &Watched| watched.seen().ended >= hooks;
+            let ended = |_: &Daemon, watched: &DrillObserver| watched.seen().ended >= hooks;
             if let Err(why) = self
                 .until(END_LIMIT, "not every hook has taken its end", ended)
                 .await

@@ -7,7 +7,7 @@ mod exercise;
 mod runner;
 
 use super::clock;
-use super::drilled::Record;
+use super::drilled::DrillRecord;
 use super::shutdown::Shutdown;
 use super::vitals::Vitals;
 use crate::config::{Config, Drill};
@@ -60,7 +60,8 @@ pub(super) fn start(
 
 async fn hold(office: &Office, drill: &Drill, shutdown: &mut Shutdown) {
     let site = &office.config.site;
-    let mut record = Record::read(&site.state_dir).unwrap_or_else(|| Record::new(clock::now()));
+    let mut record =
+        DrillRecord::read(&site.state_dir).unwrap_or_else(|| DrillRecord::new(clock::now()));
     loop {
         record.overdue_after = overdue_after(drill, &record);
         keep(office, &record);
@@ -82,7 +83,7 @@ async fn hold(office: &Office, drill: &Drill, shutdown: &mut Shutdown) {
 }
 
 /// Shows how drills stand, and keeps it over restarts.
-fn keep(office: &Office, record: &Record) {
+fn keep(office: &Office, record: &DrillRecord) {
     if let Err(error) = record.write(&office.config.site.state_dir) {
         tracing::warn!(%error, "a restart will not know of the last drill");
     }
@@ -91,7 +92,7 @@ fn keep(office: &Office, record: &Record) {
 }
 
 /// When the next one begins.
-fn due(drill: &Drill, record: &Record, (now, zone): (Timestamp, &TimeZone)) -> Timestamp {
+fn due(drill: &Drill, record: &DrillRecord, (now, zone): (Timestamp, &TimeZone)) -> Timestamp {
     let earliest = match record.started {
         Some(started) => started
             .saturating_add(drill.every)
@@ -121,7 +122,7 @@ fn due(drill: &Drill, record: &Record, (now, zone): (Timestamp, &TimeZone)) -> T
 }
 
 /// When it is an alarm that none has passed.
-fn overdue_after(drill: &Drill, record: &Record) -> Timestamp {
+fn overdue_after(drill: &Drill, record: &DrillRecord) -> Timestamp {
     let since = record.passed_at.unwrap_or(record.since);
     let slack = if drill.at.is_some() {
         SignedDuration::from_hours(25)
@@ -152,7 +153,7 @@ mod tests {
             acknowledge_within: None,
         };
         let now = time("2026-10-20T09:00:00Z");
-        let mut record = Record::new(now);
+        let mut record = DrillRecord::new(now);
         // 10:00 there is over for today.
         let first = due(&drill, &record, (now, &zone));
         assert_eq!(first, time("2026-10-21T08:00:00Z"));

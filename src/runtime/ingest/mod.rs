@@ -36,7 +36,7 @@ pub use message::{MessageError, decode_message};
 pub use ndjson_write::write_ndjson;
 pub use survey::{Survey, survey};
 pub use table_write::{write_csv, write_toa5};
-pub use taken::{Remark, Taken};
+pub use taken::{LineResult, Remark};
 pub use text::{Looked, TextFormat, TextRows, look_through};
 pub use units::FileUnits;
 pub use vector::VectorMap;

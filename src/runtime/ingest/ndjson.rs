@@ -11,7 +11,7 @@
 use super::columns::Layout;
 use super::message::{AVERAGING, Fields, MessageError, Topic};
 use super::table::TableRows;
-use super::taken::Taken;
+use super::taken::LineResult;
 use super::{IngestError, Item, ReadOptions};
 use crate::reading::{BenchmarkId, MissingValues, Quantity, Unit};
 use ::csv::StringRecord;
@@ -67,7 +67,7 @@ impl NdjsonRows {
     }
 
     /// All that is intact in one line, and what is wrong with the rest.
-    pub(super) fn row(&mut self, line: u64, text: &str) -> Taken {
+    pub(super) fn row(&mut self, line: u64, text: &str) -> LineResult {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let mut found = objects(text);
         if found.torn.is_some()
@@ -78,7 +78,7 @@ impl NdjsonRows {
                 found = again;
             }
         }
-        let mut taken = Taken::default();
+        let mut taken = LineResult::default();
         for object in &found.whole {
             match self.object(line, object) {
                 Ok(items) => taken.items.extend(items),

@@ -1,4 +1,4 @@
-//! Text files of every format, line by line behind one door, and whole.
+//! Text files of every format, line by line through one interface, and whole.
 
 use super::bytes::read_bytes;
 use super::collect::Collector;
@@ -7,7 +7,7 @@ use super::csv::CsvRows;
 use super::encoding::{Transcoder, latin1};
 use super::ndjson::NdjsonRows;
 use super::table::TableRows;
-use super::taken::{Remark, Taken};
+use super::taken::{LineResult, Remark};
 use super::toa5::Toa5Rows;
 use super::{IngestError, Item, ReadOptions};
 use crate::reading::{BenchmarkId, Disorder, Recording, Unit};
@@ -87,12 +87,12 @@ impl TextRows {
 
     /// Takes one line; `line` is its number in the file, from 1. A fault is that line's alone, unless
     /// [`TextRows::is_lost`] afterwards.
-    pub fn take(&mut self, line: u64, text: &str) -> Taken {
-        let mut taken: Taken = match &mut self.rows {
+    pub fn take(&mut self, line: u64, text: &str) -> LineResult {
+        let mut taken: LineResult = match &mut self.rows {
             Rows::NewCsv => match CsvRows::new(&self.file, text, &self.options) {
                 Ok(rows) => {
                     self.rows = Rows::Csv(Box::new(rows));
-                    Taken::default()
+                    LineResult::default()
                 }
                 Err(error) => Err(error).into(),
             },

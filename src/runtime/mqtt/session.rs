@@ -57,7 +57,7 @@ enum Link {
 }
 
 /// What came from the broker.
-pub(super) enum Came<M = Message> {
+pub(super) enum Came<M = BrokerMessage> {
     Connected,
     Message(M),
     SubscriptionRefused,
@@ -66,7 +66,7 @@ pub(super) enum Came<M = Message> {
 
 /// A message, to be acknowledged over the connection that it came by.
 #[derive(Debug)]
-pub(super) struct Message {
+pub(super) struct BrokerMessage {
     of: Published,
     /// Connections that had ended when it came, and that have ended by now.
     came_after: u64,
@@ -79,7 +79,7 @@ enum Published {
     Three(v3::AsyncClient, v3::Publish),
 }
 
-impl Message {
+impl BrokerMessage {
     pub(super) fn topic(&self) -> Cow<'_, str> {
         match &self.of {
             Published::Five(_, publish) => String::from_utf8_lossy(&publish.topic),
@@ -162,7 +162,7 @@ impl Session {
             },
         };
         match came {
-            Ok(Came::Message(of)) => Ok(Came::Message(Message {
+            Ok(Came::Message(of)) => Ok(Came::Message(BrokerMessage {
                 of,
                 came_after: self.ended.load(Ordering::Relaxed),
                 ended: Arc::clone(&self.ended),

@@ -8,7 +8,7 @@ mod schemas;
 
 use super::ingest::{IngestError, SaidTopic, escape, write_mcap_with};
 use crate::alert::Level;
-use crate::monitor::{Event, EventKind, FailureTime, Input, Stretch, levels_in};
+use crate::monitor::{Event, EventKind, FailureTime, Input, LevelStretch, levels_in};
 use crate::reading::{BenchmarkId, Channel, Quantity, Recording, Series, Timestamp, days_since};
 use crate::store::{Store, StoreError};
 use serde_json::{Map, Value, json};
@@ -267,7 +267,7 @@ fn levels(recording: &Recording, events: &[Event]) -> Vec<SaidTopic> {
 
 /// The level, and whether it is unknown, at each time at which one of them changes.
 fn changes(
-    (levels, unknown): &(Vec<Stretch>, Vec<Stretch>),
+    (levels, unknown): &(Vec<LevelStretch>, Vec<LevelStretch>),
     last: Timestamp,
 ) -> Vec<(Timestamp, Value)> {
     let starts = levels.iter().chain(unknown).map(|one| one.from);

@@ -58,9 +58,9 @@ fn is_ours(links: &Links, headers: &HeaderMap) -> bool {
 }
 
 /// What was cut short on the way is no link either.
-type Asked = Result<Query<AskedLink>, QueryRejection>;
+type LinkQuery = Result<Query<AskedLink>, QueryRejection>;
 
-async fn show(State(desk): State<Arc<Desk>>, asked: Asked) -> Response {
+async fn show(State(desk): State<Arc<Desk>>, asked: LinkQuery) -> Response {
     answer(desk, asked, None).await
 }
 
@@ -72,14 +72,14 @@ struct Filled {
 
 async fn acknowledge(
     State(desk): State<Arc<Desk>>,
-    asked: Asked,
+    asked: LinkQuery,
     Form(Filled { by }): Form<Filled>,
 ) -> Response {
     answer(desk, asked, Some(by)).await
 }
 
 /// The state is asked on a thread that may wait. With a name, which may be empty, the link is used.
-async fn answer(desk: Arc<Desk>, asked: Asked, by: Option<String>) -> Response {
+async fn answer(desk: Arc<Desk>, asked: LinkQuery, by: Option<String>) -> Response {
     let zone = desk.zone();
     let work = move || {
         let Ok(Query(asked)) = asked else {
@@ -123,7 +123,7 @@ fn document(title: &str, body: &str) -> String {
 }
 
 /// The status, the title and the rest of a page.
-type Shown = (StatusCode, &'static str, String);
+type PageAnswer = (StatusCode, &'static str, String);
 
 const UNCHANGED: &str = "Nothing was changed.";
 
@@ -131,7 +131,7 @@ const UNCHANGED: &str = "Nothing was changed.";
 const FORM: &str = "<form method=\"post\">\n<p><label>Your name, if you like: <input name=\"by\" maxlength=\"100\" \
                     autocomplete=\"name\"></label></p>\n<p><button>Acknowledge</button></p>\n</form>";
 
-fn page_of(page: &LinkPage, zone: &TimeZone) -> Shown {
+fn page_of(page: &LinkPage, zone: &TimeZone) -> PageAnswer {
     match page {
         LinkPage::Open(Meant::Alert(alert)) => {
             let text = described(alert, zone) + FORM;
@@ -185,13 +185,17 @@ fn page_of(page: &LinkPage, zone: &TimeZone) -> Shown {
 }
 
 /// What there is no more to acknowledge.
-fn gone((title, why): (&'static str, &str), alert: Option<&AlertView>, zone: &TimeZone) -> Shown {
+fn gone(
+    (title, why): (&'static str, &str),
+    alert: Option<&AlertView>,
+    zone: &TimeZone,
+) -> PageAnswer {
     let described = alert.map_or_else(String::new, |alert| described(alert, zone));
     let text = format!("<p>{why} {UNCHANGED}</p>{described}");
     (StatusCode::GONE, title, text)
 }
 
-fn over(alert: &AlertView, zone: &TimeZone) -> Shown {
+fn over(alert: &AlertView, zone: &TimeZone) -> PageAnswer {
     let why = match alert.state {
         AlertLife::Superseded => {
             "A higher level has taken its place; that has a message of its own."

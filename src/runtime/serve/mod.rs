@@ -47,7 +47,7 @@ impl Default for Limits {
 
 /// Where to listen, and to whom to open.
 #[derive(Debug, Clone)]
-pub struct Door {
+pub struct ListenOptions {
     /// The address; port 0 takes a free one.
     pub listen: SocketAddr,
     /// What a caller must know; `None` opens to everyone who can reach the address.
@@ -89,12 +89,12 @@ impl Server {
     /// # Errors
     /// [`ListenError`].
     pub async fn start(
-        door: Door,
+        options: ListenOptions,
         vitals: Arc<Vitals>,
         archive: Option<Arc<dyn Archive>>,
     ) -> Result<Self, ListenError> {
         let desk = None;
-        Self::open(door, vitals, Behind { archive, desk }).await
+        Self::open(options, vitals, Behind { archive, desk }).await
     }
 
     /// Starts to listen, with the page where there is a desk.
@@ -102,19 +102,19 @@ impl Server {
     /// # Errors
     /// [`ListenError`].
     pub async fn open(
-        door: Door,
+        options: ListenOptions,
         vitals: Arc<Vitals>,
         behind: Behind,
     ) -> Result<Self, ListenError> {
         let fail = |source| ListenError {
-            address: door.listen,
+            address: options.listen,
             source,
         };
-        let listener = TcpListener::bind(door.listen).await.map_err(fail)?;
+        let listener = TcpListener::bind(options.listen).await.map_err(fail)?;
         let address = listener.local_addr().map_err(fail)?;
         let (stop, stopped) = shutdown::pair();
-        let limits = door.limits;
-        let router = routes::router(door, vitals, behind);
+        let limits = options.limits;
+        let router = routes::router(options, vitals, behind);
         let task = tokio::spawn(connections::serve(listener, router, limits, stopped));
         tracing::info!(%address, "listening");
         Ok(Self {

@@ -1,7 +1,7 @@
 //! The commit: what has happened is made durable, then told.
 
-use super::flood::Outgoing;
-use super::{LEAST_FRESHNESS, LEAST_WATCHED, MOST_UNWRITTEN, Site, Standing};
+use super::flood::OutgoingAlerts;
+use super::{AlertInForce, LEAST_FRESHNESS, LEAST_WATCHED, MOST_UNWRITTEN, Site};
 use crate::alert::{Level, Policy};
 use crate::monitor::{AlertState, Event};
 use crate::reading::{BenchmarkId, Timestamp};
@@ -52,10 +52,10 @@ impl Site {
     }
 
     fn record_and_send(&mut self, alerts: &[Alert]) -> Result<(), StoreError> {
-        let Outgoing {
+        let OutgoingAlerts {
             sent,
             told_together,
-        } = Outgoing::of(alerts);
+        } = OutgoingAlerts::of(alerts);
         for alert in &sent {
             self.note(alert)?;
         }
@@ -185,7 +185,7 @@ impl Site {
         let was_told = is_sent || had.is_some_and(|had| had.was_told);
         match alert.state {
             AlertState::Firing if alert.level != Level::Green => {
-                let standing = Standing {
+                let standing = AlertInForce {
                     alert,
                     is_sent,
                     was_told,

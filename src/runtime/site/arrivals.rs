@@ -100,7 +100,7 @@ impl Site {
         &mut self,
         benchmark: &BenchmarkId,
         time: Timestamp,
-    ) -> Option<crate::monitor::Finding> {
+    ) -> Option<crate::monitor::SearchFinding> {
         if self.sinks.store.is_some() {
             self.searches.answered(benchmark, time)
         } else {

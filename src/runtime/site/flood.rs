@@ -14,14 +14,14 @@ const NAMED: usize = 20;
 
 /// What becomes of the alerts of one commit.
 #[derive(Debug, Default)]
-pub(super) struct Outgoing {
+pub(super) struct OutgoingAlerts {
     /// The hooks are given these.
     pub(super) sent: Vec<Alert>,
     /// One of those tells of these.
     pub(super) told_together: Vec<Alert>,
 }
 
-impl Outgoing {
+impl OutgoingAlerts {
     /// All of `alerts`, in their order, or of each level and state the first ten by forecast time of failure and one
     /// that stands for the others.
     pub(super) fn of(alerts: &[Alert]) -> Self {

@@ -82,11 +82,11 @@ pub struct Counts {
 }
 
 /// Where an alert stands: one level is in force at a benchmark, and beside it perhaps `unknown`.
-type Place = (Option<BenchmarkId>, bool);
+type AlertPlace = (Option<BenchmarkId>, bool);
 
 /// An alert in force.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-struct Standing {
+struct AlertInForce {
     alert: Alert,
     /// Whether it has been offered to the hooks.
     is_sent: bool,
@@ -120,7 +120,7 @@ pub struct Site {
     /// Alerts since the last commit.
     fresh: Vec<Alert>,
     /// What is in force: neither resolved nor superseded.
-    standing: BTreeMap<Place, Standing>,
+    standing: BTreeMap<AlertPlace, AlertInForce>,
     /// Who asked not to be told.
     mutes: Vec<Mute>,
     /// Ends of alerts that people were told of, which fell into a silence: they are sent after it.

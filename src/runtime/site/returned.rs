@@ -13,13 +13,13 @@ use std::collections::BTreeMap;
 const MOST: usize = 10_000;
 
 /// What a value is of, and when it was measured.
-type Place = (String, Option<Quantity>, Timestamp);
+type ValueName = (String, Option<Quantity>, Timestamp);
 
 /// The values that wait, by their place.
 #[derive(Debug, Default)]
-pub(super) struct Returned(BTreeMap<Place, Arrival>);
+pub(super) struct Returned(BTreeMap<ValueName, Arrival>);
 
-fn place(arrival: &Arrival) -> Place {
+fn place(arrival: &Arrival) -> ValueName {
     let quantity = match &arrival.input {
         Input::Reading { unit, .. } => Some(unit.quantity()),
         Input::Sample { .. }

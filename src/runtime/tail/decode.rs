@@ -1,6 +1,6 @@
 //! From a source's lines and messages to what the monitor takes: which benchmarks, which columns.
 
-use crate::config::{Benchmark, Broker, Source, SourceKind};
+use crate::config::{Benchmark, Broker, FileSource, SourceKind};
 use crate::monitor::Input;
 use crate::reading::{BenchmarkId, Conventions, Dialect, Quantity, Timestamp, Unit};
 use crate::runtime::ingest::{
@@ -52,7 +52,7 @@ pub(in crate::runtime) struct Decoder {
 }
 
 impl Decoder {
-    pub(in crate::runtime) fn new(source: &Source, benchmarks: &[Benchmark]) -> Self {
+    pub(in crate::runtime) fn new(source: &FileSource, benchmarks: &[Benchmark]) -> Self {
         let conventions = source.conventions.clone();
         Self {
             kind: source.kind,
@@ -213,7 +213,7 @@ impl Decoder {
 }
 
 /// How the daemon reads a file of this source.
-pub fn options_of(source: &Source, benchmarks: &[Benchmark], file: &Path) -> ReadOptions {
+pub fn options_of(source: &FileSource, benchmarks: &[Benchmark], file: &Path) -> ReadOptions {
     Decoder::new(source, benchmarks).options(&unpacked_name(file))
 }
 

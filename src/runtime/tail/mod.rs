@@ -21,7 +21,7 @@ mod text;
 pub(super) use decode::Decoder;
 pub use decode::{Arrival, options_of};
 pub(super) use follow::list;
-pub use follow::{Batch, Follower};
+pub use follow::{ArrivalBatch, Follower};
 pub(super) use text::{BadLine, Fed, TextReader};
 
 use super::clock::{self, Stopwatch};
@@ -51,7 +51,7 @@ const LONGEST_REST: Duration = Duration::from_millis(200);
 /// When a reading task broke off.
 pub async fn follow(
     mut follower: Follower,
-    batches: mpsc::Sender<Batch>,
+    batches: mpsc::Sender<ArrivalBatch>,
     mut shutdown: Shutdown,
 ) -> Result<(), tokio::task::JoinError> {
     let mut watch = FolderWatch::new(follower.folders());

@@ -80,7 +80,7 @@ impl Desk {
 }
 
 /// A change of the alert, with its place in the state.
-struct Call {
+struct StoredCall {
     event: Event,
     step: i64,
     body: String,
@@ -143,8 +143,8 @@ pub fn alert(store: &Store, site: &str, key: &str) -> Result<Option<AlertView>, 
 }
 
 /// The event that called the alert: that of the key, or the newest whose key goes on with a slash.
-fn call(store: &Store, asked: &str) -> Result<Option<Call>, StoreError> {
-    let mut found: Option<Call> = None;
+fn call(store: &Store, asked: &str) -> Result<Option<StoredCall>, StoreError> {
+    let mut found: Option<StoredCall> = None;
     for placed in store.placed_events("alert")? {
         let event: Event = read(&placed.body)?;
         let EventKind::Alert { key, state, .. } = &event.kind else {
@@ -161,7 +161,7 @@ fn call(store: &Store, asked: &str) -> Result<Option<Call>, StoreError> {
             .as_ref()
             .is_none_or(|had| had.event.time <= event.time);
         if is_it || is_newer {
-            found = Some(Call {
+            found = Some(StoredCall {
                 event,
                 step: placed.step,
                 body: placed.body,

@@ -5,7 +5,7 @@ use super::thin::{self, ThinPoint};
 use super::{Desk, EARLIEST, LATEST, held, read};
 use crate::fit::{Observations, Rate, RateOptions};
 use crate::forecast::InverseVelocityLine;
-use crate::monitor::{Event, EventKind, FailureTime, Stretch, levels_in, recent};
+use crate::monitor::{Event, EventKind, FailureTime, LevelStretch, levels_in, recent};
 use crate::reading::{
     BenchmarkId, Quantity, Reading, SECONDS_PER_DAY, Series, Timestamp, Unit, days_since,
 };
@@ -143,9 +143,9 @@ pub struct BenchmarkView {
     /// The newest refit whole.
     pub latest: Option<Event>,
     /// The levels in force.
-    pub levels: Vec<Stretch>,
+    pub levels: Vec<LevelStretch>,
     /// When nothing could be said.
-    pub unknown: Vec<Stretch>,
+    pub unknown: Vec<LevelStretch>,
     /// Covariates.
     pub covariates: Vec<Covariate>,
     /// What was found, declared, ordered.

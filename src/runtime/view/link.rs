@@ -3,7 +3,7 @@
 use super::order::LONGEST_NAME;
 use super::{AlertLife, AlertView, Desk};
 use crate::config::{EXERCISE, Links};
-use crate::monitor::{Door, EventKind, Given, Order};
+use crate::monitor::{EventKind, Given, Order, OrderedBy};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::clock;
 use crate::runtime::hook::Status;
@@ -108,7 +108,7 @@ impl Desk {
             given: Given {
                 by: (!by.is_empty()).then(|| by.to_owned()),
                 why: None,
-                door: Some(Door::Link),
+                door: Some(OrderedBy::Link),
                 given_at: Some(now),
             },
         });

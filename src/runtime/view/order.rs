@@ -2,7 +2,7 @@
 
 use super::{Desk, EARLIEST};
 use crate::config::EXERCISE;
-use crate::monitor::{Door, Given, Order};
+use crate::monitor::{Given, Order, OrderedBy};
 use crate::reading::BenchmarkId;
 use crate::runtime::clock;
 use crate::store::StoreError;
@@ -86,7 +86,7 @@ impl Desk {
         let given = Given {
             by: Some(name.to_owned()),
             why: why.map(str::to_owned),
-            door: Some(Door::Http),
+            door: Some(OrderedBy::Http),
             given_at: Some(clock::now()),
         };
         let benchmark = asked.benchmark.as_ref().map(BenchmarkId::new);
