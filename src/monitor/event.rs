@@ -208,6 +208,19 @@ impl EventKind {
         "summary",
     ];
 
+    /// Whether it says what has changed over the whole record, which only who has gone through it knows.
+    pub(super) fn is_of_the_record(&self) -> bool {
+        matches!(
+            self,
+            Self::RegimeFlip { .. } | Self::InterceptDrift { .. } | Self::TransitionDrift { .. }
+        )
+    }
+
+    /// Whether it is about the data, not about the slope.
+    pub fn is_of_data(&self) -> bool {
+        matches!(self, Self::Fault { .. } | Self::Correction { .. })
+    }
+
     /// The word in its JSON.
     pub fn name(&self) -> &'static str {
         match self {
@@ -337,25 +350,17 @@ pub struct Summary {
 impl Summary {
     /// Counts one event; an alert of the whole site repeats what its benchmarks called.
     pub(super) fn count(&mut self, event: &Event) {
-        match &event.kind {
-            EventKind::Refit { .. } => self.refits += 1,
+        let fires = matches!(
+            event.kind,
             EventKind::Alert {
                 state: AlertState::Firing,
                 ..
-            } if event.benchmark.is_some() => self.alerts += 1,
-            EventKind::Alert { .. }
-            | EventKind::RegimeFlip { .. }
-            | EventKind::InterceptDrift { .. }
-            | EventKind::TransitionDrift { .. }
-            | EventKind::UnexplainedResidual(_)
-            | EventKind::EffectFound { .. }
-            | EventKind::EffectDropped { .. }
-            | EventKind::Together { .. }
-            | EventKind::Fault { .. }
-            | EventKind::Declared { .. }
-            | EventKind::Correction { .. }
-            | EventKind::Order { .. }
-            | EventKind::Summary(_) => {}
+            }
+        );
+        if matches!(event.kind, EventKind::Refit { .. }) {
+            self.refits += 1;
+        } else if fires && event.benchmark.is_some() {
+            self.alerts += 1;
         }
     }
 }

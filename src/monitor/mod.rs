@@ -9,6 +9,7 @@ mod event;
 mod given;
 mod history;
 mod kept;
+mod measured;
 mod motion;
 mod notice;
 mod order;
@@ -30,6 +31,7 @@ pub use event::{
     SUSPECT_ENDS, SharedFailure, Summary, Unexplained,
 };
 pub use given::{Given, OrderedBy};
+pub use measured::Measured;
 pub(crate) use motion::recent;
 pub use notice::{CLOCK_FAULT, Notice};
 pub use order::Order;

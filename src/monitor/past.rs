@@ -45,21 +45,10 @@ impl Input {
     /// Whether an event that followed from this says what would have been said in the past: it changes nothing of the
     /// present, and nobody is notified.
     pub fn makes_up(&self, event: &Event) -> bool {
-        let is_past = match &event.kind {
-            EventKind::Refit { .. }
-            | EventKind::RegimeFlip { .. }
-            | EventKind::InterceptDrift { .. }
-            | EventKind::TransitionDrift { .. } => true,
-            EventKind::Alert { level, rule, .. } => *level != Level::Unknown && rule != PAST,
-            EventKind::UnexplainedResidual(_)
-            | EventKind::EffectFound { .. }
-            | EventKind::EffectDropped { .. }
-            | EventKind::Together { .. }
-            | EventKind::Fault { .. }
-            | EventKind::Declared { .. }
-            | EventKind::Correction { .. }
-            | EventKind::Order { .. }
-            | EventKind::Summary(_) => false,
+        let is_past = if let EventKind::Alert { level, rule, .. } = &event.kind {
+            *level != Level::Unknown && rule != PAST
+        } else {
+            matches!(event.kind, EventKind::Refit { .. }) || event.kind.is_of_the_record()
         };
         matches!(self, Self::Notice(Notice::Retrace)) && is_past
     }

@@ -313,19 +313,11 @@ impl Daemon {
         let taken = self.site.counts().taken;
         let events = self.site.take(arrival, (self.wall)())?;
         let vitals = &self.pulse.vitals;
-        match &arrival.input {
-            Input::Reading { benchmark, .. } if self.site.counts().taken > taken => {
-                vitals.read(benchmark, arrival.time, &events, stopwatch.elapsed());
-            }
-            Input::Reading { .. }
-            | Input::Sample { .. }
-            | Input::Missing { .. }
-            | Input::Trouble { .. }
-            | Input::Notice(_)
-            | Input::Settings(_)
-            | Input::Order(_)
-            | Input::Tick
-            | Input::Found(_) => vitals.note(&events),
+        let is_taken = self.site.counts().taken > taken;
+        if is_taken && let Input::Reading { benchmark, .. } = &arrival.input {
+            vitals.read(benchmark, arrival.time, &events, stopwatch.elapsed());
+        } else {
+            vitals.note(&events);
         }
         self.pulse.turn();
         Ok(())

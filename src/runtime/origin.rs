@@ -3,7 +3,7 @@
 use super::ingest::is_packed;
 use super::tail::{Decoder, TextReader, list};
 use crate::config::{Config, FileSource};
-use crate::monitor::Input;
+use crate::monitor::{Input, Measured};
 use crate::reading::Timestamp;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -95,27 +95,10 @@ impl Origins {
 }
 
 fn token(input: &Input) -> Option<ValueIdentity> {
-    match input {
-        Input::Reading {
-            benchmark, reading, ..
-        } => Some((
-            format!("reading {benchmark}"),
-            reading.time,
-            reading.value.to_bits(),
-        )),
-        Input::Sample {
-            channel, sample, ..
-        } => Some((
-            format!("sample {channel}"),
-            sample.time,
-            sample.value.to_bits(),
-        )),
-        Input::Missing { .. }
-        | Input::Trouble { .. }
-        | Input::Settings(_)
-        | Input::Order(_)
-        | Input::Found(_)
-        | Input::Notice(_)
-        | Input::Tick => None,
-    }
+    let measured = input.measured()?;
+    let name = match measured {
+        Measured::Reading { benchmark, .. } => format!("reading {benchmark}"),
+        Measured::Sample { channel, .. } => format!("sample {channel}"),
+    };
+    Some((name, measured.time(), measured.value().to_bits()))
 }

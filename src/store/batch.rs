@@ -42,9 +42,9 @@ pub struct Batch {
 impl Batch {
     /// Notes a step and the events that followed from it.
     pub fn step(&mut self, now: Timestamp, input: &Input, events: &[Event]) {
-        if let (Some(series), Some((time, value, _))) = (StoredSeries::of(input), value(input)) {
-            let place = (series, time);
-            if let Some(former) = self.values.insert(place.clone(), value) {
+        if let Some(measured) = input.measured() {
+            let place = (StoredSeries::of(&measured), measured.time());
+            if let Some(former) = self.values.insert(place.clone(), measured.value()) {
                 self.former.entry(place).or_default().push(former);
             }
         }
@@ -140,9 +140,11 @@ impl Store {
     /// # Errors
     /// [`StoreError`].
     pub fn has(&self, batch: &Batch, input: &Input) -> Result<Presence, StoreError> {
-        let (Some(series), Some((time, value, _))) = (StoredSeries::of(input), value(input)) else {
+        let Some(measured) = input.measured() else {
             return Ok(Presence::No);
         };
+        let series = StoredSeries::of(&measured);
+        let (time, value) = (measured.time(), measured.value());
         let in_batch = batch.known(&series, time);
         if (in_batch.first()).is_some_and(|known| known.to_bits() == value.to_bits()) {
             return Ok(Presence::Yes);
@@ -191,7 +193,8 @@ impl Inner {
         for series in batch
             .steps
             .iter()
-            .filter_map(|(_, input)| StoredSeries::of(input))
+            .filter_map(|(_, input)| input.measured())
+            .map(|measured| StoredSeries::of(&measured))
         {
             if catalogue.number(&series).is_none() && !fresh.contains_key(&series) {
                 let number = catalogue.next() + i64::try_from(fresh.len()).unwrap_or(i64::MAX);
@@ -248,21 +251,6 @@ impl Inner {
     }
 }
 
-/// When a value was measured, what it is, and its standard error.
-fn value(input: &Input) -> Option<(Timestamp, f64, Option<f64>)> {
-    match input {
-        Input::Reading { reading, .. } => Some((reading.time, reading.value, reading.sigma)),
-        Input::Sample { sample, .. } => Some((sample.time, sample.value, None)),
-        Input::Missing { .. }
-        | Input::Trouble { .. }
-        | Input::Notice(_)
-        | Input::Settings(_)
-        | Input::Order(_)
-        | Input::Found(_)
-        | Input::Tick => None,
-    }
-}
-
 fn insert_step(
     connection: &Connection,
     (seq, now): (i64, Timestamp),
@@ -272,16 +260,18 @@ fn insert_step(
     let mut insert = connection.prepare_cached(
         "INSERT INTO step (seq, now, series, time, value, sigma, body, sum) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
     )?;
-    let (own, number, time, value, sigma, body) =
-        if let (Some(series), Some((time, value, sigma))) = (StoredSeries::of(input), value(input))
-        {
-            let own = (now != time).then(|| nanoseconds(now)).transpose()?;
-            let time = nanoseconds(time)?;
-            (own, number(&series), Some(time), Some(value), sigma, None)
-        } else {
-            let body = super::read::encode(input)?;
-            (Some(nanoseconds(now)?), None, None, None, None, body)
-        };
+    let (own, number, time, value, sigma, body) = if let Some(measured) = input.measured() {
+        let own = (now != measured.time())
+            .then(|| nanoseconds(now))
+            .transpose()?;
+        let time = nanoseconds(measured.time())?;
+        let number = number(&StoredSeries::of(&measured));
+        let value = Some(measured.value());
+        (own, number, Some(time), value, measured.sigma(), None)
+    } else {
+        let body = super::read::encode(input)?;
+        (Some(nanoseconds(now)?), None, None, None, None, body)
+    };
     let integer = |value: Option<i64>| value.map_or(ValueRef::Null, ValueRef::Integer);
     let real = |value: Option<f64>| value.map_or(ValueRef::Null, ValueRef::Real);
     let sum = sum(&[

@@ -1,7 +1,7 @@
 //! The series that values belong to, by number.
 
 use super::StoreError;
-use crate::monitor::Input;
+use crate::monitor::Measured;
 use crate::reading::{BenchmarkId, Unit};
 use jiff::SignedDuration;
 use rusqlite::{Connection, params};
@@ -26,25 +26,17 @@ pub(super) struct Catalogue {
 }
 
 impl StoredSeries {
-    /// Of a value; `None` for what is none.
-    pub(super) fn of(input: &Input) -> Option<Self> {
-        match input {
-            Input::Reading {
+    pub(super) fn of(measured: &Measured<'_>) -> Self {
+        match *measured {
+            Measured::Reading {
                 benchmark,
                 unit,
                 averaging,
                 ..
-            } => Some(Self::Benchmark(benchmark.clone(), *unit, *averaging)),
-            Input::Sample { channel, unit, .. } => {
-                Some(Self::Channel(channel.clone(), unit.clone()))
+            } => Self::Benchmark(benchmark.clone(), unit, averaging),
+            Measured::Sample { channel, unit, .. } => {
+                Self::Channel(channel.to_owned(), unit.map(str::to_owned))
             }
-            Input::Missing { .. }
-            | Input::Trouble { .. }
-            | Input::Notice(_)
-            | Input::Settings(_)
-            | Input::Order(_)
-            | Input::Found(_)
-            | Input::Tick => None,
         }
     }
 }

@@ -190,7 +190,7 @@ impl Track {
         let mut events = self.judge_ahead(policy, reading.time, beside);
         events.extend(self.take_one(policy, source, reading, beside));
         if self.record == PastReview::Owed {
-            events.retain(|event| !past::is_of_the_record(event));
+            events.retain(|event| !event.kind.is_of_the_record());
         }
         events
     }
@@ -313,7 +313,7 @@ impl Track {
         }
         let mut events = self.judge(policy, time, beside);
         if self.record == PastReview::Owed {
-            events.retain(|event| !past::is_of_the_record(event));
+            events.retain(|event| !event.kind.is_of_the_record());
         }
         events
     }

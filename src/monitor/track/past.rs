@@ -79,7 +79,7 @@ impl Track {
             return Vec::new();
         }
         let mut events = self.judge(policy, time, beside);
-        events.retain(|event| !is_of_the_record(event));
+        events.retain(|event| !event.kind.is_of_the_record());
         events
     }
 
@@ -133,7 +133,7 @@ impl Track {
                 if matches!(event.kind, EventKind::Refit { .. }) {
                     refits += 1;
                     events.extend(walk.reports(event.time).then_some(event));
-                } else if is_of_the_record(&event) {
+                } else if event.kind.is_of_the_record() {
                     events.push(event);
                 } else if is_of_a_level(&event) && event.time < walk.until {
                     walk.episode.push(event);
@@ -190,16 +190,6 @@ impl Track {
             averaging: self.history.averaging(),
         }
     }
-}
-
-/// Whether it says what has changed over the whole record, which only who has gone through it knows.
-pub(super) fn is_of_the_record(event: &Event) -> bool {
-    matches!(
-        event.kind,
-        EventKind::RegimeFlip { .. }
-            | EventKind::InterceptDrift { .. }
-            | EventKind::TransitionDrift { .. }
-    )
 }
 
 /// Whether it enters or leaves a level; that nothing can be said is not reported of the past.

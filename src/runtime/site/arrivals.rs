@@ -27,20 +27,6 @@ pub(in crate::runtime) fn is_logged(total: u64) -> bool {
     total <= LOGGED || total.is_power_of_two()
 }
 
-/// What a value is of.
-pub(super) fn name(input: &Input) -> &str {
-    match input {
-        Input::Reading { benchmark, .. } | Input::Missing { benchmark, .. } => benchmark.as_str(),
-        Input::Sample { channel, .. } => channel,
-        Input::Trouble { .. }
-        | Input::Settings(_)
-        | Input::Order(_)
-        | Input::Found(_)
-        | Input::Notice(_)
-        | Input::Tick => "",
-    }
-}
-
 impl Site {
     /// Takes one value. What was taken before, or lies ahead of the clock, changes nothing; while the host's clock is
     /// earlier than readings that are known, what lies ahead of it is held. A replay waits for the answer of a search
@@ -128,9 +114,9 @@ impl Site {
         let total = self.counts.without_clock;
         if !is_logged(total) {
         } else if time < BEFORE_ALL {
-            tracing::warn!(%time, what = name(&arrival.input), "measured before 1678: quarantined");
+            tracing::warn!(%time, what = arrival.input.series_name(), "measured before 1678: quarantined");
         } else {
-            tracing::warn!(%time, what = name(&arrival.input), total, "measured on the first day of 1970, as by a logger whose clock is not set: quarantined");
+            tracing::warn!(%time, what = arrival.input.series_name(), total, "measured on the first day of 1970, as by a logger whose clock is not set: quarantined");
         }
         true
     }

@@ -6,7 +6,7 @@
 //! clock is, or the clock is behind.
 
 use super::Site;
-use super::arrivals::{is_logged, name};
+use super::arrivals::is_logged;
 use crate::monitor::Input;
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::clock::TOLERANCE;
@@ -107,7 +107,7 @@ impl Site {
         self.counts.from_the_future += 1;
         let (time, total) = (arrival.time, self.counts.from_the_future);
         if is_logged(total) {
-            tracing::warn!(%time, what = name(&arrival.input), total, "measured in the future: quarantined");
+            tracing::warn!(%time, what = arrival.input.series_name(), total, "measured in the future: quarantined");
         }
     }
 }

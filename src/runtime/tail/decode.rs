@@ -23,19 +23,8 @@ pub struct Arrival {
 impl Arrival {
     /// Where it stands among others: by time, and at one time the covariates before the readings, each by name.
     pub fn rank(&self) -> (Timestamp, bool, &str) {
-        let (is_reading, name) = match &self.input {
-            Input::Sample { channel, .. } => (false, channel.as_str()),
-            Input::Reading { benchmark, .. } | Input::Missing { benchmark, .. } => {
-                (true, benchmark.as_str())
-            }
-            Input::Trouble { .. }
-            | Input::Notice(_)
-            | Input::Settings(_)
-            | Input::Order(_)
-            | Input::Found(_)
-            | Input::Tick => (false, ""),
-        };
-        (self.time, is_reading, name)
+        let is_reading = self.input.read_benchmark().is_some();
+        (self.time, is_reading, self.input.series_name())
     }
 }
 
