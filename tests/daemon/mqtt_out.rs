@@ -3,14 +3,12 @@
 use crate::eventually::eventually;
 use crate::mqtt::Mosquitto;
 use crate::webhooks::{alert, quick, text};
-use rcgen::{BasicConstraints, CertificateParams, CertifiedIssuer, IsCa, KeyPair};
 use rumqttc::{AsyncClient, Event, MqttOptions, Packet, Publish, QoS};
 use slipwatch::config::{self, HookConfig};
 use slipwatch::runtime::deliver::{self, Dispatcher};
 use slipwatch::runtime::delivered::Delivered;
 use slipwatch::runtime::hook::HookOutcome;
 use slipwatch::store::{DeliveryOutcome, Store};
-use std::net::TcpListener;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -134,31 +132,7 @@ async fn an_alert_waits_for_a_broker_that_is_away_and_one_that_is_not_let_in_is_
 #[tokio::test(flavor = "multi_thread")]
 #[cfg_attr(not(has_mosquitto), ignore = "Mosquitto was not found by build.rs")]
 async fn an_alert_goes_over_tls_to_a_broker_that_proves_its_name_and_to_no_other() {
-    let mut params = CertificateParams::new(Vec::new()).unwrap();
-    params.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
-    let authority =
-        CertifiedIssuer::self_signed(params.clone(), KeyPair::generate().unwrap()).unwrap();
-    let stranger = CertifiedIssuer::self_signed(params, KeyPair::generate().unwrap()).unwrap();
-    let key = KeyPair::generate().unwrap();
-    let params = CertificateParams::new(vec!["localhost".to_owned()]).unwrap();
-    let own = params.signed_by(&key, &authority).unwrap();
-    let free = TcpListener::bind("127.0.0.1:0").unwrap();
-    let port = free.local_addr().unwrap().port();
-    drop(free);
-    let broker = Mosquitto::start_with(|folder| {
-        let place = |name: &str, text: String| {
-            let file = folder.join(name);
-            std::fs::write(&file, text).unwrap();
-            file.display().to_string()
-        };
-        place("authority.pem", authority.pem());
-        place("stranger.pem", stranger.pem());
-        format!(
-            "listener {port} 127.0.0.1\nallow_anonymous true\ncertfile {}\nkeyfile {}\n",
-            place("own.pem", own.pem()),
-            place("own.key", key.serialize_pem())
-        )
-    });
+    let (broker, port) = Mosquitto::start_secured();
     let secured = |authority: &str| {
         let file = broker.folder.path().join(authority);
         let lines = format!(

@@ -1,7 +1,8 @@
 //! Webhooks against real listeners: what they get, that it is signed, and how failures are tried again.
 
+use crate::certificates::Certified;
 use crate::eventually::eventually;
-use rcgen::{BasicConstraints, CertificateParams, CertifiedIssuer, IsCa, KeyPair};
+use crate::site::free_address;
 use slipwatch::alert::Level;
 use slipwatch::config::{self, HookConfig};
 use slipwatch::monitor::{AlertState, Event, EventKind};
@@ -253,10 +254,7 @@ async fn a_receiver_that_never_answers_holds_no_other_ones_red() {
 async fn a_webhook_ends_at_its_timeout_and_says_why_it_cannot_be_sent() {
     let folder = tempfile::tempdir().unwrap();
     let hanging = Receiver::answering(&[0]);
-    let free = TcpListener::bind("127.0.0.1:0")
-        .unwrap()
-        .local_addr()
-        .unwrap();
+    let free = free_address();
     let tables = [
         webhook(&hanging.url, "timeout = \"300ms\""),
         webhook(&format!("http://{free}/"), ""),
@@ -317,20 +315,15 @@ struct Secured {
 
 impl Secured {
     fn answering(status: u16) -> Self {
-        let mut params = CertificateParams::new(Vec::new()).unwrap();
-        params.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
-        let authority = CertifiedIssuer::self_signed(params, KeyPair::generate().unwrap()).unwrap();
-        let key = KeyPair::generate().unwrap();
-        let params = CertificateParams::new(vec!["localhost".to_owned()]).unwrap();
-        let own = params.signed_by(&key, &authority).unwrap();
+        let certified = Certified::localhost();
         let provider = Arc::new(rustls::crypto::ring::default_provider());
         let config = rustls::ServerConfig::builder_with_provider(provider)
             .with_safe_default_protocol_versions()
             .unwrap()
             .with_no_client_auth()
             .with_single_cert(
-                vec![own.der().clone()],
-                PrivateKeyDer::try_from(key.serialize_der()).unwrap(),
+                vec![certified.own.der().clone()],
+                PrivateKeyDer::try_from(certified.key.serialize_der()).unwrap(),
             )
             .unwrap();
         let config = Arc::new(config);
@@ -354,7 +347,7 @@ impl Secured {
         });
         let url = format!("https://localhost:{port}/alerts");
         Self {
-            authority: authority.pem(),
+            authority: certified.authority,
             receiver: Receiver { url, got },
         }
     }
@@ -454,9 +447,7 @@ async fn alertmanager_gets_a_list_with_the_same_labels_when_an_alert_fires_and_w
 #[cfg_attr(not(has_alertmanager), ignore = "there is no prometheus-alertmanager")]
 async fn a_real_alertmanager_has_the_alert_in_force_until_its_end_comes() {
     let folder = tempfile::tempdir().unwrap();
-    let free = TcpListener::bind("127.0.0.1:0").unwrap();
-    let address = free.local_addr().unwrap().to_string();
-    drop(free);
+    let address = free_address().to_string();
     let config = "route: {receiver: nobody}\nreceivers: [{name: nobody}]\n";
     std::fs::write(folder.path().join("am.yml"), config).unwrap();
     let mut program = Command::new("prometheus-alertmanager")
@@ -591,9 +582,7 @@ async fn heartbeats_come_for_as_long_as_the_site_is_watched_and_no_longer() {
     let refusing = Receiver::answering(&[500]);
     let folder = tempfile::tempdir().unwrap();
     let heartbeat = |url: &str| format!("[[heartbeat]]\nurl = \"{url}\"\nevery = \"1s\"\n");
-    let free = TcpListener::bind("127.0.0.1:0").unwrap();
-    let listen = free.local_addr().unwrap();
-    drop(free);
+    let listen = free_address();
     let tables = heartbeat(&taking.url) + &heartbeat(&refusing.url);
     let site = text(&tables).replace("[[source]]", &format!("listen = \"{listen}\"\n[[source]]"));
     std::fs::write(folder.path().join("site.toml"), site).unwrap();

@@ -21,11 +21,7 @@ fn site(after: &str) -> Site {
 /// Starts the daemon; the first hook has the red.
 fn told(site: &Site) -> Program {
     let program = site.caught_up();
-    eventually("that the red is told", || {
-        site.lines("told")
-            .iter()
-            .any(|line| line.starts_with("5/red/"))
-    });
+    site.tells_red();
     program
 }
 
