@@ -311,13 +311,9 @@ impl Monitor {
         self.summary.readings += 1;
         self.sensors.reads(benchmark, reading.time);
         self.changed.insert(benchmark.clone());
-        let beside = StepContext {
+        let context = StepContext {
+            phase: self.phase(now),
             covariates: &self.covariates,
-            explain: self.settings.explain,
-            now,
-            settles: self.settles,
-            is_past: self.past.is_open(),
-            is_queue: self.queue.is_open(),
         };
         let policy = self.settings.policy(benchmark);
         let track = self.tracks.entry(benchmark.clone()).or_insert_with(|| {
@@ -330,14 +326,14 @@ impl Monitor {
         let mut events = if reading.time > now {
             track.put_aside(now, source, reading)
         } else {
-            track.take(policy, source, reading, &beside)
+            track.take(policy, source, reading, &context)
         };
         if self.settles && track.owes_look_back() {
             self.late.insert(benchmark.clone());
         }
         self.queue.note(benchmark, track);
         let critical = policy.critical_velocity_mm_per_day;
-        self.searches.extend(track.search(critical, &beside));
+        self.searches.extend(track.search(critical, &context));
         let after = track.deadline();
         self.expect((before, after), benchmark.clone());
         events.extend(self.awaited.end(now, benchmark, "reads"));
@@ -379,20 +375,16 @@ impl Monitor {
     fn resettle(&mut self, now: Timestamp, settings: &Settings) -> Vec<Event> {
         let former = std::mem::replace(&mut self.settings, settings.clone());
         let mut events = self.unwatch(now, &former.watched);
-        let beside = StepContext {
+        let context = StepContext {
+            phase: self.phase(now),
             covariates: &self.covariates,
-            explain: self.settings.explain,
-            now,
-            settles: self.settles,
-            is_past: self.past.is_open(),
-            is_queue: self.queue.is_open(),
         };
         let mut moved = Vec::new();
         for (id, track) in &mut self.tracks {
             let declared = Declarations::of(&self.settings.declared, id);
             let before = track.deadline();
             events.extend(track.accept(now, self.settings.accepted(id)));
-            events.extend(track.redeclare(self.settings.policy(id), declared, &beside));
+            events.extend(track.redeclare(self.settings.policy(id), declared, &context));
             moved.push(((before, track.deadline()), id.clone()));
         }
         for (deadlines, id) in moved {

@@ -131,8 +131,8 @@ impl Monitor {
             return events;
         }
         for id in self.late.clone() {
-            if let Some((track, policy, beside)) = self.track_at(&id, now) {
-                events.extend(track.settle(policy, &beside));
+            if let Some((track, policy, context)) = self.track_at(&id, now) {
+                events.extend(track.settle(policy, &context));
                 self.changed.insert(id);
             }
         }

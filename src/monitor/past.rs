@@ -83,11 +83,11 @@ impl Monitor {
             let Some(id) = self.past.current.pop_first() else {
                 break;
             };
-            let Some((track, policy, beside)) = self.track_at(&id, now) else {
+            let Some((track, policy, context)) = self.track_at(&id, now) else {
                 continue;
             };
-            let (newest, judged) = track.judge_newest(policy, &beside);
-            let search = track.search(policy.critical_velocity_mm_per_day, &beside);
+            let (newest, judged) = track.judge_newest(policy, &context);
+            let search = track.search(policy.critical_velocity_mm_per_day, &context);
             let is_refit = |event: &&Event| matches!(event.kind, EventKind::Refit { .. });
             refits += judged.iter().filter(is_refit).count();
             events.extend(judged);
@@ -111,15 +111,11 @@ impl Monitor {
             return Vec::new();
         };
         let id = walk.benchmark().clone();
-        let Some((track, policy, beside)) = self.track_at(&id, now) else {
+        let Some((track, policy, mut context)) = self.track_at(&id, now) else {
             return Vec::new();
         };
-        let beside = StepContext {
-            is_past: false,
-            is_queue: false,
-            ..beside
-        };
-        let (mut events, has_more) = track.walk(&mut walk, policy, &beside);
+        (context.phase.is_past, context.phase.is_queue) = (false, false);
+        let (mut events, has_more) = track.walk(&mut walk, policy, &context);
         if has_more {
             self.walk = Some(walk);
         } else {
@@ -135,10 +131,10 @@ impl Track {
     fn judge_newest(
         &mut self,
         policy: &Policy,
-        beside: &StepContext<'_>,
+        context: &StepContext<'_>,
     ) -> (Option<Timestamp>, Vec<Event>) {
         let newest = self.newest();
-        let events = newest.map_or_else(Vec::new, |newest| self.judge_now(policy, newest, beside));
+        let events = newest.map_or_else(Vec::new, |newest| self.judge_now(policy, newest, context));
         (newest, events)
     }
 }

@@ -53,11 +53,11 @@ impl Monitor {
         while refits < MOST_REFITS
             && let Some(id) = self.queue.waiting.pop_first()
         {
-            let Some((track, policy, beside)) = self.track_at(&id, now) else {
+            let Some((track, policy, context)) = self.track_at(&id, now) else {
                 continue;
             };
-            let judged = track.settle(policy, &beside);
-            let search = track.search(policy.critical_velocity_mm_per_day, &beside);
+            let judged = track.settle(policy, &context);
+            let search = track.search(policy.critical_velocity_mm_per_day, &context);
             let is_refit = |event: &&Event| matches!(event.kind, EventKind::Refit { .. });
             refits += judged.iter().filter(is_refit).count();
             events.extend(judged);

@@ -7,7 +7,7 @@
 
 use super::Monitor;
 use super::event::Event;
-use super::track::{StepContext, Track};
+use super::track::{Phase, StepContext, Track};
 use crate::alert::Policy;
 use crate::effects::{Effect, Explained, Kind, KnownLoad, Options, Rival, explain};
 use crate::reading::{BenchmarkId, Channel, Series, Timestamp};
@@ -55,10 +55,21 @@ pub struct SearchFinding {
 impl Monitor {
     pub(super) fn found(&mut self, now: Timestamp, finding: &SearchFinding) -> Vec<Event> {
         self.changed.insert(finding.benchmark.clone());
-        let Some((track, policy, beside)) = self.track_at(&finding.benchmark, now) else {
+        let Some((track, policy, context)) = self.track_at(&finding.benchmark, now) else {
             return Vec::new();
         };
-        track.found(policy.critical_velocity_mm_per_day, now, finding, &beside)
+        track.found(policy.critical_velocity_mm_per_day, now, finding, &context)
+    }
+
+    /// How the monitor stands at this step.
+    pub(super) fn phase(&self, now: Timestamp) -> Phase {
+        Phase {
+            explain: self.settings.explain,
+            now,
+            settles: self.settles,
+            is_past: self.past.is_open(),
+            is_queue: self.queue.is_open(),
+        }
     }
 
     /// A benchmark that has given readings, its policy, and what lies beside its readings.
@@ -67,16 +78,12 @@ impl Monitor {
         benchmark: &BenchmarkId,
         now: Timestamp,
     ) -> Option<(&mut Track, &Policy, StepContext<'_>)> {
-        let beside = StepContext {
+        let context = StepContext {
+            phase: self.phase(now),
             covariates: &self.covariates,
-            explain: self.settings.explain,
-            now,
-            settles: self.settles,
-            is_past: self.past.is_open(),
-            is_queue: self.queue.is_open(),
         };
         let policy = self.settings.policy(benchmark);
-        Some((self.tracks.get_mut(benchmark)?, policy, beside))
+        Some((self.tracks.get_mut(benchmark)?, policy, context))
     }
 
     /// The searches asked for since the last call, one a benchmark at most; each is to be answered by an

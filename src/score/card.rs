@@ -232,22 +232,12 @@ fn score(said: Option<&Passage>, at: Timestamp, outcome: Outcome, scored: f64) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::Observation;
-    use crate::reading::Quantity;
 
     /// 1/v falls in a line to zero at day 60; read daily.
     fn history(days: u32) -> WholeRecord {
-        let values = (0..days).map(|day| Observation {
-            t_days: f64::from(day),
-            value: -100.0 * (1.0 - f64::from(day) / 60.0).ln(),
-            sigma: None,
-        });
+        let fall = |day: f64| (day, -100.0 * (1.0 - day / 60.0).ln());
         WholeRecord {
-            observations: Observations {
-                quantity: Quantity::Displacement,
-                averaging_days: 0.0,
-                values: values.collect(),
-            },
+            observations: Observations::of_displacements((0..days).map(f64::from).map(fall)),
             flow: Vec::new(),
             critical_mm_per_day: 1000.0,
         }

@@ -12,9 +12,8 @@ mod slope;
 
 pub use corpus::Corpus;
 
-use crate::fit::{Observation, Observations};
+use crate::fit::Observations;
 use crate::model::Law;
-use crate::reading::Quantity;
 use instrument::Instrument;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -74,16 +73,7 @@ impl Life {
     /// What a monitor has of this slope by `now_days`.
     pub fn known(&self, now_days: f64) -> Observations {
         let known = self.readings.iter().filter(|(days, _)| *days <= now_days);
-        let values = known.map(|(t_days, value)| Observation {
-            t_days: *t_days,
-            value: *value,
-            sigma: None,
-        });
-        Observations {
-            quantity: Quantity::Displacement,
-            averaging_days: 0.0,
-            values: values.collect(),
-        }
+        Observations::of_displacements(known.copied())
     }
 
     /// The life that `seed` gives; a slope that its load brings to another end, or down in less than 0.4 of

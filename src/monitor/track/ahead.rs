@@ -60,17 +60,17 @@ impl Track {
         &mut self,
         policy: &Policy,
         time: Timestamp,
-        beside: &StepContext<'_>,
+        context: &StepContext<'_>,
     ) -> Vec<Event> {
         let Some(mut ahead) = self.ahead.take() else {
             return Vec::new();
         };
-        if time >= ahead.reading.time || beside.now >= ahead.reading.time {
+        if time >= ahead.reading.time || context.phase.now >= ahead.reading.time {
             let source = MeasuredAs {
                 unit: ahead.unit,
                 averaging: ahead.averaging,
             };
-            return self.take_one(policy, source, &ahead.reading, beside);
+            return self.take_one(policy, source, &ahead.reading, context);
         }
         if self.newest.is_some_and(|newest| time > newest) {
             ahead.before += 1;

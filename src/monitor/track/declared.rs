@@ -73,7 +73,7 @@ impl Track {
         &mut self,
         policy: &Policy,
         declared: Declarations,
-        beside: &StepContext<'_>,
+        context: &StepContext<'_>,
     ) -> Vec<Event> {
         if self.declared.replace(declared).is_none() {
             return Vec::new();
@@ -86,7 +86,7 @@ impl Track {
         if !is_sorted_out && events.is_empty() {
             return events;
         }
-        if let Some(forecast) = self.forecast(policy.critical_velocity_mm_per_day, beside) {
+        if let Some(forecast) = self.forecast(policy.critical_velocity_mm_per_day, context) {
             events.extend(self.refit(policy, time, &forecast));
             events.extend(self.alert(policy, time, Some(&forecast)));
         }

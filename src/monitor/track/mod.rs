@@ -46,10 +46,16 @@ pub(super) use past::{PAST, Walk};
 /// So many readings in a row with one value are a stuck sensor, or a resolution too coarse to show it.
 const STUCK: usize = 24;
 
-/// What lies beside a benchmark's readings.
+/// What a step of a benchmark depends on beside its readings.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct StepContext<'a> {
+    pub(super) phase: Phase,
     pub(super) covariates: &'a Covariates,
+}
+
+/// What holds for all benchmarks at one step.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Phase {
     pub(super) explain: Explain,
     /// Data time.
     pub(super) now: Timestamp,
@@ -185,10 +191,10 @@ impl Track {
         policy: &Policy,
         source: MeasuredAs,
         reading: &Reading,
-        beside: &StepContext<'_>,
+        context: &StepContext<'_>,
     ) -> Vec<Event> {
-        let mut events = self.judge_ahead(policy, reading.time, beside);
-        events.extend(self.take_one(policy, source, reading, beside));
+        let mut events = self.judge_ahead(policy, reading.time, context);
+        events.extend(self.take_one(policy, source, reading, context));
         if self.record == PastReview::Owed {
             events.retain(|event| !event.kind.is_of_the_record());
         }
@@ -200,7 +206,7 @@ impl Track {
         policy: &Policy,
         source: MeasuredAs,
         reading: &Reading,
-        beside: &StepContext<'_>,
+        context: &StepContext<'_>,
     ) -> Vec<Event> {
         let mut events = self.declared_with(reading.time);
         if self.history.is_left_out(&self.declared, reading.time) {
@@ -239,36 +245,36 @@ impl Track {
         if taken == Taken::Newest {
             events.extend(self.judge_sensor(time));
             events.extend(self.suspect(source, time));
-            if !beside.settles {
+            if !context.phase.settles {
                 events.extend(self.look_back(policy, time));
             }
         }
-        let is_owed = beside.settles && taken != Taken::Newest;
+        let is_owed = context.phase.settles && taken != Taken::Newest;
         self.owes |= is_owed;
-        if beside.is_past {
+        if context.phase.is_past {
             return events;
         }
         let is_stuck = self.unknown.has(Reason::Stuck);
         if is_owed
             || is_stuck
             || !self.is_refit_due(policy, taken, reading.time)
-            || beside.is_queue && self.waits(policy, time)
+            || context.phase.is_queue && self.waits(policy, time)
         {
             events.extend(self.raise(policy, time));
             return events;
         }
-        events.extend(self.judge(policy, time, beside));
+        events.extend(self.judge(policy, time, context));
         events
     }
 
     /// What follows from the readings as they are now.
-    fn judge(&mut self, policy: &Policy, time: Timestamp, beside: &StepContext<'_>) -> Vec<Event> {
+    fn judge(&mut self, policy: &Policy, time: Timestamp, context: &StepContext<'_>) -> Vec<Event> {
         let mut events = Vec::new();
         (self.owes, self.queued_since) = (false, None);
-        let forecast = self.forecast(policy.critical_velocity_mm_per_day, beside);
+        let forecast = self.forecast(policy.critical_velocity_mm_per_day, context);
         if let Some(forecast) = &forecast {
             events.extend(self.refit(policy, time, forecast));
-            events.extend(self.watch(policy, time, forecast, beside));
+            events.extend(self.watch(policy, time, forecast, context));
         }
         let (may_fall, latch) = (self.may_fall(), self.latch.clone());
         let called = self.alert(policy, time, forecast.as_ref());
@@ -302,7 +308,7 @@ impl Track {
     }
 
     /// Everything that came together has been taken: judges what of it came late, or queued.
-    pub(super) fn settle(&mut self, policy: &Policy, beside: &StepContext<'_>) -> Vec<Event> {
+    pub(super) fn settle(&mut self, policy: &Policy, context: &StepContext<'_>) -> Vec<Event> {
         let is_owed = self.owes || self.is_queued();
         let Some(time) = self.newest.filter(|_| is_owed) else {
             return Vec::new();
@@ -311,7 +317,7 @@ impl Track {
             (self.owes, self.queued_since) = (false, None);
             return Vec::new();
         }
-        let mut events = self.judge(policy, time, beside);
+        let mut events = self.judge(policy, time, context);
         if self.record == PastReview::Owed {
             events.retain(|event| !event.kind.is_of_the_record());
         }
@@ -346,11 +352,11 @@ impl Track {
     }
 
     /// What the laws predict after the newest reading.
-    fn forecast(&mut self, critical: f64, beside: &StepContext<'_>) -> Option<Forecast> {
+    fn forecast(&mut self, critical: f64, context: &StepContext<'_>) -> Option<Forecast> {
         let plain = self.panel.update(&self.history.observations, critical)?;
         let history = &self.history;
         let known_load = self.adopted.as_mut().and_then(|adopted| {
-            let channels = beside.covariates.list();
+            let channels = context.covariates.list();
             adopted.forecast(history, &channels, (critical, &plain.rates))
         });
         Some(Forecast { plain, known_load })

@@ -72,13 +72,13 @@ impl Track {
         &mut self,
         policy: &Policy,
         time: Timestamp,
-        beside: &StepContext<'_>,
+        context: &StepContext<'_>,
     ) -> Vec<Event> {
         self.record = PastReview::Owed;
         if self.unknown.has(Reason::Stuck) {
             return Vec::new();
         }
-        let mut events = self.judge(policy, time, beside);
+        let mut events = self.judge(policy, time, context);
         events.retain(|event| !event.kind.is_of_the_record());
         events
     }
@@ -104,7 +104,7 @@ impl Track {
         &self,
         walk: &mut Walk,
         policy: &Policy,
-        beside: &StepContext<'_>,
+        context: &StepContext<'_>,
     ) -> (Vec<Event>, bool) {
         let values = &self.history.observations.values;
         let from = walk
@@ -124,11 +124,9 @@ impl Track {
                 value: one.value,
                 sigma: one.sigma,
             };
-            let beside = StepContext {
-                now: time,
-                ..*beside
-            };
-            let said = walk.track.take(policy, self.source(), &reading, &beside);
+            let mut context = *context;
+            context.phase.now = time;
+            let said = walk.track.take(policy, self.source(), &reading, &context);
             for event in said {
                 if matches!(event.kind, EventKind::Refit { .. }) {
                     refits += 1;

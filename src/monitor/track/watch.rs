@@ -89,14 +89,14 @@ impl Track {
         policy: &Policy,
         time: Timestamp,
         forecast: &Forecast,
-        beside: &StepContext<'_>,
+        context: &StepContext<'_>,
     ) -> Option<Event> {
         if self.declared.is_shaken(time) || !self.watch.is_due() {
             return None;
         }
         let moves = measurably_moves(&forecast.plain.rates);
         let found = if moves {
-            residual_structure(&self.in_force(beside))
+            residual_structure(&self.in_force(context))
         } else {
             None
         };
@@ -111,15 +111,15 @@ impl Track {
         let kind = Unexplained::Structure {
             bic_gain: found.bic_gain,
             load_sd: found.load_sd,
-            since: self.by_calendar(found.since, beside),
+            since: self.by_calendar(found.since, context),
         };
         Some(self.event(time, EventKind::UnexplainedResidual(kind)))
     }
 
     /// The readings as the law in force sees them: by the load's clock, where one is adopted.
-    fn in_force(&self, beside: &StepContext<'_>) -> Series {
+    fn in_force(&self, context: &StepContext<'_>) -> Series {
         let by_clock = self.adopted.as_ref().and_then(|adopted| {
-            let channels = beside.covariates.list();
+            let channels = context.covariates.list();
             adopted.readings(&self.history, &channels)
         });
         let observations = by_clock.as_ref().unwrap_or(&self.history.observations);
@@ -128,8 +128,8 @@ impl Track {
     }
 
     /// When that was, of a time by the clock of the law in force.
-    fn by_calendar(&self, time: Timestamp, beside: &StepContext<'_>) -> Timestamp {
-        let channels = beside.covariates.list();
+    fn by_calendar(&self, time: Timestamp, context: &StepContext<'_>) -> Timestamp {
+        let channels = context.covariates.list();
         let adopted = self.adopted.as_ref();
         adopted
             .and_then(|adopted| adopted.by_calendar(&self.history, &channels, time))
@@ -149,9 +149,9 @@ impl Track {
     pub(in crate::monitor) fn search(
         &mut self,
         critical: f64,
-        beside: &StepContext<'_>,
+        context: &StepContext<'_>,
     ) -> Option<SearchJob> {
-        if !self.wants_search(beside.explain) {
+        if !self.wants_search(context.phase.explain) {
             return None;
         }
         let observations = &self.history.observations;
@@ -160,7 +160,9 @@ impl Track {
             .series(&self.benchmark, observations, MOST_READINGS);
         let first = series.readings.first()?.time;
         let last = series.readings.last()?.time;
-        let channels = beside.covariates.beside(first, last, search::MOST_CHANNELS);
+        let channels = context
+            .covariates
+            .beside(first, last, search::MOST_CHANNELS);
         let asked = self.newest.unwrap_or(last);
         self.watch.is_searching = true;
         self.watch.searched = self.watch.taken;
@@ -173,14 +175,16 @@ impl Track {
         critical: f64,
         time: Timestamp,
         finding: &SearchFinding,
-        beside: &StepContext<'_>,
+        context: &StepContext<'_>,
     ) -> Vec<Event> {
         self.watch.is_searching = false;
         let before = self.adopted.take();
         let known_load = witnessed(finding);
-        if beside.explain == Explain::Adopt && !known_load.parts.is_empty() && is_separable(finding)
+        if context.phase.explain == Explain::Adopt
+            && !known_load.parts.is_empty()
+            && is_separable(finding)
         {
-            let channels = beside.covariates.list();
+            let channels = context.covariates.list();
             self.adopted = Some(Adopted::new(known_load, &self.history, &channels, critical));
         }
         let mut events = self.dropped(time, before.as_ref().map(Adopted::law));
