@@ -133,7 +133,7 @@ fn explain(mut section: Section<'_>) -> Explain {
     section.finish();
     match (searches, adopts) {
         (false, _) => Explain::Off,
-        (true, Some(false)) => Explain::Tell,
+        (true, Some(false)) => Explain::Report,
         (true, Some(true) | None) => Explain::Adopt,
     }
 }

@@ -10,7 +10,7 @@ use crate::regime::Regime;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Fewest readings before anything is forecast: below it the priors would speak, not the slope.
+/// Fewest readings before anything is forecast: below it the priors would decide, not the slope.
 pub const FEWEST_READINGS: usize = 10;
 /// A slope at 50 m/day has failed by any account, mm/day.
 const FASTEST_CRITICAL: f64 = 5e4;

@@ -163,7 +163,8 @@ pub enum Explain {
     #[default]
     Adopt,
     /// It is searched for and reported.
-    Tell,
+    #[serde(rename = "Tell")]
+    Report,
     /// Nothing.
     Off,
 }
@@ -198,8 +199,8 @@ pub struct Monitor {
     awaited: Awaited,
     /// Benchmarks with late readings that are to be looked back on.
     late: BTreeSet<BenchmarkId>,
-    /// Whether [`Notice::Settle`] says when what came late is judged.
-    settles: bool,
+    /// Whether [`Notice::BatchEnd`] says when what came late is judged.
+    in_batches: bool,
     /// Since when the host's clock is wrong.
     clock_wrong: Option<Timestamp>,
     /// What of the past is still to be done, and the benchmark whose past is being gone through.
@@ -225,7 +226,7 @@ impl Monitor {
             together: FailureComparisons::default(),
             awaited: Awaited::default(),
             late: BTreeSet::new(),
-            settles: false,
+            in_batches: false,
             clock_wrong: None,
             past: Past::default(),
             walk: None,
@@ -328,7 +329,7 @@ impl Monitor {
         } else {
             track.take(policy, source, reading, &context)
         };
-        if self.settles && track.owes_look_back() {
+        if self.in_batches && track.owes_look_back() {
             self.late.insert(benchmark.clone());
         }
         self.queue.note(benchmark, track);

@@ -70,8 +70,8 @@ struct Rest {
     awaited: Awaited,
     #[serde(default)]
     late: BTreeSet<BenchmarkId>,
-    #[serde(default)]
-    settles: bool,
+    #[serde(default, rename = "settles")]
+    in_batches: bool,
     #[serde(default)]
     clock_wrong: Option<Timestamp>,
     #[serde(default)]
@@ -105,7 +105,7 @@ impl Monitor {
             together: self.together.clone(),
             awaited: self.awaited.clone(),
             late: self.late.clone(),
-            settles: self.settles,
+            in_batches: self.in_batches,
             clock_wrong: self.clock_wrong,
             past: self.past.clone(),
             queue: self.queue.clone(),
@@ -158,7 +158,7 @@ impl Monitor {
             together: rest.together,
             awaited: rest.awaited,
             late: rest.late,
-            settles: rest.settles,
+            in_batches: rest.in_batches,
             clock_wrong: rest.clock_wrong,
             past: rest.past,
             queue: rest.queue,

@@ -66,7 +66,7 @@ impl Monitor {
         Phase {
             explain: self.settings.explain,
             now,
-            settles: self.settles,
+            in_batches: self.in_batches,
             is_past: self.past.is_open(),
             is_queue: self.queue.is_open(),
         }

@@ -190,7 +190,7 @@ impl Daemon {
             self.pulse.vitals.note(&events);
         }
         self.release()?;
-        self.settle()?;
+        self.end_batch()?;
         self.commit()?;
         // Also while years of backlog come in: the state is not to hold all of their refits at once.
         self.thin()?;
@@ -247,7 +247,7 @@ impl Daemon {
                 return Ok(());
             }
         }
-        self.settle()?;
+        self.end_batch()?;
         self.commit()
     }
 
@@ -276,10 +276,10 @@ impl Daemon {
     }
 
     /// Judges what came late and what queued. No alert waits for the rest.
-    fn settle(&mut self) -> Result<(), StoreError> {
+    fn end_batch(&mut self) -> Result<(), StoreError> {
         loop {
             let stopwatch = Stopwatch::start();
-            let events = self.site.settle();
+            let events = self.site.end_batch();
             self.pulse.vitals.judged(&events, stopwatch.elapsed());
             if !self.site.queues() {
                 return Ok(());
@@ -290,7 +290,7 @@ impl Daemon {
     }
 
     fn judge_queued(&mut self) -> Result<(), StoreError> {
-        self.settle()?;
+        self.end_batch()?;
         self.commit()
     }
 
@@ -428,7 +428,7 @@ impl Daemon {
         }
         self.release()?;
         if !self.site.may_queue_on() {
-            self.settle()?;
+            self.end_batch()?;
         }
         self.commit()?;
         if self.is_up_to_date {

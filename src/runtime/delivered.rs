@@ -50,11 +50,11 @@ impl Delivered {
 
     /// Whether `hook` has taken this alert, or is not to get it because somebody acknowledged it in time.
     pub fn has(&self, alert: &Alert, hook: &str) -> bool {
-        self.was_told(alert, hook) || self.stands(alert, hook, DeliveryOutcome::Acknowledged)
+        self.was_notified(alert, hook) || self.stands(alert, hook, DeliveryOutcome::Acknowledged)
     }
 
     /// Whether `hook` has taken this alert.
-    pub(super) fn was_told(&self, alert: &Alert, hook: &str) -> bool {
+    pub(super) fn was_notified(&self, alert: &Alert, hook: &str) -> bool {
         self.stands(alert, hook, DeliveryOutcome::Delivered)
     }
 
@@ -128,7 +128,7 @@ impl Delivered {
         if let Some(store) = &self.store
             && !self.unwritten.is_empty()
         {
-            store.settle(&self.unwritten)?;
+            store.record_outcomes(&self.unwritten)?;
             self.unwritten.clear();
         }
         Ok(())

@@ -62,7 +62,7 @@ impl Receipt {
         Self(Of::Number(number, acknowledged))
     }
 
-    /// Tells the broker that the message need not come again. Not to be called by the task that runs
+    /// Acknowledges the message to the broker, so that it does not come again. Not to be called by the task that runs
     /// [`follow`].
     ///
     /// # Errors

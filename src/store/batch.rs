@@ -23,7 +23,7 @@ pub struct Position {
 /// What is written together.
 #[derive(Debug, Default)]
 pub struct Batch {
-    /// Data time and what the monitor was told.
+    /// Data time and what the monitor was given.
     steps: Vec<(Timestamp, Input)>,
     /// Each with the number of its step in this batch.
     events: Vec<(usize, Event)>,
@@ -34,8 +34,8 @@ pub struct Batch {
     positions: BTreeMap<String, Option<Vec<u8>>>,
     memory: Option<Vec<MemoryPart>>,
     outbox: Vec<super::Delivery>,
-    /// What a hook is told by another alert.
-    told: Vec<super::Delivery>,
+    /// What another alert reports to a hook too.
+    reported_by_another: Vec<super::Delivery>,
     commands: Vec<i64>,
 }
 
@@ -69,14 +69,14 @@ impl Batch {
         *self = Self::default();
     }
 
-    /// Notes what a hook is to be told.
+    /// Notes of what a hook is to be notified.
     pub fn deliver(&mut self, delivery: super::Delivery) {
         self.outbox.push(delivery);
     }
 
-    /// Notes that a hook is told of this by another alert.
+    /// Notes that another alert reports this to a hook too.
     pub fn tell_together(&mut self, delivery: super::Delivery) {
-        self.told.push(delivery);
+        self.reported_by_another.push(delivery);
     }
 
     /// Notes that a command has been taken.
@@ -96,7 +96,7 @@ impl Batch {
             && self.positions.is_empty()
             && self.memory.is_none()
             && self.outbox.is_empty()
-            && self.told.is_empty()
+            && self.reported_by_another.is_empty()
             && self.commands.is_empty()
     }
 
@@ -236,7 +236,7 @@ impl Inner {
         for delivery in &batch.outbox {
             delivery.insert(&transaction, WAITING)?;
         }
-        for delivery in &batch.told {
+        for delivery in &batch.reported_by_another {
             delivery.insert(&transaction, DeliveryOutcome::Over.name())?;
         }
         for command in &batch.commands {

@@ -1,4 +1,4 @@
-//! What the hooks are to be told: written with the events that say so, ticked off when a hook has taken it.
+//! Of what the hooks are to be notified: written with the events that cause it, ticked off when a hook has taken it.
 
 use super::sealed::{seal, unseal};
 use super::sum::sum;
@@ -115,7 +115,7 @@ impl Store {
         while let Some(row) = rows.next()? {
             match body(row)? {
                 Some(body) => bodies.push(body),
-                // What is in force is told again when the past has been read.
+                // What is in force is sent again when the past has been read.
                 None => {
                     tracing::error!(id = ?row.get_ref(0)?, "an alert that waited is not what was written");
                 }
@@ -261,11 +261,14 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn settle(&self, settled: &[(Delivery, DeliveryOutcome)]) -> Result<(), StoreError> {
+    pub fn record_outcomes(
+        &self,
+        outcomes: &[(Delivery, DeliveryOutcome)],
+    ) -> Result<(), StoreError> {
         let mut inner = self.inner();
         inner.trusted()?;
-        let written = inner.settle(settled);
-        inner.committed(settled.len(), written)
+        let written = inner.record_outcomes(outcomes);
+        inner.committed(outcomes.len(), written)
     }
 }
 
@@ -356,9 +359,12 @@ impl Inner {
         Ok(())
     }
 
-    fn settle(&mut self, settled: &[(Delivery, DeliveryOutcome)]) -> Result<(), StoreError> {
+    fn record_outcomes(
+        &mut self,
+        outcomes: &[(Delivery, DeliveryOutcome)],
+    ) -> Result<(), StoreError> {
         let transaction = self.connection.transaction()?;
-        for (delivery, fate) in settled {
+        for (delivery, fate) in outcomes {
             delivery.insert(&transaction, WAITING)?;
             let standing = DeliveryState::of(&transaction, delivery)?;
             let is_done = |row: &DeliveryState| {

@@ -23,7 +23,7 @@ pub struct StepRow {
     pub seq: i64,
     /// Data time.
     pub now: Timestamp,
-    /// What the monitor was told.
+    /// What the monitor was given.
     pub input: Input,
 }
 
@@ -38,7 +38,7 @@ pub struct Recorded {
 
 /// A step that is no value.
 #[derive(Serialize, Deserialize)]
-enum Told {
+enum StoredInput {
     Settings(Box<Settings>),
     Found(Box<SearchFinding>),
     Order(Order),
@@ -49,20 +49,20 @@ enum Told {
 
 /// `None` where only time has passed.
 pub(super) fn encode(input: &Input) -> Result<Option<Vec<u8>>, StoreError> {
-    let told = match input {
-        Input::Settings(settings) => Told::Settings(settings.clone()),
-        Input::Found(finding) => Told::Found(Box::new(finding.clone())),
-        Input::Order(order) => Told::Order(order.clone()),
+    let stored = match input {
+        Input::Settings(settings) => StoredInput::Settings(settings.clone()),
+        Input::Found(finding) => StoredInput::Found(Box::new(finding.clone())),
+        Input::Order(order) => StoredInput::Order(order.clone()),
         Input::Missing {
             benchmark,
             time,
             what,
-        } => Told::Missing(benchmark.clone(), *time, what.clone()),
-        Input::Trouble { kind, text } => Told::Trouble(kind.clone(), text.clone()),
-        Input::Notice(notice) => Told::Notice(notice.clone()),
+        } => StoredInput::Missing(benchmark.clone(), *time, what.clone()),
+        Input::Trouble { kind, text } => StoredInput::Trouble(kind.clone(), text.clone()),
+        Input::Notice(notice) => StoredInput::Notice(notice.clone()),
         Input::Tick | Input::Reading { .. } | Input::Sample { .. } => return Ok(None),
     };
-    let body = rmp_serde::to_vec_named(&told);
+    let body = rmp_serde::to_vec_named(&stored);
     body.map(Some)
         .map_err(|error| StoreError::Unreadable(error.to_string()))
 }
@@ -71,19 +71,19 @@ pub(super) fn decode(body: Option<Vec<u8>>) -> Result<Input, StoreError> {
     let Some(body) = body else {
         return Ok(Input::Tick);
     };
-    let told = rmp_serde::from_slice(&body);
+    let stored = rmp_serde::from_slice(&body);
     Ok(
-        match told.map_err(|error| StoreError::Unreadable(error.to_string()))? {
-            Told::Settings(settings) => Input::Settings(settings),
-            Told::Found(finding) => Input::Found(*finding),
-            Told::Order(order) => Input::Order(order),
-            Told::Missing(benchmark, time, what) => Input::Missing {
+        match stored.map_err(|error| StoreError::Unreadable(error.to_string()))? {
+            StoredInput::Settings(settings) => Input::Settings(settings),
+            StoredInput::Found(finding) => Input::Found(*finding),
+            StoredInput::Order(order) => Input::Order(order),
+            StoredInput::Missing(benchmark, time, what) => Input::Missing {
                 benchmark,
                 time,
                 what,
             },
-            Told::Trouble(kind, text) => Input::Trouble { kind, text },
-            Told::Notice(notice) => Input::Notice(notice),
+            StoredInput::Trouble(kind, text) => Input::Trouble { kind, text },
+            StoredInput::Notice(notice) => Input::Notice(notice),
         },
     )
 }

@@ -192,7 +192,7 @@ fn deliveries_stay_while_their_alert_stands_or_a_hook_waits() {
     let store = Store::open(folder.path()).unwrap();
     let settle = |key: &str, state: &str, day: i64, fate: DeliveryOutcome| {
         let told = delivery(key, state, at(day * DAY));
-        store.settle(&[(told, fate)]).unwrap();
+        store.record_outcomes(&[(told, fate)]).unwrap();
     };
     settle("over", "firing", 1, DeliveryOutcome::Delivered);
     settle("over", "resolved", 2, DeliveryOutcome::Delivered);

@@ -169,5 +169,5 @@ fn check_says_that_nobody_is_notified_at_once_and_refuses_two_hooks_that_cannot_
     let output = site.ask(&["check", "--config-only", "site.toml"]);
     assert_eq!(output.status.code(), Some(78), "{output:?}");
     let said = String::from_utf8_lossy(&output.stderr);
-    assert!(said.contains("they cannot be told apart"), "{said}");
+    assert!(said.contains("they cannot be distinguished"), "{said}");
 }

@@ -152,7 +152,7 @@ fn a_wet_spring_raises_no_orange_once_its_effect_is_adopted_and_does_where_it_is
     let finding = (250, found(STANDS));
     let adopted = play(&mut monitor(Explain::Adopt), &wet, Some(&finding));
     assert_eq!(grave(&adopted, 250), []);
-    let told = play(&mut monitor(Explain::Tell), &wet, Some(&finding));
+    let told = play(&mut monitor(Explain::Report), &wet, Some(&finding));
     let grave = grave(&told, 250);
     assert!(!grave.is_empty(), "the plain law takes it for a failure");
 }
@@ -188,7 +188,7 @@ fn a_failure_that_a_falling_reservoir_pauses_stays_orange_and_turns_red_in_time(
         let paused = paused.filter(|(day, ..)| (240..245).contains(day));
         paused.map(|(_, chance, _)| chance).fold(1.0, f64::min)
     };
-    let told = play(&mut monitor(Explain::Tell), &paused, Some(&finding));
+    let told = play(&mut monitor(Explain::Report), &paused, Some(&finding));
     assert!(at_rest(&told) < 0.1, "{}", at_rest(&told));
     assert!(at_rest(&events) > 0.4, "{}", at_rest(&events));
 }
@@ -263,7 +263,7 @@ fn a_slope_under_no_load_has_no_structure_and_asks_for_no_search() {
 #[test]
 fn one_search_is_asked_for_at_a_time_and_none_where_it_is_switched_off() {
     let wet = wet_spring();
-    let mut on = monitor(Explain::Tell);
+    let mut on = monitor(Explain::Report);
     play(&mut on, &wet, None);
     let jobs = on.searches();
     assert_eq!(jobs.len(), 1, "unanswered, the first stays the only one");

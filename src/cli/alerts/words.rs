@@ -155,7 +155,7 @@ fn deliveries(rows: &[DeliveryRow]) -> String {
             "acknowledged" => "was not run: somebody acknowledged it in time",
             "waiting" => "is still tried",
             "delivered" => "has taken it",
-            "over" => "did not get it: it was over, superseded or told together with others",
+            "over" => "did not get it: it was over, superseded or reported together with others",
             "dead" => "was given up",
             "closed" => "was closed: the config has no such hook any more",
             _ => "",

@@ -60,7 +60,7 @@ pub(super) struct Phase {
     /// Data time.
     pub(super) now: Timestamp,
     /// Whether what comes late is judged when all that came with it has been taken.
-    pub(super) settles: bool,
+    pub(super) in_batches: bool,
     /// Whether the past is being read: nothing is judged until it has been.
     pub(super) is_past: bool,
     /// Whether readings come faster than they can be judged: each benchmark is judged for its newest.
@@ -245,11 +245,11 @@ impl Track {
         if taken == Taken::Newest {
             events.extend(self.judge_sensor(time));
             events.extend(self.suspect(source, time));
-            if !context.phase.settles {
+            if !context.phase.in_batches {
                 events.extend(self.look_back(policy, time));
             }
         }
-        let is_owed = context.phase.settles && taken != Taken::Newest;
+        let is_owed = context.phase.in_batches && taken != Taken::Newest;
         self.owes |= is_owed;
         if context.phase.is_past {
             return events;
@@ -308,7 +308,7 @@ impl Track {
     }
 
     /// Everything that came together has been taken: judges what of it came late, or queued.
-    pub(super) fn settle(&mut self, policy: &Policy, context: &StepContext<'_>) -> Vec<Event> {
+    pub(super) fn judge_batch(&mut self, policy: &Policy, context: &StepContext<'_>) -> Vec<Event> {
         let is_owed = self.owes || self.is_queued();
         let Some(time) = self.newest.filter(|_| is_owed) else {
             return Vec::new();

@@ -209,7 +209,7 @@ impl Dispatcher {
         let (name, mut firing) = (way.hook.name(), alert.clone());
         firing.state = AlertState::Firing;
         let mut delivered = locked(&self.delivered);
-        if delivered.was_told(&firing, &name) || in_hand.was_tried(&firing) {
+        if delivered.was_notified(&firing, &name) || in_hand.was_tried(&firing) {
             return false;
         }
         in_hand.end(&firing);

@@ -161,7 +161,7 @@ impl TextRows {
     }
 }
 
-/// A whole file, settled.
+/// A whole file, read.
 #[derive(Debug)]
 pub(super) struct Table {
     pub(super) recording: Recording,

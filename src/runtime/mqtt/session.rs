@@ -102,7 +102,7 @@ impl BrokerMessage {
         }
     }
 
-    /// Tells the broker that it need not come again. On a later connection that is void: the message comes again there, and
+    /// Acknowledges it to the broker, so that it does not come again. On a later connection that is void: the message comes again there, and
     /// its number may be another's.
     pub(super) async fn acknowledge(self) -> Result<(), NoConnection> {
         if self.ended.load(Ordering::Relaxed) != self.came_after {
@@ -129,7 +129,7 @@ impl Session {
         }
     }
 
-    /// The version of the protocol that is spoken, or tried.
+    /// The version of the protocol that is used, or tried.
     pub(super) fn version(&self) -> &'static str {
         match self.version {
             Version::Five => "5",

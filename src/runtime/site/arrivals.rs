@@ -254,8 +254,8 @@ impl Site {
         for time in self.newest.values() {
             self.keeper.knows(*time, false);
         }
-        if !self.monitor.settles() {
-            self.step(self.data_now(), &Input::Notice(Notice::Settles));
+        if !self.monitor.takes_batches() {
+            self.step(self.data_now(), &Input::Notice(Notice::InBatches));
         }
         if self.newest.is_empty() && !self.monitor.reads_past() {
             self.step(self.data_now(), &Input::Notice(Notice::Past));
@@ -328,12 +328,12 @@ impl Site {
 
     /// All that came together has been taken: judges what of it came late, once, and the next of what queued; to be
     /// repeated while [`Site::queues`].
-    pub fn settle(&mut self) -> Vec<Event> {
+    pub fn end_batch(&mut self) -> Vec<Event> {
         let is_owed = self.monitor.late().is_some() || self.monitor.queues();
         let Some(now) = self.now.filter(|_| is_owed) else {
             return Vec::new();
         };
-        let events = self.step(now, &Input::Notice(Notice::Settle));
+        let events = self.step(now, &Input::Notice(Notice::BatchEnd));
         for job in self.monitor.searches() {
             self.searches.start(job);
         }

@@ -45,7 +45,7 @@ impl Site {
         }
     }
 
-    /// Where messages come in a crowd, what they hold from here on is judged when [`Site::settle`] says so.
+    /// Where messages come in a crowd, what they hold from here on is judged at [`Site::end_batch`].
     pub fn queue(&mut self) {
         if self.monitor.queues() || self.monitor.reads_past() || !self.comes_crowded() {
             return;

@@ -1,4 +1,4 @@
-//! Many alerts at once: the gravest are told singly, of the others one message tells.
+//! Many alerts at once: the gravest are sent singly, the others are reported in one message.
 //!
 //! EEMUA 191 calls ten alarms in ten minutes a flood: beyond that nobody can act on them one by one.
 
@@ -17,8 +17,8 @@ const NAMED: usize = 20;
 pub(super) struct OutgoingAlerts {
     /// The hooks are given these.
     pub(super) sent: Vec<Alert>,
-    /// One of those tells of these.
-    pub(super) told_together: Vec<Alert>,
+    /// One of those reports these.
+    pub(super) reported_together: Vec<Alert>,
 }
 
 impl OutgoingAlerts {
@@ -42,7 +42,9 @@ impl OutgoingAlerts {
                 let others = group.split_off(MOST_AT_ONCE);
                 outgoing.sent.extend(group.into_iter().cloned());
                 outgoing.sent.extend(together(&others));
-                outgoing.told_together.extend(others.into_iter().cloned());
+                outgoing
+                    .reported_together
+                    .extend(others.into_iter().cloned());
             } else {
                 outgoing.sent.extend(group.into_iter().cloned());
             }

@@ -160,8 +160,9 @@ impl Site {
         for one in self.standing.values_mut() {
             let identity = identity(&one.alert);
             one.is_sent |= store.is_noted(identity, None, None)?;
-            one.was_told |= one.is_sent;
-            one.is_told_together |= store.is_noted(identity, None, Some(DeliveryOutcome::Over))?;
+            one.was_notified |= one.is_sent;
+            one.is_reported_together |=
+                store.is_noted(identity, None, Some(DeliveryOutcome::Over))?;
         }
         let mut waiting = Vec::new();
         for body in store.waiting()? {

@@ -59,9 +59,9 @@ const BEFORE_ALL: Timestamp = Timestamp::constant(-9_223_372_036, 0);
 pub struct Sinks {
     /// What is kept; `None`: nothing.
     pub store: Option<Arc<Store>>,
-    /// The alerts; `None` tells nobody.
+    /// The alerts; with `None` nobody is notified.
     pub alerts: Option<Dispatcher>,
-    /// What the hooks are told of the alerts' meaning.
+    /// What the hooks receive of the alerts' meaning.
     pub status: Status,
 }
 
@@ -91,11 +91,11 @@ struct AlertInForce {
     /// Whether it has been offered to the hooks.
     is_sent: bool,
     /// Whether this one, or a lower one that it superseded, has been offered to them: people wait for its end.
-    #[serde(default)]
-    was_told: bool,
-    /// Whether an alert of many benchmarks has told of it.
-    #[serde(default)]
-    is_told_together: bool,
+    #[serde(default, rename = "was_told")]
+    was_notified: bool,
+    /// Whether an alert of many benchmarks has reported it too.
+    #[serde(default, rename = "is_told_together")]
+    is_reported_together: bool,
 }
 
 /// One site at work.
@@ -121,9 +121,9 @@ pub struct Site {
     fresh: Vec<Alert>,
     /// What is in force: neither resolved nor superseded.
     standing: BTreeMap<AlertPlace, AlertInForce>,
-    /// Who asked not to be told.
+    /// Who asked not to be notified.
     mutes: Vec<Mute>,
-    /// Ends of alerts that people were told of, which fell into a silence: they are sent after it.
+    /// Ends of alerts that people were notified of, which fell into a silence: they are sent after it.
     put_off: Vec<Alert>,
     counts: Counts,
     keeper: Timekeeper,
@@ -260,7 +260,7 @@ impl Site {
             *latest = reading.time.max(*latest);
         }
         if let Input::Order(order) = input {
-            self.obey(order);
+            self.apply(order);
         }
         let events = self.monitor.step(now, input);
         for event in &events {

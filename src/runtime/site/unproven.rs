@@ -1,6 +1,6 @@
 //! Readings that lie ahead of the clock of a daemon that has just started: is the clock behind, or a logger ahead?
 //!
-//! A machine without a battery wakes with the time at which it went to sleep. The newest reading that it knows is older
+//! A machine without a battery starts with the time at which it stopped. The newest reading that it knows is older
 //! than that, so nothing proves the clock wrong; but the files go on beyond it. What goes on from known readings without a
 //! leap is held until the past has been read. By then either some benchmark has shown that its readings end where the
 //! clock is, or the clock is behind.
@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 const FEWEST: usize = 4;
 /// A reading goes on from one that is no older than this.
 const GOES_ON: SignedDuration = SignedDuration::from_hours(48);
-/// A benchmark whose readings end so near before the clock speaks for it.
+/// A benchmark whose readings end so near before is evidence for the clock.
 const NEAR: SignedDuration = SignedDuration::from_hours(6);
 
 /// What came before the past had been read.

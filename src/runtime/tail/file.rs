@@ -163,7 +163,7 @@ impl FileTail {
                 self.has_more = true;
                 return;
             }
-            self.settle();
+            self.mark_handed_out();
             match self.advance() {
                 Ok(true) => {
                     self.trouble = None;

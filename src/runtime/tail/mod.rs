@@ -34,7 +34,7 @@ use std::time::Duration;
 use tokio::sync::{Notify, mpsc};
 use tokio::time::MissedTickBehavior;
 
-/// How often the files are looked at when nothing wakes us.
+/// How often the files are read when the system reports no change of them.
 const RESCAN: Duration = Duration::from_secs(2);
 
 /// Between two looks: so many times as long as the last one took, so that following a busy writer costs a fifth of a
