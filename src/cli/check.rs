@@ -101,10 +101,10 @@ fn look(file: &Path, summary: &mut ConfigSummary) -> Result<Preview, ConfigError
     let config = config::load(file)?;
     let preview = preview(&config);
     let place = file.display();
-    let doubts = sampling::doubts(&config, &preview).into_iter();
+    let sampling_warnings = sampling::sampling_warnings(&config, &preview).into_iter();
     summary
         .warnings
-        .extend(doubts.map(|line| format!("{place}: warning: {line}")));
+        .extend(sampling_warnings.map(|line| format!("{place}: warning: {line}")));
     Ok(preview)
 }
 

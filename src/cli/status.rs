@@ -35,8 +35,8 @@ pub(super) struct StatusArgs {
     watch: bool,
 }
 
-/// How often `--watch` looks.
-const LOOK: Duration = Duration::from_secs(2);
+/// How often `--watch` reads the state.
+const POLL_INTERVAL: Duration = Duration::from_secs(2);
 /// Of the table, in characters: that of the terminals on which it is read.
 const WIDTH: usize = 80;
 /// Puts a terminal's cursor at the top of an empty screen.
@@ -126,7 +126,7 @@ pub(super) fn status(args: &StatusArgs) -> anyhow::Result<()> {
         if !args.watch {
             return Ok(());
         }
-        std::thread::sleep(LOOK);
+        std::thread::sleep(POLL_INTERVAL);
     }
 }
 

@@ -28,7 +28,7 @@ pub(super) fn policy(mut section: Section<'_>, base: &Policy) -> Policy {
         thresholds: thresholds(&mut section, base),
         rules: rule::rules(&mut section, &base.rules),
     };
-    doubts(&section, &policy, evacuation_time.as_ref());
+    warn(&section, &policy, evacuation_time.as_ref());
     section.finish();
     policy
 }
@@ -69,11 +69,7 @@ fn threshold(mut section: Section<'_>) -> Option<Threshold> {
 }
 
 /// Figures that are each allowed and together cannot mean what was intended.
-fn doubts(
-    section: &Section<'_>,
-    policy: &Policy,
-    evacuation_time: Option<&Placed<SignedDuration>>,
-) {
+fn warn(section: &Section<'_>, policy: &Policy, evacuation_time: Option<&Placed<SignedDuration>>) {
     let at = evacuation_time.map_or(section.at(), |given| &given.at);
     if policy.evacuation_time > policy.outlook {
         section.warning(

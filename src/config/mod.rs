@@ -39,7 +39,7 @@ use crate::alert::Level;
 use crate::monitor::Settings;
 use crate::reading::{BenchmarkId, Conventions, Dialect, Quantity, Unit};
 use jiff::SignedDuration;
-use problem::Notebook;
+use problem::ConfigProblems;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::io;
@@ -286,8 +286,8 @@ pub fn keys(text: &str) -> Keys {
     taken(text, Path::new("")).1.keys
 }
 
-fn taken(text: &str, file: &Path) -> (Option<Config>, Notebook) {
-    let notebook = RefCell::new(Notebook::new(file, text));
+fn taken(text: &str, file: &Path) -> (Option<Config>, ConfigProblems) {
+    let notebook = RefCell::new(ConfigProblems::new(file, text));
     let (document, syntax) = toml::de::DeTable::parse_recoverable(text);
     for error in &syntax {
         let at = error.span().unwrap_or(0..0);

@@ -79,9 +79,9 @@ fn lines(problems: &[ConfigProblem]) -> String {
     lines.join("\n")
 }
 
-/// Collects problems and knows which line a byte is on.
+/// The problems of one file, with the line and column of each.
 #[derive(Debug)]
-pub(super) struct Notebook {
+pub(super) struct ConfigProblems {
     file: PathBuf,
     text: String,
     problems: Vec<ConfigProblem>,
@@ -89,7 +89,7 @@ pub(super) struct Notebook {
     pub(super) keys: Keys,
 }
 
-impl Notebook {
+impl ConfigProblems {
     pub(super) fn new(file: &Path, text: &str) -> Self {
         Self {
             file: file.to_owned(),

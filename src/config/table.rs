@@ -1,7 +1,7 @@
 //! Typed reading of one TOML table: every key asked for is known, every other one is a problem.
 
 use super::keys::{Key, ValueShape};
-use super::problem::Notebook;
+use super::problem::ConfigProblems;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -22,12 +22,12 @@ pub(super) struct Section<'t> {
     table: Option<&'t DeTable<'t>>,
     at: Range<usize>,
     asked: Vec<Key>,
-    notebook: &'t RefCell<Notebook>,
+    notebook: &'t RefCell<ConfigProblems>,
 }
 
 impl<'t> Section<'t> {
     /// The whole document.
-    pub(super) fn root(table: &'t DeTable<'t>, notebook: &'t RefCell<Notebook>) -> Self {
+    pub(super) fn root(table: &'t DeTable<'t>, notebook: &'t RefCell<ConfigProblems>) -> Self {
         Self {
             name: "",
             table: Some(table),

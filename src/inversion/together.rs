@@ -11,9 +11,9 @@ use crate::reading::{BenchmarkId, Series, Timestamp, after_days, days_since};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// Looks back over the time in which all benchmarks were read, by which "since" is reported: evenly in ln of the
+/// Past times within that in which all benchmarks were read, by which "since" is reported: evenly in ln of the
 /// time to the failure that is expected now, as forecasts change.
-const LOOKS: usize = 24;
+const SNAPSHOTS: usize = 24;
 /// That time over the time looked back on, within bounds that leave no step too coarse or too fine.
 const LEFT: (f64, f64) = (0.02, 1.0);
 /// A benchmark not read for more than this share of its own record says nothing of today.
@@ -157,16 +157,16 @@ fn looks(inversions: &[Inversion], now: Timestamp) -> Option<(Vec<Timestamp>, Ve
     let soonest = medians.fold(f64::INFINITY, f64::min);
     let left = soonest.clamp(LEFT.0 * span, LEFT.1 * span);
     let back = |index: usize| {
-        let share = index as f64 / (LOOKS - 1) as f64;
+        let share = index as f64 / (SNAPSHOTS - 1) as f64;
         left * (((left + span) / left.max(f64::MIN_POSITIVE)).powf(share) - 1.0)
     };
     let at = |index: usize| {
-        if index == LOOKS - 1 {
+        if index == SNAPSHOTS - 1 {
             return Some(first);
         }
         after_days(now, -back(index))
     };
-    let mut times: Vec<Timestamp> = (0..LOOKS).rev().filter_map(at).collect();
+    let mut times: Vec<Timestamp> = (0..SNAPSHOTS).rev().filter_map(at).collect();
     times.dedup();
     let looks = times.iter().map(|time| Snapshot {
         left_days: left + days_since(*time, now),

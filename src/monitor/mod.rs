@@ -52,7 +52,7 @@ use serde::{Deserialize, Serialize};
 use site::SiteAlert;
 use std::collections::{BTreeMap, BTreeSet};
 use together::FailureComparisons;
-use track::{StepContext, Track, Walk};
+use track::{PastReplay, StepContext, Track};
 
 /// What the monitor is given.
 #[derive(Debug, Clone, PartialEq)]
@@ -205,7 +205,7 @@ pub struct Monitor {
     clock_wrong: Option<Timestamp>,
     /// What of the past is still to be done, and the benchmark whose past is being gone through.
     past: Past,
-    walk: Option<Walk>,
+    walk: Option<PastReplay>,
     queue: Queue,
     summary: Summary,
     last_time: Option<Timestamp>,
@@ -267,7 +267,7 @@ impl Monitor {
                 self.covariates.take(channel, unit.as_deref(), *sample);
                 Vec::new()
             }
-            Input::Settings(settings) => self.resettle(now, settings),
+            Input::Settings(settings) => self.change_settings(now, settings),
             Input::Order(order) => vec![order.event(now)],
             Input::Trouble { kind, text } => vec![trouble(now, kind, text)],
             Input::Tick => self.pass(now),
@@ -373,7 +373,7 @@ impl Monitor {
     }
 
     /// Goes by other settings from here on. What was in force at a benchmark that is no longer watched ends.
-    fn resettle(&mut self, now: Timestamp, settings: &Settings) -> Vec<Event> {
+    fn change_settings(&mut self, now: Timestamp, settings: &Settings) -> Vec<Event> {
         let former = std::mem::replace(&mut self.settings, settings.clone());
         let mut events = self.unwatch(now, &former.watched);
         let context = StepContext {

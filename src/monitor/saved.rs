@@ -12,7 +12,7 @@ use super::search::SearchJob;
 use super::sensor::Sensors;
 use super::site::SiteAlert;
 use super::together::FailureComparisons;
-use super::track::{Track, Walk};
+use super::track::{PastReplay, Track};
 use super::{Monitor, Settings};
 use crate::reading::{BenchmarkId, Timestamp};
 use serde::{Deserialize, Serialize};
@@ -138,7 +138,7 @@ impl Monitor {
             if name == REST {
                 rest = Some(value::<Rest>(name, body)?);
             } else if name == WALK {
-                walk = Some(value::<Walk>(name, body)?);
+                walk = Some(value::<PastReplay>(name, body)?);
             } else {
                 let track: Track = value(name, body)?;
                 tracks.insert(BenchmarkId::new(name.as_str()), track);

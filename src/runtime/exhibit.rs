@@ -3,10 +3,10 @@
 use super::clock;
 use super::hook::Status;
 use super::replay::{ReplayPace, arrivals, wait};
-use super::serve::{Behind, ListenError, ListenOptions, Server};
+use super::serve::{ListenError, ListenOptions, ServedState, Server};
 use super::shutdown::Shutdown;
 use super::site::{Sinks, Site};
-use super::view::{Desk, Facts};
+use super::view::{Facts, SiteReader};
 use super::vitals::Vitals;
 use crate::monitor::{Input, Settings};
 use crate::reading::Recording;
@@ -15,8 +15,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// How often orders are looked for.
-const LOOK: Duration = Duration::from_millis(300);
+/// How often orders are read.
+const POLL_INTERVAL: Duration = Duration::from_millis(300);
 
 /// What is played, and to whom it is shown.
 #[derive(Debug)]
@@ -56,11 +56,11 @@ pub async fn show(
     opened: &mut (dyn FnMut(std::net::SocketAddr) + '_),
 ) -> Result<(), ExhibitError> {
     let store = Arc::new(Store::open(folder)?);
-    let desk = Some(Arc::new(Desk::open(folder, exhibit.facts.clone())?));
+    let reader = Some(Arc::new(SiteReader::open(folder, exhibit.facts.clone())?));
     let archive = Some(Arc::new(super::archive::Events::of(Arc::clone(&store))) as _);
     let vitals = Arc::new(Vitals::default());
     vitals.update(|health| (health.is_caught_up, health.is_store_writable) = (true, true));
-    let behind = Behind { archive, desk };
+    let behind = ServedState { archive, reader };
     let server = Server::open(exhibit.options.clone(), Arc::clone(&vitals), behind).await?;
     opened(server.address());
     let sinks = Sinks {
@@ -114,7 +114,7 @@ impl Stage {
                 let now = self.store.newest_step()?.unwrap_or_else(clock::now);
                 self.site.commit(now)?;
             }
-            let next = clock::later(LOOK);
+            let next = clock::later(POLL_INTERVAL);
             let next = due.map_or(next, |due| due.min(next));
             tokio::select! {
                 () = tokio::time::sleep_until(next) => {}

@@ -15,7 +15,7 @@ use super::shutdown::Shutdown;
 use super::site::is_logged;
 use super::tail::{Arrival, Decoder};
 use crate::config::{Benchmark, Broker};
-use session::{BrokerMessage, Came, NoConnection, Session};
+use session::{BrokerMessage, NoConnection, Session, SessionEvent};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -103,7 +103,7 @@ pub async fn follow(
             biased;
             () = shutdown.requested() => return,
             came = session.next() => match came {
-                Ok(Came::Connected) => {
+                Ok(SessionEvent::Connected) => {
                     let version = session.version();
                     tracing::info!(source = broker.id, ?broker.address, version, "connected");
                     wait = RECONNECT.0;
@@ -112,14 +112,14 @@ pub async fn follow(
                         tracing::error!(source = broker.id, %error, "cannot subscribe");
                     }
                 }
-                Ok(Came::Message(message)) => {
+                Ok(SessionEvent::Message(message)) => {
                     let delivery = reader.delivery(message);
                     tokio::select! {
                         sent = send(delivery, &room, &deliveries) => if sent.is_err() { return },
                         () = shutdown.requested() => return,
                     }
                 }
-                Ok(Came::SubscriptionRefused) => {
+                Ok(SessionEvent::SubscriptionRefused) => {
                     let (source, topic) = (&broker.id, &broker.topic);
                     tracing::error!(source, topic, ?RECONNECT, "the broker refuses the subscription: nothing comes from it");
                     // Asked again after a while: its rules may be others then.
@@ -129,7 +129,7 @@ pub async fn follow(
                         () = shutdown.requested() => return,
                     }
                 }
-                Ok(Came::Nothing) => {}
+                Ok(SessionEvent::Nothing) => {}
                 Err(error) => {
                     tracing::warn!(source = broker.id, %error, ?wait, "no connection; will connect again");
                     tokio::select! {

@@ -1,6 +1,6 @@
 //! What the work loop shows of itself to those outside: its vitals, the server, the service manager.
 
-use super::serve::{Behind, Limits, ListenError, ListenOptions, Server};
+use super::serve::{Limits, ListenError, ListenOptions, ServedState, Server};
 use super::service::Service;
 use super::vitals::Vitals;
 use crate::config::{SiteConfig, TokenError};
@@ -32,7 +32,7 @@ impl Reporting {
     ///
     /// # Errors
     /// [`ReportingError`].
-    pub async fn start(site: &SiteConfig, behind: Behind) -> Result<Self, ReportingError> {
+    pub async fn start(site: &SiteConfig, served: ServedState) -> Result<Self, ReportingError> {
         let vitals = Arc::new(Vitals::default());
         let server = match site.listen {
             None => None,
@@ -42,7 +42,7 @@ impl Reporting {
                     token: site.token()?,
                     limits: Limits::default(),
                 };
-                Some(Server::open(options, Arc::clone(&vitals), behind).await?)
+                Some(Server::open(options, Arc::clone(&vitals), served).await?)
             }
         };
         let service = Service::of_environment();

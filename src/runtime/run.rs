@@ -7,11 +7,11 @@ use super::hook::Status;
 use super::link;
 use super::progress::Progress;
 use super::pulse::{Reporting, ReportingError};
-use super::serve::Behind;
+use super::serve::ServedState;
 use super::shutdown::{self, Shutdown};
 use super::site::{Counts, Sinks, Site};
 use super::sources::Sources;
-use super::view::{Desk, Facts};
+use super::view::{Facts, SiteReader};
 use crate::config::Config;
 use crate::store::{Store, StoreError};
 use std::path::PathBuf;
@@ -59,9 +59,9 @@ pub async fn run(
         tracing::warn!(%error, "a limit on the length of files would end this process");
     }
     make_secret(config);
-    let behind = Behind {
+    let behind = ServedState {
         archive: Some(Arc::new(super::archive::Events::of(Arc::clone(&store)))),
-        desk: desk(config),
+        reader: reader(config),
     };
     let mut pulse = Reporting::start(&config.site, behind).await?;
     let sinks = Sinks {
@@ -113,10 +113,10 @@ fn make_secret(config: &Config) {
 }
 
 /// What the page asks, where the site listens. A page that cannot be shown is no reason not to watch.
-fn desk(config: &Config) -> Option<Arc<Desk>> {
+fn reader(config: &Config) -> Option<Arc<SiteReader>> {
     config.site.listen?;
-    match Desk::open(&config.site.state_dir, Facts::of(config)) {
-        Ok(desk) => Some(Arc::new(desk)),
+    match SiteReader::open(&config.site.state_dir, Facts::of(config)) {
+        Ok(reader) => Some(Arc::new(reader)),
         Err(error) => {
             tracing::error!(%error, "the page cannot be shown");
             None

@@ -26,8 +26,8 @@ pub const LEADS_DAYS: [f64; 14] = [
     2.0 / 24.0,
     1.0 / 24.0,
 ];
-/// Looks at a slope that stood, evenly over its readings.
-const LOOKS: usize = 40;
+/// Forecasts that are scored of a slope that stood, evenly over its readings.
+const FORECASTS: usize = 40;
 /// A forecast is for a lead where its newest reading lies at no more than so many leads.
 const FARTHEST_LEADS: f64 = 2.0;
 /// A reading at the lead itself is known, whatever the rounding of the two, days.
@@ -181,7 +181,7 @@ fn looks(history: &WholeRecord, epoch: Timestamp, truth: Truth) -> Vec<(f64, Kno
         }
         Truth::Stood => {
             let values = &history.observations.values;
-            let looks = LOOKS.min(values.len().saturating_sub(1));
+            let looks = FORECASTS.min(values.len().saturating_sub(1));
             let known = (1..=looks).filter_map(|look| {
                 let last = (values.len() - 1) * look / looks;
                 let known = history.at(values.get(last.checked_sub(1)?)?.t_days)?;

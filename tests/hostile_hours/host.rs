@@ -15,7 +15,7 @@ use slipwatch::runtime::delivered::Delivered;
 use slipwatch::runtime::hook::Status;
 use slipwatch::runtime::mqtt::ReceivedMessage;
 use slipwatch::runtime::pulse::Reporting;
-use slipwatch::runtime::serve::Behind;
+use slipwatch::runtime::serve::ServedState;
 use slipwatch::runtime::shutdown;
 use slipwatch::runtime::site::{Sinks, Site};
 use slipwatch::runtime::sources::Sources;
@@ -98,7 +98,7 @@ impl<'a> Host<'a> {
         let site = Site::resume(&self.config.site.name, settings, sinks, &mut || {}).unwrap();
         let pulse = self
             .runtime
-            .block_on(Reporting::start(&self.config.site, Behind::default()))
+            .block_on(Reporting::start(&self.config.site, ServedState::default()))
             .unwrap();
         site.show(&pulse.vitals);
         let (stop, stopped) = shutdown::pair();

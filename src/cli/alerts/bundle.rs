@@ -128,19 +128,19 @@ fn taken(store: &Store, alert: &AlertView) -> anyhow::Result<Vec<Input>> {
     }
 }
 
-/// What had been said until then.
-struct Said {
+/// What had been reported until then.
+struct EventsUntil {
     lines: String,
     said: Vec<Event>,
 }
 
-fn events(store: &Store, alert: &AlertView) -> anyhow::Result<Said> {
+fn events(store: &Store, alert: &AlertView) -> anyhow::Result<EventsUntil> {
     let benchmark = alert.benchmark.as_ref().map(BenchmarkId::as_str);
     let (mut lines, mut said, mut after) = (String::new(), Vec::new(), 0);
     loop {
         let events = store.events(after, None, benchmark)?;
         let Some((last, _)) = events.last() else {
-            return Ok(Said { lines, said });
+            return Ok(EventsUntil { lines, said });
         };
         after = *last;
         for (_, body) in events {

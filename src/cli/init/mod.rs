@@ -10,7 +10,7 @@ use super::exit::{self, UsageError};
 use crate::config::{SourceKind, value};
 use crate::reading::{BenchmarkId, Dialect, Quantity, SummerTime, Unit};
 use crate::runtime::ingest::{
-    Looked, Meaning, Measure, ReadOptions, TextFormat, look_through, read_with_remarks, survey,
+    FileSurvey, Meaning, Measure, ReadOptions, TextFormat, look_through, read_with_remarks, survey,
     unpacked_name,
 };
 use dialect::Written;
@@ -261,7 +261,7 @@ fn held(
     Ok(Ok(found))
 }
 
-fn look(file: &Path, kind: SourceKind, options: &ReadOptions) -> anyhow::Result<Looked> {
+fn look(file: &Path, kind: SourceKind, options: &ReadOptions) -> anyhow::Result<FileSurvey> {
     let format = match kind {
         SourceKind::Csv => TextFormat::Csv,
         SourceKind::Ndjson => TextFormat::Ndjson,
@@ -269,9 +269,9 @@ fn look(file: &Path, kind: SourceKind, options: &ReadOptions) -> anyhow::Result<
         SourceKind::Mcap => {
             let read = read_with_remarks(&[file.to_owned()], options)?;
             let series = read.recording.series.into_iter();
-            return Ok(Looked {
+            return Ok(FileSurvey {
                 readings: series.map(|one| (one.benchmark, one.unit)).collect(),
-                ..Looked::default()
+                ..FileSurvey::default()
             });
         }
     };
@@ -279,7 +279,7 @@ fn look(file: &Path, kind: SourceKind, options: &ReadOptions) -> anyhow::Result<
 }
 
 /// Which flag names the readings of a file where no column does.
-fn without_readings(file: &Path, looked: &Looked) -> String {
+fn without_readings(file: &Path, looked: &FileSurvey) -> String {
     let numbers = looked.columns.iter().filter_map(|(name, meaning)| {
         matches!(meaning, Meaning::Covariate { .. }).then_some(name.as_str())
     });

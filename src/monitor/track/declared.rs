@@ -26,7 +26,7 @@ impl Track {
             return Vec::new();
         }
         if self.declared.is_maintained(reading.time) {
-            self.silence.goes_on(reading.time);
+            self.silence.continues(reading.time);
             return Vec::new();
         }
         let now = self

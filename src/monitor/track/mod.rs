@@ -41,7 +41,7 @@ use std::collections::BTreeSet;
 use unknown::{Reason, Unknown};
 use watch::Watch;
 
-pub(super) use past::{PAST, Walk};
+pub(super) use past::{PAST, PastReplay};
 
 /// So many readings in a row with one value are a stuck sensor, or a resolution too coarse to show it.
 const STUCK: usize = 24;

@@ -30,7 +30,7 @@ pub(super) enum PastReview {
 
 /// A benchmark's past, as far as it has been gone through.
 #[derive(Debug, Serialize, Deserialize)]
-pub(in crate::monitor) struct Walk {
+pub(in crate::monitor) struct PastReplay {
     /// As it would stand by now.
     track: Box<Track>,
     /// The last reading, days since the epoch.
@@ -44,7 +44,7 @@ pub(in crate::monitor) struct Walk {
     episode: Vec<Event>,
 }
 
-impl Walk {
+impl PastReplay {
     pub(in crate::monitor) fn benchmark(&self) -> &BenchmarkId {
         &self.track.benchmark
     }
@@ -84,13 +84,13 @@ impl Track {
     }
 
     /// The past of this benchmark up to `until`, at its beginning.
-    pub(in crate::monitor) fn past(&self, until: Timestamp) -> Walk {
+    pub(in crate::monitor) fn past(&self, until: Timestamp) -> PastReplay {
         // Declared resets are taken off what is kept.
         let declared = Declarations::default();
         let (source, epoch) = (self.source(), self.history.epoch);
         let mut track = Self::new(self.benchmark.clone(), source, epoch, declared);
         track.accepted.clone_from(&self.accepted);
-        Walk {
+        PastReplay {
             track: Box::new(track),
             at_days: None,
             until,
@@ -102,7 +102,7 @@ impl Track {
     /// Goes on through the past; its refits and alerts that are reported, and whether there is more of it.
     pub(in crate::monitor) fn walk(
         &self,
-        walk: &mut Walk,
+        walk: &mut PastReplay,
         policy: &Policy,
         context: &StepContext<'_>,
     ) -> (Vec<Event>, bool) {
@@ -145,7 +145,11 @@ impl Track {
     }
 
     /// The past has been gone through: goes on as it leads to. A level from there that has not ended is called.
-    pub(in crate::monitor) fn go_on_from(&mut self, now: Timestamp, past: Walk) -> Vec<Event> {
+    pub(in crate::monitor) fn go_on_from(
+        &mut self,
+        now: Timestamp,
+        past: PastReplay,
+    ) -> Vec<Event> {
         let (past, mut events) = (*past.track, past.episode);
         self.panel = past.panel;
         self.regime = past.regime;

@@ -30,11 +30,11 @@ impl Track {
             .checked_mul(LEAP_SPACINGS)
             .unwrap_or(SignedDuration::MAX)
             .max(LEAST_LEAP);
-        let goes_on = self
+        let continues = self
             .ahead
             .as_ref()
             .is_some_and(|ahead| ahead.precedes(time, least));
-        !goes_on && time.duration_since(newest) > least
+        !continues && time.duration_since(newest) > least
     }
 
     /// After the newest reading, of `time`: whether the sensor is stuck, or its readings are spoilt.

@@ -9,8 +9,8 @@ use crate::reading::suspicion::{self, DatedSuspicion};
 use crate::reading::{Suspicion, Timestamp};
 use std::collections::BTreeSet;
 
-/// The latest readings that are looked at.
-const LOOKED_AT: usize = 200;
+/// The latest readings that are examined.
+const INSPECTED: usize = 200;
 /// A suspicion ends when so many of the latest readings give no rise to it.
 const CALM: usize = 24;
 
@@ -20,12 +20,12 @@ impl Track {
         let unit = source.unit;
         let quantity = self.history.observations.quantity;
         let (values, name) = (
-            self.history.values_as_read(unit, LOOKED_AT),
+            self.history.values_as_read(unit, INSPECTED),
             unit.to_string(),
         );
         let mut found = Vec::new();
         if !suspicion::is_plain(&values, quantity, &name) {
-            let readings = self.history.as_read(unit, LOOKED_AT);
+            let readings = self.history.as_read(unit, INSPECTED);
             let since = readings.len().checked_sub(CALM);
             let is_late =
                 |one: &DatedSuspicion| since.is_none_or(|since| one.at >= readings[since].0);

@@ -12,10 +12,10 @@ use crate::monitor::{Explain, search};
 use crate::reading::{Series, Timestamp, days_since};
 use serde::{Deserialize, Serialize};
 
-/// Nothing is looked at before so many readings.
+/// Fewer readings are not tested.
 const FEWEST: u64 = 40;
-/// Readings that a look goes over.
-const MOST_LOOKED_AT: usize = 400;
+/// Readings that a test goes over.
+const MOST_TESTED: usize = 400;
 /// Fall of the BIC from which on the residual has structure.
 const STRUCTURE: f64 = 20.0;
 /// A load of less than this, e-folds of velocity, is worth a search but nobody's attention: a third more or less
@@ -124,7 +124,7 @@ impl Track {
         });
         let observations = by_clock.as_ref().unwrap_or(&self.history.observations);
         self.history
-            .series(&self.benchmark, observations, MOST_LOOKED_AT)
+            .series(&self.benchmark, observations, MOST_TESTED)
     }
 
     /// When that was, of a time by the clock of the law in force.

@@ -1,6 +1,6 @@
 //! One drill: a site of its own follows a file of its own, in which a made-up slope runs away.
 
-use super::Office;
+use super::DrillContext;
 use super::runner::DrillObserver;
 use crate::alert::Level;
 use crate::config::{self, Config, Drill, EXERCISE, HookConfig};
@@ -54,7 +54,7 @@ struct Exercise {
 /// # Errors
 /// Why it failed, one line for people.
 pub(super) async fn hold(
-    office: &Office,
+    office: &DrillContext,
     drill: &Drill,
     shutdown: &Shutdown,
 ) -> Result<PassedDrill, String> {
@@ -84,7 +84,7 @@ fn hooks(config: &Config) -> Vec<HookConfig> {
 }
 
 /// The folder, without what the last drill left, and the file with the past in it.
-fn made(office: &Office, started: Timestamp) -> io::Result<PathBuf> {
+fn made(office: &DrillContext, started: Timestamp) -> io::Result<PathBuf> {
     let folder = run_folder(office);
     if folder.exists() {
         fs::remove_dir_all(&folder)?;
@@ -96,7 +96,7 @@ fn made(office: &Office, started: Timestamp) -> io::Result<PathBuf> {
     Ok(file)
 }
 
-fn run_folder(office: &Office) -> PathBuf {
+fn run_folder(office: &DrillContext) -> PathBuf {
     folder(&office.config.site.state_dir).join("run")
 }
 
@@ -122,7 +122,11 @@ fn append(file: &Path, text: &str) -> io::Result<()> {
 }
 
 impl Exercise {
-    fn start(office: &Office, hooks: &[HookConfig], shutdown: &Shutdown) -> anyhow::Result<Self> {
+    fn start(
+        office: &DrillContext,
+        hooks: &[HookConfig],
+        shutdown: &Shutdown,
+    ) -> anyhow::Result<Self> {
         let folder = run_folder(office);
         let text = format!(
             "[site]\nname = \"drill\"\nstate_dir = \"state\"\n\
@@ -167,7 +171,7 @@ impl Exercise {
         &mut self,
         (file, started): (&Path, Timestamp),
         hooks: usize,
-        (office, drill): (&Office, &Drill),
+        (office, drill): (&DrillContext, &Drill),
     ) -> Result<PassedDrill, String> {
         self.until(LIMIT, "its past was not read", |daemon, _| {
             daemon.pulse.vitals.health().is_caught_up
@@ -238,7 +242,7 @@ impl Exercise {
     /// Waits for somebody to acknowledge it: the order stands in the site's own log, whatever way it came by.
     async fn acknowledged(
         &mut self,
-        office: &Office,
+        office: &DrillContext,
         (started, within): (Timestamp, SignedDuration),
     ) -> Result<Duration, String> {
         let begun = self.watched.seen().begun.unwrap_or_else(Stopwatch::start);
@@ -273,7 +277,7 @@ impl Exercise {
             },
             ..self.daemon.config.settings.clone()
         };
-        self.daemon.site.resettle(settings);
+        self.daemon.site.change_settings(settings);
         if self.watched.seen().begun.is_some() {
             let ended = |_: &Daemon, watched: &DrillObserver| watched.seen().ended >= hooks;
             if let Err(why) = self

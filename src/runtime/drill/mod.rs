@@ -19,14 +19,14 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::task::JoinSet;
 
-/// How often it is looked at whether one is due: the host's clock may be set.
-const LOOK: Duration = Duration::from_secs(1);
+/// How often it is checked whether one is due: the host's clock may be set.
+const POLL_INTERVAL: Duration = Duration::from_secs(1);
 /// A drill begins a little after it is due: the next one is not put off by a day for that.
 const SLACK: SignedDuration = SignedDuration::from_hours(1);
 
-/// What drills need of the daemon.
+/// What a drill needs of the daemon.
 #[derive(Debug)]
-struct Office {
+struct DrillContext {
     config: Config,
     store: Arc<Store>,
     vitals: Arc<Vitals>,
@@ -41,7 +41,7 @@ pub(super) fn start(
     let mut tasks = JoinSet::new();
     vitals.update(|health| health.drill = None);
     if let Some(drill) = config.drill.clone() {
-        let office = Office {
+        let office = DrillContext {
             config: config.clone(),
             store: Arc::clone(store),
             vitals: Arc::clone(vitals),
@@ -58,7 +58,7 @@ pub(super) fn start(
     tasks
 }
 
-async fn hold(office: &Office, drill: &Drill, shutdown: &mut Shutdown) {
+async fn hold(office: &DrillContext, drill: &Drill, shutdown: &mut Shutdown) {
     let site = &office.config.site;
     let mut record =
         DrillRecord::read(&site.state_dir).unwrap_or_else(|| DrillRecord::new(clock::now()));
@@ -68,7 +68,7 @@ async fn hold(office: &Office, drill: &Drill, shutdown: &mut Shutdown) {
         let due = due(drill, &record, (clock::now(), &site.time_zone));
         // Before the past has been read nobody is watched, and the machine has other work.
         while clock::now() < due || !office.vitals.health().is_caught_up {
-            tokio::time::sleep(LOOK).await;
+            tokio::time::sleep(POLL_INTERVAL).await;
         }
         tracing::info!("a drill begins");
         record.started = Some(clock::now());
@@ -83,7 +83,7 @@ async fn hold(office: &Office, drill: &Drill, shutdown: &mut Shutdown) {
 }
 
 /// Shows how drills stand, and keeps it over restarts.
-fn keep(office: &Office, record: &DrillRecord) {
+fn keep(office: &DrillContext, record: &DrillRecord) {
     if let Err(error) = record.write(&office.config.site.state_dir) {
         tracing::warn!(%error, "a restart will not know of the last drill");
     }

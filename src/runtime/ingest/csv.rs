@@ -55,7 +55,7 @@ impl CsvRows {
                 missing: "header",
             });
         }
-        rows.understand(1, header)?;
+        rows.read_header(1, header)?;
         Ok(rows)
     }
 
@@ -95,7 +95,7 @@ impl CsvRows {
         if self.is_header() {
             self.header.clear();
             self.table = None;
-            return self.understand(line, text).map(|()| Vec::new());
+            return self.read_header(line, text).map(|()| Vec::new());
         }
         match &mut self.table {
             Some(table) => table.items(line, &self.cells),
@@ -122,7 +122,7 @@ impl CsvRows {
         self.cells.iter().any(is_name)
     }
 
-    fn understand(&mut self, line: u64, text: &str) -> Result<(), IngestError> {
+    fn read_header(&mut self, line: u64, text: &str) -> Result<(), IngestError> {
         let names = self.cells.iter().map(str::to_owned).collect();
         let layout = Layout::new(&self.file, line, names, &self.options)?;
         self.table = Some(TableRows::new(&self.file, layout, &self.options));

@@ -44,7 +44,7 @@ pub fn encode_mcap(recording: &Recording, out: impl Write + Seek) -> Result<(), 
 
 /// A topic that holds no readings, but what was said of them. Readers of readings leave it out.
 #[derive(Debug, Clone)]
-pub(in crate::runtime) struct SaidTopic {
+pub(in crate::runtime) struct EventTopic {
     /// The topic, no benchmark's and no channel's.
     pub(in crate::runtime) name: String,
     /// The schema's name and its text.
@@ -59,7 +59,7 @@ pub(in crate::runtime) struct SaidTopic {
 /// As [`write_mcap`].
 pub(in crate::runtime) fn write_mcap_with(
     recording: &Recording,
-    said: &[SaidTopic],
+    said: &[EventTopic],
     file: &Path,
 ) -> Result<(), IngestError> {
     let outgoing = outgoing(recording, said)?;
@@ -90,7 +90,7 @@ enum Row {
     Said(Value),
 }
 
-fn outgoing(recording: &Recording, said: &[SaidTopic]) -> Result<Vec<OutgoingTopic>, IngestError> {
+fn outgoing(recording: &Recording, said: &[EventTopic]) -> Result<Vec<OutgoingTopic>, IngestError> {
     let series = recording.series.iter().map(from_series);
     let channels = recording.channels.iter().map(from_channel);
     let said = said.iter().map(from_said);
@@ -117,7 +117,7 @@ fn outgoing(recording: &Recording, said: &[SaidTopic]) -> Result<Vec<OutgoingTop
         .collect()
 }
 
-fn from_said(said: &SaidTopic) -> (OutgoingTopic, Vec<(Timestamp, Row)>) {
+fn from_said(said: &EventTopic) -> (OutgoingTopic, Vec<(Timestamp, Row)>) {
     let topic = OutgoingTopic {
         name: said.name.clone(),
         schema: said.schema.clone(),

@@ -29,7 +29,7 @@ pub use convert::{ChannelCount, ConvertReport, SeriesCount, convert};
 pub use csv::CsvRows;
 pub use encoding::{Transcoder, latin1};
 pub use error::IngestError;
-pub(super) use mcap_write::{SaidTopic, write_mcap_with};
+pub(super) use mcap_write::{EventTopic, write_mcap_with};
 pub use mcap_write::{encode_mcap, write_mcap};
 pub(super) use message::escape;
 pub use message::{MessageError, decode_message};
@@ -37,7 +37,7 @@ pub use ndjson_write::write_ndjson;
 pub use survey::{Survey, survey};
 pub use table_write::{write_csv, write_toa5};
 pub use taken::{LineResult, Remark};
-pub use text::{Looked, TextFormat, TextRows, look_through};
+pub use text::{FileSurvey, TextFormat, TextRows, look_through};
 pub use units::FileUnits;
 pub use vector::VectorMap;
 

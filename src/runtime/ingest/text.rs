@@ -243,7 +243,7 @@ fn not_utf8(
 
 /// What a file holds, whatever is wrong with some of its rows.
 #[derive(Debug, Default)]
-pub struct Looked {
+pub struct FileSurvey {
     /// What its columns are taken for; none for messages.
     pub columns: Vec<(String, Meaning)>,
     /// Whose readings it has, in which units.
@@ -258,11 +258,11 @@ pub fn look_through(
     format: TextFormat,
     file: &Path,
     options: &ReadOptions,
-) -> Result<Looked, IngestError> {
+) -> Result<FileSurvey, IngestError> {
     let bytes = read_bytes(file)?;
     let bytes = Transcoder::default().feed(&bytes);
     let mut rows = TextRows::new(format, &super::bytes::shown_name(file), options);
-    let mut looked = Looked::default();
+    let mut looked = FileSurvey::default();
     for (text, line) in bytes.split(|byte| *byte == b'\n').zip(1..) {
         let text = match std::str::from_utf8(text) {
             Ok(text) => text.to_owned(),

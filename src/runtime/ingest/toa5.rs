@@ -91,7 +91,7 @@ impl Toa5Rows {
         if self.table.is_none() && !self.header.is_empty() {
             self.header.push(text.to_owned());
             if self.header.len() == HEADER_LINES {
-                self.understand(line)?;
+                self.read_header(line)?;
             }
             return Ok(Vec::new());
         }
@@ -120,7 +120,7 @@ impl Toa5Rows {
     }
 
     /// Takes the header that has just become complete at `line`; none is in force where it is bad.
-    fn understand(&mut self, line: u64) -> Result<(), IngestError> {
+    fn read_header(&mut self, line: u64) -> Result<(), IngestError> {
         let understood = self.layout(line);
         match understood {
             Ok(layout) => {

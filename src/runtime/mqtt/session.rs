@@ -57,7 +57,7 @@ enum Link {
 }
 
 /// What came from the broker.
-pub(super) enum Came<M = BrokerMessage> {
+pub(super) enum SessionEvent<M = BrokerMessage> {
     Connected,
     Message(M),
     SubscriptionRefused,
@@ -138,7 +138,7 @@ impl Session {
     }
 
     /// The next that comes; connects where there is no connection.
-    pub(super) async fn next(&mut self) -> Result<Came, NoConnection> {
+    pub(super) async fn next(&mut self) -> Result<SessionEvent, NoConnection> {
         let link = match &mut self.link {
             Some(link) => link,
             none => none.insert(open(self.version, &self.broker, &self.client_id)?),
@@ -146,12 +146,12 @@ impl Session {
         let came = match link {
             Link::Five(client, connection) => match connection.poll().await {
                 Ok(v5::Event::Incoming(packet)) => Ok(came_by_five(client, packet)),
-                Ok(v5::Event::Outgoing(_)) => Ok(Came::Nothing),
+                Ok(v5::Event::Outgoing(_)) => Ok(SessionEvent::Nothing),
                 Err(error) => Err((may_be_another_version(&error), error.into())),
             },
             Link::Three(client, connection) => match connection.poll().await {
                 Ok(v3::Event::Incoming(packet)) => Ok(came_by_three(client, packet)),
-                Ok(v3::Event::Outgoing(_)) => Ok(Came::Nothing),
+                Ok(v3::Event::Outgoing(_)) => Ok(SessionEvent::Nothing),
                 Err(error) => {
                     let is_unreached = matches!(
                         error,
@@ -162,17 +162,17 @@ impl Session {
             },
         };
         match came {
-            Ok(Came::Message(of)) => Ok(Came::Message(BrokerMessage {
+            Ok(SessionEvent::Message(of)) => Ok(SessionEvent::Message(BrokerMessage {
                 of,
                 came_after: self.ended.load(Ordering::Relaxed),
                 ended: Arc::clone(&self.ended),
             })),
-            Ok(Came::Connected) => {
+            Ok(SessionEvent::Connected) => {
                 self.is_accepted = true;
-                Ok(Came::Connected)
+                Ok(SessionEvent::Connected)
             }
-            Ok(Came::SubscriptionRefused) => Ok(Came::SubscriptionRefused),
-            Ok(Came::Nothing) => Ok(Came::Nothing),
+            Ok(SessionEvent::SubscriptionRefused) => Ok(SessionEvent::SubscriptionRefused),
+            Ok(SessionEvent::Nothing) => Ok(SessionEvent::Nothing),
             Err((may_be_another_version, error)) => {
                 self.ended.fetch_add(1, Ordering::Relaxed);
                 let is_other = may_be_another_version && !self.is_accepted;
@@ -266,18 +266,18 @@ fn three(broker: &Broker, client_id: &str, transport: Transport) -> Link {
     Link::Three(client, Box::new(connection))
 }
 
-fn came_by_five(client: &v5::AsyncClient, packet: packet5::Packet) -> Came<Published> {
+fn came_by_five(client: &v5::AsyncClient, packet: packet5::Packet) -> SessionEvent<Published> {
     match packet {
-        packet5::Packet::ConnAck(_) => Came::Connected,
+        packet5::Packet::ConnAck(_) => SessionEvent::Connected,
         packet5::Packet::Publish(publish) => {
-            Came::Message(Published::Five(client.clone(), publish))
+            SessionEvent::Message(Published::Five(client.clone(), publish))
         }
         packet5::Packet::SubAck(answer) => {
             let is_granted = |code| matches!(code, &packet5::SubscribeReasonCode::Success(_));
             if answer.return_codes.iter().all(is_granted) {
-                Came::Nothing
+                SessionEvent::Nothing
             } else {
-                Came::SubscriptionRefused
+                SessionEvent::SubscriptionRefused
             }
         }
         packet5::Packet::Auth(_)
@@ -291,18 +291,20 @@ fn came_by_five(client: &v5::AsyncClient, packet: packet5::Packet) -> Came<Publi
         | packet5::Packet::PubComp(_)
         | packet5::Packet::Unsubscribe(_)
         | packet5::Packet::UnsubAck(_)
-        | packet5::Packet::Disconnect(_) => Came::Nothing,
+        | packet5::Packet::Disconnect(_) => SessionEvent::Nothing,
     }
 }
 
-fn came_by_three(client: &v3::AsyncClient, packet: v3::Packet) -> Came<Published> {
+fn came_by_three(client: &v3::AsyncClient, packet: v3::Packet) -> SessionEvent<Published> {
     match packet {
-        v3::Packet::ConnAck(_) => Came::Connected,
-        v3::Packet::Publish(publish) => Came::Message(Published::Three(client.clone(), publish)),
+        v3::Packet::ConnAck(_) => SessionEvent::Connected,
+        v3::Packet::Publish(publish) => {
+            SessionEvent::Message(Published::Three(client.clone(), publish))
+        }
         v3::Packet::SubAck(answer)
             if answer.return_codes.contains(&SubscribeReasonCode::Failure) =>
         {
-            Came::SubscriptionRefused
+            SessionEvent::SubscriptionRefused
         }
         v3::Packet::Connect(_)
         | v3::Packet::PubAck(_)
@@ -315,7 +317,7 @@ fn came_by_three(client: &v3::AsyncClient, packet: v3::Packet) -> Came<Published
         | v3::Packet::UnsubAck(_)
         | v3::Packet::PingReq
         | v3::Packet::PingResp
-        | v3::Packet::Disconnect => Came::Nothing,
+        | v3::Packet::Disconnect => SessionEvent::Nothing,
     }
 }
 

@@ -8,7 +8,7 @@ pub use view::{
 
 use super::clock;
 use super::ingest::{IngestError, Item, Meaning, ReadOptions, is_packed, read_files, unpack};
-use super::tail::{Arrival, BadLine, Decoder, Fed, TextReader, list};
+use super::tail::{Arrival, BadLine, Decoder, LinesRead, TextReader, list};
 use crate::config::{Config, FileSource, SourceKind};
 use crate::monitor::Input;
 use crate::reading::{
@@ -204,7 +204,7 @@ impl PreviewSoFar {
 
     fn fed(
         &mut self,
-        fed: Fed,
+        fed: LinesRead,
         decoder: &Decoder,
         (view, refused): (&mut SourceView, &mut Refusals),
     ) {

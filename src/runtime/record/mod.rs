@@ -6,7 +6,7 @@
 
 mod schemas;
 
-use super::ingest::{IngestError, SaidTopic, escape, write_mcap_with};
+use super::ingest::{EventTopic, IngestError, escape, write_mcap_with};
 use crate::alert::Level;
 use crate::monitor::{Event, EventKind, FailureTime, Input, LevelStretch, Measured, levels_in};
 use crate::reading::{BenchmarkId, Channel, Quantity, Recording, Series, Timestamp, days_since};
@@ -31,12 +31,12 @@ pub fn write(
     let events = &events[..];
     let mut topics = refits(events);
     topics.extend(levels(recording, events));
-    topics.push(SaidTopic {
+    topics.push(EventTopic {
         name: "/alerts".to_owned(),
         schema: schemas::alert(),
         messages: events.iter().filter_map(alert).collect(),
     });
-    topics.push(SaidTopic {
+    topics.push(EventTopic {
         name: "/log".to_owned(),
         schema: schemas::log(),
         messages: events
@@ -129,7 +129,7 @@ fn topic_of(benchmark: &BenchmarkId, what: &str) -> String {
 }
 
 /// For each benchmark its fits and its forecasts.
-fn refits(events: &[Event]) -> Vec<SaidTopic> {
+fn refits(events: &[Event]) -> Vec<EventTopic> {
     let mut fits: BTreeMap<&BenchmarkId, Vec<(Timestamp, Value)>> = BTreeMap::new();
     let mut forecasts = fits.clone();
     for event in events {
@@ -142,14 +142,14 @@ fn refits(events: &[Event]) -> Vec<SaidTopic> {
             forecasts.push((event.time, forecast));
         }
     }
-    let fits = fits.into_iter().map(|(benchmark, messages)| SaidTopic {
+    let fits = fits.into_iter().map(|(benchmark, messages)| EventTopic {
         name: topic_of(benchmark, "fit"),
         schema: schemas::fit(),
         messages,
     });
     let forecasts = forecasts
         .into_iter()
-        .map(|(benchmark, messages)| SaidTopic {
+        .map(|(benchmark, messages)| EventTopic {
             name: topic_of(benchmark, "forecast"),
             schema: schemas::forecast(),
             messages,
@@ -233,7 +233,7 @@ fn present(mut message: Value) -> Value {
 }
 
 /// For each benchmark, and for the site where it has one, the level at its beginning and at each change.
-fn levels(recording: &Recording, events: &[Event]) -> Vec<SaidTopic> {
+fn levels(recording: &Recording, events: &[Event]) -> Vec<EventTopic> {
     let times = || recording.series.iter().flat_map(|series| &series.readings);
     let (Some(first), Some(last)) = (
         times().map(|reading| reading.time).min(),
@@ -252,7 +252,7 @@ fn levels(recording: &Recording, events: &[Event]) -> Vec<SaidTopic> {
                 .map(|event| event.benchmark.as_ref()),
         )
         .collect();
-    let one = |benchmark: Option<&BenchmarkId>| SaidTopic {
+    let one = |benchmark: Option<&BenchmarkId>| EventTopic {
         name: benchmark.map_or_else(|| "/site/level".to_owned(), |id| topic_of(id, "level")),
         schema: schemas::level(),
         messages: changes(&levels_in(events, benchmark, (first, last)), last),

@@ -59,7 +59,7 @@ impl Site {
         site.catch_up(&store, step, turn)?;
         site.wait_for_hooks()?;
         if *site.monitor.settings() != settings || store.last_step() == 0 {
-            site.resettle(settings);
+            site.change_settings(settings);
         }
         site.begin();
         Ok(site)

@@ -17,7 +17,7 @@ mod unproven;
 pub(super) use arrivals::is_logged;
 pub use mute::Mute;
 
-use crowd::Crowd;
+use crowd::MessageRush;
 use returned::Returned;
 use timekeeper::Timekeeper;
 use unproven::Unproven;
@@ -135,7 +135,7 @@ pub struct Site {
     /// Values that were taken before, and corrected: until all that came with them has been seen.
     returned: Returned,
     /// Messages that come so fast that the past is not over yet.
-    crowd: Crowd,
+    crowd: MessageRush,
     /// Of which silent benchmarks it is known how late their readings come, and what time it was then.
     behind: BTreeMap<BenchmarkId, Timestamp>,
 }
@@ -166,7 +166,7 @@ impl Site {
             at_rest: BTreeSet::new(),
             held: VecDeque::new(),
             returned: Returned::default(),
-            crowd: Crowd::default(),
+            crowd: MessageRush::default(),
             behind: BTreeMap::new(),
         }
     }
@@ -191,7 +191,7 @@ impl Site {
     }
 
     /// Goes by other settings from here on.
-    pub fn resettle(&mut self, settings: Settings) -> Vec<Event> {
+    pub fn change_settings(&mut self, settings: Settings) -> Vec<Event> {
         self.settings = settings.clone();
         let now = self.data_now();
         self.step(now, &Input::Settings(Box::new(settings)))

@@ -46,14 +46,14 @@ impl Unproven {
     }
 
     /// Whether a reading ahead of the clock goes on from what is known, as far as `newest`.
-    fn goes_on(&mut self, benchmark: &BenchmarkId, time: Timestamp, newest: Timestamp) -> bool {
+    fn continues(&mut self, benchmark: &BenchmarkId, time: Timestamp, newest: Timestamp) -> bool {
         let (last, count) = self.ahead.get(benchmark).copied().unwrap_or((newest, 0));
-        let goes_on = !self.is_over && time.duration_since(last) <= GOES_ON;
-        if goes_on {
+        let continues = !self.is_over && time.duration_since(last) <= GOES_ON;
+        if continues {
             let next = (time.max(last), count + 1);
             self.ahead.insert(benchmark.clone(), next);
         }
-        goes_on
+        continues
     }
 
     /// The past has been read: how late it is at least, where the clock is behind. `None` the next time.
@@ -79,7 +79,7 @@ impl Site {
             return false;
         };
         let newest = self.newest.get(benchmark).copied();
-        newest.is_some_and(|newest| self.unproven.goes_on(benchmark, arrival.time, newest))
+        newest.is_some_and(|newest| self.unproven.continues(benchmark, arrival.time, newest))
     }
 
     /// The past has been read: what lies ahead of the clock is held on where the clock is behind, and set aside else.

@@ -3,7 +3,7 @@
 use super::decode::{Arrival, Decoder};
 use super::position::{FileId, Saved};
 use super::records::{self, Channels, HEADER_BYTES, MAGIC, NextRecord, RawMessage};
-use super::text::{BadLine, Fed, TextReader, Unpacking};
+use super::text::{BadLine, LinesRead, TextReader, Unpacking};
 use crate::reading::Timestamp;
 use crate::runtime::ingest::{IngestError, Item, decode_message, is_packed};
 use crate::runtime::site::is_logged;
@@ -302,7 +302,7 @@ impl FileTail {
         }
     }
 
-    fn take(&mut self, fed: Fed) {
+    fn take(&mut self, fed: LinesRead) {
         for remark in fed.remarks {
             if self.decoder.is_news(&remark) {
                 tracing::info!(file = %self.path.display(), "{remark}");

@@ -22,7 +22,7 @@ pub(super) use decode::Decoder;
 pub use decode::{Arrival, options_of};
 pub(super) use follow::list;
 pub use follow::{ArrivalBatch, Follower};
-pub(super) use text::{BadLine, Fed, TextReader};
+pub(super) use text::{BadLine, LinesRead, TextReader};
 
 use super::clock::{self, Stopwatch};
 use super::shutdown::Shutdown;

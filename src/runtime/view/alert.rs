@@ -1,6 +1,6 @@
 //! Everything of one alert: what called it, on which evidence, what it asks for, who got it, and who did what about it.
 
-use super::{Desk, read};
+use super::{SiteReader, read};
 use crate::alert::{Level, Policy};
 use crate::monitor::{AlertState, Event, EventKind, Settings};
 use crate::reading::{BenchmarkId, Timestamp};
@@ -69,7 +69,7 @@ pub struct AlertView {
     pub decision: String,
 }
 
-impl Desk {
+impl SiteReader {
     /// Everything of the alert with this key, or of the newest one whose key begins with it; `None` without one.
     ///
     /// # Errors
@@ -86,7 +86,7 @@ struct StoredCall {
     body: String,
 }
 
-/// As [`Desk::alert`], for those who have the state at hand.
+/// As [`SiteReader::alert`], for those who have the state at hand.
 ///
 /// # Errors
 /// [`StoreError`].

@@ -2,7 +2,7 @@
 
 use super::site::Standing;
 use super::thin::{self, ThinPoint};
-use super::{Desk, EARLIEST, LATEST, held, read};
+use super::{EARLIEST, LATEST, SiteReader, held, read};
 use crate::fit::{Observations, Rate, RateOptions};
 use crate::forecast::InverseVelocityLine;
 use crate::monitor::{Event, EventKind, FailureTime, LevelStretch, levels_in, recent};
@@ -158,7 +158,7 @@ pub struct BenchmarkView {
     pub silences: Vec<Event>,
 }
 
-impl Desk {
+impl SiteReader {
     /// One benchmark as it was known at a moment; `None` where there is none of that name.
     ///
     /// # Errors

@@ -1,6 +1,6 @@
 //! An order that was given on the page, and whether it is taken.
 
-use super::{Desk, EARLIEST};
+use super::{EARLIEST, SiteReader};
 use crate::config::EXERCISE;
 use crate::monitor::{Given, Order, OrderedBy};
 use crate::reading::BenchmarkId;
@@ -45,7 +45,7 @@ pub enum OrderError {
     Store(#[from] StoreError),
 }
 
-impl Desk {
+impl SiteReader {
     /// Leaves the order for the daemon, which takes it within a second.
     ///
     /// # Errors

@@ -1,6 +1,6 @@
 //! The whole site at a moment: how each benchmark stands, what is in force, what was said last.
 
-use super::{Desk, LATEST, held, read};
+use super::{LATEST, SiteReader, held, read};
 use crate::alert::Level;
 use crate::monitor::{Event, EventKind, FailureTime};
 use crate::reading::{BenchmarkId, Timestamp};
@@ -84,7 +84,7 @@ pub struct SiteView {
     pub log: Vec<Event>,
 }
 
-impl Desk {
+impl SiteReader {
     /// The site as it was known at `at`, or as it is.
     ///
     /// # Errors
