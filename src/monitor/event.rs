@@ -1,6 +1,6 @@
 //! What the monitor says: one JSON object a line, in data time, nothing from the wall clock.
 
-use super::given::Given;
+use super::given::{Given, OrderKind};
 use crate::alert::Level;
 use crate::effects::{Explained, Form, Kind, Rival};
 use crate::reading::{BenchmarkId, Timestamp};
@@ -169,8 +169,8 @@ pub enum EventKind {
     },
     /// People asked for something.
     Order {
-        /// `acknowledge`, `shelve`, `silence` or `unsilence`.
-        order: String,
+        /// What they asked for.
+        order: OrderKind,
         /// Until when, by the wall clock.
         until: Option<Timestamp>,
         /// The key of the only alert that it is of; `None`: of everything in its place.

@@ -43,3 +43,29 @@ impl OrderedBy {
         }
     }
 }
+
+/// What an order asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OrderKind {
+    /// It has been seen.
+    Acknowledge,
+    /// One level of a benchmark is not reported for a time.
+    Shelve,
+    /// Nothing is reported for a time.
+    Silence,
+    /// All is reported again.
+    Unsilence,
+}
+
+impl OrderKind {
+    /// The word in its JSON.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Acknowledge => "acknowledge",
+            Self::Shelve => "shelve",
+            Self::Silence => "silence",
+            Self::Unsilence => "unsilence",
+        }
+    }
+}

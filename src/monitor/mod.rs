@@ -30,7 +30,7 @@ pub use event::{
     AlertState, Event, EventKind, FailureTime, InverseVelocity, Plain, RegimeReport, SUSPECT,
     SUSPECT_ENDS, SharedFailure, Summary, Unexplained,
 };
-pub use given::{Given, OrderedBy};
+pub use given::{Given, OrderKind, OrderedBy};
 pub use measured::Measured;
 pub(crate) use motion::recent;
 pub use notice::{CLOCK_FAULT, Notice};

@@ -1,7 +1,7 @@
 //! What people order of the monitor: it keeps them as it keeps readings, so that a replay has them too.
 
 use super::event::{Event, EventKind};
-use super::given::Given;
+use super::given::{Given, OrderKind};
 use crate::reading::{BenchmarkId, Timestamp};
 use jiff::SignedDuration;
 use schemars::JsonSchema;
@@ -61,10 +61,10 @@ impl Order {
     /// That it was given.
     pub(super) fn event(&self, time: Timestamp) -> Event {
         let (order, until, given) = match self {
-            Self::Acknowledge { given, .. } => ("acknowledge", None, given),
-            Self::Shelve { until, given, .. } => ("shelve", Some(*until), given),
-            Self::Silence { until, given, .. } => ("silence", Some(*until), given),
-            Self::Unsilence { given, .. } => ("unsilence", None, given),
+            Self::Acknowledge { given, .. } => (OrderKind::Acknowledge, None, given),
+            Self::Shelve { until, given, .. } => (OrderKind::Shelve, Some(*until), given),
+            Self::Silence { until, given, .. } => (OrderKind::Silence, Some(*until), given),
+            Self::Unsilence { given, .. } => (OrderKind::Unsilence, None, given),
         };
         let alert = match self {
             Self::Acknowledge { alert, .. } => alert.clone(),
@@ -74,7 +74,7 @@ impl Order {
             time,
             benchmark: self.benchmark().cloned(),
             kind: EventKind::Order {
-                order: order.to_owned(),
+                order,
                 until,
                 alert,
                 given: given.clone(),

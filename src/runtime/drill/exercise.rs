@@ -4,7 +4,7 @@ use super::DrillContext;
 use super::runner::DrillObserver;
 use crate::alert::Level;
 use crate::config::{self, Config, Drill, EXERCISE, HookConfig};
-use crate::monitor::{EventKind, Given, Order, Settings, Watched};
+use crate::monitor::{EventKind, Given, Order, OrderKind, Settings, Watched};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::clock::{self, Stopwatch};
 use crate::runtime::daemon::Daemon;
@@ -310,6 +310,6 @@ fn acknowledgement(
             return None;
         };
         let is_since = given.given_at.is_some_and(|at| at >= started);
-        (is_of_it && order == "acknowledge" && is_since).then_some(given)
+        (is_of_it && order == OrderKind::Acknowledge && is_since).then_some(given)
     }))
 }

@@ -2,7 +2,7 @@
 
 use super::{SiteReader, read};
 use crate::alert::{Level, Policy};
-use crate::monitor::{AlertState, Event, EventKind, Settings};
+use crate::monitor::{AlertState, Event, EventKind, OrderKind, Settings};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::standing::{every, in_force, may_be_of};
 use crate::store::{DeliveryRow, Store, StoreError};
@@ -112,7 +112,15 @@ pub fn alert(store: &Store, site: &str, key: &str) -> Result<Option<AlertView>, 
         .as_ref()
         .map_or(&settings.policy, |one| settings.policy(one));
     let audit = audit(store, &alerts, (&call.event, ended))?;
-    let is_ack = |event: &Event| matches!(&event.kind, EventKind::Order { order, .. } if order == "acknowledge");
+    let is_ack = |event: &Event| {
+        matches!(
+            &event.kind,
+            EventKind::Order {
+                order: OrderKind::Acknowledge,
+                ..
+            }
+        )
+    };
     let members = if benchmark.is_none() {
         members(store, level, since)?
     } else {

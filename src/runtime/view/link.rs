@@ -3,7 +3,7 @@
 use super::order::LONGEST_NAME;
 use super::{AlertLife, AlertView, SiteReader};
 use crate::config::{EXERCISE, Links};
-use crate::monitor::{EventKind, Given, Order, OrderedBy};
+use crate::monitor::{EventKind, Given, Order, OrderKind, OrderedBy};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::clock;
 use crate::runtime::hook::Status;
@@ -159,7 +159,7 @@ impl AlertView {
                 return None;
             };
             let acknowledged = (given.given_at, given.by.as_deref());
-            (order == "acknowledge").then_some(acknowledged)
+            (*order == OrderKind::Acknowledge).then_some(acknowledged)
         })
     }
 }
