@@ -108,6 +108,9 @@ pub enum SourceKind {
 }
 
 impl SourceKind {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Csv, Self::Ndjson, Self::Toa5, Self::Mcap];
+
     /// The word in the config.
     pub fn name(self) -> &'static str {
         match self {

@@ -125,11 +125,10 @@ impl StatedKind {
 }
 
 fn source_kind(text: &str) -> Result<StatedKind, String> {
+    if let Some(kind) = SourceKind::ALL.into_iter().find(|kind| kind.name() == text) {
+        return Ok(StatedKind::Files(kind));
+    }
     match text {
-        "csv" => Ok(StatedKind::Files(SourceKind::Csv)),
-        "ndjson" => Ok(StatedKind::Files(SourceKind::Ndjson)),
-        "toa5" => Ok(StatedKind::Files(SourceKind::Toa5)),
-        "mcap" => Ok(StatedKind::Files(SourceKind::Mcap)),
         "mqtt" => Ok(StatedKind::Mqtt),
         "nats" => Err(format!("not yet supported; {KINDS}")),
         _ => Err(KINDS.to_owned()),

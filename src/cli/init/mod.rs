@@ -183,17 +183,15 @@ fn kind_of(file: &Path) -> anyhow::Result<SourceKind> {
         .unwrap_or_default()
         .to_string_lossy()
         .to_ascii_lowercase();
-    Ok(match ending.as_str() {
-        "csv" | "txt" | "tsv" => SourceKind::Csv,
-        "ndjson" | "jsonl" => SourceKind::Ndjson,
-        "dat" => SourceKind::Toa5,
-        "mcap" => SourceKind::Mcap,
-        // The reader knows what to say of every other one.
-        _ => {
-            read_with_remarks(&[file.to_owned()], &ReadOptions::default())?;
-            SourceKind::Csv
-        }
-    })
+    let format = TextFormat::of_extension(&ending).map_or(ending.as_str(), |format| format.name);
+    let kind = SourceKind::ALL
+        .into_iter()
+        .find(|kind| kind.name() == format);
+    if kind.is_none() {
+        // The reader knows what to say of such a file.
+        read_with_remarks(&[file.to_owned()], &ReadOptions::default())?;
+    }
+    Ok(kind.unwrap_or(SourceKind::Csv))
 }
 
 /// How the file is written, or what of that it leaves open.
@@ -262,18 +260,13 @@ fn held(
 }
 
 fn look(file: &Path, kind: SourceKind, options: &ReadOptions) -> anyhow::Result<FileSurvey> {
-    let format = match kind {
-        SourceKind::Csv => TextFormat::Csv,
-        SourceKind::Ndjson => TextFormat::Ndjson,
-        SourceKind::Toa5 => TextFormat::Toa5,
-        SourceKind::Mcap => {
-            let read = read_with_remarks(&[file.to_owned()], options)?;
-            let series = read.recording.series.into_iter();
-            return Ok(FileSurvey {
-                readings: series.map(|one| (one.benchmark, one.unit)).collect(),
-                ..FileSurvey::default()
-            });
-        }
+    let Some(format) = TextFormat::named(kind.name()) else {
+        let read = read_with_remarks(&[file.to_owned()], options)?;
+        let series = read.recording.series.into_iter();
+        return Ok(FileSurvey {
+            readings: series.map(|one| (one.benchmark, one.unit)).collect(),
+            ..FileSurvey::default()
+        });
     };
     Ok(look_through(format, file, options)?)
 }

@@ -3,28 +3,14 @@
 use super::bytes::read_bytes;
 use super::collect::Collector;
 use super::columns::Meaning;
-use super::csv::CsvRows;
 use super::encoding::{Transcoder, latin1};
-use super::ndjson::NdjsonRows;
-use super::table::TableRows;
 use super::taken::{LineResult, Remark};
-use super::toa5::Toa5Rows;
+use super::text_format::{LineReader, TextFormat};
 use super::{IngestError, Item, ReadOptions};
 use crate::reading::{BenchmarkId, Disorder, Recording, Unit};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
-use std::path::{Path, PathBuf};
-
-/// How a text file is laid out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TextFormat {
-    /// A header and comma-separated rows.
-    Csv,
-    /// A JSON object a line.
-    Ndjson,
-    /// A Campbell logger's table.
-    Toa5,
-}
+use std::path::Path;
 
 impl Remark {
     /// That a table is taken as Latin-1 from this line on.
@@ -52,112 +38,42 @@ impl fmt::Display for Remark {
     }
 }
 
-/// Takes the lines of one file, headers included.
+/// Takes the lines of one file, headers included, by the reader of its format.
 #[derive(Debug)]
-pub struct TextRows {
-    file: PathBuf,
-    options: ReadOptions,
-    rows: Rows,
-}
-
-#[derive(Debug)]
-enum Rows {
-    /// Before its header.
-    NewCsv,
-    Csv(Box<CsvRows>),
-    Ndjson(Box<NdjsonRows>),
-    Toa5(Box<Toa5Rows>),
-}
+pub struct TextRows(Box<dyn LineReader>);
 
 impl TextRows {
     /// Before the first line of `file`, which need not exist: its stem is the benchmark of columns
     /// that name none.
-    pub fn new(format: TextFormat, file: &Path, options: &ReadOptions) -> Self {
-        let rows = match format {
-            TextFormat::Csv => Rows::NewCsv,
-            TextFormat::Ndjson => Rows::Ndjson(Box::new(NdjsonRows::new(file, options))),
-            TextFormat::Toa5 => Rows::Toa5(Box::new(Toa5Rows::new(file, options))),
-        };
-        Self {
-            file: file.into(),
-            options: options.clone(),
-            rows,
-        }
+    pub fn new(format: &TextFormat, file: &Path, options: &ReadOptions) -> Self {
+        Self((format.reader)(file, options))
     }
 
-    /// Takes one line; `line` is its number in the file, from 1. A fault is that line's alone, unless
-    /// [`TextRows::is_lost`] afterwards.
+    /// As [`LineReader::take`], with what it has found out about the file.
     pub fn take(&mut self, line: u64, text: &str) -> LineResult {
-        let mut taken: LineResult = match &mut self.rows {
-            Rows::NewCsv => match CsvRows::new(&self.file, text, &self.options) {
-                Ok(rows) => {
-                    self.rows = Rows::Csv(Box::new(rows));
-                    LineResult::default()
-                }
-                Err(error) => Err(error).into(),
-            },
-            Rows::Csv(rows) => rows.row(line, text).into(),
-            Rows::Ndjson(rows) => rows.row(line, text),
-            Rows::Toa5(rows) => rows.row(line, text).into(),
-        };
-        let mut ask = |table: &mut TableRows| taken.remarks.extend(table.take_remarks());
-        match &mut self.rows {
-            Rows::NewCsv => {}
-            Rows::Csv(rows) => rows.table().into_iter().for_each(&mut ask),
-            Rows::Ndjson(rows) => rows.tables().for_each(&mut ask),
-            Rows::Toa5(rows) => rows.table().into_iter().for_each(&mut ask),
-        }
+        let mut taken = self.0.take(line, text);
+        taken.remarks.extend(self.0.take_remarks());
         taken
     }
 
-    /// What the columns are taken for, by what has been read so far; none for messages, each of which says it.
-    pub fn meanings(&mut self) -> Vec<(String, Meaning)> {
-        match &mut self.rows {
-            Rows::NewCsv => Vec::new(),
-            Rows::Csv(rows) => rows.table().map_or_else(Vec::new, |table| table.meanings()),
-            Rows::Ndjson(rows) => rows.tables().flat_map(|table| table.meanings()).collect(),
-            Rows::Toa5(rows) => rows.table().map_or_else(Vec::new, |table| table.meanings()),
-        }
+    /// As [`LineReader::meanings`].
+    pub fn meanings(&self) -> Vec<(String, Meaning)> {
+        self.0.meanings()
     }
 
-    /// Whether a line that is not UTF-8 may be taken as Latin-1: in a table only column names and text could
-    /// differ by it, never a number.
+    /// As [`LineReader::takes_latin1`].
     pub fn takes_latin1(&self) -> bool {
-        matches!(self.rows, Rows::NewCsv | Rows::Csv(_))
+        self.0.takes_latin1()
     }
 
-    /// Whether the file does not begin as its format does, so that nothing of it can be read.
+    /// As [`LineReader::is_lost`].
     pub fn is_lost(&self) -> bool {
-        match &self.rows {
-            Rows::NewCsv => true,
-            Rows::Toa5(rows) => rows.is_lost(),
-            Rows::Csv(_) | Rows::Ndjson(_) => false,
-        }
+        self.0.is_lost()
     }
 
-    /// The lines of the header in force; a new `TextRows` that takes them first goes on from any
-    /// later line of the file.
+    /// As [`LineReader::header`].
     pub fn header(&self) -> &[String] {
-        match &self.rows {
-            Rows::NewCsv | Rows::Ndjson(_) => &[],
-            Rows::Csv(rows) => rows.header(),
-            Rows::Toa5(rows) => rows.header(),
-        }
-    }
-
-    fn columns(&self) -> &[String] {
-        match &self.rows {
-            Rows::NewCsv | Rows::Ndjson(_) => &[],
-            Rows::Csv(rows) => rows.columns(),
-            Rows::Toa5(rows) => rows.columns(),
-        }
-    }
-
-    fn finish(&self) -> Result<(), IngestError> {
-        match &self.rows {
-            Rows::Csv(rows) => rows.finish(),
-            Rows::NewCsv | Rows::Ndjson(_) | Rows::Toa5(_) => Ok(()),
-        }
+        self.0.header()
     }
 }
 
@@ -174,7 +90,7 @@ pub(super) struct Table {
 
 /// Reads a whole file; the first fault is an error.
 pub(super) fn read_text(
-    format: TextFormat,
+    format: &TextFormat,
     file: &Path,
     options: &ReadOptions,
 ) -> Result<Table, IngestError> {
@@ -203,8 +119,8 @@ pub(super) fn read_text(
                 })?;
         }
     }
-    rows.finish()?;
-    let columns = rows.columns().to_vec();
+    rows.0.finish()?;
+    let columns = rows.0.columns().to_vec();
     let (recording, disorder) = collected.finish(BTreeMap::new());
     if recording.series.is_empty() && recording.channels.is_empty() && disorder.missing == 0 {
         return Err(IngestError::Empty {
@@ -255,7 +171,7 @@ pub struct FileSurvey {
 /// # Errors
 /// [`IngestError`] where it cannot be read or does not begin as its format does.
 pub fn look_through(
-    format: TextFormat,
+    format: &TextFormat,
     file: &Path,
     options: &ReadOptions,
 ) -> Result<FileSurvey, IngestError> {

@@ -71,12 +71,7 @@ impl Decoder {
 
     /// The reader of the lines of `file`; `None` for recordings.
     pub(in crate::runtime) fn text_rows(&self, file: &Path) -> Option<TextRows> {
-        let format = match self.kind {
-            SourceKind::Csv => TextFormat::Csv,
-            SourceKind::Ndjson => TextFormat::Ndjson,
-            SourceKind::Toa5 => TextFormat::Toa5,
-            SourceKind::Mcap => return None,
-        };
+        let format = TextFormat::named(self.kind.name())?;
         let name = unpacked_name(file);
         Some(TextRows::new(format, &name, &self.options(&name)))
     }
