@@ -193,8 +193,13 @@ impl<'t> Section<'t> {
             text.or_else(|| number(value).map(|number| number.to_string()))
         };
         let example = format!("{key} = [-7999, \"NAN\"]");
-        let kind = (ValueShape::Marks, "a number or a string", example.as_str());
-        self.list(key, kind, mark)
+        self.list(
+            key,
+            ValueShape::Marks,
+            "a number or a string",
+            &example,
+            mark,
+        )
     }
 
     /// A string, or a list of them, of which none is empty.
@@ -221,13 +226,15 @@ impl<'t> Section<'t> {
     /// A list of numbers.
     pub(super) fn numbers(&mut self, key: &'static str) -> Option<Placed<Vec<f64>>> {
         let example = format!("{key} = [0.7, 0.6, -0.4]");
-        self.list(key, (ValueShape::Numbers, "a number", &example), number)
+        self.list(key, ValueShape::Numbers, "a number", &example, number)
     }
 
     fn list<T>(
         &mut self,
         key: &'static str,
-        (shape, wanted, example): (ValueShape, &str, &str),
+        shape: ValueShape,
+        wanted: &str,
+        example: &str,
         read: impl Fn(&DeValue<'_>) -> Option<T>,
     ) -> Option<Placed<Vec<T>>> {
         let value = self.get(key, shape)?;

@@ -137,7 +137,7 @@ impl CurveFamily {
         if descent.curve.count() < 3 {
             return Vec::new();
         }
-        let best = lay(descent, record, chart, (p, lattice, seed));
+        let best = lay(descent, record, chart, p, lattice, seed);
         let place = |laid: &Laid| {
             let node = laid.window.first_node;
             let slope = descent.curve.growth(node) * laid.window.span;
@@ -165,7 +165,9 @@ fn lay(
     descent: &mut Descent,
     record: &WeightedRecord,
     chart: Chart,
-    (p, lattice, seed): (f64, Lattice, usize),
+    p: f64,
+    lattice: Lattice,
+    seed: usize,
 ) -> Vec<Laid> {
     let knee_excess = 1.0 / p.abs().max(1.0);
     let knee = descent.curve.time_at_excess(knee_excess);

@@ -149,7 +149,7 @@ impl<'a> LoadedLaw<'a> {
             steps = if passed == block.passed { steps + 1 } else { 0 };
             block.passed = passed;
             let mut step =
-                TaylorStep::expand(&self.law, (self.order, self.fraction), &block, stretch);
+                TaylorStep::expand(&self.law, self.order, self.fraction, &block, stretch);
             if let Some(relaxation) = self.relaxation(&block, stretch) {
                 step.relaxation = Some(relaxation);
                 step.end = stretch.until;
@@ -224,7 +224,8 @@ impl TaylorStep {
     /// the slip's slope is V = G/y: y V = G.
     fn expand(
         law: &Law,
-        (order, fraction): (usize, f64),
+        order: usize,
+        fraction: f64,
         block: &BlockState,
         stretch: LoadStretch,
     ) -> Self {
@@ -363,7 +364,7 @@ mod tests {
         };
         for k in 1..=count {
             let stretch = load.stretch(block.t, 0).0;
-            let mut step = TaylorStep::expand(law, (order, 1.0), &block, stretch);
+            let mut step = TaylorStep::expand(law, order, 1.0, &block, stretch);
             step.end = f64::from(k) / f64::from(count);
             let Next::BlockState(next) = step.next(law, &block) else {
                 panic!("lost");

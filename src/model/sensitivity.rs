@@ -67,7 +67,7 @@ impl Sensitivities {
     pub fn solve_again(&mut self, law: &Law, end_days: f64, accuracy: Accuracy) {
         self.law = *law;
         let coefficients = Coefficients::<Dual>::of(law);
-        self.path.solve((law, &coefficients), end_days, accuracy);
+        self.path.solve(law, &coefficients, end_days, accuracy);
     }
 
     /// The motion `t` days after the start with its derivatives at that time; `None` from the

@@ -256,7 +256,7 @@ impl Monitor {
                 benchmark,
                 time,
                 what,
-            } => self.missing(now, benchmark, (*time, what)),
+            } => self.missing(now, benchmark, *time, what),
             Input::Found(finding) => self.found(now, finding),
             Input::Notice(notice) => self.heed(now, notice),
             Input::Sample {
@@ -426,7 +426,8 @@ impl Monitor {
         &mut self,
         now: Timestamp,
         benchmark: &BenchmarkId,
-        (time, what): (Timestamp, &str),
+        time: Timestamp,
+        what: &str,
     ) -> Vec<Event> {
         let declared = Declarations::of(&self.settings.declared, benchmark);
         if declared.is_maintained(time) || !self.sensors.fails(benchmark, time, what) {

@@ -216,7 +216,7 @@ impl Panel {
                 );
             }
             Mark::Shade { from, to, colour } => {
-                self.shade(frame, (*from, *to), (colour, OPACITY), out);
+                self.shade(frame, (*from, *to), colour, OPACITY, out);
             }
             Mark::Fill { from, to, .. } => self.fill(frame, (*from, *to), mark, out),
             Mark::Lying { .. } | Mark::Standing { .. } | Mark::Strokes { .. } => {
@@ -240,7 +240,8 @@ impl Panel {
         &self,
         frame: &PlotArea,
         (from, to): (f64, f64),
-        (colour, opacity): (&str, f64),
+        colour: &str,
+        opacity: f64,
         out: &mut String,
     ) {
         let (Some(from), Some(to)) = (self.x.share(from), self.x.share(to)) else {
@@ -263,7 +264,7 @@ impl Panel {
         else {
             return;
         };
-        self.shade(frame, (from, to), (colour, 1.0), out);
+        self.shade(frame, (from, to), colour, 1.0, out);
         let (Some(from), Some(to)) = (self.x.share(from), self.x.share(to)) else {
             return;
         };

@@ -24,7 +24,8 @@ impl SideTasks {
     pub(super) fn start(
         config: &Config,
         store: &Arc<Store>,
-        (vitals, shutdown): (&Arc<Vitals>, &Shutdown),
+        vitals: &Arc<Vitals>,
+        shutdown: &Shutdown,
     ) -> Self {
         Self {
             config: config.clone(),
@@ -32,7 +33,7 @@ impl SideTasks {
             vitals: Arc::clone(vitals),
             shutdown: shutdown.clone(),
             heartbeats: heartbeat::start(&config.heartbeats, vitals, shutdown),
-            drills: drill::start(config, store, (vitals, shutdown)),
+            drills: drill::start(config, store, vitals, shutdown),
         }
     }
 
@@ -45,7 +46,7 @@ impl SideTasks {
         }
         if config.drill != self.config.drill || config.hooks != self.config.hooks {
             self.drills.shutdown().await;
-            self.drills = drill::start(config, &self.store, (vitals, shutdown));
+            self.drills = drill::start(config, &self.store, vitals, shutdown);
         }
         self.config = config.clone();
     }

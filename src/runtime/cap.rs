@@ -96,7 +96,7 @@ fn written(cap: &CapFolder, alert: &Alert, now: Timestamp) -> io::Result<()> {
     );
     replace(
         &cap.folder.join(name),
-        xml(cap, alert, (message, before)).as_bytes(),
+        xml(cap, alert, message, before).as_bytes(),
     )
 }
 
@@ -140,7 +140,7 @@ fn replace(file: &Path, bytes: &[u8]) -> io::Result<()> {
         .map_or(Ok(()), |folder| File::open(folder)?.sync_all())
 }
 
-fn xml(cap: &CapFolder, alert: &Alert, (message, before): (&CapMessage, &[CapMessage])) -> String {
+fn xml(cap: &CapFolder, alert: &Alert, message: &CapMessage, before: &[CapMessage]) -> String {
     let kind = match (alert.state, before.is_empty()) {
         (AlertState::Resolved, _) => MessageType::Cancel,
         (AlertState::Firing, true) => MessageType::Alert,
@@ -176,12 +176,12 @@ fn xml(cap: &CapFolder, alert: &Alert, (message, before): (&CapMessage, &[CapMes
         let references = each.collect::<Vec<_>>().join(" ");
         element(&mut out, 1, ("references", &references));
     }
-    info(&mut out, cap, (alert, kind));
+    info(&mut out, cap, alert, kind);
     out += "</alert>\n";
     out
 }
 
-fn info(out: &mut String, cap: &CapFolder, (alert, kind): (&Alert, MessageType)) {
+fn info(out: &mut String, cap: &CapFolder, alert: &Alert, kind: MessageType) {
     let EventKind::Alert { rule, text, .. } = &alert.event.kind else {
         return;
     };

@@ -76,7 +76,8 @@ impl Daemon {
         config: &Config,
         store: Arc<Store>,
         site: Site,
-        (sources, pulse): (Sources, Reporting),
+        sources: Sources,
+        pulse: Reporting,
         wall: fn() -> Timestamp,
     ) -> Self {
         Self {

@@ -213,7 +213,8 @@ pub enum HookOutcome {
 pub(super) async fn run_program(
     hook: &HookConfig,
     alert: &Alert,
-    (attempt, link): (u32, Option<&str>),
+    attempt: u32,
+    link: Option<&str>,
 ) -> HookOutcome {
     let run = run_name();
     let mut child = match start(hook, &alert.variables(attempt, link), &run) {

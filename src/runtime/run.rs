@@ -76,9 +76,9 @@ pub async fn run(
     for (source, count) in store.quarantined().map_err(fail)? {
         pulse.vitals.quarantined(&source, count);
     }
-    let beside = SideTasks::start(config, &store, (&pulse.vitals, &shutdown));
+    let beside = SideTasks::start(config, &store, &pulse.vitals, &shutdown);
     let sources = Sources::start(config, &store).map_err(fail)?;
-    let mut daemon = Daemon::new(config, store, site, (sources, pulse), clock::now);
+    let mut daemon = Daemon::new(config, store, site, sources, pulse, clock::now);
     daemon.beside = Some(beside);
     tracing::info!(site = name, state = %config.site.state_dir.display(), "started");
     let worked = daemon.work(shutdown, progress).await;

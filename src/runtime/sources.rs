@@ -34,21 +34,19 @@ impl Sources {
     pub(super) fn start(config: &Config, store: &Store) -> Result<Self, StoreError> {
         let (messages, deliveries) = mpsc::channel(MESSAGES);
         let (stop, stopped) = shutdown::pair();
-        listen(config, store.instance()?, (&messages, &stopped));
+        listen(config, store.instance()?, &messages, &stopped);
         let follower = Follower::new(&config.sources, &config.benchmarks, &store.positions()?);
         let (sender, batches) = mpsc::channel(BATCHES);
         let task = tokio::spawn(tail::follow(follower, sender, stopped));
-        let mut sources = Self::of((messages, deliveries), stop);
+        let mut sources = Self::of(messages, deliveries, stop);
         (sources.batches, sources.task) = (batches, task);
         Ok(sources)
     }
 
     /// Messages that somebody else brings, and no files; needs a tokio runtime.
     pub fn of(
-        (messages, deliveries): (
-            mpsc::Sender<ReceivedMessage>,
-            mpsc::Receiver<ReceivedMessage>,
-        ),
+        messages: mpsc::Sender<ReceivedMessage>,
+        deliveries: mpsc::Receiver<ReceivedMessage>,
         stop: Trigger,
     ) -> Self {
         let (_, batches) = mpsc::channel(1);
@@ -106,7 +104,8 @@ impl Sources {
 fn listen(
     config: &Config,
     instance: i64,
-    (messages, stopped): (&mpsc::Sender<ReceivedMessage>, &Shutdown),
+    messages: &mpsc::Sender<ReceivedMessage>,
+    stopped: &Shutdown,
 ) {
     for broker in &config.brokers {
         // One session for each state and source, found again after a restart. Two daemons of one site's name would

@@ -210,7 +210,7 @@ impl Inner {
         let (mut last_step, mut last_event) = (*steps, *events);
         for (now, input) in &batch.steps {
             last_step += 1;
-            insert_step(&transaction, (last_step, *now), input, &number)?;
+            insert_step(&transaction, last_step, *now, input, &number)?;
         }
         let mut latest = BTreeMap::new();
         for (step, event) in &batch.events {
@@ -253,7 +253,8 @@ impl Inner {
 
 fn insert_step(
     connection: &Connection,
-    (seq, now): (i64, Timestamp),
+    seq: i64,
+    now: Timestamp,
     input: &Input,
     number: &dyn Fn(&StoredSeries) -> Option<i64>,
 ) -> Result<(), StoreError> {

@@ -329,7 +329,8 @@ impl DeliveryState {
     fn becomes(
         &self,
         connection: &Connection,
-        (fate, attempts): (DeliveryOutcome, i64),
+        fate: DeliveryOutcome,
+        attempts: i64,
     ) -> Result<(), StoreError> {
         let sum = standing_sum(fate.name(), attempts);
         connection
@@ -352,7 +353,7 @@ impl Inner {
         for one in ended {
             let standing = DeliveryState::of(&transaction, one)?;
             if let Some(row) = standing.filter(|row| row.status == WAITING) {
-                row.becomes(&transaction, (DeliveryOutcome::Closed, row.attempts))?;
+                row.becomes(&transaction, DeliveryOutcome::Closed, row.attempts)?;
             }
         }
         transaction.commit()?;
@@ -372,7 +373,7 @@ impl Inner {
                     || row.status == DeliveryOutcome::Acknowledged.name()
             };
             if let Some(row) = standing.filter(|row| !is_done(row)) {
-                row.becomes(&transaction, (*fate, row.attempts + fate.attempt()))?;
+                row.becomes(&transaction, *fate, row.attempts + fate.attempt())?;
             }
         }
         transaction.commit()?;

@@ -103,16 +103,10 @@ impl<'a> Host<'a> {
         site.show(&pulse.vitals);
         let (stop, stopped) = shutdown::pair();
         let (messages, deliveries) = mpsc::channel(CHANNEL);
-        let sources = Sources::of((messages.clone(), deliveries), shutdown::pair().0);
+        let sources = Sources::of(messages.clone(), deliveries, shutdown::pair().0);
         let positions = store.positions().unwrap();
         let follower = Follower::new(&self.config.sources, &self.config.benchmarks, &positions);
-        let daemon = Daemon::new(
-            self.config,
-            Arc::clone(&store),
-            site,
-            (sources, pulse),
-            wall,
-        );
+        let daemon = Daemon::new(self.config, Arc::clone(&store), site, sources, pulse, wall);
         Running {
             daemon,
             follower,

@@ -25,7 +25,8 @@ const COMMAND: &str = "slipwatch replay --state state --format json | grep --lin
 pub(super) fn write(
     file: &Path,
     alert: &AlertView,
-    (config, store): (&Config, &Store),
+    config: &Config,
+    store: &Store,
 ) -> anyhow::Result<()> {
     let folder = tempfile::tempdir().context("cannot make a temporary folder")?;
     let copy = folder.path().join("slipwatch.db");

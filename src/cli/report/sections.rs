@@ -172,6 +172,6 @@ pub(super) fn scorecard(
     if args.failure_time.is_none() && !args.no_failure {
         return Ok(None);
     }
-    let whole = (&material.recording, series);
-    score::part(args.failure_time, whole, &material.policy).map(Some)
+    let recording = &material.recording;
+    score::part(args.failure_time, recording, series, &material.policy).map(Some)
 }

@@ -138,11 +138,8 @@ impl ModeProblem<'_> {
             Sign::Positive => b_over_m > 0.0,
             Sign::Negative => b_over_m < 0.0,
         };
-        let law = (at[LN_V], shape);
-        exists
-            && self
-                .window
-                .residuals(&mut bench.past, law, span_days, &mut bench.residuals)
+        let (past, out) = (&mut bench.past, &mut bench.residuals);
+        exists && (self.window).residuals(past, at[LN_V], shape, span_days, out)
     }
 
     /// ln of the prior density at a point.
@@ -191,9 +188,9 @@ impl ModeProblem<'_> {
                 let mut moved = *at;
                 moved[axis] += step;
                 bench.evaluations += 1;
-                let law = (moved[LN_V], self.shape(&moved));
+                let shape = self.shape(&moved);
                 let (past, out) = (&mut bench.past, &mut bench.there);
-                if self.window.residuals(past, law, self.span_days, out) {
+                if (self.window).residuals(past, moved[LN_V], shape, self.span_days, out) {
                     taken = step;
                     break;
                 }
@@ -224,7 +221,8 @@ impl ModeProblem<'_> {
         &self,
         bench: &mut ModeBench,
         start: Point,
-        (texture, size): (&Texture, f64),
+        texture: &Texture,
+        size: f64,
         rounds: u32,
     ) -> Option<Mode> {
         let cost_of = |residuals: &[f64], at: &Point| {

@@ -92,12 +92,13 @@ impl<'a> Side<'a> {
         problem: ModeProblem<'a>,
         bench: &ModeBench,
         at: Point,
-        (textures, log_size): (&[Texture], f64),
+        textures: &[Texture],
+        log_size: f64,
     ) -> Option<Self> {
         let mut size = log_size;
         let mut components = Vec::with_capacity(textures.len());
         for texture in textures {
-            let one = Component::new(&problem, bench, at, (texture, size))?;
+            let one = Component::new(&problem, bench, at, texture, size)?;
             size = one.centre[SIZE];
             components.push(one);
         }
@@ -258,7 +259,8 @@ impl Component {
         problem: &ModeProblem<'_>,
         bench: &ModeBench,
         at: Point,
-        (texture, log_size): (&Texture, f64),
+        texture: &Texture,
+        log_size: f64,
     ) -> Option<Self> {
         let window = problem.window;
         let (slope, bend) = problem.prior_slope(&at);

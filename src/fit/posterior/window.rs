@@ -85,7 +85,8 @@ impl Window {
     pub(super) fn residuals(
         &self,
         past: &mut PastSolution,
-        (ln_v, shape): (f64, PastShape),
+        ln_v: f64,
+        shape: PastShape,
         span: f64,
         out: &mut [f64],
     ) -> bool {

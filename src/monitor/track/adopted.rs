@@ -84,7 +84,8 @@ impl Adopted {
         &mut self,
         history: &History,
         channels: &[&Channel],
-        (critical, rates): (f64, &[Rate]),
+        critical: f64,
+        rates: &[Rate],
     ) -> Option<UnderKnownLoad> {
         let by_clock = self.by_clock(history, channels)?;
         let excess = self.panel.excess(by_clock.readings());

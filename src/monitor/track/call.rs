@@ -76,7 +76,7 @@ impl Track {
         self.levels.note(time, self.latch.level());
         let reported = transitions
             .iter()
-            .map(|change| self.alert_event(time, policy, (&evidence, ahead), change));
+            .map(|change| self.alert_event(time, policy, &evidence, ahead, change));
         events.extend(reported);
         events
     }
@@ -108,7 +108,8 @@ impl Track {
         Some(self.alert_event(
             time,
             policy,
-            (&evidence, LookAhead::of(policy, None)),
+            &evidence,
+            LookAhead::of(policy, None),
             &change,
         ))
     }
@@ -132,10 +133,11 @@ impl Track {
         &self,
         time: Timestamp,
         policy: &Policy,
-        (evidence, ahead): (&AlertEvidence, LookAhead),
+        evidence: &AlertEvidence,
+        ahead: LookAhead,
         change: &Transition,
     ) -> Event {
-        let text = self.text(policy, (evidence, ahead), change);
+        let text = self.text(policy, evidence, ahead, change);
         self.alert_of(time, change, text)
     }
 
@@ -157,7 +159,8 @@ impl Track {
     fn text(
         &self,
         policy: &Policy,
-        (evidence, ahead): (&AlertEvidence, LookAhead),
+        evidence: &AlertEvidence,
+        ahead: LookAhead,
         change: &Transition,
     ) -> String {
         let verb = match change.entered {

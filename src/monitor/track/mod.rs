@@ -357,7 +357,7 @@ impl Track {
         let history = &self.history;
         let known_load = self.adopted.as_mut().and_then(|adopted| {
             let channels = context.covariates.list();
-            adopted.forecast(history, &channels, (critical, &plain.rates))
+            adopted.forecast(history, &channels, critical, &plain.rates)
         });
         Some(Forecast { plain, known_load })
     }

@@ -39,11 +39,11 @@ impl Track {
             .map(|days| now + days)
             .filter(|days| *days > now && *days < now + FARTHEST_INTERCEPT * length);
         let mut events =
-            vec![self.refit_event(policy, time, forecast, (line, intercept, transition))];
+            vec![self.refit_event(policy, time, forecast, line, intercept, transition)];
         events.extend(self.flip(policy, time, forecast.in_force(days(policy.outlook))));
         events.extend(self.surprise(policy, time, forecast));
         let least = (length / 40.0).max(0.02);
-        events.extend(self.drifts(policy, time, outlook, (intercept, transition, least)));
+        events.extend(self.drifts(policy, time, outlook, intercept, transition, least));
         events
     }
 
@@ -67,7 +67,9 @@ impl Track {
         policy: &Policy,
         time: Timestamp,
         outlook: &Outlook,
-        (intercept, transition, least): (Option<f64>, Option<f64>, f64),
+        intercept: Option<f64>,
+        transition: Option<f64>,
+        least: f64,
     ) -> Vec<Event> {
         let now = outlook.now_days;
         let mut events = Vec::new();
@@ -107,7 +109,9 @@ impl Track {
         policy: &Policy,
         time: Timestamp,
         forecast: &Forecast,
-        (line, intercept, transition): (Option<InverseVelocityLine>, Option<f64>, Option<f64>),
+        line: Option<InverseVelocityLine>,
+        intercept: Option<f64>,
+        transition: Option<f64>,
     ) -> Event {
         let at = |days: Option<f64>| days.and_then(|days| after_days(self.history.epoch, days));
         let outlook = forecast.in_force(days(policy.outlook));

@@ -195,7 +195,7 @@ impl Track {
             .collect();
         for (effect, known) in finding.effects.iter().zip(&known) {
             if !self.is_reported(known) {
-                events.push(self.effect_event(time, effect, (finding, known.is_adopted)));
+                events.push(self.effect_event(time, effect, finding, known.is_adopted));
             }
         }
         self.watch.known = known;
@@ -248,7 +248,8 @@ impl Track {
         &self,
         time: Timestamp,
         effect: &Effect,
-        (finding, adopted): (&SearchFinding, bool),
+        finding: &SearchFinding,
+        adopted: bool,
     ) -> Event {
         let kind = EventKind::EffectFound {
             effect: effect.effect,

@@ -101,8 +101,8 @@ impl Dispatcher {
         for hook in hooks {
             let (queue, receiver) = mpsc::channel(QUEUE);
             let in_hand = Arc::new(Mutex::new(InHand::default()));
-            let shared = (Arc::clone(&delivered), Arc::clone(&in_hand));
-            let worker = Worker::new((hook, Arc::clone(runner)), retry, shared);
+            let (delivered, shared) = (Arc::clone(&delivered), Arc::clone(&in_hand));
+            let worker = Worker::new(hook, Arc::clone(runner), retry, delivered, shared);
             workers.spawn(worker.run(receiver));
             let hook = hook.clone();
             queues.push(HookQueue {

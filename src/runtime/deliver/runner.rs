@@ -52,14 +52,14 @@ pub async fn run(hook: &HookConfig, alert: &Alert, attempt: u32) -> HookOutcome 
         return outcome;
     }
     let Some(to) = &hook.webhook else {
-        return hook::run_program(hook, alert, (attempt, link.as_deref())).await;
+        return hook::run_program(hook, alert, attempt, link.as_deref()).await;
     };
     let body = match to.format {
         WebhookFormat::Slipwatch => alert.body(attempt, link.as_deref()),
         WebhookFormat::Alertmanager => alertmanager::body(alert, link.as_deref()),
     };
     let outcome = match body {
-        Ok(body) => webhook::send(to, alert, (body, hook.timeout)).await,
+        Ok(body) => webhook::send(to, alert, body, hook.timeout).await,
         Err(error) => HookOutcome::NotStarted(error.to_string()),
     };
     tracing::info!(

@@ -72,9 +72,11 @@ pub(super) struct Worker {
 
 impl Worker {
     pub(super) fn new(
-        (hook, runner): (&HookConfig, Arc<dyn Runner>),
+        hook: &HookConfig,
+        runner: Arc<dyn Runner>,
         retry: &Retry,
-        (delivered, in_hand): (Arc<Mutex<Delivered>>, Arc<Mutex<InHand>>),
+        delivered: Arc<Mutex<Delivered>>,
+        in_hand: Arc<Mutex<InHand>>,
     ) -> Self {
         Self {
             hook: Arc::new(hook.clone()),

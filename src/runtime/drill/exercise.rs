@@ -64,7 +64,7 @@ pub(super) async fn hold(
     let mut exercise = Exercise::start(office, &hooks, shutdown)
         .map_err(|error| format!("it could not be started: {error}"))?;
     let held = exercise
-        .held((&file, started), hooks.len(), (office, drill))
+        .held(&file, started, hooks.len(), office, drill)
         .await;
     exercise.end(hooks.len()).await;
     held
@@ -156,7 +156,8 @@ impl Exercise {
             &config,
             store,
             site,
-            (sources, Reporting::inward()),
+            sources,
+            Reporting::inward(),
             clock::now,
         );
         Ok(Self {
@@ -169,9 +170,11 @@ impl Exercise {
 
     async fn held(
         &mut self,
-        (file, started): (&Path, Timestamp),
+        file: &Path,
+        started: Timestamp,
         hooks: usize,
-        (office, drill): (&DrillContext, &Drill),
+        office: &DrillContext,
+        drill: &Drill,
     ) -> Result<PassedDrill, String> {
         self.until(LIMIT, "its past was not read", |daemon, _| {
             daemon.pulse.vitals.health().is_caught_up
@@ -196,7 +199,7 @@ impl Exercise {
         reached.map_err(|why| self.explained(&why))?;
         let latency = self.watched.seen().latency.unwrap_or_default();
         let acknowledged = match drill.acknowledge_within {
-            Some(within) => Some(self.acknowledged(office, (started, within)).await?),
+            Some(within) => Some(self.acknowledged(office, started, within).await?),
             None => None,
         };
         Ok(PassedDrill {
@@ -243,7 +246,8 @@ impl Exercise {
     async fn acknowledged(
         &mut self,
         office: &DrillContext,
-        (started, within): (Timestamp, SignedDuration),
+        started: Timestamp,
+        within: SignedDuration,
     ) -> Result<Duration, String> {
         let begun = self.watched.seen().begun.unwrap_or_else(Stopwatch::start);
         let within = within.unsigned_abs();

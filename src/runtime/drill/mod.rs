@@ -36,7 +36,8 @@ struct DrillContext {
 pub(super) fn start(
     config: &Config,
     store: &Arc<Store>,
-    (vitals, shutdown): (&Arc<Vitals>, &Shutdown),
+    vitals: &Arc<Vitals>,
+    shutdown: &Shutdown,
 ) -> JoinSet<()> {
     let mut tasks = JoinSet::new();
     vitals.update(|health| health.drill = None);
@@ -65,7 +66,7 @@ async fn hold(office: &DrillContext, drill: &Drill, shutdown: &mut Shutdown) {
     loop {
         record.overdue_after = overdue_after(drill, &record);
         keep(office, &record);
-        let due = due(drill, &record, (clock::now(), &site.time_zone));
+        let due = due(drill, &record, clock::now(), &site.time_zone);
         // Before the past has been read nobody is watched, and the machine has other work.
         while clock::now() < due || !office.vitals.health().is_caught_up {
             tokio::time::sleep(POLL_INTERVAL).await;
@@ -92,7 +93,7 @@ fn keep(office: &DrillContext, record: &DrillRecord) {
 }
 
 /// When the next one begins.
-fn due(drill: &Drill, record: &DrillRecord, (now, zone): (Timestamp, &TimeZone)) -> Timestamp {
+fn due(drill: &Drill, record: &DrillRecord, now: Timestamp, zone: &TimeZone) -> Timestamp {
     let earliest = match record.started {
         Some(started) => started
             .saturating_add(drill.every)
@@ -155,20 +156,20 @@ mod tests {
         let now = time("2026-10-20T09:00:00Z");
         let mut record = DrillRecord::new(now);
         // 10:00 there is over for today.
-        let first = due(&drill, &record, (now, &zone));
+        let first = due(&drill, &record, now, &zone);
         assert_eq!(first, time("2026-10-21T08:00:00Z"));
         // The summer time ends before the next one.
         record.started = Some(first + SignedDuration::from_secs(3));
-        let next = due(&drill, &record, (now, &zone));
+        let next = due(&drill, &record, now, &zone);
         assert_eq!(next, time("2026-10-28T09:00:00Z"));
         // The daemon was away at the time: it is held by day all the same.
         let late = time("2026-10-30T02:00:00Z");
         assert_eq!(
-            due(&drill, &record, (late, &zone)),
+            due(&drill, &record, late, &zone),
             time("2026-10-30T09:00:00Z")
         );
         let drill = Drill { at: None, ..drill };
-        assert!(due(&drill, &record, (late, &zone)) < late);
+        assert!(due(&drill, &record, late, &zone) < late);
         assert!(overdue_after(&drill, &record) > late);
         assert!(overdue_after(&drill, &record) < late + SignedDuration::from_hours(48));
     }

@@ -177,7 +177,7 @@ impl TableRow<'_> {
                     sigma,
                 } => met
                     .items
-                    .extend(self.reading(time, index, benchmark, (*unit, *sigma))?),
+                    .extend(self.reading(time, index, benchmark, *unit, *sigma)?),
                 Column::Channel { unit } => match self.cell(index) {
                     Ok(TableCell::Number(value)) => {
                         met.numbers
@@ -250,7 +250,8 @@ impl TableRow<'_> {
         time: Timestamp,
         index: usize,
         benchmark: &BenchmarkId,
-        (unit, sigma): (Unit, Option<SigmaColumn>),
+        unit: Unit,
+        sigma: Option<SigmaColumn>,
     ) -> Result<Option<Item>, IngestError> {
         let sigma = sigma.map_or(Ok(None), |sigma| self.sigma(sigma, unit))?;
         Ok(match self.cell(index)? {

@@ -102,7 +102,7 @@ pub(super) fn read_text(
     for (text, line) in bytes.split(|byte| *byte == b'\n').zip(1..) {
         let taken = match std::str::from_utf8(text) {
             Ok(text) => rows.take(line, text),
-            Err(_) => rows.take(line, &not_utf8(&rows, file, (line, text), &mut remarks)?),
+            Err(_) => rows.take(line, &not_utf8(&rows, file, line, text, &mut remarks)?),
         };
         remarks.extend(taken.remarks);
         if let Some(fault) = taken.fault {
@@ -140,7 +140,8 @@ pub(super) fn read_text(
 fn not_utf8(
     rows: &TextRows,
     file: &Path,
-    (line, text): (u64, &[u8]),
+    line: u64,
+    text: &[u8],
     remarks: &mut Vec<Remark>,
 ) -> Result<String, IngestError> {
     let read = latin1(text).filter(|_| rows.takes_latin1());

@@ -109,9 +109,9 @@ impl PreviewSoFar {
                 break;
             }
             let looked = match source.kind {
-                SourceKind::Mcap => self.recording(&file, (&source.id, decoder)),
+                SourceKind::Mcap => self.recording(&file, &source.id, decoder),
                 SourceKind::Csv | SourceKind::Ndjson | SourceKind::Toa5 => {
-                    self.text(&file, decoder, (&mut view, &mut refused))
+                    self.text(&file, decoder, &mut view, &mut refused)
                 }
             };
             if let Err(problem) = looked {
@@ -123,11 +123,7 @@ impl PreviewSoFar {
         view
     }
 
-    fn recording(
-        &mut self,
-        file: &Path,
-        (source, decoder): (&str, &Decoder),
-    ) -> Result<(), String> {
+    fn recording(&mut self, file: &Path, source: &str, decoder: &Decoder) -> Result<(), String> {
         let read = read_files(&[file.to_owned()], &ReadOptions::default());
         let (
             Recording {
@@ -166,7 +162,8 @@ impl PreviewSoFar {
         &mut self,
         file: &Path,
         decoder: &Decoder,
-        (view, refused): (&mut SourceView, &mut Refusals),
+        view: &mut SourceView,
+        refused: &mut Refusals,
     ) -> Result<(), String> {
         let Some(rows) = decoder.text_rows(file) else {
             return Ok(());
@@ -187,7 +184,7 @@ impl PreviewSoFar {
             };
             let fed = text.feed(bytes);
             let is_lost = fed.is_lost;
-            self.fed(fed, decoder, (view, refused));
+            self.fed(fed, decoder, view, refused);
             if count == 0 || is_lost || self.values > MOST_VALUES {
                 break;
             }
@@ -206,7 +203,8 @@ impl PreviewSoFar {
         &mut self,
         fed: LinesRead,
         decoder: &Decoder,
-        (view, refused): (&mut SourceView, &mut Refusals),
+        view: &mut SourceView,
+        refused: &mut Refusals,
     ) {
         for item in fed.items {
             self.item(item, &view.id, decoder);

@@ -154,13 +154,10 @@ fn page_of(page: &LinkPage, zone: &TimeZone) -> PageAnswer {
             (StatusCode::OK, "The drill is acknowledged", text)
         }
         LinkPage::Used(alert) => {
-            let words = ("This link has been used", "It can be used once.");
-            gone(words, alert.as_deref(), zone)
+            let why = "It can be used once.";
+            gone("This link has been used", why, alert.as_deref(), zone)
         }
-        LinkPage::Seen(alert) => {
-            let words = ("This alert has been acknowledged", "");
-            gone(words, Some(alert), zone)
-        }
+        LinkPage::Seen(alert) => gone("This alert has been acknowledged", "", Some(alert), zone),
         LinkPage::Over(alert) => over(alert, zone),
         LinkPage::Expired(until) => {
             let until = local(*until, zone);
@@ -185,11 +182,7 @@ fn page_of(page: &LinkPage, zone: &TimeZone) -> PageAnswer {
 }
 
 /// What there is no more to acknowledge.
-fn gone(
-    (title, why): (&'static str, &str),
-    alert: Option<&AlertView>,
-    zone: &TimeZone,
-) -> PageAnswer {
+fn gone(title: &'static str, why: &str, alert: Option<&AlertView>, zone: &TimeZone) -> PageAnswer {
     let described = alert.map_or_else(String::new, |alert| described(alert, zone));
     let text = format!("<p>{why} {UNCHANGED}</p>{described}");
     (StatusCode::GONE, title, text)
@@ -202,7 +195,7 @@ fn over(alert: &AlertView, zone: &TimeZone) -> PageAnswer {
         }
         AlertLife::Resolved | AlertLife::Firing => "It has ended. That is no all-clear.",
     };
-    gone(("This alert is over", why), Some(alert), zone)
+    gone("This alert is over", why, Some(alert), zone)
 }
 
 /// The alert for people, and who has acknowledged it.

@@ -111,7 +111,7 @@ pub fn alert(store: &Store, site: &str, key: &str) -> Result<Option<AlertView>, 
     let policy = benchmark
         .as_ref()
         .map_or(&settings.policy, |one| settings.policy(one));
-    let audit = audit(store, &alerts, (&call.event, ended))?;
+    let audit = audit(store, &alerts, &call.event, ended)?;
     let is_ack = |event: &Event| {
         matches!(
             &event.kind,
@@ -138,7 +138,7 @@ pub fn alert(store: &Store, site: &str, key: &str) -> Result<Option<AlertView>, 
         evidence: refit(store, benchmark.as_ref(), since)?,
         members,
         recommended: level.recommended(),
-        valid_until: valid_until(store, (level, ended), (benchmark.as_ref(), since), policy)?,
+        valid_until: valid_until(store, level, ended, benchmark.as_ref(), since, policy)?,
         deliveries: store.deliveries_of(&key)?,
         is_acknowledged: audit.iter().any(is_ack),
         audit,
@@ -224,7 +224,8 @@ fn end(alerts: &[Event], call: &Event) -> (AlertLife, Option<Timestamp>) {
 fn audit(
     store: &Store,
     alerts: &[Event],
-    (call, ended): (&Event, Option<Timestamp>),
+    call: &Event,
+    ended: Option<Timestamp>,
 ) -> Result<Vec<Event>, StoreError> {
     let EventKind::Alert { key: own_key, .. } = &call.kind else {
         return Ok(Vec::new());
@@ -277,8 +278,10 @@ fn refit(
 
 fn valid_until(
     store: &Store,
-    (level, ended): (Level, Option<Timestamp>),
-    (benchmark, since): (Option<&BenchmarkId>, Timestamp),
+    level: Level,
+    ended: Option<Timestamp>,
+    benchmark: Option<&BenchmarkId>,
+    since: Timestamp,
     policy: &Policy,
 ) -> Result<Option<Timestamp>, StoreError> {
     if ended.is_some() || level == Level::Unknown {

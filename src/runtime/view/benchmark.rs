@@ -193,7 +193,7 @@ impl SiteReader {
         alerts.truncate(MOST_EVENTS);
         let levels_now = in_force(&self.store, at)?;
         let span = self.store.span(Some(name))?;
-        let (seen, quiet) = self.orders(&levels_now, (at, moment))?;
+        let (seen, quiet) = self.orders(&levels_now, at, moment)?;
         Ok(Some(BenchmarkView {
             site: self.facts.name.clone(),
             version: env!("CARGO_PKG_VERSION"),
@@ -201,7 +201,7 @@ impl SiteReader {
             takes_orders: self.facts.takes_orders,
             acknowledged: seen,
             silences: quiet,
-            standing: self.standing(id, &levels_now, (at, moment))?,
+            standing: self.standing(id, &levels_now, at, moment)?,
             at,
             now,
             first: span.map(|(first, _)| first),

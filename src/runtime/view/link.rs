@@ -116,9 +116,9 @@ impl SiteReader {
         let within = (self.facts.links.as_ref()).map_or(SignedDuration::ZERO, |one| one.within);
         let forgotten = now.saturating_add(within).unwrap_or(signed.until);
         let name = name(&signed);
-        let link = (name.as_str(), forgotten.max(signed.until));
+        let until = forgotten.max(signed.until);
         tracing::warn!(key = signed.key, by, "somebody acknowledges by a link");
-        Ok(if self.store.use_link(link, now, order.as_ref())? {
+        Ok(if self.store.use_link(&name, until, now, order.as_ref())? {
             LinkPage::Taken(meant)
         } else {
             LinkPage::Used(match meant {
