@@ -57,7 +57,7 @@ pub enum Condition {
         /// From the newest reading; the time until the next one is added.
         within: SignedDuration,
     },
-    /// Something that asks for a look has happened.
+    /// Something that calls for attention has happened.
     Happened(AlertCause),
 }
 

@@ -21,7 +21,7 @@ pub struct AlertEvidence {
     pub displacement_mm: Option<f64>,
     /// Latest observed acceleration, mm/day per day.
     pub acceleration_mm_per_day2: Option<f64>,
-    /// What else asks for a look: a flip to instability, an intercept drifting in.
+    /// What else calls for attention: a flip to instability, an intercept drifting in.
     pub causes: Vec<AlertCause>,
     /// Chances of a collapse within other spans, that declared rules ask for.
     pub chances: Vec<(SignedDuration, f64)>,
@@ -37,7 +37,7 @@ impl AlertEvidence {
     }
 }
 
-/// What asks for a look although no chance is large.
+/// What calls for attention although no chance is large.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum AlertCause {

@@ -15,7 +15,7 @@ pub struct Call {
 }
 
 impl Policy {
-    /// The gravest call that the evidence makes.
+    /// The most severe call that the evidence makes.
     pub fn call(&self, evidence: &AlertEvidence) -> Call {
         let reaches =
             |chance: Option<f64>, limit: f64| chance.is_some_and(|chance| chance >= limit);

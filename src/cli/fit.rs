@@ -237,7 +237,7 @@ fn is_outside(estimate: &Estimate) -> bool {
     })
 }
 
-/// How far the chance of m > 1 and the law's own failure time hang on the prior.
+/// How far the chance of m > 1 and the law's own failure time depend on the prior.
 fn other_priors(report: &FitReport) -> String {
     let all = &report.prior_sensitivity;
     let unstable: Vec<f64> = all.iter().map(UnderPrior::probability_unstable).collect();
@@ -328,7 +328,7 @@ fn neighbours(report: &TogetherReport) -> String {
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
     let since = |since: Timestamp| {
         if since <= report.judged_from {
-            "from the first look on".to_owned()
+            "from the first snapshot on".to_owned()
         } else {
             format!("since {}", time(Some(since)))
         }
@@ -370,7 +370,7 @@ fn neighbours(report: &TogetherReport) -> String {
     }
     let _ = writeln!(
         out,
-        "judged by {} looks from {} on",
+        "judged by {} snapshots from {} on",
         report.looks,
         time(Some(report.judged_from)),
     );

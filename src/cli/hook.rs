@@ -32,7 +32,7 @@ pub(super) struct Test {
     /// The site whose hooks are run
     #[arg(long, value_name = "CONFIG")]
     config: PathBuf,
-    /// Only the hooks for this level, run with it; default is every hook, run with its gravest
+    /// Only the hooks for this level, run with it; default is every hook, run with its most severe
     #[arg(long, value_name = "LEVEL", value_parser = level)]
     level: Option<Level>,
     #[command(flatten)]

@@ -27,7 +27,7 @@ pub(super) fn shown(preview: &Preview, zone: &TimeZone) -> String {
         );
     }
     if !preview.is_whole {
-        text.push_str("\nonly the first values were looked at, there are very many\n");
+        text.push_str("\nonly the first values were read, there are very many\n");
     }
     text
 }

@@ -29,7 +29,7 @@ const WHOLLY: DescentEffort = DescentEffort {
     least_gain: 1e-9,
     fineness: Fineness::FINE,
 };
-/// A descent to the floor is begun afresh while it gained more than this, relative, and at most so often.
+/// A descent to the floor is begun again while it gained more than this, relative, and at most so often.
 const RESTART_GAIN: f64 = 1e-7;
 const MOST_RESTARTS: usize = 6;
 
@@ -50,6 +50,7 @@ struct Breadth {
     /// Costs within so many times the best go to the floor.
     floor_within: f64,
 }
+/// For records that a few starts decide.
 const EASY_BREADTH: Breadth = Breadth {
     nearly: 3,
     nearly_of_one_m: 1,
@@ -58,6 +59,7 @@ const EASY_BREADTH: Breadth = Breadth {
     wholly: 1,
     floor_within: 1.02,
 };
+/// For records of many valleys of nearly one cost.
 const HARD_BREADTH: Breadth = Breadth {
     nearly: 5,
     nearly_of_one_m: 2,
@@ -368,7 +370,7 @@ fn refine(descent: &mut Descent, record: &WeightedRecord, place: &mut SearchPoin
     }
 }
 
-/// Goes down, afresh as long as it gains: a curved valley stalls a descent before its floor.
+/// Goes down, again as long as it gains: a curved valley stalls a descent before its floor.
 fn go_down(descent: &mut Descent, record: &WeightedRecord, place: &mut SearchPoint, holds_m: bool) {
     for _ in 0..MOST_RESTARTS {
         let next = descent.descend(record, place, &WHOLLY, holds_m);

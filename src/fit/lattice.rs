@@ -13,6 +13,7 @@ const FIRST: [(Branch, f64); 3] = [
     (Branch::BelowOne, 0.25),
     (Branch::BelowZero, -1.2),
 ];
+/// The m's that follow in a direction that shows promise.
 const MORE: [(Branch, f64); 7] = [
     (Branch::AboveOne, 1.05),
     (Branch::AboveOne, 6.0),

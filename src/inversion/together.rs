@@ -28,7 +28,7 @@ pub struct TogetherReport {
     pub apart: Vec<ApartReport>,
     /// Benchmarks without a forecast of today, which are not judged.
     pub silent: Vec<BenchmarkId>,
-    /// The first of the looks back.
+    /// The first of the snapshots.
     pub judged_from: Timestamp,
     /// How many there are; they lie closer as the failure comes closer.
     pub looks: usize,
@@ -141,7 +141,7 @@ fn predicted(inversion: &Inversion, time: Timestamp) -> Option<(Passage, f64)> {
     measurably_moves(&rates).then_some((passage, days - now_days))
 }
 
-/// The looks back and their times: all benchmarks have readings enough by the first, and the last is now.
+/// The snapshots and their times: all benchmarks have readings enough by the first, and the last is now.
 fn looks(inversions: &[Inversion], now: Timestamp) -> Option<(Vec<Timestamp>, Vec<Snapshot>)> {
     let ready = inversions.iter().filter_map(|one| {
         let spaced = one.observations.spaced(FEWEST_READINGS);

@@ -37,7 +37,7 @@ impl SideTasks {
         }
     }
 
-    /// Goes by another config: what it changes ends and begins anew. A drill that is under way is broken off, and held again.
+    /// Goes by another config: what it changes ends and begins again. A drill that is under way is broken off, and held again.
     pub(super) async fn follow(&mut self, config: &Config) {
         let (vitals, shutdown) = (&self.vitals, &self.shutdown);
         if config.heartbeats != self.config.heartbeats {

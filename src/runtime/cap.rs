@@ -38,7 +38,7 @@ enum MessageType {
     Cancel,
 }
 
-/// Writes `alert` into the folder; where its file is there already it is written anew, the same.
+/// Writes `alert` into the folder; where its file is there already it is written again, the same.
 pub(super) fn write(cap: &CapFolder, alert: &Alert) -> HookOutcome {
     match written(cap, alert, clock::now()) {
         Ok(()) => HookOutcome::Done,
@@ -67,7 +67,7 @@ fn written(cap: &CapFolder, alert: &Alert, now: Timestamp) -> io::Result<()> {
     let at = if let Some(at) = known {
         at
     } else {
-        // After its end a place begins anew.
+        // After its end a place begins again.
         if chain.last().is_some_and(|last| last.is_cancel) {
             chain.clear();
         }

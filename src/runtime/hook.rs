@@ -121,7 +121,7 @@ impl Alert {
         })
     }
 
-    /// Whether it is tried until a hook has taken it: people's safety hangs on it.
+    /// Whether it is tried until a hook has taken it: people's safety depends on it.
     pub fn must_arrive(&self) -> bool {
         match self.level {
             Level::Orange | Level::Red | Level::Unknown => self.state == AlertState::Firing,

@@ -59,7 +59,7 @@ impl Origins {
             if !is_packed(&file)
                 && let Err(error) = self.file(&file, decoder)
             {
-                tracing::warn!(file = %file.display(), %error, "its lines cannot be looked at");
+                tracing::warn!(file = %file.display(), %error, "its lines cannot be read");
             }
         }
     }

@@ -105,7 +105,7 @@ impl Store {
             if body.is_none() {
                 tracing::warn!(
                     name,
-                    "this part of the memory is not what was written: it is made anew"
+                    "this part of the memory is not what was written: it is made again"
                 );
                 return Ok(Recorded::default());
             }

@@ -125,7 +125,7 @@ fn report(
         &recording.channels,
         policy.critical_velocity_mm_per_day,
     );
-    let template = "{msg} {bar:40} {pos}/{len} looks, {elapsed}";
+    let template = "{msg} {bar:40} {pos}/{len} forecasts, {elapsed}";
     let bar = bar::counted(0, template).with_message(format!("benchmark {}", series.benchmark));
     let mut card = card(&history, epoch, truth, &mut |done, count| {
         bar.set_length(count);

@@ -37,7 +37,7 @@ pub(super) fn meaning(report: &ScoreReport) -> String {
     } else {
         let looks = report.card.looks.len();
         format!(
-            "Over {looks} looks: mean CRPS, days, and the highest chance of a failure within 400 days."
+            "Over {looks} forecasts: mean CRPS, days, and the highest chance of a failure within 400 days."
         )
     }
 }

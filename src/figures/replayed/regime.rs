@@ -5,6 +5,7 @@ use crate::figures::day;
 use crate::figures::in_time::{every_few, line};
 use crate::plot::{Axis, BLUE, GREY, Legend, Mark, Panel, RED, Stack};
 
+/// Heights of both panels, in the sheet's units.
 const PROBABILITIES: f64 = 220.0;
 const CHANCES: f64 = 140.0;
 

@@ -321,7 +321,7 @@ impl<'a> Lot<'a> {
         }
     }
 
-    /// Draws `number` more, weighs all anew against the mixture of the proposals that they came from
+    /// Draws `number` more, weighs all again against the mixture of the proposals that they came from
     /// (Owen and Zhou 2000: no draw weighs more than any of them would make it), and shapes the next proposal by them.
     fn draw(&mut self, bench: &mut ModeBench, textures: &[Texture], (first, number): (u32, u32)) {
         let one = |at| self.next.draw(bench, textures, first + at);

@@ -53,6 +53,7 @@ pub(super) struct Mode {
     pub(super) cost: f64,
 }
 
+/// Step of a derivative by differences: far above the rounding, far below the scale of a coordinate, which is 1.
 const JACOBIAN_STEP: f64 = 1e-4;
 /// The longest step that a search may take in one coordinate.
 const LONGEST_STEP: f64 = 1.5;

@@ -107,7 +107,7 @@ impl PastSolution {
         true
     }
 
-    /// (ln y, slip over the present velocity) `ago` days ago; `hint` walks along with growing `ago`.
+    /// (ln y, slip over the present velocity) `ago` days ago; `hint` moves along with growing `ago`.
     pub(super) fn at(&self, ago: f64, hint: &mut usize) -> (f64, f64) {
         if ago >= self.last.ago || self.panels.is_empty() {
             let creep = (-self.last.ln_y).exp();

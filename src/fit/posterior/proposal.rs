@@ -173,7 +173,7 @@ impl<'a> Side<'a> {
             })
     }
 
-    /// The same side with its proposal drawn up anew from what was drawn so far: where the weights lie, as
+    /// The same side with its proposal drawn up again from what was drawn so far: where the weights lie, as
     /// one normal shape for all textures, each with its share. Weights are levelled until they are worth
     /// enough draws to estimate a shape from.
     pub(super) fn refitted(&self, drafts: &[Draft]) -> Option<Self> {

@@ -77,7 +77,7 @@ impl Life {
     }
 
     /// The life that `seed` gives; a slope that its load brings to another end, or down in less than 0.4 of
-    /// its time, is drawn anew.
+    /// its time, is drawn again.
     pub fn draw(fate: Fate, seed: u64) -> Self {
         Self::draw_with_path(fate, seed).0
     }

@@ -68,7 +68,7 @@ impl Track {
         self.ends_unknown((now, since), Reason::NoData, text)
     }
 
-    /// Goes by other declarations from here on, and looks anew at the readings that it has where they concern some.
+    /// Goes by other declarations from here on, and looks again at the readings that it has where they concern some.
     pub(in crate::monitor) fn redeclare(
         &mut self,
         policy: &Policy,

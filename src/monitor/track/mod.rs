@@ -81,7 +81,7 @@ pub(super) struct Track {
     #[serde(default)]
     held: Held,
     silence: Silence,
-    /// Until when something that happened asks for a look, and what.
+    /// Until when something that happened calls for attention, and what.
     look: Option<(Timestamp, AlertCause)>,
     faulted: bool,
     backwards: bool,

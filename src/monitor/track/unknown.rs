@@ -112,7 +112,7 @@ impl Track {
         Some(self.unknown_alert((now, since), AlertState::Resolved, reason, text.to_owned()))
     }
 
-    /// When it began is part of the key, so that each time is reported anew.
+    /// When it began is part of the key, so that each time is reported again.
     fn unknown_alert(
         &self,
         (time, since): (Timestamp, Timestamp),

@@ -1,6 +1,6 @@
 //! Takes alerts to the hooks: a worker and a bounded queue each, retries that hold nothing up.
 //!
-//! The gravest goes first, whatever waits before it; of one benchmark one alert at a time. What has been superseded
+//! The most severe goes first, whatever waits before it; of one benchmark one alert at a time. What has been superseded
 //! while it waited is not reported any more.
 //!
 //! Orange, red and unknown are tried until the hook takes them, they are resolved or superseded, or

@@ -134,7 +134,7 @@ impl Worker {
         running.all(|run| place(&run.waiting.alert) != place(&waiting.alert))
     }
 
-    /// Starts the gravest alert that is due; on the way out everything is.
+    /// Starts the most severe alert that is due; on the way out everything is.
     fn start_next(&mut self, open: bool) -> bool {
         self.drop_what_is_over(open);
         let now = clock::later(Duration::ZERO);

@@ -28,7 +28,7 @@ fn user() -> Finding {
                     slipwatch doctor --user NAME";
         return Finding::new("user", CheckVerdict::Doubtful, text);
     }
-    let text = format!("looked at as user {}, as the daemon must run", geteuid());
+    let text = format!("checked as user {}, as the daemon must run", geteuid());
     Finding::new("user", CheckVerdict::Good, text)
 }
 

@@ -91,7 +91,7 @@ fn runnable(program: &Path) -> Result<String, String> {
         HookStart::Windows => {
             return Err(format!(
                 "{name}: its lines end as on Windows, so that the kernel finds no such interpreter; \
-                 write them anew with sed -i 's/\\r$//' {name}"
+                 write them again with sed -i 's/\\r$//' {name}"
             ));
         }
         HookStart::Script(words) => words,

@@ -108,7 +108,7 @@ impl Toa5Rows {
             return Ok(Vec::new());
         }
         if let Some(at) = text.find(MARK) {
-            // The power failed within a row, and the logger began anew behind it.
+            // The power failed within a row, and the logger began again behind it.
             self.table = None;
             self.header = vec![text[at..].to_owned()];
             return Err(self.line_fault(line, "a header within the line".to_owned()));

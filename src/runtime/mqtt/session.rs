@@ -36,7 +36,7 @@ pub(super) struct Session {
     broker: Broker,
     client_id: String,
     version: Version,
-    /// Made with the first connection; over TLS anew with each, so that other authorities hold from the next one on.
+    /// Made with the first connection; over TLS again with each, so that other authorities hold from the next one on.
     link: Option<Link>,
     /// Whether a broker has accepted this version of the protocol.
     is_accepted: bool,

@@ -197,7 +197,7 @@ struct StreamPosition {
 }
 
 impl StreamPosition {
-    /// What has changed since the last look; a comment where nothing has, so that a dead connection shows.
+    /// What has changed since the last time; a comment where nothing has, so that a dead connection shows.
     fn look(&mut self) -> Result<String, StoreError> {
         let Heads { step, event } = self.reader.heads()?;
         let sent = self.event.unwrap_or(event);

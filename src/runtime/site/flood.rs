@@ -1,4 +1,4 @@
-//! Many alerts at once: the gravest are sent singly, the others are reported in one message.
+//! Many alerts at once: the most severe are sent singly, the others are reported in one message.
 //!
 //! EEMUA 191 calls ten alarms in ten minutes a flood: beyond that nobody can act on them one by one.
 
@@ -35,7 +35,7 @@ impl OutgoingAlerts {
             alerts.clone_into(&mut outgoing.sent);
             return outgoing;
         }
-        // The gravest level first.
+        // The most severe level first.
         for mut group in groups.into_values().rev() {
             if group.len() > MOST_AT_ONCE + 1 {
                 group.sort_by_key(|alert| (alert.failure_time.is_none(), alert.failure_time));

@@ -113,7 +113,7 @@ impl FolderWatch {
                 waker.notify_one();
             }
         })
-        .inspect_err(|error| tracing::warn!(%error, "no watcher: files are looked at in turn"))
+        .inspect_err(|error| tracing::warn!(%error, "no watcher: files are read in turn"))
         .ok();
         Self {
             watcher,
@@ -133,7 +133,7 @@ impl FolderWatch {
             let Err(error) = watched else { return false };
             // A folder that is not there is reported by whoever lists it.
             if !matches!(error.kind, notify::ErrorKind::PathNotFound) && folder.is_dir() && self.reported.insert(folder.clone()) {
-                tracing::warn!(folder = %folder.display(), %error, "no watch: files are looked at in turn");
+                tracing::warn!(folder = %folder.display(), %error, "no watch: files are read in turn");
             }
             true
         });
