@@ -4,7 +4,7 @@
 
 use divan::{Bencher, black_box};
 use slipwatch::fit::{ConstantLoad, Exponent, PointReadings};
-use slipwatch::inversion::{FitReport, Inversion, Options};
+use slipwatch::inversion::{FitReport, Inversion, InversionOptions};
 use slipwatch::reading::{BenchmarkId, Series, days_since};
 use slipwatch::runtime::ingest::{ReadOptions, read_files};
 use std::path::Path;
@@ -40,7 +40,7 @@ fn least_squares_of_67_readings(bencher: Bencher) {
 
 #[divan::bench]
 fn everything_that_fit_reports_of_67_readings(bencher: Bencher) {
-    let inversion = Inversion::new(&series(), &Options::default());
+    let inversion = Inversion::new(&series(), &InversionOptions::default());
     bencher.bench_local(|| -> FitReport {
         let inversion = black_box(&inversion);
         inversion.report(&inversion.least_squares(), 0.0)

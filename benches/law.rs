@@ -4,7 +4,7 @@
 
 use divan::{Bencher, black_box};
 use slipwatch::fit::{Observation, Observations, Posterior, RateOptions};
-use slipwatch::forecast::Panel;
+use slipwatch::forecast::LawForecaster;
 use slipwatch::model::{Accuracy, Law, Load, LoadedLaw, Motion, Sensitivities, Trajectory};
 use slipwatch::reading::{BenchmarkId, Quantity, days_since};
 use slipwatch::runtime::ingest::{ReadOptions, read_files};
@@ -103,7 +103,7 @@ fn watched(count: u32) -> Observations {
 fn one_more_reading(bencher: Bencher, count: u32) {
     let watched = watched(count);
     bencher
-        .with_inputs(|| (Panel::default(), watched.clone()))
+        .with_inputs(|| (LawForecaster::default(), watched.clone()))
         .bench_values(|(mut panel, mut watched)| {
             let last = watched.values[watched.values.len() - 1];
             watched.values.push(Observation {
@@ -119,5 +119,5 @@ fn one_more_reading(bencher: Bencher, count: u32) {
 #[divan::bench]
 fn outlook_of_67_readings(bencher: Bencher) {
     let all = observations();
-    bencher.bench(|| Panel::default().update(black_box(&all), CRITICAL_MM_PER_DAY));
+    bencher.bench(|| LawForecaster::default().update(black_box(&all), CRITICAL_MM_PER_DAY));
 }

@@ -8,8 +8,8 @@
 
 use slipwatch::fit::Rate;
 use slipwatch::forecast::{
-    Dependence, FailureTimeLikelihood, Fate, Group, HORIZON_DAYS, Life, Panel, Passage, Snapshot,
-    groups,
+    Dependence, FailureTimeLikelihood, Fate, Group, HORIZON_DAYS, LawForecaster, Life, Passage,
+    Snapshot, groups,
 };
 
 const LEADS: [f64; 5] = [40.0, 20.0, 10.0, 5.0, 2.0];
@@ -43,7 +43,7 @@ struct Seen {
 
 /// What the readings up to `now` days predict, from then.
 fn passage(life: &Life, now: f64) -> Option<Seen> {
-    let outlook = Panel::default().update(&life.known(now), Life::CRITICAL_MM_PER_DAY)?;
+    let outlook = LawForecaster::default().update(&life.known(now), Life::CRITICAL_MM_PER_DAY)?;
     let later = now - outlook.now_days;
     let times = outlook.passage.times().iter();
     let times = times.map(|(days, share)| (days - later, *share));

@@ -5,32 +5,32 @@
 
 use slipwatch::reading::Recording;
 use slipwatch::runtime::ingest::{
-    Item, ReadOptions, TextFormat, TextRows, decode_message, read_files,
+    CSV, Item, NDJSON, ReadOptions, TOA5, TextFormat, TextRows, decode_message, read_files,
 };
 use slipwatch::runtime::tail::lines::Lines;
-use slipwatch::runtime::tail::records::{Channels, Frame, HEADER_BYTES, MAGIC, frame};
+use slipwatch::runtime::tail::records::{Channels, HEADER_BYTES, MAGIC, NextRecord, frame};
 use std::path::Path;
 
 /// Bytes as a CSV file.
 pub(crate) fn csv(bytes: &[u8]) {
     whole(bytes, "csv");
-    grown(bytes, TextFormat::Csv, "csv");
+    grown(bytes, &CSV, "csv");
 }
 
 /// Bytes as an NDJSON file.
 pub(crate) fn ndjson(bytes: &[u8]) {
     whole(bytes, "ndjson");
-    grown(bytes, TextFormat::Ndjson, "ndjson");
+    grown(bytes, &NDJSON, "ndjson");
 }
 
 /// Bytes as a Campbell TOA5 file.
 pub(crate) fn toa5(bytes: &[u8]) {
     whole(bytes, "dat");
-    grown(bytes, TextFormat::Toa5, "dat");
+    grown(bytes, &TOA5, "dat");
 }
 
 /// Reads the bytes as the daemon does a file that grows.
-fn grown(bytes: &[u8], format: TextFormat, extension: &str) {
+fn grown(bytes: &[u8], format: &TextFormat, extension: &str) {
     let mut lines = Lines::default();
     let (first, second) = bytes.split_at(bytes.len() / 2);
     let mut fed = lines.feed(first);
@@ -42,7 +42,7 @@ fn grown(bytes: &[u8], format: TextFormat, extension: &str) {
         for item in &rows.take(line.number, &text).items {
             check(item);
         }
-        if rows.is_lost() && format == TextFormat::Csv {
+        if rows.is_lost() && format.name == CSV.name {
             return;
         }
     }
@@ -55,9 +55,9 @@ pub(crate) fn mcap(bytes: &[u8]) {
     let mut channels = Channels::default();
     while let Some((header, after)) = rest.split_first_chunk::<HEADER_BYTES>() {
         let (opcode, length) = match frame(*header, after.len() as u64) {
-            Frame::Read { opcode, length } => (Some(opcode), length),
-            Frame::Skip { length } => (None, length),
-            Frame::Wait | Frame::End | Frame::Damaged { .. } => return,
+            NextRecord::Read { opcode, length } => (Some(opcode), length),
+            NextRecord::Skip { length } => (None, length),
+            NextRecord::Wait | NextRecord::End | NextRecord::Damaged { .. } => return,
         };
         let (body, next) = after.split_at(usize::try_from(length).expect("it fits the file"));
         rest = next;

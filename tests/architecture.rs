@@ -113,6 +113,14 @@ const IMPURE_NAMES: [&str; 7] = [
 /// Lines of a file without its tests.
 const LONGEST_FILE: usize = 500;
 
+/// Arguments of a function, as in clippy.toml; the members of a tuple count each.
+const MOST_ARGUMENTS: usize = 7;
+/// Functions that take more: of two states with their covariances, and of a whole course.
+const WITH_MORE: [&str; 3] = ["effect", "smooth_pair", "voight"];
+
+/// Names of types that stand more than once: the flags of each command, and three that do not yet say what distinguishes them.
+const NAMED_TWICE: [&str; 4] = ["Args", "Change", "Kind", "Sample"];
+
 /// One source file: its module's path and the text of what is not a test.
 struct Source {
     file: PathBuf,
@@ -452,6 +460,99 @@ fn the_core_is_pure() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
+/// The types that `text` defines, outside functions and other items.
+fn types(text: &str) -> impl Iterator<Item = &str> {
+    let kinds = ["struct ", "enum ", "trait ", "type ", "union "];
+    text.lines().filter_map(move |line| {
+        let shown = line
+            .strip_prefix("pub(")
+            .and_then(|rest| rest.split_once(") "));
+        let line = shown.map_or(line, |(_, item)| item);
+        let line = line.strip_prefix("pub ").unwrap_or(line);
+        let named = kinds.iter().find_map(|kind| line.strip_prefix(kind))?;
+        let end = named.find(|c: char| !(c.is_alphanumeric() || c == '_'));
+        Some(&named[..end.unwrap_or(named.len())])
+    })
+}
+
+#[test]
+fn a_name_of_a_type_stands_once() {
+    let sources = sources();
+    let mut places: BTreeMap<&str, Vec<String>> = BTreeMap::new();
+    for source in &sources {
+        for name in types(&source.text) {
+            let file = source.file.display().to_string();
+            places.entry(name).or_default().push(file);
+        }
+    }
+    places.retain(|name, files| files.len() > 1 && !NAMED_TWICE.contains(name));
+    assert!(places.is_empty(), "{places:#?}");
+}
+
+/// The functions that `text` defines, and how many arguments each takes, the members of a tuple counted each.
+fn functions(text: &str) -> Vec<(String, usize)> {
+    let tokens = tokens(text);
+    let mut found = Vec::new();
+    for at in 0..tokens.len() {
+        // `fn` without a name is a type.
+        if tokens[at] == "fn" && tokens.get(at + 1).is_some_and(|name| is_name(name)) {
+            found.push((tokens[at + 1].clone(), arguments(&tokens[at + 2..])));
+        }
+    }
+    found
+}
+
+/// Counts the arguments of a definition from behind its name on.
+fn arguments(tokens: &[String]) -> usize {
+    let mut angles = 0_usize;
+    let mut start = 0;
+    while tokens[start] != "(" || angles > 0 {
+        match tokens[start].as_str() {
+            "<" => angles += 1,
+            ">" if tokens[start - 1] != "-" => angles -= 1,
+            _ => {}
+        }
+        start += 1;
+    }
+    // Open brackets, and whether each stands where an argument's pattern or type is a tuple.
+    let (mut open, mut count, mut is_begun) = (vec![true], 0, false);
+    for (before, token) in tokens[start..].iter().zip(&tokens[start + 1..]) {
+        let is_counted = open.iter().all(|is_counted| *is_counted);
+        match token.as_str() {
+            "(" => open.push(is_counted && ["(", ","].contains(&before.as_str())),
+            "[" | "{" | "<" => open.push(false),
+            ">" if ["-", "="].contains(&before.as_str()) => {}
+            ")" | "]" | "}" | ">" => {
+                open.pop();
+                if open.is_empty() {
+                    return count + usize::from(is_begun);
+                }
+            }
+            "," if is_counted => {
+                count += usize::from(is_begun);
+                is_begun = false;
+                continue;
+            }
+            _ => {}
+        }
+        is_begun |= is_counted;
+    }
+    count
+}
+
+#[test]
+fn no_function_takes_more_arguments_by_putting_them_into_tuples() {
+    let mut wrong = Vec::new();
+    for source in sources() {
+        for (name, count) in functions(&source.text) {
+            if count > MOST_ARGUMENTS && !WITH_MORE.contains(&name.as_str()) {
+                wrong.push(format!("{}: {name}, {count}", source.file.display()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
 #[test]
 fn every_file_is_short_and_says_its_job_in_its_first_line() {
     let mut wrong = Vec::new();
@@ -543,6 +644,28 @@ mod the_reader_of_sources {
         }
         let clean = "use std::time::Duration; use std::{fmt, collections::BTreeMap};";
         assert!(impurities(clean).is_empty());
+    }
+
+    #[test]
+    fn sees_the_types_that_a_file_defines() {
+        let text = "pub struct A {\npub(super) enum B<T> {\npub(in crate::runtime) type C = u8;\ntrait D: E {}\n    \
+                    type Output = u8;\nfn f() {}\n";
+        assert_eq!(types(text).collect::<Vec<_>>(), ["A", "B", "C", "D"]);
+    }
+
+    #[test]
+    fn counts_the_members_of_tuples_among_the_arguments() {
+        let count = |text: &str| functions(text)[0].1;
+        assert_eq!(count("fn f() -> (u8, u8) { g(1, 2) }"), 0);
+        assert_eq!(count("fn f(&self, a: Vec<(u8, u8)>,) {}"), 2);
+        assert_eq!(
+            count("fn f<F: Fn(u8, u8)>((a, b): (u8, u8), c: [u8; 2]) {}"),
+            3
+        );
+        assert_eq!(
+            count("fn f(each: impl Fn(u8, u8) -> u8, c: &dyn Fn(u8, u8)) {}"),
+            2
+        );
     }
 
     #[test]

@@ -185,7 +185,7 @@ pub(crate) const SUBJECTS: [Subject; 13] = [
         averaging_hours: None,
         until: None,
         figures: &["readings", "residual"],
-        comment: "All of it lies in the reading: no load was adopted, and the monitor replaying the record raises no alert but for its gaps. One of the steps is told as two, 45 mm and then 21 mm three weeks later.",
+        comment: "All of it lies in the reading: no load was adopted, and the monitor replaying the record raises no alert but for its gaps. One of the steps is reported as two, 45 mm and then 21 mm three weeks later.",
     },
     Subject {
         name: "lanzada",

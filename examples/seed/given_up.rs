@@ -3,7 +3,7 @@
 use super::recorded::vaiont_day;
 use super::vaiont::PAPER_LINE_DAY;
 use anyhow::Result;
-use slipwatch::inversion::{Inversion, Options};
+use slipwatch::inversion::{Inversion, InversionOptions};
 use slipwatch::reading::{BenchmarkId, Recording, Series};
 
 /// The benchmarks whose fits are near 1/(`t_c` - t).
@@ -30,7 +30,7 @@ pub(crate) fn trials(recording: &Recording) -> Result<Vec<Trial>> {
         for id in BENCHMARKS {
             let series = recording.series(Some(&BenchmarkId::new(id)), None)?;
             let series = exhausted(series, loss_per_day)?;
-            let fit = Inversion::new(&series, &Options::default()).least_squares();
+            let fit = Inversion::new(&series, &InversionOptions::default()).least_squares();
             let m = fit.best().map(|best| 1.0 / (1.0 - best.law.p));
             of.push((m, last_gain(&series)?));
         }

@@ -3,7 +3,9 @@
 use super::recorded::{report, velocities};
 use anyhow::{Context, Result};
 use slipwatch::fit::{ConstantLoad, Exponent};
-use slipwatch::inversion::{FitReport, Inversion, Options, SweepOptions, SweepReport, sweep};
+use slipwatch::inversion::{
+    FitReport, Inversion, InversionOptions, SweepOptions, SweepReport, sweep,
+};
 use slipwatch::reading::{Series, Timestamp};
 
 /// 1984.9, 1987.0 and 1987.9.
@@ -27,9 +29,9 @@ pub(crate) struct Fit {
 
 /// The displacement readings of 1982.9 to 1987.9.
 pub(crate) fn readings(whole: &Series) -> Result<Series> {
-    let options = Options {
+    let options = InversionOptions {
         until: Some(FIVE_YEARS.parse()?),
-        ..Options::default()
+        ..InversionOptions::default()
     };
     Ok(Inversion::new(whole, &options).series().clone())
 }
@@ -43,9 +45,9 @@ pub(crate) fn fits(series: &Series) -> Vec<Fit> {
         Exponent::Fixed(IMPOSED_M),
     ];
     let fit = |exponent| {
-        let options = Options {
+        let options = InversionOptions {
             exponent,
-            ..Options::default()
+            ..InversionOptions::default()
         };
         let inversion = Inversion::new(series, &options);
         let least_squares = inversion.least_squares();
@@ -60,7 +62,7 @@ pub(crate) fn fits(series: &Series) -> Vec<Fit> {
 
 /// The inversion of the velocities between the readings.
 pub(crate) fn velocity_fit(series: &Series) -> Result<FitReport> {
-    Ok(report(&velocities(series)?, &Options::default()))
+    Ok(report(&velocities(series)?, &InversionOptions::default()))
 }
 
 /// t_max every quarter of a year from two to five years after the start.
@@ -71,7 +73,7 @@ pub(crate) fn growing(series: &Series) -> Result<SweepReport> {
         last: Some(last),
         steps: STEPS,
     };
-    Ok(sweep(series, &Options::default(), &steps))
+    Ok(sweep(series, &InversionOptions::default(), &steps))
 }
 
 /// Whether `t_max` is before the end of 1986.

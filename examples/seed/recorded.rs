@@ -1,7 +1,7 @@
 //! The readings of both slopes, reconstructions unless others are given, and displacement and velocity out of each other.
 
 use anyhow::{Context, Result};
-use slipwatch::inversion::{FitReport, Inversion, Options};
+use slipwatch::inversion::{FitReport, Inversion, InversionOptions};
 use slipwatch::reading::{
     Channel, Quantity, Reading, Recording, Series, Timestamp, Unit, after_days, days_since,
 };
@@ -115,7 +115,7 @@ fn recording(folder: &Path, name: &str) -> Result<Recording> {
 }
 
 /// One inversion with everything that is said of it; the clock stays out.
-pub(crate) fn report(series: &Series, options: &Options) -> FitReport {
+pub(crate) fn report(series: &Series, options: &InversionOptions) -> FitReport {
     let inversion = Inversion::new(series, options);
     inversion.report(&inversion.least_squares(), 0.0)
 }

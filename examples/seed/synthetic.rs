@@ -9,7 +9,7 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use slipwatch::fit::{ConstantLoad, Observation, Observations, Posterior, RateOptions};
-use slipwatch::inversion::{Inversion, Options};
+use slipwatch::inversion::{Inversion, InversionOptions};
 use slipwatch::model::{Accuracy, Law, Trajectory};
 use slipwatch::reading::{
     BenchmarkId, Quantity, Reading, Series, Timestamp, Unit, after_days, days_since,
@@ -139,7 +139,8 @@ fn series(seed: u64, kind: &Kind) -> Result<Series> {
 }
 
 fn draw(series: &Series) -> Result<Draw> {
-    let least_squares: ConstantLoad = Inversion::new(series, &Options::default()).least_squares();
+    let least_squares: ConstantLoad =
+        Inversion::new(series, &InversionOptions::default()).least_squares();
     let best = least_squares.best().context("no fit")?;
     let paper = best.law.paper();
     let posterior = posterior(series).context("no posterior")?;

@@ -4,7 +4,7 @@ use super::recorded::{displacements, report};
 use super::simplex::{self, Found};
 use anyhow::Result;
 use slipwatch::fit::{ConstantLoad, Exponent};
-use slipwatch::inversion::{Alternative, FitReport, Inversion, Options};
+use slipwatch::inversion::{Alternative, FitReport, Inversion, InversionOptions};
 use slipwatch::reading::{BenchmarkId, Recording, Series};
 
 /// The paper's m of each benchmark, in its order.
@@ -44,11 +44,11 @@ pub(crate) enum Side {
 pub(crate) fn inverted(recording: &Recording) -> Result<Vec<Benchmark>> {
     let one = |(id, paper_m): (&'static str, f64)| {
         let series = recording.series(Some(&BenchmarkId::new(id)), None)?;
-        let inversion = Inversion::new(series, &Options::default());
+        let inversion = Inversion::new(series, &InversionOptions::default());
         let least_squares = inversion.least_squares();
-        let imposed = Options {
+        let imposed = InversionOptions {
             exponent: Exponent::Fixed(paper_m),
-            ..Options::default()
+            ..InversionOptions::default()
         };
         Ok(Benchmark {
             id,
@@ -58,7 +58,7 @@ pub(crate) fn inverted(recording: &Recording) -> Result<Vec<Benchmark>> {
             simplex: simplex::fit(series)?,
             least_squares,
             at_paper_m: Inversion::new(series, &imposed).least_squares(),
-            from_displacement: report(&displacements(series), &Options::default()),
+            from_displacement: report(&displacements(series), &InversionOptions::default()),
         })
     };
     PAPER.into_iter().map(one).collect()

@@ -1,7 +1,7 @@
 //! How poorly La Clapière's displacement tells m and `x_i`: the valley of the rms about its least.
 
 use slipwatch::fit::Exponent;
-use slipwatch::inversion::{Inversion, Options};
+use slipwatch::inversion::{Inversion, InversionOptions};
 use slipwatch::reading::Series;
 
 /// An rms this much above the least, relative, is as good.
@@ -58,9 +58,9 @@ fn ends(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
 /// The fits of `series` with m imposed, beside the least rms of all.
 pub(crate) fn valley(series: &Series) -> Option<Valley> {
     let best = |exponent| {
-        let options = Options {
+        let options = InversionOptions {
             exponent,
-            ..Options::default()
+            ..InversionOptions::default()
         };
         let fit = Inversion::new(series, &options).least_squares();
         fit.best().copied()

@@ -2,7 +2,7 @@
 
 use slipwatch::forecast::{Corpus, Life};
 use slipwatch::reading::Timestamp;
-use slipwatch::score::{History, Outcome};
+use slipwatch::score::{Outcome, WholeRecord};
 
 /// What a series is. Scores of one kind say nothing of another, and stand apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -59,7 +59,7 @@ pub(crate) struct Subject {
     pub(crate) family: String,
     /// Of the first reading, which is day 0; `None` of a simulated life.
     pub(crate) epoch: Option<Timestamp>,
-    pub(crate) history: History,
+    pub(crate) history: WholeRecord,
     pub(crate) truth: Truth,
     /// Days before the failure at which it is looked at; of no use where it stood.
     pub(crate) leads: Vec<f64>,
@@ -98,7 +98,7 @@ impl Subject {
             kind: Kind::Simulated,
             epoch: None,
             family: format!("{:?}", life.fate).to_lowercase(),
-            history: History {
+            history: WholeRecord {
                 observations: life.known(f64::INFINITY),
                 flow: Vec::new(),
                 critical_mm_per_day: Life::CRITICAL_MM_PER_DAY,

@@ -10,7 +10,7 @@ use anyhow::{Context, Result};
 use jiff::SignedDuration;
 use slipwatch::reading::{Recording, Series, Timestamp, days_since};
 use slipwatch::runtime::ingest::{ReadOptions, read_files};
-use slipwatch::score::History;
+use slipwatch::score::WholeRecord;
 use std::path::{Path, PathBuf};
 
 /// The default of a site file: passing 1 m/day is failure, mm/day.
@@ -187,7 +187,7 @@ impl Source {
         };
         let river = self.flow.map(named).transpose()?;
         let channels = river.map_or(&[][..], std::slice::from_ref);
-        let mut history = History::of(series, channels, CRITICAL_MM_PER_DAY);
+        let mut history = WholeRecord::of(series, channels, CRITICAL_MM_PER_DAY);
         if let Truth::FailedAt(failure) = truth {
             let values = &mut history.observations.values;
             values.retain(|value| value.t_days <= failure);

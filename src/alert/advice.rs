@@ -1,6 +1,6 @@
 //! What each level asks people to do, in words; the site's own emergency plan says how.
 
-use super::evidence::Cause;
+use super::evidence::AlertCause;
 use super::level::Level;
 use super::policy::Policy;
 
@@ -70,7 +70,7 @@ impl Policy {
                 "acceleration of {} mm/day per day or more",
                 threshold(&|one| one.acceleration_mm_per_day2)?
             ),
-            (rule, _) => match (self.declared_rule(rule), Cause::named(rule)) {
+            (rule, _) => match (self.declared_rule(rule), AlertCause::named(rule)) {
                 (Some(declared), _) => declared.words(None),
                 (None, Some(cause)) => cause.words().to_owned(),
                 (None, None) => return None,

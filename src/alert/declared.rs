@@ -1,6 +1,6 @@
 //! Rules that a site declares beside the built-in ones: conditions, all or any of which hold for a time, call a level.
 
-use super::evidence::{Cause, Evidence};
+use super::evidence::{AlertCause, AlertEvidence};
 use super::level::Level;
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
@@ -57,13 +57,13 @@ pub enum Condition {
         /// From the newest reading; the time until the next one is added.
         within: SignedDuration,
     },
-    /// Something that asks for a look has happened.
-    Happened(Cause),
+    /// Something that calls for attention has happened.
+    Happened(AlertCause),
 }
 
 impl Condition {
     /// Whether it holds; `None` where the evidence does not show it.
-    fn holds(&self, evidence: &Evidence) -> Option<bool> {
+    fn holds(&self, evidence: &AlertEvidence) -> Option<bool> {
         let figure = |value: Option<f64>, limit: f64| Some(value? >= limit);
         match *self {
             Self::Velocity(limit) => figure(evidence.velocity_mm_per_day, limit),
@@ -81,11 +81,11 @@ impl Condition {
     }
 
     /// In words, with the figure of the evidence where there is one.
-    fn words(&self, evidence: Option<&Evidence>) -> String {
+    fn words(&self, evidence: Option<&AlertEvidence>) -> String {
         let shown = |value: Option<f64>, unit: &str| {
             value.map_or_else(String::new, |value| format!(" ({value:.3}{unit})"))
         };
-        let of = |figure: fn(&Evidence) -> Option<f64>| evidence.and_then(figure);
+        let of = |figure: fn(&AlertEvidence) -> Option<f64>| evidence.and_then(figure);
         match *self {
             Self::Velocity(limit) => format!(
                 "velocity of {limit} mm/day or more{}",
@@ -119,7 +119,7 @@ impl Condition {
 }
 
 /// Degrees; 0 on a slope that moves backwards.
-pub(super) fn tangent_angle(evidence: &Evidence, steady_mm_per_day: f64) -> Option<f64> {
+pub(super) fn tangent_angle(evidence: &AlertEvidence, steady_mm_per_day: f64) -> Option<f64> {
     let ratio = evidence.velocity_mm_per_day?.max(0.0) / steady_mm_per_day;
     Some(ratio.atan().to_degrees())
 }
@@ -131,7 +131,7 @@ impl DeclaredRule {
     }
 
     /// Whether its conditions hold; `None` where the evidence does not decide it.
-    pub(super) fn holds(&self, evidence: &Evidence) -> Option<bool> {
+    pub(super) fn holds(&self, evidence: &AlertEvidence) -> Option<bool> {
         let decisive = self.combination == Combination::Any;
         let mut is_open = false;
         for condition in &self.conditions {
@@ -145,7 +145,7 @@ impl DeclaredRule {
     }
 
     /// Its conditions in words, with the figures of the evidence where it is given.
-    pub fn words(&self, evidence: Option<&Evidence>) -> String {
+    pub fn words(&self, evidence: Option<&AlertEvidence>) -> String {
         let joint = match self.combination {
             Combination::All => " and ",
             Combination::Any => " or ",

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// What is known of one benchmark after a reading.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Evidence {
+pub struct AlertEvidence {
     /// Data time.
     pub now: Timestamp,
     /// Chance of a collapse before an evacuation that the next reading calls would end, where there is a forecast.
@@ -21,15 +21,15 @@ pub struct Evidence {
     pub displacement_mm: Option<f64>,
     /// Latest observed acceleration, mm/day per day.
     pub acceleration_mm_per_day2: Option<f64>,
-    /// What else asks for a look: a flip to instability, an intercept drifting in.
-    pub causes: Vec<Cause>,
+    /// What else calls for attention: a flip to instability, an intercept drifting in.
+    pub causes: Vec<AlertCause>,
     /// Chances of a collapse within other spans, that declared rules ask for.
     pub chances: Vec<(SignedDuration, f64)>,
     /// Declared rules whose conditions have held for long enough, by their place in the policy.
     pub due: Vec<usize>,
 }
 
-impl Evidence {
+impl AlertEvidence {
     /// Chance of a collapse within a span that a declared rule asks for.
     pub(super) fn chance_within(&self, span: SignedDuration) -> Option<f64> {
         let own = self.chances.iter().find(|(within, _)| *within == span);
@@ -37,10 +37,10 @@ impl Evidence {
     }
 }
 
-/// What asks for a look although no chance is large.
+/// What calls for attention although no chance is large.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Cause {
+pub enum AlertCause {
     /// The regime turned unstable.
     RegimeFlip,
     /// The inverse-velocity intercept comes nearer.
@@ -53,7 +53,7 @@ pub enum Cause {
     MovesBackwards,
 }
 
-impl Cause {
+impl AlertCause {
     /// Each.
     pub const ALL: [Self; 5] = [
         Self::RegimeFlip,

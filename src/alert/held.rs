@@ -1,7 +1,7 @@
 //! Which declared rules are due: since when their conditions have held.
 
 use super::declared::{Condition, DeclaredRule, PREFIX};
-use super::evidence::Evidence;
+use super::evidence::AlertEvidence;
 use super::policy::Policy;
 use crate::reading::Timestamp;
 use jiff::SignedDuration;
@@ -57,7 +57,7 @@ impl Held {
     }
 
     /// Takes the evidence of one reading and notes in it which rules have held for long enough.
-    pub fn update(&mut self, policy: &Policy, evidence: &mut Evidence) {
+    pub fn update(&mut self, policy: &Policy, evidence: &mut AlertEvidence) {
         self.0
             .retain(|name, _| policy.rules.iter().any(|rule| rule.name == *name));
         for (index, rule) in policy.rules.iter().enumerate() {
@@ -107,17 +107,17 @@ mod tests {
         within: DAY,
     };
 
-    fn evidence(hours: i64, velocity: f64, chance: Option<f64>) -> Evidence {
-        Evidence {
+    fn evidence(hours: i64, velocity: f64, chance: Option<f64>) -> AlertEvidence {
+        AlertEvidence {
             now: Timestamp::UNIX_EPOCH + hours.hours(),
             chance_within_outlook: chance.map(|_| 0.0),
             velocity_mm_per_day: Some(velocity),
             chances: chance.map(|chance| (DAY, chance)).into_iter().collect(),
-            ..Evidence::default()
+            ..AlertEvidence::default()
         }
     }
 
-    fn called(policy: &Policy, held: &mut Held, mut evidence: Evidence) -> (Level, String) {
+    fn called(policy: &Policy, held: &mut Held, mut evidence: AlertEvidence) -> (Level, String) {
         held.update(policy, &mut evidence);
         let call = policy.call(&evidence);
         (call.level, call.rule.into_owned())

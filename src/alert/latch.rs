@@ -4,7 +4,7 @@
 //! highest velocity seen at this level, without gaining, for a whole evacuation time in which the evidence
 //! called for less; or it has held a velocity under the critical one, without gaining, for the stated time.
 
-use super::evidence::Evidence;
+use super::evidence::AlertEvidence;
 use super::level::Level;
 use super::policy::Policy;
 use super::rules::Call;
@@ -43,14 +43,14 @@ pub struct Latch {
     /// Highest settled velocity since the level was entered, mm/day.
     peak_velocity: f64,
     /// While the evidence calls for less: the motion at half the peak velocity or under.
-    slow: Option<Stretch>,
+    slow: Option<SteadyStretch>,
     /// While the evidence calls for less: the motion under the critical velocity.
-    steady: Option<Stretch>,
+    steady: Option<SteadyStretch>,
 }
 
 /// A stretch of motion that does not gain.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
-struct Stretch {
+struct SteadyStretch {
     since: Timestamp,
     velocity: f64,
     readings: usize,
@@ -75,7 +75,7 @@ impl Default for Latch {
     }
 }
 
-impl Stretch {
+impl SteadyStretch {
     /// One more reading of the stretch, or a new one, or none where `holds` is not the case.
     fn go_on(stretch: Option<Self>, holds: Holds, now: Timestamp, velocity: f64) -> Option<Self> {
         if holds == Holds::No {
@@ -127,7 +127,7 @@ impl Latch {
     }
 
     /// Takes the evidence of one reading and says how the level changes.
-    pub fn update(&mut self, policy: &Policy, evidence: &Evidence) -> Vec<Transition> {
+    pub fn update(&mut self, policy: &Policy, evidence: &AlertEvidence) -> Vec<Transition> {
         let call = policy.call(evidence);
         if call.level > self.level {
             return vec![self.enter(evidence, &call)];
@@ -140,12 +140,12 @@ impl Latch {
     }
 
     /// Takes evidence without a forecast, by which the level may rise and nothing else.
-    pub fn raise(&mut self, policy: &Policy, evidence: &Evidence) -> Option<Transition> {
+    pub fn raise(&mut self, policy: &Policy, evidence: &AlertEvidence) -> Option<Transition> {
         let call = policy.call(evidence);
         (call.level > self.level).then(|| self.enter(evidence, &call))
     }
 
-    fn observe(&mut self, policy: &Policy, evidence: &Evidence, call: &Call) {
+    fn observe(&mut self, policy: &Policy, evidence: &AlertEvidence, call: &Call) {
         // Backwards is motion too: a reading that fell back is no deceleration.
         let Some(velocity) = evidence.settled_velocity_mm_per_day.map(f64::abs) else {
             return;
@@ -154,27 +154,27 @@ impl Latch {
         let less = call.level < self.level;
         let slowed = less && velocity <= SLOWED_TO * self.peak_velocity;
         let steady = less && velocity < policy.critical_velocity_mm_per_day;
-        self.slow = Stretch::go_on(self.slow, slowed.into(), evidence.now, velocity);
-        self.steady = Stretch::go_on(self.steady, steady.into(), evidence.now, velocity);
+        self.slow = SteadyStretch::go_on(self.slow, slowed.into(), evidence.now, velocity);
+        self.steady = SteadyStretch::go_on(self.steady, steady.into(), evidence.now, velocity);
     }
 
     fn reason_to_fall(
         &self,
         policy: &Policy,
-        evidence: &Evidence,
+        evidence: &AlertEvidence,
         call: &Call,
     ) -> Option<&'static str> {
         if call.level >= self.level {
             return None;
         }
-        if Stretch::lasts(self.slow, evidence.now, policy.evacuation_time) == Holds::Yes {
+        if SteadyStretch::lasts(self.slow, evidence.now, policy.evacuation_time) == Holds::Yes {
             return Some("decelerated");
         }
-        (Stretch::lasts(self.steady, evidence.now, policy.steady_for) == Holds::Yes)
+        (SteadyStretch::lasts(self.steady, evidence.now, policy.steady_for) == Holds::Yes)
             .then_some("steady")
     }
 
-    fn enter(&mut self, evidence: &Evidence, call: &Call) -> Transition {
+    fn enter(&mut self, evidence: &AlertEvidence, call: &Call) -> Transition {
         self.begin(evidence, call.level);
         Transition {
             level: call.level,
@@ -184,7 +184,12 @@ impl Latch {
         }
     }
 
-    fn fall(&mut self, evidence: &Evidence, call: &Call, rule: &'static str) -> Vec<Transition> {
+    fn fall(
+        &mut self,
+        evidence: &AlertEvidence,
+        call: &Call,
+        rule: &'static str,
+    ) -> Vec<Transition> {
         let now = evidence.now;
         let left = Transition {
             level: self.level,
@@ -199,7 +204,7 @@ impl Latch {
         vec![left, self.enter(evidence, call)]
     }
 
-    fn begin(&mut self, evidence: &Evidence, level: Level) {
+    fn begin(&mut self, evidence: &AlertEvidence, level: Level) {
         let velocity = evidence.settled_velocity_mm_per_day.map_or(0.0, f64::abs);
         *self = Self {
             level,
@@ -216,15 +221,15 @@ mod tests {
     use super::*;
     use jiff::ToSpan;
 
-    fn evidence(hours: i64, chance: f64, velocity: f64) -> Evidence {
+    fn evidence(hours: i64, chance: f64, velocity: f64) -> AlertEvidence {
         let start: Timestamp = "2020-01-01T00:00:00Z".parse().unwrap();
-        Evidence {
+        AlertEvidence {
             now: start + hours.hours(),
             chance_within_evacuation_time: Some(chance),
             chance_within_outlook: Some(chance),
             velocity_mm_per_day: Some(velocity),
             settled_velocity_mm_per_day: Some(velocity),
-            ..Evidence::default()
+            ..AlertEvidence::default()
         }
     }
 

@@ -12,7 +12,7 @@ mod policy;
 mod rules;
 
 pub use declared::{Combination, Condition, DeclaredRule};
-pub use evidence::{Cause, Evidence};
+pub use evidence::{AlertCause, AlertEvidence};
 pub use held::Held;
 pub use latch::{Entered, Latch, Transition};
 pub use level::Level;

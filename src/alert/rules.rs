@@ -1,6 +1,6 @@
 //! The rules: which level the evidence calls for, before any memory.
 
-use super::evidence::Evidence;
+use super::evidence::AlertEvidence;
 use super::level::Level;
 use super::policy::{Policy, Threshold};
 use std::borrow::Cow;
@@ -15,8 +15,8 @@ pub struct Call {
 }
 
 impl Policy {
-    /// The gravest call that the evidence makes.
-    pub fn call(&self, evidence: &Evidence) -> Call {
+    /// The most severe call that the evidence makes.
+    pub fn call(&self, evidence: &AlertEvidence) -> Call {
         let reaches =
             |chance: Option<f64>, limit: f64| chance.is_some_and(|chance| chance >= limit);
         let is_past = evidence
@@ -76,7 +76,7 @@ impl Policy {
 }
 
 impl Threshold {
-    fn exceeded(&self, evidence: &Evidence) -> Option<&'static str> {
+    fn exceeded(&self, evidence: &AlertEvidence) -> Option<&'static str> {
         let over = |value: Option<f64>, limit: Option<f64>| match (value, limit) {
             (Some(value), Some(limit)) => value >= limit,
             (None, _) | (_, None) => false,

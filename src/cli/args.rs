@@ -19,7 +19,7 @@ use std::path::PathBuf;
 
 /// How results look.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
-pub enum Format {
+pub enum OutputFormat {
     /// For people.
     #[default]
     Text,
@@ -32,7 +32,7 @@ pub enum Format {
 pub struct OutputArgs {
     /// How results look on stdout
     #[arg(long, value_enum, default_value_t, value_name = "FORMAT")]
-    pub format: Format,
+    pub format: OutputFormat,
 }
 
 impl OutputArgs {
@@ -47,8 +47,8 @@ impl OutputArgs {
     ) -> anyhow::Result<()> {
         let mut stdout = io::stdout().lock();
         match self.format {
-            Format::Json => writeln!(stdout, "{}", serde_json::to_string(result)?)?,
-            Format::Text => write!(stdout, "{}", text(result))?,
+            OutputFormat::Json => writeln!(stdout, "{}", serde_json::to_string(result)?)?,
+            OutputFormat::Text => write!(stdout, "{}", text(result))?,
         }
         stdout.flush()?;
         Ok(())

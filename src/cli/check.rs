@@ -1,8 +1,8 @@
 //! `check CONFIG`: whether the site file is right, and what its files would be taken for.
 
-use super::args::{Format, OutputArgs};
+use super::args::{OutputArgs, OutputFormat};
 use super::{exit, preview as text};
-use crate::config::{self, ConfigError, Problem, Summary};
+use crate::config::{self, ConfigError, ConfigProblem, ConfigSummary};
 use crate::runtime::preview::{Preview, preview};
 use crate::runtime::sampling;
 use schemars::JsonSchema;
@@ -37,7 +37,7 @@ struct Unwatched {
 #[derive(Debug, JsonSchema, Serialize)]
 pub(super) struct Shown<'a> {
     #[serde(flatten)]
-    summary: &'a Summary,
+    summary: &'a ConfigSummary,
     /// None where the files were not looked at.
     preview: Option<&'a Preview>,
 }
@@ -46,7 +46,7 @@ pub(super) struct Shown<'a> {
 #[derive(Debug, JsonSchema, Serialize)]
 pub(super) struct Refused<'a> {
     /// In the order of the file.
-    problems: &'a [Problem],
+    problems: &'a [ConfigProblem],
 }
 
 /// Says what the site file amounts to. Warnings and problems go to stderr; with JSON the problems
@@ -57,7 +57,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
 
 /// The same for another command that has written a config.
 pub(super) fn check(file: &Path, output: OutputArgs, looks_at_files: bool) -> anyhow::Result<()> {
-    let json = output.format == Format::Json;
+    let json = output.format == OutputFormat::Json;
     let mut stdout = std::io::stdout().lock();
     match config::check(file) {
         Ok(mut summary) => {
@@ -97,14 +97,14 @@ pub(super) fn check(file: &Path, output: OutputArgs, looks_at_files: bool) -> an
 }
 
 /// Looks at what lies in the sources' files now; doubts about it become warnings.
-fn look(file: &Path, summary: &mut Summary) -> Result<Preview, ConfigError> {
+fn look(file: &Path, summary: &mut ConfigSummary) -> Result<Preview, ConfigError> {
     let config = config::load(file)?;
     let preview = preview(&config);
     let place = file.display();
-    let doubts = sampling::doubts(&config, &preview).into_iter();
+    let sampling_warnings = sampling::sampling_warnings(&config, &preview).into_iter();
     summary
         .warnings
-        .extend(doubts.map(|line| format!("{place}: warning: {line}")));
+        .extend(sampling_warnings.map(|line| format!("{place}: warning: {line}")));
     Ok(preview)
 }
 

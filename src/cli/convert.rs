@@ -1,6 +1,6 @@
 //! `convert IN OUT`: readings from one file format to another.
 
-use super::args::{FileArgs, Format, OutputArgs, warn_of};
+use super::args::{FileArgs, OutputArgs, OutputFormat, warn_of};
 use super::exit;
 use crate::runtime::ingest;
 use std::io::Write;
@@ -30,8 +30,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     let mut stdout = std::io::stdout().lock();
     match args.output.format {
-        Format::Json => writeln!(stdout, "{}", serde_json::to_string(&report)?)?,
-        Format::Text => {
+        OutputFormat::Json => writeln!(stdout, "{}", serde_json::to_string(&report)?)?,
+        OutputFormat::Text => {
             for series in &report.series {
                 let (id, quantity) = (&series.benchmark, series.quantity);
                 let (readings, unit) = (series.readings, series.unit);

@@ -1,9 +1,9 @@
 //! `doctor CONFIG`: whether this machine can carry the site.
 
-use super::args::{Format, OutputArgs};
+use super::args::{OutputArgs, OutputFormat};
 use super::exit::{AsUser, UsageError};
 use crate::config;
-use crate::runtime::doctor::{self, Finding, Verdict};
+use crate::runtime::doctor::{self, CheckVerdict, Finding};
 use anyhow::Context;
 use nix::unistd::{Uid, User};
 use schemars::JsonSchema;
@@ -47,7 +47,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let findings = doctor::examine(&config);
     let report = DoctorReport { findings };
     args.output.print(&report, text)?;
-    let is_wrong = |finding: &&Finding| finding.verdict == Verdict::Wrong;
+    let is_wrong = |finding: &&Finding| finding.verdict == CheckVerdict::Wrong;
     match report.findings.iter().filter(is_wrong).count() {
         0 => Ok(()),
         wrong => Err(Unfit(wrong).into()),
@@ -66,8 +66,8 @@ fn run_as(name: &str, args: &Args) -> anyhow::Result<()> {
         (None, Err(_)) => return Err(UsageError(format!("--user: there is no user {name}")).into()),
     };
     let format = match args.output.format {
-        Format::Text => "text",
-        Format::Json => "json",
+        OutputFormat::Text => "text",
+        OutputFormat::Json => "json",
     };
     let ended = std::process::Command::new(std::env::current_exe()?)
         .arg("doctor")

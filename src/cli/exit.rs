@@ -4,7 +4,7 @@ use crate::config::ConfigError;
 use crate::model::LawError;
 use crate::reading::{MergeError, SelectError};
 use crate::runtime::ingest::IngestError;
-use crate::runtime::pulse::PulseError;
+use crate::runtime::pulse::ReportingError;
 use crate::runtime::replay::ReplayError;
 use crate::runtime::run::RunError;
 use crate::runtime::sandbox::SandboxError;
@@ -69,8 +69,8 @@ fn code_of(error: &(dyn Error + 'static)) -> Option<u8> {
         return Some(match error {
             RunError::State { .. } => IO,
             RunError::Follow(_) => TROUBLE,
-            RunError::Pulse(PulseError::Token(_)) => CONFIG,
-            RunError::Pulse(PulseError::Listen(_)) => UNAVAILABLE,
+            RunError::Pulse(ReportingError::Token(_)) => CONFIG,
+            RunError::Pulse(ReportingError::Listen(_)) => UNAVAILABLE,
         });
     }
     if let Some(error) = error.downcast_ref::<ReplayError>() {

@@ -2,12 +2,13 @@
 
 use super::args::{OutputArgs, ReadingArgs};
 use super::bar;
-use super::table::{Table, number, time};
+use super::table::{TextTable, number, time};
 use crate::alert::Policy;
 use crate::config::value;
 use crate::fit::Exponent;
 use crate::inversion::{
-    Estimate, FitReport, Inversion, Options, RegimeReport, TogetherReport, UnderPrior, together,
+    Estimate, FitReport, FittedRegime, Inversion, InversionOptions, TogetherReport, UnderPrior,
+    together,
 };
 use crate::reading::{BenchmarkId, Quantity, Series, Timestamp, Unit};
 use crate::runtime::clock::Stopwatch;
@@ -49,15 +50,15 @@ pub(super) struct InversionArgs {
 
 impl InversionArgs {
     /// The same for the inversion.
-    pub(super) fn options(&self, readings: &ReadingArgs) -> Options {
+    pub(super) fn options(&self, readings: &ReadingArgs) -> InversionOptions {
         let policy = readings.policy(&Policy::default());
-        Options {
+        InversionOptions {
             from: self.from,
             until: self.until,
             exponent: self.fix.map_or(Exponent::Free, Exponent::Fixed),
             critical_velocity_mm_per_day: policy.critical_velocity_mm_per_day,
             evacuation_time: policy.evacuation_time,
-            ..Options::default()
+            ..InversionOptions::default()
         }
     }
 }
@@ -96,7 +97,7 @@ pub(super) struct SiteReport {
 }
 
 /// Inverts a series; `seconds` is what the least squares took.
-pub(super) fn report(series: &Series, options: &Options) -> FitReport {
+pub(super) fn report(series: &Series, options: &InversionOptions) -> FitReport {
     let inversion = Inversion::new(series, options);
     let stopwatch = Stopwatch::start();
     let least_squares = inversion.least_squares();
@@ -145,11 +146,11 @@ fn text(report: &FitReport) -> String {
     out
 }
 
-fn summary(report: &FitReport) -> Table {
+fn summary(report: &FitReport) -> TextTable {
     let percent = |share: Option<f64>| {
         share.map_or("-".to_owned(), |share| format!("{:.0} %", 100.0 * share))
     };
-    let shown = |regime: &RegimeReport| {
+    let shown = |regime: &FittedRegime| {
         format!(
             "{} (unstable {}, accelerating {})",
             regime.label,
@@ -159,7 +160,7 @@ fn summary(report: &FitReport) -> Table {
     };
     let failure = &report.failure_time;
     let line = &report.inverse_velocity;
-    let mut table = Table::plain();
+    let mut table = TextTable::plain();
     table.row(["regime".to_owned(), shown(&report.regime)]);
     if let Some(regime) = &report.regime_under_load {
         table.row(["  if the load changes".to_owned(), shown(regime)]);
@@ -216,7 +217,7 @@ fn notes(report: &FitReport) -> String {
              (see the minima below), the best one may be an extreme among them: go by the interval.\n",
         );
     }
-    let unstable = |regime: &RegimeReport| regime.probability_unstable;
+    let unstable = |regime: &FittedRegime| regime.probability_unstable;
     let under_load = report.regime_under_load.as_ref();
     if let (Some(constant), Some(load)) = (unstable(&report.regime), under_load.and_then(unstable))
         && (constant - load).abs() > DISAGREE
@@ -236,7 +237,7 @@ fn is_outside(estimate: &Estimate) -> bool {
     })
 }
 
-/// How far the chance of m > 1 and the law's own failure time hang on the prior.
+/// How far the chance of m > 1 and the law's own failure time depend on the prior.
 fn other_priors(report: &FitReport) -> String {
     let all = &report.prior_sensitivity;
     let unstable: Vec<f64> = all.iter().map(UnderPrior::probability_unstable).collect();
@@ -281,8 +282,8 @@ fn estimates(report: &FitReport) -> [EstimateRow<'_>; 9] {
     rows.map(|(name, estimate, unit)| (name, estimate, unit.to_owned()))
 }
 
-fn parameters(report: &FitReport) -> Table {
-    let mut table = Table::headed(["parameter", "best fit", "5 %", "95 %", "unit"]);
+fn parameters(report: &FitReport) -> TextTable {
+    let mut table = TextTable::headed(["parameter", "best fit", "5 %", "95 %", "unit"]);
     for (name, estimate, unit) in estimates(report) {
         let mark = if is_outside(estimate) { " *" } else { "" };
         table.row([
@@ -296,13 +297,13 @@ fn parameters(report: &FitReport) -> Table {
     table
 }
 
-fn alternatives(report: &FitReport) -> Table {
+fn alternatives(report: &FitReport) -> TextTable {
     let unit = report.unit;
     let d = match unit.quantity() {
         Quantity::Velocity => format!("D {unit}"),
         Quantity::Displacement => format!("D {unit}/day"),
     };
-    let mut table = Table::headed([
+    let mut table = TextTable::headed([
         "minimum m".to_owned(),
         "x_i".to_owned(),
         "T days".to_owned(),
@@ -327,7 +328,7 @@ fn neighbours(report: &TogetherReport) -> String {
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
     let since = |since: Timestamp| {
         if since <= report.judged_from {
-            "from the first look on".to_owned()
+            "from the first snapshot on".to_owned()
         } else {
             format!("since {}", time(Some(since)))
         }
@@ -369,7 +370,7 @@ fn neighbours(report: &TogetherReport) -> String {
     }
     let _ = writeln!(
         out,
-        "judged by {} looks from {} on",
+        "judged by {} snapshots from {} on",
         report.looks,
         time(Some(report.judged_from)),
     );

@@ -1,6 +1,6 @@
 //! `hook test`: a drill for a site's hooks. `hook exec`: what the daemon starts to run a hook within walls.
 
-use super::args::{Format, OutputArgs};
+use super::args::{OutputArgs, OutputFormat};
 use super::run::asynchronous;
 use crate::alert::Level;
 use crate::config::{self, Config, HookConfig};
@@ -8,7 +8,7 @@ use crate::monitor::{AlertState, Event, EventKind};
 use crate::reading::Timestamp;
 use crate::runtime::clock;
 use crate::runtime::deliver;
-use crate::runtime::hook::{Alert, Outcome, Status};
+use crate::runtime::hook::{Alert, HookOutcome, Status};
 use crate::runtime::log::{self, LogFormat};
 use crate::runtime::sandbox::{self, OURSELVES};
 use schemars::JsonSchema;
@@ -32,7 +32,7 @@ pub(super) struct Test {
     /// The site whose hooks are run
     #[arg(long, value_name = "CONFIG")]
     config: PathBuf,
-    /// Only the hooks for this level, run with it; default is every hook, run with its gravest
+    /// Only the hooks for this level, run with it; default is every hook, run with its most severe
     #[arg(long, value_name = "LEVEL", value_parser = level)]
     level: Option<Level>,
     #[command(flatten)]
@@ -62,7 +62,7 @@ enum Failed {
 
 /// What became of one hook's drill.
 #[derive(Debug, JsonSchema, Serialize)]
-pub(super) struct Drill {
+pub(super) struct HookDrill {
     /// The hook's name.
     hook: String,
     /// The level that it was run with.
@@ -78,7 +78,7 @@ pub(super) struct HookReport {
     /// That it was a test.
     status: &'static str,
     /// Each hook that was run.
-    hooks: Vec<Drill>,
+    hooks: Vec<HookDrill>,
 }
 
 /// Runs the drill, or becomes the hook.
@@ -96,8 +96,8 @@ pub(super) fn run(command: &HookCommand) -> anyhow::Result<()> {
 
 fn test(args: &Test) -> anyhow::Result<()> {
     log::init(match args.output.format {
-        Format::Text => LogFormat::Text,
-        Format::Json => LogFormat::Json,
+        OutputFormat::Text => LogFormat::Text,
+        OutputFormat::Json => LogFormat::Json,
     });
     let mut config = config::load(&args.config)?;
     config.wall_in_hooks(Path::new(OURSELVES));
@@ -118,10 +118,10 @@ fn test(args: &Test) -> anyhow::Result<()> {
             continue;
         };
         let outcome = runtime.block_on(deliver::run(hook, &alert, 1));
-        hooks.push(Drill {
+        hooks.push(HookDrill {
             hook: hook.name(),
             level,
-            is_taken: outcome == Outcome::Done,
+            is_taken: outcome == HookOutcome::Done,
             outcome: said(&outcome),
         });
     }
@@ -164,21 +164,21 @@ fn drill(config: &Config, hook: &HookConfig, level: Level, now: Timestamp) -> Op
     Alert::new(&event, &config.site.name, None, Status::Test)
 }
 
-fn said(outcome: &Outcome) -> String {
+fn said(outcome: &HookOutcome) -> String {
     match outcome {
-        Outcome::Done => "done".to_owned(),
-        Outcome::Failed(code) => format!("ended with exit code {code}"),
-        Outcome::Signalled(signal) => format!("ended by signal {signal}"),
-        Outcome::TimedOut => "killed when its time was up".to_owned(),
-        Outcome::Refused(status) => format!("answered with status {status}"),
-        Outcome::NotStarted(why) => format!("not started: {why}"),
+        HookOutcome::Done => "done".to_owned(),
+        HookOutcome::Failed(code) => format!("ended with exit code {code}"),
+        HookOutcome::Signalled(signal) => format!("ended by signal {signal}"),
+        HookOutcome::TimedOut => "killed when its time was up".to_owned(),
+        HookOutcome::Refused(status) => format!("answered with status {status}"),
+        HookOutcome::NotStarted(why) => format!("not started: {why}"),
     }
 }
 
 fn text(report: &HookReport) -> String {
     let mut text = String::new();
     for drill in &report.hooks {
-        let Drill {
+        let HookDrill {
             hook,
             level,
             outcome,

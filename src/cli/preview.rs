@@ -3,7 +3,7 @@
 use super::text::clock;
 use crate::reading::Timestamp;
 use crate::runtime::ingest::Meaning;
-use crate::runtime::preview::{BenchmarkView, ColumnView, CovariateView, Preview, SourceView};
+use crate::runtime::preview::{BenchmarkPreview, ColumnView, CovariateView, Preview, SourceView};
 use jiff::SignedDuration;
 use jiff::tz::TimeZone;
 use std::fmt::Write as _;
@@ -27,7 +27,7 @@ pub(super) fn shown(preview: &Preview, zone: &TimeZone) -> String {
         );
     }
     if !preview.is_whole {
-        text.push_str("\nonly the first values were looked at, there are very many\n");
+        text.push_str("\nonly the first values were read, there are very many\n");
     }
     text
 }
@@ -91,8 +91,8 @@ fn meaning(column: &ColumnView) -> String {
     }
 }
 
-fn benchmark_lines(text: &mut String, benchmark: &BenchmarkView, zone: &TimeZone) {
-    let BenchmarkView {
+fn benchmark_lines(text: &mut String, benchmark: &BenchmarkPreview, zone: &TimeZone) {
+    let BenchmarkPreview {
         id,
         source,
         quantity,

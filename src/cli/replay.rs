@@ -1,6 +1,6 @@
 //! `replay FILE...`: the monitor over recorded readings, in data time.
 
-use super::args::{Format, OutputArgs, ReadingArgs};
+use super::args::{OutputArgs, OutputFormat, ReadingArgs};
 use super::bar::BarInTime;
 use super::demo::timeline::Timeline;
 use super::run::asynchronous;
@@ -187,7 +187,7 @@ pub(super) fn events(
 /// A line for each event; as text, at the end velocity, level and forecast of each benchmark as marks.
 struct Printer {
     out: io::StdoutLock<'static>,
-    format: Format,
+    format: OutputFormat,
     zone: TimeZone,
     timeline: Timeline,
     /// All of them, where they are to be recorded.
@@ -195,7 +195,7 @@ struct Printer {
 }
 
 impl Printer {
-    fn new(format: Format, zone: TimeZone, keeps: bool) -> Self {
+    fn new(format: OutputFormat, zone: TimeZone, keeps: bool) -> Self {
         Self {
             out: io::stdout().lock(),
             format,
@@ -210,8 +210,8 @@ impl Printer {
             kept.push(event.clone());
         }
         let line = match self.format {
-            Format::Json => serde_json::to_string(event)?,
-            Format::Text => {
+            OutputFormat::Json => serde_json::to_string(event)?,
+            OutputFormat::Text => {
                 self.timeline.take(event);
                 text::line(event, &self.zone)
             }

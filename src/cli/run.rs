@@ -1,6 +1,6 @@
 //! `run CONFIG`: the daemon, until SIGTERM or SIGINT.
 
-use super::args::{Format, OutputArgs};
+use super::args::{OutputArgs, OutputFormat};
 use crate::config;
 use crate::runtime::log::{self, LogFormat};
 use crate::runtime::progress::Progress;
@@ -26,8 +26,8 @@ pub(super) struct Args {
 /// Runs the daemon until it is asked to stop.
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     log::init(args.log.unwrap_or(match args.output.format {
-        Format::Text => LogFormat::Text,
-        Format::Json => LogFormat::Json,
+        OutputFormat::Text => LogFormat::Text,
+        OutputFormat::Json => LogFormat::Json,
     }));
     let mut config = config::load(&args.config)?;
     config.wall_in_hooks(Path::new(OURSELVES));

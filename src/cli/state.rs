@@ -1,6 +1,6 @@
 //! Asks a site's state, beside a running daemon or without one: its events, a copy of it.
 
-use super::args::{Format, OutputArgs};
+use super::args::{OutputArgs, OutputFormat};
 use super::text;
 use crate::config::{self, Config};
 use crate::monitor::EventKind;
@@ -95,8 +95,8 @@ pub(super) fn events(args: &EventsArgs) -> anyhow::Result<()> {
         for (seq, body) in &events {
             after = *seq;
             match args.site.output.format {
-                Format::Json => writeln!(stdout, "{body}")?,
-                Format::Text => {
+                OutputFormat::Json => writeln!(stdout, "{body}")?,
+                OutputFormat::Text => {
                     writeln!(stdout, "{}", text::line(&serde_json::from_str(body)?, zone))?;
                 }
             }

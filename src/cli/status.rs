@@ -1,15 +1,15 @@
 //! `status`: how a site stands, with or without a running daemon.
 
-use super::args::Format;
+use super::args::OutputFormat;
 use super::preview::shown;
 use super::state::SiteArgs;
-use super::table::Table;
+use super::table::TextTable;
 use super::text;
 use crate::alert::Level;
 use crate::monitor::{Event, EventKind, SUSPECT, SUSPECT_ENDS};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::clock;
-use crate::runtime::drilled::Record;
+use crate::runtime::drilled::DrillRecord;
 use crate::runtime::preview::{Preview, preview};
 use crate::runtime::standing::{InForce, acknowledged, closed, every, in_force, orders, silences};
 use crate::store::Store;
@@ -35,8 +35,8 @@ pub(super) struct StatusArgs {
     watch: bool,
 }
 
-/// How often `--watch` looks.
-const LOOK: Duration = Duration::from_secs(2);
+/// How often `--watch` reads the state.
+const POLL_INTERVAL: Duration = Duration::from_secs(2);
 /// Of the table, in characters: that of the terminals on which it is read.
 const WIDTH: usize = 80;
 /// Puts a terminal's cursor at the top of an empty screen.
@@ -101,7 +101,7 @@ pub(super) struct SiteStatus {
     /// Lines, records and files that could not be used, a source.
     quarantined: BTreeMap<String, u64>,
     /// How drills stand, where they are held.
-    drill: Option<Record>,
+    drill: Option<DrillRecord>,
     /// Whether no drill has passed for too long.
     is_drill_overdue: bool,
     /// What the files hold, where that was asked for.
@@ -113,7 +113,8 @@ pub(super) fn status(args: &StatusArgs) -> anyhow::Result<()> {
     loop {
         // Looked up before the screen is emptied, so that it does not flicker.
         let status = gathered(args)?;
-        if args.watch && args.site.output.format == Format::Text && io::stdout().is_terminal() {
+        if args.watch && args.site.output.format == OutputFormat::Text && io::stdout().is_terminal()
+        {
             write!(io::stdout(), "{CLEAR}")?;
         }
         let (status, zone) = &status;
@@ -125,7 +126,7 @@ pub(super) fn status(args: &StatusArgs) -> anyhow::Result<()> {
         if !args.watch {
             return Ok(());
         }
-        std::thread::sleep(LOOK);
+        std::thread::sleep(POLL_INTERVAL);
     }
 }
 
@@ -166,7 +167,7 @@ fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
     let drill = config
         .drill
         .as_ref()
-        .and_then(|_| Record::read(&config.site.state_dir));
+        .and_then(|_| DrillRecord::read(&config.site.state_dir));
     let zone = config.site.time_zone;
     let status = SiteStatus {
         site: config.site.name,
@@ -252,7 +253,7 @@ fn suspicions(store: &Store) -> anyhow::Result<BTreeMap<BenchmarkId, Vec<String>
 }
 
 fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
-    let mut table = Table::headed([
+    let mut table = TextTable::headed([
         "benchmark",
         "level",
         "newest reading",

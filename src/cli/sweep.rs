@@ -3,7 +3,7 @@
 use super::args::{OutputArgs, ReadingArgs};
 use super::bar;
 use super::fit::InversionArgs;
-use super::table::{Table, number, time};
+use super::table::{TextTable, number, time};
 use crate::inversion::{SweepOptions, SweepReport, SweepRow, sweep_showing};
 use crate::reading::Timestamp;
 
@@ -74,7 +74,7 @@ fn steps(text: &str) -> Result<usize, String> {
 fn text(report: &SweepReport) -> String {
     let unit = report.unit;
     let first = time(report.first);
-    let mut table = Table::headed([
+    let mut table = TextTable::headed([
         "t_max".to_owned(),
         "n".to_owned(),
         "regime".to_owned(),

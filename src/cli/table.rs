@@ -6,12 +6,12 @@ use std::fmt::{self, Write as _};
 
 /// Rows of cells, each column as wide as its widest cell.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Table {
+pub(super) struct TextTable {
     rows: Vec<Vec<String>>,
     is_headed: bool,
 }
 
-impl Table {
+impl TextTable {
     /// Rows without a heading.
     pub(super) fn plain() -> Self {
         Self::default()
@@ -87,7 +87,7 @@ impl Table {
 /// Blanks between two columns.
 const GAP: usize = 2;
 
-impl fmt::Display for Table {
+impl fmt::Display for TextTable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let widths = self.widths();
         for row in &self.rows {
@@ -136,7 +136,7 @@ mod tests {
 
     #[test]
     fn a_name_that_is_too_long_stands_above_its_row_and_nothing_is_lost() {
-        let mut table = Table::headed(["benchmark", "level", "newest"]);
+        let mut table = TextTable::headed(["benchmark", "level", "newest"]);
         table.row(["5", "green", "2020-01-31"]);
         table.row(["the upper extensometer in the scar", "red", "2020-01-30"]);
         let text = table.clone().within(30).to_string();

@@ -180,7 +180,7 @@ fn ordered(kind: &EventKind) -> String {
     let until = until.map_or_else(String::new, |until| format!(" until {}", minute(until)));
     let by = (given.by.as_ref()).map_or_else(String::new, |by| format!(" by {by}"));
     let why = (given.why.as_ref()).map_or_else(String::new, |why| format!(": {why}"));
-    format!("{order}{by}{until}{why}")
+    format!("{}{by}{until}{why}", order.name())
 }
 
 fn unexplained(what: &Unexplained) -> String {

@@ -1,4 +1,4 @@
-//! Addresses that the daemon speaks to over HTTP, and whom it trusts there.
+//! Addresses that the daemon connects to over HTTP, and whom it trusts there.
 
 use super::table::{Placed, Section};
 

@@ -28,7 +28,7 @@ pub(super) fn policy(mut section: Section<'_>, base: &Policy) -> Policy {
         thresholds: thresholds(&mut section, base),
         rules: rule::rules(&mut section, &base.rules),
     };
-    doubts(&section, &policy, evacuation_time.as_ref());
+    warn(&section, &policy, evacuation_time.as_ref());
     section.finish();
     policy
 }
@@ -69,11 +69,7 @@ fn threshold(mut section: Section<'_>) -> Option<Threshold> {
 }
 
 /// Figures that are each allowed and together cannot mean what was intended.
-fn doubts(
-    section: &Section<'_>,
-    policy: &Policy,
-    evacuation_time: Option<&Placed<SignedDuration>>,
-) {
+fn warn(section: &Section<'_>, policy: &Policy, evacuation_time: Option<&Placed<SignedDuration>>) {
     let at = evacuation_time.map_or(section.at(), |given| &given.at);
     if policy.evacuation_time > policy.outlook {
         section.warning(
@@ -96,7 +92,7 @@ fn doubts(
         );
     }
     for (name, quantity) in [
-        ("velocity", (|t| t.velocity_mm_per_day) as Figure),
+        ("velocity", (|t| t.velocity_mm_per_day) as ThresholdField),
         ("displacement", |t| t.displacement_mm),
         ("acceleration", |t| t.acceleration_mm_per_day2),
     ] {
@@ -110,10 +106,10 @@ fn doubts(
     }
 }
 
-type Figure = fn(&Threshold) -> Option<f64>;
+type ThresholdField = fn(&Threshold) -> Option<f64>;
 
 /// A level and a graver one that begins below it.
-fn inverted(thresholds: &[Threshold], figure: Figure) -> Option<(Level, Level)> {
+fn inverted(thresholds: &[Threshold], figure: ThresholdField) -> Option<(Level, Level)> {
     let mut pairs = thresholds
         .iter()
         .flat_map(|low| thresholds.iter().map(move |high| (low, high)));

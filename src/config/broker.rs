@@ -19,14 +19,14 @@ pub struct Broker {
     pub conventions: Conventions,
 }
 
-/// Where a broker is, and as whom to speak to it.
+/// Where a broker is, and as whom to connect to it.
 #[derive(Clone, PartialEq, Eq)]
 pub struct BrokerAddress {
     /// A name or an address.
     pub host: String,
     /// Its port.
     pub port: u16,
-    /// Whether it is spoken to over TLS.
+    /// Whether the connection is over TLS.
     pub is_secured: bool,
     /// User and password.
     pub login: Option<(String, String)>,

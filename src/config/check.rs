@@ -1,6 +1,8 @@
 //! `check`: the site file and what it names on this machine, without starting anything.
 
-use super::{Config, ConfigError, HookConfig, Secret, SiteConfig, Source, Token, TokenError, load};
+use super::{
+    Config, ConfigError, FileSource, HookConfig, Secret, SiteConfig, Token, TokenError, load,
+};
 use crate::alert::Level;
 use crate::reading::{BenchmarkId, Quantity};
 use jiff::SignedDuration;
@@ -12,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 /// What a right config amounts to.
 #[derive(Debug, Clone, PartialEq, Eq, JsonSchema, Serialize)]
-pub struct Summary {
+pub struct ConfigSummary {
     /// The site's name.
     pub site: String,
     /// Where the daemon keeps what it writes.
@@ -27,7 +29,7 @@ pub struct Summary {
     pub warnings: Vec<String>,
 }
 
-impl fmt::Display for Summary {
+impl fmt::Display for ConfigSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
@@ -45,7 +47,7 @@ impl fmt::Display for Summary {
 ///
 /// # Errors
 /// [`ConfigError`] as from [`load`].
-pub fn check(file: &Path) -> Result<Summary, ConfigError> {
+pub fn check(file: &Path) -> Result<ConfigSummary, ConfigError> {
     let config = load(file)?;
     config.site.token()?;
     let mut warnings: Vec<String> = config.warnings.iter().map(ToString::to_string).collect();
@@ -60,7 +62,7 @@ pub fn check(file: &Path) -> Result<Summary, ConfigError> {
             .chain(only_escalated(&config))
             .map(|what| format!("{place}: warning: {what}")),
     );
-    Ok(Summary {
+    Ok(ConfigSummary {
         site: config.site.name,
         state_dir: config.site.state_dir,
         sources: config.sources.len(),
@@ -70,7 +72,7 @@ pub fn check(file: &Path) -> Result<Summary, ConfigError> {
     })
 }
 
-fn missing_folder(source: &Source) -> Option<String> {
+fn missing_folder(source: &FileSource) -> Option<String> {
     let folder = source.pattern.folder();
     (!folder.is_dir()).then(|| {
         format!(

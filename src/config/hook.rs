@@ -49,7 +49,7 @@ fn unlike(root: &Section<'_>, hooks: &[HookConfig]) {
             root.error(
                 root.at(),
                 format!(
-                    "two hooks run {:?}, one of them with escalate_after: they cannot be told apart",
+                    "two hooks run {:?}, one of them with escalate_after: they cannot be distinguished",
                     hook.run.join(" ")
                 ),
                 "give one of them an argument of its own, as in run = [\"./notify.sh\", \"escalation\"]",

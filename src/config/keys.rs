@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 /// What may stand behind a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Shape {
+pub enum ValueShape {
     /// A string.
     Text,
     /// A list of strings.
@@ -33,7 +33,7 @@ pub struct Key {
     /// As it stands in the file.
     pub name: &'static str,
     /// What may stand behind it.
-    pub shape: Shape,
+    pub shape: ValueShape,
     /// Whether the file is refused without it.
     pub is_required: bool,
 }

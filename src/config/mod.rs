@@ -23,14 +23,14 @@ pub(crate) mod value;
 mod vector;
 
 pub use broker::{Broker, BrokerAddress};
-pub use check::{Summary, check};
+pub use check::{ConfigSummary, check};
 pub use drill::{Drill, EXERCISE};
 pub use heartbeat::Heartbeat;
-pub use keys::{Key, Keys, Shape};
+pub use keys::{Key, Keys, ValueShape};
 pub use link::Links;
 pub use mqtt_out::MqttTopic;
 pub use pattern::FilePattern;
-pub use problem::{ConfigError, Problem, Severity};
+pub use problem::{ConfigError, ConfigProblem, Severity};
 pub use secret::{Secret, SecretError};
 pub use token::{Token, TokenError};
 pub use vector::Vector;
@@ -39,7 +39,7 @@ use crate::alert::Level;
 use crate::monitor::Settings;
 use crate::reading::{BenchmarkId, Conventions, Dialect, Quantity, Unit};
 use jiff::SignedDuration;
-use problem::Notebook;
+use problem::ConfigProblems;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::io;
@@ -57,7 +57,7 @@ pub struct Config {
     /// `[site]`.
     pub site: SiteConfig,
     /// `[[source]]`s that are files; there is at least one of these or of the brokers.
-    pub sources: Vec<Source>,
+    pub sources: Vec<FileSource>,
     /// `[[source]]`s that are topics of an MQTT broker.
     pub brokers: Vec<Broker>,
     /// `[[benchmark]]`; with none, whatever benchmarks the files name are taken.
@@ -71,7 +71,7 @@ pub struct Config {
     /// `[drill]`.
     pub drill: Option<Drill>,
     /// What is doubtful, but not refused.
-    pub warnings: Vec<Problem>,
+    pub warnings: Vec<ConfigProblem>,
 }
 
 /// `[site]`.
@@ -108,6 +108,9 @@ pub enum SourceKind {
 }
 
 impl SourceKind {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Csv, Self::Ndjson, Self::Toa5, Self::Mcap];
+
     /// The word in the config.
     pub fn name(self) -> &'static str {
         match self {
@@ -121,7 +124,7 @@ impl SourceKind {
 
 /// `[[source]]`: files that readings come from.
 #[derive(Debug, Clone)]
-pub struct Source {
+pub struct FileSource {
     /// What benchmarks call it.
     pub id: String,
     /// What the files hold.
@@ -286,8 +289,8 @@ pub fn keys(text: &str) -> Keys {
     taken(text, Path::new("")).1.keys
 }
 
-fn taken(text: &str, file: &Path) -> (Option<Config>, Notebook) {
-    let notebook = RefCell::new(Notebook::new(file, text));
+fn taken(text: &str, file: &Path) -> (Option<Config>, ConfigProblems) {
+    let notebook = RefCell::new(ConfigProblems::new(file, text));
     let (document, syntax) = toml::de::DeTable::parse_recoverable(text);
     for error in &syntax {
         let at = error.span().unwrap_or(0..0);

@@ -19,7 +19,7 @@ pub enum Severity {
 
 /// One thing that is wrong with a site file.
 #[derive(Debug, Clone, PartialEq, Eq, JsonSchema, Serialize)]
-pub struct Problem {
+pub struct ConfigProblem {
     /// The site file.
     pub file: PathBuf,
     /// Line, from 1.
@@ -34,7 +34,7 @@ pub struct Problem {
     pub fix: String,
 }
 
-impl fmt::Display for Problem {
+impl fmt::Display for ConfigProblem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let kind = match self.severity {
             Severity::Error => "error",
@@ -70,26 +70,26 @@ pub enum ConfigError {
     #[error("{}", lines(.problems))]
     Invalid {
         /// All problems, in the order of the file.
-        problems: Vec<Problem>,
+        problems: Vec<ConfigProblem>,
     },
 }
 
-fn lines(problems: &[Problem]) -> String {
-    let lines: Vec<String> = problems.iter().map(Problem::to_string).collect();
+fn lines(problems: &[ConfigProblem]) -> String {
+    let lines: Vec<String> = problems.iter().map(ConfigProblem::to_string).collect();
     lines.join("\n")
 }
 
-/// Collects problems and knows which line a byte is on.
+/// The problems of one file, with the line and column of each.
 #[derive(Debug)]
-pub(super) struct Notebook {
+pub(super) struct ConfigProblems {
     file: PathBuf,
     text: String,
-    problems: Vec<Problem>,
+    problems: Vec<ConfigProblem>,
     /// What was asked of each table.
     pub(super) keys: Keys,
 }
 
-impl Notebook {
+impl ConfigProblems {
     pub(super) fn new(file: &Path, text: &str) -> Self {
         Self {
             file: file.to_owned(),
@@ -110,7 +110,7 @@ impl Notebook {
     fn note(&mut self, severity: Severity, at: &Range<usize>, what: String, fix: String) {
         let before = self.text.get(..at.start).unwrap_or(&self.text);
         let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
-        self.problems.push(Problem {
+        self.problems.push(ConfigProblem {
             file: self.file.clone(),
             line: before.matches('\n').count() + 1,
             column: before[line_start..].chars().count() + 1,
@@ -121,7 +121,7 @@ impl Notebook {
     }
 
     /// All problems in the order of the file.
-    pub(super) fn close(mut self) -> Vec<Problem> {
+    pub(super) fn close(mut self) -> Vec<ConfigProblem> {
         self.problems
             .sort_by_key(|problem| (problem.line, problem.column));
         self.problems

@@ -2,7 +2,7 @@
 
 use super::table::{Placed, Section};
 use super::value;
-use crate::alert::{Cause, Combination, Condition, DeclaredRule};
+use crate::alert::{AlertCause, Combination, Condition, DeclaredRule};
 use jiff::SignedDuration;
 use std::collections::BTreeSet;
 
@@ -101,7 +101,7 @@ fn parsed(text: &str) -> Result<Condition, String> {
         "displacement" => value::length(figure).map(Condition::Displacement),
         "chance" => chance(figure),
         "tangent-angle" => tangent_angle(figure),
-        cause if figure.is_empty() => match Cause::named(cause) {
+        cause if figure.is_empty() => match AlertCause::named(cause) {
             Some(cause) => Ok(Condition::Happened(cause)),
             None => Err(choices()),
         },
@@ -110,7 +110,7 @@ fn parsed(text: &str) -> Result<Condition, String> {
 }
 
 fn choices() -> String {
-    let causes = Cause::ALL.map(Cause::name).join("\", \"");
+    let causes = AlertCause::ALL.map(AlertCause::name).join("\", \"");
     format!("{EXAMPLES}, or one of \"{causes}\"")
 }
 
@@ -171,7 +171,7 @@ mod tests {
                     steady_mm_per_day: 5.0,
                 },
             ),
-            ("regime-flip", Condition::Happened(Cause::RegimeFlip)),
+            ("regime-flip", Condition::Happened(AlertCause::RegimeFlip)),
         ] {
             assert_eq!(parsed(text), Ok(condition), "{text}");
         }

@@ -133,7 +133,7 @@ fn explain(mut section: Section<'_>) -> Explain {
     section.finish();
     match (searches, adopts) {
         (false, _) => Explain::Off,
-        (true, Some(false)) => Explain::Tell,
+        (true, Some(false)) => Explain::Report,
         (true, Some(true) | None) => Explain::Adopt,
     }
 }
@@ -150,13 +150,18 @@ fn watched(sources: &[&str], benchmarks: &[Benchmark]) -> Watched {
 
 /// What `[[benchmark]]` says of single ones to the monitor.
 #[derive(Debug, Default)]
-struct Own {
+struct OwnSettings {
     policies: BTreeMap<BenchmarkId, Policy>,
     accepted: BTreeMap<BenchmarkId, BTreeSet<Suspicion>>,
 }
 
-fn benchmarks(root: &mut Section<'_>, sources: &[&str], policy: &Policy) -> (Vec<Benchmark>, Own) {
-    let (mut taken, mut own, mut benchmarks) = (BTreeSet::new(), Own::default(), Vec::new());
+fn benchmarks(
+    root: &mut Section<'_>,
+    sources: &[&str],
+    policy: &Policy,
+) -> (Vec<Benchmark>, OwnSettings) {
+    let (mut taken, mut own, mut benchmarks) =
+        (BTreeSet::new(), OwnSettings::default(), Vec::new());
     for mut section in root.tables("benchmark", "benchmark") {
         let id = section.required("id", "\"5\"");
         unique(&section, id.as_ref(), &mut taken);

@@ -1,7 +1,7 @@
 //! `[[source]]`: where readings come from, and how they are written there.
 
 use super::table::{Section, unique};
-use super::{Broker, FilePattern, Source, SourceKind, broker, value};
+use super::{Broker, FilePattern, FileSource, SourceKind, broker, value};
 use crate::reading::{
     Conventions, DecimalMark, Delimiter, Dialect, LocalClock, MissingValues, SummerTime, TimeFormat,
 };
@@ -12,7 +12,7 @@ use std::path::Path;
 /// The words for the kinds.
 const KINDS: &str = "supported: csv, ndjson, toa5, mcap, mqtt";
 
-pub(super) fn sources(root: &mut Section<'_>, base: &Path) -> (Vec<Source>, Vec<Broker>) {
+pub(super) fn sources(root: &mut Section<'_>, base: &Path) -> (Vec<FileSource>, Vec<Broker>) {
     let sections = root.tables("source", "source");
     if sections.is_empty() {
         root.error(
@@ -25,8 +25,8 @@ pub(super) fn sources(root: &mut Section<'_>, base: &Path) -> (Vec<Source>, Vec<
     let (mut sources, mut brokers) = (Vec::new(), Vec::new());
     for section in sections {
         match source(section, base, &mut taken) {
-            Some(Origin::Files(source)) => sources.push(source),
-            Some(Origin::Topics(broker)) => brokers.push(broker),
+            Some(SourceOrigin::Files(source)) => sources.push(source),
+            Some(SourceOrigin::Topics(broker)) => brokers.push(broker),
             None => {}
         }
     }
@@ -34,19 +34,23 @@ pub(super) fn sources(root: &mut Section<'_>, base: &Path) -> (Vec<Source>, Vec<
 }
 
 /// What a `[[source]]` is.
-enum Origin {
-    Files(Source),
+enum SourceOrigin {
+    Files(FileSource),
     Topics(Broker),
 }
 
 /// What may stand as `kind`.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum StatedKind {
     Files(SourceKind),
     Mqtt,
 }
 
-fn source(mut section: Section<'_>, base: &Path, taken: &mut BTreeSet<String>) -> Option<Origin> {
+fn source(
+    mut section: Section<'_>,
+    base: &Path,
+    taken: &mut BTreeSet<String>,
+) -> Option<SourceOrigin> {
     let id = section.required("id", "\"logger\"");
     unique(&section, id.as_ref(), taken);
     let id = id.map(|given| given.value);
@@ -54,11 +58,11 @@ fn source(mut section: Section<'_>, base: &Path, taken: &mut BTreeSet<String>) -
         .required("kind", "\"csv\"")
         .and_then(|_| section.parsed("kind", source_kind))
         .map(|given| given.value);
-    if kind == Some(Kind::Mqtt) {
+    if kind == Some(StatedKind::Mqtt) {
         let conventions = conventions(&mut section, kind);
         let broker = broker::broker(&mut section, id, conventions, base);
         section.finish();
-        return broker.map(Origin::Topics);
+        return broker.map(SourceOrigin::Topics);
     }
     let pattern = section
         .required("path", "\"incoming/*.csv\"")
@@ -67,10 +71,10 @@ fn source(mut section: Section<'_>, base: &Path, taken: &mut BTreeSet<String>) -
     let dialect = dialect(&mut section, kind);
     let reorder = section.parsed("reorder", value::duration_or_none);
     section.finish();
-    let Kind::Files(kind) = kind? else {
+    let StatedKind::Files(kind) = kind? else {
         return None;
     };
-    Some(Origin::Files(Source {
+    Some(SourceOrigin::Files(FileSource {
         id: id?,
         kind,
         pattern: pattern?.value,
@@ -81,7 +85,7 @@ fn source(mut section: Section<'_>, base: &Path, taken: &mut BTreeSet<String>) -
 }
 
 /// How the source's tables are written.
-fn dialect(section: &mut Section<'_>, kind: Option<Kind>) -> Dialect {
+fn dialect(section: &mut Section<'_>, kind: Option<StatedKind>) -> Dialect {
     let delimiter = section.parsed("delimiter", Delimiter::parse);
     let decimal = section.parsed("decimal", DecimalMark::parse);
     let time_columns = section.text_or_texts("time_column");
@@ -109,7 +113,7 @@ fn dialect(section: &mut Section<'_>, kind: Option<Kind>) -> Dialect {
     }
 }
 
-impl Kind {
+impl StatedKind {
     /// Whether a key that says how a table is written means something for it.
     fn takes(self, key: &str) -> bool {
         match self {
@@ -120,20 +124,19 @@ impl Kind {
     }
 }
 
-fn source_kind(text: &str) -> Result<Kind, String> {
+fn source_kind(text: &str) -> Result<StatedKind, String> {
+    if let Some(kind) = SourceKind::ALL.into_iter().find(|kind| kind.name() == text) {
+        return Ok(StatedKind::Files(kind));
+    }
     match text {
-        "csv" => Ok(Kind::Files(SourceKind::Csv)),
-        "ndjson" => Ok(Kind::Files(SourceKind::Ndjson)),
-        "toa5" => Ok(Kind::Files(SourceKind::Toa5)),
-        "mcap" => Ok(Kind::Files(SourceKind::Mcap)),
-        "mqtt" => Ok(Kind::Mqtt),
+        "mqtt" => Ok(StatedKind::Mqtt),
         "nats" => Err(format!("not yet supported; {KINDS}")),
         _ => Err(KINDS.to_owned()),
     }
 }
 
 /// How the source writes times and missing values.
-fn conventions(section: &mut Section<'_>, kind: Option<Kind>) -> Conventions {
+fn conventions(section: &mut Section<'_>, kind: Option<StatedKind>) -> Conventions {
     let zone = section.parsed("time_zone", value::time_zone);
     let dst = section.parsed("dst", SummerTime::parse);
     let mut missing = MissingValues::default();
@@ -148,7 +151,7 @@ fn conventions(section: &mut Section<'_>, kind: Option<Kind>) -> Conventions {
             "add time_zone = \"Europe/Rome\", or leave dst out",
         );
     }
-    if kind == Some(Kind::Files(SourceKind::Mcap)) && (zone.is_some() || has_marks) {
+    if kind == Some(StatedKind::Files(SourceKind::Mcap)) && (zone.is_some() || has_marks) {
         section.warning(
             section.at(),
             "source.time_zone and source.missing do nothing for mcap".to_owned(),

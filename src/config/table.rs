@@ -1,7 +1,7 @@
 //! Typed reading of one TOML table: every key asked for is known, every other one is a problem.
 
-use super::keys::{Key, Shape};
-use super::problem::Notebook;
+use super::keys::{Key, ValueShape};
+use super::problem::ConfigProblems;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -22,12 +22,12 @@ pub(super) struct Section<'t> {
     table: Option<&'t DeTable<'t>>,
     at: Range<usize>,
     asked: Vec<Key>,
-    notebook: &'t RefCell<Notebook>,
+    notebook: &'t RefCell<ConfigProblems>,
 }
 
 impl<'t> Section<'t> {
     /// The whole document.
-    pub(super) fn root(table: &'t DeTable<'t>, notebook: &'t RefCell<Notebook>) -> Self {
+    pub(super) fn root(table: &'t DeTable<'t>, notebook: &'t RefCell<ConfigProblems>) -> Self {
         Self {
             name: "",
             table: Some(table),
@@ -64,12 +64,12 @@ impl<'t> Section<'t> {
         }
     }
 
-    fn get(&mut self, key: &'static str, shape: Shape) -> Option<&'t Spanned<DeValue<'t>>> {
+    fn get(&mut self, key: &'static str, shape: ValueShape) -> Option<&'t Spanned<DeValue<'t>>> {
         self.ask(key, shape);
         self.table?.get(key)
     }
 
-    fn ask(&mut self, name: &'static str, shape: Shape) {
+    fn ask(&mut self, name: &'static str, shape: ValueShape) {
         if self.asked.iter().all(|known| known.name != name) {
             self.asked.push(Key {
                 name,
@@ -90,7 +90,7 @@ impl<'t> Section<'t> {
 
     /// A string.
     pub(super) fn text(&mut self, key: &'static str) -> Option<Placed<String>> {
-        let value = self.get(key, Shape::Text)?;
+        let value = self.get(key, ValueShape::Text)?;
         let Some(text) = value.get_ref().as_str() else {
             self.wrong_type(key, value, "a string", &format!("{key} = \"...\""));
             return None;
@@ -103,7 +103,7 @@ impl<'t> Section<'t> {
 
     /// A string that must be there and not be empty.
     pub(super) fn required(&mut self, key: &'static str, example: &str) -> Option<Placed<String>> {
-        self.ask(key, Shape::Text);
+        self.ask(key, ValueShape::Text);
         if let Some(asked) = self.asked.iter_mut().find(|known| known.name == key) {
             asked.is_required = true;
         }
@@ -149,7 +149,7 @@ impl<'t> Section<'t> {
 
     /// true or false.
     pub(super) fn switch(&mut self, key: &'static str) -> Option<bool> {
-        let value = self.get(key, Shape::Switch)?;
+        let value = self.get(key, ValueShape::Switch)?;
         let DeValue::Boolean(switch) = value.get_ref() else {
             self.wrong_type(key, value, "true or false", &format!("{key} = true"));
             return None;
@@ -159,7 +159,7 @@ impl<'t> Section<'t> {
 
     /// Any number that is finite.
     pub(super) fn number(&mut self, key: &'static str) -> Option<Placed<f64>> {
-        let value = self.get(key, Shape::Number)?;
+        let value = self.get(key, ValueShape::Number)?;
         let Some(number) = number(value.get_ref()).filter(|number| number.is_finite()) else {
             self.wrong_type(key, value, "a number", &format!("{key} = 74.0"));
             return None;
@@ -172,7 +172,7 @@ impl<'t> Section<'t> {
 
     /// A number strictly between 0 and 1.
     pub(super) fn chance(&mut self, key: &'static str) -> Option<f64> {
-        let value = self.get(key, Shape::Chance)?;
+        let value = self.get(key, ValueShape::Chance)?;
         match number(value.get_ref()) {
             Some(number) if number > 0.0 && number < 1.0 => Some(number),
             Some(_) | None => {
@@ -193,14 +193,19 @@ impl<'t> Section<'t> {
             text.or_else(|| number(value).map(|number| number.to_string()))
         };
         let example = format!("{key} = [-7999, \"NAN\"]");
-        let kind = (Shape::Marks, "a number or a string", example.as_str());
-        self.list(key, kind, mark)
+        self.list(
+            key,
+            ValueShape::Marks,
+            "a number or a string",
+            &example,
+            mark,
+        )
     }
 
     /// A string, or a list of them, of which none is empty.
     pub(super) fn text_or_texts(&mut self, key: &'static str) -> Option<Placed<Vec<String>>> {
         let is_list = self
-            .get(key, Shape::TextOrTexts)?
+            .get(key, ValueShape::TextOrTexts)?
             .get_ref()
             .as_array()
             .is_some();
@@ -221,13 +226,15 @@ impl<'t> Section<'t> {
     /// A list of numbers.
     pub(super) fn numbers(&mut self, key: &'static str) -> Option<Placed<Vec<f64>>> {
         let example = format!("{key} = [0.7, 0.6, -0.4]");
-        self.list(key, (Shape::Numbers, "a number", &example), number)
+        self.list(key, ValueShape::Numbers, "a number", &example, number)
     }
 
     fn list<T>(
         &mut self,
         key: &'static str,
-        (shape, wanted, example): (Shape, &str, &str),
+        shape: ValueShape,
+        wanted: &str,
+        example: &str,
         read: impl Fn(&DeValue<'_>) -> Option<T>,
     ) -> Option<Placed<Vec<T>>> {
         let value = self.get(key, shape)?;
@@ -250,7 +257,7 @@ impl<'t> Section<'t> {
 
     /// A list of strings.
     pub(super) fn texts(&mut self, key: &'static str) -> Option<Placed<Vec<Placed<String>>>> {
-        let value = self.get(key, Shape::Texts)?;
+        let value = self.get(key, ValueShape::Texts)?;
         let example = format!("{key} = [\"...\"]");
         let Some(array) = value.get_ref().as_array() else {
             self.wrong_type(key, value, "a list of strings", &example);
@@ -274,7 +281,7 @@ impl<'t> Section<'t> {
 
     /// The table under `key`; one without keys where the file has none.
     pub(super) fn table(&mut self, key: &'static str, name: &'static str) -> Section<'t> {
-        let (table, at) = match self.get(key, Shape::Table(name)) {
+        let (table, at) = match self.get(key, ValueShape::Table(name)) {
             None => (None, self.at.clone()),
             Some(value) => {
                 let table = value.get_ref().as_table();
@@ -289,7 +296,7 @@ impl<'t> Section<'t> {
 
     /// The tables under `key`, in the order of the file.
     pub(super) fn tables(&mut self, key: &'static str, name: &'static str) -> Vec<Section<'t>> {
-        let Some(value) = self.get(key, Shape::Tables(name)) else {
+        let Some(value) = self.get(key, ValueShape::Tables(name)) else {
             return Vec::new();
         };
         let example = format!("[[{name}]]");

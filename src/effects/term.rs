@@ -3,7 +3,7 @@
 use super::kind::Kind;
 use super::problem::Problem;
 use super::response::Response;
-use crate::model::{Drive, Driven, Event, Law};
+use crate::model::{Drive, Driven, Law, LoadEvent};
 use crate::reading::{Quantity, Timestamp, after_days};
 
 /// One effect with its shape; its coefficients stand among the parameters.
@@ -135,7 +135,7 @@ pub(super) struct Scratch {
     pub(super) driven: Driven,
     pub(super) prediction: Vec<f64>,
     pub(super) log_load: Vec<f64>,
-    events: Vec<Event>,
+    events: Vec<LoadEvent>,
 }
 
 /// The law that the parameters stand for; mm and days, t = 0 at the first node.
@@ -219,7 +219,7 @@ impl Scratch {
                 }
             }
             let Some(reading) = term.at else { continue };
-            let mut event = Event {
+            let mut event = LoadEvent {
                 node: event_node(problem, reading),
                 log_load: 0.0,
                 ln_y: 0.0,

@@ -4,6 +4,7 @@ use super::{Picture, day};
 use crate::effects::{Effect, Explanation, Structure};
 use crate::plot::{Axis, BLACK, BLUE, Figure, GREEN, GREY, Legend, Mark, PURPLE, Panel, RED};
 
+/// Size of a panel, in the sheet's units.
 const PANEL: (f64, f64) = (920.0, 230.0);
 /// The readings have more to show.
 const TALL: (f64, f64) = (920.0, 360.0);

@@ -4,7 +4,9 @@ use super::{Picture, title};
 use crate::effects::Explanation;
 use crate::plot::{Axis, BLUE, Bar, Bars, Figure, GREEN, GREY, Legend, Mark, Panel, RED};
 
+/// Size of a panel, in the sheet's units.
 const PANEL: (f64, f64) = (460.0, 240.0);
+/// Width of the sheet.
 const WIDTH: f64 = 920.0;
 /// Half the width of the band that holds 95 % of the autocorrelations of noise, times the root of
 /// their number.

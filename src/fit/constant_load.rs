@@ -13,7 +13,7 @@ use std::fmt;
 
 /// Why an inversion ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Outcome {
+pub enum FitOutcome {
     /// At a minimum.
     Converged,
     /// At a minimum over the box of m, at this side of it.
@@ -35,7 +35,7 @@ pub enum Outcome {
     NotAnExponent(f64),
 }
 
-impl Outcome {
+impl FitOutcome {
     /// Whether the readings hold no motion that any law, or any regime, could be distinguished from.
     pub fn says_nothing(&self) -> bool {
         match self {
@@ -45,7 +45,7 @@ impl Outcome {
     }
 }
 
-impl fmt::Display for Outcome {
+impl fmt::Display for FitOutcome {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Converged => f.write_str("converged"),
@@ -72,7 +72,7 @@ pub struct ConstantLoad {
     /// Laws solved.
     pub evaluations: usize,
     /// Why it ended.
-    pub outcome: Outcome,
+    pub outcome: FitOutcome,
 }
 
 /// Minima kept beside the best with m > 1, m = 1 and m < 1.
@@ -113,19 +113,19 @@ impl ConstantLoad {
 }
 
 /// What makes an inversion pointless.
-fn refuse(readings: &PointReadings, exponent: Exponent) -> Option<Outcome> {
+fn refuse(readings: &PointReadings, exponent: Exponent) -> Option<FitOutcome> {
     let is_one = exponent == Exponent::Fixed(1.0);
     if let Exponent::Fixed(m) = exponent
         && !(is_one || (Branch::of(m).is_some() && (LOWEST_M..=HIGHEST_M).contains(&m)))
     {
-        return Some(Outcome::NotAnExponent(m));
+        return Some(FitOutcome::NotAnExponent(m));
     }
     let nonlinear = if exponent == Exponent::Free { 3 } else { 2 };
     let (given, needed) = (readings.count(), readings.linear_unknowns() + nonlinear + 1);
     if given < needed {
-        return Some(Outcome::TooFew { given, needed });
+        return Some(FitOutcome::TooFew { given, needed });
     }
-    readings.all_equal().then_some(Outcome::AllEqual)
+    readings.all_equal().then_some(FitOutcome::AllEqual)
 }
 
 /// Ranks what was found.
@@ -138,12 +138,12 @@ fn conclude(
     found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     prefer_unit_m(&mut found);
     let outcome = match found.first() {
-        None => Outcome::NoForwardMotion,
-        Some(best) if !best.converged => Outcome::Stopped,
+        None => FitOutcome::NoForwardMotion,
+        Some(best) if !best.converged => FitOutcome::Stopped,
         Some(best) if best.solution.place == EndOfSearch::AtBoundOfM => {
-            Outcome::AtBoundOfM(m_of(&best.solution))
+            FitOutcome::AtBoundOfM(m_of(&best.solution))
         }
-        Some(_) => Outcome::Converged,
+        Some(_) => FitOutcome::Converged,
     };
     let flat = readings.rms(search.cost_of_no_change());
     ConstantLoad {

@@ -5,7 +5,7 @@
 
 use super::chart::{Chart, ChartPoint};
 use super::curve::{CurveWindow, Fineness, LawCurve};
-use super::record::Record;
+use super::record::WeightedRecord;
 use crate::reading::Quantity;
 
 /// Step of the derivative by ln |m|.
@@ -71,7 +71,7 @@ impl Descent {
     /// Sum of squared residuals at a point; infinite outside the model's domain.
     pub(super) fn cost(
         &mut self,
-        record: &Record,
+        record: &WeightedRecord,
         chart: Chart,
         at: &ChartPoint,
         fineness: Fineness,
@@ -84,7 +84,12 @@ impl Descent {
     }
 
     /// Sum of squared residuals of a stretch of the curve as it stands.
-    pub(super) fn cost_of(&mut self, record: &Record, chart: Chart, window: &CurveWindow) -> f64 {
+    pub(super) fn cost_of(
+        &mut self,
+        record: &WeightedRecord,
+        chart: Chart,
+        window: &CurveWindow,
+    ) -> f64 {
         let basis = &mut self.basis[..record.count()];
         let times = record.times(chart.anchor());
         self.curve.follow(window, times, basis, None);
@@ -95,7 +100,7 @@ impl Descent {
     /// Goes down from a point, m held where `holds_m`.
     pub(super) fn descend(
         &mut self,
-        record: &Record,
+        record: &WeightedRecord,
         start: &SearchPoint,
         effort: &DescentEffort,
         holds_m: bool,
@@ -142,7 +147,7 @@ impl Descent {
     /// of the place: it was solved for its cost.
     fn linearise(
         &mut self,
-        record: &Record,
+        record: &WeightedRecord,
         place: &SearchPoint,
         fineness: Fineness,
         holds_m: bool,
@@ -180,7 +185,12 @@ impl Descent {
     }
 
     /// The derivative of the basis by ln |m|; 0 where the law next to it cannot be followed.
-    fn differentiate_by_m(&mut self, record: &Record, place: &SearchPoint, fineness: Fineness) {
+    fn differentiate_by_m(
+        &mut self,
+        record: &WeightedRecord,
+        place: &SearchPoint,
+        fineness: Fineness,
+    ) {
         let count = record.count();
         let mut at = place.at;
         let step = if at[2] + LN_M_STEP > place.chart.corners().1[2] {
@@ -299,13 +309,13 @@ mod tests {
         fineness: Fineness::EXACT,
     };
 
-    fn record(quantity: Quantity) -> Record {
+    fn record(quantity: Quantity) -> WeightedRecord {
         let times: Vec<f64> = (0..40).map(|i| f64::from(i) / 39.0).collect();
         let values: Vec<f64> = times
             .iter()
             .map(|t| 0.3 + t + 0.2 * (9.0 * t).sin())
             .collect();
-        Record::new(quantity, &times, &values)
+        WeightedRecord::new(quantity, &times, &values)
     }
 
     fn places() -> Vec<(Chart, ChartPoint)> {

@@ -6,7 +6,7 @@ use super::curve::{CurveWindow, Fineness, LawCurve};
 use super::descent::{Descent, DescentEffort, SearchPoint};
 use super::lattice::{self, CurveFamily, Lattice};
 use super::point_readings::PointReadings;
-use super::record::Record;
+use super::record::WeightedRecord;
 use super::solution::{EndOfSearch, Exponent, Solution};
 use super::unit_m::{UnitMLine, UnitMLines};
 use crate::reading::Quantity;
@@ -29,7 +29,7 @@ const WHOLLY: DescentEffort = DescentEffort {
     least_gain: 1e-9,
     fineness: Fineness::FINE,
 };
-/// A descent to the floor is begun afresh while it gained more than this, relative, and at most so often.
+/// A descent to the floor is begun again while it gained more than this, relative, and at most so often.
 const RESTART_GAIN: f64 = 1e-7;
 const MOST_RESTARTS: usize = 6;
 
@@ -50,6 +50,7 @@ struct Breadth {
     /// Costs within so many times the best go to the floor.
     floor_within: f64,
 }
+/// For records that a few starts decide.
 const EASY_BREADTH: Breadth = Breadth {
     nearly: 3,
     nearly_of_one_m: 1,
@@ -58,6 +59,7 @@ const EASY_BREADTH: Breadth = Breadth {
     wholly: 1,
     floor_within: 1.02,
 };
+/// For records of many valleys of nearly one cost.
 const HARD_BREADTH: Breadth = Breadth {
     nearly: 5,
     nearly_of_one_m: 2,
@@ -110,7 +112,7 @@ pub(super) struct GlobalSearch<'a> {
     readings: &'a PointReadings,
     exponent: Exponent,
     lattice: Lattice,
-    full: Record,
+    full: WeightedRecord,
     descent: Descent,
     lines: UnitMLines,
 }
@@ -162,7 +164,7 @@ impl<'a> GlobalSearch<'a> {
     }
 
     /// The minima with m other than 1.
-    fn curved(&mut self, merged: &Record, lines: &[Vec<UnitMLine>; 2]) -> Vec<SearchPoint> {
+    fn curved(&mut self, merged: &WeightedRecord, lines: &[Vec<UnitMLine>; 2]) -> Vec<SearchPoint> {
         let places = self.places(merged, lines);
         let lowest = lowest(&places, None);
         let breadth = if lowest > HARD * merged.cost_of_no_change() {
@@ -215,7 +217,7 @@ impl<'a> GlobalSearch<'a> {
     }
 
     /// The best places of the lattice, best first.
-    fn places(&mut self, merged: &Record, lines: &[Vec<UnitMLine>; 2]) -> Vec<SearchPoint> {
+    fn places(&mut self, merged: &WeightedRecord, lines: &[Vec<UnitMLine>; 2]) -> Vec<SearchPoint> {
         let mut places = Vec::new();
         match self.exponent {
             Exponent::Free => {
@@ -242,7 +244,7 @@ impl<'a> GlobalSearch<'a> {
 
     fn scan(
         &mut self,
-        merged: &Record,
+        merged: &WeightedRecord,
         families: impl Iterator<Item = CurveFamily>,
         places: &mut Vec<SearchPoint>,
     ) {
@@ -253,7 +255,7 @@ impl<'a> GlobalSearch<'a> {
     }
 
     /// The laws that follow a straight line in inverse velocity until near its end.
-    fn beside(&mut self, merged: &Record, line: &UnitMLine, places: &mut Vec<SearchPoint>) {
+    fn beside(&mut self, merged: &WeightedRecord, line: &UnitMLine, places: &mut Vec<SearchPoint>) {
         let slope = line.ln_slope.exp();
         let fall = slope.ln_1p();
         for (direction, branch, m) in LINE_LIKE {
@@ -355,7 +357,7 @@ impl<'a> GlobalSearch<'a> {
 
 /// Goes to the floor, and where m has run to its bound from the corner without a steady state too: an
 /// exponential lies there, at the end of a valley that hardly falls.
-fn refine(descent: &mut Descent, record: &Record, place: &mut SearchPoint, holds_m: bool) {
+fn refine(descent: &mut Descent, record: &WeightedRecord, place: &mut SearchPoint, holds_m: bool) {
     go_down(descent, record, place, holds_m);
     if !holds_m && is_at_bound_of_m(place) {
         let mut corner = *place;
@@ -368,8 +370,8 @@ fn refine(descent: &mut Descent, record: &Record, place: &mut SearchPoint, holds
     }
 }
 
-/// Goes down, afresh as long as it gains: a curved valley stalls a descent before its floor.
-fn go_down(descent: &mut Descent, record: &Record, place: &mut SearchPoint, holds_m: bool) {
+/// Goes down, again as long as it gains: a curved valley stalls a descent before its floor.
+fn go_down(descent: &mut Descent, record: &WeightedRecord, place: &mut SearchPoint, holds_m: bool) {
     for _ in 0..MOST_RESTARTS {
         let next = descent.descend(record, place, &WHOLLY, holds_m);
         let gain = place.cost - next.cost;

@@ -5,7 +5,7 @@ use super::chart::{Branch, Chart, Direction};
 use super::curve::{CurveShape, CurveWindow, Fineness};
 use super::descent::{Descent, SearchPoint};
 use super::quasi_random::halton;
-use super::record::Record;
+use super::record::WeightedRecord;
 
 /// The m's that are looked at in any case, and those that are where a direction shows promise.
 const FIRST: [(Branch, f64); 3] = [
@@ -13,6 +13,7 @@ const FIRST: [(Branch, f64); 3] = [
     (Branch::BelowOne, 0.25),
     (Branch::BelowZero, -1.2),
 ];
+/// The m's that follow in a direction that shows promise.
 const MORE: [(Branch, f64); 7] = [
     (Branch::AboveOne, 1.05),
     (Branch::AboveOne, 6.0),
@@ -110,7 +111,7 @@ impl CurveFamily {
     pub(super) fn scan(
         &self,
         descent: &mut Descent,
-        record: &Record,
+        record: &WeightedRecord,
         lattice: Lattice,
         holds_m: bool,
     ) -> Vec<SearchPoint> {
@@ -137,7 +138,7 @@ impl CurveFamily {
         if descent.curve.count() < 3 {
             return Vec::new();
         }
-        let best = lay(descent, record, chart, (p, lattice, seed));
+        let best = lay(descent, record, chart, p, lattice, seed);
         let place = |laid: &Laid| {
             let node = laid.window.first_node;
             let slope = descent.curve.growth(node) * laid.window.span;
@@ -163,9 +164,11 @@ impl CurveFamily {
 /// Lays the curve over the record in all ways and keeps the two best that differ.
 fn lay(
     descent: &mut Descent,
-    record: &Record,
+    record: &WeightedRecord,
     chart: Chart,
-    (p, lattice, seed): (f64, Lattice, usize),
+    p: f64,
+    lattice: Lattice,
+    seed: usize,
 ) -> Vec<Laid> {
     let knee_excess = 1.0 / p.abs().max(1.0);
     let knee = descent.curve.time_at_excess(knee_excess);

@@ -16,7 +16,7 @@ mod solution;
 mod under_load;
 mod unit_m;
 
-pub use constant_load::{ConstantLoad, Outcome};
+pub use constant_load::{ConstantLoad, FitOutcome};
 pub use lattice::Lattice;
 pub use point_readings::PointReadings;
 pub use posterior::{Ensemble, Onset, OtherPrior, P_PRIOR, Posterior, Sample as LawSample};

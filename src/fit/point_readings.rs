@@ -1,6 +1,6 @@
 //! Point readings as they are given and as they are kept: from the first, about their mean, over their size.
 
-use super::record::Record;
+use super::record::WeightedRecord;
 use super::solution::{EndOfSearch, Solution};
 use crate::model::Law;
 use crate::reading::Quantity;
@@ -88,10 +88,10 @@ impl PointReadings {
     }
 
     /// The readings over their length, the values as they are kept.
-    pub(super) fn record(&self) -> Record {
+    pub(super) fn record(&self) -> WeightedRecord {
         let length = self.length_days();
         let times: Vec<f64> = self.days.iter().map(|day| day / length).collect();
-        Record::new(self.quantity, &times, &self.values)
+        WeightedRecord::new(self.quantity, &times, &self.values)
     }
 
     /// A solution in the readings' unit, from one in the values as they are kept.

@@ -1,6 +1,7 @@
 //! Points that fill a cube evenly, the same every time: Halton's sequence and, where dimensions are many,
 //! Kronecker's; and normal deviates of them.
 
+/// The first primes, a base for each dimension.
 const BASES: [u32; 5] = [2, 3, 5, 7, 11];
 
 /// The `index`-th point of the Halton sequence in five dimensions, each in (0, 1).

@@ -89,6 +89,20 @@ const LONGEST_SHARE: f64 = 1.0 / 16.0;
 const LEAST_DISPLACEMENT_SIGMA_MM: f64 = 1e-3;
 
 impl Observations {
+    /// Displacements, mm, at times in days, without stated errors.
+    pub fn of_displacements(points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        let values = points.into_iter().map(|(t_days, value)| Observation {
+            t_days,
+            value,
+            sigma: None,
+        });
+        Self {
+            quantity: Quantity::Displacement,
+            averaging_days: 0.0,
+            values: values.collect(),
+        }
+    }
+
     /// The readings of a series, in days from its first.
     pub fn of(series: &Series) -> Self {
         let factor = series.unit.factor();
@@ -318,16 +332,7 @@ mod tests {
     use super::*;
 
     fn displacement(values: &[(f64, f64)]) -> Observations {
-        let values = values.iter().map(|(t_days, value)| Observation {
-            t_days: *t_days,
-            value: *value,
-            sigma: None,
-        });
-        Observations {
-            quantity: Quantity::Displacement,
-            averaging_days: 0.0,
-            values: values.collect(),
-        }
+        Observations::of_displacements(values.iter().copied())
     }
 
     #[test]

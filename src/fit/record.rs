@@ -13,7 +13,7 @@ pub(super) struct RecordSide {
 
 /// Readings with the number of measurements that each stands for.
 #[derive(Debug, Clone)]
-pub(super) struct Record {
+pub(super) struct WeightedRecord {
     pub(super) quantity: Quantity,
     sides: [RecordSide; 2],
     /// From either end.
@@ -46,7 +46,7 @@ pub(super) struct Projected {
     squares: f64,
 }
 
-impl Record {
+impl WeightedRecord {
     /// `times` from 0 to 1, increasing.
     pub(super) fn new(quantity: Quantity, times: &[f64], values: &[f64]) -> Self {
         let merged = times.iter().zip(values).map(|(t, v)| (*t, *v, 1.0));

@@ -1,7 +1,7 @@
 //! The laws with m = 1: inverse velocity is a straight line, and one number gives its shape.
 
 use super::chart::{Anchor, Direction, slope_bounds};
-use super::record::Record;
+use super::record::WeightedRecord;
 use crate::model::Law;
 use crate::reading::Quantity;
 
@@ -55,7 +55,7 @@ impl UnitMLines {
     /// The minima that descents from a few places end in, lowest first.
     pub(super) fn minima(
         &mut self,
-        record: &Record,
+        record: &WeightedRecord,
         direction: Direction,
         shift: f64,
     ) -> Vec<UnitMLine> {
@@ -81,13 +81,17 @@ impl UnitMLines {
     }
 
     /// The best line that descent from those finds.
-    pub(super) fn best(&mut self, record: &Record, from: &[UnitMLine]) -> Option<UnitMLine> {
+    pub(super) fn best(
+        &mut self,
+        record: &WeightedRecord,
+        from: &[UnitMLine],
+    ) -> Option<UnitMLine> {
         let ends = from.iter().map(|line| self.descend(record, *line));
         ends.min_by(|a, b| a.cost.total_cmp(&b.cost))
             .filter(|line| line.cost.is_finite())
     }
 
-    fn cost(&mut self, record: &Record, direction: Direction, ln_slope: f64) -> f64 {
+    fn cost(&mut self, record: &WeightedRecord, direction: Direction, ln_slope: f64) -> f64 {
         self.evaluations += 1;
         let (anchor, slope) = (anchor(direction), ln_slope.exp());
         let count = record.count();
@@ -101,7 +105,7 @@ impl UnitMLines {
         projected.map_or(f64::INFINITY, |projected| projected.cost)
     }
 
-    fn descend(&mut self, record: &Record, start: UnitMLine) -> UnitMLine {
+    fn descend(&mut self, record: &WeightedRecord, start: UnitMLine) -> UnitMLine {
         let bounds = slope_bounds();
         let mut line = start;
         line.cost = self.cost(record, line.direction, line.ln_slope);
@@ -127,7 +131,7 @@ impl UnitMLines {
     }
 
     /// Gauss and Newton's step at a line.
-    fn step(&mut self, record: &Record, line: &UnitMLine) -> Option<f64> {
+    fn step(&mut self, record: &WeightedRecord, line: &UnitMLine) -> Option<f64> {
         let anchor = anchor(line.direction);
         self.cost(record, line.direction, line.ln_slope);
         let count = record.count();
@@ -155,7 +159,7 @@ impl UnitMLines {
     /// both in the record's units of value.
     pub(super) fn law(
         &mut self,
-        record: &Record,
+        record: &WeightedRecord,
         line: &UnitMLine,
         length_days: f64,
     ) -> Option<(Law, f64)> {

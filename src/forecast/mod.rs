@@ -21,7 +21,7 @@ pub use evidence::RATE_PER_YEAR;
 pub use life::{Corpus, Fate, Life};
 pub use line::InverseVelocityLine;
 pub use network::{HIDDEN, INPUTS, Network};
-pub use panel::{FEWEST_READINGS, HORIZON_DAYS, Outlook, Panel, by_the_law};
+pub use panel::{FEWEST_READINGS, HORIZON_DAYS, LawForecaster, Outlook, by_the_law};
 pub(crate) use panel::{measurably_moves, outlook};
 pub use passage::Passage;
 pub use scales::{Change, Scale, Scales};

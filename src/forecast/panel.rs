@@ -10,7 +10,7 @@ use crate::regime::Regime;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Fewest readings before anything is forecast: below it the priors would speak, not the slope.
+/// Fewest readings before anything is forecast: below it the priors would decide, not the slope.
 pub const FEWEST_READINGS: usize = 10;
 /// A slope at 50 m/day has failed by any account, mm/day.
 const FASTEST_CRITICAL: f64 = 5e4;
@@ -48,17 +48,17 @@ pub struct Outlook {
 
 /// What one benchmark is expected to do, and how well that was met.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub struct Panel {
+pub struct LawForecaster {
     expected: Option<Ensemble>,
     scored_to_days: Option<f64>,
     surprise: Surprise,
     #[serde(default)]
-    seen: Option<Seen>,
+    seen: Option<NewestReading>,
 }
 
 /// The newest reading as of the last update.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
-struct Seen {
+struct NewestReading {
     t_days: f64,
     /// mm or mm/day.
     value: f64,
@@ -66,7 +66,7 @@ struct Seen {
     noise: f64,
 }
 
-impl Panel {
+impl LawForecaster {
     /// Weighs the newest reading against what was expected, refits, and says what is to be expected now of
     /// passing `critical` mm/day; `None` with too few readings to go on.
     pub fn update(&mut self, observations: &Observations, critical: f64) -> Option<Outlook> {
@@ -74,7 +74,7 @@ impl Panel {
         let outlook = outlook(observations, critical);
         let (outlook, expected) = outlook?;
         self.expected = expected;
-        self.seen = Seen::of(observations);
+        self.seen = NewestReading::of(observations);
         Some(Outlook {
             surprise_nats,
             ..outlook
@@ -82,7 +82,7 @@ impl Panel {
     }
 
     /// By how many standard deviations the newest reading is faster than what was expected of it; `None` where
-    /// nothing was. To be asked before [`Panel::update`] takes that reading.
+    /// nothing was. To be asked before [`LawForecaster::update`] takes that reading.
     pub fn excess(&self, observations: &Observations) -> Option<f64> {
         let [.., before, newest] = observations.values.as_slice() else {
             return None;
@@ -227,7 +227,7 @@ impl Outlook {
     }
 }
 
-impl Seen {
+impl NewestReading {
     fn of(observations: &Observations) -> Option<Self> {
         let newest = observations.values.last()?;
         let stated = newest.sigma.unwrap_or(0.0);

@@ -115,7 +115,7 @@ impl FailureTimeLikelihood {
     }
 }
 
-/// The groups that the snapshots speak for, oldest snapshot first, in the order of their first benchmarks.
+/// The groups that the snapshots support, oldest snapshot first, in the order of their first benchmarks.
 pub fn groups(snapshots: &[Snapshot], dependence: &Dependence) -> Vec<Group> {
     let Some(count) = snapshots
         .iter()

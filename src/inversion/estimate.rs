@@ -83,7 +83,7 @@ pub(super) fn parameters(
     let best = best(inversion, solution);
     let samples = posterior.map_or_else(Vec::new, |posterior| at_start(inversion, posterior));
     let fixed = matches!(inversion.options.exponent, Exponent::Fixed(_));
-    // A posterior over m says nothing of what hangs on m when that is given.
+    // A posterior over m says nothing of what depends on m when that is given.
     let of_m = if fixed { &[] } else { samples.as_slice() };
     // x_i, T and D have their pole at m = 1: bounds on either side of it would bound nothing.
     let of_x = if stands_on_both_sides(&samples) {

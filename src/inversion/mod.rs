@@ -11,7 +11,8 @@ mod together;
 
 pub use estimate::{Estimate, Parameters};
 pub use report::{
-    Alternative, Alternatives, FailureTime, FitReport, InverseVelocity, RegimeReport, UnderPrior,
+    Alternative, Alternatives, FitReport, FittedFailureTime, FittedInverseVelocity, FittedRegime,
+    UnderPrior,
 };
 pub use sweep::{SweepOptions, SweepReport, SweepRow, sweep, sweep_showing};
 pub use together::{ApartReport, GroupReport, TogetherReport, together};
@@ -26,7 +27,7 @@ use jiff::SignedDuration;
 
 /// What is asked of an inversion.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Options {
+pub struct InversionOptions {
     /// First instant of the readings used.
     pub from: Option<Timestamp>,
     /// Last instant of the readings used.
@@ -41,7 +42,7 @@ pub struct Options {
     pub horizon_days: f64,
 }
 
-impl Default for Options {
+impl Default for InversionOptions {
     fn default() -> Self {
         Self {
             from: None,
@@ -65,12 +66,12 @@ const FARTHEST_INTERCEPT: f64 = 3.0;
 pub struct Inversion {
     series: Series,
     observations: Observations,
-    options: Options,
+    options: InversionOptions,
 }
 
 impl Inversion {
     /// Chooses the readings that `options` ask for; what is not finite is left out.
-    pub fn new(series: &Series, options: &Options) -> Self {
+    pub fn new(series: &Series, options: &InversionOptions) -> Self {
         let mut chosen = Series {
             readings: Vec::new(),
             ..series.clone()
@@ -122,7 +123,7 @@ impl Inversion {
             .then(|| Posterior::over_onsets(&rates))
             .flatten();
         let onset = posterior.as_ref().map(Posterior::onset);
-        let regime = RegimeReport::of(posterior.as_ref());
+        let regime = FittedRegime::of(posterior.as_ref());
         let best = least_squares.best();
         let first = self.series.readings.first().map(|reading| reading.time);
         FitReport {
@@ -140,15 +141,18 @@ impl Inversion {
             transition_time: best
                 .and_then(|best| best.law.transition_days())
                 .and_then(|days| self.time_at(days)),
-            failure_time: FailureTime::of(self, outlook.as_ref().map(|one| &one.collapse)),
-            critical_velocity_time: FailureTime::of(self, outlook.as_ref().map(|one| &one.passage)),
+            failure_time: FittedFailureTime::of(self, outlook.as_ref().map(|one| &one.collapse)),
+            critical_velocity_time: FittedFailureTime::of(
+                self,
+                outlook.as_ref().map(|one| &one.passage),
+            ),
             prior_sensitivity: UnderPrior::each(self, posterior.as_ref()),
             inverse_velocity: self.inverse_velocity(&rates, regime.probability_accelerating),
             regime,
             regime_under_load: outlook
                 .as_ref()
                 .filter(|_| is_informative)
-                .map(RegimeReport::under_load),
+                .map(FittedRegime::under_load),
             rms: best.map(|best| best.rms).filter(|rms| rms.is_finite()),
             evaluations: least_squares.evaluations,
             seconds,
@@ -161,7 +165,7 @@ impl Inversion {
         self.observations.rates(all, RateOptions::default())
     }
 
-    fn inverse_velocity(&self, rates: &[Rate], accelerating: Option<f64>) -> InverseVelocity {
+    fn inverse_velocity(&self, rates: &[Rate], accelerating: Option<f64>) -> FittedInverseVelocity {
         let (share, fewest) = LINE;
         #[expect(
             clippy::cast_possible_truncation,
@@ -182,7 +186,7 @@ impl Inversion {
         };
         let is_prediction =
             |days: &f64| *days > now - 1.0 && *days < now + FARTHEST_INTERCEPT * length;
-        InverseVelocity {
+        FittedInverseVelocity {
             failure_time: line
                 .and_then(|line| line.intercept_days)
                 .filter(is_prediction)

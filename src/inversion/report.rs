@@ -1,7 +1,7 @@
 //! The report of one inversion, key for key as scripts read it: what is unbounded or missing is null.
 
 use super::estimate::{self, Estimate, Parameters};
-use super::{Inversion, Options};
+use super::{Inversion, InversionOptions};
 use crate::fit::{ConstantLoad, Ensemble, OtherPrior, Posterior};
 use crate::forecast::{HORIZON_DAYS, Outlook, Passage};
 use crate::reading::{BenchmarkId, Quantity, SECONDS_PER_DAY, Timestamp, Unit, after_days};
@@ -32,9 +32,9 @@ pub struct FitReport {
     /// 95 % quantile.
     pub onset_high: Option<Timestamp>,
     /// Which regime, with what probability, under a load that never changed.
-    pub regime: RegimeReport,
+    pub regime: FittedRegime,
     /// The same where the load may change undeclared: what the monitor goes by. `None` with too few readings.
-    pub regime_under_load: Option<RegimeReport>,
+    pub regime_under_load: Option<FittedRegime>,
     /// The law's parameters.
     pub parameters: Parameters,
     /// The distinct minima of the misfit, best first.
@@ -42,13 +42,13 @@ pub struct FitReport {
     /// Inflection of the best fit's velocity.
     pub transition_time: Option<Timestamp>,
     /// When the slope collapses.
-    pub failure_time: FailureTime,
+    pub failure_time: FittedFailureTime,
     /// When the critical velocity is passed.
-    pub critical_velocity_time: FailureTime,
+    pub critical_velocity_time: FittedFailureTime,
     /// What the law alone would say under this prior and under others.
     pub prior_sensitivity: Vec<UnderPrior>,
     /// The straight line through inverse velocity.
-    pub inverse_velocity: InverseVelocity,
+    pub inverse_velocity: FittedInverseVelocity,
     /// Root mean square residual of the best fit, in the readings' unit.
     pub rms: Option<f64>,
     /// Laws solved for the best fit.
@@ -96,7 +96,7 @@ pub struct Alternatives(pub Vec<Alternative>);
 
 /// The regime by the posterior.
 #[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
-pub struct RegimeReport {
+pub struct FittedRegime {
     /// The regime, or `undetermined` under 60 %.
     pub label: Regime,
     /// Probability of kappa > 0; `None` with too few readings for a posterior.
@@ -109,7 +109,7 @@ pub struct RegimeReport {
 
 /// First passage of the critical velocity; quantiles are unconditional.
 #[derive(Debug, Clone, Copy, PartialEq, JsonSchema, Serialize)]
-pub struct FailureTime {
+pub struct FittedFailureTime {
     /// 5 % quantile.
     pub low: Option<Timestamp>,
     /// Median.
@@ -127,7 +127,7 @@ pub struct FailureTime {
 
 /// The straight line through 1/v, and the exponent that would straighten it.
 #[derive(Debug, Clone, Copy, PartialEq, JsonSchema, Serialize)]
-pub struct InverseVelocity {
+pub struct FittedInverseVelocity {
     /// Where the line through the trailing quarter meets zero.
     pub failure_time: Option<Timestamp>,
     /// Its coefficient of determination.
@@ -161,7 +161,7 @@ impl Alternatives {
     }
 }
 
-impl RegimeReport {
+impl FittedRegime {
     pub(super) fn of(posterior: Option<&Posterior>) -> Self {
         let Some(posterior) = posterior else {
             return Self {
@@ -246,7 +246,7 @@ impl UnderPrior {
     }
 }
 
-impl FailureTime {
+impl FittedFailureTime {
     /// As seen at the newest reading; `None`: there is no forecast.
     pub(super) fn of(inversion: &Inversion, passage: Option<&Passage>) -> Self {
         let now = inversion.series.readings.last().map(|reading| reading.time);
@@ -254,7 +254,10 @@ impl FailureTime {
     }
 
     /// What a passage says as seen at a time; `None`: there is no forecast.
-    pub(super) fn from_passage(options: &Options, seen: Option<(Timestamp, &Passage)>) -> Self {
+    pub(super) fn from_passage(
+        options: &InversionOptions,
+        seen: Option<(Timestamp, &Passage)>,
+    ) -> Self {
         let horizon_days = options.horizon_days.clamp(0.0, HORIZON_DAYS);
         let at = |share: f64| {
             let (now, passage) = seen?;

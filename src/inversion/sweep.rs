@@ -1,7 +1,7 @@
 //! The inversion over growing `t_max` from a fixed start: what would have been said, and when.
 
-use super::report::{Alternatives, FailureTime, InverseVelocity, RegimeReport};
-use super::{FitReport, Inversion, Options};
+use super::report::{Alternatives, FittedFailureTime, FittedInverseVelocity, FittedRegime};
+use super::{FitReport, Inversion, InversionOptions};
 use crate::reading::{BenchmarkId, Quantity, SECONDS_PER_DAY, Series, Timestamp, Unit};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -55,7 +55,7 @@ pub struct SweepRow {
     /// How many were used.
     pub readings: usize,
     /// Which regime, with what probability.
-    pub regime: RegimeReport,
+    pub regime: FittedRegime,
     /// m of the best fit.
     pub m: Option<f64>,
     /// Its initial state.
@@ -63,9 +63,9 @@ pub struct SweepRow {
     /// Inflection of its velocity.
     pub transition_time: Option<Timestamp>,
     /// When the critical velocity is passed.
-    pub failure_time: FailureTime,
+    pub failure_time: FittedFailureTime,
     /// The straight line through inverse velocity.
-    pub inverse_velocity: InverseVelocity,
+    pub inverse_velocity: FittedInverseVelocity,
     /// The distinct minima of the misfit, best first.
     pub alternatives: Alternatives,
     /// Root mean square residual of the best fit.
@@ -75,14 +75,14 @@ pub struct SweepRow {
 }
 
 /// Inverts `series` up to each `t_max` in turn.
-pub fn sweep(series: &Series, options: &Options, steps: &SweepOptions) -> SweepReport {
+pub fn sweep(series: &Series, options: &InversionOptions, steps: &SweepOptions) -> SweepReport {
     sweep_showing(series, options, steps, &mut |_| {})
 }
 
 /// The same; `progress` is called with the share done, 0 to 1.
 pub fn sweep_showing(
     series: &Series,
-    options: &Options,
+    options: &InversionOptions,
     steps: &SweepOptions,
     progress: &mut dyn FnMut(f64),
 ) -> SweepReport {
@@ -90,7 +90,7 @@ pub fn sweep_showing(
     let t_maxes = t_maxes(whole.series(), steps);
     let rows = t_maxes.iter().enumerate().map(|(index, t_max)| {
         progress(index as f64 / t_maxes.len() as f64);
-        let upto = Options {
+        let upto = InversionOptions {
             until: Some(*t_max),
             ..*options
         };

@@ -1,7 +1,7 @@
 //! Which benchmarks of one site fail together, since when it is seen, and when they fail.
 
-use super::report::FailureTime;
-use super::{Inversion, Options};
+use super::report::FittedFailureTime;
+use super::{Inversion, InversionOptions};
 use crate::fit::{Rate, RateOptions};
 use crate::forecast::{
     Dependence, FEWEST_READINGS, FailureTimeLikelihood, Passage, Snapshot, by_the_law, groups,
@@ -11,9 +11,9 @@ use crate::reading::{BenchmarkId, Series, Timestamp, after_days, days_since};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// Looks back over the time in which all benchmarks were read, by which "since" is reported: evenly in ln of the
+/// Past times within that in which all benchmarks were read, by which "since" is reported: evenly in ln of the
 /// time to the failure that is expected now, as forecasts change.
-const LOOKS: usize = 24;
+const SNAPSHOTS: usize = 24;
 /// That time over the time looked back on, within bounds that leave no step too coarse or too fine.
 const LEFT: (f64, f64) = (0.02, 1.0);
 /// A benchmark not read for more than this share of its own record says nothing of today.
@@ -28,7 +28,7 @@ pub struct TogetherReport {
     pub apart: Vec<ApartReport>,
     /// Benchmarks without a forecast of today, which are not judged.
     pub silent: Vec<BenchmarkId>,
-    /// The first of the looks back.
+    /// The first of the snapshots.
     pub judged_from: Timestamp,
     /// How many there are; they lie closer as the failure comes closer.
     pub looks: usize,
@@ -44,7 +44,7 @@ pub struct GroupReport {
     /// The look from which on they have been a group; [`TogetherReport::judged_from`]: from the first.
     pub since: Timestamp,
     /// When they pass the critical velocity together, by the law.
-    pub failure_time: FailureTime,
+    pub failure_time: FittedFailureTime,
 }
 
 /// A benchmark on its own.
@@ -60,7 +60,7 @@ pub struct ApartReport {
 
 /// Judges the benchmarks of `series`, by the first series of each, with what `options` let be used; `None`
 /// where fewer than two have a forecast.
-pub fn together(series: &[Series], options: &Options) -> Option<TogetherReport> {
+pub fn together(series: &[Series], options: &InversionOptions) -> Option<TogetherReport> {
     let mut each: Vec<Inversion> = Vec::new();
     for one in series {
         if each
@@ -93,7 +93,7 @@ pub fn together(series: &[Series], options: &Options) -> Option<TogetherReport> 
         benchmarks: group.members.iter().map(name).collect(),
         probabilities: group.probabilities.clone(),
         since: times[group.since],
-        failure_time: FailureTime::from_passage(options, Some((now, &group.passage))),
+        failure_time: FittedFailureTime::from_passage(options, Some((now, &group.passage))),
     });
     let apart = alone.iter().flat_map(|group| {
         let members = group.members.iter().zip(&group.probabilities);
@@ -141,7 +141,7 @@ fn predicted(inversion: &Inversion, time: Timestamp) -> Option<(Passage, f64)> {
     measurably_moves(&rates).then_some((passage, days - now_days))
 }
 
-/// The looks back and their times: all benchmarks have readings enough by the first, and the last is now.
+/// The snapshots and their times: all benchmarks have readings enough by the first, and the last is now.
 fn looks(inversions: &[Inversion], now: Timestamp) -> Option<(Vec<Timestamp>, Vec<Snapshot>)> {
     let ready = inversions.iter().filter_map(|one| {
         let spaced = one.observations.spaced(FEWEST_READINGS);
@@ -157,16 +157,16 @@ fn looks(inversions: &[Inversion], now: Timestamp) -> Option<(Vec<Timestamp>, Ve
     let soonest = medians.fold(f64::INFINITY, f64::min);
     let left = soonest.clamp(LEFT.0 * span, LEFT.1 * span);
     let back = |index: usize| {
-        let share = index as f64 / (LOOKS - 1) as f64;
+        let share = index as f64 / (SNAPSHOTS - 1) as f64;
         left * (((left + span) / left.max(f64::MIN_POSITIVE)).powf(share) - 1.0)
     };
     let at = |index: usize| {
-        if index == LOOKS - 1 {
+        if index == SNAPSHOTS - 1 {
             return Some(first);
         }
         after_days(now, -back(index))
     };
-    let mut times: Vec<Timestamp> = (0..LOOKS).rev().filter_map(at).collect();
+    let mut times: Vec<Timestamp> = (0..SNAPSHOTS).rev().filter_map(at).collect();
     times.dedup();
     let looks = times.iter().map(|time| Snapshot {
         left_days: left + days_since(*time, now),

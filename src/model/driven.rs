@@ -30,7 +30,7 @@ pub struct Drive<'a> {
     /// f(t) at the nodes, linear between them.
     pub log_load: &'a [f64],
     /// What happens at nodes, in their order.
-    pub events: &'a [Event],
+    pub events: &'a [LoadEvent],
     /// eta: the log-load lost per mm/day of velocity, not negative.
     pub per_velocity: f64,
     /// k: the log-load lost per mm of slip.
@@ -39,7 +39,7 @@ pub struct Drive<'a> {
 
 /// A sudden change at a node.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Event {
+pub struct LoadEvent {
     /// The index of the node.
     pub node: usize,
     /// Added to the log-load from here on.

@@ -12,7 +12,7 @@ pub struct Load {
 
 /// A stretch of time in which the load is linear.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Stretch {
+pub(super) struct LoadStretch {
     pub(super) until: f64,
     /// f where the stretch is entered.
     pub(super) log_load: f64,
@@ -61,20 +61,20 @@ impl Load {
     }
 
     /// The stretch from `t` on, and how many knots lie at or before `t`, of which `passed` are known.
-    pub(super) fn stretch(&self, t: f64, passed: usize) -> (Stretch, usize) {
+    pub(super) fn stretch(&self, t: f64, passed: usize) -> (LoadStretch, usize) {
         let later = self.knots.get(passed..).unwrap_or_default();
         let passed = passed + later.partition_point(|(days, _)| *days <= t);
         let before = passed.checked_sub(1).and_then(|k| self.knots.get(k));
         let stretch = match (before, self.knots.get(passed)) {
             (Some(&(from, f_from)), Some(&(to, f_to))) => {
                 let per_day = (f_to - f_from) / (to - from);
-                Stretch {
+                LoadStretch {
                     until: to,
                     log_load: f_from + per_day * (t - from),
                     per_day,
                 }
             }
-            (before, after) => Stretch {
+            (before, after) => LoadStretch {
                 until: after.map_or(f64::INFINITY, |(to, _)| *to),
                 log_load: before.or(after).map_or(0.0, |(_, f)| *f),
                 per_day: 0.0,

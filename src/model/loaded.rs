@@ -9,7 +9,7 @@
 use super::accuracy::Accuracy;
 use super::coefficients::Coefficients;
 use super::law::{Law, LawError};
-use super::load::{Load, Stretch};
+use super::load::{Load, LoadStretch};
 use super::relaxation::Relaxation;
 use super::trajectory::Motion;
 use std::ops::ControlFlow;
@@ -51,7 +51,7 @@ struct TaylorStep {
     start: f64,
     end: f64,
     unit: f64,
-    stretch: Stretch,
+    stretch: LoadStretch,
     order: usize,
     y: PowerSeries,
     slip: PowerSeries,
@@ -149,7 +149,7 @@ impl<'a> LoadedLaw<'a> {
             steps = if passed == block.passed { steps + 1 } else { 0 };
             block.passed = passed;
             let mut step =
-                TaylorStep::expand(&self.law, (self.order, self.fraction), &block, stretch);
+                TaylorStep::expand(&self.law, self.order, self.fraction, &block, stretch);
             if let Some(relaxation) = self.relaxation(&block, stretch) {
                 step.relaxation = Some(relaxation);
                 step.end = stretch.until;
@@ -168,7 +168,7 @@ impl<'a> LoadedLaw<'a> {
     }
 
     /// The rest of a stretch whose load stands still, beside a steady state that attracts.
-    fn relaxation(&self, block: &BlockState, stretch: Stretch) -> Option<Relaxation<f64>> {
+    fn relaxation(&self, block: &BlockState, stretch: LoadStretch) -> Option<Relaxation<f64>> {
         if stretch.per_day != 0.0 {
             return None;
         }
@@ -224,9 +224,10 @@ impl TaylorStep {
     /// the slip's slope is V = G/y: y V = G.
     fn expand(
         law: &Law,
-        (order, fraction): (usize, f64),
+        order: usize,
+        fraction: f64,
         block: &BlockState,
-        stretch: Stretch,
+        stretch: LoadStretch,
     ) -> Self {
         let gain = stretch.log_load.exp();
         let (w_0, u_0) = ((law.p * block.y.ln()).exp(), 1.0 / block.y);
@@ -363,7 +364,7 @@ mod tests {
         };
         for k in 1..=count {
             let stretch = load.stretch(block.t, 0).0;
-            let mut step = TaylorStep::expand(law, (order, 1.0), &block, stretch);
+            let mut step = TaylorStep::expand(law, order, 1.0, &block, stretch);
             step.end = f64::from(k) / f64::from(count);
             let Next::BlockState(next) = step.next(law, &block) else {
                 panic!("lost");

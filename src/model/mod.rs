@@ -19,7 +19,7 @@ mod taylor;
 mod trajectory;
 
 pub use accuracy::Accuracy;
-pub use driven::{Drive, Driven, Event};
+pub use driven::{Drive, Driven, LoadEvent};
 pub use law::{Law, LawError, PaperParameters, StateSense, SteadyState};
 pub use load::Load;
 pub use loaded::LoadedLaw;

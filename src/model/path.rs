@@ -50,7 +50,8 @@ impl<S: Scalar> SolutionPath<S> {
     /// Solves over `[0, end_days]`, in the room that there is.
     pub(super) fn solve(
         &mut self,
-        (law, coefficients): (&Law, &Coefficients<S>),
+        law: &Law,
+        coefficients: &Coefficients<S>,
         end_days: f64,
         accuracy: Accuracy,
     ) {

@@ -24,7 +24,7 @@ pub struct Gradient {
     pub p: f64,
 }
 
-/// A motion and what it owes to the parameters.
+/// A motion and how it changes with the parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotionWithGradients {
     /// The motion.
@@ -35,7 +35,7 @@ pub struct MotionWithGradients {
     pub displacement: Gradient,
 }
 
-/// Days from t = 0, and what they owe to the parameters.
+/// Days from t = 0, and how they change with the parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DaysWithGradient {
     /// Days.
@@ -67,7 +67,7 @@ impl Sensitivities {
     pub fn solve_again(&mut self, law: &Law, end_days: f64, accuracy: Accuracy) {
         self.law = *law;
         let coefficients = Coefficients::<Dual>::of(law);
-        self.path.solve((law, &coefficients), end_days, accuracy);
+        self.path.solve(law, &coefficients, end_days, accuracy);
     }
 
     /// The motion `t` days after the start with its derivatives at that time; `None` from the

@@ -40,7 +40,7 @@ impl Trajectory {
     pub fn solve_again(&mut self, law: &Law, end_days: f64, accuracy: Accuracy) {
         self.law = *law;
         let coefficients = Coefficients::<f64>::of(law);
-        self.path.solve((law, &coefficients), end_days, accuracy);
+        self.path.solve(law, &coefficients, end_days, accuracy);
     }
 
     /// Days from t = 0 to the singularity, where there is one, within the solved span or beyond.

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 /// A level and how long it was in force.
 #[derive(Debug, Clone, Copy, PartialEq, JsonSchema, Serialize)]
-pub struct Stretch {
+pub struct LevelStretch {
     /// The level.
     pub level: Level,
     /// When it was entered.
@@ -23,9 +23,9 @@ pub fn levels_in(
     events: &[Event],
     benchmark: Option<&BenchmarkId>,
     (first, last): (Timestamp, Timestamp),
-) -> (Vec<Stretch>, Vec<Stretch>) {
-    let mut levels = Course::new(Level::Green, first);
-    let mut unknown = Course::new(Level::Green, first);
+) -> (Vec<LevelStretch>, Vec<LevelStretch>) {
+    let mut levels = LevelCourse::new(Level::Green, first);
+    let mut unknown = LevelCourse::new(Level::Green, first);
     for event in events {
         let EventKind::Alert { level, state, .. } = &event.kind else {
             continue;
@@ -53,13 +53,13 @@ pub fn levels_in(
 
 /// A level as it changes.
 #[derive(Debug)]
-struct Course {
+struct LevelCourse {
     level: Level,
     since: Timestamp,
-    past: Vec<Stretch>,
+    past: Vec<LevelStretch>,
 }
 
-impl Course {
+impl LevelCourse {
     fn new(level: Level, since: Timestamp) -> Self {
         Self {
             level,
@@ -73,7 +73,7 @@ impl Course {
             return;
         }
         if at > self.since {
-            self.past.push(Stretch {
+            self.past.push(LevelStretch {
                 level: self.level,
                 from: self.since,
                 to: at,
@@ -83,9 +83,9 @@ impl Course {
         self.since = at;
     }
 
-    fn until(mut self, end: Timestamp) -> Vec<Stretch> {
+    fn until(mut self, end: Timestamp) -> Vec<LevelStretch> {
         // The level that is in force at the end has no width where it was entered there.
-        self.past.push(Stretch {
+        self.past.push(LevelStretch {
             level: self.level,
             from: self.since,
             to: end.max(self.since),

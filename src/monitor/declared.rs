@@ -192,7 +192,7 @@ impl Declared {
             ),
             Declaration::Blast => (
                 None,
-                format!("blast at {at}: what moves within an hour asks for no look"),
+                format!("blast at {at}: an unexpected reading within an hour raises no yellow"),
             ),
         };
         Event {

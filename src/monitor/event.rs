@@ -1,6 +1,6 @@
 //! What the monitor says: one JSON object a line, in data time, nothing from the wall clock.
 
-use super::given::Given;
+use super::given::{Given, OrderKind};
 use crate::alert::Level;
 use crate::effects::{Explained, Form, Kind, Rival};
 use crate::reading::{BenchmarkId, Timestamp};
@@ -169,14 +169,14 @@ pub enum EventKind {
     },
     /// People asked for something.
     Order {
-        /// `acknowledge`, `shelve`, `silence` or `unsilence`.
-        order: String,
+        /// What they asked for.
+        order: OrderKind,
         /// Until when, by the wall clock.
         until: Option<Timestamp>,
         /// The key of the only alert that it is of; `None`: of everything in its place.
         #[serde(skip_serializing_if = "Option::is_none", default)]
         alert: Option<String>,
-        /// Who, why, over which door.
+        /// Who, why, by which way.
         #[serde(flatten)]
         given: Given,
     },
@@ -207,6 +207,19 @@ impl EventKind {
         "order",
         "summary",
     ];
+
+    /// Whether it says what has changed over the whole record, which only who has gone through it knows.
+    pub(super) fn is_of_the_record(&self) -> bool {
+        matches!(
+            self,
+            Self::RegimeFlip { .. } | Self::InterceptDrift { .. } | Self::TransitionDrift { .. }
+        )
+    }
+
+    /// Whether it is about the data, not about the slope.
+    pub fn is_of_data(&self) -> bool {
+        matches!(self, Self::Fault { .. } | Self::Correction { .. })
+    }
 
     /// The word in its JSON.
     pub fn name(&self) -> &'static str {
@@ -337,25 +350,17 @@ pub struct Summary {
 impl Summary {
     /// Counts one event; an alert of the whole site repeats what its benchmarks called.
     pub(super) fn count(&mut self, event: &Event) {
-        match &event.kind {
-            EventKind::Refit { .. } => self.refits += 1,
+        let fires = matches!(
+            event.kind,
             EventKind::Alert {
                 state: AlertState::Firing,
                 ..
-            } if event.benchmark.is_some() => self.alerts += 1,
-            EventKind::Alert { .. }
-            | EventKind::RegimeFlip { .. }
-            | EventKind::InterceptDrift { .. }
-            | EventKind::TransitionDrift { .. }
-            | EventKind::UnexplainedResidual(_)
-            | EventKind::EffectFound { .. }
-            | EventKind::EffectDropped { .. }
-            | EventKind::Together { .. }
-            | EventKind::Fault { .. }
-            | EventKind::Declared { .. }
-            | EventKind::Correction { .. }
-            | EventKind::Order { .. }
-            | EventKind::Summary(_) => {}
+            }
+        );
+        if matches!(event.kind, EventKind::Refit { .. }) {
+            self.refits += 1;
+        } else if fires && event.benchmark.is_some() {
+            self.alerts += 1;
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Who gave an order, when, why and over which door: the audit trail of what people did.
+//! Who gave an order, when, why and by which way: the audit trail of what people did.
 
 use crate::reading::Timestamp;
 use schemars::JsonSchema;
@@ -13,9 +13,9 @@ pub struct Given {
     /// Why.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub why: Option<String>,
-    /// Over which door.
+    /// By which way.
     #[serde(skip_serializing_if = "Option::is_none", default)]
-    pub door: Option<Door>,
+    pub door: Option<OrderedBy>,
     /// When, by the host's clock.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub given_at: Option<Timestamp>,
@@ -24,7 +24,7 @@ pub struct Given {
 /// The way by which an order came in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Door {
+pub enum OrderedBy {
     /// `slipwatch alerts`, on the machine itself.
     CommandLine,
     /// The page, or another caller of the HTTP API.
@@ -33,13 +33,39 @@ pub enum Door {
     Link,
 }
 
-impl Door {
+impl OrderedBy {
     /// The word for people.
     pub fn name(self) -> &'static str {
         match self {
             Self::CommandLine => "the command line",
             Self::Http => "HTTP",
             Self::Link => "the link in its message",
+        }
+    }
+}
+
+/// What an order asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OrderKind {
+    /// It has been seen.
+    Acknowledge,
+    /// One level of a benchmark is not reported for a time.
+    Shelve,
+    /// Nothing is reported for a time.
+    Silence,
+    /// All is reported again.
+    Unsilence,
+}
+
+impl OrderKind {
+    /// The word in its JSON.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Acknowledge => "acknowledge",
+            Self::Shelve => "shelve",
+            Self::Silence => "silence",
+            Self::Unsilence => "unsilence",
         }
     }
 }

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 /// Where readings come from, as far as their meaning goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Source {
+pub(super) struct MeasuredAs {
     /// Their unit.
     pub(super) unit: Unit,
     /// For velocities, the span of the mean.
@@ -70,7 +70,7 @@ struct Reset {
 }
 
 impl History {
-    pub(super) fn new(source: Source, epoch: Timestamp) -> Self {
+    pub(super) fn new(source: MeasuredAs, epoch: Timestamp) -> Self {
         let averaging_days = source
             .averaging
             .map_or(0.0, |span| span.as_secs_f64() / SECONDS_PER_DAY);
@@ -108,7 +108,7 @@ impl History {
 
     /// Keeps a reading without letting it count; says whether it is of the quantity that is monitored and may be
     /// true.
-    pub(super) fn set_aside(&mut self, source: Source, reading: &Reading) -> bool {
+    pub(super) fn set_aside(&mut self, source: MeasuredAs, reading: &Reading) -> bool {
         let new = self.observation(source, reading);
         let is_ours = source.unit.quantity() == self.observations.quantity;
         let is_used = is_ours && new.value.is_finite() && new.value.abs() <= FARTHEST;
@@ -206,7 +206,7 @@ impl History {
     }
 
     /// The reading as it is kept, but for what resets take off.
-    fn observation(&self, source: Source, reading: &Reading) -> Observation {
+    fn observation(&self, source: MeasuredAs, reading: &Reading) -> Observation {
         let factor = source.unit.factor();
         Observation {
             t_days: self.days(reading.time),
@@ -264,7 +264,7 @@ impl History {
         series
     }
 
-    pub(super) fn take(&mut self, source: Source, reading: &Reading) -> Taken {
+    pub(super) fn take(&mut self, source: MeasuredAs, reading: &Reading) -> Taken {
         if source.unit.quantity() != self.observations.quantity {
             return Taken::OtherQuantity;
         }
@@ -316,7 +316,7 @@ impl History {
 
     /// Whether a reading has the value of the newest one, or one of a sensor that stands at the end of its range, and
     /// comes after it.
-    pub(super) fn is_repeated_by(&self, source: Source, reading: &Reading) -> bool {
+    pub(super) fn is_repeated_by(&self, source: MeasuredAs, reading: &Reading) -> bool {
         let mut new = self.observation(source, reading);
         new.value -= self.taken_off(new.t_days);
         source.unit.quantity() == self.observations.quantity && self.repeats(&new)

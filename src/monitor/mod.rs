@@ -9,6 +9,7 @@ mod event;
 mod given;
 mod history;
 mod kept;
+mod measured;
 mod motion;
 mod notice;
 mod order;
@@ -23,18 +24,19 @@ mod suspect;
 mod together;
 mod track;
 
-pub use course::{Stretch, levels_in};
+pub use course::{LevelStretch, levels_in};
 pub use declared::{Declaration, Declared};
 pub use event::{
     AlertState, Event, EventKind, FailureTime, InverseVelocity, Plain, RegimeReport, SUSPECT,
     SUSPECT_ENDS, SharedFailure, Summary, Unexplained,
 };
-pub use given::{Door, Given};
+pub use given::{Given, OrderKind, OrderedBy};
+pub use measured::Measured;
 pub(crate) use motion::recent;
 pub use notice::{CLOCK_FAULT, Notice};
 pub use order::Order;
-pub use saved::{Part, SavedError};
-pub use search::{Finding, SearchJob};
+pub use saved::{MemoryPart, SavedError};
+pub use search::{SearchFinding, SearchJob};
 pub use site::SiteLevel;
 
 use crate::alert::{Level, Policy};
@@ -49,8 +51,8 @@ use sensor::Sensors;
 use serde::{Deserialize, Serialize};
 use site::SiteAlert;
 use std::collections::{BTreeMap, BTreeSet};
-use together::Together;
-use track::{Beside, Track, Walk};
+use together::FailureComparisons;
+use track::{PastReplay, StepContext, Track};
 
 /// What the monitor is given.
 #[derive(Debug, Clone, PartialEq)]
@@ -96,7 +98,7 @@ pub enum Input {
     /// What people ask for.
     Order(Order),
     /// What a search came to; to be handed in before the first reading that is no earlier than it was due.
-    Found(Finding),
+    Found(SearchFinding),
     /// How the watch goes on.
     Notice(Notice),
     /// Time has passed and nothing came.
@@ -161,7 +163,8 @@ pub enum Explain {
     #[default]
     Adopt,
     /// It is searched for and reported.
-    Tell,
+    #[serde(rename = "Tell")]
+    Report,
     /// Nothing.
     Off,
 }
@@ -191,18 +194,18 @@ pub struct Monitor {
     sensors: Sensors,
     searches: Vec<SearchJob>,
     site: SiteAlert,
-    together: Together,
+    together: FailureComparisons,
     /// Benchmarks of the config that have given no reading.
     awaited: Awaited,
     /// Benchmarks with late readings that are to be looked back on.
     late: BTreeSet<BenchmarkId>,
-    /// Whether [`Notice::Settle`] says when what came late is judged.
-    settles: bool,
+    /// Whether [`Notice::BatchEnd`] says when what came late is judged.
+    in_batches: bool,
     /// Since when the host's clock is wrong.
     clock_wrong: Option<Timestamp>,
     /// What of the past is still to be done, and the benchmark whose past is being gone through.
     past: Past,
-    walk: Option<Walk>,
+    walk: Option<PastReplay>,
     queue: Queue,
     summary: Summary,
     last_time: Option<Timestamp>,
@@ -220,10 +223,10 @@ impl Monitor {
             sensors: Sensors::default(),
             searches: Vec::new(),
             site: SiteAlert::default(),
-            together: Together::default(),
+            together: FailureComparisons::default(),
             awaited: Awaited::default(),
             late: BTreeSet::new(),
-            settles: false,
+            in_batches: false,
             clock_wrong: None,
             past: Past::default(),
             walk: None,
@@ -243,7 +246,7 @@ impl Monitor {
                 averaging,
                 reading,
             } => {
-                let source = history::Source {
+                let source = history::MeasuredAs {
                     unit: *unit,
                     averaging: *averaging,
                 };
@@ -253,7 +256,7 @@ impl Monitor {
                 benchmark,
                 time,
                 what,
-            } => self.missing(now, benchmark, (*time, what)),
+            } => self.missing(now, benchmark, *time, what),
             Input::Found(finding) => self.found(now, finding),
             Input::Notice(notice) => self.heed(now, notice),
             Input::Sample {
@@ -264,7 +267,7 @@ impl Monitor {
                 self.covariates.take(channel, unit.as_deref(), *sample);
                 Vec::new()
             }
-            Input::Settings(settings) => self.resettle(now, settings),
+            Input::Settings(settings) => self.change_settings(now, settings),
             Input::Order(order) => vec![order.event(now)],
             Input::Trouble { kind, text } => vec![trouble(now, kind, text)],
             Input::Tick => self.pass(now),
@@ -303,19 +306,15 @@ impl Monitor {
         &mut self,
         now: Timestamp,
         benchmark: &BenchmarkId,
-        source: history::Source,
+        source: history::MeasuredAs,
         reading: &Reading,
     ) -> Vec<Event> {
         self.summary.readings += 1;
         self.sensors.reads(benchmark, reading.time);
         self.changed.insert(benchmark.clone());
-        let beside = Beside {
+        let context = StepContext {
+            phase: self.phase(now),
             covariates: &self.covariates,
-            explain: self.settings.explain,
-            now,
-            settles: self.settles,
-            is_past: self.past.is_open(),
-            is_queue: self.queue.is_open(),
         };
         let policy = self.settings.policy(benchmark);
         let track = self.tracks.entry(benchmark.clone()).or_insert_with(|| {
@@ -328,14 +327,14 @@ impl Monitor {
         let mut events = if reading.time > now {
             track.put_aside(now, source, reading)
         } else {
-            track.take(policy, source, reading, &beside)
+            track.take(policy, source, reading, &context)
         };
-        if self.settles && track.owes_look_back() {
+        if self.in_batches && track.owes_look_back() {
             self.late.insert(benchmark.clone());
         }
         self.queue.note(benchmark, track);
         let critical = policy.critical_velocity_mm_per_day;
-        self.searches.extend(track.search(critical, &beside));
+        self.searches.extend(track.search(critical, &context));
         let after = track.deadline();
         self.expect((before, after), benchmark.clone());
         events.extend(self.awaited.end(now, benchmark, "reads"));
@@ -374,23 +373,19 @@ impl Monitor {
     }
 
     /// Goes by other settings from here on. What was in force at a benchmark that is no longer watched ends.
-    fn resettle(&mut self, now: Timestamp, settings: &Settings) -> Vec<Event> {
+    fn change_settings(&mut self, now: Timestamp, settings: &Settings) -> Vec<Event> {
         let former = std::mem::replace(&mut self.settings, settings.clone());
         let mut events = self.unwatch(now, &former.watched);
-        let beside = Beside {
+        let context = StepContext {
+            phase: self.phase(now),
             covariates: &self.covariates,
-            explain: self.settings.explain,
-            now,
-            settles: self.settles,
-            is_past: self.past.is_open(),
-            is_queue: self.queue.is_open(),
         };
         let mut moved = Vec::new();
         for (id, track) in &mut self.tracks {
             let declared = Declarations::of(&self.settings.declared, id);
             let before = track.deadline();
             events.extend(track.accept(now, self.settings.accepted(id)));
-            events.extend(track.redeclare(self.settings.policy(id), declared, &beside));
+            events.extend(track.redeclare(self.settings.policy(id), declared, &context));
             moved.push(((before, track.deadline()), id.clone()));
         }
         for (deadlines, id) in moved {
@@ -431,7 +426,8 @@ impl Monitor {
         &mut self,
         now: Timestamp,
         benchmark: &BenchmarkId,
-        (time, what): (Timestamp, &str),
+        time: Timestamp,
+        what: &str,
     ) -> Vec<Event> {
         let declared = Declarations::of(&self.settings.declared, benchmark);
         if declared.is_maintained(time) || !self.sensors.fails(benchmark, time, what) {

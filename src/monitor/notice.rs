@@ -23,14 +23,16 @@ pub enum Notice {
     Current,
     /// The past of a benchmark is gone through a little further.
     Retrace,
-    /// What came late or was corrected is judged only when [`Notice::Settle`] says so, and not reading by reading.
-    Settles,
+    /// What came late or was corrected is judged only at [`Notice::BatchEnd`], and not reading by reading.
+    #[serde(rename = "settles")]
+    InBatches,
     /// Readings come faster than they can be judged one by one: each benchmark is judged for its newest at
-    /// [`Notice::Settle`], and at least once in an evacuation time of its readings.
+    /// [`Notice::BatchEnd`], and at least once in an evacuation time of its readings.
     Queue,
     /// Everything that came together has been taken: what came late is judged now, once, and so are the next of the
     /// benchmarks whose readings queued.
-    Settle,
+    #[serde(rename = "settle")]
+    BatchEnd,
     /// Whether late readings of this benchmark would have called another level is looked into now.
     LookBack(BenchmarkId),
     /// The readings of a silent benchmark that come now were measured long before `time`, which it is: a backlog.
@@ -69,8 +71,8 @@ impl Monitor {
                 let each = silent.iter().map(|id| self.awaited.begin(now, id));
                 each.flatten().collect()
             }
-            Notice::Settles => {
-                self.settles = true;
+            Notice::InBatches => {
+                self.in_batches = true;
                 Vec::new()
             }
             Notice::Past => {
@@ -83,7 +85,7 @@ impl Monitor {
                 self.queue.open();
                 Vec::new()
             }
-            Notice::Settle => self.settle(now),
+            Notice::BatchEnd => self.end_batch(now),
             Notice::LookBack(benchmark) => self.look_back(now, benchmark),
             Notice::Behind { benchmark, time } => {
                 if let Some(track) = self.tracks.get_mut(benchmark) {
@@ -125,14 +127,14 @@ impl Monitor {
         self.never_read().iter().any(|id| !awaited.contains(id))
     }
 
-    fn settle(&mut self, now: Timestamp) -> Vec<Event> {
+    fn end_batch(&mut self, now: Timestamp) -> Vec<Event> {
         let mut events = Vec::new();
         if self.past.is_open() {
             return events;
         }
         for id in self.late.clone() {
-            if let Some((track, policy, beside)) = self.track_at(&id, now) {
-                events.extend(track.settle(policy, &beside));
+            if let Some((track, policy, context)) = self.track_at(&id, now) {
+                events.extend(track.judge_batch(policy, &context));
                 self.changed.insert(id);
             }
         }
@@ -169,9 +171,9 @@ impl Monitor {
         }
     }
 
-    /// Whether what comes late is judged only when [`Notice::Settle`] says so.
-    pub fn settles(&self) -> bool {
-        self.settles
+    /// Whether what comes late is judged only at [`Notice::BatchEnd`].
+    pub fn takes_batches(&self) -> bool {
+        self.in_batches
     }
 
     /// Whether a benchmark that has given readings is silent.

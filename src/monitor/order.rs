@@ -1,7 +1,7 @@
 //! What people order of the monitor: it keeps them as it keeps readings, so that a replay has them too.
 
 use super::event::{Event, EventKind};
-use super::given::Given;
+use super::given::{Given, OrderKind};
 use crate::reading::{BenchmarkId, Timestamp};
 use jiff::SignedDuration;
 use schemars::JsonSchema;
@@ -18,7 +18,7 @@ pub enum Order {
         /// The key of the only alert that has been seen; `None`: all that is in force there.
         #[serde(skip_serializing_if = "Option::is_none", default)]
         alert: Option<String>,
-        /// Who, why, over which door.
+        /// Who, why, by which way.
         #[serde(flatten)]
         given: Given,
     },
@@ -28,7 +28,7 @@ pub enum Order {
         benchmark: BenchmarkId,
         /// Until when, by the wall clock.
         until: Timestamp,
-        /// Who, why, over which door.
+        /// Who, why, by which way.
         #[serde(flatten)]
         given: Given,
     },
@@ -38,7 +38,7 @@ pub enum Order {
         benchmark: Option<BenchmarkId>,
         /// Until when, by the wall clock.
         until: Timestamp,
-        /// Who, why, over which door.
+        /// Who, why, by which way.
         #[serde(flatten)]
         given: Given,
     },
@@ -46,7 +46,7 @@ pub enum Order {
     Unsilence {
         /// Where; `None`: everywhere.
         benchmark: Option<BenchmarkId>,
-        /// Who, why, over which door.
+        /// Who, why, by which way.
         #[serde(flatten)]
         given: Given,
     },
@@ -61,10 +61,10 @@ impl Order {
     /// That it was given.
     pub(super) fn event(&self, time: Timestamp) -> Event {
         let (order, until, given) = match self {
-            Self::Acknowledge { given, .. } => ("acknowledge", None, given),
-            Self::Shelve { until, given, .. } => ("shelve", Some(*until), given),
-            Self::Silence { until, given, .. } => ("silence", Some(*until), given),
-            Self::Unsilence { given, .. } => ("unsilence", None, given),
+            Self::Acknowledge { given, .. } => (OrderKind::Acknowledge, None, given),
+            Self::Shelve { until, given, .. } => (OrderKind::Shelve, Some(*until), given),
+            Self::Silence { until, given, .. } => (OrderKind::Silence, Some(*until), given),
+            Self::Unsilence { given, .. } => (OrderKind::Unsilence, None, given),
         };
         let alert = match self {
             Self::Acknowledge { alert, .. } => alert.clone(),
@@ -74,7 +74,7 @@ impl Order {
             time,
             benchmark: self.benchmark().cloned(),
             kind: EventKind::Order {
-                order: order.to_owned(),
+                order,
                 until,
                 alert,
                 given: given.clone(),

@@ -4,7 +4,7 @@
 use super::Monitor;
 use super::event::{Event, EventKind};
 use super::notice::Notice;
-use super::track::{Beside, PAST};
+use super::track::{PAST, StepContext};
 use super::{Input, Track};
 use crate::alert::{Level, Policy};
 use crate::reading::{BenchmarkId, Timestamp};
@@ -45,21 +45,10 @@ impl Input {
     /// Whether an event that followed from this says what would have been said in the past: it changes nothing of the
     /// present, and nobody is notified.
     pub fn makes_up(&self, event: &Event) -> bool {
-        let is_past = match &event.kind {
-            EventKind::Refit { .. }
-            | EventKind::RegimeFlip { .. }
-            | EventKind::InterceptDrift { .. }
-            | EventKind::TransitionDrift { .. } => true,
-            EventKind::Alert { level, rule, .. } => *level != Level::Unknown && rule != PAST,
-            EventKind::UnexplainedResidual(_)
-            | EventKind::EffectFound { .. }
-            | EventKind::EffectDropped { .. }
-            | EventKind::Together { .. }
-            | EventKind::Fault { .. }
-            | EventKind::Declared { .. }
-            | EventKind::Correction { .. }
-            | EventKind::Order { .. }
-            | EventKind::Summary(_) => false,
+        let is_past = if let EventKind::Alert { level, rule, .. } = &event.kind {
+            *level != Level::Unknown && rule != PAST
+        } else {
+            matches!(event.kind, EventKind::Refit { .. }) || event.kind.is_of_the_record()
         };
         matches!(self, Self::Notice(Notice::Retrace)) && is_past
     }
@@ -94,11 +83,11 @@ impl Monitor {
             let Some(id) = self.past.current.pop_first() else {
                 break;
             };
-            let Some((track, policy, beside)) = self.track_at(&id, now) else {
+            let Some((track, policy, context)) = self.track_at(&id, now) else {
                 continue;
             };
-            let (newest, judged) = track.judge_newest(policy, &beside);
-            let search = track.search(policy.critical_velocity_mm_per_day, &beside);
+            let (newest, judged) = track.judge_newest(policy, &context);
+            let search = track.search(policy.critical_velocity_mm_per_day, &context);
             let is_refit = |event: &&Event| matches!(event.kind, EventKind::Refit { .. });
             refits += judged.iter().filter(is_refit).count();
             events.extend(judged);
@@ -122,15 +111,11 @@ impl Monitor {
             return Vec::new();
         };
         let id = walk.benchmark().clone();
-        let Some((track, policy, beside)) = self.track_at(&id, now) else {
+        let Some((track, policy, mut context)) = self.track_at(&id, now) else {
             return Vec::new();
         };
-        let beside = Beside {
-            is_past: false,
-            is_queue: false,
-            ..beside
-        };
-        let (mut events, has_more) = track.walk(&mut walk, policy, &beside);
+        (context.phase.is_past, context.phase.is_queue) = (false, false);
+        let (mut events, has_more) = track.walk(&mut walk, policy, &context);
         if has_more {
             self.walk = Some(walk);
         } else {
@@ -146,10 +131,10 @@ impl Track {
     fn judge_newest(
         &mut self,
         policy: &Policy,
-        beside: &Beside<'_>,
+        context: &StepContext<'_>,
     ) -> (Option<Timestamp>, Vec<Event>) {
         let newest = self.newest();
-        let events = newest.map_or_else(Vec::new, |newest| self.judge_now(policy, newest, beside));
+        let events = newest.map_or_else(Vec::new, |newest| self.judge_now(policy, newest, context));
         (newest, events)
     }
 }

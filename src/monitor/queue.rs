@@ -8,7 +8,7 @@ use crate::reading::{BenchmarkId, Timestamp};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
-/// Refits that one [`super::Notice::Settle`] makes at most of what queued.
+/// Refits that one [`super::Notice::BatchEnd`] makes at most of what queued.
 const MOST_REFITS: usize = 16;
 
 /// The queue, as far as it has been taken.
@@ -41,7 +41,7 @@ impl Queue {
 }
 
 impl Monitor {
-    /// Whether readings are judged only when [`super::Notice::Settle`] says so.
+    /// Whether readings are judged only at [`super::Notice::BatchEnd`].
     pub fn queues(&self) -> bool {
         self.queue.is_open
     }
@@ -53,11 +53,11 @@ impl Monitor {
         while refits < MOST_REFITS
             && let Some(id) = self.queue.waiting.pop_first()
         {
-            let Some((track, policy, beside)) = self.track_at(&id, now) else {
+            let Some((track, policy, context)) = self.track_at(&id, now) else {
                 continue;
             };
-            let judged = track.settle(policy, &beside);
-            let search = track.search(policy.critical_velocity_mm_per_day, &beside);
+            let judged = track.judge_batch(policy, &context);
+            let search = track.search(policy.critical_velocity_mm_per_day, &context);
             let is_refit = |event: &&Event| matches!(event.kind, EventKind::Refit { .. });
             refits += judged.iter().filter(is_refit).count();
             events.extend(judged);

@@ -11,8 +11,8 @@ use super::queue::Queue;
 use super::search::SearchJob;
 use super::sensor::Sensors;
 use super::site::SiteAlert;
-use super::together::Together;
-use super::track::{Track, Walk};
+use super::together::FailureComparisons;
+use super::track::{PastReplay, Track};
 use super::{Monitor, Settings};
 use crate::reading::{BenchmarkId, Timestamp};
 use serde::{Deserialize, Serialize};
@@ -25,7 +25,7 @@ const WALK: &str = "\0past";
 
 /// One piece of a monitor's memory.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Part {
+pub struct MemoryPart {
     /// Whose it is: a benchmark's id, or empty for what belongs to none.
     pub name: String,
     /// What is remembered; `None`: this benchmark is no longer known.
@@ -65,13 +65,13 @@ struct Rest {
     #[serde(default)]
     site: SiteAlert,
     #[serde(default)]
-    together: Together,
+    together: FailureComparisons,
     #[serde(default)]
     awaited: Awaited,
     #[serde(default)]
     late: BTreeSet<BenchmarkId>,
-    #[serde(default)]
-    settles: bool,
+    #[serde(default, rename = "settles")]
+    in_batches: bool,
     #[serde(default)]
     clock_wrong: Option<Timestamp>,
     #[serde(default)]
@@ -88,13 +88,13 @@ impl Monitor {
     ///
     /// # Errors
     /// [`SavedError::Unwritable`].
-    pub fn save(&self) -> Result<Vec<Part>, SavedError> {
+    pub fn save(&self) -> Result<Vec<MemoryPart>, SavedError> {
         let mut parts = Vec::with_capacity(self.changed.len() + 1);
         for id in &self.changed {
             let track = self.tracks.get(id);
             let body = track.map(|track| bytes(id.as_str(), track)).transpose()?;
             let name = id.as_str().to_owned();
-            parts.push(Part { name, body });
+            parts.push(MemoryPart { name, body });
         }
         let rest = Rest {
             settings: self.settings.clone(),
@@ -105,7 +105,7 @@ impl Monitor {
             together: self.together.clone(),
             awaited: self.awaited.clone(),
             late: self.late.clone(),
-            settles: self.settles,
+            in_batches: self.in_batches,
             clock_wrong: self.clock_wrong,
             past: self.past.clone(),
             queue: self.queue.clone(),
@@ -115,10 +115,10 @@ impl Monitor {
         let walk = self.walk.as_ref();
         let body = walk.map(|walk| bytes(WALK, walk)).transpose()?;
         let name = WALK.to_owned();
-        parts.push(Part { name, body });
+        parts.push(MemoryPart { name, body });
         let body = Some(bytes(REST, &rest)?);
         let name = REST.to_owned();
-        parts.push(Part { name, body });
+        parts.push(MemoryPart { name, body });
         Ok(parts)
     }
 
@@ -131,14 +131,14 @@ impl Monitor {
     ///
     /// # Errors
     /// [`SavedError`] when they are not all there, or from a version that remembered something else.
-    pub fn restore(parts: &[Part]) -> Result<Self, SavedError> {
+    pub fn restore(parts: &[MemoryPart]) -> Result<Self, SavedError> {
         let (mut rest, mut walk, mut tracks) = (None, None, BTreeMap::new());
-        for Part { name, body } in parts {
+        for MemoryPart { name, body } in parts {
             let Some(body) = body else { continue };
             if name == REST {
                 rest = Some(value::<Rest>(name, body)?);
             } else if name == WALK {
-                walk = Some(value::<Walk>(name, body)?);
+                walk = Some(value::<PastReplay>(name, body)?);
             } else {
                 let track: Track = value(name, body)?;
                 tracks.insert(BenchmarkId::new(name.as_str()), track);
@@ -158,7 +158,7 @@ impl Monitor {
             together: rest.together,
             awaited: rest.awaited,
             late: rest.late,
-            settles: rest.settles,
+            in_batches: rest.in_batches,
             clock_wrong: rest.clock_wrong,
             past: rest.past,
             queue: rest.queue,

@@ -7,7 +7,7 @@
 
 use super::Monitor;
 use super::event::Event;
-use super::track::{Beside, Track};
+use super::track::{Phase, StepContext, Track};
 use crate::alert::Policy;
 use crate::effects::{Effect, Explained, Kind, KnownLoad, Options, Rival, explain};
 use crate::reading::{BenchmarkId, Channel, Series, Timestamp};
@@ -37,7 +37,7 @@ pub struct SearchJob {
 
 /// What a search came to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Finding {
+pub struct SearchFinding {
     /// Whose readings.
     pub benchmark: BenchmarkId,
     /// The effects that were accepted, the verdict first; none where the residual passes for noise or stays
@@ -53,12 +53,23 @@ pub struct Finding {
 }
 
 impl Monitor {
-    pub(super) fn found(&mut self, now: Timestamp, finding: &Finding) -> Vec<Event> {
+    pub(super) fn found(&mut self, now: Timestamp, finding: &SearchFinding) -> Vec<Event> {
         self.changed.insert(finding.benchmark.clone());
-        let Some((track, policy, beside)) = self.track_at(&finding.benchmark, now) else {
+        let Some((track, policy, context)) = self.track_at(&finding.benchmark, now) else {
             return Vec::new();
         };
-        track.found(policy.critical_velocity_mm_per_day, now, finding, &beside)
+        track.found(policy.critical_velocity_mm_per_day, now, finding, &context)
+    }
+
+    /// How the monitor stands at this step.
+    pub(super) fn phase(&self, now: Timestamp) -> Phase {
+        Phase {
+            explain: self.settings.explain,
+            now,
+            in_batches: self.in_batches,
+            is_past: self.past.is_open(),
+            is_queue: self.queue.is_open(),
+        }
     }
 
     /// A benchmark that has given readings, its policy, and what lies beside its readings.
@@ -66,17 +77,13 @@ impl Monitor {
         &mut self,
         benchmark: &BenchmarkId,
         now: Timestamp,
-    ) -> Option<(&mut Track, &Policy, Beside<'_>)> {
-        let beside = Beside {
+    ) -> Option<(&mut Track, &Policy, StepContext<'_>)> {
+        let context = StepContext {
+            phase: self.phase(now),
             covariates: &self.covariates,
-            explain: self.settings.explain,
-            now,
-            settles: self.settles,
-            is_past: self.past.is_open(),
-            is_queue: self.queue.is_open(),
         };
         let policy = self.settings.policy(benchmark);
-        Some((self.tracks.get_mut(benchmark)?, policy, beside))
+        Some((self.tracks.get_mut(benchmark)?, policy, context))
     }
 
     /// The searches asked for since the last call, one a benchmark at most; each is to be answered by an
@@ -103,7 +110,7 @@ impl SearchJob {
     }
 
     /// Makes the search: seconds of work, bounded by count, the same wherever it is done.
-    pub fn run(&self) -> Finding {
+    pub fn run(&self) -> SearchFinding {
         let options = Options {
             critical_velocity_mm_per_day: self.critical_velocity_mm_per_day,
             surrogates: SURROGATES,
@@ -111,7 +118,7 @@ impl SearchJob {
         };
         let said = explain(&self.series, &self.channels, &[], &options, &mut |_| {});
         let effects = std::iter::once(said.verdict).chain(said.also);
-        Finding {
+        SearchFinding {
             benchmark: said.benchmark,
             effects: effects
                 .filter(|one| !matches!(one.effect, Kind::None | Kind::Unexplained))
@@ -123,8 +130,8 @@ impl SearchJob {
     }
 
     /// The answer of a search that broke off.
-    pub fn broken_off(&self) -> Finding {
-        Finding {
+    pub fn broken_off(&self) -> SearchFinding {
+        SearchFinding {
             benchmark: self.benchmark.clone(),
             effects: Vec::new(),
             explained: Explained::None,

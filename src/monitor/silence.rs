@@ -82,7 +82,7 @@ impl Silence {
     }
 
     /// Notes a reading during maintenance: it ends no silence.
-    pub(super) fn goes_on(&mut self, time: Timestamp) {
+    pub(super) fn continues(&mut self, time: Timestamp) {
         if !self.silent {
             self.newest = self.newest.max(Some(time));
         }

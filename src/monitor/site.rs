@@ -56,11 +56,13 @@ impl SiteAlert {
         // As at a benchmark: a higher level supersedes the one before it, a lower one follows on its end.
         let fallen = before.filter(|(before, _)| level.is_none_or(|level| level < *before));
         let mut events: Vec<Event> = fallen
-            .map(|fallen| event(now, fallen, AlertState::Resolved, &reach))
+            .map(|(level, since)| event(now, level, since, AlertState::Resolved, &reach))
             .into_iter()
             .collect();
         let entered = self.in_force;
-        events.extend(entered.map(|entered| event(now, entered, AlertState::Firing, &reach)));
+        events.extend(
+            entered.map(|(level, since)| event(now, level, since, AlertState::Firing, &reach)),
+        );
         events
     }
 }
@@ -81,18 +83,14 @@ impl SiteAlert {
         match (self.unknown, unknown.len() >= needed) {
             (None, true) => {
                 self.unknown = Some(now);
-                Some(event(
-                    now,
-                    (Level::Unknown, now),
-                    AlertState::Firing,
-                    unknown,
-                ))
+                Some(event(now, Level::Unknown, now, AlertState::Firing, unknown))
             }
             (Some(since), false) => {
                 self.unknown = None;
                 Some(event(
                     now,
-                    (Level::Unknown, since),
+                    Level::Unknown,
+                    since,
                     AlertState::Resolved,
                     unknown,
                 ))
@@ -104,7 +102,8 @@ impl SiteAlert {
 
 fn event(
     time: Timestamp,
-    (level, since): (Level, Timestamp),
+    level: Level,
+    since: Timestamp,
     state: AlertState,
     reach: &[&BenchmarkId],
 ) -> Event {

@@ -15,14 +15,14 @@ const COARSE: f64 = 0.1;
 /// The chance under which as many equal readings are no chance.
 const NO_CHANCE: f64 = 1e-6;
 
-/// Readings that stand at the end of a sensor's range, as many as are looked at; and those of the motion before them.
+/// Readings that stand at the end of a sensor's range, as many as are examined; and those of the motion before them.
 const STANDING: usize = 6;
 const MOVING: usize = 4;
 /// They lie within this share of what the motion before them would have made of their time.
 const JITTER: f64 = 0.005;
 
-/// The readings that are looked at for spikes.
-const LOOKED_AT: RangeInclusive<usize> = 18..=36;
+/// The readings that are examined for spikes.
+const INSPECTED: RangeInclusive<usize> = 18..=36;
 /// A spike stands out by so many times what its neighbours differ by,
 const SPIKE: f64 = 20.0;
 /// and by so many steps of the sensor's resolution.
@@ -120,8 +120,8 @@ impl History {
     /// neighbours: on a slope that grows fast the neighbours differ as well.
     pub(super) fn spoilt(&self, before: Option<f64>) -> Option<f64> {
         let values = &self.observations.values;
-        let latest = &values[values.len().saturating_sub(*LOOKED_AT.end())..];
-        if latest.len() < *LOOKED_AT.start() {
+        let latest = &values[values.len().saturating_sub(*INSPECTED.end())..];
+        if latest.len() < *INSPECTED.start() {
             return before;
         }
         let step = resolution(latest);
@@ -200,14 +200,14 @@ fn is_first_day(time: Timestamp) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::history::Source;
+    use super::super::history::MeasuredAs;
     use super::*;
     use crate::reading::{Reading, Unit};
     use jiff::ToSpan;
 
     fn history(values: impl IntoIterator<Item = f64>) -> History {
         let start: Timestamp = "2020-01-01T00:00:00Z".parse().unwrap();
-        let source = Source {
+        let source = MeasuredAs {
             unit: Unit::MM,
             averaging: None,
         };
@@ -313,7 +313,7 @@ mod tests {
     #[test]
     fn what_an_unset_clock_gave_is_left_out_and_a_record_that_begins_there_is_not() {
         let start: Timestamp = "2000-01-01T00:00:00Z".parse().unwrap();
-        let source = Source {
+        let source = MeasuredAs {
             unit: Unit::MM,
             averaging: None,
         };

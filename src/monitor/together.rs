@@ -32,19 +32,20 @@ const LEAST: Level = Level::Orange;
 
 /// What has been compared and reported.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Together {
+pub(super) struct FailureComparisons {
     /// Forecasts at the newest comparisons, oldest first.
     kept: Vec<(Timestamp, BTreeMap<BenchmarkId, KeptForecast>)>,
     reported: Vec<SharedFailure>,
 }
 
-impl Together {
+impl FailureComparisons {
     /// Takes the newest forecasts; says which benchmarks share a failure time where that is other than last reported.
     pub(super) fn update(
         &mut self,
         now: Timestamp,
         policy: &Policy,
-        (tracks, has_changed): (&BTreeMap<BenchmarkId, Track>, bool),
+        tracks: &BTreeMap<BenchmarkId, Track>,
+        has_changed: bool,
     ) -> Option<Event> {
         let evacuation_days = policy.evacuation_time.as_secs_f64() / SECONDS_PER_DAY;
         let newest = self.kept.last().map(|(time, _)| days_since(*time, now));
@@ -66,7 +67,7 @@ impl Together {
         let found = self.shared(now, &compared, tracks);
         let shared = found
             .iter()
-            .filter_map(|group| shared_failure(now, group, (&compared, evacuation_days)));
+            .filter_map(|group| shared_failure(now, group, &compared, evacuation_days));
         let shared = shared.collect();
         self.report(now, shared)
     }
@@ -133,8 +134,7 @@ impl Monitor {
             return None;
         }
         let policy = &self.settings.policy;
-        self.together
-            .update(now, policy, (&self.tracks, has_changed))
+        self.together.update(now, policy, &self.tracks, has_changed)
     }
 }
 
@@ -165,7 +165,8 @@ fn compared(
 fn shared_failure(
     now: Timestamp,
     group: &Group,
-    (compared, evacuation_days): (&[&BenchmarkId], f64),
+    compared: &[&BenchmarkId],
+    evacuation_days: f64,
 ) -> Option<SharedFailure> {
     let passage = &group.passage;
     let quantile = |share| after_days(now, passage.quantile(share, HORIZON_DAYS)?);

@@ -4,7 +4,7 @@ use super::calendar;
 
 /// How numbers stand along an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Scale {
+pub enum AxisScale {
     /// Evenly.
     Linear,
     /// By their logarithms.
@@ -25,8 +25,8 @@ pub struct Axis {
     /// At its end.
     pub to: f64,
     /// What lies between.
-    pub scale: Scale,
-    /// What stands where, of an axis that is [`Scale::Named`].
+    pub scale: AxisScale,
+    /// What stands where, of an axis that is [`AxisScale::Named`].
     pub names: Vec<(f64, String)>,
 }
 
@@ -42,7 +42,7 @@ impl Axis {
             label: label.to_owned(),
             from,
             to,
-            scale: Scale::Linear,
+            scale: AxisScale::Linear,
             names: Vec::new(),
         }
     }
@@ -50,7 +50,7 @@ impl Axis {
     /// Places from the bottom up, each with its name; bare where there are no names.
     pub fn named(from: f64, to: f64, names: Vec<(f64, String)>) -> Self {
         Self {
-            scale: Scale::Named,
+            scale: AxisScale::Named,
             names,
             ..Self::linear("", from, to)
         }
@@ -59,7 +59,7 @@ impl Axis {
     /// Positive numbers, by their logarithms.
     pub fn log(label: &str, from: f64, to: f64) -> Self {
         Self {
-            scale: Scale::Log,
+            scale: AxisScale::Log,
             ..Self::linear(label, from, to)
         }
     }
@@ -67,7 +67,7 @@ impl Axis {
     /// Days since 1970-01-01, with dates at the ticks.
     pub fn dates(label: &str, from: f64, to: f64) -> Self {
         Self {
-            scale: Scale::Date,
+            scale: AxisScale::Date,
             ..Self::linear(label, from, to)
         }
     }
@@ -93,10 +93,10 @@ impl Axis {
     /// The share of the axis at `value`; `None` where it has none.
     pub(super) fn share(&self, value: f64) -> Option<f64> {
         let share = match self.scale {
-            Scale::Linear | Scale::Date | Scale::Named => {
+            AxisScale::Linear | AxisScale::Date | AxisScale::Named => {
                 (value - self.from) / (self.to - self.from)
             }
-            Scale::Log => (value / self.from).ln() / (self.to / self.from).ln(),
+            AxisScale::Log => (value / self.from).ln() / (self.to / self.from).ln(),
         };
         // Far outside is as good as the edge of the sheet, and keeps the numbers short.
         share.is_finite().then(|| share.clamp(-20.0, 20.0))
@@ -105,10 +105,10 @@ impl Axis {
     /// Where ticks stand on an axis of `length` units of the sheet, and what stands at them.
     pub(super) fn ticks(&self, length: f64) -> Vec<(f64, String)> {
         match self.scale {
-            Scale::Linear => self.linear_ticks(),
-            Scale::Log => self.decades(),
-            Scale::Date => calendar::ticks(self.from, self.to, length),
-            Scale::Named => self.names.clone(),
+            AxisScale::Linear => self.linear_ticks(),
+            AxisScale::Log => self.decades(),
+            AxisScale::Date => calendar::ticks(self.from, self.to, length),
+            AxisScale::Named => self.names.clone(),
         }
     }
 

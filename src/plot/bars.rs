@@ -34,6 +34,7 @@ pub struct Bars {
     pub bars: Vec<Bar>,
 }
 
+/// Height of a bar's row, and the room above and below them, in the sheet's units.
 const ROW: f64 = 22.0;
 const TOP: f64 = 44.0;
 const BOTTOM: f64 = 46.0;

@@ -37,6 +37,7 @@ const STEPS: [CalendarStep; 22] = [
     CalendarStep::Months(1200),
 ];
 const MINUTES_PER_DAY: f64 = 1440.0;
+/// The mean.
 const DAYS_PER_MONTH: f64 = 30.44;
 /// Room between two labels, in the sheet's units.
 const GAP: f64 = 18.0;

@@ -1,6 +1,6 @@
 //! A sheet of panels in rows.
 
-use super::panel::{Foot, Frame, Panel};
+use super::panel::{Foot, Panel, PlotArea};
 use super::{opened, width_of};
 
 /// Panels in rows of `columns`.
@@ -42,7 +42,7 @@ impl Figure {
         for (index, panel) in self.panels.iter().enumerate() {
             let x = self.panel.0 * (index % self.columns) as f64;
             let y = self.panel.1 * (index / self.columns) as f64;
-            let frame = Frame {
+            let frame = PlotArea {
                 left: x + left,
                 top: y + TOP,
                 width: self.panel.0 - left - RIGHT,

@@ -8,7 +8,7 @@ mod mark;
 mod panel;
 mod stack;
 
-pub use axis::{Axis, Scale};
+pub use axis::{Axis, AxisScale};
 pub use bars::{Bar, Bars};
 pub use figure::Figure;
 pub use mark::Mark;
@@ -28,6 +28,7 @@ pub const GREY: &str = "#777777";
 /// Of text and frames.
 pub const BLACK: &str = "#111111";
 
+/// Size of text, in the sheet's units.
 const FONT: f64 = 12.0;
 /// The mean width of a character of the font, over its size: for the room of a legend.
 const CHARACTER: f64 = 0.56;

@@ -40,7 +40,7 @@ const BOLD: f64 = 1.15;
 
 /// Where a panel's plot stands on the sheet.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Frame {
+pub(super) struct PlotArea {
     pub(super) left: f64,
     pub(super) top: f64,
     pub(super) width: f64,
@@ -61,8 +61,8 @@ pub(super) enum Foot {
 
 impl Panel {
     /// Draws it; `clip` is a name that no other panel of the page has.
-    pub(super) fn draw(&self, frame: &Frame, clip: &str, out: &mut String) {
-        let Frame {
+    pub(super) fn draw(&self, frame: &PlotArea, clip: &str, out: &mut String) {
+        let PlotArea {
             left,
             top,
             width,
@@ -109,7 +109,7 @@ impl Panel {
         shortened(&self.title, (width - legend) / BOLD)
     }
 
-    fn grid(&self, frame: &Frame, out: &mut String) {
+    fn grid(&self, frame: &PlotArea, out: &mut String) {
         let bottom = frame.top + frame.height;
         let right = frame.left + frame.width;
         for (value, text) in self.x.ticks(frame.width) {
@@ -161,13 +161,13 @@ impl Panel {
     }
 
     /// Where a point stands on the sheet.
-    fn place(&self, frame: &Frame, (x, y): (f64, f64)) -> Option<(f64, f64)> {
+    fn place(&self, frame: &PlotArea, (x, y): (f64, f64)) -> Option<(f64, f64)> {
         let across = self.x.share(x)? * frame.width;
         let up = self.y.share(y)? * frame.height;
         Some((frame.left + across, frame.top + frame.height - up))
     }
 
-    fn mark(&self, frame: &Frame, mark: &Mark, out: &mut String) {
+    fn mark(&self, frame: &PlotArea, mark: &Mark, out: &mut String) {
         let place = |point: &(f64, f64)| self.place(frame, *point);
         match mark {
             Mark::Line {
@@ -216,7 +216,7 @@ impl Panel {
                 );
             }
             Mark::Shade { from, to, colour } => {
-                self.shade(frame, (*from, *to), (colour, OPACITY), out);
+                self.shade(frame, (*from, *to), colour, OPACITY, out);
             }
             Mark::Fill { from, to, .. } => self.fill(frame, (*from, *to), mark, out),
             Mark::Lying { .. } | Mark::Standing { .. } | Mark::Strokes { .. } => {
@@ -238,9 +238,10 @@ impl Panel {
 
     fn shade(
         &self,
-        frame: &Frame,
+        frame: &PlotArea,
         (from, to): (f64, f64),
-        (colour, opacity): (&str, f64),
+        colour: &str,
+        opacity: f64,
         out: &mut String,
     ) {
         let (Some(from), Some(to)) = (self.x.share(from), self.x.share(to)) else {
@@ -256,14 +257,14 @@ impl Panel {
         );
     }
 
-    fn fill(&self, frame: &Frame, (from, to): (f64, f64), mark: &Mark, out: &mut String) {
+    fn fill(&self, frame: &PlotArea, (from, to): (f64, f64), mark: &Mark, out: &mut String) {
         let Mark::Fill {
             colour, ink, words, ..
         } = mark
         else {
             return;
         };
-        self.shade(frame, (from, to), (colour, 1.0), out);
+        self.shade(frame, (from, to), colour, 1.0, out);
         let (Some(from), Some(to)) = (self.x.share(from), self.x.share(to)) else {
             return;
         };
@@ -281,7 +282,7 @@ impl Panel {
         );
     }
 
-    fn bars(&self, frame: &Frame, mark: &Mark, out: &mut String) {
+    fn bars(&self, frame: &PlotArea, mark: &Mark, out: &mut String) {
         let mut bar = |from: (f64, f64), to: (f64, f64), (wide, high): (f64, f64), colour: &str| {
             let (Some(from), Some(to)) = (self.place(frame, from), self.place(frame, to)) else {
                 return;
@@ -327,7 +328,7 @@ impl Panel {
         }
     }
 
-    fn words(&self, frame: &Frame, mark: &Mark, out: &mut String) {
+    fn words(&self, frame: &PlotArea, mark: &Mark, out: &mut String) {
         let right = frame.left + frame.width;
         let (text, colour, at, anchor) = match mark {
             Mark::Words { at, text, colour } => (text, colour, self.place(frame, *at), "start"),
@@ -368,7 +369,7 @@ impl Panel {
         );
     }
 
-    fn legend(&self, frame: &Frame, out: &mut String) {
+    fn legend(&self, frame: &PlotArea, out: &mut String) {
         let named: Vec<_> = self
             .marks
             .iter()

@@ -1,6 +1,6 @@
 //! Panels of their own heights, one above the other, on one horizontal axis.
 
-use super::panel::{Foot, Frame, Panel};
+use super::panel::{Foot, Panel, PlotArea};
 use super::{escaped, opened, width_of};
 use std::fmt::Write as _;
 
@@ -44,7 +44,7 @@ impl Stack {
         let mut top = HEAD;
         for (index, (height, panel)) in self.panels.iter().enumerate() {
             top += ABOVE;
-            let frame = Frame {
+            let frame = PlotArea {
                 left,
                 top,
                 width: self.width - left - RIGHT,

@@ -58,7 +58,7 @@ impl Suspicion {
 
 /// One suspicion and what it rests on.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Evidence {
+pub struct DatedSuspicion {
     /// Which.
     pub kind: Suspicion,
     /// The latest reading that shows it.
@@ -68,9 +68,9 @@ pub struct Evidence {
 }
 
 /// The newest reading, of `newest`, came while the clock said `now`.
-pub fn ahead(newest: Timestamp, now: Timestamp) -> Option<Evidence> {
+pub fn ahead(newest: Timestamp, now: Timestamp) -> Option<DatedSuspicion> {
     let ahead = SignedDuration::from_secs(newest.duration_since(now).as_secs());
-    (ahead > AHEAD).then(|| Evidence {
+    (ahead > AHEAD).then(|| DatedSuspicion {
         kind: Suspicion::Ahead,
         at: newest,
         text: format!(
@@ -118,7 +118,11 @@ fn may_have_another_scale(values: &[f64], unit: &str) -> bool {
 }
 
 /// What the values of readings in `unit`, in order of time, give rise to.
-pub fn of_values(readings: &[(Timestamp, f64)], quantity: Quantity, unit: &str) -> Vec<Evidence> {
+pub fn of_values(
+    readings: &[(Timestamp, f64)],
+    quantity: Quantity,
+    unit: &str,
+) -> Vec<DatedSuspicion> {
     let mut readings = readings.to_vec();
     let mut found = Vec::new();
     if readings.len() < FEWEST {
@@ -144,7 +148,7 @@ fn same(one: f64, other: f64) -> bool {
 }
 
 /// A number that marks no value elsewhere, far from all others, or from the one before it.
-fn mark(readings: &[(Timestamp, f64)]) -> Option<(f64, Evidence)> {
+fn mark(readings: &[(Timestamp, f64)]) -> Option<(f64, DatedSuspicion)> {
     let index = readings.iter().position(|(_, value)| is_mark(*value))?;
     let (first, value) = readings[index];
     let others: Vec<(Timestamp, f64)> = readings
@@ -165,7 +169,7 @@ fn mark(readings: &[(Timestamp, f64)]) -> Option<(f64, Evidence)> {
              if it means that there is no value, add missing = [{value}] to the source"
         );
         let kind = Suspicion::Mark;
-        (value, Evidence { kind, at, text })
+        (value, DatedSuspicion { kind, at, text })
     })
 }
 
@@ -190,10 +194,10 @@ fn steps(readings: &[(Timestamp, f64)]) -> impl Iterator<Item = (Timestamp, Time
     pairs.map(|(before, after)| (before.0, after.0, after.1 - before.1))
 }
 
-fn fall(readings: &[(Timestamp, f64)], unit: &str) -> Option<Evidence> {
+fn fall(readings: &[(Timestamp, f64)], unit: &str) -> Option<DatedSuspicion> {
     let (usual, scatter) = scatter(readings)?;
     let (before, at, step) = steps(readings).min_by(|one, other| one.2.total_cmp(&other.2))?;
-    (usual - step > LEAP * scatter).then(|| Evidence {
+    (usual - step > LEAP * scatter).then(|| DatedSuspicion {
         kind: Suspicion::Fall,
         at,
         text: format!(
@@ -205,10 +209,10 @@ fn fall(readings: &[(Timestamp, f64)], unit: &str) -> Option<Evidence> {
     })
 }
 
-fn scale(readings: &[(Timestamp, f64)], unit: &str) -> Option<Evidence> {
+fn scale(readings: &[(Timestamp, f64)], unit: &str) -> Option<DatedSuspicion> {
     let (low, high) = span(readings)?;
     let moved = high - low;
-    let evidence = |text: String| Evidence {
+    let evidence = |text: String| DatedSuspicion {
         kind: Suspicion::Scale,
         at: readings.last().map_or(Timestamp::UNIX_EPOCH, |last| last.0),
         text,

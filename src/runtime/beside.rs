@@ -10,7 +10,7 @@ use tokio::task::JoinSet;
 
 /// The tasks, and what they need.
 #[derive(Debug)]
-pub(super) struct Beside {
+pub(super) struct SideTasks {
     config: Config,
     store: Arc<Store>,
     vitals: Arc<Vitals>,
@@ -19,12 +19,13 @@ pub(super) struct Beside {
     drills: JoinSet<()>,
 }
 
-impl Beside {
+impl SideTasks {
     /// Starts what `config` asks for; it ends with the shutdown.
     pub(super) fn start(
         config: &Config,
         store: &Arc<Store>,
-        (vitals, shutdown): (&Arc<Vitals>, &Shutdown),
+        vitals: &Arc<Vitals>,
+        shutdown: &Shutdown,
     ) -> Self {
         Self {
             config: config.clone(),
@@ -32,11 +33,11 @@ impl Beside {
             vitals: Arc::clone(vitals),
             shutdown: shutdown.clone(),
             heartbeats: heartbeat::start(&config.heartbeats, vitals, shutdown),
-            drills: drill::start(config, store, (vitals, shutdown)),
+            drills: drill::start(config, store, vitals, shutdown),
         }
     }
 
-    /// Goes by another config: what it changes ends and begins anew. A drill that is under way is broken off, and held again.
+    /// Goes by another config: what it changes ends and begins again. A drill that is under way is broken off, and held again.
     pub(super) async fn follow(&mut self, config: &Config) {
         let (vitals, shutdown) = (&self.vitals, &self.shutdown);
         if config.heartbeats != self.config.heartbeats {
@@ -45,7 +46,7 @@ impl Beside {
         }
         if config.drill != self.config.drill || config.hooks != self.config.hooks {
             self.drills.shutdown().await;
-            self.drills = drill::start(config, &self.store, (vitals, shutdown));
+            self.drills = drill::start(config, &self.store, vitals, shutdown);
         }
         self.config = config.clone();
     }

@@ -5,7 +5,7 @@
 //! attempt writes the same file again.
 
 use super::clock;
-use super::hook::{Alert, Outcome, state_name};
+use super::hook::{Alert, HookOutcome, state_name};
 use crate::alert::Level;
 use crate::config::CapFolder;
 use crate::monitor::{AlertState, EventKind};
@@ -24,7 +24,7 @@ const TIME: &str = "%Y-%m-%dT%H:%M:%S-00:00";
 
 /// One message of a chain.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-struct Message {
+struct CapMessage {
     identifier: String,
     sent: Timestamp,
     is_cancel: bool,
@@ -38,11 +38,11 @@ enum MessageType {
     Cancel,
 }
 
-/// Writes `alert` into the folder; where its file is there already it is written anew, the same.
-pub(super) fn write(cap: &CapFolder, alert: &Alert) -> Outcome {
+/// Writes `alert` into the folder; where its file is there already it is written again, the same.
+pub(super) fn write(cap: &CapFolder, alert: &Alert) -> HookOutcome {
     match written(cap, alert, clock::now()) {
-        Ok(()) => Outcome::Done,
-        Err(error) => Outcome::NotStarted(format!("{}: {error}", cap.folder.display())),
+        Ok(()) => HookOutcome::Done,
+        Err(error) => HookOutcome::NotStarted(format!("{}: {error}", cap.folder.display())),
     }
 }
 
@@ -67,7 +67,7 @@ fn written(cap: &CapFolder, alert: &Alert, now: Timestamp) -> io::Result<()> {
     let at = if let Some(at) = known {
         at
     } else {
-        // After its end a place begins anew.
+        // After its end a place begins again.
         if chain.last().is_some_and(|last| last.is_cancel) {
             chain.clear();
         }
@@ -78,7 +78,7 @@ fn written(cap: &CapFolder, alert: &Alert, now: Timestamp) -> io::Result<()> {
             );
             return Ok(());
         }
-        chain.push(Message {
+        chain.push(CapMessage {
             identifier,
             sent: now,
             is_cancel,
@@ -96,7 +96,7 @@ fn written(cap: &CapFolder, alert: &Alert, now: Timestamp) -> io::Result<()> {
     );
     replace(
         &cap.folder.join(name),
-        xml(cap, alert, (message, before)).as_bytes(),
+        xml(cap, alert, message, before).as_bytes(),
     )
 }
 
@@ -121,7 +121,7 @@ fn short(text: &str) -> String {
     hex
 }
 
-fn read(file: &Path) -> io::Result<Vec<Message>> {
+fn read(file: &Path) -> io::Result<Vec<CapMessage>> {
     match fs::read(file) {
         Ok(bytes) => Ok(serde_json::from_slice(&bytes)?),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Vec::new()),
@@ -140,7 +140,7 @@ fn replace(file: &Path, bytes: &[u8]) -> io::Result<()> {
         .map_or(Ok(()), |folder| File::open(folder)?.sync_all())
 }
 
-fn xml(cap: &CapFolder, alert: &Alert, (message, before): (&Message, &[Message])) -> String {
+fn xml(cap: &CapFolder, alert: &Alert, message: &CapMessage, before: &[CapMessage]) -> String {
     let kind = match (alert.state, before.is_empty()) {
         (AlertState::Resolved, _) => MessageType::Cancel,
         (AlertState::Firing, true) => MessageType::Alert,
@@ -149,7 +149,7 @@ fn xml(cap: &CapFolder, alert: &Alert, (message, before): (&Message, &[Message])
     let mut out = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
                    <alert xmlns=\"urn:oasis:names:tc:emergency:cap:1.2\">\n"
         .to_owned();
-    let sent = |one: &Message| one.sent.strftime(TIME).to_string();
+    let sent = |one: &CapMessage| one.sent.strftime(TIME).to_string();
     element(&mut out, 1, ("identifier", &message.identifier));
     element(&mut out, 1, ("sender", &cap.sender));
     element(&mut out, 1, ("sent", &sent(message)));
@@ -176,12 +176,12 @@ fn xml(cap: &CapFolder, alert: &Alert, (message, before): (&Message, &[Message])
         let references = each.collect::<Vec<_>>().join(" ");
         element(&mut out, 1, ("references", &references));
     }
-    info(&mut out, cap, (alert, kind));
+    info(&mut out, cap, alert, kind);
     out += "</alert>\n";
     out
 }
 
-fn info(out: &mut String, cap: &CapFolder, (alert, kind): (&Alert, MessageType)) {
+fn info(out: &mut String, cap: &CapFolder, alert: &Alert, kind: MessageType) {
     let EventKind::Alert { rule, text, .. } = &alert.event.kind else {
         return;
     };

@@ -2,19 +2,19 @@
 
 mod reload;
 
-use super::beside::Beside;
+use super::beside::SideTasks;
 use super::clock::Stopwatch;
 use super::deliver::{Dispatcher, Retry};
 use super::delivered::Delivered;
 use super::log;
 use super::mqtt;
 use super::progress::Progress;
-use super::pulse::Pulse;
+use super::pulse::Reporting;
 use super::sandbox;
 use super::shutdown::Shutdown;
 use super::site::Site;
 use super::sources::Sources;
-use super::tail::{Arrival, Batch};
+use super::tail::{Arrival, ArrivalBatch};
 use crate::config::Config;
 use crate::monitor::Input;
 use crate::reading::Timestamp;
@@ -45,7 +45,7 @@ pub struct Daemon {
     /// What feeds it.
     pub sources: Sources,
     /// What shows how it is.
-    pub pulse: Pulse,
+    pub pulse: Reporting,
     /// The host's clock.
     wall: fn() -> Timestamp,
     /// Once, and as of the last batch: a logger that was away hands in its backlog in several.
@@ -60,7 +60,7 @@ pub struct Daemon {
     /// How far the rows of the state have been looked at.
     verified: Verified,
     /// What works beside it; nothing in a simulation.
-    pub(super) beside: Option<Beside>,
+    pub(super) beside: Option<SideTasks>,
 }
 
 /// The way to the hooks of `config`.
@@ -76,7 +76,8 @@ impl Daemon {
         config: &Config,
         store: Arc<Store>,
         site: Site,
-        (sources, pulse): (Sources, Pulse),
+        sources: Sources,
+        pulse: Reporting,
         wall: fn() -> Timestamp,
     ) -> Self {
         Self {
@@ -162,7 +163,11 @@ impl Daemon {
     ///
     /// # Errors
     /// When the state cannot be used any more.
-    pub fn take_batch(&mut self, batch: Batch, shutdown: &Shutdown) -> Result<(), StoreError> {
+    pub fn take_batch(
+        &mut self,
+        batch: ArrivalBatch,
+        shutdown: &Shutdown,
+    ) -> Result<(), StoreError> {
         let vitals = &self.pulse.vitals;
         batch
             .found
@@ -186,7 +191,7 @@ impl Daemon {
             self.pulse.vitals.note(&events);
         }
         self.release()?;
-        self.settle()?;
+        self.end_batch()?;
         self.commit()?;
         // Also while years of backlog come in: the state is not to hold all of their refits at once.
         self.thin()?;
@@ -216,7 +221,7 @@ impl Daemon {
     ///
     /// # Errors
     /// When the state cannot be used any more.
-    pub fn take_messages(&mut self, first: mqtt::Delivery) -> Result<(), StoreError> {
+    pub fn take_messages(&mut self, first: mqtt::ReceivedMessage) -> Result<(), StoreError> {
         let mut next = Some(first);
         while let Some(delivery) = next {
             self.site.messages_come(self.sources.deliveries.len());
@@ -243,7 +248,7 @@ impl Daemon {
                 return Ok(());
             }
         }
-        self.settle()?;
+        self.end_batch()?;
         self.commit()
     }
 
@@ -272,10 +277,10 @@ impl Daemon {
     }
 
     /// Judges what came late and what queued. No alert waits for the rest.
-    fn settle(&mut self) -> Result<(), StoreError> {
+    fn end_batch(&mut self) -> Result<(), StoreError> {
         loop {
             let stopwatch = Stopwatch::start();
-            let events = self.site.settle();
+            let events = self.site.end_batch();
             self.pulse.vitals.judged(&events, stopwatch.elapsed());
             if !self.site.queues() {
                 return Ok(());
@@ -286,7 +291,7 @@ impl Daemon {
     }
 
     fn judge_queued(&mut self) -> Result<(), StoreError> {
-        self.settle()?;
+        self.end_batch()?;
         self.commit()
     }
 
@@ -309,19 +314,11 @@ impl Daemon {
         let taken = self.site.counts().taken;
         let events = self.site.take(arrival, (self.wall)())?;
         let vitals = &self.pulse.vitals;
-        match &arrival.input {
-            Input::Reading { benchmark, .. } if self.site.counts().taken > taken => {
-                vitals.read(benchmark, arrival.time, &events, stopwatch.elapsed());
-            }
-            Input::Reading { .. }
-            | Input::Sample { .. }
-            | Input::Missing { .. }
-            | Input::Trouble { .. }
-            | Input::Notice(_)
-            | Input::Settings(_)
-            | Input::Order(_)
-            | Input::Tick
-            | Input::Found(_) => vitals.note(&events),
+        let is_taken = self.site.counts().taken > taken;
+        if is_taken && let Input::Reading { benchmark, .. } = &arrival.input {
+            vitals.read(benchmark, arrival.time, &events, stopwatch.elapsed());
+        } else {
+            vitals.note(&events);
         }
         self.pulse.turn();
         Ok(())
@@ -432,7 +429,7 @@ impl Daemon {
         }
         self.release()?;
         if !self.site.may_queue_on() {
-            self.settle()?;
+            self.end_batch()?;
         }
         self.commit()?;
         if self.is_up_to_date {

@@ -2,7 +2,7 @@
 
 use super::clock;
 use super::hook::{Alert, state_name};
-use crate::store::{Delivery, Fate, Store, StoreError};
+use crate::store::{Delivery, DeliveryOutcome, Store, StoreError};
 use jiff::Timestamp;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -11,14 +11,14 @@ use std::sync::Arc;
 const MOST_UNWRITTEN: usize = 20_000;
 
 /// Key, level, state and hook.
-type Receipt = (String, &'static str, &'static str, String);
+type DeliveredKey = (String, &'static str, &'static str, String);
 
 /// The receipts of all hooks: in the state or, for a replay, only in memory.
 #[derive(Debug, Default)]
 pub struct Delivered {
     /// What came to its end while this program ran: taken, or acknowledged in time.
-    ended: BTreeMap<Receipt, Fate>,
-    unwritten: Vec<(Delivery, Fate)>,
+    ended: BTreeMap<DeliveredKey, DeliveryOutcome>,
+    unwritten: Vec<(Delivery, DeliveryOutcome)>,
     store: Option<Arc<Store>>,
 }
 
@@ -50,12 +50,12 @@ impl Delivered {
 
     /// Whether `hook` has taken this alert, or is not to get it because somebody acknowledged it in time.
     pub fn has(&self, alert: &Alert, hook: &str) -> bool {
-        self.was_told(alert, hook) || self.stands(alert, hook, Fate::Acknowledged)
+        self.was_notified(alert, hook) || self.stands(alert, hook, DeliveryOutcome::Acknowledged)
     }
 
     /// Whether `hook` has taken this alert.
-    pub(super) fn was_told(&self, alert: &Alert, hook: &str) -> bool {
-        self.stands(alert, hook, Fate::Delivered)
+    pub(super) fn was_notified(&self, alert: &Alert, hook: &str) -> bool {
+        self.stands(alert, hook, DeliveryOutcome::Delivered)
     }
 
     /// When `hook` was first to get this alert, by the host's clock; `None` where no state says it.
@@ -69,7 +69,7 @@ impl Delivered {
     }
 
     /// Whether this alert has come to this end at `hook`.
-    fn stands(&self, alert: &Alert, hook: &str, fate: Fate) -> bool {
+    fn stands(&self, alert: &Alert, hook: &str, fate: DeliveryOutcome) -> bool {
         let (level, state) = (alert.level.name(), state_name(alert.state));
         let receipt = (alert.key.clone(), level, state, hook.to_owned());
         if let Some(ended) = self.ended.get(&receipt) {
@@ -100,8 +100,16 @@ impl Delivered {
     ///
     /// # Errors
     /// When that cannot be made durable; the alert may then be sent once more, after a restart, with the same key.
-    pub fn note(&mut self, alert: &Alert, hook: &str, fate: Fate) -> Result<(), StoreError> {
-        if matches!(fate, Fate::Delivered | Fate::Acknowledged) {
+    pub fn note(
+        &mut self,
+        alert: &Alert,
+        hook: &str,
+        fate: DeliveryOutcome,
+    ) -> Result<(), StoreError> {
+        if matches!(
+            fate,
+            DeliveryOutcome::Delivered | DeliveryOutcome::Acknowledged
+        ) {
             let (level, state) = (alert.level.name(), state_name(alert.state));
             self.ended
                 .insert((alert.key.clone(), level, state, hook.to_owned()), fate);
@@ -120,7 +128,7 @@ impl Delivered {
         if let Some(store) = &self.store
             && !self.unwritten.is_empty()
         {
-            store.settle(&self.unwritten)?;
+            store.record_outcomes(&self.unwritten)?;
             self.unwritten.clear();
         }
         Ok(())

@@ -13,7 +13,7 @@ const FILE: &str = "last.json";
 
 /// What a drill that passed took.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Passed {
+pub(super) struct PassedDrill {
     pub(super) latency: Duration,
     pub(super) acknowledged: Option<Duration>,
 }
@@ -21,7 +21,7 @@ pub(super) struct Passed {
 /// How drills stand.
 #[derive(Debug, Clone, PartialEq, JsonSchema, Serialize, Deserialize)]
 #[schemars(rename = "Drills")]
-pub struct Record {
+pub struct DrillRecord {
     /// Since when there are drills.
     pub since: Timestamp,
     /// When the newest one began.
@@ -42,7 +42,7 @@ pub struct Record {
     pub failed: u64,
 }
 
-impl Record {
+impl DrillRecord {
     /// Before the first one.
     pub(super) fn new(now: Timestamp) -> Self {
         Self {
@@ -75,7 +75,7 @@ impl Record {
         fs::rename(&partial, folder.join(FILE))
     }
 
-    pub(super) fn passes(&mut self, passed: Passed, now: Timestamp) {
+    pub(super) fn passes(&mut self, passed: PassedDrill, now: Timestamp) {
         tracing::info!(?passed, "the drill has passed");
         self.passed_at = Some(now);
         self.latency_seconds = Some(passed.latency.as_secs_f64());

@@ -3,10 +3,10 @@
 use super::clock;
 use super::hook::Status;
 use super::replay::{ReplayPace, arrivals, wait};
-use super::serve::{Behind, Door, ListenError, Server};
+use super::serve::{ListenError, ListenOptions, ServedState, Server};
 use super::shutdown::Shutdown;
 use super::site::{Sinks, Site};
-use super::view::{Desk, Facts};
+use super::view::{Facts, SiteReader};
 use super::vitals::Vitals;
 use crate::monitor::{Input, Settings};
 use crate::reading::Recording;
@@ -15,8 +15,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// How often orders are looked for.
-const LOOK: Duration = Duration::from_millis(300);
+/// How often orders are read.
+const POLL_INTERVAL: Duration = Duration::from_millis(300);
 
 /// What is played, and to whom it is shown.
 #[derive(Debug)]
@@ -30,7 +30,7 @@ pub struct Exhibit<'a> {
     /// What the page says of the site.
     pub facts: Facts,
     /// Where the page is.
-    pub door: Door,
+    pub options: ListenOptions,
 }
 
 /// Why nothing is shown.
@@ -56,12 +56,12 @@ pub async fn show(
     opened: &mut (dyn FnMut(std::net::SocketAddr) + '_),
 ) -> Result<(), ExhibitError> {
     let store = Arc::new(Store::open(folder)?);
-    let desk = Some(Arc::new(Desk::open(folder, exhibit.facts.clone())?));
+    let reader = Some(Arc::new(SiteReader::open(folder, exhibit.facts.clone())?));
     let archive = Some(Arc::new(super::archive::Events::of(Arc::clone(&store))) as _);
     let vitals = Arc::new(Vitals::default());
     vitals.update(|health| (health.is_caught_up, health.is_store_writable) = (true, true));
-    let behind = Behind { archive, desk };
-    let server = Server::open(exhibit.door.clone(), Arc::clone(&vitals), behind).await?;
+    let behind = ServedState { archive, reader };
+    let server = Server::open(exhibit.options.clone(), Arc::clone(&vitals), behind).await?;
     opened(server.address());
     let sinks = Sinks {
         store: Some(Arc::clone(&store)),
@@ -114,7 +114,7 @@ impl Stage {
                 let now = self.store.newest_step()?.unwrap_or_else(clock::now);
                 self.site.commit(now)?;
             }
-            let next = clock::later(LOOK);
+            let next = clock::later(POLL_INTERVAL);
             let next = due.map_or(next, |due| due.min(next));
             tokio::select! {
                 () = tokio::time::sleep_until(next) => {}

@@ -121,7 +121,7 @@ impl Alert {
         })
     }
 
-    /// Whether it is tried until a hook has taken it: people's safety hangs on it.
+    /// Whether it is tried until a hook has taken it: people's safety depends on it.
     pub fn must_arrive(&self) -> bool {
         match self.level {
             Level::Orange | Level::Red | Level::Unknown => self.state == AlertState::Firing,
@@ -194,7 +194,7 @@ pub(crate) fn state_name(state: AlertState) -> &'static str {
 
 /// How a run of a hook ended.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Outcome {
+pub enum HookOutcome {
     /// Exit code 0: the message is on its way.
     Done,
     /// Another exit code.
@@ -213,18 +213,19 @@ pub enum Outcome {
 pub(super) async fn run_program(
     hook: &HookConfig,
     alert: &Alert,
-    (attempt, link): (u32, Option<&str>),
-) -> Outcome {
+    attempt: u32,
+    link: Option<&str>,
+) -> HookOutcome {
     let run = run_name();
     let mut child = match start(hook, &alert.variables(attempt, link), &run) {
         Ok(child) => child,
-        Err(reason) => return Outcome::NotStarted(reason),
+        Err(reason) => return HookOutcome::NotStarted(reason),
     };
     let body = match alert.body(attempt, link) {
         Ok(body) => body,
-        Err(error) => return Outcome::NotStarted(error.to_string()),
+        Err(error) => return HookOutcome::NotStarted(error.to_string()),
     };
-    let mut group = Group::of(&child);
+    let mut group = ProcessGroup::of(&child);
     let writer = child.stdin.take().map(|mut stdin| {
         // A hook may leave stdin unread: its closing the pipe is no error, its filling up only
         // holds this task, which ends with the hook.
@@ -240,13 +241,13 @@ pub(super) async fn run_program(
             group.leave();
             outcome(status)
         }
-        Ok(Err(error)) => Outcome::NotStarted(error.to_string()),
+        Ok(Err(error)) => HookOutcome::NotStarted(error.to_string()),
         Err(_elapsed) => {
             group.kill();
             let _ = tokio::task::spawn_blocking(move || kill_all_of(&run)).await;
             // Reaps the child; a process stuck in the kernel must not hold the alerts up.
             let _ = tokio::time::timeout(KILL_GRACE, child.wait()).await;
-            Outcome::TimedOut
+            HookOutcome::TimedOut
         }
     };
     if let Some(writer) = writer {
@@ -326,19 +327,19 @@ fn capped(value: &str) -> String {
     clean[..end].to_owned()
 }
 
-fn outcome(status: ExitStatus) -> Outcome {
+fn outcome(status: ExitStatus) -> HookOutcome {
     match (status.code(), status.signal()) {
-        (Some(0), _) => Outcome::Done,
-        (Some(code), _) => Outcome::Failed(code),
-        (None, signal) => Outcome::Signalled(signal.unwrap_or_default()),
+        (Some(0), _) => HookOutcome::Done,
+        (Some(code), _) => HookOutcome::Failed(code),
+        (None, signal) => HookOutcome::Signalled(signal.unwrap_or_default()),
     }
 }
 
 /// A hook's process group, killed when the run is given up half-way.
 #[derive(Debug)]
-struct Group(Option<Pid>);
+struct ProcessGroup(Option<Pid>);
 
-impl Group {
+impl ProcessGroup {
     fn of(child: &Child) -> Self {
         let id = child.id().and_then(|id| i32::try_from(id).ok());
         Self(id.map(Pid::from_raw))
@@ -356,7 +357,7 @@ impl Group {
     }
 }
 
-impl Drop for Group {
+impl Drop for ProcessGroup {
     fn drop(&mut self) {
         self.kill();
     }

@@ -7,7 +7,7 @@ use crate::reading::BenchmarkId;
 use std::collections::BTreeMap;
 
 /// What distinguishes an alert from every other: its key, its level and its state.
-type Token = (String, Level, &'static str);
+type AlertIdentity = (String, Level, &'static str);
 
 #[derive(Debug)]
 struct Entry {
@@ -23,7 +23,7 @@ struct Entry {
 
 /// The alerts in one worker's hand, its queue included.
 #[derive(Debug, Default)]
-pub(super) struct InHand(BTreeMap<Token, Entry>);
+pub(super) struct InHand(BTreeMap<AlertIdentity, Entry>);
 
 impl InHand {
     /// Takes `alert` in hand; `false` when it is there already.
@@ -121,6 +121,6 @@ impl InHand {
     }
 }
 
-fn token(alert: &Alert) -> Token {
+fn token(alert: &Alert) -> AlertIdentity {
     (alert.key.clone(), alert.level, state_name(alert.state))
 }

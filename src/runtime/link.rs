@@ -66,7 +66,7 @@ pub(super) async fn of(hook: &HookConfig, alert: &Alert) -> Option<String> {
 
 fn url(links: &Links, key: &str, status: Status) -> io::Result<String> {
     let until = clock::now().as_second() + links.within.as_secs();
-    let mac = mac(&secret(&links.secret_file)?, (key, status, until))?;
+    let mac = mac(&secret(&links.secret_file)?, key, status, until)?;
     let signature = URL_SAFE_NO_PAD.encode(mac.finalize().into_bytes());
     Ok(format!(
         "{}/acknowledge?alert={}&status={}&until={until}&signature={signature}",
@@ -87,7 +87,7 @@ pub(super) fn verified(file: &Path, asked: &AskedLink) -> io::Result<Option<Sign
     let (Some(status), Ok(signature)) = (status, signature) else {
         return Ok(None);
     };
-    let mac = mac(&secret(file)?, (&asked.alert, status, asked.until))?;
+    let mac = mac(&secret(file)?, &asked.alert, status, asked.until)?;
     let until = Timestamp::from_second(asked.until);
     Ok(match (mac.verify_slice(&signature), until) {
         (Ok(()), Ok(until)) => Some(SignedLink {
@@ -100,7 +100,7 @@ pub(super) fn verified(file: &Path, asked: &AskedLink) -> io::Result<Option<Sign
 }
 
 /// The key comes last: it alone could hold a line's end.
-fn mac(secret: &[u8], (key, status, until): (&str, Status, i64)) -> io::Result<Hmac<Sha256>> {
+fn mac(secret: &[u8], key: &str, status: Status, until: i64) -> io::Result<Hmac<Sha256>> {
     let mut mac = Hmac::<Sha256>::new_from_slice(secret).map_err(io::Error::other)?;
     mac.update(format!("{PURPOSE}\n{}\n{until}\n{key}", status.name()).as_bytes());
     Ok(mac)

@@ -15,7 +15,7 @@ use super::shutdown::Shutdown;
 use super::site::is_logged;
 use super::tail::{Arrival, Decoder};
 use crate::config::{Benchmark, Broker};
-use session::{Came, Message, NoConnection, Session};
+use session::{BrokerMessage, NoConnection, Session, SessionEvent};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -30,7 +30,7 @@ const RECONNECT: (Duration, Duration) = (Duration::from_secs(1), Duration::from_
 
 /// One message, on its way to be made durable.
 #[derive(Debug)]
-pub struct Delivery {
+pub struct ReceivedMessage {
     /// What it holds; nothing where it cannot be used.
     pub arrivals: Vec<Arrival>,
     /// The source that it is from.
@@ -52,7 +52,7 @@ pub struct Receipt(Of);
 /// What is acknowledged.
 #[derive(Debug)]
 enum Of {
-    Message(Box<Message>),
+    Message(Box<BrokerMessage>),
     Number(u64, mpsc::UnboundedSender<u64>),
 }
 
@@ -62,7 +62,7 @@ impl Receipt {
         Self(Of::Number(number, acknowledged))
     }
 
-    /// Tells the broker that the message need not come again. Not to be called by the task that runs
+    /// Acknowledges the message to the broker, so that it does not come again. Not to be called by the task that runs
     /// [`follow`].
     ///
     /// # Errors
@@ -86,7 +86,7 @@ pub async fn follow(
     broker: Broker,
     benchmarks: Vec<Benchmark>,
     client_id: String,
-    deliveries: mpsc::Sender<Delivery>,
+    deliveries: mpsc::Sender<ReceivedMessage>,
     mut shutdown: Shutdown,
 ) {
     let mut session = Session::new(broker.clone(), client_id);
@@ -103,7 +103,7 @@ pub async fn follow(
             biased;
             () = shutdown.requested() => return,
             came = session.next() => match came {
-                Ok(Came::Connected) => {
+                Ok(SessionEvent::Connected) => {
                     let version = session.version();
                     tracing::info!(source = broker.id, ?broker.address, version, "connected");
                     wait = RECONNECT.0;
@@ -112,14 +112,14 @@ pub async fn follow(
                         tracing::error!(source = broker.id, %error, "cannot subscribe");
                     }
                 }
-                Ok(Came::Message(message)) => {
+                Ok(SessionEvent::Message(message)) => {
                     let delivery = reader.delivery(message);
                     tokio::select! {
                         sent = send(delivery, &room, &deliveries) => if sent.is_err() { return },
                         () = shutdown.requested() => return,
                     }
                 }
-                Ok(Came::SubscriptionRefused) => {
+                Ok(SessionEvent::SubscriptionRefused) => {
                     let (source, topic) = (&broker.id, &broker.topic);
                     tracing::error!(source, topic, ?RECONNECT, "the broker refuses the subscription: nothing comes from it");
                     // Asked again after a while: its rules may be others then.
@@ -129,7 +129,7 @@ pub async fn follow(
                         () = shutdown.requested() => return,
                     }
                 }
-                Ok(Came::Nothing) => {}
+                Ok(SessionEvent::Nothing) => {}
                 Err(error) => {
                     tracing::warn!(source = broker.id, %error, ?wait, "no connection; will connect again");
                     tokio::select! {
@@ -145,10 +145,10 @@ pub async fn follow(
 
 /// Sends it when there is room for its values.
 async fn send(
-    mut delivery: Delivery,
+    mut delivery: ReceivedMessage,
     room: &Arc<Semaphore>,
-    deliveries: &mpsc::Sender<Delivery>,
-) -> Result<(), mpsc::error::SendError<Delivery>> {
+    deliveries: &mpsc::Sender<ReceivedMessage>,
+) -> Result<(), mpsc::error::SendError<ReceivedMessage>> {
     let values = u32::try_from(delivery.arrivals.len()).unwrap_or(MOST_VALUES);
     let share = Arc::clone(room).acquire_many_owned(values.min(MOST_VALUES));
     // It is never closed.
@@ -165,11 +165,11 @@ struct Reader {
 }
 
 impl Reader {
-    fn delivery(&mut self, mut message: Message) -> Delivery {
+    fn delivery(&mut self, mut message: BrokerMessage) -> ReceivedMessage {
         let found = Stopwatch::start();
         let (arrivals, quarantined) = self.read(&message.topic(), message.payload());
         message.forget_payload();
-        Delivery {
+        ReceivedMessage {
             arrivals,
             source: self.source.clone(),
             found,

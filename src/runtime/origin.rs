@@ -2,8 +2,8 @@
 
 use super::ingest::is_packed;
 use super::tail::{Decoder, TextReader, list};
-use crate::config::{Config, Source};
-use crate::monitor::Input;
+use crate::config::{Config, FileSource};
+use crate::monitor::{Input, Measured};
 use crate::reading::Timestamp;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -16,7 +16,7 @@ const MOST_LINES: u64 = 2_000_000;
 const LONGEST_LINE: u64 = 1 << 20;
 
 /// A value by name, time and the bits of the number as it stands in the file.
-type Token = (String, Timestamp, u64);
+type ValueIdentity = (String, Timestamp, u64);
 
 /// A line of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -31,7 +31,7 @@ pub struct Origin {
 /// file has changed or gone since, is not among them.
 #[derive(Debug, Default)]
 pub struct Origins {
-    lines: BTreeMap<Token, Origin>,
+    lines: BTreeMap<ValueIdentity, Origin>,
     looked_at: u64,
 }
 
@@ -50,7 +50,7 @@ impl Origins {
         self.lines.get(&token(input)?)
     }
 
-    fn source(&mut self, source: &Source, decoder: &Decoder) {
+    fn source(&mut self, source: &FileSource, decoder: &Decoder) {
         let Ok((mut files, _)) = list(&source.pattern, decoder) else {
             return;
         };
@@ -59,7 +59,7 @@ impl Origins {
             if !is_packed(&file)
                 && let Err(error) = self.file(&file, decoder)
             {
-                tracing::warn!(file = %file.display(), %error, "its lines cannot be looked at");
+                tracing::warn!(file = %file.display(), %error, "its lines cannot be read");
             }
         }
     }
@@ -94,28 +94,11 @@ impl Origins {
     }
 }
 
-fn token(input: &Input) -> Option<Token> {
-    match input {
-        Input::Reading {
-            benchmark, reading, ..
-        } => Some((
-            format!("reading {benchmark}"),
-            reading.time,
-            reading.value.to_bits(),
-        )),
-        Input::Sample {
-            channel, sample, ..
-        } => Some((
-            format!("sample {channel}"),
-            sample.time,
-            sample.value.to_bits(),
-        )),
-        Input::Missing { .. }
-        | Input::Trouble { .. }
-        | Input::Settings(_)
-        | Input::Order(_)
-        | Input::Found(_)
-        | Input::Notice(_)
-        | Input::Tick => None,
-    }
+fn token(input: &Input) -> Option<ValueIdentity> {
+    let measured = input.measured()?;
+    let name = match measured {
+        Measured::Reading { benchmark, .. } => format!("reading {benchmark}"),
+        Measured::Sample { channel, .. } => format!("sample {channel}"),
+    };
+    Some((name, measured.time(), measured.value().to_bits()))
 }

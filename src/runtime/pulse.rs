@@ -1,6 +1,6 @@
 //! What the work loop shows of itself to those outside: its vitals, the server, the service manager.
 
-use super::serve::{Behind, Door, Limits, ListenError, Server};
+use super::serve::{Limits, ListenError, ListenOptions, ServedState, Server};
 use super::service::Service;
 use super::vitals::Vitals;
 use crate::config::{SiteConfig, TokenError};
@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 /// Nobody could be let in.
 #[derive(Debug, thiserror::Error)]
-pub enum PulseError {
+pub enum ReportingError {
     /// The token that callers are asked for.
     #[error(transparent)]
     Token(#[from] TokenError),
@@ -19,7 +19,7 @@ pub enum PulseError {
 
 /// Held by the work loop.
 #[derive(Debug)]
-pub struct Pulse {
+pub struct Reporting {
     /// What it knows of its health.
     pub vitals: Arc<Vitals>,
     /// The service manager.
@@ -27,22 +27,22 @@ pub struct Pulse {
     server: Option<Server>,
 }
 
-impl Pulse {
+impl Reporting {
     /// Starts to listen, where the site does, and notifies the service manager that we are up.
     ///
     /// # Errors
-    /// [`PulseError`].
-    pub async fn start(site: &SiteConfig, behind: Behind) -> Result<Self, PulseError> {
+    /// [`ReportingError`].
+    pub async fn start(site: &SiteConfig, served: ServedState) -> Result<Self, ReportingError> {
         let vitals = Arc::new(Vitals::default());
         let server = match site.listen {
             None => None,
             Some(listen) => {
-                let door = Door {
+                let options = ListenOptions {
                     listen,
                     token: site.token()?,
                     limits: Limits::default(),
                 };
-                Some(Server::open(door, Arc::clone(&vitals), behind).await?)
+                Some(Server::open(options, Arc::clone(&vitals), served).await?)
             }
         };
         let service = Service::of_environment();

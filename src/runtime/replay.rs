@@ -239,17 +239,7 @@ mod tests {
             }],
             ..Recording::default()
         };
-        let name = |arrival: &Arrival| match &arrival.input {
-            Input::Reading { benchmark, .. } => benchmark.as_str().to_owned(),
-            Input::Sample { channel, .. } => channel.clone(),
-            Input::Missing { .. }
-            | Input::Trouble { .. }
-            | Input::Notice(_)
-            | Input::Settings(_)
-            | Input::Order(_)
-            | Input::Found(_)
-            | Input::Tick => String::new(),
-        };
+        let name = |arrival: &Arrival| arrival.input.series_name().to_owned();
         let names: Vec<String> = arrivals(&recording).iter().map(name).collect();
         assert_eq!(names, ["a", "b", "b", "rain_mm", "a", "b"]);
     }

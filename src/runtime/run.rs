@@ -1,17 +1,17 @@
 //! The daemon: files to the monitor, everything to the state folder, alerts to the hooks.
 
-use super::beside::Beside;
+use super::beside::SideTasks;
 use super::clock;
 use super::daemon::{DRAIN_LIMIT, Daemon, dispatcher};
 use super::hook::Status;
 use super::link;
 use super::progress::Progress;
-use super::pulse::{Pulse, PulseError};
-use super::serve::Behind;
+use super::pulse::{Reporting, ReportingError};
+use super::serve::ServedState;
 use super::shutdown::{self, Shutdown};
 use super::site::{Counts, Sinks, Site};
 use super::sources::Sources;
-use super::view::{Desk, Facts};
+use super::view::{Facts, SiteReader};
 use crate::config::Config;
 use crate::store::{Store, StoreError};
 use std::path::PathBuf;
@@ -31,7 +31,7 @@ pub enum RunError {
     },
     /// Nobody could be let in to ask.
     #[error(transparent)]
-    Pulse(#[from] PulseError),
+    Pulse(#[from] ReportingError),
     /// The part that follows the files broke off.
     #[error("following the files broke off: {0}")]
     Follow(#[from] tokio::task::JoinError),
@@ -59,11 +59,11 @@ pub async fn run(
         tracing::warn!(%error, "a limit on the length of files would end this process");
     }
     make_secret(config);
-    let behind = Behind {
+    let behind = ServedState {
         archive: Some(Arc::new(super::archive::Events::of(Arc::clone(&store)))),
-        desk: desk(config),
+        reader: reader(config),
     };
-    let mut pulse = Pulse::start(&config.site, behind).await?;
+    let mut pulse = Reporting::start(&config.site, behind).await?;
     let sinks = Sinks {
         store: Some(Arc::clone(&store)),
         alerts: Some(dispatcher(config, &store)),
@@ -76,9 +76,9 @@ pub async fn run(
     for (source, count) in store.quarantined().map_err(fail)? {
         pulse.vitals.quarantined(&source, count);
     }
-    let beside = Beside::start(config, &store, (&pulse.vitals, &shutdown));
+    let beside = SideTasks::start(config, &store, &pulse.vitals, &shutdown);
     let sources = Sources::start(config, &store).map_err(fail)?;
-    let mut daemon = Daemon::new(config, store, site, (sources, pulse), clock::now);
+    let mut daemon = Daemon::new(config, store, site, sources, pulse, clock::now);
     daemon.beside = Some(beside);
     tracing::info!(site = name, state = %config.site.state_dir.display(), "started");
     let worked = daemon.work(shutdown, progress).await;
@@ -113,10 +113,10 @@ fn make_secret(config: &Config) {
 }
 
 /// What the page asks, where the site listens. A page that cannot be shown is no reason not to watch.
-fn desk(config: &Config) -> Option<Arc<Desk>> {
+fn reader(config: &Config) -> Option<Arc<SiteReader>> {
     config.site.listen?;
-    match Desk::open(&config.site.state_dir, Facts::of(config)) {
-        Ok(desk) => Some(Arc::new(desk)),
+    match SiteReader::open(&config.site.state_dir, Facts::of(config)) {
+        Ok(reader) => Some(Arc::new(reader)),
         Err(error) => {
             tracing::error!(%error, "the page cannot be shown");
             None

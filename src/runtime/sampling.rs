@@ -10,7 +10,7 @@ const READINGS_AN_EVACUATION: i32 = 4;
 
 /// A line for each benchmark that is measured too rarely for its evacuation time to mean anything, or not at all, or
 /// whose readings hardly mean what was intended.
-pub fn doubts(config: &Config, preview: &Preview) -> Vec<String> {
+pub fn sampling_warnings(config: &Config, preview: &Preview) -> Vec<String> {
     let settings = &config.settings;
     let lines = preview.benchmarks.iter().filter_map(|benchmark| {
         let id = &benchmark.id;

@@ -1,6 +1,6 @@
 //! Searches for missing effects beside the monitor: threads of their own, answers at a time the data decide.
 
-use crate::monitor::{Finding, SearchJob};
+use crate::monitor::{SearchFinding, SearchJob};
 use crate::reading::{BenchmarkId, Timestamp};
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -13,27 +13,27 @@ const MOST_WORKERS: usize = 4;
 /// The searches under way, one a benchmark.
 #[derive(Debug, Default)]
 pub(super) struct Searches {
-    asked: BTreeMap<BenchmarkId, Asked>,
+    asked: BTreeMap<BenchmarkId, RunningSearch>,
     /// `None` until the first search.
-    queue: Option<Sender<Order>>,
+    queue: Option<Sender<SearchOrder>>,
 }
 
 #[derive(Debug)]
-struct Asked {
+struct RunningSearch {
     job: SearchJob,
     /// Nothing comes from it if the search broke off.
-    answer: Receiver<Finding>,
+    answer: Receiver<SearchFinding>,
 }
 
 /// A search and where its answer goes.
-type Order = (SearchJob, Sender<Finding>);
+type SearchOrder = (SearchJob, Sender<SearchFinding>);
 
 impl Searches {
     /// Notes a search that a restart has still to make.
     pub(super) fn note(&mut self, job: SearchJob) {
         let (_, answer) = channel();
         self.asked
-            .insert(job.benchmark.clone(), Asked { job, answer });
+            .insert(job.benchmark.clone(), RunningSearch { job, answer });
     }
 
     /// Has the searches made that were only noted.
@@ -61,11 +61,15 @@ impl Searches {
         // With no thread to take it, the answer goes nowhere.
         let _ = queue.send((job.clone(), sender));
         self.asked
-            .insert(job.benchmark.clone(), Asked { job, answer });
+            .insert(job.benchmark.clone(), RunningSearch { job, answer });
     }
 
     /// The answer that is due at a reading of `time`, if there is one by now.
-    pub(super) fn answered(&mut self, benchmark: &BenchmarkId, time: Timestamp) -> Option<Finding> {
+    pub(super) fn answered(
+        &mut self,
+        benchmark: &BenchmarkId,
+        time: Timestamp,
+    ) -> Option<SearchFinding> {
         let asked = self.asked.get(benchmark)?;
         if asked.job.due > time {
             return None;
@@ -80,18 +84,22 @@ impl Searches {
     }
 
     /// The answer that is due at a reading of `time`; waits for it where the search is still at work.
-    pub(super) fn due(&mut self, benchmark: &BenchmarkId, time: Timestamp) -> Option<Finding> {
+    pub(super) fn due(
+        &mut self,
+        benchmark: &BenchmarkId,
+        time: Timestamp,
+    ) -> Option<SearchFinding> {
         if self.asked.get(benchmark)?.job.due > time {
             return None;
         }
-        let Asked { job, answer } = self.asked.remove(benchmark)?;
+        let RunningSearch { job, answer } = self.asked.remove(benchmark)?;
         Some(answer.recv().unwrap_or_else(|_| job.broken_off()))
     }
 }
 
 /// Threads that make searches until the queue is gone. They are not joined: whoever drops the queue no longer
 /// wants the answers, and a stop must not wait for seconds of work that is thrown away.
-fn workers() -> Sender<Order> {
+fn workers() -> Sender<SearchOrder> {
     let (queue, orders) = channel();
     let orders = Arc::new(Mutex::new(orders));
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -106,7 +114,7 @@ fn workers() -> Sender<Order> {
     queue
 }
 
-fn work(orders: &Mutex<Receiver<Order>>) {
+fn work(orders: &Mutex<Receiver<SearchOrder>>) {
     loop {
         let order = orders.lock().unwrap_or_else(PoisonError::into_inner).recv();
         let Ok((job, answer)) = order else { return };

@@ -1,8 +1,8 @@
 //! Where a daemon's values come from: files that are followed, brokers that are listened to.
 
-use super::mqtt::{self, Delivery, Receipt};
+use super::mqtt::{self, Receipt, ReceivedMessage};
 use super::shutdown::{self, Shutdown, Trigger};
-use super::tail::{self, Batch, Follower};
+use super::tail::{self, ArrivalBatch, Follower};
 use crate::config::Config;
 use crate::store::{Store, StoreError};
 use tokio::sync::mpsc;
@@ -17,13 +17,13 @@ pub(super) const MESSAGES: usize = mqtt::MOST_UNACKNOWLEDGED as usize;
 #[derive(Debug)]
 pub struct Sources {
     /// What files hold.
-    pub batches: mpsc::Receiver<Batch>,
+    pub batches: mpsc::Receiver<ArrivalBatch>,
     /// What brokers send.
-    pub deliveries: mpsc::Receiver<Delivery>,
+    pub deliveries: mpsc::Receiver<ReceivedMessage>,
     /// What has been taken and is not durable yet.
     unacknowledged: Vec<Receipt>,
     /// Held, so that without a broker the other end waits.
-    _messages: mpsc::Sender<Delivery>,
+    _messages: mpsc::Sender<ReceivedMessage>,
     /// Stops them, also when it is dropped.
     stop: Trigger,
     task: JoinHandle<Result<(), JoinError>>,
@@ -34,18 +34,19 @@ impl Sources {
     pub(super) fn start(config: &Config, store: &Store) -> Result<Self, StoreError> {
         let (messages, deliveries) = mpsc::channel(MESSAGES);
         let (stop, stopped) = shutdown::pair();
-        listen(config, store.instance()?, (&messages, &stopped));
+        listen(config, store.instance()?, &messages, &stopped);
         let follower = Follower::new(&config.sources, &config.benchmarks, &store.positions()?);
         let (sender, batches) = mpsc::channel(BATCHES);
         let task = tokio::spawn(tail::follow(follower, sender, stopped));
-        let mut sources = Self::of((messages, deliveries), stop);
+        let mut sources = Self::of(messages, deliveries, stop);
         (sources.batches, sources.task) = (batches, task);
         Ok(sources)
     }
 
     /// Messages that somebody else brings, and no files; needs a tokio runtime.
     pub fn of(
-        (messages, deliveries): (mpsc::Sender<Delivery>, mpsc::Receiver<Delivery>),
+        messages: mpsc::Sender<ReceivedMessage>,
+        deliveries: mpsc::Receiver<ReceivedMessage>,
         stop: Trigger,
     ) -> Self {
         let (_, batches) = mpsc::channel(1);
@@ -103,7 +104,8 @@ impl Sources {
 fn listen(
     config: &Config,
     instance: i64,
-    (messages, stopped): (&mpsc::Sender<Delivery>, &Shutdown),
+    messages: &mpsc::Sender<ReceivedMessage>,
+    stopped: &Shutdown,
 ) {
     for broker in &config.brokers {
         // One session for each state and source, found again after a restart. Two daemons of one site's name would

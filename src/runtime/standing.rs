@@ -1,7 +1,7 @@
 //! What stands at a moment, from the events in a site's state: alerts in force, orders, who has seen what.
 
 use crate::alert::Level;
-use crate::monitor::{AlertState, Event, EventKind};
+use crate::monitor::{AlertState, Event, EventKind, OrderKind};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::store::{Store, StoreError};
 use std::collections::BTreeMap;
@@ -75,7 +75,7 @@ pub fn silences(orders: &[Event], now: Timestamp) -> Vec<Event> {
         let EventKind::Order { order, until, .. } = &event.kind else {
             continue;
         };
-        if order == "unsilence" {
+        if *order == OrderKind::Unsilence {
             let place = &event.benchmark;
             standing.retain(|one| place.is_some() && one.benchmark != *place);
         } else if until.is_some_and(|until| until > now) {
@@ -92,8 +92,13 @@ pub fn acknowledged(orders: &[Event], in_force: &InForce) -> Vec<Event> {
         is_here && ack.time >= alert.time && may_be_of(ack, alert)
     };
     let is_one = |event: &&Event| {
-        let is_ack =
-            matches!(&event.kind, EventKind::Order { order, .. } if order == "acknowledge");
+        let is_ack = matches!(
+            &event.kind,
+            EventKind::Order {
+                order: OrderKind::Acknowledge,
+                ..
+            }
+        );
         is_ack
             && in_force
                 .iter()

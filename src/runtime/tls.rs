@@ -1,4 +1,4 @@
-//! TLS to those we speak to: who is trusted, and the handshake.
+//! TLS to those we connect to: who is trusted, and the handshake.
 
 use std::path::Path;
 use std::sync::Arc;

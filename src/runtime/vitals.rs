@@ -1,7 +1,7 @@
 //! What the daemon knows of its own health; the work loop writes it, whoever asks reads it.
 
 use super::clock::Stopwatch;
-use super::drilled::Record;
+use super::drilled::DrillRecord;
 use super::site::Mute;
 use crate::alert::Level;
 use crate::monitor::{AlertState, Event, EventKind, Unexplained};
@@ -71,7 +71,7 @@ pub struct Health {
     /// See [`Health::heartbeats`].
     pub heartbeats_failed: u64,
     /// How drills stand; `None` where none are held.
-    pub drill: Option<Record>,
+    pub drill: Option<DrillRecord>,
     /// Size of the database, bytes.
     pub database_bytes: Option<u64>,
 }
@@ -125,27 +125,19 @@ impl Default for VitalsPoint {
 
 impl VitalsPoint {
     fn note(&mut self, kind: &EventKind) {
-        match kind {
-            EventKind::Refit {
-                velocity_mm_per_day,
-                ..
-            } => self.velocity_mm_per_day = *velocity_mm_per_day,
-            EventKind::UnexplainedResidual(Unexplained::Reading { surprise_nats, .. }) => {
-                self.surprise_nats = *surprise_nats;
-            }
-            EventKind::Alert { level, state, .. } => self.call(*level, *state),
-            EventKind::UnexplainedResidual(Unexplained::Structure { .. })
-            | EventKind::RegimeFlip { .. }
-            | EventKind::InterceptDrift { .. }
-            | EventKind::TransitionDrift { .. }
-            | EventKind::EffectFound { .. }
-            | EventKind::EffectDropped { .. }
-            | EventKind::Together { .. }
-            | EventKind::Fault { .. }
-            | EventKind::Declared { .. }
-            | EventKind::Correction { .. }
-            | EventKind::Order { .. }
-            | EventKind::Summary(_) => {}
+        if let EventKind::Refit {
+            velocity_mm_per_day,
+            ..
+        } = kind
+        {
+            self.velocity_mm_per_day = *velocity_mm_per_day;
+        } else if let EventKind::UnexplainedResidual(Unexplained::Reading {
+            surprise_nats, ..
+        }) = kind
+        {
+            self.surprise_nats = *surprise_nats;
+        } else if let EventKind::Alert { level, state, .. } = kind {
+            self.call(*level, *state);
         }
     }
 

@@ -1,7 +1,7 @@
 //! Sends one alert to an address once: POST of what a hook gets on stdin, signed as Standard Webhooks asks.
 
 use super::clock;
-use super::hook::{Alert, Outcome, state_name};
+use super::hook::{Alert, HookOutcome, state_name};
 use super::http;
 use crate::config::{Secret, Webhook};
 use base64::Engine;
@@ -31,7 +31,7 @@ fn id(alert: &Alert) -> String {
 }
 
 /// The signature of a message; `None` where the key cannot be used.
-fn signature(key: &[u8], (id, timestamp): (&str, i64), body: &[u8]) -> Option<String> {
+fn signature(key: &[u8], id: &str, timestamp: i64, body: &[u8]) -> Option<String> {
     let mut mac = Hmac::<Sha256>::new_from_slice(key).ok()?;
     mac.update(format!("{id}.{timestamp}.").as_bytes());
     mac.update(body);
@@ -43,11 +43,12 @@ fn signature(key: &[u8], (id, timestamp): (&str, i64), body: &[u8]) -> Option<St
 pub(super) async fn send(
     webhook: &Webhook,
     alert: &Alert,
-    (body, limit): (Vec<u8>, Duration),
-) -> Outcome {
+    body: Vec<u8>,
+    limit: Duration,
+) -> HookOutcome {
     let request = match request(webhook, alert, body) {
         Ok(request) => request,
-        Err(why) => return Outcome::NotStarted(why),
+        Err(why) => return HookOutcome::NotStarted(why),
     };
     let address = &webhook.address;
     match tokio::time::timeout(
@@ -56,10 +57,10 @@ pub(super) async fn send(
     )
     .await
     {
-        Ok(Ok(status)) if (200..300).contains(&status) => Outcome::Done,
-        Ok(Ok(status)) => Outcome::Refused(status),
-        Ok(Err(why)) => Outcome::NotStarted(format!("{}: {why}", webhook.name)),
-        Err(_elapsed) => Outcome::TimedOut,
+        Ok(Ok(status)) if (200..300).contains(&status) => HookOutcome::Done,
+        Ok(Ok(status)) => HookOutcome::Refused(status),
+        Ok(Err(why)) => HookOutcome::NotStarted(format!("{}: {why}", webhook.name)),
+        Err(_elapsed) => HookOutcome::TimedOut,
     }
 }
 
@@ -72,7 +73,7 @@ fn request(
     let (id, timestamp) = (id(alert), clock::now().as_second());
     let signed = webhook.secret_file.as_deref().map(|file| {
         let key = Secret::read(file).map_err(|error| error.to_string())?;
-        signature(key.bytes(), (&id, timestamp), &body)
+        signature(key.bytes(), &id, timestamp, &body)
             .ok_or_else(|| "the secret is unusable".to_owned())
     });
     let signed = signed.transpose()?;
@@ -97,9 +98,9 @@ mod tests {
     fn a_signature_is_that_of_the_specification() {
         let key = STANDARD.decode("MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw").unwrap();
         let body = br#"{"test": 2432232314}"#;
-        let id = ("msg_p5jXN8AQM9LWM0D4loKWxJek", 1_614_265_330);
+        let id = "msg_p5jXN8AQM9LWM0D4loKWxJek";
         assert_eq!(
-            signature(&key, id, body).unwrap(),
+            signature(&key, id, 1_614_265_330, body).unwrap(),
             "v1,g0hM9SsE+OTPJTGt/tmIKtSyZlE3uFJELVlNIOLJ1OE="
         );
     }

@@ -1,7 +1,7 @@
 //! The scorecard of one benchmark: what each method said at each lead, and how that compares with what came.
 
 use super::measure::{Outcome, crps_days, is_covered, log_score, scored_days};
-use super::{History, Known, METHODS};
+use super::{Known, METHODS, WholeRecord};
 use crate::fit::Observations;
 use crate::forecast::{FEWEST_READINGS, HORIZON_DAYS, Passage};
 use crate::reading::{Channel, Series, Timestamp, after_days, days_since};
@@ -26,8 +26,8 @@ pub const LEADS_DAYS: [f64; 14] = [
     2.0 / 24.0,
     1.0 / 24.0,
 ];
-/// Looks at a slope that stood, evenly over its readings.
-const LOOKS: usize = 40;
+/// Forecasts that are scored of a slope that stood, evenly over its readings.
+const FORECASTS: usize = 40;
 /// A forecast is for a lead where its newest reading lies at no more than so many leads.
 const FARTHEST_LEADS: f64 = 2.0;
 /// A reading at the lead itself is known, whatever the rounding of the two, days.
@@ -102,7 +102,7 @@ pub struct Score {
     pub said: bool,
 }
 
-impl History {
+impl WholeRecord {
     /// The readings of a series, with the first channel beside it that is a river's flow.
     pub fn of(series: &Series, channels: &[Channel], critical_mm_per_day: f64) -> Self {
         let epoch = series.readings.first().map(|reading| reading.time);
@@ -124,7 +124,7 @@ impl History {
 /// The scorecard of a history that began at `epoch`; `progress` is called after each look with how many are done, of how
 /// many.
 pub fn card(
-    history: &History,
+    history: &WholeRecord,
     epoch: Timestamp,
     truth: Truth,
     progress: &mut dyn FnMut(u64, u64),
@@ -166,7 +166,7 @@ pub fn card(
 }
 
 /// What is known at each lead or look, with the lead.
-fn looks(history: &History, epoch: Timestamp, truth: Truth) -> Vec<(f64, Known)> {
+fn looks(history: &WholeRecord, epoch: Timestamp, truth: Truth) -> Vec<(f64, Known)> {
     let enough =
         |known: &Known| known.observations.spaced(FEWEST_READINGS).len() >= FEWEST_READINGS;
     match truth {
@@ -181,7 +181,7 @@ fn looks(history: &History, epoch: Timestamp, truth: Truth) -> Vec<(f64, Known)>
         }
         Truth::Stood => {
             let values = &history.observations.values;
-            let looks = LOOKS.min(values.len().saturating_sub(1));
+            let looks = FORECASTS.min(values.len().saturating_sub(1));
             let known = (1..=looks).filter_map(|look| {
                 let last = (values.len() - 1) * look / looks;
                 let known = history.at(values.get(last.checked_sub(1)?)?.t_days)?;
@@ -232,22 +232,12 @@ fn score(said: Option<&Passage>, at: Timestamp, outcome: Outcome, scored: f64) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::Observation;
-    use crate::reading::Quantity;
 
     /// 1/v falls in a line to zero at day 60; read daily.
-    fn history(days: u32) -> History {
-        let values = (0..days).map(|day| Observation {
-            t_days: f64::from(day),
-            value: -100.0 * (1.0 - f64::from(day) / 60.0).ln(),
-            sigma: None,
-        });
-        History {
-            observations: Observations {
-                quantity: Quantity::Displacement,
-                averaging_days: 0.0,
-                values: values.collect(),
-            },
+    fn history(days: u32) -> WholeRecord {
+        let fall = |day: f64| (day, -100.0 * (1.0 - day / 60.0).ln());
+        WholeRecord {
+            observations: Observations::of_displacements((0..days).map(f64::from).map(fall)),
             flow: Vec::new(),
             critical_mm_per_day: 1000.0,
         }

@@ -4,7 +4,7 @@ use crate::fit::{Observation, Observations};
 
 /// A whole record, from which only the past is given out.
 #[derive(Debug, Clone, PartialEq)]
-pub struct History {
+pub struct WholeRecord {
     /// The readings, days since the first.
     pub observations: Observations,
     /// (days, value) of a river's flow beside them, in time order; empty where there is none.
@@ -26,7 +26,7 @@ pub struct Known {
     pub critical_mm_per_day: f64,
 }
 
-impl History {
+impl WholeRecord {
     /// What is known at `days`; `None` before the first reading.
     pub fn at(&self, days: f64) -> Option<Known> {
         let values = &self.observations.values;

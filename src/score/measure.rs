@@ -65,7 +65,7 @@ pub fn crps_days(forecast: &Passage, outcome: Outcome, scored_days: f64) -> f64 
 }
 
 /// Less the logarithm of the probability given to what came, to the tenth of a decade, nats; 1 % of all is spread
-/// over the classes for what no forecaster thinks of.
+/// over the classes for what no forecaster expects.
 pub fn log_score(forecast: &Passage, outcome: Outcome) -> f64 {
     let classes = CLASSES_A_DECADE * DECADES + 2.0;
     let given = match outcome {

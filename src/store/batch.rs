@@ -1,11 +1,11 @@
 //! One commit: the steps, what follows from them, and how far the files have been read.
 
-use super::outbox::{Fate, WAITING};
+use super::outbox::{DeliveryOutcome, WAITING};
 use super::sealed::seal;
-use super::series::{self, Series};
+use super::series::{self, StoredSeries};
 use super::sum::sum;
 use super::{Inner, Store, StoreError, nanoseconds};
-use crate::monitor::{Event, Input, Part};
+use crate::monitor::{Event, Input, MemoryPart};
 use crate::reading::Timestamp;
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, params};
@@ -23,28 +23,28 @@ pub struct Position {
 /// What is written together.
 #[derive(Debug, Default)]
 pub struct Batch {
-    /// Data time and what the monitor was told.
+    /// Data time and what the monitor was given.
     steps: Vec<(Timestamp, Input)>,
     /// Each with the number of its step in this batch.
     events: Vec<(usize, Event)>,
     /// The values of the steps: what is known although it is not written yet.
-    values: BTreeMap<(Series, Timestamp), f64>,
+    values: BTreeMap<(StoredSeries, Timestamp), f64>,
     /// Values that were corrected within this batch.
-    former: BTreeMap<(Series, Timestamp), Vec<f64>>,
+    former: BTreeMap<(StoredSeries, Timestamp), Vec<f64>>,
     positions: BTreeMap<String, Option<Vec<u8>>>,
-    memory: Option<Vec<Part>>,
+    memory: Option<Vec<MemoryPart>>,
     outbox: Vec<super::Delivery>,
-    /// What a hook is told by another alert.
-    told: Vec<super::Delivery>,
+    /// What another alert reports to a hook too.
+    reported_by_another: Vec<super::Delivery>,
     commands: Vec<i64>,
 }
 
 impl Batch {
     /// Notes a step and the events that followed from it.
     pub fn step(&mut self, now: Timestamp, input: &Input, events: &[Event]) {
-        if let (Some(series), Some((time, value, _))) = (Series::of(input), value(input)) {
-            let place = (series, time);
-            if let Some(former) = self.values.insert(place.clone(), value) {
+        if let Some(measured) = input.measured() {
+            let place = (StoredSeries::of(&measured), measured.time());
+            if let Some(former) = self.values.insert(place.clone(), measured.value()) {
                 self.former.entry(place).or_default().push(former);
             }
         }
@@ -60,7 +60,7 @@ impl Batch {
     }
 
     /// Notes the monitor's memory as of the last step, where it is to be saved.
-    pub fn memory(&mut self, parts: Option<Vec<Part>>) {
+    pub fn memory(&mut self, parts: Option<Vec<MemoryPart>>) {
         self.memory = parts;
     }
 
@@ -69,14 +69,14 @@ impl Batch {
         *self = Self::default();
     }
 
-    /// Notes what a hook is to be told.
+    /// Notes of what a hook is to be notified.
     pub fn deliver(&mut self, delivery: super::Delivery) {
         self.outbox.push(delivery);
     }
 
-    /// Notes that a hook is told of this by another alert.
+    /// Notes that another alert reports this to a hook too.
     pub fn tell_together(&mut self, delivery: super::Delivery) {
-        self.told.push(delivery);
+        self.reported_by_another.push(delivery);
     }
 
     /// Notes that a command has been taken.
@@ -96,12 +96,12 @@ impl Batch {
             && self.positions.is_empty()
             && self.memory.is_none()
             && self.outbox.is_empty()
-            && self.told.is_empty()
+            && self.reported_by_another.is_empty()
             && self.commands.is_empty()
     }
 
     /// The values that this batch has for the same series and time, the newest first.
-    fn known(&self, series: &Series, time: Timestamp) -> Vec<f64> {
+    fn known(&self, series: &StoredSeries, time: Timestamp) -> Vec<f64> {
         let place = (series.clone(), time);
         let former = self.former.get(&place).into_iter().flatten().rev();
         let newest = self.values.get(&place).into_iter();
@@ -140,17 +140,19 @@ impl Store {
     /// # Errors
     /// [`StoreError`].
     pub fn has(&self, batch: &Batch, input: &Input) -> Result<Presence, StoreError> {
-        let (Some(series), Some((time, value, _))) = (Series::of(input), value(input)) else {
+        let Some(measured) = input.measured() else {
             return Ok(Presence::No);
         };
+        let series = StoredSeries::of(&measured);
+        let (time, value) = (measured.time(), measured.value());
         let in_batch = batch.known(&series, time);
         if (in_batch.first()).is_some_and(|known| known.to_bits() == value.to_bits()) {
             return Ok(Presence::Yes);
         }
         let inner = self.inner();
         let factor = match &series {
-            Series::Benchmark(_, unit, _) => unit.factor(),
-            Series::Channel(..) => 1.0,
+            StoredSeries::Benchmark(_, unit, _) => unit.factor(),
+            StoredSeries::Channel(..) => 1.0,
         };
         let mut written: Vec<(i64, f64)> = Vec::new();
         for (number, own) in inner.catalogue.alike(&series) {
@@ -187,11 +189,12 @@ impl Inner {
         } = self;
         let transaction =
             connection.transaction_with_behavior(rusqlite::TransactionBehavior::Immediate)?;
-        let mut fresh: BTreeMap<Series, i64> = BTreeMap::new();
+        let mut fresh: BTreeMap<StoredSeries, i64> = BTreeMap::new();
         for series in batch
             .steps
             .iter()
-            .filter_map(|(_, input)| Series::of(input))
+            .filter_map(|(_, input)| input.measured())
+            .map(|measured| StoredSeries::of(&measured))
         {
             if catalogue.number(&series).is_none() && !fresh.contains_key(&series) {
                 let number = catalogue.next() + i64::try_from(fresh.len()).unwrap_or(i64::MAX);
@@ -199,7 +202,7 @@ impl Inner {
                 fresh.insert(series, number);
             }
         }
-        let number = |series: &Series| {
+        let number = |series: &StoredSeries| {
             catalogue
                 .number(series)
                 .or_else(|| fresh.get(series).copied())
@@ -207,7 +210,7 @@ impl Inner {
         let (mut last_step, mut last_event) = (*steps, *events);
         for (now, input) in &batch.steps {
             last_step += 1;
-            insert_step(&transaction, (last_step, *now), input, &number)?;
+            insert_step(&transaction, last_step, *now, input, &number)?;
         }
         let mut latest = BTreeMap::new();
         for (step, event) in &batch.events {
@@ -233,8 +236,8 @@ impl Inner {
         for delivery in &batch.outbox {
             delivery.insert(&transaction, WAITING)?;
         }
-        for delivery in &batch.told {
-            delivery.insert(&transaction, Fate::Over.name())?;
+        for delivery in &batch.reported_by_another {
+            delivery.insert(&transaction, DeliveryOutcome::Over.name())?;
         }
         for command in &batch.commands {
             transaction.execute("DELETE FROM command WHERE id = ?1", [command])?;
@@ -248,39 +251,28 @@ impl Inner {
     }
 }
 
-/// When a value was measured, what it is, and its standard error.
-fn value(input: &Input) -> Option<(Timestamp, f64, Option<f64>)> {
-    match input {
-        Input::Reading { reading, .. } => Some((reading.time, reading.value, reading.sigma)),
-        Input::Sample { sample, .. } => Some((sample.time, sample.value, None)),
-        Input::Missing { .. }
-        | Input::Trouble { .. }
-        | Input::Notice(_)
-        | Input::Settings(_)
-        | Input::Order(_)
-        | Input::Found(_)
-        | Input::Tick => None,
-    }
-}
-
 fn insert_step(
     connection: &Connection,
-    (seq, now): (i64, Timestamp),
+    seq: i64,
+    now: Timestamp,
     input: &Input,
-    number: &dyn Fn(&Series) -> Option<i64>,
+    number: &dyn Fn(&StoredSeries) -> Option<i64>,
 ) -> Result<(), StoreError> {
     let mut insert = connection.prepare_cached(
         "INSERT INTO step (seq, now, series, time, value, sigma, body, sum) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
     )?;
-    let (own, number, time, value, sigma, body) =
-        if let (Some(series), Some((time, value, sigma))) = (Series::of(input), value(input)) {
-            let own = (now != time).then(|| nanoseconds(now)).transpose()?;
-            let time = nanoseconds(time)?;
-            (own, number(&series), Some(time), Some(value), sigma, None)
-        } else {
-            let body = super::read::encode(input)?;
-            (Some(nanoseconds(now)?), None, None, None, None, body)
-        };
+    let (own, number, time, value, sigma, body) = if let Some(measured) = input.measured() {
+        let own = (now != measured.time())
+            .then(|| nanoseconds(now))
+            .transpose()?;
+        let time = nanoseconds(measured.time())?;
+        let number = number(&StoredSeries::of(&measured));
+        let value = Some(measured.value());
+        (own, number, Some(time), value, measured.sigma(), None)
+    } else {
+        let body = super::read::encode(input)?;
+        (Some(nanoseconds(now)?), None, None, None, None, body)
+    };
     let integer = |value: Option<i64>| value.map_or(ValueRef::Null, ValueRef::Integer);
     let real = |value: Option<f64>| value.map_or(ValueRef::Null, ValueRef::Real);
     let sum = sum(&[
@@ -336,8 +328,12 @@ fn keep_latest(
     Ok(())
 }
 
-fn write_memory(connection: &Connection, parts: &[Part], step: i64) -> Result<(), StoreError> {
-    for Part { name, body } in parts {
+fn write_memory(
+    connection: &Connection,
+    parts: &[MemoryPart],
+    step: i64,
+) -> Result<(), StoreError> {
+    for MemoryPart { name, body } in parts {
         keep(connection, "memory", name, body.as_deref())?;
     }
     connection.execute(

@@ -35,11 +35,11 @@ impl Inner {
         rows: usize,
         written: Result<(), StoreError>,
     ) -> Result<(), StoreError> {
-        let settled = written.and_then(|()| self.move_log(rows));
-        if let Err(StoreError::Unsynced { detail }) = &settled {
+        let moved = written.and_then(|()| self.move_log(rows));
+        if let Err(StoreError::Unsynced { detail }) = &moved {
             self.log.unsynced = Some(detail.clone());
         }
-        settled
+        moved
     }
 
     fn move_log(&mut self, rows: usize) -> Result<(), StoreError> {

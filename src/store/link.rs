@@ -13,7 +13,8 @@ impl Store {
     /// [`StoreError`].
     pub fn use_link(
         &self,
-        (link, until): (&str, Timestamp),
+        link: &str,
+        until: Timestamp,
         now: Timestamp,
         order: Option<&Order>,
     ) -> Result<bool, StoreError> {

@@ -20,7 +20,7 @@ mod verify;
 
 pub use batch::{Batch, Position, Presence};
 pub use evidence::{DeliveryRow, PlacedEvent};
-pub use outbox::{Delivery, Fate};
+pub use outbox::{Delivery, DeliveryOutcome};
 pub use past::{Heads, Value, Values};
 pub use read::{Recorded, StepRow};
 pub use verify::Verified;
@@ -78,7 +78,7 @@ pub enum StoreError {
         /// What was found.
         detail: String,
     },
-    /// What was written may not be on the disk, and trying again would not tell.
+    /// What was written may not be on the disk, and trying again would not show it.
     #[error(
         "the disk failed to sync ({detail}): nothing more is written; look at the disk, then start again: that goes on from the last good commit"
     )]
@@ -350,7 +350,7 @@ fn logs_ahead(connection: &Connection) -> Result<(), StoreError> {
     }
 }
 
-/// Whether the file is whole, as far as its own structure tells.
+/// Whether the file is whole, as far as its own structure shows.
 fn sound(connection: &Connection) -> Result<(), StoreError> {
     let said: String = connection.pragma_query_value(None, "quick_check", |row| row.get(0))?;
     if said == "ok" {

@@ -1,4 +1,4 @@
-//! What the hooks are to be told: written with the events that say so, ticked off when a hook has taken it.
+//! Of what the hooks are to be notified: written with the events that cause it, ticked off when a hook has taken it.
 
 use super::sealed::{seal, unseal};
 use super::sum::sum;
@@ -31,7 +31,7 @@ pub struct Delivery {
 
 /// What became of a delivery.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Fate {
+pub enum DeliveryOutcome {
     /// The hook did not take it: it is tried again.
     Waiting,
     /// The hook took it.
@@ -46,7 +46,7 @@ pub enum Fate {
     Acknowledged,
 }
 
-impl Fate {
+impl DeliveryOutcome {
     /// Whether an attempt led to it, as a number.
     fn attempt(self) -> i64 {
         match self {
@@ -115,7 +115,7 @@ impl Store {
         while let Some(row) = rows.next()? {
             match body(row)? {
                 Some(body) => bodies.push(body),
-                // What is in force is told again when the past has been read.
+                // What is in force is sent again when the past has been read.
                 None => {
                     tracing::error!(id = ?row.get_ref(0)?, "an alert that waited is not what was written");
                 }
@@ -194,14 +194,20 @@ impl Store {
         &self,
         (key, level, state): (&str, &str, &str),
         hook: Option<&str>,
-        fate: Option<Fate>,
+        fate: Option<DeliveryOutcome>,
     ) -> Result<bool, StoreError> {
         let inner = self.inner();
         let mut query = inner.connection.prepare_cached(
             "SELECT 1 FROM outbox WHERE key = ?1 AND level = ?2 AND state = ?3
              AND (?4 IS NULL OR hook = ?4) AND (?5 IS NULL OR status = ?5) LIMIT 1",
         )?;
-        Ok(query.exists(params![key, level, state, hook, fate.map(Fate::name)])?)
+        Ok(query.exists(params![
+            key,
+            level,
+            state,
+            hook,
+            fate.map(DeliveryOutcome::name)
+        ])?)
     }
 
     /// How often a hook has been tried with this key, level and state, over restarts too.
@@ -255,11 +261,14 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn settle(&self, settled: &[(Delivery, Fate)]) -> Result<(), StoreError> {
+    pub fn record_outcomes(
+        &self,
+        outcomes: &[(Delivery, DeliveryOutcome)],
+    ) -> Result<(), StoreError> {
         let mut inner = self.inner();
         inner.trusted()?;
-        let written = inner.settle(settled);
-        inner.committed(settled.len(), written)
+        let written = inner.record_outcomes(outcomes);
+        inner.committed(outcomes.len(), written)
     }
 }
 
@@ -320,7 +329,8 @@ impl DeliveryState {
     fn becomes(
         &self,
         connection: &Connection,
-        (fate, attempts): (Fate, i64),
+        fate: DeliveryOutcome,
+        attempts: i64,
     ) -> Result<(), StoreError> {
         let sum = standing_sum(fate.name(), attempts);
         connection
@@ -343,23 +353,27 @@ impl Inner {
         for one in ended {
             let standing = DeliveryState::of(&transaction, one)?;
             if let Some(row) = standing.filter(|row| row.status == WAITING) {
-                row.becomes(&transaction, (Fate::Closed, row.attempts))?;
+                row.becomes(&transaction, DeliveryOutcome::Closed, row.attempts)?;
             }
         }
         transaction.commit()?;
         Ok(())
     }
 
-    fn settle(&mut self, settled: &[(Delivery, Fate)]) -> Result<(), StoreError> {
+    fn record_outcomes(
+        &mut self,
+        outcomes: &[(Delivery, DeliveryOutcome)],
+    ) -> Result<(), StoreError> {
         let transaction = self.connection.transaction()?;
-        for (delivery, fate) in settled {
+        for (delivery, fate) in outcomes {
             delivery.insert(&transaction, WAITING)?;
             let standing = DeliveryState::of(&transaction, delivery)?;
             let is_done = |row: &DeliveryState| {
-                row.status == Fate::Delivered.name() || row.status == Fate::Acknowledged.name()
+                row.status == DeliveryOutcome::Delivered.name()
+                    || row.status == DeliveryOutcome::Acknowledged.name()
             };
             if let Some(row) = standing.filter(|row| !is_done(row)) {
-                row.becomes(&transaction, (*fate, row.attempts + fate.attempt()))?;
+                row.becomes(&transaction, *fate, row.attempts + fate.attempt())?;
             }
         }
         transaction.commit()?;

@@ -1,9 +1,9 @@
 //! What a restart, a replay of the stored input, and people who ask read back.
 
 use super::sealed::unseal;
-use super::series::{Catalogue, Series};
+use super::series::{Catalogue, StoredSeries};
 use super::{Store, StoreError, timestamp};
-use crate::monitor::{Finding, Input, Notice, Order, Part, Settings};
+use crate::monitor::{Input, MemoryPart, Notice, Order, SearchFinding, Settings};
 use crate::reading::{BenchmarkId, Reading, Sample, Timestamp};
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, params};
@@ -23,7 +23,7 @@ pub struct StepRow {
     pub seq: i64,
     /// Data time.
     pub now: Timestamp,
-    /// What the monitor was told.
+    /// What the monitor was given.
     pub input: Input,
 }
 
@@ -31,16 +31,16 @@ pub struct StepRow {
 #[derive(Debug, Default)]
 pub struct Recorded {
     /// The monitor's memory; empty where there is none.
-    pub parts: Vec<Part>,
+    pub parts: Vec<MemoryPart>,
     /// As of which step.
     pub step: i64,
 }
 
 /// A step that is no value.
 #[derive(Serialize, Deserialize)]
-enum Told {
+enum StoredInput {
     Settings(Box<Settings>),
-    Found(Box<Finding>),
+    Found(Box<SearchFinding>),
     Order(Order),
     Missing(BenchmarkId, Timestamp, String),
     Trouble(String, String),
@@ -49,20 +49,20 @@ enum Told {
 
 /// `None` where only time has passed.
 pub(super) fn encode(input: &Input) -> Result<Option<Vec<u8>>, StoreError> {
-    let told = match input {
-        Input::Settings(settings) => Told::Settings(settings.clone()),
-        Input::Found(finding) => Told::Found(Box::new(finding.clone())),
-        Input::Order(order) => Told::Order(order.clone()),
+    let stored = match input {
+        Input::Settings(settings) => StoredInput::Settings(settings.clone()),
+        Input::Found(finding) => StoredInput::Found(Box::new(finding.clone())),
+        Input::Order(order) => StoredInput::Order(order.clone()),
         Input::Missing {
             benchmark,
             time,
             what,
-        } => Told::Missing(benchmark.clone(), *time, what.clone()),
-        Input::Trouble { kind, text } => Told::Trouble(kind.clone(), text.clone()),
-        Input::Notice(notice) => Told::Notice(notice.clone()),
+        } => StoredInput::Missing(benchmark.clone(), *time, what.clone()),
+        Input::Trouble { kind, text } => StoredInput::Trouble(kind.clone(), text.clone()),
+        Input::Notice(notice) => StoredInput::Notice(notice.clone()),
         Input::Tick | Input::Reading { .. } | Input::Sample { .. } => return Ok(None),
     };
-    let body = rmp_serde::to_vec_named(&told);
+    let body = rmp_serde::to_vec_named(&stored);
     body.map(Some)
         .map_err(|error| StoreError::Unreadable(error.to_string()))
 }
@@ -71,19 +71,19 @@ pub(super) fn decode(body: Option<Vec<u8>>) -> Result<Input, StoreError> {
     let Some(body) = body else {
         return Ok(Input::Tick);
     };
-    let told = rmp_serde::from_slice(&body);
+    let stored = rmp_serde::from_slice(&body);
     Ok(
-        match told.map_err(|error| StoreError::Unreadable(error.to_string()))? {
-            Told::Settings(settings) => Input::Settings(settings),
-            Told::Found(finding) => Input::Found(*finding),
-            Told::Order(order) => Input::Order(order),
-            Told::Missing(benchmark, time, what) => Input::Missing {
+        match stored.map_err(|error| StoreError::Unreadable(error.to_string()))? {
+            StoredInput::Settings(settings) => Input::Settings(settings),
+            StoredInput::Found(finding) => Input::Found(*finding),
+            StoredInput::Order(order) => Input::Order(order),
+            StoredInput::Missing(benchmark, time, what) => Input::Missing {
                 benchmark,
                 time,
                 what,
             },
-            Told::Trouble(kind, text) => Input::Trouble { kind, text },
-            Told::Notice(notice) => Input::Notice(notice),
+            StoredInput::Trouble(kind, text) => Input::Trouble { kind, text },
+            StoredInput::Notice(notice) => Input::Notice(notice),
         },
     )
 }
@@ -105,11 +105,11 @@ impl Store {
             if body.is_none() {
                 tracing::warn!(
                     name,
-                    "this part of the memory is not what was written: it is made anew"
+                    "this part of the memory is not what was written: it is made again"
                 );
                 return Ok(Recorded::default());
             }
-            parts.push(Part { name, body });
+            parts.push(MemoryPart { name, body });
         }
         let step = meta(&inner.connection, "memory_step")?.unwrap_or(0);
         Ok(Recorded { parts, step })
@@ -324,14 +324,14 @@ fn lost(seq: i64) -> StoreError {
     }
 }
 
-fn input(series: &Series, time: Timestamp, value: f64, sigma: Option<f64>) -> Input {
+fn input(series: &StoredSeries, time: Timestamp, value: f64, sigma: Option<f64>) -> Input {
     match series {
-        Series::Channel(channel, unit) => Input::Sample {
+        StoredSeries::Channel(channel, unit) => Input::Sample {
             channel: channel.clone(),
             unit: unit.clone(),
             sample: Sample { time, value },
         },
-        Series::Benchmark(benchmark, unit, averaging) => Input::Reading {
+        StoredSeries::Benchmark(benchmark, unit, averaging) => Input::Reading {
             benchmark: benchmark.clone(),
             unit: *unit,
             averaging: *averaging,

@@ -1,4 +1,4 @@
-//! What goes with time: older refits but for the first of each day, and what hooks were told of alerts that are over.
+//! What goes with time: older refits but for the first of each day, and the deliveries of alerts that are over.
 
 use super::{Store, StoreError, nanoseconds, read};
 use crate::reading::Timestamp;
@@ -99,7 +99,7 @@ fn kept_days(connection: &Connection) -> Result<BTreeMap<String, i64>, StoreErro
     Ok(rows.collect::<Result<_, _>>()?)
 }
 
-/// Once for each day of data time. An alert that has not ended stays, however old: whether a hook has been told of it
+/// Once for each day of data time. An alert that has not ended stays, however old: whether a hook has been notified of it
 /// is asked at every start; so does one of which a hook waits or was given up.
 fn thin_outbox(connection: &Connection, before: i64) -> Result<bool, StoreError> {
     let day = before.div_euclid(DAY_NS);

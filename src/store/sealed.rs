@@ -43,7 +43,7 @@ mod tests {
         let sealed = seal(&beside, b"what was remembered");
         assert_eq!(unseal(&beside, &sealed), Some(&b"what was remembered"[..]));
         assert_eq!(unseal(&[ValueRef::Text(b"6")], &sealed), None);
-        // The first byte tells whether there is a seal.
+        // The first byte shows whether there is a seal.
         for bit in 8..8 * sealed.len() {
             let mut flipped = sealed.clone();
             flipped[bit / 8] ^= 1 << (bit % 8);

@@ -1,7 +1,7 @@
 //! The series that values belong to, by number.
 
 use super::StoreError;
-use crate::monitor::Input;
+use crate::monitor::Measured;
 use crate::reading::{BenchmarkId, Unit};
 use jiff::SignedDuration;
 use rusqlite::{Connection, params};
@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 /// What values of one series have in common.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Series {
+pub(super) enum StoredSeries {
     /// A covariate: its name and unit.
     Channel(String, Option<String>),
     /// A benchmark's readings: unit and averaging.
@@ -19,37 +19,29 @@ pub(super) enum Series {
 /// All series that have been seen, both ways.
 #[derive(Debug, Default)]
 pub(super) struct Catalogue {
-    numbers: BTreeMap<Series, i64>,
-    series: BTreeMap<i64, Series>,
+    numbers: BTreeMap<StoredSeries, i64>,
+    series: BTreeMap<i64, StoredSeries>,
     /// By whether it is a benchmark's, and name.
     names: BTreeMap<(bool, String), Vec<i64>>,
 }
 
-impl Series {
-    /// Of a value; `None` for what is none.
-    pub(super) fn of(input: &Input) -> Option<Self> {
-        match input {
-            Input::Reading {
+impl StoredSeries {
+    pub(super) fn of(measured: &Measured<'_>) -> Self {
+        match *measured {
+            Measured::Reading {
                 benchmark,
                 unit,
                 averaging,
                 ..
-            } => Some(Self::Benchmark(benchmark.clone(), *unit, *averaging)),
-            Input::Sample { channel, unit, .. } => {
-                Some(Self::Channel(channel.clone(), unit.clone()))
+            } => Self::Benchmark(benchmark.clone(), unit, averaging),
+            Measured::Sample { channel, unit, .. } => {
+                Self::Channel(channel.to_owned(), unit.map(str::to_owned))
             }
-            Input::Missing { .. }
-            | Input::Trouble { .. }
-            | Input::Notice(_)
-            | Input::Settings(_)
-            | Input::Order(_)
-            | Input::Found(_)
-            | Input::Tick => None,
         }
     }
 }
 
-impl Series {
+impl StoredSeries {
     fn name(&self) -> (bool, String) {
         match self {
             Self::Channel(name, _) => (false, name.clone()),
@@ -72,42 +64,42 @@ impl Catalogue {
                 let averaging = row
                     .get::<_, Option<i64>>(4)?
                     .map(SignedDuration::from_nanos);
-                Series::Benchmark(BenchmarkId::new(name), unit, averaging)
+                StoredSeries::Benchmark(BenchmarkId::new(name), unit, averaging)
             } else {
-                Series::Channel(name, unit)
+                StoredSeries::Channel(name, unit)
             };
             catalogue.note(row.get(0)?, series);
         }
         Ok(catalogue)
     }
 
-    pub(super) fn note(&mut self, number: i64, series: Series) {
+    pub(super) fn note(&mut self, number: i64, series: StoredSeries) {
         let name = series.name();
         self.names.entry(name).or_default().push(number);
         self.numbers.insert(series.clone(), number);
         self.series.insert(number, series);
     }
 
-    pub(super) fn get(&self, number: i64) -> Option<&Series> {
+    pub(super) fn get(&self, number: i64) -> Option<&StoredSeries> {
         self.series.get(&number)
     }
 
-    pub(super) fn number(&self, series: &Series) -> Option<i64> {
+    pub(super) fn number(&self, series: &StoredSeries) -> Option<i64> {
         self.numbers.get(series).copied()
     }
 
     /// The numbers of series that measure the same, with the factor to a common unit.
-    pub(super) fn alike(&self, series: &Series) -> Vec<(i64, f64)> {
+    pub(super) fn alike(&self, series: &StoredSeries) -> Vec<(i64, f64)> {
         let numbers = self
             .names
             .get(&series.name())
             .map_or(&[][..], Vec::as_slice);
         let factor = |number: &i64| match (series, self.series.get(number)?) {
-            (Series::Channel(..), Series::Channel(..)) => Some((*number, 1.0)),
-            (Series::Benchmark(_, unit, _), Series::Benchmark(_, own, _)) => {
+            (StoredSeries::Channel(..), StoredSeries::Channel(..)) => Some((*number, 1.0)),
+            (StoredSeries::Benchmark(_, unit, _), StoredSeries::Benchmark(_, own, _)) => {
                 (unit.quantity() == own.quantity()).then_some((*number, own.factor()))
             }
-            (Series::Channel(..) | Series::Benchmark(..), _) => None,
+            (StoredSeries::Channel(..) | StoredSeries::Benchmark(..), _) => None,
         };
         numbers.iter().filter_map(factor).collect()
     }
@@ -121,16 +113,16 @@ impl Catalogue {
 pub(super) fn insert(
     connection: &Connection,
     number: i64,
-    series: &Series,
+    series: &StoredSeries,
 ) -> Result<(), StoreError> {
     let mut insert = connection.prepare_cached(
         "INSERT INTO series (id, is_reading, name, unit, averaging) VALUES (?1, ?2, ?3, ?4, ?5)",
     )?;
     match series {
-        Series::Channel(name, unit) => {
+        StoredSeries::Channel(name, unit) => {
             insert.execute(params![number, false, name, unit, None::<i64>])?;
         }
-        Series::Benchmark(benchmark, unit, averaging) => {
+        StoredSeries::Benchmark(benchmark, unit, averaging) => {
             let averaging = averaging.and_then(|span| i64::try_from(span.as_nanos()).ok());
             insert.execute(params![
                 number,

@@ -318,7 +318,7 @@ fn what_is_done_about_the_unexplained_is_read_and_wrong_words_are_refused() {
         (config.settings.explain, config.warnings.len())
     };
     assert_eq!(explain(""), (Explain::Adopt, 0));
-    assert_eq!(explain("adopt = false\n"), (Explain::Tell, 0));
+    assert_eq!(explain("adopt = false\n"), (Explain::Report, 0));
     assert_eq!(explain("search = false\n"), (Explain::Off, 0));
     assert_eq!(
         explain("search = false\nadopt = true\n"),

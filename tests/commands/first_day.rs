@@ -459,7 +459,7 @@ fn doctor_tries_it_as_the_user_that_will_do_it() {
     for part in [
         "nothing can be written to state",
         "slope.csv cannot be read as this user",
-        "looked at as user",
+        "checked as user",
     ] {
         let line = out.lines().find(|line| line.contains(part));
         assert!(line.is_some(), "no {part:?} in {out}");

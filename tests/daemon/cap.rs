@@ -6,7 +6,7 @@ use slipwatch::config::{self, HookConfig};
 use slipwatch::monitor::{AlertState, Event, EventKind};
 use slipwatch::reading::BenchmarkId;
 use slipwatch::runtime::deliver;
-use slipwatch::runtime::hook::{Alert, Outcome, Status};
+use slipwatch::runtime::hook::{Alert, HookOutcome, Status};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
@@ -81,7 +81,7 @@ async fn written(folder: &Path, hook: &HookConfig, alert: &Alert) -> Option<Stri
             .collect()
     };
     let before = files();
-    assert_eq!(deliver::run(hook, alert, 1).await, Outcome::Done);
+    assert_eq!(deliver::run(hook, alert, 1).await, HookOutcome::Done);
     let after = files();
     let fresh = after.difference(&before).next()?;
     Some(fs::read_to_string(fresh).unwrap())

@@ -19,7 +19,7 @@ use slipwatch::runtime::run::{RunError, run};
 use slipwatch::runtime::shutdown::{self, Shutdown};
 use slipwatch::runtime::site::{Counts, Sinks, Site};
 use slipwatch::runtime::tail::Arrival;
-use slipwatch::store::{Fate, Store, StoreError};
+use slipwatch::store::{DeliveryOutcome, Store, StoreError};
 use std::fs::{self, OpenOptions};
 use std::io::Write;
 use std::path::Path;
@@ -146,7 +146,11 @@ async fn an_alert_is_told_and_after_a_restart_not_again() {
     let key = format!("5/red/{}", noon().as_second());
     assert_eq!(lines(&folder, "told"), [format!("{key} Actual")]);
     let store = Store::look(&config.site.state_dir).unwrap();
-    let taken = store.is_noted((&key, "red", "firing"), None, Some(Fate::Delivered));
+    let taken = store.is_noted(
+        (&key, "red", "firing"),
+        None,
+        Some(DeliveryOutcome::Delivered),
+    );
     assert!(taken.unwrap());
 }
 

@@ -2,7 +2,7 @@
 
 use slipwatch::config;
 use slipwatch::reading::BenchmarkId;
-use slipwatch::runtime::serve::{Door, Limits, Server};
+use slipwatch::runtime::serve::{Limits, ListenOptions, Server};
 use slipwatch::runtime::vitals::Vitals;
 use std::collections::BTreeSet;
 use std::io::{Read, Write};
@@ -161,12 +161,12 @@ async fn exposed() -> BTreeSet<String> {
         health.database_bytes = Some(1);
         health.quarantined.insert("logger".to_owned(), 1);
     });
-    let door = Door {
+    let options = ListenOptions {
         listen: "127.0.0.1:0".parse().unwrap(),
         token: None,
         limits: Limits::default(),
     };
-    let server = Server::start(door, vitals, None).await.unwrap();
+    let server = Server::start(options, vitals, None).await.unwrap();
     let mut stream = TcpStream::connect(server.address()).unwrap();
     let request = "GET /metrics HTTP/1.1\r\nHost: localhost\r\n\r\n";
     stream.write_all(request.as_bytes()).unwrap();

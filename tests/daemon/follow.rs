@@ -6,7 +6,7 @@ use slipwatch::monitor::Input;
 use slipwatch::reading::Timestamp;
 use slipwatch::runtime::ingest::{ReadOptions, read_files};
 use slipwatch::runtime::replay::arrivals;
-use slipwatch::runtime::tail::{Arrival, Batch, Follower};
+use slipwatch::runtime::tail::{Arrival, ArrivalBatch, Follower};
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
 use std::io::{Seek, SeekFrom, Write};
@@ -59,7 +59,7 @@ impl Bench {
     fn news(&mut self) -> Vec<String> {
         let mut news = Vec::new();
         loop {
-            let Batch {
+            let ArrivalBatch {
                 arrivals,
                 caught_up,
                 ..

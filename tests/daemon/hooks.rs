@@ -13,8 +13,8 @@ use slipwatch::monitor::{AlertState, Event, EventKind};
 use slipwatch::reading::BenchmarkId;
 use slipwatch::runtime::deliver::{self, Dispatcher, Retry};
 use slipwatch::runtime::delivered::Delivered;
-use slipwatch::runtime::hook::{Alert, Outcome, Status};
-use slipwatch::store::{Fate, Store};
+use slipwatch::runtime::hook::{Alert, HookOutcome, Status};
+use slipwatch::store::{DeliveryOutcome, Store};
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
@@ -76,7 +76,7 @@ fn is_running(pid: &str) -> bool {
     !stat.is_empty() && !stat.contains(") Z ")
 }
 
-async fn run(hook_config: &HookConfig, alert: &Alert) -> Outcome {
+async fn run(hook_config: &HookConfig, alert: &Alert) -> HookOutcome {
     tokio::time::timeout(LIMIT, deliver::run(hook_config, alert, 1))
         .await
         .expect("the hook's run never ended")
@@ -85,7 +85,7 @@ async fn run(hook_config: &HookConfig, alert: &Alert) -> Outcome {
 #[tokio::test]
 async fn a_hook_gets_the_documented_environment_and_the_alert_on_stdin() {
     let (folder, config) = hook("env > env; cat > stdin");
-    assert_eq!(run(&config, &alert()).await, Outcome::Done);
+    assert_eq!(run(&config, &alert()).await, HookOutcome::Done);
     let env = read(&folder, "env");
     for line in [
         "SLIPWATCH_EVENT=alert",
@@ -136,7 +136,7 @@ async fn a_hook_gets_the_documented_environment_and_the_alert_on_stdin() {
 async fn a_hook_that_hangs_is_killed_with_its_children() {
     let (folder, mut config) = hook("sleep 90 & echo $! > pid; wait");
     config.timeout = Duration::from_secs(2);
-    assert_eq!(run(&config, &alert()).await, Outcome::TimedOut);
+    assert_eq!(run(&config, &alert()).await, HookOutcome::TimedOut);
     let pid = read(&folder, "pid").trim().to_owned();
     assert!(!pid.is_empty(), "the script had no time to start");
     eventually("the child's end", || !is_running(&pid)).await;
@@ -146,23 +146,23 @@ async fn a_hook_that_hangs_is_killed_with_its_children() {
 async fn a_hook_that_ignores_a_long_stdin_blocks_nothing() {
     let (_folder, config) = hook("exit 0");
     let long = alert_of(Level::Red, "k", &"x".repeat(200_000));
-    assert_eq!(run(&config, &long).await, Outcome::Done);
+    assert_eq!(run(&config, &long).await, HookOutcome::Done);
     let (_folder, mut config) = hook("sleep 90");
     config.timeout = Duration::from_millis(300);
-    assert_eq!(run(&config, &long).await, Outcome::TimedOut);
+    assert_eq!(run(&config, &long).await, HookOutcome::TimedOut);
 }
 
 #[tokio::test]
 async fn a_hook_that_floods_stdout_runs_to_its_end() {
     let (folder, config) = hook("head -c 5000000 /dev/zero; echo done > end");
-    assert_eq!(run(&config, &alert()).await, Outcome::Done);
+    assert_eq!(run(&config, &alert()).await, HookOutcome::Done);
     assert_eq!(read(&folder, "end"), "done\n");
 }
 
 #[tokio::test]
 async fn a_grandchild_that_holds_stdout_open_is_not_waited_for() {
     let (folder, config) = hook("sleep 90 & echo $! > pid; exit 0");
-    assert_eq!(run(&config, &alert()).await, Outcome::Done);
+    assert_eq!(run(&config, &alert()).await, HookOutcome::Done);
     let pid = read(&folder, "pid").trim().to_owned();
     assert!(is_running(&pid), "it was to outlive the hook");
     let status = std::process::Command::new("kill").arg(&pid).status();
@@ -175,14 +175,14 @@ async fn a_hook_that_is_missing_or_not_executable_is_not_started() {
     config.run = vec!["./nowhere.sh".to_owned()];
     let outcome = run(&config, &alert()).await;
     assert!(
-        matches!(&outcome, Outcome::NotStarted(why) if why.contains("nowhere.sh")),
+        matches!(&outcome, HookOutcome::NotStarted(why) if why.contains("nowhere.sh")),
         "{outcome:?}"
     );
     std::fs::write(folder.path().join("plain.sh"), "#!/bin/sh\n").unwrap();
     config.run = vec!["./plain.sh".to_owned()];
     let outcome = run(&config, &alert()).await;
     assert!(
-        matches!(&outcome, Outcome::NotStarted(why) if why.contains("denied")),
+        matches!(&outcome, HookOutcome::NotStarted(why) if why.contains("denied")),
         "{outcome:?}"
     );
 }
@@ -190,9 +190,9 @@ async fn a_hook_that_is_missing_or_not_executable_is_not_started() {
 #[tokio::test]
 async fn an_exit_code_and_a_signal_are_told_apart() {
     let (_folder, config) = hook("exit 7");
-    assert_eq!(run(&config, &alert()).await, Outcome::Failed(7));
+    assert_eq!(run(&config, &alert()).await, HookOutcome::Failed(7));
     let (_folder, config) = hook("kill -9 $$");
-    assert_eq!(run(&config, &alert()).await, Outcome::Signalled(9));
+    assert_eq!(run(&config, &alert()).await, HookOutcome::Signalled(9));
 }
 
 fn quick_retry() -> Retry {
@@ -250,7 +250,8 @@ async fn an_escalation_reports_the_end_of_what_it_has_reported_and_nothing_of_wh
         dispatcher.offer(&ended(key));
         assert_eq!(dispatcher.close(LIMIT).await, Some(0));
         assert_eq!(read(&folder, "calls"), expected);
-        let is_over = |state| store.is_noted((key, "red", state), None, Some(Fate::Over));
+        let is_over =
+            |state| store.is_noted((key, "red", state), None, Some(DeliveryOutcome::Over));
         assert_eq!(is_over("firing").unwrap(), expected.is_empty());
     }
     assert!(store.waiting().unwrap().is_empty());
@@ -313,7 +314,7 @@ async fn an_orange_a_red_and_an_unknown_are_tried_until_the_hook_takes_them() {
         let identity = (level.name(), level.name(), "firing");
         eventually("its receipt", || {
             store
-                .is_noted(identity, None, Some(Fate::Delivered))
+                .is_noted(identity, None, Some(DeliveryOutcome::Delivered))
                 .unwrap()
         })
         .await;

@@ -4,6 +4,7 @@
 
 mod browser;
 mod cap;
+mod certificates;
 mod daemon;
 mod deploy;
 mod eventually;

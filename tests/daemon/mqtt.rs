@@ -5,14 +5,14 @@
     reason = "a test fails by panicking"
 )]
 
+use crate::certificates::Certified;
 use crate::eventually::eventually;
-use rcgen::{BasicConstraints, CertificateParams, CertifiedIssuer, IsCa, KeyPair};
+use crate::site::free_address;
 use rumqttc::{AsyncClient, Event, MqttOptions, Packet, QoS};
 use slipwatch::config::{self, Config};
 use slipwatch::monitor::Input;
-use slipwatch::runtime::mqtt::{Delivery, follow};
+use slipwatch::runtime::mqtt::{ReceivedMessage, follow};
 use slipwatch::runtime::shutdown::{self, Trigger};
-use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
@@ -51,9 +51,7 @@ impl Mosquitto {
         let program = program.expect("Mosquitto, installed or named by MOSQUITTO");
         let folder = tempfile::tempdir().unwrap();
         let more = more(folder.path());
-        let free = TcpListener::bind("127.0.0.1:0").unwrap();
-        let port = free.local_addr().unwrap().port();
-        drop(free);
+        let port = free_address().port();
         let conf = folder.path().join("mosquitto.conf");
         let text = format!(
             "listener {port} 127.0.0.1\nallow_anonymous true\npersistence true\n\
@@ -68,6 +66,28 @@ impl Mosquitto {
             port,
             process,
         }
+    }
+
+    /// With a second listener, at the port that is returned, which proves its name by the `authority.pem` in its folder
+    /// and not by the `stranger.pem` there.
+    pub(crate) fn start_secured() -> (Self, u16) {
+        let (certified, stranger) = (Certified::localhost(), Certified::localhost());
+        let port = free_address().port();
+        let broker = Self::start_with(|folder| {
+            let place = |name: &str, text: String| {
+                let file = folder.join(name);
+                std::fs::write(&file, text).unwrap();
+                file.display().to_string()
+            };
+            place("authority.pem", certified.authority.clone());
+            place("stranger.pem", stranger.authority.clone());
+            format!(
+                "listener {port} 127.0.0.1\nallow_anonymous true\ncertfile {}\nkeyfile {}\n",
+                place("own.pem", certified.own.pem()),
+                place("own.key", certified.key.serialize_pem())
+            )
+        });
+        (broker, port)
     }
 
     /// Ends it as a reboot would, and starts it again.
@@ -147,7 +167,7 @@ fn config_of(lines: &str) -> Config {
 
 /// A daemon's source at work.
 struct Source {
-    deliveries: Receiver<Delivery>,
+    deliveries: Receiver<ReceivedMessage>,
     stop: Trigger,
     task: JoinHandle<()>,
 }
@@ -178,7 +198,7 @@ impl Source {
         }
     }
 
-    async fn next(&mut self) -> Delivery {
+    async fn next(&mut self) -> ReceivedMessage {
         let came = tokio::time::timeout(LIMIT, self.deliveries.recv()).await;
         came.expect("in time").expect("a delivery")
     }
@@ -193,7 +213,7 @@ fn message(day: usize) -> String {
     format!(r#"{{"benchmark":"5","time":"2017-06-{day:02}T00:00:00Z","value":{day},"unit":"mm"}}"#)
 }
 
-fn values(delivery: &Delivery) -> Vec<f64> {
+fn values(delivery: &ReceivedMessage) -> Vec<f64> {
     let value = |input: &Input| match input {
         Input::Reading { reading, .. } => reading.value,
         Input::Sample { .. }
@@ -299,34 +319,7 @@ async fn a_backlog_comes_without_waiting_for_the_acknowledgement_of_each_twenty(
 #[tokio::test(flavor = "multi_thread")]
 #[cfg_attr(not(has_mosquitto), ignore = "Mosquitto was not found by build.rs")]
 async fn readings_come_over_tls_from_a_broker_that_proves_its_name_and_from_no_other() {
-    let mut params = CertificateParams::new(Vec::new()).unwrap();
-    params.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
-    let authority = CertifiedIssuer::self_signed(params, KeyPair::generate().unwrap()).unwrap();
-    let key = KeyPair::generate().unwrap();
-    let params = CertificateParams::new(vec!["localhost".to_owned()]).unwrap();
-    let own = params.signed_by(&key, &authority).unwrap();
-    let stranger = CertifiedIssuer::self_signed(
-        CertificateParams::new(Vec::new()).unwrap(),
-        KeyPair::generate().unwrap(),
-    )
-    .unwrap();
-    let free = TcpListener::bind("127.0.0.1:0").unwrap();
-    let port = free.local_addr().unwrap().port();
-    drop(free);
-    let broker = Mosquitto::start_with(|folder| {
-        let place = |name: &str, text: String| {
-            let file = folder.join(name);
-            std::fs::write(&file, text).unwrap();
-            file.display().to_string()
-        };
-        place("authority.pem", authority.pem());
-        place("stranger.pem", stranger.pem());
-        format!(
-            "listener {port} 127.0.0.1\nallow_anonymous true\ncertfile {}\nkeyfile {}\n",
-            place("own.pem", own.pem()),
-            place("own.key", key.serialize_pem())
-        )
-    });
+    let (broker, port) = Mosquitto::start_secured();
     let secured = |authority: &str| {
         let file = broker.folder.path().join(authority);
         let lines = format!("url = \"mqtts://localhost:{port}\"\nca_file = {file:?}");

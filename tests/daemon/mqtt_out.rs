@@ -3,14 +3,12 @@
 use crate::eventually::eventually;
 use crate::mqtt::Mosquitto;
 use crate::webhooks::{alert, quick, text};
-use rcgen::{BasicConstraints, CertificateParams, CertifiedIssuer, IsCa, KeyPair};
 use rumqttc::{AsyncClient, Event, MqttOptions, Packet, Publish, QoS};
 use slipwatch::config::{self, HookConfig};
 use slipwatch::runtime::deliver::{self, Dispatcher};
 use slipwatch::runtime::delivered::Delivered;
-use slipwatch::runtime::hook::Outcome;
-use slipwatch::store::{Fate, Store};
-use std::net::TcpListener;
+use slipwatch::runtime::hook::HookOutcome;
+use slipwatch::store::{DeliveryOutcome, Store};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -49,11 +47,11 @@ async fn next_of(broker: &Mosquitto, topic: &str) -> Publish {
 }
 
 /// Runs it until the broker is up.
-async fn sent(hook: &HookConfig) -> Outcome {
+async fn sent(hook: &HookConfig) -> HookOutcome {
     for _ in 0..200 {
         let outcome = deliver::run(hook, &alert("5", "5/red/1"), 2).await;
         let is_away =
-            matches!(&outcome, Outcome::NotStarted(why) if why.contains("refused (os error"));
+            matches!(&outcome, HookOutcome::NotStarted(why) if why.contains("refused (os error"));
         if !is_away {
             return outcome;
         }
@@ -71,7 +69,7 @@ async fn a_topic_gets_what_a_hook_gets_and_keeps_it_where_that_is_asked_for() {
         hooks[0].name(),
         format!("mqtt 127.0.0.1:{} toc/alerts", broker.port)
     );
-    assert_eq!(sent(&hooks[0]).await, Outcome::Done);
+    assert_eq!(sent(&hooks[0]).await, HookOutcome::Done);
     // Whoever comes later gets it too.
     let message = next_of(&broker, "toc/#").await;
     assert_eq!(
@@ -102,7 +100,7 @@ async fn an_alert_waits_for_a_broker_that_is_away_and_one_that_is_not_let_in_is_
     let denied = way(&broker, "topic = \"elsewhere\"");
     let outcome = sent(&denied[0]).await;
     assert!(
-        matches!(&outcome, Outcome::NotStarted(why) if why.contains("NotAuthorized")),
+        matches!(&outcome, HookOutcome::NotStarted(why) if why.contains("NotAuthorized")),
         "{outcome:?}"
     );
     let hooks = way(&broker, "topic = \"toc/alerts\"\nretain = true");
@@ -117,13 +115,13 @@ async fn an_alert_waits_for_a_broker_that_is_away_and_one_that_is_not_let_in_is_
     eventually("attempts", || store.attempts(identity, &name).unwrap() >= 2).await;
     assert!(
         !store
-            .is_noted(identity, Some(&name), Some(Fate::Delivered))
+            .is_noted(identity, Some(&name), Some(DeliveryOutcome::Delivered))
             .unwrap()
     );
     broker.start_again();
     eventually("its delivery", || {
         store
-            .is_noted(identity, Some(&name), Some(Fate::Delivered))
+            .is_noted(identity, Some(&name), Some(DeliveryOutcome::Delivered))
             .unwrap()
     })
     .await;
@@ -134,31 +132,7 @@ async fn an_alert_waits_for_a_broker_that_is_away_and_one_that_is_not_let_in_is_
 #[tokio::test(flavor = "multi_thread")]
 #[cfg_attr(not(has_mosquitto), ignore = "Mosquitto was not found by build.rs")]
 async fn an_alert_goes_over_tls_to_a_broker_that_proves_its_name_and_to_no_other() {
-    let mut params = CertificateParams::new(Vec::new()).unwrap();
-    params.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
-    let authority =
-        CertifiedIssuer::self_signed(params.clone(), KeyPair::generate().unwrap()).unwrap();
-    let stranger = CertifiedIssuer::self_signed(params, KeyPair::generate().unwrap()).unwrap();
-    let key = KeyPair::generate().unwrap();
-    let params = CertificateParams::new(vec!["localhost".to_owned()]).unwrap();
-    let own = params.signed_by(&key, &authority).unwrap();
-    let free = TcpListener::bind("127.0.0.1:0").unwrap();
-    let port = free.local_addr().unwrap().port();
-    drop(free);
-    let broker = Mosquitto::start_with(|folder| {
-        let place = |name: &str, text: String| {
-            let file = folder.join(name);
-            std::fs::write(&file, text).unwrap();
-            file.display().to_string()
-        };
-        place("authority.pem", authority.pem());
-        place("stranger.pem", stranger.pem());
-        format!(
-            "listener {port} 127.0.0.1\nallow_anonymous true\ncertfile {}\nkeyfile {}\n",
-            place("own.pem", own.pem()),
-            place("own.key", key.serialize_pem())
-        )
-    });
+    let (broker, port) = Mosquitto::start_secured();
     let secured = |authority: &str| {
         let file = broker.folder.path().join(authority);
         let lines = format!(
@@ -166,11 +140,11 @@ async fn an_alert_goes_over_tls_to_a_broker_that_proves_its_name_and_to_no_other
         );
         ways(&lines)
     };
-    assert_eq!(sent(&secured("authority.pem")[0]).await, Outcome::Done);
+    assert_eq!(sent(&secured("authority.pem")[0]).await, HookOutcome::Done);
     assert!(!next_of(&broker, "toc/alerts").await.payload.is_empty());
     let outcome = sent(&secured("stranger.pem")[0]).await;
     assert!(
-        matches!(&outcome, Outcome::NotStarted(why) if why.contains("certificate")),
+        matches!(&outcome, HookOutcome::NotStarted(why) if why.contains("certificate")),
         "{outcome:?}"
     );
 }

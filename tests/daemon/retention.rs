@@ -4,7 +4,7 @@ use jiff::{SignedDuration, Timestamp};
 use slipwatch::monitor::{Event, EventKind, FailureTime, Input, InverseVelocity, RegimeReport};
 use slipwatch::reading::{BenchmarkId, Reading, Unit};
 use slipwatch::regime::Regime;
-use slipwatch::store::{Batch, Delivery, Fate, Store, StoreError};
+use slipwatch::store::{Batch, Delivery, DeliveryOutcome, Store, StoreError};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
@@ -190,17 +190,17 @@ fn delivery(key: &str, state: &str, time: Timestamp) -> Delivery {
 fn deliveries_stay_while_their_alert_stands_or_a_hook_waits() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).unwrap();
-    let settle = |key: &str, state: &str, day: i64, fate: Fate| {
+    let settle = |key: &str, state: &str, day: i64, fate: DeliveryOutcome| {
         let told = delivery(key, state, at(day * DAY));
-        store.settle(&[(told, fate)]).unwrap();
+        store.record_outcomes(&[(told, fate)]).unwrap();
     };
-    settle("over", "firing", 1, Fate::Delivered);
-    settle("over", "resolved", 2, Fate::Delivered);
-    settle("stands", "firing", 1, Fate::Delivered);
-    settle("just over", "firing", 1, Fate::Delivered);
-    settle("just over", "resolved", 200, Fate::Delivered);
-    settle("given up", "firing", 1, Fate::Dead);
-    settle("given up", "resolved", 2, Fate::Delivered);
+    settle("over", "firing", 1, DeliveryOutcome::Delivered);
+    settle("over", "resolved", 2, DeliveryOutcome::Delivered);
+    settle("stands", "firing", 1, DeliveryOutcome::Delivered);
+    settle("just over", "firing", 1, DeliveryOutcome::Delivered);
+    settle("just over", "resolved", 200, DeliveryOutcome::Delivered);
+    settle("given up", "firing", 1, DeliveryOutcome::Dead);
+    settle("given up", "resolved", 2, DeliveryOutcome::Delivered);
     let mut batch = Batch::default();
     batch.deliver(delivery("waits", "firing", at(DAY)));
     batch.deliver(delivery("waits", "resolved", at(2 * DAY)));

@@ -5,7 +5,7 @@ use slipwatch::config::HookConfig;
 use slipwatch::monitor::{AlertState, Event, EventKind};
 use slipwatch::reading::BenchmarkId;
 use slipwatch::runtime::deliver;
-use slipwatch::runtime::hook::{Alert, Outcome, Status};
+use slipwatch::runtime::hook::{Alert, HookOutcome, Status};
 use slipwatch::runtime::sandbox::{self, Walls};
 use std::collections::BTreeSet;
 use std::fs;
@@ -84,7 +84,7 @@ async fn a_hook_writes_where_it_may_and_nowhere_else() {
     fs::write(at.join("own/hook.sh"), script).unwrap();
     let mut hook = walled(&at.join("own"), &["/bin/sh", "hook.sh"]);
     hook.writable = vec![at.join("allowed"), at.join("not-there")];
-    assert_eq!(deliver::run(&hook, &alert(), 1).await, Outcome::Done);
+    assert_eq!(deliver::run(&hook, &alert(), 1).await, HookOutcome::Done);
     let read = |name: &str| fs::read_to_string(at.join(name)).unwrap_or_default();
     assert_eq!(read("own/done"), "", "written elsewhere");
     assert_eq!(read("own/there"), "after\n");
@@ -116,7 +116,7 @@ async fn walls_change_neither_the_arguments_nor_the_environment_nor_stdin() {
         }
         assert_eq!(read("stdin").lines().count(), 1);
     }
-    assert_eq!(outcomes, [Outcome::Done, Outcome::Done]);
+    assert_eq!(outcomes, [HookOutcome::Done, HookOutcome::Done]);
 }
 
 #[tokio::test]
@@ -125,11 +125,14 @@ async fn a_hook_within_walls_that_is_missing_fails_and_one_that_hangs_is_killed(
     let missing = walled(folder.path(), &["./not-there.sh"]);
     assert_eq!(
         deliver::run(&missing, &alert(), 1).await,
-        Outcome::Failed(126)
+        HookOutcome::Failed(126)
     );
     let mut hanging = walled(folder.path(), &["/bin/sh", "-c", "sleep 300 & sleep 300"]);
     hanging.timeout = Duration::from_millis(500);
-    assert_eq!(deliver::run(&hanging, &alert(), 1).await, Outcome::TimedOut);
+    assert_eq!(
+        deliver::run(&hanging, &alert(), 1).await,
+        HookOutcome::TimedOut
+    );
 }
 
 #[tokio::test]
@@ -149,7 +152,7 @@ async fn a_hook_of_a_config_under_a_relative_path_is_found() {
         if !launcher {
             hook.launcher = None;
         }
-        assert_eq!(deliver::run(&hook, &alert(), 1).await, Outcome::Done);
+        assert_eq!(deliver::run(&hook, &alert(), 1).await, HookOutcome::Done);
         fs::remove_file(folder.path().join("ran")).unwrap();
     }
 }

@@ -6,7 +6,9 @@ use slipwatch::alert::Level;
 use slipwatch::config::Token;
 use slipwatch::monitor::{AlertState, Event, EventKind};
 use slipwatch::reading::BenchmarkId;
-use slipwatch::runtime::serve::{Archive, ArchiveError, CONTENT_TYPE, Door, Limits, Page, Server};
+use slipwatch::runtime::serve::{
+    Archive, ArchiveError, CONTENT_TYPE, Limits, ListenOptions, Page, Server,
+};
 use slipwatch::runtime::vitals::Vitals;
 use std::fmt::Write as _;
 use std::fs;
@@ -50,16 +52,18 @@ fn get(address: SocketAddr, path: &str, headers: &str) -> Answer {
     send(address, request.as_bytes())
 }
 
-fn door() -> Door {
-    Door {
+fn options() -> ListenOptions {
+    ListenOptions {
         listen: "127.0.0.1:0".parse().unwrap(),
         token: None,
         limits: Limits::default(),
     }
 }
 
-async fn start(door: Door, vitals: &Arc<Vitals>) -> (Server, SocketAddr) {
-    let server = Server::start(door, Arc::clone(vitals), None).await.unwrap();
+async fn start(options: ListenOptions, vitals: &Arc<Vitals>) -> (Server, SocketAddr) {
+    let server = Server::start(options, Arc::clone(vitals), None)
+        .await
+        .unwrap();
     let address = server.address();
     (server, address)
 }
@@ -85,7 +89,14 @@ async fn health_is_bad_while_the_work_loop_stands_still_and_good_again_after() {
         turn_time: Duration::from_millis(300),
         ..Limits::default()
     };
-    let (server, address) = start(Door { limits, ..door() }, &vitals).await;
+    let (server, address) = start(
+        ListenOptions {
+            limits,
+            ..options()
+        },
+        &vitals,
+    )
+    .await;
     let idle = Duration::from_millis(400);
     tokio::time::sleep(idle).await;
     let answer = get(address, "/healthz", "");
@@ -100,7 +111,7 @@ async fn health_is_bad_while_the_work_loop_stands_still_and_good_again_after() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 1)]
 async fn it_is_ready_only_when_the_past_is_read_and_the_store_takes_writes() {
     let vitals = Arc::new(Vitals::default());
-    let (_server, address) = start(door(), &vitals).await;
+    let (_server, address) = start(options(), &vitals).await;
     let ready = || get(address, "/readyz", "").status;
     vitals.update(|health| health.is_store_writable = true);
     assert_eq!(ready(), 503);
@@ -129,7 +140,7 @@ async fn metrics_are_openmetrics_text_with_every_figure_and_escaped_names() {
         health.database_bytes = Some(4096);
         health.quarantined.insert("logger".to_owned(), 3);
     });
-    let (_server, address) = start(door(), &vitals).await;
+    let (_server, address) = start(options(), &vitals).await;
     let answer = get(address, "/metrics", "");
     assert_eq!(answer.status, 200);
     let kind = format!("content-type: {CONTENT_TYPE}");
@@ -170,7 +181,7 @@ async fn a_token_opens_everything_and_without_it_only_health_is_told() {
     fs::write(&file, format!("{SECRET}\n")).unwrap();
     let token = Some(Token::read(&file).unwrap());
     let vitals = Arc::new(Vitals::default());
-    let (_server, address) = start(Door { token, ..door() }, &vitals).await;
+    let (_server, address) = start(ListenOptions { token, ..options() }, &vitals).await;
     let authorized = |given: &str| {
         let headers = format!("Authorization: {given}\r\n");
         get(address, "/metrics", &headers).status
@@ -198,7 +209,7 @@ async fn a_token_opens_everything_and_without_it_only_health_is_told() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 1)]
 async fn a_page_under_a_foreign_name_that_points_here_is_told_nothing() {
     let vitals = Arc::new(Vitals::default());
-    let (_server, address) = start(door(), &vitals).await;
+    let (_server, address) = start(options(), &vitals).await;
     let under = |host: &str| {
         let request = format!("GET /api/status HTTP/1.1\r\nHost: {host}\r\n\r\n");
         send(address, request.as_bytes()).status
@@ -225,7 +236,7 @@ async fn a_page_under_a_foreign_name_that_points_here_is_told_nothing() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 1)]
 async fn heads_and_bodies_that_are_too_long_are_refused() {
     let vitals = Arc::new(Vitals::default());
-    let (_server, address) = start(door(), &vitals).await;
+    let (_server, address) = start(options(), &vitals).await;
     let long = "x".repeat(20_000);
     assert_eq!(
         get(address, "/healthz", &format!("X: {long}\r\n")).status,
@@ -249,7 +260,14 @@ async fn callers_that_never_finish_their_request_shut_nobody_out() {
         head_time: Duration::from_millis(300),
         ..Limits::default()
     };
-    let (_server, address) = start(Door { limits, ..door() }, &vitals).await;
+    let (_server, address) = start(
+        ListenOptions {
+            limits,
+            ..options()
+        },
+        &vitals,
+    )
+    .await;
     let mut slow = Vec::new();
     for number in 0..24 {
         let mut stream = TcpStream::connect(address).unwrap();
@@ -291,7 +309,7 @@ impl Archive for Three {
 #[tokio::test(flavor = "multi_thread", worker_threads = 1)]
 async fn events_come_in_pages_and_a_place_that_is_none_is_refused() {
     let vitals = Arc::new(Vitals::default());
-    let server = Server::start(door(), vitals, Some(Arc::new(Three)))
+    let server = Server::start(options(), vitals, Some(Arc::new(Three)))
         .await
         .unwrap();
     let page = |query: &str| get(server.address(), &format!("/api/events{query}"), "");

@@ -7,7 +7,7 @@ use slipwatch::runtime::clock::Stopwatch;
 use std::fmt::Write as _;
 use std::fs;
 use std::io::{Read, Write};
-use std::net::{TcpListener, TcpStream};
+use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::process::{Child, Stdio};
 use std::time::Duration;
 use tempfile::TempDir;
@@ -17,6 +17,12 @@ pub(crate) const TOKEN: &str = "0123456789abcdef-of-the-test";
 /// A benchmark whose name is markup.
 pub(crate) const MARKUP: &str = "<script>window.pwned=1</script>";
 const LIMIT: Duration = Duration::from_secs(60);
+
+/// An address of this machine at which nothing listens.
+pub(crate) fn free_address() -> SocketAddr {
+    let free = TcpListener::bind("127.0.0.1:0").unwrap();
+    free.local_addr().unwrap()
+}
 
 pub(crate) struct Site {
     folder: TempDir,
@@ -31,9 +37,7 @@ impl Site {
 
     /// The same with another name for the benchmark that stands still.
     pub(crate) fn with(still: &str) -> Self {
-        let free = TcpListener::bind("127.0.0.1:0").unwrap();
-        let port = free.local_addr().unwrap().port();
-        drop(free);
+        let port = free_address().port();
         let folder = tempfile::tempdir().unwrap();
         let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
         write("token", TOKEN);

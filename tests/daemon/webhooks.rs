@@ -1,15 +1,16 @@
 //! Webhooks against real listeners: what they get, that it is signed, and how failures are tried again.
 
+use crate::certificates::Certified;
 use crate::eventually::eventually;
-use rcgen::{BasicConstraints, CertificateParams, CertifiedIssuer, IsCa, KeyPair};
+use crate::site::free_address;
 use slipwatch::alert::Level;
 use slipwatch::config::{self, HookConfig};
 use slipwatch::monitor::{AlertState, Event, EventKind};
 use slipwatch::reading::BenchmarkId;
 use slipwatch::runtime::deliver::{self, Dispatcher, Retry};
 use slipwatch::runtime::delivered::Delivered;
-use slipwatch::runtime::hook::{Alert, Outcome, Status};
-use slipwatch::store::{Fate, Store};
+use slipwatch::runtime::hook::{Alert, HookOutcome, Status};
+use slipwatch::store::{DeliveryOutcome, Store};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpListener;
@@ -165,7 +166,7 @@ async fn a_webhook_gets_what_a_hook_gets_on_stdin_under_a_signature() {
     let receiver = Receiver::answering(&[204]);
     let hooks = webhooks(folder.path(), &webhook(&receiver.url, ""));
     let alert = alert("m\u{fc}hle", "m\u{fc}hle/red/1.5");
-    assert_eq!(deliver::run(&hooks[0], &alert, 3).await, Outcome::Done);
+    assert_eq!(deliver::run(&hooks[0], &alert, 3).await, HookOutcome::Done);
     let got = receiver.got().remove(0);
     assert_eq!(got.line, "POST /alerts?x=1 HTTP/1.1");
     assert_eq!(got.headers["content-type"], "application/json");
@@ -207,7 +208,11 @@ async fn a_webhook_that_fails_is_tried_again_under_the_same_id_until_it_is_taken
     assert!(dispatcher.offer(&red));
     let identity = ("toc/5/red/1", "red", "firing");
     let is_taken = || {
-        let noted = store.is_noted(identity, Some(&receiver.url), Some(Fate::Delivered));
+        let noted = store.is_noted(
+            identity,
+            Some(&receiver.url),
+            Some(DeliveryOutcome::Delivered),
+        );
         noted.unwrap()
     };
     eventually("taken", is_taken).await;
@@ -249,26 +254,26 @@ async fn a_receiver_that_never_answers_holds_no_other_ones_red() {
 async fn a_webhook_ends_at_its_timeout_and_says_why_it_cannot_be_sent() {
     let folder = tempfile::tempdir().unwrap();
     let hanging = Receiver::answering(&[0]);
-    let free = TcpListener::bind("127.0.0.1:0")
-        .unwrap()
-        .local_addr()
-        .unwrap();
+    let free = free_address();
     let tables = [
         webhook(&hanging.url, "timeout = \"300ms\""),
         webhook(&format!("http://{free}/"), ""),
     ];
     let hooks = webhooks(folder.path(), &tables.concat());
     let alert = alert("5", "k");
-    assert_eq!(deliver::run(&hooks[0], &alert, 1).await, Outcome::TimedOut);
+    assert_eq!(
+        deliver::run(&hooks[0], &alert, 1).await,
+        HookOutcome::TimedOut
+    );
     let refused = deliver::run(&hooks[1], &alert, 1).await;
     assert!(
-        matches!(&refused, Outcome::NotStarted(why) if why.contains("refused")),
+        matches!(&refused, HookOutcome::NotStarted(why) if why.contains("refused")),
         "{refused:?}"
     );
     std::fs::write(folder.path().join("secret"), "guess me").unwrap();
     let unsigned = deliver::run(&hooks[0], &alert, 1).await;
     assert!(
-        matches!(&unsigned, Outcome::NotStarted(why) if why.contains("whsec_")),
+        matches!(&unsigned, HookOutcome::NotStarted(why) if why.contains("whsec_")),
         "{unsigned:?}"
     );
     assert_eq!(hanging.got().len(), 1, "nothing goes out unsigned");
@@ -310,20 +315,15 @@ struct Secured {
 
 impl Secured {
     fn answering(status: u16) -> Self {
-        let mut params = CertificateParams::new(Vec::new()).unwrap();
-        params.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
-        let authority = CertifiedIssuer::self_signed(params, KeyPair::generate().unwrap()).unwrap();
-        let key = KeyPair::generate().unwrap();
-        let params = CertificateParams::new(vec!["localhost".to_owned()]).unwrap();
-        let own = params.signed_by(&key, &authority).unwrap();
+        let certified = Certified::localhost();
         let provider = Arc::new(rustls::crypto::ring::default_provider());
         let config = rustls::ServerConfig::builder_with_provider(provider)
             .with_safe_default_protocol_versions()
             .unwrap()
             .with_no_client_auth()
             .with_single_cert(
-                vec![own.der().clone()],
-                PrivateKeyDer::try_from(key.serialize_der()).unwrap(),
+                vec![certified.own.der().clone()],
+                PrivateKeyDer::try_from(certified.key.serialize_der()).unwrap(),
             )
             .unwrap();
         let config = Arc::new(config);
@@ -347,7 +347,7 @@ impl Secured {
         });
         let url = format!("https://localhost:{port}/alerts");
         Self {
-            authority: authority.pem(),
+            authority: certified.authority,
             receiver: Receiver { url, got },
         }
     }
@@ -367,7 +367,10 @@ async fn an_alert_goes_over_tls_to_who_can_prove_its_name_by_a_trusted_authority
     let send =
         |hook: HookConfig| async move { deliver::run(&hook, &alert("5", "5/red/1"), 1).await };
 
-    assert_eq!(send(with(url, "ca_file = \"ca.pem\"")).await, Outcome::Done);
+    assert_eq!(
+        send(with(url, "ca_file = \"ca.pem\"")).await,
+        HookOutcome::Done
+    );
     let got = secured.receiver.got();
     assert_eq!(
         (got.len(), got[0].line.as_str()),
@@ -393,7 +396,7 @@ async fn an_alert_goes_over_tls_to_who_can_prove_its_name_by_a_trusted_authority
     ] {
         let outcome = send(hook).await;
         assert!(
-            matches!(&outcome, Outcome::NotStarted(said) if said.contains(why)),
+            matches!(&outcome, HookOutcome::NotStarted(said) if said.contains(why)),
             "{why}: {outcome:?}"
         );
     }
@@ -419,7 +422,7 @@ async fn alertmanager_gets_a_list_with_the_same_labels_when_an_alert_fires_and_w
     let hook = webhooks(folder.path(), &table).remove(0);
     let end = ended(alert("5", KEY), "2017-06-09T05:00:00Z");
     for alert in [&alert("5", KEY), &end] {
-        assert_eq!(deliver::run(&hook, alert, 1).await, Outcome::Done);
+        assert_eq!(deliver::run(&hook, alert, 1).await, HookOutcome::Done);
     }
     let got = receiver.got();
     assert!(!got[0].headers.contains_key("webhook-signature"));
@@ -444,9 +447,7 @@ async fn alertmanager_gets_a_list_with_the_same_labels_when_an_alert_fires_and_w
 #[cfg_attr(not(has_alertmanager), ignore = "there is no prometheus-alertmanager")]
 async fn a_real_alertmanager_has_the_alert_in_force_until_its_end_comes() {
     let folder = tempfile::tempdir().unwrap();
-    let free = TcpListener::bind("127.0.0.1:0").unwrap();
-    let address = free.local_addr().unwrap().to_string();
-    drop(free);
+    let address = free_address().to_string();
     let config = "route: {receiver: nobody}\nreceivers: [{name: nobody}]\n";
     std::fs::write(folder.path().join("am.yml"), config).unwrap();
     let mut program = Command::new("prometheus-alertmanager")
@@ -494,7 +495,7 @@ async fn a_real_alertmanager_has_the_alert_in_force_until_its_end_comes() {
     eventually("that it is over", || in_force().is_empty()).await;
     program.kill().unwrap();
     program.wait().unwrap();
-    assert_eq!((outcome, ended), (Outcome::Done, Outcome::Done));
+    assert_eq!((outcome, ended), (HookOutcome::Done, HookOutcome::Done));
     assert_eq!(held, [format!("5/red/{now}")]);
 }
 
@@ -581,9 +582,7 @@ async fn heartbeats_come_for_as_long_as_the_site_is_watched_and_no_longer() {
     let refusing = Receiver::answering(&[500]);
     let folder = tempfile::tempdir().unwrap();
     let heartbeat = |url: &str| format!("[[heartbeat]]\nurl = \"{url}\"\nevery = \"1s\"\n");
-    let free = TcpListener::bind("127.0.0.1:0").unwrap();
-    let listen = free.local_addr().unwrap();
-    drop(free);
+    let listen = free_address();
     let tables = heartbeat(&taking.url) + &heartbeat(&refusing.url);
     let site = text(&tables).replace("[[source]]", &format!("listen = \"{listen}\"\n[[source]]"));
     std::fs::write(folder.path().join("site.toml"), site).unwrap();

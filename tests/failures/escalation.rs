@@ -21,11 +21,7 @@ fn site(after: &str) -> Site {
 /// Starts the daemon; the first hook has the red.
 fn told(site: &Site) -> Program {
     let program = site.caught_up();
-    eventually("that the red is told", || {
-        site.lines("told")
-            .iter()
-            .any(|line| line.starts_with("5/red/"))
-    });
+    site.tells_red();
     program
 }
 
@@ -173,5 +169,5 @@ fn check_says_that_nobody_is_notified_at_once_and_refuses_two_hooks_that_cannot_
     let output = site.ask(&["check", "--config-only", "site.toml"]);
     assert_eq!(output.status.code(), Some(78), "{output:?}");
     let said = String::from_utf8_lossy(&output.stderr);
-    assert!(said.contains("they cannot be told apart"), "{said}");
+    assert!(said.contains("they cannot be distinguished"), "{said}");
 }

@@ -11,18 +11,13 @@ use std::io::Write;
 const HEADER: &str = "time,displacement_mm\n";
 const POLICY: &str = "[alert]\nevacuation_time = \"3h\"\n";
 
-fn told(site: &Site, begins: &str) -> usize {
-    let lines = site.lines("told");
-    lines.iter().filter(|line| line.starts_with(begins)).count()
-}
-
 /// With a file in its folder that never gives anything, a site tells its red, takes a new config, and stops.
 fn goes_on(site: &Site) {
     site.append("incoming/5.csv", HEADER);
     let program = site.start(&[]);
     eventually("a start", || site.log().contains("followed"));
     site.append("incoming/5.csv", &failing(0..114));
-    eventually("told", || told(site, "5/red/") == 1);
+    eventually("told", || site.told("5/red/", "") == 1);
     program.signal(Signal::SIGHUP);
     eventually("the config", || site.log().contains("the config is taken"));
     program.stop();

@@ -122,6 +122,6 @@ fn without_any_watch_files_are_looked_at_in_turn() {
     eventually("caught up", || site.log().contains("caught up"));
     site.append("incoming/5.csv", &rows(4..9));
     eventually("what was added", || site.values().len() == 8);
-    eventually("a warning", || site.log().contains("looked at in turn"));
+    eventually("a warning", || site.log().contains("read in turn"));
     program.stop();
 }

@@ -109,8 +109,7 @@ fn a_red_of_the_past_that_nothing_has_ended_is_told_after_a_first_start() {
         .collect();
     site.append("incoming/5.csv", &format!("{HEADER}{rows}"));
     let program = site.caught_up();
-    let is_told = |line: &String| line.starts_with("5/red/") && line.ends_with("firing");
-    eventually("the red told", || site.lines("told").iter().any(is_told));
+    eventually("the red told", || site.told("5/red/", "firing") > 0);
     program.stop();
     site.proven_events();
 }

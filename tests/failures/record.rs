@@ -19,11 +19,7 @@ fn red() -> (Site, crate::site::Program, String) {
         &format!("time,displacement_mm\n{}", failing(0..114)),
     );
     let program = site.caught_up();
-    eventually("that the red is told", || {
-        site.lines("told")
-            .iter()
-            .any(|line| line.starts_with("5/red/"))
-    });
+    site.tells_red();
     (site, program, address)
 }
 

@@ -14,12 +14,6 @@ use std::time::Duration;
 
 const HEADER: &str = "time,displacement_mm\n";
 
-fn told(site: &Site, begins: &str, ends: &str) -> usize {
-    let lines = site.lines("told");
-    let is_it = |line: &&String| line.starts_with(begins) && line.ends_with(ends);
-    lines.iter().filter(is_it).count()
-}
-
 #[test]
 fn a_benchmark_that_never_gave_a_reading_is_seen_and_unknown_from_the_start() {
     let ids = ["absent", "refused", "nan", "strange"];
@@ -46,7 +40,7 @@ fn a_benchmark_that_never_gave_a_reading_is_seen_and_unknown_from_the_start() {
         let row = status.lines().find(|line| line.starts_with(id)).unwrap();
         assert!(row.contains("unknown"), "{status}");
         eventually("told", || {
-            told(&site, &format!("{id}/unknown/"), "firing") == 1
+            site.told(&format!("{id}/unknown/"), "firing") == 1
         });
     }
     assert!(
@@ -58,16 +52,14 @@ fn a_benchmark_that_never_gave_a_reading_is_seen_and_unknown_from_the_start() {
         "incoming/absent.csv",
         &format!("{HEADER}{}", failing(0..114)),
     );
-    eventually("its end", || {
-        told(&site, "absent/unknown/", "resolved") == 1
-    });
+    eventually("its end", || site.told("absent/unknown/", "resolved") == 1);
     assert!(
         get(&listen, "/metrics").contains("slipwatch_benchmark_unknown{benchmark=\"absent\"} 0")
     );
     program.stop();
     site.caught_up().stop();
     assert_eq!(
-        told(&site, "nan/unknown/", "firing"),
+        site.told("nan/unknown/", "firing"),
         1,
         "told again after a restart"
     );
@@ -79,7 +71,7 @@ fn three_readings_and_then_silence_are_unknown() {
     let site = Site::new("");
     site.append("incoming/5.csv", &format!("{HEADER}{}", failing(90..93)));
     let program = site.caught_up();
-    eventually("told", || told(&site, "5/unknown/", "firing") == 1);
+    eventually("told", || site.told("5/unknown/", "firing") == 1);
     program.stop();
     site.proven_events();
 }

@@ -13,9 +13,9 @@ use slipwatch::runtime::daemon::Daemon;
 use slipwatch::runtime::deliver::{Dispatcher, Retry, Runner};
 use slipwatch::runtime::delivered::Delivered;
 use slipwatch::runtime::hook::Status;
-use slipwatch::runtime::mqtt::Delivery;
-use slipwatch::runtime::pulse::Pulse;
-use slipwatch::runtime::serve::Behind;
+use slipwatch::runtime::mqtt::ReceivedMessage;
+use slipwatch::runtime::pulse::Reporting;
+use slipwatch::runtime::serve::ServedState;
 use slipwatch::runtime::shutdown;
 use slipwatch::runtime::site::{Sinks, Site};
 use slipwatch::runtime::sources::Sources;
@@ -39,7 +39,7 @@ struct Running {
     daemon: Daemon,
     follower: Follower,
     store: Arc<Store>,
-    messages: Sender<Delivery>,
+    messages: Sender<ReceivedMessage>,
     stopped: shutdown::Shutdown,
     _stop: shutdown::Trigger,
 }
@@ -98,21 +98,15 @@ impl<'a> Host<'a> {
         let site = Site::resume(&self.config.site.name, settings, sinks, &mut || {}).unwrap();
         let pulse = self
             .runtime
-            .block_on(Pulse::start(&self.config.site, Behind::default()))
+            .block_on(Reporting::start(&self.config.site, ServedState::default()))
             .unwrap();
         site.show(&pulse.vitals);
         let (stop, stopped) = shutdown::pair();
         let (messages, deliveries) = mpsc::channel(CHANNEL);
-        let sources = Sources::of((messages.clone(), deliveries), shutdown::pair().0);
+        let sources = Sources::of(messages.clone(), deliveries, shutdown::pair().0);
         let positions = store.positions().unwrap();
         let follower = Follower::new(&self.config.sources, &self.config.benchmarks, &positions);
-        let daemon = Daemon::new(
-            self.config,
-            Arc::clone(&store),
-            site,
-            (sources, pulse),
-            wall,
-        );
+        let daemon = Daemon::new(self.config, Arc::clone(&store), site, sources, pulse, wall);
         Running {
             daemon,
             follower,
@@ -221,7 +215,7 @@ impl Running {
         }
     }
 
-    fn listen(&mut self, sent: impl Iterator<Item = Delivery>) {
+    fn listen(&mut self, sent: impl Iterator<Item = ReceivedMessage>) {
         for delivery in sent {
             // What finds no room comes again over the next connection.
             if self.messages.try_send(delivery).is_err() {

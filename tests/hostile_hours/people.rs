@@ -4,7 +4,7 @@ use slipwatch::alert::Level;
 use slipwatch::config::HookConfig;
 use slipwatch::monitor::AlertState;
 use slipwatch::runtime::deliver::{Run, Runner};
-use slipwatch::runtime::hook::{Alert, Outcome};
+use slipwatch::runtime::hook::{Alert, HookOutcome};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -88,17 +88,17 @@ impl Runner for Hook {
             match mood {
                 Mood::Works => {
                     people.lock().unwrap().hear(&alert);
-                    Outcome::Done
+                    HookOutcome::Done
                 }
-                Mood::LosesRed => Outcome::Done,
+                Mood::LosesRed => HookOutcome::Done,
                 Mood::Fails => {
                     people.lock().unwrap().failed += 1;
-                    Outcome::Failed(1)
+                    HookOutcome::Failed(1)
                 }
                 Mood::Hangs | Mood::HangsAt(_) => {
                     tokio::time::sleep(hook.timeout).await;
                     people.lock().unwrap().failed += 1;
-                    Outcome::TimedOut
+                    HookOutcome::TimedOut
                 }
             }
         })

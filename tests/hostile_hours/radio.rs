@@ -7,7 +7,7 @@ use rand_pcg::Pcg64;
 use slipwatch::monitor::Input;
 use slipwatch::reading::{BenchmarkId, Reading, Unit};
 use slipwatch::runtime::clock::Stopwatch;
-use slipwatch::runtime::mqtt::{Delivery, Receipt};
+use slipwatch::runtime::mqtt::{Receipt, ReceivedMessage};
 use slipwatch::runtime::tail::Arrival;
 use std::collections::BTreeMap;
 use tokio::sync::mpsc::{self, UnboundedReceiver, UnboundedSender};
@@ -56,7 +56,7 @@ impl Radio {
     }
 
     /// What is sent now, and whether red is due once it has been read.
-    pub(crate) fn send(&mut self, random: &mut Pcg64) -> Vec<(Delivery, Measured)> {
+    pub(crate) fn send(&mut self, random: &mut Pcg64) -> Vec<(ReceivedMessage, Measured)> {
         self.heed();
         if self.is_away {
             return Vec::new();
@@ -86,14 +86,14 @@ impl Radio {
     }
 }
 
-fn delivery(number: u64, measured: &Measured, sender: &UnboundedSender<u64>) -> Delivery {
+fn delivery(number: u64, measured: &Measured, sender: &UnboundedSender<u64>) -> ReceivedMessage {
     assert!(measured.time <= truth());
     let reading = Reading {
         time: measured.time,
         value: measured.value,
         sigma: None,
     };
-    Delivery {
+    ReceivedMessage {
         arrivals: vec![Arrival {
             time: measured.time,
             input: Input::Reading {

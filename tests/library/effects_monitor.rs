@@ -12,12 +12,12 @@ use jiff::SignedDuration;
 use slipwatch::alert::{Level, Policy};
 use slipwatch::effects::{Effect, Explained, Filtered, Form, Kind, KnownLoad, Part};
 use slipwatch::monitor::{
-    AlertState, Event, EventKind, Explain, Finding, Input, Monitor, Settings, Unexplained,
+    AlertState, Event, EventKind, Explain, Input, Monitor, SearchFinding, Settings, Unexplained,
 };
 use slipwatch::reading::{BenchmarkId, Timestamp, Unit};
 
 /// What a search that found the truth would hand in.
-fn found(slope: Slope) -> Finding {
+fn found(slope: Slope) -> SearchFinding {
     let effect = Effect {
         channel: Some(RESERVOIR.to_owned()),
         form: Some(Form::Level),
@@ -31,7 +31,7 @@ fn found(slope: Slope) -> Finding {
         mean: 0.0,
         deviation: 1.0,
     };
-    Finding {
+    SearchFinding {
         benchmark: BenchmarkId::new("a"),
         effects: vec![effect],
         explained: Explained::Full,
@@ -61,7 +61,7 @@ fn monitor(explain: Explain) -> Monitor {
 fn play(
     monitor: &mut Monitor,
     measured: &Measured,
-    found: Option<&(usize, Finding)>,
+    found: Option<&(usize, SearchFinding)>,
 ) -> Vec<Event> {
     let mut events = Vec::new();
     for (index, (sample, reading)) in measured.samples.iter().zip(&measured.readings).enumerate() {
@@ -152,7 +152,7 @@ fn a_wet_spring_raises_no_orange_once_its_effect_is_adopted_and_does_where_it_is
     let finding = (250, found(STANDS));
     let adopted = play(&mut monitor(Explain::Adopt), &wet, Some(&finding));
     assert_eq!(grave(&adopted, 250), []);
-    let told = play(&mut monitor(Explain::Tell), &wet, Some(&finding));
+    let told = play(&mut monitor(Explain::Report), &wet, Some(&finding));
     let grave = grave(&told, 250);
     assert!(!grave.is_empty(), "the plain law takes it for a failure");
 }
@@ -188,7 +188,7 @@ fn a_failure_that_a_falling_reservoir_pauses_stays_orange_and_turns_red_in_time(
         let paused = paused.filter(|(day, ..)| (240..245).contains(day));
         paused.map(|(_, chance, _)| chance).fold(1.0, f64::min)
     };
-    let told = play(&mut monitor(Explain::Tell), &paused, Some(&finding));
+    let told = play(&mut monitor(Explain::Report), &paused, Some(&finding));
     assert!(at_rest(&told) < 0.1, "{}", at_rest(&told));
     assert!(at_rest(&events) > 0.4, "{}", at_rest(&events));
 }
@@ -263,7 +263,7 @@ fn a_slope_under_no_load_has_no_structure_and_asks_for_no_search() {
 #[test]
 fn one_search_is_asked_for_at_a_time_and_none_where_it_is_switched_off() {
     let wet = wet_spring();
-    let mut on = monitor(Explain::Tell);
+    let mut on = monitor(Explain::Report);
     play(&mut on, &wet, None);
     let jobs = on.searches();
     assert_eq!(jobs.len(), 1, "unanswered, the first stays the only one");
@@ -293,7 +293,7 @@ fn an_effect_is_told_once_and_its_end_too() {
     let now = part.readings[59].time;
     let again = monitor.step(now, &Input::Found(found(STANDS)));
     assert_eq!(again, [], "known");
-    let nothing = Finding {
+    let nothing = SearchFinding {
         effects: Vec::new(),
         known_load: KnownLoad::default(),
         ..found(STANDS)
@@ -313,11 +313,11 @@ fn what_another_kind_would_explain_as_well_and_a_step_that_only_the_motion_shows
         samples: wet.samples[..60].to_vec(),
         fails: None,
     };
-    let rivalled = Finding {
+    let rivalled = SearchFinding {
         cannot_separate_from: vec![Kind::Seasonal.into()],
         ..found(STANDS)
     };
-    let step = Finding {
+    let step = SearchFinding {
         effects: vec![Effect::of(Kind::LoadStep)],
         known_load: KnownLoad {
             parts: vec![Part::Step {

@@ -215,7 +215,7 @@ async fn a_daemon_finds_what_a_replay_finds_though_its_search_holds_nothing_up()
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_search_that_is_switched_off_finds_nothing_and_one_that_only_tells_adopts_nothing() {
     assert_eq!(found(&said(Explain::Off, ReplayPace::Max, None).await), []);
-    let told = said(Explain::Tell, ReplayPace::Max, None).await;
+    let told = said(Explain::Report, ReplayPace::Max, None).await;
     let found = found(&told);
     assert!(
         !found.is_empty() && found.iter().all(|one| !one.3),

@@ -2,8 +2,8 @@
 
 use jiff::SignedDuration;
 use proptest::prelude::*;
-use slipwatch::fit::{ConstantLoad, Exponent, Lattice, Outcome, PointReadings};
-use slipwatch::inversion::{FitReport, Inversion, Options};
+use slipwatch::fit::{ConstantLoad, Exponent, FitOutcome, Lattice, PointReadings};
+use slipwatch::inversion::{FitReport, Inversion, InversionOptions};
 use slipwatch::monitor::{Input, Monitor, Settings};
 use slipwatch::reading::{BenchmarkId, Quantity, Reading, Series, Timestamp, Unit};
 use slipwatch::regime::Regime;
@@ -35,9 +35,9 @@ fn daily(values: &[f64]) -> Vec<(i64, f64)> {
 }
 
 fn report(unit: Unit, pairs: &[(i64, f64)], exponent: Exponent) -> FitReport {
-    let options = Options {
+    let options = InversionOptions {
         exponent,
-        ..Options::default()
+        ..InversionOptions::default()
     };
     let inversion = Inversion::new(&series(unit, pairs), &options);
     inversion.report(&inversion.least_squares(), 0.0)
@@ -187,7 +187,7 @@ fn five_readings_are_enough_for_an_answer_and_four_are_not() {
     };
     assert_eq!(
         of(4).outcome,
-        Outcome::TooFew {
+        FitOutcome::TooFew {
             given: 4,
             needed: 5
         }

@@ -3,18 +3,14 @@
 use crate::made_up::{assert_identical, made_up, read};
 use crate::measured::measured;
 use jiff::SignedDuration;
-use slipwatch::runtime::ingest::{Item, ReadOptions, TextFormat, TextRows, convert, write_ndjson};
+use slipwatch::runtime::ingest::{Item, NDJSON, ReadOptions, TextRows, convert, write_ndjson};
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 
 /// What the lines give: values, marks, or what is wrong.
 fn told(text: &str) -> Vec<String> {
-    let mut rows = TextRows::new(
-        TextFormat::Ndjson,
-        Path::new("toc.ndjson"),
-        &ReadOptions::default(),
-    );
+    let mut rows = TextRows::new(&NDJSON, Path::new("toc.ndjson"), &ReadOptions::default());
     let mut told = Vec::new();
     for (line, number) in text.lines().zip(1..) {
         let taken = rows.take(number, line);

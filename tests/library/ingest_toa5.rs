@@ -4,7 +4,7 @@ use crate::made_up::{assert_identical, made_up, read};
 use crate::measured::measured;
 use slipwatch::reading::{Conventions, LocalClock, SummerTime, Unit};
 use slipwatch::runtime::ingest::{
-    Item, ReadOptions, TextFormat, TextRows, convert, read_files, write_toa5,
+    Item, ReadOptions, TOA5, TextRows, convert, read_files, write_toa5,
 };
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -59,7 +59,7 @@ fn told(rows: &mut TextRows, text: &str) -> Vec<String> {
 }
 
 fn rows(options: &ReadOptions) -> TextRows {
-    TextRows::new(TextFormat::Toa5, Path::new("toc.dat"), options)
+    TextRows::new(&TOA5, Path::new("toc.dat"), options)
 }
 
 #[test]

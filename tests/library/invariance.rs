@@ -6,11 +6,9 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 use slipwatch::alert::Level;
-use slipwatch::fit::{Observation, Observations};
-use slipwatch::forecast::{Outlook, Panel};
-use slipwatch::reading::{
-    BenchmarkId, Quantity, Reading, Series, Timestamp, Unit, after_days, days_since,
-};
+use slipwatch::fit::Observations;
+use slipwatch::forecast::{LawForecaster, Outlook};
+use slipwatch::reading::{BenchmarkId, Reading, Series, Timestamp, Unit, after_days, days_since};
 
 const CRITICAL: f64 = 1000.0;
 /// The collapse, days.
@@ -44,20 +42,11 @@ fn failing(interval: f64, until: f64) -> Vec<(f64, f64)> {
 }
 
 fn observations(readings: &[(f64, f64)]) -> Observations {
-    let values = readings.iter().map(|(t_days, value)| Observation {
-        t_days: *t_days,
-        value: *value,
-        sigma: None,
-    });
-    Observations {
-        quantity: Quantity::Displacement,
-        averaging_days: 0.0,
-        values: values.collect(),
-    }
+    Observations::of_displacements(readings.iter().copied())
 }
 
 fn outlook(readings: &[(f64, f64)]) -> Outlook {
-    let mut panel = Panel::default();
+    let mut panel = LawForecaster::default();
     panel.update(&observations(readings), CRITICAL).unwrap()
 }
 

@@ -2,8 +2,8 @@
 
 use jiff::SignedDuration;
 use proptest::prelude::*;
-use slipwatch::fit::{ConstantLoad, Exponent, Outcome, PointReadings};
-use slipwatch::inversion::{FitReport, Inversion, Options, SweepOptions, SweepRow, sweep};
+use slipwatch::fit::{ConstantLoad, Exponent, FitOutcome, PointReadings};
+use slipwatch::inversion::{FitReport, Inversion, InversionOptions, SweepOptions, SweepRow, sweep};
 use slipwatch::model::{Accuracy, Law, Trajectory};
 use slipwatch::reading::{BenchmarkId, Quantity, Reading, Series, Timestamp, Unit};
 use slipwatch::regime::Regime;
@@ -27,7 +27,7 @@ fn series(unit: Unit, values: &[f64]) -> Series {
     }
 }
 
-fn report(series: &Series, options: &Options) -> FitReport {
+fn report(series: &Series, options: &InversionOptions) -> FitReport {
     let inversion = Inversion::new(series, options);
     inversion.report(&inversion.least_squares(), 0.0)
 }
@@ -133,7 +133,7 @@ fn neither_scale_nor_zero_nor_day_zero_changes_what_is_found() {
 fn the_best_of_each_side_of_m_one_is_always_among_the_alternatives() {
     let vaiont = recording("vaiont-1963-reconstruction.mcap");
     for series in &vaiont.series {
-        let report = report(series, &Options::default());
+        let report = report(series, &InversionOptions::default());
         let ms: Vec<f64> = report
             .alternatives
             .0
@@ -161,11 +161,11 @@ fn the_best_of_each_side_of_m_one_is_always_among_the_alternatives() {
 fn a_fixed_m_is_held_and_fits_no_better_than_a_free_one() {
     let vaiont = recording("vaiont-1963-reconstruction.mcap");
     let series = &vaiont.series[0];
-    let free = report(series, &Options::default());
+    let free = report(series, &InversionOptions::default());
     for m in [1.5, 1.0, 0.7, -2.0] {
-        let options = Options {
+        let options = InversionOptions {
             exponent: Exponent::Fixed(m),
-            ..Options::default()
+            ..InversionOptions::default()
         };
         let held = report(series, &options);
         assert!(
@@ -181,7 +181,7 @@ fn a_fixed_m_is_held_and_fits_no_better_than_a_free_one() {
     let none = Exponent::Fixed(0.0);
     let pairs = (0..20).map(|i| (f64::from(i), f64::from(i * i)));
     let refused = ConstantLoad::fit(&PointReadings::new(Quantity::Velocity, pairs), none);
-    assert_eq!(refused.outcome, Outcome::NotAnExponent(0.0));
+    assert_eq!(refused.outcome, FitOutcome::NotAnExponent(0.0));
 }
 
 #[test]
@@ -194,7 +194,10 @@ fn readings_that_say_nothing_end_in_a_name_and_no_number() {
         (&[-1.0, -2.0, -3.0, -4.0, -5.0, -7.0], "no forward motion"),
     ];
     for (values, termination) in cases {
-        let report = report(&series(Unit::MM_PER_DAY, values), &Options::default());
+        let report = report(
+            &series(Unit::MM_PER_DAY, values),
+            &InversionOptions::default(),
+        );
         assert_eq!(report.termination, termination);
         assert_eq!((report.rms, report.parameters.m.best), (None, None));
         assert!(report.alternatives.0.is_empty());
@@ -204,7 +207,10 @@ fn readings_that_say_nothing_end_in_a_name_and_no_number() {
 #[test]
 fn what_is_not_a_number_never_enters() {
     let mut values: Vec<f64> = (0..30).map(|day| 30.0 / (40.0 - f64::from(day))).collect();
-    let sound = report(&series(Unit::MM_PER_DAY, &values), &Options::default());
+    let sound = report(
+        &series(Unit::MM_PER_DAY, &values),
+        &InversionOptions::default(),
+    );
     let mut spoilt = series(Unit::MM_PER_DAY, &values);
     values = vec![f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
     for (index, value) in values.into_iter().enumerate() {
@@ -213,7 +219,7 @@ fn what_is_not_a_number_never_enters() {
         reading.value = value;
         spoilt.readings.push(reading);
     }
-    assert_eq!(report(&spoilt, &Options::default()), sound);
+    assert_eq!(report(&spoilt, &InversionOptions::default()), sound);
 }
 
 #[test]
@@ -221,7 +227,10 @@ fn a_slope_that_only_slows_down_is_not_said_to_fail() {
     let values: Vec<f64> = (0..40_u32)
         .map(|day| 20.0 / (3.0 + f64::from(day)) * (1.0 + 0.03 * scatter(day as usize)))
         .collect();
-    let report = report(&series(Unit::MM_PER_DAY, &values), &Options::default());
+    let report = report(
+        &series(Unit::MM_PER_DAY, &values),
+        &InversionOptions::default(),
+    );
     assert!(
         report.regime.probability_accelerating.unwrap() < 0.05,
         "{report:?}"
@@ -236,7 +245,7 @@ fn a_slope_that_only_slows_down_is_not_said_to_fail() {
 #[test]
 fn the_report_has_the_documented_keys_in_their_order() {
     let vaiont = recording("vaiont-1963-reconstruction.mcap");
-    let report = report(&vaiont.series[0], &Options::default());
+    let report = report(&vaiont.series[0], &InversionOptions::default());
     let json = serde_json::to_value(&report).unwrap();
     let keys = |value: &serde_json::Value| -> Vec<String> {
         value.as_object().unwrap().keys().cloned().collect()
@@ -310,7 +319,7 @@ fn vaiont_67_bends_upwards_and_the_line_through_5_ends_near_day_69_and_a_half() 
     let vaiont = recording("vaiont-1963-reconstruction.mcap");
     let of = |id: &str| {
         let series = vaiont.series(Some(&BenchmarkId::new(id)), None).unwrap();
-        report(series, &Options::default())
+        report(series, &InversionOptions::default())
     };
     let bent = of("67");
     assert_eq!(bent.regime.label, Regime::StableAccelerating, "{bent:?}");
@@ -340,7 +349,7 @@ fn la_clapiere_by_year() -> Vec<SweepRow> {
         last: Some("1988-01-01T00:00:00Z".parse().unwrap()),
         steps: 4,
     };
-    let swept = sweep(&la_clapiere.series[0], &Options::default(), &steps);
+    let swept = sweep(&la_clapiere.series[0], &InversionOptions::default(), &steps);
     assert_eq!(swept.rows.len(), 4);
     swept.rows
 }
@@ -380,11 +389,11 @@ fn a_row_of_a_sweep_is_the_fit_up_to_its_t_max() {
         last: None,
         steps: 3,
     };
-    let swept = sweep(series, &Options::default(), &steps);
+    let swept = sweep(series, &InversionOptions::default(), &steps);
     for row in &swept.rows {
-        let options = Options {
+        let options = InversionOptions {
             until: Some(row.t_max),
-            ..Options::default()
+            ..InversionOptions::default()
         };
         let fit = report(series, &options);
         assert_eq!(
@@ -415,7 +424,7 @@ proptest! {
         displacement in any::<bool>(),
     ) {
         let unit = if displacement { Unit::MM } else { Unit::MM_PER_DAY };
-        let report = report(&series(unit, &values), &Options::default());
+        let report = report(&series(unit, &values), &InversionOptions::default());
         let text = serde_json::to_string(&report).unwrap();
         prop_assert!(!text.contains("NaN") && !text.contains("inf"));
         prop_assert!(report.rms.is_none_or(|rms| rms.is_finite() && rms >= 0.0));

@@ -13,7 +13,7 @@ use slipwatch::config::{self, Config};
 use slipwatch::model::Law;
 use slipwatch::monitor::{Event, EventKind, Input, Monitor, Settings};
 use slipwatch::reading::{BenchmarkId, Reading, Timestamp, Unit};
-use slipwatch::runtime::tail::{Arrival, Batch, Follower};
+use slipwatch::runtime::tail::{Arrival, ArrivalBatch, Follower};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
@@ -166,8 +166,8 @@ impl Bench {
         fs::write(self.folder.path().join("a.csv"), text).unwrap();
     }
 
-    fn poll(&mut self) -> Batch {
-        let mut all = Batch::default();
+    fn poll(&mut self) -> ArrivalBatch {
+        let mut all = ArrivalBatch::default();
         loop {
             let batch = self.follower.poll(self.wall);
             all.arrivals.extend(batch.arrivals);

@@ -41,5 +41,6 @@ mod site_level;
 mod site_together;
 mod slopes;
 mod steady_creep;
+mod text_formats;
 mod together;
 mod under_load;

@@ -13,7 +13,7 @@ const BEFORE: usize = 40;
 fn before(inputs: &[(Timestamp, Input)]) -> (Monitor, impl Iterator<Item = &(Timestamp, Input)>) {
     let (known, rest) = inputs.split_at(2 * BEFORE);
     let (mut monitor, _) = as_it_came(known);
-    monitor.step(at(39), &Input::Notice(Notice::Settles));
+    monitor.step(at(39), &Input::Notice(Notice::InBatches));
     monitor.step(at(39), &Input::Notice(Notice::Queue));
     (monitor, rest.iter())
 }
@@ -21,7 +21,7 @@ fn before(inputs: &[(Timestamp, Input)]) -> (Monitor, impl Iterator<Item = &(Tim
 fn settle(monitor: &mut Monitor, now: Timestamp) -> Vec<Event> {
     let mut said = Vec::new();
     while monitor.queues() {
-        said.extend(monitor.step(now, &Input::Notice(Notice::Settle)));
+        said.extend(monitor.step(now, &Input::Notice(Notice::BatchEnd)));
     }
     said
 }

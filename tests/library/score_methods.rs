@@ -4,7 +4,7 @@ use slipwatch::fit::{Observation, Observations};
 use slipwatch::forecast::{Fate, Life, Passage};
 use slipwatch::reading::{Quantity, days_since};
 use slipwatch::runtime::ingest::{ReadOptions, read_files};
-use slipwatch::score::{History, METHODS};
+use slipwatch::score::{METHODS, WholeRecord};
 use std::path::Path;
 
 /// Where a record is looked at, tenths of its readings.
@@ -12,14 +12,14 @@ const LOOKS: [usize; 3] = [2, 6, 9];
 /// Readings kept of a recording: what is shown does not need more.
 const MOST: usize = 240;
 
-fn of_life(fate: Fate, seed: u64) -> History {
+fn of_life(fate: Fate, seed: u64) -> WholeRecord {
     let life = Life::draw(fate, seed);
     let observations = life.known(f64::INFINITY);
     let flow = (0..2000).map(|day| {
         let days = f64::from(day);
         (days, 12.0 + 9.0 * (days / 29.0).sin())
     });
-    History {
+    WholeRecord {
         observations,
         flow: flow.collect(),
         critical_mm_per_day: Life::CRITICAL_MM_PER_DAY,
@@ -27,7 +27,7 @@ fn of_life(fate: Fate, seed: u64) -> History {
 }
 
 /// Every series of a recording, with its first channel as the flow.
-fn recorded(name: &str) -> Vec<History> {
+fn recorded(name: &str) -> Vec<WholeRecord> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings");
     let (recording, _) = read_files(&[folder.join(name)], &ReadOptions::default()).unwrap();
     let series = recording.series.iter().map(|series| {
@@ -36,7 +36,7 @@ fn recorded(name: &str) -> Vec<History> {
         observations.values.truncate(MOST);
         let samples = recording.channels.first().map(|channel| &channel.samples);
         let flow = samples.into_iter().flatten();
-        History {
+        WholeRecord {
             observations,
             flow: flow
                 .map(|sample| (days_since(epoch, sample.time), sample.value))
@@ -47,21 +47,21 @@ fn recorded(name: &str) -> Vec<History> {
     series.collect()
 }
 
-fn histories() -> Vec<History> {
+fn histories() -> Vec<WholeRecord> {
     let lives = [
         (Fate::Failing, 3),
         (Fate::Failing, 7),
         (Fate::Saturating, 1),
         (Fate::Settling, 2),
     ];
-    let mut histories: Vec<History> = lives.map(|(fate, seed)| of_life(fate, seed)).into();
+    let mut histories: Vec<WholeRecord> = lives.map(|(fate, seed)| of_life(fate, seed)).into();
     histories.extend(recorded("century-mine-2013.mcap"));
     histories.extend(recorded("vaiont-1963-reconstruction.mcap"));
     histories.extend(recorded("la-clapiere-1982-1995-reconstruction.mcap"));
     histories
 }
 
-fn forecasts(history: &History, days: f64) -> Vec<(&'static str, Option<Passage>)> {
+fn forecasts(history: &WholeRecord, days: f64) -> Vec<(&'static str, Option<Passage>)> {
     let known = history.at(days).unwrap();
     METHODS
         .iter()
@@ -70,7 +70,7 @@ fn forecasts(history: &History, days: f64) -> Vec<(&'static str, Option<Passage>
 }
 
 /// The record as it stood at `days`, and then whatever `future` makes of what is to come.
-fn with_future(history: &History, days: f64, future: impl Fn(f64) -> f64) -> History {
+fn with_future(history: &WholeRecord, days: f64, future: impl Fn(f64) -> f64) -> WholeRecord {
     let mut other = history.clone();
     other
         .observations
@@ -179,7 +179,7 @@ fn no_record_makes_a_method_panic_or_say_what_is_no_time() {
                     sigma: (index % 3 == 0).then_some(0.0),
                 });
                 let flow = (0..count).map(|index| (days(index), value(index)));
-                let history = History {
+                let history = WholeRecord {
                     observations: Observations {
                         quantity,
                         averaging_days: 0.0,

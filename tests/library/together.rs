@@ -4,7 +4,9 @@ use crate::measured::measured;
 use assert_cmd::Command;
 use jiff::SignedDuration;
 use slipwatch::forecast::{Fate, Life};
-use slipwatch::inversion::{FailureTime, Inversion, Options, TogetherReport, together};
+use slipwatch::inversion::{
+    FittedFailureTime, Inversion, InversionOptions, TogetherReport, together,
+};
 use slipwatch::reading::{BenchmarkId, Reading, Series, Timestamp, Unit, after_days, days_since};
 use slipwatch::runtime::ingest::{ReadOptions, read_files};
 use std::path::{Path, PathBuf};
@@ -20,14 +22,14 @@ fn vaiont() -> Vec<Series> {
     read_files(&[vaiont_file()], &options).unwrap().0.series
 }
 
-fn until(time: Timestamp) -> Options {
-    Options {
+fn until(time: Timestamp) -> InversionOptions {
+    InversionOptions {
         until: Some(time),
-        ..Options::default()
+        ..InversionOptions::default()
     }
 }
 
-fn alone(series: &Series, options: &Options) -> FailureTime {
+fn alone(series: &Series, options: &InversionOptions) -> FittedFailureTime {
     let inversion = Inversion::new(series, options);
     let report = inversion.report(&inversion.least_squares(), 0.0);
     report.critical_velocity_time
@@ -149,7 +151,7 @@ fn slopes_with_failure_times_of_their_own_are_not_one() {
             series(name, Unit::MM, shifted)
         };
         let pair = [slope("soon", &soon, 3.0), slope("later", &later, 50.0)];
-        let Some(report) = together(&pair, &Options::default()) else {
+        let Some(report) = together(&pair, &InversionOptions::default()) else {
             continue;
         };
         if !report.groups.is_empty() {

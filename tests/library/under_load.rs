@@ -7,7 +7,7 @@
 
 use crate::measured::measured;
 use slipwatch::fit::{Observation, Observations};
-use slipwatch::forecast::{Fate, HORIZON_DAYS, Life, Outlook, Panel};
+use slipwatch::forecast::{Fate, HORIZON_DAYS, LawForecaster, Life, Outlook};
 use slipwatch::reading::{Quantity, Series, Timestamp, days_since};
 use slipwatch::runtime::ingest::{ReadOptions, read_files};
 use std::path::{Path, PathBuf};
@@ -59,7 +59,7 @@ fn at(observations: &Observations, until_days: f64) -> Option<Outlook> {
         values: observations.values[..known].to_vec(),
         ..observations.clone()
     };
-    Panel::default().update(&known, CRITICAL)
+    LawForecaster::default().update(&known, CRITICAL)
 }
 
 /// Leads in hours before 08:15, with the outlook at each.
@@ -210,7 +210,9 @@ fn a_compacted_record_foretells_what_the_whole_one_does() {
         }
         assert!(kept.values.len() <= Observations::MOST && whole.values.len() > 2400);
         let median = |observations: &Observations| {
-            let outlook = Panel::default().update(observations, CRITICAL).unwrap();
+            let outlook = LawForecaster::default()
+                .update(observations, CRITICAL)
+                .unwrap();
             outlook.passage.quantile(0.5, HORIZON_DAYS).unwrap()
         };
         let (whole, kept) = (median(&whole), median(&kept));
@@ -242,7 +244,9 @@ fn hourly_failure() -> Observations {
 }
 
 fn chance_within_a_day(observations: &Observations) -> f64 {
-    let outlook = Panel::default().update(observations, CRITICAL).unwrap();
+    let outlook = LawForecaster::default()
+        .update(observations, CRITICAL)
+        .unwrap();
     outlook.passage.chance_within(1.0)
 }
 

@@ -3,7 +3,7 @@
 use super::words;
 use crate::config::Config;
 use crate::figures::Replayed;
-use crate::monitor::{Event, Input};
+use crate::monitor::{Event, Input, Measured};
 use crate::reading::{BenchmarkId, Series};
 use crate::runtime::origin::Origins;
 use crate::runtime::view::AlertView;
@@ -25,7 +25,8 @@ const COMMAND: &str = "slipwatch replay --state state --format json | grep --lin
 pub(super) fn write(
     file: &Path,
     alert: &AlertView,
-    (config, store): (&Config, &Store),
+    config: &Config,
+    store: &Store,
 ) -> anyhow::Result<()> {
     let folder = tempfile::tempdir().context("cannot make a temporary folder")?;
     let copy = folder.path().join("slipwatch.db");
@@ -106,18 +107,12 @@ fn sha256(bytes: &[u8]) -> String {
 
 /// The values that had been taken when the alert was called: of its benchmark, or of all, and of every covariate.
 fn taken(store: &Store, alert: &AlertView) -> anyhow::Result<Vec<Input>> {
-    let is_wanted = |input: &Input| match input {
-        Input::Reading { benchmark, .. } => {
-            alert.benchmark.is_none() || alert.benchmark.as_ref() == Some(benchmark)
+    let is_wanted = |input: &Input| match input.measured() {
+        Some(Measured::Reading { benchmark, .. }) => {
+            alert.benchmark.as_ref().is_none_or(|own| own == benchmark)
         }
-        Input::Sample { .. } => true,
-        Input::Missing { .. }
-        | Input::Trouble { .. }
-        | Input::Settings(_)
-        | Input::Order(_)
-        | Input::Found(_)
-        | Input::Notice(_)
-        | Input::Tick => false,
+        Some(Measured::Sample { .. }) => true,
+        None => false,
     };
     let (mut taken, mut after) = (Vec::new(), 0);
     loop {
@@ -134,19 +129,19 @@ fn taken(store: &Store, alert: &AlertView) -> anyhow::Result<Vec<Input>> {
     }
 }
 
-/// What had been said until then.
-struct Said {
+/// What had been reported until then.
+struct EventsUntil {
     lines: String,
     said: Vec<Event>,
 }
 
-fn events(store: &Store, alert: &AlertView) -> anyhow::Result<Said> {
+fn events(store: &Store, alert: &AlertView) -> anyhow::Result<EventsUntil> {
     let benchmark = alert.benchmark.as_ref().map(BenchmarkId::as_str);
     let (mut lines, mut said, mut after) = (String::new(), Vec::new(), 0);
     loop {
         let events = store.events(after, None, benchmark)?;
         let Some((last, _)) = events.last() else {
-            return Ok(Said { lines, said });
+            return Ok(EventsUntil { lines, said });
         };
         after = *last;
         for (_, body) in events {
@@ -164,44 +159,22 @@ fn events(store: &Store, alert: &AlertView) -> anyhow::Result<Said> {
 fn readings(taken: &[Input], origins: &Origins) -> String {
     let mut out = "time,kind,name,value,unit,sigma,file,line\n".to_owned();
     for input in taken {
-        let (time, kind, name, value, unit, sigma) = match input {
-            Input::Reading {
-                benchmark,
-                unit,
-                reading,
-                ..
-            } => (
-                reading.time,
-                "reading",
-                benchmark.as_str(),
-                reading.value,
-                unit.to_string(),
-                reading.sigma,
-            ),
-            Input::Sample {
-                channel,
-                unit,
-                sample,
-            } => (
-                sample.time,
-                "covariate",
-                channel.as_str(),
-                sample.value,
-                unit.clone().unwrap_or_default(),
-                None,
-            ),
-            Input::Missing { .. }
-            | Input::Trouble { .. }
-            | Input::Settings(_)
-            | Input::Order(_)
-            | Input::Found(_)
-            | Input::Notice(_)
-            | Input::Tick => continue,
+        let Some(measured) = input.measured() else {
+            continue;
         };
+        let (kind, name, unit) = match measured {
+            Measured::Reading {
+                benchmark, unit, ..
+            } => ("reading", benchmark.as_str(), unit.to_string()),
+            Measured::Sample { channel, unit, .. } => {
+                ("covariate", channel, unit.unwrap_or_default().to_owned())
+            }
+        };
+        let (time, value) = (measured.time(), measured.value());
         let origin = origins.find(input);
         let file = origin.map_or_else(String::new, |origin| origin.file.display().to_string());
         let number = origin.map_or_else(String::new, |origin| origin.line.to_string());
-        let sigma = sigma.map_or_else(String::new, |sigma| sigma.to_string());
+        let sigma = (measured.sigma()).map_or_else(String::new, |sigma| sigma.to_string());
         let _ = writeln!(
             out,
             "{time},{kind},{},{value},{},{sigma},{},{number}",

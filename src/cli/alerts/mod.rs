@@ -4,12 +4,12 @@ mod bundle;
 mod show;
 mod words;
 
-use super::args::Format;
+use super::args::OutputFormat;
 use super::exit::UsageError;
 use super::state::SiteArgs;
 use super::text;
 use crate::config::{Config, EXERCISE, value};
-use crate::monitor::{Door, Given, Order};
+use crate::monitor::{Given, Order, OrderedBy};
 use crate::reading::BenchmarkId;
 use crate::runtime::clock;
 use crate::runtime::standing::{acknowledged, closed, in_force, orders, silences};
@@ -43,7 +43,7 @@ impl GivenArgs {
         Given {
             by: self.by.clone(),
             why: self.why.clone(),
-            door: Some(Door::CommandLine),
+            door: Some(OrderedBy::CommandLine),
             given_at: Some(clock::now()),
         }
     }
@@ -232,8 +232,10 @@ fn list(site: &SiteArgs) -> anyhow::Result<()> {
     standing.sort_by_key(|event| event.time);
     for event in &standing {
         match site.output.format {
-            Format::Json => writeln!(stdout, "{}", serde_json::to_string(event)?)?,
-            Format::Text => writeln!(stdout, "{}", text::line(event, &config.site.time_zone))?,
+            OutputFormat::Json => writeln!(stdout, "{}", serde_json::to_string(event)?)?,
+            OutputFormat::Text => {
+                writeln!(stdout, "{}", text::line(event, &config.site.time_zone))?;
+            }
         }
     }
     Ok(())

@@ -31,7 +31,7 @@ pub(super) fn show(args: &ShowArgs) -> anyhow::Result<()> {
     };
     let zone = &config.site.time_zone;
     if let Some(file) = &args.bundle {
-        bundle::write(file, &alert, (&config, &store))?;
+        bundle::write(file, &alert, &config, &store)?;
     }
     args.site
         .output

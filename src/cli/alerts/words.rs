@@ -155,7 +155,7 @@ fn deliveries(rows: &[DeliveryRow]) -> String {
             "acknowledged" => "was not run: somebody acknowledged it in time",
             "waiting" => "is still tried",
             "delivered" => "has taken it",
-            "over" => "did not get it: it was over, superseded or told together with others",
+            "over" => "did not get it: it was over, superseded or reported together with others",
             "dead" => "was given up",
             "closed" => "was closed: the config has no such hook any more",
             _ => "",
@@ -174,7 +174,7 @@ fn deliveries(rows: &[DeliveryRow]) -> String {
     out
 }
 
-/// Over which door an order came, and when by the host's clock.
+/// By which way an order came, and when by the host's clock.
 fn door(event: &Event, clock: &dyn Fn(Timestamp) -> String) -> String {
     let EventKind::Order { given, .. } = &event.kind else {
         return String::new();

@@ -5,7 +5,7 @@ use crate::cli::run::asynchronous;
 use crate::monitor::{Settings, SiteLevel};
 use crate::runtime::exhibit::{Exhibit, show};
 use crate::runtime::replay;
-use crate::runtime::serve::{Door, Limits};
+use crate::runtime::serve::{Limits, ListenOptions};
 use crate::runtime::shutdown::Shutdown;
 use crate::runtime::view::{Facts, Now};
 use anyhow::Context;
@@ -43,7 +43,7 @@ pub(super) fn serve(args: &Args, listen: SocketAddr, folder: &Path) -> anyhow::R
             now: Now::Data,
             collapse: crisis.failed(),
         },
-        door: Door {
+        options: ListenOptions {
             listen,
             token: None,
             limits: Limits::default(),

@@ -52,7 +52,7 @@ pub(super) struct Args {
 /// Reads the files, explains the series, prints the result and writes the page.
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let mut recording = args.readings.load()?.recording;
-    // Which series is meant is settled before any is cut, so that the answer does not hang on it.
+    // Which series is meant is decided before any is cut, so that the answer does not depend on it.
     let one = args.readings.series(&recording);
     let several =
         matches!(one, Err(SelectError::Several { .. })) && args.readings.benchmark.is_none();

@@ -1,7 +1,7 @@
 //! The tables of an explanation, the same for the terminal and for the page.
 
 use super::sentence::{brief, tail_probability};
-use crate::cli::table::{Table, time};
+use crate::cli::table::{TextTable, time};
 use crate::effects::{Change, Effect, Explanation, Form, Kind};
 use crate::reading::Timestamp;
 
@@ -9,7 +9,7 @@ use crate::reading::Timestamp;
 #[derive(Debug)]
 pub(super) struct PageSection {
     pub(super) heading: &'static str,
-    pub(super) table: Table,
+    pub(super) table: TextTable,
 }
 
 /// Before and after, in the readings and in the forecast.
@@ -51,9 +51,9 @@ pub(super) fn subject(explanation: &Explanation) -> String {
     )
 }
 
-fn error(explanation: &Explanation) -> Table {
+fn error(explanation: &Explanation) -> TextTable {
     let error = &explanation.error;
-    let mut table = Table::headed([
+    let mut table = TextTable::headed([
         format!("rms in {}", error.unit),
         "before".to_owned(),
         "after".to_owned(),
@@ -94,9 +94,9 @@ fn percent_change(change: Change) -> String {
     }
 }
 
-fn forecast(explanation: &Explanation) -> Table {
+fn forecast(explanation: &Explanation) -> TextTable {
     let forecast = &explanation.forecast;
-    let mut table = Table::headed(["", "before", "after"]);
+    let mut table = TextTable::headed(["", "before", "after"]);
     let shares = [
         (
             "probability that it is unstable (m > 1)",
@@ -124,14 +124,14 @@ fn forecast(explanation: &Explanation) -> Table {
 type PageCell = fn(&Effect) -> String;
 
 /// A column each; what none of them has is left out.
-fn effects(explanation: &Explanation) -> Option<Table> {
+fn effects(explanation: &Explanation) -> Option<TextTable> {
     let all = [&explanation.verdict].into_iter().chain(&explanation.also);
     let accepted: Vec<&Effect> = all.filter(|effect| is_an_effect(effect)).collect();
     if accepted.is_empty() {
         return None;
     }
     let names = accepted.iter().map(|effect| effect.effect.to_string());
-    let mut table = Table::headed([String::new()].into_iter().chain(names));
+    let mut table = TextTable::headed([String::new()].into_iter().chain(names));
     let adds = format!("adds to the readings, rms {}", explanation.unit);
     let rows: [(&str, PageCell); 13] = [
         ("channel", |effect| {
@@ -178,9 +178,9 @@ fn is_an_effect(effect: &Effect) -> bool {
     !matches!(effect.effect, Kind::None | Kind::Unexplained)
 }
 
-fn residual(explanation: &Explanation) -> Table {
+fn residual(explanation: &Explanation) -> TextTable {
     let tests = &explanation.residual;
-    let mut table = Table::headed(["", "before", "after"]);
+    let mut table = TextTable::headed(["", "before", "after"]);
     let mut row = |name: &str, change: Change, said: fn(Option<f64>) -> String| {
         table.row([name.to_owned(), said(change.before), said(change.after)]);
     };
@@ -196,9 +196,9 @@ fn residual(explanation: &Explanation) -> Table {
     table
 }
 
-fn structure(explanation: &Explanation) -> Option<Table> {
+fn structure(explanation: &Explanation) -> Option<TextTable> {
     let stretches = &explanation.residual.structure;
-    let mut table = Table::headed(["from", "to", "log-load", "standard errors"]);
+    let mut table = TextTable::headed(["from", "to", "log-load", "standard errors"]);
     for one in stretches {
         table.row([
             time(Some(one.from)),
@@ -210,9 +210,9 @@ fn structure(explanation: &Explanation) -> Option<Table> {
     (!stretches.is_empty()).then_some(table)
 }
 
-fn candidates(explanation: &Explanation) -> Option<Table> {
+fn candidates(explanation: &Explanation) -> Option<TextTable> {
     let tried = &explanation.candidates;
-    let mut table = Table::headed([
+    let mut table = TextTable::headed([
         "effect",
         "channel",
         "form",
@@ -241,9 +241,10 @@ fn candidates(explanation: &Explanation) -> Option<Table> {
     (!tried.is_empty()).then_some(table)
 }
 
-fn faults(explanation: &Explanation) -> Option<Table> {
+fn faults(explanation: &Explanation) -> Option<TextTable> {
     let faults = &explanation.faults;
-    let mut table = Table::headed(["fault", "where", "from", "to", "size", "values", "copy of"]);
+    let mut table =
+        TextTable::headed(["fault", "where", "from", "to", "size", "values", "copy of"]);
     for fault in faults {
         table.row([
             fault.kind.name().to_owned(),
@@ -258,10 +259,10 @@ fn faults(explanation: &Explanation) -> Option<Table> {
     (!faults.is_empty()).then_some(table)
 }
 
-fn noise(explanation: &Explanation) -> Table {
+fn noise(explanation: &Explanation) -> TextTable {
     let noise = &explanation.noise;
     let unit = explanation.unit;
-    let mut table = Table::plain();
+    let mut table = TextTable::plain();
     table.row([
         "white".to_owned(),
         format!("{} {unit}", number(Some(noise.white))),
@@ -277,9 +278,9 @@ fn noise(explanation: &Explanation) -> Table {
     table
 }
 
-fn settings(explanation: &Explanation) -> Table {
+fn settings(explanation: &Explanation) -> TextTable {
     let settings = &explanation.settings;
-    let mut table = Table::plain();
+    let mut table = TextTable::plain();
     table.row(["slipwatch", &settings.version]);
     table.row(["seed".to_owned(), settings.seed.to_string()]);
     table.row(["surrogates".to_owned(), settings.surrogates.to_string()]);

@@ -4,13 +4,13 @@ mod dialect;
 mod text;
 mod times;
 
-use super::args::{FileArgs, Format, OutputArgs};
+use super::args::{FileArgs, OutputArgs, OutputFormat};
 use super::check;
 use super::exit::{self, UsageError};
 use crate::config::{SourceKind, value};
 use crate::reading::{BenchmarkId, Dialect, Quantity, SummerTime, Unit};
 use crate::runtime::ingest::{
-    Looked, Meaning, Measure, ReadOptions, TextFormat, look_through, read_with_remarks, survey,
+    FileSurvey, Meaning, Measure, ReadOptions, TextFormat, look_through, read_with_remarks, survey,
     unpacked_name,
 };
 use dialect::Written;
@@ -183,17 +183,15 @@ fn kind_of(file: &Path) -> anyhow::Result<SourceKind> {
         .unwrap_or_default()
         .to_string_lossy()
         .to_ascii_lowercase();
-    Ok(match ending.as_str() {
-        "csv" | "txt" | "tsv" => SourceKind::Csv,
-        "ndjson" | "jsonl" => SourceKind::Ndjson,
-        "dat" => SourceKind::Toa5,
-        "mcap" => SourceKind::Mcap,
-        // The reader knows what to say of every other one.
-        _ => {
-            read_with_remarks(&[file.to_owned()], &ReadOptions::default())?;
-            SourceKind::Csv
-        }
-    })
+    let format = TextFormat::of_extension(&ending).map_or(ending.as_str(), |format| format.name);
+    let kind = SourceKind::ALL
+        .into_iter()
+        .find(|kind| kind.name() == format);
+    if kind.is_none() {
+        // The reader knows what to say of such a file.
+        read_with_remarks(&[file.to_owned()], &ReadOptions::default())?;
+    }
+    Ok(kind.unwrap_or(SourceKind::Csv))
 }
 
 /// How the file is written, or what of that it leaves open.
@@ -261,25 +259,20 @@ fn held(
     Ok(Ok(found))
 }
 
-fn look(file: &Path, kind: SourceKind, options: &ReadOptions) -> anyhow::Result<Looked> {
-    let format = match kind {
-        SourceKind::Csv => TextFormat::Csv,
-        SourceKind::Ndjson => TextFormat::Ndjson,
-        SourceKind::Toa5 => TextFormat::Toa5,
-        SourceKind::Mcap => {
-            let read = read_with_remarks(&[file.to_owned()], options)?;
-            let series = read.recording.series.into_iter();
-            return Ok(Looked {
-                readings: series.map(|one| (one.benchmark, one.unit)).collect(),
-                ..Looked::default()
-            });
-        }
+fn look(file: &Path, kind: SourceKind, options: &ReadOptions) -> anyhow::Result<FileSurvey> {
+    let Some(format) = TextFormat::named(kind.name()) else {
+        let read = read_with_remarks(&[file.to_owned()], options)?;
+        let series = read.recording.series.into_iter();
+        return Ok(FileSurvey {
+            readings: series.map(|one| (one.benchmark, one.unit)).collect(),
+            ..FileSurvey::default()
+        });
     };
     Ok(look_through(format, file, options)?)
 }
 
 /// Which flag names the readings of a file where no column does.
-fn without_readings(file: &Path, looked: &Looked) -> String {
+fn without_readings(file: &Path, looked: &FileSurvey) -> String {
     let numbers = looked.columns.iter().filter_map(|(name, meaning)| {
         matches!(meaning, Meaning::Covariate { .. }).then_some(name.as_str())
     });
@@ -351,14 +344,14 @@ fn say_written(args: &Args, plan: &InitPlan) -> anyhow::Result<()> {
     let mut stdout = std::io::stdout().lock();
     let config = args.output_config.display();
     match args.output.format {
-        Format::Text => {
+        OutputFormat::Text => {
             let (sources, benchmarks) = (plan.sources.len(), plan.benchmarks.len());
             writeln!(
                 stdout,
                 "wrote {config} (sources: {sources}, benchmarks: {benchmarks}); it is checked now\n"
             )?;
         }
-        Format::Json => {
+        OutputFormat::Json => {
             let ids = plan
                 .benchmarks
                 .iter()
@@ -375,7 +368,7 @@ fn say_written(args: &Args, plan: &InitPlan) -> anyhow::Result<()> {
 }
 
 fn say_next(args: &Args) -> anyhow::Result<()> {
-    if args.output.format == Format::Json {
+    if args.output.format == OutputFormat::Json {
         return Ok(());
     }
     let mut stdout = std::io::stdout().lock();

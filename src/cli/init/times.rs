@@ -20,8 +20,8 @@ const TIMES: [&str; 6] = [
     " %I:%M %p",
     " %I:%M:%S %p",
 ];
-/// Cells by which most candidates fall out.
-const FIRST_LOOK: usize = 200;
+/// The first cells, which exclude most candidates.
+const FIRST_CELLS: usize = 200;
 /// Parts of names of columns whose numbers may be times.
 const NAMES_OF_TIMES: [&str; 8] = [
     "time", "date", "stamp", "datum", "zeit", "heure", "fecha", "data",
@@ -164,7 +164,7 @@ fn is_dated(survey: &Survey, at: usize, decimal: DecimalMark) -> bool {
     let name = survey.names[at].to_lowercase();
     let may_be_numbers = NAMES_OF_TIMES.iter().any(|part| name.contains(part));
     let is_number = |cell: &String| reader(decimal, TimeFormat::Rfc3339).number(cell).is_some();
-    if cells.iter().take(FIRST_LOOK).any(is_number) {
+    if cells.iter().take(FIRST_CELLS).any(is_number) {
         return may_be_numbers && of_numbers(&cells, decimal).is_some();
     }
     !matching(&cells, decimal).is_empty()
@@ -248,7 +248,7 @@ fn matching(cells: &[String], decimal: DecimalMark) -> Vec<TimeFormat> {
         };
         !cells.is_empty() && cells.iter().all(read)
     };
-    let few = &cells[..cells.len().min(FIRST_LOOK)];
+    let few = &cells[..cells.len().min(FIRST_CELLS)];
     let fits = |format: &TimeFormat| reads(format, few) && reads(format, cells);
     if fits(&TimeFormat::Rfc3339) {
         return vec![TimeFormat::Rfc3339];
@@ -282,7 +282,7 @@ fn anywhere() -> LocalClock {
 fn needs_zone(cells: &[String], format: &TimeFormat, decimal: DecimalMark) -> bool {
     let dialect = reader(decimal, format.clone());
     let here = LocalClock::default();
-    let distinct: BTreeSet<&String> = cells.iter().take(FIRST_LOOK).collect();
+    let distinct: BTreeSet<&String> = cells.iter().take(FIRST_CELLS).collect();
     distinct
         .into_iter()
         .any(|cell| dialect.instant(cell, &here).is_err())

@@ -111,7 +111,7 @@ pub(super) fn of_state(args: &Args, file: &Path) -> anyhow::Result<Material> {
         }
     }
     for (name, unit) in store.channels()? {
-        let samples = store.values(&wanted((&name, false), drawn_from))?;
+        let samples = store.values(&wanted(&name, false, drawn_from))?;
         let samples = samples.into_iter().map(|one| Sample {
             time: one.time,
             value: one.value,
@@ -143,7 +143,7 @@ pub(super) fn of_state(args: &Args, file: &Path) -> anyhow::Result<Material> {
     })
 }
 
-fn wanted((name, is_reading): (&str, bool), from: Timestamp) -> Values<'_> {
+fn wanted(name: &str, is_reading: bool, from: Timestamp) -> Values<'_> {
     Values {
         name,
         is_reading,
@@ -156,7 +156,7 @@ fn wanted((name, is_reading): (&str, bool), from: Timestamp) -> Values<'_> {
 
 /// The benchmark's readings in mm or mm/day; of two quantities the displacement.
 fn series(store: &Store, id: &BenchmarkId, from: Timestamp) -> anyhow::Result<Option<Series>> {
-    let values = store.values(&wanted((id.as_str(), true), from))?;
+    let values = store.values(&wanted(id.as_str(), true, from))?;
     let is_displacement = |value: &Value| value.quantity == Some(Quantity::Displacement);
     let has_displacement = values.iter().any(is_displacement);
     let ours = values

@@ -4,7 +4,7 @@ use super::Args;
 use super::material::Material;
 use super::sections;
 use crate::cli::explain::STYLE;
-use crate::cli::table::Table;
+use crate::cli::table::TextTable;
 use crate::plot::escaped;
 use std::fmt::Write as _;
 
@@ -107,13 +107,13 @@ fn heading(rank: usize, text: &str) -> String {
     format!("<h{rank}>{text}</h{rank}>\n")
 }
 
-fn wide(table: &Table) -> String {
+fn wide(table: &TextTable) -> String {
     format!("<div class=\"wide\">{}</div>\n", table.html())
 }
 
-fn provenance(args: &Args, material: &Material) -> Table {
+fn provenance(args: &Args, material: &Material) -> TextTable {
     let policy = &material.policy;
-    let mut table = Table::plain();
+    let mut table = TextTable::plain();
     let mut row = |what: &str, which: String| table.row([what.to_owned(), which]);
     for (what, which) in &material.sources {
         row(what, which.clone());

@@ -3,7 +3,7 @@
 use super::Args;
 use super::material::Material;
 use crate::alert::Level;
-use crate::cli::table::{Table, time};
+use crate::cli::table::{TextTable, time};
 use crate::cli::{explain, score, text};
 use crate::figures::{self, Replayed};
 use crate::monitor::{Event, EventKind, FailureTime, levels_in};
@@ -93,7 +93,7 @@ pub(super) fn figures(args: &Args, material: &Material, series: &Series) -> Vec<
 }
 
 /// What was said of a benchmark but its forecasts, oldest first.
-pub(super) fn in_order(material: &Material, series: &Series) -> Table {
+pub(super) fn in_order(material: &Material, series: &Series) -> TextTable {
     let ours = |event: &&Event| {
         let kind = event.kind.name();
         event.benchmark.as_ref() == Some(&series.benchmark)
@@ -102,7 +102,7 @@ pub(super) fn in_order(material: &Material, series: &Series) -> Table {
             && event.time >= material.listed_from
     };
     let said: Vec<&Event> = material.events.iter().filter(ours).collect();
-    let mut table = Table::headed(["time", "kind", "what"]);
+    let mut table = TextTable::headed(["time", "kind", "what"]);
     for event in &said[said.len().saturating_sub(LISTED)..] {
         let line = text::line(event, &TimeZone::UTC);
         // Time and place stand before it, two blanks apart.
@@ -117,9 +117,9 @@ pub(super) fn in_order(material: &Material, series: &Series) -> Table {
 }
 
 /// When each level was first in force, for how long, and how long before the failure.
-pub(super) fn levels(args: &Args, material: &Material, series: &Series) -> Table {
+pub(super) fn levels(args: &Args, material: &Material, series: &Series) -> TextTable {
     let (levels, unknown) = levels_in(&material.events, Some(&series.benchmark), span(series));
-    let mut table = Table::headed([
+    let mut table = TextTable::headed([
         "level",
         "first",
         "hours in force",
@@ -172,6 +172,6 @@ pub(super) fn scorecard(
     if args.failure_time.is_none() && !args.no_failure {
         return Ok(None);
     }
-    let whole = (&material.recording, series);
-    score::part(args.failure_time, whole, &material.policy).map(Some)
+    let recording = &material.recording;
+    score::part(args.failure_time, recording, series, &material.policy).map(Some)
 }

@@ -1,6 +1,6 @@
 //! The schema of a site file: its keys from the reader itself, what they mean from the example with every key.
 
-use crate::config::{Key, Keys, Shape, keys};
+use crate::config::{Key, Keys, ValueShape, keys};
 use anyhow::Context;
 use serde_json::{Map, Value, json};
 
@@ -34,7 +34,7 @@ fn table(name: &str, keys: &Keys, notes: &[Note]) -> anyhow::Result<Value> {
         keys.copied().any(|key| key.is_required)
     };
     let is_required = |key: &&Key| {
-        key.is_required || matches!(key.shape, Shape::Table(table) if must_have(table))
+        key.is_required || matches!(key.shape, ValueShape::Table(table) if must_have(table))
     };
     let required = known.iter().filter(is_required);
     let required: Vec<&str> = required.map(|key| key.name).collect();
@@ -67,21 +67,23 @@ fn property(table: &str, key: &Key, notes: &[Note]) -> Value {
     schema
 }
 
-fn of_shape(shape: Shape) -> Value {
+fn of_shape(shape: ValueShape) -> Value {
     let reference = |name: &str| json!({ "$ref": format!("#/$defs/{name}") });
     match shape {
-        Shape::Text => json!({ "type": "string" }),
-        Shape::Texts => json!({ "type": "array", "items": { "type": "string" } }),
-        Shape::TextOrTexts => {
+        ValueShape::Text => json!({ "type": "string" }),
+        ValueShape::Texts => json!({ "type": "array", "items": { "type": "string" } }),
+        ValueShape::TextOrTexts => {
             json!({ "type": ["string", "array"], "items": { "type": "string" } })
         }
-        Shape::Switch => json!({ "type": "boolean" }),
-        Shape::Number => json!({ "type": "number" }),
-        Shape::Chance => json!({ "type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1 }),
-        Shape::Numbers => json!({ "type": "array", "items": { "type": "number" } }),
-        Shape::Marks => json!({ "type": "array", "items": { "type": ["number", "string"] } }),
-        Shape::Table(name) => reference(name),
-        Shape::Tables(name) => json!({ "type": "array", "items": reference(name) }),
+        ValueShape::Switch => json!({ "type": "boolean" }),
+        ValueShape::Number => json!({ "type": "number" }),
+        ValueShape::Chance => {
+            json!({ "type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1 })
+        }
+        ValueShape::Numbers => json!({ "type": "array", "items": { "type": "number" } }),
+        ValueShape::Marks => json!({ "type": "array", "items": { "type": ["number", "string"] } }),
+        ValueShape::Table(name) => reference(name),
+        ValueShape::Tables(name) => json!({ "type": "array", "items": reference(name) }),
     }
 }
 

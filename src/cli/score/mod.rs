@@ -8,7 +8,7 @@ use super::{bar, exit, picture};
 use crate::alert::Policy;
 use crate::figures;
 use crate::reading::{Recording, Series, Timestamp, days_since};
-use crate::score::{Card, History, METHODS, Truth, card};
+use crate::score::{Card, METHODS, Truth, WholeRecord, card};
 use anyhow::{Context, ensure};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -63,7 +63,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         "--plot draws one benchmark, and there are {count}: expected --benchmark"
     );
     for (index, series) in recording.series.iter().enumerate() {
-        let report = report(args.failure_time, (&recording, series), &policy)?;
+        let report = report(args.failure_time, &recording, series, &policy)?;
         if let Some(file) = &args.plot {
             let svg = figures::life_expectancy(&report.card, report.failure_time);
             picture::write(file, &svg)?;
@@ -78,10 +78,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
 /// The scorecard and its figure as a part of a page.
 pub(super) fn part(
     failure_time: Option<Timestamp>,
-    whole: (&Recording, &Series),
+    recording: &Recording,
+    series: &Series,
     policy: &Policy,
 ) -> anyhow::Result<String> {
-    let report = report(failure_time, whole, policy)?;
+    let report = report(failure_time, recording, series, policy)?;
     let svg = figures::life_expectancy(&report.card, failure_time);
     Ok(format!(
         "<figure>\n{svg}</figure>\n<p>{}</p>\n<div class=\"wide\">{}</div>\n",
@@ -92,7 +93,8 @@ pub(super) fn part(
 
 fn report(
     failure_time: Option<Timestamp>,
-    (recording, series): (&Recording, &Series),
+    recording: &Recording,
+    series: &Series,
     policy: &Policy,
 ) -> anyhow::Result<ScoreReport> {
     let mut series = series.clone();
@@ -118,12 +120,12 @@ fn report(
             series.benchmark
         )
     })?;
-    let history = History::of(
+    let history = WholeRecord::of(
         &series,
         &recording.channels,
         policy.critical_velocity_mm_per_day,
     );
-    let template = "{msg} {bar:40} {pos}/{len} looks, {elapsed}";
+    let template = "{msg} {bar:40} {pos}/{len} forecasts, {elapsed}";
     let bar = bar::counted(0, template).with_message(format!("benchmark {}", series.benchmark));
     let mut card = card(&history, epoch, truth, &mut |done, count| {
         bar.set_length(count);

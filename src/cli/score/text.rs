@@ -2,7 +2,7 @@
 
 use super::{ScoreReport, hours};
 use crate::alert::Level;
-use crate::cli::table::{Table, time};
+use crate::cli::table::{TextTable, time};
 use crate::reading::Timestamp;
 use crate::score::Score;
 use std::collections::BTreeMap;
@@ -37,13 +37,13 @@ pub(super) fn meaning(report: &ScoreReport) -> String {
     } else {
         let looks = report.card.looks.len();
         format!(
-            "Over {looks} looks: mean CRPS, days, and the highest chance of a failure within 400 days."
+            "Over {looks} forecasts: mean CRPS, days, and the highest chance of a failure within 400 days."
         )
     }
 }
 
 /// The scores.
-pub(super) fn table(report: &ScoreReport) -> Table {
+pub(super) fn table(report: &ScoreReport) -> TextTable {
     if report.failure_time.is_some() {
         leads(report)
     } else {
@@ -52,7 +52,7 @@ pub(super) fn table(report: &ScoreReport) -> Table {
 }
 
 /// A row for each method, a column for each lead.
-fn leads(report: &ScoreReport) -> Table {
+fn leads(report: &ScoreReport) -> TextTable {
     let heads = report.card.leads.iter().map(|lead| {
         if lead.lead_days < HOURS_UNDER_DAYS {
             format!("{:.0} h before", 24.0 * lead.lead_days)
@@ -60,7 +60,7 @@ fn leads(report: &ScoreReport) -> Table {
             format!("{:.0} d before", lead.lead_days)
         }
     });
-    let mut table = Table::headed(std::iter::once("method".to_owned()).chain(heads));
+    let mut table = TextTable::headed(std::iter::once("method".to_owned()).chain(heads));
     for method in &report.card.methods {
         let cells = report.card.leads.iter().map(|lead| {
             let (factor, unit) = if lead.lead_days < HOURS_UNDER_DAYS {
@@ -88,8 +88,8 @@ fn cell(score: &Score, factor: f64, unit: &str) -> String {
     }
 }
 
-fn looks(report: &ScoreReport) -> Table {
-    let mut table = Table::headed(["method", "CRPS", "highest chance", "said"]);
+fn looks(report: &ScoreReport) -> TextTable {
+    let mut table = TextTable::headed(["method", "CRPS", "highest chance", "said"]);
     for method in &report.card.methods {
         let of = |look: &BTreeMap<&'static str, Score>| look.get(method).cloned();
         let scores: Vec<Score> = report

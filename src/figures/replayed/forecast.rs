@@ -5,6 +5,7 @@ use crate::figures::day;
 use crate::figures::in_time::{dots, every_few, line};
 use crate::plot::{Axis, BLACK, BLUE, GREY, Legend, Mark, Panel, Stack};
 
+/// Heights of both panels, in the sheet's units.
 const FORECASTS: f64 = 380.0;
 const CHANCES: f64 = 80.0;
 /// The upright axis ends so far after the record's end or the collapse, as a share of the time before.

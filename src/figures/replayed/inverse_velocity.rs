@@ -146,7 +146,7 @@ impl Replayed<'_> {
         let y = Axis::named(0.0, count, names.collect());
         let mut marks = Vec::new();
         for (index, one) in dated.iter().enumerate() {
-            marks.extend(self.row(one, (index, height(index)), x));
+            marks.extend(self.row(one, index, height(index), x));
         }
         marks.extend(self.collapse_line());
         let horizon = dated.iter().find_map(|one| one.refit);
@@ -164,7 +164,7 @@ impl Replayed<'_> {
     }
 
     /// The marks of one forecast in its row, with their names in the first.
-    fn row(&self, one: &Dated, (index, y): (usize, f64), x: &Axis) -> Vec<(String, Mark)> {
+    fn row(&self, one: &Dated, index: usize, y: f64, x: &Axis) -> Vec<(String, Mark)> {
         let named = |name: &str| {
             if index == 0 {
                 name.to_owned()

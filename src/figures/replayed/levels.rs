@@ -3,7 +3,7 @@
 use super::Replayed;
 use crate::alert::Level;
 use crate::figures::day;
-use crate::monitor::{Stretch, levels_in};
+use crate::monitor::{LevelStretch, levels_in};
 use crate::plot::{Axis, BLACK, GREY, Legend, Mark, Panel};
 use crate::reading::days_since;
 
@@ -13,7 +13,7 @@ const WHITE: &str = "#ffffff";
 
 /// Every stretch of one level, from the first reading to the last; then those in which it was unknown, which
 /// stand beside the level.
-pub(super) fn stretches(replayed: &Replayed) -> (Vec<Stretch>, Vec<Stretch>) {
+pub(super) fn stretches(replayed: &Replayed) -> (Vec<LevelStretch>, Vec<LevelStretch>) {
     replayed.span().map_or_else(Default::default, |span| {
         levels_in(replayed.events, Some(&replayed.series.benchmark), span)
     })
@@ -50,7 +50,7 @@ pub(super) fn panel(replayed: &Replayed, x: &Axis) -> Panel {
     }
 }
 
-fn fill(replayed: &Replayed, stretch: &Stretch) -> Mark {
+fn fill(replayed: &Replayed, stretch: &LevelStretch) -> Mark {
     let name = stretch.level.name();
     let (colour, ink) = match stretch.level {
         Level::Green => ("#6cbf84", BLACK),

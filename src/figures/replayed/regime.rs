@@ -5,6 +5,7 @@ use crate::figures::day;
 use crate::figures::in_time::{every_few, line};
 use crate::plot::{Axis, BLUE, GREY, Legend, Mark, Panel, RED, Stack};
 
+/// Heights of both panels, in the sheet's units.
 const PROBABILITIES: f64 = 220.0;
 const CHANCES: f64 = 140.0;
 
@@ -49,15 +50,15 @@ impl Replayed<'_> {
             title,
             width: WIDTH,
             panels: vec![
-                (PROBABILITIES, self.shares(("probability", &x), regime)),
-                (CHANCES, self.shares(("chance of a collapse", &x), chances)),
+                (PROBABILITIES, self.shares("probability", &x, regime)),
+                (CHANCES, self.shares("chance of a collapse", &x, chances)),
                 (levels::HEIGHT, levels::panel(self, &x)),
             ],
         }
         .svg()
     }
 
-    fn shares(&self, (title, x): (&str, &Axis), mut marks: Vec<(String, Mark)>) -> Panel {
+    fn shares(&self, title: &str, x: &Axis, mut marks: Vec<(String, Mark)>) -> Panel {
         let collapse = self.collapse_line();
         marks.extend(collapse.map(|(_, mark)| ("collapse".to_owned(), mark)));
         Panel {

@@ -129,7 +129,7 @@ impl Posterior {
                 found.map(|(_, side)| side)
             })
             .collect();
-        let drafts = draw(&mut bench, &textures, (sides, &QUICK));
+        let drafts = draw(&mut bench, &textures, sides, &QUICK);
         Self::of(&window, &drafts, bench.evaluations)
     }
 
@@ -168,7 +168,7 @@ impl Posterior {
                 found.map(|(_, side)| side)
             })
             .collect();
-        let drafts = draw(&mut bench, &textures, (sides, &THOROUGH));
+        let drafts = draw(&mut bench, &textures, sides, &THOROUGH);
         Self::of(&window, &drafts, bench.evaluations)
     }
 
@@ -233,19 +233,19 @@ fn side<'a>(
     let size = log_size.exp();
     let found = starts
         .iter()
-        .filter_map(|start| problem.search(bench, *start, (white, size), ROUNDS.0))
+        .filter_map(|start| problem.search(bench, *start, white, size, ROUNDS.0))
         .min_by(|a: &Mode, b: &Mode| a.cost.total_cmp(&b.cost))?;
     let mut log_size = *log_size;
     if problem.evaluate(bench, &found.at) {
         (log_size, _) = white.size(problem.window, &bench.residuals, log_size, 4);
     }
-    let Mode { at, .. } = problem.search(bench, found.at, (white, log_size.exp()), ROUNDS.1)?;
+    let Mode { at, .. } = problem.search(bench, found.at, white, log_size.exp(), ROUNDS.1)?;
     let summit = Summit {
         shape: problem.shape(&at),
         ln_v: at[LN_V],
         log_size,
     };
-    let side = Side::new(problem, bench, at, (textures, log_size))?;
+    let side = Side::new(problem, bench, at, textures, log_size)?;
     Some((summit, side))
 }
 
@@ -283,7 +283,8 @@ fn line(problem: &ModeProblem<'_>, rates: &[Rate]) -> (f64, f64) {
 fn draw(
     bench: &mut ModeBench,
     textures: &[Texture],
-    (sides, effort): (Vec<Side<'_>>, &Effort),
+    sides: Vec<Side<'_>>,
+    effort: &Effort,
 ) -> Vec<Draft> {
     let mut said: Vec<f64> = sides.iter().map(|side| side.log_evidence).collect();
     let mut lots: Vec<Lot<'_>> = sides.into_iter().map(Lot::new).collect();
@@ -320,7 +321,7 @@ impl<'a> Lot<'a> {
         }
     }
 
-    /// Draws `number` more, weighs all anew against the mixture of the proposals that they came from
+    /// Draws `number` more, weighs all again against the mixture of the proposals that they came from
     /// (Owen and Zhou 2000: no draw weighs more than any of them would make it), and shapes the next proposal by them.
     fn draw(&mut self, bench: &mut ModeBench, textures: &[Texture], (first, number): (u32, u32)) {
         let one = |at| self.next.draw(bench, textures, first + at);

@@ -1,6 +1,6 @@
 //! Where a posterior is highest on one side of kappa = 0, and how it falls off there.
 
-use super::past::{Past, PastShape};
+use super::past::{PastShape, PastSolution};
 use super::prior::{P_PRIOR, SLOPE_PER_INTERVAL, log_cauchy};
 use super::scatter::Texture;
 use super::window::Window;
@@ -39,7 +39,7 @@ pub(super) struct ModeProblem<'a> {
 /// Buffers that every evaluation uses again.
 #[derive(Debug)]
 pub(super) struct ModeBench {
-    past: Past,
+    past: PastSolution,
     pub(super) residuals: Vec<f64>,
     there: Vec<f64>,
     pub(super) columns: [Vec<f64>; 4],
@@ -53,6 +53,7 @@ pub(super) struct Mode {
     pub(super) cost: f64,
 }
 
+/// Step of a derivative by differences: far above the rounding, far below the scale of a coordinate, which is 1.
 const JACOBIAN_STEP: f64 = 1e-4;
 /// The longest step that a search may take in one coordinate.
 const LONGEST_STEP: f64 = 1.5;
@@ -86,7 +87,7 @@ impl Sign {
 impl ModeBench {
     pub(super) fn new(count: usize) -> Self {
         Self {
-            past: Past::default(),
+            past: PastSolution::default(),
             residuals: vec![0.0; count],
             there: vec![0.0; count],
             columns: [(); 4].map(|()| vec![0.0; count]),
@@ -138,11 +139,8 @@ impl ModeProblem<'_> {
             Sign::Positive => b_over_m > 0.0,
             Sign::Negative => b_over_m < 0.0,
         };
-        let law = (at[LN_V], shape);
-        exists
-            && self
-                .window
-                .residuals(&mut bench.past, law, span_days, &mut bench.residuals)
+        let (past, out) = (&mut bench.past, &mut bench.residuals);
+        exists && (self.window).residuals(past, at[LN_V], shape, span_days, out)
     }
 
     /// ln of the prior density at a point.
@@ -191,9 +189,9 @@ impl ModeProblem<'_> {
                 let mut moved = *at;
                 moved[axis] += step;
                 bench.evaluations += 1;
-                let law = (moved[LN_V], self.shape(&moved));
+                let shape = self.shape(&moved);
                 let (past, out) = (&mut bench.past, &mut bench.there);
-                if self.window.residuals(past, law, self.span_days, out) {
+                if (self.window).residuals(past, moved[LN_V], shape, self.span_days, out) {
                     taken = step;
                     break;
                 }
@@ -224,7 +222,8 @@ impl ModeProblem<'_> {
         &self,
         bench: &mut ModeBench,
         start: Point,
-        (texture, size): (&Texture, f64),
+        texture: &Texture,
+        size: f64,
         rounds: u32,
     ) -> Option<Mode> {
         let cost_of = |residuals: &[f64], at: &Point| {

@@ -31,7 +31,7 @@ pub(super) struct PastShape {
 
 /// One solution; its buffers are used again by the next.
 #[derive(Debug, Default)]
-pub(super) struct Past {
+pub(super) struct PastSolution {
     panels: Vec<PastPanel>,
     last: Node,
 }
@@ -54,7 +54,7 @@ struct PastPanel {
     slip: [f64; 6],
 }
 
-impl Past {
+impl PastSolution {
     /// Solves over `span` days ago; false where the velocity left the prior's range within them.
     /// Before that the slope creeps at the velocity it had then.
     pub(super) fn solve(&mut self, shape: PastShape, span: f64) -> bool {
@@ -107,7 +107,7 @@ impl Past {
         true
     }
 
-    /// (ln y, slip over the present velocity) `ago` days ago; `hint` walks along with growing `ago`.
+    /// (ln y, slip over the present velocity) `ago` days ago; `hint` moves along with growing `ago`.
     pub(super) fn at(&self, ago: f64, hint: &mut usize) -> (f64, f64) {
         if ago >= self.last.ago || self.panels.is_empty() {
             let creep = (-self.last.ln_y).exp();
@@ -234,7 +234,7 @@ mod tests {
 
     #[test]
     fn the_past_is_that_of_the_exact_solution_to_a_ten_thousandth() {
-        let mut past = Past::default();
+        let mut past = PastSolution::default();
         let mut seen = 0;
         for r in [-3.0, -0.9, -0.3, -1e-4, 0.0, 1e-4, 0.5, 4.0, 60.0] {
             for kappa in [-8.0, -1.0, -0.05, 0.0, 0.05, 1.0, 8.0, 100.0] {

@@ -92,12 +92,13 @@ impl<'a> Side<'a> {
         problem: ModeProblem<'a>,
         bench: &ModeBench,
         at: Point,
-        (textures, log_size): (&[Texture], f64),
+        textures: &[Texture],
+        log_size: f64,
     ) -> Option<Self> {
         let mut size = log_size;
         let mut components = Vec::with_capacity(textures.len());
         for texture in textures {
-            let one = Component::new(&problem, bench, at, (texture, size))?;
+            let one = Component::new(&problem, bench, at, texture, size)?;
             size = one.centre[SIZE];
             components.push(one);
         }
@@ -172,7 +173,7 @@ impl<'a> Side<'a> {
             })
     }
 
-    /// The same side with its proposal drawn up anew from what was drawn so far: where the weights lie, as
+    /// The same side with its proposal drawn up again from what was drawn so far: where the weights lie, as
     /// one normal shape for all textures, each with its share. Weights are levelled until they are worth
     /// enough draws to estimate a shape from.
     pub(super) fn refitted(&self, drafts: &[Draft]) -> Option<Self> {
@@ -258,7 +259,8 @@ impl Component {
         problem: &ModeProblem<'_>,
         bench: &ModeBench,
         at: Point,
-        (texture, log_size): (&Texture, f64),
+        texture: &Texture,
+        log_size: f64,
     ) -> Option<Self> {
         let window = problem.window;
         let (slope, bend) = problem.prior_slope(&at);

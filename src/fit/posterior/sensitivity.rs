@@ -54,7 +54,7 @@ impl OtherPrior {
 }
 
 impl Posterior {
-    /// The ensemble under another prior, by weighing the same laws anew.
+    /// The ensemble under another prior, by weighing the same laws again.
     pub fn under(&self, prior: OtherPrior) -> Ensemble {
         let samples = self.ensemble.samples.iter().zip(&self.spans_days);
         let mut samples: Vec<Sample> = samples

@@ -4,7 +4,7 @@
 //! error and v itself where it does not: so zero and backward velocities are readings like all others,
 //! and the scale is the data's alone, the same for every law.
 
-use super::past::{Past, PastShape};
+use super::past::{PastShape, PastSolution};
 use crate::fit::rates::{Rate, ReadingError};
 
 /// A velocity this many of its own standard errors large is half-way from v to ln v.
@@ -84,8 +84,9 @@ impl Window {
     /// slope creeps at the velocity that it had then. False where the law leaves the prior's range.
     pub(super) fn residuals(
         &self,
-        past: &mut Past,
-        (ln_v, shape): (f64, PastShape),
+        past: &mut PastSolution,
+        ln_v: f64,
+        shape: PastShape,
         span: f64,
         out: &mut [f64],
     ) -> bool {

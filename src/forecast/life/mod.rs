@@ -12,14 +12,13 @@ mod slope;
 
 pub use corpus::Corpus;
 
-use crate::fit::{Observation, Observations};
+use crate::fit::Observations;
 use crate::model::Law;
-use crate::reading::Quantity;
 use instrument::Instrument;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
-use slope::{Path, Slope};
+use slope::{DisplacementPath, Slope};
 
 /// How a life goes, and ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -74,25 +73,16 @@ impl Life {
     /// What a monitor has of this slope by `now_days`.
     pub fn known(&self, now_days: f64) -> Observations {
         let known = self.readings.iter().filter(|(days, _)| *days <= now_days);
-        let values = known.map(|(t_days, value)| Observation {
-            t_days: *t_days,
-            value: *value,
-            sigma: None,
-        });
-        Observations {
-            quantity: Quantity::Displacement,
-            averaging_days: 0.0,
-            values: values.collect(),
-        }
+        Observations::of_displacements(known.copied())
     }
 
     /// The life that `seed` gives; a slope that its load brings to another end, or down in less than 0.4 of
-    /// its time, is drawn anew.
+    /// its time, is drawn again.
     pub fn draw(fate: Fate, seed: u64) -> Self {
         Self::draw_with_path(fate, seed).0
     }
 
-    fn draw_with_path(fate: Fate, seed: u64) -> (Self, Path) {
+    fn draw_with_path(fate: Fate, seed: u64) -> (Self, DisplacementPath) {
         let mut generator = Pcg64::seed_from_u64(seed);
         loop {
             if let Some(drawn) = Self::attempt(fate, &mut generator) {
@@ -128,7 +118,7 @@ impl Life {
         }
     }
 
-    fn attempt(fate: Fate, generator: &mut impl Rng) -> Option<(Self, Path)> {
+    fn attempt(fate: Fate, generator: &mut impl Rng) -> Option<(Self, DisplacementPath)> {
         let (onset, duration) = slope::span(fate, generator);
         let law = slope::law(fate, duration, generator);
         let knots = load::of(fate, onset + 1.5 * duration, generator);
@@ -141,7 +131,7 @@ impl Life {
         (onset, duration): (f64, f64),
         knots: &[(f64, f64)],
         generator: &mut impl Rng,
-    ) -> Option<(Self, Path)> {
+    ) -> Option<(Self, DisplacementPath)> {
         let end = onset + 1.5 * duration;
         let (path, failure_days) = Slope { law, onset, end }.path(knots)?;
         let ends_as_it_should = match (fate, failure_days) {

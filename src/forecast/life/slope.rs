@@ -6,7 +6,7 @@ use crate::model::{Accuracy, Law, Load, LoadedLaw};
 use rand::{Rng, RngExt};
 
 /// (days, mm) at every knot of the load.
-pub(super) type Path = Vec<(f64, f64)>;
+pub(super) type DisplacementPath = Vec<(f64, f64)>;
 
 pub(super) struct Slope {
     pub(super) law: Law,
@@ -129,7 +129,7 @@ fn sorted_means(path: &[(f64, f64)], knots: usize) -> Vec<f64> {
 
 impl Slope {
     /// Where it is at every knot of the load, and when the critical velocity was passed.
-    pub(super) fn path(&self, knots: &[(f64, f64)]) -> Option<(Path, Option<f64>)> {
+    pub(super) fn path(&self, knots: &[(f64, f64)]) -> Option<(DisplacementPath, Option<f64>)> {
         let mut path = vec![(0.0, 0.0)];
         let mut creep = 0.0;
         let before = knots.partition_point(|(days, _)| *days <= self.onset);

@@ -36,7 +36,7 @@ fn exact(law: &Law, knots: Vec<(f64, f64)>, times: &[f64]) -> Vec<Option<Motion>
     motions
 }
 
-fn drive<'a>(nodes: &'a [f64], log_load: &'a [f64], events: &'a [Event]) -> Drive<'a> {
+fn drive<'a>(nodes: &'a [f64], log_load: &'a [f64], events: &'a [LoadEvent]) -> Drive<'a> {
     Drive {
         nodes,
         log_load,
@@ -46,8 +46,8 @@ fn drive<'a>(nodes: &'a [f64], log_load: &'a [f64], events: &'a [Event]) -> Driv
     }
 }
 
-fn event(node: usize) -> Event {
-    Event {
+fn event(node: usize) -> LoadEvent {
+    LoadEvent {
         node,
         log_load: 0.0,
         ln_y: 0.0,
@@ -134,7 +134,7 @@ fn where_failure_may_come_the_slip_is_the_precise_one_to_a_hundredth_and_the_vel
 #[test]
 fn a_step_of_the_load_is_that_of_the_precise_law() {
     let law = Law::from_paper(0.8, 3.0, 60.0, 1.0).unwrap();
-    let events = [Event {
+    let events = [LoadEvent {
         log_load: 0.7,
         ..event(100)
     }];
@@ -159,7 +159,7 @@ fn after_a_reset_and_a_change_of_friction_the_block_is_the_precise_laws_with_the
  {
     let law = Law::from_paper(0.8, 3.0, 60.0, 1.0).unwrap();
     let at = 120;
-    let change = Event {
+    let change = LoadEvent {
         ln_y: 0.5,
         ln_a: 1.5_f64.ln(),
         b: 0.3 * law.b,

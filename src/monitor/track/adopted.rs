@@ -4,7 +4,7 @@
 use super::forecast::UnderKnownLoad;
 use crate::effects::{self, ByClock};
 use crate::fit::{Observations, Rate};
-use crate::forecast::Panel;
+use crate::forecast::LawForecaster;
 use crate::monitor::history::History;
 use crate::monitor::motion::{fastest, is_new_highest, settled};
 use crate::reading::{Channel, Timestamp, after_days};
@@ -32,7 +32,7 @@ pub(super) struct Adopted {
     range: (f64, f64),
     /// The highest settled velocity of that record, mm/day.
     fastest: f64,
-    panel: Panel,
+    panel: LawForecaster,
     /// Readings in a row that were faster than explained.
     faster: u32,
 }
@@ -50,7 +50,7 @@ impl Adopted {
             usual: 0.0,
             range: (0.0, 0.0),
             fastest: fastest(&history.rates()).unwrap_or(0.0),
-            panel: Panel::default(),
+            panel: LawForecaster::default(),
             faster: 0,
         };
         let observations = &history.observations;
@@ -84,7 +84,8 @@ impl Adopted {
         &mut self,
         history: &History,
         channels: &[&Channel],
-        (critical, rates): (f64, &[Rate]),
+        critical: f64,
+        rates: &[Rate],
     ) -> Option<UnderKnownLoad> {
         let by_clock = self.by_clock(history, channels)?;
         let excess = self.panel.excess(by_clock.readings());

@@ -1,10 +1,10 @@
 //! A reading that lies far ahead of all others waits until another one confirms it: with one wrong time stamp all that
 //! comes before that time would be late.
 
-use super::{Beside, Track};
+use super::{StepContext, Track};
 use crate::alert::Policy;
 use crate::monitor::event::Event;
-use crate::monitor::history::Source;
+use crate::monitor::history::MeasuredAs;
 use crate::reading::{Reading, Timestamp, Unit};
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
@@ -14,7 +14,7 @@ const CONTRADICTED: u32 = 3;
 
 /// The reading that waits.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(super) struct Ahead {
+pub(super) struct HeldReading {
     unit: Unit,
     averaging: Option<SignedDuration>,
     reading: Reading,
@@ -22,7 +22,7 @@ pub(super) struct Ahead {
     before: u32,
 }
 
-impl Ahead {
+impl HeldReading {
     /// Whether a reading of `time` goes on where this one stands.
     pub(super) fn precedes(&self, time: Timestamp, within: SignedDuration) -> bool {
         let since = time.duration_since(self.reading.time);
@@ -35,7 +35,7 @@ impl Track {
     pub(in crate::monitor) fn put_aside(
         &mut self,
         now: Timestamp,
-        source: Source,
+        source: MeasuredAs,
         reading: &Reading,
     ) -> Vec<Event> {
         let text = format!(
@@ -46,7 +46,7 @@ impl Track {
                 reading.time.duration_since(newest)
             ))
         );
-        self.ahead = Some(Ahead {
+        self.ahead = Some(HeldReading {
             unit: source.unit,
             averaging: source.averaging,
             reading: *reading,
@@ -60,17 +60,17 @@ impl Track {
         &mut self,
         policy: &Policy,
         time: Timestamp,
-        beside: &Beside<'_>,
+        context: &StepContext<'_>,
     ) -> Vec<Event> {
         let Some(mut ahead) = self.ahead.take() else {
             return Vec::new();
         };
-        if time >= ahead.reading.time || beside.now >= ahead.reading.time {
-            let source = Source {
+        if time >= ahead.reading.time || context.phase.now >= ahead.reading.time {
+            let source = MeasuredAs {
                 unit: ahead.unit,
                 averaging: ahead.averaging,
             };
-            return self.take_one(policy, source, &ahead.reading, beside);
+            return self.take_one(policy, source, &ahead.reading, context);
         }
         if self.newest.is_some_and(|newest| time > newest) {
             ahead.before += 1;

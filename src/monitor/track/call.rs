@@ -2,7 +2,7 @@
 
 use super::forecast::Forecast;
 use super::{Track, days};
-use crate::alert::{Cause, Entered, Evidence, Policy, Transition};
+use crate::alert::{AlertCause, AlertEvidence, Entered, Policy, Transition};
 use crate::fit::Rate;
 use crate::monitor::event::{AlertState, Event, EventKind};
 use crate::monitor::motion::{
@@ -13,12 +13,12 @@ use jiff::SignedDuration;
 
 /// How far ahead red, and orange and yellow, look from the newest reading.
 #[derive(Debug, Clone, Copy)]
-struct Ahead {
+struct LookAhead {
     red: SignedDuration,
     orange: SignedDuration,
 }
 
-impl Ahead {
+impl LookAhead {
     fn of(policy: &Policy, forecast: Option<&Forecast>) -> Self {
         forecast.map_or(
             Self {
@@ -41,10 +41,10 @@ impl Track {
         forecast: Option<&Forecast>,
     ) -> Vec<Event> {
         let within = |span| forecast.map(|forecast| forecast.chance_within(days(span)));
-        let ahead = Ahead::of(policy, forecast);
+        let ahead = LookAhead::of(policy, forecast);
         let rates = forecast.map_or(&[][..], |forecast| &forecast.plain.rates);
         let look = self.look.filter(|(until, _)| time < *until);
-        let mut evidence = Evidence {
+        let mut evidence = AlertEvidence {
             chance_within_evacuation_time: within(ahead.red),
             chance_within_outlook: within(ahead.orange),
             causes: look.map(|(_, cause)| cause).into_iter().collect(),
@@ -62,8 +62,8 @@ impl Track {
             events.push(self.fault(time, "moves-backwards", text));
         }
         if self.backwards {
-            self.look_until(policy, time, Cause::MovesBackwards);
-            evidence.causes.push(Cause::MovesBackwards);
+            self.look_until(policy, time, AlertCause::MovesBackwards);
+            evidence.causes.push(AlertCause::MovesBackwards);
         }
         let chances = policy.spans().filter_map(|span| {
             let forecast = forecast?;
@@ -76,7 +76,7 @@ impl Track {
         self.levels.note(time, self.latch.level());
         let reported = transitions
             .iter()
-            .map(|change| self.alert_event(time, policy, (&evidence, ahead), change));
+            .map(|change| self.alert_event(time, policy, &evidence, ahead, change));
         events.extend(reported);
         events
     }
@@ -99,19 +99,25 @@ impl Track {
             return None;
         }
         if !needs_rates {
-            evidence = Evidence {
+            evidence = AlertEvidence {
                 due: evidence.due,
                 ..self.observed(time, &self.history.rates())
             };
         }
         let change = self.latch.raise(policy, &evidence)?;
-        Some(self.alert_event(time, policy, (&evidence, Ahead::of(policy, None)), &change))
+        Some(self.alert_event(
+            time,
+            policy,
+            &evidence,
+            LookAhead::of(policy, None),
+            &change,
+        ))
     }
 
     /// What the readings show by themselves.
-    fn observed(&self, time: Timestamp, rates: &[Rate]) -> Evidence {
+    fn observed(&self, time: Timestamp, rates: &[Rate]) -> AlertEvidence {
         let shown = &self.history.observations;
-        Evidence {
+        AlertEvidence {
             now: time,
             velocity_mm_per_day: rates
                 .last()
@@ -119,7 +125,7 @@ impl Track {
             settled_velocity_mm_per_day: settled(rates),
             displacement_mm: displacement_mm(shown),
             acceleration_mm_per_day2: acceleration(rates),
-            ..Evidence::default()
+            ..AlertEvidence::default()
         }
     }
 
@@ -127,10 +133,11 @@ impl Track {
         &self,
         time: Timestamp,
         policy: &Policy,
-        (evidence, ahead): (&Evidence, Ahead),
+        evidence: &AlertEvidence,
+        ahead: LookAhead,
         change: &Transition,
     ) -> Event {
-        let text = self.text(policy, (evidence, ahead), change);
+        let text = self.text(policy, evidence, ahead, change);
         self.alert_of(time, change, text)
     }
 
@@ -152,7 +159,8 @@ impl Track {
     fn text(
         &self,
         policy: &Policy,
-        (evidence, ahead): (&Evidence, Ahead),
+        evidence: &AlertEvidence,
+        ahead: LookAhead,
         change: &Transition,
     ) -> String {
         let verb = match change.entered {
@@ -196,7 +204,7 @@ impl Track {
 }
 
 /// The figures that a rule rests on, where the text has them nowhere else.
-fn grounds(policy: &Policy, evidence: &Evidence, rule: &str) -> String {
+fn grounds(policy: &Policy, evidence: &AlertEvidence, rule: &str) -> String {
     let figure = |name: &str, value: Option<f64>, unit: &str| {
         value.map_or_else(String::new, |value| format!("; {name} {value:.3} {unit}"))
     };

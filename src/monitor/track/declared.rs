@@ -1,11 +1,11 @@
 //! What people declare, as it acts on one benchmark.
 
 use super::unknown::Reason;
-use super::{Beside, Track};
+use super::{StepContext, Track};
 use crate::alert::Policy;
 use crate::monitor::declared::Declarations;
 use crate::monitor::event::Event;
-use crate::monitor::history::Source;
+use crate::monitor::history::MeasuredAs;
 use crate::reading::{Reading, Timestamp};
 
 impl Track {
@@ -21,12 +21,12 @@ impl Track {
     }
 
     /// Keeps a reading that is not to count: one during maintenance, or a velocity that is a mean over a reset.
-    pub(super) fn leave_out(&mut self, source: Source, reading: &Reading) -> Vec<Event> {
+    pub(super) fn leave_out(&mut self, source: MeasuredAs, reading: &Reading) -> Vec<Event> {
         if !self.history.set_aside(source, reading) {
             return Vec::new();
         }
         if self.declared.is_maintained(reading.time) {
-            self.silence.goes_on(reading.time);
+            self.silence.continues(reading.time);
             return Vec::new();
         }
         let now = self
@@ -68,12 +68,12 @@ impl Track {
         self.ends_unknown((now, since), Reason::NoData, text)
     }
 
-    /// Goes by other declarations from here on, and looks anew at the readings that it has where they concern some.
+    /// Goes by other declarations from here on, and looks again at the readings that it has where they concern some.
     pub(in crate::monitor) fn redeclare(
         &mut self,
         policy: &Policy,
         declared: Declarations,
-        beside: &Beside<'_>,
+        context: &StepContext<'_>,
     ) -> Vec<Event> {
         if self.declared.replace(declared).is_none() {
             return Vec::new();
@@ -86,7 +86,7 @@ impl Track {
         if !is_sorted_out && events.is_empty() {
             return events;
         }
-        if let Some(forecast) = self.forecast(policy.critical_velocity_mm_per_day, beside) {
+        if let Some(forecast) = self.forecast(policy.critical_velocity_mm_per_day, context) {
             events.extend(self.refit(policy, time, &forecast));
             events.extend(self.alert(policy, time, Some(&forecast)));
         }

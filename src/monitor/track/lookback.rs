@@ -2,9 +2,9 @@
 
 use super::forecast::to_the_next_reading;
 use super::{Track, days};
-use crate::alert::{Evidence, Held, Latch, Level, Policy};
+use crate::alert::{AlertEvidence, Held, Latch, Level, Policy};
 use crate::fit::Observations;
-use crate::forecast::Panel;
+use crate::forecast::LawForecaster;
 use crate::monitor::event::{Event, EventKind};
 use crate::monitor::history::History;
 use crate::monitor::motion::{acceleration, displacement_mm, newest_velocity, settled};
@@ -139,8 +139,9 @@ fn highest(
     highest
 }
 
-fn evidence(policy: &Policy, observations: &Observations, now: Timestamp) -> Evidence {
-    let outlook = Panel::default().update(observations, policy.critical_velocity_mm_per_day);
+fn evidence(policy: &Policy, observations: &Observations, now: Timestamp) -> AlertEvidence {
+    let outlook =
+        LawForecaster::default().update(observations, policy.critical_velocity_mm_per_day);
     let rates = outlook.as_ref().map_or(&[][..], |outlook| &outlook.rates);
     let within = |span| Some(outlook.as_ref()?.chances.chance_within(days(span)));
     let evacuation = policy.evacuation_time;
@@ -151,7 +152,7 @@ fn evidence(policy: &Policy, observations: &Observations, now: Timestamp) -> Evi
         let outlook = outlook.as_ref()?;
         Some((span, within(to_the_next_reading(outlook, span))?))
     };
-    Evidence {
+    AlertEvidence {
         now,
         chances: policy.spans().filter_map(chance).collect(),
         chance_within_evacuation_time: within(ahead),
@@ -162,6 +163,6 @@ fn evidence(policy: &Policy, observations: &Observations, now: Timestamp) -> Evi
         settled_velocity_mm_per_day: settled(rates),
         displacement_mm: displacement_mm(observations),
         acceleration_mm_per_day2: acceleration(rates),
-        ..Evidence::default()
+        ..AlertEvidence::default()
     }
 }

@@ -20,41 +20,47 @@ use super::covariates::Covariates;
 use super::declared::Declarations;
 use super::drift::Drift;
 use super::event::{AlertState, Event, EventKind};
-use super::history::{History, Source, Taken};
+use super::history::{History, MeasuredAs, Taken};
 use super::kept::KeptForecast;
 use super::silence::Silence;
-use crate::alert::{Cause, Held, Latch, Level, Policy};
+use crate::alert::{AlertCause, Held, Latch, Level, Policy};
 use crate::fit::Rate;
-use crate::forecast::Panel;
+use crate::forecast::LawForecaster;
 use crate::reading::{BenchmarkId, Reading, SECONDS_PER_DAY, Suspicion, Timestamp, days_since};
 use crate::regime::Tracker;
 use adopted::Adopted;
-use ahead::Ahead;
+use ahead::HeldReading;
 use forecast::Forecast;
 use jiff::SignedDuration;
 use lookback::{Levels, Lookback};
 use overdue::Overdue;
 use pace::Pace;
-use past::Record;
+use past::PastReview;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use unknown::{Reason, Unknown};
 use watch::Watch;
 
-pub(super) use past::{PAST, Walk};
+pub(super) use past::{PAST, PastReplay};
 
 /// So many readings in a row with one value are a stuck sensor, or a resolution too coarse to show it.
 const STUCK: usize = 24;
 
-/// What lies beside a benchmark's readings.
+/// What a step of a benchmark depends on beside its readings.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Beside<'a> {
+pub(super) struct StepContext<'a> {
+    pub(super) phase: Phase,
     pub(super) covariates: &'a Covariates,
+}
+
+/// What holds for all benchmarks at one step.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Phase {
     pub(super) explain: Explain,
     /// Data time.
     pub(super) now: Timestamp,
     /// Whether what comes late is judged when all that came with it has been taken.
-    pub(super) settles: bool,
+    pub(super) in_batches: bool,
     /// Whether the past is being read: nothing is judged until it has been.
     pub(super) is_past: bool,
     /// Whether readings come faster than they can be judged: each benchmark is judged for its newest.
@@ -66,7 +72,7 @@ pub(super) struct Beside<'a> {
 pub(super) struct Track {
     benchmark: BenchmarkId,
     history: History,
-    panel: Panel,
+    panel: LawForecaster,
     regime: Tracker,
     intercept: Drift,
     transition: Drift,
@@ -75,8 +81,8 @@ pub(super) struct Track {
     #[serde(default)]
     held: Held,
     silence: Silence,
-    /// Until when something that happened asks for a look, and what.
-    look: Option<(Timestamp, Cause)>,
+    /// Until when something that happened calls for attention, and what.
+    look: Option<(Timestamp, AlertCause)>,
     faulted: bool,
     backwards: bool,
     newest: Option<Timestamp>,
@@ -98,7 +104,7 @@ pub(super) struct Track {
     unknown: Unknown,
     /// A reading that lies far ahead of all others.
     #[serde(default)]
-    ahead: Option<Ahead>,
+    ahead: Option<HeldReading>,
     /// By how much its readings jump to and fro, where they are spoilt.
     #[serde(default)]
     spoilt_by: Option<f64>,
@@ -122,13 +128,13 @@ pub(super) struct Track {
     accepted: BTreeSet<Suspicion>,
     /// Whether its past has been gone through.
     #[serde(default)]
-    record: Record,
+    record: PastReview,
 }
 
 impl Track {
     pub(super) fn new(
         benchmark: BenchmarkId,
-        source: Source,
+        source: MeasuredAs,
         epoch: Timestamp,
         declared: Declarations,
     ) -> Self {
@@ -145,10 +151,10 @@ impl Track {
             kept: None,
             overdue: None,
             accepted: BTreeSet::new(),
-            record: Record::Known,
+            record: PastReview::Known,
             benchmark,
             history: History::new(source, epoch),
-            panel: Panel::default(),
+            panel: LawForecaster::default(),
             regime: Tracker::default(),
             intercept: Drift::default(),
             transition: Drift::default(),
@@ -183,14 +189,14 @@ impl Track {
     pub(super) fn take(
         &mut self,
         policy: &Policy,
-        source: Source,
+        source: MeasuredAs,
         reading: &Reading,
-        beside: &Beside<'_>,
+        context: &StepContext<'_>,
     ) -> Vec<Event> {
-        let mut events = self.judge_ahead(policy, reading.time, beside);
-        events.extend(self.take_one(policy, source, reading, beside));
-        if self.record == Record::Owed {
-            events.retain(|event| !past::is_of_the_record(event));
+        let mut events = self.judge_ahead(policy, reading.time, context);
+        events.extend(self.take_one(policy, source, reading, context));
+        if self.record == PastReview::Owed {
+            events.retain(|event| !event.kind.is_of_the_record());
         }
         events
     }
@@ -198,9 +204,9 @@ impl Track {
     fn take_one(
         &mut self,
         policy: &Policy,
-        source: Source,
+        source: MeasuredAs,
         reading: &Reading,
-        beside: &Beside<'_>,
+        context: &StepContext<'_>,
     ) -> Vec<Event> {
         let mut events = self.declared_with(reading.time);
         if self.history.is_left_out(&self.declared, reading.time) {
@@ -239,36 +245,36 @@ impl Track {
         if taken == Taken::Newest {
             events.extend(self.judge_sensor(time));
             events.extend(self.suspect(source, time));
-            if !beside.settles {
+            if !context.phase.in_batches {
                 events.extend(self.look_back(policy, time));
             }
         }
-        let is_owed = beside.settles && taken != Taken::Newest;
+        let is_owed = context.phase.in_batches && taken != Taken::Newest;
         self.owes |= is_owed;
-        if beside.is_past {
+        if context.phase.is_past {
             return events;
         }
         let is_stuck = self.unknown.has(Reason::Stuck);
         if is_owed
             || is_stuck
             || !self.is_refit_due(policy, taken, reading.time)
-            || beside.is_queue && self.waits(policy, time)
+            || context.phase.is_queue && self.waits(policy, time)
         {
             events.extend(self.raise(policy, time));
             return events;
         }
-        events.extend(self.judge(policy, time, beside));
+        events.extend(self.judge(policy, time, context));
         events
     }
 
     /// What follows from the readings as they are now.
-    fn judge(&mut self, policy: &Policy, time: Timestamp, beside: &Beside<'_>) -> Vec<Event> {
+    fn judge(&mut self, policy: &Policy, time: Timestamp, context: &StepContext<'_>) -> Vec<Event> {
         let mut events = Vec::new();
         (self.owes, self.queued_since) = (false, None);
-        let forecast = self.forecast(policy.critical_velocity_mm_per_day, beside);
+        let forecast = self.forecast(policy.critical_velocity_mm_per_day, context);
         if let Some(forecast) = &forecast {
             events.extend(self.refit(policy, time, forecast));
-            events.extend(self.watch(policy, time, forecast, beside));
+            events.extend(self.watch(policy, time, forecast, context));
         }
         let (may_fall, latch) = (self.may_fall(), self.latch.clone());
         let called = self.alert(policy, time, forecast.as_ref());
@@ -302,7 +308,7 @@ impl Track {
     }
 
     /// Everything that came together has been taken: judges what of it came late, or queued.
-    pub(super) fn settle(&mut self, policy: &Policy, beside: &Beside<'_>) -> Vec<Event> {
+    pub(super) fn judge_batch(&mut self, policy: &Policy, context: &StepContext<'_>) -> Vec<Event> {
         let is_owed = self.owes || self.is_queued();
         let Some(time) = self.newest.filter(|_| is_owed) else {
             return Vec::new();
@@ -311,9 +317,9 @@ impl Track {
             (self.owes, self.queued_since) = (false, None);
             return Vec::new();
         }
-        let mut events = self.judge(policy, time, beside);
-        if self.record == Record::Owed {
-            events.retain(|event| !past::is_of_the_record(event));
+        let mut events = self.judge(policy, time, context);
+        if self.record == PastReview::Owed {
+            events.retain(|event| !event.kind.is_of_the_record());
         }
         events
     }
@@ -346,12 +352,12 @@ impl Track {
     }
 
     /// What the laws predict after the newest reading.
-    fn forecast(&mut self, critical: f64, beside: &Beside<'_>) -> Option<Forecast> {
+    fn forecast(&mut self, critical: f64, context: &StepContext<'_>) -> Option<Forecast> {
         let plain = self.panel.update(&self.history.observations, critical)?;
         let history = &self.history;
         let known_load = self.adopted.as_mut().and_then(|adopted| {
-            let channels = beside.covariates.list();
-            adopted.forecast(history, &channels, (critical, &plain.rates))
+            let channels = context.covariates.list();
+            adopted.forecast(history, &channels, critical, &plain.rates)
         });
         Some(Forecast { plain, known_load })
     }
@@ -453,7 +459,7 @@ impl Track {
         events
     }
 
-    fn look_until(&mut self, policy: &Policy, time: Timestamp, cause: Cause) {
+    fn look_until(&mut self, policy: &Policy, time: Timestamp, cause: AlertCause) {
         self.look = time
             .checked_add(policy.steady_for)
             .ok()

@@ -3,17 +3,17 @@
 
 use super::forecast::Forecast;
 use super::{Track, days};
-use crate::alert::{Evidence, Level, Policy};
+use crate::alert::{AlertEvidence, Level, Policy};
 use crate::monitor::event::Event;
 use crate::monitor::kept::KeptForecast;
 use crate::reading::{SECONDS_PER_DAY, Timestamp};
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
 
-/// Looks an evacuation time.
-const LOOKS: i32 = 8;
-/// Looks at most, however long the outlook is beside the evacuation time.
-const MOST_LOOKS: i32 = 2000;
+/// Checks in an evacuation time.
+const CHECKS_AN_EVACUATION: i32 = 8;
+/// Checks at most, however long the outlook is beside the evacuation time.
+const MOST_CHECKS: i32 = 2000;
 
 /// What the newest forecast leaves to the time after it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -36,8 +36,8 @@ impl Overdue {
         let is_red = |now: Timestamp| {
             chances.chance_within(now, days(policy.evacuation_time)) >= policy.red_chance
         };
-        let looks = (1..=MOST_LOOKS).map_while(|look| {
-            let after = policy.evacuation_time.checked_mul(look)? / LOOKS;
+        let looks = (1..=MOST_CHECKS).map_while(|look| {
+            let after = policy.evacuation_time.checked_mul(look)? / CHECKS_AN_EVACUATION;
             let now = time.checked_add(interval.checked_add(after)?).ok()?;
             (after <= policy.outlook).then_some(now)
         });
@@ -79,10 +79,10 @@ impl Track {
         let chance = overdue
             .chances
             .chance_within(now, days(policy.evacuation_time));
-        let evidence = Evidence {
+        let evidence = AlertEvidence {
             now,
             chance_within_evacuation_time: Some(chance),
-            ..Evidence::default()
+            ..AlertEvidence::default()
         };
         let change = self.latch.raise(policy, &evidence)?;
         self.levels.note(now, change.level);

@@ -1,11 +1,11 @@
 //! A benchmark's past, gone through after its newest reading has been judged: what would have been, had each reading
 //! been judged as it came.
 
-use super::{Beside, Reason, Track};
+use super::{Reason, StepContext, Track};
 use crate::alert::{Level, Policy};
 use crate::monitor::declared::Declarations;
 use crate::monitor::event::{AlertState, Event, EventKind};
-use crate::monitor::history::Source;
+use crate::monitor::history::MeasuredAs;
 use crate::reading::{BenchmarkId, Quantity, Reading, Timestamp, Unit};
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
@@ -22,7 +22,7 @@ const DAY: SignedDuration = SignedDuration::from_hours(24);
 
 /// Whether the readings from before a first start have been gone through.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) enum Record {
+pub(super) enum PastReview {
     #[default]
     Known,
     Owed,
@@ -30,7 +30,7 @@ pub(super) enum Record {
 
 /// A benchmark's past, as far as it has been gone through.
 #[derive(Debug, Serialize, Deserialize)]
-pub(in crate::monitor) struct Walk {
+pub(in crate::monitor) struct PastReplay {
     /// As it would stand by now.
     track: Box<Track>,
     /// The last reading, days since the epoch.
@@ -44,7 +44,7 @@ pub(in crate::monitor) struct Walk {
     episode: Vec<Event>,
 }
 
-impl Walk {
+impl PastReplay {
     pub(in crate::monitor) fn benchmark(&self) -> &BenchmarkId {
         &self.track.benchmark
     }
@@ -72,25 +72,25 @@ impl Track {
         &mut self,
         policy: &Policy,
         time: Timestamp,
-        beside: &Beside<'_>,
+        context: &StepContext<'_>,
     ) -> Vec<Event> {
-        self.record = Record::Owed;
+        self.record = PastReview::Owed;
         if self.unknown.has(Reason::Stuck) {
             return Vec::new();
         }
-        let mut events = self.judge(policy, time, beside);
-        events.retain(|event| !is_of_the_record(event));
+        let mut events = self.judge(policy, time, context);
+        events.retain(|event| !event.kind.is_of_the_record());
         events
     }
 
     /// The past of this benchmark up to `until`, at its beginning.
-    pub(in crate::monitor) fn past(&self, until: Timestamp) -> Walk {
+    pub(in crate::monitor) fn past(&self, until: Timestamp) -> PastReplay {
         // Declared resets are taken off what is kept.
         let declared = Declarations::default();
         let (source, epoch) = (self.source(), self.history.epoch);
         let mut track = Self::new(self.benchmark.clone(), source, epoch, declared);
         track.accepted.clone_from(&self.accepted);
-        Walk {
+        PastReplay {
             track: Box::new(track),
             at_days: None,
             until,
@@ -102,9 +102,9 @@ impl Track {
     /// Goes on through the past; its refits and alerts that are reported, and whether there is more of it.
     pub(in crate::monitor) fn walk(
         &self,
-        walk: &mut Walk,
+        walk: &mut PastReplay,
         policy: &Policy,
-        beside: &Beside<'_>,
+        context: &StepContext<'_>,
     ) -> (Vec<Event>, bool) {
         let values = &self.history.observations.values;
         let from = walk
@@ -124,16 +124,14 @@ impl Track {
                 value: one.value,
                 sigma: one.sigma,
             };
-            let beside = Beside {
-                now: time,
-                ..*beside
-            };
-            let said = walk.track.take(policy, self.source(), &reading, &beside);
+            let mut context = *context;
+            context.phase.now = time;
+            let said = walk.track.take(policy, self.source(), &reading, &context);
             for event in said {
                 if matches!(event.kind, EventKind::Refit { .. }) {
                     refits += 1;
                     events.extend(walk.reports(event.time).then_some(event));
-                } else if is_of_the_record(&event) {
+                } else if event.kind.is_of_the_record() {
                     events.push(event);
                 } else if is_of_a_level(&event) && event.time < walk.until {
                     walk.episode.push(event);
@@ -147,13 +145,17 @@ impl Track {
     }
 
     /// The past has been gone through: goes on as it leads to. A level from there that has not ended is called.
-    pub(in crate::monitor) fn go_on_from(&mut self, now: Timestamp, past: Walk) -> Vec<Event> {
+    pub(in crate::monitor) fn go_on_from(
+        &mut self,
+        now: Timestamp,
+        past: PastReplay,
+    ) -> Vec<Event> {
         let (past, mut events) = (*past.track, past.episode);
         self.panel = past.panel;
         self.regime = past.regime;
         (self.intercept, self.transition) = (past.intercept, past.transition);
         self.pace = past.pace;
-        self.record = Record::Known;
+        self.record = PastReview::Known;
         let in_force = past.latch.in_force();
         let Some((level, since)) = in_force.filter(|(level, _)| *level > self.latch.level()) else {
             if self.latch.level() == Level::Green {
@@ -180,26 +182,16 @@ impl Track {
     }
 
     /// Where the readings come from as they are kept.
-    fn source(&self) -> Source {
+    fn source(&self) -> MeasuredAs {
         let unit = match self.history.observations.quantity {
             Quantity::Displacement => Unit::MM,
             Quantity::Velocity => Unit::MM_PER_DAY,
         };
-        Source {
+        MeasuredAs {
             unit,
             averaging: self.history.averaging(),
         }
     }
-}
-
-/// Whether it says what has changed over the whole record, which only who has gone through it knows.
-pub(super) fn is_of_the_record(event: &Event) -> bool {
-    matches!(
-        event.kind,
-        EventKind::RegimeFlip { .. }
-            | EventKind::InterceptDrift { .. }
-            | EventKind::TransitionDrift { .. }
-    )
 }
 
 /// Whether it enters or leaves a level; that nothing can be said is not reported of the past.

@@ -2,7 +2,7 @@
 
 use super::forecast::Forecast;
 use super::{Track, days};
-use crate::alert::{Cause, Policy};
+use crate::alert::{AlertCause, Policy};
 use crate::forecast::{HORIZON_DAYS, InverseVelocityLine, Outlook, Passage};
 use crate::monitor::drift;
 use crate::monitor::event::{
@@ -39,11 +39,11 @@ impl Track {
             .map(|days| now + days)
             .filter(|days| *days > now && *days < now + FARTHEST_INTERCEPT * length);
         let mut events =
-            vec![self.refit_event(policy, time, forecast, (line, intercept, transition))];
+            vec![self.refit_event(policy, time, forecast, line, intercept, transition)];
         events.extend(self.flip(policy, time, forecast.in_force(days(policy.outlook))));
         events.extend(self.surprise(policy, time, forecast));
         let least = (length / 40.0).max(0.02);
-        events.extend(self.drifts(policy, time, outlook, (intercept, transition, least)));
+        events.extend(self.drifts(policy, time, outlook, intercept, transition, least));
         events
     }
 
@@ -53,7 +53,7 @@ impl Track {
         if self.declared.is_shaken(time) {
             return None;
         }
-        self.look_until(policy, time, Cause::UnexplainedResidual);
+        self.look_until(policy, time, AlertCause::UnexplainedResidual);
         let unexplained = Unexplained::Reading {
             surprise_nats,
             velocity_mm_per_day: forecast.plain.rates.last().map(|rate| rate.velocity),
@@ -67,7 +67,9 @@ impl Track {
         policy: &Policy,
         time: Timestamp,
         outlook: &Outlook,
-        (intercept, transition, least): (Option<f64>, Option<f64>, f64),
+        intercept: Option<f64>,
+        transition: Option<f64>,
+        least: f64,
     ) -> Vec<Event> {
         let now = outlook.now_days;
         let mut events = Vec::new();
@@ -76,7 +78,7 @@ impl Track {
                 .law
                 .and_then(|law| drift::expected_by_the_law(&law, recent(&outlook.rates), now));
             if moved.to_days < moved.from_days {
-                self.look_until(policy, time, Cause::InterceptDriftingIn);
+                self.look_until(policy, time, AlertCause::InterceptDriftingIn);
             }
             events.extend(
                 self.drift_event(time, moved, |from, to| EventKind::InterceptDrift {
@@ -89,7 +91,7 @@ impl Track {
         }
         if let Some(moved) = self.transition.update(now, transition, 2.0 * least) {
             if moved.to_days < moved.from_days {
-                self.look_until(policy, time, Cause::TransitionDriftingIn);
+                self.look_until(policy, time, AlertCause::TransitionDriftingIn);
             }
             events.extend(
                 self.drift_event(time, moved, |from, to| EventKind::TransitionDrift {
@@ -107,7 +109,9 @@ impl Track {
         policy: &Policy,
         time: Timestamp,
         forecast: &Forecast,
-        (line, intercept, transition): (Option<InverseVelocityLine>, Option<f64>, Option<f64>),
+        line: Option<InverseVelocityLine>,
+        intercept: Option<f64>,
+        transition: Option<f64>,
     ) -> Event {
         let at = |days: Option<f64>| days.and_then(|days| after_days(self.history.epoch, days));
         let outlook = forecast.in_force(days(policy.outlook));
@@ -156,7 +160,7 @@ impl Track {
     fn flip(&mut self, policy: &Policy, time: Timestamp, outlook: &Outlook) -> Option<Event> {
         let flip = self.regime.update(&outlook.regimes)?;
         if flip.to == Regime::UnstableAccelerating && flip.from != Regime::Undetermined {
-            self.look_until(policy, time, Cause::RegimeFlip);
+            self.look_until(policy, time, AlertCause::RegimeFlip);
         }
         let kind = EventKind::RegimeFlip {
             from: flip.from,

@@ -30,11 +30,11 @@ impl Track {
             .checked_mul(LEAP_SPACINGS)
             .unwrap_or(SignedDuration::MAX)
             .max(LEAST_LEAP);
-        let goes_on = self
+        let continues = self
             .ahead
             .as_ref()
             .is_some_and(|ahead| ahead.precedes(time, least));
-        !goes_on && time.duration_since(newest) > least
+        !continues && time.duration_since(newest) > least
     }
 
     /// After the newest reading, of `time`: whether the sensor is stuck, or its readings are spoilt.
@@ -42,13 +42,13 @@ impl Track {
         let mut events = Vec::new();
         if let Some((count, since)) = self.history.stuck() {
             let what = "are the same, as this sensor never gave them before: it is stuck";
-            events.extend(self.sticks(time, (count, since), what));
+            events.extend(self.sticks(time, count, since, what));
         } else if self.latch.level() >= Level::Orange
             && let Some((count, since, around)) = self.history.stands_at_the_end()
         {
             self.history.range_end = Some(around);
             let what = "only jitter where a fast motion ended at once: the sensor is stuck, or at the end of its range";
-            events.extend(self.sticks(time, (count, since), what));
+            events.extend(self.sticks(time, count, since, what));
         }
         let was_spoilt = self.spoilt_by.is_some();
         self.spoilt_by = self.history.spoilt(self.spoilt_by);
@@ -71,7 +71,8 @@ impl Track {
     fn sticks(
         &mut self,
         time: Timestamp,
-        (count, since): (usize, Timestamp),
+        count: usize,
+        since: Timestamp,
         what: &str,
     ) -> Vec<Event> {
         self.history.forget_repeats(count);

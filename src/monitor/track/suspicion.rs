@@ -4,30 +4,31 @@
 use super::Track;
 use super::unknown::Reason;
 use crate::monitor::event::Event;
-use crate::monitor::history::Source;
-use crate::reading::suspicion::{self, Evidence};
+use crate::monitor::history::MeasuredAs;
+use crate::reading::suspicion::{self, DatedSuspicion};
 use crate::reading::{Suspicion, Timestamp};
 use std::collections::BTreeSet;
 
-/// The latest readings that are looked at.
-const LOOKED_AT: usize = 200;
+/// The latest readings that are examined.
+const INSPECTED: usize = 200;
 /// A suspicion ends when so many of the latest readings give no rise to it.
 const CALM: usize = 24;
 
 impl Track {
     /// After the newest reading, of `time`.
-    pub(super) fn suspect(&mut self, source: Source, time: Timestamp) -> Vec<Event> {
+    pub(super) fn suspect(&mut self, source: MeasuredAs, time: Timestamp) -> Vec<Event> {
         let unit = source.unit;
         let quantity = self.history.observations.quantity;
         let (values, name) = (
-            self.history.values_as_read(unit, LOOKED_AT),
+            self.history.values_as_read(unit, INSPECTED),
             unit.to_string(),
         );
         let mut found = Vec::new();
         if !suspicion::is_plain(&values, quantity, &name) {
-            let readings = self.history.as_read(unit, LOOKED_AT);
+            let readings = self.history.as_read(unit, INSPECTED);
             let since = readings.len().checked_sub(CALM);
-            let is_late = |one: &Evidence| since.is_none_or(|since| one.at >= readings[since].0);
+            let is_late =
+                |one: &DatedSuspicion| since.is_none_or(|since| one.at >= readings[since].0);
             found = suspicion::of_values(&readings, quantity, &name);
             found.retain(is_late);
         }
@@ -72,7 +73,7 @@ impl Track {
         &mut self,
         now: Timestamp,
         kind: Suspicion,
-        evidence: Option<&Evidence>,
+        evidence: Option<&DatedSuspicion>,
     ) -> Vec<Event> {
         let reason = Reason::Suspect(kind);
         let evidence = evidence.filter(|_| !self.accepted.contains(&kind));

@@ -83,7 +83,7 @@ impl Track {
             return None;
         }
         self.unknown.since = Some(since);
-        Some(self.unknown_alert((now, since), AlertState::Firing, (reason, text)))
+        Some(self.unknown_alert((now, since), AlertState::Firing, reason, text))
     }
 
     /// `reason` has ended, which began after the reading of `since` where nothing else was the matter; the end of the
@@ -99,7 +99,7 @@ impl Track {
             return None;
         }
         let since = self.unknown.since.take().unwrap_or(since);
-        Some(self.unknown_alert((now, since), AlertState::Resolved, (reason, text)))
+        Some(self.unknown_alert((now, since), AlertState::Resolved, reason, text))
     }
 
     /// Everything ends; `None` where nothing was the matter.
@@ -109,19 +109,16 @@ impl Track {
         self.unknown.reasons.clear();
         let since = self.unknown.since.take().or(silent)?;
         let reason = reason.unwrap_or(Reason::NoData);
-        Some(self.unknown_alert(
-            (now, since),
-            AlertState::Resolved,
-            (reason, text.to_owned()),
-        ))
+        Some(self.unknown_alert((now, since), AlertState::Resolved, reason, text.to_owned()))
     }
 
-    /// When it began is part of the key, so that each time is reported anew.
+    /// When it began is part of the key, so that each time is reported again.
     fn unknown_alert(
         &self,
         (time, since): (Timestamp, Timestamp),
         state: AlertState,
-        (reason, text): (Reason, String),
+        reason: Reason,
+        text: String,
     ) -> Event {
         let kind = EventKind::Alert {
             level: Level::Unknown,

@@ -2,20 +2,20 @@
 
 use super::adopted::Adopted;
 use super::forecast::Forecast;
-use super::{Beside, Track};
-use crate::alert::{Cause, Policy};
+use super::{StepContext, Track};
+use crate::alert::{AlertCause, Policy};
 use crate::effects::{Effect, Kind, KnownLoad, Rival, residual_structure};
 use crate::forecast::measurably_moves;
 use crate::monitor::event::{Event, EventKind, Unexplained};
-use crate::monitor::search::{Finding, MOST_READINGS, SearchJob};
+use crate::monitor::search::{MOST_READINGS, SearchFinding, SearchJob};
 use crate::monitor::{Explain, search};
 use crate::reading::{Series, Timestamp, days_since};
 use serde::{Deserialize, Serialize};
 
-/// Nothing is looked at before so many readings.
+/// Fewer readings are not tested.
 const FEWEST: u64 = 40;
-/// Readings that a look goes over.
-const MOST_LOOKED_AT: usize = 400;
+/// Readings that a test goes over.
+const MOST_TESTED: usize = 400;
 /// Fall of the BIC from which on the residual has structure.
 const STRUCTURE: f64 = 20.0;
 /// A load of less than this, e-folds of velocity, is worth a search but nobody's attention: a third more or less
@@ -89,14 +89,14 @@ impl Track {
         policy: &Policy,
         time: Timestamp,
         forecast: &Forecast,
-        beside: &Beside<'_>,
+        context: &StepContext<'_>,
     ) -> Option<Event> {
         if self.declared.is_shaken(time) || !self.watch.is_due() {
             return None;
         }
         let moves = measurably_moves(&forecast.plain.rates);
         let found = if moves {
-            residual_structure(&self.in_force(beside))
+            residual_structure(&self.in_force(context))
         } else {
             None
         };
@@ -107,29 +107,29 @@ impl Track {
             return None;
         }
         let found = worth?;
-        self.look_until(policy, time, Cause::UnexplainedResidual);
+        self.look_until(policy, time, AlertCause::UnexplainedResidual);
         let kind = Unexplained::Structure {
             bic_gain: found.bic_gain,
             load_sd: found.load_sd,
-            since: self.by_calendar(found.since, beside),
+            since: self.by_calendar(found.since, context),
         };
         Some(self.event(time, EventKind::UnexplainedResidual(kind)))
     }
 
     /// The readings as the law in force sees them: by the load's clock, where one is adopted.
-    fn in_force(&self, beside: &Beside<'_>) -> Series {
+    fn in_force(&self, context: &StepContext<'_>) -> Series {
         let by_clock = self.adopted.as_ref().and_then(|adopted| {
-            let channels = beside.covariates.list();
+            let channels = context.covariates.list();
             adopted.readings(&self.history, &channels)
         });
         let observations = by_clock.as_ref().unwrap_or(&self.history.observations);
         self.history
-            .series(&self.benchmark, observations, MOST_LOOKED_AT)
+            .series(&self.benchmark, observations, MOST_TESTED)
     }
 
     /// When that was, of a time by the clock of the law in force.
-    fn by_calendar(&self, time: Timestamp, beside: &Beside<'_>) -> Timestamp {
-        let channels = beside.covariates.list();
+    fn by_calendar(&self, time: Timestamp, context: &StepContext<'_>) -> Timestamp {
+        let channels = context.covariates.list();
         let adopted = self.adopted.as_ref();
         adopted
             .and_then(|adopted| adopted.by_calendar(&self.history, &channels, time))
@@ -149,9 +149,9 @@ impl Track {
     pub(in crate::monitor) fn search(
         &mut self,
         critical: f64,
-        beside: &Beside<'_>,
+        context: &StepContext<'_>,
     ) -> Option<SearchJob> {
-        if !self.wants_search(beside.explain) {
+        if !self.wants_search(context.phase.explain) {
             return None;
         }
         let observations = &self.history.observations;
@@ -160,7 +160,9 @@ impl Track {
             .series(&self.benchmark, observations, MOST_READINGS);
         let first = series.readings.first()?.time;
         let last = series.readings.last()?.time;
-        let channels = beside.covariates.beside(first, last, search::MOST_CHANNELS);
+        let channels = context
+            .covariates
+            .beside(first, last, search::MOST_CHANNELS);
         let asked = self.newest.unwrap_or(last);
         self.watch.is_searching = true;
         self.watch.searched = self.watch.taken;
@@ -172,15 +174,17 @@ impl Track {
         &mut self,
         critical: f64,
         time: Timestamp,
-        finding: &Finding,
-        beside: &Beside<'_>,
+        finding: &SearchFinding,
+        context: &StepContext<'_>,
     ) -> Vec<Event> {
         self.watch.is_searching = false;
         let before = self.adopted.take();
         let known_load = witnessed(finding);
-        if beside.explain == Explain::Adopt && !known_load.parts.is_empty() && is_separable(finding)
+        if context.phase.explain == Explain::Adopt
+            && !known_load.parts.is_empty()
+            && is_separable(finding)
         {
-            let channels = beside.covariates.list();
+            let channels = context.covariates.list();
             self.adopted = Some(Adopted::new(known_load, &self.history, &channels, critical));
         }
         let mut events = self.dropped(time, before.as_ref().map(Adopted::law));
@@ -191,7 +195,7 @@ impl Track {
             .collect();
         for (effect, known) in finding.effects.iter().zip(&known) {
             if !self.is_reported(known) {
-                events.push(self.effect_event(time, effect, (finding, known.is_adopted)));
+                events.push(self.effect_event(time, effect, finding, known.is_adopted));
             }
         }
         self.watch.known = known;
@@ -244,7 +248,8 @@ impl Track {
         &self,
         time: Timestamp,
         effect: &Effect,
-        (finding, adopted): (&Finding, bool),
+        finding: &SearchFinding,
+        adopted: bool,
     ) -> Event {
         let kind = EventKind::EffectFound {
             effect: effect.effect,
@@ -264,7 +269,7 @@ impl Track {
 
 /// The effects that something besides the motion bears witness to: a covariate, the calendar, the instrument. A
 /// step of the load that only the motion shows may as well be the failure's own beginning.
-fn witnessed(finding: &Finding) -> KnownLoad {
+fn witnessed(finding: &SearchFinding) -> KnownLoad {
     let parts = finding.known_load.parts.iter();
     KnownLoad {
         parts: parts
@@ -276,7 +281,7 @@ fn witnessed(finding: &Finding) -> KnownLoad {
 
 /// Whether the readings distinguish the effects from everything else: another covariate of the same kind that does as
 /// well means the same load so far, another kind does not.
-fn is_separable(finding: &Finding) -> bool {
+fn is_separable(finding: &SearchFinding) -> bool {
     let same_kind = |rival: &Rival| {
         let mut effects = finding.effects.iter();
         effects.any(|effect| effect.effect == rival.kind)

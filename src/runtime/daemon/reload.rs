@@ -55,7 +55,7 @@ impl Daemon {
                 return Ok(());
             }
         }
-        let events = self.site.resettle(fresh.settings.clone());
+        let events = self.site.change_settings(fresh.settings.clone());
         self.pulse.vitals.note(&events);
         self.site.show(&self.pulse.vitals);
         self.commit()?;

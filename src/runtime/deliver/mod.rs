@@ -1,6 +1,6 @@
 //! Takes alerts to the hooks: a worker and a bounded queue each, retries that hold nothing up.
 //!
-//! The gravest goes first, whatever waits before it; of one benchmark one alert at a time. What has been superseded
+//! The most severe goes first, whatever waits before it; of one benchmark one alert at a time. What has been superseded
 //! while it waited is not reported any more.
 //!
 //! Orange, red and unknown are tried until the hook takes them, they are resolved or superseded, or
@@ -16,7 +16,7 @@ use super::hook::Alert;
 use super::in_hand::InHand;
 use crate::config::HookConfig;
 use crate::monitor::AlertState;
-use crate::store::Fate;
+use crate::store::DeliveryOutcome;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -67,7 +67,7 @@ impl Retry {
 
 /// The way to one hook.
 #[derive(Debug)]
-struct Way {
+struct HookQueue {
     hook: HookConfig,
     queue: mpsc::Sender<Alert>,
     in_hand: Arc<Mutex<InHand>>,
@@ -76,7 +76,7 @@ struct Way {
 /// The way to all hooks.
 #[derive(Debug)]
 pub struct Dispatcher {
-    hooks: Vec<Way>,
+    hooks: Vec<HookQueue>,
     workers: JoinSet<usize>,
     delivered: Arc<Mutex<Delivered>>,
 }
@@ -101,11 +101,11 @@ impl Dispatcher {
         for hook in hooks {
             let (queue, receiver) = mpsc::channel(QUEUE);
             let in_hand = Arc::new(Mutex::new(InHand::default()));
-            let shared = (Arc::clone(&delivered), Arc::clone(&in_hand));
-            let worker = Worker::new((hook, Arc::clone(runner)), retry, shared);
+            let (delivered, shared) = (Arc::clone(&delivered), Arc::clone(&in_hand));
+            let worker = Worker::new(hook, Arc::clone(runner), retry, delivered, shared);
             workers.spawn(worker.run(receiver));
             let hook = hook.clone();
-            queues.push(Way {
+            queues.push(HookQueue {
                 hook,
                 queue,
                 in_hand,
@@ -134,7 +134,7 @@ impl Dispatcher {
 
     /// The names of the hooks that ask for such an alert.
     pub(super) fn asking(&self, alert: &Alert) -> Vec<String> {
-        let asks = |way: &&Way| way.hook.asks_for(alert);
+        let asks = |way: &&HookQueue| way.hook.asks_for(alert);
         self.hooks
             .iter()
             .filter(asks)
@@ -183,7 +183,7 @@ impl Dispatcher {
     }
 
     /// Notes durably that an escalation is not made, where it has not begun.
-    fn call_off(&self, way: &Way, alert: &Alert) {
+    fn call_off(&self, way: &HookQueue, alert: &Alert) {
         let name = way.hook.name();
         let mut in_hand = locked(&way.in_hand);
         if !way.hook.escalates() || !way.hook.asks_for(alert) || in_hand.was_tried(alert) {
@@ -196,25 +196,25 @@ impl Dispatcher {
         in_hand.end(alert);
         let key = &alert.key;
         tracing::info!(hook = name, key, "acknowledged in time: not escalated");
-        if let Err(error) = delivered.note(alert, &name, Fate::Acknowledged) {
+        if let Err(error) = delivered.note(alert, &name, DeliveryOutcome::Acknowledged) {
             tracing::warn!(hook = name, key, %error, "no receipt: a restart may escalate it");
         }
     }
 
     /// Whether this is the end of what an escalation has never reported: neither of them is then.
-    fn ends_unescalated(&self, way: &Way, in_hand: &mut InHand, alert: &Alert) -> bool {
+    fn ends_unescalated(&self, way: &HookQueue, in_hand: &mut InHand, alert: &Alert) -> bool {
         if !way.hook.escalates() || alert.state != AlertState::Resolved {
             return false;
         }
         let (name, mut firing) = (way.hook.name(), alert.clone());
         firing.state = AlertState::Firing;
         let mut delivered = locked(&self.delivered);
-        if delivered.was_told(&firing, &name) || in_hand.was_tried(&firing) {
+        if delivered.was_notified(&firing, &name) || in_hand.was_tried(&firing) {
             return false;
         }
         in_hand.end(&firing);
         for one in [&firing, alert] {
-            if let Err(error) = delivered.note(one, &name, Fate::Over) {
+            if let Err(error) = delivered.note(one, &name, DeliveryOutcome::Over) {
                 let key = &alert.key;
                 tracing::warn!(hook = name, key, %error, "no receipt: a restart may send it");
             }
@@ -222,7 +222,7 @@ impl Dispatcher {
         true
     }
 
-    fn offer_to(&self, way: &Way, alert: &Alert) -> bool {
+    fn offer_to(&self, way: &HookQueue, alert: &Alert) -> bool {
         let (name, key) = (way.hook.name(), &alert.key);
         // In hand first: a worker notes the receipt before it lets go.
         let mut in_hand = locked(&way.in_hand);
@@ -231,7 +231,7 @@ impl Dispatcher {
         }
         if in_hand.cancels(alert) {
             tracing::debug!(hook = name, key, "over before it was reported");
-            if let Err(error) = locked(&self.delivered).note(alert, &name, Fate::Over) {
+            if let Err(error) = locked(&self.delivered).note(alert, &name, DeliveryOutcome::Over) {
                 tracing::warn!(hook = name, key, %error, "no receipt: a restart may send it");
             }
             return true;

@@ -1,14 +1,14 @@
 //! How a hook is run: as a process, or by whoever simulates one.
 
 use crate::config::{HookConfig, WebhookFormat};
-use crate::runtime::hook::{self, Alert, Outcome};
+use crate::runtime::hook::{self, Alert, HookOutcome};
 use crate::runtime::{alertmanager, cap, link, mqtt, webhook};
 use std::fmt::Debug;
 use std::pin::Pin;
 use std::sync::Arc;
 
 /// A run of a hook that is under way.
-pub type Run = Pin<Box<dyn Future<Output = Outcome> + Send>>;
+pub type Run = Pin<Box<dyn Future<Output = HookOutcome> + Send>>;
 
 /// Runs hooks.
 pub trait Runner: Debug + Send + Sync {
@@ -27,14 +27,16 @@ impl Runner for Processes {
 }
 
 /// Runs `hook` for `alert`, or sends or writes it where it is a webhook or a folder; `attempt` counts from 1.
-pub async fn run(hook: &HookConfig, alert: &Alert, attempt: u32) -> Outcome {
+pub async fn run(hook: &HookConfig, alert: &Alert, attempt: u32) -> HookOutcome {
     if let Some(folder) = hook.cap.clone() {
         let (name, key, alert) = (hook.name(), alert.key.clone(), alert.clone());
         // A disk may hang: the worker does not wait with it.
         let writing = tokio::task::spawn_blocking(move || cap::write(&folder, &alert));
         let outcome = match tokio::time::timeout(hook.timeout, writing).await {
-            Ok(written) => written.unwrap_or_else(|error| Outcome::NotStarted(error.to_string())),
-            Err(_elapsed) => Outcome::TimedOut,
+            Ok(written) => {
+                written.unwrap_or_else(|error| HookOutcome::NotStarted(error.to_string()))
+            }
+            Err(_elapsed) => HookOutcome::TimedOut,
         };
         tracing::info!(hook = name, key, attempt, ?outcome, "CAP message ended");
         return outcome;
@@ -43,22 +45,22 @@ pub async fn run(hook: &HookConfig, alert: &Alert, attempt: u32) -> Outcome {
     if let Some(to) = &hook.mqtt {
         let outcome = match alert.body(attempt, link.as_deref()) {
             Ok(body) => mqtt::publish(to, body, hook.timeout).await,
-            Err(error) => Outcome::NotStarted(error.to_string()),
+            Err(error) => HookOutcome::NotStarted(error.to_string()),
         };
         let (name, key) = (&to.name, &alert.key);
         tracing::info!(name, key, attempt, ?outcome, "MQTT message ended");
         return outcome;
     }
     let Some(to) = &hook.webhook else {
-        return hook::run_program(hook, alert, (attempt, link.as_deref())).await;
+        return hook::run_program(hook, alert, attempt, link.as_deref()).await;
     };
     let body = match to.format {
         WebhookFormat::Slipwatch => alert.body(attempt, link.as_deref()),
         WebhookFormat::Alertmanager => alertmanager::body(alert, link.as_deref()),
     };
     let outcome = match body {
-        Ok(body) => webhook::send(to, alert, (body, hook.timeout)).await,
-        Err(error) => Outcome::NotStarted(error.to_string()),
+        Ok(body) => webhook::send(to, alert, body, hook.timeout).await,
+        Err(error) => HookOutcome::NotStarted(error.to_string()),
     };
     tracing::info!(
         webhook = to.name,

@@ -7,9 +7,9 @@ use crate::monitor::AlertState;
 use crate::reading::BenchmarkId;
 use crate::runtime::clock;
 use crate::runtime::delivered::Delivered;
-use crate::runtime::hook::{Alert, Outcome};
+use crate::runtime::hook::{Alert, HookOutcome};
 use crate::runtime::in_hand::InHand;
-use crate::store::Fate;
+use crate::store::DeliveryOutcome;
 use std::collections::BTreeMap;
 use std::pin::Pin;
 use std::sync::{Arc, Mutex};
@@ -72,9 +72,11 @@ pub(super) struct Worker {
 
 impl Worker {
     pub(super) fn new(
-        (hook, runner): (&HookConfig, Arc<dyn Runner>),
+        hook: &HookConfig,
+        runner: Arc<dyn Runner>,
         retry: &Retry,
-        (delivered, in_hand): (Arc<Mutex<Delivered>>, Arc<Mutex<InHand>>),
+        delivered: Arc<Mutex<Delivered>>,
+        in_hand: Arc<Mutex<InHand>>,
     ) -> Self {
         Self {
             hook: Arc::new(hook.clone()),
@@ -132,7 +134,7 @@ impl Worker {
         running.all(|run| place(&run.waiting.alert) != place(&waiting.alert))
     }
 
-    /// Starts the gravest alert that is due; on the way out everything is.
+    /// Starts the most severe alert that is due; on the way out everything is.
     fn start_next(&mut self, open: bool) -> bool {
         self.drop_what_is_over(open);
         let now = clock::later(Duration::ZERO);
@@ -175,19 +177,19 @@ impl Worker {
                 self.untried -= 1;
                 let (hook, key) = (self.hook.name(), &waiting.alert.key);
                 tracing::info!(hook, key, "superseded before it was reported");
-                self.let_go(&waiting.alert, Fate::Over);
+                self.let_go(&waiting.alert, DeliveryOutcome::Over);
             } else {
                 self.drop_over(&waiting.alert);
             }
         }
     }
 
-    fn note_outcome(&mut self, waiting: &Waiting, outcome: Option<&Outcome>, open: bool) {
+    fn note_outcome(&mut self, waiting: &Waiting, outcome: Option<&HookOutcome>, open: bool) {
         let (hook, key) = (self.hook.name(), waiting.alert.key.clone());
         let attempt = waiting.attempt;
         let goes_on = waiting.alert.must_arrive() || attempt < self.retry.attempts;
-        if outcome == Some(&Outcome::Done) {
-            self.let_go(&waiting.alert, Fate::Delivered);
+        if outcome == Some(&HookOutcome::Done) {
+            self.let_go(&waiting.alert, DeliveryOutcome::Delivered);
         } else if self.is_over(&waiting.alert) {
             self.drop_over(&waiting.alert);
         } else if open && goes_on {
@@ -201,7 +203,7 @@ impl Worker {
                 delay_s,
                 "hook will be retried"
             );
-            self.note(&waiting.alert, Fate::Waiting);
+            self.note(&waiting.alert, DeliveryOutcome::Waiting);
             let again = Waiting {
                 alert: waiting.alert.clone(),
                 attempt: attempt.saturating_add(1),
@@ -213,18 +215,22 @@ impl Worker {
             tracing::error!(hook, key, attempt, ?outcome, "alert not delivered");
             self.lost += 1;
             // What is given up only because the daemon stops, the next start tries again.
-            let fate = if open { Fate::Dead } else { Fate::Waiting };
+            let fate = if open {
+                DeliveryOutcome::Dead
+            } else {
+                DeliveryOutcome::Waiting
+            };
             self.let_go(&waiting.alert, fate);
         }
     }
 
     /// Notes what became of an alert, then lets go of it.
-    fn let_go(&self, alert: &Alert, fate: Fate) {
+    fn let_go(&self, alert: &Alert, fate: DeliveryOutcome) {
         self.note(alert, fate);
         locked(&self.in_hand).release(alert);
     }
 
-    fn note(&self, alert: &Alert, fate: Fate) {
+    fn note(&self, alert: &Alert, fate: DeliveryOutcome) {
         let hook = self.hook.name();
         if let Err(error) = locked(&self.delivered).note(alert, &hook, fate) {
             let key = &alert.key;
@@ -240,7 +246,7 @@ impl Worker {
         let (hook, key) = (self.hook.name(), &alert.key);
         tracing::error!(hook, key, "alert not delivered before it was over");
         self.lost += 1;
-        self.let_go(alert, Fate::Over);
+        self.let_go(alert, DeliveryOutcome::Over);
     }
 
     fn begin(&mut self, alert: Alert) {
@@ -283,7 +289,7 @@ impl Worker {
 /// A hook's run, and for what. It ends with its worker.
 #[derive(Debug)]
 struct Running {
-    task: JoinHandle<Outcome>,
+    task: JoinHandle<HookOutcome>,
     waiting: Waiting,
 }
 
@@ -294,7 +300,7 @@ impl Drop for Running {
 }
 
 /// The first run that ends, by its place; `None` when it broke off.
-async fn finished(running: &mut [Running]) -> (usize, Option<Outcome>) {
+async fn finished(running: &mut [Running]) -> (usize, Option<HookOutcome>) {
     std::future::poll_fn(|context| {
         for (index, run) in running.iter_mut().enumerate() {
             if let Poll::Ready(ended) = Pin::new(&mut run.task).poll(context) {

@@ -1,6 +1,6 @@
 //! Whether something keeps this machine's clock right.
 
-use super::{Finding, Verdict};
+use super::{CheckVerdict, Finding};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
@@ -18,17 +18,17 @@ pub(super) fn finding() -> Finding {
     let said = said.ok().filter(|output| output.status.success());
     let said = said.map(|output| String::from_utf8_lossy(&output.stdout).trim().to_owned());
     match said.as_deref() {
-        Some("yes") => Finding::new(CHECK, Verdict::Good, "synchronized"),
+        Some("yes") => Finding::new(CHECK, CheckVerdict::Good, "synchronized"),
         Some("no") => Finding::new(
             CHECK,
-            Verdict::Wrong,
+            CheckVerdict::Wrong,
             "not synchronized: a slow clock takes right readings for ones from the future; \
              install chrony or systemd-timesyncd",
         ),
-        _ if Path::new(SYNCED).exists() => Finding::new(CHECK, Verdict::Good, "synchronized"),
+        _ if Path::new(SYNCED).exists() => Finding::new(CHECK, CheckVerdict::Good, "synchronized"),
         _ => Finding::new(
             CHECK,
-            Verdict::Unknown,
+            CheckVerdict::Unknown,
             "timedatectl does not say whether it is synchronized; see that it is",
         ),
     }

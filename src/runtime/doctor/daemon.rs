@@ -1,6 +1,6 @@
 //! Whether the daemon could start as this user: its state, its token, its address; and whether this is its user.
 
-use super::{Finding, Verdict};
+use super::{CheckVerdict, Finding};
 use crate::config::Config;
 use crate::store::Store;
 use nix::unistd::geteuid;
@@ -26,10 +26,10 @@ fn user() -> Finding {
     if geteuid().is_root() {
         let text = "looked at as root, who may do everything: what the daemon's own user may do is shown by \
                     slipwatch doctor --user NAME";
-        return Finding::new("user", Verdict::Doubtful, text);
+        return Finding::new("user", CheckVerdict::Doubtful, text);
     }
-    let text = format!("looked at as user {}, as the daemon must run", geteuid());
-    Finding::new("user", Verdict::Good, text)
+    let text = format!("checked as user {}, as the daemon must run", geteuid());
+    Finding::new("user", CheckVerdict::Good, text)
 }
 
 /// A state that another user began may not be this one's to write.
@@ -45,35 +45,35 @@ fn database(folder: &Path) -> Option<Finding> {
     });
     let Some((file, error)) = tried else {
         let text = format!("the state in {} can be written", folder.display());
-        return Some(Finding::new(STATE, Verdict::Good, text));
+        return Some(Finding::new(STATE, CheckVerdict::Good, text));
     };
     let text = format!(
         "{} cannot be written as this user: {error}; give the state folder to the daemon's user with chown -R",
         file.display()
     );
-    Some(Finding::new(STATE, Verdict::Wrong, text))
+    Some(Finding::new(STATE, CheckVerdict::Wrong, text))
 }
 
 fn token(config: &Config) -> Finding {
     match config.site.token() {
-        Ok(_) => Finding::new("token", Verdict::Good, "the token can be read"),
-        Err(error) => Finding::new("token", Verdict::Wrong, error.to_string()),
+        Ok(_) => Finding::new("token", CheckVerdict::Good, "the token can be read"),
+        Err(error) => Finding::new("token", CheckVerdict::Wrong, error.to_string()),
     }
 }
 
 fn listen(config: &Config) -> Finding {
     let Some(address) = config.site.listen else {
-        return Finding::new(LISTEN, Verdict::Unknown, "nothing to listen on");
+        return Finding::new(LISTEN, CheckVerdict::Unknown, "nothing to listen on");
     };
     if Store::is_held(&config.site.state_dir) {
         let text = format!("{address} is not tried while the daemon runs");
-        return Finding::new(LISTEN, Verdict::Unknown, text);
+        return Finding::new(LISTEN, CheckVerdict::Unknown, text);
     }
     match TcpListener::bind(address) {
-        Ok(_) => Finding::new(LISTEN, Verdict::Good, format!("{address} is free")),
+        Ok(_) => Finding::new(LISTEN, CheckVerdict::Good, format!("{address} is free")),
         Err(error) => {
             let text = format!("{address} cannot be listened on: {error}");
-            Finding::new(LISTEN, Verdict::Wrong, text)
+            Finding::new(LISTEN, CheckVerdict::Wrong, text)
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Which file systems the state and the sources are on, and how long the state's takes to sync.
 
-use super::{Finding, Verdict};
+use super::{CheckVerdict, Finding};
 use crate::config::Config;
 use crate::runtime::clock::Stopwatch;
 use nix::sys::statfs::statfs;
@@ -64,21 +64,21 @@ pub(super) fn file_systems(config: &Config) -> Vec<Finding> {
 fn state(folder: &Path) -> Finding {
     let place = format!("state folder {}", folder.display());
     let (verdict, text) = match kind(folder) {
-        Err(error) => (Verdict::Unknown, error.to_string()),
-        Ok((name, DiskKind::Local)) => (Verdict::Good, format!("on {name}")),
+        Err(error) => (CheckVerdict::Unknown, error.to_string()),
+        Ok((name, DiskKind::Local)) => (CheckVerdict::Good, format!("on {name}")),
         Ok((name, DiskKind::Memory)) => (
-            Verdict::Doubtful,
+            CheckVerdict::Doubtful,
             format!("on {name}, lost when the machine restarts; move it to a disk"),
         ),
         Ok((name, DiskKind::Network)) => (
-            Verdict::Wrong,
+            CheckVerdict::Wrong,
             format!(
                 "on {name}, a network file system, whose locks and syncs cannot be relied on; \
                      move it to a local disk"
             ),
         ),
         Ok((name, DiskKind::Unsure)) => (
-            Verdict::Unknown,
+            CheckVerdict::Unknown,
             format!("on {name}; see that it is a local disk"),
         ),
     };
@@ -87,10 +87,12 @@ fn state(folder: &Path) -> Finding {
 
 fn of_source(place: &str, folder: &Path) -> Finding {
     let (verdict, text) = match kind(folder) {
-        Err(error) => (Verdict::Unknown, error.to_string()),
-        Ok((name, DiskKind::Local | DiskKind::Memory)) => (Verdict::Good, format!("on {name}")),
+        Err(error) => (CheckVerdict::Unknown, error.to_string()),
+        Ok((name, DiskKind::Local | DiskKind::Memory)) => {
+            (CheckVerdict::Good, format!("on {name}"))
+        }
         Ok((name, DiskKind::Network | DiskKind::Unsure)) => (
-            Verdict::Doubtful,
+            CheckVerdict::Doubtful,
             format!(
                 "on {name}: what others write there raises no event, so the files are looked \
                      at every two seconds"
@@ -134,15 +136,15 @@ pub(super) fn fsync(folder: &Path) -> Finding {
             let text = format!(
                 "{place} is not there, and cannot be created in {there} as this user: {error}"
             );
-            return Finding::new(FSYNC, Verdict::Wrong, text);
+            return Finding::new(FSYNC, CheckVerdict::Wrong, text);
         }
         let text = format!("{place} is not there yet; it is created at the first start");
-        return Finding::new(FSYNC, Verdict::Unknown, text);
+        return Finding::new(FSYNC, CheckVerdict::Unknown, text);
     }
     match syncs(folder) {
         Err(error) => Finding::new(
             FSYNC,
-            Verdict::Wrong,
+            CheckVerdict::Wrong,
             format!("nothing can be written to {place}: {error}"),
         ),
         Ok(mut times) => {
@@ -152,9 +154,9 @@ pub(super) fn fsync(folder: &Path) -> Finding {
             let text = format!("median of {SYNCS} in {place}: {milliseconds:.2} ms");
             if median > SLOW {
                 let text = format!("{text}; a catch-up on history will be slow");
-                Finding::new(FSYNC, Verdict::Doubtful, text)
+                Finding::new(FSYNC, CheckVerdict::Doubtful, text)
             } else {
-                Finding::new(FSYNC, Verdict::Good, text)
+                Finding::new(FSYNC, CheckVerdict::Good, text)
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Whether the readings can be had: the files' folders and files, as this user; the brokers.
 
-use super::{Finding, Verdict};
-use crate::config::{Broker, Config, Source};
+use super::{CheckVerdict, Finding};
+use crate::config::{Broker, Config, FileSource};
 use crate::runtime::tail::{Decoder, list};
 use crate::runtime::tls;
 use std::fs::File;
@@ -23,7 +23,7 @@ pub(super) fn findings(config: &Config) -> Vec<Finding> {
     files.chain(config.brokers.iter().map(broker)).collect()
 }
 
-fn files(source: &Source, decoder: &Decoder) -> Finding {
+fn files(source: &FileSource, decoder: &Decoder) -> Finding {
     let finding =
         |verdict, text: String| Finding::new(SOURCE, verdict, format!("{:?}: {text}", source.id));
     let pattern = &source.pattern;
@@ -32,11 +32,11 @@ fn files(source: &Source, decoder: &Decoder) -> Finding {
         Ok((listed, _)) => listed,
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
             let text = format!("there is no folder {folder}; create it, or put the path right");
-            return finding(Verdict::Doubtful, text);
+            return finding(CheckVerdict::Doubtful, text);
         }
         Err(error) => {
             let text = format!("{folder} cannot be listed as this user: {error}");
-            return finding(Verdict::Wrong, text);
+            return finding(CheckVerdict::Wrong, text);
         }
     };
     let failed = listed
@@ -45,10 +45,16 @@ fn files(source: &Source, decoder: &Decoder) -> Finding {
     match (failed, listed.len()) {
         (Some((file, error)), _) => {
             let text = format!("{} cannot be read as this user: {error}", file.display());
-            finding(Verdict::Wrong, text)
+            finding(CheckVerdict::Wrong, text)
         }
-        (None, 0) => finding(Verdict::Doubtful, format!("there is no file {pattern} yet")),
-        (None, count) => finding(Verdict::Good, format!("files that can be read: {count}")),
+        (None, 0) => finding(
+            CheckVerdict::Doubtful,
+            format!("there is no file {pattern} yet"),
+        ),
+        (None, count) => finding(
+            CheckVerdict::Good,
+            format!("files that can be read: {count}"),
+        ),
     }
 }
 
@@ -68,9 +74,9 @@ fn broker(broker: &Broker) -> Finding {
         .then(|| tls::config(broker.ca_file.as_deref()))
         .transpose();
     let (verdict, text) = match (answer, trusted) {
-        (Ok(_), Ok(_)) => (Verdict::Good, "answers".to_owned()),
-        (Err(error), _) => (Verdict::Wrong, format!("cannot be reached: {error}")),
-        (Ok(_), Err(why)) => (Verdict::Wrong, format!("can prove nothing: {why}")),
+        (Ok(_), Ok(_)) => (CheckVerdict::Good, "answers".to_owned()),
+        (Err(error), _) => (CheckVerdict::Wrong, format!("cannot be reached: {error}")),
+        (Ok(_), Err(why)) => (CheckVerdict::Wrong, format!("can prove nothing: {why}")),
     };
     Finding::new(
         SOURCE,

@@ -1,6 +1,6 @@
 //! Whether the hooks could be run; none is.
 
-use super::{Finding, Verdict};
+use super::{CheckVerdict, Finding};
 use crate::config::{HookConfig, Secret};
 use crate::runtime::sandbox::{self, Walls};
 use crate::runtime::tls;
@@ -23,11 +23,11 @@ pub(super) fn finding(hook: &HookConfig) -> Finding {
         let trusted = webhook.ca_file.as_deref().map(tls::own).transpose();
         let (verdict, text) = match secret.and(trusted) {
             Ok(_) => (
-                Verdict::Good,
+                CheckVerdict::Good,
                 format!("{name} has what it needs; hook test sends to it"),
             ),
             Err(error) => (
-                Verdict::Wrong,
+                CheckVerdict::Wrong,
                 format!("{name}: {error}: alerts would go nowhere"),
             ),
         };
@@ -38,11 +38,11 @@ pub(super) fn finding(hook: &HookConfig) -> Finding {
         let name = &topic.name;
         let (verdict, text) = match trusted {
             Ok(_) => (
-                Verdict::Good,
+                CheckVerdict::Good,
                 format!("{name} has what it needs; hook test publishes to it"),
             ),
             Err(error) => (
-                Verdict::Wrong,
+                CheckVerdict::Wrong,
                 format!("{name}: {error}: alerts would go nowhere"),
             ),
         };
@@ -52,19 +52,22 @@ pub(super) fn finding(hook: &HookConfig) -> Finding {
         let folder = cap.folder.display();
         let (verdict, text) = match writable(&cap.folder) {
             Ok(()) => (
-                Verdict::Good,
+                CheckVerdict::Good,
                 format!("{folder} can be written to; hook test writes a message"),
             ),
             Err(error) => (
-                Verdict::Wrong,
+                CheckVerdict::Wrong,
                 format!("{folder}: {error}: alerts would go nowhere"),
             ),
         };
         return Finding::new("cap", verdict, text);
     }
     let (verdict, text) = match runnable(&hook.program()) {
-        Ok(text) => (Verdict::Good, text),
-        Err(text) => (Verdict::Wrong, format!("{text}: alerts would go nowhere")),
+        Ok(text) => (CheckVerdict::Good, text),
+        Err(text) => (
+            CheckVerdict::Wrong,
+            format!("{text}: alerts would go nowhere"),
+        ),
     };
     Finding::new("hook", verdict, text)
 }
@@ -88,7 +91,7 @@ fn runnable(program: &Path) -> Result<String, String> {
         HookStart::Windows => {
             return Err(format!(
                 "{name}: its lines end as on Windows, so that the kernel finds no such interpreter; \
-                 write them anew with sed -i 's/\\r$//' {name}"
+                 write them again with sed -i 's/\\r$//' {name}"
             ));
         }
         HookStart::Script(words) => words,
@@ -149,15 +152,15 @@ pub(super) fn walls(hooks: &[HookConfig]) -> Option<Finding> {
     let finding = |verdict, text: &str| Finding::new("sandbox", verdict, text);
     is_needed.then(|| match sandbox::probe() {
         Walls::Whole => finding(
-            Verdict::Good,
+            CheckVerdict::Good,
             "hooks can write only where they are allowed to",
         ),
         Walls::Partial => finding(
-            Verdict::Doubtful,
+            CheckVerdict::Doubtful,
             "an old kernel keeps hooks from most writes elsewhere, not from all",
         ),
         Walls::Missing => finding(
-            Verdict::Doubtful,
+            CheckVerdict::Doubtful,
             "the kernel has no landlock: hooks can write wherever the daemon can",
         ),
     })

@@ -15,7 +15,7 @@ use serde::Serialize;
 /// How something stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Verdict {
+pub enum CheckVerdict {
     /// As it should be.
     Good,
     /// The daemon copes, at a price.
@@ -26,7 +26,7 @@ pub enum Verdict {
     Unknown,
 }
 
-impl Verdict {
+impl CheckVerdict {
     /// The word in reports.
     pub fn name(self) -> &'static str {
         match self {
@@ -44,13 +44,13 @@ pub struct Finding {
     /// What: `user`, `state`, `token`, `listen`, `inotify`, `file-system`, `clock`, `fsync`, `hook`, `webhook`, `cap`, `mqtt_out`, `sandbox`, `source`, `recording`.
     pub check: &'static str,
     /// How it stands.
-    pub verdict: Verdict,
+    pub verdict: CheckVerdict,
     /// One line for a person, with what to do about it.
     pub text: String,
 }
 
 impl Finding {
-    fn new(check: &'static str, verdict: Verdict, text: impl Into<String>) -> Self {
+    fn new(check: &'static str, verdict: CheckVerdict, text: impl Into<String>) -> Self {
         Self {
             check,
             verdict,

@@ -1,7 +1,7 @@
 //! Whether recordings keep readings back in a chunk that their writer has not closed.
 
-use super::{Finding, Verdict};
-use crate::config::{FilePattern, Source, SourceKind};
+use super::{CheckVerdict, Finding};
+use crate::config::{FilePattern, FileSource, SourceKind};
 use crate::runtime::tail::records::{HEADER_BYTES, MAGIC, OPEN_CHUNK};
 use std::fs::File;
 use std::io;
@@ -16,19 +16,19 @@ const NEWEST: usize = 20;
 const MOST_RECORDS: usize = 1_000_000;
 
 /// A finding for each recording with an open chunk, or one that there is none.
-pub(super) fn findings(sources: &[Source]) -> Vec<Finding> {
+pub(super) fn findings(sources: &[FileSource]) -> Vec<Finding> {
     let recorded = sources
         .iter()
         .filter(|source| source.kind == SourceKind::Mcap);
     recorded.flat_map(of_source).collect()
 }
 
-fn of_source(source: &Source) -> Vec<Finding> {
+fn of_source(source: &FileSource) -> Vec<Finding> {
     let files = match newest(&source.pattern) {
         Ok(files) => files,
         Err(error) => {
             let text = format!("{}: {error}", source.pattern.folder().display());
-            return vec![Finding::new(CHECK, Verdict::Unknown, text)];
+            return vec![Finding::new(CHECK, CheckVerdict::Unknown, text)];
         }
     };
     let found: Vec<Finding> = files.iter().filter_map(|file| of_file(file)).collect();
@@ -38,7 +38,7 @@ fn of_source(source: &Source) -> Vec<Finding> {
             source.id,
             files.len()
         );
-        return vec![Finding::new(CHECK, Verdict::Good, text)];
+        return vec![Finding::new(CHECK, CheckVerdict::Good, text)];
     }
     found
 }
@@ -49,7 +49,7 @@ fn of_file(file: &Path) -> Option<Finding> {
         Ok(None) => None,
         Ok(Some(bytes)) => Some(Finding::new(
             CHECK,
-            Verdict::Doubtful,
+            CheckVerdict::Doubtful,
             format!(
                 "{name}: {bytes} bytes stand in a chunk that is not closed, and cannot be seen \
                  before it is; have the recorder write without chunks, or flush after each reading"
@@ -57,7 +57,7 @@ fn of_file(file: &Path) -> Option<Finding> {
         )),
         Err(error) => {
             let text = format!("{name}: {error}");
-            Some(Finding::new(CHECK, Verdict::Unknown, text))
+            Some(Finding::new(CHECK, CheckVerdict::Unknown, text))
         }
     }
 }

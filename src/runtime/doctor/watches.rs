@@ -1,6 +1,6 @@
 //! Whether the kernel lets us watch the sources' folders.
 
-use super::{Finding, Verdict};
+use super::{CheckVerdict, Finding};
 use crate::config::Config;
 use notify::{RecursiveMode, Watcher};
 use std::collections::BTreeSet;
@@ -25,10 +25,10 @@ pub(super) fn finding(config: &Config) -> Finding {
         },
     );
     match tried {
-        Ok(()) => Finding::new(CHECK, Verdict::Good, limits),
+        Ok(()) => Finding::new(CHECK, CheckVerdict::Good, limits),
         Err(error) => Finding::new(
             CHECK,
-            Verdict::Doubtful,
+            CheckVerdict::Doubtful,
             format!(
                 "{error} ({limits}): files are looked at every two seconds instead; raise \
                  fs.inotify.max_user_watches or max_user_instances with sysctl"

@@ -1,18 +1,18 @@
 //! One drill: a site of its own follows a file of its own, in which a made-up slope runs away.
 
-use super::Office;
-use super::runner::Watched;
+use super::DrillContext;
+use super::runner::DrillObserver;
 use crate::alert::Level;
 use crate::config::{self, Config, Drill, EXERCISE, HookConfig};
-use crate::monitor::{EventKind, Given, Order, Settings, Watched as WatchedBenchmarks};
+use crate::monitor::{EventKind, Given, Order, OrderKind, Settings, Watched};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::clock::{self, Stopwatch};
 use crate::runtime::daemon::Daemon;
 use crate::runtime::deliver::{Dispatcher, Retry, Runner};
 use crate::runtime::delivered::Delivered;
-use crate::runtime::drilled::{Passed, folder};
-use crate::runtime::hook::{Outcome, Status};
-use crate::runtime::pulse::Pulse;
+use crate::runtime::drilled::{PassedDrill, folder};
+use crate::runtime::hook::{HookOutcome, Status};
+use crate::runtime::pulse::Reporting;
 use crate::runtime::shutdown::Shutdown;
 use crate::runtime::site::{Sinks, Site};
 use crate::runtime::sources::Sources;
@@ -44,7 +44,7 @@ const SCALE_MM: f64 = 200.0;
 /// A drill under way.
 struct Exercise {
     daemon: Daemon,
-    watched: Watched,
+    watched: DrillObserver,
     tick: Interval,
     shutdown: Shutdown,
 }
@@ -54,17 +54,17 @@ struct Exercise {
 /// # Errors
 /// Why it failed, one line for people.
 pub(super) async fn hold(
-    office: &Office,
+    office: &DrillContext,
     drill: &Drill,
     shutdown: &Shutdown,
-) -> Result<Passed, String> {
+) -> Result<PassedDrill, String> {
     let started = clock::now();
     let file = made(office, started).map_err(|error| format!("its folder: {error}"))?;
     let hooks = hooks(&office.config);
     let mut exercise = Exercise::start(office, &hooks, shutdown)
         .map_err(|error| format!("it could not be started: {error}"))?;
     let held = exercise
-        .held((&file, started), hooks.len(), (office, drill))
+        .held(&file, started, hooks.len(), office, drill)
         .await;
     exercise.end(hooks.len()).await;
     held
@@ -84,7 +84,7 @@ fn hooks(config: &Config) -> Vec<HookConfig> {
 }
 
 /// The folder, without what the last drill left, and the file with the past in it.
-fn made(office: &Office, started: Timestamp) -> io::Result<PathBuf> {
+fn made(office: &DrillContext, started: Timestamp) -> io::Result<PathBuf> {
     let folder = run_folder(office);
     if folder.exists() {
         fs::remove_dir_all(&folder)?;
@@ -96,7 +96,7 @@ fn made(office: &Office, started: Timestamp) -> io::Result<PathBuf> {
     Ok(file)
 }
 
-fn run_folder(office: &Office) -> PathBuf {
+fn run_folder(office: &DrillContext) -> PathBuf {
     folder(&office.config.site.state_dir).join("run")
 }
 
@@ -122,7 +122,11 @@ fn append(file: &Path, text: &str) -> io::Result<()> {
 }
 
 impl Exercise {
-    fn start(office: &Office, hooks: &[HookConfig], shutdown: &Shutdown) -> anyhow::Result<Self> {
+    fn start(
+        office: &DrillContext,
+        hooks: &[HookConfig],
+        shutdown: &Shutdown,
+    ) -> anyhow::Result<Self> {
         let folder = run_folder(office);
         let text = format!(
             "[site]\nname = \"drill\"\nstate_dir = \"state\"\n\
@@ -132,7 +136,7 @@ impl Exercise {
         );
         let config = config::parse(&text, &folder.join("drill.toml"))?;
         let store = Arc::new(Store::open(&config.site.state_dir)?);
-        let watched = Watched::default();
+        let watched = DrillObserver::default();
         let runner: Arc<dyn Runner> = Arc::new(watched.clone());
         let delivered = Delivered::of(Arc::clone(&store));
         let sinks = Sinks {
@@ -148,7 +152,14 @@ impl Exercise {
         let name = &office.config.site.name;
         let site = Site::resume(name, config.settings.clone(), sinks, &mut || {})?;
         let sources = Sources::start(&config, &store)?;
-        let daemon = Daemon::new(&config, store, site, (sources, Pulse::inward()), clock::now);
+        let daemon = Daemon::new(
+            &config,
+            store,
+            site,
+            sources,
+            Reporting::inward(),
+            clock::now,
+        );
         Ok(Self {
             daemon,
             watched,
@@ -159,10 +170,12 @@ impl Exercise {
 
     async fn held(
         &mut self,
-        (file, started): (&Path, Timestamp),
+        file: &Path,
+        started: Timestamp,
         hooks: usize,
-        (office, drill): (&Office, &Drill),
-    ) -> Result<Passed, String> {
+        office: &DrillContext,
+        drill: &Drill,
+    ) -> Result<PassedDrill, String> {
         self.until(LIMIT, "its past was not read", |daemon, _| {
             daemon.pulse.vitals.health().is_caught_up
         })
@@ -172,9 +185,12 @@ impl Exercise {
         }
         self.watched.seen().appended = Some(Stopwatch::start());
         append(file, &rows(APPENDED, started)).map_err(|error| format!("its file: {error}"))?;
-        let taken = |_: &Daemon, watched: &Watched| {
+        let taken = |_: &Daemon, watched: &DrillObserver| {
             let seen = watched.seen();
-            let done = seen.outcomes.values().filter(|one| **one == Outcome::Done);
+            let done = seen
+                .outcomes
+                .values()
+                .filter(|one| **one == HookOutcome::Done);
             done.count() == hooks
         };
         let reached = self
@@ -183,10 +199,10 @@ impl Exercise {
         reached.map_err(|why| self.explained(&why))?;
         let latency = self.watched.seen().latency.unwrap_or_default();
         let acknowledged = match drill.acknowledge_within {
-            Some(within) => Some(self.acknowledged(office, (started, within)).await?),
+            Some(within) => Some(self.acknowledged(office, started, within).await?),
             None => None,
         };
-        Ok(Passed {
+        Ok(PassedDrill {
             latency,
             acknowledged,
         })
@@ -197,7 +213,7 @@ impl Exercise {
         &mut self,
         limit: Duration,
         what: &str,
-        is_so: impl Fn(&Daemon, &Watched) -> bool,
+        is_so: impl Fn(&Daemon, &DrillObserver) -> bool,
     ) -> Result<(), String> {
         let begun = Stopwatch::start();
         while !is_so(&self.daemon, &self.watched) {
@@ -221,16 +237,17 @@ impl Exercise {
         let failed = seen
             .outcomes
             .iter()
-            .filter(|(_, one)| **one != Outcome::Done);
+            .filter(|(_, one)| **one != HookOutcome::Done);
         let failed = failed.map(|(name, outcome)| format!("{name}: {outcome:?}"));
         format!("{why}: {}", failed.collect::<Vec<_>>().join("; "))
     }
 
-    /// Waits for somebody to acknowledge it: the order stands in the site's own log, whatever the door.
+    /// Waits for somebody to acknowledge it: the order stands in the site's own log, whatever way it came by.
     async fn acknowledged(
         &mut self,
-        office: &Office,
-        (started, within): (Timestamp, SignedDuration),
+        office: &DrillContext,
+        started: Timestamp,
+        within: SignedDuration,
     ) -> Result<Duration, String> {
         let begun = self.watched.seen().begun.unwrap_or_else(Stopwatch::start);
         let within = within.unsigned_abs();
@@ -258,15 +275,15 @@ impl Exercise {
     /// The benchmark is watched no more, which ends its alert; the hooks get that end too.
     async fn end(mut self, hooks: usize) {
         let settings = Settings {
-            watched: WatchedBenchmarks {
+            watched: Watched {
                 named: BTreeSet::new(),
                 is_open: false,
             },
             ..self.daemon.config.settings.clone()
         };
-        self.daemon.site.resettle(settings);
+        self.daemon.site.change_settings(settings);
         if self.watched.seen().begun.is_some() {
-            let ended = |_: &Daemon, watched: &Watched| watched.seen().ended >= hooks;
+            let ended = |_: &Daemon, watched: &DrillObserver| watched.seen().ended >= hooks;
             if let Err(why) = self
                 .until(END_LIMIT, "not every hook has taken its end", ended)
                 .await
@@ -297,6 +314,6 @@ fn acknowledgement(
             return None;
         };
         let is_since = given.given_at.is_some_and(|at| at >= started);
-        (is_of_it && order == "acknowledge" && is_since).then_some(given)
+        (is_of_it && order == OrderKind::Acknowledge && is_since).then_some(given)
     }))
 }

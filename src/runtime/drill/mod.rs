@@ -7,7 +7,7 @@ mod exercise;
 mod runner;
 
 use super::clock;
-use super::drilled::Record;
+use super::drilled::DrillRecord;
 use super::shutdown::Shutdown;
 use super::vitals::Vitals;
 use crate::config::{Config, Drill};
@@ -19,14 +19,14 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::task::JoinSet;
 
-/// How often it is looked at whether one is due: the host's clock may be set.
-const LOOK: Duration = Duration::from_secs(1);
+/// How often it is checked whether one is due: the host's clock may be set.
+const POLL_INTERVAL: Duration = Duration::from_secs(1);
 /// A drill begins a little after it is due: the next one is not put off by a day for that.
 const SLACK: SignedDuration = SignedDuration::from_hours(1);
 
-/// What drills need of the daemon.
+/// What a drill needs of the daemon.
 #[derive(Debug)]
-struct Office {
+struct DrillContext {
     config: Config,
     store: Arc<Store>,
     vitals: Arc<Vitals>,
@@ -36,12 +36,13 @@ struct Office {
 pub(super) fn start(
     config: &Config,
     store: &Arc<Store>,
-    (vitals, shutdown): (&Arc<Vitals>, &Shutdown),
+    vitals: &Arc<Vitals>,
+    shutdown: &Shutdown,
 ) -> JoinSet<()> {
     let mut tasks = JoinSet::new();
     vitals.update(|health| health.drill = None);
     if let Some(drill) = config.drill.clone() {
-        let office = Office {
+        let office = DrillContext {
             config: config.clone(),
             store: Arc::clone(store),
             vitals: Arc::clone(vitals),
@@ -58,16 +59,17 @@ pub(super) fn start(
     tasks
 }
 
-async fn hold(office: &Office, drill: &Drill, shutdown: &mut Shutdown) {
+async fn hold(office: &DrillContext, drill: &Drill, shutdown: &mut Shutdown) {
     let site = &office.config.site;
-    let mut record = Record::read(&site.state_dir).unwrap_or_else(|| Record::new(clock::now()));
+    let mut record =
+        DrillRecord::read(&site.state_dir).unwrap_or_else(|| DrillRecord::new(clock::now()));
     loop {
         record.overdue_after = overdue_after(drill, &record);
         keep(office, &record);
-        let due = due(drill, &record, (clock::now(), &site.time_zone));
+        let due = due(drill, &record, clock::now(), &site.time_zone);
         // Before the past has been read nobody is watched, and the machine has other work.
         while clock::now() < due || !office.vitals.health().is_caught_up {
-            tokio::time::sleep(LOOK).await;
+            tokio::time::sleep(POLL_INTERVAL).await;
         }
         tracing::info!("a drill begins");
         record.started = Some(clock::now());
@@ -82,7 +84,7 @@ async fn hold(office: &Office, drill: &Drill, shutdown: &mut Shutdown) {
 }
 
 /// Shows how drills stand, and keeps it over restarts.
-fn keep(office: &Office, record: &Record) {
+fn keep(office: &DrillContext, record: &DrillRecord) {
     if let Err(error) = record.write(&office.config.site.state_dir) {
         tracing::warn!(%error, "a restart will not know of the last drill");
     }
@@ -91,7 +93,7 @@ fn keep(office: &Office, record: &Record) {
 }
 
 /// When the next one begins.
-fn due(drill: &Drill, record: &Record, (now, zone): (Timestamp, &TimeZone)) -> Timestamp {
+fn due(drill: &Drill, record: &DrillRecord, now: Timestamp, zone: &TimeZone) -> Timestamp {
     let earliest = match record.started {
         Some(started) => started
             .saturating_add(drill.every)
@@ -121,7 +123,7 @@ fn due(drill: &Drill, record: &Record, (now, zone): (Timestamp, &TimeZone)) -> T
 }
 
 /// When it is an alarm that none has passed.
-fn overdue_after(drill: &Drill, record: &Record) -> Timestamp {
+fn overdue_after(drill: &Drill, record: &DrillRecord) -> Timestamp {
     let since = record.passed_at.unwrap_or(record.since);
     let slack = if drill.at.is_some() {
         SignedDuration::from_hours(25)
@@ -152,22 +154,22 @@ mod tests {
             acknowledge_within: None,
         };
         let now = time("2026-10-20T09:00:00Z");
-        let mut record = Record::new(now);
+        let mut record = DrillRecord::new(now);
         // 10:00 there is over for today.
-        let first = due(&drill, &record, (now, &zone));
+        let first = due(&drill, &record, now, &zone);
         assert_eq!(first, time("2026-10-21T08:00:00Z"));
         // The summer time ends before the next one.
         record.started = Some(first + SignedDuration::from_secs(3));
-        let next = due(&drill, &record, (now, &zone));
+        let next = due(&drill, &record, now, &zone);
         assert_eq!(next, time("2026-10-28T09:00:00Z"));
         // The daemon was away at the time: it is held by day all the same.
         let late = time("2026-10-30T02:00:00Z");
         assert_eq!(
-            due(&drill, &record, (late, &zone)),
+            due(&drill, &record, late, &zone),
             time("2026-10-30T09:00:00Z")
         );
         let drill = Drill { at: None, ..drill };
-        assert!(due(&drill, &record, (late, &zone)) < late);
+        assert!(due(&drill, &record, late, &zone) < late);
         assert!(overdue_after(&drill, &record) > late);
         assert!(overdue_after(&drill, &record) < late + SignedDuration::from_hours(48));
     }

@@ -4,14 +4,14 @@ use crate::config::HookConfig;
 use crate::monitor::{AlertState, EventKind};
 use crate::runtime::clock::Stopwatch;
 use crate::runtime::deliver::{Processes, Run, Runner};
-use crate::runtime::hook::{Alert, Outcome};
+use crate::runtime::hook::{Alert, HookOutcome};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// What has been seen so far.
 #[derive(Debug, Default)]
-pub(super) struct Seen {
+pub(super) struct DrillProgress {
     /// Since the readings were appended that lead to the alert.
     pub(super) appended: Option<Stopwatch>,
     /// How long after that the first hook began; zero where it began before.
@@ -19,22 +19,22 @@ pub(super) struct Seen {
     /// Since the first hook began.
     pub(super) begun: Option<Stopwatch>,
     /// How each hook's newest run for the alert ended.
-    pub(super) outcomes: BTreeMap<String, Outcome>,
+    pub(super) outcomes: BTreeMap<String, HookOutcome>,
     /// Hooks that have taken the end of the drill.
     pub(super) ended: usize,
 }
 
 /// The runner of one drill.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Watched(Arc<Mutex<Seen>>);
+pub(super) struct DrillObserver(Arc<Mutex<DrillProgress>>);
 
-impl Watched {
-    pub(super) fn seen(&self) -> MutexGuard<'_, Seen> {
+impl DrillObserver {
+    pub(super) fn seen(&self) -> MutexGuard<'_, DrillProgress> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Runner for Watched {
+impl Runner for DrillObserver {
     fn run(&self, hook: Arc<HookConfig>, mut alert: Alert, attempt: u32) -> Run {
         // Whoever reads this line alone is to know.
         if let EventKind::Alert { text, .. } = &mut alert.event.kind {
@@ -53,7 +53,7 @@ impl Runner for Watched {
             let outcome = Processes.run(hook, alert, attempt).await;
             let mut seen = watched.seen();
             if is_end {
-                seen.ended += usize::from(outcome == Outcome::Done);
+                seen.ended += usize::from(outcome == HookOutcome::Done);
             } else {
                 seen.outcomes.insert(name, outcome.clone());
             }

@@ -175,6 +175,7 @@ pub(super) enum Name<'a> {
     WithoutUnit,
 }
 
+/// Words by which a column is one of readings.
 const KEYWORDS: [&str; 3] = ["displacement", "velocity", "sigma"];
 
 /// Reads a column's name.
@@ -253,6 +254,7 @@ fn lacks_a_unit(plain: &str) -> bool {
         })
 }
 
+/// Units at the end of a covariate's name, as loggers and surveys write them.
 const CHANNEL_UNITS: [&str; 41] = [
     "mm", "cm", "m", "in", "ft", "km", "c", "f", "k", "degc", "degf", "deg_c", "deg_f", "deg",
     "m3_s", "m3_per_s", "l_s", "l_per_s", "cfs", "m_s", "m_per_s", "km_h", "km_per_h", "pa", "hpa",

@@ -1,10 +1,7 @@
 //! Turns a file of readings into another format.
 
 use super::atomic::write_atomically;
-use super::text::TextFormat;
-use super::{
-    Format, ReadOptions, encode_mcap, is_packed, read_files, write_csv, write_ndjson, write_toa5,
-};
+use super::{Format, ReadOptions, encode_mcap, is_packed, read_files};
 use crate::reading::{BenchmarkId, Disorder, Quantity, Recording, Unit};
 use anyhow::Context;
 use schemars::JsonSchema;
@@ -65,9 +62,7 @@ pub fn convert(
     );
     let (recording, disorder) = read_files(&[input.to_owned()], options)?;
     write_atomically(output, |out| match format {
-        Format::Text(TextFormat::Csv) => write_csv(&recording, BufWriter::new(out)),
-        Format::Text(TextFormat::Ndjson) => write_ndjson(&recording, BufWriter::new(out)),
-        Format::Text(TextFormat::Toa5) => write_toa5(&recording, BufWriter::new(out)),
+        Format::Text(format) => (format.write)(&recording, &mut BufWriter::new(out)),
         Format::Mcap => encode_mcap(&recording, out),
     })
     .with_context(|| format!("converting {} to {}", input.display(), output.display()))?;
@@ -88,7 +83,7 @@ fn report(recording: &Recording, disorder: Disorder, format: Format) -> ConvertR
     let mut left_out = Vec::new();
     if let Format::Text(format) = format {
         for series in &recording.series {
-            if let Some(span) = series.averaging.filter(|_| format != TextFormat::Ndjson) {
+            if let Some(span) = series.averaging.filter(|_| !format.states_averaging) {
                 left_out.push(format!(
                     "averaging of {} {}: {span}",
                     series.benchmark,

@@ -4,13 +4,92 @@
 //! Every other cell holds one finite number, or a mark that the sensor gave none. Times are kept as
 //! instants: the offset in which they were written is not.
 
-use super::columns::Layout;
+use super::columns::{Layout, Meaning};
 use super::split::Splitter;
 use super::table::TableRows;
+use super::table_write::write_csv;
+use super::taken::{LineResult, Remark};
+use super::text_format::{LineReader, TextFormat};
 use super::{IngestError, Item, ReadOptions};
 use crate::reading::Delimiter;
 use ::csv::StringRecord;
 use std::path::{Path, PathBuf};
+
+/// A header and separated rows.
+pub static CSV: TextFormat = TextFormat {
+    name: "csv",
+    extensions: &["csv", "tsv", "txt"],
+    begins: |_| true,
+    reader: |file, options| Box::new(CsvReader::new(file, options)),
+    write: |recording, out| write_csv(recording, out),
+    states_averaging: false,
+};
+
+/// Reads one file line by line: the first line is a header.
+#[derive(Debug)]
+struct CsvReader {
+    file: PathBuf,
+    options: ReadOptions,
+    /// None before a header that is understood.
+    rows: Option<CsvRows>,
+}
+
+impl CsvReader {
+    fn new(file: &Path, options: &ReadOptions) -> Self {
+        Self {
+            file: file.into(),
+            options: options.clone(),
+            rows: None,
+        }
+    }
+
+    fn table(&self) -> Option<&TableRows> {
+        self.rows.as_ref()?.table.as_ref()
+    }
+}
+
+impl LineReader for CsvReader {
+    fn take(&mut self, line: u64, text: &str) -> LineResult {
+        if let Some(rows) = &mut self.rows {
+            return rows.row(line, text).into();
+        }
+        let rows = CsvRows::new(&self.file, text, &self.options);
+        rows.map(|rows| {
+            self.rows = Some(rows);
+            Vec::new()
+        })
+        .into()
+    }
+
+    fn take_remarks(&mut self) -> Vec<Remark> {
+        let table = self.rows.as_mut().and_then(|rows| rows.table.as_mut());
+        table.map_or_else(Vec::new, TableRows::take_remarks)
+    }
+
+    fn meanings(&self) -> Vec<(String, Meaning)> {
+        self.table().map_or_else(Vec::new, TableRows::meanings)
+    }
+
+    fn takes_latin1(&self) -> bool {
+        true
+    }
+
+    fn is_lost(&self) -> bool {
+        self.rows.is_none()
+    }
+
+    fn header(&self) -> &[String] {
+        self.rows.as_ref().map_or(&[], |rows| &rows.header)
+    }
+
+    fn columns(&self) -> &[String] {
+        self.rows.as_ref().map_or(&[], CsvRows::columns)
+    }
+
+    fn finish(&self) -> Result<(), IngestError> {
+        self.rows.as_ref().map_or(Ok(()), CsvRows::finish)
+    }
+}
 
 /// Reads the rows of one file, one at a time; what the columns are is decided by the header alone.
 #[derive(Debug)]
@@ -55,21 +134,13 @@ impl CsvRows {
                 missing: "header",
             });
         }
-        rows.understand(1, header)?;
+        rows.read_header(1, header)?;
         Ok(rows)
     }
 
     /// The columns' names, in their order.
     pub fn columns(&self) -> &[String] {
         self.table.as_ref().map_or(&[], TableRows::names)
-    }
-
-    pub(super) fn table(&mut self) -> Option<&mut TableRows> {
-        self.table.as_mut()
-    }
-
-    pub(super) fn header(&self) -> &[String] {
-        &self.header
     }
 
     /// What one row holds, nothing if it is blank or a header again, whose columns then hold for what
@@ -95,7 +166,7 @@ impl CsvRows {
         if self.is_header() {
             self.header.clear();
             self.table = None;
-            return self.understand(line, text).map(|()| Vec::new());
+            return self.read_header(line, text).map(|()| Vec::new());
         }
         match &mut self.table {
             Some(table) => table.items(line, &self.cells),
@@ -122,7 +193,7 @@ impl CsvRows {
         self.cells.iter().any(is_name)
     }
 
-    fn understand(&mut self, line: u64, text: &str) -> Result<(), IngestError> {
+    fn read_header(&mut self, line: u64, text: &str) -> Result<(), IngestError> {
         let names = self.cells.iter().map(str::to_owned).collect();
         let layout = Layout::new(&self.file, line, names, &self.options)?;
         self.table = Some(TableRows::new(&self.file, layout, &self.options));
@@ -130,8 +201,7 @@ impl CsvRows {
         Ok(())
     }
 
-    /// What a whole file must have held.
-    pub(super) fn finish(&self) -> Result<(), IngestError> {
+    fn finish(&self) -> Result<(), IngestError> {
         let Some(table) = &self.table else {
             return Ok(());
         };

@@ -44,7 +44,7 @@ pub fn encode_mcap(recording: &Recording, out: impl Write + Seek) -> Result<(), 
 
 /// A topic that holds no readings, but what was said of them. Readers of readings leave it out.
 #[derive(Debug, Clone)]
-pub(in crate::runtime) struct SaidTopic {
+pub(in crate::runtime) struct EventTopic {
     /// The topic, no benchmark's and no channel's.
     pub(in crate::runtime) name: String,
     /// The schema's name and its text.
@@ -59,7 +59,7 @@ pub(in crate::runtime) struct SaidTopic {
 /// As [`write_mcap`].
 pub(in crate::runtime) fn write_mcap_with(
     recording: &Recording,
-    said: &[SaidTopic],
+    said: &[EventTopic],
     file: &Path,
 ) -> Result<(), IngestError> {
     let outgoing = outgoing(recording, said)?;
@@ -76,7 +76,7 @@ fn unwritten(error: McapError) -> IngestError {
 }
 
 /// One topic on its way out.
-struct Outgoing {
+struct OutgoingTopic {
     name: String,
     schema: (&'static str, String),
     unit: Option<String>,
@@ -90,7 +90,7 @@ enum Row {
     Said(Value),
 }
 
-fn outgoing(recording: &Recording, said: &[SaidTopic]) -> Result<Vec<Outgoing>, IngestError> {
+fn outgoing(recording: &Recording, said: &[EventTopic]) -> Result<Vec<OutgoingTopic>, IngestError> {
     let series = recording.series.iter().map(from_series);
     let channels = recording.channels.iter().map(from_channel);
     let said = said.iter().map(from_said);
@@ -117,8 +117,8 @@ fn outgoing(recording: &Recording, said: &[SaidTopic]) -> Result<Vec<Outgoing>, 
         .collect()
 }
 
-fn from_said(said: &SaidTopic) -> (Outgoing, Vec<(Timestamp, Row)>) {
-    let topic = Outgoing {
+fn from_said(said: &EventTopic) -> (OutgoingTopic, Vec<(Timestamp, Row)>) {
+    let topic = OutgoingTopic {
         name: said.name.clone(),
         schema: said.schema.clone(),
         unit: None,
@@ -129,7 +129,7 @@ fn from_said(said: &SaidTopic) -> (Outgoing, Vec<(Timestamp, Row)>) {
     (topic, said.messages.iter().map(row).collect())
 }
 
-fn from_series(series: &Series) -> (Outgoing, Vec<(Timestamp, Row)>) {
+fn from_series(series: &Series) -> (OutgoingTopic, Vec<(Timestamp, Row)>) {
     let mut metadata = BTreeMap::new();
     if let Some(span) = series.averaging {
         let seconds = if span.subsec_nanos() == 0 {
@@ -139,7 +139,7 @@ fn from_series(series: &Series) -> (Outgoing, Vec<(Timestamp, Row)>) {
         };
         metadata.insert(AVERAGING.to_owned(), seconds);
     }
-    let topic = Outgoing {
+    let topic = OutgoingTopic {
         name: Topic::Benchmark(series.benchmark.clone(), series.quantity()).name(),
         schema: ("slipwatch.Reading", READING_SCHEMA.to_owned()),
         unit: Some(series.unit.to_string()),
@@ -150,8 +150,8 @@ fn from_series(series: &Series) -> (Outgoing, Vec<(Timestamp, Row)>) {
     (topic, series.readings.iter().map(row).collect())
 }
 
-fn from_channel(channel: &Channel) -> (Outgoing, Vec<(Timestamp, Row)>) {
-    let topic = Outgoing {
+fn from_channel(channel: &Channel) -> (OutgoingTopic, Vec<(Timestamp, Row)>) {
+    let topic = OutgoingTopic {
         name: Topic::Channel(channel.name.clone()).name(),
         schema: ("slipwatch.Sample", SAMPLE_SCHEMA.to_owned()),
         unit: channel.unit.clone(),
@@ -170,7 +170,7 @@ fn from_channel(channel: &Channel) -> (Outgoing, Vec<(Timestamp, Row)>) {
 }
 
 fn timed(
-    topic: &Outgoing,
+    topic: &OutgoingTopic,
     rows: Vec<(Timestamp, Row)>,
     base: Timestamp,
 ) -> Result<Vec<(u64, Row)>, IngestError> {
@@ -195,7 +195,7 @@ fn timed(
 
 fn encode(
     recording: &Recording,
-    outgoing: &[Outgoing],
+    outgoing: &[OutgoingTopic],
     out: impl Write + Seek,
 ) -> Result<(), McapError> {
     let mut writer = WriteOptions::new()
@@ -248,7 +248,7 @@ fn encode(
     Ok(())
 }
 
-fn declare<W: Write + Seek>(writer: &mut Writer<W>, one: &Outgoing) -> Result<u16, McapError> {
+fn declare<W: Write + Seek>(writer: &mut Writer<W>, one: &OutgoingTopic) -> Result<u16, McapError> {
     let (name, schema) = &one.schema;
     let schema = writer.add_schema(name, "jsonschema", schema.as_bytes())?;
     writer.add_channel(schema, &one.name, "json", &one.metadata)

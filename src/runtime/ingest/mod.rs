@@ -19,6 +19,8 @@ mod table;
 mod table_write;
 mod taken;
 mod text;
+mod text_format;
+mod text_formats;
 mod toa5;
 mod units;
 mod vector;
@@ -26,18 +28,22 @@ mod vector;
 pub use bytes::{is_packed, unpack, unpacked_name};
 pub use columns::{ColumnMap, ColumnMapError, Meaning, Measure};
 pub use convert::{ChannelCount, ConvertReport, SeriesCount, convert};
-pub use csv::CsvRows;
+pub use csv::{CSV, CsvRows};
 pub use encoding::{Transcoder, latin1};
 pub use error::IngestError;
-pub(super) use mcap_write::{SaidTopic, write_mcap_with};
+pub(super) use mcap_write::{EventTopic, write_mcap_with};
 pub use mcap_write::{encode_mcap, write_mcap};
 pub(super) use message::escape;
 pub use message::{MessageError, decode_message};
+pub use ndjson::NDJSON;
 pub use ndjson_write::write_ndjson;
 pub use survey::{Survey, survey};
 pub use table_write::{write_csv, write_toa5};
-pub use taken::{Remark, Taken};
-pub use text::{Looked, TextFormat, TextRows, look_through};
+pub use taken::{LineResult, Remark};
+pub use text::{FileSurvey, TextRows, look_through};
+pub use text_format::{LineReader, TextFormat};
+pub use text_formats::TEXT_FORMATS;
+pub use toa5::TOA5;
 pub use units::FileUnits;
 pub use vector::VectorMap;
 
@@ -130,9 +136,9 @@ pub enum Item {
     },
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 enum Format {
-    Text(TextFormat),
+    Text(&'static TextFormat),
     Mcap,
 }
 
@@ -143,10 +149,11 @@ impl Format {
         }
         let name = bytes::unpacked_name(file);
         let extension = name.extension().unwrap_or_default().to_string_lossy();
-        match extension.to_ascii_lowercase().as_str() {
-            "csv" | "tsv" | "txt" => Ok(Self::Text(TextFormat::Csv)),
-            "ndjson" | "jsonl" => Ok(Self::Text(TextFormat::Ndjson)),
-            "dat" => Ok(Self::Text(TextFormat::Toa5)),
+        let extension = extension.to_ascii_lowercase();
+        if let Some(format) = TextFormat::of_extension(&extension) {
+            return Ok(Self::Text(format));
+        }
+        match extension.as_str() {
             "mcap" if !is_packed(file) => Ok(Self::Mcap),
             "xlsx" | "xls" | "xlsm" | "xlsb" | "ods" => {
                 Err(IngestError::Workbook { file: file.into() })
@@ -165,15 +172,12 @@ impl Format {
         })?;
         let text = all.strip_prefix("\u{feff}".as_bytes()).unwrap_or(all);
         let text = text.trim_ascii_start();
-        Ok(if all.starts_with(MCAP_MAGIC) {
-            Self::Mcap
-        } else if text.starts_with(b"{") {
-            Self::Text(TextFormat::Ndjson)
-        } else if text.starts_with(b"\"TOA5\"") || text.starts_with(b"TOA5,") {
-            Self::Text(TextFormat::Toa5)
-        } else {
-            Self::Text(TextFormat::Csv)
-        })
+        if all.starts_with(MCAP_MAGIC) {
+            return Ok(Self::Mcap);
+        }
+        let mut formats = TEXT_FORMATS.into_iter();
+        let format = formats.find(|one| (one.begins)(text)).unwrap_or(&CSV);
+        Ok(Self::Text(format))
     }
 }
 

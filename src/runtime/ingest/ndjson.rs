@@ -8,10 +8,12 @@
 //! A writer that was killed leaves a torn object, and the next one begins behind it on the same line:
 //! that one is kept.
 
-use super::columns::Layout;
+use super::columns::{Layout, Meaning};
 use super::message::{AVERAGING, Fields, MessageError, Topic};
+use super::ndjson_write::write_ndjson;
 use super::table::TableRows;
-use super::taken::Taken;
+use super::taken::{LineResult, Remark};
+use super::text_format::{LineReader, TextFormat};
 use super::{IngestError, Item, ReadOptions};
 use crate::reading::{BenchmarkId, MissingValues, Quantity, Unit};
 use ::csv::StringRecord;
@@ -45,16 +47,41 @@ impl MessageKind {
     }
 }
 
+/// A JSON object a line.
+pub static NDJSON: TextFormat = TextFormat {
+    name: "ndjson",
+    extensions: &["ndjson", "jsonl"],
+    begins: |text| text.starts_with(b"{"),
+    reader: |file, options| Box::new(NdjsonRows::new(file, options)),
+    write: |recording, out| write_ndjson(recording, out),
+    states_averaging: true,
+};
+
+impl LineReader for NdjsonRows {
+    fn take(&mut self, line: u64, text: &str) -> LineResult {
+        self.row(line, text)
+    }
+
+    fn take_remarks(&mut self) -> Vec<Remark> {
+        let tables = self.tables.values_mut();
+        tables.flat_map(TableRows::take_remarks).collect()
+    }
+
+    fn meanings(&self) -> Vec<(String, Meaning)> {
+        self.tables.values().flat_map(TableRows::meanings).collect()
+    }
+}
+
 /// Reads one file line by line.
 #[derive(Debug)]
-pub(super) struct NdjsonRows {
+struct NdjsonRows {
     file: PathBuf,
     options: ReadOptions,
     tables: BTreeMap<Vec<String>, TableRows>,
 }
 
 impl NdjsonRows {
-    pub(super) fn new(file: &Path, options: &ReadOptions) -> Self {
+    fn new(file: &Path, options: &ReadOptions) -> Self {
         Self {
             file: file.into(),
             options: options.clone(),
@@ -62,12 +89,8 @@ impl NdjsonRows {
         }
     }
 
-    pub(super) fn tables(&mut self) -> impl Iterator<Item = &mut TableRows> {
-        self.tables.values_mut()
-    }
-
     /// All that is intact in one line, and what is wrong with the rest.
-    pub(super) fn row(&mut self, line: u64, text: &str) -> Taken {
+    fn row(&mut self, line: u64, text: &str) -> LineResult {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let mut found = objects(text);
         if found.torn.is_some()
@@ -78,7 +101,7 @@ impl NdjsonRows {
                 found = again;
             }
         }
-        let mut taken = Taken::default();
+        let mut taken = LineResult::default();
         for object in &found.whole {
             match self.object(line, object) {
                 Ok(items) => taken.items.extend(items),

@@ -8,7 +8,7 @@ use std::io::{self, Write};
 
 /// One line.
 #[derive(Debug, Serialize)]
-struct Message<'a> {
+struct NdjsonLine<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     benchmark: Option<&'a str>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -31,7 +31,7 @@ struct Message<'a> {
 /// [`IngestError::Unwritable`] for a value that is not finite and for a name that is empty;
 /// [`IngestError::Write`] when `out` fails.
 pub fn write_ndjson(recording: &Recording, mut out: impl Write) -> Result<(), IngestError> {
-    let mut messages: Vec<Message<'_>> = messages(recording).collect();
+    let mut messages: Vec<NdjsonLine<'_>> = messages(recording).collect();
     for message in &messages {
         let name = message.benchmark.or(message.channel).unwrap_or_default();
         let row = Reading {
@@ -60,9 +60,9 @@ pub fn write_ndjson(recording: &Recording, mut out: impl Write) -> Result<(), In
     out.flush().map_err(fail)
 }
 
-fn messages(recording: &Recording) -> impl Iterator<Item = Message<'_>> {
+fn messages(recording: &Recording) -> impl Iterator<Item = NdjsonLine<'_>> {
     let readings = recording.series.iter().flat_map(|series| {
-        series.readings.iter().map(|reading| Message {
+        series.readings.iter().map(|reading| NdjsonLine {
             benchmark: Some(series.benchmark.as_str()),
             channel: None,
             quantity: Some(series.quantity().name()),
@@ -77,7 +77,7 @@ fn messages(recording: &Recording) -> impl Iterator<Item = Message<'_>> {
         // Where the name says it, it need not be said again with every value.
         let unit = channel.unit.clone();
         let unit = unit.filter(|unit| channel_unit(&channel.name) != Some(unit));
-        channel.samples.iter().map(move |sample| Message {
+        channel.samples.iter().map(move |sample| NdjsonLine {
             benchmark: None,
             channel: Some(&channel.name),
             quantity: None,

@@ -1,7 +1,7 @@
 //! Rows of a table whose columns are understood: cells in, readings and covariates out.
 
 use super::columns::{Column, Layout, Meaning, SigmaColumn};
-use super::vector::{self, Vector};
+use super::vector::{self, VectorColumns};
 use super::{IngestError, Item, ReadOptions, Remark};
 use crate::reading::{BenchmarkId, DecimalMark, Reading, Sample, Timestamp, Unit, after_days};
 use ::csv::StringRecord;
@@ -16,7 +16,7 @@ const SHOWN: usize = 40;
 pub(super) struct TableRows {
     file: PathBuf,
     layout: Layout,
-    vectors: Vec<Vector>,
+    vectors: Vec<VectorColumns>,
     options: ReadOptions,
     filled: Vec<bool>,
     /// Columns that have held a number: what is no number in one of them is a fault, in others text.
@@ -177,7 +177,7 @@ impl TableRow<'_> {
                     sigma,
                 } => met
                     .items
-                    .extend(self.reading(time, index, benchmark, (*unit, *sigma))?),
+                    .extend(self.reading(time, index, benchmark, *unit, *sigma)?),
                 Column::Channel { unit } => match self.cell(index) {
                     Ok(TableCell::Number(value)) => {
                         met.numbers
@@ -206,7 +206,7 @@ impl TableRow<'_> {
     }
 
     /// The projection of a vector; with a component missing it is missing as a whole.
-    fn vector(&self, time: Timestamp, vector: &Vector) -> Result<Option<Item>, IngestError> {
+    fn vector(&self, time: Timestamp, vector: &VectorColumns) -> Result<Option<Item>, IngestError> {
         let names = &self.rows.layout.names;
         let missing = |what| {
             Some(Item::Missing {
@@ -250,7 +250,8 @@ impl TableRow<'_> {
         time: Timestamp,
         index: usize,
         benchmark: &BenchmarkId,
-        (unit, sigma): (Unit, Option<SigmaColumn>),
+        unit: Unit,
+        sigma: Option<SigmaColumn>,
     ) -> Result<Option<Item>, IngestError> {
         let sigma = sigma.map_or(Ok(None), |sigma| self.sigma(sigma, unit))?;
         Ok(match self.cell(index)? {

@@ -12,7 +12,7 @@ use std::collections::BTreeSet;
 use std::io::{self, Write};
 
 /// One column on its way out: its rows, of which those before `next` are written.
-struct Outgoing<'a> {
+struct OutgoingColumn<'a> {
     name: String,
     unit: String,
     rows: Vec<(Timestamp, Reading)>,
@@ -49,7 +49,7 @@ pub fn write_toa5(recording: &Recording, out: impl Write) -> Result<(), IngestEr
     let columns = outgoing(recording);
     refuse_unreadable(recording, &columns)?;
     let marks = Conventions::default().of_a_logger().missing;
-    let is_mark = |column: &&Outgoing<'_>| {
+    let is_mark = |column: &&OutgoingColumn<'_>| {
         let mut rows = column.rows.iter();
         rows.any(|row| marks.has_number(row.1.value))
     };
@@ -102,7 +102,7 @@ fn unwritten(output: &str, error: ::csv::Error) -> IngestError {
 
 /// One row for each time: what `begin` makes of the time and the row's number, then the values.
 fn write_rows<W: Write>(
-    mut columns: Vec<Outgoing<'_>>,
+    mut columns: Vec<OutgoingColumn<'_>>,
     writer: &mut Writer<W>,
     begin: impl Fn(Timestamp, usize) -> Vec<String>,
 ) -> Result<(), ::csv::Error> {
@@ -128,12 +128,12 @@ fn write_rows<W: Write>(
     Ok(())
 }
 
-fn outgoing(recording: &Recording) -> Vec<Outgoing<'_>> {
+fn outgoing(recording: &Recording) -> Vec<OutgoingColumn<'_>> {
     let series = recording.series.iter().map(|series| {
         let suffix = series.unit.column_suffix();
         let id = &series.benchmark;
         let has_sigma = series.readings.iter().any(|row| row.sigma.is_some());
-        Outgoing {
+        OutgoingColumn {
             name: format!("{id}_{}_{suffix}", series.quantity()),
             unit: series.unit.to_string(),
             rows: series.readings.iter().map(|row| (row.time, *row)).collect(),
@@ -149,7 +149,7 @@ fn outgoing(recording: &Recording) -> Vec<Outgoing<'_>> {
             sigma: None,
         };
         let samples = channel.samples.iter();
-        Outgoing {
+        OutgoingColumn {
             name: channel.name.clone(),
             unit: channel.unit.clone().unwrap_or_default(),
             rows: samples.map(|row| (row.time, as_reading(row))).collect(),
@@ -162,7 +162,10 @@ fn outgoing(recording: &Recording) -> Vec<Outgoing<'_>> {
     columns.filter(|column| !column.rows.is_empty()).collect()
 }
 
-fn refuse_unreadable(recording: &Recording, columns: &[Outgoing<'_>]) -> Result<(), IngestError> {
+fn refuse_unreadable(
+    recording: &Recording,
+    columns: &[OutgoingColumn<'_>],
+) -> Result<(), IngestError> {
     let fail = |name: &str, problem, expected| IngestError::Unwritable {
         name: name.to_owned(),
         problem,

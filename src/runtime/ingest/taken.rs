@@ -4,7 +4,7 @@ use super::{IngestError, Item};
 
 /// What came of one line.
 #[derive(Debug, Default)]
-pub struct Taken {
+pub struct LineResult {
     /// What it holds.
     pub items: Vec<Item>,
     /// What of it cannot be used, and why.
@@ -22,7 +22,7 @@ pub struct Remark {
     pub text: String,
 }
 
-impl From<Result<Vec<Item>, IngestError>> for Taken {
+impl From<Result<Vec<Item>, IngestError>> for LineResult {
     fn from(taken: Result<Vec<Item>, IngestError>) -> Self {
         match taken {
             Ok(items) => Self {

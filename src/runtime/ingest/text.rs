@@ -1,30 +1,16 @@
-//! Text files of every format, line by line behind one door, and whole.
+//! Text files of every format, line by line through one interface, and whole.
 
 use super::bytes::read_bytes;
 use super::collect::Collector;
 use super::columns::Meaning;
-use super::csv::CsvRows;
 use super::encoding::{Transcoder, latin1};
-use super::ndjson::NdjsonRows;
-use super::table::TableRows;
-use super::taken::{Remark, Taken};
-use super::toa5::Toa5Rows;
+use super::taken::{LineResult, Remark};
+use super::text_format::{LineReader, TextFormat};
 use super::{IngestError, Item, ReadOptions};
 use crate::reading::{BenchmarkId, Disorder, Recording, Unit};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
-use std::path::{Path, PathBuf};
-
-/// How a text file is laid out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TextFormat {
-    /// A header and comma-separated rows.
-    Csv,
-    /// A JSON object a line.
-    Ndjson,
-    /// A Campbell logger's table.
-    Toa5,
-}
+use std::path::Path;
 
 impl Remark {
     /// That a table is taken as Latin-1 from this line on.
@@ -52,116 +38,46 @@ impl fmt::Display for Remark {
     }
 }
 
-/// Takes the lines of one file, headers included.
+/// Takes the lines of one file, headers included, by the reader of its format.
 #[derive(Debug)]
-pub struct TextRows {
-    file: PathBuf,
-    options: ReadOptions,
-    rows: Rows,
-}
-
-#[derive(Debug)]
-enum Rows {
-    /// Before its header.
-    NewCsv,
-    Csv(Box<CsvRows>),
-    Ndjson(Box<NdjsonRows>),
-    Toa5(Box<Toa5Rows>),
-}
+pub struct TextRows(Box<dyn LineReader>);
 
 impl TextRows {
     /// Before the first line of `file`, which need not exist: its stem is the benchmark of columns
     /// that name none.
-    pub fn new(format: TextFormat, file: &Path, options: &ReadOptions) -> Self {
-        let rows = match format {
-            TextFormat::Csv => Rows::NewCsv,
-            TextFormat::Ndjson => Rows::Ndjson(Box::new(NdjsonRows::new(file, options))),
-            TextFormat::Toa5 => Rows::Toa5(Box::new(Toa5Rows::new(file, options))),
-        };
-        Self {
-            file: file.into(),
-            options: options.clone(),
-            rows,
-        }
+    pub fn new(format: &TextFormat, file: &Path, options: &ReadOptions) -> Self {
+        Self((format.reader)(file, options))
     }
 
-    /// Takes one line; `line` is its number in the file, from 1. A fault is that line's alone, unless
-    /// [`TextRows::is_lost`] afterwards.
-    pub fn take(&mut self, line: u64, text: &str) -> Taken {
-        let mut taken: Taken = match &mut self.rows {
-            Rows::NewCsv => match CsvRows::new(&self.file, text, &self.options) {
-                Ok(rows) => {
-                    self.rows = Rows::Csv(Box::new(rows));
-                    Taken::default()
-                }
-                Err(error) => Err(error).into(),
-            },
-            Rows::Csv(rows) => rows.row(line, text).into(),
-            Rows::Ndjson(rows) => rows.row(line, text),
-            Rows::Toa5(rows) => rows.row(line, text).into(),
-        };
-        let mut ask = |table: &mut TableRows| taken.remarks.extend(table.take_remarks());
-        match &mut self.rows {
-            Rows::NewCsv => {}
-            Rows::Csv(rows) => rows.table().into_iter().for_each(&mut ask),
-            Rows::Ndjson(rows) => rows.tables().for_each(&mut ask),
-            Rows::Toa5(rows) => rows.table().into_iter().for_each(&mut ask),
-        }
+    /// As [`LineReader::take`], with what it has found out about the file.
+    pub fn take(&mut self, line: u64, text: &str) -> LineResult {
+        let mut taken = self.0.take(line, text);
+        taken.remarks.extend(self.0.take_remarks());
         taken
     }
 
-    /// What the columns are taken for, by what has been read so far; none for messages, each of which says it.
-    pub fn meanings(&mut self) -> Vec<(String, Meaning)> {
-        match &mut self.rows {
-            Rows::NewCsv => Vec::new(),
-            Rows::Csv(rows) => rows.table().map_or_else(Vec::new, |table| table.meanings()),
-            Rows::Ndjson(rows) => rows.tables().flat_map(|table| table.meanings()).collect(),
-            Rows::Toa5(rows) => rows.table().map_or_else(Vec::new, |table| table.meanings()),
-        }
+    /// As [`LineReader::meanings`].
+    pub fn meanings(&self) -> Vec<(String, Meaning)> {
+        self.0.meanings()
     }
 
-    /// Whether a line that is not UTF-8 may be taken as Latin-1: in a table only column names and text could
-    /// differ by it, never a number.
+    /// As [`LineReader::takes_latin1`].
     pub fn takes_latin1(&self) -> bool {
-        matches!(self.rows, Rows::NewCsv | Rows::Csv(_))
+        self.0.takes_latin1()
     }
 
-    /// Whether the file does not begin as its format does, so that nothing of it can be read.
+    /// As [`LineReader::is_lost`].
     pub fn is_lost(&self) -> bool {
-        match &self.rows {
-            Rows::NewCsv => true,
-            Rows::Toa5(rows) => rows.is_lost(),
-            Rows::Csv(_) | Rows::Ndjson(_) => false,
-        }
+        self.0.is_lost()
     }
 
-    /// The lines of the header in force; a new `TextRows` that takes them first goes on from any
-    /// later line of the file.
+    /// As [`LineReader::header`].
     pub fn header(&self) -> &[String] {
-        match &self.rows {
-            Rows::NewCsv | Rows::Ndjson(_) => &[],
-            Rows::Csv(rows) => rows.header(),
-            Rows::Toa5(rows) => rows.header(),
-        }
-    }
-
-    fn columns(&self) -> &[String] {
-        match &self.rows {
-            Rows::NewCsv | Rows::Ndjson(_) => &[],
-            Rows::Csv(rows) => rows.columns(),
-            Rows::Toa5(rows) => rows.columns(),
-        }
-    }
-
-    fn finish(&self) -> Result<(), IngestError> {
-        match &self.rows {
-            Rows::Csv(rows) => rows.finish(),
-            Rows::NewCsv | Rows::Ndjson(_) | Rows::Toa5(_) => Ok(()),
-        }
+        self.0.header()
     }
 }
 
-/// A whole file, settled.
+/// A whole file, read.
 #[derive(Debug)]
 pub(super) struct Table {
     pub(super) recording: Recording,
@@ -174,7 +90,7 @@ pub(super) struct Table {
 
 /// Reads a whole file; the first fault is an error.
 pub(super) fn read_text(
-    format: TextFormat,
+    format: &TextFormat,
     file: &Path,
     options: &ReadOptions,
 ) -> Result<Table, IngestError> {
@@ -186,7 +102,7 @@ pub(super) fn read_text(
     for (text, line) in bytes.split(|byte| *byte == b'\n').zip(1..) {
         let taken = match std::str::from_utf8(text) {
             Ok(text) => rows.take(line, text),
-            Err(_) => rows.take(line, &not_utf8(&rows, file, (line, text), &mut remarks)?),
+            Err(_) => rows.take(line, &not_utf8(&rows, file, line, text, &mut remarks)?),
         };
         remarks.extend(taken.remarks);
         if let Some(fault) = taken.fault {
@@ -203,8 +119,8 @@ pub(super) fn read_text(
                 })?;
         }
     }
-    rows.finish()?;
-    let columns = rows.columns().to_vec();
+    rows.0.finish()?;
+    let columns = rows.0.columns().to_vec();
     let (recording, disorder) = collected.finish(BTreeMap::new());
     if recording.series.is_empty() && recording.channels.is_empty() && disorder.missing == 0 {
         return Err(IngestError::Empty {
@@ -224,7 +140,8 @@ pub(super) fn read_text(
 fn not_utf8(
     rows: &TextRows,
     file: &Path,
-    (line, text): (u64, &[u8]),
+    line: u64,
+    text: &[u8],
     remarks: &mut Vec<Remark>,
 ) -> Result<String, IngestError> {
     let read = latin1(text).filter(|_| rows.takes_latin1());
@@ -243,7 +160,7 @@ fn not_utf8(
 
 /// What a file holds, whatever is wrong with some of its rows.
 #[derive(Debug, Default)]
-pub struct Looked {
+pub struct FileSurvey {
     /// What its columns are taken for; none for messages.
     pub columns: Vec<(String, Meaning)>,
     /// Whose readings it has, in which units.
@@ -255,14 +172,14 @@ pub struct Looked {
 /// # Errors
 /// [`IngestError`] where it cannot be read or does not begin as its format does.
 pub fn look_through(
-    format: TextFormat,
+    format: &TextFormat,
     file: &Path,
     options: &ReadOptions,
-) -> Result<Looked, IngestError> {
+) -> Result<FileSurvey, IngestError> {
     let bytes = read_bytes(file)?;
     let bytes = Transcoder::default().feed(&bytes);
     let mut rows = TextRows::new(format, &super::bytes::shown_name(file), options);
-    let mut looked = Looked::default();
+    let mut looked = FileSurvey::default();
     for (text, line) in bytes.split(|byte| *byte == b'\n').zip(1..) {
         let text = match std::str::from_utf8(text) {
             Ok(text) => text.to_owned(),

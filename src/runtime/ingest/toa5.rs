@@ -5,9 +5,12 @@
 //! numbers and the times of extremes are not read. A logger that starts again writes its header
 //! again, in the middle of the file.
 
-use super::columns::{Column, ColumnMap, Layout, Measure, Name, channel_unit, name_of};
+use super::columns::{Column, ColumnMap, Layout, Meaning, Measure, Name, channel_unit, name_of};
 use super::split::Splitter;
 use super::table::TableRows;
+use super::table_write::write_toa5;
+use super::taken::{LineResult, Remark};
+use super::text_format::{LineReader, TextFormat};
 use super::{IngestError, Item, ReadOptions};
 use crate::reading::{Delimiter, Dialect, Unit};
 use ::csv::StringRecord;
@@ -17,12 +20,55 @@ use std::path::{Path, PathBuf};
 const HEADER_LINES: usize = 4;
 /// How an environment line begins.
 const MARK: &str = "\"TOA5\"";
+/// The same without quotes.
+const BARE_MARK: &str = "TOA5,";
 /// What a column of times of extremes says of its processing.
 const TIMES_OF_EXTREMES: [&str; 2] = ["TMx", "TMn"];
 
+/// A Campbell logger's table.
+pub static TOA5: TextFormat = TextFormat {
+    name: "toa5",
+    extensions: &["dat"],
+    begins: |text| text.starts_with(MARK.as_bytes()) || text.starts_with(BARE_MARK.as_bytes()),
+    reader: |file, options| Box::new(Toa5Rows::new(file, options)),
+    write: |recording, out| write_toa5(recording, out),
+    states_averaging: false,
+};
+
+impl LineReader for Toa5Rows {
+    fn take(&mut self, line: u64, text: &str) -> LineResult {
+        self.row(line, text).into()
+    }
+
+    fn take_remarks(&mut self) -> Vec<Remark> {
+        (self.table.as_mut()).map_or_else(Vec::new, TableRows::take_remarks)
+    }
+
+    fn meanings(&self) -> Vec<(String, Meaning)> {
+        (self.table.as_ref()).map_or_else(Vec::new, TableRows::meanings)
+    }
+
+    /// Whether the file began with something else than a header.
+    fn is_lost(&self) -> bool {
+        self.is_new && self.header.is_empty()
+    }
+
+    /// The four lines in force; none before they have come.
+    fn header(&self) -> &[String] {
+        match self.table {
+            Some(_) => &self.header,
+            None => &[],
+        }
+    }
+
+    fn columns(&self) -> &[String] {
+        self.table.as_ref().map_or(&[], TableRows::names)
+    }
+}
+
 /// Reads one file line by line.
 #[derive(Debug)]
-pub(super) struct Toa5Rows {
+struct Toa5Rows {
     file: PathBuf,
     options: ReadOptions,
     /// The header in force, or as much of it as has come.
@@ -35,7 +81,7 @@ pub(super) struct Toa5Rows {
 }
 
 impl Toa5Rows {
-    pub(super) fn new(file: &Path, options: &ReadOptions) -> Self {
+    fn new(file: &Path, options: &ReadOptions) -> Self {
         let conventions = options.conventions.clone().of_a_logger();
         Self {
             file: file.into(),
@@ -53,37 +99,16 @@ impl Toa5Rows {
         }
     }
 
-    /// The four lines in force; none before they have come.
-    pub(super) fn header(&self) -> &[String] {
-        match self.table {
-            Some(_) => &self.header,
-            None => &[],
-        }
-    }
-
-    /// Whether the file began with something else than a header.
-    pub(super) fn is_lost(&self) -> bool {
-        self.is_new && self.header.is_empty()
-    }
-
-    pub(super) fn columns(&self) -> &[String] {
-        self.table.as_ref().map_or(&[], TableRows::names)
-    }
-
-    pub(super) fn table(&mut self) -> Option<&mut TableRows> {
-        self.table.as_mut()
-    }
-
-    pub(super) fn row(&mut self, line: u64, text: &str) -> Result<Vec<Item>, IngestError> {
+    fn row(&mut self, line: u64, text: &str) -> Result<Vec<Item>, IngestError> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let plain = text.trim_start();
-        if plain.starts_with(MARK) || plain.starts_with("TOA5,") {
+        if plain.starts_with(MARK) || plain.starts_with(BARE_MARK) {
             self.table = None;
             self.header = vec![plain.to_owned()];
             return Ok(Vec::new());
         }
         if let Some(at) = text.find(MARK) {
-            // The power failed within a row, and the logger began anew behind it.
+            // The power failed within a row, and the logger began again behind it.
             self.table = None;
             self.header = vec![text[at..].to_owned()];
             return Err(self.line_fault(line, "a header within the line".to_owned()));
@@ -91,7 +116,7 @@ impl Toa5Rows {
         if self.table.is_none() && !self.header.is_empty() {
             self.header.push(text.to_owned());
             if self.header.len() == HEADER_LINES {
-                self.understand(line)?;
+                self.read_header(line)?;
             }
             return Ok(Vec::new());
         }
@@ -120,7 +145,7 @@ impl Toa5Rows {
     }
 
     /// Takes the header that has just become complete at `line`; none is in force where it is bad.
-    fn understand(&mut self, line: u64) -> Result<(), IngestError> {
+    fn read_header(&mut self, line: u64) -> Result<(), IngestError> {
         let understood = self.layout(line);
         match understood {
             Ok(layout) => {

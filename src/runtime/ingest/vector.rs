@@ -16,7 +16,7 @@ pub struct VectorMap {
 
 /// A vector whose columns have been found.
 #[derive(Debug, Clone)]
-pub(super) struct Vector {
+pub(super) struct VectorColumns {
     pub(super) benchmark: BenchmarkId,
     pub(super) unit: Unit,
     /// The columns' places.
@@ -24,7 +24,7 @@ pub(super) struct Vector {
 }
 
 /// Finds the vectors' columns, which are no longer anything else then.
-pub(super) fn claim(layout: &mut Layout, maps: &[VectorMap]) -> Vec<Vector> {
+pub(super) fn claim(layout: &mut Layout, maps: &[VectorMap]) -> Vec<VectorColumns> {
     let mut vectors = Vec::new();
     for map in maps {
         let place = |(name, part): &(String, f64)| {
@@ -33,7 +33,7 @@ pub(super) fn claim(layout: &mut Layout, maps: &[VectorMap]) -> Vec<Vector> {
         };
         let found: Vec<(usize, f64)> = map.components.iter().filter_map(place).collect();
         if found.len() == map.components.len() {
-            vectors.push(Vector {
+            vectors.push(VectorColumns {
                 benchmark: map.benchmark.clone(),
                 unit: map.unit,
                 components: found,

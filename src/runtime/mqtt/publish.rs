@@ -4,7 +4,7 @@
 
 use super::session::{NoConnection, may_be_another_version, transport};
 use crate::config::MqttTopic;
-use crate::runtime::hook::Outcome;
+use crate::runtime::hook::HookOutcome;
 use rumqttc::v5::mqttbytes::QoS as QoS5;
 use rumqttc::v5::mqttbytes::v5::{Packet as Packet5, PubAckReason};
 use rumqttc::{self as v3, QoS, v5};
@@ -17,36 +17,40 @@ const LONGEST_PACKET: u32 = 1 << 20;
 const REQUESTS: usize = 2;
 
 /// Publishes `body` within `limit`.
-pub(in crate::runtime) async fn publish(to: &MqttTopic, body: Vec<u8>, limit: Duration) -> Outcome {
+pub(in crate::runtime) async fn publish(
+    to: &MqttTopic,
+    body: Vec<u8>,
+    limit: Duration,
+) -> HookOutcome {
     match tokio::time::timeout(limit, published(to, body)).await {
-        Ok(Ok(())) => Outcome::Done,
-        Ok(Err(error)) => Outcome::NotStarted(format!("{}: {error}", to.name)),
-        Err(_elapsed) => Outcome::TimedOut,
+        Ok(Ok(())) => HookOutcome::Done,
+        Ok(Err(error)) => HookOutcome::NotStarted(format!("{}: {error}", to.name)),
+        Err(_elapsed) => HookOutcome::TimedOut,
     }
 }
 
 async fn published(to: &MqttTopic, body: Vec<u8>) -> Result<(), NoConnection> {
     match by_five(to, body.clone()).await {
-        Err(Refused::Version) => by_three(to, body).await,
-        Err(Refused::Otherwise(error)) => Err(error),
+        Err(PublishRefusal::Version) => by_three(to, body).await,
+        Err(PublishRefusal::Otherwise(error)) => Err(error),
         Ok(()) => Ok(()),
     }
 }
 
 /// Why nothing was published.
-enum Refused {
+enum PublishRefusal {
     /// The broker may know no MQTT 5.
     Version,
     Otherwise(NoConnection),
 }
 
-impl<E: Into<NoConnection>> From<E> for Refused {
+impl<E: Into<NoConnection>> From<E> for PublishRefusal {
     fn from(error: E) -> Self {
         Self::Otherwise(error.into())
     }
 }
 
-async fn by_five(to: &MqttTopic, body: Vec<u8>) -> Result<(), Refused> {
+async fn by_five(to: &MqttTopic, body: Vec<u8>) -> Result<(), PublishRefusal> {
     let address = &to.address;
     let mut options = v5::MqttOptions::new(client_id(), &address.host, address.port);
     options
@@ -74,7 +78,7 @@ async fn by_five(to: &MqttTopic, body: Vec<u8>) -> Result<(), Refused> {
                 };
             }
             Ok(_) => {}
-            Err(error) if may_be_another_version(&error) => return Err(Refused::Version),
+            Err(error) if may_be_another_version(&error) => return Err(PublishRefusal::Version),
             Err(error) => return Err(error.into()),
         }
     }

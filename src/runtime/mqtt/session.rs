@@ -36,7 +36,7 @@ pub(super) struct Session {
     broker: Broker,
     client_id: String,
     version: Version,
-    /// Made with the first connection; over TLS anew with each, so that other authorities hold from the next one on.
+    /// Made with the first connection; over TLS again with each, so that other authorities hold from the next one on.
     link: Option<Link>,
     /// Whether a broker has accepted this version of the protocol.
     is_accepted: bool,
@@ -57,7 +57,7 @@ enum Link {
 }
 
 /// What came from the broker.
-pub(super) enum Came<M = Message> {
+pub(super) enum SessionEvent<M = BrokerMessage> {
     Connected,
     Message(M),
     SubscriptionRefused,
@@ -66,7 +66,7 @@ pub(super) enum Came<M = Message> {
 
 /// A message, to be acknowledged over the connection that it came by.
 #[derive(Debug)]
-pub(super) struct Message {
+pub(super) struct BrokerMessage {
     of: Published,
     /// Connections that had ended when it came, and that have ended by now.
     came_after: u64,
@@ -79,7 +79,7 @@ enum Published {
     Three(v3::AsyncClient, v3::Publish),
 }
 
-impl Message {
+impl BrokerMessage {
     pub(super) fn topic(&self) -> Cow<'_, str> {
         match &self.of {
             Published::Five(_, publish) => String::from_utf8_lossy(&publish.topic),
@@ -102,7 +102,7 @@ impl Message {
         }
     }
 
-    /// Tells the broker that it need not come again. On a later connection that is void: the message comes again there, and
+    /// Acknowledges it to the broker, so that it does not come again. On a later connection that is void: the message comes again there, and
     /// its number may be another's.
     pub(super) async fn acknowledge(self) -> Result<(), NoConnection> {
         if self.ended.load(Ordering::Relaxed) != self.came_after {
@@ -129,7 +129,7 @@ impl Session {
         }
     }
 
-    /// The version of the protocol that is spoken, or tried.
+    /// The version of the protocol that is used, or tried.
     pub(super) fn version(&self) -> &'static str {
         match self.version {
             Version::Five => "5",
@@ -138,7 +138,7 @@ impl Session {
     }
 
     /// The next that comes; connects where there is no connection.
-    pub(super) async fn next(&mut self) -> Result<Came, NoConnection> {
+    pub(super) async fn next(&mut self) -> Result<SessionEvent, NoConnection> {
         let link = match &mut self.link {
             Some(link) => link,
             none => none.insert(open(self.version, &self.broker, &self.client_id)?),
@@ -146,12 +146,12 @@ impl Session {
         let came = match link {
             Link::Five(client, connection) => match connection.poll().await {
                 Ok(v5::Event::Incoming(packet)) => Ok(came_by_five(client, packet)),
-                Ok(v5::Event::Outgoing(_)) => Ok(Came::Nothing),
+                Ok(v5::Event::Outgoing(_)) => Ok(SessionEvent::Nothing),
                 Err(error) => Err((may_be_another_version(&error), error.into())),
             },
             Link::Three(client, connection) => match connection.poll().await {
                 Ok(v3::Event::Incoming(packet)) => Ok(came_by_three(client, packet)),
-                Ok(v3::Event::Outgoing(_)) => Ok(Came::Nothing),
+                Ok(v3::Event::Outgoing(_)) => Ok(SessionEvent::Nothing),
                 Err(error) => {
                     let is_unreached = matches!(
                         error,
@@ -162,17 +162,17 @@ impl Session {
             },
         };
         match came {
-            Ok(Came::Message(of)) => Ok(Came::Message(Message {
+            Ok(SessionEvent::Message(of)) => Ok(SessionEvent::Message(BrokerMessage {
                 of,
                 came_after: self.ended.load(Ordering::Relaxed),
                 ended: Arc::clone(&self.ended),
             })),
-            Ok(Came::Connected) => {
+            Ok(SessionEvent::Connected) => {
                 self.is_accepted = true;
-                Ok(Came::Connected)
+                Ok(SessionEvent::Connected)
             }
-            Ok(Came::SubscriptionRefused) => Ok(Came::SubscriptionRefused),
-            Ok(Came::Nothing) => Ok(Came::Nothing),
+            Ok(SessionEvent::SubscriptionRefused) => Ok(SessionEvent::SubscriptionRefused),
+            Ok(SessionEvent::Nothing) => Ok(SessionEvent::Nothing),
             Err((may_be_another_version, error)) => {
                 self.ended.fetch_add(1, Ordering::Relaxed);
                 let is_other = may_be_another_version && !self.is_accepted;
@@ -266,18 +266,18 @@ fn three(broker: &Broker, client_id: &str, transport: Transport) -> Link {
     Link::Three(client, Box::new(connection))
 }
 
-fn came_by_five(client: &v5::AsyncClient, packet: packet5::Packet) -> Came<Published> {
+fn came_by_five(client: &v5::AsyncClient, packet: packet5::Packet) -> SessionEvent<Published> {
     match packet {
-        packet5::Packet::ConnAck(_) => Came::Connected,
+        packet5::Packet::ConnAck(_) => SessionEvent::Connected,
         packet5::Packet::Publish(publish) => {
-            Came::Message(Published::Five(client.clone(), publish))
+            SessionEvent::Message(Published::Five(client.clone(), publish))
         }
         packet5::Packet::SubAck(answer) => {
             let is_granted = |code| matches!(code, &packet5::SubscribeReasonCode::Success(_));
             if answer.return_codes.iter().all(is_granted) {
-                Came::Nothing
+                SessionEvent::Nothing
             } else {
-                Came::SubscriptionRefused
+                SessionEvent::SubscriptionRefused
             }
         }
         packet5::Packet::Auth(_)
@@ -291,18 +291,20 @@ fn came_by_five(client: &v5::AsyncClient, packet: packet5::Packet) -> Came<Publi
         | packet5::Packet::PubComp(_)
         | packet5::Packet::Unsubscribe(_)
         | packet5::Packet::UnsubAck(_)
-        | packet5::Packet::Disconnect(_) => Came::Nothing,
+        | packet5::Packet::Disconnect(_) => SessionEvent::Nothing,
     }
 }
 
-fn came_by_three(client: &v3::AsyncClient, packet: v3::Packet) -> Came<Published> {
+fn came_by_three(client: &v3::AsyncClient, packet: v3::Packet) -> SessionEvent<Published> {
     match packet {
-        v3::Packet::ConnAck(_) => Came::Connected,
-        v3::Packet::Publish(publish) => Came::Message(Published::Three(client.clone(), publish)),
+        v3::Packet::ConnAck(_) => SessionEvent::Connected,
+        v3::Packet::Publish(publish) => {
+            SessionEvent::Message(Published::Three(client.clone(), publish))
+        }
         v3::Packet::SubAck(answer)
             if answer.return_codes.contains(&SubscribeReasonCode::Failure) =>
         {
-            Came::SubscriptionRefused
+            SessionEvent::SubscriptionRefused
         }
         v3::Packet::Connect(_)
         | v3::Packet::PubAck(_)
@@ -315,7 +317,7 @@ fn came_by_three(client: &v3::AsyncClient, packet: v3::Packet) -> Came<Published
         | v3::Packet::UnsubAck(_)
         | v3::Packet::PingReq
         | v3::Packet::PingResp
-        | v3::Packet::Disconnect => Came::Nothing,
+        | v3::Packet::Disconnect => SessionEvent::Nothing,
     }
 }
 

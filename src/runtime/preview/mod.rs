@@ -3,13 +3,13 @@
 mod view;
 
 pub use view::{
-    BenchmarkView, ColumnView, CovariateView, LayoutView, Preview, Refusal, SourceView, Unfed,
+    BenchmarkPreview, ColumnView, CovariateView, LayoutView, Preview, Refusal, SourceView, Unfed,
 };
 
 use super::clock;
 use super::ingest::{IngestError, Item, Meaning, ReadOptions, is_packed, read_files, unpack};
-use super::tail::{Arrival, BadLine, Decoder, Fed, TextReader, list};
-use crate::config::{Config, Source, SourceKind};
+use super::tail::{Arrival, BadLine, Decoder, LinesRead, TextReader, list};
+use crate::config::{Config, FileSource, SourceKind};
 use crate::monitor::Input;
 use crate::reading::{
     BenchmarkId, LocalClock, Quantity, Recording, SummerTime, Suspicion, Timestamp, suspicion,
@@ -55,7 +55,7 @@ pub fn preview(config: &Config) -> Preview {
 
 #[derive(Debug)]
 struct PreviewTrack {
-    view: BenchmarkView,
+    view: BenchmarkPreview,
     /// Suspicions that people have looked into.
     accepted: BTreeSet<Suspicion>,
     readings: Vec<(Timestamp, f64)>,
@@ -75,7 +75,7 @@ struct PreviewSoFar {
 type Refusals = BTreeMap<String, Refusal>;
 
 impl PreviewSoFar {
-    fn source(&mut self, source: &Source, decoder: &Decoder) -> SourceView {
+    fn source(&mut self, source: &FileSource, decoder: &Decoder) -> SourceView {
         let mut view = SourceView {
             id: source.id.clone(),
             kind: source.kind.name(),
@@ -109,9 +109,9 @@ impl PreviewSoFar {
                 break;
             }
             let looked = match source.kind {
-                SourceKind::Mcap => self.recording(&file, (&source.id, decoder)),
+                SourceKind::Mcap => self.recording(&file, &source.id, decoder),
                 SourceKind::Csv | SourceKind::Ndjson | SourceKind::Toa5 => {
-                    self.text(&file, decoder, (&mut view, &mut refused))
+                    self.text(&file, decoder, &mut view, &mut refused)
                 }
             };
             if let Err(problem) = looked {
@@ -123,11 +123,7 @@ impl PreviewSoFar {
         view
     }
 
-    fn recording(
-        &mut self,
-        file: &Path,
-        (source, decoder): (&str, &Decoder),
-    ) -> Result<(), String> {
+    fn recording(&mut self, file: &Path, source: &str, decoder: &Decoder) -> Result<(), String> {
         let read = read_files(&[file.to_owned()], &ReadOptions::default());
         let (
             Recording {
@@ -166,7 +162,8 @@ impl PreviewSoFar {
         &mut self,
         file: &Path,
         decoder: &Decoder,
-        (view, refused): (&mut SourceView, &mut Refusals),
+        view: &mut SourceView,
+        refused: &mut Refusals,
     ) -> Result<(), String> {
         let Some(rows) = decoder.text_rows(file) else {
             return Ok(());
@@ -187,7 +184,7 @@ impl PreviewSoFar {
             };
             let fed = text.feed(bytes);
             let is_lost = fed.is_lost;
-            self.fed(fed, decoder, (view, refused));
+            self.fed(fed, decoder, view, refused);
             if count == 0 || is_lost || self.values > MOST_VALUES {
                 break;
             }
@@ -204,9 +201,10 @@ impl PreviewSoFar {
 
     fn fed(
         &mut self,
-        fed: Fed,
+        fed: LinesRead,
         decoder: &Decoder,
-        (view, refused): (&mut SourceView, &mut Refusals),
+        view: &mut SourceView,
+        refused: &mut Refusals,
     ) {
         for item in fed.items {
             self.item(item, &view.id, decoder);
@@ -267,7 +265,7 @@ impl PreviewSoFar {
             let here = (time, reading.value);
             let accepted = self.accepted.get(&benchmark).cloned().unwrap_or_default();
             let track = self.benchmarks.entry(key).or_insert_with(|| PreviewTrack {
-                view: BenchmarkView {
+                view: BenchmarkPreview {
                     id: benchmark,
                     source: source.to_owned(),
                     quantity: unit.quantity(),
@@ -374,7 +372,7 @@ impl PreviewTrack {
         self.readings.push(here);
     }
 
-    fn finish(mut self, now: Timestamp) -> BenchmarkView {
+    fn finish(mut self, now: Timestamp) -> BenchmarkPreview {
         let times: BTreeSet<Timestamp> = self.readings.iter().map(|reading| reading.0).collect();
         let latest: Vec<Timestamp> = times.into_iter().rev().take(LATEST).collect();
         let pairs = latest.iter().zip(latest.iter().skip(1));
@@ -387,7 +385,7 @@ impl PreviewTrack {
 
     fn suspicions(&mut self, now: Timestamp) -> Vec<String> {
         self.readings.sort_by_key(|(time, _)| *time);
-        let BenchmarkView {
+        let BenchmarkPreview {
             last,
             quantity,
             unit,

@@ -13,7 +13,7 @@ pub struct Preview {
     /// The sources that are files.
     pub sources: Vec<SourceView>,
     /// What would be watched.
-    pub benchmarks: Vec<BenchmarkView>,
+    pub benchmarks: Vec<BenchmarkPreview>,
     /// What would be taken as covariates.
     pub covariates: Vec<CovariateView>,
     /// Benchmarks in the files that no `[[benchmark]]` asks for.
@@ -77,7 +77,7 @@ pub struct Refusal {
 
 /// One quantity of a benchmark.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
-pub struct BenchmarkView {
+pub struct BenchmarkPreview {
     /// Its id.
     pub id: BenchmarkId,
     /// Where its readings come from.

@@ -6,9 +6,9 @@
 
 mod schemas;
 
-use super::ingest::{IngestError, SaidTopic, escape, write_mcap_with};
+use super::ingest::{EventTopic, IngestError, escape, write_mcap_with};
 use crate::alert::Level;
-use crate::monitor::{Event, EventKind, FailureTime, Input, Stretch, levels_in};
+use crate::monitor::{Event, EventKind, FailureTime, Input, LevelStretch, Measured, levels_in};
 use crate::reading::{BenchmarkId, Channel, Quantity, Recording, Series, Timestamp, days_since};
 use crate::store::{Store, StoreError};
 use serde_json::{Map, Value, json};
@@ -31,12 +31,12 @@ pub fn write(
     let events = &events[..];
     let mut topics = refits(events);
     topics.extend(levels(recording, events));
-    topics.push(SaidTopic {
+    topics.push(EventTopic {
         name: "/alerts".to_owned(),
         schema: schemas::alert(),
         messages: events.iter().filter_map(alert).collect(),
     });
-    topics.push(SaidTopic {
+    topics.push(EventTopic {
         name: "/log".to_owned(),
         schema: schemas::log(),
         messages: events
@@ -62,7 +62,7 @@ pub fn taken_in(store: &Store, until: Option<Timestamp>) -> Result<Recording, St
         after = last.seq;
         for row in rows {
             if until.is_none_or(|until| row.now <= until) {
-                take(row.input, &mut series, &mut channels);
+                take(&row.input, &mut series, &mut channels);
             }
         }
     }
@@ -81,51 +81,46 @@ pub fn taken_in(store: &Store, until: Option<Timestamp>) -> Result<Recording, St
 }
 
 fn take(
-    input: Input,
+    input: &Input,
     series: &mut BTreeMap<(BenchmarkId, Quantity), Series>,
     channels: &mut BTreeMap<String, Channel>,
 ) {
-    match input {
-        Input::Reading {
+    match input.measured() {
+        Some(Measured::Reading {
             benchmark,
             unit,
             averaging,
-            mut reading,
-        } => {
+            reading,
+        }) => {
             let place = (benchmark.clone(), unit.quantity());
             let one = series.entry(place).or_insert_with(|| Series {
-                benchmark,
+                benchmark: benchmark.clone(),
                 unit,
                 averaging,
                 readings: Vec::new(),
             });
             // A source may have changed its unit; a topic has one.
             let factor = unit.factor() / one.unit.factor();
+            let mut reading = *reading;
             if unit != one.unit {
                 reading.value *= factor;
                 reading.sigma = reading.sigma.map(|sigma| sigma * factor);
             }
             one.readings.push(reading);
         }
-        Input::Sample {
+        Some(Measured::Sample {
             channel,
             unit,
             sample,
-        } => {
-            let one = channels.entry(channel).or_insert_with_key(|name| Channel {
+        }) => {
+            let one = (channels.entry(channel.to_owned())).or_insert_with_key(|name| Channel {
                 name: name.clone(),
-                unit,
+                unit: unit.map(str::to_owned),
                 samples: Vec::new(),
             });
-            one.samples.push(sample);
+            one.samples.push(*sample);
         }
-        Input::Missing { .. }
-        | Input::Trouble { .. }
-        | Input::Settings(_)
-        | Input::Order(_)
-        | Input::Found(_)
-        | Input::Notice(_)
-        | Input::Tick => {}
+        None => {}
     }
 }
 
@@ -134,7 +129,7 @@ fn topic_of(benchmark: &BenchmarkId, what: &str) -> String {
 }
 
 /// For each benchmark its fits and its forecasts.
-fn refits(events: &[Event]) -> Vec<SaidTopic> {
+fn refits(events: &[Event]) -> Vec<EventTopic> {
     let mut fits: BTreeMap<&BenchmarkId, Vec<(Timestamp, Value)>> = BTreeMap::new();
     let mut forecasts = fits.clone();
     for event in events {
@@ -147,14 +142,14 @@ fn refits(events: &[Event]) -> Vec<SaidTopic> {
             forecasts.push((event.time, forecast));
         }
     }
-    let fits = fits.into_iter().map(|(benchmark, messages)| SaidTopic {
+    let fits = fits.into_iter().map(|(benchmark, messages)| EventTopic {
         name: topic_of(benchmark, "fit"),
         schema: schemas::fit(),
         messages,
     });
     let forecasts = forecasts
         .into_iter()
-        .map(|(benchmark, messages)| SaidTopic {
+        .map(|(benchmark, messages)| EventTopic {
             name: topic_of(benchmark, "forecast"),
             schema: schemas::forecast(),
             messages,
@@ -238,7 +233,7 @@ fn present(mut message: Value) -> Value {
 }
 
 /// For each benchmark, and for the site where it has one, the level at its beginning and at each change.
-fn levels(recording: &Recording, events: &[Event]) -> Vec<SaidTopic> {
+fn levels(recording: &Recording, events: &[Event]) -> Vec<EventTopic> {
     let times = || recording.series.iter().flat_map(|series| &series.readings);
     let (Some(first), Some(last)) = (
         times().map(|reading| reading.time).min(),
@@ -257,7 +252,7 @@ fn levels(recording: &Recording, events: &[Event]) -> Vec<SaidTopic> {
                 .map(|event| event.benchmark.as_ref()),
         )
         .collect();
-    let one = |benchmark: Option<&BenchmarkId>| SaidTopic {
+    let one = |benchmark: Option<&BenchmarkId>| EventTopic {
         name: benchmark.map_or_else(|| "/site/level".to_owned(), |id| topic_of(id, "level")),
         schema: schemas::level(),
         messages: changes(&levels_in(events, benchmark, (first, last)), last),
@@ -267,7 +262,7 @@ fn levels(recording: &Recording, events: &[Event]) -> Vec<SaidTopic> {
 
 /// The level, and whether it is unknown, at each time at which one of them changes.
 fn changes(
-    (levels, unknown): &(Vec<Stretch>, Vec<Stretch>),
+    (levels, unknown): &(Vec<LevelStretch>, Vec<LevelStretch>),
     last: Timestamp,
 ) -> Vec<(Timestamp, Value)> {
     let starts = levels.iter().chain(unknown).map(|one| one.from);
@@ -325,24 +320,20 @@ fn alert(event: &Event) -> Option<(Timestamp, Value)> {
 
 /// As Foxglove's log panel shows it.
 fn log(event: &Event, words: &dyn Fn(&Event) -> String) -> Option<(Timestamp, Value)> {
-    let gravity = match &event.kind {
-        EventKind::Refit { .. } | EventKind::Summary(_) => return None,
-        EventKind::Alert { level, .. } => match level {
+    if matches!(event.kind, EventKind::Refit { .. } | EventKind::Summary(_)) {
+        return None;
+    }
+    let gravity = if let EventKind::Alert { level, .. } = &event.kind {
+        match level {
             Level::Green => schemas::INFO,
             Level::Yellow | Level::Unknown => schemas::WARNING,
             Level::Orange => schemas::ERROR,
             Level::Red => schemas::FATAL,
-        },
-        EventKind::Fault { .. } | EventKind::Correction { .. } => schemas::WARNING,
-        EventKind::RegimeFlip { .. }
-        | EventKind::InterceptDrift { .. }
-        | EventKind::TransitionDrift { .. }
-        | EventKind::UnexplainedResidual(_)
-        | EventKind::EffectFound { .. }
-        | EventKind::EffectDropped { .. }
-        | EventKind::Together { .. }
-        | EventKind::Declared { .. }
-        | EventKind::Order { .. } => schemas::INFO,
+        }
+    } else if event.kind.is_of_data() {
+        schemas::WARNING
+    } else {
+        schemas::INFO
     };
     let of = event.benchmark.as_ref().map_or("site", BenchmarkId::as_str);
     let nanosecond = event.time.as_nanosecond();

@@ -4,7 +4,7 @@ use super::is_this_machine;
 use crate::config::Links;
 use crate::reading::Timestamp;
 use crate::runtime::link::AskedLink;
-use crate::runtime::view::{AlertLife, AlertView, Desk, LinkPage, Meant};
+use crate::runtime::view::{AlertLife, AlertView, LinkPage, LinkTarget, SiteReader};
 use crate::store::StoreError;
 use axum::Router;
 use axum::extract::rejection::QueryRejection;
@@ -23,13 +23,13 @@ const POLICY: &str =
     "default-src 'none'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'";
 
 /// The routes; none where messages have no links.
-pub(super) fn router(desk: Arc<Desk>) -> Router {
-    let Some(links) = desk.links().cloned() else {
+pub(super) fn router(reader: Arc<SiteReader>) -> Router {
+    let Some(links) = reader.links().cloned() else {
         return Router::new();
     };
     Router::new()
         .route("/acknowledge", get(show).post(acknowledge))
-        .with_state(desk)
+        .with_state(reader)
         .layer(from_fn_with_state(Arc::new(links), admit))
 }
 
@@ -58,10 +58,10 @@ fn is_ours(links: &Links, headers: &HeaderMap) -> bool {
 }
 
 /// What was cut short on the way is no link either.
-type Asked = Result<Query<AskedLink>, QueryRejection>;
+type LinkQuery = Result<Query<AskedLink>, QueryRejection>;
 
-async fn show(State(desk): State<Arc<Desk>>, asked: Asked) -> Response {
-    answer(desk, asked, None).await
+async fn show(State(reader): State<Arc<SiteReader>>, asked: LinkQuery) -> Response {
+    answer(reader, asked, None).await
 }
 
 #[derive(Debug, Deserialize)]
@@ -71,21 +71,21 @@ struct Filled {
 }
 
 async fn acknowledge(
-    State(desk): State<Arc<Desk>>,
-    asked: Asked,
+    State(reader): State<Arc<SiteReader>>,
+    asked: LinkQuery,
     Form(Filled { by }): Form<Filled>,
 ) -> Response {
-    answer(desk, asked, Some(by)).await
+    answer(reader, asked, Some(by)).await
 }
 
 /// The state is asked on a thread that may wait. With a name, which may be empty, the link is used.
-async fn answer(desk: Arc<Desk>, asked: Asked, by: Option<String>) -> Response {
-    let zone = desk.zone();
+async fn answer(reader: Arc<SiteReader>, asked: LinkQuery, by: Option<String>) -> Response {
+    let zone = reader.zone();
     let work = move || {
         let Ok(Query(asked)) = asked else {
             return Ok(LinkPage::Forged);
         };
-        by.map_or_else(|| desk.link(&asked), |by| desk.acknowledge(&asked, &by))
+        by.map_or_else(|| reader.link(&asked), |by| reader.acknowledge(&asked, &by))
     };
     let found = tokio::task::spawn_blocking(work).await;
     let found = found.unwrap_or_else(|error| Err(StoreError::Unreadable(error.to_string())));
@@ -123,7 +123,7 @@ fn document(title: &str, body: &str) -> String {
 }
 
 /// The status, the title and the rest of a page.
-type Shown = (StatusCode, &'static str, String);
+type PageAnswer = (StatusCode, &'static str, String);
 
 const UNCHANGED: &str = "Nothing was changed.";
 
@@ -131,36 +131,33 @@ const UNCHANGED: &str = "Nothing was changed.";
 const FORM: &str = "<form method=\"post\">\n<p><label>Your name, if you like: <input name=\"by\" maxlength=\"100\" \
                     autocomplete=\"name\"></label></p>\n<p><button>Acknowledge</button></p>\n</form>";
 
-fn page_of(page: &LinkPage, zone: &TimeZone) -> Shown {
+fn page_of(page: &LinkPage, zone: &TimeZone) -> PageAnswer {
     match page {
-        LinkPage::Open(Meant::Alert(alert)) => {
+        LinkPage::Open(LinkTarget::Alert(alert)) => {
             let text = described(alert, zone) + FORM;
             (StatusCode::OK, "Acknowledge this alert?", text)
         }
-        LinkPage::Open(Meant::Drill(status)) => {
+        LinkPage::Open(LinkTarget::Drill(status)) => {
             let status = status.name();
             let text = format!("<p>{status}: this is a drill. Nothing has happened.</p>{FORM}");
             (StatusCode::OK, "Acknowledge this drill?", text)
         }
-        LinkPage::Taken(Meant::Alert(alert)) => {
+        LinkPage::Taken(LinkTarget::Alert(alert)) => {
             let text = "<p>It is not tried any further and not escalated. It stays in force; a higher level is a new \
                         alert.</p>"
                 .to_owned()
                 + &described(alert, zone);
             (StatusCode::OK, "The alert is acknowledged", text)
         }
-        LinkPage::Taken(Meant::Drill(status)) => {
+        LinkPage::Taken(LinkTarget::Drill(status)) => {
             let text = format!("<p>{}: nothing has happened.</p>", status.name());
             (StatusCode::OK, "The drill is acknowledged", text)
         }
         LinkPage::Used(alert) => {
-            let words = ("This link has been used", "It can be used once.");
-            gone(words, alert.as_deref(), zone)
+            let why = "It can be used once.";
+            gone("This link has been used", why, alert.as_deref(), zone)
         }
-        LinkPage::Seen(alert) => {
-            let words = ("This alert has been acknowledged", "");
-            gone(words, Some(alert), zone)
-        }
+        LinkPage::Seen(alert) => gone("This alert has been acknowledged", "", Some(alert), zone),
         LinkPage::Over(alert) => over(alert, zone),
         LinkPage::Expired(until) => {
             let until = local(*until, zone);
@@ -185,20 +182,20 @@ fn page_of(page: &LinkPage, zone: &TimeZone) -> Shown {
 }
 
 /// What there is no more to acknowledge.
-fn gone((title, why): (&'static str, &str), alert: Option<&AlertView>, zone: &TimeZone) -> Shown {
+fn gone(title: &'static str, why: &str, alert: Option<&AlertView>, zone: &TimeZone) -> PageAnswer {
     let described = alert.map_or_else(String::new, |alert| described(alert, zone));
     let text = format!("<p>{why} {UNCHANGED}</p>{described}");
     (StatusCode::GONE, title, text)
 }
 
-fn over(alert: &AlertView, zone: &TimeZone) -> Shown {
+fn over(alert: &AlertView, zone: &TimeZone) -> PageAnswer {
     let why = match alert.state {
         AlertLife::Superseded => {
             "A higher level has taken its place; that has a message of its own."
         }
         AlertLife::Resolved | AlertLife::Firing => "It has ended. That is no all-clear.",
     };
-    gone(("This alert is over", why), Some(alert), zone)
+    gone("This alert is over", why, Some(alert), zone)
 }
 
 /// The alert for people, and who has acknowledged it.

@@ -3,7 +3,7 @@
 use crate::alert::Level;
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::clock;
-use crate::runtime::drilled::Record;
+use crate::runtime::drilled::DrillRecord;
 use crate::runtime::vitals::{Health, Vitals, VitalsPoint};
 use prometheus_client::collector::Collector;
 use prometheus_client::encoding::{DescriptorEncoder, EncodeMetric, text};
@@ -92,8 +92,8 @@ fn trouble(sheet: &mut Sheet<'_>, health: &Health) -> fmt::Result {
 }
 
 /// All zero where no drills are held.
-fn drills(sheet: &mut Sheet<'_>, drill: Option<&Record>) -> fmt::Result {
-    let count = |one: fn(&Record) -> u64| ConstCounter::new(drill.map_or(0, one));
+fn drills(sheet: &mut Sheet<'_>, drill: Option<&DrillRecord>) -> fmt::Result {
+    let count = |one: fn(&DrillRecord) -> u64| ConstCounter::new(drill.map_or(0, one));
     let about = "Drills in which every hook took the alert, and somebody acknowledged it where that is asked for";
     sheet.whole("drills", about, &count(|drill| drill.passed))?;
     let about = "Drills that failed";
@@ -222,8 +222,8 @@ fn counts(sheet: &mut Sheet<'_>, health: &Health) -> fmt::Result {
 }
 
 fn benchmarks(sheet: &mut Sheet<'_>, points: &[(BenchmarkId, VitalsPoint)]) -> fmt::Result {
-    type Figure = fn(&VitalsPoint) -> Option<f64>;
-    let figures: [(&str, &str, Figure); 6] = [
+    type PointFigure = fn(&VitalsPoint) -> Option<f64>;
+    let figures: [(&str, &str, PointFigure); 6] = [
         (
             "last_reading_timestamp_seconds",
             "When the newest reading was measured, Unix time",

@@ -2,16 +2,16 @@
 
 mod acknowledge;
 mod connections;
-mod desk;
 mod metrics;
 mod page;
 mod routes;
+mod views;
 
 pub use metrics::CONTENT_TYPE;
 pub use routes::{Archive, ArchiveError, DaemonStatus, Page};
 
 use super::shutdown::{self, Trigger};
-use super::view::Desk;
+use super::view::SiteReader;
 use super::vitals::Vitals;
 use crate::config::Token;
 use std::io;
@@ -47,7 +47,7 @@ impl Default for Limits {
 
 /// Where to listen, and to whom to open.
 #[derive(Debug, Clone)]
-pub struct Door {
+pub struct ListenOptions {
     /// The address; port 0 takes a free one.
     pub listen: SocketAddr,
     /// What a caller must know; `None` opens to everyone who can reach the address.
@@ -74,13 +74,13 @@ pub struct Server {
     task: JoinHandle<()>,
 }
 
-/// What there is to ask about beside the daemon's health.
+/// What is served beside the daemon's health.
 #[derive(Debug, Clone, Default)]
-pub struct Behind {
+pub struct ServedState {
     /// Past events.
     pub archive: Option<Arc<dyn Archive>>,
     /// What the page shows.
-    pub desk: Option<Arc<Desk>>,
+    pub reader: Option<Arc<SiteReader>>,
 }
 
 impl Server {
@@ -89,32 +89,32 @@ impl Server {
     /// # Errors
     /// [`ListenError`].
     pub async fn start(
-        door: Door,
+        options: ListenOptions,
         vitals: Arc<Vitals>,
         archive: Option<Arc<dyn Archive>>,
     ) -> Result<Self, ListenError> {
-        let desk = None;
-        Self::open(door, vitals, Behind { archive, desk }).await
+        let reader = None;
+        Self::open(options, vitals, ServedState { archive, reader }).await
     }
 
-    /// Starts to listen, with the page where there is a desk.
+    /// Starts to listen, with the page where there is a reader.
     ///
     /// # Errors
     /// [`ListenError`].
     pub async fn open(
-        door: Door,
+        options: ListenOptions,
         vitals: Arc<Vitals>,
-        behind: Behind,
+        served: ServedState,
     ) -> Result<Self, ListenError> {
         let fail = |source| ListenError {
-            address: door.listen,
+            address: options.listen,
             source,
         };
-        let listener = TcpListener::bind(door.listen).await.map_err(fail)?;
+        let listener = TcpListener::bind(options.listen).await.map_err(fail)?;
         let address = listener.local_addr().map_err(fail)?;
         let (stop, stopped) = shutdown::pair();
-        let limits = door.limits;
-        let router = routes::router(door, vitals, behind);
+        let limits = options.limits;
+        let router = routes::router(options, vitals, served);
         let task = tokio::spawn(connections::serve(listener, router, limits, stopped));
         tracing::info!(%address, "listening");
         Ok(Self {

@@ -1,6 +1,6 @@
 //! What is answered to which request, and to whom.
 
-use super::{Behind, Door, acknowledge, desk, is_this_machine, metrics, page};
+use super::{ListenOptions, ServedState, acknowledge, is_this_machine, metrics, page, views};
 use crate::config::Token;
 use crate::runtime::vitals::{Health, Vitals, VitalsPoint};
 use axum::extract::{DefaultBodyLimit, Query, Request, State};
@@ -65,13 +65,13 @@ impl IntoResponse for ArchiveError {
 
 /// All routes; every one but `/healthz` and the page's own files, which say nothing of the site, asks for the token,
 /// where there is one. Whoever follows the link in a message knows its signature instead.
-pub(super) fn router(door: Door, vitals: Arc<Vitals>, behind: Behind) -> Router {
+pub(super) fn router(options: ListenOptions, vitals: Arc<Vitals>, served: ServedState) -> Router {
     let mut guarded = Router::new()
         .route("/readyz", get(ready))
         .route("/metrics", get(expose))
         .route("/api/status", get(status))
         .with_state(Arc::clone(&vitals));
-    if let Some(archive) = behind.archive {
+    if let Some(archive) = served.archive {
         guarded = guarded.merge(
             Router::new()
                 .route("/api/events", get(events))
@@ -80,15 +80,15 @@ pub(super) fn router(door: Door, vitals: Arc<Vitals>, behind: Behind) -> Router 
     }
     let mut open = Router::new()
         .route("/healthz", get(healthy))
-        .with_state((vitals, door.limits.turn_time));
-    if let Some(desk) = behind.desk {
-        open = open.merge(acknowledge::router(Arc::clone(&desk)));
-        guarded = guarded.merge(desk::router(desk));
+        .with_state((vitals, options.limits.turn_time));
+    if let Some(reader) = served.reader {
+        open = open.merge(acknowledge::router(Arc::clone(&reader)));
+        guarded = guarded.merge(views::router(reader));
         open = open.merge(page::router());
     }
     guarded
         .fallback(|| async { (StatusCode::NOT_FOUND, "no such page\n") })
-        .layer(from_fn_with_state(door.token.map(Arc::new), admit))
+        .layer(from_fn_with_state(options.token.map(Arc::new), admit))
         .merge(open)
         .layer(DefaultBodyLimit::max(LONGEST_BODY))
         .layer(from_fn(refuse_long_bodies))

@@ -1,7 +1,7 @@
-//! The commit: what has happened is made durable, then told.
+//! The commit: what has happened is made durable, then the hooks are notified.
 
-use super::flood::Outgoing;
-use super::{LEAST_FRESHNESS, LEAST_WATCHED, MOST_UNWRITTEN, Site, Standing};
+use super::flood::OutgoingAlerts;
+use super::{AlertInForce, LEAST_FRESHNESS, LEAST_WATCHED, MOST_UNWRITTEN, Site};
 use crate::alert::{Level, Policy};
 use crate::monitor::{AlertState, Event};
 use crate::reading::{BenchmarkId, Timestamp};
@@ -17,9 +17,9 @@ const MOST_PUT_OFF: usize = 4096;
 impl Site {
     /// Makes everything since the last commit durable in one transaction, then hands the alerts to the hooks, but
     /// for what began longer before `wall` than twice the evacuation time: of that, [`Site::caught_up`] sends what
-    /// is still in force. The end of what was told is told however long ago it was.
+    /// is still in force. Of the end of what they were notified of they are notified however long ago it was.
     ///
-    /// On a full disk everything waits for the next commit, and the hooks are told all the same: an alert may then
+    /// On a full disk everything waits for the next commit, and the hooks are notified all the same: an alert may then
     /// come twice after a crash, with the same key.
     ///
     /// # Errors
@@ -52,15 +52,15 @@ impl Site {
     }
 
     fn record_and_send(&mut self, alerts: &[Alert]) -> Result<(), StoreError> {
-        let Outgoing {
+        let OutgoingAlerts {
             sent,
-            told_together,
-        } = Outgoing::of(alerts);
+            reported_together,
+        } = OutgoingAlerts::of(alerts);
         for alert in &sent {
             self.note(alert)?;
         }
-        for alert in &told_together {
-            self.note_told_together(alert)?;
+        for alert in &reported_together {
+            self.note_reported_together(alert)?;
         }
         let recorded = self.record();
         for alert in &sent {
@@ -84,11 +84,11 @@ impl Site {
         Ok(())
     }
 
-    /// Notes that an alert of many benchmarks tells of this one too.
-    fn note_told_together(&mut self, alert: &Alert) -> Result<(), StoreError> {
+    /// Notes that an alert of many benchmarks reports this one too.
+    fn note_reported_together(&mut self, alert: &Alert) -> Result<(), StoreError> {
         let place = (alert.event.benchmark.clone(), alert.level == Level::Unknown);
         if let Some(standing) = self.standing.get_mut(&place) {
-            standing.is_told_together |= standing.alert.key == alert.key;
+            standing.is_reported_together |= standing.alert.key == alert.key;
         }
         let Some(dispatcher) = &self.sinks.alerts else {
             return Ok(());
@@ -153,13 +153,13 @@ impl Site {
         self.is_full
     }
 
-    /// Tells no hook from here on; returns the way to those that were told. It is to be closed before
-    /// [`Site::rehook`], or what waits is told by both.
+    /// Notifies no hook from here on; returns the way to those that were notified. It is to be closed before
+    /// [`Site::rehook`], or what waits is sent by both.
     pub fn unhook(&mut self) -> Option<Dispatcher> {
         self.sinks.alerts.take()
     }
 
-    /// Tells these hooks from here on, first what some hook has not taken yet.
+    /// Notifies these hooks from here on, first what some hook has not taken yet.
     ///
     /// # Errors
     /// When the state cannot be read.
@@ -182,14 +182,14 @@ impl Site {
         if had.is_some_and(|had| had.alert.level > alert.level) {
             return;
         }
-        let was_told = is_sent || had.is_some_and(|had| had.was_told);
+        let was_notified = is_sent || had.is_some_and(|had| had.was_notified);
         match alert.state {
             AlertState::Firing if alert.level != Level::Green => {
-                let standing = Standing {
+                let standing = AlertInForce {
                     alert,
                     is_sent,
-                    was_told,
-                    is_told_together: false,
+                    was_notified,
+                    is_reported_together: false,
                 };
                 self.standing.insert(place, standing);
             }
@@ -214,12 +214,12 @@ impl Site {
         due
     }
 
-    /// Whether it is the end of what people have been told of.
+    /// Whether it is the end of what people have been notified of.
     pub(super) fn is_waited_for(&self, alert: &Alert) -> bool {
         let place = (alert.event.benchmark.clone(), alert.level == Level::Unknown);
         let had = self.standing.get(&place);
         alert.state == AlertState::Resolved
-            && had.is_some_and(|had| had.was_told && had.alert.level <= alert.level)
+            && had.is_some_and(|had| had.was_notified && had.alert.level <= alert.level)
     }
 
     /// Whether it says that a benchmark has given no reading: that is never long past.
@@ -228,11 +228,11 @@ impl Site {
         alert.level == Level::Unknown && benchmark.is_some_and(|one| !self.newest.contains_key(one))
     }
 
-    /// Whether it is the end of what nobody has been told of.
+    /// Whether it is the end of what nobody has been notified of.
     fn ends_untold(&self, alert: &Alert) -> bool {
         let place = (alert.event.benchmark.clone(), alert.level == Level::Unknown);
         let had = self.standing.get(&place);
-        alert.state == AlertState::Resolved && had.is_some_and(|had| !had.was_told)
+        alert.state == AlertState::Resolved && had.is_some_and(|had| !had.was_notified)
     }
 
     /// Everything there is has been read: what is in force and was not sent because it began long
@@ -255,7 +255,7 @@ impl Site {
         for one in standing.values_mut() {
             if one.is_sent {
                 // Again: there may have been no room for it. The hooks that have it ignore it.
-                if one.alert.must_arrive() && !one.is_told_together {
+                if one.alert.must_arrive() && !one.is_reported_together {
                     self.send(&one.alert);
                 }
             } else if (self.never_read(&one.alert)
@@ -263,7 +263,7 @@ impl Site {
                 && !self.is_muted(&one.alert, now)
             {
                 to_send.push(one.alert.clone());
-                (one.is_sent, one.was_told) = (true, true);
+                (one.is_sent, one.was_notified) = (true, true);
                 let counted = u64::from(one.alert.event.benchmark.is_some());
                 self.counts.long_past = self.counts.long_past.saturating_sub(counted);
             }
@@ -275,7 +275,7 @@ impl Site {
         Ok(events)
     }
 
-    /// Whether something has been called that people are to be told of at once.
+    /// Whether something has been called that people are to be notified of at once.
     pub fn is_urgent(&self, wall: Timestamp) -> bool {
         let now = self.keeper.now(wall);
         self.fresh.iter().any(|alert| {

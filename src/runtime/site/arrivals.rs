@@ -27,20 +27,6 @@ pub(in crate::runtime) fn is_logged(total: u64) -> bool {
     total <= LOGGED || total.is_power_of_two()
 }
 
-/// What a value is of.
-pub(super) fn name(input: &Input) -> &str {
-    match input {
-        Input::Reading { benchmark, .. } | Input::Missing { benchmark, .. } => benchmark.as_str(),
-        Input::Sample { channel, .. } => channel,
-        Input::Trouble { .. }
-        | Input::Settings(_)
-        | Input::Order(_)
-        | Input::Found(_)
-        | Input::Notice(_)
-        | Input::Tick => "",
-    }
-}
-
 impl Site {
     /// Takes one value. What was taken before, or lies ahead of the clock, changes nothing; while the host's clock is
     /// earlier than readings that are known, what lies ahead of it is held. A replay waits for the answer of a search
@@ -100,7 +86,7 @@ impl Site {
         &mut self,
         benchmark: &BenchmarkId,
         time: Timestamp,
-    ) -> Option<crate::monitor::Finding> {
+    ) -> Option<crate::monitor::SearchFinding> {
         if self.sinks.store.is_some() {
             self.searches.answered(benchmark, time)
         } else {
@@ -128,9 +114,9 @@ impl Site {
         let total = self.counts.without_clock;
         if !is_logged(total) {
         } else if time < BEFORE_ALL {
-            tracing::warn!(%time, what = name(&arrival.input), "measured before 1678: quarantined");
+            tracing::warn!(%time, what = arrival.input.series_name(), "measured before 1678: quarantined");
         } else {
-            tracing::warn!(%time, what = name(&arrival.input), total, "measured on the first day of 1970, as by a logger whose clock is not set: quarantined");
+            tracing::warn!(%time, what = arrival.input.series_name(), total, "measured on the first day of 1970, as by a logger whose clock is not set: quarantined");
         }
         true
     }
@@ -268,8 +254,8 @@ impl Site {
         for time in self.newest.values() {
             self.keeper.knows(*time, false);
         }
-        if !self.monitor.settles() {
-            self.step(self.data_now(), &Input::Notice(Notice::Settles));
+        if !self.monitor.takes_batches() {
+            self.step(self.data_now(), &Input::Notice(Notice::InBatches));
         }
         if self.newest.is_empty() && !self.monitor.reads_past() {
             self.step(self.data_now(), &Input::Notice(Notice::Past));
@@ -342,12 +328,12 @@ impl Site {
 
     /// All that came together has been taken: judges what of it came late, once, and the next of what queued; to be
     /// repeated while [`Site::queues`].
-    pub fn settle(&mut self) -> Vec<Event> {
+    pub fn end_batch(&mut self) -> Vec<Event> {
         let is_owed = self.monitor.late().is_some() || self.monitor.queues();
         let Some(now) = self.now.filter(|_| is_owed) else {
             return Vec::new();
         };
-        let events = self.step(now, &Input::Notice(Notice::Settle));
+        let events = self.step(now, &Input::Notice(Notice::BatchEnd));
         for job in self.monitor.searches() {
             self.searches.start(job);
         }

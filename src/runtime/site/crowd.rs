@@ -16,9 +16,9 @@ const LONGEST: Duration = Duration::from_secs(60);
 const MOST_QUEUED: u64 = 16_384;
 const LONGEST_QUEUE: Duration = Duration::from_secs(2);
 
-/// The messages of late.
+/// How fast messages came of late.
 #[derive(Debug, Default)]
-pub(super) struct Crowd {
+pub(super) struct MessageRush {
     /// Since when they are counted, and how many came since then.
     counted: Option<(Stopwatch, usize)>,
     /// When the first and the last crowd came.
@@ -45,7 +45,7 @@ impl Site {
         }
     }
 
-    /// Where messages come in a crowd, what they hold from here on is judged when [`Site::settle`] says so.
+    /// Where messages come in a crowd, what they hold from here on is judged at [`Site::end_batch`].
     pub fn queue(&mut self) {
         if self.monitor.queues() || self.monitor.reads_past() || !self.comes_crowded() {
             return;

@@ -1,4 +1,4 @@
-//! Many alerts at once: the gravest are told singly, of the others one message tells.
+//! Many alerts at once: the most severe are sent singly, the others are reported in one message.
 //!
 //! EEMUA 191 calls ten alarms in ten minutes a flood: beyond that nobody can act on them one by one.
 
@@ -14,14 +14,14 @@ const NAMED: usize = 20;
 
 /// What becomes of the alerts of one commit.
 #[derive(Debug, Default)]
-pub(super) struct Outgoing {
+pub(super) struct OutgoingAlerts {
     /// The hooks are given these.
     pub(super) sent: Vec<Alert>,
-    /// One of those tells of these.
-    pub(super) told_together: Vec<Alert>,
+    /// One of those reports these.
+    pub(super) reported_together: Vec<Alert>,
 }
 
-impl Outgoing {
+impl OutgoingAlerts {
     /// All of `alerts`, in their order, or of each level and state the first ten by forecast time of failure and one
     /// that stands for the others.
     pub(super) fn of(alerts: &[Alert]) -> Self {
@@ -35,14 +35,16 @@ impl Outgoing {
             alerts.clone_into(&mut outgoing.sent);
             return outgoing;
         }
-        // The gravest level first.
+        // The most severe level first.
         for mut group in groups.into_values().rev() {
             if group.len() > MOST_AT_ONCE + 1 {
                 group.sort_by_key(|alert| (alert.failure_time.is_none(), alert.failure_time));
                 let others = group.split_off(MOST_AT_ONCE);
                 outgoing.sent.extend(group.into_iter().cloned());
                 outgoing.sent.extend(together(&others));
-                outgoing.told_together.extend(others.into_iter().cloned());
+                outgoing
+                    .reported_together
+                    .extend(others.into_iter().cloned());
             } else {
                 outgoing.sent.extend(group.into_iter().cloned());
             }

@@ -2,29 +2,30 @@
 
 use super::mute::Mute;
 use super::{
-    Counts, OWN, Place, STEPS_A_BENCHMARK, STEPS_A_MEMORY, STEPS_UNJUDGED, Sinks, Site, Standing,
+    AlertInForce, AlertPlace, Counts, OWN, STEPS_A_BENCHMARK, STEPS_A_MEMORY, STEPS_UNJUDGED,
+    Sinks, Site,
 };
 use crate::alert::Level;
-use crate::monitor::{Input, Monitor, Part, SavedError, SearchJob, Settings};
+use crate::monitor::{Input, MemoryPart, Monitor, SavedError, SearchJob, Settings};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::delivered::delivery;
 use crate::runtime::hook::{Alert, state_name};
 use crate::runtime::vitals::Vitals;
-use crate::store::{Delivery, Fate, Recorded, Store, StoreError};
+use crate::store::{Delivery, DeliveryOutcome, Recorded, Store, StoreError};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// What the site remembers beside the monitor.
 #[derive(Debug, Serialize, Deserialize)]
-struct Own {
+struct SiteMemory {
     asked: Vec<SearchJob>,
     now: Option<Timestamp>,
     newest: BTreeMap<BenchmarkId, Timestamp>,
     #[serde(default)]
     ahead: BTreeMap<BenchmarkId, Timestamp>,
     failure_times: BTreeMap<Option<BenchmarkId>, Timestamp>,
-    standing: Vec<(Place, Standing)>,
+    standing: Vec<(AlertPlace, AlertInForce)>,
     mutes: Vec<Mute>,
     #[serde(default)]
     put_off: Vec<Alert>,
@@ -58,7 +59,7 @@ impl Site {
         site.catch_up(&store, step, turn)?;
         site.wait_for_hooks()?;
         if *site.monitor.settings() != settings || store.last_step() == 0 {
-            site.resettle(settings);
+            site.change_settings(settings);
         }
         site.begin();
         Ok(site)
@@ -80,7 +81,7 @@ impl Site {
     }
 
     fn remember(&mut self, recorded: &Recorded) -> Result<(), SavedError> {
-        let (own, parts): (Vec<Part>, Vec<Part>) = recorded
+        let (own, parts): (Vec<MemoryPart>, Vec<MemoryPart>) = recorded
             .parts
             .iter()
             .cloned()
@@ -89,10 +90,11 @@ impl Site {
             .into_iter()
             .find_map(|part| part.body)
             .ok_or(SavedError::Incomplete)?;
-        let own: Own = rmp_serde::from_slice(&body).map_err(|source| SavedError::Unreadable {
-            name: "site".to_owned(),
-            source,
-        })?;
+        let own: SiteMemory =
+            rmp_serde::from_slice(&body).map_err(|source| SavedError::Unreadable {
+                name: "site".to_owned(),
+                source,
+            })?;
         self.monitor = Monitor::restore(&parts)?;
         own.asked
             .into_iter()
@@ -158,8 +160,9 @@ impl Site {
         for one in self.standing.values_mut() {
             let identity = identity(&one.alert);
             one.is_sent |= store.is_noted(identity, None, None)?;
-            one.was_told |= one.is_sent;
-            one.is_told_together |= store.is_noted(identity, None, Some(Fate::Over))?;
+            one.was_notified |= one.is_sent;
+            one.is_reported_together |=
+                store.is_noted(identity, None, Some(DeliveryOutcome::Over))?;
         }
         let mut waiting = Vec::new();
         for body in store.waiting()? {
@@ -206,7 +209,7 @@ impl Site {
     }
 
     /// The memory as of the last step, where it is time to save it.
-    pub(super) fn memory(&self) -> Option<Vec<Part>> {
+    pub(super) fn memory(&self) -> Option<Vec<MemoryPart>> {
         let mut many = STEPS_A_MEMORY.max(STEPS_A_BENCHMARK * self.newest.len());
         if self.monitor.reads_past() || self.monitor.queues() {
             many *= STEPS_UNJUDGED;
@@ -214,7 +217,7 @@ impl Site {
         if self.steps_since_memory < many {
             return None;
         }
-        let own = Own {
+        let own = SiteMemory {
             asked: self.searches.jobs().cloned().collect(),
             now: self.now,
             newest: self.newest.clone(),
@@ -235,7 +238,7 @@ impl Site {
             Ok((mut parts, own)) => {
                 let body = Some(own);
                 let name = OWN.to_owned();
-                parts.push(Part { name, body });
+                parts.push(MemoryPart { name, body });
                 Some(parts)
             }
             Err(error) => {

@@ -17,7 +17,7 @@ mod unproven;
 pub(super) use arrivals::is_logged;
 pub use mute::Mute;
 
-use crowd::Crowd;
+use crowd::MessageRush;
 use returned::Returned;
 use timekeeper::Timekeeper;
 use unproven::Unproven;
@@ -59,9 +59,9 @@ const BEFORE_ALL: Timestamp = Timestamp::constant(-9_223_372_036, 0);
 pub struct Sinks {
     /// What is kept; `None`: nothing.
     pub store: Option<Arc<Store>>,
-    /// The alerts; `None` tells nobody.
+    /// The alerts; with `None` nobody is notified.
     pub alerts: Option<Dispatcher>,
-    /// What the hooks are told of the alerts' meaning.
+    /// What the hooks receive of the alerts' meaning.
     pub status: Status,
 }
 
@@ -82,20 +82,20 @@ pub struct Counts {
 }
 
 /// Where an alert stands: one level is in force at a benchmark, and beside it perhaps `unknown`.
-type Place = (Option<BenchmarkId>, bool);
+type AlertPlace = (Option<BenchmarkId>, bool);
 
 /// An alert in force.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-struct Standing {
+struct AlertInForce {
     alert: Alert,
     /// Whether it has been offered to the hooks.
     is_sent: bool,
     /// Whether this one, or a lower one that it superseded, has been offered to them: people wait for its end.
-    #[serde(default)]
-    was_told: bool,
-    /// Whether an alert of many benchmarks has told of it.
-    #[serde(default)]
-    is_told_together: bool,
+    #[serde(default, rename = "was_told")]
+    was_notified: bool,
+    /// Whether an alert of many benchmarks has reported it too.
+    #[serde(default, rename = "is_told_together")]
+    is_reported_together: bool,
 }
 
 /// One site at work.
@@ -120,10 +120,10 @@ pub struct Site {
     /// Alerts since the last commit.
     fresh: Vec<Alert>,
     /// What is in force: neither resolved nor superseded.
-    standing: BTreeMap<Place, Standing>,
-    /// Who asked not to be told.
+    standing: BTreeMap<AlertPlace, AlertInForce>,
+    /// Who asked not to be notified.
     mutes: Vec<Mute>,
-    /// Ends of alerts that people were told of, which fell into a silence: they are sent after it.
+    /// Ends of alerts that people were notified of, which fell into a silence: they are sent after it.
     put_off: Vec<Alert>,
     counts: Counts,
     keeper: Timekeeper,
@@ -135,7 +135,7 @@ pub struct Site {
     /// Values that were taken before, and corrected: until all that came with them has been seen.
     returned: Returned,
     /// Messages that come so fast that the past is not over yet.
-    crowd: Crowd,
+    crowd: MessageRush,
     /// Of which silent benchmarks it is known how late their readings come, and what time it was then.
     behind: BTreeMap<BenchmarkId, Timestamp>,
 }
@@ -166,7 +166,7 @@ impl Site {
             at_rest: BTreeSet::new(),
             held: VecDeque::new(),
             returned: Returned::default(),
-            crowd: Crowd::default(),
+            crowd: MessageRush::default(),
             behind: BTreeMap::new(),
         }
     }
@@ -191,7 +191,7 @@ impl Site {
     }
 
     /// Goes by other settings from here on.
-    pub fn resettle(&mut self, settings: Settings) -> Vec<Event> {
+    pub fn change_settings(&mut self, settings: Settings) -> Vec<Event> {
         self.settings = settings.clone();
         let now = self.data_now();
         self.step(now, &Input::Settings(Box::new(settings)))
@@ -260,7 +260,7 @@ impl Site {
             *latest = reading.time.max(*latest);
         }
         if let Input::Order(order) = input {
-            self.obey(order);
+            self.apply(order);
         }
         let events = self.monitor.step(now, input);
         for event in &events {

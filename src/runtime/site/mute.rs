@@ -1,4 +1,4 @@
-//! Who asked not to be told, of what, until when: never for longer than an order may last, whatever the clock says.
+//! Who asked not to be notified, of what, until when: never for longer than an order may last, whatever the clock says.
 
 use super::Site;
 use crate::alert::Level;
@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 /// Orders in force at most; the oldest goes.
 const MOST: usize = 256;
 
-/// Alerts that are not told for a time.
+/// Alerts of which nobody is notified for a time.
 #[derive(Debug, Clone, PartialEq, Eq, JsonSchema, Serialize, Deserialize)]
 pub struct Mute {
     /// `None`: of the whole site.
@@ -37,8 +37,8 @@ impl Mute {
 }
 
 impl Site {
-    /// Does what people ask for, as far as it concerns who is told.
-    pub(super) fn obey(&mut self, order: &Order) {
+    /// Does what people ask for, as far as it concerns who is notified.
+    pub(super) fn apply(&mut self, order: &Order) {
         match order {
             Order::Acknowledge {
                 benchmark, alert, ..
@@ -50,7 +50,7 @@ impl Site {
                 let all = self.standing.iter_mut();
                 let seen = all.filter(|((place, _), one)| is_seen(place, &one.alert.key));
                 for (_, one) in seen {
-                    (one.is_sent, one.was_told) = (true, true);
+                    (one.is_sent, one.was_notified) = (true, true);
                     if let Some(alerts) = &self.sinks.alerts {
                         alerts.end(&one.alert);
                     }
@@ -99,14 +99,14 @@ impl Site {
         }
     }
 
-    /// Who is not to be told of what while the host's clock says `wall`.
+    /// Who is not to be notified of what while the host's clock says `wall`.
     pub fn mutes(&self, wall: Timestamp) -> Vec<Mute> {
         let now = self.keeper.now(wall);
         let all = self.mutes.iter();
         all.filter(|mute| mute.is_in_force(now)).cloned().collect()
     }
 
-    /// Whether nobody is to be told of this alert at `now`.
+    /// Whether nobody is to be notified of this alert at `now`.
     pub(super) fn is_muted(&self, alert: &Alert, now: Timestamp) -> bool {
         self.mutes.iter().any(|mute| {
             let here = mute.benchmark.is_none() || mute.benchmark == alert.event.benchmark;

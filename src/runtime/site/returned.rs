@@ -4,7 +4,7 @@
 //! Which of both it is shows when all that came together has been seen.
 
 use super::Site;
-use crate::monitor::{Event, Input};
+use crate::monitor::{Event, Measured};
 use crate::reading::{Quantity, Timestamp};
 use crate::runtime::tail::Arrival;
 use std::collections::BTreeMap;
@@ -13,25 +13,18 @@ use std::collections::BTreeMap;
 const MOST: usize = 10_000;
 
 /// What a value is of, and when it was measured.
-type Place = (String, Option<Quantity>, Timestamp);
+type ValueName = (String, Option<Quantity>, Timestamp);
 
 /// The values that wait, by their place.
 #[derive(Debug, Default)]
-pub(super) struct Returned(BTreeMap<Place, Arrival>);
+pub(super) struct Returned(BTreeMap<ValueName, Arrival>);
 
-fn place(arrival: &Arrival) -> Place {
-    let quantity = match &arrival.input {
-        Input::Reading { unit, .. } => Some(unit.quantity()),
-        Input::Sample { .. }
-        | Input::Missing { .. }
-        | Input::Trouble { .. }
-        | Input::Settings(_)
-        | Input::Order(_)
-        | Input::Found(_)
-        | Input::Notice(_)
-        | Input::Tick => None,
+fn place(arrival: &Arrival) -> ValueName {
+    let quantity = match arrival.input.measured() {
+        Some(Measured::Reading { unit, .. }) => Some(unit.quantity()),
+        Some(Measured::Sample { .. }) | None => None,
     };
-    let name = super::arrivals::name(&arrival.input).to_owned();
+    let name = arrival.input.series_name().to_owned();
     (name, quantity, arrival.time)
 }
 

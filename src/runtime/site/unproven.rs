@@ -1,12 +1,12 @@
 //! Readings that lie ahead of the clock of a daemon that has just started: is the clock behind, or a logger ahead?
 //!
-//! A machine without a battery wakes with the time at which it went to sleep. The newest reading that it knows is older
+//! A machine without a battery starts with the time at which it stopped. The newest reading that it knows is older
 //! than that, so nothing proves the clock wrong; but the files go on beyond it. What goes on from known readings without a
 //! leap is held until the past has been read. By then either some benchmark has shown that its readings end where the
 //! clock is, or the clock is behind.
 
 use super::Site;
-use super::arrivals::{is_logged, name};
+use super::arrivals::is_logged;
 use crate::monitor::Input;
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::clock::TOLERANCE;
@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 const FEWEST: usize = 4;
 /// A reading goes on from one that is no older than this.
 const GOES_ON: SignedDuration = SignedDuration::from_hours(48);
-/// A benchmark whose readings end so near before the clock speaks for it.
+/// A benchmark whose readings end so near before is evidence for the clock.
 const NEAR: SignedDuration = SignedDuration::from_hours(6);
 
 /// What came before the past had been read.
@@ -46,14 +46,14 @@ impl Unproven {
     }
 
     /// Whether a reading ahead of the clock goes on from what is known, as far as `newest`.
-    fn goes_on(&mut self, benchmark: &BenchmarkId, time: Timestamp, newest: Timestamp) -> bool {
+    fn continues(&mut self, benchmark: &BenchmarkId, time: Timestamp, newest: Timestamp) -> bool {
         let (last, count) = self.ahead.get(benchmark).copied().unwrap_or((newest, 0));
-        let goes_on = !self.is_over && time.duration_since(last) <= GOES_ON;
-        if goes_on {
+        let continues = !self.is_over && time.duration_since(last) <= GOES_ON;
+        if continues {
             let next = (time.max(last), count + 1);
             self.ahead.insert(benchmark.clone(), next);
         }
-        goes_on
+        continues
     }
 
     /// The past has been read: how late it is at least, where the clock is behind. `None` the next time.
@@ -79,7 +79,7 @@ impl Site {
             return false;
         };
         let newest = self.newest.get(benchmark).copied();
-        newest.is_some_and(|newest| self.unproven.goes_on(benchmark, arrival.time, newest))
+        newest.is_some_and(|newest| self.unproven.continues(benchmark, arrival.time, newest))
     }
 
     /// The past has been read: what lies ahead of the clock is held on where the clock is behind, and set aside else.
@@ -107,7 +107,7 @@ impl Site {
         self.counts.from_the_future += 1;
         let (time, total) = (arrival.time, self.counts.from_the_future);
         if is_logged(total) {
-            tracing::warn!(%time, what = name(&arrival.input), total, "measured in the future: quarantined");
+            tracing::warn!(%time, what = arrival.input.series_name(), total, "measured in the future: quarantined");
         }
     }
 }

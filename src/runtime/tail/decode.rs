@@ -1,6 +1,6 @@
 //! From a source's lines and messages to what the monitor takes: which benchmarks, which columns.
 
-use crate::config::{Benchmark, Broker, Source, SourceKind};
+use crate::config::{Benchmark, Broker, FileSource, SourceKind};
 use crate::monitor::Input;
 use crate::reading::{BenchmarkId, Conventions, Dialect, Quantity, Timestamp, Unit};
 use crate::runtime::ingest::{
@@ -23,19 +23,8 @@ pub struct Arrival {
 impl Arrival {
     /// Where it stands among others: by time, and at one time the covariates before the readings, each by name.
     pub fn rank(&self) -> (Timestamp, bool, &str) {
-        let (is_reading, name) = match &self.input {
-            Input::Sample { channel, .. } => (false, channel.as_str()),
-            Input::Reading { benchmark, .. } | Input::Missing { benchmark, .. } => {
-                (true, benchmark.as_str())
-            }
-            Input::Trouble { .. }
-            | Input::Notice(_)
-            | Input::Settings(_)
-            | Input::Order(_)
-            | Input::Found(_)
-            | Input::Tick => (false, ""),
-        };
-        (self.time, is_reading, name)
+        let is_reading = self.input.read_benchmark().is_some();
+        (self.time, is_reading, self.input.series_name())
     }
 }
 
@@ -52,7 +41,7 @@ pub(in crate::runtime) struct Decoder {
 }
 
 impl Decoder {
-    pub(in crate::runtime) fn new(source: &Source, benchmarks: &[Benchmark]) -> Self {
+    pub(in crate::runtime) fn new(source: &FileSource, benchmarks: &[Benchmark]) -> Self {
         let conventions = source.conventions.clone();
         Self {
             kind: source.kind,
@@ -82,12 +71,7 @@ impl Decoder {
 
     /// The reader of the lines of `file`; `None` for recordings.
     pub(in crate::runtime) fn text_rows(&self, file: &Path) -> Option<TextRows> {
-        let format = match self.kind {
-            SourceKind::Csv => TextFormat::Csv,
-            SourceKind::Ndjson => TextFormat::Ndjson,
-            SourceKind::Toa5 => TextFormat::Toa5,
-            SourceKind::Mcap => return None,
-        };
+        let format = TextFormat::named(self.kind.name())?;
         let name = unpacked_name(file);
         Some(TextRows::new(format, &name, &self.options(&name)))
     }
@@ -213,7 +197,7 @@ impl Decoder {
 }
 
 /// How the daemon reads a file of this source.
-pub fn options_of(source: &Source, benchmarks: &[Benchmark], file: &Path) -> ReadOptions {
+pub fn options_of(source: &FileSource, benchmarks: &[Benchmark], file: &Path) -> ReadOptions {
     Decoder::new(source, benchmarks).options(&unpacked_name(file))
 }
 

@@ -2,8 +2,8 @@
 
 use super::decode::{Arrival, Decoder};
 use super::position::{FileId, Saved};
-use super::records::{self, Channels, Frame, HEADER_BYTES, MAGIC, RawMessage};
-use super::text::{BadLine, Fed, TextReader, Unpacking};
+use super::records::{self, Channels, HEADER_BYTES, MAGIC, NextRecord, RawMessage};
+use super::text::{BadLine, LinesRead, TextReader, Unpacking};
 use crate::reading::Timestamp;
 use crate::runtime::ingest::{IngestError, Item, decode_message, is_packed};
 use crate::runtime::site::is_logged;
@@ -163,7 +163,7 @@ impl FileTail {
                 self.has_more = true;
                 return;
             }
-            self.settle();
+            self.mark_handed_out();
             match self.advance() {
                 Ok(true) => {
                     self.trouble = None;
@@ -302,7 +302,7 @@ impl FileTail {
         }
     }
 
-    fn take(&mut self, fed: Fed) {
+    fn take(&mut self, fed: LinesRead) {
         for remark in fed.remarks {
             if self.decoder.is_news(&remark) {
                 tracing::info!(file = %self.path.display(), "{remark}");
@@ -365,18 +365,18 @@ impl FileTail {
         file.read_exact_at(&mut header, self.at)?;
         let body_at = self.at + HEADER_BYTES as u64;
         match records::frame(header, size - body_at) {
-            Frame::Wait => {}
-            Frame::Skip { length } => self.at = body_at + length,
-            Frame::Read { opcode, length } => {
+            NextRecord::Wait => {}
+            NextRecord::Skip { length } => self.at = body_at + length,
+            NextRecord::Read { opcode, length } => {
                 let body = read_at(file, body_at, length)?;
                 let end = body_at + length;
                 self.take_record(opcode, &body, end, end == size);
             }
-            Frame::End => {
+            NextRecord::End => {
                 tracing::info!(file = %self.path.display(), "recording complete");
                 self.content = Content::Complete;
             }
-            Frame::Damaged { length } => {
+            NextRecord::Damaged { length } => {
                 let error = io::Error::other(format!("a record of {length} bytes at {}", self.at));
                 self.refuse(&error);
             }

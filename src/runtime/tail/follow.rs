@@ -4,7 +4,7 @@ use super::decode::{Arrival, Decoder};
 use super::file::FileTail;
 use super::position::FileId;
 use super::reorder::Reorder;
-use crate::config::{Benchmark, FilePattern, Source};
+use crate::config::{Benchmark, FilePattern, FileSource};
 use crate::reading::Timestamp;
 use crate::runtime::clock::Stopwatch;
 use crate::store::Position;
@@ -19,7 +19,7 @@ const BATCH: usize = 1000;
 
 /// Values in the order of their measurement, as far as they had arrived.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Batch {
+pub struct ArrivalBatch {
     /// The values.
     pub arrivals: Vec<Arrival>,
     /// How far files have been read once all of these, and those before, are taken: what has changed.
@@ -73,8 +73,12 @@ pub struct Follower {
 
 impl Follower {
     /// Follows nothing yet; files go on from where `saved`, by name, has left them.
-    pub fn new(sources: &[Source], benchmarks: &[Benchmark], saved: &[(String, Vec<u8>)]) -> Self {
-        let of = |source: &Source| Followed {
+    pub fn new(
+        sources: &[FileSource],
+        benchmarks: &[Benchmark],
+        saved: &[(String, Vec<u8>)],
+    ) -> Self {
+        let of = |source: &FileSource| Followed {
             id: source.id.clone(),
             pattern: source.pattern.clone(),
             decoder: Arc::new(Decoder::new(source, benchmarks)),
@@ -142,7 +146,7 @@ impl Follower {
     /// files before the next round looks at them again: years of history in many files arrive as
     /// if they had come in live. Values of a source that waits for earlier ones go out when they have waited for long
     /// enough, also by the wall clock's time, `wall`.
-    pub fn poll(&mut self, wall: Timestamp) -> Batch {
+    pub fn poll(&mut self, wall: Timestamp) -> ArrivalBatch {
         if self.heads.is_empty() {
             self.looked = Some(Stopwatch::start());
             self.rescan();
@@ -171,7 +175,7 @@ impl Follower {
         arrivals.append(&mut self.lost);
         arrivals.extend(direct);
         let is_due = |source: &Followed| source.reorder.as_ref().is_some_and(Reorder::is_due);
-        Batch {
+        ArrivalBatch {
             positions: self.positions(),
             caught_up: self.heads.is_empty()
                 && !self.sources.iter().any(is_due)

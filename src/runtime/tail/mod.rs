@@ -21,8 +21,8 @@ mod text;
 pub(super) use decode::Decoder;
 pub use decode::{Arrival, options_of};
 pub(super) use follow::list;
-pub use follow::{Batch, Follower};
-pub(super) use text::{BadLine, Fed, TextReader};
+pub use follow::{ArrivalBatch, Follower};
+pub(super) use text::{BadLine, LinesRead, TextReader};
 
 use super::clock::{self, Stopwatch};
 use super::shutdown::Shutdown;
@@ -34,7 +34,7 @@ use std::time::Duration;
 use tokio::sync::{Notify, mpsc};
 use tokio::time::MissedTickBehavior;
 
-/// How often the files are looked at when nothing wakes us.
+/// How often the files are read when the system reports no change of them.
 const RESCAN: Duration = Duration::from_secs(2);
 
 /// Between two looks: so many times as long as the last one took, so that following a busy writer costs a fifth of a
@@ -51,7 +51,7 @@ const LONGEST_REST: Duration = Duration::from_millis(200);
 /// When a reading task broke off.
 pub async fn follow(
     mut follower: Follower,
-    batches: mpsc::Sender<Batch>,
+    batches: mpsc::Sender<ArrivalBatch>,
     mut shutdown: Shutdown,
 ) -> Result<(), tokio::task::JoinError> {
     let mut watch = FolderWatch::new(follower.folders());
@@ -113,7 +113,7 @@ impl FolderWatch {
                 waker.notify_one();
             }
         })
-        .inspect_err(|error| tracing::warn!(%error, "no watcher: files are looked at in turn"))
+        .inspect_err(|error| tracing::warn!(%error, "no watcher: files are read in turn"))
         .ok();
         Self {
             watcher,
@@ -133,7 +133,7 @@ impl FolderWatch {
             let Err(error) = watched else { return false };
             // A folder that is not there is reported by whoever lists it.
             if !matches!(error.kind, notify::ErrorKind::PathNotFound) && folder.is_dir() && self.reported.insert(folder.clone()) {
-                tracing::warn!(folder = %folder.display(), %error, "no watch: files are looked at in turn");
+                tracing::warn!(folder = %folder.display(), %error, "no watch: files are read in turn");
             }
             true
         });

@@ -26,7 +26,7 @@ pub const OPEN_CHUNK: [u8; HEADER_BYTES] = [op::CHUNK, 255, 255, 255, 255, 255, 
 
 /// What stands at an offset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Frame {
+pub enum NextRecord {
     /// Nothing whole yet.
     Wait,
     /// A whole record to be read and handed to [`Channels::decode`].
@@ -52,22 +52,22 @@ pub enum Frame {
 
 /// Says what to do with the record whose header is given and which is followed by `available` more
 /// bytes of the file.
-pub fn frame(header: [u8; HEADER_BYTES], available: u64) -> Frame {
+pub fn frame(header: [u8; HEADER_BYTES], available: u64) -> NextRecord {
     let [opcode, length @ ..] = header;
     let length = u64::from_le_bytes(length);
     let needed = matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE | op::CHUNK);
     if header == OPEN_CHUNK {
-        Frame::Wait
+        NextRecord::Wait
     } else if (needed || opcode == op::METADATA) && length > LONGEST_RECORD || length > FARTHEST {
-        Frame::Damaged { length }
+        NextRecord::Damaged { length }
     } else if length > available {
-        Frame::Wait
+        NextRecord::Wait
     } else if opcode == op::FOOTER {
-        Frame::End
+        NextRecord::End
     } else if needed {
-        Frame::Read { opcode, length }
+        NextRecord::Read { opcode, length }
     } else {
-        Frame::Skip { length }
+        NextRecord::Skip { length }
     }
 }
 

@@ -58,7 +58,7 @@ impl FileTail {
     }
 
     /// Everything up to here has been handed out.
-    pub(super) fn settle(&mut self) {
+    pub(super) fn mark_handed_out(&mut self) {
         if self.safe.at == self.at && self.safe.place == self.place && self.safe.mark == self.mark {
             return;
         }

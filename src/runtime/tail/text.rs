@@ -21,7 +21,7 @@ pub(in crate::runtime) struct BadLine {
 
 /// What came of some bytes.
 #[derive(Debug, Default)]
-pub(in crate::runtime) struct Fed {
+pub(in crate::runtime) struct LinesRead {
     pub(in crate::runtime) items: Vec<Item>,
     pub(in crate::runtime) bad: Vec<BadLine>,
     /// The file does not begin as it should: the last of `bad` says why, and nothing follows.
@@ -75,8 +75,8 @@ impl TextReader {
     }
 
     /// Takes the next bytes.
-    pub(in crate::runtime) fn feed(&mut self, bytes: &[u8]) -> Fed {
-        let mut fed = Fed::default();
+    pub(in crate::runtime) fn feed(&mut self, bytes: &[u8]) -> LinesRead {
+        let mut fed = LinesRead::default();
         for line in self.lines.feed(bytes) {
             let number = line.number;
             let (text, error) = match line.text {
@@ -106,7 +106,12 @@ impl TextReader {
         fed
     }
 
-    fn line(&mut self, number: u64, text: String, fed: &mut Fed) -> (String, Option<DecodeFault>) {
+    fn line(
+        &mut self,
+        number: u64,
+        text: String,
+        fed: &mut LinesRead,
+    ) -> (String, Option<DecodeFault>) {
         let taken = self.rows.take(number, &text);
         let mut items = taken.items;
         items.sort_by(|a, b| order(a).cmp(&order(b)));
@@ -165,7 +170,7 @@ impl Unpacking {
     }
 
     /// The next piece of `file`; `None` when it has all been read.
-    pub(super) fn next(&mut self, file: &Path) -> io::Result<Option<Fed>> {
+    pub(super) fn next(&mut self, file: &Path) -> io::Result<Option<LinesRead>> {
         let packed = match &mut self.packed {
             Some(packed) => packed,
             packed => packed.insert(Box::new(unpack(file)?)),
@@ -176,7 +181,7 @@ impl Unpacking {
     }
 
     /// What is left when all has been read: a packed file has no more to come behind its last line.
-    pub(super) fn end(&mut self) -> Fed {
+    pub(super) fn end(&mut self) -> LinesRead {
         self.text.feed(b"\n")
     }
 }

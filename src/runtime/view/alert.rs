@@ -1,8 +1,8 @@
 //! Everything of one alert: what called it, on which evidence, what it asks for, who got it, and who did what about it.
 
-use super::{Desk, read};
+use super::{SiteReader, read};
 use crate::alert::{Level, Policy};
-use crate::monitor::{AlertState, Event, EventKind, Settings};
+use crate::monitor::{AlertState, Event, EventKind, OrderKind, Settings};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::standing::{every, in_force, may_be_of};
 use crate::store::{DeliveryRow, Store, StoreError};
@@ -69,7 +69,7 @@ pub struct AlertView {
     pub decision: String,
 }
 
-impl Desk {
+impl SiteReader {
     /// Everything of the alert with this key, or of the newest one whose key begins with it; `None` without one.
     ///
     /// # Errors
@@ -80,13 +80,13 @@ impl Desk {
 }
 
 /// A change of the alert, with its place in the state.
-struct Call {
+struct StoredCall {
     event: Event,
     step: i64,
     body: String,
 }
 
-/// As [`Desk::alert`], for those who have the state at hand.
+/// As [`SiteReader::alert`], for those who have the state at hand.
 ///
 /// # Errors
 /// [`StoreError`].
@@ -111,8 +111,16 @@ pub fn alert(store: &Store, site: &str, key: &str) -> Result<Option<AlertView>, 
     let policy = benchmark
         .as_ref()
         .map_or(&settings.policy, |one| settings.policy(one));
-    let audit = audit(store, &alerts, (&call.event, ended))?;
-    let is_ack = |event: &Event| matches!(&event.kind, EventKind::Order { order, .. } if order == "acknowledge");
+    let audit = audit(store, &alerts, &call.event, ended)?;
+    let is_ack = |event: &Event| {
+        matches!(
+            &event.kind,
+            EventKind::Order {
+                order: OrderKind::Acknowledge,
+                ..
+            }
+        )
+    };
     let members = if benchmark.is_none() {
         members(store, level, since)?
     } else {
@@ -130,7 +138,7 @@ pub fn alert(store: &Store, site: &str, key: &str) -> Result<Option<AlertView>, 
         evidence: refit(store, benchmark.as_ref(), since)?,
         members,
         recommended: level.recommended(),
-        valid_until: valid_until(store, (level, ended), (benchmark.as_ref(), since), policy)?,
+        valid_until: valid_until(store, level, ended, benchmark.as_ref(), since, policy)?,
         deliveries: store.deliveries_of(&key)?,
         is_acknowledged: audit.iter().any(is_ack),
         audit,
@@ -143,8 +151,8 @@ pub fn alert(store: &Store, site: &str, key: &str) -> Result<Option<AlertView>, 
 }
 
 /// The event that called the alert: that of the key, or the newest whose key goes on with a slash.
-fn call(store: &Store, asked: &str) -> Result<Option<Call>, StoreError> {
-    let mut found: Option<Call> = None;
+fn call(store: &Store, asked: &str) -> Result<Option<StoredCall>, StoreError> {
+    let mut found: Option<StoredCall> = None;
     for placed in store.placed_events("alert")? {
         let event: Event = read(&placed.body)?;
         let EventKind::Alert { key, state, .. } = &event.kind else {
@@ -161,7 +169,7 @@ fn call(store: &Store, asked: &str) -> Result<Option<Call>, StoreError> {
             .as_ref()
             .is_none_or(|had| had.event.time <= event.time);
         if is_it || is_newer {
-            found = Some(Call {
+            found = Some(StoredCall {
                 event,
                 step: placed.step,
                 body: placed.body,
@@ -216,7 +224,8 @@ fn end(alerts: &[Event], call: &Event) -> (AlertLife, Option<Timestamp>) {
 fn audit(
     store: &Store,
     alerts: &[Event],
-    (call, ended): (&Event, Option<Timestamp>),
+    call: &Event,
+    ended: Option<Timestamp>,
 ) -> Result<Vec<Event>, StoreError> {
     let EventKind::Alert { key: own_key, .. } = &call.kind else {
         return Ok(Vec::new());
@@ -269,8 +278,10 @@ fn refit(
 
 fn valid_until(
     store: &Store,
-    (level, ended): (Level, Option<Timestamp>),
-    (benchmark, since): (Option<&BenchmarkId>, Timestamp),
+    level: Level,
+    ended: Option<Timestamp>,
+    benchmark: Option<&BenchmarkId>,
+    since: Timestamp,
     policy: &Policy,
 ) -> Result<Option<Timestamp>, StoreError> {
     if ended.is_some() || level == Level::Unknown {

@@ -2,10 +2,10 @@
 
 use super::site::Standing;
 use super::thin::{self, ThinPoint};
-use super::{Desk, EARLIEST, LATEST, held, read};
+use super::{EARLIEST, LATEST, SiteReader, held, read};
 use crate::fit::{Observations, Rate, RateOptions};
 use crate::forecast::InverseVelocityLine;
-use crate::monitor::{Event, EventKind, FailureTime, Stretch, levels_in, recent};
+use crate::monitor::{Event, EventKind, FailureTime, LevelStretch, levels_in, recent};
 use crate::reading::{
     BenchmarkId, Quantity, Reading, SECONDS_PER_DAY, Series, Timestamp, Unit, days_since,
 };
@@ -143,9 +143,9 @@ pub struct BenchmarkView {
     /// The newest refit whole.
     pub latest: Option<Event>,
     /// The levels in force.
-    pub levels: Vec<Stretch>,
+    pub levels: Vec<LevelStretch>,
     /// When nothing could be said.
-    pub unknown: Vec<Stretch>,
+    pub unknown: Vec<LevelStretch>,
     /// Covariates.
     pub covariates: Vec<Covariate>,
     /// What was found, declared, ordered.
@@ -158,7 +158,7 @@ pub struct BenchmarkView {
     pub silences: Vec<Event>,
 }
 
-impl Desk {
+impl SiteReader {
     /// One benchmark as it was known at a moment; `None` where there is none of that name.
     ///
     /// # Errors
@@ -193,7 +193,7 @@ impl Desk {
         alerts.truncate(MOST_EVENTS);
         let levels_now = in_force(&self.store, at)?;
         let span = self.store.span(Some(name))?;
-        let (seen, quiet) = self.orders(&levels_now, (at, moment))?;
+        let (seen, quiet) = self.orders(&levels_now, at, moment)?;
         Ok(Some(BenchmarkView {
             site: self.facts.name.clone(),
             version: env!("CARGO_PKG_VERSION"),
@@ -201,7 +201,7 @@ impl Desk {
             takes_orders: self.facts.takes_orders,
             acknowledged: seen,
             silences: quiet,
-            standing: self.standing(id, &levels_now, (at, moment))?,
+            standing: self.standing(id, &levels_now, at, moment)?,
             at,
             now,
             first: span.map(|(first, _)| first),

@@ -1,9 +1,9 @@
 //! What somebody who follows the link in an alert's message is shown, and the acknowledgement that follows from it.
 
 use super::order::LONGEST_NAME;
-use super::{AlertLife, AlertView, Desk};
+use super::{AlertLife, AlertView, SiteReader};
 use crate::config::{EXERCISE, Links};
-use crate::monitor::{Door, EventKind, Given, Order};
+use crate::monitor::{EventKind, Given, Order, OrderKind, OrderedBy};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::clock;
 use crate::runtime::hook::Status;
@@ -14,7 +14,7 @@ use jiff::tz::TimeZone;
 
 /// What a good link is of.
 #[derive(Debug)]
-pub enum Meant {
+pub enum LinkTarget {
     /// An alert that is in force, and that nobody has acknowledged.
     Alert(Box<AlertView>),
     /// A drill, with its status: there is nothing to acknowledge but the drill.
@@ -25,9 +25,9 @@ pub enum Meant {
 #[derive(Debug)]
 pub enum LinkPage {
     /// It can be used.
-    Open(Meant),
+    Open(LinkTarget),
     /// It has just been used.
-    Taken(Meant),
+    Taken(LinkTarget),
     /// It is none of ours, or was changed on the way.
     Forged,
     /// It was good until then.
@@ -44,7 +44,7 @@ pub enum LinkPage {
     WrongName,
 }
 
-impl Desk {
+impl SiteReader {
     /// What following the link leads to; it changes nothing, because scanners of mail follow links.
     ///
     /// # Errors
@@ -61,7 +61,7 @@ impl Desk {
             return Ok(if is_used {
                 LinkPage::Used(None)
             } else {
-                LinkPage::Open(Meant::Drill(signed.status))
+                LinkPage::Open(LinkTarget::Drill(signed.status))
             });
         }
         let alert = self.alert(&signed.key)?.map(Box::new);
@@ -73,7 +73,7 @@ impl Desk {
             Some(alert) if alert.key != signed.key => LinkPage::Foreign,
             Some(alert) if alert.state != AlertLife::Firing => LinkPage::Over(alert),
             Some(alert) if alert.is_acknowledged => LinkPage::Seen(alert),
-            Some(alert) => LinkPage::Open(Meant::Alert(alert)),
+            Some(alert) => LinkPage::Open(LinkTarget::Alert(alert)),
             None => LinkPage::Foreign,
         })
     }
@@ -97,10 +97,10 @@ impl Desk {
         };
         let now = clock::now();
         let place = match &meant {
-            Meant::Alert(alert) => Some(alert.benchmark.clone()),
+            LinkTarget::Alert(alert) => Some(alert.benchmark.clone()),
             // The drill, which waits for it, finds it in the site's log.
-            Meant::Drill(Status::Exercise) => Some(Some(BenchmarkId::new(EXERCISE))),
-            Meant::Drill(_) => None,
+            LinkTarget::Drill(Status::Exercise) => Some(Some(BenchmarkId::new(EXERCISE))),
+            LinkTarget::Drill(_) => None,
         };
         let order = place.map(|benchmark| Order::Acknowledge {
             benchmark,
@@ -108,7 +108,7 @@ impl Desk {
             given: Given {
                 by: (!by.is_empty()).then(|| by.to_owned()),
                 why: None,
-                door: Some(Door::Link),
+                door: Some(OrderedBy::Link),
                 given_at: Some(now),
             },
         });
@@ -116,14 +116,14 @@ impl Desk {
         let within = (self.facts.links.as_ref()).map_or(SignedDuration::ZERO, |one| one.within);
         let forgotten = now.saturating_add(within).unwrap_or(signed.until);
         let name = name(&signed);
-        let link = (name.as_str(), forgotten.max(signed.until));
+        let until = forgotten.max(signed.until);
         tracing::warn!(key = signed.key, by, "somebody acknowledges by a link");
-        Ok(if self.store.use_link(link, now, order.as_ref())? {
+        Ok(if self.store.use_link(&name, until, now, order.as_ref())? {
             LinkPage::Taken(meant)
         } else {
             LinkPage::Used(match meant {
-                Meant::Alert(alert) => Some(alert),
-                Meant::Drill(_) => None,
+                LinkTarget::Alert(alert) => Some(alert),
+                LinkTarget::Drill(_) => None,
             })
         })
     }
@@ -159,7 +159,7 @@ impl AlertView {
                 return None;
             };
             let acknowledged = (given.given_at, given.by.as_deref());
-            (order == "acknowledge").then_some(acknowledged)
+            (*order == OrderKind::Acknowledge).then_some(acknowledged)
         })
     }
 }

@@ -9,7 +9,7 @@ mod thin;
 
 pub use alert::{AlertLife, AlertView, alert};
 pub use benchmark::{BenchmarkView, TimeWindow};
-pub use link::{LinkPage, Meant};
+pub use link::{LinkPage, LinkTarget};
 pub use order::{Asked, OrderError};
 pub use site::{SiteView, Standing};
 
@@ -83,13 +83,13 @@ impl Facts {
 
 /// Answers what the page asks, from the state on the disk.
 #[derive(Debug)]
-pub struct Desk {
+pub struct SiteReader {
     /// A connection of its own: a long answer keeps the work loop from nothing.
     store: Store,
     facts: Facts,
 }
 
-impl Desk {
+impl SiteReader {
     /// Opens the state in `folder`, which is there already.
     ///
     /// # Errors

@@ -1,8 +1,8 @@
 //! An order that was given on the page, and whether it is taken.
 
-use super::{Desk, EARLIEST};
+use super::{EARLIEST, SiteReader};
 use crate::config::EXERCISE;
-use crate::monitor::{Door, Given, Order};
+use crate::monitor::{Given, Order, OrderedBy};
 use crate::reading::BenchmarkId;
 use crate::runtime::clock;
 use crate::store::StoreError;
@@ -45,7 +45,7 @@ pub enum OrderError {
     Store(#[from] StoreError),
 }
 
-impl Desk {
+impl SiteReader {
     /// Leaves the order for the daemon, which takes it within a second.
     ///
     /// # Errors
@@ -86,7 +86,7 @@ impl Desk {
         let given = Given {
             by: Some(name.to_owned()),
             why: why.map(str::to_owned),
-            door: Some(Door::Http),
+            door: Some(OrderedBy::Http),
             given_at: Some(clock::now()),
         };
         let benchmark = asked.benchmark.as_ref().map(BenchmarkId::new);

@@ -1,6 +1,6 @@
 //! The whole site at a moment: how each benchmark stands, what is in force, what was said last.
 
-use super::{Desk, LATEST, held, read};
+use super::{LATEST, SiteReader, held, read};
 use crate::alert::Level;
 use crate::monitor::{Event, EventKind, FailureTime};
 use crate::reading::{BenchmarkId, Timestamp};
@@ -84,7 +84,7 @@ pub struct SiteView {
     pub log: Vec<Event>,
 }
 
-impl Desk {
+impl SiteReader {
     /// The site as it was known at `at`, or as it is.
     ///
     /// # Errors
@@ -93,10 +93,10 @@ impl Desk {
         let now = self.now()?;
         let (at, moment) = (at.map(held), at.map_or(now, held));
         let levels = in_force(&self.store, at)?;
-        let (seen, quiet) = self.orders(&levels, (at, moment))?;
+        let (seen, quiet) = self.orders(&levels, at, moment)?;
         let span = self.store.span(None)?;
         let benchmarks = self.known()?.into_iter();
-        let benchmarks = benchmarks.map(|one| self.standing(one, &levels, (at, moment)));
+        let benchmarks = benchmarks.map(|one| self.standing(one, &levels, at, moment));
         let site_levels = levels.iter().filter(|((place, _), _)| place.is_none());
         let called = site_levels.map(|((_, level), _)| *level);
         let called = called.filter(|level| *level != Level::Unknown).max();
@@ -125,7 +125,8 @@ impl Desk {
     pub(super) fn orders(
         &self,
         levels: &InForce,
-        (at, moment): (Option<Timestamp>, Timestamp),
+        at: Option<Timestamp>,
+        moment: Timestamp,
     ) -> Result<(Vec<Event>, Vec<Event>), StoreError> {
         let mut orders = orders(&self.store)?;
         orders.retain(|order| at.is_none_or(|at| order.time <= at));
@@ -144,7 +145,8 @@ impl Desk {
         &self,
         benchmark: BenchmarkId,
         levels: &InForce,
-        (at, moment): (Option<Timestamp>, Timestamp),
+        at: Option<Timestamp>,
+        moment: Timestamp,
     ) -> Result<Standing, StoreError> {
         let until = at.unwrap_or(LATEST);
         let newest = self.store.newest_reading(benchmark.as_str(), until)?;

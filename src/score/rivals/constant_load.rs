@@ -6,7 +6,7 @@
 //! [`ConstantLoad`] instead of by simplices from random points.
 
 use super::point;
-use crate::fit::{ConstantLoad, Exponent, Outcome, PointReadings};
+use crate::fit::{ConstantLoad, Exponent, FitOutcome, PointReadings};
 use crate::forecast::Passage;
 use crate::model::{Accuracy, Law, Trajectory};
 use crate::score::Known;
@@ -20,7 +20,7 @@ pub(in crate::score) fn forecast(known: &Known) -> Option<Passage> {
         .map(|reading| (reading.t_days, reading.value));
     let readings = PointReadings::new(observations.quantity, pairs);
     let fitted = ConstantLoad::fit(&readings, Exponent::Free);
-    if matches!(fitted.outcome, Outcome::TooFew { .. }) {
+    if matches!(fitted.outcome, FitOutcome::TooFew { .. }) {
         return None;
     }
     let Some(best) = fitted.best() else {

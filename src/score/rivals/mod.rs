@@ -15,11 +15,12 @@ pub(super) mod voight;
 
 use super::Known;
 use crate::fit::{Rate, RateOptions};
-use crate::forecast::{Panel, Passage, by_the_law};
+use crate::forecast::{LawForecaster, Passage, by_the_law};
 
 /// What the monitor goes by.
 pub(super) fn panel(known: &Known) -> Option<Passage> {
-    let outlook = Panel::default().update(&known.observations, known.critical_mm_per_day)?;
+    let outlook =
+        LawForecaster::default().update(&known.observations, known.critical_mm_per_day)?;
     Some(outlook.collapse)
 }
 

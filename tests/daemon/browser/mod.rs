@@ -127,8 +127,9 @@ fn an_order_given_on_the_page_is_in_the_log_with_the_name_of_who_gave_it() {
     browser.until("document.getElementById('order').open");
     browser.value("document.getElementById('span').value = '28800'");
     browser.click("#order-give");
-    browser
-        .until("document.querySelector('.head').innerText.includes('not told: silence by Anna')");
+    browser.until(
+        "document.querySelector('.head').innerText.includes('not notified: silence by Anna')",
+    );
     let orders = site.events("order");
     let given: Vec<[&Value; 3]> = orders
         .iter()

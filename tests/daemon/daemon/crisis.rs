@@ -5,7 +5,7 @@ use jiff::Timestamp;
 use slipwatch::alert::Level;
 use slipwatch::config::{self, Config};
 use slipwatch::monitor::{AlertState, Event, EventKind};
-use slipwatch::store::{Fate, Store};
+use slipwatch::store::{DeliveryOutcome, Store};
 use std::fs;
 use std::time::Duration;
 use tempfile::TempDir;
@@ -246,7 +246,7 @@ async fn a_receipt_that_finds_no_room_still_keeps_the_hook_from_being_told_twice
         };
         let store = Store::look(&folder.path().join("state")).unwrap();
         let identity = (key.as_str(), "red", "firing");
-        store.is_noted(identity, None, Some(Fate::Delivered)).unwrap()
+        store.is_noted(identity, None, Some(DeliveryOutcome::Delivered)).unwrap()
     })
     .await;
     assert!(program.is_running());

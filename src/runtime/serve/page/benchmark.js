@@ -75,7 +75,7 @@ export class BenchmarkPage {
     const quiet = view.silences.filter((one) => !one.benchmark || one.benchmark === this.name);
     return [el('a', { href: place(null) }, 'All benchmarks'), el('h1', {}, this.name), ...badges(view.standing, 'big'),
       ...(seen && view.standing.since && seen.time >= view.standing.since ? [el('span', { class: 'soft' }, `seen by ${seen.by ?? 'somebody'}`)] : []),
-      ...quiet.map((one) => el('span', { class: 'soft' }, `not told: ${told(one)}`))];
+      ...quiet.map((one) => el('span', { class: 'soft' }, `not notified: ${told(one)}`))];
   }
 
   /** So many seconds until the moment that is shown. */

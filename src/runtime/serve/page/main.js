@@ -155,9 +155,9 @@ function changed() {
 function orders(kind, benchmark) {
   const means = {
     acknowledge: 'Somebody has seen what is in force: hooks that have not taken it are not tried again.',
-    shelve: 'The level in force, and lower ones, are not told until then. A higher one is, at once.',
-    silence: 'Nothing is told until then, red neither. What is in force at the end is told then.',
-    unsilence: 'What was shelved or silenced is told again from now on.',
+    shelve: 'The level in force, and lower ones, are not sent until then. A higher one is, at once.',
+    silence: 'Nobody is notified until then, not of red either. What is in force at the end is sent then.',
+    unsilence: 'What was shelved or silenced is sent again from now on.',
   };
   const spans = { shelve: [[3600, '1 h'], [28800, '8 h'], [86400, '1 day'], [604800, '7 days'], [2592000, '30 days']],
     silence: [[1800, '30 min'], [3600, '1 h'], [28800, '8 h'], [86400, '1 day'], [604800, '7 days']] }[kind];

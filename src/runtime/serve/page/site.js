@@ -63,7 +63,7 @@ export class SitePage {
     });
     const quiet = site.silences.map((one) => el('li', {}, `${one.benchmark ?? 'the whole site'}: ${told(one)}`));
     const nodes = [items.length ? el('ul', { class: 'log', tabindex: '0' }, items) : el('p', { class: 'soft' }, 'No alert is in force.')];
-    if (quiet.length) nodes.push(el('h2', {}, 'Not told'), el('ul', { class: 'log' }, quiet));
+    if (quiet.length) nodes.push(el('h2', {}, 'Not notified'), el('ul', { class: 'log' }, quiet));
     if (at === null) nodes.push(buttons(site, (kind) => this.orders(kind, null), ['acknowledge', 'silence', 'unsilence']));
     return nodes;
   }

@@ -3,7 +3,7 @@
 use crate::monitor::Order;
 use crate::reading::Timestamp;
 use crate::runtime::view::{
-    AlertView, Asked, BenchmarkView, Desk, OrderError, SiteView, TimeWindow,
+    AlertView, Asked, BenchmarkView, OrderError, SiteReader, SiteView, TimeWindow,
 };
 use crate::store::{Heads, StoreError};
 use axum::body::Body;
@@ -19,23 +19,23 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// How often the state is looked at for changes.
-const LOOK: Duration = Duration::from_secs(1);
-/// A stream ends after so many looks; whoever reads it asks again, from where it ended. So none holds a place for
+/// How often the state is read for changes.
+const POLL_INTERVAL: Duration = Duration::from_secs(1);
+/// A stream ends after so many reads; its client asks again, from where it ended. So none holds a connection for
 /// ever, and all end before [`super::Limits::request_time`].
-const LOOKS: u32 = 20;
+const MOST_POLLS: u32 = 20;
 /// Events sent in one round; after more of them the next round follows at once.
 const MOST_TOLD: usize = 500;
 
 /// The routes.
-pub(super) fn router(desk: Arc<Desk>) -> Router {
+pub(super) fn router(reader: Arc<SiteReader>) -> Router {
     Router::new()
         .route("/api/site", get(site))
         .route("/api/benchmark", get(benchmark))
         .route("/api/alert", get(alert))
         .route("/api/stream", get(changes))
         .route("/api/orders", post(ask))
-        .with_state(desk)
+        .with_state(reader)
 }
 
 /// What could not be answered.
@@ -87,10 +87,12 @@ struct StreamMoment {
 }
 
 async fn site(
-    State(desk): State<Arc<Desk>>,
+    State(reader): State<Arc<SiteReader>>,
     Query(moment): Query<StreamMoment>,
 ) -> Result<Json<SiteView>, Failure> {
-    blocking(move || Ok(desk.site(moment.at)?)).await.map(Json)
+    blocking(move || Ok(reader.site(moment.at)?))
+        .await
+        .map(Json)
 }
 
 #[derive(Debug, Deserialize)]
@@ -104,7 +106,7 @@ struct OfBenchmark {
 }
 
 async fn benchmark(
-    State(desk): State<Arc<Desk>>,
+    State(reader): State<Arc<SiteReader>>,
     Query(asked): Query<OfBenchmark>,
 ) -> Result<Json<BenchmarkView>, Failure> {
     let window = TimeWindow {
@@ -114,7 +116,7 @@ async fn benchmark(
         buckets: asked.buckets,
     };
     let found = blocking(move || {
-        let view = desk.benchmark(&asked.id, window)?;
+        let view = reader.benchmark(&asked.id, window)?;
         view.ok_or_else(|| Failure::NoSuch(format!("benchmark {:?}", asked.id)))
     });
     found.await.map(Json)
@@ -127,21 +129,21 @@ struct OfAlert {
 }
 
 async fn alert(
-    State(desk): State<Arc<Desk>>,
+    State(reader): State<Arc<SiteReader>>,
     Query(asked): Query<OfAlert>,
 ) -> Result<Json<AlertView>, Failure> {
     let found = blocking(move || {
-        let view = desk.alert(&asked.key)?;
+        let view = reader.alert(&asked.key)?;
         view.ok_or_else(|| Failure::NoSuch(format!("alert {:?}", asked.key)))
     });
     found.await.map(Json)
 }
 
 async fn ask(
-    State(desk): State<Arc<Desk>>,
+    State(reader): State<Arc<SiteReader>>,
     Json(asked): Json<Asked>,
 ) -> Result<Json<Order>, Failure> {
-    let taken = blocking(move || desk.ask(&asked).map_err(Failure::Order));
+    let taken = blocking(move || reader.ask(&asked).map_err(Failure::Order));
     taken.await.map(Json)
 }
 
@@ -152,20 +154,20 @@ struct Since {
 }
 
 /// Server-sent events: each event of the site with its number as id, and `progress` when anything was taken in.
-async fn changes(State(desk): State<Arc<Desk>>, Query(since): Query<Since>) -> Response {
+async fn changes(State(reader): State<Arc<SiteReader>>, Query(since): Query<Since>) -> Response {
     let place = StreamPosition {
-        desk,
+        reader,
         event: since.since,
         step: None,
         looks: 0,
         is_behind: false,
     };
     let parts = stream::unfold(place, |mut place| async move {
-        if place.looks == LOOKS {
+        if place.looks == MOST_POLLS {
             return None;
         }
         if place.looks > 0 && !place.is_behind {
-            tokio::time::sleep(LOOK).await;
+            tokio::time::sleep(POLL_INTERVAL).await;
         }
         place.looks += 1;
         let (place, text) = blocking(move || {
@@ -185,7 +187,7 @@ async fn changes(State(desk): State<Arc<Desk>>, Query(since): Query<Since>) -> R
 
 /// How far a stream has been sent.
 struct StreamPosition {
-    desk: Arc<Desk>,
+    reader: Arc<SiteReader>,
     /// The last event; `None`: only what comes from now on is sent.
     event: Option<i64>,
     step: Option<i64>,
@@ -195,12 +197,12 @@ struct StreamPosition {
 }
 
 impl StreamPosition {
-    /// What has changed since the last look; a comment where nothing has, so that a dead connection shows.
+    /// What has changed since the last time; a comment where nothing has, so that a dead connection shows.
     fn look(&mut self) -> Result<String, StoreError> {
-        let Heads { step, event } = self.desk.heads()?;
+        let Heads { step, event } = self.reader.heads()?;
         let sent = self.event.unwrap_or(event);
         let mut fresh = if event > sent {
-            self.desk.events_after(sent)?
+            self.reader.events_after(sent)?
         } else {
             Vec::new()
         };
