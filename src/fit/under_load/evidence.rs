@@ -91,6 +91,8 @@ pub(super) fn weigh(
     room.today.clear();
     let count = record.ln_velocity.len();
     let [mut load, mut level, mut velocity_now, mut load_now, mut ln] = [[0.0; LANES]; 5];
+    let first = FEWEST_UNDER_THE_LAW.min(count) - 1;
+    let mut best = [f64::NEG_INFINITY; LANES];
     for (step, gain) in gains.steps.iter().enumerate() {
         let index = count - 1 - step;
         let (read, predicted) = (record.ln_velocity[index], &predicted[index]);
@@ -108,29 +110,40 @@ pub(super) fn weigh(
         }
         room.ln_evidence.push(total);
         room.today.push([velocity_now, load_now]);
+        if step >= first {
+            for (best, total) in best.iter_mut().zip(total) {
+                *best = if total > *best { total } else { *best };
+            }
+        }
     }
-    std::array::from_fn(|lane| over_starts(gains, room, lane, least))
+    // Their sum is no more than all of them at the best.
+    let least = least - ((count - first) as f64).ln();
+    std::array::from_fn(|lane| {
+        if best[lane].is_finite() && best[lane] >= least {
+            over_starts(gains, room, (first, lane), best[lane])
+        } else {
+            NO_EVIDENCE
+        }
+    })
 }
 
-fn over_starts(gains: &Gains, room: &Room, lane: usize, least: f64) -> ShapeEvidence {
-    let count = room.ln_evidence.len();
-    let first = FEWEST_UNDER_THE_LAW.min(count) - 1;
+const NO_EVIDENCE: ShapeEvidence = ShapeEvidence {
+    ln: f64::NEG_INFINITY,
+    ln_velocity: 0.0,
+    load: 0.0,
+    today: [0.0; 3],
+};
+
+/// Over the starts of a lane from the first that may be, of which the best has that evidence, ln.
+fn over_starts(
+    gains: &Gains,
+    room: &Room,
+    (first, lane): (usize, usize),
+    best: f64,
+) -> ShapeEvidence {
     let starts = &room.ln_evidence[first..];
-    let best = starts
-        .iter()
-        .map(|ln| ln[lane])
-        .fold(f64::NEG_INFINITY, f64::max);
     let mut sum = 0.0;
-    let mut mean = ShapeEvidence {
-        ln: f64::NEG_INFINITY,
-        ln_velocity: 0.0,
-        load: 0.0,
-        today: [0.0; 3],
-    };
-    // Their sum is no more than all of them at the best.
-    if !best.is_finite() || best + (starts.len() as f64).ln() < least {
-        return mean;
-    }
+    let mut mean = NO_EVIDENCE;
     for (offset, ln) in starts.iter().enumerate() {
         if ln[lane] < best - NEGLIGIBLE {
             continue;
