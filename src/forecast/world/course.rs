@@ -406,15 +406,10 @@ fn straight((from, to): (f64, f64), velocities: (f64, f64)) -> Stretch {
     }
 }
 
-/// The share of changes of rate that come at once, and what share of a life these take.
-const AT_ONCE: (f64, f64) = (0.5, 1e-4);
-
 fn two_rates(end: f64, creep: f64, generator: &mut impl Rng) -> Vec<Stretch> {
     let change = end * between(generator, 0.2, 0.8);
-    let gradual = log_uniform(generator, 0.001, 0.1);
-    let is_at_once = happens(generator, AT_ONCE.0);
-    let ramp = end * if is_at_once { AT_ONCE.1 } else { gradual };
-    let faster = creep.max(0.02) * log_uniform(generator, 1.3, 6.0);
+    let ramp = end * log_uniform(generator, 0.001, 0.1);
+    let faster = creep.max(0.1) * log_uniform(generator, 1.3, 6.0);
     vec![
         straight((0.0, change), (creep, creep)),
         straight((change, change + ramp), (creep, faster)),
