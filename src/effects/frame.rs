@@ -68,6 +68,23 @@ impl Frame {
             .sum()
     }
 
+    /// What each of `columns` alone would take off the misfit: by its products with the directions, which leave its own
+    /// length and its share of the residual, that is orthogonal to them.
+    fn taken_by_each(&self, columns: &[Vec<f64>]) -> Vec<f64> {
+        let taken = |white: &Vec<f64>| {
+            let length = dot(white, white);
+            let known = self.directions.iter().map(|unit| dot(unit, white).powi(2));
+            let left = length - known.sum::<f64>();
+            if left.is_finite() && left > LEAST_LEFT * LEAST_LEFT * length {
+                dot(white, &self.residual).powi(2) / left
+            } else {
+                0.0
+            }
+        };
+        let white = self.whitener.whiten_all(&slices(columns));
+        white.iter().map(taken).collect()
+    }
+
     /// The innovations of noise in the readings, without what the model can take; noise has no motion.
     pub(super) fn project_noise(&self, readings: &[f64]) -> Vec<f64> {
         let mut residual = self.whitener.innovations(readings);
@@ -105,6 +122,17 @@ impl Frames {
             frame.surprise(frame.misfit - taken) + frame.cost()
         });
         each.fold(f64::INFINITY, f64::min)
+    }
+
+    /// The same with each of `columns` alone.
+    pub(super) fn surprise_with_each(&self, columns: &[Vec<f64>]) -> Vec<f64> {
+        let mut least = vec![f64::INFINITY; columns.len()];
+        for frame in &self.each {
+            for (least, taken) in least.iter_mut().zip(frame.taken_by_each(columns)) {
+                *least = least.min(frame.surprise(frame.misfit - taken) + frame.cost());
+            }
+        }
+        least
     }
 
     /// Which of the noise models makes the residual likeliest.

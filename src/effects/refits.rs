@@ -11,6 +11,7 @@ use super::search::{Refitted, SIGNIFICANT, Search};
 use super::surrogate::NullGains;
 use super::term::{Act, Term};
 use super::trials::{Ground, Trial, shortlist};
+use std::cell::LazyCell;
 
 /// Most candidates refitted for one place: the best of each covariate, and of the kinds that need none.
 const MOST_COVARIATES: usize = 8;
@@ -57,7 +58,8 @@ impl<'a> Search<'a> {
         covariates.truncate(MOST_COVARIATES);
         let covariates = self.refit_each(base, covariates);
         let (others, tried) = ground.of_itself();
-        let alone = ground.null_gains_of_noise(&tried, count, seed + 1);
+        // Only what passes the margin is judged by it.
+        let alone = LazyCell::new(|| ground.null_gains_of_noise(&tried, count, seed + 1));
         let mut all = Vec::new();
         if covariates
             .iter()

@@ -27,6 +27,8 @@ pub(super) struct NullGains {
     pub(super) largest: Vec<(Term, f64)>,
 }
 
+/// Series of noise that are searched at once: what is tried is more than the cache holds, and is read once for all of them.
+const AT_ONCE: usize = 8;
 /// How many of the largest null gains are refitted in full.
 const REFITTED: usize = 4;
 
@@ -112,11 +114,15 @@ fn best_response(
         .into_iter()
         .flat_map(|form| responses(form, &coarse))
         .filter(|response| response.stages == 2 || response.mean_days == 0.0)
-        .filter_map(|response| of_channel(problem, driver, response))
-        .map(|term| {
-            let surprise = frames.surprise_with(&linear.columns(problem, &term));
-            (term, surprise)
-        });
+        .filter_map(|response| of_channel(problem, driver, response));
+    let mut terms = Vec::new();
+    let mut columns = Vec::new();
+    for term in each {
+        columns.extend(linear.columns(problem, &term));
+        terms.push(term);
+    }
+    let surprises = frames.surprise_with_each(&columns);
+    let each = terms.into_iter().zip(surprises);
     each.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
@@ -158,29 +164,44 @@ pub(super) fn noise_alone(
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     let best = &frames.each[frames.best()];
     let mut innovations = best.residual[..best.residual.len() - 1].to_vec();
-    let gains = (0..count).map(|_| {
+    let mut readings = |_| {
         innovations.shuffle(&mut random);
         let readings = best.whitener.colour(&innovations);
-        let left: Vec<(Vec<f64>, f64)> = frames
-            .each
-            .iter()
-            .map(|frame| {
-                let residual = frame.project_noise(&readings);
-                let misfit = super::frame::dot(&residual, &residual);
-                (residual, misfit)
-            })
-            .collect();
-        let each = frames.each.iter().zip(&left);
-        let before = each
-            .map(|(frame, (_, misfit))| frame.surprise(*misfit) + frame.cost())
-            .fold(f64::INFINITY, f64::min);
-        let with = tried.iter().map(|one| one.surprise(frames, &left));
-        before - with.fold(f64::INFINITY, f64::min)
-    });
+        let each = frames.each.iter();
+        each.map(|frame| {
+            let residual = frame.project_noise(&readings);
+            let misfit = super::frame::dot(&residual, &residual);
+            (residual, misfit)
+        })
+        .collect()
+    };
+    let mut gains = Vec::with_capacity(count);
+    while gains.len() < count {
+        let some = AT_ONCE.min(count - gains.len());
+        let left: Vec<Vec<(Vec<f64>, f64)>> = (0..some).map(&mut readings).collect();
+        gains.extend(gains_from(frames, tried, &left));
+    }
     NullGains {
-        gains: gains.collect(),
+        gains,
         largest: Vec::new(),
     }
+}
+
+/// The best gain over all that was tried for each of several series of noise, of which `left` holds what is left by frame.
+fn gains_from(frames: &Frames, tried: &[Tried], left: &[Vec<(Vec<f64>, f64)>]) -> Vec<f64> {
+    let mut least = vec![f64::INFINITY; left.len()];
+    for one in tried {
+        for (least, left) in least.iter_mut().zip(left) {
+            *least = least.min(one.surprise(frames, left));
+        }
+    }
+    let before = |left: &Vec<(Vec<f64>, f64)>| {
+        let each = frames.each.iter().zip(left);
+        each.map(|(frame, (_, misfit))| frame.surprise(*misfit) + frame.cost())
+            .fold(f64::INFINITY, f64::min)
+    };
+    let each = left.iter().zip(least);
+    each.map(|(left, least)| before(left) - least).collect()
 }
 
 #[cfg(test)]
