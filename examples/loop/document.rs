@@ -83,9 +83,12 @@ fn section(out: &mut String, told: &Told) {
     for also in &explanation.also {
         let _ = writeln!(out, "- Also: {}.", effect(also));
     }
+    let mut rivals = explanation.cannot_separate_from.iter();
+    let is_one_channel = rivals.all(|rival| rival.channel.is_none());
     let explained = match explanation.explained {
         Explained::Full => "the residual that is left passes for noise",
-        Explained::Partly => "in part: structure is left in the residual",
+        Explained::Partly if is_one_channel => "in part: structure is left in the residual",
+        Explained::Partly => "in part: which channel acts cannot be told",
         Explained::None => "no effect was accepted",
     };
     let _ = writeln!(out, "- Explained: {explained}.");

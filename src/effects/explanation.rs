@@ -124,7 +124,7 @@ impl Effect {
 pub enum Explained {
     /// The residual after it passes for noise.
     Full,
-    /// Structure is left.
+    /// Structure is left, or another channel would do as well.
     Partly,
     /// No effect was accepted.
     None,

@@ -4,6 +4,7 @@ mod blur;
 mod by_clock;
 mod candidates;
 mod clock;
+mod companions;
 mod diagnosis;
 mod explain;
 mod explanation;

@@ -1,6 +1,7 @@
 //! The search: one effect after another, each refitted with the law and judged, while any earns its place.
 
 use super::candidates;
+use super::companions::{go_together, is_rain};
 use super::explanation::Candidate;
 use super::judge::{block, held_out, named, objection, step_errors};
 use super::kind::Kind;
@@ -195,6 +196,7 @@ impl Search<'_> {
         }
         refitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         prefer_witnesses(&mut refitted, self.options.bic_margin);
+        self.prefer_rain(&mut refitted);
         let mut chosen: Option<(usize, Vec<Rival>)> = None;
         for (k, one) in refitted.iter().enumerate() {
             let (held, reason) = self.judged(base, one);
@@ -202,7 +204,8 @@ impl Search<'_> {
             if let (Some((first, ties)), None) = (&mut chosen, &reason) {
                 let best = &refitted[*first];
                 let same = best.term.kind == one.term.kind && best.term.channel == one.term.channel;
-                if one.gain > best.gain - self.options.bic_margin && !same {
+                let is_near = one.gain > best.gain - self.options.bic_margin;
+                if !same && (is_near || go_together(&best.term, term)) {
                     ties.push(named(term, self.drivers));
                 }
             }
@@ -225,6 +228,22 @@ impl Search<'_> {
         };
         let how = one.with_season(how, self.problem);
         Some((one.fitted, vec![how]))
+    }
+
+    /// Among what the BIC cannot separate from the first, rain goes before what it feeds.
+    fn prefer_rain(&self, refitted: &mut [Refitted]) {
+        let Some((first, others)) = refitted.split_first() else {
+            return;
+        };
+        let leads = |one: &Refitted| {
+            let is_near = (one.gain - first.gain).abs() < self.options.bic_margin;
+            is_near && is_rain(&one.term, self.drivers) && go_together(&one.term, &first.term)
+        };
+        if !is_rain(&first.term, self.drivers)
+            && let Some(place) = others.iter().position(leads)
+        {
+            refitted[..=place + 1].rotate_right(1);
+        }
     }
 
     fn beaten_by(&self, best: &Refitted, one: &Refitted) -> String {

@@ -72,7 +72,8 @@ pub(super) fn conclude(
     }
     let memory_gain = judged.as_ref().map_or(0.0, Judged::memory_gain);
     let remembers = full.noise.memory == Memory::Reading && memory_gain > margin;
-    let explained = match (effects.is_empty(), left) {
+    let is_one_channel = cannot_separate_from.iter().all(|one| one.channel.is_none());
+    let explained = match (effects.is_empty(), left || !is_one_channel) {
         (false, false) => Explained::Full,
         (false, true) => Explained::Partly,
         (true, _) => Explained::None,

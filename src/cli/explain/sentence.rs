@@ -53,13 +53,18 @@ pub(super) fn parting(found: &Together) -> String {
 pub(super) fn others(explanation: &Explanation) -> Vec<String> {
     let mut said = Vec::new();
     let left = most_marked(&explanation.residual.structure);
+    let mut rivals = explanation.cannot_separate_from.iter();
+    let is_one_channel = rivals.all(|rival| rival.channel.is_none());
     if !matches!(explanation.verdict.effect, Kind::None | Kind::Unexplained) {
         said.push(match explanation.explained {
             Explained::Full => {
                 "Explained in full: the residual that is left passes for noise.".to_owned()
             }
-            Explained::Partly => {
+            Explained::Partly if is_one_channel => {
                 format!("Explained in part: structure is left in the residual{left}.")
+            }
+            Explained::Partly => {
+                format!("Explained in part: which channel acts cannot be told{left}.")
             }
             Explained::None => format!("Not explained: structure is left in the residual{left}."),
         });
