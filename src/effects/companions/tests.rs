@@ -1,3 +1,5 @@
+//! A slope that rain drives, beside a river that the rain feeds, and beside one that it does not.
+
 use crate::effects::fixture::{channel, daily, generator, normals, series};
 use crate::effects::{Explained, Explanation, Kind, Options, explain};
 use crate::model::{Accuracy, Law, Load, LoadedLaw};
