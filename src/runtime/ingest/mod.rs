@@ -3,6 +3,7 @@
 mod atomic;
 mod bytes;
 mod collect;
+mod column_map;
 mod columns;
 mod convert;
 mod csv;
@@ -26,7 +27,8 @@ mod units;
 mod vector;
 
 pub use bytes::{is_packed, unpack, unpacked_name};
-pub use columns::{ColumnMap, ColumnMapError, Meaning, Measure};
+pub use column_map::{ColumnMap, ColumnMapError, Measure};
+pub use columns::Meaning;
 pub use convert::{ChannelCount, ConvertReport, SeriesCount, convert};
 pub use csv::{CSV, CsvRows};
 pub use encoding::{Transcoder, latin1};

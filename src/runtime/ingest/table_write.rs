@@ -4,7 +4,8 @@
 //! of velocities nor for provenance: these are not written, and must be given again on reading.
 
 use super::IngestError;
-use super::columns::{Measure, Name, name_of};
+use super::column_map::Measure;
+use super::columns::{Name, name_of};
 use crate::reading::{Conventions, Reading, Recording, Sample, Timestamp, Unit};
 use ::csv::{QuoteStyle, Writer, WriterBuilder};
 use jiff::tz::Offset;

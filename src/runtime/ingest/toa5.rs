@@ -5,7 +5,8 @@
 //! numbers and the times of extremes are not read. A logger that starts again writes its header
 //! again, in the middle of the file.
 
-use super::columns::{Column, ColumnMap, Layout, Meaning, Measure, Name, channel_unit, name_of};
+use super::column_map::{ColumnMap, Measure};
+use super::columns::{Column, Layout, Meaning, Name, channel_unit, name_of};
 use super::split::Splitter;
 use super::table::TableRows;
 use super::table_write::write_toa5;
