@@ -88,7 +88,7 @@ fn section(out: &mut String, told: &Told) {
     let explained = match explanation.explained {
         Explained::Full => "the residual that is left passes for noise",
         Explained::Partly if is_one_channel => "in part: structure is left in the residual",
-        Explained::Partly => "in part: which channel acts cannot be told",
+        Explained::Partly => "in part: which channel acts cannot be distinguished",
         Explained::None => "no effect was accepted",
     };
     let _ = writeln!(out, "- Explained: {explained}.");

@@ -45,7 +45,7 @@ fn on_a_full_disk_alerts_go_out_and_what_was_taken_is_written_when_there_is_room
     assert!(filled.is_err(), "three megabytes hold eight");
     site.append("incoming/5.csv", &failing());
     eventually("no room", || site.log().contains("no room on the disk"));
-    let reds = || site.told("5/red/", "");
+    let reds = || site.notified("5/red/", "");
     eventually("told", || reds() > 0);
     assert_eq!(site.values().len(), 0, "there was room");
     assert_eq!(program.ended(), None, "{}", site.log());

@@ -19,9 +19,9 @@ fn site(after: &str) -> Site {
 }
 
 /// Starts the daemon; the first hook has the red.
-fn told(site: &Site) -> Program {
+fn notified(site: &Site) -> Program {
     let program = site.caught_up();
-    site.tells_red();
+    site.awaits_red();
     program
 }
 
@@ -53,7 +53,7 @@ fn escalated(site: &Site) -> usize {
 #[test]
 fn what_nobody_acknowledges_in_time_is_escalated() {
     let site = site("1s");
-    let program = told(&site);
+    let program = notified(&site);
     eventually("that it is escalated", || escalated(&site) == 1);
     eventually("the receipt", || {
         standing(&site) == ("delivered".to_owned(), 1)
@@ -65,7 +65,7 @@ fn what_nobody_acknowledges_in_time_is_escalated() {
 #[test]
 fn an_escalation_outlasts_a_restart_is_not_made_by_it_and_is_made_once() {
     let site = site("1h");
-    let program = told(&site);
+    let program = notified(&site);
     eventually("that it waits", || {
         standing(&site) == ("waiting".to_owned(), 0)
     });
@@ -87,7 +87,7 @@ fn an_escalation_outlasts_a_restart_is_not_made_by_it_and_is_made_once() {
 #[test]
 fn an_acknowledgement_in_time_calls_an_escalation_off_for_good() {
     let site = site("1h");
-    let program = told(&site);
+    let program = notified(&site);
     eventually("that it waits", || {
         standing(&site) == ("waiting".to_owned(), 0)
     });
@@ -122,7 +122,7 @@ fn an_acknowledgement_in_time_calls_an_escalation_off_for_good() {
 #[test]
 fn a_silence_that_covers_an_alert_calls_its_escalation_off_and_one_elsewhere_does_not() {
     let site = site("1h");
-    let program = told(&site);
+    let program = notified(&site);
     eventually("that it waits", || {
         standing(&site) == ("waiting".to_owned(), 0)
     });

@@ -17,7 +17,7 @@ fn goes_on(site: &Site) {
     let program = site.start(&[]);
     eventually("a start", || site.log().contains("followed"));
     site.append("incoming/5.csv", &failing(0..114));
-    eventually("told", || site.told("5/red/", "") == 1);
+    eventually("told", || site.notified("5/red/", "") == 1);
     program.signal(Signal::SIGHUP);
     eventually("the config", || site.log().contains("the config is taken"));
     program.stop();

@@ -26,7 +26,7 @@ fn tells_its_red(site: &Site, mut program: Program) {
     site.append("incoming/5.csv", &failing(0..114));
     eventually("told", || {
         assert_eq!(program.ended(), None, "it ended");
-        site.told("5/red/", "") > 0
+        site.notified("5/red/", "") > 0
     });
     program.stop();
 }

@@ -68,7 +68,7 @@ fn a_daemon_without_file_descriptors_loses_nothing_and_tells_its_alerts_once_it_
     assert!(site.lines("told").is_empty(), "a hook was started");
     limit("1024");
     eventually("everything", || site.values().len() == 117);
-    site.tells_red();
+    site.awaits_red();
     program.stop();
     assert_eq!(gaps(&site), 0);
     site.proven_events();

@@ -109,7 +109,7 @@ fn a_red_of_the_past_that_nothing_has_ended_is_told_after_a_first_start() {
         .collect();
     site.append("incoming/5.csv", &format!("{HEADER}{rows}"));
     let program = site.caught_up();
-    eventually("the red told", || site.told("5/red/", "firing") > 0);
+    eventually("the red told", || site.notified("5/red/", "firing") > 0);
     program.stop();
     site.proven_events();
 }

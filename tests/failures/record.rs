@@ -19,7 +19,7 @@ fn red() -> (Site, crate::site::Program, String) {
         &format!("time,displacement_mm\n{}", failing(0..114)),
     );
     let program = site.caught_up();
-    site.tells_red();
+    site.awaits_red();
     (site, program, address)
 }
 

@@ -32,7 +32,7 @@ fn at_red(more: &str) -> (Site, Program) {
         &format!("{HEADER}{}", earlier(failing(0..114))),
     );
     let program = site.caught_up();
-    eventually("a red", || site.told("5/red/", "firing") == 1);
+    eventually("a red", || site.notified("5/red/", "firing") == 1);
     (site, program)
 }
 
@@ -48,8 +48,8 @@ fn a_sensor_that_repeats_its_value_after_a_red_is_unknown_and_the_red_stays() {
     eventually("everything", || site.values().len() == 144);
     program.stop();
     let events = site.proven_events();
-    assert_eq!(site.told("5/red/", "resolved"), 0, "{events}");
-    assert!(site.told("5/unknown/", "firing") >= 1, "{events}");
+    assert_eq!(site.notified("5/red/", "resolved"), 0, "{events}");
+    assert!(site.notified("5/unknown/", "firing") >= 1, "{events}");
 }
 
 #[test]
@@ -65,8 +65,8 @@ fn a_sensor_that_jitters_at_the_end_of_its_range_after_a_red_is_unknown_and_the_
     eventually("everything", || site.values().len() == 144);
     program.stop();
     let events = site.proven_events();
-    assert_eq!(site.told("5/red/", "resolved"), 0, "{events}");
-    assert!(site.told("5/unknown/", "firing") >= 1, "{events}");
+    assert_eq!(site.notified("5/red/", "resolved"), 0, "{events}");
+    assert!(site.notified("5/unknown/", "firing") >= 1, "{events}");
 }
 
 fn spoils(change: impl Fn(usize, f64) -> f64) {
@@ -74,7 +74,7 @@ fn spoils(change: impl Fn(usize, f64) -> f64) {
     site.append("incoming/5.csv", HEADER);
     let program = site.caught_up();
     site.append("incoming/5.csv", &changed(&failing(0..114), change));
-    eventually("unknown", || site.told("5/unknown/", "firing") == 1);
+    eventually("unknown", || site.notified("5/unknown/", "firing") == 1);
     program.stop();
     site.proven_events();
 }
@@ -112,7 +112,7 @@ fn a_benchmark_that_gave_one_velocity_and_then_displacements_is_unknown() {
         &format!("time,displacement_mm,velocity_mm_per_day\n{first},,3\n{rows}"),
     );
     let program = site.caught_up();
-    eventually("unknown", || site.told("5/unknown/", "firing") == 1);
+    eventually("unknown", || site.notified("5/unknown/", "firing") == 1);
     program.stop();
     site.proven_events();
 }

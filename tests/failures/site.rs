@@ -82,15 +82,15 @@ impl Site {
     }
 
     /// How many notices of alerts whose key begins so, and whose state ends so, the hook has written.
-    pub(crate) fn told(&self, begins: &str, ends: &str) -> usize {
+    pub(crate) fn notified(&self, begins: &str, ends: &str) -> usize {
         let lines = self.lines("told");
         let is_it = |line: &&String| line.starts_with(begins) && line.ends_with(ends);
         lines.iter().filter(is_it).count()
     }
 
     /// Waits until the hook has been notified that benchmark 5 is red.
-    pub(crate) fn tells_red(&self) {
-        eventually("that the red is told", || self.told("5/red/", "") > 0);
+    pub(crate) fn awaits_red(&self) {
+        eventually("that the red is told", || self.notified("5/red/", "") > 0);
     }
 
     pub(crate) fn path(&self, name: &str) -> PathBuf {

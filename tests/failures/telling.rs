@@ -49,7 +49,7 @@ fn a_backlog_that_comes_in_row_by_row_is_one_silence_a_benchmark() {
     );
     let program = site.caught_up();
     eventually("that they are silent", || {
-        site.told("", "firing") >= 1
+        site.notified("", "firing") >= 1
             && site
                 .events()
                 .matches("unknown\",\"state\":\"firing")
@@ -105,7 +105,7 @@ fn corrected_readings_are_judged_once_a_batch_and_delay_no_red_of_another_benchm
         .collect();
     site.append("incoming/4.csv", &corrected);
     site.append("incoming/5.csv", &failing(60..114));
-    eventually("the other's red", || site.told("5/red/", "firing") == 1);
+    eventually("the other's red", || site.notified("5/red/", "firing") == 1);
     eventually("all corrections", || {
         site.events().matches("\"kind\":\"corrected\"").count() == 486
     });
@@ -144,9 +144,9 @@ fn a_silence_has_a_longest_time_and_an_end_and_is_seen_everywhere() {
     site.append("incoming/5.csv", &failing(8..114));
     eventually("a red", || site.events().contains("\"level\":\"red\""));
     std::thread::sleep(Duration::from_secs(2));
-    assert_eq!(site.told("5/red/", "firing"), 0, "it was silenced");
+    assert_eq!(site.notified("5/red/", "firing"), 0, "it was silenced");
     assert!(alerts(&["unsilence"]).status.success());
-    eventually("told", || site.told("5/red/", "firing") == 1);
+    eventually("told", || site.notified("5/red/", "firing") == 1);
     assert!(shown("/metrics").contains("slipwatch_silences 0"));
     program.stop();
     site.proven_events();
@@ -169,7 +169,7 @@ fn a_hook_of_the_whole_site_is_told_that_its_sensors_are_silent() {
         ),
     );
     let program = site.caught_up();
-    eventually("told", || site.told("site/unknown/", "firing") == 1);
+    eventually("told", || site.notified("site/unknown/", "firing") == 1);
     program.stop();
     site.proven_events();
 }

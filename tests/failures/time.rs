@@ -23,7 +23,7 @@ fn what_arrives_live_is_told_although_the_hosts_clock_is_forty_days_ahead() {
         site.append("incoming/5.csv", &failing(first..(first + 10).min(114)));
         std::thread::sleep(Duration::from_millis(100));
     }
-    eventually("told", || site.told("5/red/", "firing") == 1);
+    eventually("told", || site.notified("5/red/", "firing") == 1);
     program.stop();
     site.proven_events();
 }
@@ -38,7 +38,7 @@ fn a_clock_that_is_years_back_is_told_and_what_lies_ahead_is_taken_when_it_is_ri
     fs::write(site.path("ahead"), "-9000d").unwrap();
     let program = by_another_clock(&site);
     eventually("that the clock is wrong", || {
-        site.told("site/unknown/clock/", "firing") == 1
+        site.notified("site/unknown/clock/", "firing") == 1
     });
     site.append("incoming/5.csv", &failing(100..114));
     std::thread::sleep(Duration::from_secs(3));
@@ -52,9 +52,9 @@ fn a_clock_that_is_years_back_is_told_and_what_lies_ahead_is_taken_when_it_is_ri
     fs::write(site.path("ahead"), "+0").unwrap();
     eventually("what was held", || site.values().len() == 104);
     eventually("the end of it", || {
-        site.told("site/unknown/clock/", "resolved") == 1
+        site.notified("site/unknown/clock/", "resolved") == 1
     });
-    eventually("the red", || site.told("5/red/", "firing") == 1);
+    eventually("the red", || site.notified("5/red/", "firing") == 1);
     program.stop();
     site.proven_events();
 }
@@ -70,7 +70,7 @@ fn a_clock_that_is_set_back_by_two_days_keeps_no_reading_from_being_taken() {
     site.append("incoming/5.csv", &failing(113..114));
     eventually("it is taken", || site.values().len() == 114);
     eventually("and told", || {
-        site.told("site/unknown/clock/", "firing") == 1
+        site.notified("site/unknown/clock/", "firing") == 1
     });
     program.stop();
     site.proven_events();
@@ -107,7 +107,7 @@ fn one_reading_stamped_a_month_ahead_keeps_no_later_one_from_counting() {
         site.append("incoming/5.csv", &old(first..(first + 10).min(113)));
         std::thread::sleep(Duration::from_millis(50));
     }
-    eventually("told", || site.told("5/red/", "firing") == 1);
+    eventually("told", || site.notified("5/red/", "firing") == 1);
     program.stop();
     let events = site.proven_events();
     assert!(events.contains("leapt-ahead"), "{events}");
@@ -129,7 +129,7 @@ fn what_an_unset_clock_gave_first_does_not_disarm_a_displacement_threshold() {
     let program = site.caught_up();
     site.append("incoming/5.csv", &format!("{unset},97.5\n"));
     site.append("incoming/5.csv", &row(40));
-    eventually("told", || site.told("5/red/", "firing") == 1);
+    eventually("told", || site.notified("5/red/", "firing") == 1);
     program.stop();
     let events = site.proven_events();
     assert!(events.contains("displacement-threshold"), "{events}");

@@ -40,7 +40,7 @@ fn a_benchmark_that_never_gave_a_reading_is_seen_and_unknown_from_the_start() {
         let row = status.lines().find(|line| line.starts_with(id)).unwrap();
         assert!(row.contains("unknown"), "{status}");
         eventually("told", || {
-            site.told(&format!("{id}/unknown/"), "firing") == 1
+            site.notified(&format!("{id}/unknown/"), "firing") == 1
         });
     }
     assert!(
@@ -52,14 +52,16 @@ fn a_benchmark_that_never_gave_a_reading_is_seen_and_unknown_from_the_start() {
         "incoming/absent.csv",
         &format!("{HEADER}{}", failing(0..114)),
     );
-    eventually("its end", || site.told("absent/unknown/", "resolved") == 1);
+    eventually("its end", || {
+        site.notified("absent/unknown/", "resolved") == 1
+    });
     assert!(
         get(&listen, "/metrics").contains("slipwatch_benchmark_unknown{benchmark=\"absent\"} 0")
     );
     program.stop();
     site.caught_up().stop();
     assert_eq!(
-        site.told("nan/unknown/", "firing"),
+        site.notified("nan/unknown/", "firing"),
         1,
         "told again after a restart"
     );
@@ -71,7 +73,7 @@ fn three_readings_and_then_silence_are_unknown() {
     let site = Site::new("");
     site.append("incoming/5.csv", &format!("{HEADER}{}", failing(90..93)));
     let program = site.caught_up();
-    eventually("told", || site.told("5/unknown/", "firing") == 1);
+    eventually("told", || site.notified("5/unknown/", "firing") == 1);
     program.stop();
     site.proven_events();
 }

@@ -64,7 +64,7 @@ pub(super) fn others(explanation: &Explanation) -> Vec<String> {
                 format!("Explained in part: structure is left in the residual{left}.")
             }
             Explained::Partly => {
-                format!("Explained in part: which channel acts cannot be told{left}.")
+                format!("Explained in part: which channel acts cannot be distinguished{left}.")
             }
             Explained::None => format!("Not explained: structure is left in the residual{left}."),
         });
