@@ -6,9 +6,8 @@ use crate::source;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
-use slipwatch::fit::{Observation, Observations};
+use slipwatch::fit::Observations;
 use slipwatch::forecast::Network;
-use slipwatch::reading::Quantity;
 use std::fmt::Write as _;
 
 const FIRST_SEED: u64 = 4_000_000;
@@ -91,19 +90,10 @@ fn draw(seed: u64, doubles: bool) -> (Noise, Observations, f64) {
             Noise::Flicker => position + size * flicker(&mut flickers, &mut generator),
             Noise::Quantised => ((position + FINE * size * normal) / size).round() * size,
         };
-        values.push(Observation {
-            t_days,
-            value,
-            sigma: None,
-        });
+        values.push((t_days, value));
         t_days += interval;
     }
-    let observations = Observations {
-        quantity: Quantity::Displacement,
-        averaging_days: 0.0,
-        values,
-    };
-    (noise, observations, change)
+    (noise, Observations::of_displacements(values), change)
 }
 
 fn flicker(each: &mut [f64; FLICKERS.len()], generator: &mut impl Rng) -> f64 {
