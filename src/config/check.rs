@@ -1,7 +1,8 @@
 //! `check`: the site file and what it names on this machine, without starting anything.
 
 use super::{
-    Config, ConfigError, FileSource, HookConfig, Secret, SiteConfig, Token, TokenError, load,
+    Config, ConfigError, DutyHours, FileSource, HookConfig, Secret, SiteConfig, Token, TokenError,
+    duty, load,
 };
 use crate::alert::Level;
 use crate::reading::{BenchmarkId, Quantity};
@@ -60,6 +61,7 @@ pub fn check(file: &Path) -> Result<ConfigSummary, ConfigError> {
             .chain(untold(&config))
             .chain(unknown_benchmarks(&config))
             .chain(only_escalated(&config))
+            .chain(off_duty(&config))
             .map(|what| format!("{place}: warning: {what}")),
     );
     Ok(ConfigSummary {
@@ -160,6 +162,19 @@ fn only_escalated(config: &Config) -> Vec<String> {
         }
     }
     lines
+}
+
+/// When in the week nobody is on duty who is notified of red at once.
+fn off_duty(config: &Config) -> Option<String> {
+    let at_once = |hook: &&HookConfig| hook.escalate_after.is_none() && !hook.site;
+    let asked = config.hooks.iter().filter(at_once);
+    let mut asked = asked.filter(|hook| hook.levels.contains(&Level::Red));
+    let hours: Option<Vec<&DutyHours>> = asked.by_ref().map(|hook| hook.hours.as_ref()).collect();
+    let hours = hours.filter(|hours| !hours.is_empty())?;
+    let from = duty::gap(&hours)?;
+    Some(format!(
+        "every hook that has red among its levels has hours, and none of them is on duty from {from}: nobody is notified of red then"
+    ))
 }
 
 /// A hook of a benchmark whose name is mistyped would never be notified.

@@ -1,5 +1,6 @@
 //! `[[hook]]`, `[[webhook]]`, `[[cap]]` and `[[mqtt_out]]`: whom alerts are sent to, and which.
 
+use super::duty::{DutyHours, Shift};
 use super::table::Section;
 use super::{CapFolder, HookConfig, Webhook, WebhookFormat, address, mqtt_out, value};
 use crate::alert::Level;
@@ -43,13 +44,14 @@ pub(super) fn hooks(root: &mut Section<'_>, base: &Path) -> Vec<HookConfig> {
 
 /// The outbox knows a hook by its command line: one that is run at once and again later needs two.
 fn unlike(root: &Section<'_>, hooks: &[HookConfig]) {
-    let later = hooks.iter().filter(|hook| hook.escalate_after.is_some());
+    let later = |hook: &&HookConfig| hook.escalate_after.is_some() || hook.hours.is_some();
+    let later = hooks.iter().filter(later);
     for hook in later.filter(|hook| !hook.run.is_empty()) {
         if hooks.iter().filter(|one| one.run == hook.run).count() > 1 {
             root.error(
                 root.at(),
                 format!(
-                    "two hooks run {:?}, one of them with escalate_after: they cannot be distinguished",
+                    "two hooks run {:?}, one of them with escalate_after or hours: they cannot be distinguished",
                     hook.run.join(" ")
                 ),
                 "give one of them an argument of its own, as in run = [\"./notify.sh\", \"escalation\"]",
@@ -89,6 +91,7 @@ struct Common {
     site: bool,
     timeout: Duration,
     escalate_after: Option<Duration>,
+    hours: Option<DutyHours>,
     drills: bool,
 }
 
@@ -105,6 +108,7 @@ impl Common {
             site: self.site,
             timeout: self.timeout,
             escalate_after: self.escalate_after,
+            hours: self.hours,
             drills: self.drills,
             links: None,
             folder: base.to_owned(),
@@ -138,10 +142,36 @@ fn common(section: &mut Section<'_>) -> Common {
             .map(|word| BenchmarkId::new(word.value))
             .collect(),
         site: section.switch("site").unwrap_or(false),
+        hours: hours(section),
         drills: section.switch("drills").unwrap_or(false),
         timeout: timeout.map_or(TIMEOUT, |given| given.value.unsigned_abs()),
         escalate_after: escalate_after.map(|given| given.value.unsigned_abs()),
     }
+}
+
+/// When it is on duty, by UTC until the site's time zone is known; `None`: always.
+fn hours(section: &mut Section<'_>) -> Option<DutyHours> {
+    let texts = section.texts("hours")?;
+    let path = section.path("hours");
+    if texts.value.is_empty() {
+        section.error(
+            &texts.at,
+            format!("{path} is empty: no alert would ever be sent"),
+            "leave it out for always, or write hours = [\"mon-fri 07:00-19:00\"]",
+        );
+        return None;
+    }
+    let mut shifts = Vec::new();
+    for text in &texts.value {
+        match Shift::parse(&text.value) {
+            Ok(shift) => shifts.push(shift),
+            Err(fix) => {
+                let what = format!("{:?} in {path} is no shift", text.value);
+                section.error(&text.at, what, fix);
+            }
+        }
+    }
+    Some(DutyHours::new(shifts))
 }
 
 fn program(mut section: Section<'_>, base: &Path) -> Option<HookConfig> {

@@ -6,6 +6,7 @@ mod broker;
 mod check;
 mod declared;
 mod drill;
+mod duty;
 mod heartbeat;
 mod hook;
 mod keys;
@@ -25,6 +26,7 @@ mod vector;
 pub use broker::{Broker, BrokerAddress};
 pub use check::{ConfigSummary, check};
 pub use drill::{Drill, EXERCISE};
+pub use duty::DutyHours;
 pub use heartbeat::Heartbeat;
 pub use keys::{Key, Keys, ValueShape};
 pub use link::Links;
@@ -227,6 +229,8 @@ pub struct HookConfig {
     pub site: bool,
     /// It is notified only of what nobody has acknowledged within this time; `None`: of everything, at once.
     pub escalate_after: Option<Duration>,
+    /// When the people behind it are on duty; alerts wait for that. `None`: always.
+    pub hours: Option<DutyHours>,
     /// Whether drills reach it.
     pub drills: bool,
     /// By which links its alerts are acknowledged; `None`: by none.

@@ -33,9 +33,12 @@ pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
     let declared = declared::events(root, &benchmarks);
     let watched = watched(&known, &benchmarks);
     let mut hooks = hook::hooks(root, base);
-    let links = site.as_ref().and_then(|site| site.links.as_ref());
-    for hook in &mut hooks {
-        hook.links = links.cloned();
+    if let Some(site) = &site {
+        for hook in &mut hooks {
+            hook.links.clone_from(&site.links);
+            let hours = hook.hours.take();
+            hook.hours = hours.map(|hours| hours.in_zone(site.time_zone.clone()));
+        }
     }
     let heartbeats = heartbeat::heartbeats(root, base);
     let drill = drill::drill(root, &hooks, &benchmarks);

@@ -55,6 +55,7 @@ fn hook(script: &str) -> (TempDir, HookConfig) {
         cap: None,
         mqtt: None,
         escalate_after: None,
+        hours: None,
         benchmarks: BTreeSet::new(),
         run: vec!["/bin/sh".to_owned(), "hook.sh".to_owned()],
         levels: vec![Level::Orange, Level::Red],

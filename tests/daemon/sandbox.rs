@@ -54,6 +54,7 @@ fn walled(folder: &Path, run: &[&str]) -> HookConfig {
         cap: None,
         mqtt: None,
         escalate_after: None,
+        hours: None,
         benchmarks: BTreeSet::new(),
         run: run.iter().map(|word| (*word).to_owned()).collect(),
         levels: vec![Level::Red],

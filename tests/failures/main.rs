@@ -55,6 +55,7 @@ mod crowd;
 mod database;
 mod disk;
 mod drill;
+mod duty;
 mod escalation;
 mod feeds;
 mod files;

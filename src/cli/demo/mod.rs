@@ -204,6 +204,7 @@ fn sample_hook(folder: &Path) -> anyhow::Result<HookConfig> {
         cap: None,
         mqtt: None,
         escalate_after: None,
+        hours: None,
         benchmarks: BTreeSet::new(),
         run: vec![script.display().to_string(), WRITTEN.to_owned()],
         levels: vec![Level::Orange, Level::Red, Level::Unknown],

@@ -156,7 +156,7 @@ impl Dispatcher {
         }
     }
 
-    /// Somebody has seen `alert`: it is not tried again, and an escalation that was not due yet is not made.
+    /// Somebody has seen `alert`: it is not tried again, and where it waits for its escalation or for somebody on duty it is not sent.
     pub fn end(&self, alert: &Alert) {
         for way in &self.hooks {
             locked(&way.in_hand).end(alert);
@@ -164,9 +164,9 @@ impl Dispatcher {
         }
     }
 
-    /// Somebody sees to `alert`: an escalation that was not due yet is not made.
+    /// Somebody sees to `alert`: where it waits for its escalation or for somebody on duty it is not sent.
     pub fn spare(&self, alert: &Alert) {
-        for way in self.hooks.iter().filter(|way| way.hook.escalates()) {
+        for way in self.hooks.iter().filter(|way| way.hook.may_wait()) {
             self.call_off(way, alert);
         }
     }
@@ -182,11 +182,11 @@ impl Dispatcher {
         }
     }
 
-    /// Notes durably that an escalation is not made, where it has not begun.
+    /// Notes durably that an alert that may wait is not sent, where that has not begun.
     fn call_off(&self, way: &HookQueue, alert: &Alert) {
         let name = way.hook.name();
         let mut in_hand = locked(&way.in_hand);
-        if !way.hook.escalates() || !way.hook.asks_for(alert) || in_hand.was_tried(alert) {
+        if !way.hook.may_wait() || !way.hook.asks_for(alert) || in_hand.was_tried(alert) {
             return;
         }
         let mut delivered = locked(&self.delivered);
@@ -195,15 +195,15 @@ impl Dispatcher {
         }
         in_hand.end(alert);
         let key = &alert.key;
-        tracing::info!(hook = name, key, "acknowledged in time: not escalated");
+        tracing::info!(hook = name, key, "acknowledged in time: not sent");
         if let Err(error) = delivered.note(alert, &name, DeliveryOutcome::Acknowledged) {
-            tracing::warn!(hook = name, key, %error, "no receipt: a restart may escalate it");
+            tracing::warn!(hook = name, key, %error, "no receipt: a restart may send it");
         }
     }
 
-    /// Whether this is the end of what an escalation has never reported: neither of them is then.
-    fn ends_unescalated(&self, way: &HookQueue, in_hand: &mut InHand, alert: &Alert) -> bool {
-        if !way.hook.escalates() || alert.state != AlertState::Resolved {
+    /// Whether this is the end of what waited and was never reported: neither of them is then.
+    fn ends_unreported(&self, way: &HookQueue, in_hand: &mut InHand, alert: &Alert) -> bool {
+        if !way.hook.may_wait() || alert.state != AlertState::Resolved {
             return false;
         }
         let (name, mut firing) = (way.hook.name(), alert.clone());
@@ -226,7 +226,7 @@ impl Dispatcher {
         let (name, key) = (way.hook.name(), &alert.key);
         // In hand first: a worker notes the receipt before it lets go.
         let mut in_hand = locked(&way.in_hand);
-        if self.ends_unescalated(way, &mut in_hand, alert) {
+        if self.ends_unreported(way, &mut in_hand, alert) {
             return true;
         }
         if in_hand.cancels(alert) {
@@ -282,9 +282,9 @@ impl HookConfig {
             .unwrap_or_else(|| self.run.join(" "))
     }
 
-    /// Whether it is notified only of what nobody acknowledges in time.
-    fn escalates(&self) -> bool {
-        self.escalate_after.is_some()
+    /// Whether its alerts may wait: for an acknowledgement that does not come in time, or for somebody on duty.
+    pub(super) fn may_wait(&self) -> bool {
+        self.escalate_after.is_some() || self.hours.is_some()
     }
 
     /// Whether it is notified of an alert of this level, at a benchmark or the whole site. What reports many benchmarks

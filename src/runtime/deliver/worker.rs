@@ -29,7 +29,7 @@ struct Waiting {
     attempt: u32,
     /// Not tried since the start.
     is_new: bool,
-    /// It waits for an acknowledgement: until it is due it is not sent on the way out either.
+    /// It waits for an acknowledgement, or for somebody on duty: until it is due it is not sent on the way out either.
     is_held: bool,
 }
 
@@ -163,8 +163,8 @@ impl Worker {
     fn drop_what_is_over(&mut self, open: bool) {
         let now = clock::later(Duration::ZERO);
         let due = self.waiting.iter();
-        // An escalation that is called off does not wait for its time.
-        let looks_ahead = !open || self.hook.escalate_after.is_some();
+        // An escalation that is called off does not wait for its time, nor what is over for somebody on duty.
+        let looks_ahead = !open || self.hook.may_wait();
         let due = due.take_while(|((due, _), _)| looks_ahead || *due <= now);
         let due = due.filter(|((due, _), waiting)| !open || waiting.is_held || *due <= now);
         let over = due.filter(|(_, waiting)| self.is_over(&waiting.alert));
@@ -252,7 +252,7 @@ impl Worker {
     fn begin(&mut self, alert: Alert) {
         let before = locked(&self.delivered).attempts(&alert, &self.hook.name());
         let held = if before == 0 {
-            self.held(&alert)
+            self.unacknowledged_wait(&alert).max(self.duty_wait())
         } else {
             Duration::ZERO
         };
@@ -268,7 +268,7 @@ impl Worker {
     /// How long an escalation still waits for an acknowledgement. It is counted from when the alert came into the outbox, by
     /// the host's clock: a restart neither loses nor renews the time. Whatever that clock does, it is never longer than
     /// the whole.
-    fn held(&self, alert: &Alert) -> Duration {
+    fn unacknowledged_wait(&self, alert: &Alert) -> Duration {
         let (Some(after), AlertState::Firing) = (self.hook.escalate_after, alert.state) else {
             return Duration::ZERO;
         };
@@ -277,6 +277,12 @@ impl Worker {
         // Before the beginning there is only a clock that was set back.
         let gone = gone.and_then(|gone| Duration::try_from(gone).ok());
         after.saturating_sub(gone.unwrap_or(Duration::ZERO))
+    }
+
+    /// How long nobody behind the hook is on duty yet.
+    fn duty_wait(&self) -> Duration {
+        let hours = self.hook.hours.as_ref();
+        hours.map_or(Duration::ZERO, |hours| hours.wait(clock::now()))
     }
 
     fn wait(&mut self, waiting: Waiting, due: Instant) {

@@ -78,6 +78,7 @@ fn hooks(config: &Config) -> Vec<HookConfig> {
         benchmarks: BTreeSet::new(),
         site: false,
         escalate_after: None,
+        hours: None,
         ..hook.clone()
     };
     reached.map(of_the_drill).collect()
