@@ -373,7 +373,7 @@ async fn messages_of_many_lines_wait_at_the_broker_until_those_before_have_been_
 
 /// Stands before a broker and refuses MQTT 5, as a broker does that knows only 3.1.1; which Debian does not have any more.
 /// Gives its port and counts whom it refused.
-async fn refusing_version_5(port: u16) -> (u16, Arc<AtomicUsize>) {
+pub(crate) async fn refusing_version_5(port: u16) -> (u16, Arc<AtomicUsize>) {
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
     let own = listener.local_addr().unwrap().port();
     let refused = Arc::new(AtomicUsize::new(0));

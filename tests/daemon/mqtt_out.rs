@@ -1,7 +1,7 @@
 //! Alerts to a topic of a real Mosquitto: at QoS 1, tried again while it is away, over TLS only where it is trusted.
 
 use crate::eventually::eventually;
-use crate::mqtt::Mosquitto;
+use crate::mqtt::{Mosquitto, refusing_version_5};
 use crate::webhooks::{alert, quick, text};
 use rumqttc::{AsyncClient, Event, MqttOptions, Packet, Publish, QoS};
 use slipwatch::config::{self, HookConfig};
@@ -11,6 +11,7 @@ use slipwatch::runtime::hook::HookOutcome;
 use slipwatch::store::{DeliveryOutcome, Store};
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 /// The ways out of a config with this one.
@@ -87,6 +88,25 @@ async fn a_topic_gets_what_a_hook_gets_and_keeps_it_where_that_is_asked_for() {
         assert_eq!(body[key], value, "{key}");
     }
     assert_eq!(body["attempt"], 2);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+#[cfg_attr(not(has_mosquitto), ignore = "Mosquitto was not found by build.rs")]
+async fn an_alert_reaches_a_broker_that_knows_only_3_1_1() {
+    let broker = Mosquitto::start();
+    // The broker is up when it has taken this one.
+    let directly = way(&broker, "topic = \"toc/first\"");
+    assert_eq!(sent(&directly[0]).await, HookOutcome::Done);
+    let (port, refused) = refusing_version_5(broker.port).await;
+    let older = ways(&format!(
+        "url = \"mqtt://127.0.0.1:{port}\"\ntopic = \"toc/alerts\"\nretain = true"
+    ));
+    assert_eq!(sent(&older[0]).await, HookOutcome::Done);
+    assert_eq!(refused.load(Ordering::Relaxed), 1);
+    let message = next_of(&broker, "toc/alerts").await;
+    assert_eq!(message.qos, QoS::AtLeastOnce);
+    let body: serde_json::Value = serde_json::from_slice(&message.payload).unwrap();
+    assert_eq!(body["key"], "5/red/1");
 }
 
 #[tokio::test(flavor = "multi_thread")]
