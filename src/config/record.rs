@@ -87,3 +87,43 @@ pub(super) fn refuse_own(section: &Section<'_>, record: &RecordFiles, sources: &
         );
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::config::parse;
+    use std::path::Path;
+
+    fn said(of_site: &str) -> String {
+        let text = format!(
+            "[site]\nname = \"Toc\"\nstate_dir = \"state\"\n{of_site}\n\
+             [[source]]\nid = \"recorder\"\nkind = \"mcap\"\npath = \"incoming/*.mcap\"\n"
+        );
+        match parse(&text, Path::new("/site/site.toml")) {
+            Ok(config) => format!("{:?}", config.site.record),
+            Err(error) => error.to_string(),
+        }
+    }
+
+    #[test]
+    fn a_record_has_its_own_folder_and_room_for_two_files() {
+        let right = said("record = \"record/site.mcap\"\nrecord_size = \"1 MB\"");
+        assert!(right.contains("/site/record/site.mcap"), "{right}");
+        assert!(
+            right.contains("size: 1000000, total: 1000000000"),
+            "{right}"
+        );
+        for (wrong, why) in [
+            ("record = \"incoming/site.mcap\"", "source \"recorder\""),
+            ("record = \"record/site.csv\"", "ends in .mcap"),
+            ("record_total = \"1 GB\"", "without site.record"),
+            (
+                "record = \"site.mcap\"\nrecord_total = \"100 MB\"",
+                "does not hold two files",
+            ),
+        ] {
+            let said = said(wrong);
+            assert!(said.contains(why), "{wrong}: {said}");
+        }
+        assert_eq!(said(""), "None");
+    }
+}

@@ -20,23 +20,23 @@ const ROWS: usize = 16_384;
 const MEANING: &str = "slipwatch.columns";
 
 /// The values of a column that wait to be written.
-enum Waiting {
+enum ColumnValues {
     Numbers(Vec<f64>),
     Wholes(Vec<i64>),
     Flags(Vec<bool>),
     Texts(Vec<ByteArray>),
 }
 
-struct WaitingColumn {
+struct TableColumnWriter {
     column: TableColumn,
-    values: Waiting,
+    values: ColumnValues,
     /// 1 where a row has a value, 0 where it is null.
     levels: Vec<i16>,
 }
 
 /// A table on its way to stdout.
 pub(super) struct ParquetRows {
-    columns: Vec<WaitingColumn>,
+    columns: Vec<TableColumnWriter>,
     writer: SerializedFileWriter<BufWriter<Stdout>>,
     rows: usize,
 }
@@ -61,13 +61,13 @@ impl ParquetRows {
             Arc::new(schema.build()?),
             Arc::new(properties.build()),
         )?;
-        let columns = columns.iter().map(|column| WaitingColumn {
+        let columns = columns.iter().map(|column| TableColumnWriter {
             column: column.clone(),
             values: match column.kind {
-                ColumnKind::Number => Waiting::Numbers(Vec::new()),
-                ColumnKind::Whole | ColumnKind::Time => Waiting::Wholes(Vec::new()),
-                ColumnKind::Flag => Waiting::Flags(Vec::new()),
-                ColumnKind::Text | ColumnKind::Json => Waiting::Texts(Vec::new()),
+                ColumnKind::Number => ColumnValues::Numbers(Vec::new()),
+                ColumnKind::Whole | ColumnKind::Time => ColumnValues::Wholes(Vec::new()),
+                ColumnKind::Flag => ColumnValues::Flags(Vec::new()),
+                ColumnKind::Text | ColumnKind::Json => ColumnValues::Texts(Vec::new()),
             },
             levels: Vec::new(),
         });
@@ -113,7 +113,7 @@ impl RowSink for ParquetRows {
     }
 }
 
-impl WaitingColumn {
+impl TableColumnWriter {
     fn take(&mut self, value: &Value) -> anyhow::Result<()> {
         self.levels.push(i16::from(!value.is_null()));
         if value.is_null() {
@@ -122,18 +122,18 @@ impl WaitingColumn {
         let (name, kind) = (|| self.column.path.join("."), self.column.kind);
         let wrong = || format!("column {}: {value} is no {kind:?}", name());
         match &mut self.values {
-            Waiting::Numbers(all) => all.push(value.as_f64().with_context(wrong)?),
-            Waiting::Flags(all) => all.push(value.as_bool().with_context(wrong)?),
-            Waiting::Wholes(all) if kind == ColumnKind::Time => {
+            ColumnValues::Numbers(all) => all.push(value.as_f64().with_context(wrong)?),
+            ColumnValues::Flags(all) => all.push(value.as_bool().with_context(wrong)?),
+            ColumnValues::Wholes(all) if kind == ColumnKind::Time => {
                 let time: Timestamp = value.as_str().with_context(wrong)?.parse()?;
                 let nanoseconds = i64::try_from(time.as_nanosecond());
                 all.push(nanoseconds.with_context(|| format!("column {}: {time}", name()))?);
             }
-            Waiting::Wholes(all) => all.push(value.as_i64().with_context(wrong)?),
-            Waiting::Texts(all) if kind == ColumnKind::Text => {
+            ColumnValues::Wholes(all) => all.push(value.as_i64().with_context(wrong)?),
+            ColumnValues::Texts(all) if kind == ColumnKind::Text => {
                 all.push(value.as_str().with_context(wrong)?.into());
             }
-            Waiting::Texts(all) => all.push(value.to_string().into_bytes().into()),
+            ColumnValues::Texts(all) => all.push(value.to_string().into_bytes().into()),
         }
         Ok(())
     }
@@ -142,22 +142,22 @@ impl WaitingColumn {
         let levels = std::mem::take(&mut self.levels);
         let known = levels.iter().filter(|level| **level == 1).count();
         let written = match &mut self.values {
-            Waiting::Numbers(all) => {
+            ColumnValues::Numbers(all) => {
                 let all = std::mem::take(all);
                 out.typed::<DoubleType>()
                     .write_batch(&all, Some(&levels), None)
             }
-            Waiting::Wholes(all) => {
+            ColumnValues::Wholes(all) => {
                 let all = std::mem::take(all);
                 out.typed::<Int64Type>()
                     .write_batch(&all, Some(&levels), None)
             }
-            Waiting::Flags(all) => {
+            ColumnValues::Flags(all) => {
                 let all = std::mem::take(all);
                 out.typed::<BoolType>()
                     .write_batch(&all, Some(&levels), None)
             }
-            Waiting::Texts(all) => {
+            ColumnValues::Texts(all) => {
                 let all = std::mem::take(all);
                 out.typed::<ByteArrayType>()
                     .write_batch(&all, Some(&levels), None)

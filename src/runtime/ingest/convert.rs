@@ -54,13 +54,13 @@ pub enum ConvertStage {
 }
 
 /// Tells how many bytes have gone through.
-struct Watched<'a, W> {
+struct CountedOutput<'a, W> {
     out: W,
     bytes: u64,
     progress: &'a mut dyn FnMut(ConvertStage),
 }
 
-impl<W: Write> Write for Watched<'_, W> {
+impl<W: Write> Write for CountedOutput<'_, W> {
     fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
         let written = self.out.write(buffer)?;
         self.bytes += written as u64;
@@ -73,7 +73,7 @@ impl<W: Write> Write for Watched<'_, W> {
     }
 }
 
-impl<W: Seek> Seek for Watched<'_, W> {
+impl<W: Seek> Seek for CountedOutput<'_, W> {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         self.out.seek(to)
     }
@@ -102,7 +102,7 @@ pub fn convert(
     let (recording, disorder) = (read.recording, read.disorder);
     write_atomically(output, |out| {
         let bytes = 0;
-        let out = Watched {
+        let out = CountedOutput {
             out,
             bytes,
             progress,
