@@ -285,6 +285,12 @@ pub(super) fn warn_of(disorder: Disorder) {
             "left out",
         ),
     ];
+    if disorder.unended > 0 {
+        let files = disorder.unended;
+        exit::complain(&format_args!(
+            "warning: files of a daemon's record without an end: {files} (read as far as they go)"
+        ));
+    }
     for (what, rows, remedy) in kinds {
         if rows > 0 {
             exit::complain(&format_args!(

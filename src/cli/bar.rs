@@ -28,6 +28,16 @@ pub(super) fn share(bar: &ProgressBar, share: f64) {
     bar.set_position((share.clamp(0.0, 1.0) * STEPS as f64) as u64);
 }
 
+/// From now on it counts bytes, of which nobody knows how many there will be.
+pub(super) fn of_bytes(bar: &ProgressBar) {
+    if bar.length().is_some()
+        && let Ok(style) = ProgressStyle::with_template("{bytes} written, {elapsed}")
+    {
+        bar.unset_length();
+        bar.set_style(style);
+    }
+}
+
 /// A bar of the time that a recording spans; it goes when it is dropped.
 #[derive(Debug)]
 pub(super) struct BarInTime {

@@ -1,8 +1,8 @@
 //! `convert IN OUT`: readings from one file format to another.
 
 use super::args::{FileArgs, OutputArgs, OutputFormat, warn_of};
-use super::exit;
-use crate::runtime::ingest;
+use super::{bar, exit};
+use crate::runtime::ingest::{self, ConvertStage};
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -23,7 +23,18 @@ pub(super) struct Args {
 
 /// Converts, and says what was written and what the output has no place for.
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
-    let report = ingest::convert(&args.input, &args.out, &args.file.options())?;
+    let bar = bar::shared();
+    let mut progress = |stage: ConvertStage| match stage {
+        ConvertStage::Read(share) => bar::share(&bar, share),
+        ConvertStage::Written(bytes) => {
+            bar::of_bytes(&bar);
+            bar.set_position(bytes);
+        }
+    };
+    let options = args.file.options();
+    let report = ingest::convert(&args.input, &args.out, &options, &mut progress);
+    bar.finish_and_clear();
+    let report = report?;
     warn_of(report.disorder);
     for what in &report.left_out {
         exit::complain(&format_args!("warning: left out: {what}"));

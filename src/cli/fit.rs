@@ -2,6 +2,7 @@
 
 use super::args::{OutputArgs, ReadingArgs};
 use super::bar;
+use super::columnar::TableArgs;
 use super::table::{TextTable, number, time};
 use crate::alert::Policy;
 use crate::config::value;
@@ -23,7 +24,8 @@ const DISAGREE: f64 = 0.5;
 ///
 /// Several benchmarks are inverted one by one, and then asked which of them fail together, and when.
 /// The best fit and its rms are those of the constant-load law by unweighted least squares. Intervals
-/// bound 90 %. Failure is the first passage of --critical-velocity.
+/// bound 90 %. Failure is the first passage of --critical-velocity. A table has a row a benchmark, and not
+/// which fail together.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     #[command(flatten)]
@@ -31,7 +33,7 @@ pub(super) struct Args {
     #[command(flatten)]
     inversion: InversionArgs,
     #[command(flatten)]
-    output: OutputArgs,
+    output: TableArgs,
 }
 
 /// What `fit` and `sweep` hold and choose.
@@ -69,22 +71,30 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     args.readings.narrow(&mut recording)?;
     let options = args.inversion.options(&args.readings);
     let count = recording.series.len() as u64;
+    let mut table = args.output.table::<FitReport>()?;
+    let format = args.output.lines();
+    let output = OutputArgs { format };
     let bar = bar::counted(count + 1, "{bar:40} {pos}/{len} inversions, {elapsed}");
     for (index, series) in recording.series.iter().enumerate() {
         let report = report(series, &options);
         bar.inc(1);
+        if let Some(table) = &mut table {
+            table.row(&serde_json::to_value(&report)?)?;
+            continue;
+        }
         let blank = if index == 0 { "" } else { "\n" };
-        bar.suspend(|| {
-            args.output
-                .print(&report, |report| format!("{blank}{}", text(report)))
-        })?;
+        bar.suspend(|| output.print(&report, |report| format!("{blank}{}", text(report))))?;
+    }
+    if let Some(table) = table {
+        bar.finish_and_clear();
+        return table.finish();
     }
     let report = together(&recording.series, &options);
     bar.finish_and_clear();
     let Some(report) = report else {
         return Ok(());
     };
-    args.output.print(&SiteReport { together: report }, |site| {
+    output.print(&SiteReport { together: report }, |site| {
         neighbours(&site.together)
     })
 }

@@ -4,6 +4,7 @@ mod alerts;
 pub mod args;
 mod bar;
 mod check;
+mod columnar;
 mod completions;
 mod convert;
 mod demo;

@@ -1,7 +1,8 @@
 //! `replay FILE...`: the monitor over recorded readings, in data time.
 
-use super::args::{OutputArgs, OutputFormat, ReadingArgs};
-use super::bar::BarInTime;
+use super::args::{OutputFormat, ReadingArgs};
+use super::bar::{self, BarInTime};
+use super::columnar::{RowSink, TableArgs};
 use super::demo::timeline::Timeline;
 use super::run::asynchronous;
 use super::{exit, text};
@@ -48,7 +49,7 @@ pub(super) struct Args {
     #[arg(long, requires = "config")]
     hooks: bool,
     #[command(flatten)]
-    output: OutputArgs,
+    output: TableArgs,
 }
 
 /// Replays the files and prints the events.
@@ -87,7 +88,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let zone = config
         .as_ref()
         .map_or(TimeZone::UTC, |config| config.site.time_zone.clone());
-    let mut printer = Printer::new(args.output.format, zone, args.record.is_some());
+    let mut printer = Printer::new(args, zone)?;
     asynchronous()?.block_on(async {
         let shutdown = Shutdown::on_signals().context("cannot listen for signals")?;
         // Where the lines are seen they say how far it has come.
@@ -134,18 +135,27 @@ fn run_state(args: &Args, folder: &Path) -> anyhow::Result<()> {
     }
     let is_wanted =
         |event: &Event| wanted.is_none() || event.benchmark.is_none() || event.benchmark == wanted;
-    let mut printer = Printer::new(args.output.format, TimeZone::UTC, args.record.is_some());
+    let mut printer = Printer::new(args, TimeZone::UTC)?;
     asynchronous()?.block_on(async {
         let shutdown = Shutdown::on_signals().context("cannot listen for signals")?;
+        // Where the lines are seen they say how far it has come.
+        let bar = (!io::stdout().is_terminal()).then(bar::shared);
+        let mut progress = |share: f64| {
+            if let Some(bar) = &bar {
+                bar::share(bar, share);
+            }
+        };
         let mut print = |event: &Event| {
             if is_wanted(event) {
                 printer.print(event)?;
             }
             Ok(())
         };
-        anyhow::Ok(replay::replay_state(
-            &store, args.until, &shutdown, &mut print,
-        )?)
+        let played = replay::replay_state(&store, args.until, &shutdown, &mut progress, &mut print);
+        if let Some(bar) = &bar {
+            bar.finish_and_clear();
+        }
+        anyhow::Ok(played?)
     })?;
     printer.end(args.record.as_deref(), || {
         let mut taken = record::taken_in(&store, args.until)?;
@@ -188,6 +198,8 @@ pub(super) fn events(
 struct Printer {
     out: io::StdoutLock<'static>,
     format: OutputFormat,
+    /// Instead of lines, where that is asked for.
+    table: Option<Box<dyn RowSink>>,
     zone: TimeZone,
     timeline: Timeline,
     /// All of them, where they are to be recorded.
@@ -195,19 +207,24 @@ struct Printer {
 }
 
 impl Printer {
-    fn new(format: OutputFormat, zone: TimeZone, keeps: bool) -> Self {
-        Self {
+    fn new(args: &Args, zone: TimeZone) -> anyhow::Result<Self> {
+        Ok(Self {
             out: io::stdout().lock(),
-            format,
+            format: args.output.lines(),
+            table: args.output.table::<Event>()?,
             zone,
             timeline: Timeline::new(),
-            kept: keeps.then(Vec::new),
-        }
+            kept: args.record.is_some().then(Vec::new),
+        })
     }
 
     fn print(&mut self, event: &Event) -> io::Result<()> {
         if let Some(kept) = &mut self.kept {
             kept.push(event.clone());
+        }
+        if let Some(table) = &mut self.table {
+            let row = serde_json::to_value(event)?;
+            return table.row(&row).map_err(io::Error::other);
         }
         let line = match self.format {
             OutputFormat::Json => serde_json::to_string(event)?,
@@ -226,6 +243,9 @@ impl Printer {
         readings: impl FnOnce() -> anyhow::Result<Recording>,
     ) -> anyhow::Result<()> {
         write!(self.out, "{}", self.timeline.bands())?;
+        if let Some(table) = self.table {
+            table.finish()?;
+        }
         if let (Some(file), Some(events)) = (file, &self.kept) {
             let words = |event: &Event| text::line(event, &self.zone);
             record::write(file, &readings()?, events, &words)?;

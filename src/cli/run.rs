@@ -1,6 +1,7 @@
 //! `run CONFIG`: the daemon, until SIGTERM or SIGINT.
 
 use super::args::{OutputArgs, OutputFormat};
+use super::text;
 use crate::config;
 use crate::runtime::log::{self, LogFormat};
 use crate::runtime::progress::Progress;
@@ -37,7 +38,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     asynchronous()?.block_on(async {
         let shutdown = Shutdown::on_signals().context("cannot listen for signals")?;
         let (progress, _) = tokio::sync::watch::channel(Progress::default());
-        daemon::run(&config, shutdown, &progress).await?;
+        daemon::run(&config, shutdown, &progress, text::line).await?;
         Ok(())
     })
 }

@@ -11,6 +11,7 @@ use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::clock;
 use crate::runtime::drilled::DrillRecord;
 use crate::runtime::preview::{Preview, preview};
+use crate::runtime::record::standing::RecordStanding;
 use crate::runtime::standing::{InForce, acknowledged, closed, every, in_force, orders, silences};
 use crate::store::Store;
 use jiff::tz::TimeZone;
@@ -104,6 +105,8 @@ pub(super) struct SiteStatus {
     drill: Option<DrillRecord>,
     /// Whether no drill has passed for too long.
     is_drill_overdue: bool,
+    /// How the record in MCAP files stands, where one is kept.
+    record: Option<RecordStanding>,
     /// What the files hold, where that was asked for.
     preview: Option<Preview>,
 }
@@ -186,6 +189,8 @@ fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
             .as_ref()
             .is_some_and(|drill| drill.is_overdue(clock::now())),
         drill,
+        record: (config.site.record.as_ref())
+            .and_then(|_| RecordStanding::read(&config.site.state_dir)),
         preview,
     };
     Ok((status, zone))
@@ -310,7 +315,7 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
         alerts => format!("\nin force:\n{}", lines(alerts)),
     };
     format!(
-        "{dead}{}: {} inputs taken, {} alerts wait for a hook\n{}{}{}{}{refused}{suspicions}\n{table}\
+        "{dead}{}: {} inputs taken, {} alerts wait for a hook\n{}{}{}{}{}{refused}{suspicions}\n{table}\
          collapse: median of the forecast; chance: of collapse within the evacuation time\n{force}",
         text::plain(&status.site),
         status.steps,
@@ -319,7 +324,19 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
         lines(&status.acknowledged),
         lines(&status.closed),
         drilled(status, zone),
+        recorded(status, zone),
     )
+}
+
+/// Whether the record can be written; nothing where it can, or where none is kept.
+fn recorded(status: &SiteStatus, zone: &TimeZone) -> String {
+    let failing = status.record.as_ref().and_then(|record| {
+        let since = text::clock(record.failing_since?, zone);
+        Some((since, record.failure.as_ref()?))
+    });
+    failing.map_or_else(String::new, |(since, why)| {
+        format!("NO RECORD since {since}: {}\n", text::plain(why))
+    })
 }
 
 /// What became of the newest drill; nothing where none has been held yet and none is overdue.

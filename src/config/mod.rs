@@ -14,6 +14,7 @@ mod link;
 mod mqtt_out;
 mod pattern;
 mod problem;
+mod record;
 mod rule;
 mod secret;
 mod section;
@@ -33,6 +34,7 @@ pub use link::Links;
 pub use mqtt_out::MqttTopic;
 pub use pattern::FilePattern;
 pub use problem::{ConfigError, ConfigProblem, Severity};
+pub use record::RecordFiles;
 pub use secret::{Secret, SecretError};
 pub use token::{Token, TokenError};
 pub use vector::Vector;
@@ -90,6 +92,8 @@ pub struct SiteConfig {
     pub token_file: Option<PathBuf>,
     /// By which links in the messages alerts are acknowledged; `None`: by none.
     pub links: Option<Links>,
+    /// Where all that is said is written as MCAP; `None`: nowhere.
+    pub record: Option<RecordFiles>,
     /// The zone that people there live in.
     pub time_zone: jiff::tz::TimeZone,
     /// Data time for which every refit is kept; of older ones the first of each UTC day and benchmark is.

@@ -2,8 +2,8 @@
 
 use super::table::{Placed, Section, unique};
 use super::{
-    Benchmark, Config, SiteConfig, alert, declared, drill, heartbeat, hook, link, source, value,
-    vector,
+    Benchmark, Config, FileSource, SiteConfig, alert, declared, drill, heartbeat, hook, link,
+    record, source, value, vector,
 };
 use crate::alert::Policy;
 use crate::monitor::{Explain, Settings, SiteLevel, Watched};
@@ -22,8 +22,8 @@ pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
     let base = file.parent().unwrap_or(Path::new(""));
     let mut site_section = root.table("site", "site");
     let site_level = site_level(&mut site_section);
-    let site = site(site_section, base);
     let (sources, brokers) = source::sources(root, base);
+    let site = site(site_section, base, &sources);
     let policy = alert::policy(root.table("alert", "alert"), &Policy::default());
     let explain = explain(root.table("explain", "explain"));
     let known: Vec<&str> = (sources.iter().map(|source| source.id.as_str()))
@@ -64,7 +64,7 @@ pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
     })
 }
 
-fn site(mut section: Section<'_>, base: &Path) -> Option<SiteConfig> {
+fn site(mut section: Section<'_>, base: &Path, sources: &[FileSource]) -> Option<SiteConfig> {
     let name = section.required("name", "\"Monte Toc\"");
     let state_dir = section.required("state_dir", "\"state\"");
     let listen = section.parsed("listen", |text| {
@@ -75,6 +75,10 @@ fn site(mut section: Section<'_>, base: &Path) -> Option<SiteConfig> {
     refuse_open_door(&section, listen.as_ref(), token_file.is_some());
     let time_zone = section.parsed("time_zone", value::time_zone);
     let keep_refits = section.parsed("keep_refits", value::duration);
+    let record = record::record(&mut section, base);
+    if let Some(record) = &record {
+        record::refuse_own(&section, record, sources);
+    }
     let state_dir = state_dir.map(|given| base.join(given.value));
     let links = link::links(&mut section, listen.is_some(), state_dir.as_deref());
     section.finish();
@@ -82,6 +86,7 @@ fn site(mut section: Section<'_>, base: &Path) -> Option<SiteConfig> {
         name: name?.value,
         state_dir: state_dir?,
         links,
+        record,
         listen: listen.map(|given| given.value),
         token_file: token_file.map(|given| base.join(given.value)),
         time_zone: time_zone.map_or(TimeZone::UTC, |given| given.value),

@@ -82,6 +82,31 @@ fn split(text: &str) -> Option<(f64, &str)> {
     (number.is_finite() && number > 0.0).then(|| (number, text[end..].trim()))
 }
 
+/// So many bytes: `64 MB`, `1 GB`, `512 kB`, `10000 B`.
+pub(super) fn bytes(text: &str) -> Result<u64, String> {
+    let fix = || "write a positive number and a unit: \"64 MB\", \"1 GB\"".to_owned();
+    let (number, unit) = split(text).ok_or_else(fix)?;
+    let factor = match unit {
+        "B" => 1.0,
+        "kB" => 1e3,
+        "MB" => 1e6,
+        "GB" => 1e9,
+        "TB" => 1e12,
+        _ => return Err(fix()),
+    };
+    let bytes = number * factor;
+    if !(1.0..1e18).contains(&bytes) {
+        return Err(fix());
+    }
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "within the range of a u64"
+    )]
+    let whole = bytes as u64;
+    Ok(whole)
+}
+
 /// A level by its word.
 pub(super) fn level(text: &str) -> Result<Level, String> {
     [
@@ -115,6 +140,7 @@ mod tests {
         assert_eq!(length("2 m"), Ok(2000.0));
         assert_eq!(acceleration("5 mm/day/day"), Ok(5.0));
         assert!((acceleration("1 mm/h/h").unwrap() - 576.0).abs() < 1e-9);
+        assert_eq!((bytes("64 MB"), bytes("0.5 kB")), (Ok(64_000_000), Ok(500)));
         assert_eq!(duration("1d 12h"), Ok(SignedDuration::from_hours(36)));
     }
 
@@ -125,6 +151,9 @@ mod tests {
         }
         for text in ["5 mm/day", "5 mm", "5 mm/day/furlong"] {
             assert!(acceleration(text).is_err(), "{text}");
+        }
+        for text in ["64", "64 Mb", "-1 MB", "0 B", "MB", "1e30 GB"] {
+            assert!(bytes(text).is_err(), "{text}");
         }
         for text in ["0s", "12", "", "-1h"] {
             assert!(duration(text).is_err(), "{text}");

@@ -90,6 +90,8 @@ pub struct Disorder {
     pub out_of_order: usize,
     /// Readings that were a mark for no value, such as NAN; they are left out.
     pub missing: usize,
+    /// Files of a daemon's record that have no end: read as far as they go.
+    pub unended: usize,
 }
 
 impl AddAssign for Disorder {
@@ -98,6 +100,7 @@ impl AddAssign for Disorder {
         self.corrected += other.corrected;
         self.out_of_order += other.out_of_order;
         self.missing += other.missing;
+        self.unended += other.unended;
     }
 }
 

@@ -1,12 +1,17 @@
-//! What works beside the work loop for as long as a config holds: heartbeats and drills.
+//! What works beside the work loop for as long as a config holds: heartbeats, drills, the record.
 
+use super::record::live::{EventWords, LiveRecord};
 use super::shutdown::Shutdown;
 use super::vitals::Vitals;
 use super::{drill, heartbeat};
 use crate::config::Config;
 use crate::store::Store;
 use std::sync::Arc;
+use std::time::Duration;
 use tokio::task::JoinSet;
+
+/// How long a reload waits for a record that is to be kept no longer.
+const RECORD_LIMIT: Duration = Duration::from_secs(2);
 
 /// The tasks, and what they need.
 #[derive(Debug)]
@@ -17,6 +22,8 @@ pub(super) struct SideTasks {
     shutdown: Shutdown,
     heartbeats: JoinSet<()>,
     drills: JoinSet<()>,
+    record: Option<LiveRecord>,
+    words: EventWords,
 }
 
 impl SideTasks {
@@ -26,6 +33,7 @@ impl SideTasks {
         store: &Arc<Store>,
         vitals: &Arc<Vitals>,
         shutdown: &Shutdown,
+        words: EventWords,
     ) -> Self {
         Self {
             config: config.clone(),
@@ -34,6 +42,8 @@ impl SideTasks {
             shutdown: shutdown.clone(),
             heartbeats: heartbeat::start(&config.heartbeats, vitals, shutdown),
             drills: drill::start(config, store, vitals, shutdown),
+            record: LiveRecord::start(config, store, vitals, words),
+            words,
         }
     }
 
@@ -48,12 +58,31 @@ impl SideTasks {
             self.drills.shutdown().await;
             self.drills = drill::start(config, &self.store, vitals, shutdown);
         }
+        if config.site.record != self.config.site.record {
+            self.follow_record(config).await;
+        }
         self.config = config.clone();
     }
 
-    /// Ends it all.
-    pub(super) async fn stop(mut self) {
+    async fn follow_record(&mut self, config: &Config) {
+        match (&self.record, &config.site.record) {
+            (Some(record), Some(files)) => record.follow(files),
+            (Some(_), None) => {
+                if let Some(record) = self.record.take() {
+                    record.close(RECORD_LIMIT).await;
+                }
+                self.vitals.update(|health| health.record = None);
+            }
+            (None, _) => {
+                self.record = LiveRecord::start(config, &self.store, &self.vitals, self.words);
+            }
+        }
+    }
+
+    /// Ends it all but the record, which has the last to come.
+    pub(super) async fn stop(mut self) -> Option<LiveRecord> {
         self.heartbeats.shutdown().await;
         self.drills.shutdown().await;
+        self.record
     }
 }

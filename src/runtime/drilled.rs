@@ -1,10 +1,10 @@
 //! How drills stand: what became of the last one, kept in the state folder over restarts.
 
+use super::kept;
 use crate::reading::Timestamp;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::fs::{self, File};
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -60,19 +60,12 @@ impl DrillRecord {
 
     /// As it stands in a state folder; `None` where there is none, or none that can be read.
     pub fn read(state_dir: &Path) -> Option<Self> {
-        let text = fs::read_to_string(folder(state_dir).join(FILE)).ok()?;
-        serde_json::from_str(&text).ok()
+        kept::read(&folder(state_dir).join(FILE))
     }
 
     /// Nobody sees half of it.
     pub(super) fn write(&self, state_dir: &Path) -> io::Result<()> {
-        let folder = folder(state_dir);
-        fs::create_dir_all(&folder)?;
-        let partial = folder.join("last.partial");
-        let mut file = File::create(&partial)?;
-        file.write_all(&serde_json::to_vec(self)?)?;
-        file.sync_all()?;
-        fs::rename(&partial, folder.join(FILE))
+        kept::write(&folder(state_dir), FILE, self)
     }
 
     pub(super) fn passes(&mut self, passed: PassedDrill, now: Timestamp) {

@@ -17,6 +17,7 @@ pub mod hook;
 mod http;
 mod in_hand;
 pub mod ingest;
+mod kept;
 mod link;
 pub mod log;
 pub mod mqtt;

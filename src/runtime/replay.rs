@@ -144,7 +144,8 @@ pub async fn replay(
 }
 
 /// Plays what a daemon took in, in the order in which it did: every value, every passage of time, every finding of
-/// a search and every change of its settings. The events are the daemon's own, the summary last.
+/// a search and every change of its settings. The events are the daemon's own, the summary last. `progress` is told the
+/// share of the steps that is done, 0 to 1.
 ///
 /// # Errors
 /// [`ReplayError`].
@@ -152,8 +153,10 @@ pub fn replay_state(
     store: &Store,
     until: Option<Timestamp>,
     shutdown: &Shutdown,
+    progress: &mut dyn FnMut(f64),
     each: &mut (dyn FnMut(&Event) -> io::Result<()> + '_),
 ) -> Result<(), ReplayError> {
+    let steps = store.last_step().max(1) as f64;
     let mut monitor = Monitor::new(Settings::default());
     let mut after = 0;
     'all: loop {
@@ -168,6 +171,7 @@ pub fn replay_state(
                 return Err(ReplayError::Interrupted);
             }
             report_each(&monitor.step(row.now, &row.input), each)?;
+            progress(row.seq as f64 / steps);
             // Their findings are among the steps.
             monitor.searches();
         }

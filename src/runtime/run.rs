@@ -7,6 +7,7 @@ use super::hook::Status;
 use super::link;
 use super::progress::Progress;
 use super::pulse::{Reporting, ReportingError};
+use super::record::live::EventWords;
 use super::serve::ServedState;
 use super::shutdown::{self, Shutdown};
 use super::site::{Counts, Sinks, Site};
@@ -41,7 +42,7 @@ pub enum RunError {
 /// shows on the way; needs a multi-threaded tokio runtime.
 ///
 /// It goes on where its state was last committed: files from where they had been read, the monitor from what it
-/// remembered, alerts that no hook had taken.
+/// remembered, alerts that no hook had taken. `words` gives an event's line for a person, in the record.
 ///
 /// # Errors
 /// [`RunError`]; being asked to stop is none.
@@ -49,6 +50,7 @@ pub async fn run(
     config: &Config,
     shutdown: Shutdown,
     progress: &watch::Sender<Progress>,
+    words: EventWords,
 ) -> Result<Counts, RunError> {
     let fail = |source| RunError::State {
         folder: config.site.state_dir.clone(),
@@ -76,7 +78,7 @@ pub async fn run(
     for (source, count) in store.quarantined().map_err(fail)? {
         pulse.vitals.quarantined(&source, count);
     }
-    let beside = SideTasks::start(config, &store, &pulse.vitals, &shutdown);
+    let beside = SideTasks::start(config, &store, &pulse.vitals, &shutdown, words);
     let sources = Sources::start(config, &store).map_err(fail)?;
     let mut daemon = Daemon::new(config, store, site, sources, pulse, clock::now);
     daemon.beside = Some(beside);
@@ -90,12 +92,16 @@ pub async fn run(
         ..
     } = daemon;
     sources.stop();
-    if let Some(beside) = beside {
-        beside.stop().await;
-    }
+    let record = match beside {
+        Some(beside) => beside.stop().await,
+        None => None,
+    };
     pulse.stop().await;
     let counts = site.counts();
     let closed = site.close(clock::now(), DRAIN_LIMIT).await;
+    if let Some(record) = record {
+        record.close(DRAIN_LIMIT).await;
+    }
     tracing::info!(?counts, "stopped");
     let followed = sources.join().await;
     worked.and(closed.map(drop)).map_err(fail)?;

@@ -46,15 +46,26 @@ pub fn in_force(store: &Store, until: Option<Timestamp>) -> Result<InForce, Stor
 /// # Errors
 /// [`StoreError`].
 pub fn every(store: &Store, kind: &str) -> Result<Vec<Event>, StoreError> {
+    every_until(store, kind, i64::MAX)
+}
+
+/// Every event of a kind up to number `last`, oldest first.
+///
+/// # Errors
+/// [`StoreError`].
+pub(super) fn every_until(store: &Store, kind: &str, last: i64) -> Result<Vec<Event>, StoreError> {
     let mut all = Vec::new();
     let mut after = 0;
     loop {
         let events = store.events(after, Some(kind), None)?;
-        let Some((last, _)) = events.last() else {
+        let Some((newest, _)) = events.last() else {
             return Ok(all);
         };
-        after = *last;
-        for (_, body) in &events {
+        after = *newest;
+        for (number, body) in &events {
+            if *number > last {
+                return Ok(all);
+            }
             all.push(read(body)?);
         }
     }

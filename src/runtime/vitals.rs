@@ -2,6 +2,7 @@
 
 use super::clock::Stopwatch;
 use super::drilled::DrillRecord;
+use super::record::standing::RecordStanding;
 use super::site::Mute;
 use crate::alert::Level;
 use crate::monitor::{AlertState, Event, EventKind, Unexplained};
@@ -74,6 +75,8 @@ pub struct Health {
     pub drill: Option<DrillRecord>,
     /// Size of the database, bytes.
     pub database_bytes: Option<u64>,
+    /// How the record stands; `None` where none is kept.
+    pub record: Option<RecordStanding>,
 }
 
 impl Health {
@@ -142,13 +145,22 @@ impl VitalsPoint {
     }
 
     fn call(&mut self, level: Level, state: AlertState) {
-        match (level, state) {
-            (Level::Unknown, _) => self.is_unknown = state == AlertState::Firing,
-            (_, AlertState::Firing) => self.level = level,
-            // The end of a level that another one has superseded says nothing of that one.
-            (_, AlertState::Resolved) if self.level == level => self.level = Level::Green,
-            (_, AlertState::Resolved) => {}
-        }
+        (self.level, self.is_unknown) = after_alert((self.level, self.is_unknown), level, state);
+    }
+}
+
+/// The level in force at a place, and whether it is unknown beside it, once a level has been entered or left there.
+pub(super) fn after_alert(
+    (in_force, is_unknown): (Level, bool),
+    level: Level,
+    state: AlertState,
+) -> (Level, bool) {
+    match (level, state) {
+        (Level::Unknown, _) => (in_force, state == AlertState::Firing),
+        (_, AlertState::Firing) => (level, is_unknown),
+        // The end of a level that another one has superseded says nothing of that one.
+        (_, AlertState::Resolved) if in_force == level => (Level::Green, is_unknown),
+        (_, AlertState::Resolved) => (in_force, is_unknown),
     }
 }
 

@@ -288,6 +288,11 @@ impl Store {
         self.inner().steps
     }
 
+    /// The number of the last event.
+    pub fn last_event(&self) -> i64 {
+        self.inner().events
+    }
+
     /// Events after number `after`, of `kind` and `benchmark` where these are given, as (number, JSON): the next few.
     ///
     /// # Errors

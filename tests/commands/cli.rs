@@ -507,3 +507,16 @@ fn a_second_daemon_on_the_same_state_folder_is_74() {
     daemon.until("caught up");
     slipwatch(&["run", config.to_str().unwrap()]).code(74);
 }
+
+#[test]
+#[cfg_attr(feature = "parquet", ignore = "this build writes it")]
+fn a_build_without_parquet_says_how_to_build_one_with_it() {
+    let file = "recordings/preonzo-2012.mcap";
+    let refused = slipwatch(&["replay", file, "--format", "parquet"]).code(2);
+    let said = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+    assert!(
+        said.contains("cargo build --release --features parquet"),
+        "{said}"
+    );
+    assert!(refused.get_output().stdout.is_empty());
+}

@@ -11,7 +11,10 @@ mod explain_cli;
 mod first_day;
 mod first_site;
 mod office;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod plot_cli;
+mod progress;
 mod record;
 mod report_cli;
 mod schema;

@@ -369,7 +369,12 @@ impl Daemon {
         let (trigger, shutdown) = shutdown::pair();
         let (sender, progress) = watch::channel(Progress::default());
         let config = config.clone();
-        let task = tokio::spawn(async move { run(&config, shutdown, &sender).await });
+        let task = tokio::spawn(async move {
+            run(&config, shutdown, &sender, |event, _| {
+                event.kind.name().to_owned()
+            })
+            .await
+        });
         Self {
             trigger,
             progress,

@@ -32,6 +32,7 @@
 //! | 30 | a first start on history; a row and its correction, read again | `past`; tests/library/first_start.rs |
 //! | 31 | links in messages that are followed, forged, used again | `link` |
 //! | 32 | an alert's whole way breaks without anybody seeing it | `drill` |
+//! | 33 | the disk of the daemon's own record | `recorded` |
 //!
 //! docs/failure-modes.md says the same for operators.
 //!
@@ -67,6 +68,7 @@ mod model;
 mod orders;
 mod past;
 mod record;
+mod recorded;
 mod sensors;
 mod site;
 mod telling;

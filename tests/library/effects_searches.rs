@@ -107,7 +107,12 @@ async fn said_by_a_daemon() -> Vec<String> {
     let (trigger, shutdown) = shutdown::pair();
     let (sender, mut progress) = watch::channel(Progress::default());
     let own = config.clone();
-    let task = tokio::spawn(async move { run(&own, shutdown, &sender).await });
+    let task = tokio::spawn(async move {
+        run(&own, shutdown, &sender, |event, _| {
+            event.kind.name().to_owned()
+        })
+        .await
+    });
     let caught_up = progress.wait_for(|progress| progress.is_caught_up);
     tokio::time::timeout(Duration::from_secs(120), caught_up)
         .await

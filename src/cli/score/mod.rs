@@ -1,9 +1,11 @@
 //! `score FILE...`: forecasts scored as they would have been made, against every rival.
 
+mod rows;
 mod text;
 mod warning;
 
 use super::args::{OutputArgs, ReadingArgs};
+use super::columnar::TableArgs;
 use super::{bar, exit, picture};
 use crate::alert::Policy;
 use crate::figures;
@@ -34,7 +36,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
     #[command(flatten)]
-    output: OutputArgs,
+    output: TableArgs,
 }
 
 /// What is printed of one benchmark.
@@ -62,17 +64,28 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         args.plot.is_none() || count == 1,
         "--plot draws one benchmark, and there are {count}: expected --benchmark"
     );
+    let mut table = args.output.table::<rows::ScoreRow<'_>>()?;
+    let format = args.output.lines();
+    let output = OutputArgs { format };
     for (index, series) in recording.series.iter().enumerate() {
         let report = report(args.failure_time, &recording, series, &policy)?;
         if let Some(file) = &args.plot {
             let svg = figures::life_expectancy(&report.card, report.failure_time);
             picture::write(file, &svg)?;
         }
+        if let Some(table) = &mut table {
+            for row in rows::of(&report) {
+                table.row(&serde_json::to_value(row)?)?;
+            }
+            continue;
+        }
         let blank = if index == 0 { "" } else { "\n" };
-        args.output
-            .print(&report, |report| format!("{blank}{}", text::text(report)))?;
+        output.print(&report, |report| format!("{blank}{}", text::text(report)))?;
     }
-    Ok(())
+    match table {
+        Some(table) => table.finish(),
+        None => Ok(()),
+    }
 }
 
 /// The scorecard and its figure as a part of a page.

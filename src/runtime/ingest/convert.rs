@@ -1,12 +1,12 @@
 //! Turns a file of readings into another format.
 
 use super::atomic::write_atomically;
-use super::{Format, ReadOptions, encode_mcap, is_packed, read_files};
+use super::{Format, ReadOptions, encode_mcap, is_packed, read_watched};
 use crate::reading::{BenchmarkId, Disorder, Quantity, Recording, Unit};
 use anyhow::Context;
 use schemars::JsonSchema;
 use serde::Serialize;
-use std::io::BufWriter;
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
 
 /// What was converted.
@@ -44,8 +44,43 @@ pub struct ChannelCount {
     pub samples: usize,
 }
 
+/// How far a conversion has come.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ConvertStage {
+    /// The share of the input that is read, 0 to 1.
+    Read(f64),
+    /// Bytes of the output that are written.
+    Written(u64),
+}
+
+/// Tells how many bytes have gone through.
+struct CountedOutput<'a, W> {
+    out: W,
+    bytes: u64,
+    progress: &'a mut dyn FnMut(ConvertStage),
+}
+
+impl<W: Write> Write for CountedOutput<'_, W> {
+    fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
+        let written = self.out.write(buffer)?;
+        self.bytes += written as u64;
+        (self.progress)(ConvertStage::Written(self.bytes));
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+}
+
+impl<W: Seek> Seek for CountedOutput<'_, W> {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.out.seek(to)
+    }
+}
+
 /// Reads `input` and writes it as `output`, each in the format of its extension. The output is wholly
-/// there afterwards or untouched.
+/// there afterwards or untouched. `progress` is told how far it has come.
 ///
 /// # Errors
 /// An [`IngestError`](super::IngestError) (to be had by `downcast_ref`), with the files named.
@@ -53,6 +88,7 @@ pub fn convert(
     input: &Path,
     output: &Path,
     options: &ReadOptions,
+    progress: &mut dyn FnMut(ConvertStage),
 ) -> anyhow::Result<ConvertReport> {
     let format = Format::of(output)?;
     anyhow::ensure!(
@@ -60,10 +96,21 @@ pub fn convert(
         "{}: packed files are read and not written, expected a name without .gz",
         output.display()
     );
-    let (recording, disorder) = read_files(&[input.to_owned()], options)?;
-    write_atomically(output, |out| match format {
-        Format::Text(format) => (format.write)(&recording, &mut BufWriter::new(out)),
-        Format::Mcap => encode_mcap(&recording, out),
+    let read = read_watched(&[input.to_owned()], options, &mut |share| {
+        progress(ConvertStage::Read(share));
+    })?;
+    let (recording, disorder) = (read.recording, read.disorder);
+    write_atomically(output, |out| {
+        let bytes = 0;
+        let out = CountedOutput {
+            out,
+            bytes,
+            progress,
+        };
+        match format {
+            Format::Text(format) => (format.write)(&recording, &mut BufWriter::new(out)),
+            Format::Mcap => encode_mcap(&recording, out),
+        }
     })
     .with_context(|| format!("converting {} to {}", input.display(), output.display()))?;
     Ok(report(&recording, disorder, format))

@@ -1,12 +1,13 @@
 //! Reads MCAP files, whole and checked: every checksum, every length, every value.
 //!
 //! A file that is truncated or fails a checksum is refused as a whole, since what can be read of it
-//! might be less, or other, than what was measured. Topics that are neither benchmarks nor channels
+//! might be less, or other, than what was measured; but for the end of a record that a daemon writes, which is
+//! read as far as it goes. Topics that are neither benchmarks nor channels
 //! are left out.
 
 use super::bytes::{is_stdin, stdin};
 use super::collect::Collector;
-use super::mcap_write::PROVENANCE;
+use super::mcap_stream::{GROWING, PROVENANCE};
 use super::message::{MessageError, Topic, decode_message, is_said};
 use super::{IngestError, Item, ReadOptions};
 use crate::reading::{Disorder, Recording};
@@ -26,7 +27,10 @@ const RECORD_LENGTH_LIMIT: usize = 64 << 20;
 pub(super) fn read_mcap(
     file: &Path,
     options: &ReadOptions,
+    progress: &mut dyn FnMut(f64),
 ) -> Result<(Recording, Disorder), IngestError> {
+    let length = file.metadata().map_or(0, |metadata| metadata.len());
+    let mut done = 0;
     let fail = |source| IngestError::Read {
         file: file.into(),
         source,
@@ -47,10 +51,19 @@ pub(super) fn read_mcap(
     );
     let mut contents = Contents::new(file, options);
     while let Some(event) = reader.next_event() {
-        match event.map_err(|source| contents.damaged(source))? {
+        let event = match event {
+            Err(McapError::UnexpectedEof) if contents.grows => {
+                contents.unended = 1;
+                break;
+            }
+            event => event.map_err(|source| contents.damaged(source))?,
+        };
+        match event {
             LinearReadEvent::ReadRequest(wanted) => {
                 let read = input.read(reader.insert(wanted)).map_err(fail)?;
                 reader.notify_read(read);
+                done += read;
+                progress(done as f64 / length.max(1) as f64);
             }
             LinearReadEvent::Record { opcode, data } => {
                 let record = ::mcap::parse_record(opcode, data);
@@ -67,6 +80,9 @@ struct Contents<'a> {
     channels: BTreeMap<u16, Channel>,
     collected: Collector,
     provenance: BTreeMap<String, String>,
+    /// Whether it may have no end.
+    grows: bool,
+    unended: usize,
     messages: u64,
     taken: u64,
     counted: Option<u64>,
@@ -80,6 +96,8 @@ impl<'a> Contents<'a> {
             channels: BTreeMap::new(),
             collected: Collector::default(),
             provenance: BTreeMap::new(),
+            grows: false,
+            unended: 0,
             messages: 0,
             taken: 0,
             counted: None,
@@ -125,6 +143,7 @@ impl<'a> Contents<'a> {
             Record::Metadata(metadata) if metadata.name == PROVENANCE => {
                 self.provenance.extend(metadata.metadata);
             }
+            Record::Metadata(metadata) if metadata.name == GROWING => self.grows = true,
             Record::Statistics(statistics) => self.counted = Some(statistics.message_count),
             _ => {}
         }
@@ -178,7 +197,9 @@ impl<'a> Contents<'a> {
                 topics: topics.collect(),
             });
         }
-        Ok(self.collected.finish(self.provenance))
+        let (recording, mut disorder) = self.collected.finish(self.provenance);
+        disorder.unended = self.unended;
+        Ok((recording, disorder))
     }
 }
 

@@ -10,6 +10,7 @@ mod csv;
 mod encoding;
 mod error;
 mod mcap;
+mod mcap_stream;
 mod mcap_write;
 mod message;
 mod ndjson;
@@ -29,11 +30,12 @@ mod vector;
 pub use bytes::{is_packed, unpack, unpacked_name};
 pub use column_map::{ColumnMap, ColumnMapError, Measure};
 pub use columns::Meaning;
-pub use convert::{ChannelCount, ConvertReport, SeriesCount, convert};
+pub use convert::{ChannelCount, ConvertReport, ConvertStage, SeriesCount, convert};
 pub use csv::{CSV, CsvRows};
 pub use encoding::{Transcoder, latin1};
 pub use error::IngestError;
-pub(super) use mcap_write::{EventTopic, write_mcap_with};
+pub(super) use mcap_stream::{McapStream, TopicHead, reading_json};
+pub(super) use mcap_write::write_mcap_by;
 pub use mcap_write::{encode_mcap, write_mcap};
 pub(super) use message::escape;
 pub use message::{MessageError, decode_message};
@@ -220,9 +222,18 @@ pub fn read_with_remarks(
     paths: &[PathBuf],
     options: &ReadOptions,
 ) -> Result<FilesRead, IngestError> {
+    read_watched(paths, options, &mut |_| {})
+}
+
+/// As [`read_with_remarks`]; `progress` is told the share of the present file that is read, 0 to 1.
+fn read_watched(
+    paths: &[PathBuf],
+    options: &ReadOptions,
+    progress: &mut dyn FnMut(f64),
+) -> Result<FilesRead, IngestError> {
     let each: Vec<(&Path, &ReadOptions)> =
         paths.iter().map(|path| (path.as_path(), options)).collect();
-    let read = read_each(&each)?;
+    let read = read_each_watched(&each, progress)?;
     for map in &options.columns {
         if !read.columns.contains(&map.column) {
             return Err(IngestError::NoSuchColumn {
@@ -239,18 +250,25 @@ pub fn read_with_remarks(
 /// # Errors
 /// As [`read_files`], but for columns of the options that no file has.
 pub fn read_each(files: &[(&Path, &ReadOptions)]) -> Result<FilesRead, IngestError> {
+    read_each_watched(files, &mut |_| {})
+}
+
+fn read_each_watched(
+    files: &[(&Path, &ReadOptions)],
+    progress: &mut dyn FnMut(f64),
+) -> Result<FilesRead, IngestError> {
     let (mut parts, mut read) = (Vec::new(), FilesRead::default());
     for (path, options) in files {
         let (recording, met) = match Format::of(path)? {
             Format::Text(format) => {
-                let table = text::read_text(format, path, options)?;
+                let table = text::read_text(format, path, options, progress)?;
                 read.columns.extend(table.columns);
                 let remarks = table.remarks.into_iter();
                 read.remarks
                     .extend(remarks.map(|one| (path.to_path_buf(), one)));
                 (table.recording, table.disorder)
             }
-            Format::Mcap => mcap::read_mcap(path, options)?,
+            Format::Mcap => mcap::read_mcap(path, options, progress)?,
         };
         parts.push(recording);
         read.disorder += met;

@@ -77,6 +77,9 @@ impl TextRows {
     }
 }
 
+/// It is said how far a file has been read each time after so many lines.
+const LINES_A_LOOK: u64 = 256;
+
 /// A whole file, read.
 #[derive(Debug)]
 pub(super) struct Table {
@@ -93,13 +96,19 @@ pub(super) fn read_text(
     format: &TextFormat,
     file: &Path,
     options: &ReadOptions,
+    progress: &mut dyn FnMut(f64),
 ) -> Result<Table, IngestError> {
     let bytes = read_bytes(file)?;
     let bytes = Transcoder::default().feed(&bytes);
+    let mut done = 0;
     let mut rows = TextRows::new(format, &super::bytes::shown_name(file), options);
     let mut collected = Collector::default();
     let mut remarks = Vec::new();
     for (text, line) in bytes.split(|byte| *byte == b'\n').zip(1..) {
+        done += text.len() + 1;
+        if line % LINES_A_LOOK == 0 {
+            progress(done as f64 / bytes.len() as f64);
+        }
         let taken = match std::str::from_utf8(text) {
             Ok(text) => rows.take(line, text),
             Err(_) => rows.take(line, &not_utf8(&rows, file, line, text, &mut remarks)?),

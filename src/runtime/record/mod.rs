@@ -1,19 +1,25 @@
-//! What a replay said, beside the readings that it was given, as one MCAP file: fits, forecasts, levels, alerts.
+//! What was said beside the readings, as MCAP: fits, forecasts, levels, alerts, a log.
 //!
-//! Readings stand as in any recording, so that the file can be replayed again. Times that lie ahead stand twice: as
-//! they are, and as days from the message, which can be drawn. What does not exist is left out of a message, because
-//! few readers of MCAP know schemas in which a number may be null.
+//! Readings stand as in any recording, so that the file can be replayed again. A replay writes one file at its end, a
+//! daemon file after file while it works (`live`); both by the same writer (`topics`).
 
+mod files;
+mod level_now;
+pub mod live;
+mod messages;
 mod schemas;
+pub mod standing;
+mod topics;
 
-use super::ingest::{EventTopic, IngestError, escape, write_mcap_with};
-use crate::alert::Level;
-use crate::monitor::{Event, EventKind, FailureTime, Input, LevelStretch, Measured, levels_in};
-use crate::reading::{BenchmarkId, Channel, Quantity, Recording, Series, Timestamp, days_since};
+use super::ingest::{IngestError, write_mcap_by};
+use crate::monitor::{Event, Input, Measured};
+use crate::reading::{BenchmarkId, Channel, Quantity, Recording, Series, Timestamp};
+use crate::runtime::replay::arrivals;
 use crate::store::{Store, StoreError};
-use serde_json::{Map, Value, json};
-use std::collections::{BTreeMap, BTreeSet};
+use level_now::LevelsNow;
+use std::collections::BTreeMap;
 use std::path::Path;
+use topics::TopicWriter;
 
 /// Writes `recording` and the `events` that followed from it into `file`; `words` gives an event's line for a person.
 ///
@@ -25,27 +31,29 @@ pub fn write(
     events: &[Event],
     words: &dyn Fn(&Event) -> String,
 ) -> Result<(), IngestError> {
+    let values = arrivals(recording);
     // A daemon judges what is current before the past.
-    let mut events = events.to_vec();
+    let mut events: Vec<&Event> = events.iter().collect();
     events.sort_by_key(|event| event.time);
-    let events = &events[..];
-    let mut topics = refits(events);
-    topics.extend(levels(recording, events));
-    topics.push(EventTopic {
-        name: "/alerts".to_owned(),
-        schema: schemas::alert(),
-        messages: events.iter().filter_map(alert).collect(),
-    });
-    topics.push(EventTopic {
-        name: "/log".to_owned(),
-        schema: schemas::log(),
-        messages: events
-            .iter()
-            .filter_map(|event| log(event, words))
-            .collect(),
-    });
-    topics.retain(|topic| !topic.messages.is_empty());
-    write_mcap_with(recording, &topics, file)
+    let times = values.first().map(|one| one.time).into_iter();
+    let first = times.chain(events.first().map(|event| event.time)).min();
+    let first = first.unwrap_or_default();
+    write_mcap_by(file, |out| {
+        let mut writer = TopicWriter::create(out, first, &recording.provenance)?;
+        let (mut levels, mut events) = (LevelsNow::default(), events.into_iter().peekable());
+        for value in &values {
+            while let Some(event) = events.next_if(|event| event.time < value.time) {
+                writer.event(event, &words(event), &mut levels)?;
+            }
+            if let Some(measured) = value.input.measured() {
+                writer.measured(&measured, &levels)?;
+            }
+        }
+        for event in events {
+            writer.event(event, &words(event), &mut levels)?;
+        }
+        writer.finish()
+    })
 }
 
 /// Everything measured that a daemon took in, up to `until`.
@@ -122,231 +130,4 @@ fn take(
         }
         None => {}
     }
-}
-
-fn topic_of(benchmark: &BenchmarkId, what: &str) -> String {
-    format!("/benchmarks/{}/{what}", escape(benchmark.as_str()))
-}
-
-/// For each benchmark its fits and its forecasts.
-fn refits(events: &[Event]) -> Vec<EventTopic> {
-    let mut fits: BTreeMap<&BenchmarkId, Vec<(Timestamp, Value)>> = BTreeMap::new();
-    let mut forecasts = fits.clone();
-    for event in events {
-        let Some(benchmark) = &event.benchmark else {
-            continue;
-        };
-        if let Some((fit, forecast)) = refit(event) {
-            fits.entry(benchmark).or_default().push((event.time, fit));
-            let forecasts = forecasts.entry(benchmark).or_default();
-            forecasts.push((event.time, forecast));
-        }
-    }
-    let fits = fits.into_iter().map(|(benchmark, messages)| EventTopic {
-        name: topic_of(benchmark, "fit"),
-        schema: schemas::fit(),
-        messages,
-    });
-    let forecasts = forecasts
-        .into_iter()
-        .map(|(benchmark, messages)| EventTopic {
-            name: topic_of(benchmark, "forecast"),
-            schema: schemas::forecast(),
-            messages,
-        });
-    fits.chain(forecasts).collect()
-}
-
-fn refit(event: &Event) -> Option<(Value, Value)> {
-    let EventKind::Refit {
-        t_max,
-        regime,
-        failure_time,
-        critical_velocity_time,
-        probability_of_acceleration,
-        inverse_velocity,
-        transition_time,
-        velocity_mm_per_day,
-        chance_within_evacuation_time,
-        chance_within_outlook,
-        ..
-    } = &event.kind
-    else {
-        return None;
-    };
-    let line = inverse_velocity.failure_time;
-    let fit = present(json!({
-        "time": event.time,
-        "t_max": t_max,
-        "regime": regime.label,
-        "probability_unstable": regime.probability_unstable,
-        "probability_accelerating": regime.probability_accelerating,
-        "probability_of_acceleration": probability_of_acceleration,
-        "velocity_mm_per_day": velocity_mm_per_day,
-        "transition_time": transition_time,
-        "inverse_velocity_failure_time": line,
-        "inverse_velocity_failure_days": line.map(|line| days_since(event.time, line)),
-        "inverse_velocity_r_squared": inverse_velocity.r_squared,
-    }));
-    let mut forecast = quantiles(event.time, failure_time, "");
-    forecast.extend(quantiles(
-        event.time,
-        critical_velocity_time,
-        "critical_velocity_",
-    ));
-    forecast.insert("time".to_owned(), json!(event.time));
-    for (key, chance) in [
-        (
-            "chance_within_evacuation_time",
-            chance_within_evacuation_time,
-        ),
-        ("chance_within_outlook", chance_within_outlook),
-    ] {
-        forecast.insert(key.to_owned(), json!(chance));
-    }
-    Some((fit, present(Value::Object(forecast))))
-}
-
-fn quantiles(now: Timestamp, time: &FailureTime, before: &str) -> Map<String, Value> {
-    let days = |at: Option<Timestamp>| at.map(|at| days_since(now, at));
-    let all = [
-        ("low", json!(time.low)),
-        ("median", json!(time.median)),
-        ("high", json!(time.high)),
-        ("low_days", json!(days(time.low))),
-        ("median_days", json!(days(time.median))),
-        ("high_days", json!(days(time.high))),
-        ("probability", json!(time.probability)),
-        ("horizon_days", json!(time.horizon_days)),
-    ];
-    all.map(|(key, value)| (format!("{before}{key}"), value))
-        .into_iter()
-        .collect()
-}
-
-/// Without what does not exist.
-fn present(mut message: Value) -> Value {
-    if let Some(members) = message.as_object_mut() {
-        members.retain(|_, value| !value.is_null());
-    }
-    message
-}
-
-/// For each benchmark, and for the site where it has one, the level at its beginning and at each change.
-fn levels(recording: &Recording, events: &[Event]) -> Vec<EventTopic> {
-    let times = || recording.series.iter().flat_map(|series| &series.readings);
-    let (Some(first), Some(last)) = (
-        times().map(|reading| reading.time).min(),
-        times().map(|reading| reading.time).max(),
-    ) else {
-        return Vec::new();
-    };
-    let benchmarks: BTreeSet<Option<&BenchmarkId>> = recording
-        .series
-        .iter()
-        .map(|series| Some(&series.benchmark))
-        .chain(
-            events
-                .iter()
-                .filter(|event| alert(event).is_some())
-                .map(|event| event.benchmark.as_ref()),
-        )
-        .collect();
-    let one = |benchmark: Option<&BenchmarkId>| EventTopic {
-        name: benchmark.map_or_else(|| "/site/level".to_owned(), |id| topic_of(id, "level")),
-        schema: schemas::level(),
-        messages: changes(&levels_in(events, benchmark, (first, last)), last),
-    };
-    benchmarks.into_iter().map(one).collect()
-}
-
-/// The level, and whether it is unknown, at each time at which one of them changes.
-fn changes(
-    (levels, unknown): &(Vec<LevelStretch>, Vec<LevelStretch>),
-    last: Timestamp,
-) -> Vec<(Timestamp, Value)> {
-    let starts = levels.iter().chain(unknown).map(|one| one.from);
-    let ends = unknown.iter().map(|one| one.to).filter(|to| *to < last);
-    let times: BTreeSet<Timestamp> = starts.chain(ends).collect();
-    let at = |time: Timestamp| {
-        let level = levels.iter().rev().find(|one| one.from <= time);
-        let level = level.map_or(Level::Green, |one| one.level);
-        let is_unknown = unknown
-            .iter()
-            .any(|one| one.from <= time && (time < one.to || one.to == last));
-        let message = json!({
-            "time": time,
-            "level": level,
-            "number": number(level),
-            "is_unknown": is_unknown,
-        });
-        (time, message)
-    };
-    times.into_iter().map(at).collect()
-}
-
-/// The level as something that can be drawn.
-fn number(level: Level) -> u8 {
-    match level {
-        Level::Green | Level::Unknown => 0,
-        Level::Yellow => 1,
-        Level::Orange => 2,
-        Level::Red => 3,
-    }
-}
-
-fn alert(event: &Event) -> Option<(Timestamp, Value)> {
-    let EventKind::Alert {
-        level,
-        state,
-        key,
-        rule,
-        text,
-    } = &event.kind
-    else {
-        return None;
-    };
-    let message = present(json!({
-        "time": event.time,
-        "benchmark": event.benchmark,
-        "level": level,
-        "state": state,
-        "key": key,
-        "rule": rule,
-        "text": text,
-    }));
-    Some((event.time, message))
-}
-
-/// As Foxglove's log panel shows it.
-fn log(event: &Event, words: &dyn Fn(&Event) -> String) -> Option<(Timestamp, Value)> {
-    if matches!(event.kind, EventKind::Refit { .. } | EventKind::Summary(_)) {
-        return None;
-    }
-    let gravity = if let EventKind::Alert { level, .. } = &event.kind {
-        match level {
-            Level::Green => schemas::INFO,
-            Level::Yellow | Level::Unknown => schemas::WARNING,
-            Level::Orange => schemas::ERROR,
-            Level::Red => schemas::FATAL,
-        }
-    } else if event.kind.is_of_data() {
-        schemas::WARNING
-    } else {
-        schemas::INFO
-    };
-    let of = event.benchmark.as_ref().map_or("site", BenchmarkId::as_str);
-    let nanosecond = event.time.as_nanosecond();
-    let message = json!({
-        "timestamp": {
-            "sec": i64::try_from(nanosecond.div_euclid(1_000_000_000)).unwrap_or_default(),
-            "nsec": u32::try_from(nanosecond.rem_euclid(1_000_000_000)).unwrap_or_default(),
-        },
-        "level": gravity,
-        "message": words(event),
-        "name": of,
-        "file": event.kind.name(),
-        "line": 0,
-    });
-    Some((event.time, message))
 }

@@ -8,7 +8,7 @@ pub(super) const WARNING: u8 = 3;
 pub(super) const ERROR: u8 = 4;
 pub(super) const FATAL: u8 = 5;
 
-type Schema = (&'static str, String);
+pub(super) type Schema = (&'static str, String);
 /// A key, its type and what it means; it is there in each message where the type has no `?`.
 type Field = (&'static str, &'static str, &'static str);
 

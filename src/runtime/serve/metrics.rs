@@ -76,6 +76,11 @@ fn trouble(sheet: &mut Sheet<'_>, health: &Health) -> fmt::Result {
             health.held as f64,
         ),
         (
+            "record_failed",
+            "1 while the record in MCAP files cannot be written",
+            flag((health.record.as_ref()).is_some_and(|record| record.failure.is_some())),
+        ),
+        (
             "silences",
             "Orders in force by which alerts are not reported",
             health.silences.len() as f64,
