@@ -39,7 +39,7 @@ fn readings(count: i64) -> String {
 #[test]
 fn convert_says_how_much_is_read_and_then_written() {
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("5.csv"), readings(50_000)).unwrap();
+    fs::write(folder.path().join("5.csv"), readings(300_000)).unwrap();
     for out in ["out.ndjson", "out.mcap"] {
         let (on_a_terminal, in_a_file) = said(folder.path(), &["convert", "5.csv", out]);
         assert!(on_a_terminal.contains(" %, "), "{on_a_terminal:?}");

@@ -52,8 +52,8 @@ fn a_recording_converted_there_and_back_is_the_same_readings() {
         let folder = TempDir::new().unwrap();
         let archive = folder.path().join("archive.mcap");
         let back = folder.path().join("back.csv");
-        let report = convert(&file, &archive, &options).unwrap();
-        convert(&archive, &back, &options).unwrap();
+        let report = convert(&file, &archive, &options, &mut |_| {}).unwrap();
+        convert(&archive, &back, &options, &mut |_| {}).unwrap();
         let (original, disorder) = read(&file).unwrap();
         assert_eq!(disorder, Disorder::default(), "{}", file.display());
         assert_identical(&original, &read(&archive).unwrap().0);
@@ -70,7 +70,7 @@ fn csv_holds_all_but_averaging_and_provenance_and_convert_says_so() {
     let archive = folder.path().join("made-up.mcap");
     let table = folder.path().join("made-up.csv");
     write_mcap(&made_up(), &archive).unwrap();
-    let report = convert(&archive, &table, &ReadOptions::default()).unwrap();
+    let report = convert(&archive, &table, &ReadOptions::default(), &mut |_| {}).unwrap();
     assert_eq!(report.left_out.len(), 2, "{:?}", report.left_out);
     let mut expected = made_up();
     expected.provenance.clear();
@@ -379,7 +379,7 @@ fn a_failed_conversion_leaves_the_old_file_as_it_was() {
     let archive = folder.path().join("a.mcap");
     write_mcap(&recording, &archive).unwrap();
     let table = write(&folder, "a.csv", "precious");
-    let error = convert(&archive, &table, &ReadOptions::default()).unwrap_err();
+    let error = convert(&archive, &table, &ReadOptions::default(), &mut |_| {}).unwrap_err();
     assert!(
         format!("{error:#}").contains("lake_displacement_m"),
         "{error:#}"

@@ -161,7 +161,7 @@ fn a_measured_recording_converted_to_ndjson_and_back_is_the_same() {
     let lines = folder.path().join("lines.ndjson");
     let options = ReadOptions::default();
     for file in ["lanzada_2025_f1.csv", "baishuihe_2006.csv"].map(measured) {
-        convert(&file, &lines, &options).unwrap();
+        convert(&file, &lines, &options, &mut |_| {}).unwrap();
         assert_identical(&read(&file).unwrap().0, &read(&lines).unwrap().0);
     }
 }

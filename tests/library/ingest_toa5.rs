@@ -242,8 +242,8 @@ fn a_measured_recording_converted_to_toa5_and_back_is_the_same_readings() {
     for file in names.map(measured) {
         let table = folder.path().join("table.dat");
         let back = folder.path().join("back.csv");
-        convert(&file, &table, &options).unwrap();
-        convert(&table, &back, &options).unwrap();
+        convert(&file, &table, &options, &mut |_| {}).unwrap();
+        convert(&table, &back, &options, &mut |_| {}).unwrap();
         let (original, _) = read(&file).unwrap();
         let (there, disorder) = read(&table).unwrap();
         assert_eq!(disorder, slipwatch::reading::Disorder::default());

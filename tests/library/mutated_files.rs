@@ -95,7 +95,7 @@ fn damage_text(extension: &str, seed: u64, read: fn(&[u8])) {
     let mut generator = Pcg64::seed_from_u64(seed);
     for recording in recordings() {
         let file = folder.path().join(format!("whole.{extension}"));
-        convert(&recording, &file, &ReadOptions::default()).unwrap();
+        convert(&recording, &file, &ReadOptions::default(), &mut |_| {}).unwrap();
         let mut bytes = fs::read(&file).unwrap();
         bytes.truncate(LONGEST);
         for _ in 0..COPIES {

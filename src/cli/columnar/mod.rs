@@ -78,6 +78,10 @@ fn begin<T: JsonSchema>() -> anyhow::Result<Box<dyn RowSink>> {
 }
 
 #[cfg(not(feature = "parquet"))]
+#[expect(
+    clippy::extra_unused_type_parameters,
+    reason = "the builds with the feature use it"
+)]
 fn begin<T: JsonSchema>() -> anyhow::Result<Box<dyn RowSink>> {
     let what = "--format parquet: this slipwatch was built without it; \
                 build it with: cargo build --release --features parquet";

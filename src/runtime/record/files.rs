@@ -2,12 +2,14 @@
 
 use std::ffi::OsStr;
 use std::fs::{self, File};
-use std::io;
+use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 /// Digits of a number in a name; no other file is taken for one of the record.
 const DIGITS: usize = 6;
 const ENDING: &str = ".mcap";
+/// The last bytes of a finished file.
+const END: [u8; 8] = *b"\x89MCAP0\r\n";
 
 /// Begins the next file and gives its path. No file that is there is written to.
 pub(super) fn begin(path: &Path) -> io::Result<(PathBuf, File)> {
@@ -41,6 +43,21 @@ pub(super) fn remove_oldest(path: &Path, most: u64) -> io::Result<()> {
         bytes -= own;
     }
     Ok(())
+}
+
+/// Whether the file has an end, as a finished one has.
+pub(super) fn is_ended(file: &Path) -> bool {
+    let last = || -> io::Result<[u8; END.len()]> {
+        let mut opened = File::open(file)?;
+        let length = i64::try_from(END.len()).unwrap_or_default();
+        // A file also begins so: it is longer than that.
+        opened.seek(SeekFrom::End(-2 * length))?;
+        opened.seek(SeekFrom::End(-length))?;
+        let mut last = [0; END.len()];
+        opened.read_exact(&mut last)?;
+        Ok(last)
+    };
+    last().is_ok_and(|last| last == END)
 }
 
 /// The number, path and bytes of each file, the oldest first.

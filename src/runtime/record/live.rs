@@ -354,7 +354,9 @@ impl Recorder {
         let Some(open) = self.open.take() else {
             return;
         };
-        if open.writer.finish().is_ok() && open.file.sync_all().is_ok() {
+        let finished = open.writer.finish();
+        // A writer that has failed before may say that it has finished.
+        if finished.is_ok() && files::is_ended(&open.path) && open.file.sync_all().is_ok() {
             return;
         }
         let cut = match open.whole {
