@@ -1,9 +1,10 @@
 //! What an effect must show before it is believed: sign, memory, bounds, and a later block that it helps to predict.
 
+use super::fresh::{best_of_starts, fresh_starts};
 use super::kind::{Form, Kind};
-use super::noise::{Noise, Whitener};
+use super::noise::Whitener;
 use super::problem::{Problem, median};
-use super::refit::{Fitted, Start, plain_starts, refit, refit_from};
+use super::refit::{Fitted, Start, refit};
 use super::response::Driver;
 use super::rival::Rival;
 use super::term::{Act, Scratch, Term, law_parameters};
@@ -179,10 +180,7 @@ pub(super) fn without_block(
     scratch: &mut Scratch,
 ) -> Option<Fitted> {
     let part = problem.trained_on(from);
-    let bank = [Whitener::new(&part, Noise::WHITE)];
-    let starts = plain_starts(&part).into_iter();
-    let starts: Vec<Start> = starts.map(|start| start.joined(terms)).collect();
-    refit_from(&part, &starts, &bank, scratch)
+    best_of_starts(&part, &fresh_starts(&part, terms), scratch)
 }
 
 /// The later block predicted reading after reading, each from those before it.

@@ -169,7 +169,8 @@ pub(super) fn refit_every_memory(
     likeliest(problem, fits)
 }
 
-fn likeliest(problem: &Problem, fits: impl Iterator<Item = Fitted>) -> Option<Fitted> {
+/// The fit of the lowest BIC.
+pub(super) fn likeliest(problem: &Problem, fits: impl Iterator<Item = Fitted>) -> Option<Fitted> {
     fits.min_by(|a, b| a.bic(problem).total_cmp(&b.bic(problem)))
 }
 
@@ -187,7 +188,7 @@ pub(super) fn refit(
         .or(bank.first())?;
     let mut best: Option<Fitted> = None;
     for _ in 0..NOISE_ROUNDS {
-        point = point.descend(problem, start, whitener, scratch);
+        point = point.descend(problem, start, whitener, (MOST_STEPS, scratch));
         let fitted = point.fitted(problem, &start.terms, whitener);
         if best
             .as_ref()
@@ -206,6 +207,18 @@ pub(super) fn refit(
         whitener = &bank[likeliest];
     }
     best
+}
+
+/// No more than `steps` towards the fit from one start, under one noise model.
+pub(super) fn towards(
+    problem: &Problem,
+    start: &Start,
+    whitener: &Whitener,
+    (steps, scratch): (usize, &mut Scratch),
+) -> Option<Fitted> {
+    let point = ParameterPoint::at(problem, &start.terms, start.parameters.clone(), scratch)?;
+    let there = point.descend(problem, start, whitener, (steps, scratch));
+    Some(there.fitted(problem, &start.terms, whitener))
 }
 
 /// A start at `fitted` under the noise that makes its residual likeliest.
@@ -351,13 +364,13 @@ impl ParameterPoint {
         problem: &Problem,
         start: &Start,
         whitener: &Whitener,
-        scratch: &mut Scratch,
+        (most_steps, scratch): (usize, &mut Scratch),
     ) -> Self {
         let terms = start.terms.as_slice();
         let prior = Prior::of(problem, terms);
         let mut innovations = whitener.whiten(&self.residual(problem));
         let mut damping = 1e-3;
-        for _ in 0..MOST_STEPS {
+        for _ in 0..most_steps {
             let columns = self.jacobian(problem, terms, scratch);
             let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
             let mut white = whitener.whiten_all(&columns);

@@ -161,13 +161,14 @@ impl Search<'_> {
         let null = self.null(&plain)?;
         let mut full = null.clone();
         let mut accepted = Vec::new();
-        while accepted.len() < MOST_EFFECTS {
-            progress(0.1 + 0.8 * accepted.len() as f64 / MOST_EFFECTS as f64);
-            let Some((next, how)) = self.one_more(&full, accepted.len()) else {
+        for round in 0..MOST_EFFECTS {
+            progress(0.1 + 0.8 * round as f64 / MOST_EFFECTS as f64);
+            let Some((next, how)) = self.one_more(&full, round) else {
                 break;
             };
             full = next;
             accepted.extend(how);
+            self.drop_needless(&mut full, &mut accepted);
         }
         Some(SearchResult {
             plain,
@@ -294,7 +295,7 @@ impl Search<'_> {
 
     fn withhold(&mut self, one: &Refitted) {
         if self.withheld.is_none_or(|best| best.bic_gain < one.gain) {
-            let at = one.term.at.and_then(|at| time_of(self.problem, at));
+            let at = time_of(self.problem, &one.term);
             self.withheld = Some(Withheld {
                 kind: one.term.kind,
                 at,
@@ -342,7 +343,7 @@ impl Search<'_> {
             effect: term.kind,
             channel,
             form: term.response.map(|response| response.form),
-            at: term.at.and_then(|at| time_of(self.problem, at)),
+            at: time_of(self.problem, term),
             lag_days: term.response.map(|response| response.mean_days),
             bic_gain: one.gain,
             p_value: Some(one.p_value),

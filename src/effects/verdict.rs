@@ -162,7 +162,7 @@ fn effect(
         p_value: Some(how.p_value),
         lag_days: term.response.map(|response| response.mean_days),
         memory_days: term.response.map(|response| response.memory_days()),
-        at: term.at.and_then(|at| time_of(problem, at)),
+        at: time_of(problem, term),
         bic_gain: how.bic_gain,
         contribution_rms: rms(&contribution(problem, full, index, scratch)).map(|c| c / factor),
         ..Effect::of(term.kind)

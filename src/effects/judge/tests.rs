@@ -13,6 +13,7 @@ fn term(kind: Kind, act: Act) -> Term {
         channel: None,
         response: None,
         at: None,
+        share: 0.5,
         act,
     }
 }
