@@ -82,7 +82,12 @@ pub(super) fn findings(
     let noise = noise_report(&full, unit);
     // Errors are those of least squares, before and after.
     let after = least_squares(problem, &full, scratch).unwrap_or_else(|| found.plain.clone());
-    let held = held_out(problem, (&[], &full), options.held_out_share, scratch);
+    let held = held_out(
+        problem,
+        (&found.plain, &full),
+        options.held_out_share,
+        scratch,
+    );
     let both = (&found.null, &full);
     let error = ErrorChange {
         held_out_step: held.as_ref().map_or_else(Change::default, |held| {

@@ -7,8 +7,8 @@ use super::refit::{Fitted, Start, plain_starts, refit_from, towards};
 use super::term::{Scratch, Term, law_parameters};
 
 /// So many steps from each start, and only the best so many starts are followed to the end.
-const FIRST_STEPS: usize = 5;
-const FOLLOWED: usize = 2;
+const FIRST_STEPS: usize = 8;
+const FOLLOWED: usize = 4;
 
 /// Starts of the law with `terms`, at every size that they may start at.
 pub(super) fn fresh_starts(problem: &Problem, terms: &[Term]) -> Vec<Start> {
@@ -54,5 +54,7 @@ pub(super) fn best_of_starts(
         .collect();
     first.sort_by(|a, b| a.surprise.total_cmp(&b.surprise));
     let leading: Vec<Start> = first.iter().take(FOLLOWED).map(Start::at).collect();
-    refit_from(problem, &leading, &white, scratch)
+    let best = refit_from(problem, &leading, &white, scratch)?;
+    // What goes along a narrow valley has not arrived after one fit's steps.
+    refit_from(problem, &[Start::at(&best)], &white, scratch)
 }

@@ -25,6 +25,7 @@ mod together;
 
 mod linear;
 mod noise;
+mod prior;
 mod problem;
 mod ready;
 mod refit;

@@ -3,6 +3,7 @@
 use super::candidates;
 use super::companions::{go_together, is_rain};
 use super::explanation::Candidate;
+use super::fresh::best_of_starts;
 use super::judge::{block, held_out, named, objection, step_errors};
 use super::kind::Kind;
 use super::noise::{Noise, Whitener};
@@ -136,8 +137,7 @@ impl Refitted {
 
 /// The plain law by least squares; `None` where no start leads to a motion.
 pub(super) fn plain(problem: &Problem, scratch: &mut Scratch) -> Option<Fitted> {
-    let white = [Whitener::new(problem, Noise::WHITE)];
-    refit_from(problem, &plain_starts(problem), &white, scratch)
+    best_of_starts(problem, &plain_starts(problem), scratch)
 }
 
 impl Search<'_> {
@@ -310,7 +310,7 @@ impl Search<'_> {
         if block(self.problem, &one.fitted.terms, share).is_none() {
             return (None, None);
         }
-        let models = (base.terms.as_slice(), &one.fitted);
+        let models = (base, &one.fitted);
         let Some(held) = held_out(self.problem, models, share, &mut self.scratch) else {
             let reason = "without the later block it cannot be fitted".to_owned();
             return (None, Some(reason));

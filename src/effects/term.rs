@@ -55,7 +55,7 @@ impl Term {
     /// several sizes.
     pub(super) fn starts(&self) -> &'static [f64] {
         match self.act {
-            Act::PerVelocity => &[0.1, 1.0, 5.0],
+            Act::PerVelocity => &[0.1, 0.4, 1.5, 5.0],
             Act::PerSlip => &[0.3, 2.0],
             Act::Averaging => &[2.0, 8.0],
             // From next to nothing a fit seldom finds its way to a state that was halved or doubled.
