@@ -11,7 +11,7 @@ use super::problem::Problem;
 use super::ready::Ready;
 use super::refit::Fitted;
 use super::search::Search;
-use super::term::{Scratch, Term};
+use super::term::Scratch;
 use super::trials::{Ground, Trial};
 use super::witnesses::distinct;
 use crate::reading::{Channel, Series, Timestamp, after_days, days_since};
