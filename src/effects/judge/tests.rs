@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::effects::fixture::{channel, daily, epoch, generator, normals, steady};
+use crate::effects::noise::Noise;
 use crate::effects::response::Response;
 use crate::reading::Quantity;
 
