@@ -29,7 +29,7 @@ pub(super) struct Prior {
 }
 
 /// A quantity that should be small, with its derivatives by some of the parameters.
-struct Row {
+struct Penalty {
     value: f64,
     by: [(usize, f64); 3],
 }
@@ -91,7 +91,7 @@ impl Prior {
     /// r, an acceleration by e over the record being nothing rare; kappa times the span over its deviation, where it lets
     /// small departures grow: a block balanced on an unstable steady state for a whole record is no slope's; and how fast
     /// a steady state is approached.
-    fn rows(&self, parameters: &[f64]) -> [Row; 3] {
+    fn rows(&self, parameters: &[f64]) -> [Penalty; 3] {
         let (r, a, p) = (parameters[R], parameters[LN_A].exp(), parameters[P]);
         let scale = MOST_ACCELERATION + if r < 0.0 { a } else { 0.0 };
         let by_a = if r < 0.0 {
@@ -109,15 +109,15 @@ impl Prior {
         };
         let per_b = approach * (1.0 - p);
         [
-            Row {
+            Penalty {
                 value: r / scale,
                 by: [(R, 1.0 / scale), (LN_A, by_a), (P, 0.0)],
             },
-            Row {
+            Penalty {
                 value: growth,
                 by: [(R, 0.0), (LN_A, growth), (P, by_p)],
             },
-            Row {
+            Penalty {
                 value: per_b * b,
                 by: [(R, per_b), (LN_A, per_b * a), (P, -approach * b)],
             },
