@@ -4,7 +4,7 @@ use super::frame::dot;
 use super::kind::{Form, Kind};
 use super::problem::{Problem, median};
 use super::response::{Driver, Response};
-use super::term::{Act, Term};
+use super::term::{Act, MIDDLE, Term};
 use crate::reading::Quantity;
 
 /// One year, days.
@@ -34,6 +34,7 @@ fn plain(kind: Kind, act: Act) -> Term {
         channel: None,
         response: None,
         at: None,
+        share: MIDDLE,
         act,
     }
 }
@@ -65,6 +66,7 @@ pub(super) fn of_channel(
         channel: Some(index),
         response: Some(response),
         at: None,
+        share: MIDDLE,
         act: Act::Load(vec![column]),
     })
 }
@@ -249,6 +251,7 @@ pub(super) fn thermal(
         channel: Some(index),
         response: Some(response),
         at: None,
+        share: MIDDLE,
         act: Act::Reading(vec![column]),
     })
 }

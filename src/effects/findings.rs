@@ -7,13 +7,14 @@ use super::explanation::{
     Candidate, Change, Curves, Effect, ErrorChange, Explained, NoiseReport, ResidualTests,
     Structure,
 };
+use super::fresh::{best_of_starts, fresh_starts};
 use super::judge::{HeldOut, held_out, named, step_errors};
 use super::kind::Kind;
 use super::known_load::KnownLoad;
-use super::noise::{Memory, Noise, Whitener};
+use super::noise::{Memory, Whitener};
 use super::options::Options;
 use super::problem::Problem;
-use super::refit::{Fitted, Start, plain_starts, refit_from};
+use super::refit::{Fitted, Start};
 use super::response::Driver;
 use super::rival::Rival;
 use super::search::SearchResult;
@@ -81,7 +82,12 @@ pub(super) fn findings(
     let noise = noise_report(&full, unit);
     // Errors are those of least squares, before and after.
     let after = least_squares(problem, &full, scratch).unwrap_or_else(|| found.plain.clone());
-    let held = held_out(problem, (&[], &full), options.held_out_share, scratch);
+    let held = held_out(
+        problem,
+        (&found.plain, &full),
+        options.held_out_share,
+        scratch,
+    );
     let both = (&found.null, &full);
     let error = ErrorChange {
         held_out_step: held.as_ref().map_or_else(Change::default, |held| {
@@ -213,11 +219,9 @@ pub(super) fn least_squares(
     full: &Fitted,
     scratch: &mut Scratch,
 ) -> Option<Fitted> {
-    let white = [Whitener::new(problem, Noise::WHITE)];
-    let starts = plain_starts(problem).into_iter();
-    let mut starts: Vec<Start> = starts.map(|start| start.joined(&full.terms)).collect();
+    let mut starts = fresh_starts(problem, &full.terms);
     starts.push(Start::at(full));
-    refit_from(problem, &starts, &white, scratch)
+    best_of_starts(problem, &starts, scratch)
 }
 
 /// A name that no curve has yet.
@@ -243,7 +247,7 @@ fn log_load(problem: &Problem, full: &Fitted, index: usize) -> Option<Vec<f64>> 
             Some(each.map(|(column, gain)| gain * column[node]).sum())
         }
         Act::Step => {
-            let from = super::term::event_node(problem, term.at?);
+            let (from, _) = super::term::event_place(problem, (term.at?, term.share));
             Some(if node >= from { own[0] } else { 0.0 })
         }
         Act::Reset

@@ -11,7 +11,7 @@ use super::problem::Problem;
 use super::ready::Ready;
 use super::refit::Fitted;
 use super::search::Search;
-use super::term::{Scratch, Term};
+use super::term::Scratch;
 use super::trials::{Ground, Trial};
 use super::witnesses::distinct;
 use crate::reading::{Channel, Series, Timestamp, after_days, days_since};
@@ -72,13 +72,13 @@ pub fn error_given(
         None => block(problem, &full.terms, options.held_out_share),
     };
     if let Some(from) = from.filter(|from| (8..all.end).contains(from)) {
-        let mut held = |terms: &[Term]| {
-            let fitted = without_block(problem, terms, from, &mut scratch)?;
+        let mut held = |fitted: &Fitted| {
+            let fitted = without_block(problem, fitted, from, &mut scratch)?;
             of(&fitted, from..all.end)
         };
         error.held_out = Change {
-            before: held(&[]),
-            after: held(&full.terms),
+            before: held(&ready.plain),
+            after: held(&full),
         };
         error.held_out_from = after_days(problem.epoch, problem.t[from]);
     }

@@ -1,9 +1,10 @@
 //! What an effect must show before it is believed: sign, memory, bounds, and a later block that it helps to predict.
 
+use super::fresh::{best_of_starts, fresh_starts};
 use super::kind::{Form, Kind};
-use super::noise::{Noise, Whitener};
+use super::noise::Whitener;
 use super::problem::{Problem, median};
-use super::refit::{Fitted, Start, plain_starts, refit, refit_from};
+use super::refit::{Fitted, Start, refit};
 use super::response::Driver;
 use super::rival::Rival;
 use super::term::{Act, Scratch, Term, law_parameters};
@@ -155,11 +156,11 @@ pub(super) fn block(problem: &Problem, terms: &[Term], share: f64) -> Option<usi
     (from + FEWEST_HELD_OUT <= n && from >= 2 * FEWEST_HELD_OUT).then_some(from)
 }
 
-/// Fits both models without the block, by least squares from fresh starts: nothing of it is known to them but the
-/// covariates and the shape of the response.
+/// Fits both models without the block, by least squares: nothing of it is known to them but the covariates, the shape of
+/// the response, and where a fit to all may start one.
 pub(super) fn held_out(
     problem: &Problem,
-    (before, after): (&[Term], &Fitted),
+    (before, after): (&Fitted, &Fitted),
     share: f64,
     scratch: &mut Scratch,
 ) -> Option<HeldOut> {
@@ -167,22 +168,22 @@ pub(super) fn held_out(
     Some(HeldOut {
         from,
         before: without_block(problem, before, from, scratch)?,
-        after: without_block(problem, &after.terms, from, scratch)?,
+        after: without_block(problem, after, from, scratch)?,
     })
 }
 
-/// The law with these terms by least squares from fresh starts, without the readings from `from` on.
+/// The law with the terms of `fitted` by least squares from fresh starts and from there, without the readings from `from`
+/// on.
 pub(super) fn without_block(
     problem: &Problem,
-    terms: &[Term],
+    fitted: &Fitted,
     from: usize,
     scratch: &mut Scratch,
 ) -> Option<Fitted> {
     let part = problem.trained_on(from);
-    let bank = [Whitener::new(&part, Noise::WHITE)];
-    let starts = plain_starts(&part).into_iter();
-    let starts: Vec<Start> = starts.map(|start| start.joined(terms)).collect();
-    refit_from(&part, &starts, &bank, scratch)
+    let mut starts = fresh_starts(&part, &fitted.terms);
+    starts.push(Start::at(fitted));
+    best_of_starts(&part, &starts, scratch)
 }
 
 /// The later block predicted reading after reading, each from those before it.

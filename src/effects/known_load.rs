@@ -252,11 +252,11 @@ fn part(problem: &Problem, term: &Term, own: &[f64], drivers: &[(usize, Driver)]
         (Kind::Seasonal, Act::Load(_)) => Some(waves(problem, term, own, &candidates::SEASON)),
         (Kind::Tide, Act::Load(_)) => Some(waves(problem, term, own, &candidates::TIDE)),
         (Kind::LoadStep, Act::Step) => Some(Part::Step {
-            at: time_of(problem, term.at?)?,
+            at: time_of(problem, term)?,
             size: *own.first()?,
         }),
         (Kind::Offset, Act::Reading(_)) => Some(Part::Offset {
-            at: time_of(problem, term.at?)?,
+            at: time_of(problem, term)?,
             size: *own.first()?,
         }),
         _ => None,

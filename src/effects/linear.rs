@@ -1,9 +1,12 @@
 //! What a small effect would change in every reading: the law linearised about its fitted motion.
 
 use super::problem::Problem;
-use super::term::{Act, Feedback, Scratch, Term, event_node, law, law_parameters};
+use super::term::{Act, Feedback, Scratch, Term, event_place, law, law_parameters};
 use crate::model::Driven;
 use crate::reading::Quantity;
+
+/// From the first node on.
+const START: (usize, f64) = (0, 0.0);
 
 /// The law's own response to small changes, along the nodes.
 #[derive(Debug, Clone)]
@@ -97,12 +100,14 @@ impl Linear {
     pub(super) fn of_law(&self, problem: &Problem) -> Vec<Vec<f64>> {
         let a = self.a[0];
         let mut columns = vec![
-            self.run(problem, (0, 1.0, 0.0), &|_| 0.0),
-            self.run(problem, (0, 0.0, 0.0), &|k| -self.relative[k] / self.span),
-            self.run(problem, (0, 0.0, 0.0), &|k| {
+            self.run(problem, (START, (1.0, 0.0)), &|_| 0.0),
+            self.run(problem, (START, (0.0, 0.0)), &|k| {
+                -self.relative[k] / self.span
+            }),
+            self.run(problem, (START, (0.0, 0.0)), &|k| {
                 self.a[k] * self.healing[k] - a * self.relative[k]
             }),
-            self.run(problem, (0, 0.0, 0.0), &|k| {
+            self.run(problem, (START, (0.0, 0.0)), &|k| {
                 self.a[k] * self.ln_y[k] * self.healing[k]
             }),
         ];
@@ -112,15 +117,20 @@ impl Linear {
         columns
     }
 
-    /// From node `from` on: ln v changes by `direct`, ln y by `jump`, and the slope of ln y by `forcing`.
+    /// From `early` days before node `from` on: ln v changes by `direct`, ln y by `jump`, and the slope of ln y by `forcing`.
     fn run(
         &self,
         problem: &Problem,
-        (from, direct, jump): (usize, f64, f64),
+        ((from, early), (direct, jump)): ((usize, f64), (f64, f64)),
         forcing: &dyn Fn(usize) -> f64,
     ) -> Vec<f64> {
         let mut ln_v = vec![0.0; self.velocity.len()];
-        let mut change = jump;
+        // What is left of the jump at that node, and what has been added by then.
+        let part = match from.checked_sub(1) {
+            Some(before) => early / (problem.nodes[from] - problem.nodes[before]),
+            None => 0.0,
+        };
+        let mut change = jump * self.left[from].powf(part) + early * forcing(from);
         for (k, slot) in ln_v.iter_mut().enumerate().skip(from) {
             if k > from {
                 let mean = 0.5 * (forcing(k - 1) + forcing(k));
@@ -128,7 +138,7 @@ impl Linear {
             }
             *slot = direct - change;
         }
-        self.read_from(problem, &ln_v, from)
+        self.read_from(problem, &ln_v, (from, early))
     }
 
     /// The change of every reading for one unit of each coefficient of `term`.
@@ -165,9 +175,11 @@ impl Linear {
     }
 
     fn of_event(&self, problem: &Problem, term: &Term) -> Vec<Vec<f64>> {
-        let from = term.at.map_or(0, |at| event_node(problem, at));
+        let from = term
+            .at
+            .map_or(START, |at| event_place(problem, (at, term.share)));
         let run = |direct: f64, jump: f64, forcing: &dyn Fn(usize) -> f64| {
-            self.run(problem, (from, direct, jump), forcing)
+            self.run(problem, (from, (direct, jump)), forcing)
         };
         if matches!(term.act, Act::Step) {
             return vec![run(1.0, 0.0, &|k| -self.wear[k])];
@@ -201,11 +213,11 @@ impl Linear {
     }
 
     fn read(&self, problem: &Problem, ln_v: &[f64]) -> Vec<f64> {
-        self.read_from(problem, ln_v, 0)
+        self.read_from(problem, ln_v, START)
     }
 
-    /// From changes of ln v at the nodes, none before node `from`, to changes of readings.
-    fn read_from(&self, problem: &Problem, ln_v: &[f64], from: usize) -> Vec<f64> {
+    /// From changes of ln v at the nodes, none until `early` days before node `from`, to changes of readings.
+    fn read_from(&self, problem: &Problem, ln_v: &[f64], (from, early): (usize, f64)) -> Vec<f64> {
         let velocity = |k: usize| self.velocity[k] * ln_v[k];
         if problem.quantity == Quantity::Velocity && self.averaging <= 0.0 {
             return problem.node_of.iter().map(|&node| velocity(node)).collect();
@@ -214,11 +226,10 @@ impl Linear {
         for k in from.max(1)..ln_v.len() {
             let dt = problem.nodes[k] - problem.nodes[k - 1];
             // Nothing before the event, although its node already moves at the new rate.
-            let before = if k - 1 < from { 0.0 } else { velocity(k - 1) };
             let step = if k == from {
-                0.0
+                velocity(k) * early
             } else {
-                0.5 * (before + velocity(k)) * dt
+                0.5 * (velocity(k - 1) + velocity(k)) * dt
             };
             slip[k] = slip[k - 1] + step;
         }
@@ -255,7 +266,8 @@ fn friction_changes(
             let own = &parameters[at..at + term.coefficients()];
             let change = |index: usize| own.get(index).copied().unwrap_or(0.0);
             let by = [change(0) / span, change(1), change(2)];
-            changes.push((event_node(problem, reading), by));
+            let (node, _) = event_place(problem, (reading, term.share));
+            changes.push((node, by));
         }
         at += term.coefficients();
     }

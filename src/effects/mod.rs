@@ -1,5 +1,6 @@
 //! From the residual to the effect that the law lacks: the search, the joint refit, before and after.
 
+mod backward;
 mod blur;
 mod by_clock;
 mod candidates;
@@ -11,6 +12,7 @@ mod explanation;
 mod faults;
 mod findings;
 mod frame;
+mod fresh;
 mod given;
 mod judge;
 mod kind;
@@ -23,6 +25,7 @@ mod together;
 
 mod linear;
 mod noise;
+mod prior;
 mod problem;
 mod ready;
 mod refit;

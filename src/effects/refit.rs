@@ -3,6 +3,7 @@
 use super::frame::{dot, likeliest as likeliest_noise};
 use super::linear::Linear;
 use super::noise::{Memory, Noise, Whitener};
+use super::prior::Prior;
 use super::problem::Problem;
 use super::term::{Act, Scratch, Term, law_parameters, read};
 use crate::model::Driven;
@@ -15,9 +16,6 @@ const MOST_STEPS: usize = 20;
 const CONVERGED: f64 = 1e-5;
 /// Rounds of 'which noise, then which law': the third no longer changes the choice.
 const NOISE_ROUNDS: usize = 4;
-
-/// Deviation of kappa times the span, where kappa > 0.
-const MOST_GROWTH: f64 = 1.0;
 
 /// The law with its effects, fitted.
 #[derive(Debug, Clone)]
@@ -95,7 +93,7 @@ impl Start {
     }
 }
 
-/// Starts of the law alone: steady, accelerating, relaxing from above and from below.
+/// Starts of the law alone: steady, accelerating, relaxing from above and from below, and soon there.
 pub(super) fn plain_starts(problem: &Problem) -> Vec<Start> {
     let shapes = [
         (0.0, -2.0, 0.0),
@@ -103,6 +101,7 @@ pub(super) fn plain_starts(problem: &Problem) -> Vec<Start> {
         (0.95, -3.0, 0.0),
         (-3.0, 1.0, -0.5),
         (1.0, 2.0, -0.5),
+        (-20.0, 3.4, -0.8),
     ];
     let used = problem.used;
     let ends = (used / 5).max(2);
@@ -169,7 +168,8 @@ pub(super) fn refit_every_memory(
     likeliest(problem, fits)
 }
 
-fn likeliest(problem: &Problem, fits: impl Iterator<Item = Fitted>) -> Option<Fitted> {
+/// The fit of the lowest BIC.
+pub(super) fn likeliest(problem: &Problem, fits: impl Iterator<Item = Fitted>) -> Option<Fitted> {
     fits.min_by(|a, b| a.bic(problem).total_cmp(&b.bic(problem)))
 }
 
@@ -187,7 +187,7 @@ pub(super) fn refit(
         .or(bank.first())?;
     let mut best: Option<Fitted> = None;
     for _ in 0..NOISE_ROUNDS {
-        point = point.descend(problem, start, whitener, scratch);
+        point = point.descend(problem, start, whitener, (MOST_STEPS, scratch));
         let fitted = point.fitted(problem, &start.terms, whitener);
         if best
             .as_ref()
@@ -206,6 +206,18 @@ pub(super) fn refit(
         whitener = &bank[likeliest];
     }
     best
+}
+
+/// No more than `steps` towards the fit from one start, under one noise model.
+pub(super) fn towards(
+    problem: &Problem,
+    start: &Start,
+    whitener: &Whitener,
+    (steps, scratch): (usize, &mut Scratch),
+) -> Option<Fitted> {
+    let point = ParameterPoint::at(problem, &start.terms, start.parameters.clone(), scratch)?;
+    let there = point.descend(problem, start, whitener, (steps, scratch));
+    Some(there.fitted(problem, &start.terms, whitener))
 }
 
 /// A start at `fitted` under the noise that makes its residual likeliest.
@@ -351,13 +363,13 @@ impl ParameterPoint {
         problem: &Problem,
         start: &Start,
         whitener: &Whitener,
-        scratch: &mut Scratch,
+        (most_steps, scratch): (usize, &mut Scratch),
     ) -> Self {
         let terms = start.terms.as_slice();
         let prior = Prior::of(problem, terms);
         let mut innovations = whitener.whiten(&self.residual(problem));
         let mut damping = 1e-3;
-        for _ in 0..MOST_STEPS {
+        for _ in 0..most_steps {
             let columns = self.jacobian(problem, terms, scratch);
             let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
             let mut white = whitener.whiten_all(&columns);
@@ -404,48 +416,6 @@ impl ParameterPoint {
     }
 }
 
-/// Normal priors, weak, that keep within bounds what the readings do not determine.
-struct Prior {
-    centre: Vec<f64>,
-    deviation: Vec<f64>,
-}
-
-impl Prior {
-    fn of(problem: &Problem, terms: &[Term]) -> Self {
-        // ln v: within a few e-folds of the mean velocity, or a noise that sums up would take the motion over. r: an acceleration by e over the record is nothing rare. a: the contacts age over some third
-        // of the record, give or take e^2. p: m between some .6 and 3.
-        let mut centre = vec![problem.typical_velocity().ln(), 0.0, -1.0, 0.0];
-        let mut deviation = vec![2.0, 3.0, 2.0, 0.6];
-        if law_parameters(problem) == 5 {
-            centre.push(0.0);
-            deviation.push(f64::INFINITY);
-        }
-        for term in terms {
-            for index in 0..term.coefficients() {
-                centre.push(0.0);
-                deviation.push(term.prior(index));
-            }
-        }
-        Self { centre, deviation }
-    }
-
-    /// kappa times the span over its prior's deviation, where it lets small departures grow: a block balanced on an
-    /// unstable steady state for a whole record is no slope's.
-    fn balance(parameters: &[f64]) -> f64 {
-        parameters[2].exp() * parameters[3].max(0.0) / MOST_GROWTH
-    }
-
-    fn misfit(&self, parameters: &[f64]) -> f64 {
-        let balance = Self::balance(parameters).powi(2);
-        let each = parameters
-            .iter()
-            .zip(self.centre.iter().zip(&self.deviation));
-        each.map(|(p, (centre, deviation))| ((p - centre) / deviation).powi(2))
-            .sum::<f64>()
-            + balance
-    }
-}
-
 fn normal_equations(
     columns: &[Vec<f64>],
     innovations: &[f64],
@@ -463,22 +433,8 @@ fn normal_equations(
             normal[(j, i)] = value;
         }
         slope[i] = dot(&columns[i], innovations) / variance;
-        let weight = prior.deviation[i].powi(-2);
-        normal[(i, i)] += weight;
-        slope[i] -= weight * (parameters[i] - prior.centre[i]);
     }
-    let balance = Prior::balance(parameters);
-    let by_p = if parameters[3] > 0.0 {
-        parameters[2].exp() / MOST_GROWTH
-    } else {
-        0.0
-    };
-    for (i, di) in [(2, balance), (3, by_p)] {
-        for (j, dj) in [(2, balance), (3, by_p)] {
-            normal[(i, j)] += di * dj;
-        }
-        slope[i] -= di * balance;
-    }
+    prior.weigh_in(parameters, (&mut normal, &mut slope));
     (normal, slope)
 }
 

@@ -2,10 +2,11 @@
 
 use super::candidates;
 use super::frame::Frames;
+use super::fresh::{best_of_starts, fresh_laws};
 use super::kind::Kind;
 use super::linear::Linear;
 use super::noise::{Noise, Whitener};
-use super::refit::{Fitted, Start, jacobian, refit, under_likeliest};
+use super::refit::{Fitted, Start, jacobian, likeliest, refit, under_likeliest};
 use super::response::Response;
 use super::search::{Refitted, SIGNIFICANT, Search};
 use super::surrogate::NullGains;
@@ -20,6 +21,25 @@ const MOST_OTHERS: usize = 6;
 const MOST_FRICTION: usize = 3;
 /// A covariate that follows the year may fit as well shifted by whole years, but no better than this at any shift.
 const AT_RANDOM: f64 = 0.3;
+
+/// Fits by least squares that are followed by one under the likeliest noise.
+const LEVELS: usize = 2;
+
+/// How far the newest term's delay, or its time, is moved at once.
+#[derive(Debug, Clone, Copy)]
+enum Stride {
+    Coarse,
+    Fine,
+    /// This share of the time between two readings.
+    Within(f64),
+}
+
+const STRIDES: [Stride; 4] = [
+    Stride::Coarse,
+    Stride::Fine,
+    Stride::Within(0.25),
+    Stride::Within(0.08),
+];
 
 impl<'a> Search<'a> {
     /// What stands before a search for one more effect than `base` has.
@@ -109,13 +129,14 @@ impl<'a> Search<'a> {
         if best.gain < self.options.bic_margin {
             return;
         }
-        let at = best.term.at;
+        let (at, share) = (best.term.at, best.term.share);
         for one in others.iter_mut() {
             if !one.term.kind.is_event_of_the_ground() || one.term.at == at {
                 continue;
             }
             let term = Term {
                 at,
+                share,
                 ..one.term.clone()
             };
             if let Some(there) = self.refitted(base, &term)
@@ -151,53 +172,55 @@ impl<'a> Search<'a> {
         null_gains.amplified(most)
     }
 
-    /// The joint fit with one more term; its shape is refined where it promises something.
+    /// The joint fit with one more term, from the law of `base` and from fresh laws; its shape is refined where it
+    /// promises something.
     pub(super) fn refitted(&mut self, base: &Fitted, term: &Term) -> Option<Refitted> {
-        let white = [Whitener::new(self.problem, Noise::WHITE)];
-        let (problem, bank) = (self.problem, self.bank);
-        let mut rms = f64::INFINITY;
-        let mut best: Option<Fitted> = None;
-        let mut keep = |fit: Option<Fitted>| {
-            let Some(fit) = fit else { return };
-            if best
-                .as_ref()
-                .is_none_or(|best| fit.bic(problem) < best.bic(problem))
-            {
-                best = Some(fit);
-            }
-        };
-        for size in term.starts() {
-            let start = Start::at(base).with_size(term, *size);
-            keep(refit(problem, &start, bank, &mut self.scratch));
-            // By least squares first as well: from there the fit finds what a noise that remembers would hide.
-            let level = refit(problem, &start, &white, &mut self.scratch);
-            if let Some(level) = level {
-                rms = rms.min(level.rms(problem, 0..problem.used));
-                let start = under_likeliest(problem, &level, bank, &mut self.scratch);
-                keep(refit(problem, &start, bank, &mut self.scratch));
-            }
-        }
-        let mut fitted = best?;
+        let problem = self.problem;
+        let mut fitted = self.best_start(base, term)?;
         if base.bic(problem) - fitted.bic(problem) > 0.0 {
             self.sharpen(&mut fitted);
         }
         if matches!(term.act, Act::Friction(_)) {
             fitted = self.fewer_or_more(base, fitted);
         }
+        let white = [Whitener::new(problem, Noise::WHITE)];
+        let level = refit(problem, &Start::at(&fitted), &white, &mut self.scratch);
+        let rms = level.map(|level| level.rms(problem, 0..problem.used));
         Some(Refitted {
             gain: base.bic(problem) - fitted.bic(problem),
             follows_season: candidates::follows_season(problem, fitted.terms.last()?),
             term: fitted.terms.last()?.clone(),
-            rms,
+            rms: rms.unwrap_or(f64::INFINITY),
             fitted,
             p_value: 1.0,
         })
     }
 
+    /// The best joint fit with one more term as it is.
+    fn best_start(&mut self, base: &Fitted, term: &Term) -> Option<Fitted> {
+        let (problem, bank) = (self.problem, self.bank);
+        let white = [Whitener::new(problem, Noise::WHITE)];
+        let mut fits: Vec<Fitted> = Vec::new();
+        let fresh = fresh_laws(problem, base, term);
+        let mut levels = Vec::from_iter(best_of_starts(problem, &fresh, &mut self.scratch));
+        for size in term.starts() {
+            let start = Start::at(base).with_size(term, *size);
+            fits.extend(refit(problem, &start, bank, &mut self.scratch));
+            levels.extend(refit(problem, &start, &white, &mut self.scratch));
+        }
+        // By least squares first as well: from there the fit finds what a noise that remembers would hide.
+        levels.sort_by(|a, b| a.surprise.total_cmp(&b.surprise));
+        for level in levels.iter().take(LEVELS) {
+            let start = under_likeliest(problem, level, bank, &mut self.scratch);
+            fits.extend(refit(problem, &start, bank, &mut self.scratch));
+        }
+        likeliest(problem, fits.into_iter())
+    }
+
     /// Refines the newest term's shape, and fits once more under every noise model.
     fn sharpen(&mut self, fitted: &mut Fitted) {
-        for neighbours in [[1.6, 1.0 / 1.6], [1.25, 0.8]] {
-            self.refine(fitted, neighbours);
+        for stride in STRIDES {
+            self.refine(fitted, stride);
         }
         let last = refit(
             self.problem,
@@ -210,26 +233,33 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// A change of the friction with as many changing parameters as pay for themselves: from the pace alone, each
-    /// fit starts where the one with fewer ended, for all three at once seldom find their way from nothing.
+    /// A change of the friction with as many changing parameters as pay for themselves, beside the law of `base`, or, where
+    /// that leads to nothing better, beside the law found with it.
     fn fewer_or_more(&mut self, base: &Fitted, found: Fitted) -> Fitted {
+        let own = found.terms.last().map_or(0, Term::coefficients);
+        let mut beside = Start::at(&found);
+        beside.terms.pop();
+        beside.parameters.truncate(found.parameters.len() - own);
+        for law in [Start::at(base), beside] {
+            let best = self.by_count(base, &law, &found);
+            if let Some(best) = best.filter(|best| best.bic(self.problem) < found.bic(self.problem))
+            {
+                return best;
+            }
+        }
+        found
+    }
+
+    /// The best of the changes of one, two and three parameters of the friction: from the pace alone, each fit starts where
+    /// the one with fewer ended, for all three at once seldom find their way from nothing.
+    fn by_count(&mut self, base: &Fitted, law: &Start, found: &Fitted) -> Option<Fitted> {
         let (problem, bank) = (self.problem, self.bank);
-        let Some(term) = found.terms.last().cloned() else {
-            return found;
-        };
-        let mut best = found;
+        let mut term = found.terms.last()?.clone();
+        let mut best: Option<Fitted> = None;
         let mut known: Vec<f64> = Vec::new();
-        let mut at = term.at;
         for count in 1..=MOST_FRICTION {
-            let act = Act::Friction(count);
-            let mut start = Start::at(base).with_size(
-                &Term {
-                    at,
-                    act,
-                    ..term.clone()
-                },
-                1e-3,
-            );
+            term.act = Act::Friction(count);
+            let mut start = law.clone().with_size(&term, 1e-3);
             let first = start.parameters.len() - count;
             start.parameters[first..first + known.len()].copy_from_slice(&known);
             let Some(mut fitted) = refit(problem, &start, bank, &mut self.scratch) else {
@@ -239,21 +269,21 @@ impl<'a> Search<'a> {
                 self.sharpen(&mut fitted);
             }
             known = fitted.parameters[first..].to_vec();
-            at = fitted.terms.last().and_then(|term| term.at);
-            if fitted.bic(problem) < best.bic(problem) {
-                best = fitted;
+            if let Some(last) = fitted.terms.last() {
+                term.clone_from(last);
             }
+            best = likeliest(problem, best.into_iter().chain([fitted]));
         }
         best
     }
 
     /// Moves the newest term's delay, or its time, while that helps.
-    fn refine(&mut self, fitted: &mut Fitted, factors: [f64; 2]) {
-        for factor in factors {
+    fn refine(&mut self, fitted: &mut Fitted, stride: Stride) {
+        for later in [true, false] {
             while let Some(term) = fitted
                 .terms
                 .last()
-                .and_then(|term| self.moved(term, factor))
+                .and_then(|term| self.moved(term, stride, later))
             {
                 let mut start = Start::at(fitted);
                 start.terms.pop();
@@ -274,42 +304,58 @@ impl<'a> Search<'a> {
     }
 
     /// The term with another delay, or at another time; `None` where it has neither, or would leave its range.
-    fn moved(&self, term: &Term, factor: f64) -> Option<Term> {
-        if let (Some(response), Some(channel)) = (term.response, term.channel) {
-            let (_, driver) = self.drivers.iter().find(|(index, _)| *index == channel)?;
-            if response.mean_days <= 0.0 {
-                return None;
-            }
-            let response = Response {
-                mean_days: response.mean_days * factor,
-                ..response
-            };
-            let shortest = 0.3 * driver.step();
-            if response.memory_days() > 0.5 * self.problem.span() || response.mean_days < shortest {
-                return None;
-            }
-            let own = (channel, driver);
-            if matches!(term.act, Act::Reading(_)) {
-                let Response {
-                    stages, mean_days, ..
-                } = response;
-                return candidates::thermal(self.problem, own, stages, mean_days);
-            }
-            return candidates::of_channel(self.problem, own, response);
+    fn moved(&self, term: &Term, stride: Stride, later: bool) -> Option<Term> {
+        if term.at.is_some() {
+            return self.at_another_time(term, stride, later);
         }
-        let at = term.at?;
-        // Coarse steps first, then fine ones, in readings.
-        let stride = (self.problem.used / 128).max(1);
-        let by = if (factor - 1.0).abs() > 0.3 {
-            stride
-        } else {
-            1
+        let response = term.response?;
+        let (_, driver) = self
+            .drivers
+            .iter()
+            .find(|(index, _)| Some(*index) == term.channel)?;
+        if response.mean_days <= 0.0 {
+            return None;
+        }
+        let factor = match stride {
+            Stride::Coarse => 1.6,
+            Stride::Fine => 1.25,
+            Stride::Within(_) => return None,
         };
-        let to = if factor > 1.0 {
-            at + by
-        } else {
-            at.checked_sub(by)?
+        let factor: f64 = if later { factor } else { 1.0 / factor };
+        let response = Response {
+            mean_days: response.mean_days * factor,
+            ..response
         };
+        let shortest = 0.3 * driver.step();
+        if response.memory_days() > 0.5 * self.problem.span() || response.mean_days < shortest {
+            return None;
+        }
+        let own = (term.channel?, driver);
+        if matches!(term.act, Act::Reading(_)) {
+            let Response {
+                stages, mean_days, ..
+            } = response;
+            return candidates::thermal(self.problem, own, stages, mean_days);
+        }
+        candidates::of_channel(self.problem, own, response)
+    }
+
+    fn at_another_time(&self, term: &Term, stride: Stride, later: bool) -> Option<Term> {
+        let (at, sign) = (term.at?, if later { 1.0 } else { -1.0 });
+        let by = match stride {
+            Stride::Coarse => (self.problem.used / 128).max(1) as f64,
+            Stride::Fine => 1.0,
+            // A jump of the reading lies between the same two readings all the time.
+            Stride::Within(_) if term.kind == Kind::Offset => return None,
+            Stride::Within(share) => share,
+        };
+        let passed = (at as f64 + term.share + sign * by).max(0.0);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "not negative, and a place among the readings"
+        )]
+        let to = passed as usize;
         let inside = to >= 2 && to + 2 < self.problem.used;
         inside.then(|| {
             if term.kind == Kind::Offset {
@@ -317,6 +363,7 @@ impl<'a> Search<'a> {
             }
             Term {
                 at: Some(to),
+                share: passed.fract(),
                 ..term.clone()
             }
         })

@@ -3,12 +3,13 @@
 use super::candidates;
 use super::companions::{go_together, is_rain};
 use super::explanation::Candidate;
+use super::fresh::best_of_starts;
 use super::judge::{block, held_out, named, objection, step_errors};
 use super::kind::Kind;
-use super::noise::{Noise, Whitener};
+use super::noise::Whitener;
 use super::options::Options;
 use super::problem::Problem;
-use super::refit::{Fitted, Start, plain_starts, refit_every_memory, refit_from};
+use super::refit::{Fitted, Start, plain_starts, refit_every_memory};
 use super::response::Driver;
 use super::rival::Rival;
 use super::surrogate::NullGains;
@@ -136,8 +137,7 @@ impl Refitted {
 
 /// The plain law by least squares; `None` where no start leads to a motion.
 pub(super) fn plain(problem: &Problem, scratch: &mut Scratch) -> Option<Fitted> {
-    let white = [Whitener::new(problem, Noise::WHITE)];
-    refit_from(problem, &plain_starts(problem), &white, scratch)
+    best_of_starts(problem, &plain_starts(problem), scratch)
 }
 
 impl Search<'_> {
@@ -161,13 +161,14 @@ impl Search<'_> {
         let null = self.null(&plain)?;
         let mut full = null.clone();
         let mut accepted = Vec::new();
-        while accepted.len() < MOST_EFFECTS {
-            progress(0.1 + 0.8 * accepted.len() as f64 / MOST_EFFECTS as f64);
-            let Some((next, how)) = self.one_more(&full, accepted.len()) else {
+        for round in 0..MOST_EFFECTS {
+            progress(0.1 + 0.8 * round as f64 / MOST_EFFECTS as f64);
+            let Some((next, how)) = self.one_more(&full, round) else {
                 break;
             };
             full = next;
             accepted.extend(how);
+            self.drop_needless(&mut full, &mut accepted);
         }
         Some(SearchResult {
             plain,
@@ -294,7 +295,7 @@ impl Search<'_> {
 
     fn withhold(&mut self, one: &Refitted) {
         if self.withheld.is_none_or(|best| best.bic_gain < one.gain) {
-            let at = one.term.at.and_then(|at| time_of(self.problem, at));
+            let at = time_of(self.problem, &one.term);
             self.withheld = Some(Withheld {
                 kind: one.term.kind,
                 at,
@@ -309,7 +310,7 @@ impl Search<'_> {
         if block(self.problem, &one.fitted.terms, share).is_none() {
             return (None, None);
         }
-        let models = (base.terms.as_slice(), &one.fitted);
+        let models = (base, &one.fitted);
         let Some(held) = held_out(self.problem, models, share, &mut self.scratch) else {
             let reason = "without the later block it cannot be fitted".to_owned();
             return (None, Some(reason));
@@ -342,7 +343,7 @@ impl Search<'_> {
             effect: term.kind,
             channel,
             form: term.response.map(|response| response.form),
-            at: term.at.and_then(|at| time_of(self.problem, at)),
+            at: time_of(self.problem, term),
             lag_days: term.response.map(|response| response.mean_days),
             bic_gain: one.gain,
             p_value: Some(one.p_value),

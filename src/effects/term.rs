@@ -15,6 +15,8 @@ pub(super) struct Term {
     pub(super) response: Option<Response>,
     /// Index of the reading before which it happens.
     pub(super) at: Option<usize>,
+    /// How much of the time between that reading and the one before it had passed by then, 0 to 1.
+    pub(super) share: f64,
     pub(super) act: Act,
 }
 
@@ -53,7 +55,7 @@ impl Term {
     /// several sizes.
     pub(super) fn starts(&self) -> &'static [f64] {
         match self.act {
-            Act::PerVelocity => &[0.1, 1.0, 5.0],
+            Act::PerVelocity => &[0.1, 0.4, 1.5, 5.0],
             Act::PerSlip => &[0.3, 2.0],
             Act::Averaging => &[2.0, 8.0],
             // From next to nothing a fit seldom finds its way to a state that was halved or doubled.
@@ -219,8 +221,10 @@ impl Scratch {
                 }
             }
             let Some(reading) = term.at else { continue };
+            let (node, early) = event_place(problem, (reading, term.share));
             let mut event = LoadEvent {
-                node: event_node(problem, reading),
+                node,
+                early,
                 log_load: 0.0,
                 ln_y: 0.0,
                 ln_a: 0.0,
@@ -243,7 +247,11 @@ impl Scratch {
             }
             self.events.push(event);
         }
-        self.events.sort_by_key(|event| event.node);
+        let earlier = |one: &LoadEvent, other: &LoadEvent| {
+            let by_node = one.node.cmp(&other.node);
+            by_node.then(other.early.total_cmp(&one.early))
+        };
+        self.events.sort_by(earlier);
     }
 }
 
@@ -261,18 +269,26 @@ pub(super) fn read(problem: &Problem, driven: &Driven, averaging: f64, readings:
     readings.extend(problem.node_of.iter().map(value));
 }
 
-/// When an event before reading `at` happened.
-pub(super) fn time_of(problem: &Problem, at: usize) -> Option<Timestamp> {
-    after_days(problem.epoch, problem.nodes[event_node(problem, at)])
+/// Where what happens once is tried: in the middle between two readings.
+pub(super) const MIDDLE: f64 = 0.5;
+
+/// When what happens once happened; `None` of what acts all along.
+pub(super) fn time_of(problem: &Problem, term: &Term) -> Option<Timestamp> {
+    let (node, early) = event_place(problem, (term.at?, term.share));
+    after_days(problem.epoch, problem.nodes[node] - early)
 }
 
-/// The node in the middle between a reading and the one before it.
-pub(super) fn event_node(problem: &Problem, reading: usize) -> usize {
-    let after = problem.node_of[reading];
+/// Of an event before a reading, with the share of the time since the reading before that had passed: the first node that
+/// it does not come after, and the days between.
+pub(super) fn event_place(problem: &Problem, (reading, share): (usize, f64)) -> (usize, f64) {
+    let after = problem.t[reading];
     let before = reading
         .checked_sub(1)
-        .map_or(0, |before| problem.node_of[before]);
-    (before + after).div_ceil(2)
+        .map_or(problem.nodes[0], |before| problem.t[before]);
+    let t = after - (1.0 - share) * (after - before);
+    let last = problem.node_of[reading];
+    let node = problem.nodes[..last].partition_point(|node| *node < t);
+    (node, (problem.nodes[node] - t).max(0.0))
 }
 
 /// Slip at `t`, between nodes by the velocities at both; before the first node at its velocity.

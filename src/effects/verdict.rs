@@ -24,6 +24,10 @@ pub(super) struct Verdict {
 
 /// Explained in full, the residual is at most this many times the white noise.
 pub(super) const LARGEST_REST: f64 = 2.0;
+/// A kind without a witness stands beside something left where it gains this many times the margin and the later block is
+/// predicted with no more than this share of the error.
+const STANDING_OUT: f64 = 30.0;
+const FAR_BETTER: f64 = 0.1;
 /// Most kinds without a witness that are believed together.
 const MOST_LABELS: usize = 2;
 /// 5 and 95 % of a normal distribution, in standard deviations.
@@ -42,7 +46,11 @@ pub(super) fn conclude(
     let mut left = judged.as_ref().map_or(0.0, Judged::load_gain) > margin;
     let only_labels = !accepted.is_empty() && full.terms.iter().all(|term| is_label(term.kind));
     let mut cannot_separate_from = Vec::new();
-    if only_labels && (left || !accounts_for_all(problem, &full)) {
+    let is_whole = !left && accounts_for_all(problem, &full);
+    if only_labels && !is_whole && stands_out(&full, &found.candidates, margin) {
+        // What is left is little beside it.
+        left = true;
+    } else if only_labels && !is_whole {
         left = true;
         for term in &full.terms {
             cannot_separate_from.push(named(term, drivers));
@@ -119,6 +127,19 @@ fn accounts_for_all(problem: &Problem, full: &Fitted) -> bool {
     small && full.terms.len() <= most
 }
 
+/// Whether one kind without a witness is alone, gains many times the margin, and predicts the later block far better than
+/// the law without it: then it stands although something is left beside it.
+fn stands_out(full: &Fitted, candidates: &[Candidate], margin: f64) -> bool {
+    let mut accepted = candidates
+        .iter()
+        .filter(|one| one.rejected_because.is_none());
+    let (Some(one), None) = (accepted.next(), accepted.next()) else {
+        return false;
+    };
+    let predicts = one.held_out.is_some_and(|ratio| ratio < FAR_BETTER);
+    full.terms.len() == 1 && predicts && one.bic_gain > STANDING_OUT * margin
+}
+
 fn refuse(candidates: &mut [Candidate], kind: Kind) {
     let own = candidates
         .iter_mut()
@@ -162,7 +183,7 @@ fn effect(
         p_value: Some(how.p_value),
         lag_days: term.response.map(|response| response.mean_days),
         memory_days: term.response.map(|response| response.memory_days()),
-        at: term.at.and_then(|at| time_of(problem, at)),
+        at: time_of(problem, term),
         bic_gain: how.bic_gain,
         contribution_rms: rms(&contribution(problem, full, index, scratch)).map(|c| c / factor),
         ..Effect::of(term.kind)

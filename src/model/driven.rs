@@ -29,7 +29,7 @@ pub struct Drive<'a> {
     pub nodes: &'a [f64],
     /// f(t) at the nodes, linear between them.
     pub log_load: &'a [f64],
-    /// What happens at nodes, in their order.
+    /// What happens, in the order of time.
     pub events: &'a [LoadEvent],
     /// eta: the log-load lost per mm/day of velocity, not negative.
     pub per_velocity: f64,
@@ -37,11 +37,13 @@ pub struct Drive<'a> {
     pub per_slip: f64,
 }
 
-/// A sudden change at a node.
+/// A sudden change, at a node or before it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoadEvent {
-    /// The index of the node.
+    /// The index of the first node that it does not come after.
     pub node: usize,
+    /// Days from the event to that node, less than from the node before it; 0: at the node.
+    pub early: f64,
     /// Added to the log-load from here on.
     pub log_load: f64,
     /// Added to ln y here.
@@ -115,25 +117,29 @@ impl Driven {
         let mut state = friction.state((0.0, 0.0), first, still);
         let (mut extra, mut events) = (0.0, drive.events.iter().peekable());
         for (k, (&t, &f)) in drive.nodes.iter().zip(drive.log_load).enumerate() {
-            if k > 0 {
-                let (before, f_before) = (drive.nodes[k - 1], drive.log_load[k - 1]);
-                let loads = (f_before + extra, f + extra);
-                let Some(next) = friction.cross(state, t - before, loads) else {
-                    return false;
+            // Where the block has come to, and the load declared there.
+            let mut here = match k.checked_sub(1) {
+                Some(before) => (drive.nodes[before], drive.log_load[before]),
+                None => (t, f),
+            };
+            loop {
+                let event = events.next_if(|event| event.node <= k);
+                let there = match event {
+                    Some(event) if event.early > 0.0 => between(here, (t, f), t - event.early),
+                    _ => (t, f),
                 };
-                state = next;
-            }
-            let mut changes = false;
-            while let Some(event) = events.next_if(|event| event.node <= k) {
+                if there.0 > here.0 {
+                    let loads = (here.1 + extra, there.1 + extra);
+                    let Some(next) = friction.cross(state, there.0 - here.0, loads) else {
+                        return false;
+                    };
+                    (state, here) = (next, there);
+                }
+                let Some(event) = event else { break };
                 extra += event.log_load;
-                state.ln_y += event.ln_y;
-                friction.a *= event.ln_a.exp();
-                friction.b += event.b;
-                friction.p = (friction.p + event.p).min(LARGEST_P);
-                changes = true;
-            }
-            if changes {
-                state = friction.state((state.ln_y, state.slip), f + extra, state.speed);
+                friction.change(event);
+                let ln_y = state.ln_y + event.ln_y;
+                state = friction.state((ln_y, state.slip), here.1 + extra, state.speed);
             }
             self.ln_y.push(state.ln_y);
             self.velocity.push(state.speed.v);
@@ -143,7 +149,22 @@ impl Driven {
     }
 }
 
+/// The point (time, load) at `t` on the line from one to the other; the one where `t` is before it.
+fn between(from: (f64, f64), to: (f64, f64), t: f64) -> (f64, f64) {
+    if t <= from.0 {
+        return from;
+    }
+    let share = (t - from.0) / (to.0 - from.0);
+    (t, from.1 + share * (to.1 - from.1))
+}
+
 impl Friction {
+    fn change(&mut self, event: &LoadEvent) {
+        self.a *= event.ln_a.exp();
+        self.b += event.b;
+        self.p = (self.p + event.p).min(LARGEST_P);
+    }
+
     /// The block under a log-load, its velocity somewhere near `last`.
     fn state(&self, (ln_y, slip): (f64, f64), log_load: f64, last: Speed) -> State {
         State {

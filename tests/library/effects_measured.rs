@@ -87,18 +87,18 @@ fn the_lake_drives(benchmark: &str, fit: f64, held_out: f64) {
     assert!(predicted.after.unwrap() < 0.75 * predicted.before.unwrap());
 }
 
-/// Asked for were 3.3 and 11.3 mm: the held-out 12.7 mm falls short.
+/// As good as a rate model fitted by hand.
 #[test]
 #[cfg_attr(not(measured_data), ignore = "no measured data here")]
 fn the_lake_level_and_no_decoy_is_found_at_salmon_falls_blkm() {
-    the_lake_drives("blkm", 3.3, 13.0);
+    the_lake_drives("blkm", 3.3, 11.3);
 }
 
-/// Asked for were 4.0 and 13.0 mm: the held-out 13.7 mm falls short.
+/// As good as a rate model fitted by hand.
 #[test]
 #[cfg_attr(not(measured_data), ignore = "no measured data here")]
 fn the_lake_level_and_no_decoy_is_found_at_salmon_falls_ntoe() {
-    the_lake_drives("ntoe", 4.0, 14.0);
+    the_lake_drives("ntoe", 4.0, 13.0);
 }
 
 fn resets(said: &Explanation) -> Vec<Timestamp> {

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::effects::fixture::{channel, daily, epoch, generator, normals, steady};
+use crate::effects::noise::Noise;
 use crate::effects::response::Response;
 use crate::reading::Quantity;
 
@@ -13,6 +14,7 @@ fn term(kind: Kind, act: Act) -> Term {
         channel: None,
         response: None,
         at: None,
+        share: 0.5,
         act,
     }
 }

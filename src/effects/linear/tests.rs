@@ -29,6 +29,7 @@ fn term(kind: Kind, act: Act) -> Term {
         channel: None,
         response: None,
         at: None,
+        share: 0.5,
         act,
     }
 }

@@ -49,6 +49,7 @@ fn drive<'a>(nodes: &'a [f64], log_load: &'a [f64], events: &'a [LoadEvent]) -> 
 fn event(node: usize) -> LoadEvent {
     LoadEvent {
         node,
+        early: 0.0,
         log_load: 0.0,
         ln_y: 0.0,
         ln_a: 0.0,
@@ -152,6 +153,31 @@ fn a_step_of_the_load_is_that_of_the_precise_law() {
     }
     let jump = driven.velocity[100] / driven.velocity[99];
     assert!((jump.ln() - 0.7).abs() < 0.02, "{jump}");
+}
+
+#[test]
+fn a_step_between_two_nodes_is_that_of_the_precise_law_and_slips_from_its_own_time_on() {
+    let law = Law::from_paper(0.8, 3.0, 60.0, 1.0).unwrap();
+    let load: Vec<f64> = days().iter().map(|day| 0.3 * (day / 20.0).sin()).collect();
+    let events = [LoadEvent {
+        log_load: 0.7,
+        early: 0.7,
+        ..event(100)
+    }];
+    let mut driven = Driven::default();
+    assert!(driven.solve(&law, &drive(&days(), &load, &events)));
+    let mut knots: Vec<(f64, f64)> = days().into_iter().zip(load.iter().copied()).collect();
+    let there = load[99] + 0.3 * (load[100] - load[99]);
+    for (day, value) in &mut knots {
+        *value += if *day > 99.5 { 0.7 } else { 0.0 };
+    }
+    knots.splice(100..100, [(99.3, there), (99.3, there + 0.7)]);
+    let precise = exact(&law, knots, &days());
+    for (k, motion) in precise.into_iter().enumerate().skip(1) {
+        let motion = motion.unwrap();
+        assert!(relative(driven.velocity[k], motion.velocity) < 2e-3, "{k}");
+        assert!(relative(driven.slip[k], motion.displacement) < 5e-4, "{k}");
+    }
 }
 
 #[test]
