@@ -30,12 +30,17 @@ The law is the slider block of Helmstetter et al. (2004) in one regular equation
 2. The law under a constant load is fitted (*before*). Its residual is judged by its innovations, under a bank of noises: white, AR(1)
    for irregular sampling, random walk.
 3. Every kind of effect is tried inside the law, with every channel, as level and as rate, through exponential and gamma
-   responses. The law's own parameters are refitted with it. The best one enters, and the search begins again (*after*).
+   responses. The law's own parameters are refitted with it, from where they stood and from laws found anew, because beside a poor law
+   everything that is tried gains alike; an event lies between two readings. The best one enters, and the search begins again (*after*). What
+   entered early leaves again where the BIC rises by less than 10 without it.
 4. An effect is accepted only if the BIC falls by 10 or more, the sign is one that the ground allows, its memory is short against the
    record, a search where there is nothing on 399 surrogates gains as much in fewer than 1 % of cases, and a later block, held out, is predicted
    no worse: extrapolated over the whole block, or, where the law's own drift rules that, reading after reading; an extrapolation that
    grows by half is refused in any case. Everything else is listed with the reason.
 5. Effects within the margin of each other stand under *cannot be separated from*. Structure that is left is called so.
+
+Two weak priors of the law (`src/effects/prior.rs`: a deviation of 1.5 of ln v, and of .2 of an approach to the steady state within one
+interval) were set with NTOE and Baishuihe below in view; the held-out error of NTOE lay between 12 and 18 mm under others that are as plausible.
 
 What it assumes: the load acts through the ratio of shear to normal stress only (the state's direct response to normal stress is left
 out); responses are linear; covariates are measured where it matters; what is held out is the last third of the record, or half of
