@@ -20,7 +20,7 @@ use mcap::McapError;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufWriter};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::Duration;
@@ -299,7 +299,7 @@ impl Recorder {
         let files = &self.files;
         let begun = || {
             // A place that nothing was ever written to has nothing to remove.
-            if files.path.parent().is_some_and(std::path::Path::exists) {
+            if files.path.parent().is_some_and(Path::exists) {
                 files::remove_oldest(&files.path, files.total.saturating_sub(files.size))?;
             }
             let (path, file) = files::begin(&files.path)?;
@@ -317,9 +317,11 @@ impl Recorder {
         };
         let writer = TopicWriter::create(BufWriter::new(out), first, &BTreeMap::new());
         let writer = writer.and_then(|mut writer| writer.grows().map(|()| writer));
-        let writer = writer.map_err(|source| RecordError::Write {
-            file: path.clone(),
-            source,
+        let writer = writer.map_err(|source| {
+            // Nothing is in it yet.
+            remove(&path);
+            let file = path.clone();
+            RecordError::Write { file, source }
         })?;
         self.standing.file = Some(path.display().to_string());
         Ok(OpenFile {
@@ -366,6 +368,13 @@ impl Recorder {
         if let Err(error) = cut {
             tracing::warn!(file = %open.path.display(), %error, "the record's file ends in the middle of a chunk");
         }
+    }
+}
+
+/// Removes a file without anything in it.
+fn remove(file: &Path) {
+    if let Err(error) = std::fs::remove_file(file) {
+        tracing::warn!(file = %file.display(), %error, "an empty file of the record cannot be removed");
     }
 }
 
