@@ -18,23 +18,22 @@ fn slipwatch(words: &[&str], format: &str) -> Output {
 }
 
 type RowMap = BTreeMap<String, Value>;
+type ColumnTypes = BTreeMap<String, (Physical, Option<LogicalType>)>;
 
-/// What a reader of Parquet finds: the columns with their types, and of each row what is not null.
-fn table(
-    words: &[&str],
-) -> (
-    BTreeMap<String, (Physical, Option<LogicalType>)>,
-    Vec<RowMap>,
-    Value,
-) {
+/// What a reader of Parquet finds: the columns with their types, of each row what is not null, and what the columns mean.
+#[expect(
+    clippy::wildcard_enum_match_arm,
+    reason = "a column of any other kind is wrong"
+)]
+fn table(words: &[&str]) -> (ColumnTypes, Vec<RowMap>, Value) {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("table.parquet");
     std::fs::write(&file, slipwatch(words, "parquet").stdout).unwrap();
     let reader = SerializedFileReader::new(File::open(&file).unwrap()).unwrap();
     let metadata = reader.metadata().file_metadata();
-    let meaning = metadata.key_value_metadata().unwrap().iter();
-    let meaning = meaning.filter(|one| one.key == "slipwatch.columns");
-    let meaning = meaning.filter_map(|one| one.value.as_ref()).next().unwrap();
+    let mut meaning = metadata.key_value_metadata().unwrap().iter();
+    let meaning = meaning.find(|one| one.key == "slipwatch.columns").unwrap();
+    let meaning = meaning.value.as_ref().unwrap();
     let columns = metadata.schema_descr().columns().iter().map(|column| {
         let kind = (column.physical_type(), column.logical_type_ref().cloned());
         (column.self_type().name().to_owned(), kind)
