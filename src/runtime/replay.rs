@@ -144,7 +144,7 @@ pub async fn replay(
 }
 
 /// Plays what a daemon took in, in the order in which it did: every value, every passage of time, every finding of
-/// a search and every change of its settings. The events are the daemon's own, the summary last. `progress` is told the
+/// a search and every change of its settings. The events are the daemon's own, the summary last. `progress` receives the
 /// share of the steps that is done, 0 to 1.
 ///
 /// # Errors

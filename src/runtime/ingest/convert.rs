@@ -80,7 +80,7 @@ impl<W: Seek> Seek for CountedOutput<'_, W> {
 }
 
 /// Reads `input` and writes it as `output`, each in the format of its extension. The output is wholly
-/// there afterwards or untouched. `progress` is told how far it has come.
+/// there afterwards or untouched. `progress` receives how far it has come.
 ///
 /// # Errors
 /// An [`IngestError`](super::IngestError) (to be had by `downcast_ref`), with the files named.

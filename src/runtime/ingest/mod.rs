@@ -225,7 +225,7 @@ pub fn read_with_remarks(
     read_watched(paths, options, &mut |_| {})
 }
 
-/// As [`read_with_remarks`]; `progress` is told the share of the present file that is read, 0 to 1.
+/// As [`read_with_remarks`]; `progress` receives the share of the present file that is read, 0 to 1.
 fn read_watched(
     paths: &[PathBuf],
     options: &ReadOptions,
