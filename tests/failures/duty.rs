@@ -68,13 +68,7 @@ fn what_is_acknowledged_before_the_shift_is_not_sent_and_a_restart_does_not_send
 fn check_names_the_first_hour_in_which_nobody_is_notified_of_red() {
     let (site, _) = site(SignedDuration::from_hours(6));
     let text = std::fs::read_to_string(site.path("site.toml")).unwrap();
-    let only = text.replace(
-        "\"yellow\", \"orange\", \"red\", \"unknown\"",
-        "\"unknown\"",
-    );
-    std::fs::write(site.path("site.toml"), &only).unwrap();
-    let output = site.ask(&["check", "--config-only", "site.toml"]);
-    let said = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+    let said = site.checked_with_a_first_hook_for_unknown();
     assert!(said.contains("none of them is on duty from"), "{said}");
     let wrong = text.replace("hours = [\"", "hours = [\"weekdays ");
     std::fs::write(site.path("site.toml"), wrong).unwrap();
