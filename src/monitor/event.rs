@@ -1,6 +1,7 @@
 //! What the monitor says: one JSON object a line, in data time, nothing from the wall clock.
 
 use super::given::{Given, OrderKind};
+use super::undeclared::UndeclaredLoad;
 use crate::alert::Level;
 use crate::effects::{Explained, Form, Kind, Rival};
 use crate::reading::{BenchmarkId, Timestamp};
@@ -107,6 +108,9 @@ pub enum EventKind {
         cannot_separate_from: Vec<Rival>,
         /// Whether forecasts and levels go by it from here on.
         adopted: bool,
+        /// The load that nobody declared, before and after all effects that were found.
+        #[serde(skip_serializing_if = "Option::is_none", default)]
+        undeclared_load: Option<Box<UndeclaredLoad>>,
     },
     /// A later search no longer finds an effect that forecasts went by.
     EffectDropped {

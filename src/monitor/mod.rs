@@ -23,6 +23,7 @@ mod site;
 mod suspect;
 mod together;
 mod track;
+mod undeclared;
 
 pub use course::{LevelStretch, levels_in};
 pub use declared::{Declaration, Declared};
@@ -38,6 +39,7 @@ pub use order::Order;
 pub use saved::{MemoryPart, SavedError};
 pub use search::{SearchFinding, SearchJob};
 pub use site::SiteLevel;
+pub use undeclared::UndeclaredLoad;
 
 use crate::alert::{Level, Policy};
 use crate::reading::{BenchmarkId, Reading, Sample, Suspicion, Timestamp, Unit};

@@ -8,6 +8,7 @@
 use super::Monitor;
 use super::event::Event;
 use super::track::{Phase, StepContext, Track};
+use super::undeclared::UndeclaredLoad;
 use crate::alert::Policy;
 use crate::effects::{Effect, Explained, Kind, KnownLoad, Options, Rival, explain};
 use crate::reading::{BenchmarkId, Channel, Series, Timestamp};
@@ -50,6 +51,9 @@ pub struct SearchFinding {
     /// The effects as forecasts use them.
     #[serde(rename = "fuller")]
     pub known_load: KnownLoad,
+    /// The load that nobody declared, before and after them.
+    #[serde(default)]
+    pub undeclared_load: Option<Box<UndeclaredLoad>>,
 }
 
 impl Monitor {
@@ -126,6 +130,7 @@ impl SearchJob {
             explained: said.explained,
             cannot_separate_from: said.cannot_separate_from,
             known_load: said.known_load,
+            undeclared_load: UndeclaredLoad::of(&said.curves),
         }
     }
 
@@ -137,6 +142,7 @@ impl SearchJob {
             explained: Explained::None,
             cannot_separate_from: Vec::new(),
             known_load: KnownLoad::default(),
+            undeclared_load: None,
         }
     }
 }

@@ -42,6 +42,7 @@ fn found(slope: Slope) -> SearchFinding {
                 gain: slope.gain,
             }],
         },
+        undeclared_load: None,
     }
 }
 

@@ -12,7 +12,7 @@ use crate::loaded::{Measured, RESERVOIR, Slope, flood, restless, start};
 use jiff::SignedDuration;
 use slipwatch::config;
 use slipwatch::effects::{Kind, Options, explain};
-use slipwatch::monitor::{Event, EventKind, Explain, Settings};
+use slipwatch::monitor::{Event, EventKind, Explain, Settings, UndeclaredLoad};
 use slipwatch::reading::{BenchmarkId, Channel, Recording, Series, Timestamp, Unit};
 use slipwatch::runtime::progress::Progress;
 use slipwatch::runtime::replay::{ReplayPace, ReplayPlan, replay};
@@ -182,6 +182,17 @@ fn found(events: &[String]) -> Vec<(i64, Kind, Option<String>, bool)> {
     events.iter().filter_map(one).collect()
 }
 
+/// The load that nobody declared, of each effect found.
+fn loads(events: &[String]) -> Vec<UndeclaredLoad> {
+    let one = |line: &String| match serde_json::from_str::<Event>(line).unwrap().kind {
+        EventKind::EffectFound {
+            undeclared_load, ..
+        } => undeclared_load.map(|load| *load),
+        _ => None,
+    };
+    events.iter().filter_map(one).collect()
+}
+
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_search_finds_the_reservoir_and_its_answer_comes_at_one_time_of_the_data_at_any_pace() {
     let fast = adopted().await;
@@ -190,6 +201,14 @@ async fn a_search_finds_the_reservoir_and_its_answer_comes_at_one_time_of_the_da
     assert_eq!(*kind, Kind::Hydrological, "{found:?}");
     assert_eq!(channel.as_deref(), Some(RESERVOIR));
     assert!(*adopted);
+    let load = loads(fast).remove(0);
+    let mean_square =
+        |load: &[f64]| load.iter().map(|one| one * one).sum::<f64>() / load.len() as f64;
+    assert_eq!(load.times.len(), load.before.len());
+    assert!(
+        mean_square(&load.after) < 0.25 * mean_square(&load.before),
+        "the reservoir takes half of the load that nobody declared: {load:?}"
+    );
     // A day in 10 ms: the search takes longer than that, and is waited for.
     let slow = said(Explain::Adopt, ReplayPace::Times(8_640_000.0), None).await;
     assert!(fast == slow, "the pace changed the events");

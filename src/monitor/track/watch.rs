@@ -262,6 +262,7 @@ impl Track {
             explained: finding.explained,
             cannot_separate_from: finding.cannot_separate_from.clone(),
             adopted,
+            undeclared_load: finding.undeclared_load.clone(),
         };
         self.event(time, kind)
     }

@@ -5,7 +5,10 @@
     reason = "a test fails by panicking"
 )]
 
+mod accessible;
 mod chromium;
+mod found;
+mod pace;
 
 use crate::site::{MARKUP, Site, TOKEN};
 use chromium::Chromium;

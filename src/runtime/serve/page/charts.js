@@ -203,6 +203,8 @@ function charts(view) {
   if (isDisplacement) list.push(plain('displacement', 'Displacement, mm', view.readings, 'accent', 170));
   list.push(plain('velocity', 'Velocity, mm/day', view.velocities, 'accent', 150, isDisplacement ? 'mean of readings' : 'readings'));
   list.push(inverse(view), forecasts(view), chances(view), regimes(view));
+  const load = view.marks.filter((mark) => mark.undeclared_load).pop();
+  if (load) list.push(undeclared(load.undeclared_load));
   for (const one of view.covariates) {
     list.push(plain(`covariate ${one.name}`, `${one.name}${one.unit ? `, ${one.unit}` : ''}`, one, 'third', 110));
   }
@@ -220,6 +222,33 @@ function plain(key, title, columns, colour, height, name = 'readings') {
     series: (shades) => [{ stroke: shades[colour], width: 1.5, points: { show: columns.t.length < 150, size: 4, fill: shades[colour] } }],
     keys: (shades) => [[name, shades[colour]]],
     value: (index) => `${minute(1000 * columns.t[index])}: ${figure(columns.v[index])}`,
+  };
+}
+
+/** The load beyond the law as the newest search saw it, before and after the effects that it found. */
+function undeclared(load) {
+  const t = load.times.map(seconds);
+  const after = load.after.length ? load.after : t.map(() => null);
+  return {
+    key: 'undeclared', title: 'Undeclared load, e-folds', height: 130,
+    data: [t, load.before, after],
+    range: (min, max) => around(Math.min(min ?? 0, 0), Math.max(max ?? 0, 0)),
+    series: (shades) => [{ stroke: shades.soft, width: 1.5, dash: [6, 3], points: { show: false } }, { stroke: shades.accent, width: 1.8, points: { show: false } }],
+    keys: (shades) => [['before what was found', shades.soft, 'dashed'], ['after', shades.accent, '', shades.fill]],
+    value: (index) => `${minute(1000 * t[index])}: ${figure(load.before[index])}${load.after.length ? `, after ${figure(load.after[index])}` : ''}`,
+    over: (plot, { shades }) => clipped(plot, (ctx) => {
+      const at = (index, value) => [plot.valToPos(t[index], 'x', true), plot.valToPos(value, 'y', true)];
+      const { min, max } = plot.scales.x;
+      line(ctx, [min, max].map((edge) => [plot.valToPos(edge, 'x', true), plot.valToPos(0, 'y', true)]), shades.rule, [], 1);
+      if (!load.after.length) return;
+      // 90 % of a normal distribution.
+      const edge = (sign) => load.after.map((mean, index) => at(index, mean + sign * 1.645 * load.after_sd[index]));
+      ctx.beginPath();
+      [...edge(1), ...edge(-1).reverse()].forEach(([x, y], index) => (index ? ctx.lineTo(x, y) : ctx.moveTo(x, y)));
+      ctx.closePath();
+      ctx.fillStyle = shades.fill;
+      ctx.fill();
+    }),
   };
 }
 

@@ -1,6 +1,7 @@
 // Elements, times and figures as a person reads them. Every text is set as text: a name is never markup.
 
 const SVG = 'http://www.w3.org/2000/svg';
+const EXPLAINED = { full: 'explains the residual in full', partly: 'explains a part of the residual', none: 'explains nothing' };
 let zone = 'UTC';
 
 /** An element with attributes and children; strings become text. */
@@ -159,7 +160,7 @@ export function told(event) {
     case 'unexplained-residual': return event.surprise_nats === undefined
       ? `residual with structure since ${minute(event.since)}, like an undeclared load (s.d. ${figure(event.load_sd)} e-folds)`
       : `a reading nobody expected (surprise ${figure(event.surprise_nats)} nats)`;
-    case 'effect-found': return `effect found: ${event.effect}${event.channel ? ` by ${event.channel}` : ''}, explains it ${event.explained}${event.adopted ? '; forecasts go by it from here on' : ''}`;
+    case 'effect-found': return `effect found: ${event.effect}${event.channel ? ` by ${event.channel}` : ''}, ${EXPLAINED[event.explained] ?? event.explained}${event.adopted ? '; forecasts go by it from here on' : ''}`;
     case 'effect-dropped': return `effect dropped: ${event.effect}${event.channel ? ` by ${event.channel}` : ''}`;
     default: return event.text ? `${event.event}: ${event.text}` : event.event;
   }
