@@ -59,6 +59,8 @@ pub enum Condition {
     },
     /// Something that calls for attention has happened.
     Happened(AlertCause),
+    /// The newest search has found an effect that the law lacked; by itself that calls no level.
+    EffectFound,
 }
 
 impl Condition {
@@ -77,6 +79,7 @@ impl Condition {
             Self::Happened(cause) if evidence.causes.contains(&cause) => Some(true),
             // Between two refits nothing is known of causes.
             Self::Happened(_) => evidence.chance_within_outlook.map(|_| false),
+            Self::EffectFound => Some(evidence.has_effect),
         }
     }
 
@@ -114,6 +117,7 @@ impl Condition {
                 shown(evidence.and_then(|one| one.chance_within(within)), "")
             ),
             Self::Happened(cause) => cause.words().to_owned(),
+            Self::EffectFound => "an effect that the law lacked has been found".to_owned(),
         }
     }
 }

@@ -23,6 +23,8 @@ pub struct AlertEvidence {
     pub acceleration_mm_per_day2: Option<f64>,
     /// What else calls for attention: a flip to instability, an intercept drifting in.
     pub causes: Vec<AlertCause>,
+    /// Whether the newest search has found an effect that the law lacked.
+    pub has_effect: bool,
     /// Chances of a collapse within other spans, that declared rules ask for.
     pub chances: Vec<(SignedDuration, f64)>,
     /// Declared rules whose conditions have held for long enough, by their place in the policy.

@@ -24,7 +24,8 @@ impl Policy {
             | Condition::Acceleration(_)
             | Condition::Displacement(_)
             | Condition::TangentAngle { .. }
-            | Condition::Happened(_) => None,
+            | Condition::Happened(_)
+            | Condition::EffectFound => None,
         })
     }
 
@@ -39,9 +40,10 @@ impl Policy {
                 Condition::Velocity(_)
                 | Condition::Acceleration(_)
                 | Condition::TangentAngle { .. } => true,
-                Condition::Displacement(_) | Condition::Chance { .. } | Condition::Happened(_) => {
-                    false
-                }
+                Condition::Displacement(_)
+                | Condition::Chance { .. }
+                | Condition::Happened(_)
+                | Condition::EffectFound => false,
             })
     }
 }

@@ -101,6 +101,7 @@ fn parsed(text: &str) -> Result<Condition, String> {
         "displacement" => value::length(figure).map(Condition::Displacement),
         "chance" => chance(figure),
         "tangent-angle" => tangent_angle(figure),
+        "effect-found" if figure.is_empty() => Ok(Condition::EffectFound),
         cause if figure.is_empty() => match AlertCause::named(cause) {
             Some(cause) => Ok(Condition::Happened(cause)),
             None => Err(choices()),
@@ -111,7 +112,7 @@ fn parsed(text: &str) -> Result<Condition, String> {
 
 fn choices() -> String {
     let causes = AlertCause::ALL.map(AlertCause::name).join("\", \"");
-    format!("{EXAMPLES}, or one of \"{causes}\"")
+    format!("{EXAMPLES}, or one of \"{causes}\", \"effect-found\"")
 }
 
 fn chance(figure: &str) -> Result<Condition, String> {
@@ -172,6 +173,7 @@ mod tests {
                 },
             ),
             ("regime-flip", Condition::Happened(AlertCause::RegimeFlip)),
+            ("effect-found", Condition::EffectFound),
         ] {
             assert_eq!(parsed(text), Ok(condition), "{text}");
         }
@@ -184,6 +186,7 @@ mod tests {
             ("tangent-angle 90 deg for 5 mm/day", "between 0 and 90"),
             ("tangent-angle 80 deg", "uniform creep"),
             ("rain", "unexplained-residual"),
+            ("effect-found rain", "effect-found"),
             ("", "velocity 20 mm/day"),
         ] {
             let said = parsed(text).unwrap_err();

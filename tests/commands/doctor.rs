@@ -147,6 +147,27 @@ fn a_state_folder_in_memory_and_one_that_takes_no_writes_are_not_good() {
 }
 
 #[test]
+fn a_record_that_has_no_room_is_doubtful_and_one_that_cannot_be_written_is_wrong() {
+    let folder = site("#!/bin/sh\n");
+    let at = folder.path();
+    let plain = fs::read_to_string(at.join("site.toml")).unwrap();
+    assert!(findings("record", at).is_empty(), "there is none");
+    let with = |path: &str, total: &str| {
+        let keys = format!("[site]\nrecord = \"{path}\"\nrecord_total = \"{total}\"");
+        let text = plain.replace("[site]", &keys);
+        fs::write(at.join("site.toml"), text).unwrap();
+        finding("record", at)
+    };
+    let (verdict, text) = with("record/site.mcap", "200 MB");
+    assert_eq!(verdict, "good", "{text}");
+    assert!(text.contains("up to 200 MB are recorded"), "{text}");
+    let (verdict, text) = with("record/site.mcap", "900000 GB");
+    assert_eq!(verdict, "doubtful", "{text}");
+    assert!(text.contains("lower record_total"), "{text}");
+    assert_eq!(with("/proc/site.mcap", "200 MB").0, "wrong");
+}
+
+#[test]
 fn a_recording_that_keeps_readings_back_in_an_open_chunk_is_told_with_its_bytes() {
     let folder = site("#!/bin/sh\n");
     let at = folder.path().join("recordings");

@@ -9,7 +9,7 @@
 
 use crate::loaded::{DELAY, Measured, RESERVOIR, Slope, flood, restless, start};
 use jiff::SignedDuration;
-use slipwatch::alert::{Level, Policy};
+use slipwatch::alert::{Combination, Condition, DeclaredRule, Level, Policy};
 use slipwatch::effects::{Effect, Explained, Filtered, Form, Kind, KnownLoad, Part};
 use slipwatch::monitor::{
     AlertState, Event, EventKind, Explain, Input, Monitor, SearchFinding, Settings, Unexplained,
@@ -304,6 +304,47 @@ fn an_effect_is_told_once_and_its_end_too() {
         matches!(gone[0].kind, EventKind::EffectDropped { .. }),
         "{gone:?}"
     );
+}
+
+#[test]
+fn a_rule_of_the_site_asks_for_an_effect_that_was_found_and_without_one_is_silent() {
+    let wet = wet_spring();
+    let part = Measured {
+        readings: wet.readings[..60].to_vec(),
+        samples: wet.samples[..60].to_vec(),
+        fails: None,
+    };
+    let rule = DeclaredRule {
+        name: "driven".to_owned(),
+        level: Level::Orange,
+        combination: Combination::All,
+        conditions: vec![Condition::EffectFound, Condition::Velocity(0.1)],
+        lasting: SignedDuration::ZERO,
+    };
+    let called = |finding: Option<SearchFinding>| {
+        let mut monitor = Monitor::new(Settings {
+            policy: Policy {
+                rules: vec![rule.clone()],
+                ..Policy::default()
+            },
+            explain: Explain::Adopt,
+            ..Settings::default()
+        });
+        let finding = finding.map(|finding| (50, finding));
+        let events = play(&mut monitor, &part, finding.as_ref());
+        let called = events.into_iter().find_map(|event| match event.kind {
+            EventKind::Alert { rule, text, .. } if rule == "rule:driven" => {
+                Some((event.time, text))
+            }
+            _ => None,
+        });
+        called
+    };
+    assert_eq!(called(None), None);
+    let (time, text) = called(Some(found(STANDS))).unwrap();
+    assert!(time >= part.readings[50].time, "{time}");
+    let said = "an effect that the law lacked has been found and velocity of 0.1 mm/day or more";
+    assert!(text.contains(said), "{text}");
 }
 
 #[test]

@@ -125,6 +125,7 @@ impl Track {
             settled_velocity_mm_per_day: settled(rates),
             displacement_mm: displacement_mm(shown),
             acceleration_mm_per_day2: acceleration(rates),
+            has_effect: self.watch.has_effect(),
             ..AlertEvidence::default()
         }
     }

@@ -63,6 +63,11 @@ impl Watch {
         self.taken += 1;
     }
 
+    /// Whether the newest search has found an effect.
+    pub(super) fn has_effect(&self) -> bool {
+        !self.known.is_empty()
+    }
+
     /// How many readings there were.
     pub(super) fn taken(&self) -> u64 {
         self.taken

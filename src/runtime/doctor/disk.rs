@@ -1,9 +1,10 @@
 //! Which file systems the state and the sources are on, and how long the state's takes to sync.
 
 use super::{CheckVerdict, Finding};
-use crate::config::Config;
+use crate::config::{Config, RecordFiles};
 use crate::runtime::clock::Stopwatch;
 use nix::sys::statfs::statfs;
+use nix::sys::statvfs::statvfs;
 use nix::unistd::{AccessFlags, access};
 use std::fs::File;
 use std::io::{self, Write};
@@ -12,6 +13,7 @@ use std::time::Duration;
 
 const FILE_SYSTEM: &str = "file-system";
 const FSYNC: &str = "fsync";
+const RECORD: &str = "record";
 /// Syncs that are measured.
 const SYNCS: usize = 20;
 /// A batch of readings costs one sync or more; a slower disk falls behind in a catch-up.
@@ -157,6 +159,39 @@ pub(super) fn fsync(folder: &Path) -> Finding {
                 Finding::new(FSYNC, CheckVerdict::Doubtful, text)
             } else {
                 Finding::new(FSYNC, CheckVerdict::Good, text)
+            }
+        }
+    }
+}
+
+/// Whether the daemon's own record can be written where it is to be, and has room.
+pub(super) fn record(files: &RecordFiles) -> Finding {
+    let folder = files.path.parent().unwrap_or(Path::new("."));
+    let place = folder.display();
+    let there = folder.ancestors().find(|path| path.exists());
+    let there = there.filter(|path| !path.as_os_str().is_empty());
+    let there = there.unwrap_or(Path::new("."));
+    // What the rights promise, a file system such as /proc need not keep.
+    let tried = if there == folder {
+        tempfile::tempfile_in(folder).map(drop)
+    } else {
+        access(there, AccessFlags::W_OK).map_err(io::Error::from)
+    };
+    if let Err(error) = tried {
+        let text = format!("nothing can be recorded in {place} as this user: {error}");
+        return Finding::new(RECORD, CheckVerdict::Wrong, text);
+    }
+    match statvfs(there) {
+        Err(error) => Finding::new(RECORD, CheckVerdict::Unknown, format!("{place}: {error}")),
+        Ok(disk) => {
+            let free = disk.blocks_available().saturating_mul(disk.fragment_size());
+            let (free, asked) = (free / 1_000_000, files.total / 1_000_000);
+            let text = format!("{place}: {free} MB free, up to {asked} MB are recorded");
+            if free < asked {
+                let text = format!("{text}; a full disk ends the record: lower record_total");
+                Finding::new(RECORD, CheckVerdict::Doubtful, text)
+            } else {
+                Finding::new(RECORD, CheckVerdict::Good, text)
             }
         }
     }

@@ -65,6 +65,7 @@ pub fn examine(config: &Config) -> Vec<Finding> {
     findings.push(watches::finding(config));
     findings.extend(disk::file_systems(config));
     findings.push(disk::fsync(&config.site.state_dir));
+    findings.extend(config.site.record.iter().map(disk::record));
     findings.push(clock_sync::finding());
     findings.extend(config.hooks.iter().map(hooks::finding));
     findings.extend(hooks::walls(&config.hooks));

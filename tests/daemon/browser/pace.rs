@@ -8,7 +8,7 @@ use crate::site::{Site, TOKEN};
 use jiff::SignedDuration;
 use std::fmt::Write as _;
 
-const BENCHMARKS: usize = 10;
+const BENCHMARKS: i64 = 10;
 const READINGS: i64 = 100_000;
 
 /// Ten that creep, read each minute.
@@ -22,7 +22,7 @@ fn readings() -> String {
         let time = newest - SignedDuration::from_mins(READINGS - index);
         write!(text, "\n{time}").unwrap();
         for benchmark in 0..BENCHMARKS {
-            let noise = ((index * 7919 + benchmark as i64 * 104_729) % 1000) as f64 / 1000.0;
+            let noise = ((index * 7919 + benchmark * 104_729) % 1000) as f64 / 1000.0;
             let mm = 1e-3 * (benchmark + 1) as f64 * index as f64 + noise;
             write!(text, ",{mm:.3}").unwrap();
         }
@@ -40,7 +40,6 @@ fn config(port: u16) -> String {
 
 #[test]
 #[ignore = "it measures, for minutes: run it by name"]
-#[expect(clippy::print_stdout, reason = "its figures")]
 fn paint_and_frames_with_a_million_readings() {
     let site = Site::of(&readings(), config);
     let mut browser = Chromium::start();
