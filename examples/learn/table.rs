@@ -11,14 +11,24 @@ pub(crate) fn write(families: &[Judged], slopes: u64) -> anyhow::Result<()> {
 }
 
 fn text(families: &[Judged], slopes: u64) -> anyhow::Result<String> {
+    let only = if families.iter().all(|one| one.family.fails()) {
+        " --failing"
+    } else {
+        ""
+    };
     let mut out = format!(
         "# Forecasts on families of slopes that taught them nothing\n\n\
-         Written by `cargo run --release --example learn -- --left-out {slopes}`. Each family of simulated slopes (src/forecast/world) is judged by a \
+         Written by `cargo run --release --example learn -- --left-out {slopes}{only}`. Each family of simulated slopes (src/forecast/world) is judged by a \
          network that was taught on all the other families, {slopes} slopes each, and never saw one of it. The network in force is taught on all \
          of them; what it is worth on a slope of no family here, nobody knows better than this table does.\n"
     );
     failing(&mut out, families)?;
     in_time(&mut out, families)?;
+    if families.iter().all(|one| one.family.fails()) {
+        out += "\nFamilies that stand were not judged in this run. What the network in force calls on them, which was taught on others of the same \
+                families: [false-alarms.md](false-alarms.md).\n";
+        return Ok(out);
+    }
     standing(&mut out, families)?;
     by_gauge(&mut out, families)?;
     by_sampling(&mut out, families)?;
