@@ -332,13 +332,12 @@ fn a_rule_of_the_site_asks_for_an_effect_that_was_found_and_without_one_is_silen
         });
         let finding = finding.map(|finding| (50, finding));
         let events = play(&mut monitor, &part, finding.as_ref());
-        let called = events.into_iter().find_map(|event| match event.kind {
+        events.into_iter().find_map(|event| match event.kind {
             EventKind::Alert { rule, text, .. } if rule == "rule:driven" => {
                 Some((event.time, text))
             }
             _ => None,
-        });
-        called
+        })
     };
     assert_eq!(called(None), None);
     let (time, text) = called(Some(found(STANDS))).unwrap();
