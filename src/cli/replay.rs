@@ -22,6 +22,10 @@ use std::path::{Path, PathBuf};
 
 /// What a site without a config is called.
 const NAMELESS: &str = "replay";
+/// Fewer columns leave no room for a time and a name.
+const LEAST_COLUMNS: i64 = 40;
+/// What a line begins with that continues an event.
+const CONTINUED: &str = "    ";
 
 /// Play recorded readings through the monitor, in their own time
 ///
@@ -48,6 +52,9 @@ pub(super) struct Args {
     /// Run the hooks of --config, marked as an exercise
     #[arg(long, requires = "config")]
     hooks: bool,
+    /// Text in lines of at most so many columns, such as 80; default is a line for each event
+    #[arg(long, value_name = "COLUMNS", value_parser = clap::value_parser!(u16).range(LEAST_COLUMNS..))]
+    width: Option<u16>,
     #[command(flatten)]
     output: TableArgs,
 }
@@ -201,6 +208,8 @@ struct Printer {
     /// Instead of lines, where that is asked for.
     table: Option<Box<dyn RowSink>>,
     zone: TimeZone,
+    /// Columns of a line, where that is asked for.
+    width: Option<usize>,
     timeline: Timeline,
     /// All of them, where they are to be recorded.
     kept: Option<Vec<Event>>,
@@ -213,6 +222,7 @@ impl Printer {
             format: args.output.lines(),
             table: args.output.table::<Event>()?,
             zone,
+            width: args.width.map(usize::from),
             timeline: Timeline::new(),
             kept: args.record.is_some().then(Vec::new),
         })
@@ -230,7 +240,11 @@ impl Printer {
             OutputFormat::Json => serde_json::to_string(event)?,
             OutputFormat::Text => {
                 self.timeline.take(event);
-                text::line(event, &self.zone)
+                let line = text::line(event, &self.zone);
+                match self.width {
+                    Some(columns) => text::wrapped(&line, columns, CONTINUED),
+                    None => line,
+                }
             }
         };
         writeln!(self.out, "{line}")

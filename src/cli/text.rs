@@ -6,12 +6,19 @@ use crate::monitor::{
 };
 use crate::reading::{BenchmarkId, Timestamp};
 use jiff::tz::TimeZone;
+use textwrap::{Options, WordSplitter};
 
 /// One event on one line: when, where, what, by the clocks of `zone`.
 pub(super) fn line(event: &Event, zone: &TimeZone) -> String {
     let place = event.benchmark.as_ref().map_or("site", |id| id.as_str());
     let text = format!("{}  {place}  {}", minute(event.time), what(&event.kind));
     local(&plain(&text), zone)
+}
+
+/// A line on as many lines of at most `columns` columns as its words need; those after the first begin with `indent`.
+pub(super) fn wrapped(line: &str, columns: usize, indent: &str) -> String {
+    let options = Options::new(columns).subsequent_indent(indent);
+    textwrap::fill(line, options.word_splitter(WordSplitter::NoHyphenation))
 }
 
 /// The text with its times in UTC as the clocks of `zone` show them.

@@ -293,6 +293,18 @@ fn a_replay_as_text_ends_with_velocity_level_and_forecast_as_marks_in_eighty_col
 }
 
 #[test]
+fn a_replay_in_eighty_columns_has_every_word_of_the_other_and_no_longer_line() {
+    let plain = out(&slipwatch(&["replay", &vaiont()]).success());
+    let narrow = out(&slipwatch(&["replay", &vaiont(), "--width", "80"]).success());
+    assert!(plain.lines().any(|line| line.chars().count() > 80));
+    let longest = narrow.lines().map(|line| line.chars().count()).max();
+    assert!(longest.is_some_and(|columns| columns <= 80), "{longest:?}");
+    assert!(plain.split_whitespace().eq(narrow.split_whitespace()));
+    let said = err(&slipwatch(&["replay", &vaiont(), "--width", "8"]).code(2));
+    assert!(said.contains("--width") && said.contains("40"), "{said}");
+}
+
+#[test]
 fn a_replay_up_to_a_time_is_the_beginning_of_the_whole_one() {
     let vaiont = vaiont();
     let replay = ["replay", &vaiont, "--format", "json", "--benchmark", "5"];

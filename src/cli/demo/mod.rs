@@ -9,6 +9,7 @@ mod verdict;
 use super::bar;
 use super::run::asynchronous;
 use crate::alert::{Level, Policy};
+use crate::cli::text::wrapped;
 use crate::config::HookConfig;
 use crate::monitor::{Event, Settings};
 use crate::reading::Recording;
@@ -104,7 +105,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     writeln!(out)?;
     for end in &ends {
-        writeln!(out, "{}", wrapped(end))?;
+        writeln!(out, "{}", indented(end))?;
     }
     writeln!(out, "{LAST_WORDS}")?;
     Ok(())
@@ -216,6 +217,11 @@ fn sample_hook(folder: &Path) -> anyhow::Result<HookConfig> {
     })
 }
 
+/// A line by two blanks to the right, on as many lines as it needs.
+fn indented(line: &str) -> String {
+    wrapped(&format!("  {line}"), COLUMNS, "  ")
+}
+
 /// Prints what the hook wrote first, and empties its file for the next crisis.
 fn show_hook(out: &mut impl Write, folder: &Path) -> anyhow::Result<()> {
     let file = folder.join(WRITTEN);
@@ -226,26 +232,9 @@ fn show_hook(out: &mut impl Write, folder: &Path) -> anyhow::Result<()> {
         Some(line) => writeln!(
             out,
             "\nthe hook, a process of its own, was run {count} times; what it wrote first:\n{}",
-            wrapped(line)
+            indented(line)
         )?,
     }
     std::fs::write(&file, "")?;
     Ok(())
-}
-
-/// The words of a line, indented, on as many lines as they need.
-fn wrapped(line: &str) -> String {
-    let mut text = String::new();
-    let mut at = COLUMNS;
-    for word in line.split(' ') {
-        let length = word.chars().count() + 1;
-        if at + length > COLUMNS {
-            text.push_str(if text.is_empty() { " " } else { "\n " });
-            at = 1;
-        }
-        text.push(' ');
-        text.push_str(word);
-        at += length;
-    }
-    text
 }
