@@ -102,7 +102,14 @@ pub async fn run(
     if let Some(record) = record {
         record.close(DRAIN_LIMIT).await;
     }
-    tracing::info!(?counts, "stopped");
+    tracing::info!(
+        taken = counts.taken,
+        repeated = counts.repeated,
+        from_the_future = counts.from_the_future,
+        without_clock = counts.without_clock,
+        long_past = counts.long_past,
+        "stopped"
+    );
     let followed = sources.join().await;
     worked.and(closed.map(drop)).map_err(fail)?;
     followed?;

@@ -146,7 +146,7 @@ impl Site {
                 self.stand(alert, is_sent);
             }
         }
-        tracing::info!(steps = after - from, of = after, "the past is there");
+        tracing::info!(steps = after - from, of = after, "stored steps replayed");
         self.settings = self.monitor.settings().clone();
         self.searches.resume();
         Ok(())
