@@ -110,7 +110,7 @@ soon is_again || fail "not started again after kill -9"
 is_red || fail "after kill -9 the red is not in force"
 sleep 2
 [ "$(given)" = "$before" ] || fail "after kill -9 the hook was given an alert again: $before, then $(given)"
-echo "ok: killed, started again by systemd, red as before and not told twice"
+echo "ok: killed, started again by systemd, red as before and not notified of twice"
 
 restarts=$(property NRestarts)
 inside systemctl kill --signal STOP --kill-who main slipwatch

@@ -89,7 +89,7 @@ fn nanoseconds() -> i128 {
 /// A site of `benchmarks` files with `each` readings before now, `seconds` apart: creep of a mm a day that slows down.
 fn site(benchmarks: usize, each: usize, seconds: i64) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
-    for name in ["incoming", "told"] {
+    for name in ["incoming", "notified"] {
         fs::create_dir(folder.path().join(name)).unwrap();
     }
     let hook = std::env::current_exe().unwrap();
@@ -99,7 +99,7 @@ fn site(benchmarks: usize, each: usize, seconds: i64) -> TempDir {
          [[alert.threshold]]\nlevel = \"orange\"\ndisplacement = \"5 m\"\n\
          [[hook]]\nrun = [{:?}, \"--hook\", {:?}]\nlevels = [\"orange\", \"red\"]\n",
         hook.display(),
-        folder.path().join("told").display(),
+        folder.path().join("notified").display(),
     );
     fs::write(folder.path().join("site.toml"), text).unwrap();
     let mut generator = Pcg64::seed_from_u64(20_261_122);
@@ -234,13 +234,13 @@ fn held_load(seconds: u32) {
     let (mut latencies, mut stood) = (Vec::new(), 0);
     for (benchmark, appended) in appended.iter().take(BENCHMARKS).enumerate().step_by(ALERTS) {
         let name = format!("b{benchmark:05}");
-        // It was told before, perhaps in one message with many others.
+        // It was notified before, perhaps in one message with many others.
         if standing.contains(&format!("\"benchmark\":\"{name}\"")) {
             stood += 1;
             continue;
         }
-        let told = fs::read_to_string(folder.path().join("told").join(&name));
-        let started = told.unwrap_or_else(|error| panic!("{name} was never told: {error}"));
+        let notified = fs::read_to_string(folder.path().join("notified").join(&name));
+        let started = notified.unwrap_or_else(|error| panic!("{name} was never notified: {error}"));
         let started: i128 = started.parse().unwrap();
         latencies.push((started - appended) as f64 / 1e6);
     }

@@ -1,7 +1,7 @@
-//! What is told of chances: the Brier score, and the levels they would call.
+//! What is reported of chances: the Brier score, and the levels they would call.
 
 use crate::corpus::{LOOKS, LOOKS_AT_FAILING, SHORT_LEADS, SIMULATED_LEADS};
-use crate::record::{Record, Told};
+use crate::record::{Record, SeriesForecasts};
 use crate::reduce::brier;
 use crate::simulated::{of_family, standing_fates};
 use crate::sums::{
@@ -14,20 +14,20 @@ use std::fmt::Write as _;
 /// Passing within so many days is scored.
 pub(crate) const BRIER_DAYS: [f64; 4] = [0.25, 1.0, 3.0, 10.0];
 
-fn all<'a>(scored: &Scored<'a>) -> Vec<&'a Told> {
+fn all<'a>(scored: &Scored<'a>) -> Vec<&'a SeriesForecasts> {
     [&scored.failing[..], &scored.standing[..]].concat()
 }
 
 /// How often it came within that time, over all looks of which that is known.
-fn base_rate(told: &[&Told], days: f64) -> Option<f64> {
+fn base_rate(series: &[&SeriesForecasts], days: f64) -> Option<f64> {
     let came = |record: &Record| record.outcome.within(days).map(one_if);
-    average(&sums(told, PANEL, &came))
+    average(&sums(series, PANEL, &came))
 }
 
 /// The skill of one method against the base rate: 1 less the ratio of their Brier scores.
 pub(crate) fn skill(scored: &Scored, name: &str, days: f64) -> Option<Interval> {
-    let told = all(scored);
-    let base = base_rate(&told, days)?;
+    let series = all(scored);
+    let base = base_rate(&series, days)?;
     let theirs = |record: &Record| {
         Some(brier(
             record.chance_within(days),
@@ -36,8 +36,8 @@ pub(crate) fn skill(scored: &Scored, name: &str, days: f64) -> Option<Interval> 
     };
     let climate = |record: &Record| Some(brier(base, record.outcome.within(days)?));
     let over = ratio(
-        &sums(&told, name, &theirs),
-        &sums(&told, name, &climate),
+        &sums(&series, name, &theirs),
+        &sums(&series, name, &climate),
         SEED,
     )?;
     Some(Interval {
@@ -49,7 +49,7 @@ pub(crate) fn skill(scored: &Scored, name: &str, days: f64) -> Option<Interval> 
 
 /// The section on the Brier score.
 pub(crate) fn brier_section(out: &mut String, scored: &Scored) {
-    let told = all(scored);
+    let series = all(scored);
     let short: Vec<String> = SHORT_LEADS.iter().map(ToString::to_string).collect();
     // Writing to a string cannot fail.
     let _ = writeln!(
@@ -70,7 +70,7 @@ pub(crate) fn brier_section(out: &mut String, scored: &Scored) {
     let mut head = vec!["method".to_owned()];
     head.extend(BRIER_DAYS.iter().map(horizon));
     let of_base = |of: &dyn Fn(f64) -> f64| {
-        let each = BRIER_DAYS.map(|days| base_rate(&told, days).map(of));
+        let each = BRIER_DAYS.map(|days| base_rate(&series, days).map(of));
         each.map(|value| value.map_or("–".to_owned(), |value| format!("{value:.4}")))
     };
     let mut rows = vec![
@@ -123,21 +123,21 @@ impl Called {
 
 /// The share of the panel's looks that call a level.
 pub(crate) fn share_called(
-    told: &[&Told],
+    series: &[&SeriesForecasts],
     called: Called,
     is_meant: &dyn Fn(&Record) -> bool,
 ) -> Option<f64> {
     let score = |record: &Record| is_meant(record).then(|| one_if(called.by(record)));
-    average(&sums(told, PANEL, &score))
+    average(&sums(series, PANEL, &score))
 }
 
 /// The share of series of which a look ever calls a level.
-pub(crate) fn share_ever(told: &[&Told], called: Called) -> Option<f64> {
-    let ever = told.iter().filter(|one| {
+pub(crate) fn share_ever(series: &[&SeriesForecasts], called: Called) -> Option<f64> {
+    let ever = series.iter().filter(|one| {
         let mut panel = one.records.iter().filter(|record| record.method == PANEL);
         panel.any(|record| called.by(record))
     });
-    (!told.is_empty()).then(|| ever.count() as f64 / told.len() as f64)
+    (!series.is_empty()).then(|| ever.count() as f64 / series.len() as f64)
 }
 
 /// The section on levels.
@@ -172,16 +172,16 @@ pub(crate) fn levels_section(out: &mut String, scored: &Scored) {
         "slopes ever red",
         "slopes ever orange",
     ];
-    let mut groups: Vec<(&str, Vec<&Told>)> = standing_fates(scored)
+    let mut groups: Vec<(&str, Vec<&SeriesForecasts>)> = standing_fates(scored)
         .into_iter()
         .map(|fate| (fate, of_family(&scored.standing, fate)))
         .collect();
     groups.push(("all", scored.standing.clone()));
-    let row = |(name, told): &(&str, Vec<&Told>)| {
-        let mut row = vec![(*name).to_owned(), told.len().to_string()];
-        row.extend(Called::ALL.map(|called| percent(share_called(told, called, &|_| true))));
-        row.push(percent(share_ever(told, Called::Red)));
-        row.push(percent(share_ever(told, Called::Orange)));
+    let row = |(name, series): &(&str, Vec<&SeriesForecasts>)| {
+        let mut row = vec![(*name).to_owned(), series.len().to_string()];
+        row.extend(Called::ALL.map(|called| percent(share_called(series, called, &|_| true))));
+        row.push(percent(share_ever(series, Called::Red)));
+        row.push(percent(share_ever(series, Called::Orange)));
         row
     };
     let rows: Vec<Vec<String>> = groups.iter().map(row).collect();

@@ -78,7 +78,7 @@ pub(crate) struct Evaluation {
 
 /// Leads of simulated lives that methods are compared at, days.
 pub(crate) const SIMULATED_LEADS: [f64; 5] = [40.0, 20.0, 10.0, 5.0, 2.0];
-/// Leads beside those, for what is told of the last days.
+/// Leads beside those, for what is reported of the last days.
 pub(crate) const SHORT_LEADS: [f64; 3] = [1.0, 0.5, 0.2];
 /// Looks at a slope that stood, evenly over its readings.
 pub(crate) const LOOKS: usize = 40;

@@ -1,7 +1,7 @@
 //! The figures of the document.
 
 use crate::corpus::SIMULATED_LEADS;
-use crate::record::Told;
+use crate::record::SeriesForecasts;
 use crate::simulated::{is_at_a_lead, pit_counts};
 use crate::sites::{leads, record_at, unit};
 use crate::sums::{OURS, PANEL, Scored, average, crps, error_days, sums};
@@ -113,7 +113,7 @@ fn pit(scored: &Scored) -> String {
     bars.svg()
 }
 
-fn errors(one: &Told, scored: &Scored) -> String {
+fn errors(one: &SeriesForecasts, scored: &Scored) -> String {
     let (unit, factor) = unit(one);
     let leads = leads(one);
     let points = |name: &str| -> Vec<(f64, f64)> {

@@ -1,6 +1,6 @@
 //! What each method predicted of La Clapière, which contemporaries expected to fall and which stands.
 
-use crate::record::{Record, Told};
+use crate::record::{Record, SeriesForecasts};
 use crate::sums::{PANEL, Scored, grid};
 use slipwatch::reading::{Timestamp, after_days};
 use std::collections::BTreeMap;
@@ -17,7 +17,7 @@ const METHODS: [&str; 6] = [
 ];
 /// Contemporaries expected the collapse in these years (Vibert et al. 1988, Rat 1988).
 const FEARED: [&str; 2] = ["1988", "1990"];
-/// A median so many days away is told as one that is far.
+/// A median so many days away is given as one that is far.
 const FAR_DAYS: f64 = 3652.5;
 
 /// The section; empty without the series.
@@ -92,7 +92,7 @@ fn in_runs(cells: &[String]) -> String {
     }
 }
 
-fn false_ones(one: &Told, epoch: Timestamp, name: &str) -> Vec<String> {
+fn false_ones(one: &SeriesForecasts, epoch: Timestamp, name: &str) -> Vec<String> {
     let end = one
         .records
         .iter()

@@ -1,7 +1,7 @@
 //! The records as lines of JSON, written and read again.
 
 use crate::corpus::Kind;
-use crate::record::{HORIZONS_DAYS, Record, Told};
+use crate::record::{HORIZONS_DAYS, Record, SeriesForecasts};
 use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 use slipwatch::forecast::Passage;
@@ -26,9 +26,9 @@ struct Line {
 }
 
 /// Every record, a line of JSON each.
-pub(crate) fn written(told: &[Told]) -> serde_json::Result<String> {
+pub(crate) fn written(series: &[SeriesForecasts]) -> serde_json::Result<String> {
     let mut out = String::new();
-    for one in told {
+    for one in series {
         for record in &one.records {
             out.push_str(&serde_json::to_string(&Line::of(one, record))?);
             out.push('\n');
@@ -38,12 +38,12 @@ pub(crate) fn written(told: &[Told]) -> serde_json::Result<String> {
 }
 
 /// What [`written`] wrote.
-pub(crate) fn read(lines: &str) -> Result<Vec<Told>> {
-    let mut told: Vec<Told> = Vec::new();
+pub(crate) fn read(lines: &str) -> Result<Vec<SeriesForecasts>> {
+    let mut series: Vec<SeriesForecasts> = Vec::new();
     for line in lines.lines() {
         let line: Line = serde_json::from_str(line)?;
-        if told.last().is_none_or(|last| last.name != line.series) {
-            told.push(Told {
+        if series.last().is_none_or(|last| last.name != line.series) {
+            series.push(SeriesForecasts {
                 name: line.series.clone(),
                 kind: Kind::of(&line.kind).with_context(|| format!("no kind {}", line.kind))?,
                 family: line.family.clone(),
@@ -51,15 +51,15 @@ pub(crate) fn read(lines: &str) -> Result<Vec<Told>> {
                 records: Vec::new(),
             });
         }
-        if let Some(last) = told.last_mut() {
+        if let Some(last) = series.last_mut() {
             last.records.push(line.record()?);
         }
     }
-    Ok(told)
+    Ok(series)
 }
 
 impl Line {
-    fn of(one: &Told, record: &Record) -> Self {
+    fn of(one: &SeriesForecasts, record: &Record) -> Self {
         let (failed_after_days, stood_for_days) = match record.outcome {
             Outcome::Failed(days) => (Some(days), None),
             Outcome::Stood(days) => (None, Some(days)),

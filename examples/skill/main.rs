@@ -9,7 +9,7 @@
 //! what had been measured until then, and what it says is scored against what came.
 #![expect(
     clippy::print_stderr,
-    reason = "what is left out is told to who runs it"
+    reason = "what is left out is printed for who runs it"
 )]
 
 mod chances;
@@ -87,7 +87,7 @@ fn main() -> Result<()> {
         Corpus::TRAINING
     };
     let subjects = Subjects::new(recorded, corpus, arguments.simulated);
-    let told = match &arguments.from {
+    let series = match &arguments.from {
         Some(file) => {
             let lines = std::fs::read_to_string(file);
             lines::read(&lines.with_context(|| file.display().to_string())?)?
@@ -95,13 +95,13 @@ fn main() -> Result<()> {
         None => run::run(&subjects, &methods, arguments.threads)?,
     };
     if let Some(file) = &arguments.records {
-        let lines = lines::written(&told)?;
+        let lines = lines::written(&series)?;
         std::fs::write(file, lines).with_context(|| file.display().to_string())?;
     }
     if arguments.write {
         let names = methods.iter().map(|method| method.name).collect();
-        return document::write(&Scored::of(&told, names), arguments.judged);
+        return document::write(&Scored::of(&series, names), arguments.judged);
     }
-    write!(std::io::stdout(), "{}", table::text(&told, &methods))?;
+    write!(std::io::stdout(), "{}", table::text(&series, &methods))?;
     Ok(())
 }

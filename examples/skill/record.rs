@@ -7,12 +7,12 @@ use slipwatch::score::{Known, Method, Outcome, is_covered, pit};
 
 /// A passage is reduced to so many times, each of about the same share of it.
 const MOST_TIMES: u32 = 64;
-/// Chances are told of passing within so many days.
+/// Chances are given of passing within so many days.
 pub(crate) const HORIZONS_DAYS: [f64; 5] = [0.25, 1.0, 3.0, 10.0, 30.0];
 
 /// A series as its records name it.
 #[derive(Debug, Clone)]
-pub(crate) struct Told {
+pub(crate) struct SeriesForecasts {
     pub(crate) name: String,
     pub(crate) kind: Kind,
     pub(crate) family: String,

@@ -1,7 +1,7 @@
 //! Every method at every look of every series, over a few threads.
 
 use crate::corpus::Subjects;
-use crate::record::{Record, Told};
+use crate::record::{Record, SeriesForecasts};
 use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
 use slipwatch::score::Method;
@@ -9,7 +9,11 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// What was said of each series, in the order of the series whatever the threads.
-pub(crate) fn run(subjects: &Subjects, methods: &[&Method], threads: usize) -> Result<Vec<Told>> {
+pub(crate) fn run(
+    subjects: &Subjects,
+    methods: &[&Method],
+    threads: usize,
+) -> Result<Vec<SeriesForecasts>> {
     let bar = bar(subjects.count());
     let next = AtomicU64::new(0);
     let done = Mutex::new(Vec::new());
@@ -20,10 +24,10 @@ pub(crate) fn run(subjects: &Subjects, methods: &[&Method], threads: usize) -> R
                 if index >= subjects.count() {
                     return;
                 }
-                let told = told(subjects, index, methods);
+                let series = forecasts_of(subjects, index, methods);
                 bar.inc(1);
                 if let Ok(mut done) = done.lock() {
-                    done.push((index, told));
+                    done.push((index, series));
                 }
             }
         };
@@ -40,10 +44,10 @@ pub(crate) fn run(subjects: &Subjects, methods: &[&Method], threads: usize) -> R
         .into_inner()
         .map_err(|_| anyhow::anyhow!("a worker panicked"))?;
     done.sort_by_key(|(index, _)| *index);
-    Ok(done.into_iter().map(|(_, told)| told).collect())
+    Ok(done.into_iter().map(|(_, series)| series).collect())
 }
 
-fn told(subjects: &Subjects, index: u64, methods: &[&Method]) -> Told {
+fn forecasts_of(subjects: &Subjects, index: u64, methods: &[&Method]) -> SeriesForecasts {
     let subject = subjects.at(index);
     let mut records = Vec::new();
     for look in subject.looks() {
@@ -55,7 +59,7 @@ fn told(subjects: &Subjects, index: u64, methods: &[&Method]) -> Told {
             .map(|method| Record::of(&subject, &look, &known, method));
         records.extend(said);
     }
-    Told {
+    SeriesForecasts {
         name: subject.name,
         kind: subject.kind,
         family: subject.family,

@@ -1,7 +1,7 @@
-//! What is told of the simulated slopes: scores by lead and by fate.
+//! What is reported of the simulated slopes: scores by lead and by fate.
 
 use crate::corpus::SIMULATED_LEADS;
-use crate::record::{Record, Told};
+use crate::record::{Record, SeriesForecasts};
 use crate::reduce::{median, prognostic_horizon, tenths};
 use crate::sums::{
     OURS, PANEL, SEED, Scored, average, crps, error_days, grid, lead_head, mean_crps, one_if,
@@ -172,7 +172,7 @@ fn share_near(scored: &Scored, name: &str, lead: f64) -> Option<f64> {
     average(&sums(&scored.failing, name, &score))
 }
 
-fn horizon(one: &Told, name: &str) -> f64 {
+fn horizon(one: &SeriesForecasts, name: &str) -> f64 {
     let records = one.records.iter();
     let meant = records.filter(|record| record.method == name && is_at_a_lead(record));
     let near = meant.filter_map(|record| Some((record.lead_days?, is_near(record)?)));
@@ -186,8 +186,11 @@ pub(crate) fn standing_fates<'a>(scored: &Scored<'a>) -> BTreeSet<&'a str> {
 }
 
 /// Those of one family.
-pub(crate) fn of_family<'a>(told: &[&'a Told], family: &str) -> Vec<&'a Told> {
-    let meant = told.iter().filter(|one| one.family == family);
+pub(crate) fn of_family<'a>(
+    series: &[&'a SeriesForecasts],
+    family: &str,
+) -> Vec<&'a SeriesForecasts> {
+    let meant = series.iter().filter(|one| one.family == family);
     meant.copied().collect()
 }
 
@@ -199,8 +202,8 @@ fn fates(out: &mut String, scored: &Scored) {
     let row = |name: &&'static str| {
         let mut row = vec![(*name).to_owned()];
         for fate in &fates {
-            let told = of_family(&scored.standing, fate);
-            row.push(short_cell(mean_crps(&told, name, &|_| true)));
+            let series = of_family(&scored.standing, fate);
+            row.push(short_cell(mean_crps(&series, name, &|_| true)));
         }
         row
     };

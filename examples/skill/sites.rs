@@ -1,8 +1,8 @@
-//! What is told of measured and reconstructed series.
+//! What is reported of measured and reconstructed series.
 
 use crate::chances::{Called, share_called};
 use crate::corpus::Kind;
-use crate::record::{Record, Told};
+use crate::record::{Record, SeriesForecasts};
 use crate::sums::{PANEL, Scored, average, crps, error_days, grid, percent, sums};
 use slipwatch::score::{METHODS, Outcome};
 use std::cmp::Ordering;
@@ -25,7 +25,7 @@ pub(crate) struct Standing {
 }
 
 /// The leads of a series, longest first, days.
-pub(crate) fn leads(one: &Told) -> Vec<f64> {
+pub(crate) fn leads(one: &SeriesForecasts) -> Vec<f64> {
     let mut leads: Vec<f64> = one
         .records
         .iter()
@@ -37,13 +37,13 @@ pub(crate) fn leads(one: &Told) -> Vec<f64> {
 }
 
 /// The record of a method at a lead.
-pub(crate) fn record_at<'a>(one: &'a Told, name: &str, lead: f64) -> Option<&'a Record> {
+pub(crate) fn record_at<'a>(one: &'a SeriesForecasts, name: &str, lead: f64) -> Option<&'a Record> {
     let mut records = one.records.iter();
     records.find(|record| record.method == name && record.lead_days == Some(lead))
 }
 
 /// The lowest CRPS of any rival at a lead, days.
-fn best_at(one: &Told, scored: &Scored, lead: f64) -> Option<(&'static str, f64)> {
+fn best_at(one: &SeriesForecasts, scored: &Scored, lead: f64) -> Option<(&'static str, f64)> {
     let each = scored
         .rivals()
         .filter_map(|name| Some((name, crps(record_at(one, name, lead)?))));
@@ -51,7 +51,7 @@ fn best_at(one: &Told, scored: &Scored, lead: f64) -> Option<(&'static str, f64)
 }
 
 impl Standing {
-    pub(crate) fn of(one: &Told, scored: &Scored) -> Option<Self> {
+    pub(crate) fn of(one: &SeriesForecasts, scored: &Scored) -> Option<Self> {
         let (best, _) = scored.best_rival(&[one], &|_| true)?;
         let leads = leads(one);
         let panel = |lead: &f64| record_at(one, PANEL, *lead);
@@ -76,8 +76,8 @@ impl Standing {
     }
 }
 
-/// Days are told in hours where no lead is longer than one.
-pub(crate) fn unit(one: &Told) -> (&'static str, f64) {
+/// Days are given in hours where no lead is longer than one.
+pub(crate) fn unit(one: &SeriesForecasts) -> (&'static str, f64) {
     if leads(one).first().is_some_and(|lead| *lead <= 1.0) {
         ("h", 24.0)
     } else {
@@ -100,7 +100,7 @@ pub(crate) fn failed_section(out: &mut String, scored: &Scored) {
     }
     each_site_once(out, scored);
     out.push_str("\n### The panel beside its rivals\n\nLeads at which its CRPS is at or under that of the rival best at that lead, and of the rival best over all leads; leads with a late median:\n");
-    let row = |one: &&Told| {
+    let row = |one: &&SeriesForecasts| {
         let standing = Standing::of(one, scored)?;
         let of = |count: usize| format!("{count} of {}", standing.leads);
         Some(vec![
@@ -116,7 +116,7 @@ pub(crate) fn failed_section(out: &mut String, scored: &Scored) {
 }
 
 /// The place of a measured series: the first word of its heading.
-fn place(one: &Told) -> &str {
+fn place(one: &SeriesForecasts) -> &str {
     let heading = one.family.split(',').next().unwrap_or(&one.family);
     heading.split(' ').next().unwrap_or(heading)
 }
@@ -124,7 +124,7 @@ fn place(one: &Told) -> &str {
 /// CRPS over the time that remained, of every method, the measured places that failed each counted once.
 fn each_site_once(out: &mut String, scored: &Scored) {
     let failed = scored.failed.iter().copied();
-    let measured: Vec<&Told> = failed.filter(|one| one.kind == Kind::Measured).collect();
+    let measured: Vec<&SeriesForecasts> = failed.filter(|one| one.kind == Kind::Measured).collect();
     let mut places: Vec<&str> = measured.iter().map(|one| place(one)).collect();
     places.dedup();
     let mut rows: Vec<(f64, Vec<String>)> = Vec::new();
@@ -168,7 +168,7 @@ fn each_site_once(out: &mut String, scored: &Scored) {
     grid(out, &head, &rows);
 }
 
-fn table_of(out: &mut String, one: &Told, scored: &Scored) {
+fn table_of(out: &mut String, one: &SeriesForecasts, scored: &Scored) {
     let (unit, factor) = unit(one);
     let leads = leads(one);
     // Writing to a string cannot fail.
@@ -223,7 +223,7 @@ pub(crate) fn stood_section(out: &mut String, scored: &Scored) {
         "red",
         "orange",
     ];
-    let row = |one: &&Told| {
+    let row = |one: &&SeriesForecasts| {
         let crps_of = |name: &str| {
             let mean = average(&sums(&[one], name, &|record| Some(crps(record))));
             mean.map_or("–".to_owned(), |mean| format!("{mean:.3}"))
@@ -257,11 +257,11 @@ pub(crate) fn stood_section(out: &mut String, scored: &Scored) {
 /// The panel's mean CRPS over some records, and every rival of a lower one, best first; `None` where there is none.
 pub(crate) fn loss(
     scored: &Scored,
-    told: &[&Told],
+    series: &[&SeriesForecasts],
     is_meant: &dyn Fn(&Record) -> bool,
 ) -> Option<(f64, Vec<(f64, &'static str)>)> {
     let score = |record: &Record| is_meant(record).then(|| crps(record));
-    let of = |name: &str| average(&sums(told, name, &score));
+    let of = |name: &str| average(&sums(series, name, &score));
     let ours = of(PANEL)?;
     let rivals = scored.rivals().filter_map(|name| Some((of(name)?, name)));
     let mut lower: Vec<(f64, &str)> = rivals.filter(|(theirs, _)| *theirs < ours).collect();

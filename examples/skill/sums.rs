@@ -1,7 +1,7 @@
-//! Scores gathered by series, and how figures are told.
+//! Scores gathered by series, and how figures are written.
 
 use crate::corpus::Kind;
-use crate::record::{Record, Told};
+use crate::record::{Record, SeriesForecasts};
 use slipwatch::forecast::{HORIZON_DAYS, Passage};
 use slipwatch::score::{Interval, Sum, crps_days, mean, scored_days};
 use std::fmt::Write as _;
@@ -13,27 +13,27 @@ pub(crate) const OURS: [&str; 2] = ["panel", "slider-block"];
 /// The first of them: what the monitor goes by.
 pub(crate) const PANEL: &str = OURS[0];
 
-/// What is told of each series, as the document groups it.
+/// What is reported of each series, as the document groups it.
 #[derive(Debug)]
 pub(crate) struct Scored<'a> {
     pub(crate) methods: Vec<&'static str>,
-    pub(crate) failing: Vec<&'a Told>,
-    pub(crate) standing: Vec<&'a Told>,
+    pub(crate) failing: Vec<&'a SeriesForecasts>,
+    pub(crate) standing: Vec<&'a SeriesForecasts>,
     /// Measured and reconstructed, that failed.
-    pub(crate) failed: Vec<&'a Told>,
+    pub(crate) failed: Vec<&'a SeriesForecasts>,
     /// Measured and reconstructed, that stood.
-    pub(crate) stood: Vec<&'a Told>,
+    pub(crate) stood: Vec<&'a SeriesForecasts>,
 }
 
 impl<'a> Scored<'a> {
-    pub(crate) fn of(told: &'a [Told], methods: Vec<&'static str>) -> Self {
+    pub(crate) fn of(series: &'a [SeriesForecasts], methods: Vec<&'static str>) -> Self {
         let those = |simulated: bool, failed: bool| {
-            let is_meant = |one: &&Told| {
+            let is_meant = |one: &&SeriesForecasts| {
                 let mut ends = one.records.iter().map(Record::remaining_days);
                 let has_failed = ends.any(|days| days.is_some());
                 (one.kind == Kind::Simulated) == simulated && has_failed == failed
             };
-            told.iter().filter(is_meant).collect()
+            series.iter().filter(is_meant).collect()
         };
         Self {
             methods,
@@ -52,12 +52,12 @@ impl<'a> Scored<'a> {
     /// The rival of the lowest mean CRPS over the records that `is_meant`, and that, days.
     pub(crate) fn best_rival(
         &self,
-        told: &[&Told],
+        series: &[&SeriesForecasts],
         is_meant: &dyn Fn(&Record) -> bool,
     ) -> Option<(&'static str, f64)> {
         let each = self.rivals().filter_map(|name| {
             let score = |record: &Record| is_meant(record).then(|| crps(record));
-            Some((name, average(&sums(told, name, &score))?))
+            Some((name, average(&sums(series, name, &score))?))
         });
         each.min_by(|one, other| one.1.total_cmp(&other.1))
     }
@@ -65,11 +65,11 @@ impl<'a> Scored<'a> {
 
 /// The scores of one method by series, the series without any left out.
 pub(crate) fn sums(
-    told: &[&Told],
+    series: &[&SeriesForecasts],
     method: &str,
     score: &dyn Fn(&Record) -> Option<f64>,
 ) -> Vec<Sum> {
-    let of = |one: &&Told| {
+    let of = |one: &&SeriesForecasts| {
         let meant = one.records.iter().filter(|record| record.method == method);
         let scores = meant.filter_map(score);
         scores.fold(Sum::default(), |sum, score| Sum {
@@ -77,7 +77,7 @@ pub(crate) fn sums(
             count: sum.count + 1.0,
         })
     };
-    let each = told.iter().map(of);
+    let each = series.iter().map(of);
     each.filter(|sum| sum.count > 0.0).collect()
 }
 
@@ -91,12 +91,12 @@ pub(crate) fn average(sums: &[Sum]) -> Option<f64> {
 
 /// The mean of a score at the records that `is_meant`, with its interval.
 pub(crate) fn mean_crps(
-    told: &[&Told],
+    series: &[&SeriesForecasts],
     method: &str,
     is_meant: &dyn Fn(&Record) -> bool,
 ) -> Option<Interval> {
     let score = |record: &Record| is_meant(record).then(|| crps(record));
-    mean(&sums(told, method, &score), SEED)
+    mean(&sums(series, method, &score), SEED)
 }
 
 /// What was said; of who said nothing, that no failure comes.

@@ -1,7 +1,7 @@
 //! The scores, a table for each site and each fate, a row for each lead and method.
 
 use crate::corpus::Kind;
-use crate::record::{Record, Told};
+use crate::record::{Record, SeriesForecasts};
 use crate::sums::{SEED, cell, crps, one_if, said, sums};
 use slipwatch::score::{Method, Sum, log_score, mean, ratio};
 use std::cmp::Ordering;
@@ -18,15 +18,15 @@ those that spoke; a point forecast has no interval. Series of \
 one site share their failure, so the intervals of several are too narrow; one series alone has none.\n";
 
 /// The whole text.
-pub(crate) fn text(told: &[Told], methods: &[&Method]) -> String {
+pub(crate) fn text(series: &[SeriesForecasts], methods: &[&Method]) -> String {
     let mut out = ABOUT.to_owned();
-    let families: BTreeSet<(Kind, &str)> = told
+    let families: BTreeSet<(Kind, &str)> = series
         .iter()
         .map(|one| (one.kind, one.family.as_str()))
         .collect();
     for (kind, family) in families {
-        let of_family = told.iter();
-        let of_family: Vec<&Told> = of_family
+        let of_family = series.iter();
+        let of_family: Vec<&SeriesForecasts> = of_family
             .filter(|one| (one.kind, one.family.as_str()) == (kind, family))
             .collect();
         let heading = format!("{family} ({}, {} series)", kind.name(), of_family.len());
@@ -43,10 +43,10 @@ pub(crate) fn text(told: &[Told], methods: &[&Method]) -> String {
     out
 }
 
-fn rows(out: &mut String, lead: Option<f64>, (told, methods): (&[&Told], &[&Method])) {
+fn rows(out: &mut String, lead: Option<f64>, (series, methods): (&[&SeriesForecasts], &[&Method])) {
     let sums = |method: &Method, score: &dyn Fn(&Record) -> Option<f64>| {
         let at_lead = |record: &Record| (record.lead_days == lead).then(|| score(record))?;
-        sums(told, method.name, &at_lead)
+        sums(series, method.name, &at_lead)
     };
     let before = match lead {
         Some(days) if days <= 1.0 => format!("{:.0} h before it failed", 24.0 * days),

@@ -11,7 +11,7 @@ use std::fmt::Write as _;
 /// The panel's mean CRPS, and the rivals that are lower, days.
 type Loss = (f64, Vec<(f64, &'static str)>);
 
-/// Nobody is told of less, days.
+/// Less is not reported, days.
 const LEAST_DAYS: f64 = 0.005;
 /// What the figures rest on, in words.
 const REASONS: &str = include_str!("reasons.md");
@@ -60,8 +60,8 @@ pub(crate) fn losses(out: &mut String, scored: &Scored) {
         }
     }
     for fate in standing_fates(scored) {
-        let told = of_family(&scored.standing, fate);
-        let lost = loss(scored, &told, &|_| true);
+        let series = of_family(&scored.standing, fate);
+        let lost = loss(scored, &series, &|_| true);
         row(format!("simulated, {fate}"), days, lost);
     }
     for one in &scored.stood {
@@ -127,8 +127,8 @@ pub(crate) fn targets(out: &mut String, scored: &Scored) {
             format!("{} of {leads}", standing.late),
         );
     }
-    for (name, told) in [("simulated", &scored.standing), ("recorded", &scored.stood)] {
-        let share = |called| share_called(told, called, &|_| true);
+    for (name, series) in [("simulated", &scored.standing), ("recorded", &scored.stood)] {
+        let share = |called| share_called(series, called, &|_| true);
         let (red, orange) = (share(Called::Red), share(Called::Orange));
         row(
             format!("{name} slopes that stand: never red"),

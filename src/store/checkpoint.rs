@@ -1,7 +1,7 @@
 //! Moves what the log holds into the database, and never tries a failed sync again.
 //!
 //! SQLite would do so by itself, but says nothing when the sync of the database fails. A disk that fails is to be
-//! told, and not to be worked on.
+//! reported, and not to be worked on.
 
 use super::{Inner, StoreError};
 

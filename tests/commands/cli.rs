@@ -326,7 +326,7 @@ fn a_replay_tells_the_hooks_that_it_is_an_exercise_and_tells_them_every_alert() 
     let mut text = fs::read_to_string(&config).unwrap();
     text.push_str("[[hook]]\nrun = [\"/bin/sh\", \"hook.sh\"]\nlevels = [\"orange\", \"red\"]\n");
     fs::write(&config, text).unwrap();
-    let script = "echo $SLIPWATCH_LEVEL $SLIPWATCH_STATUS >> told\n";
+    let script = "echo $SLIPWATCH_LEVEL $SLIPWATCH_STATUS >> reported\n";
     fs::write(folder.path().join("hook.sh"), script).unwrap();
     let (vaiont, config) = (vaiont(), config.to_str().unwrap());
     let args = [
@@ -342,12 +342,12 @@ fn a_replay_tells_the_hooks_that_it_is_an_exercise_and_tells_them_every_alert() 
         .filter(|level| level == "orange" || level == "red")
         .map(|level| format!("{level} Exercise"))
         .collect();
-    let told = fs::read_to_string(folder.path().join("told")).unwrap_or_default();
-    let mut told: Vec<String> = told.lines().map(str::to_owned).collect();
+    let reported = fs::read_to_string(folder.path().join("reported")).unwrap_or_default();
+    let mut reported: Vec<String> = reported.lines().map(str::to_owned).collect();
     levels.sort();
-    told.sort();
+    reported.sort();
     assert!(!levels.is_empty());
-    assert_eq!(told, levels);
+    assert_eq!(reported, levels);
     assert!(!folder.path().join("state").exists());
     // A hook that fails is trouble, and the events are the same.
     fs::write(folder.path().join("hook.sh"), "exit 3\n").unwrap();

@@ -168,7 +168,7 @@ fn a_record_that_has_no_room_is_doubtful_and_one_that_cannot_be_written_is_wrong
 }
 
 #[test]
-fn a_recording_that_keeps_readings_back_in_an_open_chunk_is_told_with_its_bytes() {
+fn a_recording_that_keeps_readings_back_in_an_open_chunk_is_reported_with_its_bytes() {
     let folder = site("#!/bin/sh\n");
     let at = folder.path().join("recordings");
     let whole = fs::File::create(at.join("whole.mcap")).unwrap();

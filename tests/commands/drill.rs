@@ -5,7 +5,7 @@ use std::fs;
 use std::time::Duration;
 use tempfile::TempDir;
 
-/// A site with three hooks, each a script that tells what it was told; `last` is what the third then does.
+/// A site with three hooks, each a script that writes what it receives; `last` is what the third then does.
 fn site(last: &str) -> (TempDir, String) {
     let folder = tempfile::tempdir().unwrap();
     fs::create_dir(folder.path().join("incoming")).unwrap();

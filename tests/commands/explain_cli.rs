@@ -185,7 +185,7 @@ fn exit_codes_are_those_of_every_command() {
     explain(&["no-such-file.csv"]).code(74);
     let nowhere = folder.path().join("no/such/folder/page.html");
     let done = explain(&[path, "--html", text_of(&nowhere)]).code(74);
-    // What was found is told all the same.
+    // What was found is reported all the same.
     assert!(out(&done).starts_with("a: "));
     assert!(err(&done).contains("page.html"), "{}", err(&done));
 }

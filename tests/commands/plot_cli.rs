@@ -1,4 +1,4 @@
-//! `plot` from outside: what is drawn, and what a wrong call is told.
+//! `plot` from outside: what is drawn, and what it answers to a wrong call.
 
 use assert_cmd::Command;
 use assert_cmd::assert::Assert;

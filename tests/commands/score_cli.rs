@@ -1,4 +1,4 @@
-//! `score` from the outside: what a script reads, and what a wrong call is told.
+//! `score` from the outside: what a script reads, and what it answers to a wrong call.
 
 use assert_cmd::Command;
 use serde_json::Value;
@@ -70,9 +70,9 @@ fn a_plot_is_one_svg_and_a_call_without_the_truth_is_refused() {
     score(&[VAIONT]).code(2);
     let early = "1960-01-01T00:00:00Z";
     let refused = score(&[VAIONT, "--benchmark", "5", "--failure-time", early]).failure();
-    let told = String::from_utf8(refused.get_output().stderr.clone()).unwrap();
+    let reported = String::from_utf8(refused.get_output().stderr.clone()).unwrap();
     assert!(
-        told.contains("expected readings before --failure-time"),
-        "{told}"
+        reported.contains("expected readings before --failure-time"),
+        "{reported}"
     );
 }

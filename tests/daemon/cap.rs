@@ -159,8 +159,8 @@ async fn the_messages_of_a_place_make_a_chain_that_names_what_came_before() {
         .unwrap();
     assert_eq!(kind(&yellow), ("Alert".to_owned(), String::new()));
     // The end of what was never said is no message: a Cancel must name what it ends.
-    let untold = alert("7", Level::Red, (resolved, Status::Actual));
-    assert_eq!(written(at, &hook, &untold).await, None);
+    let unnotified = alert("7", Level::Red, (resolved, Status::Actual));
+    assert_eq!(written(at, &hook, &unnotified).await, None);
 }
 
 #[tokio::test]

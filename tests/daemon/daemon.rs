@@ -34,11 +34,11 @@ mod crisis;
 const LIMIT: Duration = Duration::from_secs(60);
 const MULTI: &str = "time,5_displacement_mm,6_displacement_mm\n";
 
-/// A site whose hook writes down what it is told.
+/// A site whose hook writes down what it is notified of.
 fn site_folder() -> (TempDir, Config) {
     let folder = tempfile::tempdir().unwrap();
     fs::create_dir(folder.path().join("incoming")).unwrap();
-    let script = "echo $SLIPWATCH_KEY $SLIPWATCH_STATUS >> told\ncat >> stdin\n";
+    let script = "echo $SLIPWATCH_KEY $SLIPWATCH_STATUS >> notified\ncat >> stdin\n";
     fs::write(folder.path().join("hook.sh"), script).unwrap();
     let text = "[site]\nname = \"Toc\"\nstate_dir = \"state\"\n\
                 [[source]]\nid = \"logger\"\nkind = \"csv\"\npath = \"incoming/*.csv\"\n\
@@ -135,7 +135,7 @@ async fn close(site: Site, wall: Timestamp) {
 }
 
 #[tokio::test]
-async fn an_alert_is_told_and_after_a_restart_not_again() {
+async fn an_alert_is_reported_and_after_a_restart_not_again() {
     let (folder, config) = site_folder();
     for _start in 0..2 {
         let mut site = site(&config);
@@ -144,7 +144,7 @@ async fn an_alert_is_told_and_after_a_restart_not_again() {
         close(site, noon()).await;
     }
     let key = format!("5/red/{}", noon().as_second());
-    assert_eq!(lines(&folder, "told"), [format!("{key} Actual")]);
+    assert_eq!(lines(&folder, "notified"), [format!("{key} Actual")]);
     let store = Store::look(&config.site.state_dir).unwrap();
     let taken = store.is_noted(
         (&key, "red", "firing"),
@@ -179,7 +179,7 @@ async fn while_a_long_past_is_read_what_is_current_is_judged_once_a_minute() {
 #[tokio::test]
 async fn attempts_are_counted_over_restarts() {
     let (folder, config) = site_folder();
-    let script = "echo $SLIPWATCH_ATTEMPT >> told\nexit 1\n";
+    let script = "echo $SLIPWATCH_ATTEMPT >> notified\nexit 1\n";
     fs::write(folder.path().join("hook.sh"), script).unwrap();
     for start in 0..3 {
         let mut site = site(&config);
@@ -189,19 +189,19 @@ async fn attempts_are_counted_over_restarts() {
         site.commit(noon()).unwrap();
         assert_eq!(site.close(noon(), LIMIT).await.unwrap(), Some(1));
     }
-    let told = lines(&folder, "told");
-    assert!(told.len() >= 3, "{told:?}");
+    let notified = lines(&folder, "notified");
+    assert!(notified.len() >= 3, "{notified:?}");
     let counted = (1..).map(|attempt: u32| attempt.to_string());
     assert!(
-        told.iter().cloned().eq(counted.take(told.len())),
-        "{told:?}"
+        notified.iter().cloned().eq(counted.take(notified.len())),
+        "{notified:?}"
     );
 }
 
 #[tokio::test]
-async fn what_was_given_up_is_made_to_wait_again_and_told_at_the_next_start() {
+async fn what_was_given_up_is_made_to_wait_again_and_reported_at_the_next_start() {
     let (folder, config) = site_folder();
-    let (key, told) = (format!("5/red/{}", noon().as_second()), "told");
+    let (key, notified) = (format!("5/red/{}", noon().as_second()), "notified");
     let mut first = site(&config);
     first.handle(&alert(noon(), Level::Red, AlertState::Firing));
     first.commit(noon()).unwrap();
@@ -212,13 +212,13 @@ async fn what_was_given_up_is_made_to_wait_again_and_told_at_the_next_start() {
         .unwrap();
     drop(database);
     close(site(&config), noon()).await;
-    assert_eq!(lines(&folder, told).len(), 1, "it had been given up");
+    assert_eq!(lines(&folder, notified).len(), 1, "it had been given up");
     let store = Store::look(&config.site.state_dir).unwrap();
     assert_eq!(store.redeliver().unwrap(), 1);
     drop(store);
     close(site(&config), noon()).await;
     let line = format!("{key} Actual");
-    assert_eq!(lines(&folder, told), [line.clone(), line]);
+    assert_eq!(lines(&folder, notified), [line.clone(), line]);
 }
 
 #[tokio::test]
@@ -233,13 +233,13 @@ async fn what_is_long_past_fires_no_hook() {
     assert_eq!(site.counts().long_past, 1);
     site.caught_up(wall).unwrap();
     close(site, wall).await;
-    let told = lines(&folder, "told");
-    assert_eq!(told.len(), 1, "{told:?}");
-    assert!(told[0].starts_with("5/orange/"));
+    let notified = lines(&folder, "notified");
+    assert_eq!(notified.len(), 1, "{notified:?}");
+    assert!(notified[0].starts_with("5/orange/"));
 }
 
 #[tokio::test]
-async fn an_old_alert_still_in_force_is_told_when_its_readings_are_recent() {
+async fn an_old_alert_still_in_force_is_reported_when_its_readings_are_recent() {
     let (folder, config) = site_folder();
     let wall = noon() + hours(24 * 30);
     let mut site = site(&config);
@@ -254,13 +254,13 @@ async fn an_old_alert_still_in_force_is_told_when_its_readings_are_recent() {
     site.take(&reading(wall - hours(1), 5.0), wall).unwrap();
     site.caught_up(wall).unwrap();
     close(site, wall).await;
-    let told = lines(&folder, "told");
-    assert_eq!(told.len(), 1, "{told:?}");
-    assert!(told[0].starts_with("5/red/"));
+    let notified = lines(&folder, "notified");
+    assert_eq!(notified.len(), 1, "{notified:?}");
+    assert!(notified[0].starts_with("5/red/"));
 }
 
 #[tokio::test]
-async fn the_end_of_what_was_told_is_told_however_late_it_comes_and_after_a_restart_too() {
+async fn the_end_of_what_was_reported_is_reported_however_late_it_comes_and_after_a_restart_too() {
     let (folder, config) = site_folder();
     let mut first = site(&config);
     first.handle(&alert(noon(), Level::Orange, AlertState::Firing));
@@ -268,7 +268,7 @@ async fn the_end_of_what_was_told_is_told_however_late_it_comes_and_after_a_rest
     close(first, noon()).await;
     let wall = noon() + hours(24 * 30);
     let mut second = site(&config);
-    // Long past, and so not told; the orange that it supersedes was.
+    // Long past, and so not notified; the orange that it supersedes was.
     second.handle(&alert(noon() + hours(1), Level::Red, AlertState::Firing));
     let end = noon() + hours(2);
     second.handle(&alert(end, Level::Red, AlertState::Resolved));
@@ -281,11 +281,11 @@ async fn the_end_of_what_was_told_is_told_however_late_it_comes_and_after_a_rest
         format!("5/orange/{} Actual", noon().as_second()),
         format!("5/red/{} Actual", end.as_second()),
     ];
-    assert_eq!(lines(&folder, "told"), expected);
+    assert_eq!(lines(&folder, "notified"), expected);
 }
 
 #[tokio::test]
-async fn an_old_alert_in_force_is_told_in_whatever_batch_it_comes_and_once() {
+async fn an_old_alert_in_force_is_reported_in_whatever_batch_it_comes_and_once() {
     let (folder, config) = site_folder();
     let wall = noon() + hours(24 * 3);
     let mut site = site(&config);
@@ -301,8 +301,8 @@ async fn an_old_alert_in_force_is_told_in_whatever_batch_it_comes_and_once() {
     }
     assert_eq!(site.counts().long_past, 1, "the orange, superseded");
     close(site, wall).await;
-    let told = lines(&folder, "told");
-    assert_eq!(told, [format!("5/red/{} Actual", noon().as_second())]);
+    let notified = lines(&folder, "notified");
+    assert_eq!(notified, [format!("5/red/{} Actual", noon().as_second())]);
 }
 
 #[tokio::test]
@@ -315,7 +315,7 @@ async fn an_alert_of_a_benchmark_that_nobody_watches_any_more_fires_no_hook() {
     site.commit(wall).unwrap();
     site.caught_up(wall).unwrap();
     close(site, wall).await;
-    assert_eq!(lines(&folder, "told"), [""; 0]);
+    assert_eq!(lines(&folder, "notified"), [""; 0]);
 }
 
 #[tokio::test]

@@ -189,7 +189,7 @@ async fn a_hook_that_is_missing_or_not_executable_is_not_started() {
 }
 
 #[tokio::test]
-async fn an_exit_code_and_a_signal_are_told_apart() {
+async fn an_exit_code_and_a_signal_are_distinguished() {
     let (_folder, config) = hook("exit 7");
     assert_eq!(run(&config, &alert()).await, HookOutcome::Failed(7));
     let (_folder, config) = hook("kill -9 $$");
@@ -338,7 +338,7 @@ async fn what_is_superseded_or_resolved_is_not_tried_again() {
     let orange = alert_of(Level::Orange, "orange", "");
     dispatcher.offer(&orange);
     eventually("some calls", || calls(&folder, "orange") >= 3).await;
-    // The hook does not ask for red, but is told no more of the orange either. Another level's
+    // The hook does not ask for red, but does not receive the orange any more either. Another level's
     // alert in hand shows that the worker goes on.
     dispatcher.supersede(&alert_of(Level::Red, "red", ""));
     dispatcher.offer(&alert_of(Level::Unknown, "unknown", ""));
@@ -346,7 +346,7 @@ async fn what_is_superseded_or_resolved_is_not_tried_again() {
     let before = calls(&folder, "orange");
     eventually("more calls", || calls(&folder, "unknown") >= 10).await;
     assert_eq!(calls(&folder, "orange"), before);
-    // Neither is it told more of a silence that has ended.
+    // Nor does it receive more of a silence that has ended.
     let mut end = alert_of(Level::Unknown, "unknown", "");
     end.state = AlertState::Resolved;
     std::fs::write(folder.path().join("hook.sh"), "exit 0").unwrap();
@@ -399,7 +399,7 @@ fn alert_at(benchmark: &str, level: Level, state: AlertState) -> Alert {
 }
 
 #[tokio::test]
-async fn a_red_is_told_before_everything_that_waits_for_a_slow_hook() {
+async fn a_red_is_reported_before_everything_that_waits_for_a_slow_hook() {
     let (folder, mut config) = hook("echo $SLIPWATCH_KEY >> calls; sleep 0.3");
     config.levels.push(Level::Unknown);
     let dispatcher = Dispatcher::start(&[config], &quick_retry(), Delivered::default());
@@ -419,7 +419,7 @@ async fn a_red_is_told_before_everything_that_waits_for_a_slow_hook() {
 }
 
 #[tokio::test]
-async fn what_is_superseded_while_it_waits_is_not_told_and_a_silence_that_is_over_neither() {
+async fn what_is_superseded_while_it_waits_is_not_reported_and_a_silence_that_is_over_neither() {
     let (folder, mut config) =
         hook("echo $SLIPWATCH_KEY $SLIPWATCH_STATE >> calls; until [ -e go ]; do sleep 0.01; done");
     config.levels.push(Level::Unknown);

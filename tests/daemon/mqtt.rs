@@ -543,14 +543,14 @@ fn refusing(folder: &Path) -> String {
     not(has_mosquitto_plugin),
     ignore = "Mosquitto with its security plugin was not found by build.rs"
 )]
-async fn a_broker_that_refuses_the_subscription_is_told_and_its_benchmark_is_unknown() {
+async fn a_broker_that_refuses_the_subscription_is_reported_and_its_benchmark_is_unknown() {
     let broker = Mosquitto::start_with(refusing);
     tokio::time::sleep(Duration::from_millis(500)).await;
     let daemon = Daemon::start_with(
         &broker,
         "[[source]]\nid = \"logger\"\nkind = \"csv\"\npath = \"*.csv\"\n\
          [[benchmark]]\nid = \"5\"\nsource = \"radio\"\n[[benchmark]]\nid = \"6\"\nsource = \"logger\"\n\
-         [[hook]]\nrun = [\"/bin/sh\", \"-c\", \"echo $SLIPWATCH_KEY $SLIPWATCH_STATE >> told\"]\n\
+         [[hook]]\nrun = [\"/bin/sh\", \"-c\", \"echo $SLIPWATCH_KEY $SLIPWATCH_STATE >> notified\"]\n\
          levels = [\"unknown\"]\n",
     );
     let now = slipwatch::runtime::clock::now();
@@ -559,21 +559,21 @@ async fn a_broker_that_refuses_the_subscription_is_told_and_its_benchmark_is_unk
         format!("time,displacement_mm\n{now},1\n"),
     )
     .unwrap();
-    let is_told = || {
-        let told = daemon.text("told");
-        let mut told = told.lines();
-        told.any(|line| line.starts_with("5/unknown/") && line.ends_with("firing"))
+    let is_notified = || {
+        let notified = daemon.text("notified");
+        let mut notified = notified.lines();
+        notified.any(|line| line.starts_with("5/unknown/") && line.ends_with("firing"))
     };
     for _ in 0..300 {
         let is_said = daemon
             .text("log")
             .contains("the broker refuses the subscription");
-        if is_told() && is_said && daemon.readings() == 1 {
+        if is_notified() && is_said && daemon.readings() == 1 {
             return;
         }
         tokio::time::sleep(Duration::from_millis(100)).await;
     }
-    panic!("{}\n{}", daemon.text("told"), daemon.text("log"));
+    panic!("{}\n{}", daemon.text("notified"), daemon.text("log"));
 }
 
 /// The benchmarks of a backlog, the readings of each that a daemon knows before it, and those that queue, an hour apart.

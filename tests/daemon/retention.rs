@@ -191,8 +191,8 @@ fn deliveries_stay_while_their_alert_stands_or_a_hook_waits() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).unwrap();
     let settle = |key: &str, state: &str, day: i64, fate: DeliveryOutcome| {
-        let told = delivery(key, state, at(day * DAY));
-        store.record_outcomes(&[(told, fate)]).unwrap();
+        let notified = delivery(key, state, at(day * DAY));
+        store.record_outcomes(&[(notified, fate)]).unwrap();
     };
     settle("over", "firing", 1, DeliveryOutcome::Delivered);
     settle("over", "resolved", 2, DeliveryOutcome::Delivered);

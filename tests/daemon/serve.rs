@@ -175,7 +175,7 @@ async fn metrics_are_openmetrics_text_with_every_figure_and_escaped_names() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 1)]
-async fn a_token_opens_everything_and_without_it_only_health_is_told() {
+async fn a_token_opens_everything_and_without_it_only_health_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("token");
     fs::write(&file, format!("{SECRET}\n")).unwrap();
@@ -207,7 +207,7 @@ async fn a_token_opens_everything_and_without_it_only_health_is_told() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 1)]
-async fn a_page_under_a_foreign_name_that_points_here_is_told_nothing() {
+async fn a_page_under_a_foreign_name_that_points_here_is_shown_nothing() {
     let vitals = Arc::new(Vitals::default());
     let (_server, address) = start(options(), &vitals).await;
     let under = |host: &str| {

@@ -26,14 +26,14 @@ fn run_away(file: usize) -> String {
 
 /// 19.
 #[test]
-fn alerts_of_very_many_benchmarks_at_once_are_told_in_few_messages_and_none_again_after_a_restart()
-{
+fn alerts_of_very_many_benchmarks_at_once_are_reported_in_few_messages_and_none_again_after_a_restart()
+ {
     all_at_once(1);
 }
 
 /// 19.
 #[test]
-fn alerts_of_ten_thousand_benchmarks_at_once_are_told_in_few_messages() {
+fn alerts_of_ten_thousand_benchmarks_at_once_are_reported_in_few_messages() {
     all_at_once(34);
 }
 
@@ -47,8 +47,9 @@ fn all_at_once(files: usize) {
     }
     let program = site.caught_up();
     let together = || {
-        let told = site.lines("told");
-        told.iter()
+        let notified = site.lines("notified");
+        notified
+            .iter()
             .filter(|line| line.starts_with("flood/"))
             .count()
     };
@@ -59,11 +60,15 @@ fn all_at_once(files: usize) {
         .count();
     assert!(reds >= benchmarks, "{reds}");
     program.stop();
-    let told = site.lines("told");
+    let notified = site.lines("notified");
     // Of each commit, level and state ten and one; the past comes in few commits.
-    assert!(told.len() < 15 + benchmarks / 50, "{} messages", told.len());
+    assert!(
+        notified.len() < 15 + benchmarks / 50,
+        "{} messages",
+        notified.len()
+    );
     site.caught_up().stop();
-    let again: Vec<String> = site.lines("told").split_off(told.len());
+    let again: Vec<String> = site.lines("notified").split_off(notified.len());
     assert!(again.is_empty(), "{again:?}");
     site.proven_events();
 }

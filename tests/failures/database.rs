@@ -151,16 +151,16 @@ fn a_flipped_bit_in_the_memory_or_a_position_is_seen_and_both_are_made_anew() {
 }
 
 #[test]
-fn a_flipped_bit_in_what_hooks_are_to_be_told_is_seen_at_the_next_start() {
+fn a_flipped_bit_in_what_hooks_are_to_be_sent_is_seen_at_the_next_start() {
     let site = Site::new("");
     let rows = failing(0..114);
     site.append("incoming/5.csv", &format!("time,displacement_mm\n{rows}"));
     let program = site.caught_up();
-    eventually("an alert", || !site.lines("told").is_empty());
+    eventually("an alert", || !site.lines("notified").is_empty());
     program.stop();
     let file = site.path("state/slipwatch.db");
     let whole = fs::read(&file).unwrap();
-    // Waiting or delivered, and how often it was tried, too: an alert that stands as delivered is not told any more.
+    // Waiting or delivered, and how often it was tried, too: an alert that stands as delivered is not sent again.
     for flip in [
         "key = key || '1'",
         "status = 'delivered!'",
@@ -176,7 +176,7 @@ fn a_flipped_bit_in_what_hooks_are_to_be_told_is_seen_at_the_next_start() {
 }
 
 #[test]
-fn a_bit_that_flips_while_the_daemon_runs_is_told() {
+fn a_bit_that_flips_while_the_daemon_runs_is_reported() {
     let site = used();
     let listen = site.listen();
     let program = site.caught_up();
@@ -186,7 +186,7 @@ fn a_bit_that_flips_while_the_daemon_runs_is_told() {
         "UPDATE event SET body = replace(body, '1', '3') WHERE seq = (SELECT min(seq) FROM event)";
     assert_eq!(database.execute(flip, []).unwrap(), 1);
     drop(database);
-    eventually("told", || !get(&listen, "/readyz").contains("200 OK"));
+    eventually("notified", || !get(&listen, "/readyz").contains("200 OK"));
     eventually("in the metrics", || {
         get(&listen, "/metrics").contains("slipwatch_store_damaged 1")
     });

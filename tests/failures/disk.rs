@@ -46,7 +46,7 @@ fn on_a_full_disk_alerts_go_out_and_what_was_taken_is_written_when_there_is_room
     site.append("incoming/5.csv", &failing());
     eventually("no room", || site.log().contains("no room on the disk"));
     let reds = || site.notified("5/red/", "");
-    eventually("told", || reds() > 0);
+    eventually("notified", || reds() > 0);
     assert_eq!(site.values().len(), 0, "there was room");
     assert_eq!(program.ended(), None, "{}", site.log());
     fs::remove_file(state.join("ballast")).unwrap();
@@ -60,7 +60,7 @@ fn on_a_full_disk_alerts_go_out_and_what_was_taken_is_written_when_there_is_room
     assert_eq!(times.len(), 114, "each once");
     program.stop();
     site.caught_up().stop();
-    assert_eq!(reds(), 1, "told again");
+    assert_eq!(reds(), 1, "notified again");
     site.proven_events();
 }
 

@@ -65,7 +65,7 @@ fn nothing_of_it_is_the_sites(site: &Site) {
     assert_eq!(of_it.len(), 1, "{of_it:?}");
     assert!(of_it[0].contains("\"by\":\"Anna\""), "{of_it:?}");
     assert!(
-        site.lines("told")
+        site.lines("notified")
             .iter()
             .all(|line| !line.contains("exercise"))
     );

@@ -151,7 +151,7 @@ fn a_silence_that_covers_an_alert_calls_its_escalation_off_and_one_elsewhere_doe
 }
 
 #[test]
-fn check_says_that_nobody_is_notified_at_once_and_refuses_two_hooks_that_cannot_be_told_apart() {
+fn check_says_that_nobody_is_notified_at_once_and_refuses_two_hooks_that_cannot_be_distinguished() {
     let site = site("15m");
     let text = std::fs::read_to_string(site.path("site.toml")).unwrap();
     let said = site.checked_with_a_first_hook_for_unknown();

@@ -17,7 +17,7 @@ fn goes_on(site: &Site) {
     let program = site.start(&[]);
     eventually("a start", || site.log().contains("followed"));
     site.append("incoming/5.csv", &failing(0..114));
-    eventually("told", || site.notified("5/red/", "") == 1);
+    eventually("notified", || site.notified("5/red/", "") == 1);
     program.signal(Signal::SIGHUP);
     eventually("the config", || site.log().contains("the config is taken"));
     program.stop();
@@ -73,7 +73,7 @@ fn a_file_that_was_moved_away_while_the_daemon_was_down_is_a_possible_gap() {
     assert_eq!(
         events.matches("\"kind\":\"possible-gap\"").count(),
         1,
-        "told again"
+        "notified again"
     );
 }
 

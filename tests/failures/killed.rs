@@ -125,7 +125,7 @@ fn findings(events: &str, benchmark: &str) -> Vec<String> {
     ours
 }
 
-/// The daemon has taken everything and is stopped: nothing is missing, nothing is there twice, everybody was told.
+/// The daemon has taken everything and is stopped: nothing is missing, nothing is there twice, everybody was notified.
 fn settle(site: &Site, loggers: &mut Loggers) {
     loggers.finish(site);
     let program = site.caught_up();
@@ -154,18 +154,18 @@ fn settle(site: &Site, loggers: &mut Loggers) {
         assert!(ours.len() > loggers.rows / 2, "{}", ours.len());
         assert!(ours == findings(&plain, benchmark), "{benchmark}");
     }
-    everybody_was_told(site, &events);
+    everybody_was_notified(site, &events);
 }
 
 /// Each alert that was to be delivered was, and none that was never called.
-fn everybody_was_told(site: &Site, events: &str) {
+fn everybody_was_notified(site: &Site, events: &str) {
     let called: BTreeSet<String> = (events.lines())
         .map(|line| serde_json::from_str::<Value>(line).unwrap())
         .filter(|event| event["event"] == "alert")
         .map(|event| format!("{} {}", text(&event["key"]), text(&event["state"])))
         .collect();
-    let told: BTreeSet<String> = site.lines("told").into_iter().collect();
-    assert!(told.is_subset(&called), "{told:?} {called:?}");
+    let notified: BTreeSet<String> = site.lines("notified").into_iter().collect();
+    assert!(notified.is_subset(&called), "{notified:?} {called:?}");
     let database = rusqlite::Connection::open(site.path("state/slipwatch.db")).unwrap();
     let mut query = database
         .prepare("SELECT key || ' ' || state FROM outbox WHERE status = 'delivered'")
@@ -173,7 +173,7 @@ fn everybody_was_told(site: &Site, events: &str) {
     let noted = query.query_map([], |row| row.get::<_, String>(0)).unwrap();
     let noted: BTreeSet<String> = noted.map(Result::unwrap).collect();
     assert!(!noted.is_empty(), "nothing was called");
-    assert!(noted.is_subset(&told), "{noted:?} {told:?}");
+    assert!(noted.is_subset(&notified), "{noted:?} {notified:?}");
     let waiting: i64 = database
         .query_row(
             "SELECT count(*) FROM outbox WHERE status IN ('waiting', 'dead')",
@@ -181,7 +181,7 @@ fn everybody_was_told(site: &Site, events: &str) {
             |row| row.get(0),
         )
         .unwrap();
-    assert_eq!(waiting, 0, "nobody was told of these");
+    assert_eq!(waiting, 0, "nobody was notified of these");
 }
 
 fn text(value: &Value) -> &str {

@@ -21,7 +21,7 @@ fn site() -> (Site, String) {
          [[hook]]\nrun = [\"/bin/sh\", \"next.sh\"]\nlevels = [\"red\"]\nescalate_after = \"1h\"\n",
     );
     fs::write(site.path("next.sh"), "echo $SLIPWATCH_KEY >> escalated\n").unwrap();
-    let script = "echo $SLIPWATCH_KEY $SLIPWATCH_STATE >> told\n\
+    let script = "echo $SLIPWATCH_KEY $SLIPWATCH_STATE >> notified\n\
                   echo \"$SLIPWATCH_KEY $SLIPWATCH_ACKNOWLEDGE_URL\" >> links\ncat >> bodies\n";
     fs::write(site.path("hook.sh"), script).unwrap();
     fs::write(site.path("token"), TOKEN).unwrap();
@@ -150,7 +150,7 @@ fn the_link_in_a_message_acknowledges_its_alert_once_and_only_when_its_button_is
     let orders = orders(&site);
     assert_eq!(orders.len(), 1, "{orders:?}");
     let key = site
-        .lines("told")
+        .lines("notified")
         .into_iter()
         .find(|line| line.starts_with("5/red/"));
     let key = key.unwrap().replace(" firing", "");
@@ -184,7 +184,7 @@ fn a_link_that_is_forged_expired_foreign_or_over_changes_nothing() {
     site.append("incoming/5.csv", &failing(8..114));
     let red = link(&site, "5/red/");
     let key = site
-        .lines("told")
+        .lines("notified")
         .into_iter()
         .find(|line| line.starts_with("5/red/"));
     let key = key.unwrap().replace(" firing", "");
@@ -258,8 +258,8 @@ fn without_a_usable_secret_an_alert_goes_out_without_a_link() {
     fs::set_permissions(site.path("state/link.secret"), readable).unwrap();
     let program = started(&site, 0..114);
     eventually("the red", || {
-        let told = site.lines("told");
-        told.iter().any(|line| line.starts_with("5/red/"))
+        let notified = site.lines("notified");
+        notified.iter().any(|line| line.starts_with("5/red/"))
     });
     assert!(site.log().contains("chmod 600"), "{}", site.log());
     assert!(

@@ -24,7 +24,7 @@ fn site() -> Site {
 
 fn tells_its_red(site: &Site, mut program: Program) {
     site.append("incoming/5.csv", &failing(0..114));
-    eventually("told", || {
+    eventually("notified", || {
         assert_eq!(program.ended(), None, "it ended");
         site.notified("5/red/", "") > 0
     });
@@ -32,7 +32,7 @@ fn tells_its_red(site: &Site, mut program: Program) {
 }
 
 #[test]
-fn a_log_on_a_full_disk_keeps_no_red_from_being_told() {
+fn a_log_on_a_full_disk_keeps_no_red_from_being_sent() {
     let site = site();
     let full = OpenOptions::new().write(true).open("/dev/full").unwrap();
     let program = start(&site, full.into());
@@ -40,7 +40,7 @@ fn a_log_on_a_full_disk_keeps_no_red_from_being_told() {
 }
 
 #[test]
-fn a_log_whose_reader_has_gone_keeps_no_red_from_being_told() {
+fn a_log_whose_reader_has_gone_keeps_no_red_from_being_sent() {
     let site = site();
     let mut program = start(&site, Stdio::piped());
     drop(program.0.stderr.take());
@@ -48,7 +48,7 @@ fn a_log_whose_reader_has_gone_keeps_no_red_from_being_told() {
 }
 
 #[test]
-fn a_log_that_nobody_reads_keeps_no_red_from_being_told() {
+fn a_log_that_nobody_reads_keeps_no_red_from_being_sent() {
     let site = site();
     // Each is worth a line: more than a pipe holds.
     for number in 0..1500 {

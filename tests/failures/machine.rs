@@ -65,7 +65,7 @@ fn a_daemon_without_file_descriptors_loses_nothing_and_tells_its_alerts_once_it_
     eventually("that it says so", || site.log().contains("os error 24"));
     std::thread::sleep(Duration::from_secs(3));
     assert_eq!(program.ended(), None, "{}", site.log());
-    assert!(site.lines("told").is_empty(), "a hook was started");
+    assert!(site.lines("notified").is_empty(), "a hook was started");
     limit("1024");
     eventually("everything", || site.values().len() == 117);
     site.awaits_red();
@@ -189,16 +189,16 @@ fn a_clock_that_jumps_ahead_makes_a_silence_that_the_next_reading_ends_and_data_
     site.append("incoming/5.csv", &format!("{HEADER}{past}"));
     fs::write(site.path("ahead"), "+0").unwrap();
     let program = by_another_clock(&site);
-    let told = |state: &str| {
-        let lines = site.lines("told");
+    let notified = |state: &str| {
+        let lines = site.lines("notified");
         let unknown = |line: &&String| line.starts_with("5/unknown/") && line.ends_with(state);
         lines.iter().filter(unknown).count()
     };
     fs::write(site.path("ahead"), "+3d").unwrap();
-    eventually("a silence", || told("firing") == 1);
+    eventually("a silence", || notified("firing") == 1);
     let meanwhile: String = (1..=72).map(at).collect();
     site.append("incoming/5.csv", &meanwhile);
-    eventually("its end", || told("resolved") == 1);
+    eventually("its end", || notified("resolved") == 1);
     eventually("what came meanwhile", || site.values().len() == 103);
     fs::write(site.path("ahead"), "+0").unwrap();
     std::thread::sleep(Duration::from_secs(2));

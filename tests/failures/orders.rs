@@ -22,18 +22,18 @@ fn failing(name: &str) -> String {
 
 /// 21.
 #[test]
-fn a_wrong_config_on_sighup_is_not_taken_and_a_benchmark_taken_out_is_closed_and_told() {
+fn a_wrong_config_on_sighup_is_not_taken_and_a_benchmark_taken_out_is_closed_and_reported() {
     let site = Site::new(&format!("{BENCHMARKS}{POLICY}"));
     for name in ["4", "5"] {
         site.append(&format!("incoming/{name}.csv"), &failing(name));
     }
     let mut program = site.caught_up();
-    let is_told = |what: &str, state: &str| {
-        let told = site.lines("told");
-        (told.iter()).any(|line| line.starts_with(what) && line.ends_with(state))
+    let is_notified = |what: &str, state: &str| {
+        let notified = site.lines("notified");
+        (notified.iter()).any(|line| line.starts_with(what) && line.ends_with(state))
     };
     eventually("both reds", || {
-        is_told("4/red", "firing") && is_told("5/red", "firing")
+        is_notified("4/red", "firing") && is_notified("5/red", "firing")
     });
     site.configure("[alert]\nevacuation_time = \"never\"\n");
     program.signal(Signal::SIGHUP);
@@ -56,17 +56,17 @@ fn a_wrong_config_on_sighup_is_not_taken_and_a_benchmark_taken_out_is_closed_and
     eventually("that it is taken", || {
         site.log().contains("the config is taken")
     });
-    eventually("the end told", || is_told("4/red", "resolved"));
-    assert!(!is_told("5/red", "resolved"), "5 is still watched");
+    eventually("the end notified", || is_notified("4/red", "resolved"));
+    assert!(!is_notified("5/red", "resolved"), "5 is still watched");
     program.stop();
     site.proven_events();
 }
 
 /// 21. A hook that is at work while the config changes is waited for.
 #[test]
-fn what_a_hook_is_being_told_while_the_config_changes_is_told_once() {
+fn what_a_hook_is_being_sent_while_the_config_changes_is_reported_once() {
     let site = Site::new(POLICY);
-    let script = "echo $SLIPWATCH_KEY >> begun\nsleep 1\necho $SLIPWATCH_KEY >> told\n";
+    let script = "echo $SLIPWATCH_KEY >> begun\nsleep 1\necho $SLIPWATCH_KEY >> notified\n";
     std::fs::write(site.path("hook.sh"), script).unwrap();
     site.append("incoming/5.csv", &failing("5"));
     let program = site.caught_up();
@@ -83,7 +83,12 @@ fn what_a_hook_is_being_told_while_the_config_changes_is_told_once() {
         site.log().contains("the config is taken")
     });
     program.stop();
-    assert_eq!((is_red("begun"), is_red("told")), (1, 1), "{}", site.log());
+    assert_eq!(
+        (is_red("begun"), is_red("notified")),
+        (1, 1),
+        "{}",
+        site.log()
+    );
 }
 
 /// 20. Whoever sets the clock back, data time stays: a reading of the future waits for nobody.
@@ -121,7 +126,7 @@ fn an_alert_that_waits_for_a_hook_whose_command_line_changed_goes_to_the_new_one
     std::fs::write(site.path("hook.sh"), "exit 1\n").unwrap();
     std::fs::write(
         site.path("new.sh"),
-        "echo $SLIPWATCH_KEY $SLIPWATCH_STATE >> told\n",
+        "echo $SLIPWATCH_KEY $SLIPWATCH_STATE >> notified\n",
     )
     .unwrap();
     site.append("incoming/5.csv", &failing("5"));
@@ -135,9 +140,9 @@ fn an_alert_that_waits_for_a_hook_whose_command_line_changed_goes_to_the_new_one
     eventually("that the new one has taken it", || {
         outbox(&site) == ["/bin/sh hook.sh closed", "/bin/sh new.sh delivered"]
     });
-    let told = site.lines("told");
-    let reds = told.iter().filter(|line| line.starts_with("5/red/"));
-    assert_eq!(reds.count(), 1, "{told:?}");
+    let notified = site.lines("notified");
+    let reds = notified.iter().filter(|line| line.starts_with("5/red/"));
+    assert_eq!(reds.count(), 1, "{notified:?}");
     let closed = "alerts waited for a hook that does not ask for them any more";
     assert!(site.log().contains(closed), "{}", site.log());
     eventually("that it is counted", || {
@@ -174,10 +179,10 @@ fn an_alert_that_no_hook_asks_for_any_more_is_closed_at_the_next_start_and_can_b
     });
     program.stop();
     std::fs::write(site.path("site.toml"), before).unwrap();
-    std::fs::write(site.path("hook.sh"), "echo $SLIPWATCH_KEY >> told\n").unwrap();
+    std::fs::write(site.path("hook.sh"), "echo $SLIPWATCH_KEY >> notified\n").unwrap();
     site.printed(&["alerts", "redeliver", "--config", "site.toml"]);
     let program = site.caught_up();
-    eventually("that it is told", || {
+    eventually("that it is notified", || {
         outbox(&site) == ["/bin/sh hook.sh delivered"]
     });
     program.stop();

@@ -93,7 +93,7 @@ fn site_newest(site: &Site) -> BTreeMap<String, String> {
 
 /// Ten hours at twice the threshold, and twenty of creep: no evacuation time yet.
 #[test]
-fn a_red_of_the_past_that_nothing_has_ended_is_told_after_a_first_start() {
+fn a_red_of_the_past_that_nothing_has_ended_is_reported_after_a_first_start() {
     let site = Site::new(
         "[alert]\nevacuation_time = \"24h\"\n\
          [[alert.threshold]]\nlevel = \"red\"\nvelocity = \"100 mm/day\"\n",
@@ -109,7 +109,7 @@ fn a_red_of_the_past_that_nothing_has_ended_is_told_after_a_first_start() {
         .collect();
     site.append("incoming/5.csv", &format!("{HEADER}{rows}"));
     let program = site.caught_up();
-    eventually("the red told", || site.notified("5/red/", "firing") > 0);
+    eventually("the red notified", || site.notified("5/red/", "firing") > 0);
     program.stop();
     site.proven_events();
 }

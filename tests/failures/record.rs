@@ -10,7 +10,7 @@ use std::process::{Command, Output};
 const POLICY: &str =
     "[[benchmark]]\nid = \"5\"\nsource = \"logger\"\n[alert]\nevacuation_time = \"3h\"\n";
 
-/// A site whose benchmark 5 has been red, told, seen by Ada, and is red no more than that.
+/// A site whose benchmark 5 has been red, notified, seen by Ada, and is red no more than that.
 fn red() -> (Site, crate::site::Program, String) {
     let site = Site::new(POLICY);
     let address = site.listen();
@@ -52,8 +52,8 @@ fn an_alert_says_what_called_it_who_has_it_and_who_has_seen_it_why_and_over_whic
     );
     let key = alert["key"].as_str().unwrap();
     assert!(key.starts_with("5/red/"), "{key}");
-    let told = site.lines("told");
-    assert!(told.contains(&format!("{key} firing")), "{told:?}");
+    let notified = site.lines("notified");
+    assert!(notified.contains(&format!("{key} firing")), "{notified:?}");
     assert_eq!(alert["deliveries"][0]["hook"], "/bin/sh hook.sh");
     assert_eq!(alert["deliveries"][0]["status"], "delivered");
     assert_eq!(alert["deliveries"][0]["attempts"], 1);

@@ -39,7 +39,7 @@ pub(crate) fn get(address: &str, path: &str) -> String {
     answer
 }
 
-/// A folder with a site that reads `incoming/*.csv` and `incoming/*.mcap`, and a hook that notes the keys it is told.
+/// A folder with a site that reads `incoming/*.csv` and `incoming/*.mcap`, and a hook that writes the keys it receives.
 pub(crate) struct Site(pub(crate) TempDir);
 
 impl Site {
@@ -48,7 +48,7 @@ impl Site {
         fs::create_dir(folder.path().join("incoming")).unwrap();
         fs::write(
             folder.path().join("hook.sh"),
-            "echo $SLIPWATCH_KEY $SLIPWATCH_STATE >> told\n",
+            "echo $SLIPWATCH_KEY $SLIPWATCH_STATE >> notified\n",
         )
         .unwrap();
         let site = Self(folder);
@@ -83,14 +83,16 @@ impl Site {
 
     /// How many notices of alerts whose key begins so, and whose state ends so, the hook has written.
     pub(crate) fn notified(&self, begins: &str, ends: &str) -> usize {
-        let lines = self.lines("told");
+        let lines = self.lines("notified");
         let is_it = |line: &&String| line.starts_with(begins) && line.ends_with(ends);
         lines.iter().filter(is_it).count()
     }
 
     /// Waits until the hook has been notified that benchmark 5 is red.
     pub(crate) fn awaits_red(&self) {
-        eventually("that the red is told", || self.notified("5/red/", "") > 0);
+        eventually("that the red is notified", || {
+            self.notified("5/red/", "") > 0
+        });
     }
 
     pub(crate) fn path(&self, name: &str) -> PathBuf {

@@ -1,4 +1,4 @@
-//! Who is told of what: in which order, how often, and what people ask for.
+//! Who is notified of what: in which order, how often, and what people ask for.
 
 use crate::site::{Site, eventually, get};
 use jiff::{SignedDuration, Timestamp};
@@ -74,7 +74,11 @@ fn a_backlog_that_comes_in_row_by_row_is_one_silence_a_benchmark() {
         .lines()
         .filter(|line| line.contains("\"level\":\"unknown\"") && line.contains("benchmark\":\"p"));
     assert_eq!(of_benchmarks.count(), 24, "each silence once: {events}");
-    assert!(site.lines("told").len() <= 24, "{:?}", site.lines("told"));
+    assert!(
+        site.lines("notified").len() <= 24,
+        "{:?}",
+        site.lines("notified")
+    );
     site.proven_events();
 }
 
@@ -146,14 +150,14 @@ fn a_silence_has_a_longest_time_and_an_end_and_is_seen_everywhere() {
     std::thread::sleep(Duration::from_secs(2));
     assert_eq!(site.notified("5/red/", "firing"), 0, "it was silenced");
     assert!(alerts(&["unsilence"]).status.success());
-    eventually("told", || site.notified("5/red/", "firing") == 1);
+    eventually("notified", || site.notified("5/red/", "firing") == 1);
     assert!(shown("/metrics").contains("slipwatch_silences 0"));
     program.stop();
     site.proven_events();
 }
 
 #[test]
-fn a_hook_of_the_whole_site_is_told_that_its_sensors_are_silent() {
+fn a_hook_of_the_whole_site_is_notified_that_its_sensors_are_silent() {
     let site = Site::new("");
     let text = fs::read_to_string(site.path("site.toml")).unwrap();
     let text = text.replace("[[hook]]\n", "[[hook]]\nsite = true\n");
@@ -169,13 +173,13 @@ fn a_hook_of_the_whole_site_is_told_that_its_sensors_are_silent() {
         ),
     );
     let program = site.caught_up();
-    eventually("told", || site.notified("site/unknown/", "firing") == 1);
+    eventually("notified", || site.notified("site/unknown/", "firing") == 1);
     program.stop();
     site.proven_events();
 }
 
 #[test]
-fn a_site_of_which_nobody_is_told_that_a_sensor_is_dead_does_not_pass_the_check_unseen() {
+fn a_site_of_which_nobody_is_notified_that_a_sensor_is_dead_does_not_pass_the_check_unseen() {
     let site = Site::new("");
     let text = fs::read_to_string(site.path("site.toml")).unwrap();
     let text = text.replace(", \"unknown\"]", "]");

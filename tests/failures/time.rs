@@ -14,7 +14,7 @@ const POLICY: &str = "[alert]\nevacuation_time = \"3h\"\n";
 
 #[test]
 #[cfg_attr(not(has_faketime), ignore = "libfaketime was not found by build.rs")]
-fn what_arrives_live_is_told_although_the_hosts_clock_is_forty_days_ahead() {
+fn what_arrives_live_is_reported_although_the_hosts_clock_is_forty_days_ahead() {
     let site = Site::new(POLICY);
     site.append("incoming/5.csv", &format!("{HEADER}{}", failing(0..40)));
     fs::write(site.path("ahead"), "+40d").unwrap();
@@ -23,14 +23,14 @@ fn what_arrives_live_is_told_although_the_hosts_clock_is_forty_days_ahead() {
         site.append("incoming/5.csv", &failing(first..(first + 10).min(114)));
         std::thread::sleep(Duration::from_millis(100));
     }
-    eventually("told", || site.notified("5/red/", "firing") == 1);
+    eventually("notified", || site.notified("5/red/", "firing") == 1);
     program.stop();
     site.proven_events();
 }
 
 #[test]
 #[cfg_attr(not(has_faketime), ignore = "libfaketime was not found by build.rs")]
-fn a_clock_that_is_years_back_is_told_and_what_lies_ahead_is_taken_when_it_is_right() {
+fn a_clock_that_is_years_back_is_reported_and_what_lies_ahead_is_taken_when_it_is_right() {
     let site = Site::new(POLICY);
     site.append("incoming/5.csv", &format!("{HEADER}{}", failing(0..90)));
     site.caught_up().stop();
@@ -69,7 +69,7 @@ fn a_clock_that_is_set_back_by_two_days_keeps_no_reading_from_being_taken() {
     fs::write(site.path("ahead"), "-2d").unwrap();
     site.append("incoming/5.csv", &failing(113..114));
     eventually("it is taken", || site.values().len() == 114);
-    eventually("and told", || {
+    eventually("and notified", || {
         site.notified("site/unknown/clock/", "firing") == 1
     });
     program.stop();
@@ -107,7 +107,7 @@ fn one_reading_stamped_a_month_ahead_keeps_no_later_one_from_counting() {
         site.append("incoming/5.csv", &old(first..(first + 10).min(113)));
         std::thread::sleep(Duration::from_millis(50));
     }
-    eventually("told", || site.notified("5/red/", "firing") == 1);
+    eventually("notified", || site.notified("5/red/", "firing") == 1);
     program.stop();
     let events = site.proven_events();
     assert!(events.contains("leapt-ahead"), "{events}");
@@ -129,7 +129,7 @@ fn what_an_unset_clock_gave_first_does_not_disarm_a_displacement_threshold() {
     let program = site.caught_up();
     site.append("incoming/5.csv", &format!("{unset},97.5\n"));
     site.append("incoming/5.csv", &row(40));
-    eventually("told", || site.notified("5/red/", "firing") == 1);
+    eventually("notified", || site.notified("5/red/", "firing") == 1);
     program.stop();
     let events = site.proven_events();
     assert!(events.contains("displacement-threshold"), "{events}");

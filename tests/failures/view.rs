@@ -39,7 +39,7 @@ fn a_benchmark_that_never_gave_a_reading_is_seen_and_unknown_from_the_start() {
         assert!(metrics.contains(&line), "{metrics}");
         let row = status.lines().find(|line| line.starts_with(id)).unwrap();
         assert!(row.contains("unknown"), "{status}");
-        eventually("told", || {
+        eventually("notified", || {
             site.notified(&format!("{id}/unknown/"), "firing") == 1
         });
     }
@@ -63,7 +63,7 @@ fn a_benchmark_that_never_gave_a_reading_is_seen_and_unknown_from_the_start() {
     assert_eq!(
         site.notified("nan/unknown/", "firing"),
         1,
-        "told again after a restart"
+        "notified again after a restart"
     );
     site.proven_events();
 }
@@ -73,7 +73,7 @@ fn three_readings_and_then_silence_are_unknown() {
     let site = Site::new("");
     site.append("incoming/5.csv", &format!("{HEADER}{}", failing(90..93)));
     let program = site.caught_up();
-    eventually("told", || site.notified("5/unknown/", "firing") == 1);
+    eventually("notified", || site.notified("5/unknown/", "firing") == 1);
     program.stop();
     site.proven_events();
 }

@@ -25,7 +25,7 @@ pub(crate) const LIFE_HOURS: u64 = 250;
 /// The daemon takes its turns and the plan goes on each half hour.
 const STEP: Duration = Duration::from_secs(1800);
 pub(crate) const STEPS: usize = 500;
-/// Within so much time in which the daemon runs and the hook works, people are told: a turn, and the longest wait
+/// Within so much time in which the daemon runs and the hook works, people are notified: a turn, and the longest wait
 /// between two attempts at a hook.
 pub(crate) const BOUND: SignedDuration = SignedDuration::from_mins(45);
 /// Steps without trouble at the end: what was held, kept or refused comes in.
@@ -37,13 +37,13 @@ pub(crate) struct Seen {
     hours: u64,
     readings: usize,
     pub(crate) reds_due: u64,
-    pub(crate) reds_told: u64,
-    told_unknown: u64,
+    pub(crate) reds_notified: u64,
+    notified_unknown: u64,
     over: u64,
     pub(crate) restarts: u64,
     pub(crate) full_disk: u64,
     wrong_clock: u64,
-    told: u64,
+    notified: u64,
     failed_runs: u64,
 }
 
@@ -52,24 +52,24 @@ impl Seen {
         self.hours += other.hours;
         self.readings += other.readings;
         self.reds_due += other.reds_due;
-        self.reds_told += other.reds_told;
-        self.told_unknown += other.told_unknown;
+        self.reds_notified += other.reds_notified;
+        self.notified_unknown += other.notified_unknown;
         self.over += other.over;
         self.restarts += other.restarts;
         self.full_disk += other.full_disk;
         self.wrong_clock += other.wrong_clock;
-        self.told += other.told;
+        self.notified += other.notified;
         self.failed_runs += other.failed_runs;
     }
 }
 
-/// A red that people are to be told of.
+/// A red that people are to be notified of.
 struct Due {
     name: &'static str,
     /// When the reading was measured that makes it due.
     of: Timestamp,
-    /// Since when it could have been told without a break, and neither it nor `unknown` has been.
-    untold_since: Option<Timestamp>,
+    /// Since when it could have been sent without a break, and neither it nor `unknown` has been.
+    unnotified_since: Option<Timestamp>,
     was_unknown: bool,
 }
 
@@ -210,7 +210,7 @@ impl Life<'_> {
         if was_well && self.is_machine_well() {
             self.nothing_keeps_the_quiet_one_waiting();
         }
-        self.reds_are_told();
+        self.reds_are_notified();
     }
 
     /// Whether what concerns all benchmarks is well.
@@ -343,7 +343,7 @@ impl Life<'_> {
                 self.dues.push(Due {
                     name,
                     of: one.time,
-                    untold_since: None,
+                    unnotified_since: None,
                     was_unknown: false,
                 });
             }
@@ -361,7 +361,7 @@ impl Life<'_> {
         }
     }
 
-    fn reds_are_told(&mut self) {
+    fn reds_are_notified(&mut self) {
         let now = truth();
         let mut dues = std::mem::take(&mut self.dues);
         dues.retain_mut(|due| !self.is_done(due, now));
@@ -377,13 +377,13 @@ impl Life<'_> {
             (people.know(Some(due.name), Level::Red), knows_unknown)
         };
         if knows_red {
-            self.seen.reds_told += 1;
-            self.seen.told_unknown += u64::from(due.was_unknown);
+            self.seen.reds_notified += 1;
+            self.seen.notified_unknown += u64::from(due.was_unknown);
             return true;
         }
         due.was_unknown |= knows_unknown;
         if !self.host.is_up() || !self.host.tells(due.name) || knows_unknown {
-            due.untold_since = None;
+            due.unnotified_since = None;
             return false;
         }
         let store = self.host.store().expect("the daemon runs");
@@ -391,10 +391,10 @@ impl Life<'_> {
             self.seen.over += 1;
             return true;
         }
-        let since = *due.untold_since.get_or_insert(now);
+        let since = *due.unnotified_since.get_or_insert(now);
         assert!(
             now.duration_since(since) <= BOUND,
-            "seed {}, {now}: red of {} at {} has not been told",
+            "seed {}, {now}: red of {} at {} has not been notified",
             self.seed,
             due.of,
             due.name
@@ -435,6 +435,6 @@ impl Life<'_> {
         assert_eq!(store.outbox().unwrap().0, 0, "seed {seed}: alerts wait");
         is_what_a_replay_says(seed, store);
         let people = self.host.hook.0.lock().unwrap();
-        (self.seen.told, self.seen.failed_runs) = (people.told, people.failed);
+        (self.seen.notified, self.seen.failed_runs) = (people.notified, people.failed);
     }
 }

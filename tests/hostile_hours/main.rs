@@ -11,7 +11,7 @@
 //! properties are held:
 //!
 //! 1. What could be read is in the state once, when the trouble is over.
-//! 2. Where red was due, people have been told red, or `unknown` for the benchmark or the clock, within [`life::BOUND`] in
+//! 2. Where red was due, people have received red, or `unknown` for the benchmark or the clock, within [`life::BOUND`] in
 //!    which the daemon ran and the hook worked.
 //! 3. The fourth benchmark's readings are in the state at the end of the turn in which they came, and property 2 holds for
 //!    it, whatever the others do, while the machine is well.
@@ -85,9 +85,9 @@ fn in_hostile_hours_no_reading_is_lost_no_red_is_kept_from_people_and_no_benchma
     let seen = apart::live_in_processes(NAME, first..first + lives);
     println!("{seen:?}");
     if lives >= 20 {
-        // That the plan reaches what is claimed: most reds are told as such, and not only as unknown.
+        // That the plan reaches what is claimed: most reds are sent as such, and not only as unknown.
         assert!(seen.reds_due > lives, "{seen:?}");
-        assert!(seen.reds_told * 2 > seen.reds_due, "{seen:?}");
+        assert!(seen.reds_notified * 2 > seen.reds_due, "{seen:?}");
         assert!(seen.restarts > lives && seen.full_disk > 0, "{seen:?}");
     }
 }
@@ -104,7 +104,7 @@ fn what_seeds_have_found_is_mended() {
 }
 
 #[test]
-#[should_panic(expected = "has not been told")]
+#[should_panic(expected = "has not been notified")]
 fn a_hook_that_loses_red_is_found() {
     if let Some(seeds) = apart::own_seeds() {
         return apart::live_all(seeds, &Mood::LosesRed);

@@ -1,4 +1,4 @@
-//! The hook, as the people behind it see it: what they have been told, and when the hook works.
+//! The hook, as the people behind it see it: what they have received, and when the hook works.
 
 use slipwatch::alert::Level;
 use slipwatch::config::HookConfig;
@@ -25,7 +25,7 @@ pub(crate) enum Mood {
     LosesRed,
 }
 
-/// What people have been told, and the hook between.
+/// What people have received, and the hook between.
 #[derive(Debug, Default)]
 pub(crate) struct People {
     pub(crate) mood: Mood,
@@ -33,7 +33,7 @@ pub(crate) struct People {
     pub(crate) usual: Mood,
     /// By benchmark (none: the site, its clock) and level, the keys that are in force.
     in_force: BTreeMap<(Option<String>, Level), BTreeSet<String>>,
-    pub(crate) told: u64,
+    pub(crate) notified: u64,
     pub(crate) failed: u64,
 }
 
@@ -47,7 +47,7 @@ impl People {
     }
 
     fn hear(&mut self, alert: &Alert) {
-        self.told += 1;
+        self.notified += 1;
         let benchmark = alert.event.benchmark.as_ref().map(ToString::to_string);
         let keys = self.in_force.entry((benchmark, alert.level)).or_default();
         match alert.state {

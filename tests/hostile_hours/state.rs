@@ -7,7 +7,7 @@ use slipwatch::runtime::shutdown;
 use slipwatch::store::Store;
 use std::collections::BTreeMap;
 
-/// Whether the monitor has ended the red at `name` since the reading of `of`: what nobody was told of before is not told any more.
+/// Whether the monitor has ended the red at `name` since the reading of `of`: what nobody was notified of before is not sent any more.
 pub(crate) fn is_over(store: &Store, name: &str, of: Timestamp) -> bool {
     let (mut after, mut is_over) = (0, false);
     loop {

@@ -104,7 +104,7 @@ fn jumps(events: &[Event]) -> Vec<f64> {
 }
 
 #[test]
-fn a_declared_reset_is_no_motion_and_an_undeclared_one_is_told() {
+fn a_declared_reset_is_no_motion_and_an_undeclared_one_is_reported() {
     let time = start() + (61 * 24).hours() + 1.hour();
     let readings = series(90, 24, (time, 500.0));
     let silent = play(&mut Monitor::new(Settings::default()), &readings, Unit::MM);
@@ -128,9 +128,9 @@ fn a_reset_declared_after_its_readings_came_joins_the_history_and_refits() {
     play(&mut before, &readings[..70], Unit::MM);
     let mut after = Monitor::new(Settings::default());
     play(&mut after, &readings[..70], Unit::MM);
-    let told = after.step(readings[69].0, &Input::Settings(Box::new(declared.clone())));
-    assert_eq!(names(&told)[0], "declared");
-    assert!(told.iter().any(|event| event.kind.name() == "refit"));
+    let reported = after.step(readings[69].0, &Input::Settings(Box::new(declared.clone())));
+    assert_eq!(names(&reported)[0], "declared");
+    assert!(reported.iter().any(|event| event.kind.name() == "refit"));
     assert!(
         after
             .step(readings[69].0, &Input::Settings(Box::new(declared)))
@@ -225,7 +225,7 @@ fn silence_during_maintenance_is_no_fault_and_silence_after_it_is_one() {
     play(&mut monitor, &readings, Unit::MM);
     let due = monitor.next_deadline().unwrap();
     assert!(due > until && due < until + (6 * 24).hours(), "{due}");
-    let told = monitor.step(due, &Input::Tick);
+    let reported = monitor.step(due, &Input::Tick);
     let is_unknown = |event: &Event| {
         matches!(
             &event.kind,
@@ -236,7 +236,7 @@ fn silence_during_maintenance_is_no_fault_and_silence_after_it_is_one() {
             }
         )
     };
-    assert!(told.iter().any(is_unknown));
+    assert!(reported.iter().any(is_unknown));
 }
 
 #[test]

@@ -148,7 +148,7 @@ fn wet_spring() -> Measured {
 }
 
 #[test]
-fn a_wet_spring_raises_no_orange_once_its_effect_is_adopted_and_does_where_it_is_only_told() {
+fn a_wet_spring_raises_no_orange_once_its_effect_is_adopted_and_does_where_it_is_only_reported() {
     let wet = wet_spring();
     let finding = (250, found(STANDS));
     let adopted = play(&mut monitor(Explain::Adopt), &wet, Some(&finding));
@@ -223,7 +223,7 @@ fn an_effect_that_rises_along_with_a_failure_by_chance_does_not_hide_it() {
 }
 
 #[test]
-fn structure_in_the_residual_is_told_and_again_only_when_it_has_doubled() {
+fn structure_in_the_residual_is_reported_and_again_only_when_it_has_doubled() {
     let events = play(&mut monitor(Explain::Off), &wet_spring(), None);
     let told = structures(&events);
     assert!(!told.is_empty());
@@ -279,7 +279,7 @@ fn one_search_is_asked_for_at_a_time_and_none_where_it_is_switched_off() {
 }
 
 #[test]
-fn an_effect_is_told_once_and_its_end_too() {
+fn an_effect_is_reported_once_and_its_end_too() {
     let mut monitor = monitor(Explain::Adopt);
     let wet = wet_spring();
     let part = Measured {

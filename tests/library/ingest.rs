@@ -80,8 +80,8 @@ fn csv_holds_all_but_averaging_and_provenance_and_convert_says_so() {
         averaging: Some(SignedDuration::from_mins(90)),
         ..ReadOptions::default()
     };
-    let (told, _) = read_files(&[table], &hour_and_half).unwrap();
-    assert_eq!(told.series, made_up().series);
+    let (reported, _) = read_files(&[table], &hour_and_half).unwrap();
+    assert_eq!(reported.series, made_up().series);
 }
 
 #[test]

@@ -9,13 +9,13 @@ use std::path::Path;
 use tempfile::TempDir;
 
 /// What the lines give: values, marks, or what is wrong.
-fn told(text: &str) -> Vec<String> {
+fn reported(text: &str) -> Vec<String> {
     let mut rows = TextRows::new(&NDJSON, Path::new("toc.ndjson"), &ReadOptions::default());
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     for (line, number) in text.lines().zip(1..) {
         let taken = rows.take(number, line);
         assert!(!rows.is_lost(), "every line stands for itself");
-        told.extend(taken.items.into_iter().map(|item| match item {
+        reported.extend(taken.items.into_iter().map(|item| match item {
             Item::Reading {
                 benchmark,
                 unit,
@@ -29,9 +29,9 @@ fn told(text: &str) -> Vec<String> {
                 benchmark, what, ..
             } => format!("{benchmark} gives {what}"),
         }));
-        told.extend(taken.fault.map(|fault| format!("fault: {fault}")));
+        reported.extend(taken.fault.map(|fault| format!("fault: {fault}")));
     }
-    told
+    reported
 }
 
 fn message(value: &str) -> String {
@@ -53,18 +53,18 @@ fn messages_and_rows_may_stand_in_one_file() {
         "upper:2 mm/h",
         "7:3 mm/day",
     ];
-    assert_eq!(told(text), expected);
+    assert_eq!(reported(text), expected);
 }
 
 #[test]
 fn of_a_torn_object_glued_to_the_next_one_the_intact_one_is_kept() {
     let whole = message("1");
     for cut in 1..whole.len() {
-        let told = told(&format!("{}{}", &whole[..cut], message("2")));
-        assert_eq!(told[0], "5:2 mm", "cut at {cut}: {told:?}");
+        let reported = reported(&format!("{}{}", &whole[..cut], message("2")));
+        assert_eq!(reported[0], "5:2 mm", "cut at {cut}: {reported:?}");
         assert!(
-            told[1].contains("line 1") && told.len() == 2,
-            "cut at {cut}: {told:?}"
+            reported[1].contains("line 1") && reported.len() == 2,
+            "cut at {cut}: {reported:?}"
         );
     }
 }
@@ -72,23 +72,23 @@ fn of_a_torn_object_glued_to_the_next_one_the_intact_one_is_kept() {
 #[test]
 fn intact_objects_before_a_torn_one_or_on_one_line_are_kept() {
     let (a, b) = (message("1"), message("2"));
-    assert_eq!(told(&format!("{a}{b}")), ["5:1 mm", "5:2 mm"]);
-    let told = told(&format!("{a}{}", &b[..30]));
-    assert_eq!((told[0].as_str(), told.len()), ("5:1 mm", 2));
+    assert_eq!(reported(&format!("{a}{b}")), ["5:1 mm", "5:2 mm"]);
+    let reported = reported(&format!("{a}{}", &b[..30]));
+    assert_eq!((reported[0].as_str(), reported.len()), ("5:1 mm", 2));
 }
 
 #[test]
 fn a_value_that_is_null_nan_or_infinite_is_a_missing_reading() {
     for value in ["null", "NaN", "-Infinity", "\"NAN\"", "\"inf\""] {
-        let told = told(&message(value));
+        let reported = reported(&message(value));
         assert!(
-            told.len() == 1 && told[0].starts_with("5 gives"),
-            "{value}: {told:?}"
+            reported.len() == 1 && reported[0].starts_with("5 gives"),
+            "{value}: {reported:?}"
         );
     }
     let row =
         r#"{"time":"2017-06-06T00:00:00Z","5_displacement_mm":NaN,"NaN \"x_mm":-Infinity,"b_c":1}"#;
-    assert_eq!(told(row), ["5 gives NaN", "b_c:1"]);
+    assert_eq!(reported(row), ["5 gives NaN", "b_c:1"]);
 }
 
 #[test]
@@ -105,15 +105,15 @@ fn what_is_no_reading_is_named_by_line_and_field() {
         ("[1,2]".to_owned(), "one JSON object"),
     ];
     for (line, problem) in cases {
-        let told = told(&format!("{}\n{line}\n{}", message("1"), message("2")));
+        let reported = reported(&format!("{}\n{line}\n{}", message("1"), message("2")));
         assert_eq!(
-            (told[0].as_str(), told[2].as_str()),
+            (reported[0].as_str(), reported[2].as_str()),
             ("5:1 mm", "5:2 mm"),
             "{line}"
         );
         assert!(
-            told[1].contains("line 2") && told[1].contains(problem),
-            "{told:?}"
+            reported[1].contains("line 2") && reported[1].contains(problem),
+            "{reported:?}"
         );
     }
 }

@@ -38,11 +38,11 @@ fn in_rome(summer_time: SummerTime) -> ReadOptions {
 }
 
 /// What each line gives: values, marks, or what is wrong.
-fn told(rows: &mut TextRows, text: &str) -> Vec<String> {
-    let mut told = Vec::new();
+fn reported(rows: &mut TextRows, text: &str) -> Vec<String> {
+    let mut reported = Vec::new();
     for (line, number) in text.lines().zip(1..) {
         let taken = rows.take(number, line);
-        told.extend(taken.items.into_iter().map(|item| match item {
+        reported.extend(taken.items.into_iter().map(|item| match item {
             Item::Reading {
                 benchmark, reading, ..
             } => format!("{benchmark}:{}", reading.value),
@@ -53,9 +53,9 @@ fn told(rows: &mut TextRows, text: &str) -> Vec<String> {
                 benchmark, what, ..
             } => format!("{benchmark} gives {what}"),
         }));
-        told.extend(taken.fault.map(|fault| fault.to_string()));
+        reported.extend(taken.fault.map(|fault| fault.to_string()));
     }
-    told
+    reported
 }
 
 fn rows(options: &ReadOptions) -> TextRows {
@@ -106,7 +106,10 @@ fn nan_and_the_loggers_codes_are_missing_readings_and_never_values() {
         "Rain_Tot_mm:0",
         "lake_level_m:1",
     ];
-    assert_eq!(told(&mut rows(&ReadOptions::default()), &text), expected);
+    assert_eq!(
+        reported(&mut rows(&ReadOptions::default()), &text),
+        expected
+    );
     let folder = TempDir::new().unwrap();
     let (recording, disorder) = read(&write(&folder, &text)).unwrap();
     assert_eq!((recording.series.len(), disorder.missing), (0, 4));
@@ -131,12 +134,12 @@ fn an_hour_that_came_twice_is_quarantined_with_its_line_and_the_next_one_is_take
         "{HEADER}\"2017-10-29 02:30:00\",1,1,2,0,\"\",650\n\
          \"2017-10-29 03:30:00\",2,3,4,0,\"\",650\n"
     );
-    let told = told(&mut rows(&in_rome(SummerTime::Reject)), &text);
+    let reported = reported(&mut rows(&in_rome(SummerTime::Reject)), &text);
     assert!(
-        told[0].contains("line 5") && told[0].contains("twice"),
-        "{told:?}"
+        reported[0].contains("line 5") && reported[0].contains("twice"),
+        "{reported:?}"
     );
-    assert_eq!(told[1..3], ["5:3", "upper:4"]);
+    assert_eq!(reported[1..3], ["5:3", "upper:4"]);
 }
 
 #[test]
@@ -149,8 +152,8 @@ fn a_header_in_the_middle_holds_for_what_follows() {
         .replace("\"RN\",\"mm\",\"\"", "\"RN\",\"\",\"mm\"");
     let row = |hour: u32| format!("\"2017-06-06 {hour}:00:00\",1,1,2,0,\"\",650\n");
     let text = format!("{HEADER}{}{second}{}", row(17), row(18));
-    let told = told(&mut rows(&ReadOptions::default()), &text);
-    let readings: Vec<_> = told.iter().filter(|one| !one.contains('_')).collect();
+    let reported = reported(&mut rows(&ReadOptions::default()), &text);
+    let readings: Vec<_> = reported.iter().filter(|one| !one.contains('_')).collect();
     assert_eq!(readings, ["5:1", "upper:2", "upper:1", "5:2"]);
 }
 
@@ -162,12 +165,12 @@ fn a_row_torn_by_a_power_failure_costs_itself_and_not_the_header_behind_it() {
         row(17),
         row(19)
     );
-    let told = told(&mut rows(&ReadOptions::default()), &text);
+    let reported = reported(&mut rows(&ReadOptions::default()), &text);
     assert!(
-        told[4].contains("line 6") && told[4].contains("a header within"),
-        "{told:?}"
+        reported[4].contains("line 6") && reported[4].contains("a header within"),
+        "{reported:?}"
     );
-    assert_eq!(told[5..7], ["5:1", "upper:2"]);
+    assert_eq!(reported[5..7], ["5:1", "upper:2"]);
 }
 
 #[test]
@@ -176,13 +179,13 @@ fn after_a_header_that_is_not_understood_no_row_is_taken_until_one_is() {
     let row = |hour: u32| format!("\"2017-06-06 {hour}:00:00\",1,1,2,0,\"\",650\n");
     let text = format!("{HEADER}{}{bad}{}{HEADER}{}", row(17), row(18), row(19));
     let mut reader = rows(&ReadOptions::default());
-    let told = told(&mut reader, &text);
-    assert!(told[4].contains("another such column"), "{told:?}");
+    let reported = reported(&mut reader, &text);
+    assert!(reported[4].contains("another such column"), "{reported:?}");
     assert!(
-        told[5].contains("line 10") && told[5].contains("no header"),
-        "{told:?}"
+        reported[5].contains("line 10") && reported[5].contains("no header"),
+        "{reported:?}"
     );
-    assert_eq!(told[6..8], ["5:1", "upper:2"]);
+    assert_eq!(reported[6..8], ["5:1", "upper:2"]);
     assert!(!reader.is_lost());
 }
 
@@ -220,13 +223,13 @@ fn the_lines_of_the_header_are_all_that_a_reader_needs_to_go_on() {
     let options = ReadOptions::default();
     let mut first = rows(&options);
     assert!(first.header().is_empty());
-    assert!(told(&mut first, HEADER).is_empty());
+    assert!(reported(&mut first, HEADER).is_empty());
     let mut second = rows(&options);
     for (line, number) in first.header().to_vec().iter().zip(1..) {
         assert!(second.take(number, line).fault.is_none());
     }
     let row = "\"2017-06-06 17:00:00\",1,1,2,0,\"\",650";
-    assert_eq!(told(&mut second, row), told(&mut first, row));
+    assert_eq!(reported(&mut second, row), reported(&mut first, row));
 }
 
 #[test]

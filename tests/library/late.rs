@@ -95,13 +95,13 @@ fn corrected_readings_that_would_have_called_a_higher_level_are_a_correction() {
     assert!(corrections(&events).is_empty());
     let mut restarted = Monitor::restore(&monitor.save().unwrap()).unwrap();
     let (time, value) = readings[90];
-    let told = monitor.step(time, &input(time, value));
-    let [(since, then, now)] = corrections(&told)[..] else {
-        panic!("{told:?}");
+    let reported = monitor.step(time, &input(time, value));
+    let [(since, then, now)] = corrections(&reported)[..] else {
+        panic!("{reported:?}");
     };
     assert_eq!(since, readings[51].0);
     assert!(now > then && now >= Level::Orange, "{then} {now}");
-    assert_eq!(restarted.step(time, &input(time, value)), told);
+    assert_eq!(restarted.step(time, &input(time, value)), reported);
 }
 
 #[test]
@@ -240,7 +240,7 @@ proptest! {
 
     #[test]
     fn any_arrival_order_within_the_window_gives_the_same_events(order in arrival_orders()) {
-        let told = |order: &[i64]| {
+        let reported = |order: &[i64]| {
             let mut bench = Bench::new();
             bench.write(order);
             let mut arrivals = bench.poll().arrivals;
@@ -252,6 +252,6 @@ proptest! {
             (minutes(&arrivals), events)
         };
         let in_order: Vec<i64> = (0..60).collect();
-        prop_assert_eq!(told(&order), told(&in_order));
+        prop_assert_eq!(reported(&order), reported(&in_order));
     }
 }

@@ -148,7 +148,7 @@ fn faults(events: &[Event]) -> Vec<&str> {
 }
 
 #[test]
-fn a_sensor_that_gives_nan_is_a_fault_told_once_a_run_and_becomes_unknown_like_silence() {
+fn a_sensor_that_gives_nan_is_a_fault_reported_once_a_run_and_becomes_unknown_like_silence() {
     let mut monitor = monitor(Policy::default());
     let day = |day: i64| start() + (24 * day).hours();
     let readings: Vec<(Timestamp, f64)> = (0..20).map(|one| (day(one), one as f64)).collect();
@@ -163,7 +163,7 @@ fn a_sensor_that_gives_nan_is_a_fault_told_once_a_run_and_becomes_unknown_like_s
     let silent = monitor.step(due, &Input::Tick);
     assert_eq!(levels(&silent), [(Level::Unknown, AlertState::Firing)]);
     assert!(matches!(&silent[0].kind, EventKind::Fault { text, .. } if text.contains("gives NAN")));
-    // What was read again is over; a reading ends the run, and the next one is told anew.
+    // What was read again is over; a reading ends the run, and the next one is reported anew.
     assert!(monitor.step(due, &missing(day(3))).is_empty());
     let back = monitor.step(day(30), &input(day(30), 30.0, Unit::MM));
     assert_eq!(levels(&back), [(Level::Unknown, AlertState::Resolved)]);

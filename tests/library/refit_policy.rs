@@ -24,7 +24,7 @@ fn creep(readings: usize, minutes: i64) -> Vec<(Timestamp, f64)> {
 }
 
 /// The events after each reading.
-fn told(settings: &Settings, readings: &[(Timestamp, f64)]) -> Vec<Vec<Event>> {
+fn reported(settings: &Settings, readings: &[(Timestamp, f64)]) -> Vec<Vec<Event>> {
     let mut monitor = Monitor::new(settings.clone());
     let each = readings.iter().map(|(time, value)| {
         let reading = Input::Reading {
@@ -51,9 +51,9 @@ fn has_refit(events: &[Event]) -> bool {
 #[test]
 fn an_old_record_is_refitted_each_quarter_of_an_hour_of_data_and_a_young_one_at_each_reading() {
     let readings = creep(1600, 1);
-    let told = told(&Settings::default(), &readings);
-    let refits: Vec<usize> = (0..told.len())
-        .filter(|index| has_refit(&told[*index]))
+    let reported = reported(&Settings::default(), &readings);
+    let refits: Vec<usize> = (0..reported.len())
+        .filter(|index| has_refit(&reported[*index]))
         .collect();
     let young = refits.iter().take_while(|index| **index < YOUNG);
     assert!(
@@ -77,26 +77,28 @@ fn an_old_record_is_refitted_each_quarter_of_an_hour_of_data_and_a_young_one_at_
 #[test]
 fn a_reading_that_was_not_foreseen_is_refitted_at_once() {
     let mut readings = creep(1100, 1);
-    let quiet = told(&Settings::default(), &readings);
+    let quiet = reported(&Settings::default(), &readings);
     let refits: Vec<usize> = (YOUNG..1100)
         .filter(|index| has_refit(&quiet[*index]))
         .collect();
     let between = refits[1] + 3;
     assert!(!has_refit(&quiet[between]));
     readings[between].1 += 10.0 * NOISE_MM;
-    assert!(has_refit(&told(&Settings::default(), &readings)[between]));
+    assert!(has_refit(
+        &reported(&Settings::default(), &readings)[between]
+    ));
 }
 
 #[test]
 fn readings_as_far_apart_as_a_quarter_of_an_hour_are_all_refitted() {
-    let told = told(&Settings::default(), &creep(1050, 15));
-    assert!(told[YOUNG..].iter().all(|events| has_refit(events)));
+    let reported = reported(&Settings::default(), &creep(1050, 15));
+    assert!(reported[YOUNG..].iter().all(|events| has_refit(events)));
 }
 
 #[test]
 fn plain_thresholds_act_at_readings_that_are_not_refitted() {
     let readings = creep(1200, 1);
-    let quiet = told(&Settings::default(), &readings);
+    let quiet = reported(&Settings::default(), &readings);
     let first = readings[0].1;
     let highest = |index: usize| {
         readings[..index]
@@ -123,16 +125,16 @@ fn plain_thresholds_act_at_readings_that_are_not_refitted() {
         displacement_mm: Some(readings[crossing].1 - first),
         acceleration_mm_per_day2: None,
     });
-    let told = told(&settings, &readings);
+    let reported = reported(&settings, &readings);
     let is_alert = |event: &Event| {
         matches!(&event.kind, EventKind::Alert { level: Level::Red, state: AlertState::Firing, rule, .. }
             if rule == "displacement-threshold")
     };
-    let alerts: Vec<usize> = (0..told.len())
-        .filter(|index| told[*index].iter().any(is_alert))
+    let alerts: Vec<usize> = (0..reported.len())
+        .filter(|index| reported[*index].iter().any(is_alert))
         .collect();
     assert_eq!(alerts, [crossing]);
-    assert!(!has_refit(&told[crossing]));
+    assert!(!has_refit(&reported[crossing]));
     assert_eq!(
         settings.policy.evacuation_time,
         SignedDuration::from_hours(24)
@@ -141,8 +143,8 @@ fn plain_thresholds_act_at_readings_that_are_not_refitted() {
 
 #[test]
 fn steady_creep_read_each_minute_stays_below_orange() {
-    let told = told(&Settings::default(), &creep(1600, 1));
+    let reported = reported(&Settings::default(), &creep(1600, 1));
     let is_high = |event: &&Event| matches!(event.kind, EventKind::Alert { level, .. } if level >= Level::Orange);
-    let high: Vec<&Event> = told.iter().flatten().filter(is_high).collect();
+    let high: Vec<&Event> = reported.iter().flatten().filter(is_high).collect();
     assert!(high.is_empty(), "{high:#?}");
 }

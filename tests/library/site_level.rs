@@ -100,14 +100,14 @@ fn two_of_three_make_the_site_and_one_that_is_removed_no_longer_does() {
         ..settings(Some(SiteLevel::AtLeast(2)))
     };
     let input = Input::Settings(Box::new(without));
-    let told = monitor.step(start() + 3.hours(), &input);
-    let said = of_the_site(&told);
+    let reported = monitor.step(start() + 3.hours(), &input);
+    let said = of_the_site(&reported);
     assert_eq!(said.len(), 1);
     assert_eq!(
         (said[0].0, said[0].1),
         (Level::Orange, AlertState::Resolved)
     );
-    assert_eq!(restarted.step(start() + 3.hours(), &input), told);
+    assert_eq!(restarted.step(start() + 3.hours(), &input), reported);
 }
 
 #[test]

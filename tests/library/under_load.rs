@@ -153,7 +153,7 @@ fn before_the_end(life: &Life, lead: f64) -> Option<(Outlook, f64)> {
 
 /// docs/skill.md measures the like on a thousand; the bounds here leave room for the scatter of 120.
 #[test]
-fn simulated_failures_are_foretold_without_bias_and_within_their_intervals() {
+fn simulated_failures_are_predicted_without_bias_and_within_their_intervals() {
     let lives: Vec<Life> = (0..120)
         .map(|seed| Life::draw(Fate::Failing, 20_000 + seed))
         .collect();

@@ -28,7 +28,7 @@ fn crisis(end: Timestamp) -> Vec<String> {
         .collect()
 }
 
-/// The site with a short evacuation, whose hook is told of silence too.
+/// The site with a short evacuation, whose hook is notified of silence too.
 fn crisis_folder() -> (TempDir, Config) {
     let (folder, _) = site_folder();
     let file = folder.path().join("site.toml");
@@ -84,7 +84,7 @@ fn called(folder: &TempDir, level: Level) -> Vec<Timestamp> {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_red_that_comes_with_the_backlog_of_a_logger_that_was_silent_is_told() {
+async fn a_red_that_comes_with_the_backlog_of_a_logger_that_was_silent_is_reported() {
     let (folder, config) = crisis_folder();
     let now = slipwatch::runtime::clock::now();
     let rows = crisis(now);
@@ -94,12 +94,12 @@ async fn a_red_that_comes_with_the_backlog_of_a_logger_that_was_silent_is_told()
         .until("the past", |progress| progress.is_caught_up)
         .await;
     append(&folder, &rows[70..]);
-    let is_told = || {
-        lines(&folder, "told")
+    let is_notified = || {
+        lines(&folder, "notified")
             .iter()
             .any(|line| line.starts_with("5/red/"))
     };
-    eventually("the red told", is_told).await;
+    eventually("the red notified", is_notified).await;
     daemon.stop().await;
     let red = called(&folder, Level::Red);
     let time = &red[0];
@@ -110,13 +110,13 @@ async fn a_red_that_comes_with_the_backlog_of_a_logger_that_was_silent_is_told()
         .until("the past", |progress| progress.is_caught_up)
         .await;
     daemon.stop().await;
-    let told = lines(&folder, "told");
-    let reds = told.iter().filter(|line| line.starts_with("5/red/"));
-    assert_eq!(reds.count(), 1, "{told:?}");
+    let notified = lines(&folder, "notified");
+    let reds = notified.iter().filter(|line| line.starts_with("5/red/"));
+    assert_eq!(reds.count(), 1, "{notified:?}");
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_silence_that_began_before_the_start_is_told() {
+async fn a_silence_that_began_before_the_start_is_reported() {
     let (folder, config) = crisis_folder();
     let now = slipwatch::runtime::clock::now();
     append(&folder, &crisis(now - hours(48))[..40]);
@@ -124,12 +124,12 @@ async fn a_silence_that_began_before_the_start_is_told() {
     daemon
         .until("the past", |progress| progress.is_caught_up)
         .await;
-    let is_told = || {
-        lines(&folder, "told")
+    let is_notified = || {
+        lines(&folder, "notified")
             .iter()
             .any(|line| line.starts_with("5/unknown/"))
     };
-    eventually("the silence told", is_told).await;
+    eventually("the silence notified", is_notified).await;
     daemon.stop().await;
     let time = &called(&folder, Level::Unknown)[0];
     assert!(*time < now - hours(6), "{time} is not long past at {now}");
@@ -186,12 +186,12 @@ async fn a_full_disk_ends_neither_the_daemon_nor_its_hooks_and_what_waited_is_wr
     // No file may grow beyond 256 kB, the database's log neither: the write fails as on a full disk.
     let mut program = Program::start(&folder, "--fsize=262144:unlimited");
     let log = || lines(&folder, "log").join("\n");
-    let is_told = || {
-        lines(&folder, "told")
+    let is_notified = || {
+        lines(&folder, "notified")
             .iter()
             .any(|line| line.starts_with("5/red/"))
     };
-    eventually("the red told", is_told).await;
+    eventually("the red notified", is_notified).await;
     eventually("the full disk logged", || {
         log().contains("no room on the disk")
     })
@@ -220,10 +220,10 @@ async fn a_full_disk_ends_neither_the_daemon_nor_its_hooks_and_what_waited_is_wr
 }
 
 #[tokio::test]
-async fn a_receipt_that_finds_no_room_still_keeps_the_hook_from_being_told_twice() {
+async fn a_receipt_that_finds_no_room_still_keeps_the_hook_from_being_notified_twice() {
     let (folder, _) = crisis_folder();
     // Hooks inherit the limit: this one leaves nothing behind but the names of empty files.
-    let script = "mkdir -p told-$SLIPWATCH_LEVEL/$$";
+    let script = "mkdir -p notified-$SLIPWATCH_LEVEL/$$";
     fs::write(folder.path().join("hook.sh"), script).unwrap();
     let mut program = Program::start(&folder, "--fsize=unlimited");
     eventually("its start", || {
@@ -233,10 +233,10 @@ async fn a_receipt_that_finds_no_room_still_keeps_the_hook_from_being_told_twice
     program.limit("--fsize=0:unlimited");
     append(&folder, &crisis(slipwatch::runtime::clock::now()));
     let calls = || {
-        let calls = fs::read_dir(folder.path().join("told-red"));
+        let calls = fs::read_dir(folder.path().join("notified-red"));
         calls.map_or(0, Iterator::count)
     };
-    eventually("the red told", || calls() > 0).await;
+    eventually("the red notified", || calls() > 0).await;
     program.limit("--fsize=unlimited");
     eventually("its receipt", || {
         let is_red = |event: &&Event| matches!(&event.kind, EventKind::Alert { level, .. } if *level == Level::Red);
@@ -275,5 +275,5 @@ async fn an_archived_crisis_fires_no_hook() {
     eventually("the red", || !called(&folder, Level::Red).is_empty()).await;
     daemon.stop().await;
     assert_eq!(called(&folder, Level::Red).len(), 1);
-    assert_eq!(lines(&folder, "told"), [""; 0]);
+    assert_eq!(lines(&folder, "notified"), [""; 0]);
 }

@@ -3,7 +3,7 @@
 import { get } from '/page/ask.js';
 import { Charts } from '/page/charts.js';
 import { buttons } from '/page/site.js';
-import { badges, collapse, el, figure, left, list, percent, place, span, svg, told, when } from '/page/words.js';
+import { badges, collapse, el, figure, left, list, percent, place, span, svg, described, when } from '/page/words.js';
 
 const DAY = 86400;
 const SPANS = [[null, 'Whole record'], [365 * DAY, '1 year'], [30 * DAY, '30 days'], [7 * DAY, '7 days'], [DAY, '1 day']];
@@ -75,7 +75,7 @@ export class BenchmarkPage {
     const quiet = view.silences.filter((one) => !one.benchmark || one.benchmark === this.name);
     return [el('a', { href: place(null) }, 'All benchmarks'), el('h1', {}, this.name), ...badges(view.standing, 'big'),
       ...(seen && view.standing.since && seen.time >= view.standing.since ? [el('span', { class: 'soft' }, `seen by ${seen.by ?? 'somebody'}`)] : []),
-      ...quiet.map((one) => el('span', { class: 'soft' }, `not notified: ${told(one)}`))];
+      ...quiet.map((one) => el('span', { class: 'soft' }, `not notified: ${described(one)}`))];
   }
 
   /** So many seconds until the moment that is shown. */
@@ -149,9 +149,9 @@ function effects(view) {
   const found = view.marks.filter((mark) => ['effect-found', 'effect-dropped'].includes(mark.event));
   const load = view.marks.filter((mark) => mark.event === 'unexplained-residual' && mark.load_sd !== undefined).pop();
   const nodes = [];
-  if (load) nodes.push(el('p', {}, `${told(load)[0].toUpperCase()}${told(load).slice(1)}.`));
+  if (load) nodes.push(el('p', {}, `${described(load)[0].toUpperCase()}${described(load).slice(1)}.`));
   if (found.length === 0) nodes.push(el('p', { class: 'soft' }, 'No effect was found: forecasts go by the law and by motion alone.'));
-  for (const one of found) nodes.push(el('p', {}, when(one.time), ` ${told(one)}.`));
+  for (const one of found) nodes.push(el('p', {}, when(one.time), ` ${described(one)}.`));
   const plain = view.latest?.plain;
   if (plain) {
     nodes.push(el('table', {}, el('thead', {}, el('tr', {}, ['', 'Critical velocity passed'].map((name) => el('th', { scope: 'col' }, name)))),

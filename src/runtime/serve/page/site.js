@@ -1,7 +1,7 @@
 // The site: every benchmark by level, where each stands, what is in force.
 
 import { get } from '/page/ask.js';
-import { badge, badges, collapse, el, figure, left, list, percent, place, shape, span, svg, told, when } from '/page/words.js';
+import { badge, badges, collapse, el, figure, left, list, percent, place, shape, span, svg, described, when } from '/page/words.js';
 
 const RANK = { green: 0, unknown: 0.5, yellow: 1, orange: 2, red: 3 };
 const HEALTH = [
@@ -61,7 +61,7 @@ export class SitePage {
         el('div', {}, alert.text),
         seen ? el('div', { class: 'soft' }, `seen by ${seen.by ?? 'somebody'} at `, when(seen.time)) : null);
     });
-    const quiet = site.silences.map((one) => el('li', {}, `${one.benchmark ?? 'the whole site'}: ${told(one)}`));
+    const quiet = site.silences.map((one) => el('li', {}, `${one.benchmark ?? 'the whole site'}: ${described(one)}`));
     const nodes = [items.length ? el('ul', { class: 'log', tabindex: '0' }, items) : el('p', { class: 'soft' }, 'No alert is in force.')];
     if (quiet.length) nodes.push(el('h2', {}, 'Not notified'), el('ul', { class: 'log' }, quiet));
     if (at === null) nodes.push(buttons(site, (kind) => this.orders(kind, null), ['acknowledge', 'silence', 'unsilence']));

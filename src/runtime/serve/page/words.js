@@ -147,7 +147,7 @@ export function left(forecast, now) {
 }
 
 /** One event in a line. */
-export function told(event) {
+export function described(event) {
   switch (event.event) {
     case 'alert': return event.state === 'firing' ? event.text : `${event.level} ${event.state}: ${event.text}`;
     case 'together': return event.groups.map((group) => `${group.benchmarks.join(', ')} share a failure time: ${
@@ -172,7 +172,7 @@ export function list(events, none, own = null) {
   return el('ul', { class: 'log', tabindex: '0' }, events.map((event) => el('li', {},
     when(event.time),
     event.benchmark === own && own !== null ? null : event.benchmark ? el('a', { href: place(event.benchmark) }, event.benchmark) : el('span', {}, 'site'),
-    ' ', event.event === 'alert' && event.state === 'firing' ? badge(event.level) : null, ' ', told(event))));
+    ' ', event.event === 'alert' && event.state === 'firing' ? badge(event.level) : null, ' ', described(event))));
 }
 
 let moment = null;
