@@ -55,6 +55,9 @@ struct Arguments {
     /// Writes docs/effects-table.md in place of showing the table.
     #[arg(long)]
     write: bool,
+    /// Says under each series that is not right what was refused, and why.
+    #[arg(long)]
+    refused: bool,
     /// Threads.
     #[arg(long, default_value_t = 2)]
     threads: usize,
@@ -69,7 +72,9 @@ fn main() -> Result<()> {
         })?;
         return written.into_iter().collect();
     }
-    let outcomes = each(&arguments, &families, explained)?;
+    let outcomes = each(&arguments, &families, |family, name, drawn| {
+        explained(family, name, drawn, arguments.refused)
+    })?;
     let document = table::document(&outcomes, arguments.range);
     if arguments.write {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/effects-table.md");
@@ -80,8 +85,8 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// Explains one series and says in a line how that went.
-fn explained(family: Family, name: &str, drawn: &Drawn) -> Outcome {
+/// Explains one series and says in a line how that went; where `refused`, also what it refused.
+fn explained(family: Family, name: &str, drawn: &Drawn, refused: bool) -> Outcome {
     let neighbours: Vec<&Series> = drawn.neighbours.iter().collect();
     let watch = Stopwatch::start();
     let explanation = effects::explain(
@@ -107,6 +112,20 @@ fn explained(family: Family, name: &str, drawn: &Drawn) -> Outcome {
         outcome.said,
         outcome.called
     );
+    if refused && !outcome.right_kind() {
+        for one in &explanation.candidates {
+            let _ = writeln!(
+                std::io::stderr(),
+                "    {} {:?}: BIC {:.1}, p {:?}, held out {:?}: {:?}",
+                one.effect,
+                one.at,
+                one.bic_gain,
+                one.p_value,
+                one.held_out,
+                one.rejected_because
+            );
+        }
+    }
     outcome
 }
 

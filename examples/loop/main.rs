@@ -8,8 +8,11 @@
 )]
 
 mod document;
+mod found_again;
+mod injected;
 #[path = "../../tests/measured/mod.rs"]
 mod measured;
+mod put_in;
 mod subjects;
 mod tables;
 
@@ -46,6 +49,8 @@ fn main() -> Result<()> {
             figures,
         });
     }
+    let put_in = injected::section(&injected::all()?);
     let file = docs.join("closing-the-loop.md");
-    std::fs::write(&file, document::text(&told)).with_context(|| file.display().to_string())
+    std::fs::write(&file, document::text(&told) + &put_in)
+        .with_context(|| file.display().to_string())
 }

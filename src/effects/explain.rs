@@ -7,6 +7,7 @@ use super::judge::is_label;
 use super::kind::{FaultKind, Kind};
 use super::options::Options;
 use super::outlook::forecast_change;
+use super::own_event::parted_by;
 use super::partition::partition_candidate;
 use super::ready::Ready;
 use super::remarks;
@@ -14,7 +15,7 @@ use super::search::Withheld;
 use super::term::Scratch;
 use super::verdict::conclude;
 use super::witnesses::distinct;
-use crate::reading::{Channel, Series};
+use crate::reading::{Channel, Series, Timestamp};
 
 /// Explains `series` by what its law lacks, from `channels` beside it; `neighbours` are the other
 /// benchmarks of the slope. `progress` is called with the share done, 0 to 1.
@@ -43,7 +44,9 @@ pub fn explain(
     let (findings, of_search) = look((series, channels), is_drawn, options, progress);
     let critical = options.critical_velocity_mm_per_day;
     let forecast = forecast_change(series, channels, &findings.known_load, critical);
-    let findings = with_partition(findings, partition_candidate(series, neighbours, options));
+    let parted = partition_candidate(series, neighbours, options);
+    let parted = by_own_event(&findings, parted, (series, neighbours), options);
+    let findings = with_partition(findings, parted);
     progress(1.0);
     let of_channels = remarks::of_channels(series, channels);
     let remarks = inspected.remarks.into_iter();
@@ -75,6 +78,37 @@ pub fn explain(
         },
         curves: findings.curves,
         known_load: findings.known_load,
+    }
+}
+
+/// What the proportions of the benchmarks show of a partition, made good by what the law shows of this one: where they do
+/// not show it, an event that its neighbours had not; where they do, the time of the event, which the law knows more nearly.
+fn by_own_event(
+    findings: &Findings,
+    (mut found, candidate): (Option<Effect>, Option<Candidate>),
+    (series, neighbours): (&Series, &[&Series]),
+    options: &Options,
+) -> (Option<Effect>, Option<Candidate>) {
+    let effects: Vec<&Effect> = std::iter::once(&findings.verdict)
+        .chain(&findings.also)
+        .collect();
+    if let Some(partition) = &mut found {
+        let within = |at: Timestamp| {
+            let interval = partition.at_interval;
+            interval.is_some_and(|[from, until]| (from..=until).contains(&at))
+        };
+        let events = effects
+            .iter()
+            .filter(|one| one.effect.is_event_of_the_ground());
+        if let Some(at) = events.filter_map(|one| one.at).find(|at| within(*at)) {
+            partition.at = Some(at);
+        }
+        return (found, candidate);
+    }
+    let own = (effects.as_slice(), &findings.curves);
+    match parted_by(series, neighbours, own, options.bic_margin) {
+        Some((partition, own)) => (Some(partition), Some(own)),
+        None => (None, candidate),
     }
 }
 

@@ -8,7 +8,7 @@ use super::explanation::{
     Structure,
 };
 use super::fresh::{best_of_starts, fresh_starts};
-use super::judge::{HeldOut, held_out, named, step_errors};
+use super::judge::{HeldOut, held_out, named};
 use super::kind::Kind;
 use super::known_load::KnownLoad;
 use super::noise::{Memory, Whitener};
@@ -89,12 +89,7 @@ pub(super) fn findings(
         scratch,
     );
     let both = (&found.null, &full);
-    let error = ErrorChange {
-        held_out_step: held.as_ref().map_or_else(Change::default, |held| {
-            by_steps(problem, both, held, unit, scratch)
-        }),
-        ..errors(problem, (&found.plain, &after), held.as_ref(), unit)
-    };
+    let error = errors(problem, (&found.plain, &after), held.as_ref(), unit);
     let (residual, left) = residual_tests(ground, both, scratch);
     let explained = confirmed(explained, (&full, &noise), &error, &residual);
     let curves = curves(problem, (&found.plain, &after, held.as_ref()), unit, left);
@@ -130,7 +125,7 @@ fn noise_report(full: &Fitted, unit: Unit) -> NoiseReport {
     }
 }
 
-/// Errors of the fit, and over the later block extrapolated over all of it.
+/// Errors of the fit, and over the later block, extrapolated over all of it and from each reading to the next.
 fn errors(
     problem: &Problem,
     (before, after): (&Fitted, &Fitted),
@@ -139,34 +134,19 @@ fn errors(
 ) -> ErrorChange {
     let factor = unit.factor();
     let n = problem.t.len();
-    let held_out = held.map(|held| held.errors(problem));
+    let change = |errors: Option<(f64, f64)>| Change {
+        before: errors.map(|(before, _)| before / factor),
+        after: errors.map(|(_, after)| after / factor),
+    };
     ErrorChange {
         fit: Change {
             before: Some(before.rms(problem, 0..n) / factor),
             after: Some(after.rms(problem, 0..n) / factor),
         },
-        held_out: Change {
-            before: held_out.map(|(before, _)| before / factor),
-            after: held_out.map(|(_, after)| after / factor),
-        },
+        held_out: change(held.map(|held| held.errors(problem))),
+        held_out_step: change(held.map(|held| held.errors_of_changes(problem))),
         held_out_from: held.and_then(|held| after_days(problem.epoch, problem.t[held.from])),
         ..ErrorChange::none(unit)
-    }
-}
-
-/// Errors over the later block, each reading predicted from those before it.
-fn by_steps(
-    problem: &Problem,
-    both: (&Fitted, &Fitted),
-    held: &HeldOut,
-    unit: Unit,
-    scratch: &mut Scratch,
-) -> Change {
-    let learned: usize = both.1.terms.iter().map(Term::coefficients).sum();
-    let steps = step_errors(problem, both, (held.from, learned), scratch);
-    Change {
-        before: steps.map(|steps| steps.before / unit.factor()),
-        after: steps.map(|steps| steps.after / unit.factor()),
     }
 }
 

@@ -4,11 +4,16 @@
 use super::noise::{Noise, Whitener};
 use super::problem::Problem;
 use super::refit::{Fitted, Start, plain_starts, refit_from, towards};
-use super::term::{Scratch, Term, law_parameters};
+use super::term::{Act, Scratch, Term, law_parameters};
+use crate::reading::Quantity;
 
 /// So many steps from each start, and only the best so many starts are followed to the end.
 const FIRST_STEPS: usize = 8;
 const FOLLOWED: usize = 4;
+/// Shares of the slip within which a load that answers to the motion has hardly shown.
+const EARLY: [f64; 4] = [0.1, 0.25, 0.5, 0.75];
+/// Fewest readings of an early law.
+const FEWEST_EARLY: usize = 12;
 
 /// Starts of the law with `terms`, at every size that they may start at.
 pub(super) fn fresh_starts(problem: &Problem, terms: &[Term]) -> Vec<Start> {
@@ -39,6 +44,84 @@ pub(super) fn fresh_laws(problem: &Problem, base: &Fitted, term: &Term) -> Vec<S
     sizes
         .flat_map(|size| laws.iter().map(|law| law.clone().with_size(term, *size)))
         .collect()
+}
+
+/// The law with a load that answers to the motion, followed from the first readings, at which that load has hardly shown,
+/// to all of them: a slope that is held back in the end would run away with its own law without it, and with a law that
+/// suits the whole nothing is held back. `None` of another term.
+pub(super) fn grown_up(problem: &Problem, term: &Term, scratch: &mut Scratch) -> Option<Fitted> {
+    if !matches!(term.act, Act::PerVelocity | Act::PerSlip) {
+        return None;
+    }
+    let counts = EARLY.map(|share| readings_until(problem, share));
+    let mut counts: Vec<usize> = counts
+        .into_iter()
+        .filter(|count| (FEWEST_EARLY..problem.used).contains(count))
+        .collect();
+    counts.dedup();
+    let first = problem.until(*counts.first()?);
+    let mut known = best_of_starts(&first, &plain_starts(&first), scratch)?;
+    let mut part = first;
+    let wholes = counts.into_iter().skip(1).chain([problem.used]);
+    for count in wholes {
+        let next = problem.until(count);
+        let sizes = if known.terms.is_empty() {
+            term.starts()
+        } else {
+            &[0.0]
+        };
+        let start = in_terms_of(&next, (&part, &known), term);
+        let starts = sizes.iter().map(|size| {
+            if known.terms.is_empty() {
+                start.clone().with_size(term, *size)
+            } else {
+                start.clone()
+            }
+        });
+        known = best_of_starts(&next, &starts.collect::<Vec<_>>(), scratch)?;
+        part = next;
+    }
+    Some(known)
+}
+
+/// What was fitted to one part of the readings, in the parameters of another: these are in units of its span and of its
+/// usual velocity.
+fn in_terms_of(next: &Problem, (part, known): (&Problem, &Fitted), term: &Term) -> Start {
+    let mut start = Start::at(known);
+    let longer = next.whole_span() / part.whole_span();
+    let faster = next.typical_velocity() / part.typical_velocity();
+    start.parameters[1] *= longer;
+    start.parameters[2] += longer.ln();
+    let is_of_slip = matches!(term.act, Act::PerSlip);
+    let larger = if is_of_slip { faster * longer } else { faster };
+    let first = law_parameters(part);
+    for coefficient in &mut start.parameters[first..] {
+        *coefficient *= larger;
+    }
+    start
+}
+
+/// How many of the fitted readings lie within that share of the slip.
+fn readings_until(problem: &Problem, share: f64) -> usize {
+    let y = &problem.y[..problem.used];
+    let slip: Vec<f64> = match problem.quantity {
+        Quantity::Displacement => y.iter().map(|value| value - y[0]).collect(),
+        Quantity::Velocity => {
+            let mut sum = 0.0;
+            let steps = y.windows(2).zip(problem.t.windows(2));
+            let sums = steps.map(|(v, t)| {
+                sum += 0.5 * (v[0] + v[1]) * (t[1] - t[0]);
+                sum
+            });
+            std::iter::once(0.0)
+                .chain(sums.collect::<Vec<f64>>())
+                .collect()
+        }
+    };
+    let whole = slip[slip.len() - 1];
+    slip.iter()
+        .rposition(|slip| *slip <= share * whole)
+        .map_or(0, |last| last + 1)
 }
 
 /// The best of many starts by least squares: all a few steps far, then those that lead.

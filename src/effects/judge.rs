@@ -8,6 +8,7 @@ use super::refit::{Fitted, Start, refit};
 use super::response::Driver;
 use super::rival::Rival;
 use super::term::{Act, Scratch, Term, law_parameters};
+use crate::reading::Quantity;
 
 /// The later block has at least so many readings.
 const FEWEST_HELD_OUT: usize = 5;
@@ -53,6 +54,11 @@ pub(super) fn objection(
         Act::Load(_) if loosening && level && own[0] < 0.0 => {
             Some("its sign is not physical: more water would slow the slope".to_owned())
         }
+        Act::PerVelocity | Act::PerSlip | Act::Step | Act::Reset | Act::Friction(_)
+            if jumps_at_once(problem, fitted) =>
+        {
+            Some("half of its motion lies between two readings: a jump of the reading looks the same".to_owned())
+        }
         Act::PerVelocity if own[0] <= 0.0 => {
             Some("its sign is not physical: the load would grow with the velocity".to_owned())
         }
@@ -77,6 +83,24 @@ pub(super) fn objection(
         | Act::Friction(_)
         | Act::Reading(_) => None,
     }
+}
+
+/// Whether the motion goes half of its whole way from one reading to the next, jumps of the reading left out.
+fn jumps_at_once(problem: &Problem, fitted: &Fitted) -> bool {
+    let predicted = &fitted.prediction;
+    if problem.quantity == Quantity::Velocity || predicted.len() < 2 {
+        return false;
+    }
+    let is_offset = |i: usize| {
+        let mut offsets = fitted.terms.iter().filter(|term| term.kind == Kind::Offset);
+        offsets.any(|term| term.at == Some(i))
+    };
+    let steps = (1..predicted.len()).filter(|i| !is_offset(*i));
+    let steps: Vec<f64> = steps
+        .map(|i| (predicted[i] - predicted[i - 1]).abs())
+        .collect();
+    let largest = steps.iter().copied().fold(0.0, f64::max);
+    largest > 0.5 * steps.iter().sum::<f64>()
 }
 
 /// Why a jump in the sense of the motion may be slip and no offset; `None` where a jump back speaks for the instrument, or
@@ -140,6 +164,17 @@ impl HeldOut {
             self.after.rms(problem, range),
         )
     }
+
+    /// Root mean square errors of what the readings of the block change by, each from the one before it, mm or mm/day: by
+    /// how much the law had drifted until then counts once, and not again at every later reading.
+    pub(super) fn errors_of_changes(&self, problem: &Problem) -> (f64, f64) {
+        let of = |fitted: &Fitted| {
+            let off = |i: usize| problem.y[i] - fitted.prediction[i];
+            let squares = (self.from..problem.t.len()).map(|i| (off(i) - off(i - 1)).powi(2));
+            (squares.sum::<f64>() / (problem.t.len() - self.from) as f64).sqrt()
+        };
+        (of(&self.before), of(&self.after))
+    }
 }
 
 /// The block: the last `share` of the readings, or less where an event stands late: half of what follows it.
@@ -156,8 +191,44 @@ pub(super) fn block(problem: &Problem, terms: &[Term], share: f64) -> Option<usi
     (from + FEWEST_HELD_OUT <= n && from >= 2 * FEWEST_HELD_OUT).then_some(from)
 }
 
+/// A later block for loads that answer to the motion, and grow with it to the end: half of what follows once they have
+/// shown, and the last readings at least. `None` where there is no such load.
+fn block_once_shown(problem: &Problem, fitted: &Fitted) -> Option<usize> {
+    let n = problem.t.len();
+    let each = fitted.terms.iter();
+    let shown = each.filter_map(|term| shown(problem, fitted, term)).max()?;
+    Some((shown + (n - shown) / 2).min(n.saturating_sub(FEWEST_HELD_OUT)))
+}
+
+/// The first reading at which a load that answers to the motion is half as large as it gets; `None` of other terms.
+fn shown(problem: &Problem, fitted: &Fitted, term: &Term) -> Option<usize> {
+    let grown: Vec<f64> = match term.act {
+        Act::PerVelocity => fitted.velocity.clone(),
+        Act::PerSlip => {
+            let mut slip = 0.0;
+            let steps = fitted.velocity.windows(2).zip(problem.t.windows(2));
+            let sums = steps.map(|(v, t)| {
+                slip += 0.5 * (v[0] + v[1]) * (t[1] - t[0]);
+                slip
+            });
+            std::iter::once(0.0)
+                .chain(sums.collect::<Vec<f64>>())
+                .collect()
+        }
+        Act::Load(_)
+        | Act::Step
+        | Act::Reset
+        | Act::Friction(_)
+        | Act::Reading(_)
+        | Act::Averaging => return None,
+    };
+    let most = grown.iter().copied().fold(0.0, f64::max);
+    grown.iter().position(|size| *size >= 0.5 * most)
+}
+
 /// Fits both models without the block, by least squares: nothing of it is known to them but the covariates, the shape of
-/// the response, and where a fit to all may start one.
+/// the response, and where a fit to all may start one. Where a load that answers to the motion cannot be learned before the
+/// block, because it had hardly acted, a later block is taken.
 pub(super) fn held_out(
     problem: &Problem,
     (before, after): (&Fitted, &Fitted),
@@ -165,11 +236,23 @@ pub(super) fn held_out(
     scratch: &mut Scratch,
 ) -> Option<HeldOut> {
     let from = block(problem, &after.terms, share)?;
-    Some(HeldOut {
-        from,
-        before: without_block(problem, before, from, scratch)?,
-        after: without_block(problem, after, from, scratch)?,
-    })
+    let mut without = |from: usize| {
+        Some(HeldOut {
+            from,
+            before: without_block(problem, before, from, scratch)?,
+            after: without_block(problem, after, from, scratch)?,
+        })
+    };
+    let usual = without(from);
+    let is_learned = usual.as_ref().is_some_and(|held| {
+        let (before, after) = held.errors(problem);
+        after <= before
+    });
+    if is_learned {
+        return usual;
+    }
+    let later = block_once_shown(problem, after).filter(|later| *later > from);
+    later.and_then(without).or(usual)
 }
 
 /// The law with the terms of `fitted` by least squares from fresh starts and from there, without the readings from `from`

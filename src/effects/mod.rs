@@ -19,6 +19,7 @@ mod kind;
 mod known_load;
 mod options;
 mod outlook;
+mod own_event;
 mod partition;
 pub mod remarks;
 mod together;

@@ -102,6 +102,19 @@ impl Problem {
         }
     }
 
+    /// The first `count` readings alone, as if nothing had been read later.
+    pub(super) fn until(&self, count: usize) -> Self {
+        let mut part = self.trained_on(count);
+        part.t.truncate(count);
+        part.y.truncate(count);
+        part.weight.truncate(count);
+        part.seen.truncate(count);
+        part.node_of.truncate(count);
+        let last = part.node_of.last().copied().unwrap_or(0);
+        part.nodes.truncate(last + 1);
+        part
+    }
+
     /// Days from the first reading to the last that is fitted.
     pub(super) fn span(&self) -> f64 {
         self.t[self.used - 1] - self.t[0]

@@ -2,14 +2,14 @@
 
 use super::candidates;
 use super::frame::Frames;
-use super::fresh::{best_of_starts, fresh_laws};
+use super::fresh::{best_of_starts, fresh_laws, grown_up};
 use super::kind::Kind;
 use super::linear::Linear;
 use super::noise::{Noise, Whitener};
 use super::refit::{Fitted, Start, jacobian, likeliest, refit, under_likeliest};
 use super::response::Response;
 use super::search::{Refitted, SIGNIFICANT, Search};
-use super::surrogate::NullGains;
+use super::surrogate::{Innovations, NullGains};
 use super::term::{Act, Term};
 use super::trials::{Ground, Trial, shortlist};
 use std::cell::LazyCell;
@@ -79,7 +79,9 @@ impl<'a> Search<'a> {
         let covariates = self.refit_each(base, covariates);
         let (others, tried) = ground.of_itself();
         // Only what passes the margin is judged by it.
-        let alone = LazyCell::new(|| ground.null_gains_of_noise(&tried, count, seed + 1));
+        let of_noise = |kind| ground.null_gains_of_noise((&tried, kind), count, seed + 1);
+        let alone = LazyCell::new(|| of_noise(Innovations::AsTheyAre));
+        let without_jumps = LazyCell::new(|| of_noise(Innovations::WithoutJumps));
         let mut all = Vec::new();
         if covariates
             .iter()
@@ -109,6 +111,9 @@ impl<'a> Search<'a> {
         if others.iter().any(|one| one.gain > self.options.bic_margin) {
             all.extend(others.into_iter().map(|one| {
                 let gain = one.gain;
+                if one.term.kind == Kind::Offset {
+                    return one.judged_by(&without_jumps, gain);
+                }
                 one.judged_by(&alone, gain).judged_by_astronomy()
             }));
         } else {
@@ -203,6 +208,10 @@ impl<'a> Search<'a> {
         let mut fits: Vec<Fitted> = Vec::new();
         let fresh = fresh_laws(problem, base, term);
         let mut levels = Vec::from_iter(best_of_starts(problem, &fresh, &mut self.scratch));
+        if base.terms.is_empty() {
+            let grown = grown_up(problem, term, &mut self.scratch);
+            levels.extend(grown.filter(|grown| grown.prediction.len() == problem.t.len()));
+        }
         for size in term.starts() {
             let start = Start::at(base).with_size(term, *size);
             fits.extend(refit(problem, &start, bank, &mut self.scratch));

@@ -4,7 +4,7 @@ use super::candidates;
 use super::companions::{go_together, is_rain};
 use super::explanation::Candidate;
 use super::fresh::best_of_starts;
-use super::judge::{block, held_out, named, objection, step_errors};
+use super::judge::{block, held_out, is_label, named, objection, step_errors};
 use super::kind::Kind;
 use super::noise::Whitener;
 use super::options::Options;
@@ -20,10 +20,11 @@ use crate::reading::Timestamp;
 const MOST_EFFECTS: usize = 10;
 /// A search's p-value must lie under this.
 pub(super) const SIGNIFICANT: f64 = 0.01;
-/// The held-out error, which carries the law's own extrapolation, may grow by this factor at most, and only if the later
-/// block is predicted no worse reading after reading: neither by its likelihood, by more than this in -2 ln likelihood,
-/// nor by its errors, by more than this factor.
-const MOST_EXTRAPOLATED: f64 = 1.5;
+/// The later block is predicted no worse from reading to reading, but for this factor. The error extrapolated over all of
+/// it carries the law's own drift: of what bears a witness it may grow by the first factor at most, and only if the block by
+/// its innovations is predicted no worse, neither in -2 ln likelihood, by more than this, nor in its errors; of what has none
+/// but the shape of the readings it may not grow.
+const MOST_EXTRAPOLATED: f64 = 1.2;
 const WORSE: f64 = 2.0;
 const WORSE_STEPS: f64 = 1.005;
 
@@ -321,8 +322,18 @@ impl Search<'_> {
         if !ratio.is_finite() || ratio > MOST_EXTRAPOLATED {
             return (Some(ratio).filter(|ratio| ratio.is_finite()), Some(grows()));
         }
+        let (before, after) = held.errors_of_changes(self.problem);
+        if after > WORSE_STEPS * before {
+            let share = 100.0 * after / before.max(1e-300);
+            let reason =
+                format!("from reading to reading the held-out error grows to {share:.0} %");
+            return (Some(ratio), Some(reason));
+        }
         if ratio <= 1.0 {
             return (Some(ratio), None);
+        }
+        if is_label(one.term.kind) {
+            return (Some(ratio), Some(grows()));
         }
         let newest = one.fitted.terms[base.terms.len()..].iter();
         let newest = newest.map(Term::coefficients).sum();

@@ -4,7 +4,7 @@ use super::candidates::{delays, of_channel, responses};
 use super::frame::{Frame, Frames};
 use super::kind::Form;
 use super::linear::Linear;
-use super::problem::Problem;
+use super::problem::{Problem, median};
 use super::response::Driver;
 use super::term::Term;
 use rand::RngExt as _;
@@ -26,6 +26,10 @@ pub(super) struct NullGains {
     /// The terms behind the largest of them, with their gains, where covariates were searched.
     pub(super) largest: Vec<(Term, f64)>,
 }
+
+/// An innovation of noise is no larger than so many standard deviations, which are taken from the median size.
+const LARGEST: f64 = 4.0;
+const NORMAL_MEDIAN: f64 = 0.6745;
 
 /// Series of noise that are searched at once: what is tried is more than the cache holds, and is read once for all of them.
 const AT_ONCE: usize = 8;
@@ -154,16 +158,33 @@ impl Tried {
     }
 }
 
+/// What the innovations of the surrogates are like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Innovations {
+    /// As they are, in another order.
+    AsTheyAre,
+    /// No larger than noise has them: where noise walks, a jump of the reading is one innovation, and wherever the order
+    /// puts it, it is that jump again.
+    WithoutJumps,
+}
+
 /// The whole search over what needs no covariate, on readings made of the likeliest noise: its own innovations in
 /// another order.
 pub(super) fn noise_alone(
     frames: &Frames,
-    tried: &[Tried],
+    (tried, kind): (&[Tried], Innovations),
     (count, seed): (usize, u64),
 ) -> NullGains {
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     let best = &frames.each[frames.best()];
     let mut innovations = best.residual[..best.residual.len() - 1].to_vec();
+    if kind == Innovations::WithoutJumps {
+        let sizes = innovations.iter().map(|u| u.abs()).collect();
+        let most = LARGEST * median(sizes) / NORMAL_MEDIAN;
+        for innovation in &mut innovations {
+            *innovation = innovation.clamp(-most, most);
+        }
+    }
     let mut readings = |_| {
         innovations.shuffle(&mut random);
         let readings = best.whitener.colour(&innovations);

@@ -10,7 +10,7 @@ use super::linear::Linear;
 use super::noise::{Memory, Whitener};
 use super::problem::Problem;
 use super::response::Driver;
-use super::surrogate::{NullGains, Tried, noise_alone, shifted_covariates};
+use super::surrogate::{Innovations, NullGains, Tried, noise_alone, shifted_covariates};
 use super::term::Term;
 
 /// A term with its linear gain.
@@ -140,7 +140,7 @@ impl Ground<'_> {
     /// What the search without covariates gains where there is nothing.
     pub(super) fn null_gains_of_noise(
         &self,
-        tried: &[Tried],
+        tried: (&[Tried], Innovations),
         count: usize,
         seed: u64,
     ) -> NullGains {

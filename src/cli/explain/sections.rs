@@ -67,7 +67,7 @@ fn error(explanation: &Explanation) -> TextTable {
         ("fit".to_owned(), error.fit),
         (held_out, error.held_out),
         (
-            "the same, reading by reading".to_owned(),
+            "the same, from reading to reading".to_owned(),
             error.held_out_step,
         ),
     ];
