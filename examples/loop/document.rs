@@ -50,7 +50,7 @@ what follows the last dated effect. Errors are root mean squares of least-square
 before and after. The held-out errors are given twice. *From reading to reading*: by how much the change from each reading of the
 block to the next is missed, law and effects learned before the block, the covariates known. *Extrapolated*: by how much the
 readings themselves are missed, over the whole block at once. In the second, what the law has drifted by in the first
-months of the block counts again in every later reading, whatever the effect does; so the first is what effects are judged by, and it falls for every effect that was accepted. An effect is what the readings are consistent with, and is not proved to cause them.
+months of the block counts again in every later reading, whatever the effect does; so the first is what effects are judged by (but for jumps of the reading and the blur of a mean, which say nothing of what comes), and it rises for none of the series below by more than half a per cent where an effect was accepted. An effect is what the readings are consistent with, and is not proved to cause them.
 ";
 
 /// The whole document.

@@ -60,12 +60,12 @@ const SECTION: &str = "
 ## Measured, with an effect put in by us
 
 The readings of this section are measured, and one effect in each was not: it was put in by us. Date, phase and size are drawn by
-a seed, three draws of each effect, the same seeds for every series (`examples/loop/injected.rs`), and nothing was drawn again because of what was found. The
+a seed, three draws of each effect, the same seeds for every series, a step and a reset up or down by turns (`examples/loop/injected.rs`). The
 ground's motion is taken from the fit of `explain` to the readings as they are. A step multiplies its velocity by e to the size from
 a date on, a wave by e to a sine of that size; a reset adds one value to every reading from a date on. The measured noise stays
 what it was, and no law is asked how the state would answer. Each series is explained alone, with the channels beside it and
 nothing declared, as it is and with the effect. An effect counts as found where its kind is right, an event also within three
-intervals between readings of its date; *as* another kind is not counted.
+intervals between readings of its date; *as* another kind is not counted. A jump of the reading is not judged by the later block.
 ";
 
 /// The section of the document.

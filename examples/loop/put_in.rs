@@ -17,7 +17,7 @@ const DATE: (f64, f64) = (0.3, 0.65);
 /// A step multiplies the velocity by e to a power of this size, a wave by e to as much at its crest, drawn evenly.
 const STEP: (f64, f64) = (0.7, 1.2);
 const WAVE: (f64, f64) = (0.4, 0.8);
-/// A reset is so many times the scatter of the readings about the line through their neighbours, and of either sign.
+/// A reset is so many times the scatter of the readings about the line through their neighbours, up or down.
 const RESET: (f64, f64) = (8.0, 20.0);
 /// The wave is summed up in so many parts of the time between two readings.
 const PARTS: u32 = 24;
@@ -99,11 +99,9 @@ pub(crate) fn put_in(
         What::Tide | What::Season => between(WAVE),
         What::Reset => between(RESET) * scatter(&series.readings),
     };
-    let size = if between((-1.0, 1.0)) < 0.0 && what.period_days().is_none() {
-        -size
-    } else {
-        size
-    };
+    // An event goes either way by turns.
+    let is_down = seed % 2 == 0 && what.period_days().is_none();
+    let size = if is_down { -size } else { size };
     let motion = Motion::of(said)?;
     let readings = match what {
         What::Reset => jumped(series, first, (day, size)),

@@ -141,3 +141,6 @@ pub(super) fn best_of_starts(
     // What goes along a narrow valley has not arrived after one fit's steps.
     refit_from(problem, &[Start::at(&best)], &white, scratch)
 }
+
+#[cfg(test)]
+mod tests;

@@ -5,10 +5,9 @@
 
 use super::explanation::{Candidate, Curves, Effect};
 use super::kind::Kind;
+use super::partition::AS_ONE;
 use crate::reading::{BenchmarkId, Quantity, Series, Timestamp, days_since};
 
-/// What moves as one strays from the common motion by less than this share of it.
-const AS_ONE: f64 = 0.12;
 /// A neighbour follows one course where the other leaves this many times its squared error.
 const CLEARLY: f64 = 2.0;
 /// Fewest readings of a neighbour before the event and after it.
@@ -24,7 +23,7 @@ struct Courses<'a> {
 
 /// Which course a neighbour goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Side {
+enum Follows {
     With,
     Without,
     Unclear,
@@ -60,9 +59,9 @@ pub(super) fn parted_by(
     let (mut stayed, mut left) = (vec![series.benchmark.clone()], Vec::new());
     for other in others {
         match side(&courses, other, margin) {
-            Side::With => stayed.push(other.benchmark.clone()),
-            Side::Without => left.push(other.benchmark.clone()),
-            Side::Unclear => {}
+            Follows::With => stayed.push(other.benchmark.clone()),
+            Follows::Without => left.push(other.benchmark.clone()),
+            Follows::Unclear => {}
         }
     }
     (!left.is_empty()).then(|| partition(event, (stayed, left)))
@@ -94,9 +93,9 @@ fn partition(
 }
 
 /// The course that `other` follows: where only one of the two leaves no more than what moves as one may stray by.
-fn side(courses: &Courses, other: &Series, margin: f64) -> Side {
+fn side(courses: &Courses, other: &Series, margin: f64) -> Follows {
     let (Some(first), Some(last)) = (courses.times.first(), courses.times.last()) else {
-        return Side::Unclear;
+        return Follows::Unclear;
     };
     let common: Vec<_> = other
         .readings
@@ -105,7 +104,7 @@ fn side(courses: &Courses, other: &Series, margin: f64) -> Side {
         .collect();
     let before = common.iter().filter(|one| one.time < courses.at).count();
     if before < FEWEST || common.len() - before < FEWEST {
-        return Side::Unclear;
+        return Follows::Unclear;
     }
     let values: Vec<f64> = common.iter().map(|reading| reading.value).collect();
     let of = |course: &[f64]| {
@@ -121,11 +120,11 @@ fn side(courses: &Courses, other: &Series, margin: f64) -> Side {
         small <= most && large >= CLEARLY * small && gain >= margin
     };
     if clearly(without, with) {
-        Side::Without
+        Follows::Without
     } else if clearly(with, without) {
-        Side::With
+        Follows::With
     } else {
-        Side::Unclear
+        Follows::Unclear
     }
 }
 
@@ -158,3 +157,6 @@ fn left_of_line(course: &[f64], values: &[f64], quantity: Quantity) -> f64 {
     let slope = xy / xx.max(1e-300);
     both().map(|(x, y)| (y - slope * x).powi(2)).sum::<f64>() / n
 }
+
+#[cfg(test)]
+mod tests;

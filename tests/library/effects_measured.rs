@@ -101,6 +101,30 @@ fn the_lake_level_and_no_decoy_is_found_at_salmon_falls_ntoe() {
     the_lake_drives("ntoe", 4.0, 13.0);
 }
 
+/// Half a per cent is noise: a station that does not move has nothing to be predicted but that.
+#[test]
+#[cfg_attr(not(measured_data), ignore = "no measured data here")]
+fn the_later_block_is_predicted_no_worse_from_reading_to_reading_by_what_was_accepted() {
+    let lake = ["salmon_falls_2017.csv"].map(measured);
+    let reservoir = ["bazimen_2006.csv"].map(measured);
+    let rain = ["baishuihe_2006.csv"].map(measured);
+    let tide = ["columbia_1985_marker1.csv", "columbia_1985_rain.csv"].map(measured);
+    let all: [(&[PathBuf], Option<&str>); 5] = [
+        (&lake, Some("blkm")),
+        (&lake, Some("ntoe")),
+        (&reservoir, None),
+        (&rain, None),
+        (&tide, None),
+    ];
+    for (files, benchmark) in all {
+        let said = explained(&read(files), benchmark);
+        assert_ne!(said.explained, Explained::None);
+        let error = &said.error.held_out_step;
+        let (before, after) = (error.before.unwrap(), error.after.unwrap());
+        assert!(after <= before, "{files:?}: {before} -> {after}");
+    }
+}
+
 fn resets(said: &Explanation) -> Vec<Timestamp> {
     let faults = said.faults.iter();
     let resets = faults.filter(|fault| fault.kind == FaultKind::Reset);

@@ -11,8 +11,12 @@ mod effects_groups;
 mod effects_lives;
 mod effects_measured;
 mod effects_monitor;
+mod effects_put_in;
 mod effects_searches;
 mod first_start;
+#[path = "../../examples/loop/found_again.rs"]
+#[expect(dead_code, reason = "the document shows more than is claimed here")]
+mod found_again;
 mod global_minimum;
 mod hostile;
 mod ingest;
@@ -30,6 +34,9 @@ mod made_up;
 mod measured;
 mod monitor;
 mod mutated_files;
+#[path = "../../examples/loop/put_in.rs"]
+#[expect(dead_code, reason = "the document shows more than is claimed here")]
+mod put_in;
 mod queue;
 mod reconstructions;
 mod recordings;

@@ -162,3 +162,54 @@ fn the_later_block_is_the_last_share_or_what_follows_a_late_event() {
     assert_eq!(block(&problem, &[event(260)], 0.25), Some(280));
     assert_eq!(block(&problem, &[event(295)], 0.25), None);
 }
+
+/// A fit that predicts so much at each reading, moving at 1 mm/day.
+fn predicting(prediction: Vec<f64>) -> Fitted {
+    Fitted {
+        velocity: vec![1.0; prediction.len()],
+        prediction,
+        ..fitted(term(Kind::LoadStep, Act::Step), &[0.0])
+    }
+}
+
+#[test]
+fn what_a_law_has_drifted_by_counts_once_from_reading_to_reading() {
+    let problem = steady(Quantity::Displacement, &daily(COUNT), 1);
+    let shifted: Vec<f64> = problem.y.iter().map(|y| y + 7.0).collect();
+    let held = HeldOut {
+        from: 200,
+        before: predicting(problem.y.clone()),
+        after: predicting(shifted),
+    };
+    assert!((held.errors(&problem).1 - 7.0).abs() < 1e-9);
+    assert!(held.errors_of_changes(&problem).1 < 1e-9);
+    assert!(held.errors_of_changes(&problem).0 < 1e-9);
+}
+
+#[test]
+fn a_load_that_grows_with_the_velocity_is_judged_once_it_has_shown() {
+    let problem = steady(Quantity::Displacement, &daily(COUNT), 1);
+    let mut limited = fitted(term(Kind::RateLimit, Act::PerVelocity), &[0.5]);
+    limited.velocity = (0..COUNT)
+        .map(|i| if i < 240 { 1.0 } else { 10.0 })
+        .collect();
+    assert_eq!(block_once_shown(&problem, &limited), Some(270));
+    limited.velocity = (0..COUNT)
+        .map(|i| if i < 298 { 1.0 } else { 10.0 })
+        .collect();
+    assert_eq!(block_once_shown(&problem, &limited), Some(295));
+    let other = fitted(term(Kind::LoadStep, Act::Step), &[0.5]);
+    assert_eq!(block_once_shown(&problem, &other), None);
+}
+
+#[test]
+fn what_moves_half_of_its_way_between_two_readings_may_be_a_jump_of_the_reading() {
+    let problem = steady(Quantity::Displacement, &daily(COUNT), 1);
+    let path = |jump: f64| -> Vec<f64> {
+        let days = daily(COUNT).into_iter();
+        days.map(|day| if day < 150.0 { day } else { day + jump })
+            .collect()
+    };
+    assert!(jumps_at_once(&problem, &predicting(path(400.0))));
+    assert!(!jumps_at_once(&problem, &predicting(path(100.0))));
+}

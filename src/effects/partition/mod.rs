@@ -20,7 +20,7 @@ use std::ops::Range;
 /// A partition is believed with a chance under this of being noise.
 const P_VALUE: f64 = 0.01;
 /// What moves as one strays from the common motion by less than this share of it.
-const AS_ONE: f64 = 0.12;
+pub(super) const AS_ONE: f64 = 0.12;
 
 /// How benchmarks parted.
 #[derive(Debug, Clone, PartialEq)]

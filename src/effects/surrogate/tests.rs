@@ -104,3 +104,20 @@ fn of_40_series_of_white_noise_with_two_decoys_two_at_most_lead_to_a_find() {
     let found: Vec<u64> = (0..40).filter(|seed| finds_something(*seed)).collect();
     assert!(found.len() <= 2, "{found:?}");
 }
+
+#[test]
+fn a_jump_of_the_reading_in_a_walk_is_found_though_it_is_one_step_of_the_walk() {
+    const COUNT: usize = 120;
+    let mut walk = 0.0;
+    let steps = normals(&mut generator(3), COUNT);
+    let values = steps.iter().enumerate().map(|(day, step)| {
+        walk += step;
+        let jump = if day < 60 { 0.0 } else { -25.0 };
+        0.4 * day as f64 + walk + jump
+    });
+    let values: Vec<f64> = values.collect();
+    let series = series(Quantity::Displacement, &daily(COUNT), &values);
+    let found = explain(&series, &[], &[], &Options::default(), &mut |_| {});
+    assert_eq!(found.verdict.effect, Kind::Offset, "{:?}", found.candidates);
+    assert!((found.verdict.size.unwrap() + 25.0).abs() < 4.0);
+}
