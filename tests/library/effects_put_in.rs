@@ -11,6 +11,8 @@ use std::path::{Path, PathBuf};
 /// Seeds of the document's first draws.
 const RESET: u64 = 101;
 const TIDE: u64 = 201;
+/// Of the only step of 21 that is found.
+const STEP: u64 = 3;
 
 /// What was put in, and what was said with and without it.
 fn trial(files: &[PathBuf], benchmark: Option<&str>, drawn: (What, u64)) -> Trial {
@@ -54,6 +56,19 @@ fn a_reset_put_into_either_benchmark_of_salmon_falls_is_found_beside_the_lake() 
             Some("lake_level_m")
         );
     }
+}
+
+#[test]
+#[cfg_attr(not(measured_data), ignore = "no measured data here")]
+fn a_step_of_the_velocity_put_into_blkm_at_salmon_falls_is_found_with_its_size() {
+    let file = measured("salmon_falls_2017.csv");
+    let trial = trial(&[file], Some("blkm"), (What::Step, STEP));
+    assert!(trial.is_right(), "{:?}", trial.with.verdict);
+    let found = trial.found().unwrap();
+    let off = found.size.unwrap() / trial.put_in.size - 1.0;
+    assert!(off.abs() <= 0.15, "{found:?} for {:?}", trial.put_in);
+    let held_out = &trial.with.error.held_out_step;
+    assert!(held_out.after < held_out.before);
 }
 
 #[test]
