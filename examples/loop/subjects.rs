@@ -294,6 +294,6 @@ pub(crate) const SUBJECTS: [Subject; 14] = [
         averaging_hours: None,
         until: None,
         figures: &["readings"],
-        comment: "On 8 May the pause began for which the record is known, and the load falls then. The last benchmarks to be compared part a week before. Too few readings follow to hold a block out.",
+        comment: "On 8 May the pause began for which the record is known, and the load falls then. E1 and E2 part from the three others a week before. Too few readings follow to hold a block out.",
     },
 ];
