@@ -100,7 +100,7 @@ pub(crate) fn put_in(
         What::Reset => between(RESET) * scatter(&series.readings),
     };
     // An event goes either way by turns.
-    let is_down = seed % 2 == 0 && what.period_days().is_none();
+    let is_down = seed.is_multiple_of(2) && what.period_days().is_none();
     let size = if is_down { -size } else { size };
     let motion = Motion::of(said)?;
     let readings = match what {

@@ -47,7 +47,11 @@ fn a_reset_put_into_a_prism_of_century_mine_is_found() {
 fn a_reset_put_into_either_benchmark_of_salmon_falls_is_found_beside_the_lake() {
     let file = measured("salmon_falls_2017.csv");
     for benchmark in ["blkm", "ntoe"] {
-        let trial = trial(&[file.clone()], Some(benchmark), (What::Reset, RESET));
+        let trial = trial(
+            std::slice::from_ref(&file),
+            Some(benchmark),
+            (What::Reset, RESET),
+        );
         the_reset_is_found(&trial, 0.05);
         let lake = trial.with.also.iter().chain([&trial.with.verdict]);
         let mut lake = lake.filter(|one| one.effect == Kind::Hydrological);
