@@ -22,6 +22,10 @@ const READ: f64 = 4.0;
 /// Chances that call red and orange, and the outlook, days.
 pub(crate) const RED: f64 = 0.05;
 pub(crate) const ORANGE: (f64, f64) = (0.5, 30.0);
+/// Chances from which red could be called instead of [`RED`], and the evacuation time for which that is tried, in
+/// [`EVACUATIONS`].
+pub(crate) const CHANCES: [f64; 6] = [RED, 0.08, 0.12, 0.2, 0.3, 0.5];
+const A_DAY: usize = 1;
 /// Levels stay: another entry within so many days is the same alarm.
 const SAME_ALARM_DAYS: f64 = 3.0;
 pub(crate) const FEWEST: usize = 12;
@@ -53,12 +57,44 @@ pub(crate) struct Replay {
     pub(crate) gauge: GaugeKind,
     pub(crate) interval_days: f64,
     pub(crate) years: f64,
-    pub(crate) reds: u32,
-    pub(crate) oranges: u32,
-    pub(crate) red_years: f64,
-    pub(crate) orange_years: f64,
+    pub(crate) red: Alarms,
+    pub(crate) orange: Alarms,
     /// For each evacuation time that the sampling serves, whether red came so long before the collapse.
     pub(crate) in_time: [Option<bool>; EVACUATIONS.len()],
+    /// Red from each of [`CHANCES`] on, within an evacuation time of a day.
+    pub(crate) by_chance: [Alarms; CHANCES.len()],
+    pub(crate) in_time_by_chance: [Option<bool>; CHANCES.len()],
+}
+
+/// Alarms of one level.
+#[derive(Debug, Default)]
+pub(crate) struct Alarms {
+    /// Those that begin within [`SAME_ALARM_DAYS`] of another are that one.
+    pub(crate) count: u32,
+    /// How long they lasted.
+    pub(crate) years: f64,
+    /// When the slope was looked at during them, days.
+    times: Vec<f64>,
+}
+
+impl Alarms {
+    fn add(&mut self, now_days: f64, years: f64) {
+        let is_new = |last: &f64| now_days - last > SAME_ALARM_DAYS;
+        self.count += u32::from(self.times.last().is_none_or(is_new));
+        self.years += years;
+        self.times.push(now_days);
+    }
+
+    /// Whether the first of them since the acceleration could be seen came an evacuation time before the collapse; `None`
+    /// where the slope does not collapse, or is read too seldom or seen too late for that.
+    fn in_time(&self, slope: &Simulated, evacuation: f64) -> Option<bool> {
+        let collapse = slope.collapse_days?;
+        let is_read = slope.interval_days <= evacuation / READ;
+        let can_be = collapse - slope.visible_days >= evacuation;
+        let since = self.times.iter().find(|at| **at >= slope.visible_days);
+        let in_time = since.is_some_and(|at| collapse - at >= evacuation);
+        (is_read && can_be).then_some(in_time)
+    }
 }
 
 pub(crate) fn family(family: Family, network: &Network) -> Judged {
@@ -103,6 +139,16 @@ pub(crate) fn years(family: Family, network: &Network) -> Vec<Vec<Replay>> {
         })
     });
     each.collect()
+}
+
+/// Lives of slopes of a family that fails.
+pub(crate) fn failing_lives(family: Family, network: &Network) -> Vec<Replay> {
+    let seeds: Vec<u64> = (0..REPLAYED.0)
+        .map(|index| 3 * FIRST_SEED + index)
+        .collect();
+    in_two(&seeds, |seed| {
+        vec![replay(&Simulated::draw(family, *seed), network, MOST_ASKED)]
+    })
 }
 
 fn leads(slope: &Simulated, seed: u64, network: &Network) -> Vec<Lead> {
@@ -167,18 +213,9 @@ pub(crate) fn chances(
 /// One life, asked at each reading, or at so many of them evenly.
 fn replay(slope: &Simulated, network: &Network, most_asked: usize) -> Replay {
     let values = &slope.observations.values;
-    let mut reds: [Vec<f64>; EVACUATIONS.len()] = Default::default();
-    let mut result = Replay {
-        gauge: slope.gauge,
-        interval_days: slope.interval_days,
-        years: 0.0,
-        reds: 0,
-        oranges: 0,
-        red_years: 0.0,
-        orange_years: 0.0,
-        in_time: [None; EVACUATIONS.len()],
-    };
-    let mut last = (f64::NEG_INFINITY, f64::NEG_INFINITY);
+    let mut reds: [Alarms; EVACUATIONS.len()] = Default::default();
+    let mut by_chance: [Alarms; CHANCES.len()] = Default::default();
+    let (mut orange, mut all_years) = (Alarms::default(), 0.0);
     let step = values.len().div_ceil(most_asked);
     for count in (FEWEST..=values.len()).step_by(step) {
         let Some(chances) = chances(&first(&slope.observations, count), network) else {
@@ -187,33 +224,33 @@ fn replay(slope: &Simulated, network: &Network, most_asked: usize) -> Replay {
         let now = values[count - 1].t_days;
         let next = values.get(count - 1 + step);
         let years = next.map_or(0.0, |next| next.t_days - now) / 365.25;
-        for (chance, times) in chances.iter().zip(&mut reds) {
+        all_years += years;
+        for (chance, alarms) in chances.iter().zip(&mut reds) {
             if *chance >= RED {
-                times.push(now);
+                alarms.add(now, years);
             }
         }
-        let is_red = chances[1] >= RED;
-        let is_orange = is_red || chances[EVACUATIONS.len()] >= ORANGE.0;
-        result.years += years;
-        if is_red {
-            result.reds += u32::from(now - last.0 > SAME_ALARM_DAYS);
-            result.red_years += years;
-            last.0 = now;
+        for (least, alarms) in CHANCES.iter().zip(&mut by_chance) {
+            if chances[A_DAY] >= *least {
+                alarms.add(now, years);
+            }
         }
-        if is_orange {
-            result.oranges += u32::from(now - last.1 > SAME_ALARM_DAYS);
-            result.orange_years += years;
-            last.1 = now;
+        if chances[A_DAY] >= RED || chances[EVACUATIONS.len()] >= ORANGE.0 {
+            orange.add(now, years);
         }
     }
-    if let Some(collapse) = slope.collapse_days {
-        for (index, days) in EVACUATIONS.iter().enumerate() {
-            let is_read = slope.interval_days <= days / READ;
-            let since = reds[index].iter().find(|at| **at >= slope.visible_days);
-            let in_time = since.is_some_and(|at| collapse - at >= *days);
-            let can_be = collapse - slope.visible_days >= *days;
-            result.in_time[index] = (is_read && can_be).then_some(in_time);
-        }
+    let in_time = std::array::from_fn(|index| reds[index].in_time(slope, EVACUATIONS[index]));
+    let in_time_by_chance =
+        std::array::from_fn(|index| by_chance[index].in_time(slope, EVACUATIONS[A_DAY]));
+    let [_, red, _] = reds;
+    Replay {
+        gauge: slope.gauge,
+        interval_days: slope.interval_days,
+        years: all_years,
+        red,
+        orange,
+        in_time,
+        by_chance,
+        in_time_by_chance,
     }
-    result
 }

@@ -5,7 +5,7 @@
 //!   the network that never saw it, and writes docs/families.md. That takes hours: a network that is taught is kept in
 //!   target/left-out, and the next run goes on from there. `--failing`: the families that fail alone.
 //!
-//! - `learn --years` follows years of standing slopes by the network in force and writes docs/false-alarms.md.
+//! - `learn --years` follows years of standing slopes, and lives of failing ones, by the network in force and writes docs/false-alarms.md.
 //! - `learn --steady [SERIES]` follows so many series of steady creep, and of a rate that doubles and stays, and writes
 //!   docs/steady-creep.md.
 //!

@@ -170,10 +170,10 @@ pub(crate) fn alarms(out: &mut String, name: &str, replays: &[&Replay]) -> anyho
     writeln!(
         out,
         "| {name} | {years:.1} | {:.2} | {:.2} | {:.2} % | {:.2} % |",
-        sum(&|replay| f64::from(replay.reds)) / years,
-        sum(&|replay| f64::from(replay.oranges)) / years,
-        100.0 * sum(&|replay| replay.red_years) / years,
-        100.0 * sum(&|replay| replay.orange_years) / years,
+        sum(&|replay| f64::from(replay.red.count)) / years,
+        sum(&|replay| f64::from(replay.orange.count)) / years,
+        100.0 * sum(&|replay| replay.red.years) / years,
+        100.0 * sum(&|replay| replay.orange.years) / years,
     )?;
     Ok(())
 }
