@@ -36,8 +36,8 @@ The law is the slider block of Helmstetter et al. (2004) in one regular equation
 4. An effect is accepted only if the BIC falls by 10 or more, the sign is one that the ground allows, its memory is short against the
    record, a search where there is nothing on 399 surrogates gains as much in fewer than 1 % of cases, and a later block, held out, is predicted
    no worse by the law and the effects as they were learned before it. Every candidate is judged alike: by what the readings of
-   the block change by from one to the next. Extrapolated over the whole block, an effect that bears no witness (no channel, no
-   tide) may not be worse at all; one that bears a witness may be worse by a fifth at most, where the innovations over the block are no
+   the block change by from one to the next. Extrapolated over the whole block, an effect that only the shape of the readings supports (no channel, no
+   tide) may not be worse at all; another may be worse by a fifth at most, where the innovations over the block are no
    worse. Everything else is listed with the reason.
 5. Effects within the margin of each other stand under *cannot be separated from*. Structure that is left is called so.
 

@@ -1,5 +1,6 @@
 //! The way from a benchmark's readings to an explanation.
 
+use super::channels::distinct;
 use super::explanation::{Candidate, Effect, Explained, Explanation, SettingsReport};
 use super::faults::inspect;
 use super::findings::{Findings, findings};
@@ -14,7 +15,6 @@ use super::remarks;
 use super::search::Withheld;
 use super::term::Scratch;
 use super::verdict::conclude;
-use super::witnesses::distinct;
 use crate::reading::{Channel, Series, Timestamp};
 
 /// Explains `series` by what its law lacks, from `channels` beside it; `neighbours` are the other

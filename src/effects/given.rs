@@ -1,6 +1,7 @@
 //! The law with causes that are known beforehand: what its error would be, and nothing judged.
 
 use super::candidates::{event_times, events, feedbacks, offset, seasonal, tides};
+use super::channels::distinct;
 use super::explanation::{Change, ErrorChange};
 use super::faults::{Inspected, inspect};
 use super::findings::least_squares;
@@ -13,7 +14,6 @@ use super::refit::Fitted;
 use super::search::Search;
 use super::term::Scratch;
 use super::trials::{Ground, Trial};
-use super::witnesses::distinct;
 use crate::reading::{Channel, Series, Timestamp, after_days, days_since};
 
 /// An effect that is known to be there; how large it is, how late it acts, and what shape it has, is not.

@@ -335,7 +335,7 @@ pub(super) fn coefficients<'a>(problem: &Problem, fitted: &'a Fitted, index: usi
     &fitted.parameters[from..from + fitted.terms[index].coefficients()]
 }
 
-/// Whether a kind is called by what the readings themselves look like, with no outside witness: then it must
+/// Whether a kind is called by what the readings themselves look like, without independent evidence: then it must
 /// account for everything, or it is but the nearest label.
 pub(super) fn is_label(kind: Kind) -> bool {
     matches!(

@@ -24,6 +24,7 @@ mod partition;
 pub mod remarks;
 mod together;
 
+mod channels;
 mod linear;
 mod noise;
 mod prior;
@@ -39,7 +40,6 @@ mod term;
 mod trials;
 mod verdict;
 mod watch;
-mod witnesses;
 
 pub use by_clock::ByClock;
 pub use explain::explain;

@@ -1,5 +1,6 @@
 //! A series made ready for a search: its readings, its covariates, the plain law, and the noise models.
 
+use super::channels::{drivers, is_temperature};
 use super::noise::{Noise, Whitener};
 use super::options::Options;
 use super::problem::Problem;
@@ -7,7 +8,6 @@ use super::refit::Fitted;
 use super::response::Driver;
 use super::search::{Search, plain};
 use super::term::Scratch;
-use super::witnesses::{drivers, is_temperature};
 use crate::reading::{Channel, Series};
 
 /// All that a search rests on.

@@ -21,9 +21,9 @@ const MOST_EFFECTS: usize = 10;
 /// A search's p-value must lie under this.
 pub(super) const SIGNIFICANT: f64 = 0.01;
 /// The later block is predicted no worse from reading to reading, but for this factor. The error extrapolated over all of
-/// it carries the law's own drift: of what bears a witness it may grow by the first factor at most, and only if the block by
-/// its innovations is predicted no worse, neither in -2 ln likelihood, by more than this, nor in its errors; of what has none
-/// but the shape of the readings it may not grow.
+/// it carries the law's own drift: of what independent data support it may grow by the first factor at most, and only if the block by
+/// its innovations is predicted no worse, neither in -2 ln likelihood, by more than this, nor in its errors; of what
+/// only the shape of the readings supports it may not grow.
 const MOST_EXTRAPOLATED: f64 = 1.2;
 const WORSE: f64 = 2.0;
 const WORSE_STEPS: f64 = 1.005;
@@ -197,7 +197,7 @@ impl Search<'_> {
             }
         }
         refitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        prefer_witnesses(&mut refitted, self.options.bic_margin);
+        prefer_independent_evidence(&mut refitted, self.options.bic_margin);
         self.prefer_rain(&mut refitted);
         let mut chosen: Option<(usize, Vec<Rival>)> = None;
         for (k, one) in refitted.iter().enumerate() {
@@ -283,7 +283,7 @@ impl Search<'_> {
         if let Some(reason) = objection(self.problem, &one.fitted, self.drivers) {
             return (None, Some(reason));
         }
-        if self.is_drawn && !has_witness(one.term.kind) {
+        if self.is_drawn && !has_independent_evidence(one.term.kind) {
             self.withhold(one);
             return (None, Some(NO_READINGS.to_owned()));
         }
@@ -372,23 +372,23 @@ impl Search<'_> {
     }
 }
 
-/// Whether a covariate or the sky bears witness to a kind, and not the shape of the curve alone.
-fn has_witness(kind: Kind) -> bool {
+/// Whether a covariate or known astronomy supports a kind, and not the shape of the curve alone.
+fn has_independent_evidence(kind: Kind) -> bool {
     matches!(kind, Kind::Hydrological | Kind::Thermal | Kind::Tide)
 }
 
-/// Among what the BIC cannot separate from the best, an effect that a covariate bears witness to goes first, and then
+/// Among what the BIC cannot separate from the best, an effect that a covariate supports goes first, and then
 /// the simplest; a change of friction goes before a step of the load that hardly jumps. A covariate that follows the year goes before the bare season if it leaves the smaller error.
-fn prefer_witnesses(refitted: &mut [Refitted], margin: f64) {
+fn prefer_independent_evidence(refitted: &mut [Refitted], margin: f64) {
     let Some(best) = refitted.first().map(|one| one.gain) else {
         return;
     };
     let near = refitted.partition_point(|one| one.gain > best - margin);
     refitted[..near].sort_by(|a, b| {
-        let witnessed = |one: &Refitted| one.term.channel.is_some();
+        let has_channel = |one: &Refitted| one.term.channel.is_some();
         let simpler = a.term.parameters().total_cmp(&b.term.parameters());
-        witnessed(b)
-            .cmp(&witnessed(a))
+        has_channel(b)
+            .cmp(&has_channel(a))
             .then(simpler)
             .then(b.gain.total_cmp(&a.gain))
     });

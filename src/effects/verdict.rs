@@ -24,16 +24,16 @@ pub(super) struct Verdict {
 
 /// Explained in full, the residual is at most this many times the white noise.
 pub(super) const LARGEST_REST: f64 = 2.0;
-/// A kind without a witness stands beside something left where it gains this many times the margin and the later block is
+/// A kind without independent evidence stands beside something left where it gains this many times the margin and the later block is
 /// predicted with no more than this share of the error.
 const STANDING_OUT: f64 = 30.0;
 const FAR_BETTER: f64 = 0.1;
-/// Most kinds without a witness that are believed together.
+/// Most kinds without independent evidence that are believed together.
 const MOST_LABELS: usize = 2;
 /// 5 and 95 % of a normal distribution, in standard deviations.
 const NINETY: f64 = 1.645;
 
-/// Concludes: a kind with no outside witness stands as the verdict only if nothing is left unexplained after it.
+/// Concludes: a kind without independent evidence stands as the verdict only if nothing is left unexplained after it.
 pub(super) fn conclude(
     (problem, bank, drivers): (&Problem, &[Whitener], &[(usize, Driver)]),
     unit: Unit,
@@ -67,7 +67,7 @@ pub(super) fn conclude(
             effect((problem, bank, drivers), unit, (&full, index), how, scratch)
         })
         .collect();
-    // What bears a witness speaks first.
+    // What independent data support comes first.
     effects.sort_by_key(|effect| is_label(effect.effect));
     // A slow load that nothing declares leaves what remembers as well.
     let as_a_load = judged
@@ -110,7 +110,7 @@ pub(super) fn conclude(
     }
 }
 
-/// Whether kinds without a witness leave no more than noise, and are few: enough events, one after the other, follow
+/// Whether kinds without independent evidence leave no more than noise, and are few: enough events, one after the other, follow
 /// any load there is.
 fn accounts_for_all(problem: &Problem, full: &Fitted) -> bool {
     let rest = full.rms(problem, 0..problem.used);
@@ -127,7 +127,7 @@ fn accounts_for_all(problem: &Problem, full: &Fitted) -> bool {
     small && full.terms.len() <= most
 }
 
-/// Whether one kind without a witness is alone, gains many times the margin, and predicts the later block far better than
+/// Whether one kind without independent evidence is alone, gains many times the margin, and predicts the later block far better than
 /// the law without it: then it stands although something is left beside it.
 fn stands_out(full: &Fitted, candidates: &[Candidate], margin: f64) -> bool {
     let mut accepted = candidates

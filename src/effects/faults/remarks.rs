@@ -50,7 +50,7 @@ pub(super) fn remarks(
         .collect();
     sentences.extend(twins.iter().map(|(jumping, other)| {
         format!(
-            "{jumping} measures the same as {other} but for its resets: they are one instrument, and no two witnesses."
+            "{jumping} measures the same as {other} but for its resets: they are one instrument, and count once."
         )
     }));
     sentences

@@ -69,7 +69,7 @@ fn neighbours_that_had_the_event_too_part_from_nothing() {
 }
 
 #[test]
-fn a_neighbour_that_goes_its_own_way_is_no_witness() {
+fn a_neighbour_that_moves_differently_is_no_evidence() {
     let there_and_back: Vec<f64> = daily(DAYS)
         .iter()
         .map(|day| 60.0 * (day / 25.0).sin())

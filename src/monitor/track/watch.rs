@@ -184,7 +184,7 @@ impl Track {
     ) -> Vec<Event> {
         self.watch.is_searching = false;
         let before = self.adopted.take();
-        let known_load = witnessed(finding);
+        let known_load = supported(finding);
         if context.phase.explain == Explain::Adopt
             && !known_load.parts.is_empty()
             && is_separable(finding)
@@ -273,9 +273,9 @@ impl Track {
     }
 }
 
-/// The effects that something besides the motion bears witness to: a covariate, the calendar, the instrument. A
+/// The effects that something besides the motion supports: a covariate, the calendar, the instrument. A
 /// step of the load that only the motion shows may as well be the failure's own beginning.
-fn witnessed(finding: &SearchFinding) -> KnownLoad {
+fn supported(finding: &SearchFinding) -> KnownLoad {
     let parts = finding.known_load.parts.iter();
     KnownLoad {
         parts: parts

@@ -1,4 +1,4 @@
-//! Which covariates may bear witness: each once, and only those that cover the record.
+//! Which covariates count as evidence: each once, and only those that cover the record.
 
 use super::problem::Problem;
 use super::response::Driver;
