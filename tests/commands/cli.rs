@@ -488,7 +488,7 @@ fn sigterm_ends_a_daemon_that_follows_a_growing_file_and_its_events_are_those_of
     .unwrap();
     let stopped = daemon.until("\"stopped\"");
     assert_eq!(daemon.child.wait().unwrap().code(), Some(0));
-    assert!(stopped.contains("taken: 31"), "{stopped}");
+    assert!(stopped.contains("\"taken\":31,"), "{stopped}");
     // What is current is judged first: the events of a replay, in the order of their times. That nothing came between
     // the last of them and the reading after it is a matter of this daemon's clock.
     let mut by_time: Vec<&str> = events.lines().collect();
