@@ -91,7 +91,7 @@ fn readings_of_the_first_day_of_1970_are_set_aside_and_time_does_not_go_by_them(
         4,
         "{log}"
     );
-    assert!(log.contains("without_clock: 4"), "{log}");
+    assert!(log.contains("without_clock=4"), "{log}");
 }
 
 /// 13. Root may read everything, so a folder stands in the place of a file, and a link that leads nowhere.
