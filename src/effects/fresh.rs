@@ -2,7 +2,7 @@
 //! effect may be a poor one, beside which everything that is tried gains alike.
 
 use super::noise::{Noise, Whitener};
-use super::problem::Problem;
+use super::problem::{Problem, slips};
 use super::refit::{Fitted, Start, plain_starts, refit_from, towards};
 use super::term::{Act, Scratch, Term, law_parameters};
 use crate::reading::Quantity;
@@ -106,17 +106,7 @@ fn readings_until(problem: &Problem, share: f64) -> usize {
     let y = &problem.y[..problem.used];
     let slip: Vec<f64> = match problem.quantity {
         Quantity::Displacement => y.iter().map(|value| value - y[0]).collect(),
-        Quantity::Velocity => {
-            let mut sum = 0.0;
-            let steps = y.windows(2).zip(problem.t.windows(2));
-            let sums = steps.map(|(v, t)| {
-                sum += 0.5 * (v[0] + v[1]) * (t[1] - t[0]);
-                sum
-            });
-            std::iter::once(0.0)
-                .chain(sums.collect::<Vec<f64>>())
-                .collect()
-        }
+        Quantity::Velocity => slips(&problem.t, y),
     };
     let whole = slip[slip.len() - 1];
     slip.iter()

@@ -3,7 +3,7 @@
 use super::fresh::{best_of_starts, fresh_starts};
 use super::kind::{Form, Kind};
 use super::noise::Whitener;
-use super::problem::{Problem, median};
+use super::problem::{Problem, median, slips};
 use super::refit::{Fitted, Start, refit};
 use super::response::Driver;
 use super::rival::Rival;
@@ -204,17 +204,7 @@ fn block_once_shown(problem: &Problem, fitted: &Fitted) -> Option<usize> {
 fn shown(problem: &Problem, fitted: &Fitted, term: &Term) -> Option<usize> {
     let grown: Vec<f64> = match term.act {
         Act::PerVelocity => fitted.velocity.clone(),
-        Act::PerSlip => {
-            let mut slip = 0.0;
-            let steps = fitted.velocity.windows(2).zip(problem.t.windows(2));
-            let sums = steps.map(|(v, t)| {
-                slip += 0.5 * (v[0] + v[1]) * (t[1] - t[0]);
-                slip
-            });
-            std::iter::once(0.0)
-                .chain(sums.collect::<Vec<f64>>())
-                .collect()
-        }
+        Act::PerSlip => slips(&problem.t, &fitted.velocity),
         Act::Load(_)
         | Act::Step
         | Act::Reset

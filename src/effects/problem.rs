@@ -254,6 +254,17 @@ fn unit_median(mut values: Vec<f64>) -> Vec<f64> {
     values
 }
 
+/// The slip from the first of the times, days, to each: velocities, one a time, by the trapezium rule.
+pub(super) fn slips(t: &[f64], velocity: &[f64]) -> Vec<f64> {
+    let steps = velocity.windows(2).zip(t.windows(2));
+    let each = steps.map(|(v, t)| 0.5 * (v[0] + v[1]) * (t[1] - t[0]));
+    let sums = each.scan(0.0, |sum, step| {
+        *sum += step;
+        Some(*sum)
+    });
+    std::iter::once(0.0).chain(sums).collect()
+}
+
 /// The middle value; 0 of none.
 pub(super) fn median(mut values: Vec<f64>) -> f64 {
     if values.is_empty() {
