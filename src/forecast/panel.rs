@@ -70,9 +70,18 @@ impl LawForecaster {
     /// Weighs the newest reading against what was expected, refits, and says what is to be expected now of
     /// passing `critical` mm/day; `None` with too few readings to go on.
     pub fn update(&mut self, observations: &Observations, critical: f64) -> Option<Outlook> {
+        self.update_by(observations, critical, outlook)
+    }
+
+    /// The same, with `outlook` in place of the function of this name, which it may have called before.
+    pub(crate) fn update_by(
+        &mut self,
+        observations: &Observations,
+        critical: f64,
+        outlook: impl FnOnce(&Observations, f64) -> Option<(Outlook, Option<Ensemble>)>,
+    ) -> Option<Outlook> {
         let surprise_nats = self.surprise(observations);
-        let outlook = outlook(observations, critical);
-        let (outlook, expected) = outlook?;
+        let (outlook, expected) = outlook(observations, critical)?;
         self.expected = expected;
         self.seen = NewestReading::of(observations);
         Some(Outlook {

@@ -35,6 +35,11 @@ impl Queue {
         }
     }
 
+    /// The benchmarks that are judged next.
+    pub(super) fn next(&self) -> impl Iterator<Item = &BenchmarkId> {
+        self.waiting.iter().take(MOST_REFITS)
+    }
+
     pub(super) fn forget(&mut self, benchmark: &BenchmarkId) {
         self.waiting.remove(benchmark);
     }

@@ -19,7 +19,7 @@ use crate::config::Config;
 use crate::monitor::Input;
 use crate::reading::Timestamp;
 use crate::store::{Position, Store, StoreError, Verified};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::signal::unix::{SignalKind, signal};
@@ -176,10 +176,15 @@ impl Daemon {
         for (source, more) in &batch.quarantined {
             vitals.quarantined(source, *more);
         }
-        for arrival in &batch.arrivals {
+        let mut prepared = 0;
+        for (number, arrival) in batch.arrivals.iter().enumerate() {
             if shutdown.is_requested() {
                 return self.commit();
             }
+            if prepared == 0 {
+                prepared = self.site.prepare(&batch.arrivals[number..]);
+            }
+            prepared -= 1;
             self.take(arrival)?;
             self.commit_what_is_urgent()?;
         }
@@ -223,20 +228,28 @@ impl Daemon {
     /// When the state cannot be used any more.
     pub fn take_messages(&mut self, first: mqtt::ReceivedMessage) -> Result<(), StoreError> {
         let mut next = Some(first);
+        let mut prepared = 0;
+        let mut waiting = VecDeque::new();
         while let Some(delivery) = next {
-            self.site.messages_come(self.sources.deliveries.len());
+            self.site
+                .messages_come(self.sources.deliveries.len() + waiting.len());
             self.site.queue();
             let vitals = &self.pulse.vitals;
             vitals.takes(delivery.found);
             vitals.quarantined(&delivery.source, delivery.quarantined);
+            if prepared == 0 {
+                self.sources.receive_more(&mut waiting);
+                let more = waiting.iter().flat_map(|one| &one.arrivals);
+                prepared = self.site.prepare(delivery.arrivals.iter().chain(more));
+            }
             for arrival in &delivery.arrivals {
                 self.take(arrival)?;
                 self.commit_what_is_urgent()?;
             }
-            let has_room = self.sources.hold(delivery.receipt);
-            next = has_room
-                .then(|| self.sources.deliveries.try_recv().ok())
-                .flatten();
+            prepared = prepared.saturating_sub(delivery.arrivals.len());
+            self.sources.hold(delivery.receipt);
+            self.sources.receive_more(&mut waiting);
+            next = waiting.pop_front();
         }
         if self.is_up_to_date {
             self.decide();

@@ -42,3 +42,4 @@ mod tls;
 pub mod view;
 pub mod vitals;
 mod webhook;
+mod workers;

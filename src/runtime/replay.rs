@@ -7,6 +7,7 @@ use super::hook::Status;
 use super::shutdown::Shutdown;
 use super::site::{Counts, Sinks, Site};
 use super::tail::Arrival;
+use super::workers::AllCores;
 use crate::config::HookConfig;
 use crate::monitor::{Event, Input, Monitor, Settings};
 use crate::reading::{Recording, Timestamp};
@@ -119,7 +120,11 @@ pub async fn replay(
     }
     let mut site = Site::new(plan.site, plan.settings.clone(), sinks(plan.hooks));
     let started = clock::later(Duration::ZERO);
-    for arrival in arrivals.iter().take_while(|arrival| arrival.time <= end) {
+    let mut prepared = 0;
+    for (number, arrival) in arrivals.iter().enumerate() {
+        if arrival.time > end {
+            break;
+        }
         if let Some(wait) = wait(plan.pace, first.time, arrival.time) {
             tokio::select! {
                 () = tokio::time::sleep_until(started + wait) => {}
@@ -129,6 +134,10 @@ pub async fn replay(
         if shutdown.is_requested() {
             return Err(ReplayError::Interrupted);
         }
+        if prepared == 0 {
+            prepared = site.prepare(&arrivals[number..]);
+        }
+        prepared -= 1;
         report_each(&site.take(arrival, arrival.time)?, each)?;
         site.commit(arrival.time)?;
     }
@@ -163,13 +172,19 @@ pub fn replay_state(
         let rows = store.steps(after)?;
         let Some(last) = rows.last() else { break };
         after = last.seq;
-        for row in &rows {
+        let mut prepared = 0;
+        for (number, row) in rows.iter().enumerate() {
             if until.is_some_and(|until| row.now > until) {
                 break 'all;
             }
             if shutdown.is_requested() {
                 return Err(ReplayError::Interrupted);
             }
+            if prepared == 0 {
+                let next = rows[number..].iter().map(|row| &row.input);
+                prepared = monitor.prepare(next, &AllCores);
+            }
+            prepared -= 1;
             report_each(&monitor.step(row.now, &row.input), each)?;
             progress(row.seq as f64 / steps);
             // Their findings are among the steps.

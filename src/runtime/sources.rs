@@ -5,6 +5,7 @@ use super::shutdown::{self, Shutdown, Trigger};
 use super::tail::{self, ArrivalBatch, Follower};
 use crate::config::Config;
 use crate::store::{Store, StoreError};
+use std::collections::VecDeque;
 use tokio::sync::mpsc;
 use tokio::task::{JoinError, JoinHandle};
 
@@ -12,6 +13,9 @@ use tokio::task::{JoinError, JoinHandle};
 const BATCHES: usize = 4;
 /// Messages that may wait to be taken, or to be acknowledged.
 pub(super) const MESSAGES: usize = mqtt::MOST_UNACKNOWLEDGED as usize;
+
+/// Messages that are looked at together at most.
+const FEW: usize = 32;
 
 /// The sources at work.
 #[derive(Debug)]
@@ -72,10 +76,19 @@ impl Sources {
         self.task.await?
     }
 
-    /// Keeps the acknowledgement until what it is for is durable; says whether there is room for more.
-    pub(super) fn hold(&mut self, receipt: Receipt) -> bool {
+    /// Keeps the acknowledgement until what it is for is durable.
+    pub(super) fn hold(&mut self, receipt: Receipt) {
         self.unacknowledged.push(receipt);
-        self.has_room()
+    }
+
+    /// Adds the messages that have come by now to those that wait to be taken, a few at once, as far as there is room.
+    pub(super) fn receive_more(&mut self, waiting: &mut VecDeque<ReceivedMessage>) {
+        while waiting.len() < FEW
+            && self.unacknowledged.len() + waiting.len() < MESSAGES
+            && let Ok(message) = self.deliveries.try_recv()
+        {
+            waiting.push_back(message);
+        }
     }
 
     /// Whether another message may wait to be acknowledged.

@@ -17,7 +17,7 @@ use slipwatch::monitor::{
 use slipwatch::reading::{BenchmarkId, Timestamp, Unit};
 
 /// What a search that found the truth would hand in.
-fn found(slope: Slope) -> SearchFinding {
+pub(crate) fn found(slope: Slope) -> SearchFinding {
     let effect = Effect {
         channel: Some(RESERVOIR.to_owned()),
         form: Some(Form::Level),
@@ -46,7 +46,7 @@ fn found(slope: Slope) -> SearchFinding {
     }
 }
 
-fn monitor(explain: Explain) -> Monitor {
+pub(crate) fn monitor(explain: Explain) -> Monitor {
     let policy = Policy {
         evacuation_time: SignedDuration::from_hours(72),
         ..Policy::default()
@@ -134,7 +134,7 @@ fn structures(events: &[Event]) -> Vec<f64> {
     events.iter().filter_map(one).collect()
 }
 
-const STANDS: Slope = Slope {
+pub(crate) const STANDS: Slope = Slope {
     v: 5.0,
     life: f64::INFINITY,
     gain: 0.8,

@@ -34,6 +34,7 @@ mod made_up;
 mod measured;
 mod monitor;
 mod mutated_files;
+mod parallel;
 #[path = "../../examples/loop/put_in.rs"]
 #[expect(dead_code, reason = "the document shows more than is claimed here")]
 mod put_in;

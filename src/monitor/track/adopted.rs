@@ -2,6 +2,7 @@
 //! slope is now.
 
 use super::forecast::UnderKnownLoad;
+use super::prepared::Prepared;
 use crate::effects::{self, ByClock};
 use crate::fit::{Observations, Rate};
 use crate::forecast::LawForecaster;
@@ -86,6 +87,7 @@ impl Adopted {
         channels: &[&Channel],
         critical: f64,
         rates: &[Rate],
+        prepared: &mut Prepared,
     ) -> Option<UnderKnownLoad> {
         let by_clock = self.by_clock(history, channels)?;
         let excess = self.panel.excess(by_clock.readings());
@@ -95,7 +97,8 @@ impl Adopted {
         };
         let load = by_clock.now()?;
         let outlook = by_clock.outlook(critical, |readings, critical| {
-            self.panel.update(readings, critical)
+            let by = |readings: &_, critical| prepared.outlook(readings, critical);
+            self.panel.update_by(readings, critical, by)
         })?;
         let width = BEYOND_RANGE * (self.range.1 - self.range.0);
         let is_explained = self.known_load.reaches(channels, history.newest()?)
@@ -109,6 +112,22 @@ impl Adopted {
             outlook,
             is_explained,
         })
+    }
+
+    /// Has `compute` compute what [`Adopted::forecast`] will ask for.
+    pub(super) fn prepare(
+        &self,
+        history: &History,
+        channels: &[&Channel],
+        critical: f64,
+        compute: impl FnOnce(&Observations, f64),
+    ) {
+        if let Some(by_clock) = self.by_clock(history, channels) {
+            by_clock.outlook(critical, |readings, critical| {
+                compute(readings, critical);
+                None
+            });
+        }
     }
 
     /// The readings by the load's clock, without what in them is no motion.

@@ -9,6 +9,7 @@ mod lookback;
 mod overdue;
 mod pace;
 mod past;
+mod prepared;
 mod refit;
 mod sensor;
 mod suspicion;
@@ -42,6 +43,7 @@ use unknown::{Reason, Unknown};
 use watch::Watch;
 
 pub(super) use past::{PAST, PastReplay};
+pub(super) use prepared::Prepared;
 
 /// So many readings in a row with one value are a stuck sensor, or a resolution too coarse to show it.
 const STUCK: usize = 24;
@@ -129,6 +131,9 @@ pub(super) struct Track {
     /// Whether its past has been gone through.
     #[serde(default)]
     record: PastReview,
+    /// Forecasts computed ahead, for the next reading alone.
+    #[serde(skip)]
+    prepared: Prepared,
 }
 
 impl Track {
@@ -152,6 +157,7 @@ impl Track {
             overdue: None,
             accepted: BTreeSet::new(),
             record: PastReview::Known,
+            prepared: Prepared::default(),
             benchmark,
             history: History::new(source, epoch),
             panel: LawForecaster::default(),
@@ -195,6 +201,7 @@ impl Track {
     ) -> Vec<Event> {
         let mut events = self.judge_ahead(policy, reading.time, context);
         events.extend(self.take_one(policy, source, reading, context));
+        self.prepared = Prepared::default();
         if self.record == PastReview::Owed {
             events.retain(|event| !event.kind.is_of_the_record());
         }
@@ -318,6 +325,7 @@ impl Track {
             return Vec::new();
         }
         let mut events = self.judge(policy, time, context);
+        self.prepared = Prepared::default();
         if self.record == PastReview::Owed {
             events.retain(|event| !event.kind.is_of_the_record());
         }
@@ -326,8 +334,14 @@ impl Track {
 
     /// Whether a reading of a queue is judged later: not where the first that was not lies an evacuation time back.
     fn waits(&mut self, policy: &Policy, time: Timestamp) -> bool {
-        let since = *self.queued_since.get_or_insert(time);
-        time.duration_since(since) < policy.evacuation_time
+        self.queued_since.get_or_insert(time);
+        !self.is_long_queued(policy, time)
+    }
+
+    /// Whether the first reading that was not judged lies an evacuation time before `time`.
+    fn is_long_queued(&self, policy: &Policy, time: Timestamp) -> bool {
+        self.queued_since
+            .is_some_and(|since| time.duration_since(since) >= policy.evacuation_time)
     }
 
     /// Whether a reading of a queue is still to be judged.
@@ -353,11 +367,12 @@ impl Track {
 
     /// What the laws predict after the newest reading.
     fn forecast(&mut self, critical: f64, context: &StepContext<'_>) -> Option<Forecast> {
-        let plain = self.panel.update(&self.history.observations, critical)?;
-        let history = &self.history;
+        let (history, prepared) = (&self.history, &mut self.prepared);
+        let by = |readings: &_, critical| prepared.outlook(readings, critical);
+        let plain = (self.panel).update_by(&history.observations, critical, by)?;
         let known_load = self.adopted.as_mut().and_then(|adopted| {
             let channels = context.covariates.list();
-            adopted.forecast(history, &channels, critical, &plain.rates)
+            adopted.forecast(history, &channels, critical, &plain.rates, prepared)
         });
         Some(Forecast { plain, known_load })
     }

@@ -3,6 +3,7 @@
 use super::super::history::Taken;
 use super::Track;
 use crate::alert::Policy;
+use crate::fit::Observations;
 use crate::reading::Timestamp;
 use serde::{Deserialize, Serialize};
 
@@ -23,24 +24,36 @@ pub(super) struct Pace {
 impl Track {
     /// Whether this reading leads to a refit; if not, it is part of the record that the next one rests on.
     pub(super) fn is_refit_due(&mut self, policy: &Policy, taken: Taken, time: Timestamp) -> bool {
-        let least = policy.evacuation_time / REFITS_AN_EVACUATION;
-        let is_far_from = |last: Option<Timestamp>| {
-            last.is_none_or(|last| time.duration_since(last).abs() >= least)
-        };
         let is_young = self.watch.taken() <= YOUNG;
         if taken == Taken::Newest {
-            let is_due = is_young
-                || is_far_from(self.pace.newest)
-                || !self.panel.predicts(&self.history.observations);
+            let is_due = self.awaits_refit(policy, time, &self.history.observations);
             if is_due {
                 (self.pace.newest, self.pace.past) = (Some(time), None);
             }
             return is_due;
         }
-        let is_due = is_young || is_far_from(self.pace.past);
+        let is_due = is_young || is_far(policy, self.pace.past, time);
         if is_due {
             self.pace.past = Some(time);
         }
         is_due
     }
+
+    /// Whether a newest reading of `time` leads to a refit, where `observations` end with it.
+    pub(super) fn awaits_refit(
+        &self,
+        policy: &Policy,
+        time: Timestamp,
+        observations: &Observations,
+    ) -> bool {
+        self.watch.taken() <= YOUNG
+            || is_far(policy, self.pace.newest, time)
+            || !self.panel.predicts(observations)
+    }
+}
+
+/// Whether the last refit is so far from `time` that the next one is due.
+fn is_far(policy: &Policy, last: Option<Timestamp>, time: Timestamp) -> bool {
+    let least = policy.evacuation_time / REFITS_AN_EVACUATION;
+    last.is_none_or(|last| time.duration_since(last).abs() >= least)
 }

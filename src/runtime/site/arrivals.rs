@@ -5,6 +5,7 @@ use crate::monitor::{Event, Input, Notice};
 use crate::reading::{BenchmarkId, Timestamp, suspicion};
 use crate::runtime::clock;
 use crate::runtime::tail::Arrival;
+use crate::runtime::workers::AllCores;
 use crate::store::{Presence, StoreError};
 use jiff::SignedDuration;
 
@@ -56,6 +57,13 @@ impl Site {
             }
         }
         Ok(self.take_new(arrival, wall))
+    }
+
+    /// Computes what the first of `next` lead to on all cores; of how many of them, at least one. Changes no event: an arrival
+    /// that leads to something else when it is taken is computed then.
+    pub fn prepare<'a>(&mut self, next: impl IntoIterator<Item = &'a Arrival>) -> usize {
+        let inputs = next.into_iter().map(|arrival| &arrival.input);
+        self.monitor.prepare(inputs, &AllCores)
     }
 
     /// Takes a value that has not been taken, or is the last of its time again.
@@ -333,6 +341,7 @@ impl Site {
         let Some(now) = self.now.filter(|_| is_owed) else {
             return Vec::new();
         };
+        self.monitor.prepare_queued(&AllCores);
         let events = self.step(now, &Input::Notice(Notice::BatchEnd));
         for job in self.monitor.searches() {
             self.searches.start(job);
