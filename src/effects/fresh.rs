@@ -12,6 +12,8 @@ const FIRST_STEPS: usize = 8;
 const FOLLOWED: usize = 4;
 /// Shares of the slip within which a load that answers to the motion has hardly shown.
 const EARLY: [f64; 4] = [0.1, 0.25, 0.5, 0.75];
+/// Lengths of a growing mean, spacings of the readings.
+const GROWING: [f64; 7] = [0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
 /// Fewest readings of an early law.
 const FEWEST_EARLY: usize = 12;
 
@@ -82,6 +84,37 @@ pub(super) fn grown_up(problem: &Problem, term: &Term, scratch: &mut Scratch) ->
         part = next;
     }
     Some(known)
+}
+
+/// The law of `base` under a mean over more and more readings, each fit from the law under the shorter mean: a law that
+/// nearly fails within the last mean is not reached from one that is far from its failure. All of these, the mean's length
+/// free in the end; none of another term.
+pub(super) fn under_growing_means(
+    problem: &Problem,
+    base: &Fitted,
+    term: &Term,
+    scratch: &mut Scratch,
+) -> Vec<Fitted> {
+    let mut all = Vec::new();
+    if !matches!(term.act, Act::Averaging) {
+        return all;
+    }
+    let white = [Whitener::new(problem, Noise::WHITE)];
+    let mut law = Start::at(base);
+    for spacings in GROWING {
+        let held = Start {
+            frozen: 1,
+            ..law.clone().with_size(term, spacings)
+        };
+        let Some(under) = refit_from(problem, &[held], &white, scratch) else {
+            continue;
+        };
+        law = Start::at(&under);
+        law.terms.pop();
+        law.parameters.pop();
+        all.extend(refit_from(problem, &[Start::at(&under)], &white, scratch));
+    }
+    all
 }
 
 /// What was fitted to one part of the readings, in the parameters of another: these are in units of its span and of its

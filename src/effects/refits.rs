@@ -2,7 +2,7 @@
 
 use super::candidates;
 use super::frame::Frames;
-use super::fresh::{best_of_starts, fresh_laws, grown_up};
+use super::fresh::{best_of_starts, fresh_laws, grown_up, under_growing_means};
 use super::kind::Kind;
 use super::linear::Linear;
 use super::noise::{Noise, Whitener};
@@ -212,6 +212,7 @@ impl<'a> Search<'a> {
             let grown = grown_up(problem, term, &mut self.scratch);
             levels.extend(grown.filter(|grown| grown.prediction.len() == problem.t.len()));
         }
+        levels.extend(under_growing_means(problem, base, term, &mut self.scratch));
         for size in term.starts() {
             let start = Start::at(base).with_size(term, *size);
             fits.extend(refit(problem, &start, bank, &mut self.scratch));

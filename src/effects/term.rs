@@ -269,6 +269,9 @@ pub(super) fn read(problem: &Problem, driven: &Driven, averaging: f64, readings:
     readings.extend(problem.node_of.iter().map(value));
 }
 
+/// The velocity before the first node differs from the first one's by no more than so many e-folds.
+const MOST_BEFORE: f64 = 1.0;
+
 /// Where what happens once is tried: in the middle between two readings.
 pub(super) const MIDDLE: f64 = 0.5;
 
@@ -291,11 +294,27 @@ pub(super) fn event_place(problem: &Problem, (reading, share): (usize, f64)) -> 
     (node, (problem.nodes[node] - t).max(0.0))
 }
 
-/// Slip at `t`, between nodes by the velocities at both; before the first node at its velocity.
+/// The slip from the first node back to `t`, in days at the first node's velocity, below 0.
+fn time_before(problem: &Problem, driven: &Driven, t: f64) -> f64 {
+    let (first, v) = (problem.nodes[0], driven.velocity[0]);
+    let back = t - first;
+    let mirrored = problem.nodes.partition_point(|node| *node <= first - back);
+    let ahead = mirrored.clamp(1, problem.nodes.len() - 1);
+    let growth = (driven.velocity[ahead] / v).ln() / (problem.nodes[ahead] - first);
+    let exponent = growth * back;
+    if exponent.is_finite() && exponent.abs() > 1e-9 {
+        exponent.clamp(-MOST_BEFORE, MOST_BEFORE).exp_m1() / growth
+    } else {
+        back
+    }
+}
+
+/// Slip at `t`, between nodes by the velocities at both; before the first node the velocity grows as it does over as long a
+/// time after it.
 pub(super) fn slip_at(problem: &Problem, driven: &Driven, t: f64) -> f64 {
     let k = problem.nodes.partition_point(|node| *node <= t);
     let Some(before) = k.checked_sub(1) else {
-        return driven.slip[0] + driven.velocity[0] * (t - problem.nodes[0]);
+        return driven.slip[0] + driven.velocity[0] * time_before(problem, driven, t);
     };
     let (h, v) = (t - problem.nodes[before], driven.velocity[before]);
     let Some(&next) = problem.nodes.get(k) else {
