@@ -301,6 +301,12 @@ pub struct RegimeReport {
     pub probability_accelerating: f64,
     /// Every regime's probability.
     pub probabilities: BTreeMap<Regime, f64>,
+    /// r of the most probable law, 1/day: where it stands in the regime plane. Absent without a law.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub r_per_day: Option<f64>,
+    /// kappa of the same law, 1/day.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub kappa_per_day: Option<f64>,
 }
 
 /// The time of a collapse, or of the first passage of the critical velocity; quantiles are unconditional.

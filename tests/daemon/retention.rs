@@ -43,6 +43,8 @@ fn refit(time: Timestamp) -> EventKind {
             probability_unstable: 0.123_456_789_012_345_6,
             probability_accelerating: 0.123_456_789_012_345_6,
             probabilities: probabilities.collect(),
+            r_per_day: Some(0.012_345_678_901_234_56),
+            kappa_per_day: Some(-0.012_345_678_901_234_56),
         },
         failure_time: FailureTime {
             low: later(3),

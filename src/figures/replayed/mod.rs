@@ -224,6 +224,8 @@ mod tests {
                 probability_unstable: 0.5,
                 probability_accelerating: 0.5,
                 probabilities: BTreeMap::new(),
+                r_per_day: None,
+                kappa_per_day: None,
             },
             failure_time,
             critical_velocity_time: Box::default(),

@@ -10,6 +10,7 @@ mod overdue;
 mod pace;
 mod past;
 mod prepared;
+mod queued;
 mod refit;
 mod sensor;
 mod suspicion;
@@ -312,41 +313,6 @@ impl Track {
     pub(super) fn rates_at(&self, now: Timestamp) -> (Vec<Rate>, f64) {
         let now_days = days_since(self.history.epoch, now);
         (self.history.rates(), now_days)
-    }
-
-    /// Everything that came together has been taken: judges what of it came late, or queued.
-    pub(super) fn judge_batch(&mut self, policy: &Policy, context: &StepContext<'_>) -> Vec<Event> {
-        let is_owed = self.owes || self.is_queued();
-        let Some(time) = self.newest.filter(|_| is_owed) else {
-            return Vec::new();
-        };
-        if self.unknown.has(Reason::Stuck) {
-            (self.owes, self.queued_since) = (false, None);
-            return Vec::new();
-        }
-        let mut events = self.judge(policy, time, context);
-        self.prepared = Prepared::default();
-        if self.record == PastReview::Owed {
-            events.retain(|event| !event.kind.is_of_the_record());
-        }
-        events
-    }
-
-    /// Whether a reading of a queue is judged later: not where the first that was not lies an evacuation time back.
-    fn waits(&mut self, policy: &Policy, time: Timestamp) -> bool {
-        self.queued_since.get_or_insert(time);
-        !self.is_long_queued(policy, time)
-    }
-
-    /// Whether the first reading that was not judged lies an evacuation time before `time`.
-    fn is_long_queued(&self, policy: &Policy, time: Timestamp) -> bool {
-        self.queued_since
-            .is_some_and(|since| time.duration_since(since) >= policy.evacuation_time)
-    }
-
-    /// Whether a reading of a queue is still to be judged.
-    pub(super) fn is_queued(&self) -> bool {
-        self.queued_since.is_some()
     }
 
     /// What comes now was measured long before `time`, which it is by the clock.

@@ -189,5 +189,7 @@ fn report(outlook: &Outlook) -> RegimeReport {
         probability_unstable: of(Regime::UnstableAccelerating) + of(Regime::UnstableDecelerating),
         probability_accelerating: of(Regime::UnstableAccelerating) + of(Regime::StableAccelerating),
         probabilities: outlook.regimes.clone(),
+        r_per_day: outlook.law.map(|law| law.r),
+        kappa_per_day: outlook.law.map(|law| law.kappa),
     }
 }

@@ -99,6 +99,10 @@ pub struct ForecastView {
     pub probability_accelerating: f64,
     /// The regime.
     pub regime: &'static str,
+    /// r of the most probable law, 1/day.
+    pub r_per_day: Option<f64>,
+    /// kappa of the same law, 1/day.
+    pub kappa_per_day: Option<f64>,
     /// The velocity then, mm/day.
     pub velocity_mm_per_day: Option<f64>,
     /// Where an effect is adopted: what the law says without it.
@@ -413,6 +417,8 @@ fn forecast(event: &Event) -> Option<ForecastView> {
         probability_unstable: regime.probability_unstable,
         probability_accelerating: regime.probability_accelerating,
         regime: regime.label.label(),
+        r_per_day: regime.r_per_day,
+        kappa_per_day: regime.kappa_per_day,
         velocity_mm_per_day: *velocity_mm_per_day,
         without_effect: plain.as_ref().map(|plain| plain.failure_time),
     })

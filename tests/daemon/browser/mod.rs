@@ -199,6 +199,43 @@ fn the_slider_shows_a_moment_as_it_was_known_then_and_nothing_of_what_came_later
 
 #[test]
 #[cfg_attr(not(has_chromium), ignore = "Chromium was not found by build.rs")]
+fn the_regime_plane_has_a_point_for_the_law_of_each_forecast_and_ends_where_the_newest_stands() {
+    let (site, mut browser) = open("#/b/E3");
+    browser.until("document.querySelector('svg.plane .here')");
+    let view = site.json("/api/benchmark?id=E3");
+    let forecasts = view["forecasts"].as_array().unwrap().iter();
+    let laws = forecasts.filter_map(|one| {
+        let of = |name: &str| one[name].as_f64();
+        Some((
+            of("r_per_day")?,
+            of("kappa_per_day")?,
+            of("probability_unstable")?,
+        ))
+    });
+    let laws: Vec<(f64, f64, f64)> = laws.collect();
+    assert!(laws.len() > 10, "{laws:?}");
+    let points = browser.value("document.querySelectorAll('svg.plane .past').length");
+    assert_eq!(points, laws.len().min(120));
+    let here = browser.value(
+        "['cx', 'cy', 'fill-opacity'].map((name) => Number(document.querySelector('svg.plane .here').getAttribute(name)))",
+    );
+    let [x, y, fill] = [0, 1, 2].map(|index| here[index].as_f64().unwrap());
+    let (r, kappa, unstable) = laws[laws.len() - 1];
+    // To the right of the middle unstable, above it accelerating.
+    assert_eq!(
+        (x > 185.0, y < 145.0),
+        (kappa > 0.0, r > 0.0),
+        "{here} {r} {kappa}"
+    );
+    assert!(
+        (fill - 0.1 - 0.9 * unstable).abs() < 0.01,
+        "{fill} {unstable}"
+    );
+    assert_eq!(browser.complaints, [""; 0]);
+}
+
+#[test]
+#[cfg_attr(not(has_chromium), ignore = "Chromium was not found by build.rs")]
 fn a_drag_across_one_chart_zooms_all_of_them_and_asks_for_more_detail() {
     let (_site, mut browser) = open("#/b/E3");
     browser.until("document.querySelectorAll('figure.chart .u-over').length > 5");

@@ -43,7 +43,7 @@ export class BenchmarkPage {
     this.factsNode.replaceChildren(...facts(view));
     this.giveNode.replaceChildren(...(at === null ? [buttons(view, (kind) => this.orders(kind, this.name), ['acknowledge', 'shelve', 'silence', 'unsilence'])] : []));
     this.charts.draw(view);
-    this.planeNode.replaceChildren(plane(view.forecasts));
+    this.planeNode.replaceChildren(plane(view.forecasts, view.latest?.regime));
     this.effectsNode.replaceChildren(...effects(view));
     fillList(this.alertsNode, list(view.alerts, 'No alert so far.', this.name));
     fillList(this.marksNode, list([...view.marks].reverse(), 'Nothing found, declared or ordered so far.', this.name));
@@ -126,22 +126,38 @@ function facts(view) {
   return nodes;
 }
 
-/** Each forecast at its probabilities: the upper right is a slope that accelerates to failure. */
-function plane(forecasts) {
-  const at = (one) => [40 + 250 * one.probability_unstable, 270 - 250 * one.probability_accelerating];
-  const points = forecasts.slice(-120).map(at);
-  const corner = (x, y, text, anchor) => svg('text', { x, y, 'text-anchor': anchor }, text);
-  const last = points[points.length - 1];
-  return svg('svg', { class: 'plane', viewBox: '0 0 320 310', role: 'img', 'aria-label': 'The probability of acceleration against that of instability, with its trail' },
-    svg('rect', { class: 'frame', x: 40, y: 20, width: 250, height: 250 }),
-    svg('path', { class: 'frame', d: 'M165 20v250M40 145h250' }),
-    [['stable,', 46, 'start'], ['unstable,', 285, 'end']].flatMap(([word, x, anchor]) => [
-      corner(x, 34, word, anchor), corner(x, 47, 'accelerating', anchor), corner(x, 252, word, anchor), corner(x, 265, 'decelerating', anchor)]),
-    corner(165, 302, 'probability unstable (kappa > 0)', 'middle'),
-    svg('text', { x: 14, y: 145, 'text-anchor': 'middle', transform: 'rotate(-90 14 145)' }, 'probability accelerating (r > 0)'),
-    corner(40, 286, '0', 'middle'), corner(290, 286, '1', 'middle'), corner(34, 274, '0', 'end'), corner(34, 24, '1', 'end'),
-    points.length > 1 ? svg('polyline', { class: 'trail', points: points.map((point) => point.map((n) => n.toFixed(1)).join()).join(' ') }) : null,
-    last ? svg('circle', { class: 'here', cx: last[0], cy: last[1], r: 6 }) : null);
+/** Decades between the middle of the regime plane and its rim; nearer to the middle the scale is linear. */
+const PLANE_DECADES = 3;
+
+/** The most probable law of each forecast: to the right it is unstable, in the upper half it accelerates. */
+function plane(forecasts, newest) {
+  const hasLaw = (one) => one?.r_per_day != null && one.kappa_per_day != null;
+  const trail = forecasts.filter(hasLaw).slice(-120);
+  const known = hasLaw(newest) ? [...trail, newest] : trail;
+  if (known.length === 0) return svg('svg', { class: 'plane', viewBox: '0 0 340 40' }, svg('text', { x: 8, y: 24 }, 'No law was fitted yet.'));
+  const rim = (of) => 10 ** Math.ceil(Math.log10(Math.max(...known.map((one) => Math.abs(of(one))), 1e-9)));
+  const [right, top] = [rim((one) => one.kappa_per_day), rim((one) => one.r_per_day)];
+  const place = (value, most) => Math.sign(value) * Math.log10(1 + ((10 ** PLANE_DECADES - 1) * Math.abs(value)) / most) / PLANE_DECADES;
+  const x = (kappa) => 185 + 125 * place(kappa, right);
+  const y = (r) => 145 - 125 * place(r, top);
+  const at = (one) => [x(one.kappa_per_day), y(one.r_per_day), one.probability_unstable];
+  const points = trail.map(at);
+  const word = (left, at, text, anchor) => svg('text', { x: left, y: at, 'text-anchor': anchor }, text);
+  const ticks = (most) => [-1, -0.01, 0, 0.01, 1].map((part) => part * most);
+  const last = at(known[known.length - 1]);
+  return svg('svg', { class: 'plane', viewBox: '0 0 340 330', role: 'img', 'aria-label': 'r and kappa of the most probable law of each forecast, with their trail' },
+    svg('rect', { class: 'frame', x: 60, y: 20, width: 250, height: 250 }),
+    svg('path', { class: 'frame', d: 'M185 20v250M60 145h250' }),
+    [['stable,', 66, 'start'], ['unstable,', 304, 'end']].flatMap(([text, left, anchor]) => [
+      word(left, 34, text, anchor), word(left, 47, 'accelerating', anchor), word(left, 252, text, anchor), word(left, 265, 'decelerating', anchor)]),
+    ticks(right).map((kappa) => word(x(kappa), 284, figure(kappa), 'middle')),
+    ticks(top).map((r) => word(55, y(r) + 4, figure(r), 'end')),
+    word(185, 302, 'kappa, 1/day', 'middle'),
+    svg('text', { x: 12, y: 145, 'text-anchor': 'middle', transform: 'rotate(-90 12 145)' }, 'r, 1/day'),
+    word(185, 322, 'a fuller point: more probably unstable', 'middle'),
+    points.length > 1 ? svg('polyline', { class: 'trail', points: points.map(([left, at]) => `${left.toFixed(1)},${at.toFixed(1)}`).join(' ') }) : null,
+    points.map(([left, at, unstable]) => svg('circle', { class: 'past', cx: left.toFixed(1), cy: at.toFixed(1), r: 2.5, 'fill-opacity': (0.1 + 0.9 * unstable).toFixed(2) })),
+    svg('circle', { class: 'here', cx: last[0].toFixed(1), cy: last[1].toFixed(1), r: 6, 'fill-opacity': (0.1 + 0.9 * last[2]).toFixed(2) }));
 }
 
 /** What was found, and the forecast with and without it. */

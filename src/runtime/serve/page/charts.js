@@ -123,7 +123,7 @@ export class Charts {
       },
       scales: { x: { time: true, range: () => this.range() }, y: { range: (plot, min, max) => entry.chart.range(min, max, this) } },
       axes: [
-        { ...axis, size: chart.isLast ? 40 : 20, values: (plot, ticks, index, space, step) => ticks.map((tick) => (chart.isLast ? tickWord(tick, step) : '')) },
+        { ...axis, size: chart.isLast ? 40 : 20, space: 90, values: (plot, ticks, index, space, step) => ticks.map((tick) => (chart.isLast ? tickWord(tick, step) : '')) },
         { ...axis, size: AXIS, show: true, splits: chart.splits, values: chart.values, grid: chart.hasGrid === false ? { show: false } : axis.grid },
       ],
       series: [{}, ...chart.series(shades)],
@@ -256,7 +256,8 @@ function inverse(view) {
   const points = view.velocities.t.map((t, index) => [t, view.velocities.v[index]]).filter(([, v]) => v > 0).map(([t, v]) => [t, 1 / v]);
   const latest = view.latest;
   const fan = latest?.failure_time;
-  const from = points.length ? points[points.length - 1] : null;
+  // From the newest reading that it rests on, wherever the charts look.
+  const from = latest?.velocity_mm_per_day > 0 ? [seconds(latest.t_max), 1 / latest.velocity_mm_per_day] : null;
   // The slow velocities of the beginning would press the end flat.
   const late = points.slice(Math.floor(points.length / 2)).map(([, y]) => y);
   const top = 1.25 * Math.max(...(late.length ? late : [1]), view.line ? Math.min(view.line[0][1], 2 * Math.max(...late, 1e-9)) : 0);
