@@ -1,7 +1,7 @@
 //! What a small effect would change in every reading: the law linearised about its fitted motion.
 
 use super::problem::Problem;
-use super::term::{Act, Feedback, Scratch, Term, event_place, law, law_parameters};
+use super::term::{Act, Feedback, MotionBefore, Scratch, Term, event_place, law, law_parameters};
 use crate::model::Driven;
 use crate::reading::Quantity;
 
@@ -239,7 +239,11 @@ impl Linear {
                 let t = problem.nodes[node] - self.averaging;
                 let k = problem.nodes.partition_point(|n| *n <= t);
                 let early = match k.checked_sub(1) {
-                    None => velocity(0) * (t - problem.nodes[0]),
+                    None => {
+                        let before = MotionBefore::back_to(problem, &self.velocity, t);
+                        let growth = (ln_v[before.ahead] - ln_v[0]) / before.apart;
+                        velocity(0) * before.days + self.velocity[0] * before.by_growth * growth
+                    }
                     Some(j) if k < slip.len() => {
                         let share = (t - problem.nodes[j]) / (problem.nodes[k] - problem.nodes[j]);
                         slip[j] + share * (slip[k] - slip[j])

@@ -294,18 +294,42 @@ pub(super) fn event_place(problem: &Problem, (reading, share): (usize, f64)) -> 
     (node, (problem.nodes[node] - t).max(0.0))
 }
 
-/// The slip from the first node back to `t`, in days at the first node's velocity, below 0.
-fn time_before(problem: &Problem, driven: &Driven, t: f64) -> f64 {
-    let (first, v) = (problem.nodes[0], driven.velocity[0]);
-    let back = t - first;
-    let mirrored = problem.nodes.partition_point(|node| *node <= first - back);
-    let ahead = mirrored.clamp(1, problem.nodes.len() - 1);
-    let growth = (driven.velocity[ahead] / v).ln() / (problem.nodes[ahead] - first);
-    let exponent = growth * back;
-    if exponent.is_finite() && exponent.abs() > 1e-9 {
-        exponent.clamp(-MOST_BEFORE, MOST_BEFORE).exp_m1() / growth
-    } else {
-        back
+/// The motion before the first node: the velocity grows there as it does over as long a time after it.
+pub(super) struct MotionBefore {
+    /// The slip from the first node back, in days at that node's velocity, below 0.
+    pub(super) days: f64,
+    /// Its change by that of the growth, days squared.
+    pub(super) by_growth: f64,
+    /// The growth is that of ln v from the first node to this one, so many days after it.
+    pub(super) ahead: usize,
+    pub(super) apart: f64,
+}
+
+impl MotionBefore {
+    /// Back to `t`, by the velocities at the nodes.
+    pub(super) fn back_to(problem: &Problem, velocity: &[f64], t: f64) -> Self {
+        let first = problem.nodes[0];
+        let back = t - first;
+        let mirrored = problem.nodes.partition_point(|node| *node <= first - back);
+        let ahead = mirrored.clamp(1, problem.nodes.len() - 1);
+        let apart = problem.nodes[ahead] - first;
+        let growth = (velocity[ahead] / velocity[0]).ln() / apart;
+        let exponent = growth * back;
+        let (days, by_growth) = if !exponent.is_finite() || exponent.abs() < 1e-5 {
+            (back, 0.5 * back * back)
+        } else if exponent.abs() < MOST_BEFORE {
+            let days = exponent.exp_m1() / growth;
+            (days, (back * exponent.exp() - days) / growth)
+        } else {
+            let days = MOST_BEFORE.copysign(exponent).exp_m1() / growth;
+            (days, -days / growth)
+        };
+        Self {
+            days,
+            by_growth,
+            ahead,
+            apart,
+        }
     }
 }
 
@@ -314,7 +338,8 @@ fn time_before(problem: &Problem, driven: &Driven, t: f64) -> f64 {
 pub(super) fn slip_at(problem: &Problem, driven: &Driven, t: f64) -> f64 {
     let k = problem.nodes.partition_point(|node| *node <= t);
     let Some(before) = k.checked_sub(1) else {
-        return driven.slip[0] + driven.velocity[0] * time_before(problem, driven, t);
+        return driven.slip[0]
+            + driven.velocity[0] * MotionBefore::back_to(problem, &driven.velocity, t).days;
     };
     let (h, v) = (t - problem.nodes[before], driven.velocity[before]);
     let Some(&next) = problem.nodes.get(k) else {
