@@ -114,6 +114,37 @@ fn a_moment_is_shown_as_it_was_known_then() {
 }
 
 #[test]
+fn an_order_from_a_foreign_page_or_under_a_foreign_name_is_refused() {
+    let site = Site::start();
+    let body = json!({ "order": "acknowledge", "benchmark": "E3", "by": "Anna" }).to_string();
+    let port = site.port;
+    let order = |host: &str, origin: &str| {
+        let request = format!(
+            "POST /api/orders HTTP/1.1\r\nHost: {host}\r\n{origin}Authorization: Bearer {TOKEN}\r\n\
+             Content-Type: application/json\r\nContent-Length: {}\r\n\r\n{body}",
+            body.len()
+        );
+        send(&site, &request)
+    };
+    let own = format!("127.0.0.1:{port}");
+    for (host, origin) in [
+        (&*own, "Origin: http://evil.example\r\n".to_owned()),
+        (&*own, "Origin: null\r\n".to_owned()),
+        (&*own, format!("Origin: http://127.0.0.1:{}\r\n", port ^ 1)),
+        // A name that somebody else had lead to this machine, asked by the page under that name.
+        ("evil.example", "Origin: http://evil.example\r\n".to_owned()),
+        ("evil.example", String::new()),
+    ] {
+        let (status, _, said) = order(host, &origin);
+        assert_eq!(status, 403, "{host} {origin}: {said}");
+    }
+    assert_eq!(site.events("order").len(), 0);
+    let ours = format!("Origin: http://{own}\r\n");
+    assert_eq!(order(&own, &ours).0, 200);
+    assert_eq!(order(&format!("localhost:{port}"), "").0, 200);
+}
+
+#[test]
 fn an_order_needs_the_token_a_name_and_a_span_that_is_allowed() {
     let site = Site::start();
     let json_kind = "Content-Type: application/json\r\n";
@@ -131,7 +162,8 @@ fn an_order_needs_the_token_a_name_and_a_span_that_is_allowed() {
         json!({ "order": "shelve", "benchmark": "nobody", "by": "Anna", "seconds": 3600 }),
         json!({ "order": "silence", "by": "Anna" }),
         json!({ "order": "silence", "by": "Anna", "seconds": 8 * 86_400 }),
-        json!({ "order": "resolve", "by": "Anna" }),
+        json!({ "order": "resolve", "by": "Anna", "why": "wire cut" }),
+        json!({ "order": "resolve", "benchmark": "E3", "by": "Anna" }),
     ] {
         let (status, said) = order(&headers, &wrong);
         assert_eq!(status, 422, "{wrong}: {said}");

@@ -1,7 +1,6 @@
 //! The page behind the link in an alert's message: it shows the alert, and its button acknowledges it. Plain HTML, no script.
 
-use super::is_this_machine;
-use crate::config::Links;
+use super::caller::OwnNames;
 use crate::reading::Timestamp;
 use crate::runtime::link::AskedLink;
 use crate::runtime::view::{AlertLife, AlertView, LinkPage, LinkTarget, SiteReader};
@@ -9,7 +8,7 @@ use crate::store::StoreError;
 use axum::Router;
 use axum::extract::rejection::QueryRejection;
 use axum::extract::{Form, Query, Request, State};
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::http::{StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
@@ -23,38 +22,24 @@ const POLICY: &str =
     "default-src 'none'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'";
 
 /// The routes; none where messages have no links.
-pub(super) fn router(reader: Arc<SiteReader>) -> Router {
-    let Some(links) = reader.links().cloned() else {
+pub(super) fn router(reader: Arc<SiteReader>, names: Arc<OwnNames>) -> Router {
+    if reader.links().is_none() {
         return Router::new();
-    };
+    }
     Router::new()
         .route("/acknowledge", get(show).post(acknowledge))
         .with_state(reader)
-        .layer(from_fn_with_state(Arc::new(links), admit))
+        .layer(from_fn_with_state(names, admit))
 }
 
 /// Under our own names only, and no form of a foreign page.
-async fn admit(State(links): State<Arc<Links>>, request: Request, next: Next) -> Response {
-    if is_ours(&links, request.headers()) {
+async fn admit(State(names): State<Arc<OwnNames>>, request: Request, next: Next) -> Response {
+    let headers = request.headers();
+    if names.is_our_host(headers) && names.is_our_page(headers) {
         next.run(request).await
     } else {
         (StatusCode::FORBIDDEN, "ask under the address of the link\n").into_response()
     }
-}
-
-fn is_ours(links: &Links, headers: &HeaderMap) -> bool {
-    let text = |name| {
-        headers
-            .get(name)
-            .map(|value| value.to_str().unwrap_or_default())
-    };
-    let host = text(header::HOST).unwrap_or("localhost");
-    let is_our_host = is_this_machine(host) || host.eq_ignore_ascii_case(links.authority());
-    let is_our_page = text(header::ORIGIN).is_none_or(|origin| {
-        let (_, name) = origin.split_once("://").unwrap_or_default();
-        origin.eq_ignore_ascii_case(&links.origin()) || name == host && is_this_machine(host)
-    });
-    is_our_host && is_our_page
 }
 
 /// What was cut short on the way is no link either.

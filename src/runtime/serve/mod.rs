@@ -1,6 +1,7 @@
 //! Answers over HTTP: whether the daemon lives and is ready, its metrics, its status, its events, its page.
 
 mod acknowledge;
+mod caller;
 mod connections;
 mod metrics;
 mod page;
@@ -136,17 +137,4 @@ impl Server {
             tracing::error!(%error, "the server broke off");
         }
     }
-}
-
-/// Whether a host, with its port or without, is a name of the machine itself.
-fn is_this_machine(host: &str) -> bool {
-    let name = host.rsplit_once(':').map_or(
-        host,
-        |(name, port)| {
-            if port.ends_with(']') { host } else { name }
-        },
-    );
-    let bare = name.trim_start_matches('[').trim_end_matches(']');
-    let is_loopback = |ip: std::net::IpAddr| ip.is_loopback();
-    bare.eq_ignore_ascii_case("localhost") || bare.parse().is_ok_and(is_loopback)
 }

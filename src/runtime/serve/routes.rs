@@ -1,10 +1,11 @@
 //! What is answered to which request, and to whom.
 
-use super::{ListenOptions, ServedState, acknowledge, is_this_machine, metrics, page, views};
+use super::caller::{OwnNames, is_this_machine};
+use super::{ListenOptions, ServedState, acknowledge, metrics, page, views};
 use crate::config::Token;
 use crate::runtime::vitals::{Health, Vitals, VitalsPoint};
 use axum::extract::{DefaultBodyLimit, Query, Request, State};
-use axum::http::{HeaderValue, StatusCode, header};
+use axum::http::{HeaderValue, Method, StatusCode, header};
 use axum::middleware::{Next, from_fn, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
@@ -81,33 +82,53 @@ pub(super) fn router(options: ListenOptions, vitals: Arc<Vitals>, served: Served
     let mut open = Router::new()
         .route("/healthz", get(healthy))
         .with_state((vitals, options.limits.turn_time));
+    let links = (served.reader.as_ref()).and_then(|reader| reader.links().cloned());
+    let names = Arc::new(OwnNames::new(links));
     if let Some(reader) = served.reader {
-        open = open.merge(acknowledge::router(Arc::clone(&reader)));
+        open = open.merge(acknowledge::router(Arc::clone(&reader), Arc::clone(&names)));
         guarded = guarded.merge(views::router(reader));
         open = open.merge(page::router());
     }
     guarded
         .fallback(|| async { (StatusCode::NOT_FOUND, "no such page\n") })
-        .layer(from_fn_with_state(options.token.map(Arc::new), admit))
+        .layer(from_fn_with_state(
+            (options.token.map(Arc::new), names),
+            admit,
+        ))
         .merge(open)
         .layer(DefaultBodyLimit::max(LONGEST_BODY))
         .layer(from_fn(refuse_long_bodies))
 }
 
-async fn admit(State(token): State<Option<Arc<Token>>>, request: Request, next: Next) -> Response {
+/// Who may ask: the token, where there is one, and who may know it.
+type Admission = (Option<Arc<Token>>, Arc<OwnNames>);
+
+/// A caller without the token, a page of another site, and an order under a name that is not ours are refused.
+async fn admit(State((token, names)): State<Admission>, request: Request, next: Next) -> Response {
+    let headers = request.headers();
     let is_admitted = match &token {
         Some(token) => bearer(&request).is_some_and(|given| token.is(given)),
         None => is_named_as_this_machine(&request),
     };
-    match (is_admitted, token) {
-        (true, _) => next.run(request).await,
-        (false, Some(_)) => {
-            let challenge = [(header::WWW_AUTHENTICATE, "Bearer")];
-            (StatusCode::UNAUTHORIZED, challenge, "a token is needed\n").into_response()
-        }
-        (false, None) => (StatusCode::FORBIDDEN, "ask for localhost\n").into_response(),
+    if !is_admitted && token.is_none() {
+        return (StatusCode::FORBIDDEN, "ask for localhost\n").into_response();
     }
+    if !is_admitted {
+        let challenge = [(header::WWW_AUTHENTICATE, "Bearer")];
+        return (StatusCode::UNAUTHORIZED, challenge, "a token is needed\n").into_response();
+    }
+    if !names.is_our_page(headers) {
+        return (StatusCode::FORBIDDEN, FOREIGN_PAGE).into_response();
+    }
+    if request.method() != Method::GET && !names.is_our_host(headers) {
+        return (StatusCode::FORBIDDEN, FOREIGN_HOST).into_response();
+    }
+    next.run(request).await
 }
+
+const FOREIGN_PAGE: &str = "a page of another site asks (Origin): only the daemon's own page may\n";
+const FOREIGN_HOST: &str =
+    "an order is taken under this machine's name or address, or that of site.public_url (Host)\n";
 
 fn bearer(request: &Request) -> Option<&[u8]> {
     let value = request.headers().get(header::AUTHORIZATION)?.as_bytes();
