@@ -32,7 +32,14 @@ impl Silence {
         if let Some(newest) = self.newest
             && time > newest
         {
-            self.spacings.push_back(time.duration_since(newest));
+            // A silence says little of the usual spacing: after one of months the next would be reported months late. Where
+            // the benchmark is read more seldom from now on, a few readings are enough to learn it.
+            let spacing = time.duration_since(newest);
+            let most = self
+                .allowed()
+                .and_then(|allowed| allowed.checked_mul(MAY_SKIP));
+            let most = most.filter(|_| self.silent).unwrap_or(spacing);
+            self.spacings.push_back(spacing.min(most));
             if self.spacings.len() > REMEMBERED {
                 self.spacings.pop_front();
             }
@@ -99,6 +106,11 @@ impl Silence {
     }
 
     fn due(&self) -> Option<Timestamp> {
+        self.newest?.checked_add(self.allowed()?).ok()
+    }
+
+    /// For how long it may be silent.
+    fn allowed(&self) -> Option<SignedDuration> {
         let longest = self.spacings.iter().max().copied();
         let allowed = match longest {
             None => FIRST,
@@ -107,7 +119,7 @@ impl Silence {
             // The longest gap seen lately is no silence either.
             Some(longest) => self.median()?.checked_mul(MAY_SKIP)?.max(longest),
         };
-        self.newest?.checked_add(allowed.max(LEAST)).ok()
+        Some(allowed.max(LEAST))
     }
 
     /// Ends the silence that there is; the reading before which it began.

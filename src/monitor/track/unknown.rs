@@ -51,6 +51,9 @@ impl Reason {
 pub(super) struct Unknown {
     reasons: BTreeSet<Reason>,
     since: Option<Timestamp>,
+    /// When the one before began, which has ended.
+    #[serde(default)]
+    before: Option<Timestamp>,
 }
 
 impl Unknown {
@@ -82,6 +85,9 @@ impl Track {
         if !is_first {
             return None;
         }
+        // A sensor that is found stuck at the reading after which it was silent is another alert than the silence.
+        let is_other = self.unknown.before.is_none_or(|before| since > before);
+        let since = if is_other { since } else { now };
         self.unknown.since = Some(since);
         Some(self.unknown_alert((now, since), AlertState::Firing, reason, text))
     }
@@ -99,6 +105,7 @@ impl Track {
             return None;
         }
         let since = self.unknown.since.take().unwrap_or(since);
+        self.unknown.before = Some(since);
         Some(self.unknown_alert((now, since), AlertState::Resolved, reason, text))
     }
 
@@ -108,6 +115,7 @@ impl Track {
         let reason = self.unknown.reasons.first().copied();
         self.unknown.reasons.clear();
         let since = self.unknown.since.take().or(silent)?;
+        self.unknown.before = Some(since);
         let reason = reason.unwrap_or(Reason::NoData);
         Some(self.unknown_alert((now, since), AlertState::Resolved, reason, text.to_owned()))
     }
