@@ -2,6 +2,7 @@
 
 use super::evidence::{AlertCause, AlertEvidence};
 use super::level::Level;
+use crate::reading::SECONDS_PER_DAY;
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
 
@@ -57,6 +58,11 @@ pub enum Condition {
         /// From the newest reading; the time until the next one is added.
         within: SignedDuration,
     },
+    /// The 5 % quantile of the time of collapse, as `failure_time.low` reports it, comes within this time of the newest reading.
+    EarlyQuantile {
+        /// From the newest reading.
+        within: SignedDuration,
+    },
     /// Something that calls for attention has happened.
     Happened(AlertCause),
     /// The newest search has found an effect that the law lacked; by itself that calls no level.
@@ -76,6 +82,12 @@ impl Condition {
                 steady_mm_per_day,
             } => figure(tangent_angle(evidence, steady_mm_per_day), degrees),
             Self::Chance { at_least, within } => figure(evidence.chance_within(within), at_least),
+            // Beyond the horizon is a judgement too, where there is a forecast.
+            Self::EarlyQuantile { within } => {
+                let is_near = |days: f64| days * SECONDS_PER_DAY <= within.as_secs_f64();
+                evidence.chance_within_outlook?;
+                Some(evidence.early_quantile_days.is_some_and(is_near))
+            }
             Self::Happened(cause) if evidence.causes.contains(&cause) => Some(true),
             // Between two refits nothing is known of causes.
             Self::Happened(_) => evidence.chance_within_outlook.map(|_| false),
@@ -115,6 +127,10 @@ impl Condition {
             Self::Chance { at_least, within } => format!(
                 "chance of collapse of {at_least} or more within {within:#} and until the next reading{}",
                 shown(evidence.and_then(|one| one.chance_within(within)), "")
+            ),
+            Self::EarlyQuantile { within } => format!(
+                "5 % quantile of the time of collapse within {within:#}{}",
+                shown(of(|one| one.early_quantile_days), " days")
             ),
             Self::Happened(cause) => cause.words().to_owned(),
             Self::EffectFound => "an effect that the law lacked has been found".to_owned(),

@@ -25,6 +25,9 @@ pub struct AlertEvidence {
     pub causes: Vec<AlertCause>,
     /// Whether the newest search has found an effect that the law lacked.
     pub has_effect: bool,
+    /// Days from the newest reading to the 5 % quantile of the time of collapse; `None` where it lies beyond the horizon, or
+    /// without a forecast.
+    pub early_quantile_days: Option<f64>,
     /// Chances of a collapse within other spans, that declared rules ask for.
     pub chances: Vec<(SignedDuration, f64)>,
     /// Declared rules whose conditions have held for long enough, by their place in the policy.

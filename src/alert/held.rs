@@ -24,6 +24,7 @@ impl Policy {
             | Condition::Acceleration(_)
             | Condition::Displacement(_)
             | Condition::TangentAngle { .. }
+            | Condition::EarlyQuantile { .. }
             | Condition::Happened(_)
             | Condition::EffectFound => None,
         })
@@ -42,6 +43,7 @@ impl Policy {
                 | Condition::TangentAngle { .. } => true,
                 Condition::Displacement(_)
                 | Condition::Chance { .. }
+                | Condition::EarlyQuantile { .. }
                 | Condition::Happened(_)
                 | Condition::EffectFound => false,
             })
@@ -56,6 +58,15 @@ impl Held {
     /// Whether nothing holds.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
+    }
+
+    /// The rules whose conditions hold, and have not held for long enough yet.
+    pub fn pending(&self, policy: &Policy, evidence: &AlertEvidence) -> Vec<String> {
+        let is_pending = |(index, rule): &(usize, &DeclaredRule)| {
+            self.0.contains_key(&rule.name) && !evidence.due.contains(index)
+        };
+        let rules = policy.rules.iter().enumerate().filter(is_pending);
+        rules.map(|(_, rule)| rule.id()).collect()
     }
 
     /// Takes the evidence of one reading and notes in it which rules have held for long enough.

@@ -139,6 +139,14 @@ impl Latch {
         }
     }
 
+    /// Ends the level in force at `now`, without evidence: people say that it is over.
+    pub fn resolve(&mut self, now: Timestamp) {
+        *self = Self {
+            since: self.since.max(Some(now)),
+            ..Self::default()
+        };
+    }
+
     /// Takes evidence without a forecast, by which the level may rise and nothing else.
     pub fn raise(&mut self, policy: &Policy, evidence: &AlertEvidence) -> Option<Transition> {
         let call = policy.call(evidence);
@@ -175,11 +183,19 @@ impl Latch {
     }
 
     fn enter(&mut self, evidence: &AlertEvidence, call: &Call) -> Transition {
+        // What has ended may be called again by what was measured before, or by a correction: as another alert.
+        let since = match (self.level, self.since) {
+            (Level::Green, Some(ended)) if ended >= evidence.now => ended
+                .checked_add(SignedDuration::from_secs(1))
+                .unwrap_or(ended),
+            _ => evidence.now,
+        };
         self.begin(evidence, call.level);
+        self.since = Some(since);
         Transition {
             level: call.level,
             entered: Entered::Yes,
-            since: evidence.now,
+            since,
             rule: call.rule.clone(),
         }
     }

@@ -6,8 +6,9 @@ use super::state::SiteArgs;
 use super::table::TextTable;
 use super::text;
 use crate::alert::Level;
-use crate::monitor::{Event, EventKind, SUSPECT, SUSPECT_ENDS};
+use crate::monitor::{CalledLevel, Event, EventKind, SUSPECT, SUSPECT_ENDS};
 use crate::reading::{BenchmarkId, Timestamp};
+use crate::runtime::alarm_state::{AlarmState, Alarms};
 use crate::runtime::clock;
 use crate::runtime::drilled::DrillRecord;
 use crate::runtime::preview::{Preview, preview};
@@ -50,6 +51,8 @@ pub(super) struct StatusStanding {
     benchmark: BenchmarkId,
     /// The level in force.
     level: Level,
+    /// How its alarm stands, by the names of ISA-18.2.
+    alarm_state: AlarmState,
     /// Since when.
     since: Option<Timestamp>,
     /// Since when nothing can be said of it: no data, a sensor fault.
@@ -66,6 +69,8 @@ pub(super) struct StatusStanding {
     failure_time: Option<Timestamp>,
     /// The chance of collapse within the evacuation time then.
     chance_within_evacuation_time: Option<f64>,
+    /// The level that the newest forecast calls for, and the chances that levels are called by.
+    called: Option<CalledLevel>,
     /// Why it is at its level.
     reason: Option<String>,
     /// Why nothing can be said of it.
@@ -95,6 +100,8 @@ pub(super) struct SiteStatus {
     alerts: Vec<Event>,
     /// Acknowledgements of them.
     acknowledged: Vec<Event>,
+    /// The alerts that have ended and that nobody has acknowledged, the newest of each place.
+    returned: Vec<Event>,
     /// The orders by which no hook is run.
     silences: Vec<Event>,
     /// Alerts in force that a hook did not take and will not: it is not in the config any more.
@@ -144,6 +151,7 @@ fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
         }
     }
     let suspicions = suspicions(&store)?;
+    let alarms = Alarms::read(&store, None, clock::now())?;
     let mut newest: BTreeMap<BenchmarkId, Option<Timestamp>> = BTreeMap::new();
     newest.extend(config.benchmarks.iter().map(|one| (one.id.clone(), None)));
     let read = store.benchmarks()?.into_iter();
@@ -159,12 +167,16 @@ fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
             velocity_mm_per_day: None,
             failure_time: None,
             chance_within_evacuation_time: None,
+            called: None,
+            alarm_state: AlarmState::Normal,
             reason: None,
             unknown_reason: None,
             suspicions: suspicions.get(&benchmark).cloned().unwrap_or_default(),
             benchmark,
         };
-        stands(standing, &levels, &refits)
+        let mut standing = stands(standing, &levels, &refits);
+        standing.alarm_state = alarms.state(Some(&standing.benchmark), standing.called.as_ref());
+        standing
     });
     let preview = args.sources.then(|| preview(&config));
     let drill = config
@@ -181,6 +193,7 @@ fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
         site_unknown_since: levels.get(&(None, Level::Unknown)).map(|event| event.time),
         is_running: Store::is_held(&config.site.state_dir),
         acknowledged: acknowledged(&orders, &levels),
+        returned: alarms.returned().into_iter().cloned().collect(),
         silences: silences(&orders, clock::now()),
         closed: closed(&store, &levels)?,
         quarantined: store.quarantined()?,
@@ -194,6 +207,16 @@ fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
         preview,
     };
     Ok((status, zone))
+}
+
+impl StatusStanding {
+    /// The chance that red is called by; in states of older versions that within the evacuation time.
+    fn chance(&self) -> Option<f64> {
+        let called = self.called.as_ref();
+        called.map_or(self.chance_within_evacuation_time, |called| {
+            Some(called.red.chance)
+        })
+    }
 }
 
 fn stands(
@@ -223,6 +246,7 @@ fn stands(
         failure_time,
         velocity_mm_per_day,
         chance_within_evacuation_time,
+        called,
         ..
     }) = refits.get(&standing.benchmark)
     {
@@ -230,6 +254,7 @@ fn stands(
         standing.velocity_mm_per_day = *velocity_mm_per_day;
         standing.failure_time = failure_time.median;
         standing.chance_within_evacuation_time = Some(*chance_within_evacuation_time);
+        standing.called = called.as_deref().cloned();
     }
     standing
 }
@@ -282,7 +307,7 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
             one.newest_reading.map_or_else(dash, clock),
             velocity.map_or_else(dash, |velocity| format!("{velocity:.3}")),
             one.failure_time.map_or_else(dash, day),
-            chance(one.chance_within_evacuation_time),
+            chance(one.chance()),
         ]);
     }
     let lines = |events: &[Event]| -> String {
@@ -310,13 +335,18 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
     let suspicions: String = suspicions
         .map(|one| text::local(&text::plain(one), zone) + "\n")
         .collect();
+    let returned = match &status.returned[..] {
+        [] => String::new(),
+        alerts => format!("\nended, and acknowledged by nobody:\n{}", lines(alerts)),
+    };
     let force = match &status.alerts[..] {
         [] => String::new(),
         alerts => format!("\nin force:\n{}", lines(alerts)),
     };
     format!(
         "{dead}{}: {} inputs taken, {} alerts wait for a hook\n{}{}{}{}{}{refused}{suspicions}\n{table}\
-         collapse: median of the forecast; chance: of collapse within the evacuation time\n{force}",
+         collapse: median of the forecast; chance: of collapse within the evacuation time\nand until the next reading is \
+         due, which red is called by\n{force}{returned}",
         text::plain(&status.site),
         status.steps,
         status.alerts_waiting,

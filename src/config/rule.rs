@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 
 /// What a condition looks like.
 const EXAMPLES: &str = "write \"velocity 20 mm/day\", \"acceleration 5 mm/day/day\", \"displacement 500 mm\", \
-                        \"chance 0.2 within 12h\" or \"tangent-angle 80 deg for 5 mm/day\" (the velocity of uniform creep)";
+                        \"chance 0.2 within 12h\", \"early-quantile within 7d\" or \"tangent-angle 80 deg for 5 mm/day\" (the velocity of uniform creep)";
 /// Longest name.
 const LONGEST_NAME: usize = 60;
 
@@ -100,6 +100,7 @@ fn parsed(text: &str) -> Result<Condition, String> {
         "acceleration" => value::acceleration(figure).map(Condition::Acceleration),
         "displacement" => value::length(figure).map(Condition::Displacement),
         "chance" => chance(figure),
+        "early-quantile" => early_quantile(figure),
         "tangent-angle" => tangent_angle(figure),
         "effect-found" if figure.is_empty() => Ok(Condition::EffectFound),
         cause if figure.is_empty() => match AlertCause::named(cause) {
@@ -126,6 +127,15 @@ fn chance(figure: &str) -> Result<Condition, String> {
     } else {
         Err(fix())
     }
+}
+
+fn early_quantile(figure: &str) -> Result<Condition, String> {
+    let fix = || {
+        "write a time within which the 5 % quantile of the time of collapse comes: \"early-quantile within 7d\"".to_owned()
+    };
+    let within = figure.strip_prefix("within ").ok_or_else(fix)?;
+    let within = value::duration(within.trim()).map_err(|_| fix())?;
+    Ok(Condition::EarlyQuantile { within })
 }
 
 fn tangent_angle(figure: &str) -> Result<Condition, String> {
@@ -172,6 +182,12 @@ mod tests {
                     steady_mm_per_day: 5.0,
                 },
             ),
+            (
+                "early-quantile within 7d",
+                Condition::EarlyQuantile {
+                    within: hours(7 * 24),
+                },
+            ),
             ("regime-flip", Condition::Happened(AlertCause::RegimeFlip)),
             ("effect-found", Condition::EffectFound),
         ] {
@@ -183,6 +199,7 @@ mod tests {
             ("speed 20 mm/day", "velocity 20 mm/day"),
             ("chance 1.2 within 12h", "up to 1"),
             ("chance 0.2", "within 12h"),
+            ("early-quantile 7d", "within 7d"),
             ("tangent-angle 90 deg for 5 mm/day", "between 0 and 90"),
             ("tangent-angle 80 deg", "uniform creep"),
             ("rain", "unexplained-residual"),

@@ -48,6 +48,9 @@ impl Declaration {
     }
 }
 
+/// A reset that is declared so near to one that was found is the same.
+const NEAR: SignedDuration = SignedDuration::from_hours(48);
+
 /// What is declared for one benchmark.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Declarations {
@@ -56,6 +59,9 @@ pub(super) struct Declarations {
     /// Those that have taken effect, and were reported.
     #[serde(rename = "told")]
     reported: Vec<Declared>,
+    /// Resets that the readings show and nobody has declared: when, and by what the readings jump, mm.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    found: Vec<(Timestamp, f64)>,
 }
 
 impl Declarations {
@@ -70,7 +76,13 @@ impl Declarations {
         Self {
             all,
             reported: Vec::new(),
+            found: Vec::new(),
         }
+    }
+
+    /// Takes a reset that the readings show: as of one that is declared, what they jump by is no motion.
+    pub(super) fn find_reset(&mut self, time: Timestamp, jump: f64) {
+        self.found.push((time, jump));
     }
 
     /// Takes these instead; `None` where they are the same.
@@ -79,16 +91,27 @@ impl Declarations {
             return None;
         }
         self.all = by.all;
+        let is_declared = |time: Timestamp| {
+            let mut resets = self.all.iter();
+            resets.any(|one| {
+                let before = time.duration_since(one.time);
+                matches!(one.kind, Declaration::Reset { .. }) && (-NEAR..=NEAR).contains(&before)
+            })
+        };
+        // What was found, and is declared now, is taken off once.
+        self.found.retain(|(time, _)| !is_declared(*time));
         self.reported.retain(|one| self.all.contains(one));
         Some(())
     }
 
     /// The resets, by time, with what the readings jump by where that is declared.
     pub(super) fn resets(&self) -> impl Iterator<Item = (Timestamp, Option<f64>)> {
-        self.all.iter().filter_map(|one| match one.kind {
+        let declared = self.all.iter().filter_map(|one| match one.kind {
             Declaration::Reset { size_mm } => Some((one.time, size_mm)),
             Declaration::Maintenance { .. } | Declaration::Blast => None,
-        })
+        });
+        let found = self.found.iter();
+        declared.chain(found.map(|(time, jump)| (*time, Some(*jump))))
     }
 
     fn windows(&self) -> impl Iterator<Item = (Timestamp, Timestamp)> {

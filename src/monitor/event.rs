@@ -51,6 +51,10 @@ pub enum EventKind {
         chance_within_evacuation_time: f64,
         /// Chance of failure within the outlook.
         chance_within_outlook: f64,
+        /// The level that this forecast calls for, and the chances that the levels are called by. Absent in states of older
+        /// versions.
+        #[serde(skip_serializing_if = "Option::is_none", default)]
+        called: Option<Box<CalledLevel>>,
         /// What the law under a constant load says by itself, where an effect is adopted.
         #[serde(skip_serializing_if = "Option::is_none", default)]
         plain: Option<Box<Plain>>,
@@ -266,6 +270,36 @@ pub enum Unexplained {
         /// From when it stands out.
         since: Timestamp,
     },
+}
+
+/// The level that one forecast calls for, before any level in force is held.
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize, Deserialize)]
+pub struct CalledLevel {
+    /// The level. One in force that is higher is held until the slope slows down.
+    pub level: Level,
+    /// The rule that calls it; `quiet` where none does.
+    pub rule: String,
+    /// The site's own rules whose conditions hold, and have not held for long enough yet.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub pending: Vec<String>,
+    /// What red is called by.
+    pub red: LevelChance,
+    /// What orange is called by.
+    pub orange: LevelChance,
+    /// What yellow is called by.
+    pub yellow: LevelChance,
+}
+
+/// The chance of collapse that a level is called by.
+#[derive(Debug, Clone, Copy, PartialEq, JsonSchema, Serialize, Deserialize)]
+pub struct LevelChance {
+    /// The chance.
+    pub chance: f64,
+    /// Within how many hours of the newest reading: for red the evacuation time and the time until the next reading, for
+    /// orange and yellow the outlook, or five times the record's length where that is shorter.
+    pub within_hours: f64,
+    /// From which chance on the level is called.
+    pub at_least: f64,
 }
 
 /// The forecast of the law under a constant load, beside that of the law under the known load.

@@ -54,6 +54,8 @@ pub enum OrderKind {
     Shelve,
     /// Nothing is reported for a time.
     Silence,
+    /// The level in force is over.
+    Resolve,
     /// All is reported again.
     Unsilence,
 }
@@ -65,6 +67,7 @@ impl OrderKind {
             Self::Acknowledge => "acknowledge",
             Self::Shelve => "shelve",
             Self::Silence => "silence",
+            Self::Resolve => "resolve",
             Self::Unsilence => "unsilence",
         }
     }

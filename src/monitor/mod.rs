@@ -6,6 +6,7 @@ mod covariates;
 mod declared;
 mod drift;
 mod event;
+mod fallen;
 mod given;
 mod history;
 mod kept;
@@ -29,8 +30,8 @@ mod undeclared;
 pub use course::{LevelStretch, levels_in};
 pub use declared::{Declaration, Declared};
 pub use event::{
-    AlertState, Event, EventKind, FailureTime, InverseVelocity, Plain, RegimeReport, SUSPECT,
-    SUSPECT_ENDS, SharedFailure, Summary, Unexplained,
+    AlertState, CalledLevel, Event, EventKind, FailureTime, InverseVelocity, LevelChance, Plain,
+    RegimeReport, SUSPECT, SUSPECT_ENDS, SharedFailure, Summary, Unexplained,
 };
 pub use given::{Given, OrderKind, OrderedBy};
 pub use measured::Measured;
@@ -272,7 +273,7 @@ impl Monitor {
                 Vec::new()
             }
             Input::Settings(settings) => self.change_settings(now, settings),
-            Input::Order(order) => vec![order.event(now)],
+            Input::Order(order) => self.take_order(now, order),
             Input::Trouble { kind, text } => vec![trouble(now, kind, text)],
             Input::Tick => self.pass(now),
         };

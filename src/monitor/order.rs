@@ -1,5 +1,6 @@
 //! What people order of the monitor: it keeps them as it keeps readings, so that a replay has them too.
 
+use super::Monitor;
 use super::event::{Event, EventKind};
 use super::given::{Given, OrderKind};
 use crate::reading::{BenchmarkId, Timestamp};
@@ -7,7 +8,7 @@ use jiff::SignedDuration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// An order from people. It changes who is notified, never what is found.
+/// An order from people. It changes who is notified and may end a level, never what is found.
 #[derive(Debug, Clone, PartialEq, Eq, JsonSchema, Serialize, Deserialize)]
 #[serde(tag = "order", rename_all = "kebab-case")]
 pub enum Order {
@@ -42,6 +43,14 @@ pub enum Order {
         #[serde(flatten)]
         given: Given,
     },
+    /// The level in force ends, because people know that it is over. The next reading that calls for it calls it again.
+    Resolve {
+        /// Where; `None`: everywhere.
+        benchmark: Option<BenchmarkId>,
+        /// Who, why, by which way.
+        #[serde(flatten)]
+        given: Given,
+    },
     /// What was shelved or silenced is reported again from now on.
     Unsilence {
         /// Where; `None`: everywhere.
@@ -64,11 +73,15 @@ impl Order {
             Self::Acknowledge { given, .. } => (OrderKind::Acknowledge, None, given),
             Self::Shelve { until, given, .. } => (OrderKind::Shelve, Some(*until), given),
             Self::Silence { until, given, .. } => (OrderKind::Silence, Some(*until), given),
+            Self::Resolve { given, .. } => (OrderKind::Resolve, None, given),
             Self::Unsilence { given, .. } => (OrderKind::Unsilence, None, given),
         };
         let alert = match self {
             Self::Acknowledge { alert, .. } => alert.clone(),
-            Self::Shelve { .. } | Self::Silence { .. } | Self::Unsilence { .. } => None,
+            Self::Shelve { .. }
+            | Self::Silence { .. }
+            | Self::Resolve { .. }
+            | Self::Unsilence { .. } => None,
         };
         Event {
             time,
@@ -87,8 +100,35 @@ impl Order {
         match self {
             Self::Acknowledge { benchmark, .. }
             | Self::Silence { benchmark, .. }
+            | Self::Resolve { benchmark, .. }
             | Self::Unsilence { benchmark, .. } => benchmark.as_ref(),
             Self::Shelve { benchmark, .. } => Some(benchmark),
         }
+    }
+}
+
+impl Monitor {
+    /// Takes an order at `now`: that it was given, and what ends by it.
+    pub(super) fn take_order(&mut self, now: Timestamp, order: &Order) -> Vec<Event> {
+        let mut events = vec![order.event(now)];
+        let Order::Resolve { benchmark, given } = order else {
+            return events;
+        };
+        let mut deadlines = Vec::new();
+        for (id, track) in &mut self.tracks {
+            if benchmark.as_ref().is_some_and(|only| only != id) {
+                continue;
+            }
+            let before = track.deadline();
+            if let Some(event) = track.resolve(now, given) {
+                events.push(event);
+                deadlines.push(((before, track.deadline()), id.clone()));
+            }
+        }
+        for (deadlines, id) in deadlines {
+            self.changed.insert(id.clone());
+            self.expect(deadlines, id);
+        }
+        events
     }
 }

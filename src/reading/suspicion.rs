@@ -180,9 +180,14 @@ fn span(readings: &[(Timestamp, f64)]) -> Option<(f64, f64)> {
     })
 }
 
-/// The usual step from one reading to the next, and how steps scatter; `None` where they do not.
 fn scatter(readings: &[(Timestamp, f64)]) -> Option<(f64, f64)> {
     let steps: Vec<f64> = steps(readings).map(|(.., step)| step).collect();
+    scatter_of(&steps)
+}
+
+/// The usual step from one reading to the next, and how steps scatter about it, no less than the usual size of one;
+/// `None` where they do not.
+pub fn scatter_of(steps: &[f64]) -> Option<(f64, f64)> {
     let usual = median(steps.iter().copied())?;
     let scatter = 1.4826 * median(steps.iter().map(|step| (step - usual).abs()))?;
     let scatter = scatter.max(median(steps.iter().map(|step| step.abs()))?);

@@ -1,5 +1,6 @@
 //! The thin shell around the monitor: clock, files, signals, hooks.
 
+pub mod alarm_state;
 mod alertmanager;
 mod archive;
 mod beside;

@@ -22,7 +22,10 @@ pub fn in_force(store: &Store, until: Option<Timestamp>) -> Result<InForce, Stor
         if until.is_some_and(|until| event.time > until) {
             continue;
         }
-        let EventKind::Alert { level, state, .. } = &event.kind else {
+        let EventKind::Alert {
+            level, state, key, ..
+        } = &event.kind
+        else {
             continue;
         };
         let (level, state, place) = (*level, *state, event.benchmark.clone());
@@ -34,7 +37,11 @@ pub fn in_force(store: &Store, until: Option<Timestamp>) -> Result<InForce, Stor
                 standing.insert((place, level), event);
             }
             AlertState::Resolved => {
-                standing.remove(&(place, level));
+                // One that was called by readings from before its predecessor was resolved stands before that in time.
+                let is_of = |standing: &Event| matches!(&standing.kind, EventKind::Alert { key: own, .. } if own == key);
+                if standing.get(&(place.clone(), level)).is_some_and(is_of) {
+                    standing.remove(&(place, level));
+                }
             }
         }
     }

@@ -1,7 +1,10 @@
 //! What the state keeps over the years, and how large it becomes.
 
 use jiff::{SignedDuration, Timestamp};
-use slipwatch::monitor::{Event, EventKind, FailureTime, Input, InverseVelocity, RegimeReport};
+use slipwatch::alert::Level;
+use slipwatch::monitor::{
+    CalledLevel, Event, EventKind, FailureTime, Input, InverseVelocity, LevelChance, RegimeReport,
+};
 use slipwatch::reading::{BenchmarkId, Reading, Unit};
 use slipwatch::regime::Regime;
 use slipwatch::store::{Batch, Delivery, DeliveryOutcome, Store, StoreError};
@@ -27,6 +30,14 @@ fn fault() -> EventKind {
     EventKind::Fault {
         kind: "stuck".to_owned(),
         text: "24 readings in a row are the same".to_owned(),
+    }
+}
+
+fn level_chance() -> LevelChance {
+    LevelChance {
+        chance: 0.123_456_789_012_345_6,
+        within_hours: 24.123_456_789_012_345,
+        at_least: 0.05,
     }
 }
 
@@ -69,6 +80,14 @@ fn refit(time: Timestamp) -> EventKind {
         velocity_mm_per_day: Some(0.123_456_789_012_345_6),
         chance_within_evacuation_time: 0.123_456_789_012_345_6,
         chance_within_outlook: 0.123_456_789_012_345_6,
+        called: Some(Box::new(CalledLevel {
+            level: Level::Yellow,
+            rule: "chance-within-outlook".to_owned(),
+            pending: Vec::new(),
+            red: level_chance(),
+            orange: level_chance(),
+            yellow: level_chance(),
+        })),
         plain: None,
     }
 }

@@ -213,3 +213,78 @@ fn a_child_that_leaves_its_hooks_group_does_not_outlive_the_attempt() {
         let _ = std::process::Command::new("kill").arg(child).status();
     }
 }
+
+#[test]
+fn what_people_resolve_ends_and_the_next_reading_that_calls_for_it_calls_it_again() {
+    let site = Site::new(POLICY);
+    site.append(
+        "incoming/5.csv",
+        &format!("time,displacement_mm\n{}", failing(0..8)),
+    );
+    let alerts = |words: &[&str]| {
+        let all = [&["alerts"], words, &["--config", "site.toml"]].concat();
+        site.ask(&all)
+    };
+    let said = |output: &std::process::Output| {
+        String::from_utf8_lossy(&[&output.stdout[..], &output.stderr[..]].concat()).into_owned()
+    };
+    let program = site.caught_up();
+    let nothing = alerts(&["ack", "--by", "Ada"]);
+    assert_eq!(nothing.status.code(), Some(1), "{}", said(&nothing));
+    assert!(said(&nothing).contains("there is nothing to acknowledge"));
+    site.append("incoming/5.csv", &failing(8..113));
+    eventually("notified", || site.notified("5/red/", "firing") == 1);
+    for refused in [
+        &["resolve", "--benchmark", "5", "--by", "Ada"][..],
+        &["resolve", "--by", "Ada", "--why", "the wire was cut"],
+    ] {
+        assert_eq!(alerts(refused).status.code(), Some(2), "{refused:?}");
+    }
+    let resolve = [
+        "resolve",
+        "--benchmark",
+        "5",
+        "--by",
+        "Ada",
+        "--why",
+        "wire cut",
+    ];
+    let state = |benchmark: &str| {
+        let status = site.printed(&["status", "--format", "json", "--config", "site.toml"]);
+        let status: serde_json::Value = serde_json::from_str(&status).unwrap();
+        let all = status["benchmarks"].as_array().unwrap().clone();
+        let one = all.into_iter().find(|one| one["benchmark"] == benchmark);
+        let one = one.unwrap();
+        (one["level"].clone(), one["alarm_state"].clone())
+    };
+    assert_eq!(state("5"), ("red".into(), "unacknowledged".into()));
+    let taken = alerts(&resolve);
+    assert!(taken.status.success(), "{}", said(&taken));
+    assert!(said(&taken).contains("calls the level again"));
+    eventually("its end notified", || {
+        site.notified("5/red/", "resolved") == 1
+    });
+    assert_eq!(state("5"), ("green".into(), "normal".into()));
+    assert_eq!(
+        alerts(&resolve).status.code(),
+        Some(1),
+        "nothing is in force"
+    );
+    site.append("incoming/5.csv", &failing(113..114));
+    eventually("called again", || site.notified("5/red/", "firing") == 2);
+    let keys: std::collections::BTreeSet<String> = site.lines("notified").into_iter().collect();
+    assert_eq!(
+        keys.iter()
+            .filter(|line| line.ends_with("firing") && line.starts_with("5/red"))
+            .count(),
+        2
+    );
+    assert!(alerts(&["ack", "--by", "Ada"]).status.success());
+    eventually("acknowledged", || {
+        state("5") == ("red".into(), "acknowledged".into())
+    });
+    program.stop();
+    let late = alerts(&["ack", "--by", "Ada"]);
+    assert!(said(&late).contains("NO DAEMON RUNS"), "{}", said(&late));
+    site.proven_events();
+}

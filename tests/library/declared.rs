@@ -277,3 +277,72 @@ fn what_is_declared_is_remembered_over_a_restart() {
         play(&mut second, &readings[69..], Unit::MM)
     );
 }
+
+fn found_resets(events: &[Event]) -> usize {
+    let is_one = |event: &&Event| matches!(&event.kind, EventKind::Fault { kind, .. } if kind == "reset-found");
+    events.iter().filter(is_one).count()
+}
+
+/// The displacement since the first reading that a threshold sees, by which one it calls.
+fn displaced_by(
+    readings: &[(Timestamp, f64)],
+    mut settings: Settings,
+    mm: f64,
+) -> (Vec<Event>, Monitor) {
+    settings
+        .policy
+        .thresholds
+        .push(slipwatch::alert::Threshold {
+            level: Level::Orange,
+            velocity_mm_per_day: None,
+            displacement_mm: Some(mm),
+            acceleration_mm_per_day2: None,
+        });
+    let mut monitor = Monitor::new(settings);
+    let events = play(&mut monitor, readings, Unit::MM);
+    (events, monitor)
+}
+
+#[test]
+fn a_fall_that_no_slope_makes_is_a_reset_that_nobody_declared_and_a_spike_is_none() {
+    let when = start() + 200.hours();
+    let readings = series(400, 1, (when, -30.0));
+    // 400 h at 2 mm/day are 33 mm, of which 30 would be missing.
+    let (events, monitor) = displaced_by(&readings, Settings::default(), 25.0);
+    assert_eq!(found_resets(&events), 1);
+    assert_eq!(monitor.level(&BenchmarkId::new("a")), Some(Level::Orange));
+    let is_red = |event: &Event| {
+        matches!(
+            event.kind,
+            EventKind::Alert {
+                level: Level::Red,
+                ..
+            }
+        )
+    };
+    assert!(!events.iter().any(is_red), "{events:?}");
+    // Declared as well, it is taken off once.
+    let declared = declaring(&[reset(when, Some(-30.0))]);
+    let (mut events, mut monitor) = displaced_by(&readings, Settings::default(), 45.0);
+    events.extend(monitor.step(readings.last().unwrap().0, &Input::Settings(declared)));
+    assert_eq!(monitor.level(&BenchmarkId::new("a")), Some(Level::Green));
+    // Whoever knows that the slope fell says so.
+    let mut accepting = Settings::default();
+    let fall = [slipwatch::reading::Suspicion::Fall].into();
+    accepting.accepted.insert(BenchmarkId::new("a"), fall);
+    assert_eq!(found_resets(&displaced_by(&readings, accepting, 25.0).0), 0);
+    // What comes back is a spike; a slope that is read with the other sign moves on.
+    let mut spike = series(400, 1, (when, 0.0));
+    spike[200].1 -= 30.0;
+    spike[201].1 -= 30.0;
+    assert_eq!(
+        found_resets(&displaced_by(&spike, Settings::default(), 25.0).0),
+        0
+    );
+    let mut turned: Vec<(Timestamp, f64)> = series(400, 1, (when, 30.0));
+    turned.iter_mut().for_each(|one| one.1 = -one.1);
+    assert_eq!(
+        found_resets(&displaced_by(&turned, Settings::default(), 25.0).0),
+        0
+    );
+}

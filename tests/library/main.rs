@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod alerts_by_crisis;
 mod calibration;
 mod crises;
 mod crisis;
@@ -34,6 +35,7 @@ mod made_up;
 mod measured;
 mod monitor;
 mod mutated_files;
+mod orders;
 mod parallel;
 #[path = "../../examples/loop/put_in.rs"]
 #[expect(dead_code, reason = "the document shows more than is claimed here")]

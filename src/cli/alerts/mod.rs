@@ -8,11 +8,14 @@ use super::args::OutputFormat;
 use super::exit::UsageError;
 use super::state::SiteArgs;
 use super::text;
+use crate::alert::Level;
 use crate::config::{Config, EXERCISE, value};
 use crate::monitor::{Given, Order, OrderedBy};
 use crate::reading::BenchmarkId;
+use crate::runtime::alarm_state::Alarms;
 use crate::runtime::clock;
 use crate::runtime::standing::{acknowledged, closed, in_force, orders, silences};
+use crate::store::Store;
 use anyhow::Context;
 use clap::Subcommand;
 use jiff::SignedDuration;
@@ -20,7 +23,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use std::io::Write;
 
-/// List the alerts in force, acknowledge them, or have no hook run for a time
+/// List the alerts in force, acknowledge or end them, or have no hook run for a time
 #[derive(Debug, clap::Args)]
 pub(super) struct AlertsArgs {
     #[command(subcommand)]
@@ -81,6 +84,26 @@ enum Action {
         #[command(flatten)]
         site: SiteArgs,
     },
+    /// The level in force is over, because people know why it was called: it ends, and hooks get its end
+    ///
+    /// What is known of the slope stays: the next reading calls the level again, as a new alert, if it still calls for it.
+    #[command(group = clap::ArgGroup::new("place").required(true))]
+    Resolve {
+        /// Where
+        #[arg(long, value_name = "ID", group = "place")]
+        benchmark: Option<String>,
+        /// Everywhere
+        #[arg(long, group = "place")]
+        all: bool,
+        /// Who
+        #[arg(long, value_name = "NAME")]
+        by: String,
+        /// Why
+        #[arg(long, value_name = "TEXT")]
+        why: String,
+        #[command(flatten)]
+        site: SiteArgs,
+    },
     /// Have hooks tried again with the alerts that were given up: at the daemon's next start or reload
     Redeliver {
         #[command(flatten)]
@@ -114,75 +137,141 @@ enum Action {
 
 /// Lists alerts, or leaves an order.
 pub(super) fn run(args: &AlertsArgs) -> anyhow::Result<()> {
-    let until = |span: SignedDuration| clock::now().checked_add(span).context("that is too long");
     let (site, order) = match &args.action {
         Action::List { site } => return list(site),
         Action::Show(args) => return show::show(args),
         Action::Redeliver { site } => return redeliver(site),
-        Action::Ack {
-            benchmark,
-            given,
-            site,
-        } => {
-            let (benchmark, given) = (benchmark.as_ref().map(BenchmarkId::new), given.given());
-            let order = Order::Acknowledge {
-                benchmark,
-                alert: None,
-                given,
-            };
-            (site, order)
-        }
-        Action::Shelve {
-            benchmark,
-            span,
-            given,
-            site,
-        } => {
-            limit(*span, Order::LONGEST_SHELVE)?;
-            let order = Order::Shelve {
-                benchmark: BenchmarkId::new(benchmark),
-                until: until(*span)?,
-                given: given.given(),
-            };
-            (site, order)
-        }
-        Action::Silence {
-            benchmark,
-            span,
-            given,
-            site,
-        } => {
-            limit(*span, Order::LONGEST_SILENCE)?;
-            let order = Order::Silence {
-                benchmark: benchmark.as_ref().map(BenchmarkId::new),
-                until: until(*span)?,
-                given: given.given(),
-            };
-            (site, order)
-        }
-        Action::Unsilence {
-            benchmark,
-            given,
-            site,
-        } => {
-            let (benchmark, given) = (benchmark.as_ref().map(BenchmarkId::new), given.given());
-            (site, Order::Unsilence { benchmark, given })
-        }
+        Action::Ack { site, .. }
+        | Action::Shelve { site, .. }
+        | Action::Silence { site, .. }
+        | Action::Resolve { site, .. }
+        | Action::Unsilence { site, .. } => (site, args.action.order()?),
+    };
+    let Some(order) = order else {
+        return Ok(());
     };
     let (config, store) = site.open()?;
     let is_known =
         |benchmark: &BenchmarkId| config.benchmarks.iter().any(|one| one.id == *benchmark);
+    let is_of_a_drill = is_of_a_drill(&config, &order);
     if let Some(benchmark) = order.benchmark()
-        && !is_of_a_drill(&config, &order)
+        && !is_of_a_drill
         && !is_known(benchmark)
         && !store.benchmarks()?.contains_key(benchmark)
     {
         anyhow::bail!("benchmark {benchmark} has given no readings yet");
     }
+    if !is_of_a_drill && config.drill.is_none() {
+        needs_an_alert(&store, &order)?;
+    }
     store.ask(&order)?;
-    site.output.print(&order, |_| {
-        "noted; the daemon takes it within a second, or at its next start\n".to_owned()
-    })
+    let is_running = Store::is_held(&config.site.state_dir);
+    site.output.print(&order, |_| taken(&order, is_running))
+}
+
+/// What becomes of an order that has been left in the state.
+fn taken(order: &Order, is_running: bool) -> String {
+    let when = if is_running {
+        "noted; the daemon takes it within a second\n"
+    } else {
+        "noted, but NO DAEMON RUNS: it is taken at the next start\n"
+    };
+    let again = match order {
+        Order::Resolve { .. } => {
+            "the next reading calls the level again, as a new alert, if it still calls for it\n"
+        }
+        _ => "",
+    };
+    format!("{when}{again}")
+}
+
+/// What acknowledges or ends an alert needs one.
+fn needs_an_alert(store: &Store, order: &Order) -> anyhow::Result<()> {
+    let place = order.benchmark();
+    let shown = place.map_or_else(
+        || "anywhere".to_owned(),
+        |benchmark| format!("at benchmark {benchmark}"),
+    );
+    let in_force = in_force(store, None)?;
+    let mut here = (in_force.keys()).filter(|(at, _)| place.is_none() || at.as_ref() == place);
+    match order {
+        Order::Acknowledge { .. } => {
+            let alarms = Alarms::read(store, None, clock::now())?;
+            if here.next().is_none() && alarms.is_all_seen(place) {
+                anyhow::bail!("no alert is in force {shown}: there is nothing to acknowledge");
+            }
+        }
+        Order::Resolve { .. } => {
+            if !here.any(|(_, level)| *level != Level::Unknown) {
+                anyhow::bail!("no level is in force {shown}: there is nothing to resolve");
+            }
+        }
+        Order::Shelve { .. } | Order::Silence { .. } | Order::Unsilence { .. } => {}
+    }
+    Ok(())
+}
+
+impl Action {
+    /// The order that is given; `None` of what is none.
+    fn order(&self) -> anyhow::Result<Option<Order>> {
+        let until = |span: SignedDuration| {
+            let until = clock::now().checked_add(span);
+            until.context("that is too long")
+        };
+        let place = |benchmark: &Option<String>| benchmark.as_ref().map(BenchmarkId::new);
+        Ok(Some(match self {
+            Self::List { .. } | Self::Show(_) | Self::Redeliver { .. } => return Ok(None),
+            Self::Ack {
+                benchmark, given, ..
+            } => Order::Acknowledge {
+                benchmark: place(benchmark),
+                alert: None,
+                given: given.given(),
+            },
+            Self::Shelve {
+                benchmark,
+                span,
+                given,
+                ..
+            } => {
+                limit(*span, Order::LONGEST_SHELVE)?;
+                Order::Shelve {
+                    benchmark: BenchmarkId::new(benchmark),
+                    until: until(*span)?,
+                    given: given.given(),
+                }
+            }
+            Self::Silence {
+                benchmark,
+                span,
+                given,
+                ..
+            } => {
+                limit(*span, Order::LONGEST_SILENCE)?;
+                Order::Silence {
+                    benchmark: place(benchmark),
+                    until: until(*span)?,
+                    given: given.given(),
+                }
+            }
+            Self::Resolve {
+                benchmark, by, why, ..
+            } => {
+                let (by, why) = (Some(by.clone()), Some(why.clone()));
+                let given = GivenArgs { by, why }.given();
+                Order::Resolve {
+                    benchmark: place(benchmark),
+                    given,
+                }
+            }
+            Self::Unsilence {
+                benchmark, given, ..
+            } => Order::Unsilence {
+                benchmark: place(benchmark),
+                given: given.given(),
+            },
+        }))
+    }
 }
 
 /// A drill waits for the acknowledgement of its own benchmark.

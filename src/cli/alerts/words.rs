@@ -25,6 +25,10 @@ pub(super) fn shown(alert: &AlertView, zone: &TimeZone) -> String {
     line("where", &place);
     line("level", alert.level.name());
     line("state", &state(alert, &clock));
+    line(
+        "alarm state",
+        &format!("{} (ISA-18.2)", alert.alarm_state.name()),
+    );
     line("said", &text::local(&text::plain(&alert.text), zone));
     let condition = alert.condition.as_ref();
     let condition = condition.map_or_else(String::new, |condition| format!(": {condition}"));

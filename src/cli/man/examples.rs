@@ -1,7 +1,7 @@
 //! Examples of every command, for its page.
 
 /// By command.
-pub(super) const ALL: [(&str, &[&str]); 31] = [
+pub(super) const ALL: [(&str, &[&str]); 32] = [
     (
         "",
         &[
@@ -80,6 +80,12 @@ pub(super) const ALL: [(&str, &[&str]); 31] = [
     (
         "alerts unsilence",
         &["slipwatch alerts unsilence --config site.toml"],
+    ),
+    (
+        "alerts resolve",
+        &[
+            "slipwatch alerts resolve --config site.toml --benchmark P1 --by Ada --why \"the wire was cut\"",
+        ],
     ),
     (
         "alerts redeliver",

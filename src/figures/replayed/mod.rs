@@ -238,6 +238,7 @@ mod tests {
             velocity_mm_per_day: Some(5.0),
             chance_within_evacuation_time: 0.0,
             chance_within_outlook: 0.0,
+            called: None,
             plain: None,
         };
         event(day, kind)

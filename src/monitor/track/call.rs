@@ -4,12 +4,16 @@ use super::forecast::Forecast;
 use super::{Track, days};
 use crate::alert::{AlertCause, AlertEvidence, Entered, Policy, Transition};
 use crate::fit::Rate;
-use crate::monitor::event::{AlertState, Event, EventKind};
+use crate::forecast::HORIZON_DAYS;
+use crate::monitor::event::{AlertState, CalledLevel, Event, EventKind, LevelChance};
 use crate::monitor::motion::{
     acceleration, displacement_mm, moves_backwards, newest_velocity, settled,
 };
 use crate::reading::Timestamp;
 use jiff::SignedDuration;
+
+/// The early quantile of the time of collapse that rules may ask for, as reported.
+pub(super) const EARLY: f64 = 0.05;
 
 /// How far ahead red, and orange and yellow, look from the newest reading.
 #[derive(Debug, Clone, Copy)]
@@ -34,11 +38,13 @@ impl LookAhead {
 }
 
 impl Track {
+    /// The level that follows from the evidence; the refit among the events in `refit` gets what it calls for.
     pub(super) fn alert(
         &mut self,
         policy: &Policy,
         time: Timestamp,
         forecast: Option<&Forecast>,
+        refit: &mut [Event],
     ) -> Vec<Event> {
         let within = |span| forecast.map(|forecast| forecast.chance_within(days(span)));
         let ahead = LookAhead::of(policy, forecast);
@@ -71,7 +77,16 @@ impl Track {
             Some((span, chance))
         });
         evidence.chances = chances.collect();
+        evidence.early_quantile_days = forecast.and_then(|forecast| {
+            let outlook = forecast.in_force(days(policy.outlook));
+            outlook.collapse.quantile(EARLY, HORIZON_DAYS)
+        });
         self.held.update(policy, &mut evidence);
+        for event in refit {
+            if let EventKind::Refit { called, .. } = &mut event.kind {
+                *called = self.called(policy, &evidence, ahead).map(Box::new);
+            }
+        }
         let transitions = self.latch.update(policy, &evidence);
         self.levels.note(time, self.latch.level());
         let reported = transitions
@@ -79,6 +94,31 @@ impl Track {
             .map(|change| self.alert_event(time, policy, &evidence, ahead, change));
         events.extend(reported);
         events
+    }
+
+    /// What the evidence calls for by itself; `None` without a forecast.
+    fn called(
+        &self,
+        policy: &Policy,
+        evidence: &AlertEvidence,
+        ahead: LookAhead,
+    ) -> Option<CalledLevel> {
+        let call = policy.call(evidence);
+        let of = |chance: f64, span: SignedDuration, at_least: f64| LevelChance {
+            chance,
+            within_hours: days(span) * 24.0,
+            at_least,
+        };
+        let red = evidence.chance_within_evacuation_time?;
+        let outlook = evidence.chance_within_outlook?;
+        Some(CalledLevel {
+            level: call.level,
+            rule: call.rule.into_owned(),
+            pending: self.held.pending(policy, evidence),
+            red: of(red, ahead.red, policy.red_chance),
+            orange: of(outlook, ahead.orange, policy.orange_chance),
+            yellow: of(outlook, ahead.orange, policy.yellow_chance),
+        })
     }
 
     /// Between two refits: plain thresholds and the site's own rules act at every reading. They may raise the level; it

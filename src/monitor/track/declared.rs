@@ -6,7 +6,7 @@ use crate::alert::Policy;
 use crate::monitor::declared::Declarations;
 use crate::monitor::event::Event;
 use crate::monitor::history::MeasuredAs;
-use crate::reading::{Reading, Timestamp};
+use crate::reading::{Reading, Suspicion, Timestamp};
 
 impl Track {
     /// What takes effect with the reading of `time`.
@@ -55,6 +55,23 @@ impl Track {
         events
     }
 
+    /// Takes off a fall that no slope makes and that the newest readings confirm: a reset that nobody declared.
+    pub(super) fn find_reset(&mut self, now: Timestamp) -> Option<Event> {
+        if self.accepted.contains(&Suspicion::Fall) {
+            return None;
+        }
+        let (time, jump) = self.history.fallen_back()?;
+        self.declared.find_reset(time, jump);
+        self.history.reset(&self.declared);
+        let text = format!(
+            "benchmark {}: its readings fell by {:.3} mm at {time} and went on from there; no slope does that, so it is taken \
+             for a reset of the instrument and is no motion. Declare it with [[event]] kind = \"reset\"; if the slope did fall, \
+             set accept = [\"fall\"] for this benchmark",
+            self.benchmark, -jump
+        );
+        Some(self.fault(now, "reset-found", text))
+    }
+
     /// The end of a silence, where the reading of `time` is one.
     pub(super) fn reads_again(&mut self, now: Timestamp, time: Timestamp) -> Option<Event> {
         let maintained = (self.silence.newest())
@@ -88,7 +105,8 @@ impl Track {
         }
         if let Some(forecast) = self.forecast(policy.critical_velocity_mm_per_day, context) {
             events.extend(self.refit(policy, time, &forecast));
-            events.extend(self.alert(policy, time, Some(&forecast)));
+            let alerts = self.alert(policy, time, Some(&forecast), &mut events);
+            events.extend(alerts);
         }
         events
     }

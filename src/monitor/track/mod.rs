@@ -12,6 +12,7 @@ mod past;
 mod prepared;
 mod queued;
 mod refit;
+mod resolved;
 mod sensor;
 mod suspicion;
 mod unknown;
@@ -251,6 +252,7 @@ impl Track {
         events.extend(self.reads_again(time, reading.time));
         events.extend(self.leave_out_clockless(time));
         if taken == Taken::Newest {
+            events.extend(self.find_reset(time));
             events.extend(self.judge_sensor(time));
             events.extend(self.suspect(source, time));
             if !context.phase.in_batches {
@@ -285,13 +287,13 @@ impl Track {
             events.extend(self.watch(policy, time, forecast, context));
         }
         let (may_fall, latch) = (self.may_fall(), self.latch.clone());
-        let called = self.alert(policy, time, forecast.as_ref());
+        let alerts = self.alert(policy, time, forecast.as_ref(), &mut events);
         if !may_fall && self.latch.level() < latch.level() {
             self.levels.note(time, latch.level());
             self.latch = latch;
             return events;
         }
-        events.extend(called);
+        events.extend(alerts);
         match &forecast {
             Some(forecast) => self.await_red(policy, time, forecast),
             None => self.overdue = None,

@@ -1,5 +1,6 @@
 //! What a refit says: the regime, the failure time, and predicted times that moved.
 
+use super::call::EARLY;
 use super::forecast::Forecast;
 use super::{Track, days};
 use crate::alert::{AlertCause, Policy};
@@ -138,6 +139,7 @@ impl Track {
                 velocity_mm_per_day: forecast.plain.rates.last().map(|rate| rate.velocity),
                 chance_within_evacuation_time: forecast.chance_within(days(policy.evacuation_time)),
                 chance_within_outlook: forecast.chance_within(days(policy.outlook)),
+                called: None,
                 plain,
             },
         )
@@ -149,7 +151,7 @@ impl Track {
             after_days(self.history.epoch, now_days + days)
         };
         FailureTime {
-            low: quantile(0.05),
+            low: quantile(EARLY),
             median: quantile(0.5),
             high: quantile(0.95),
             probability: passage.chance_within(HORIZON_DAYS),

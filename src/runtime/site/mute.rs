@@ -68,6 +68,8 @@ impl Site {
             Order::Silence {
                 benchmark, until, ..
             } => self.mute(benchmark.as_ref(), None, *until),
+            // The monitor ends it.
+            Order::Resolve { .. } => {}
             Order::Unsilence { benchmark, .. } => {
                 let ends = |mute: &Mute| benchmark.is_none() || mute.benchmark == *benchmark;
                 self.mutes.retain(|mute| !ends(mute));

@@ -4,6 +4,8 @@ use super::{SiteReader, read};
 use crate::alert::{Level, Policy};
 use crate::monitor::{AlertState, Event, EventKind, OrderKind, Settings};
 use crate::reading::{BenchmarkId, Timestamp};
+use crate::runtime::alarm_state::{AlarmState, Alarms};
+use crate::runtime::clock;
 use crate::runtime::standing::{every, in_force, may_be_of};
 use crate::store::{DeliveryRow, Store, StoreError};
 use schemars::JsonSchema;
@@ -55,6 +57,8 @@ pub struct AlertView {
     pub valid_until: Option<Timestamp>,
     /// Who was to get it.
     pub deliveries: Vec<DeliveryRow>,
+    /// How it stands by the names of ISA-18.2.
+    pub alarm_state: AlarmState,
     /// Whether somebody has acknowledged it.
     pub is_acknowledged: bool,
     /// What happened to it and what people did about it, oldest first.
@@ -121,6 +125,7 @@ pub fn alert(store: &Store, site: &str, key: &str) -> Result<Option<AlertView>, 
             }
         )
     };
+    let is_acknowledged = audit.iter().any(is_ack);
     let members = if benchmark.is_none() {
         members(store, level, since)?
     } else {
@@ -140,7 +145,8 @@ pub fn alert(store: &Store, site: &str, key: &str) -> Result<Option<AlertView>, 
         recommended: level.recommended(),
         valid_until: valid_until(store, level, ended, benchmark.as_ref(), since, policy)?,
         deliveries: store.deliveries_of(&key)?,
-        is_acknowledged: audit.iter().any(is_ack),
+        alarm_state: alarm_state(store, &call.event, is_acknowledged)?,
+        is_acknowledged,
         audit,
         step: call.step,
         settings,
@@ -237,7 +243,8 @@ fn audit(
         |event: &Event| event.time >= call.time && ended.is_none_or(|ended| event.time <= ended);
     for event in every(store, "order")? {
         let concerns = event.benchmark.is_none() || event.benchmark == call.benchmark;
-        if concerns && is_in_time(&event) && may_be_of(&event, call) {
+        let is_in_time = is_in_time(&event) || is_seen_after(alerts, call, &event);
+        if concerns && is_in_time && may_be_of(&event, call) {
             audit.push(event);
         }
     }
@@ -248,6 +255,38 @@ fn audit(
     }
     audit.sort_by_key(|event| event.time);
     Ok(audit)
+}
+
+/// Whether it acknowledges an alert that has ended, before another one is called in its place.
+fn is_seen_after(alerts: &[Event], call: &Event, order: &Event) -> bool {
+    let is_ack = matches!(
+        &order.kind,
+        EventKind::Order {
+            order: OrderKind::Acknowledge,
+            ..
+        }
+    );
+    let is_next = |event: &&Event| {
+        matches!(&event.kind, EventKind::Alert { state: AlertState::Firing, level, .. } if *level != Level::Unknown)
+            && event.benchmark == call.benchmark
+            && event.time > call.time
+    };
+    let next = alerts.iter().filter(is_next).map(|event| event.time).min();
+    is_ack && order.time >= call.time && next.is_none_or(|next| order.time < next)
+}
+
+fn alarm_state(
+    store: &Store,
+    call: &Event,
+    is_acknowledged: bool,
+) -> Result<AlarmState, StoreError> {
+    let alarms = Alarms::read(store, None, clock::now())?;
+    let newest = refit(store, call.benchmark.as_ref(), super::LATEST)?;
+    let called = newest.and_then(|event| match event.kind {
+        EventKind::Refit { called, .. } => called,
+        _ => None,
+    });
+    Ok(alarms.state_of(call, is_acknowledged, called.as_deref()))
 }
 
 fn members(store: &Store, level: Level, since: Timestamp) -> Result<Vec<String>, StoreError> {

@@ -5,10 +5,11 @@ use super::thin::{self, ThinPoint};
 use super::{EARLIEST, LATEST, SiteReader, held, read};
 use crate::fit::{Observations, Rate, RateOptions};
 use crate::forecast::InverseVelocityLine;
-use crate::monitor::{Event, EventKind, FailureTime, LevelStretch, levels_in, recent};
+use crate::monitor::{CalledLevel, Event, EventKind, FailureTime, LevelStretch, levels_in, recent};
 use crate::reading::{
     BenchmarkId, Quantity, Reading, SECONDS_PER_DAY, Series, Timestamp, Unit, days_since,
 };
+use crate::runtime::alarm_state::Alarms;
 use crate::runtime::standing::in_force;
 use crate::store::{StoreError, Value, Values};
 use schemars::JsonSchema;
@@ -93,6 +94,8 @@ pub struct ForecastView {
     pub chance_within_evacuation_time: f64,
     /// The chance of that within the outlook.
     pub chance_within_outlook: f64,
+    /// The level that it calls for, and the chances that levels are called by.
+    pub called: Option<CalledLevel>,
     /// Of kappa above 0.
     pub probability_unstable: f64,
     /// Of r above 0.
@@ -196,6 +199,7 @@ impl SiteReader {
         alerts.reverse();
         alerts.truncate(MOST_EVENTS);
         let levels_now = in_force(&self.store, at)?;
+        let alarms = Alarms::read(&self.store, at, moment)?;
         let span = self.store.span(Some(name))?;
         let (seen, quiet) = self.orders(&levels_now, at, moment)?;
         Ok(Some(BenchmarkView {
@@ -205,7 +209,7 @@ impl SiteReader {
             takes_orders: self.facts.takes_orders,
             acknowledged: seen,
             silences: quiet,
-            standing: self.standing(id, &levels_now, at, moment)?,
+            standing: self.standing(id, (&levels_now, &alarms), at, moment)?,
             at,
             now,
             first: span.map(|(first, _)| first),
@@ -403,6 +407,7 @@ fn forecast(event: &Event) -> Option<ForecastView> {
         velocity_mm_per_day,
         chance_within_evacuation_time,
         chance_within_outlook,
+        called,
         plain,
         ..
     } = &event.kind
@@ -414,6 +419,7 @@ fn forecast(event: &Event) -> Option<ForecastView> {
         failure_time: *failure_time,
         chance_within_evacuation_time: *chance_within_evacuation_time,
         chance_within_outlook: *chance_within_outlook,
+        called: called.as_deref().cloned(),
         probability_unstable: regime.probability_unstable,
         probability_accelerating: regime.probability_accelerating,
         regime: regime.label.label(),

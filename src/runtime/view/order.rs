@@ -19,7 +19,7 @@ const LONGEST_REASON: usize = 500;
 #[derive(Debug, Clone, JsonSchema, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Asked {
-    /// `acknowledge`, `shelve`, `silence` or `unsilence`.
+    /// `acknowledge`, `shelve`, `silence`, `resolve` or `unsilence`.
     pub order: String,
     /// Where; the whole site without one.
     pub benchmark: Option<String>,
@@ -105,6 +105,16 @@ impl SiteReader {
                 alert: None,
                 given,
             },
+            ("resolve", Some(benchmark)) if given.why.is_some() => Order::Resolve {
+                benchmark: Some(benchmark),
+                given,
+            },
+            ("resolve", Some(_)) => {
+                return wrong("why: an alert is resolved for a reason".to_owned());
+            }
+            ("resolve", None) => {
+                return wrong("benchmark: one at a time is resolved here".to_owned());
+            }
             ("unsilence", benchmark) => Order::Unsilence { benchmark, given },
             ("silence", benchmark) => {
                 let until = until(Order::LONGEST_SILENCE)?;
@@ -124,7 +134,7 @@ impl SiteReader {
             }
             ("shelve", None) => return wrong("benchmark: only one can be shelved".to_owned()),
             _ => {
-                let known = "acknowledge, shelve, silence or unsilence";
+                let known = "acknowledge, shelve, silence, resolve or unsilence";
                 return wrong(format!("order: {known} is needed"));
             }
         })

@@ -2,9 +2,10 @@
 
 use super::{LATEST, SiteReader, held, read};
 use crate::alert::Level;
-use crate::monitor::{Event, EventKind, FailureTime};
+use crate::monitor::{CalledLevel, Event, EventKind, FailureTime};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::regime::Regime;
+use crate::runtime::alarm_state::{AlarmState, Alarms};
 use crate::runtime::standing::{InForce, acknowledged, in_force, orders, silences};
 use crate::store::StoreError;
 use schemars::JsonSchema;
@@ -23,6 +24,8 @@ pub struct Standing {
     pub level: Level,
     /// Since when; `None` for green.
     pub since: Option<Timestamp>,
+    /// How its alarm stands, by the names of ISA-18.2.
+    pub alarm_state: AlarmState,
     /// Whether nothing can be said of it: beside the level, never instead of it.
     pub is_unknown: bool,
     /// Since when not.
@@ -43,6 +46,8 @@ pub struct Standing {
     pub chance_within_evacuation_time: Option<f64>,
     /// The chance of that within the outlook.
     pub chance_within_outlook: Option<f64>,
+    /// The level that this forecast calls for, and the chances that levels are called by.
+    pub called: Option<CalledLevel>,
     /// Where it stands: east, north and perhaps height, m.
     pub position: Option<Vec<f64>>,
 }
@@ -96,7 +101,8 @@ impl SiteReader {
         let (seen, quiet) = self.orders(&levels, at, moment)?;
         let span = self.store.span(None)?;
         let benchmarks = self.known()?.into_iter();
-        let benchmarks = benchmarks.map(|one| self.standing(one, &levels, at, moment));
+        let alarms = Alarms::read(&self.store, at, moment)?;
+        let benchmarks = benchmarks.map(|one| self.standing(one, (&levels, &alarms), at, moment));
         let site_levels = levels.iter().filter(|((place, _), _)| place.is_none());
         let called = site_levels.map(|((_, level), _)| *level);
         let called = called.filter(|level| *level != Level::Unknown).max();
@@ -144,7 +150,7 @@ impl SiteReader {
     pub(super) fn standing(
         &self,
         benchmark: BenchmarkId,
-        levels: &InForce,
+        (levels, alarms): (&InForce, &Alarms),
         at: Option<Timestamp>,
         moment: Timestamp,
     ) -> Result<Standing, StoreError> {
@@ -171,6 +177,8 @@ impl SiteReader {
             failure_time: None,
             chance_within_evacuation_time: None,
             chance_within_outlook: None,
+            called: None,
+            alarm_state: AlarmState::Normal,
             benchmark,
         };
         let refit = self
@@ -179,6 +187,7 @@ impl SiteReader {
         if let Some(body) = refit {
             standing.forecast(&read(&body)?);
         }
+        standing.alarm_state = alarms.state(Some(&standing.benchmark), standing.called.as_ref());
         Ok(standing)
     }
 
@@ -213,6 +222,7 @@ impl Standing {
             velocity_mm_per_day,
             chance_within_evacuation_time,
             chance_within_outlook,
+            called,
             ..
         } = &refit.kind
         else {
@@ -224,5 +234,6 @@ impl Standing {
         self.failure_time = Some(*failure_time);
         self.chance_within_evacuation_time = Some(*chance_within_evacuation_time);
         self.chance_within_outlook = Some(*chance_within_outlook);
+        self.called = called.as_deref().cloned();
     }
 }

@@ -1,0 +1,247 @@
+//! How the alarm of each place stands, by the names of ISA-18.2 (ANSI/ISA-18.2-2016, "Management of Alarm Systems for the
+//! Process Industries"), from the events in a site's state.
+
+use super::standing::{every, may_be_of, orders, silences};
+use crate::alert::Level;
+use crate::monitor::{AlertState, CalledLevel, Event, EventKind, OrderKind};
+use crate::reading::{BenchmarkId, Timestamp};
+use crate::store::{Store, StoreError};
+use schemars::JsonSchema;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// How the alarm of a place stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum AlarmState {
+    /// No level above green is in force, and the last one was acknowledged.
+    Normal,
+    /// The conditions of a rule of the site's own hold, and have not held for long enough yet.
+    Pending,
+    /// A level is in force that nobody has acknowledged.
+    Unacknowledged,
+    /// A level is in force that somebody has acknowledged, and the forecast calls for it.
+    Acknowledged,
+    /// The last level has ended, and nobody has acknowledged it.
+    ReturnedUnacknowledged,
+    /// A level is in force that somebody has acknowledged; the forecast calls for a lower one, and the slope has not slowed
+    /// down for long enough.
+    Latched,
+    /// Nobody is notified of this level for a time (`alerts shelve`).
+    Shelved,
+    /// Nobody is notified of anything for a time (`alerts silence`).
+    Suppressed,
+    /// Declared maintenance: readings are kept and not judged.
+    OutOfService,
+}
+
+impl AlarmState {
+    /// The word in its JSON.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Normal => "normal",
+            Self::Pending => "pending",
+            Self::Unacknowledged => "unacknowledged",
+            Self::Acknowledged => "acknowledged",
+            Self::ReturnedUnacknowledged => "returned-unacknowledged",
+            Self::Latched => "latched",
+            Self::Shelved => "shelved",
+            Self::Suppressed => "suppressed",
+            Self::OutOfService => "out-of-service",
+        }
+    }
+}
+
+/// The newest alert of a place, whether it has ended and whether people have seen it.
+#[derive(Debug, Clone)]
+struct NewestAlert {
+    event: Event,
+    has_ended: bool,
+    is_acknowledged: bool,
+}
+
+/// What the alarms of a site stand by at a moment.
+#[derive(Debug)]
+pub struct Alarms {
+    newest: BTreeMap<Option<BenchmarkId>, NewestAlert>,
+    /// Orders by which nobody is notified.
+    silences: Vec<Event>,
+    /// Benchmarks under declared maintenance; `None`: the whole site.
+    out_of_service: Vec<Option<BenchmarkId>>,
+}
+
+impl Alarms {
+    /// Those of the events until `at`, of all without it, at the moment `now`.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn read(store: &Store, at: Option<Timestamp>, now: Timestamp) -> Result<Self, StoreError> {
+        let is_known = |event: &Event| at.is_none_or(|at| event.time <= at);
+        let mut alerts = every(store, "alert")?;
+        alerts.retain(is_known);
+        // Those of the past before a first start come after those of the present.
+        alerts.sort_by_key(|event| event.time);
+        let mut newest = BTreeMap::new();
+        for event in alerts {
+            take(&mut newest, event);
+        }
+        let mut orders = orders(store)?;
+        orders.retain(is_known);
+        for one in newest.values_mut() {
+            one.is_acknowledged = orders.iter().any(|order| is_seen_by(&one.event, order));
+        }
+        let mut declared = every(store, "declared")?;
+        declared.retain(is_known);
+        Ok(Self {
+            newest,
+            silences: silences(&orders, now),
+            out_of_service: declared
+                .into_iter()
+                .filter_map(|event| under_maintenance(event, now))
+                .collect(),
+        })
+    }
+
+    /// How that of a place stands, `None` of the whole site, where its newest forecast calls for `called`.
+    pub fn state(&self, place: Option<&BenchmarkId>, called: Option<&CalledLevel>) -> AlarmState {
+        let newest = self.newest.get(&place.cloned());
+        let is_here = |at: Option<&BenchmarkId>| at.is_none() || at == place;
+        if self.out_of_service.iter().any(|one| is_here(one.as_ref())) {
+            return AlarmState::OutOfService;
+        }
+        if let Some(muted) = self.muted(place, newest) {
+            return muted;
+        }
+        match newest {
+            Some(one) if !one.has_ended && !one.is_acknowledged => AlarmState::Unacknowledged,
+            Some(one) if !one.has_ended => {
+                let is_held = called.is_some_and(|called| Some(called.level) < one.level());
+                if is_held {
+                    AlarmState::Latched
+                } else {
+                    AlarmState::Acknowledged
+                }
+            }
+            Some(one) if !one.is_acknowledged => AlarmState::ReturnedUnacknowledged,
+            _ if called.is_some_and(|called| !called.pending.is_empty()) => AlarmState::Pending,
+            _ => AlarmState::Normal,
+        }
+    }
+
+    /// How one alert stands: as its place does where it is the newest there.
+    pub fn state_of(
+        &self,
+        alert: &Event,
+        is_acknowledged: bool,
+        called: Option<&CalledLevel>,
+    ) -> AlarmState {
+        let place = alert.benchmark.as_ref();
+        let newest = self.newest.get(&alert.benchmark);
+        let is_newest = newest.is_some_and(|one| key(&one.event) == key(alert));
+        if is_newest {
+            return self.state(place, called);
+        }
+        if is_acknowledged {
+            AlarmState::Normal
+        } else {
+            AlarmState::ReturnedUnacknowledged
+        }
+    }
+
+    /// The alerts that have ended, are the newest of their place, and were acknowledged by nobody.
+    pub fn returned(&self) -> Vec<&Event> {
+        let ended = self
+            .newest
+            .values()
+            .filter(|one| one.has_ended && !one.is_acknowledged);
+        ended.map(|one| &one.event).collect()
+    }
+
+    /// Whether there is nothing at `place`, or anywhere without it, that could be acknowledged.
+    pub fn is_all_seen(&self, place: Option<&BenchmarkId>) -> bool {
+        let here = (self.newest.iter()).filter(|(at, _)| place.is_none() || at.as_ref() == place);
+        here.into_iter()
+            .all(|(_, one)| one.has_ended && one.is_acknowledged)
+    }
+
+    fn muted(
+        &self,
+        place: Option<&BenchmarkId>,
+        newest: Option<&NewestAlert>,
+    ) -> Option<AlarmState> {
+        let here = |event: &&Event| event.benchmark.is_none() || event.benchmark.as_ref() == place;
+        let mut found = None;
+        for event in self.silences.iter().filter(here) {
+            let EventKind::Order { order, .. } = &event.kind else {
+                continue;
+            };
+            if *order == OrderKind::Silence {
+                return Some(AlarmState::Suppressed);
+            }
+            // A level that was called after the order is higher than the one that it is of.
+            let is_of_it = newest.is_none_or(|one| one.has_ended || one.event.time <= event.time);
+            found = found.or(is_of_it.then_some(AlarmState::Shelved));
+        }
+        found
+    }
+}
+
+impl NewestAlert {
+    fn level(&self) -> Option<Level> {
+        match &self.event.kind {
+            EventKind::Alert { level, .. } => Some(*level),
+            _ => None,
+        }
+    }
+}
+
+fn key(event: &Event) -> Option<&str> {
+    match &event.kind {
+        EventKind::Alert { key, .. } => Some(key),
+        _ => None,
+    }
+}
+
+/// Takes one alert event; what is unknown is no level.
+fn take(newest: &mut BTreeMap<Option<BenchmarkId>, NewestAlert>, event: Event) {
+    let EventKind::Alert { level, state, .. } = &event.kind else {
+        return;
+    };
+    if *level == Level::Unknown {
+        return;
+    }
+    match state {
+        AlertState::Firing => {
+            let one = NewestAlert {
+                has_ended: false,
+                is_acknowledged: false,
+                event,
+            };
+            newest.insert(one.event.benchmark.clone(), one);
+        }
+        AlertState::Resolved => {
+            if let Some(one) = newest.get_mut(&event.benchmark)
+                && key(&one.event) == key(&event)
+            {
+                one.has_ended = true;
+            }
+        }
+    }
+}
+
+/// Whether an order says that people have seen the alert: an acknowledgement, or that they ended it.
+fn is_seen_by(alert: &Event, order: &Event) -> bool {
+    let is_here = order.benchmark.is_none() || order.benchmark == alert.benchmark;
+    let EventKind::Order { order: kind, .. } = &order.kind else {
+        return false;
+    };
+    let says_so = matches!(kind, OrderKind::Acknowledge | OrderKind::Resolve);
+    says_so && is_here && order.time >= alert.time && may_be_of(order, alert)
+}
+
+fn under_maintenance(event: Event, now: Timestamp) -> Option<Option<BenchmarkId>> {
+    let EventKind::Declared { at, until, .. } = event.kind else {
+        return None;
+    };
+    (at <= now && now < until?).then_some(event.benchmark)
+}
