@@ -95,9 +95,9 @@ impl Alarms {
         Ok(Self {
             newest,
             silences: silences(&orders, now),
-            out_of_service: declared
-                .into_iter()
-                .filter_map(|event| under_maintenance(event, now))
+            out_of_service: (declared.into_iter())
+                .filter(|event| is_under_maintenance(event, now))
+                .map(|event| event.benchmark)
                 .collect(),
         })
     }
@@ -188,17 +188,19 @@ impl Alarms {
 
 impl NewestAlert {
     fn level(&self) -> Option<Level> {
-        match &self.event.kind {
-            EventKind::Alert { level, .. } => Some(*level),
-            _ => None,
+        if let EventKind::Alert { level, .. } = &self.event.kind {
+            Some(*level)
+        } else {
+            None
         }
     }
 }
 
 fn key(event: &Event) -> Option<&str> {
-    match &event.kind {
-        EventKind::Alert { key, .. } => Some(key),
-        _ => None,
+    if let EventKind::Alert { key, .. } = &event.kind {
+        Some(key)
+    } else {
+        None
     }
 }
 
@@ -239,9 +241,10 @@ fn is_seen_by(alert: &Event, order: &Event) -> bool {
     says_so && is_here && order.time >= alert.time && may_be_of(order, alert)
 }
 
-fn under_maintenance(event: Event, now: Timestamp) -> Option<Option<BenchmarkId>> {
-    let EventKind::Declared { at, until, .. } = event.kind else {
-        return None;
+/// Whether the declared maintenance of this event is going on.
+fn is_under_maintenance(event: &Event, now: Timestamp) -> bool {
+    let EventKind::Declared { at, until, .. } = &event.kind else {
+        return false;
     };
-    (at <= now && now < until?).then_some(event.benchmark)
+    *at <= now && until.is_some_and(|until| now < until)
 }

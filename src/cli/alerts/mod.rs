@@ -180,7 +180,10 @@ fn taken(order: &Order, is_running: bool) -> String {
         Order::Resolve { .. } => {
             "the next reading calls the level again, as a new alert, if it still calls for it\n"
         }
-        _ => "",
+        Order::Acknowledge { .. }
+        | Order::Shelve { .. }
+        | Order::Silence { .. }
+        | Order::Unsilence { .. } => "",
     };
     format!("{when}{again}")
 }

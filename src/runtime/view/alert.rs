@@ -282,9 +282,12 @@ fn alarm_state(
 ) -> Result<AlarmState, StoreError> {
     let alarms = Alarms::read(store, None, clock::now())?;
     let newest = refit(store, call.benchmark.as_ref(), super::LATEST)?;
-    let called = newest.and_then(|event| match event.kind {
-        EventKind::Refit { called, .. } => called,
-        _ => None,
+    let called = newest.and_then(|event| {
+        if let EventKind::Refit { called, .. } = event.kind {
+            called
+        } else {
+            None
+        }
     });
     Ok(alarms.state_of(call, is_acknowledged, called.as_deref()))
 }
