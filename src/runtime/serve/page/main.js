@@ -3,7 +3,7 @@
 import { follow, forget, hasToken, order, Refused } from '/page/ask.js';
 import { BenchmarkPage } from '/page/benchmark.js';
 import { SitePage } from '/page/site.js';
-import { el, field, instant, keepMoment, minute, useZone } from '/page/words.js';
+import { el, instant, keepMoment, minute, useZone } from '/page/words.js';
 
 const SOON_MS = 300;
 const SELDOM_MS = 30000;
@@ -97,7 +97,7 @@ function frame({ site, time_zone: zone, now, first, last, version }) {
     slide.value = String(1000 * (shown - state.span.from) / Math.max(1, state.span.to - state.span.from));
   }
   slide.setAttribute('aria-valuetext', state.at === null ? 'live' : minute(state.at));
-  if (document.activeElement !== byId('date')) byId('date').value = field(state.at ?? now);
+  if (document.activeElement !== byId('date')) byId('date').value = minute(state.at ?? now);
   byId('live').setAttribute('aria-pressed', String(state.at === null));
   byId('leave').hidden = !hasToken();
   mark();
@@ -165,6 +165,7 @@ function orders(kind, benchmark) {
   byId('order-means').textContent = means[kind];
   byId('order-wrong').textContent = '';
   byId('by').value = localStorage.getItem('slipwatch-by') ?? '';
+  byId('why').value = '';
   byId('span-label').hidden = !spans;
   byId('span').replaceChildren(...(spans ?? []).map(([seconds, text]) => el('option', { value: seconds }, text)));
   byId('order').showModal();
@@ -176,7 +177,8 @@ function orders(kind, benchmark) {
     }
     localStorage.setItem('slipwatch-by', by);
     try {
-      await order({ order: kind, benchmark, by, ...(spans ? { seconds: Number(byId('span').value) } : {}) });
+      const why = byId('why').value.trim() || null;
+      await order({ order: kind, benchmark, by, why, ...(spans ? { seconds: Number(byId('span').value) } : {}) });
       byId('order').close();
       changed();
     } catch (error) {
@@ -213,7 +215,10 @@ byId('slide').addEventListener('input', () => {
 });
 byId('date').addEventListener('change', () => {
   const time = instant(byId('date').value);
-  if (Number.isFinite(time)) show(new Date(time).toISOString());
+  const isTime = Number.isFinite(time);
+  byId('date').setCustomValidity(isTime ? '' : 'Write 2012-05-14 06:30, or 2012-05-14T04:30:00Z.');
+  byId('date').reportValidity();
+  if (isTime) show(new Date(time).toISOString());
 });
 addEventListener('hashchange', go);
 setInterval(() => { if (state.at === null && !state.isLost) refresh(); }, SELDOM_MS);

@@ -48,17 +48,16 @@ export function minute(time) {
   return `${p.year}-${p.month}-${p.day} ${p.hour}:${p.minute}`;
 }
 
-/** As a field for a local time wants it. */
-export function field(time) {
-  return minute(time).replace(' ', 'T');
-}
+const WRITTEN = /^\s*(\d{4}-\d\d-\d\d)(?:[T ](\d\d:\d\d)(:\d\d(?:\.\d+)?)?)?\s*(Z|[+-]\d\d:\d\d)?\s*$/i;
 
-/** The instant of a local time in the site's zone. */
+/** The instant that is written: 2012-05-14 06:30 in the site's zone, or RFC 3339 with its offset; NaN where it is neither. */
 export function instant(text) {
-  const wanted = Date.parse(`${text}Z`);
+  const [, day, clock = '00:00', second = '', offset] = WRITTEN.exec(text) ?? [];
+  const wanted = Date.parse(`${day}T${clock}${second}${offset ?? 'Z'}`);
+  if (offset || !Number.isFinite(wanted)) return wanted;
   let guess = wanted;
   for (let round = 0; round < 3; round += 1) {
-    guess += wanted - Date.parse(`${field(guess)}Z`);
+    guess += wanted - Date.parse(`${minute(guess).replace(' ', 'T')}${second}Z`);
   }
   return guess;
 }
@@ -97,11 +96,11 @@ export function figure(value) {
   return size < 0.001 ? value.toExponential(1) : String(Number(value.toPrecision(3)));
 }
 
-/** 5 %, under 1 %. */
+/** 5 %, < 1 %: no chance is shown as none, or as certain. */
 export function percent(chance) {
   if (chance === null || chance === undefined) return '-';
-  if (chance > 0 && chance < 0.01) return 'under 1 %';
-  if (chance < 1 && chance > 0.99) return 'over 99 %';
+  if (chance < 0.005) return '< 1 %';
+  if (chance > 0.995) return '> 99 %';
   return `${Math.round(100 * chance)} %`;
 }
 
@@ -153,7 +152,7 @@ export function described(event) {
     case 'together': return event.groups.map((group) => `${group.benchmarks.join(', ')} share a failure time: ${
       group.failure_time.median ? minute(group.failure_time.median) : 'none in sight'}, chance ${
       percent(group.chance_within_evacuation_time)} within the evacuation time`).join('; ') || 'no benchmarks share a failure time any more';
-    case 'order': return `${event.order}${event.by ? ` by ${event.by}` : ''}${event.until ? ` until ${minute(event.until)}` : ''}`;
+    case 'order': return `${event.order}${event.by ? ` by ${event.by}` : ''}${event.until ? ` until ${minute(event.until)}` : ''}${event.why ? `: ${event.why}` : ''}`;
     case 'regime-flip': return `regime ${event.from} to ${event.to}, probability ${percent(event.probability)}`;
     case 'intercept-drift': return `inverse-velocity intercept moved to ${minute(event.to)}`;
     case 'transition-drift': return `transition time moved to ${minute(event.to)}`;
