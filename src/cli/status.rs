@@ -5,7 +5,7 @@ use super::preview::shown;
 use super::state::SiteArgs;
 use super::table::TextTable;
 use super::text;
-use crate::alert::Level;
+use crate::alert::{Level, chance_in_words};
 use crate::monitor::{Event, EventKind, SUSPECT, SUSPECT_ENDS};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::clock;
@@ -40,6 +40,8 @@ pub(super) struct StatusArgs {
 const POLL_INTERVAL: Duration = Duration::from_secs(2);
 /// Of the table, in characters: that of the terminals on which it is read.
 const WIDTH: usize = 80;
+/// What a line begins with that goes on with the one before it.
+const CONTINUED: &str = "    ";
 /// Puts a terminal's cursor at the top of an empty screen.
 const CLEAR: &str = "\u{1b}[H\u{1b}[2J";
 
@@ -314,9 +316,8 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
         [] => String::new(),
         alerts => format!("\nin force:\n{}", lines(alerts)),
     };
-    format!(
-        "{dead}{}: {} inputs taken, {} alerts wait for a hook\n{}{}{}{}{}{refused}{suspicions}\n{table}\
-         collapse: median of the forecast; chance: of collapse within the evacuation time\n{force}",
+    let head = format!(
+        "{dead}{}: {} inputs taken, {} alerts wait for a hook\n{}{}{}{}{}{refused}{suspicions}",
         text::plain(&status.site),
         status.steps,
         status.alerts_waiting,
@@ -325,7 +326,17 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
         lines(&status.closed),
         drilled(status, zone),
         recorded(status, zone),
-    )
+    );
+    let legend = "collapse: median of the forecast; chance: of collapse within the evacuation time";
+    format!("{}\n{table}{legend}\n{}", folded(&head), folded(&force))
+}
+
+/// Lines of no more than the table's width.
+fn folded(lines: &str) -> String {
+    let lines = lines.lines();
+    lines
+        .map(|line| text::wrapped(line, WIDTH, CONTINUED) + "\n")
+        .collect()
 }
 
 /// Whether the record can be written; nothing where it can, or where none is kept.
@@ -365,5 +376,5 @@ fn drilled(status: &SiteStatus, zone: &TimeZone) -> String {
 }
 
 fn chance(chance: Option<f64>) -> String {
-    chance.map_or_else(|| "-".to_owned(), |chance| format!("{chance:.2}"))
+    chance.map_or_else(|| "-".to_owned(), chance_in_words)
 }
