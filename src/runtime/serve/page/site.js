@@ -35,7 +35,7 @@ export class SitePage {
       ...(at ? [] : HEALTH.filter(([is]) => is(status)).map(([, text]) => el('p', { class: 'card level red' }, text))),
       el('section', { class: 'card', 'aria-label': 'Benchmarks' }, table(sorted, site)),
       el('div', { class: sorted.some((one) => one.position) ? 'two' : '' },
-        sketch(sorted),
+        sketch(sorted, site.positions_are),
         el('section', { class: 'card' }, el('h2', {}, 'In force'), this.force(site, at))),
       el('section', { class: 'card' }, el('h2', {}, 'What was said'), list(site.log, 'Nothing yet.')));
     const log = this.view.querySelector('ul.log');
@@ -103,7 +103,7 @@ function table(standings, site) {
 }
 
 /** The plan, and where heights are known a section along the direction in which the benchmarks lie. */
-function sketch(standings) {
+function sketch(standings, says) {
   const placed = standings.filter((one) => one.position);
   if (placed.length === 0) return null;
   const plan = placed.map((one) => [one.position[0], one.position[1]]);
@@ -113,6 +113,7 @@ function sketch(standings) {
     const section = placed.map((one, index) => [plan[index][0] * along[0] + plan[index][1] * along[1], one.position[2]]);
     nodes.push(el('h2', {}, 'Section'), drawing(placed, section, 'Section of the benchmarks'));
   }
+  if (says) nodes.push(el('p', { class: 'soft' }, says));
   return el('section', { class: 'card' }, nodes);
 }
 

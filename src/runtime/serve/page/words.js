@@ -99,9 +99,9 @@ export function figure(value) {
 /** 5 %, < 1 %: no chance is shown as none, or as certain. */
 export function percent(chance) {
   if (chance === null || chance === undefined) return '-';
-  if (chance < 0.005) return '< 1 %';
-  if (chance > 0.995) return '> 99 %';
-  return `${Math.round(100 * chance)} %`;
+  if (chance < 0.005) return '<\u00a01\u00a0%';
+  if (chance > 0.995) return '>\u00a099\u00a0%';
+  return `${Math.round(100 * chance)}\u00a0%`;
 }
 
 const SHAPES = {
