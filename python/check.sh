@@ -13,7 +13,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 python3 -m venv "$work/venv" 2>/dev/null || skip "python3 has no venv"
 python=$work/venv/bin/python
-"$python" -m pip install --quiet 'maturin>=1.7,<2' numpy pandas polars pytest nbclient nbformat ipykernel \
+"$python" -m pip install --quiet 'maturin>=1.7,<2' numpy pandas polars matplotlib pytest nbclient nbformat ipykernel \
     >"$work/pip" 2>&1 || skip "PyPI is not there ($(tail -n 1 "$work/pip"))"
 
 started=$SECONDS

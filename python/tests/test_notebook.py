@@ -11,6 +11,7 @@ def test_the_notebook_runs():
     nbformat = pytest.importorskip("nbformat")
     nbclient = pytest.importorskip("nbclient")
     notebook = nbformat.read(FILE, as_version=4)
+    pytest.importorskip("matplotlib")
     client = nbclient.NotebookClient(notebook, timeout=300, resources={"metadata": {"path": FILE.parent}})
     client.execute()
     printed = [
@@ -20,3 +21,10 @@ def test_the_notebook_runs():
         if output["output_type"] == "stream"
     ]
     assert any("first red: 2012-04-27" in text for text in printed), printed
+    pictures = [
+        output
+        for cell in notebook.cells
+        for output in cell.get("outputs", [])
+        if "image/png" in output.get("data", {})
+    ]
+    assert len(pictures) == 1

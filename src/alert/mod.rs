@@ -3,6 +3,7 @@
 //! This module never sees a parameter of the law, only chances and observed motion.
 
 mod advice;
+mod chance;
 mod declared;
 mod evidence;
 mod held;
@@ -11,6 +12,7 @@ mod level;
 mod policy;
 mod rules;
 
+pub use chance::{chance_in_words, percent_in_words};
 pub use declared::{Combination, Condition, DeclaredRule};
 pub use evidence::{AlertCause, AlertEvidence};
 pub use held::Held;

@@ -4,7 +4,7 @@ use super::args::{OutputArgs, ReadingArgs};
 use super::bar;
 use super::columnar::TableArgs;
 use super::table::{TextTable, number, time};
-use crate::alert::Policy;
+use crate::alert::{Policy, percent_in_words};
 use crate::config::value;
 use crate::fit::Exponent;
 use crate::inversion::{
@@ -157,9 +157,7 @@ fn text(report: &FitReport) -> String {
 }
 
 fn summary(report: &FitReport) -> TextTable {
-    let percent = |share: Option<f64>| {
-        share.map_or("-".to_owned(), |share| format!("{:.0} %", 100.0 * share))
-    };
+    let percent = |share: Option<f64>| share.map_or("-".to_owned(), percent_in_words);
     let shown = |regime: &FittedRegime| {
         format!(
             "{} (unstable {}, accelerating {})",
@@ -335,7 +333,6 @@ fn alternatives(report: &FitReport) -> TextTable {
 }
 
 fn neighbours(report: &TogetherReport) -> String {
-    let percent = |share: f64| format!("{:.0} %", 100.0 * share);
     let since = |since: Timestamp| {
         if since <= report.judged_from {
             "from the first snapshot on".to_owned()
@@ -347,7 +344,9 @@ fn neighbours(report: &TogetherReport) -> String {
     for group in &report.groups {
         let named = group.benchmarks.iter().zip(&group.probabilities);
         let named: Vec<String> = named
-            .map(|(benchmark, probability)| format!("{benchmark} ({})", percent(*probability)))
+            .map(|(benchmark, probability)| {
+                format!("{benchmark} ({})", percent_in_words(*probability))
+            })
             .collect();
         let failure = &group.failure_time;
         let _ = writeln!(
@@ -355,11 +354,11 @@ fn neighbours(report: &TogetherReport) -> String {
             "together {}, {}: failure {} within {:.0} days, {} within the evacuation time\n  5, 50, 95 %     {}",
             named.join(", "),
             since(group.since),
-            failure.probability.map_or("-".to_owned(), percent),
+            failure.probability.map_or("-".to_owned(), percent_in_words),
             failure.horizon_days,
             failure
                 .chance_within_evacuation_time
-                .map_or("-".to_owned(), percent),
+                .map_or("-".to_owned(), percent_in_words),
             [failure.low, failure.median, failure.high]
                 .map(time)
                 .join("  "),
@@ -370,7 +369,7 @@ fn neighbours(report: &TogetherReport) -> String {
             out,
             "apart {} ({}), {}",
             one.benchmark,
-            percent(one.probability),
+            percent_in_words(one.probability),
             since(one.since),
         );
     }

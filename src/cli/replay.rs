@@ -34,14 +34,14 @@ const CONTINUED: &str = "    ";
 pub(super) struct Args {
     #[command(flatten)]
     readings: ReadingArgs,
-    /// The site whose alert policy and averaging hold; default is the policy's defaults
+    /// The site whose alert policy and averaging hold; default is the policy's defaults, with --state what the daemon had
     #[arg(long, value_name = "CONFIG")]
     config: Option<PathBuf>,
     /// max, or how many seconds of data go by in a second
     #[arg(long, value_name = "max|N", default_value = "max", value_parser = pace)]
     speed: ReplayPace,
     /// Play what the daemon of this state folder took in, in the order in which it did, instead of files
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["config", "hooks", "quantity"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["hooks", "quantity"])]
     state: Option<PathBuf>,
     /// Stop at this time of the data
     #[arg(long, value_name = "TIME", value_parser = value::instant)]
@@ -142,7 +142,13 @@ fn run_state(args: &Args, folder: &Path) -> anyhow::Result<()> {
     }
     let is_wanted =
         |event: &Event| wanted.is_none() || event.benchmark.is_none() || event.benchmark == wanted;
-    let mut printer = Printer::new(args, TimeZone::UTC)?;
+    let config = args.config.as_deref().map(config::load).transpose()?;
+    for warning in config.iter().flat_map(|config| &config.warnings) {
+        exit::complain(warning);
+    }
+    let settings = config.as_ref().map(|config| settings(args, Some(config)));
+    let zone = config.map_or(TimeZone::UTC, |config| config.site.time_zone);
+    let mut printer = Printer::new(args, zone)?;
     asynchronous()?.block_on(async {
         let shutdown = Shutdown::on_signals().context("cannot listen for signals")?;
         // Where the lines are seen they say how far it has come.
@@ -158,7 +164,15 @@ fn run_state(args: &Args, folder: &Path) -> anyhow::Result<()> {
             }
             Ok(())
         };
-        let played = replay::replay_state(&store, args.until, &shutdown, &mut progress, &mut print);
+        let settings = settings.as_ref();
+        let played = replay::replay_state(
+            &store,
+            settings,
+            args.until,
+            &shutdown,
+            &mut progress,
+            &mut print,
+        );
         if let Some(bar) = &bar {
             bar.finish_and_clear();
         }

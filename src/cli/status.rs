@@ -5,7 +5,7 @@ use super::preview::shown;
 use super::state::SiteArgs;
 use super::table::TextTable;
 use super::text;
-use crate::alert::Level;
+use crate::alert::{Level, chance_in_words};
 use crate::monitor::{CalledLevel, Event, EventKind, SUSPECT, SUSPECT_ENDS};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::alarm_state::{AlarmState, Alarms};
@@ -41,6 +41,8 @@ pub(super) struct StatusArgs {
 const POLL_INTERVAL: Duration = Duration::from_secs(2);
 /// Of the table, in characters: that of the terminals on which it is read.
 const WIDTH: usize = 80;
+/// What a line begins with that goes on with the one before it.
+const CONTINUED: &str = "    ";
 /// Puts a terminal's cursor at the top of an empty screen.
 const CLEAR: &str = "\u{1b}[H\u{1b}[2J";
 
@@ -335,18 +337,8 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
     let suspicions: String = suspicions
         .map(|one| text::local(&text::plain(one), zone) + "\n")
         .collect();
-    let returned = match &status.returned[..] {
-        [] => String::new(),
-        alerts => format!("\nended, and acknowledged by nobody:\n{}", lines(alerts)),
-    };
-    let force = match &status.alerts[..] {
-        [] => String::new(),
-        alerts => format!("\nin force:\n{}", lines(alerts)),
-    };
-    format!(
-        "{dead}{}: {} inputs taken, {} alerts wait for a hook\n{}{}{}{}{}{refused}{suspicions}\n{table}\
-         collapse: median of the forecast; chance: of collapse within the evacuation time\nand until the next reading is \
-         due, which red is called by\n{force}{returned}",
+    let head = format!(
+        "{dead}{}: {} inputs taken, {} alerts wait for a hook\n{}{}{}{}{}{refused}{suspicions}",
         text::plain(&status.site),
         status.steps,
         status.alerts_waiting,
@@ -355,7 +347,29 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
         lines(&status.closed),
         drilled(status, zone),
         recorded(status, zone),
-    )
+    );
+    let legend = "collapse: median of the forecast; chance: of collapse within the evacuation time\n\
+                  and until the next reading is due, by which red is called";
+    let alerts = listed("in force", &status.alerts, zone)
+        + &listed("ended, and acknowledged by nobody", &status.returned, zone);
+    format!("{}\n{table}{legend}\n{}", folded(&head), folded(&alerts))
+}
+
+/// The events, a line each, under a title; nothing where there are none.
+fn listed(title: &str, events: &[Event], zone: &TimeZone) -> String {
+    if events.is_empty() {
+        return String::new();
+    }
+    let lines = events.iter().map(|event| text::line(event, zone) + "\n");
+    format!("\n{title}:\n{}", lines.collect::<String>())
+}
+
+/// Lines of no more than the table's width.
+fn folded(lines: &str) -> String {
+    let lines = lines.lines();
+    lines
+        .map(|line| text::wrapped(line, WIDTH, CONTINUED) + "\n")
+        .collect()
 }
 
 /// Whether the record can be written; nothing where it can, or where none is kept.
@@ -395,5 +409,5 @@ fn drilled(status: &SiteStatus, zone: &TimeZone) -> String {
 }
 
 fn chance(chance: Option<f64>) -> String {
-    chance.map_or_else(|| "-".to_owned(), |chance| format!("{chance:.2}"))
+    chance.map_or_else(|| "-".to_owned(), chance_in_words)
 }

@@ -4,6 +4,7 @@ use super::args::{OutputArgs, ReadingArgs};
 use super::bar;
 use super::fit::InversionArgs;
 use super::table::{TextTable, number, time};
+use crate::alert::percent_in_words;
 use crate::inversion::{SweepOptions, SweepReport, SweepRow, sweep_showing};
 use crate::reading::Timestamp;
 
@@ -97,9 +98,7 @@ fn text(report: &SweepReport) -> String {
 }
 
 fn cells(row: &SweepRow) -> [String; 13] {
-    let percent = |share: Option<f64>| {
-        share.map_or("-".to_owned(), |share| format!("{:.0} %", 100.0 * share))
-    };
+    let percent = |share: Option<f64>| share.map_or("-".to_owned(), percent_in_words);
     let minima = row.alternatives.range_of_m();
     let minima = minima.map_or("-".to_owned(), |(low, high)| {
         format!("{}: m {low:.2} to {high:.2}", row.alternatives.0.len())

@@ -2,7 +2,7 @@
 
 use crate::plot::escaped;
 use crate::reading::Timestamp;
-use std::fmt::{self, Write as _};
+use std::fmt;
 
 /// Rows of cells, each column as wide as its widest cell.
 #[derive(Debug, Clone, Default)]
@@ -34,22 +34,19 @@ impl TextTable {
 
     /// The same as an element of a page.
     pub(super) fn html(&self) -> String {
-        let mut out = String::from("<table>\n");
-        for (index, row) in self.rows.iter().enumerate() {
-            let tag = if self.is_headed && index == 0 {
-                "th"
-            } else {
-                "td"
-            };
-            out.push_str("<tr>");
-            for cell in row {
-                // Writing to a string cannot fail.
-                let _ = write!(out, "<{tag}>{}</{tag}>", escaped(cell));
-            }
-            out.push_str("</tr>\n");
-        }
-        out.push_str("</table>");
-        out
+        // On paper the head of a table is on each of its sheets.
+        let (head, body) = self.rows.split_at(usize::from(self.is_headed));
+        let rows = |rows: &[Vec<String>], tag: &str| -> String {
+            rows.iter().map(|row| html_row(row, tag)).collect()
+        };
+        let head = match head {
+            [] => String::new(),
+            head => format!("<thead>\n{}</thead>\n", rows(head, "th")),
+        };
+        format!(
+            "<table>\n{head}<tbody>\n{}</tbody>\n</table>",
+            rows(body, "td")
+        )
     }
 
     /// The width of each column, in characters.
@@ -82,6 +79,13 @@ impl TextTable {
         }
         fitted
     }
+}
+
+fn html_row(row: &[String], tag: &str) -> String {
+    let cells = row
+        .iter()
+        .map(|cell| format!("<{tag}>{}</{tag}>", escaped(cell)));
+    format!("<tr>{}</tr>\n", cells.collect::<String>())
 }
 
 /// Blanks between two columns.

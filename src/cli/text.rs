@@ -1,5 +1,6 @@
 //! Events as lines for people.
 
+use crate::alert::percent_in_words;
 use crate::effects::{Kind, Rival};
 use crate::monitor::{
     AlertState, Event, EventKind, FailureTime, SharedFailure, Summary, Unexplained,
@@ -111,8 +112,8 @@ fn what(kind: &EventKind) -> String {
             to,
             probability,
         } => format!(
-            "regime flip: {from} to {to} (probability {:.0} %)",
-            100.0 * probability
+            "regime flip: {from} to {to} (probability {})",
+            percent_in_words(*probability)
         ),
         EventKind::InterceptDrift {
             from,
@@ -265,13 +266,13 @@ fn drift(name: &str, (from, to): (Timestamp, Timestamp), days_per_day: f64) -> S
 }
 
 fn forecast(failure: &FailureTime) -> String {
-    let chance = 100.0 * failure.probability;
+    let chance = percent_in_words(failure.probability);
     let horizon = failure.horizon_days;
     let bound = |time: Option<Timestamp>| time.map_or("later".to_owned(), minute);
     match failure.median.or(failure.low) {
-        None => format!("no failure predicted ({chance:.0} % within {horizon:.0} days)"),
+        None => format!("no failure predicted ({chance} within {horizon:.0} days)"),
         Some(_) => format!(
-            "failure {} ({} to {}, {chance:.0} % within {horizon:.0} days)",
+            "failure {} ({} to {}, {chance} within {horizon:.0} days)",
             bound(failure.median),
             bound(failure.low),
             bound(failure.high)

@@ -75,7 +75,7 @@ pub(super) fn residual(explanation: &Explanation) -> Option<Picture> {
         marks.push((String::new(), zero(&x)));
         marks.push((String::new(), dots(thinned(points), colour, 1.8)));
         panels.push(Panel {
-            title: format!("residual {name}"),
+            title: format!("{}: residual {name} the effects", explanation.benchmark),
             x,
             y: y.clone(),
             marks,
@@ -231,7 +231,8 @@ fn points(explanation: &Explanation, values: &[f64]) -> Option<Vec<(f64, f64)>> 
         .iter()
         .map(|time| day(*time))
         .zip(values.iter().copied());
-    Some(points.filter(|point| point.1.is_finite()).collect())
+    let points: Vec<_> = points.filter(|point| point.1.is_finite()).collect();
+    (!points.is_empty()).then_some(points)
 }
 
 fn dates(points: &[(f64, f64)]) -> Axis {

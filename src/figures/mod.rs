@@ -79,6 +79,21 @@ mod tests {
     }
 
     #[test]
+    fn a_contribution_that_is_known_at_no_time_has_no_panel() {
+        let mut explanation = fixture::lake();
+        let panels = |explanation: &Explanation| {
+            let drawn = pictures(explanation);
+            let own = drawn.iter().find(|one| one.name == "contributions");
+            own.map_or(0, |picture| picture.svg.matches("<clipPath").count())
+        };
+        let before = panels(&explanation);
+        let values = explanation.curves.contributions.values_mut().next();
+        values.unwrap().fill(f64::NAN);
+        assert!(before > 0);
+        assert_eq!(panels(&explanation), before - 1);
+    }
+
+    #[test]
     fn curves_that_do_not_fit_their_times_are_not_drawn() {
         let mut explanation = fixture::lake();
         explanation.curves.load_after.pop();

@@ -49,12 +49,13 @@ pub fn escaped(text: &str) -> String {
 
 /// The opening of a sheet: its size, its title for screen readers, and a white ground.
 fn opened(width: f64, height: f64, description: &str) -> String {
+    let description = escaped(description);
+    let label = description.replace('"', "&quot;");
     format!(
-        r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}" font-family="DejaVu Sans, Verdana, sans-serif" font-size="{FONT}" fill="{BLACK}">
-<title>{}</title>
+        r##"<svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label="{label}" viewBox="0 0 {width} {height}" width="{width}" height="{height}" font-family="DejaVu Sans, Verdana, sans-serif" font-size="{FONT}" fill="{BLACK}">
+<title>{description}</title>
 <rect width="{width}" height="{height}" fill="#ffffff"/>
-"##,
-        escaped(description)
+"##
     )
 }
 

@@ -37,6 +37,10 @@ pub struct Panel {
 const GAP: f64 = 6.0;
 /// How much wider bold letters are.
 const BOLD: f64 = 1.15;
+/// How much wider digits are.
+const DIGITS: f64 = 1.15;
+/// Room to the right of a plot, at least.
+const EDGE: f64 = 12.0;
 
 /// Where a panel's plot stands on the sheet.
 #[derive(Debug, Clone, Copy)]
@@ -123,6 +127,8 @@ impl Panel {
                 frame.top
             );
             if frame.foot == Foot::Axis {
+                // The last label stays on the sheet.
+                let x = x.min(right + EDGE - 0.5 * DIGITS * width_of(&text));
                 let _ = write!(
                     out,
                     r#"<text x="{x:.1}" y="{:.1}" text-anchor="middle">{text}</text>"#,
@@ -432,7 +438,7 @@ mod tests {
             legend,
         };
         Figure {
-            description: "a < b".to_owned(),
+            description: "a < b \"c\"".to_owned(),
             columns: 1,
             panel: (300.0, 200.0),
             panels: vec![panel],
@@ -452,9 +458,26 @@ mod tests {
     }
 
     #[test]
+    fn the_label_at_the_end_of_an_axis_stays_on_the_sheet() {
+        let mut figure = panel("", Legend::TopLeft);
+        figure.panels[0].x = Axis::dates("", 15_000.0, 15_010.0);
+        let svg = figure.svg();
+        let ends = svg.lines().filter_map(|line| {
+            let (_, text) = line.split_once("<text x=\"")?;
+            let (x, rest) = text.split_once('"')?;
+            let (_, label) = rest.split_once("text-anchor=\"middle\">")?;
+            let label = label.split('<').next()?;
+            Some(x.parse::<f64>().ok()? + 0.5 * width_of(label))
+        });
+        let furthest = ends.fold(0.0, f64::max);
+        assert!((280.0..300.0).contains(&furthest), "{furthest}: {svg}");
+    }
+
+    #[test]
     fn what_is_written_is_escaped_and_inner_names_begin_with_the_figure() {
         let svg = panel("p < q", Legend::Above).named("load-");
-        assert!(svg.contains("p &lt; q") && svg.contains("a &lt; b"));
+        assert!(svg.contains("p &lt; q") && svg.contains("<title>a &lt; b \"c\""));
+        assert!(svg.contains("role=\"img\" aria-label=\"a &lt; b &quot;c&quot;\""));
         assert!(svg.contains("id=\"load-c0\"") && svg.contains("url(#load-c0)"));
     }
 

@@ -1,6 +1,8 @@
 //! A recording played through a site with a state folder and the page, at a pace that one can watch.
 
 use super::clock;
+use super::deliver::{Dispatcher, Retry};
+use super::delivered::Delivered;
 use super::hook::Status;
 use super::replay::{ReplayPace, arrivals, wait};
 use super::serve::{ListenError, ListenOptions, ServedState, Server};
@@ -8,6 +10,7 @@ use super::shutdown::Shutdown;
 use super::site::{Sinks, Site};
 use super::view::{Facts, SiteReader};
 use super::vitals::Vitals;
+use crate::config::HookConfig;
 use crate::monitor::{Input, Settings};
 use crate::reading::Recording;
 use crate::store::{Store, StoreError};
@@ -17,6 +20,8 @@ use std::time::Duration;
 
 /// How often orders are read.
 const POLL_INTERVAL: Duration = Duration::from_millis(300);
+/// How long hooks may take to finish at the end.
+const DRAIN_LIMIT: Duration = Duration::from_secs(10);
 
 /// What is played, and to whom it is shown.
 #[derive(Debug)]
@@ -31,6 +36,8 @@ pub struct Exhibit<'a> {
     pub facts: Facts,
     /// Where the page is.
     pub options: ListenOptions,
+    /// Who is notified, as in an exercise.
+    pub hooks: &'a [HookConfig],
 }
 
 /// Why nothing is shown.
@@ -63,9 +70,11 @@ pub async fn show(
     let behind = ServedState { archive, reader };
     let server = Server::open(exhibit.options.clone(), Arc::clone(&vitals), behind).await?;
     opened(server.address());
+    let delivered = Delivered::of(Arc::clone(&store));
+    let alerts = Dispatcher::start(exhibit.hooks, &Retry::default(), delivered);
     let sinks = Sinks {
         store: Some(Arc::clone(&store)),
-        alerts: None,
+        alerts: Some(alerts),
         status: Status::Exercise,
     };
     let site = Site::new(&exhibit.facts.name, exhibit.settings, sinks);
@@ -90,6 +99,9 @@ pub async fn show(
     }
     stage.wait(None, &mut shutdown).await?;
     server.stop().await;
+    let now = stage.store.newest_step()?.unwrap_or_else(clock::now);
+    // What its hooks did not take is in the log.
+    stage.site.close(now, DRAIN_LIMIT).await?;
     Ok(())
 }
 
@@ -110,7 +122,7 @@ impl Stage {
             self.vitals.turned();
             for (number, order) in self.store.orders()? {
                 self.site.order(number, order);
-                // Orders fire no hook here: the time of the data is all there is.
+                // The time of the data is all there is.
                 let now = self.store.newest_step()?.unwrap_or_else(clock::now);
                 self.site.commit(now)?;
             }

@@ -153,23 +153,30 @@ pub async fn replay(
 }
 
 /// Plays what a daemon took in, in the order in which it did: every value, every passage of time, every finding of
-/// a search and every change of its settings. The events are the daemon's own, the summary last. `progress` receives the
-/// share of the steps that is done, 0 to 1.
+/// a search and every change of its settings. The events are the daemon's own, the summary last. Under `settings` they are
+/// those that it would have said with these in place of its own. `progress` receives the share of the steps that is
+/// done, 0 to 1.
 ///
 /// # Errors
 /// [`ReplayError`].
 pub fn replay_state(
     store: &Store,
+    settings: Option<&Settings>,
     until: Option<Timestamp>,
     shutdown: &Shutdown,
     progress: &mut dyn FnMut(f64),
     each: &mut (dyn FnMut(&Event) -> io::Result<()> + '_),
 ) -> Result<(), ReplayError> {
     let steps = store.last_step().max(1) as f64;
-    let mut monitor = Monitor::new(Settings::default());
+    let mut monitor = Monitor::new(settings.cloned().unwrap_or_default());
     let mut after = 0;
     'all: loop {
-        let rows = store.steps(after)?;
+        let mut rows = store.steps(after)?;
+        for row in &mut rows {
+            if let (Input::Settings(held), Some(settings)) = (&mut row.input, settings) {
+                **held = settings.clone();
+            }
+        }
         let Some(last) = rows.last() else { break };
         after = last.seq;
         let mut prepared = 0;

@@ -428,6 +428,19 @@ fn a_replay_of_a_state_keeps_to_the_benchmark_and_an_acknowledgement_is_shown() 
     ]);
     assert!(events.contains("\"P1\""), "{events}");
     assert!(!events.contains("\"benchmark\":\"P2\""), "{events}");
+    // Under another policy than the daemon had.
+    let state = ["replay", "--state", "state", "--format", "json"];
+    let lived = office.done(&state);
+    let own = office.done(&[&state[..], &["--config", "site.toml"]].concat());
+    assert_eq!(own, lived);
+    let strict = "[alert]\ncritical_velocity = \"5 mm/day\"\n";
+    fs::write(office.path("strict.toml"), site("*.csv", strict)).unwrap();
+    let strict = office.done(&[&state[..], &["--config", "strict.toml"]].concat());
+    let by_velocity = "\"rule\":\"critical-velocity\"";
+    assert!(!lived.contains(by_velocity) && strict.contains(by_velocity));
+    for line in office.done(&["status", "--config", "site.toml"]).lines() {
+        assert!(line.chars().count() <= 80, "{line}");
+    }
     let said = office.refused(65, &["replay", "--state", "state", "--benchmark", "P9"]);
     assert!(said.contains("P9") && said.contains("P1"), "{said}");
 }

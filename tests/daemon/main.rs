@@ -18,5 +18,6 @@ mod sample_hooks;
 mod sandbox;
 mod serve;
 mod service;
+mod shown;
 mod site;
 mod webhooks;

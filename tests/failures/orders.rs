@@ -150,6 +150,7 @@ fn an_alert_that_waits_for_a_hook_whose_command_line_changed_goes_to_the_new_one
     });
     for words in [&["status"][..], &["alerts", "list"]] {
         let said = site.printed(&[words, &["--config", "site.toml"]].concat());
+        let said = said.replace("\n    ", " ");
         assert!(
             said.contains("hook \"/bin/sh hook.sh\" has not taken the red alert"),
             "{said}"

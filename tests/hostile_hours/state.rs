@@ -56,7 +56,7 @@ pub(crate) fn is_what_a_replay_says(seed: u64, store: &Store) {
         said.push(serde_json::to_string(event).unwrap());
         Ok(())
     };
-    replay_state(store, None, &stopped, &mut |_| {}, &mut note).unwrap();
+    replay_state(store, None, None, &stopped, &mut |_| {}, &mut note).unwrap();
     // The summary is a replay's own.
     said.pop();
     let (mut stored, mut after) = (Vec::new(), 0);

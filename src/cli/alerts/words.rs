@@ -1,5 +1,6 @@
 //! One alert in plain words.
 
+use crate::alert::percent_in_words;
 use crate::cli::text;
 use crate::monitor::{Event, EventKind, FailureTime};
 use crate::reading::Timestamp;
@@ -92,20 +93,19 @@ fn evidence(alert: &AlertView, clock: &dyn Fn(Timestamp) -> String) -> Vec<Strin
     else {
         return vec!["no refit had been made".to_owned()];
     };
-    let percent = |chance: f64| format!("{:.1} %", 100.0 * chance);
     let mut found = vec![format!("refit with the readings until {}", clock(*time))];
     if let Some(velocity) = velocity_mm_per_day {
         found.push(format!("velocity {velocity:.3} mm/day"));
     }
     found.push(format!(
         "chance of collapse within the evacuation time {}, within the outlook {}",
-        percent(*chance_within_evacuation_time),
-        percent(*chance_within_outlook)
+        percent_in_words(*chance_within_evacuation_time),
+        percent_in_words(*chance_within_outlook)
     ));
     found.push(format!(
         "regime {}, unstable with probability {}",
         regime.label,
-        percent(regime.probability_unstable)
+        percent_in_words(regime.probability_unstable)
     ));
     found.push(collapse(failure_time, clock));
     if let Some(intercept) = inverse_velocity.failure_time {

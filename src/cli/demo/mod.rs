@@ -12,7 +12,7 @@ use crate::alert::{Level, Policy};
 use crate::cli::text::wrapped;
 use crate::config::HookConfig;
 use crate::monitor::{Event, Settings};
-use crate::reading::Recording;
+use crate::reading::{Recording, Series};
 use crate::runtime::ingest::{ReadOptions, read_files};
 use crate::runtime::replay::{self, ReplayPace, ReplayPlan};
 use crate::runtime::shutdown::Shutdown;
@@ -39,7 +39,7 @@ pub(super) struct Args {
     serve: Option<SocketAddr>,
 }
 
-/// The demo asks nobody for a token.
+/// The demo's token is known to everybody.
 fn loopback(text: &str) -> Result<SocketAddr, String> {
     let address: SocketAddr = text
         .parse()
@@ -76,7 +76,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     writeln!(out, "{}", timeline::LEGEND)?;
     let runtime = asynchronous()?;
     for crisis in &CRISES {
-        let recording = recording(folder.path(), crisis)?;
+        let mut recording = recording(folder.path(), crisis)?;
+        let is_played = |series: &Series| crisis.benchmarks.contains(&series.benchmark.as_str());
+        recording.series.retain(is_played);
         introduce(&mut out, crisis, &recording)?;
         let mut timeline = Timeline::new();
         runtime.block_on(play(
@@ -111,15 +113,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Reads the crisis's benchmarks and covariates from the program's own copy of the recording.
+/// Reads the program's own copy of the recording.
 fn recording(folder: &Path, crisis: &Crisis) -> anyhow::Result<Recording> {
     let file = folder.join(crisis.file);
     std::fs::write(&file, crisis.recording)
         .with_context(|| format!("cannot write {}", file.display()))?;
-    let (mut recording, _) = read_files(&[file], &ReadOptions::default())?;
-    recording
-        .series
-        .retain(|series| crisis.benchmarks.contains(&series.benchmark.as_str()));
+    let (recording, _) = read_files(&[file], &ReadOptions::default())?;
     Ok(recording)
 }
 

@@ -1,7 +1,7 @@
 //! A crisis as it unfolds: a line for each change of a level, with its reason; then velocity, level and forecast as marks.
 
 use super::marks::{self, MarkScale};
-use crate::alert::Level;
+use crate::alert::{Level, percent_in_words};
 use crate::cli::text::plain;
 use crate::monitor::{AlertState, Event, EventKind, FailureTime};
 use crate::reading::{BenchmarkId, Timestamp, days_since};
@@ -257,11 +257,12 @@ fn reason(rule: &str, text: &str, moment: Option<&DemoMoment>) -> String {
         .map_or_else(String::new, |time| format!("; median {}", day(time)));
     let why = match rule {
         "chance-within-outlook" => {
-            format!("{:.0} % in 30 days{median}", 100.0 * moment.within_outlook)
+            let chance = percent_in_words(moment.within_outlook);
+            format!("{chance} in 30 days{median}")
         }
         "chance-within-evacuation-time" => {
             let (chance, span) = until_next(text).unwrap_or((moment.within_evacuation, "time"));
-            format!("{:.0} % in {span}{median}", 100.0 * chance)
+            format!("{} in {span}{median}", percent_in_words(chance))
         }
         other => words(other),
     };

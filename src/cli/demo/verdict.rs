@@ -2,7 +2,7 @@
 
 use super::crisis::{Crisis, End};
 use super::timeline::{DemoRecord, day};
-use crate::alert::Level;
+use crate::alert::{Level, chance_in_words};
 use crate::reading::{BenchmarkId, Timestamp, days_since};
 
 /// The table's head.
@@ -52,6 +52,6 @@ fn ten_days_before(failed: Timestamp, record: &DemoRecord) -> String {
     };
     match forecast.median {
         Some(median) => format!("{:+.1}", days_since(failed, median)),
-        None => format!("no failure ({:.2})", forecast.probability),
+        None => format!("no failure ({})", chance_in_words(forecast.probability)),
     }
 }

@@ -17,11 +17,12 @@ h2 { font-size: 1.1rem; margin: 2rem 0 .5rem; }
 .subject, figcaption, footer { color: var(--faint); font-size: .9rem; }
 figure { margin: 1.6rem 0; }
 svg { display: block; height: auto; max-width: 100%; }
-.wide { overflow-x: auto; }
+.wide { margin-bottom: 1rem; overflow-x: auto; }
 table { border-collapse: collapse; font-size: .88rem; font-variant-numeric: tabular-nums; }
 th, td { border-bottom: 1px solid var(--line); padding: .25rem .8rem .25rem 0; text-align: left; vertical-align: top; }
 th, td:not(:last-child) { white-space: nowrap; }
 td:last-child { min-width: 6rem; }
+@media (max-width: 50rem) { th, td:not(:last-child) { white-space: normal; } }
 @media (prefers-color-scheme: dark) {
 :root { --ground: #16181c; --text: #e6e6e6; --faint: #a5a5a5; --line: #3a3d42; --note: #1f2329; }
 svg { fill: #e6e6e6; }

@@ -1,6 +1,7 @@
 //! The tables of an explanation, the same for the terminal and for the page.
 
 use super::sentence::{brief, tail_probability};
+use crate::alert::percent_in_words;
 use crate::cli::table::{TextTable, time};
 use crate::effects::{Change, Effect, Explanation, Form, Kind};
 use crate::reading::Timestamp;
@@ -291,7 +292,7 @@ fn settings(explanation: &Explanation) -> TextTable {
 }
 
 fn percent(share: Option<f64>) -> String {
-    share.map_or_else(dash, |share| format!("{:.0} %", 100.0 * share))
+    share.map_or_else(dash, percent_in_words)
 }
 
 /// A fall of the BIC: fractions of one mean nothing.

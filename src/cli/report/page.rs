@@ -11,14 +11,18 @@ use std::fmt::Write as _;
 /// On paper each figure and table row stays whole, and each benchmark begins a sheet.
 const PRINT: &str = "
 h3 { font-size: 1rem; margin: 1.4rem 0 .4rem; }
+.scores table { font-size: .8rem; }
+.scores th, .scores td:not(:first-child) { min-width: 0; padding-right: .5rem; white-space: normal !important; }
 @media print {
-body { font-size: 10pt; margin: 0; max-width: none; padding: 0; }
+body { font-size: 9pt; margin: 0; max-width: none; padding: 0; }
 section.benchmark { break-before: page; }
 section.benchmark:first-of-type { break-before: auto; }
 figure, tr { break-inside: avoid; }
 h2, h3 { break-after: avoid; }
 .wide { overflow: visible; }
-td { white-space: normal !important; }
+svg { max-height: 13cm; }
+th, td { white-space: normal !important; }
+thead { break-after: avoid; }
 nav { display: none; }
 }
 ";

@@ -2,7 +2,7 @@
 
 use super::Args;
 use super::material::Material;
-use crate::alert::Level;
+use crate::alert::{Level, chance_in_words};
 use crate::cli::table::{TextTable, time};
 use crate::cli::{explain, score, text};
 use crate::figures::{self, Replayed};
@@ -39,11 +39,11 @@ pub(super) fn summary(material: &Material, series: &Series) -> String {
         };
         let _ = write!(
             out,
-            "; collapse forecast {} (90 %: {} to {}; chance {:.2} in {:.0} days)",
+            "; collapse forecast {} (90 %: {} to {}; chance {} in {:.0} days)",
             never(failure.median),
             never(failure.low),
             never(failure.high),
-            failure.probability,
+            chance_in_words(failure.probability),
             failure.horizon_days
         );
     }

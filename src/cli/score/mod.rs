@@ -98,7 +98,7 @@ pub(super) fn part(
     let report = report(failure_time, recording, series, policy)?;
     let svg = figures::life_expectancy(&report.card, failure_time);
     Ok(format!(
-        "<figure>\n{svg}</figure>\n<p>{}</p>\n<div class=\"wide\">{}</div>\n",
+        "<figure>\n{svg}</figure>\n<p>{}</p>\n<div class=\"wide scores\">{}</div>\n",
         text::meaning(&report),
         text::table(&report).html()
     ))

@@ -1,7 +1,7 @@
 //! The scorecard for people.
 
 use super::{ScoreReport, hours};
-use crate::alert::Level;
+use crate::alert::{Level, chance_in_words};
 use crate::cli::table::{TextTable, time};
 use crate::reading::Timestamp;
 use crate::score::Score;
@@ -108,7 +108,7 @@ fn looks(report: &ScoreReport) -> TextTable {
         table.row([
             (*method).to_owned(),
             format!("{crps:.2}"),
-            format!("{highest:.2}"),
+            chance_in_words(highest),
             format!("{said} of {}", scores.len()),
         ]);
     }

@@ -2,6 +2,7 @@
 
 use super::levels;
 use super::{Replayed, ReplayedRefit, WIDTH};
+use crate::alert::chance_in_words;
 use crate::figures::day;
 use crate::figures::in_time::{dots, line, thinned};
 use crate::fit::Rate;
@@ -210,7 +211,7 @@ impl Replayed<'_> {
 
     /// A forecast in words.
     fn described(&self, failure: &FailureTime) -> String {
-        let chance = format!("chance {:.2}", failure.probability);
+        let chance = format!("chance {}", chance_in_words(failure.probability));
         if failure.low.is_none() {
             return chance;
         }

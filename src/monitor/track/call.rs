@@ -2,7 +2,7 @@
 
 use super::forecast::Forecast;
 use super::{Track, days};
-use crate::alert::{AlertCause, AlertEvidence, Entered, Policy, Transition};
+use crate::alert::{AlertCause, AlertEvidence, Entered, Policy, Transition, chance_in_words};
 use crate::fit::Rate;
 use crate::forecast::HORIZON_DAYS;
 use crate::monitor::event::{AlertState, CalledLevel, Event, EventKind, LevelChance};
@@ -217,7 +217,8 @@ impl Track {
         let chance = |name: &str, chance: Option<f64>, span: SignedDuration| {
             chance.map_or_else(String::new, |chance| {
                 let hours = span.as_secs() / 3600;
-                format!("; chance {chance:.2} within {name} ({hours} h)")
+                let chance = chance_in_words(chance);
+                format!("; chance {chance} within {name} ({hours} h)")
             })
         };
         let outlook = if ahead.orange < policy.outlook {

@@ -3,7 +3,7 @@
 
 use super::forecast::Forecast;
 use super::{Track, days};
-use crate::alert::{AlertEvidence, Level, Policy};
+use crate::alert::{AlertEvidence, Level, Policy, chance_in_words};
 use crate::monitor::event::Event;
 use crate::monitor::kept::KeptForecast;
 use crate::reading::{SECONDS_PER_DAY, Timestamp};
@@ -88,8 +88,11 @@ impl Track {
         self.levels.note(now, change.level);
         let hours = policy.evacuation_time.as_secs() / 3600;
         let text = format!(
-            "benchmark {}: {} ({}); no reading since {newest}; if no collapse has come since, chance {chance:.2} within the evacuation time ({hours} h) from now on",
-            self.benchmark, change.level, change.rule
+            "benchmark {}: {} ({}); no reading since {newest}; if no collapse has come since, chance {} within the evacuation time ({hours} h) from now on",
+            self.benchmark,
+            change.level,
+            change.rule,
+            chance_in_words(chance)
         );
         Some(self.alert_of(now, &change, text))
     }

@@ -133,7 +133,7 @@ pub struct BenchmarkView {
     pub first: Option<Timestamp>,
     /// The last reading of all, also after the moment.
     pub last: Option<Timestamp>,
-    /// In a replay: when the slope collapsed.
+    /// In a replay: when the slope collapsed, once that is known.
     pub collapse: Option<Timestamp>,
     /// What is measured.
     pub quantity: Quantity,
@@ -214,7 +214,7 @@ impl SiteReader {
             now,
             first: span.map(|(first, _)| first),
             last: span.map(|(_, last)| last),
-            collapse: self.facts.collapse,
+            collapse: self.collapse(at, now),
             quantity: all.quantity(),
             is_cut,
             readings: ViewColumns::of(&points(&shown), buckets),

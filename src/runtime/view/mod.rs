@@ -52,8 +52,19 @@ pub struct Facts {
     pub links: Option<Links>,
     /// What time it is.
     pub now: Now,
-    /// In a replay: when the slope collapsed.
-    pub collapse: Option<Timestamp>,
+    /// In a replay: how it ended.
+    pub ending: Option<Ending>,
+    /// What is to be said of the positions, where they are not surveyed.
+    pub positions_are: Option<&'static str>,
+}
+
+/// How a crisis ended that is played.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Ending {
+    /// When the slope collapsed.
+    pub collapse: Timestamp,
+    /// The last that was measured before it.
+    pub last_reading: Timestamp,
 }
 
 impl Facts {
@@ -76,7 +87,8 @@ impl Facts {
             has_drills: config.drill.is_some(),
             links: config.site.links.clone(),
             now: Now::Wall,
-            collapse: None,
+            ending: None,
+            positions_are: None,
         }
     }
 }
@@ -113,6 +125,13 @@ impl SiteReader {
     /// [`StoreError`].
     pub fn events_after(&self, after: i64) -> Result<Vec<(i64, String)>, StoreError> {
         self.store.events(after, None, None)
+    }
+
+    /// When the slope collapsed, as far as that was known at `at`; without it, once all has been played.
+    fn collapse(&self, at: Option<Timestamp>, now: Timestamp) -> Option<Timestamp> {
+        let ending = self.facts.ending?;
+        let is_known = at.map_or(now >= ending.last_reading, |at| at >= ending.collapse);
+        is_known.then_some(ending.collapse)
     }
 
     fn now(&self) -> Result<Timestamp, StoreError> {

@@ -69,8 +69,11 @@ pub struct SiteView {
     pub first: Option<Timestamp>,
     /// The last reading of all.
     pub last: Option<Timestamp>,
-    /// In a replay: when the slope collapsed.
+    /// In a replay: when the slope collapsed, once that is known.
     pub collapse: Option<Timestamp>,
+    /// What is to be said of the positions, where they are not surveyed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub positions_are: Option<&'static str>,
     /// Whether orders are taken from here.
     pub takes_orders: bool,
     /// The whole site's level.
@@ -115,7 +118,8 @@ impl SiteReader {
             at,
             first: span.map(|(first, _)| first),
             last: span.map(|(_, last)| last),
-            collapse: self.facts.collapse,
+            collapse: self.collapse(at, now),
+            positions_are: self.facts.positions_are,
             takes_orders: self.facts.takes_orders,
             level: called.unwrap_or(Level::Green),
             unknown_since: levels.get(&(None, Level::Unknown)).map(|event| event.time),

@@ -125,6 +125,9 @@ impl Chromium {
         let scheme = if is_dark { "dark" } else { "light" };
         let media = json!({ "features": [{ "name": "prefers-color-scheme", "value": scheme }] });
         self.call("Emulation.setEmulatedMedia", &media);
+        // A phone is touched.
+        let touch = json!({ "enabled": width < 600 });
+        self.call("Emulation.setTouchEmulationEnabled", &touch);
     }
 
     pub(crate) fn visit(&mut self, address: &str) {
@@ -199,6 +202,33 @@ impl Chromium {
             let event = json!({ "type": kind, "x": at(share), "y": y, "button": "left", "buttons": buttons, "clickCount": 1 });
             self.call("Input.dispatchMouseEvent", &event);
         }
+    }
+
+    /// Draws a finger across an element, from one share of its width to another.
+    pub(crate) fn swipe(&mut self, selector: &str, from: f64, to: f64) {
+        let selector = json!(selector);
+        let place = self.value(&format!(
+            "(() => {{ const node = document.querySelector({selector}); node.scrollIntoView({{ block: 'center' }});
+               const box = node.getBoundingClientRect(); return [box.x, box.y + box.height / 2, box.width]; }})()"
+        ));
+        let [x, y, width] = [0, 1, 2].map(|index| place[index].as_f64().unwrap());
+        let on = |share: f64| json!([{ "x": x + share * width, "y": y }]);
+        let steps = [
+            ("touchStart", on(from)),
+            ("touchMove", on(f64::midpoint(from, to))),
+            ("touchMove", on(to)),
+            ("touchEnd", json!([])),
+        ];
+        for (kind, points) in steps {
+            let event = json!({ "type": kind, "touchPoints": points });
+            self.call("Input.dispatchTouchEvent", &event);
+        }
+    }
+
+    /// As it is printed, or as it is shown.
+    pub(crate) fn print(&mut self, is_printed: bool) {
+        let media = if is_printed { "print" } else { "" };
+        self.call("Emulation.setEmulatedMedia", &json!({ "media": media }));
     }
 
     /// Types into whatever has the focus.

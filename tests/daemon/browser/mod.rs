@@ -9,6 +9,7 @@ mod accessible;
 mod chromium;
 mod found;
 mod pace;
+mod report;
 
 use crate::site::{MARKUP, Site, TOKEN};
 use chromium::Chromium;
@@ -123,24 +124,43 @@ fn an_order_given_on_the_page_is_in_the_log_with_the_name_of_who_gave_it() {
     browser.until("document.getElementById('order-wrong').innerText === 'A name is needed.'");
     browser.click("#by");
     browser.type_in("Anna");
+    browser.click("#why");
+    browser.type_in("the road is closed");
     browser.click("#order-give");
     browser.until("!document.getElementById('order').open");
+    browser.until("document.querySelector('main').innerText.includes('acknowledge by Anna: the road is closed')");
     browser.until("document.querySelector('.head').innerText.includes('seen by Anna')");
     browser.click("button[data-order=silence]");
     browser.until("document.getElementById('order').open");
+    // The reason of one order is not that of the next.
+    assert_eq!(browser.value("document.getElementById('why').value"), "");
     browser.value("document.getElementById('span').value = '28800'");
     browser.click("#order-give");
     browser.until(
         "document.querySelector('.head').innerText.includes('not notified: silence by Anna')",
     );
     let orders = site.events("order");
-    let given: Vec<[&Value; 3]> = orders
+    let given: Vec<[&Value; 4]> = orders
         .iter()
-        .map(|order| [&order["order"], &order["benchmark"], &order["by"]])
+        .map(|order| {
+            [
+                &order["order"],
+                &order["benchmark"],
+                &order["by"],
+                &order["why"],
+            ]
+        })
         .collect();
     let anna = json!("Anna");
     let (acknowledge, silence, e3) = (json!("acknowledge"), json!("silence"), json!("E3"));
-    assert_eq!(given, [[&acknowledge, &e3, &anna], [&silence, &e3, &anna]]);
+    let (why, none) = (json!("the road is closed"), Value::Null);
+    assert_eq!(
+        given,
+        [
+            [&acknowledge, &e3, &anna, &why],
+            [&silence, &e3, &anna, &none]
+        ]
+    );
     assert_eq!(browser.complaints, [""; 0]);
 }
 
@@ -249,6 +269,95 @@ fn a_drag_across_one_chart_zooms_all_of_them_and_asks_for_more_detail() {
     // A fifth of the 45 days on the axis.
     let days = length.as_f64().unwrap();
     assert!((7.0..11.0).contains(&days), "{days}");
+    assert_eq!(browser.complaints, [""; 0]);
+}
+
+#[test]
+#[cfg_attr(not(has_chromium), ignore = "Chromium was not found by build.rs")]
+fn a_moment_outside_the_stretch_that_is_looked_at_moves_the_stretch() {
+    let (site, mut browser) = open("#/b/E3");
+    browser.until("document.querySelectorAll('figure.chart .u-over').length > 5");
+    browser.value("window.asked = []; const had = window.fetch; window.fetch = (path, ...rest) => { window.asked.push(String(path)); return had(path, ...rest); }");
+    browser.drag("figure[data-chart=displacement] .u-over", 0.5, 0.7);
+    browser.until("window.asked.some((path) => path.includes('from=') && path.includes('to='))");
+    let readings = &site.json("/api/benchmark?id=E3")["readings"]["t"];
+    let early = readings[8].as_f64().unwrap();
+    browser.value(&format!(
+        "location.hash = `#/b/E3?at=${{new Date(1000 * {early}).toISOString()}}`"
+    ));
+    let moved =
+        "window.asked.filter((path) => path.includes('at=') && path.includes('from=')).pop()";
+    browser.until(moved);
+    let asked = browser.value(moved);
+    let shown = site.json(asked.as_str().unwrap());
+    let times = shown["readings"]["t"].as_array().unwrap();
+    assert!(times.len() > 3, "{asked}: {times:?}");
+    // Back to the present the same.
+    browser.click("#live");
+    browser.until(
+        "window.asked.filter((path) => path.includes('from=')).pop()?.includes('at=') === false",
+    );
+    let asked = browser.value("window.asked.filter((path) => path.includes('from=')).pop()");
+    let shown = site.json(asked.as_str().unwrap());
+    let newest = shown["readings"]["t"].as_array().unwrap().last().unwrap();
+    assert_eq!(Some(newest), readings.as_array().unwrap().last());
+    assert_eq!(browser.complaints, [""; 0]);
+}
+
+#[test]
+#[cfg_attr(not(has_chromium), ignore = "Chromium was not found by build.rs")]
+fn a_date_is_written_year_first_in_the_zone_of_the_site_and_what_is_none_is_said() {
+    let (_site, mut browser) = open("#/b/E3");
+    let shown = browser.value("document.getElementById('date').value");
+    let shown = shown.as_str().unwrap();
+    let is_civil = jiff::civil::DateTime::strptime("%Y-%m-%d %H:%M", shown);
+    assert!(is_civil.is_ok(), "{shown}");
+    let mut write = |text: &str| {
+        browser.value(&format!(
+            "(() => {{ const date = document.getElementById('date'); date.value = {}; date.dispatchEvent(new Event('change')); }})()",
+            json!(text)
+        ));
+        let at = browser.value("new URLSearchParams(location.hash.split('?')[1]).get('at')");
+        let said = browser.value("document.getElementById('date').validationMessage");
+        (at, said)
+    };
+    // Zurich is two hours ahead in May and one in January.
+    for (text, at) in [
+        ("2012-05-14 06:30", "2012-05-14T04:30:00.000Z"),
+        ("2012-01-14", "2012-01-13T23:00:00.000Z"),
+        ("2012-05-14T06:30:15Z", "2012-05-14T06:30:15.000Z"),
+        ("2012-05-14T06:30-02:00", "2012-05-14T08:30:00.000Z"),
+    ] {
+        assert_eq!(write(text), (json!(at), json!("")), "{text}");
+    }
+    let (at, said) = write("05/14/2012");
+    assert_eq!(at, "2012-05-14T08:30:00.000Z");
+    assert!(
+        said.as_str().unwrap().contains("2012-05-14 06:30"),
+        "{said}"
+    );
+}
+
+#[test]
+#[cfg_attr(not(has_chromium), ignore = "Chromium was not found by build.rs")]
+fn a_finger_reads_values_and_looks_closer_where_that_is_asked_for() {
+    let (site, mut browser) = open("#/b/E3");
+    browser.look(PHONE, false);
+    browser.visit("about:blank");
+    browser.visit(&site.address("#/b/E3"));
+    browser.until("document.querySelectorAll('figure.chart .u-over').length > 5");
+    browser.value("window.asked = []; const had = window.fetch; window.fetch = (path, ...rest) => { window.asked.push(String(path)); return had(path, ...rest); }");
+    let chart = "figure[data-chart=displacement] .u-over";
+    browser.swipe(chart, 0.2, 0.5);
+    // All charts say the value there.
+    browser.until("/^20[0-9-]+ [0-9:]+: [0-9]+/.test(document.querySelector('figure[data-chart=displacement] .value').innerText)");
+    browser.until("/^20[0-9-]+ [0-9:]+: [0-9.]+/.test(document.querySelector('figure[data-chart=velocity] .value').innerText)");
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    let zoomed = "window.asked.some((path) => path.includes('from='))";
+    assert_eq!(browser.value(zoomed), false);
+    browser.click("button.finger");
+    browser.swipe(chart, 0.2, 0.5);
+    browser.until(zoomed);
     assert_eq!(browser.complaints, [""; 0]);
 }
 

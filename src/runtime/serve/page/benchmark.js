@@ -1,9 +1,9 @@
 // One benchmark: how it stands, and everything on one axis of time.
 
 import { get } from '/page/ask.js';
-import { Charts } from '/page/charts.js';
+import { AFTER, Charts } from '/page/charts.js';
 import { buttons } from '/page/site.js';
-import { badges, collapse, el, figure, left, list, percent, place, span, svg, described, when } from '/page/words.js';
+import { badges, collapse, el, figure, left, list, outlookChance, percent, place, redChance, span, svg, described, when } from '/page/words.js';
 
 const DAY = 86400;
 const SPANS = [[null, 'Whole record'], [365 * DAY, '1 year'], [30 * DAY, '30 days'], [7 * DAY, '7 days'], [DAY, '1 day']];
@@ -20,6 +20,8 @@ export class BenchmarkPage {
   }
 
   async ask(at, signal) {
+    if (at !== this.asked) this.follow(at);
+    this.asked = at;
     const edges = this.window ? this.window.map((t) => new Date(1000 * t).toISOString()) : [null, null];
     const buckets = Math.max(200, Math.min(1000, Math.round(this.view.clientWidth / 2)));
     const answer = await get('/api/benchmark', { id: this.name, at, from: edges[0], to: edges[1], buckets }, signal);
@@ -41,7 +43,7 @@ export class BenchmarkPage {
     if (!this.charts) this.build();
     this.headNode.replaceChildren(...this.head(view));
     this.factsNode.replaceChildren(...facts(view));
-    this.giveNode.replaceChildren(...(at === null ? [buttons(view, (kind) => this.orders(kind, this.name), ['acknowledge', 'shelve', 'silence', 'unsilence'])] : []));
+    this.giveNode.replaceChildren(...(at === null ? [buttons(view, (kind) => this.orders(kind, this.name), ['acknowledge', 'shelve', 'silence', 'resolve', 'unsilence'])] : []));
     this.charts.draw(view);
     this.planeNode.replaceChildren(plane(view.forecasts, view.latest?.regime));
     this.effectsNode.replaceChildren(...effects(view));
@@ -55,12 +57,15 @@ export class BenchmarkPage {
     this.headNode.className = 'head';
     const tools = el('div', { class: 'tools', role: 'toolbar', 'aria-label': 'Stretch of time' },
       SPANS.map(([length, text]) => el('button', { type: 'button', onclick: () => this.near(length) }, text)),
+      el('button', { type: 'button', class: 'finger', 'aria-pressed': 'false', onclick: (event) => this.brush(event.currentTarget) }, 'Drag to zoom'),
       [['Earlier', -0.5, 1], ['Later', 0.5, 1], ['Nearer', 0, 0.5], ['Wider', 0, 2]].map(([text, shift, factor]) =>
         el('button', { type: 'button', onclick: () => this.move(shift, factor) }, text)));
     this.view.replaceChildren(this.headNode,
       el('section', { class: 'card', 'aria-label': 'How it stands' }, this.factsNode, this.giveNode),
       el('section', { class: 'card', 'aria-label': 'Over time' }, tools, this.chartsNode,
-        el('p', { class: 'soft' }, 'The upright line is the moment that is shown. Drag across a chart to look closer; a double click shows the whole record.')),
+        el('p', { class: 'soft' }, 'The upright line is the moment that is shown. ',
+          el('span', { class: 'mouse' }, 'Drag across a chart to look closer; a double click shows the whole record.'),
+          el('span', { class: 'finger' }, 'A finger that is drawn across a chart reads its values; with Drag to zoom it looks closer.'))),
       el('div', { class: 'two' },
         el('section', { class: 'card' }, el('h2', {}, 'Regime, with its trail'), this.planeNode),
         el('section', { class: 'card' }, el('h2', {}, 'What the law lacks here'), this.effectsNode)),
@@ -78,10 +83,22 @@ export class BenchmarkPage {
       ...quiet.map((one) => el('span', { class: 'soft' }, `not notified: ${described(one)}`))];
   }
 
+  /** Keeps another moment within the stretch that the charts look at. */
+  follow(at) {
+    const moment = Date.parse(at ?? this.last?.last ?? this.last?.now);
+    if (this.charts) this.window = this.charts.follow(moment / 1000);
+  }
+
   /** So many seconds until the moment that is shown. */
   near(length) {
     const end = Date.parse(this.last.at ?? this.last.last ?? this.last.now) / 1000;
-    this.charts.show(length === null ? null : [end - length, end + 0.25 * length]);
+    this.charts.show(length === null ? null : [end - length, end + AFTER * length]);
+  }
+
+  /** Whether a finger zooms or reads. */
+  brush(button) {
+    this.charts.isBrush = !this.charts.isBrush;
+    button.setAttribute('aria-pressed', String(this.charts.isBrush));
   }
 
   move(shift, factor) {
@@ -118,7 +135,8 @@ function facts(view) {
     ['Newest reading', reading],
     ['Velocity', [`${figure(standing.velocity_mm_per_day)} mm/day`]],
     ['Collapse forecast', [...collapse(standing.failure_time), left(standing.failure_time, view.at ?? view.now) ? el('small', {}, left(standing.failure_time, view.at ?? view.now)) : null]],
-    ['Chance within the evacuation time', [percent(standing.chance_within_evacuation_time), el('small', {}, `${percent(standing.chance_within_outlook)} within the outlook`)]],
+    ['Chance of collapse', [redChance(standing)[0], el('small', {}, redChance(standing)[1]), el('small', {}, outlookChance(standing))]],
+    ['Alarm state', [standing.alarm_state]],
     ['Regime', [standing.regime ?? '-', view.latest ? el('small', {}, `unstable ${percent(view.latest.regime.probability_unstable)}, accelerating ${percent(view.latest.regime.probability_accelerating)}`) : null]],
   ];
   const nodes = [el('dl', {}, rows.map(([name, value]) => el('div', {}, el('dt', {}, name), el('dd', {}, value.filter((part) => part !== null)))))];

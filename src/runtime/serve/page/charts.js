@@ -7,6 +7,8 @@ const LEVELS = ['green', 'yellow', 'orange', 'red', 'unknown'];
 const MARKS = { 'effect-found': 'E', 'effect-dropped': 'e', 'regime-flip': 'R', declared: 'D', fault: 'F', correction: 'C', 'unexplained-residual': '?', order: 'O', 'intercept-drift': 'i', 'transition-drift': 't' };
 /** What lies ahead of the moment, as a share of what lies before. */
 const AHEAD = 0.3;
+/** What lies after the moment, as a share of what lies before it, in a stretch that was chosen. */
+export const AFTER = 0.25;
 const AXIS = 64;
 
 const seconds = (time) => Date.parse(time) / 1000;
@@ -24,6 +26,7 @@ export class Charts {
     this.zoomed = zoomed;
     this.zoom = null;
     this.plots = new Map();
+    this.isBrush = false;
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(node);
   }
@@ -86,6 +89,16 @@ export class Charts {
     this.zoomed(this.zoom);
   }
 
+  /** Moves a stretch that has too little before the moment, or not the moment; what it is then. */
+  follow(moment) {
+    if (this.zoom && Number.isFinite(moment)) {
+      const [from, to] = this.zoom;
+      const before = (to - from) / (1 + AFTER);
+      if (moment < from + 0.1 * before || moment > to) this.zoom = [moment - before, moment + AFTER * before];
+    }
+    return this.zoom;
+  }
+
   scale() {
     const [min, max] = this.range();
     for (const { plot } of this.plots.values()) plot.setScale('x', { min, max });
@@ -105,6 +118,7 @@ export class Charts {
     const entry = { chart, caption };
     this.plots.set(chart.key, entry);
     entry.plot = new uPlot(this.options(entry), chart.data, figureNode);
+    touch(entry.plot, () => this.isBrush);
   }
 
   options(entry) {
@@ -167,6 +181,40 @@ export class Charts {
     const value = plot && index !== null && index !== undefined ? chart.value(index) : null;
     caption.replaceChildren(el('b', {}, chart.title), ...keys, el('span', { class: 'value' }, value ?? ''));
   }
+}
+
+/** A finger: dragged across a chart it reads values, or chooses a stretch. Up and down it scrolls the page. */
+function touch(plot, isBrush) {
+  const { over } = plot;
+  let start = null;
+  const at = (event) => {
+    const box = over.getBoundingClientRect();
+    return [Math.min(Math.max(event.clientX - box.left, 0), box.width), event.clientY - box.top];
+  };
+  const stretch = (to, isEnd) => plot.setSelect({ left: Math.min(start, to), top: 0, width: Math.abs(to - start), height: over.clientHeight }, isEnd);
+  const moved = (event) => {
+    if (start === null || event.pointerType === 'mouse') return;
+    const [left, top] = at(event);
+    plot.setCursor({ left, top }, true, true);
+    if (isBrush()) stretch(left, false);
+  };
+  over.addEventListener('pointerdown', (event) => {
+    if (event.pointerType === 'mouse' || !event.isPrimary) return;
+    // Else the browser adds a mouse that does the same again.
+    event.preventDefault();
+    over.setPointerCapture(event.pointerId);
+    [start] = at(event);
+    moved(event);
+  });
+  over.addEventListener('pointermove', moved);
+  over.addEventListener('pointerup', (event) => {
+    if (start !== null && event.pointerType !== 'mouse' && isBrush()) stretch(at(event)[0], true);
+    start = null;
+  });
+  over.addEventListener('pointercancel', () => {
+    if (start !== null) plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+    start = null;
+  });
 }
 
 function line(ctx, points, colour, dash = [], width = 1.5) {
@@ -360,8 +408,20 @@ function two(key, title, view, [first, second], [one, other]) {
   };
 }
 
-const chances = (view) => two('chance', 'Chance of collapse', view,
-  [(one) => one.chance_within_evacuation_time, (one) => one.chance_within_outlook], ['within the evacuation time', 'within the outlook']);
+/** The chances by which levels are called, with the limits from which they are. */
+function chances(view) {
+  const limits = view.forecasts.findLast((one) => one.called)?.called;
+  const chart = two('chance', 'Chance of collapse, by which levels are called', view,
+    [(one) => one.called?.red.chance ?? one.chance_within_evacuation_time, (one) => one.called?.orange.chance ?? one.chance_within_outlook],
+    [limits ? `within ${Math.round(limits.red.within_hours)} h; red from ${percent(limits.red.at_least)} (dotted)` : 'within the evacuation time',
+      limits ? `within the outlook; orange from ${percent(limits.orange.at_least)} (dotted)` : 'within the outlook']);
+  if (!limits) return chart;
+  const { series } = chart;
+  const limit = (stroke) => ({ stroke, width: 1, dash: [1, 4], points: { show: false } });
+  chart.data.push(chart.data[0].map(() => limits.red.at_least), chart.data[0].map(() => limits.orange.at_least));
+  chart.series = (shades) => [...series(shades), limit(shades.red), limit(shades.accent)];
+  return chart;
+}
 
 const regimes = (view) => two('regime', 'Regime, probability', view,
   [(one) => one.probability_unstable, (one) => one.probability_accelerating], ['unstable', 'accelerating']);

@@ -3,7 +3,7 @@
 import { follow, forget, hasToken, order, Refused } from '/page/ask.js';
 import { BenchmarkPage } from '/page/benchmark.js';
 import { SitePage } from '/page/site.js';
-import { el, field, instant, keepMoment, minute, useZone } from '/page/words.js';
+import { el, instant, keepMoment, minute, useZone } from '/page/words.js';
 
 const SOON_MS = 300;
 const SELDOM_MS = 30000;
@@ -97,7 +97,7 @@ function frame({ site, time_zone: zone, now, first, last, version }) {
     slide.value = String(1000 * (shown - state.span.from) / Math.max(1, state.span.to - state.span.from));
   }
   slide.setAttribute('aria-valuetext', state.at === null ? 'live' : minute(state.at));
-  if (document.activeElement !== byId('date')) byId('date').value = field(state.at ?? now);
+  if (document.activeElement !== byId('date')) byId('date').value = minute(state.at ?? now);
   byId('live').setAttribute('aria-pressed', String(state.at === null));
   byId('leave').hidden = !hasToken();
   mark();
@@ -157,6 +157,7 @@ function orders(kind, benchmark) {
     acknowledge: 'Somebody has seen what is in force: hooks that have not taken it are not tried again.',
     shelve: 'The level in force, and lower ones, are not sent until then. A higher one is, at once.',
     silence: 'Nobody is notified until then, not of red either. What is in force at the end is sent then.',
+    resolve: 'The level in force ends, because people know why it was called and that it is over. The next reading that calls for it calls it again.',
     unsilence: 'What was shelved or silenced is sent again from now on.',
   };
   const spans = { shelve: [[3600, '1 h'], [28800, '8 h'], [86400, '1 day'], [604800, '7 days'], [2592000, '30 days']],
@@ -165,6 +166,7 @@ function orders(kind, benchmark) {
   byId('order-means').textContent = means[kind];
   byId('order-wrong').textContent = '';
   byId('by').value = localStorage.getItem('slipwatch-by') ?? '';
+  byId('why').value = '';
   byId('span-label').hidden = !spans;
   byId('span').replaceChildren(...(spans ?? []).map(([seconds, text]) => el('option', { value: seconds }, text)));
   byId('order').showModal();
@@ -174,9 +176,14 @@ function orders(kind, benchmark) {
       byId('order-wrong').textContent = 'A name is needed.';
       return;
     }
+    if (kind === 'resolve' && !byId('why').value.trim()) {
+      byId('order-wrong').textContent = 'A reason is needed.';
+      return;
+    }
     localStorage.setItem('slipwatch-by', by);
     try {
-      await order({ order: kind, benchmark, by, ...(spans ? { seconds: Number(byId('span').value) } : {}) });
+      const why = byId('why').value.trim() || null;
+      await order({ order: kind, benchmark, by, why, ...(spans ? { seconds: Number(byId('span').value) } : {}) });
       byId('order').close();
       changed();
     } catch (error) {
@@ -213,7 +220,10 @@ byId('slide').addEventListener('input', () => {
 });
 byId('date').addEventListener('change', () => {
   const time = instant(byId('date').value);
-  if (Number.isFinite(time)) show(new Date(time).toISOString());
+  const isTime = Number.isFinite(time);
+  byId('date').setCustomValidity(isTime ? '' : 'Write 2012-05-14 06:30, or 2012-05-14T04:30:00Z.');
+  byId('date').reportValidity();
+  if (isTime) show(new Date(time).toISOString());
 });
 addEventListener('hashchange', go);
 setInterval(() => { if (state.at === null && !state.isLost) refresh(); }, SELDOM_MS);

@@ -1,7 +1,7 @@
 // The site: every benchmark by level, where each stands, what is in force.
 
 import { get } from '/page/ask.js';
-import { badge, badges, collapse, el, figure, left, list, percent, place, shape, span, svg, described, when } from '/page/words.js';
+import { badge, badges, collapse, el, figure, left, list, outlookChance, place, redChance, shape, span, svg, described, when } from '/page/words.js';
 
 const RANK = { green: 0, unknown: 0.5, yellow: 1, orange: 2, red: 3 };
 const HEALTH = [
@@ -35,7 +35,7 @@ export class SitePage {
       ...(at ? [] : HEALTH.filter(([is]) => is(status)).map(([, text]) => el('p', { class: 'card level red' }, text))),
       el('section', { class: 'card', 'aria-label': 'Benchmarks' }, table(sorted, site)),
       el('div', { class: sorted.some((one) => one.position) ? 'two' : '' },
-        sketch(sorted),
+        sketch(sorted, site.positions_are),
         el('section', { class: 'card' }, el('h2', {}, 'In force'), this.force(site, at))),
       el('section', { class: 'card' }, el('h2', {}, 'What was said'), list(site.log, 'Nothing yet.')));
     const log = this.view.querySelector('ul.log');
@@ -92,7 +92,7 @@ function table(standings, site) {
       one.newest_reading ? [when(one.newest_reading), el('small', {}, `${span(one.silent_seconds)} ago`)] : ['none yet'],
       [`${figure(one.velocity_mm_per_day)} mm/day`],
       [...collapse(one.failure_time), one.failure_time ? el('small', {}, left(one.failure_time, site.at ?? site.now)) : null],
-      [percent(one.chance_within_evacuation_time), el('small', {}, `${percent(one.chance_within_outlook)} in the outlook`)],
+      [redChance(one)[0], el('small', {}, redChance(one)[1]), el('small', {}, outlookChance(one))],
       [one.regime ?? '-'],
     ];
     return el('tr', { 'data-benchmark': one.benchmark, 'data-level': one.level }, cells.map((cell, index) => el('td', { 'data-name': names[index] }, cell)));
@@ -103,7 +103,7 @@ function table(standings, site) {
 }
 
 /** The plan, and where heights are known a section along the direction in which the benchmarks lie. */
-function sketch(standings) {
+function sketch(standings, says) {
   const placed = standings.filter((one) => one.position);
   if (placed.length === 0) return null;
   const plan = placed.map((one) => [one.position[0], one.position[1]]);
@@ -113,6 +113,7 @@ function sketch(standings) {
     const section = placed.map((one, index) => [plan[index][0] * along[0] + plan[index][1] * along[1], one.position[2]]);
     nodes.push(el('h2', {}, 'Section'), drawing(placed, section, 'Section of the benchmarks'));
   }
+  if (says) nodes.push(el('p', { class: 'soft' }, says));
   return el('section', { class: 'card' }, nodes);
 }
 

@@ -48,17 +48,16 @@ export function minute(time) {
   return `${p.year}-${p.month}-${p.day} ${p.hour}:${p.minute}`;
 }
 
-/** As a field for a local time wants it. */
-export function field(time) {
-  return minute(time).replace(' ', 'T');
-}
+const WRITTEN = /^\s*(\d{4}-\d\d-\d\d)(?:[T ](\d\d:\d\d)(:\d\d(?:\.\d+)?)?)?\s*(Z|[+-]\d\d:\d\d)?\s*$/i;
 
-/** The instant of a local time in the site's zone. */
+/** The instant that is written: 2012-05-14 06:30 in the site's zone, or RFC 3339 with its offset; NaN where it is neither. */
 export function instant(text) {
-  const wanted = Date.parse(`${text}Z`);
+  const [, day, clock = '00:00', second = '', offset] = WRITTEN.exec(text) ?? [];
+  const wanted = Date.parse(`${day}T${clock}${second}${offset ?? 'Z'}`);
+  if (offset || !Number.isFinite(wanted)) return wanted;
   let guess = wanted;
   for (let round = 0; round < 3; round += 1) {
-    guess += wanted - Date.parse(`${field(guess)}Z`);
+    guess += wanted - Date.parse(`${minute(guess).replace(' ', 'T')}${second}Z`);
   }
   return guess;
 }
@@ -97,12 +96,26 @@ export function figure(value) {
   return size < 0.001 ? value.toExponential(1) : String(Number(value.toPrecision(3)));
 }
 
-/** 5 %, under 1 %. */
+/** The chance by which red is called: within how many hours, and from which chance on. Older states only have that within the evacuation time. */
+export function redChance(one) {
+  const red = one.called?.red;
+  if (!red) return [percent(one.chance_within_evacuation_time), 'within the evacuation time'];
+  return [percent(red.chance), `within ${Math.round(red.within_hours)} h, red from ${percent(red.at_least)}`];
+}
+
+/** The chance by which orange and yellow are called. */
+export function outlookChance(one) {
+  const { orange, yellow } = one.called ?? {};
+  if (!orange) return `${percent(one.chance_within_outlook)} within the outlook`;
+  return `${percent(orange.chance)} within ${span(3600 * orange.within_hours)}, orange from ${percent(orange.at_least)}, yellow from ${percent(yellow.at_least)}`;
+}
+
+/** 5 %, < 1 %: no chance is shown as none, or as certain. */
 export function percent(chance) {
   if (chance === null || chance === undefined) return '-';
-  if (chance > 0 && chance < 0.01) return 'under 1 %';
-  if (chance < 1 && chance > 0.99) return 'over 99 %';
-  return `${Math.round(100 * chance)} %`;
+  if (chance < 0.005) return '<\u00a01\u00a0%';
+  if (chance > 0.995) return '>\u00a099\u00a0%';
+  return `${Math.round(100 * chance)}\u00a0%`;
 }
 
 const SHAPES = {
@@ -153,7 +166,7 @@ export function described(event) {
     case 'together': return event.groups.map((group) => `${group.benchmarks.join(', ')} share a failure time: ${
       group.failure_time.median ? minute(group.failure_time.median) : 'none in sight'}, chance ${
       percent(group.chance_within_evacuation_time)} within the evacuation time`).join('; ') || 'no benchmarks share a failure time any more';
-    case 'order': return `${event.order}${event.by ? ` by ${event.by}` : ''}${event.until ? ` until ${minute(event.until)}` : ''}`;
+    case 'order': return `${event.order}${event.by ? ` by ${event.by}` : ''}${event.until ? ` until ${minute(event.until)}` : ''}${event.why ? `: ${event.why}` : ''}`;
     case 'regime-flip': return `regime ${event.from} to ${event.to}, probability ${percent(event.probability)}`;
     case 'intercept-drift': return `inverse-velocity intercept moved to ${minute(event.to)}`;
     case 'transition-drift': return `transition time moved to ${minute(event.to)}`;
