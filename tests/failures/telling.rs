@@ -214,6 +214,11 @@ fn a_child_that_leaves_its_hooks_group_does_not_outlive_the_attempt() {
     }
 }
 
+/// All that a program printed.
+fn said(output: &std::process::Output) -> String {
+    String::from_utf8_lossy(&[&output.stdout[..], &output.stderr[..]].concat()).into_owned()
+}
+
 #[test]
 fn what_people_resolve_ends_and_the_next_reading_that_calls_for_it_calls_it_again() {
     let site = Site::new(POLICY);
@@ -224,9 +229,6 @@ fn what_people_resolve_ends_and_the_next_reading_that_calls_for_it_calls_it_agai
     let alerts = |words: &[&str]| {
         let all = [&["alerts"], words, &["--config", "site.toml"]].concat();
         site.ask(&all)
-    };
-    let said = |output: &std::process::Output| {
-        String::from_utf8_lossy(&[&output.stdout[..], &output.stderr[..]].concat()).into_owned()
     };
     let program = site.caught_up();
     let nothing = alerts(&["ack", "--by", "Ada"]);

@@ -324,7 +324,10 @@ fn a_fall_that_no_slope_makes_is_a_reset_that_nobody_declared_and_a_spike_is_non
     // Declared as well, it is taken off once.
     let declared = declaring(&[reset(when, Some(-30.0))]);
     let (mut events, mut monitor) = displaced_by(&readings, Settings::default(), 45.0);
-    events.extend(monitor.step(readings.last().unwrap().0, &Input::Settings(declared)));
+    events.extend(monitor.step(
+        readings.last().unwrap().0,
+        &Input::Settings(Box::new(declared)),
+    ));
     assert_eq!(monitor.level(&BenchmarkId::new("a")), Some(Level::Green));
     // Whoever knows that the slope fell says so.
     let mut accepting = Settings::default();
