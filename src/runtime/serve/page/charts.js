@@ -26,6 +26,7 @@ export class Charts {
     this.zoomed = zoomed;
     this.zoom = null;
     this.plots = new Map();
+    this.waiting = [];
     this.isBrush = false;
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(node);
@@ -39,6 +40,7 @@ export class Charts {
   clear() {
     for (const { plot } of this.plots.values()) plot.destroy();
     this.plots.clear();
+    this.waiting = [];
     this.node.replaceChildren();
   }
 
@@ -54,18 +56,32 @@ export class Charts {
     this.moment = seconds(view.at ?? view.now);
     this.shades = colours();
     const wanted = charts(view);
-    if (wanted.map((one) => one.key).join() !== [...this.plots.keys()].join()) this.clear();
-    for (const one of wanted) {
-      const had = this.plots.get(one.key);
-      if (had) {
-        Object.assign(had, { chart: one });
-        had.plot.setData(one.data, false);
-      } else {
-        this.add(one);
-      }
-      this.caption(this.plots.get(one.key), null);
+    if ([...this.plots.keys()].some((key, index) => wanted[index]?.key !== key)) this.clear();
+    this.queue(wanted.map((one) => () => this.drawn(one)));
+  }
+
+  /** Works through these in place of what still waits, one a frame: all charts at once would hold the page up. */
+  queue(tasks) {
+    const isAtWork = this.waiting.length > 0;
+    this.waiting = tasks;
+    if (!isAtWork) requestAnimationFrame(() => this.turn());
+  }
+
+  turn() {
+    this.waiting.shift()?.();
+    if (this.waiting.length > 0) requestAnimationFrame(() => this.turn());
+  }
+
+  drawn(one) {
+    const had = this.plots.get(one.key);
+    if (had) {
+      had.chart = one;
+      had.plot.setData(one.data, false);
+      this.look(had.plot);
+    } else {
+      this.add(one);
     }
-    this.scale();
+    this.caption(this.plots.get(one.key), null);
   }
 
   /** The whole record with some room for forecasts. */
@@ -100,8 +116,14 @@ export class Charts {
   }
 
   scale() {
+    const charts = [...this.plots.values()].map(({ plot }) => () => this.look(plot));
+    // What is still to be drawn will look there by itself.
+    this.queue([...this.waiting, ...charts]);
+  }
+
+  look(plot) {
     const [min, max] = this.range();
-    for (const { plot } of this.plots.values()) plot.setScale('x', { min, max });
+    plot.setScale('x', { min, max });
   }
 
   resize() {
