@@ -3,11 +3,10 @@
 //! The map, from the ground up; arrows go one way, and a test holds them:
 //!
 //! ```text
-//! main -> cli -> runtime, config -> monitor -> alert, regime, forecast -> fit -> model -> reading
-//!         cli -> inversion -> regime, forecast, fit
-//!         cli -> effects -> forecast, fit, model
-//!         cli -> figures -> effects, monitor, plot
-//!         cli -> score -> forecast, fit
+//! main -> cli -> runtime -> config, store -> monitor -> alert, effects -> forecast -> fit -> model -> regime
+//!         cli -> inversion, score -> forecast
+//!         cli -> figures -> effects, monitor, plot, score
+//! alert, effects, forecast, fit, inversion, score -> reading
 //! ```
 //!
 //! Everything from `monitor` down is pure: no clock, no files, no network, no ambient randomness.

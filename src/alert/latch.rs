@@ -18,7 +18,7 @@ use std::borrow::Cow;
 pub struct Transition {
     /// The level that was entered or left.
     pub level: Level,
-    /// Entered (true) or left.
+    /// Entered or left.
     pub entered: Entered,
     /// When the level was entered: with the benchmark and the level, the alert's identity.
     pub since: Timestamp,

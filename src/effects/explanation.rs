@@ -23,7 +23,7 @@ pub struct Explanation {
     pub first: Option<Timestamp>,
     /// The last one.
     pub last: Option<Timestamp>,
-    /// The first effect accepted, or one of the two honest ends.
+    /// The first effect accepted, or `unexplained` or `none`.
     pub verdict: Effect,
     /// How much of the residual's structure the effects account for.
     pub explained: Explained,

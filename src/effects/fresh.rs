@@ -49,9 +49,13 @@ pub(super) fn fresh_laws(problem: &Problem, base: &Fitted, term: &Term) -> Vec<S
 }
 
 /// The law with a load that answers to the motion, followed from the first readings, at which that load has hardly shown,
-/// to all of them: a slope that is held back in the end would run away with its own law without it, and with a law that
-/// suits the whole nothing is held back. `None` of another term.
-pub(super) fn grown_up(problem: &Problem, term: &Term, scratch: &mut Scratch) -> Option<Fitted> {
+/// to all of them: without it the slope's own law would go to infinite velocity where the load slows it down in the end, and in a
+/// law that suits the whole record there is nothing for the load to slow down. `None` of another term.
+pub(super) fn from_the_first_readings(
+    problem: &Problem,
+    term: &Term,
+    scratch: &mut Scratch,
+) -> Option<Fitted> {
     if !matches!(term.act, Act::PerVelocity | Act::PerSlip) {
         return None;
     }

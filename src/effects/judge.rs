@@ -1,4 +1,4 @@
-//! What an effect must show before it is believed: sign, memory, bounds, and a later block that it helps to predict.
+//! What an effect must show before it is accepted: sign, memory, bounds, and a later block that it helps to predict.
 
 use super::fresh::{best_of_starts, fresh_starts};
 use super::kind::{Form, Kind};
@@ -103,8 +103,8 @@ fn jumps_at_once(problem: &Problem, fitted: &Fitted) -> bool {
     largest > 0.5 * steps.iter().sum::<f64>()
 }
 
-/// Why a jump in the sense of the motion may be slip and no offset; `None` where a jump back speaks for the instrument, or
-/// nothing speaks for slip.
+/// Why a jump in the sense of the motion may be slip and no offset; `None` where a jump back is evidence of the
+/// instrument, or nothing is evidence of slip.
 fn slip_instead(
     problem: &Problem,
     at: usize,

@@ -33,7 +33,7 @@ pub(super) enum Memory {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Noise {
     pub(super) memory: Memory,
-    /// Days over which it forgets; infinite: a random walk.
+    /// Correlation time, days; infinite: a random walk.
     pub(super) days: f64,
     /// Of the reading: standard deviation over that of the white noise (of a walk: of its step over the
     /// median spacing). Of the load: e-folds times 'what one e-fold would change a reading by, over the white

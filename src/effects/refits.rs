@@ -2,7 +2,7 @@
 
 use super::candidates;
 use super::frame::Frames;
-use super::fresh::{best_of_starts, fresh_laws, grown_up, under_growing_means};
+use super::fresh::{best_of_starts, fresh_laws, from_the_first_readings, under_growing_means};
 use super::kind::Kind;
 use super::linear::Linear;
 use super::noise::{Noise, Whitener};
@@ -209,7 +209,7 @@ impl<'a> Search<'a> {
         let fresh = fresh_laws(problem, base, term);
         let mut levels = Vec::from_iter(best_of_starts(problem, &fresh, &mut self.scratch));
         if base.terms.is_empty() {
-            let grown = grown_up(problem, term, &mut self.scratch);
+            let grown = from_the_first_readings(problem, term, &mut self.scratch);
             levels.extend(grown.filter(|grown| grown.prediction.len() == problem.t.len()));
         }
         levels.extend(under_growing_means(problem, base, term, &mut self.scratch));

@@ -37,7 +37,7 @@ const ASTRONOMICAL: f64 = 20.0;
 /// Why nothing is concluded from a drawn or interpolated curve by its shape alone.
 const NO_READINGS: &str = "the values are no readings: they are smoother than any instrument's";
 
-/// One effect that was believed.
+/// One effect that was accepted.
 #[derive(Debug, Clone)]
 pub(super) struct Accepted {
     pub(super) bic_gain: f64,
@@ -46,7 +46,7 @@ pub(super) struct Accepted {
     pub(super) ties: Vec<Rival>,
 }
 
-/// What would be believed of values that are no readings, were they readings.
+/// What would be accepted of values that are no readings, were they readings.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Withheld {
     pub(super) kind: Kind,
@@ -263,7 +263,7 @@ impl Search<'_> {
         }
     }
 
-    /// Why not; `None` for what may be believed. The held-out error with it over that without comes first.
+    /// Why not; `None` for what may be accepted. The held-out error with it over that without comes first.
     fn judged(&mut self, base: &Fitted, one: &Refitted) -> (Option<f64>, Option<String>) {
         let margin = self.options.bic_margin;
         if one.gain < margin {
@@ -305,7 +305,7 @@ impl Search<'_> {
         }
     }
 
-    /// The held-out error with `one` over that without, and why it speaks against it.
+    /// The held-out error with `one` over that without, and why it is evidence against it.
     fn held_out(&mut self, base: &Fitted, one: &Refitted) -> (Option<f64>, Option<String>) {
         let share = self.options.held_out_share;
         if block(self.problem, &one.fitted.terms, share).is_none() {

@@ -156,7 +156,7 @@ pub(super) fn law(span: f64, parameters: &[f64]) -> Law {
 }
 
 impl Scratch {
-    /// The prediction of every reading; `false` where the block runs away before the last.
+    /// The prediction of every reading; `false` where the velocity becomes infinite before the last.
     pub(super) fn predict(
         &mut self,
         problem: &Problem,

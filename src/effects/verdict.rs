@@ -28,7 +28,7 @@ pub(super) const LARGEST_REST: f64 = 2.0;
 /// predicted with no more than this share of the error.
 const STANDING_OUT: f64 = 30.0;
 const FAR_BETTER: f64 = 0.1;
-/// Most kinds without independent evidence that are believed together.
+/// Most kinds without independent evidence that are accepted together.
 const MOST_LABELS: usize = 2;
 /// 5 and 95 % of a normal distribution, in standard deviations.
 const NINETY: f64 = 1.645;

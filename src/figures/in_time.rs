@@ -241,7 +241,7 @@ fn dates(points: &[(f64, f64)]) -> Axis {
 }
 
 /// An axis that shows all readings, and of what else is shown no more than as much again on either
-/// side: a fit that runs away out of its data would press the data flat.
+/// side: a fit that grows far beyond its data would press the data flat.
 fn bounded(label: &str, readings: &[f64], shown: &[f64]) -> Axis {
     let core = Axis::around(label, readings.iter().copied());
     let span = core.to - core.from;

@@ -33,7 +33,7 @@ pub struct Change {
     /// The newest one, mm; above 0 is faster.
     pub newest: f64,
     /// Standard deviation of such changes before, mm, from those that slow down: a noise slows down as often as it
-    /// speeds up, a slope that runs away only speeds up.
+    /// speeds up, a slope that fails only speeds up.
     pub usual: f64,
     /// Degrees of freedom of `usual`.
     pub freedom: f64,

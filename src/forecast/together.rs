@@ -192,9 +192,9 @@ impl GroupPart {
     }
 }
 
-/// When the benchmarks of `members` fail by what they say now. The sharpest is believed as it stands, each
-/// other as far as it is likely by now to share the failure of the rest: one that halts for a moment is not
-/// to talk the mass out of its failure.
+/// When the benchmarks of `members` fail by their forecasts of now. The sharpest has its full weight, each
+/// other as much as it is likely by now to share the failure of the rest: one that halts for a moment must
+/// not lower the chance that the mass fails.
 fn common_passage(
     now: &[Option<FailureTimeLikelihood>],
     dependence: &Dependence,

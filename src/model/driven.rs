@@ -13,7 +13,7 @@ const GAMMA: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
 const LARGEST_CHANGE: f64 = 0.25;
 /// p = 1 - 1/m with a finite m.
 const LARGEST_P: f64 = 0.99;
-/// More steps than this between two nodes, and the block runs away there.
+/// More steps than this between two nodes, and the velocity is taken to become infinite there.
 const MOST_STEPS: usize = 400;
 /// Most Newton steps for v under a load that falls with it; each squares the error.
 const NEWTON_STEPS: usize = 8;
@@ -94,7 +94,8 @@ struct Friction {
 }
 
 impl Driven {
-    /// Solves the law along the nodes, reusing the room of `self`; `false` where it runs away before the last.
+    /// Solves the law along the nodes, reusing the room of `self`; `false` where the velocity becomes infinite before
+    /// the last.
     pub fn solve(&mut self, law: &Law, drive: &Drive) -> bool {
         for room in [&mut self.ln_y, &mut self.velocity, &mut self.slip] {
             room.clear();
@@ -218,7 +219,7 @@ impl Friction {
         self.b / self.v_i * velocity
     }
 
-    /// From node to node, the load going linearly; `None` where the block runs away.
+    /// From node to node, the load going linearly; `None` where the velocity becomes infinite.
     fn cross(&self, mut state: State, span: f64, (from, to): (f64, f64)) -> Option<State> {
         let per_day = (to - from) / span;
         let (mut t, mut steps) = (0.0, 0);

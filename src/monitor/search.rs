@@ -1,7 +1,7 @@
 //! A search for the effect that a benchmark's law lacks: asked for by the monitor, done outside it.
 //!
 //! The monitor never searches by itself: a step must not take seconds. It hands out a job; whoever runs the
-//! monitor runs the job wherever it likes, and hands the answer in as [`Input::Found`](super::Input::Found)
+//! monitor runs the job anywhere, and hands the answer in as [`Input::Found`](super::Input::Found)
 //! right before the benchmark's first reading that is no earlier than [`SearchJob::due`]. So the answer takes
 //! effect at a time that the data alone decide.
 

@@ -2,7 +2,7 @@
 //!
 //! Only benchmarks at orange or above are compared, a bounded number of them, so that a quiet site costs nothing. What is
 //! reported here calls no level and lowers none: a neighbour that is noisy, halted or silent takes nothing from the
-//! benchmark that runs away.
+//! benchmark that accelerates to failure.
 
 use super::Monitor;
 use super::event::{Event, EventKind, FailureTime, SharedFailure};

@@ -118,7 +118,7 @@ fn work(orders: &Mutex<Receiver<SearchOrder>>) {
     loop {
         let order = orders.lock().unwrap_or_else(PoisonError::into_inner).recv();
         let Ok((job, answer)) = order else { return };
-        // A fault of the search must not take the daemon's eyes.
+        // A search that panics must not end the thread, on which the next searches depend.
         if let Ok(finding) = catch_unwind(AssertUnwindSafe(|| job.run())) {
             // Nobody waits any more when the site is closed.
             let _ = answer.send(finding);

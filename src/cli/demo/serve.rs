@@ -1,4 +1,4 @@
-//! `demo --serve`: the measured crisis on the page, as it was lived, and then for as long as one likes to look.
+//! `demo --serve`: the measured crisis on the page, as it happened, and then for as long as it is looked at.
 
 use super::{Args, CRISES, Crisis, WRITTEN, pace, policy, recording, sample_hook, show_hook};
 use crate::cli::run::asynchronous;

@@ -76,7 +76,7 @@ enum Source {
     Channel(usize),
 }
 
-/// Data on the way from as they came to as they are believed.
+/// Data from which faults are removed one after another.
 struct FaultBench {
     series: Series,
     channels: Vec<Channel>,

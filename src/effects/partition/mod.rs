@@ -17,7 +17,7 @@ use ratio::Pair;
 use scan::{Break, LEAST_CHANGE, Scan, apart};
 use std::ops::Range;
 
-/// A partition is believed with a chance under this of being noise.
+/// A partition is accepted with a chance under this of being noise.
 const P_VALUE: f64 = 0.01;
 /// What moves as one strays from the common motion by less than this share of it.
 pub(super) const AS_ONE: f64 = 0.12;

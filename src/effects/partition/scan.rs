@@ -14,7 +14,7 @@ const BLOCKS: usize = 3;
 pub(super) const LEAST_CHANGE: f64 = 0.14;
 /// A misfit under this share of the motion is rounding.
 const ROUNDING: f64 = 1e-11;
-/// A benchmark's noise is at least this share of the typical one, by which none is believed alone.
+/// A benchmark's noise is at least this share of the typical one, so that none has nearly all the weight.
 const LEAST_NOISE: f64 = 0.2;
 
 /// How the noise of the displacements runs on, and whether it grows with the velocity.

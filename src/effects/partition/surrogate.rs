@@ -6,7 +6,7 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 
-/// A row's noise is taken to forget at least so fast.
+/// Most that the noise of a row correlates with that of the row before it.
 const LONGEST_MEMORY: f64 = 0.97;
 
 /// The chance that `count` seeded copies of the motion without a partition show as much.

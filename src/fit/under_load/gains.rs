@@ -16,7 +16,7 @@ pub(super) struct RateRecord {
     pub(super) from: Vec<f64>,
     pub(super) to: Vec<f64>,
     pub(super) centre: f64,
-    /// How far each rate is believed, 1 but for outliers.
+    /// Weight of each rate, 1 but for outliers.
     pub(super) trust: Vec<f64>,
 }
 

@@ -5,7 +5,7 @@
 //!
 //! - the log-load f, Ornstein-Uhlenbeck with a standard deviation and a memory of its own;
 //! - the law itself: seen from the present, ln v drifts off by [`DRIFT`] for each e-fold of the time to
-//!   failure that one looks back, so that old readings cannot outvote new ones;
+//!   failure that one looks back, so that old readings weigh less than new ones;
 //! - where the law begins: before its start, which may be any reading, the velocity is a random walk.
 //!
 //! The law is taken in the coordinates of the present. Its shape, p and the ratio of healing to

@@ -25,10 +25,10 @@ struct Displaced {
 
 /// What the instrument stands on, and moves by itself; now and then it is hit.
 struct Monument {
-    /// Standard deviation of the part that forgets, mm, and the days over which it does.
+    /// Standard deviation of the part whose correlation ends, mm, and its correlation time, days.
     drift: f64,
     memory: f64,
-    /// Of the part that does not, mm/√day.
+    /// Of the part whose correlation does not end, mm/√day.
     walk: f64,
     /// Share of readings that are outliers.
     outliers: f64,

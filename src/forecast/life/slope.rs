@@ -81,7 +81,7 @@ fn m(fate: Fate, generator: &mut impl Rng) -> f64 {
         Fate::Saturating | Fate::Steady | Fate::Settling | Fate::Reset | Fate::Noisy => {
             generator.random_range(0.5..0.95)
         }
-        // Nearer to 1 a strong load would run away: at rest v goes as e^f to the power 1/(1 - m).
+        // Nearer to 1 a strong load would let it accelerate without bound: at rest v goes as e^f to the power 1/(1 - m).
         Fate::Seasonal | Fate::Stepped => {
             if generator.random::<bool>() {
                 generator.random_range(0.2..0.6)

@@ -1,6 +1,6 @@
 //! Simulated slopes that fail and stand as published slopes do, read by instruments as they are.
 //!
-//! Beside the lives of [`super::Life`], which obey the law that the monitor fits, these are what forecasts of a collapse
+//! Beside the lives of [`super::Life`], which follow the law that the monitor fits, these are what forecasts of a collapse
 //! learn from and are judged by, one family left out at a time. The velocity last read before a collapse is lognormal
 //! with the median of 30 published failures (93 mm/day, 1.1 decades; Federico et al. 2012), the time from the onset
 //! to the collapse has the spread of 20 published ones (0.8 decades about 25 days); slopes that accelerate and stop

@@ -1,4 +1,4 @@
-//! What one benchmark is forecast to do: by the law under a constant load, and by the law under the known load beside it.
+//! What one benchmark is forecast to do: by the law without a known load, and by that under the known load beside it.
 
 use super::days;
 use crate::alert::Policy;

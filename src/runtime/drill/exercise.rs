@@ -1,4 +1,4 @@
-//! One drill: a site of its own follows a file of its own, in which a made-up slope runs away.
+//! One drill: a site of its own follows a file of its own, in which a simulated slope fails.
 
 use super::DrillContext;
 use super::runner::DrillObserver;
@@ -101,7 +101,7 @@ fn run_folder(office: &DrillContext) -> PathBuf {
     folder(&office.config.site.state_dir).join("run")
 }
 
-/// Readings of a slope that runs away, the last of all now: 1/v falls on a straight line.
+/// Readings of a slope that fails, the last of all now: 1/v falls on a straight line.
 fn rows(range: Range<i32>, now: Timestamp) -> String {
     let mut text = String::new();
     for row in range {

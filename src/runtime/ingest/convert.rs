@@ -53,7 +53,7 @@ pub enum ConvertStage {
     Written(u64),
 }
 
-/// Tells how many bytes have gone through.
+/// Reports how many bytes have gone through.
 struct CountedOutput<'a, W> {
     out: W,
     bytes: u64,

@@ -1,45 +1,30 @@
 //! Splits one line of CSV at a time, without a new parser for each.
 
 use crate::reading::Delimiter;
-use ::csv::{ReaderBuilder, StringRecord, Terminator, Trim};
-use std::io::{self, Read};
+use ::csv::StringRecord;
+use csv_core::{ReadRecordResult, Reader, ReaderBuilder, Terminator};
 
 /// A CSV parser that is fed line by line.
 #[derive(Debug)]
 pub(super) struct Splitter {
-    reader: ::csv::Reader<SplitLine>,
-    delimiter: Delimiter,
-}
-
-/// The line to be split, as a stream that ends with it.
-#[derive(Debug, Default)]
-struct SplitLine {
+    parser: Reader,
+    /// The cells of the line one after another, unquoted, and where each ends.
     text: Vec<u8>,
-    read: usize,
-    /// Whether more was asked for than the line holds.
-    exhausted: bool,
-}
-
-impl Read for SplitLine {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let read = (&self.text[self.read..]).read(buffer)?;
-        self.read += read;
-        self.exhausted |= read == 0;
-        Ok(read)
-    }
+    ends: Vec<usize>,
 }
 
 impl Splitter {
     pub(super) fn new(delimiter: Delimiter) -> Self {
-        let reader = ReaderBuilder::new()
-            .has_headers(false)
-            .flexible(true)
+        let parser = ReaderBuilder::new()
             .delimiter(delimiter.byte())
-            .trim(Trim::All)
             // Only what ends our lines: a stray carriage return is part of its cell.
             .terminator(Terminator::Any(b'\n'))
-            .from_reader(SplitLine::default());
-        Self { reader, delimiter }
+            .build();
+        Self {
+            parser,
+            text: Vec::new(),
+            ends: Vec::new(),
+        }
     }
 
     /// The cells of one line, trimmed; none if it is blank.
@@ -52,25 +37,25 @@ impl Splitter {
         if line.contains('\n') {
             return Err("a line break within the line".to_owned());
         }
-        let source = self.reader.get_mut();
-        source.text.clear();
-        source.text.extend_from_slice(line.as_bytes());
-        source.text.push(b'\n');
-        source.read = 0;
-        let outcome = self.reader.read_record(cells);
-        // The parser asks for more than the line only where a quote is left open.
-        let failed = if self.reader.get_ref().exhausted {
-            Some("a quote that is not closed".to_owned())
-        } else {
-            outcome.err().map(|error| error.to_string())
-        };
-        match failed {
-            None => Ok(()),
-            Some(problem) => {
-                *self = Self::new(self.delimiter);
-                Err(problem)
-            }
+        // One more than a line can fill: the parser does not begin where there is no room.
+        self.text.resize(line.len() + 1, 0);
+        self.ends.resize(line.len() + 2, 0);
+        let (text, ends) = (&mut self.text, &mut self.ends);
+        let (_, _, written, ended) = self.parser.read_record(line.as_bytes(), text, ends);
+        let (last, _, _, more) =
+            (self.parser).read_record(b"\n", &mut text[written..], &mut ends[ended..]);
+        // The line break is part of a cell only where a quote is left open.
+        if !matches!(last, ReadRecordResult::Record) {
+            self.parser.reset();
+            return Err("a quote that is not closed".to_owned());
         }
+        let mut from = 0;
+        for to in &ends[..ended + more] {
+            let cell = std::str::from_utf8(&text[from..*to]).map_err(|error| error.to_string())?;
+            cells.push_field(cell.trim());
+            from = *to;
+        }
+        Ok(())
     }
 }
 

@@ -1,4 +1,4 @@
-//! Answers over HTTP: whether the daemon lives and is ready, its metrics, its status, its events, its page.
+//! Answers over HTTP: whether the daemon runs and is ready, its metrics, its status, its events, its page.
 
 mod acknowledge;
 mod caller;
