@@ -343,7 +343,9 @@ fn a_fall_that_no_slope_makes_is_a_reset_that_nobody_declared_and_a_spike_is_non
         0
     );
     let mut turned: Vec<(Timestamp, f64)> = series(400, 1, (when, 30.0));
-    turned.iter_mut().for_each(|one| one.1 = -one.1);
+    for one in &mut turned {
+        one.1 = -one.1;
+    }
     assert_eq!(
         found_resets(&displaced_by(&turned, Settings::default(), 25.0).0),
         0
