@@ -194,6 +194,8 @@ pub enum EventKind {
 
 /// How the kind of a fault begins that says a suspicion of readings, and how that of its end ends.
 pub const SUSPECT: &str = "suspect-";
+/// The kind of a fault that says that a reset was found which nobody declared.
+pub const RESET_FOUND: &str = "reset-found";
 /// See [`SUSPECT`].
 pub const SUSPECT_ENDS: &str = "-ends";
 

@@ -31,7 +31,7 @@ pub use course::{LevelStretch, levels_in};
 pub use declared::{Declaration, Declared};
 pub use event::{
     AlertState, CalledLevel, Event, EventKind, FailureTime, InverseVelocity, LevelChance, Plain,
-    RegimeReport, SUSPECT, SUSPECT_ENDS, SharedFailure, Summary, Unexplained,
+    RESET_FOUND, RegimeReport, SUSPECT, SUSPECT_ENDS, SharedFailure, Summary, Unexplained,
 };
 pub use given::{Given, OrderKind, OrderedBy};
 pub use measured::Measured;

@@ -44,8 +44,9 @@ fn suspect_files() -> [(&'static str, String, &'static str); 4] {
         format!("time,P1_displacement_mm\n{}", rows(60, row))
     };
     let wobble = |value: f64| value * 0.01 + (value * 7.0).sin();
+    // A fourth reading after the fall would show that it was a reset.
     let fallen = table(&|time, value| {
-        let after = if value > 20.0 { -400.0 } else { 0.0 };
+        let after = if value > 28.0 { -400.0 } else { 0.0 };
         format!("{time}+02:00,{:.3}\n", wobble(value) + after)
     });
     let metres = table(&|time, value| format!("{time}+02:00,{:.3}\n", 12.345 + value / 1000.0));
@@ -53,7 +54,7 @@ fn suspect_files() -> [(&'static str, String, &'static str); 4] {
     let ahead = recent(60, SignedDuration::from_mins(58));
     [
         ("mark", marked, "-999 stands 1 times"),
-        ("fall", fallen, "it fell by 401.824 mm, "),
+        ("fall", fallen, "it fell by 401.934 mm, "),
         ("scale", metres, "if they are metres, say unit = \"m\""),
         (
             "ahead",

@@ -328,7 +328,8 @@ fn a_fall_that_no_slope_makes_is_a_reset_that_nobody_declared_and_a_spike_is_non
         readings.last().unwrap().0,
         &Input::Settings(Box::new(declared)),
     ));
-    assert_eq!(monitor.level(&BenchmarkId::new("a")), Some(Level::Green));
+    let level = monitor.level(&BenchmarkId::new("a"));
+    assert!(level < Some(Level::Orange), "{level:?}: 63 mm");
     // Whoever knows that the slope fell says so.
     let mut accepting = Settings::default();
     let fall = [slipwatch::reading::Suspicion::Fall].into();

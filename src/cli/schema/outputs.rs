@@ -67,7 +67,7 @@ pub(super) const OUTPUTS: [Output; 22] = [
     ),
     output(
         "order",
-        "alerts ack, shelve, silence or unsilence with --format json, and the answer of POST /api/orders.",
+        "alerts ack, shelve, silence, resolve or unsilence with --format json, and the answer of POST /api/orders.",
         of::<Order>,
     ),
     output(

@@ -4,7 +4,7 @@ use super::unknown::Reason;
 use super::{StepContext, Track};
 use crate::alert::Policy;
 use crate::monitor::declared::Declarations;
-use crate::monitor::event::Event;
+use crate::monitor::event::{Event, RESET_FOUND};
 use crate::monitor::history::MeasuredAs;
 use crate::reading::{Reading, Suspicion, Timestamp};
 
@@ -69,7 +69,7 @@ impl Track {
              set accept = [\"fall\"] for this benchmark",
             self.benchmark, -jump
         );
-        Some(self.fault(now, "reset-found", text))
+        Some(self.fault(now, RESET_FOUND, text))
     }
 
     /// The end of a silence, where the reading of `time` is one.

@@ -22,7 +22,7 @@ use returned::Returned;
 use timekeeper::Timekeeper;
 use unproven::Unproven;
 
-use crate::monitor::{Event, EventKind, Input, Monitor, Order, SUSPECT, Settings};
+use crate::monitor::{Event, EventKind, Input, Monitor, Order, RESET_FOUND, SUSPECT, Settings};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::deliver::Dispatcher;
 use crate::runtime::hook::{Alert, Status};
@@ -322,7 +322,7 @@ impl Site {
 fn log_suspicions(events: &[Event]) {
     for event in events {
         if let EventKind::Fault { kind, text } = &event.kind
-            && kind.starts_with(SUSPECT)
+            && (kind.starts_with(SUSPECT) || kind == RESET_FOUND)
         {
             tracing::warn!(kind, "{text}");
         }
