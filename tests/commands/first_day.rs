@@ -54,7 +54,7 @@ fn suspect_files() -> [(&'static str, String, &'static str); 4] {
     let ahead = recent(60, SignedDuration::from_mins(58));
     [
         ("mark", marked, "-999 stands 1 times"),
-        ("fall", fallen, "it fell by 401.934 mm, "),
+        ("fall", fallen, "it fell by 401.935 mm, "),
         ("scale", metres, "if they are metres, say unit = \"m\""),
         (
             "ahead",
