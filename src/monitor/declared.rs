@@ -80,6 +80,16 @@ impl Declarations {
         }
     }
 
+    /// The newest reset that the readings have shown: when, and by what they jumped, mm.
+    pub(super) fn newest_found(&self) -> Option<(Timestamp, f64)> {
+        self.found.last().copied()
+    }
+
+    /// The newest reset that was found was none.
+    pub(super) fn forget_found(&mut self) {
+        self.found.pop();
+    }
+
     /// Takes a reset that the readings show: as of one that is declared, what they jump by is no motion.
     pub(super) fn find_reset(&mut self, time: Timestamp, jump: f64) {
         self.found.push((time, jump));

@@ -196,6 +196,8 @@ pub enum EventKind {
 pub const SUSPECT: &str = "suspect-";
 /// The kind of a fault that says that a reset was found which nobody declared.
 pub const RESET_FOUND: &str = "reset-found";
+/// The kind of a fault that says that it was none: the readings came back.
+pub(super) const RESET_RETURNED: &str = "reset-returned";
 /// See [`SUSPECT`].
 pub const SUSPECT_ENDS: &str = "-ends";
 

@@ -16,6 +16,10 @@ const FEWEST: usize = 16;
 const LEAP: f64 = 12.0;
 /// The readings on either side lie within this share of the fall of one another.
 const APART: f64 = 0.25;
+/// What was taken for a reset may come back within this time, days; later a jump as large is motion,
+const LONGEST_OFFSET_DAYS: f64 = 30.0;
+/// and so it is where the readings before it moved by more than this share of it.
+const STILL: f64 = 0.25;
 
 impl History {
     /// Since which reading the displacement stands lower, and by what it jumped there, mm (negative), where the newest reading
@@ -50,6 +54,22 @@ impl History {
         });
         let jump = jumps.sum::<f64>() / CONFIRMING as f64;
         Some((self.time(after[0].t_days)?, jump))
+    }
+}
+
+impl History {
+    /// Whether the newest reading has come back by what a reset found at `time`, of this jump, has taken off: it was none, but
+    /// an offset that has passed. So it is only where the readings before it stood still beside that, and no longer after.
+    pub(super) fn has_come_back(&self, (time, jump): (Timestamp, f64)) -> bool {
+        let values = &self.observations.values;
+        let Some(from) = values.len().checked_sub(CONFIRMING + 1) else {
+            return false;
+        };
+        let (newest, before) = (&values[values.len() - 1], &values[from..values.len() - 1]);
+        let step = newest.value - before[CONFIRMING - 1].value;
+        let is_still = spread(before) <= STILL * step;
+        let age = newest.t_days - self.days(time);
+        is_still && (step + jump).abs() <= APART * jump.abs() && age <= LONGEST_OFFSET_DAYS
     }
 }
 

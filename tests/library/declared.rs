@@ -335,7 +335,7 @@ fn a_fall_that_no_slope_makes_is_a_reset_that_nobody_declared_and_a_spike_is_non
     let fall = [slipwatch::reading::Suspicion::Fall].into();
     accepting.accepted.insert(BenchmarkId::new("a"), fall);
     assert_eq!(found_resets(&displaced_by(&readings, accepting, 25.0).0), 0);
-    // What comes back is a spike; a slope that is read with the other sign moves on.
+    // What comes back is a spike, or an offset that has passed; a slope that is read with the other sign moves on.
     let mut spike = series(400, 1, (when, 0.0));
     spike[200].1 -= 30.0;
     spike[201].1 -= 30.0;
@@ -343,6 +343,15 @@ fn a_fall_that_no_slope_makes_is_a_reset_that_nobody_declared_and_a_spike_is_non
         found_resets(&displaced_by(&spike, Settings::default(), 25.0).0),
         0
     );
+    let mut offset = series(400, 1, (when, 0.0));
+    for one in &mut offset[200..260] {
+        one.1 -= 30.0;
+    }
+    let (events, monitor) = displaced_by(&offset, Settings::default(), 45.0);
+    assert_eq!(found_resets(&events), 1);
+    // 33 mm, and not the 30 more by which it came back.
+    let level = monitor.level(&BenchmarkId::new("a"));
+    assert!(level < Some(Level::Orange), "{level:?}");
     let mut turned: Vec<(Timestamp, f64)> = series(400, 1, (when, 30.0));
     for one in &mut turned {
         one.1 = -one.1;

@@ -4,7 +4,7 @@ use super::unknown::Reason;
 use super::{StepContext, Track};
 use crate::alert::Policy;
 use crate::monitor::declared::Declarations;
-use crate::monitor::event::{Event, RESET_FOUND};
+use crate::monitor::event::{Event, RESET_FOUND, RESET_RETURNED};
 use crate::monitor::history::MeasuredAs;
 use crate::reading::{Reading, Suspicion, Timestamp};
 
@@ -55,10 +55,22 @@ impl Track {
         events
     }
 
-    /// Takes off a fall that no slope makes and that the newest readings confirm: a reset that nobody declared.
+    /// Takes off a fall that no slope makes and that the newest readings confirm: a reset that nobody declared. Where they come
+    /// back it is put on again.
     pub(super) fn find_reset(&mut self, now: Timestamp) -> Option<Event> {
         if self.accepted.contains(&Suspicion::Fall) {
             return None;
+        }
+        if let Some(found) = self.declared.newest_found()
+            && self.history.has_come_back(found)
+        {
+            self.declared.forget_found();
+            self.history.sort_out(&self.declared);
+            let text = format!(
+                "benchmark {}: its readings came back by what they had fallen at {}: an offset that has passed, no reset",
+                self.benchmark, found.0
+            );
+            return Some(self.fault(now, RESET_RETURNED, text));
         }
         let (time, jump) = self.history.fallen_back()?;
         self.declared.find_reset(time, jump);
