@@ -222,9 +222,10 @@ fn said(output: &std::process::Output) -> String {
 #[test]
 fn what_people_resolve_ends_and_the_next_reading_that_calls_for_it_calls_it_again() {
     let site = Site::new(POLICY);
+    // One reading, four days old: after a second one the benchmark would be silent as soon as that is checked.
     site.append(
         "incoming/5.csv",
-        &format!("time,displacement_mm\n{}", failing(0..8)),
+        &format!("time,displacement_mm\n{}", failing(0..1)),
     );
     let alerts = |words: &[&str]| {
         let all = [&["alerts"], words, &["--config", "site.toml"]].concat();
@@ -234,7 +235,7 @@ fn what_people_resolve_ends_and_the_next_reading_that_calls_for_it_calls_it_agai
     let nothing = alerts(&["ack", "--by", "Ada"]);
     assert_eq!(nothing.status.code(), Some(1), "{}", said(&nothing));
     assert!(said(&nothing).contains("there is nothing to acknowledge"));
-    site.append("incoming/5.csv", &failing(8..113));
+    site.append("incoming/5.csv", &failing(1..113));
     eventually("notified", || site.notified("5/red/", "firing") == 1);
     for refused in [
         &["resolve", "--benchmark", "5", "--by", "Ada"][..],

@@ -40,7 +40,14 @@ pub(super) fn start(
     shutdown: &Shutdown,
 ) -> JoinSet<()> {
     let mut tasks = JoinSet::new();
-    vitals.update(|health| health.drill = None);
+    // Here and not in the task: what is shown of drills stands before the past has been read.
+    let mut record =
+        DrillRecord::read(&config.site.state_dir).unwrap_or_else(|| DrillRecord::new(clock::now()));
+    if let Some(drill) = &config.drill {
+        record.overdue_after = overdue_after(drill, &record);
+    }
+    let shown = config.drill.is_some().then(|| record.clone());
+    vitals.update(|health| health.drill = shown);
     if let Some(drill) = config.drill.clone() {
         let office = DrillContext {
             config: config.clone(),
@@ -52,17 +59,20 @@ pub(super) fn start(
             let mut asked = shutdown.clone();
             tokio::select! {
                 () = asked.requested() => {}
-                () = hold(&office, &drill, &mut shutdown) => {}
+                () = hold(&office, &drill, record, &mut shutdown) => {}
             }
         });
     }
     tasks
 }
 
-async fn hold(office: &DrillContext, drill: &Drill, shutdown: &mut Shutdown) {
+async fn hold(
+    office: &DrillContext,
+    drill: &Drill,
+    mut record: DrillRecord,
+    shutdown: &mut Shutdown,
+) {
     let site = &office.config.site;
-    let mut record =
-        DrillRecord::read(&site.state_dir).unwrap_or_else(|| DrillRecord::new(clock::now()));
     loop {
         record.overdue_after = overdue_after(drill, &record);
         keep(office, &record);
