@@ -2,6 +2,7 @@
 
 use super::fresh::{best_of_starts, fresh_starts};
 use super::judge::named;
+use super::problem::Problem;
 use super::refit::{Fitted, Start, likeliest, refit, towards, under_likeliest};
 use super::search::{Accepted, Search};
 use super::term::{Term, law_parameters, time_of};
@@ -36,18 +37,24 @@ impl Search<'_> {
 
     /// The joint fit without the term of that index; `None` where it is needed beyond doubt.
     fn without(&mut self, full: &Fitted, index: usize) -> Option<Fitted> {
-        let (problem, bank) = (self.problem, self.bank);
-        let mut start = Start::at(full);
-        let earlier = full.terms[..index].iter().map(Term::coefficients);
-        let first = law_parameters(problem) + earlier.sum::<usize>();
-        let own = first..first + full.terms[index].coefficients();
-        start.parameters.drain(own);
-        start.terms.remove(index);
-        let whitener = bank.iter().find(|one| one.noise == full.noise)?;
+        let problem = self.problem;
+        let start = start_without(problem, full, index);
+        let whitener = self.bank.iter().find(|one| one.noise == full.noise)?;
         let near = towards(problem, &start, whitener, (FIRST_STEPS, &mut self.scratch))?;
         if near.bic(problem) - full.bic(problem) > BEYOND_DOUBT * self.options.bic_margin {
             return None;
         }
+        self.joint(start)
+    }
+
+    /// The joint fit without the term of that index, however much it is needed.
+    pub(super) fn without_at_all(&mut self, full: &Fitted, index: usize) -> Option<Fitted> {
+        self.joint(start_without(self.problem, full, index))
+    }
+
+    /// The likeliest fit of these terms, from `start` and from fresh laws.
+    fn joint(&mut self, start: Start) -> Option<Fitted> {
+        let (problem, bank) = (self.problem, self.bank);
         let mut fits = Vec::from_iter(refit(problem, &start, bank, &mut self.scratch));
         let mut starts = fresh_starts(problem, &start.terms);
         starts.push(start);
@@ -74,4 +81,15 @@ impl Search<'_> {
             ));
         }
     }
+}
+
+/// `full` without the term of that index and its coefficients.
+fn start_without(problem: &Problem, full: &Fitted, index: usize) -> Start {
+    let mut start = Start::at(full);
+    let earlier = full.terms[..index].iter().map(Term::coefficients);
+    let first = law_parameters(problem) + earlier.sum::<usize>();
+    let own = first..first + full.terms[index].coefficients();
+    start.parameters.drain(own);
+    start.terms.remove(index);
+    start
 }

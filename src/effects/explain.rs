@@ -17,6 +17,9 @@ use super::term::Scratch;
 use super::verdict::conclude;
 use crate::reading::{Channel, Series, Timestamp};
 
+/// Said of a record with which nothing can be tried.
+pub(super) const TOO_FEW: &str = "There are too few readings to distinguish anything from noise.";
+
 /// Explains `series` by what its law lacks, from `channels` beside it; `neighbours` are the other
 /// benchmarks of the slope. `progress` is called with the share done, 0 to 1.
 pub fn explain(
@@ -25,6 +28,23 @@ pub fn explain(
     neighbours: &[&Series],
     options: &Options,
     progress: &mut dyn FnMut(f64),
+) -> Explanation {
+    explained_by(series, channels, options, |cleaned, is_drawn| {
+        let (findings, remarks) = look(cleaned, is_drawn, options, progress);
+        let parted = partition_candidate(cleaned.0, neighbours, options);
+        let parted = by_own_event(&findings, parted, (cleaned.0, neighbours), options);
+        progress(1.0);
+        (with_partition(findings, parted), remarks)
+    })
+}
+
+/// The explanation that `look` comes to, of the readings and covariates without their faults; the second argument of it:
+/// whether the values are no readings.
+pub(super) fn explained_by(
+    series: &Series,
+    channels: &[Channel],
+    options: &Options,
+    look: impl FnOnce((&Series, &[Channel]), bool) -> (Findings, Vec<String>),
 ) -> Explanation {
     let data_hash = hash(series, channels);
     let (first, last) = (series.readings.first(), series.readings.last());
@@ -41,13 +61,9 @@ pub fn explain(
         .faults
         .iter()
         .any(|fault| fault.kind == FaultKind::Interpolated && fault.channel.is_none());
-    let (findings, of_search) = look((series, channels), is_drawn, options, progress);
+    let (findings, of_search) = look((series, channels), is_drawn);
     let critical = options.critical_velocity_mm_per_day;
     let forecast = forecast_change(series, channels, &findings.known_load, critical);
-    let parted = partition_candidate(series, neighbours, options);
-    let parted = by_own_event(&findings, parted, (series, neighbours), options);
-    let findings = with_partition(findings, parted);
-    progress(1.0);
     let of_channels = remarks::of_channels(series, channels);
     let remarks = inspected.remarks.into_iter();
     Explanation {
@@ -60,6 +76,7 @@ pub fn explain(
         verdict: findings.verdict,
         explained: findings.explained,
         also: findings.also,
+        given: Vec::new(),
         cannot_separate_from: findings.cannot_separate_from,
         faults: inspected.faults,
         error: findings.error,
@@ -146,7 +163,7 @@ fn look(
     let mut remarks = Vec::new();
     let none = Findings::none(series.unit);
     let Some(ready) = Ready::of(series, channels, &mut remarks) else {
-        remarks.push("There are too few readings to distinguish anything from noise.".to_owned());
+        remarks.push(TOO_FEW.to_owned());
         return (none, remarks);
     };
     progress(0.05);

@@ -29,6 +29,9 @@ pub struct Explanation {
     pub explained: Explained,
     /// The effects accepted after the verdict, in that order.
     pub also: Vec<Effect>,
+    /// What was declared to be there, each with its judgement; missing where nothing was.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub given: Vec<DeclaredEffect>,
     /// What explains the same within the margin: kinds, with the channel where there is one.
     pub cannot_separate_from: Vec<Rival>,
     /// What is wrong with the data themselves.
@@ -116,6 +119,19 @@ impl Effect {
             contribution_rms: None,
         }
     }
+}
+
+/// An effect that people declare to be there, put into the law with all others that they declare, and judged.
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
+pub struct DeclaredEffect {
+    /// As it was declared: `KIND[:CHANNEL][@TIME]`.
+    pub declared: String,
+    /// As it was fitted; null where it cannot be put into the law of this record.
+    pub effect: Option<Effect>,
+    /// Held-out error with it over that of the law with all others that were declared; null where that is not asked of it.
+    pub held_out: Option<f64>,
+    /// Why it does not stand; null where it does.
+    pub rejected_because: Option<String>,
 }
 
 /// How much of the structure is accounted for.

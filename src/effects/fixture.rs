@@ -1,5 +1,7 @@
 //! Series made up for the tests of the engine's parts.
 
+use super::given::Cause;
+use super::kind::Kind;
 use super::problem::Problem;
 use crate::reading::{
     BenchmarkId, Channel, LengthUnit, Quantity, Reading, Sample, Series, TimeUnit, Timestamp, Unit,
@@ -88,4 +90,53 @@ pub(super) fn correlation(a: &[f64], b: &[f64]) -> f64 {
         each.map(|(x, y)| of(x - means.0, y - means.1)).sum::<f64>()
     };
     sum(&|x, y| x * y) / (sum(&|x, _| x * x) * sum(&|_, y| y * y)).sqrt()
+}
+
+const COUNT: usize = 240;
+/// mm.
+pub(super) const NOISE: f64 = 0.2;
+
+pub(super) fn cause(kind: Kind) -> Cause {
+    Cause {
+        kind,
+        channel: None,
+        at: None,
+    }
+}
+
+pub(super) fn lake(days: &[f64]) -> Vec<f64> {
+    days.iter().map(|day| (day / 9.0).sin()).collect()
+}
+
+/// 1 mm/day, by a factor of e^0.5 more where the lake is high, and a jump of the reading by 15 mm before day 100.
+pub(super) fn driven_by_the_lake() -> (Series, Vec<Channel>) {
+    let days = daily(COUNT);
+    let noise = normals(&mut generator(3), COUNT);
+    let mut moved = 0.0;
+    let values = lake(&days).into_iter().zip(noise).enumerate();
+    let values = values.map(|(day, (level, noise))| {
+        moved += (0.5 * level).exp();
+        moved + NOISE * noise + if day >= 100 { -15.0 } else { 0.0 }
+    });
+    let values: Vec<f64> = values.collect();
+    let other: Vec<f64> = days.iter().map(|day| (day / 4.0).cos()).collect();
+    let channels = vec![
+        channel("lake", &days, &lake(&days)),
+        channel("other", &days, &other),
+    ];
+    (series(Quantity::Displacement, &days, &values), channels)
+}
+
+pub(super) fn through(name: &str) -> Cause {
+    Cause {
+        channel: Some(name.to_owned()),
+        ..cause(Kind::Hydrological)
+    }
+}
+
+pub(super) fn jump() -> Cause {
+    Cause {
+        at: after_days(epoch(), 100.0),
+        ..cause(Kind::Offset)
+    }
 }

@@ -1,22 +1,25 @@
 //! The law with causes that are known beforehand: what its error would be, and nothing judged.
 
-use super::candidates::{event_times, events, feedbacks, offset, seasonal, tides};
+use super::candidates::{
+    delays, event_times, events, feedbacks, of_channel, offset, responses, seasonal, thermal, tides,
+};
 use super::channels::distinct;
 use super::explanation::{Change, ErrorChange};
 use super::faults::{Inspected, inspect};
 use super::findings::least_squares;
 use super::judge::{block, without_block};
-use super::kind::Kind;
+use super::kind::{Form, Kind};
 use super::options::Options;
 use super::problem::Problem;
 use super::ready::Ready;
 use super::refit::Fitted;
 use super::search::Search;
-use super::term::Scratch;
+use super::term::{Scratch, Term};
 use super::trials::{Ground, Trial};
 use crate::reading::{Channel, Series, Timestamp, after_days, days_since};
+use std::fmt;
 
-/// An effect that is known to be there; how large it is, how late it acts, and what shape it has, is not.
+/// An effect that is known, or declared, to be there; how large it is, how late it acts, and what shape it has, is not.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cause {
     /// Its kind.
@@ -25,6 +28,19 @@ pub struct Cause {
     pub channel: Option<String>,
     /// When it happened, for kinds that happen once; `None` where that is not known. It is moved to where it fits best.
     pub at: Option<Timestamp>,
+}
+
+impl fmt::Display for Cause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.kind.name())?;
+        if let Some(channel) = &self.channel {
+            write!(f, ":{channel}")?;
+        }
+        match self.at {
+            Some(at) => write!(f, "@{at}"),
+            None => Ok(()),
+        }
+    }
 }
 
 /// The errors of the law with these `causes`, fitted as [`explain`](super::explain()) fits what it finds and held out as
@@ -48,7 +64,9 @@ pub fn error_given(
     let channels = distinct(channels, &faulty);
     let ready = Ready::of(&series, &channels, &mut Vec::new())?;
     let problem = &ready.problem;
-    let full = fitted(ready.search(options, false), &ready.plain, causes)?;
+    let mut search = ready.search(options, false);
+    let null = search.null(&ready.plain)?;
+    let (full, _) = put_in(&mut search, null, causes)?;
     let mut scratch = Scratch::default();
     let after = least_squares(problem, &full, &mut scratch)?;
     let all = 0..problem.t.len();
@@ -85,61 +103,97 @@ pub fn error_given(
     Some(error)
 }
 
-/// The law with the causes, one after another, that first which promises most, each refitted with all before it.
-fn fitted(mut search: Search, plain: &Fitted, causes: &[Cause]) -> Option<Fitted> {
-    let mut full = search.null(plain)?;
-    let mut left: Vec<&Cause> = causes.iter().collect();
+/// The law with the causes, one after another, that first which promises most, each refitted with all before it; and by
+/// term of the law which cause it is.
+pub(super) fn put_in(
+    search: &mut Search,
+    mut full: Fitted,
+    causes: &[Cause],
+) -> Option<(Fitted, Vec<usize>)> {
+    let mut left: Vec<usize> = (0..causes.len()).collect();
+    let mut placed = Vec::new();
     while !left.is_empty() {
         let ground = search.ground(&full)?;
-        let trials = left.iter().enumerate();
-        let trials = trials.filter_map(|(index, cause)| Some((index, promising(&ground, cause)?)));
-        let Some((index, trial)) = trials.max_by(|a, b| a.1.gain.total_cmp(&b.1.gain)) else {
+        let each = left.iter().enumerate();
+        let each = each.map(|(place, cause)| (place, promising(&ground, &causes[*cause])));
+        let most = |trials: &[Trial]| trials.iter().map(|one| one.gain).fold(f64::MIN, f64::max);
+        let each = each.filter(|(_, trials)| !trials.is_empty());
+        let Some((place, trials)) = each.max_by(|a, b| most(&a.1).total_cmp(&most(&b.1))) else {
             break;
         };
-        left.swap_remove(index);
-        if let Some(one) = search.refitted(&full, &trial.term) {
+        let cause = left.swap_remove(place);
+        let refitted = trials.iter();
+        let refitted = refitted.filter_map(|trial| search.refitted(&full, &trial.term));
+        if let Some(one) = refitted.max_by(|a, b| a.gain.total_cmp(&b.gain)) {
             full = one.fitted;
+            placed.push(cause);
         }
     }
-    Some(full)
+    Some((full, placed))
 }
 
-/// The shape of a cause that takes most off the misfit; `None` where it has none.
-fn promising(ground: &Ground, cause: &Cause) -> Option<Trial> {
+/// The shapes of a cause that take most off the misfit, of a covariate one by its level and one by its rate; none where it
+/// has no shape here.
+fn promising(ground: &Ground, cause: &Cause) -> Vec<Trial> {
+    let each = shapes(ground, cause).into_iter();
+    let mut best: Vec<Trial> = Vec::new();
+    for trial in each.map(|term| ground.trial(term)) {
+        let form = |one: &Trial| one.term.response.map(|response| response.form);
+        match best.iter_mut().find(|one| form(one) == form(&trial)) {
+            Some(one) if trial.gain > one.gain => *one = trial,
+            Some(_) => {}
+            None => best.push(trial),
+        }
+    }
+    best
+}
+
+/// Everything that a cause may look like: its delays, its times, its periods.
+pub(super) fn shapes(ground: &Ground, cause: &Cause) -> Vec<Term> {
     let problem = ground.problem;
-    let trials: Vec<Trial> = match cause.kind {
-        Kind::Hydrological | Kind::Thermal => of_channel(ground, cause),
+    match cause.kind {
+        Kind::Hydrological | Kind::Thermal => of_cause(ground, cause),
         Kind::LoadStep | Kind::StateReset | Kind::FrictionChange => times(problem, cause.at)
             .into_iter()
             .flat_map(events)
             .filter(|term| term.kind == cause.kind)
-            .map(|term| ground.trial(term))
             .collect(),
         Kind::Offset => times(problem, cause.at)
             .into_iter()
-            .map(|at| ground.trial(offset(problem, at)))
+            .map(|at| offset(problem, at))
             .collect(),
         Kind::Seasonal | Kind::Tide | Kind::RateLimit | Kind::Geometry | Kind::IntervalMean => {
             let all_along = seasonal(problem).into_iter().chain(tides(problem));
             all_along
                 .chain(feedbacks(problem))
                 .filter(|term| term.kind == cause.kind)
-                .map(|term| ground.trial(term))
                 .collect()
         }
         Kind::Partition | Kind::CorrelatedNoise | Kind::Unexplained | Kind::None => Vec::new(),
-    };
-    trials.into_iter().max_by(|a, b| a.gain.total_cmp(&b.gain))
+    }
 }
 
-fn of_channel(ground: &Ground, cause: &Cause) -> Vec<Trial> {
-    let own = |trial: &Trial| {
-        let mut drivers = ground.drivers.iter();
-        let driver = drivers.find(|(index, _)| Some(*index) == trial.term.channel);
-        trial.term.kind == cause.kind
-            && driver.is_some_and(|(_, driver)| Some(&driver.name) == cause.channel.as_ref())
+/// The responses of its covariate, in the load or, of a temperature, in the reading.
+fn of_cause(ground: &Ground, cause: &Cause) -> Vec<Term> {
+    let mut drivers = ground.drivers.iter();
+    let Some((index, driver)) =
+        drivers.find(|(_, driver)| Some(&driver.name) == cause.channel.as_ref())
+    else {
+        return Vec::new();
     };
-    ground.of_covariates().into_iter().filter(own).collect()
+    let (problem, driver) = (ground.problem, (*index, driver));
+    let delays = delays(problem, driver.1);
+    if cause.kind == Kind::Thermal {
+        let each = delays.iter();
+        return each
+            .filter_map(|days| thermal(problem, driver, 1, *days))
+            .collect();
+    }
+    [Form::Level, Form::Rate]
+        .into_iter()
+        .flat_map(|form| responses(form, &delays))
+        .filter_map(|response| of_channel(problem, driver, response))
+        .collect()
 }
 
 /// The readings before which it may have happened: those that the search would try, or, where the time is known, all

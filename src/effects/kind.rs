@@ -91,6 +91,34 @@ impl Kind {
         )
     }
 
+    /// Whether it works through a covariate.
+    pub fn has_channel(self) -> bool {
+        matches!(self, Self::Hydrological | Self::Thermal)
+    }
+
+    /// Whether it happens once, so that it has a time.
+    pub fn has_time(self) -> bool {
+        self.is_event_of_the_ground() || self == Self::Offset
+    }
+
+    /// Whether one can declare it to be there: it is a term of the law, or of the reading, of one benchmark.
+    pub fn can_be_declared(self) -> bool {
+        match self {
+            Self::Hydrological
+            | Self::Seasonal
+            | Self::Tide
+            | Self::LoadStep
+            | Self::StateReset
+            | Self::FrictionChange
+            | Self::RateLimit
+            | Self::Geometry
+            | Self::Offset
+            | Self::Thermal
+            | Self::IntervalMean => true,
+            Self::Partition | Self::CorrelatedNoise | Self::Unexplained | Self::None => false,
+        }
+    }
+
     /// Whether it lies in the instrument or its noise and not in the ground.
     pub fn is_of_the_reading(self) -> bool {
         matches!(

@@ -6,6 +6,7 @@ mod by_clock;
 mod candidates;
 mod clock;
 mod companions;
+mod declared;
 mod diagnosis;
 mod explain;
 mod explanation;
@@ -42,10 +43,11 @@ mod verdict;
 mod watch;
 
 pub use by_clock::ByClock;
+pub use declared::explain_given;
 pub use explain::explain;
 pub use explanation::{
-    Candidate, Change, Curves, Effect, ErrorChange, Explained, Explanation, Fault, ForecastChange,
-    NoiseReport, ResidualTests, SettingsReport, Structure,
+    Candidate, Change, Curves, DeclaredEffect, Effect, ErrorChange, Explained, Explanation, Fault,
+    ForecastChange, NoiseReport, ResidualTests, SettingsReport, Structure,
 };
 pub use faults::{Inspected, inspect};
 pub use given::{Cause, error_given};

@@ -20,7 +20,7 @@ const MOST_OTHERS: usize = 6;
 /// Parameters of the friction: b, a and p.
 const MOST_FRICTION: usize = 3;
 /// A covariate that follows the year may fit as well shifted by whole years, but no better than this at any shift.
-const AT_RANDOM: f64 = 0.3;
+pub(super) const AT_RANDOM: f64 = 0.3;
 
 /// Fits by least squares that are followed by one under the likeliest noise.
 const LEVELS: usize = 2;
@@ -159,7 +159,7 @@ impl<'a> Search<'a> {
     }
 
     /// The null gains by the law linearised, made as much larger as full refits of the largest of them are.
-    fn amplified(&mut self, base: &Fitted, mut null_gains: NullGains) -> NullGains {
+    pub(super) fn amplified(&mut self, base: &Fitted, mut null_gains: NullGains) -> NullGains {
         let mut most = 1.0_f64;
         for (term, gain) in std::mem::take(&mut null_gains.largest) {
             let start = Start::at(base).joined(std::slice::from_ref(&term));

@@ -96,7 +96,7 @@ pub(super) struct Refitted {
 
 impl Refitted {
     /// What follows the year cannot be distinguished from the season.
-    fn with_season(&self, mut how: Accepted, problem: &Problem) -> Accepted {
+    pub(super) fn with_season(&self, mut how: Accepted, problem: &Problem) -> Accepted {
         let season = Rival::from(Kind::Seasonal);
         let seen = !candidates::seasonal(problem).is_empty();
         if self.follows_season && seen && !how.ties.contains(&season) {
@@ -264,7 +264,11 @@ impl Search<'_> {
     }
 
     /// Why not; `None` for what may be accepted. The held-out error with it over that without comes first.
-    fn judged(&mut self, base: &Fitted, one: &Refitted) -> (Option<f64>, Option<String>) {
+    pub(super) fn judged(
+        &mut self,
+        base: &Fitted,
+        one: &Refitted,
+    ) -> (Option<f64>, Option<String>) {
         let margin = self.options.bic_margin;
         if one.gain < margin {
             let reason = format!(
@@ -345,7 +349,13 @@ impl Search<'_> {
         (Some(ratio), (!is_no_worse).then(grows))
     }
 
-    fn note(&mut self, term: &Term, one: &Refitted, held: Option<f64>, reason: Option<String>) {
+    pub(super) fn note(
+        &mut self,
+        term: &Term,
+        one: &Refitted,
+        held: Option<f64>,
+        reason: Option<String>,
+    ) {
         let channel = term
             .channel
             .and_then(|index| self.drivers.iter().find(|(own, _)| *own == index))

@@ -162,8 +162,8 @@ fn correlated(unit: Unit, full: &Fitted, bic_gain: f64) -> Effect {
     }
 }
 
-/// Everything known of one accepted term.
-fn effect(
+/// Everything known of one term of the law.
+pub(super) fn effect(
     (problem, bank, drivers): (&Problem, &[Whitener], &[(usize, Driver)]),
     unit: Unit,
     (full, index): (&Fitted, usize),

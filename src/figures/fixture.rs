@@ -34,6 +34,7 @@ pub(crate) fn lake() -> Explanation {
         verdict: by_the_lake(),
         explained: Explained::Partly,
         also: vec![an_offset()],
+        given: Vec::new(),
         cannot_separate_from: vec![Kind::Seasonal.into()],
         faults: vec![a_reset()],
         error: ErrorChange {
@@ -230,6 +231,7 @@ pub(crate) fn bare(kind: Kind) -> Explanation {
         verdict: Effect::of(kind),
         explained: Explained::None,
         also: Vec::new(),
+        given: Vec::new(),
         cannot_separate_from: Vec::new(),
         faults: Vec::new(),
         error: ErrorChange {

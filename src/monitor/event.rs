@@ -311,7 +311,7 @@ pub struct LevelChance {
 pub struct Plain {
     /// Which regime, with what probability.
     pub regime: RegimeReport,
-    /// When the critical velocity is passed.
+    /// When the slope collapses.
     pub failure_time: FailureTime,
     /// Whether the law under the known load explains the present velocity. While it does not, the larger of both chances
     /// decides the level.

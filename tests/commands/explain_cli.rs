@@ -265,3 +265,58 @@ fn the_balance_of_tags_can_fail() {
     assert_eq!(first_unbalanced("<a><b></a>"), Some("/a".to_owned()));
     assert_eq!(first_unbalanced("<a><b></b>"), Some("a".to_owned()));
 }
+
+#[test]
+fn what_is_declared_is_judged_and_nothing_else_is_tried() {
+    let (_folder, path) = slope();
+    let declared = ["hydrological:rain_mm", "offset@2020-03-21T00:00:00Z"];
+    let done = explain(&[
+        text_of(&path),
+        "--given",
+        declared[0],
+        "--given",
+        declared[1],
+        "--format",
+        "json",
+    ]);
+    let said = json(&done.success());
+    let given = said["given"].as_array().unwrap();
+    assert_eq!(given.len(), 2);
+    for (one, text) in given.iter().zip(declared) {
+        assert_eq!(one["declared"], text);
+        assert!(one["rejected_because"].is_string(), "{one}");
+    }
+    assert_eq!(given[1]["effect"]["effect"], "offset");
+    let tried = said["candidates"].as_array().unwrap();
+    assert_eq!(tried.len(), 2, "{tried:?}");
+    let text = out(&explain(&[text_of(&path), "--given", declared[1]]).success());
+    let first = text.lines().next().unwrap();
+    assert!(
+        first.contains("nothing of what was declared stands"),
+        "{first}"
+    );
+    let why = "Declared, and does not stand: offset@2020-03-21T00:00:00Z";
+    assert!(text.contains(why), "{text}");
+    let none = explain(&[text_of(&path), "--format", "json"]).success();
+    assert!(json(&none).get("given").is_none());
+}
+
+#[test]
+fn what_cannot_be_declared_of_these_readings_is_a_usage_error_that_says_what_can() {
+    let (_folder, path) = slope();
+    for (declared, said) in [
+        ("lake", "no kind of effect; expected one of hydrological"),
+        ("hydrological", "write hydrological:CHANNEL"),
+        ("hydrological:lake", "there are rain_mm"),
+        (
+            "offset@2031-01-01T00:00:00Z",
+            "the readings are from 2020-03-01T00:00:00Z to",
+        ),
+        ("seasonal@2020-03-21T00:00:00Z", "has no time"),
+    ] {
+        let done = explain(&[text_of(&path), "--given", declared]).code(2);
+        assert!(err(&done).contains(said), "{declared}: {}", err(&done));
+    }
+    let twice = explain(&[text_of(&path), "--given", "seasonal", "--given", "seasonal"]);
+    assert!(err(&twice.code(2)).contains("stands twice"));
+}

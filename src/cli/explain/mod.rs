@@ -1,5 +1,6 @@
 //! `explain FILE`: from a benchmark's residual to the effect that its law lacks.
 
+mod given;
 mod page;
 mod sections;
 mod sentence;
@@ -11,7 +12,7 @@ use super::args::{OutputArgs, ReadingArgs};
 use super::{bar, exit};
 use crate::alert::Policy;
 use crate::config::value;
-use crate::effects::{self, Explanation, Options};
+use crate::effects::{self, Cause, Explanation, Options};
 use crate::reading::{Channel, Recording, SelectError, Series, Timestamp};
 use anyhow::Context;
 use std::path::PathBuf;
@@ -25,7 +26,8 @@ const MOST_SURROGATES: usize = 9999;
 ///
 /// Nothing is declared beforehand: every known effect is tried inside the law, with every covariate
 /// there is, and accepted only if it also predicts a later block that the fit has not seen. An
-/// effect is what the readings are consistent with, never what is proved to cause them.
+/// effect is what the readings are consistent with, never what is proved to cause them. With `--given`
+/// only what you declare is tried.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     #[command(flatten)]
@@ -36,6 +38,10 @@ pub(super) struct Args {
     /// Use no reading and no covariate after this
     #[arg(long, value_name = "TIME", value_parser = value::instant)]
     until: Option<Timestamp>,
+    /// Try no effect but this one and others that are declared like it: all are put into the law, and each is judged.
+    /// `hydrological:lake_level_m`, `offset@2017-06-06T17:00:00Z`, `seasonal`
+    #[arg(long, value_name = "KIND[:CHANNEL][@TIME]", value_parser = given::cause)]
+    given: Vec<Cause>,
     /// Write a page with plots to this file, which needs no other
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
@@ -60,11 +66,21 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         one?;
     }
     cut(&mut recording, args.from, args.until);
+    if several && !args.given.is_empty() {
+        anyhow::bail!(exit::UsageError(
+            "--given is judged on one benchmark: choose it with --benchmark".to_owned()
+        ));
+    }
     if several {
         return together(args, &mut recording);
     }
     let series = args.readings.series(&recording)?;
-    let mut explanation = search(series, &recording, &options(args));
+    given::check(&args.given, series, &recording.channels)?;
+    let mut explanation = if args.given.is_empty() {
+        search(series, &recording, &options(args))
+    } else {
+        judged(series, &recording, args)
+    };
     if let Some(remark) = remark_on_origin(&recording) {
         explanation.remarks.insert(0, remark);
     }
@@ -131,6 +147,17 @@ fn search(series: &Series, recording: &Recording, options: &Options) -> Explanat
     let mut progress = |share: f64| bar::share(&bar, share);
     let channels = &recording.channels;
     let explanation = effects::explain(series, channels, &neighbours, options, &mut progress);
+    bar.finish_and_clear();
+    explanation
+}
+
+/// The effects that are declared, judged.
+fn judged(series: &Series, recording: &Recording, args: &Args) -> Explanation {
+    let bar = bar::shared();
+    let mut progress = |share: f64| bar::share(&bar, share);
+    let (channels, causes) = (&recording.channels, &args.given);
+    let explanation =
+        effects::explain_given(series, channels, causes, &options(args), &mut progress);
     bar.finish_and_clear();
     explanation
 }

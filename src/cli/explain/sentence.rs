@@ -1,7 +1,9 @@
 //! What an explanation comes to, in sentences.
 
 use crate::cli::table::time;
-use crate::effects::{Effect, Explained, Explanation, Form, Kind, Rival, Structure, Together};
+use crate::effects::{
+    DeclaredEffect, Effect, Explained, Explanation, Form, Kind, Rival, Structure, Together,
+};
 use crate::reading::BenchmarkId;
 
 const HOURS_PER_DAY: f64 = 24.0;
@@ -12,7 +14,12 @@ const A_FEW_DAYS: f64 = 2.0;
 pub(super) fn verdict(explanation: &Explanation) -> String {
     let effect = &explanation.verdict;
     let benchmark = &explanation.benchmark;
+    let is_declared = !explanation.given.is_empty();
     match effect.effect {
+        Kind::None | Kind::Unexplained if is_declared => format!(
+            "{benchmark}: nothing of what was declared stands{}",
+            most_marked(&explanation.residual.structure)
+        ),
         Kind::None => format!(
             "{benchmark}: the residual cannot be distinguished from noise; these readings show nothing that the law lacks"
         ),
@@ -75,6 +82,7 @@ pub(super) fn others(explanation: &Explanation) -> Vec<String> {
     for effect in &explanation.also {
         said.push(format!("Also consistent with {}.", phrase(effect)));
     }
+    said.extend(explanation.given.iter().filter_map(refused));
     if !explanation.cannot_separate_from.is_empty() {
         let rivals = Rival::listed(&explanation.cannot_separate_from);
         said.push(format!("Cannot be separated from: {rivals}."));
@@ -82,6 +90,19 @@ pub(super) fn others(explanation: &Explanation) -> Vec<String> {
     said.extend(explanation.remarks.iter().cloned());
     said.extend(explanation.error.caveat.clone());
     said
+}
+
+/// Why something that was declared does not stand; `None` of what does.
+fn refused(one: &DeclaredEffect) -> Option<String> {
+    let why = one.rejected_because.as_ref()?;
+    let fitted = one.effect.as_ref();
+    let fitted = fitted.map_or(String::new(), |effect| {
+        format!(" (fitted as {})", phrase(effect))
+    });
+    Some(format!(
+        "Declared, and does not stand: {}{fitted}: {why}.",
+        one.declared
+    ))
 }
 
 /// Where and when structure stands out most, behind a colon; nothing where it is not known.

@@ -1,0 +1,77 @@
+//! What is declared is judged: what is there stands, and what is not does not.
+
+use super::*;
+use crate::effects::fixture::{NOISE, cause, driven_by_the_lake, jump, through};
+
+fn judged(causes: &[Cause]) -> Explanation {
+    let (series, channels) = driven_by_the_lake();
+    explain_given(&series, &channels, causes, &Options::default(), &mut |_| {})
+}
+
+fn refusals(explanation: &Explanation) -> Vec<Option<&str>> {
+    let each = explanation.given.iter();
+    each.map(|one| one.rejected_because.as_deref()).collect()
+}
+
+#[test]
+fn what_is_there_stands_in_the_order_in_which_it_was_declared_and_the_error_falls_to_the_noise() {
+    let said = judged(&[jump(), through("lake")]);
+    assert_eq!(refusals(&said), [None, None]);
+    let kinds: Vec<Kind> = said
+        .given
+        .iter()
+        .map(|one| one.effect.as_ref().unwrap().effect)
+        .collect();
+    assert_eq!(kinds, [Kind::Offset, Kind::Hydrological]);
+    let jump = said.given[0].effect.as_ref().unwrap();
+    assert!((jump.size.unwrap() + 15.0).abs() < 1.0, "{jump:?}");
+    assert!(said.given[1].held_out.unwrap() < 0.5, "{:?}", said.given[1]);
+    let fit = said.error.fit;
+    assert!(
+        fit.after.unwrap() < 1.3 * NOISE && fit.before.unwrap() > 5.0 * NOISE,
+        "{fit:?}"
+    );
+    assert!(
+        said.error.held_out.after < said.error.held_out.before,
+        "{:?}",
+        said.error
+    );
+    let both = [said.verdict.effect, said.also[0].effect];
+    assert!(
+        both.contains(&Kind::Offset) && both.contains(&Kind::Hydrological),
+        "{both:?}"
+    );
+    assert_eq!(said.candidates.len(), 2);
+}
+
+#[test]
+fn what_is_not_there_does_not_stand_and_what_is_there_stands_beside_it() {
+    let said = judged(&[through("other"), jump()]);
+    let refusals = refusals(&said);
+    assert!(
+        refusals[0].is_some() && refusals[1].is_none(),
+        "{refusals:?}"
+    );
+    assert_eq!(said.verdict.effect, Kind::Offset);
+    assert!(said.also.is_empty());
+    assert_ne!(said.explained, Explained::Full);
+    assert!(said.remarks.iter().any(|remark| remark == ALL_IN));
+}
+
+#[test]
+fn what_a_record_cannot_show_is_said_to_be_no_part_of_its_law() {
+    let said = judged(&[cause(Kind::IntervalMean), cause(Kind::Tide)]);
+    assert_eq!(refusals(&said), [Some(NOT_SEEN); 2]);
+    assert!(said.given.iter().all(|one| one.effect.is_none()));
+    assert_eq!(said.verdict.effect, Kind::Unexplained);
+    assert_eq!(said.explained, Explained::None);
+}
+
+#[test]
+fn of_too_few_readings_nothing_is_judged() {
+    let (mut series, channels) = driven_by_the_lake();
+    series.readings.truncate(3);
+    let options = Options::default();
+    let said = explain_given(&series, &channels, &[jump()], &options, &mut |_| {});
+    assert_eq!(refusals(&said), [Some(TOO_FEW)]);
+}
