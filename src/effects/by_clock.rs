@@ -9,7 +9,13 @@ use super::clock::Clock;
 use super::known_load::KnownLoad;
 use crate::fit::Observations;
 use crate::forecast::Outlook;
-use crate::reading::{Channel, Timestamp, instant_after_days};
+use crate::reading::{Channel, Quantity, Timestamp, instant_after_days};
+
+/// A load that is higher than this over the usual one does not stay, e-folds: it is a storm.
+const HIGHEST_TO_STAY: f64 = 4.0;
+/// While the clock all but stands, one displacement is enough for each such share of the mean spacing: of many at one of its
+/// times a forecast makes velocities that are all noise. Of 0, .5 and 1 (docs/adoption.md).
+const LEAST_APART: f64 = 0.5;
 
 /// Readings by the clock of a known load.
 #[derive(Debug)]
@@ -45,6 +51,7 @@ impl ByClock {
             .filter_map(|value| instant_after_days(epoch, value.t_days))
             .collect();
         let readings = clock.readings(observations, &load.in_reading(channels, &read));
+        let readings = thinned(readings);
         Some(Self {
             clock,
             readings,
@@ -86,11 +93,63 @@ impl ByClock {
         critical: f64,
         forecast: impl FnOnce(&Observations, f64) -> Option<Outlook>,
     ) -> Option<Outlook> {
-        let pace = self.now()?.clamp(0.0, Clock::FARTHEST_LOAD).exp();
+        let pace = self.now()?.clamp(0.0, HIGHEST_TO_STAY).exp();
         let outlook = forecast(&self.readings, critical / pace)?;
         Some(Outlook {
             now_days: self.newest_days,
             ..outlook.sooner(pace)
         })
+    }
+}
+
+/// Displacements that stand apart by this clock, the newest among them.
+fn thinned(mut readings: Observations) -> Observations {
+    let values = &mut readings.values;
+    let (Some(first), Some(last)) = (values.first(), values.last()) else {
+        return readings;
+    };
+    if readings.quantity == Quantity::Velocity {
+        return readings;
+    }
+    let (newest, mut kept) = (last.t_days, f64::NEG_INFINITY);
+    let least = LEAST_APART * (newest - first.t_days) / values.len() as f64;
+    let newest_place = values.len() - 1;
+    let mut place = 0;
+    values.retain(|value| {
+        let is_kept = value.t_days - kept >= least || place == newest_place;
+        place += 1;
+        if is_kept {
+            kept = value.t_days;
+        }
+        is_kept
+    });
+    readings
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::Observation;
+
+    #[test]
+    fn displacements_at_one_time_of_the_clock_are_thinned_and_the_newest_stays() {
+        let at = |t_days: f64| Observation {
+            t_days,
+            value: t_days,
+            sigma: None,
+        };
+        let days = [0.0, 1.0, 1.001, 1.002, 2.0, 3.0, 4.0, 4.0001];
+        let readings = |quantity| Observations {
+            quantity,
+            averaging_days: 0.0,
+            values: days.map(at).to_vec(),
+        };
+        let kept = thinned(readings(Quantity::Displacement)).values;
+        let kept: Vec<f64> = kept.iter().map(|value| value.t_days).collect();
+        assert_eq!(kept, [0.0, 1.0, 2.0, 3.0, 4.0, 4.0001]);
+        assert_eq!(
+            thinned(readings(Quantity::Velocity)).values.len(),
+            days.len()
+        );
     }
 }

@@ -18,8 +18,8 @@ pub(super) struct Clock {
 }
 
 impl Clock {
-    /// The pace leaves e^-4 to e^4 by a covariate's fault, not by any load.
-    pub(super) const FARTHEST_LOAD: f64 = 4.0;
+    /// The pace leaves e^-7 to e^7 by a covariate's fault, not by any load. A storm on a slope that rests is measured to give e^6.
+    const FARTHEST_LOAD: f64 = 7.0;
 
     /// `usual` is the log-load under which it keeps pace with the calendar.
     pub(super) fn new(days: Vec<f64>, log_load: Vec<f64>, usual: f64) -> Self {

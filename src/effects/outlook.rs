@@ -28,11 +28,14 @@ pub(super) fn forecast_change(
     } else {
         let channels: Vec<&Channel> = channels.iter().collect();
         let by_clock = ByClock::new(&observations, epoch, &channels, known_load, None);
-        by_clock.and_then(|one| {
+        let after = by_clock.and_then(|one| {
             one.outlook(critical, |readings, critical| {
                 outlook(readings, critical).map(|(outlook, _)| outlook)
             })
-        })
+        });
+        after
+            .zip(before.as_ref())
+            .map(|(after, before)| after.beside(before))
     };
     let both = |of: &dyn Fn(&Outlook) -> Option<f64>| Change {
         before: before.as_ref().and_then(of),

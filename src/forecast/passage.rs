@@ -21,6 +21,16 @@ impl Passage {
         Self::from_times(times.collect())
     }
 
+    /// This and `other`, which has that share of the weight.
+    #[must_use]
+    pub fn pooled(&self, other: &Self, share: f64) -> Self {
+        let own = self.times.iter();
+        let own = own.map(|(days, chance)| (*days, (1.0 - share) * chance));
+        let others = other.times.iter();
+        let others = others.map(|(days, chance)| (*days, share * chance));
+        Self::from_times(own.chain(others).collect())
+    }
+
     /// The same, each chance within a time raised to `power`.
     #[must_use]
     pub fn raised(&self, power: f64) -> Self {

@@ -4,8 +4,8 @@
 use super::forecast::UnderKnownLoad;
 use super::prepared::Prepared;
 use crate::effects::{self, ByClock};
-use crate::fit::{Observations, Rate};
-use crate::forecast::LawForecaster;
+use crate::fit::Observations;
+use crate::forecast::{LawForecaster, Outlook};
 use crate::monitor::history::History;
 use crate::monitor::motion::{fastest, is_new_highest, settled};
 use crate::reading::{Channel, Timestamp, after_days};
@@ -80,13 +80,13 @@ impl Adopted {
         &self.known_load
     }
 
-    /// What it predicts after the newest reading of `history`, of which `rates` are the velocities.
+    /// What it predicts after the newest reading of `history`, beside `plain`, which knows no load.
     pub(super) fn forecast(
         &mut self,
         history: &History,
         channels: &[&Channel],
         critical: f64,
-        rates: &[Rate],
+        plain: &Outlook,
         prepared: &mut Prepared,
     ) -> Option<UnderKnownLoad> {
         let by_clock = self.by_clock(history, channels)?;
@@ -105,11 +105,11 @@ impl Adopted {
             && (self.range.0 - width..=self.range.1 + width).contains(&load)
             && self.faster < IN_A_ROW
             && !is_new_highest(&outlook.rates)
-            && settled(rates).is_some_and(|velocity| {
+            && settled(&plain.rates).is_some_and(|velocity| {
                 velocity < TOO_FAST * critical && velocity <= BEYOND_FASTEST * self.fastest
             });
         Some(UnderKnownLoad {
-            outlook,
+            outlook: outlook.beside(plain),
             is_explained,
         })
     }

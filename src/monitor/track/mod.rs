@@ -340,7 +340,7 @@ impl Track {
         let plain = (self.panel).update_by(&history.observations, critical, by)?;
         let known_load = self.adopted.as_mut().and_then(|adopted| {
             let channels = context.covariates.list();
-            adopted.forecast(history, &channels, critical, &plain.rates, prepared)
+            adopted.forecast(history, &channels, critical, &plain, prepared)
         });
         Some(Forecast { plain, known_load })
     }

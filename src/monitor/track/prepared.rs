@@ -7,17 +7,21 @@ use crate::fit::{Ensemble, Observations};
 use crate::forecast::{self, Outlook};
 use crate::reading::Reading;
 
-type Result = Option<(Outlook, Option<Ensemble>)>;
+type ComputedOutlook = Option<(Outlook, Option<Ensemble>)>;
 
 /// What has been computed: of which readings, for which critical velocity, with what result. One under a constant load, and
 /// one by the clock of a known load where there is one.
 #[derive(Debug, Default)]
-pub(in crate::monitor) struct Prepared(Vec<(Observations, f64, Result)>);
+pub(in crate::monitor) struct Prepared(Vec<(Observations, f64, ComputedOutlook)>);
 
 impl Prepared {
     /// What `observations` give, computed now where it has not been.
-    pub(super) fn outlook(&mut self, observations: &Observations, critical: f64) -> Result {
-        let is_it = |(of, at, _): &(Observations, f64, Result)| {
+    pub(super) fn outlook(
+        &mut self,
+        observations: &Observations,
+        critical: f64,
+    ) -> ComputedOutlook {
+        let is_it = |(of, at, _): &(Observations, f64, ComputedOutlook)| {
             at.to_bits() == critical.to_bits() && of == observations
         };
         match self.0.iter().position(is_it) {
