@@ -164,7 +164,7 @@ fn drawn_lives(n: u64, from: u64, out: &mut String) -> Result<()> {
     each.sort_by_key(|one| one.0);
     out.push_str(
         "## Simulated slopes\n\nThe slider-block law under rain that drains or a lake that seeps in, .3 to .8 e-folds of velocity (standard deviation), \
-         read each\n6 hours or each day with noise of 0.2 to 2 mm. The monitor has the covariate, and is told nothing of it.\n\n\
+         read each\n6 hours or each day with noise of 0.2 to 2 mm. The monitor has the covariate, and nothing is declared.\n\n\
          | slopes | n | an effect adopted | quantile loss, plain | adopted | ratio (geometric mean) | better | Brier, plain | adopted | orange, plain | adopted | red, plain | adopted |\n\
          |---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );

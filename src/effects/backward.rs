@@ -84,7 +84,7 @@ impl Search<'_> {
 }
 
 /// `full` without the term of that index and its coefficients.
-fn start_without(problem: &Problem, full: &Fitted, index: usize) -> Start {
+pub(super) fn start_without(problem: &Problem, full: &Fitted, index: usize) -> Start {
     let mut start = Start::at(full);
     let earlier = full.terms[..index].iter().map(Term::coefficients);
     let first = law_parameters(problem) + earlier.sum::<usize>();

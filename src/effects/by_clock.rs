@@ -14,7 +14,7 @@ use crate::reading::{Channel, Quantity, Timestamp, instant_after_days};
 /// A load that is higher than this over the usual one does not stay, e-folds: it is a storm.
 const HIGHEST_TO_STAY: f64 = 4.0;
 /// While the clock all but stands, one displacement is enough for each such share of the mean spacing: of many at one of its
-/// times a forecast makes velocities that are all noise. Of 0, .5 and 1 (docs/adoption.md).
+/// times a forecast makes velocities that are all noise. Of 0 and .5 (docs/adoption.md).
 const LEAST_APART: f64 = 0.5;
 
 /// Readings by the clock of a known load.

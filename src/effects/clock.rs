@@ -18,7 +18,7 @@ pub(super) struct Clock {
 }
 
 impl Clock {
-    /// The pace leaves e^-7 to e^7 by a covariate's fault, not by any load. A storm on a slope that rests is measured to give e^6.
+    /// The pace leaves e^-7 to e^7 by a covariate's fault, not by any load. The storm on Century's prism 40-1938 is fitted as e^7 over the mean.
     const FARTHEST_LOAD: f64 = 7.0;
 
     /// `usual` is the log-load under which it keeps pace with the calendar.

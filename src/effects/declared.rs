@@ -1,19 +1,21 @@
 //! What people declare to be there, put into the law together, and each judged beside all others.
 
+use super::backward::start_without;
 use super::candidates::follows_season;
 use super::diagnosis::Judged;
 use super::explain::{TOO_FEW, explained_by};
 use super::explanation::{Candidate, DeclaredEffect, Effect, Explained, Explanation};
 use super::findings::{Findings, findings};
 use super::given::{Cause, put_in, shapes};
+use super::judge::coefficients;
 use super::kind::Kind;
 use super::options::Options;
+use super::problem::Problem;
 use super::ready::Ready;
 use super::refit::{Fitted, Start, refit};
-use super::refits::AT_RANDOM;
-use super::search::{Accepted, Refitted, SIGNIFICANT, Search, SearchResult};
+use super::search::{Accepted, Refitted, Search, SearchResult};
 use super::surrogate::{Innovations, Tried};
-use super::term::{Scratch, Term, law_parameters};
+use super::term::Scratch;
 use super::verdict::{Verdict, effect};
 use crate::reading::{Channel, Series};
 
@@ -240,7 +242,7 @@ impl Search<'_> {
     fn declared(&mut self, full: &Fitted, index: usize, cause: &Cause) -> Option<DeclaredTerm> {
         let problem = self.problem;
         let base = self.without_at_all(full, index)?;
-        let start = with_last(full, index, law_parameters(problem));
+        let start = with_last(problem, full, index);
         let fitted = refit(problem, &start, self.bank, &mut self.scratch)?;
         let term = fitted.terms.last()?.clone();
         let one = Refitted {
@@ -269,30 +271,24 @@ impl Search<'_> {
     /// With the chance that its kind, at the delays or times that it may have, gains as much where there is nothing.
     fn as_declared(&mut self, base: &Fitted, one: Refitted, cause: &Cause) -> Option<Refitted> {
         let (count, seed) = (self.options.surrogates, self.options.seed);
-        let mut ground = self.ground(base)?;
+        let ground = self.ground(base)?;
         let terms = shapes(&ground, cause);
         let of_noise = |kind| {
-            let tried = terms.iter().map(|term| {
-                let columns = ground.linear.columns(ground.problem, term);
-                Tried::new(&ground.frames, &columns, ground.cost(term))
-            });
-            let tried: Vec<Tried> = tried.collect();
+            let tried: Vec<Tried> = terms.iter().map(|term| ground.tried(term)).collect();
             let null_gains = ground.null_gains_of_noise((&tried, kind), count, seed + 1);
             null_gains.p_value(one.gain)
         };
         let p_value = if one.term.kind == Kind::Offset {
             of_noise(Innovations::WithoutJumps)
         } else if let Some(channel) = one.term.channel {
-            let from_noise = of_noise(Innovations::AsTheyAre);
             let place = ground.drivers.iter().position(|own| own.0 == channel)?;
-            ground.drivers = &ground.drivers[place..=place];
-            let null_gains = ground.null_gains_of_covariates(count, seed);
+            let own = &ground.drivers[place..=place];
+            let null_gains = ground.null_gains_of(own, count, seed);
             // The null gains have paid for nothing.
             let paid = one.gain + ground.cost(&one.term);
             let shifted = self.amplified(base, null_gains).p_value(paid);
-            // What follows the year is the same again where it is shifted by years.
-            if one.follows_season && (SIGNIFICANT..AT_RANDOM).contains(&shifted) {
-                from_noise
+            if one.is_its_own_shift(shifted) {
+                of_noise(Innovations::AsTheyAre)
             } else {
                 shifted
             }
@@ -303,18 +299,12 @@ impl Search<'_> {
     }
 }
 
-/// `full` with the term of that index at the end; the law has so many parameters of its own.
-fn with_last(full: &Fitted, index: usize, of_law: usize) -> Start {
-    let mut start = Start::at(full);
-    let earlier = full.terms[..index].iter().map(Term::coefficients);
-    let first = of_law + earlier.sum::<usize>();
-    let own = start
-        .parameters
-        .drain(first..first + full.terms[index].coefficients());
-    let own: Vec<f64> = own.collect();
-    start.parameters.extend(own);
-    let term = start.terms.remove(index);
-    start.terms.push(term);
+/// `full` with the term of that index at the end.
+fn with_last(problem: &Problem, full: &Fitted, index: usize) -> Start {
+    let mut start = start_without(problem, full, index);
+    let own = coefficients(problem, full, index);
+    start.parameters.extend_from_slice(own);
+    start.terms.push(full.terms[index].clone());
     start
 }
 

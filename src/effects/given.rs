@@ -1,8 +1,6 @@
 //! The law with causes that are known beforehand: what its error would be, and nothing judged.
 
-use super::candidates::{
-    delays, event_times, events, feedbacks, of_channel, offset, responses, seasonal, thermal, tides,
-};
+use super::candidates::{event_times, events, feedbacks, offset, seasonal, tides};
 use super::channels::distinct;
 use super::explanation::{Change, ErrorChange};
 use super::faults::{Inspected, inspect};
@@ -181,19 +179,12 @@ fn of_cause(ground: &Ground, cause: &Cause) -> Vec<Term> {
     else {
         return Vec::new();
     };
-    let (problem, driver) = (ground.problem, (*index, driver));
-    let delays = delays(problem, driver.1);
+    let own = (*index, driver);
     if cause.kind == Kind::Thermal {
-        let each = delays.iter();
-        return each
-            .filter_map(|days| thermal(problem, driver, 1, *days))
-            .collect();
+        return ground.in_reading(own);
     }
-    [Form::Level, Form::Rate]
-        .into_iter()
-        .flat_map(|form| responses(form, &delays))
-        .filter_map(|response| of_channel(problem, driver, response))
-        .collect()
+    let forms = [Form::Level, Form::Rate].into_iter();
+    forms.flat_map(|form| ground.in_load(own, form)).collect()
 }
 
 /// The readings before which it may have happened: those that the search would try, or, where the time is known, all

@@ -20,7 +20,7 @@ const MOST_OTHERS: usize = 6;
 /// Parameters of the friction: b, a and p.
 const MOST_FRICTION: usize = 3;
 /// A covariate that follows the year may fit as well shifted by whole years, but no better than this at any shift.
-pub(super) const AT_RANDOM: f64 = 0.3;
+const AT_RANDOM: f64 = 0.3;
 
 /// Fits by least squares that are followed by one under the likeliest noise.
 const LEVELS: usize = 2;
@@ -87,16 +87,14 @@ impl<'a> Search<'a> {
             .iter()
             .any(|one| one.gain > self.options.bic_margin)
         {
-            let null_gains = self.amplified(base, ground.null_gains_of_covariates(count, seed));
+            let null_gains =
+                self.amplified(base, ground.null_gains_of(ground.drivers, count, seed));
             // The null gains have paid for nothing.
             let paid = |one: &Refitted| one.gain + ground.cost(&one.term);
             all.extend(covariates.into_iter().map(|one| {
                 let (gain, net) = (paid(&one), one.gain);
-                let follows = one.follows_season;
                 let one = one.judged_by(&null_gains, gain);
-                // Shifted by years, what follows the year is the same again: shifts cannot give its time, and that noise
-                // does not do as much has to be enough. The season stays a rival.
-                if follows && one.p_value >= SIGNIFICANT && one.p_value < AT_RANDOM {
+                if one.is_its_own_shift(one.p_value) {
                     return one.judged_by(&alone, net);
                 }
                 one
@@ -377,6 +375,14 @@ impl<'a> Search<'a> {
                 ..term.clone()
             }
         })
+    }
+}
+
+impl Refitted {
+    /// Shifted by years, what follows the year is the same again: shifts, which give it this p-value, cannot give its time, and that
+    /// noise does not do as much has to be enough. The season stays a rival.
+    pub(super) fn is_its_own_shift(&self, shifted: f64) -> bool {
+        self.follows_season && (SIGNIFICANT..AT_RANDOM).contains(&shifted)
     }
 }
 

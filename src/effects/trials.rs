@@ -66,6 +66,26 @@ impl Ground<'_> {
         term.parameters() * (self.problem.used as f64).ln()
     }
 
+    /// What a term adds to the directions, for null gains.
+    pub(super) fn tried(&self, term: &Term) -> Tried {
+        let columns = self.linear.columns(self.problem, term);
+        Tried::new(&self.frames, &columns, self.cost(term))
+    }
+
+    /// A covariate's responses in the load, by its level or by its rate.
+    pub(super) fn in_load(&self, (index, driver): (usize, &Driver), form: Form) -> Vec<Term> {
+        let responses = responses(form, &delays(self.problem, driver)).into_iter();
+        let each = responses.filter_map(|one| of_channel(self.problem, (index, driver), one));
+        each.collect()
+    }
+
+    /// A temperature's responses in the reading.
+    pub(super) fn in_reading(&self, (index, driver): (usize, &Driver)) -> Vec<Term> {
+        let delays = delays(self.problem, driver).into_iter();
+        let each = delays.filter_map(|days| thermal(self.problem, (index, driver), 1, days));
+        each.collect()
+    }
+
     pub(super) fn trial(&self, term: Term) -> Trial {
         let columns = self.linear.columns(self.problem, &term);
         let gain = self.frames.surprise() - self.frames.surprise_with(&columns) - self.cost(&term);
@@ -80,24 +100,18 @@ impl Ground<'_> {
                 let own = |term: &Term| term.kind == kind && term.channel == Some(driver.0);
                 self.present.iter().any(own)
             };
-            let delays = delays(self.problem, &driver.1);
+            let own = (driver.0, &driver.1);
             for form in [Form::Level, Form::Rate] {
                 if present(Kind::Hydrological) {
                     continue;
                 }
-                let each = responses(form, &delays)
-                    .into_iter()
-                    .filter_map(|response| {
-                        of_channel(self.problem, (driver.0, &driver.1), response)
-                    })
-                    .map(|term| self.trial(term));
+                let each = self.in_load(own, form).into_iter();
+                let each = each.map(|term| self.trial(term));
                 trials.extend(each.max_by(|a, b| a.gain.total_cmp(&b.gain)));
             }
             if *temperature && !present(Kind::Thermal) {
-                let each = delays
-                    .iter()
-                    .filter_map(|days| thermal(self.problem, (driver.0, &driver.1), 1, *days))
-                    .map(|term| self.trial(term));
+                let each = self.in_reading(own).into_iter();
+                let each = each.map(|term| self.trial(term));
                 trials.extend(each.max_by(|a, b| a.gain.total_cmp(&b.gain)));
             }
         }
@@ -120,8 +134,7 @@ impl Ground<'_> {
         terms.extend(jumps.into_iter().map(|at| offset(self.problem, at)));
         let (mut trials, mut tried) = (Vec::new(), Vec::new());
         for term in terms {
-            let columns = self.linear.columns(self.problem, &term);
-            let one = Tried::new(&self.frames, &columns, self.cost(&term));
+            let one = self.tried(&term);
             let left = self.frames.each.iter();
             let left: Vec<(Vec<f64>, f64)> = left.map(|f| (f.residual.clone(), f.misfit)).collect();
             let gain = self.frames.surprise() - one.surprise(&self.frames, &left);
@@ -131,10 +144,15 @@ impl Ground<'_> {
         (trials, tried)
     }
 
-    /// What the search over covariates gains where there is nothing.
-    pub(super) fn null_gains_of_covariates(&self, count: usize, seed: u64) -> NullGains {
+    /// What the search over these covariates gains where there is nothing.
+    pub(super) fn null_gains_of(
+        &self,
+        drivers: &[(usize, Driver)],
+        count: usize,
+        seed: u64,
+    ) -> NullGains {
         let both = (&self.linear, &self.frames);
-        shifted_covariates(self.problem, self.drivers, both, (count, seed))
+        shifted_covariates(self.problem, drivers, both, (count, seed))
     }
 
     /// What the search without covariates gains where there is nothing.

@@ -76,11 +76,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     let series = args.readings.series(&recording)?;
     given::check(&args.given, series, &recording.channels)?;
-    let mut explanation = if args.given.is_empty() {
-        search(series, &recording, &options(args))
-    } else {
-        judged(series, &recording, args)
-    };
+    let mut explanation = look(series, &recording, &args.given, &options(args));
     if let Some(remark) = remark_on_origin(&recording) {
         explanation.remarks.insert(0, remark);
     }
@@ -131,14 +127,15 @@ pub(super) fn quick(series: &Series, recording: &Recording, policy: &Policy) -> 
         critical_velocity_mm_per_day: policy.critical_velocity_mm_per_day,
         ..Options::default()
     };
-    let mut explanation = search(series, recording, &options);
+    let mut explanation = look(series, recording, &[], &options);
     if let Some(remark) = remark_on_origin(recording) {
         explanation.remarks.insert(0, remark);
     }
     explanation
 }
 
-fn search(series: &Series, recording: &Recording, options: &Options) -> Explanation {
+/// Searches for what the law lacks, or, where effects are declared, judges these.
+fn look(series: &Series, recording: &Recording, given: &[Cause], options: &Options) -> Explanation {
     let others = recording.series.iter();
     let neighbours: Vec<&Series> = others
         .filter(|other| other.benchmark != series.benchmark)
@@ -146,18 +143,11 @@ fn search(series: &Series, recording: &Recording, options: &Options) -> Explanat
     let bar = bar::shared();
     let mut progress = |share: f64| bar::share(&bar, share);
     let channels = &recording.channels;
-    let explanation = effects::explain(series, channels, &neighbours, options, &mut progress);
-    bar.finish_and_clear();
-    explanation
-}
-
-/// The effects that are declared, judged.
-fn judged(series: &Series, recording: &Recording, args: &Args) -> Explanation {
-    let bar = bar::shared();
-    let mut progress = |share: f64| bar::share(&bar, share);
-    let (channels, causes) = (&recording.channels, &args.given);
-    let explanation =
-        effects::explain_given(series, channels, causes, &options(args), &mut progress);
+    let explanation = if given.is_empty() {
+        effects::explain(series, channels, &neighbours, options, &mut progress)
+    } else {
+        effects::explain_given(series, channels, given, options, &mut progress)
+    };
     bar.finish_and_clear();
     explanation
 }

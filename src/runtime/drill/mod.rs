@@ -41,14 +41,15 @@ pub(super) fn start(
 ) -> JoinSet<()> {
     let mut tasks = JoinSet::new();
     // Here and not in the task: what is shown of drills stands before the past has been read.
-    let mut record =
-        DrillRecord::read(&config.site.state_dir).unwrap_or_else(|| DrillRecord::new(clock::now()));
-    if let Some(drill) = &config.drill {
-        record.overdue_after = overdue_after(drill, &record);
-    }
-    let shown = config.drill.is_some().then(|| record.clone());
+    let held = config.drill.clone().map(|drill| {
+        let mut record = DrillRecord::read(&config.site.state_dir)
+            .unwrap_or_else(|| DrillRecord::new(clock::now()));
+        record.overdue_after = overdue_after(&drill, &record);
+        (drill, record)
+    });
+    let shown = held.as_ref().map(|(_, record)| record.clone());
     vitals.update(|health| health.drill = shown);
-    if let Some(drill) = config.drill.clone() {
+    if let Some((drill, record)) = held {
         let office = DrillContext {
             config: config.clone(),
             store: Arc::clone(store),
