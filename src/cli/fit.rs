@@ -169,11 +169,15 @@ fn summary(report: &FitReport) -> TextTable {
     let failure = &report.failure_time;
     let line = &report.inverse_velocity;
     let mut table = TextTable::plain();
-    table.row(["regime".to_owned(), shown(&report.regime)]);
-    if let Some(regime) = &report.regime_under_load {
-        table.row(["  if the load changes".to_owned(), shown(regime)]);
+    // First what the monitor goes by.
+    match &report.regime_under_load {
+        Some(regime) => {
+            table.row(["regime".to_owned(), shown(regime)]);
+            table.row(["  under constant load".to_owned(), shown(&report.regime)]);
+        }
+        None => table.row(["regime".to_owned(), shown(&report.regime)]),
     }
-    table.row(["  other priors".to_owned(), other_priors(report)]);
+    table.row(["    other priors".to_owned(), other_priors(report)]);
     table.row([
         "onset".to_owned(),
         format!(
@@ -231,8 +235,8 @@ fn notes(report: &FitReport) -> String {
         && (constant - load).abs() > DISAGREE
     {
         out.push_str(
-            "The two regimes differ: the first takes the load for constant over the whole record, the second does not.\n\
-             One of them may be wrong; the monitor goes by the second.\n",
+            "The two regimes differ. The first lets the load change, and is what the monitor goes by; go by it too. The\n\
+             second, the parameters and the minima take the load for constant over the whole record.\n",
         );
     }
     out

@@ -31,7 +31,7 @@ pub(super) fn drill(
     let is_there = root.has("drill");
     let mut section = root.table("drill", "drill");
     if !is_there {
-        if hooks.iter().any(|hook| hook.drills) {
+        if hooks.iter().any(|hook| hook.extra.drills) {
             root.warning(
                 root.at(),
                 "a hook has drills = true, and there is no [drill]".to_owned(),
@@ -61,7 +61,7 @@ pub(super) fn drill(
             "write a shorter one: the next drill would begin before this one ends",
         );
     }
-    if !hooks.iter().any(|hook| hook.drills) {
+    if !hooks.iter().any(|hook| hook.extra.drills) {
         section.error(
             section.at(),
             "no hook has drills = true: a drill would reach nobody".to_owned(),

@@ -2,7 +2,9 @@
 
 use super::duty::{DutyHours, Shift};
 use super::table::Section;
-use super::{CapFolder, HookConfig, Webhook, WebhookFormat, address, mqtt_out, value};
+use super::{
+    CapFolder, ExtraMessages, HookConfig, Webhook, WebhookFormat, address, mqtt_out, value,
+};
 use crate::alert::Level;
 use crate::reading::BenchmarkId;
 use std::collections::BTreeSet;
@@ -92,7 +94,7 @@ struct Common {
     timeout: Duration,
     escalate_after: Option<Duration>,
     hours: Option<DutyHours>,
-    drills: bool,
+    extra: ExtraMessages,
 }
 
 impl Common {
@@ -109,7 +111,7 @@ impl Common {
             timeout: self.timeout,
             escalate_after: self.escalate_after,
             hours: self.hours,
-            drills: self.drills,
+            extra: self.extra,
             links: None,
             folder: base.to_owned(),
             sandbox: false,
@@ -143,7 +145,10 @@ fn common(section: &mut Section<'_>) -> Common {
             .collect(),
         site: section.switch("site").unwrap_or(false),
         hours: hours(section),
-        drills: section.switch("drills").unwrap_or(false),
+        extra: ExtraMessages {
+            drills: section.switch("drills").unwrap_or(false),
+            corrections: section.switch("corrections").unwrap_or(false),
+        },
         timeout: timeout.map_or(TIMEOUT, |given| given.value.unsigned_abs()),
         escalate_after: escalate_after.map(|given| given.value.unsigned_abs()),
     }
@@ -222,6 +227,13 @@ fn webhook(
     };
     let ca_file = address::ca_file(&mut section, address.as_ref());
     let common = common(&mut section);
+    if common.extra.corrections && format == WebhookFormat::Alertmanager {
+        section.error(
+            section.at(),
+            "webhook.corrections with format = \"alertmanager\": it has no message that corrects an alert".to_owned(),
+            "leave corrections out, or add a [[webhook]] without format for them",
+        );
+    }
     if let Some(one) = name.as_ref().or(url.as_ref())
         && !taken.insert(one.value.clone())
     {

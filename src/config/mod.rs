@@ -214,6 +214,15 @@ pub struct CapFolder {
     pub polygon: Option<String>,
 }
 
+/// What reaches a hook only where it asks for it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct ExtraMessages {
+    /// Drills.
+    pub drills: bool,
+    /// Corrections: what late or corrected readings would have called in the past.
+    pub corrections: bool,
+}
+
 /// `[[hook]]`: a program to run when a level is entered or left; or `[[webhook]]`, `[[cap]]` or `[[mqtt_out]]`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct HookConfig {
@@ -235,8 +244,8 @@ pub struct HookConfig {
     pub escalate_after: Option<Duration>,
     /// When the people behind it are on duty; alerts wait for that. `None`: always.
     pub hours: Option<DutyHours>,
-    /// Whether drills reach it.
-    pub drills: bool,
+    /// What it gets beside alerts.
+    pub extra: ExtraMessages,
     /// By which links its alerts are acknowledged; `None`: by none.
     pub links: Option<Links>,
     /// After this it is killed.

@@ -172,6 +172,9 @@ pub enum EventKind {
         level_then: Level,
         /// The highest level that would have been called.
         level_now: Level,
+        /// The keys of the benchmark's alerts that were in force from then on, the oldest first; none where no level was.
+        #[serde(skip_serializing_if = "Vec::is_empty", default)]
+        alerts: Vec<String>,
         /// One line for a person.
         text: String,
     },

@@ -62,7 +62,11 @@ pub enum MergeError {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SelectError {
     /// There is no series at all.
-    #[error("there are no benchmark readings, only channels: {}", listed(channels))]
+    #[error(
+        "there are no benchmark readings, only channels: {}; expected a column named as displacement_mm or \
+         5_velocity_mm_per_day are, or --column NAME=ID:displacement:mm",
+        listed(channels)
+    )]
     Nothing {
         /// The names of the channels that there are.
         channels: Vec<String>,

@@ -1,7 +1,7 @@
 //! One alert as Prometheus Alertmanager takes it at `POST /api/v2/alerts`.
 
-use super::hook::Alert;
-use crate::monitor::{AlertState, EventKind};
+use super::hook::{Alert, MessageState};
+use crate::monitor::EventKind;
 use crate::reading::Timestamp;
 use jiff::SignedDuration;
 use serde_json::json;
@@ -23,8 +23,10 @@ pub(super) fn body(alert: &Alert, link: Option<&str>) -> Result<Vec<u8>, serde_j
     }
     let time = alert.event.time;
     let (starts_at, ends_at) = match alert.state {
-        AlertState::Firing => (time, time.checked_add(STANDS_FOR).ok()),
-        AlertState::Resolved => (since(alert).unwrap_or(time), Some(time)),
+        MessageState::Firing => (time, time.checked_add(STANDS_FOR).ok()),
+        MessageState::Resolved | MessageState::Correction => {
+            (since(alert).unwrap_or(time), Some(time))
+        }
     };
     let benchmark = alert.event.benchmark.as_ref();
     let benchmark = benchmark.map_or_else(String::new, ToString::to_string);

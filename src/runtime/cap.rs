@@ -1,14 +1,15 @@
 //! Writes one alert as a message of the Common Alerting Protocol 1.2 (OASIS): a file each, in a folder.
 //!
 //! Of each place the messages make a chain: an Alert, an Update for each change of level that follows on it, a Cancel at the end;
-//! each names all that came before it. The chain stands beside the messages and is written first, so that a second
+//! each names all that came before it. A correction is an Update that leaves the level as it is; where none is in force there is
+//! nothing to update. The chain stands beside the messages and is written first, so that a second
 //! attempt writes the same file again.
 
 use super::clock;
-use super::hook::{Alert, HookOutcome, state_name};
+use super::hook::{Alert, HookOutcome, MessageState, state_name};
 use crate::alert::Level;
 use crate::config::CapFolder;
-use crate::monitor::{AlertState, EventKind};
+use crate::monitor::EventKind;
 use crate::reading::Timestamp;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -28,6 +29,9 @@ struct CapMessage {
     identifier: String,
     sent: Timestamp,
     is_cancel: bool,
+    /// The level in force; none in chains of an earlier version.
+    #[serde(default)]
+    level: Option<Level>,
 }
 
 /// What a message is to those before it.
@@ -62,7 +66,7 @@ fn written(cap: &CapFolder, alert: &Alert, now: Timestamp) -> io::Result<()> {
             alert.status.name()
         ))
     );
-    let is_cancel = alert.state == AlertState::Resolved;
+    let is_cancel = alert.state == MessageState::Resolved;
     let known = chain.iter().position(|one| one.identifier == identifier);
     let at = if let Some(at) = known {
         at
@@ -71,17 +75,22 @@ fn written(cap: &CapFolder, alert: &Alert, now: Timestamp) -> io::Result<()> {
         if chain.last().is_some_and(|last| last.is_cancel) {
             chain.clear();
         }
-        if is_cancel && chain.is_empty() {
+        if chain.is_empty() && alert.state != MessageState::Firing {
             tracing::info!(
                 key = alert.key,
-                "the end of what no CAP message has reported"
+                "the end, or the correction, of what no CAP message has reported"
             );
             return Ok(());
         }
+        let level = match alert.state {
+            MessageState::Firing | MessageState::Resolved => Some(alert.level),
+            MessageState::Correction => chain.last().and_then(|last| last.level),
+        };
         chain.push(CapMessage {
             identifier,
             sent: now,
             is_cancel,
+            level,
         });
         let excess = chain.len().saturating_sub(LONGEST_CHAIN);
         chain.drain(..excess);
@@ -142,9 +151,9 @@ fn replace(file: &Path, bytes: &[u8]) -> io::Result<()> {
 
 fn xml(cap: &CapFolder, alert: &Alert, message: &CapMessage, before: &[CapMessage]) -> String {
     let kind = match (alert.state, before.is_empty()) {
-        (AlertState::Resolved, _) => MessageType::Cancel,
-        (AlertState::Firing, true) => MessageType::Alert,
-        (AlertState::Firing, false) => MessageType::Update,
+        (MessageState::Resolved, _) => MessageType::Cancel,
+        (MessageState::Firing, true) => MessageType::Alert,
+        (MessageState::Firing, false) | (MessageState::Correction, _) => MessageType::Update,
     };
     let mut out = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
                    <alert xmlns=\"urn:oasis:names:tc:emergency:cap:1.2\">\n"
@@ -176,17 +185,28 @@ fn xml(cap: &CapFolder, alert: &Alert, message: &CapMessage, before: &[CapMessag
         let references = each.collect::<Vec<_>>().join(" ");
         element(&mut out, 1, ("references", &references));
     }
-    info(&mut out, cap, alert, kind);
+    let level = message.level.unwrap_or(alert.level);
+    info(&mut out, cap, (alert, level), kind);
     out += "</alert>\n";
     out
 }
 
-fn info(out: &mut String, cap: &CapFolder, alert: &Alert, kind: MessageType) {
-    let EventKind::Alert { rule, text, .. } = &alert.event.kind else {
-        return;
-    };
+/// The rule of an alert, the text, and the keys of the alerts that a correction is about.
+fn content(alert: &Alert) -> (&str, &str, Option<String>) {
+    if let EventKind::Alert { rule, text, .. } = &alert.event.kind {
+        (rule, text, None)
+    } else if let EventKind::Correction { alerts, text, .. } = &alert.event.kind {
+        (state_name(alert.state), text, Some(alerts.join(" ")))
+    } else {
+        (state_name(alert.state), "", None)
+    }
+}
+
+/// `level`: what is in force, or has ended.
+fn info(out: &mut String, cap: &CapFolder, (alert, level): (&Alert, Level), kind: MessageType) {
+    let (rule, text, corrects) = content(alert);
     let is_over = kind == MessageType::Cancel;
-    let (response, urgency, severity) = match alert.level {
+    let (response, urgency, severity) = match level {
         Level::Red => ("Evacuate", "Immediate", "Extreme"),
         Level::Orange => ("Prepare", "Future", "Severe"),
         Level::Yellow => ("Monitor", "Future", "Moderate"),
@@ -197,8 +217,12 @@ fn info(out: &mut String, cap: &CapFolder, alert: &Alert, kind: MessageType) {
         || "the whole site".to_owned(),
         |benchmark| format!("benchmark {benchmark}"),
     );
-    let ends = if is_over { " ends" } else { "" };
-    let headline = format!("{}, {place}: {}{ends}", alert.site, alert.level);
+    let what = match alert.state {
+        MessageState::Firing => "",
+        MessageState::Resolved => " ends",
+        MessageState::Correction => " is in force; what was called before is corrected",
+    };
+    let headline = format!("{}, {place}: {level}{what}", alert.site);
     *out += "  <info>\n";
     element(out, 2, ("language", "en"));
     element(out, 2, ("category", "Geo"));
@@ -210,7 +234,7 @@ fn info(out: &mut String, cap: &CapFolder, alert: &Alert, kind: MessageType) {
     );
     element(out, 2, ("urgency", urgency));
     element(out, 2, ("severity", severity));
-    element(out, 2, ("certainty", certainty(alert.level, rule)));
+    element(out, 2, ("certainty", certainty(level, rule)));
     element(
         out,
         2,
@@ -221,15 +245,30 @@ fn info(out: &mut String, cap: &CapFolder, alert: &Alert, kind: MessageType) {
     let instruction = if is_over {
         "The level has ended. People look at the slope before anybody goes back."
     } else {
-        alert.level.recommended()
+        level.recommended()
     };
     element(out, 2, ("instruction", instruction));
+    parameters(out, (alert, level), (rule, corrects));
+    *out += "    <area>\n";
+    element(out, 3, ("areaDesc", &cap.area));
+    if let Some(polygon) = &cap.polygon {
+        element(out, 3, ("polygon", polygon));
+    }
+    *out += "    </area>\n  </info>\n";
+}
+
+fn parameters(
+    out: &mut String,
+    (alert, level): (&Alert, Level),
+    (rule, corrects): (&str, Option<String>),
+) {
     let median = alert.failure_time.map(|time| time.to_string());
     let parameters = [
-        ("level", Some(alert.level.name().to_owned())),
+        ("level", Some(level.name().to_owned())),
         ("state", Some(state_name(alert.state).to_owned())),
-        ("rule", Some(rule.clone())),
+        ("rule", Some(rule.to_owned())),
         ("key", Some(alert.key.clone())),
+        ("corrects", corrects),
         ("called-at", Some(alert.event.time.to_string())),
         ("failure-time-median", median),
     ];
@@ -240,12 +279,6 @@ fn info(out: &mut String, cap: &CapFolder, alert: &Alert, kind: MessageType) {
         element(out, 3, ("value", &value));
         *out += "    </parameter>\n";
     }
-    *out += "    <area>\n";
-    element(out, 3, ("areaDesc", &cap.area));
-    if let Some(polygon) = &cap.polygon {
-        element(out, 3, ("polygon", polygon));
-    }
-    *out += "    </area>\n  </info>\n";
 }
 
 /// CAP's words: observed; likely, over one half; possible, less.

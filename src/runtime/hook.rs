@@ -33,6 +33,8 @@ const KILL_GRACE: Duration = Duration::from_secs(5);
 
 /// The rule of an alert that reports many benchmarks at once.
 pub(super) const FLOOD: &str = "flood";
+/// The state of a message that corrects what was called, and what stands in its key for a level.
+const CORRECTION: &str = "correction";
 
 /// Whether a message means what it says; CAP 1.2's words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema, Serialize, Deserialize)]
@@ -56,16 +58,37 @@ impl Status {
     }
 }
 
-/// An alert on its way to people.
+/// What a message says of a level.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum MessageState {
+    /// It is in force.
+    Firing,
+    /// It has ended.
+    Resolved,
+    /// With readings that came late, or were corrected, it would have been called in the past; what is in force stays so.
+    Correction,
+}
+
+impl From<AlertState> for MessageState {
+    fn from(state: AlertState) -> Self {
+        match state {
+            AlertState::Firing => Self::Firing,
+            AlertState::Resolved => Self::Resolved,
+        }
+    }
+}
+
+/// An alert, or the correction of one, on its way to people.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Alert {
     /// The monitor's event.
     pub event: Event,
-    /// Which level.
+    /// Which level; of a correction the one that would have been called.
     pub level: Level,
-    /// Firing or resolved.
-    pub state: AlertState,
-    /// The event's idempotency key.
+    /// What the message says of it.
+    pub state: MessageState,
+    /// The event's idempotency key; a correction has one of its own.
     pub key: String,
     /// The site's name.
     pub site: String,
@@ -80,6 +103,8 @@ pub struct Alert {
 pub struct HookBody<'a> {
     #[serde(flatten)]
     event: &'a Event,
+    #[serde(flatten)]
+    correction: Option<CorrectionIdentity<'a>>,
     /// The site's name.
     site: &'a str,
     /// The benchmark's forecast of failure when the alert was called, its median.
@@ -96,24 +121,41 @@ pub struct HookBody<'a> {
     schema_version: u32,
 }
 
+/// What a correction's message has beside its event, so that it can be known as an alert is.
+#[derive(Debug, JsonSchema, Serialize)]
+struct CorrectionIdentity<'a> {
+    /// The level that would have been called.
+    level: Level,
+    /// `correction`.
+    state: MessageState,
+    /// The same at each attempt, and no alert's.
+    key: &'a str,
+}
+
 impl Alert {
-    /// The alert in `event`; `None` where it is an event of another kind.
+    /// The alert or the correction in `event`; `None` where it is an event of another kind.
     pub fn new(
         event: &Event,
         site: &str,
         failure_time: Option<Timestamp>,
         status: Status,
     ) -> Option<Self> {
-        let EventKind::Alert {
+        let (level, state, key) = if let EventKind::Alert {
             level, state, key, ..
         } = &event.kind
-        else {
+        {
+            (*level, (*state).into(), key.clone())
+        } else if let EventKind::Correction { level_now, .. } = &event.kind {
+            let benchmark = event.benchmark.as_ref()?;
+            let key = format!("{benchmark}/{CORRECTION}/{}", event.time);
+            (*level_now, MessageState::Correction, key)
+        } else {
             return None;
         };
         Some(Self {
-            level: *level,
-            state: *state,
-            key: key.clone(),
+            level,
+            state,
+            key,
             event: event.clone(),
             site: site.to_owned(),
             failure_time,
@@ -124,14 +166,23 @@ impl Alert {
     /// Whether it is tried until a hook has taken it: people's safety depends on it.
     pub fn must_arrive(&self) -> bool {
         match self.level {
-            Level::Orange | Level::Red | Level::Unknown => self.state == AlertState::Firing,
+            Level::Orange | Level::Red | Level::Unknown => match self.state {
+                MessageState::Firing | MessageState::Correction => true,
+                MessageState::Resolved => false,
+            },
             Level::Green | Level::Yellow => false,
         }
     }
 
     /// Whether it reports many benchmarks at once, each of which it stands for.
     pub fn is_flood(&self) -> bool {
-        matches!(&self.event.kind, EventKind::Alert { rule, .. } if rule == FLOOD)
+        let is_of_many = self.event.benchmark.is_none() && self.is_correction();
+        is_of_many || matches!(&self.event.kind, EventKind::Alert { rule, .. } if rule == FLOOD)
+    }
+
+    /// Whether it corrects what was called, and calls nothing itself.
+    pub fn is_correction(&self) -> bool {
+        self.state == MessageState::Correction
     }
 
     /// Whether it says that the host's clock is wrong, or right again.
@@ -143,7 +194,7 @@ impl Alert {
         let benchmark = self.event.benchmark.as_ref();
         let optional_time = self.failure_time.map(|time| time.to_string());
         [
-            ("SLIPWATCH_EVENT", "alert".to_owned()),
+            ("SLIPWATCH_EVENT", self.event.kind.name().to_owned()),
             ("SLIPWATCH_KEY", self.key.clone()),
             ("SLIPWATCH_SITE", self.site.clone()),
             (
@@ -169,12 +220,18 @@ impl Alert {
         attempt: u32,
         link: Option<&str>,
     ) -> Result<Vec<u8>, serde_json::Error> {
+        let correction = self.is_correction().then_some(CorrectionIdentity {
+            level: self.level,
+            state: self.state,
+            key: &self.key,
+        });
         let mut body = serde_json::to_vec(&HookBody {
             event: &self.event,
+            correction,
             site: &self.site,
             failure_time: self.failure_time,
             status: self.status,
-            recommended: (self.state == AlertState::Firing).then(|| self.level.recommended()),
+            recommended: (self.state == MessageState::Firing).then(|| self.level.recommended()),
             acknowledge_url: link,
             attempt,
             schema_version: 1,
@@ -185,10 +242,11 @@ impl Alert {
 }
 
 /// The word in `SLIPWATCH_STATE`.
-pub(crate) fn state_name(state: AlertState) -> &'static str {
+pub(crate) fn state_name(state: MessageState) -> &'static str {
     match state {
-        AlertState::Firing => "firing",
-        AlertState::Resolved => "resolved",
+        MessageState::Firing => "firing",
+        MessageState::Resolved => "resolved",
+        MessageState::Correction => CORRECTION,
     }
 }
 

@@ -1,8 +1,7 @@
 //! What a hook's worker has in hand: neither taken by the hook nor given up.
 
-use super::hook::{Alert, state_name};
+use super::hook::{Alert, MessageState, state_name};
 use crate::alert::Level;
-use crate::monitor::AlertState;
 use crate::reading::BenchmarkId;
 use std::collections::BTreeMap;
 
@@ -12,7 +11,7 @@ type AlertIdentity = (String, Level, &'static str);
 #[derive(Debug)]
 struct Entry {
     benchmark: Option<BenchmarkId>,
-    state: AlertState,
+    state: MessageState,
     /// The alert itself where it reports many benchmarks at once: no other one reports what it reports.
     of_many: Option<Box<Alert>>,
     /// A hook's run for it has begun.
@@ -65,14 +64,16 @@ impl InHand {
 
     /// Whether `alert` is the end of an `unknown` that has not been reported: neither of them is then.
     pub(super) fn cancels(&mut self, alert: &Alert) -> bool {
-        if alert.level != Level::Unknown || alert.state != AlertState::Resolved || alert.is_flood()
+        if alert.level != Level::Unknown
+            || alert.state != MessageState::Resolved
+            || alert.is_flood()
         {
             return false;
         }
         let firing = (
             alert.key.clone(),
             alert.level,
-            state_name(AlertState::Firing),
+            state_name(MessageState::Firing),
         );
         match self.0.get_mut(&firing) {
             Some(entry) if !entry.is_tried => {
@@ -99,21 +100,22 @@ impl InHand {
     }
 
     /// `alert` has come: what it supersedes or resolves at its benchmark is over. A level ends
-    /// itself and the lower ones; `unknown` stands for itself.
+    /// itself and the lower ones; `unknown` stands for itself, and so does a correction, which is of the past.
     pub(super) fn supersede(&mut self, alert: &Alert) {
         let own = token(alert);
-        if alert.is_flood() {
+        if alert.is_flood() || alert.is_correction() {
             return;
         }
         for (token, entry) in self
             .0
             .iter_mut()
-            .filter(|(_, entry)| entry.of_many.is_none())
+            .filter(|(_, entry)| entry.of_many.is_none() && entry.state != MessageState::Correction)
         {
             let same_place = entry.benchmark == alert.event.benchmark
                 && (token.1 == Level::Unknown) == (alert.level == Level::Unknown);
             // An end does not make an earlier end untrue; a new beginning does.
-            let is_touched = alert.state == AlertState::Firing || entry.state == AlertState::Firing;
+            let is_touched =
+                alert.state == MessageState::Firing || entry.state == MessageState::Firing;
             if same_place && is_touched && token.1 <= alert.level && *token != own {
                 entry.is_over = true;
             }

@@ -4,9 +4,8 @@
 //! makes and keeps in its state folder. That it is used once only the state says (`Store::use_link`).
 
 use super::clock;
-use super::hook::{Alert, Status};
+use super::hook::{Alert, MessageState, Status};
 use crate::config::{HookConfig, Links};
-use crate::monitor::AlertState;
 use crate::reading::Timestamp;
 use base64::Engine;
 use base64::engine::general_purpose::{STANDARD, URL_SAFE_NO_PAD};
@@ -50,7 +49,7 @@ pub(super) struct SignedLink {
 /// many benchmarks at once. A link that cannot be made is logged: the message goes out without it.
 pub(super) async fn of(hook: &HookConfig, alert: &Alert) -> Option<String> {
     let links = hook.links.clone()?;
-    if alert.state != AlertState::Firing || alert.is_flood() {
+    if alert.state != MessageState::Firing || alert.is_flood() {
         return None;
     }
     let (key, status) = (alert.key.clone(), alert.status);

@@ -208,6 +208,17 @@ fn a_topic_that_alerts_cannot_be_published_to_is_refused() {
 }
 
 #[test]
+fn corrections_for_alertmanager_are_refused() {
+    let said = problem(
+        "[[webhook]]\nurl = \"http://127.0.0.1:9093/api/v2/alerts\"\nformat = \"alertmanager\"\ncorrections = true\n",
+    );
+    assert!(
+        said.contains("webhook.corrections with format = \"alertmanager\""),
+        "{said}"
+    );
+}
+
+#[test]
 fn a_drill_that_reaches_nobody_or_never_ends_is_refused() {
     let hook = "[[hook]]\nrun = [\"./drilled.sh\"]\ndrills = true\n";
     for (lines, parts) in [

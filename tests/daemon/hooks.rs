@@ -8,7 +8,7 @@
 
 use crate::eventually::eventually;
 use slipwatch::alert::Level;
-use slipwatch::config::HookConfig;
+use slipwatch::config::{ExtraMessages, HookConfig};
 use slipwatch::monitor::{AlertState, Event, EventKind};
 use slipwatch::reading::BenchmarkId;
 use slipwatch::runtime::deliver::{self, Dispatcher, Retry};
@@ -48,7 +48,7 @@ fn hook(script: &str) -> (TempDir, HookConfig) {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("hook.sh"), script).unwrap();
     let config = HookConfig {
-        drills: false,
+        extra: ExtraMessages::default(),
         links: None,
         site: false,
         webhook: None,
@@ -229,7 +229,7 @@ async fn an_escalation_reports_the_end_of_what_it_has_reported_and_nothing_of_wh
     let store = Arc::new(Store::open(&folder.path().join("state")).unwrap());
     let ended = |key: &str| {
         let mut alert = alert_of(Level::Red, key, "");
-        alert.state = AlertState::Resolved;
+        alert.state = AlertState::Resolved.into();
         alert
     };
     for (after, key, expected) in [
@@ -348,7 +348,7 @@ async fn what_is_superseded_or_resolved_is_not_tried_again() {
     assert_eq!(calls(&folder, "orange"), before);
     // Nor does it receive more of a silence that has ended.
     let mut end = alert_of(Level::Unknown, "unknown", "");
-    end.state = AlertState::Resolved;
+    end.state = AlertState::Resolved.into();
     std::fs::write(folder.path().join("hook.sh"), "exit 0").unwrap();
     dispatcher.offer(&end);
     assert!(dispatcher.close(LIMIT).await.is_some());
@@ -394,7 +394,7 @@ async fn only_the_levels_that_a_hook_asks_for_reach_it() {
 fn alert_at(benchmark: &str, level: Level, state: AlertState) -> Alert {
     let mut alert = alert_of(level, &format!("{benchmark}/{level}"), "");
     alert.event.benchmark = Some(BenchmarkId::new(benchmark));
-    alert.state = state;
+    alert.state = state.into();
     alert
 }
 

@@ -1,7 +1,7 @@
 //! Hooks within walls, run for real through the program that walls itself in.
 
 use slipwatch::alert::Level;
-use slipwatch::config::HookConfig;
+use slipwatch::config::{ExtraMessages, HookConfig};
 use slipwatch::monitor::{AlertState, Event, EventKind};
 use slipwatch::reading::BenchmarkId;
 use slipwatch::runtime::deliver;
@@ -47,7 +47,7 @@ fn folder_outside_tmp() -> Option<TempDir> {
 
 fn walled(folder: &Path, run: &[&str]) -> HookConfig {
     HookConfig {
-        drills: false,
+        extra: ExtraMessages::default(),
         links: None,
         site: false,
         webhook: None,

@@ -404,7 +404,7 @@ async fn an_alert_goes_over_tls_to_who_can_prove_its_name_by_a_trusted_authority
 }
 
 fn ended(mut alert: Alert, time: &str) -> Alert {
-    alert.state = AlertState::Resolved;
+    alert.state = AlertState::Resolved.into();
     alert.event.time = time.parse().unwrap();
     alert
 }

@@ -291,3 +291,86 @@ fn what_people_resolve_ends_and_the_next_reading_that_calls_for_it_calls_it_agai
     assert!(said(&late).contains("NO DAEMON RUNS"), "{}", said(&late));
     site.proven_events();
 }
+
+/// Rows of a slope that goes on at the velocity of row 60, and does not run away.
+fn steady(rows: Range<i32>) -> String {
+    let now = *NOW.get_or_init(clock::now);
+    rows.map(|row| {
+        let time = now - SignedDuration::from_hours(i64::from(113 - row));
+        let moved = 200.0 * 2.0_f64.ln() + 200.0 / 60.0 * f64::from(row - 60);
+        format!("{time},{moved:.4}\n")
+    })
+    .collect()
+}
+
+#[test]
+fn readings_that_are_corrected_after_a_red_send_a_correction_that_names_it_to_whom_asks_for_these()
+{
+    let cap = "[[hook]]\nrun = [\"/bin/sh\", \"corrected.sh\"]\nlevels = [\"red\"]\ncorrections = true\n\
+               [[cap]]\nfolder = \"cap\"\nsender = \"toc@example.org\"\narea = \"Toc\"\ncorrections = true\n";
+    let site = Site::new(&format!("{POLICY}{cap}"));
+    fs::write(site.path("corrected.sh"), "cat >> corrected\n").unwrap();
+    site.append(
+        "incoming/5.csv",
+        &format!("time,displacement_mm\n{}", failing(0..112)),
+    );
+    let program = site.caught_up();
+    site.awaits_red();
+    site.append("incoming/5.csv", &steady(61..113));
+    eventually("the correction", || {
+        site.lines("corrected")
+            .iter()
+            .any(|line| line.contains("\"event\":\"correction\""))
+    });
+    let messages = || {
+        let files = fs::read_dir(site.path("cap")).unwrap().map(Result::unwrap);
+        let mut files: Vec<_> = files.map(|file| file.path()).collect();
+        files.retain(|file| file.extension().is_some_and(|one| one == "xml"));
+        let texts = files.iter().map(|file| fs::read_to_string(file).unwrap());
+        texts.collect::<Vec<_>>()
+    };
+    let is_update =
+        |text: &String| text.contains("is in force; what was called before is corrected");
+    eventually("its CAP message", || messages().iter().any(is_update));
+    program.stop();
+    let red = site.lines("notified");
+    let red = red.iter().find_map(|line| {
+        line.strip_suffix(" firing")
+            .filter(|key| key.starts_with("5/red/"))
+    });
+    let red = red.unwrap();
+    let lines = site.lines("corrected");
+    let corrections = lines
+        .iter()
+        .filter(|line| line.contains("\"event\":\"correction\""));
+    let [correction] = corrections.collect::<Vec<_>>()[..] else {
+        panic!("{lines:?}");
+    };
+    for part in [
+        "\"level_then\":\"red\"",
+        "\"state\":\"correction\"",
+        "\"key\":\"5/correction/",
+        "\"recommended\":null",
+        red,
+    ] {
+        assert!(correction.contains(part), "{part}: {correction}");
+    }
+    let messages = messages();
+    let update = messages.iter().find(|text| is_update(text)).unwrap();
+    for part in [
+        "<msgType>Update</msgType>",
+        "<references>toc@example.org,slipwatch-",
+        "<severity>Extreme</severity>",
+        red,
+    ] {
+        assert!(update.contains(part), "{part}: {update}");
+    }
+    assert_eq!(
+        site.notified("5/correction/", ""),
+        0,
+        "it was not asked for"
+    );
+    // What stands stays: the newest reading decides that.
+    assert_eq!(site.notified("5/red/", "resolved"), 0);
+    site.proven_events();
+}

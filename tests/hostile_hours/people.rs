@@ -2,9 +2,8 @@
 
 use slipwatch::alert::Level;
 use slipwatch::config::HookConfig;
-use slipwatch::monitor::AlertState;
 use slipwatch::runtime::deliver::{Run, Runner};
-use slipwatch::runtime::hook::{Alert, HookOutcome};
+use slipwatch::runtime::hook::{Alert, HookOutcome, MessageState};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -51,8 +50,9 @@ impl People {
         let benchmark = alert.event.benchmark.as_ref().map(ToString::to_string);
         let keys = self.in_force.entry((benchmark, alert.level)).or_default();
         match alert.state {
-            AlertState::Firing => keys.insert(alert.key.clone()),
-            AlertState::Resolved => keys.remove(&alert.key),
+            MessageState::Firing => keys.insert(alert.key.clone()),
+            MessageState::Resolved => keys.remove(&alert.key),
+            MessageState::Correction => false,
         };
     }
 

@@ -10,7 +10,7 @@ use super::bar;
 use super::run::asynchronous;
 use crate::alert::{Level, Policy};
 use crate::cli::text::wrapped;
-use crate::config::HookConfig;
+use crate::config::{ExtraMessages, HookConfig};
 use crate::monitor::{Event, Settings};
 use crate::reading::{Recording, Series};
 use crate::runtime::ingest::{ReadOptions, read_files};
@@ -197,7 +197,7 @@ fn sample_hook(folder: &Path) -> anyhow::Result<HookConfig> {
         .and_then(|()| std::fs::set_permissions(&script, std::fs::Permissions::from_mode(0o755)))
         .with_context(|| format!("cannot write {}", script.display()))?;
     Ok(HookConfig {
-        drills: false,
+        extra: ExtraMessages::default(),
         links: None,
         site: false,
         webhook: None,

@@ -88,7 +88,7 @@ impl Track {
             }
         }
         let transitions = self.latch.update(policy, &evidence);
-        self.levels.note(time, self.latch.level());
+        self.levels.note(time, &self.latch);
         let reported = transitions
             .iter()
             .map(|change| self.alert_event(time, policy, &evidence, ahead, change));
@@ -145,6 +145,7 @@ impl Track {
             };
         }
         let change = self.latch.raise(policy, &evidence)?;
+        self.levels.note(time, &self.latch);
         Some(self.alert_event(
             time,
             policy,

@@ -24,8 +24,9 @@ pub(super) struct Levels {
 }
 
 impl Levels {
-    /// This level is in force at `time`.
-    pub(super) fn note(&mut self, time: Timestamp, level: Level) {
+    /// What is in force at `time`, noted by when it was called: that is in its alert's key.
+    pub(super) fn note(&mut self, time: Timestamp, latch: &Latch) {
+        let (level, time) = latch.in_force().unwrap_or((Level::Green, time));
         let last = self.changes.back().map_or(Level::Green, |(_, last)| *last);
         if level != last {
             self.changes.push_back((time, level));
@@ -35,12 +36,16 @@ impl Levels {
         }
     }
 
-    /// The highest level in force at `since` or later.
-    fn highest_since(&self, since: Timestamp) -> Level {
+    /// Those in force at `since` or later, the oldest first.
+    fn since(&self, since: Timestamp) -> impl Iterator<Item = (Timestamp, Level)> {
         let at = self.changes.partition_point(|(time, _)| *time <= since);
-        let from = at.saturating_sub(1);
-        let from = self.changes.iter().skip(from).map(|(_, level)| *level);
-        from.max().unwrap_or(Level::Green)
+        self.changes.iter().skip(at.saturating_sub(1)).copied()
+    }
+
+    /// The highest of them.
+    fn highest_since(&self, since: Timestamp) -> Level {
+        let levels = self.since(since).map(|(_, level)| level);
+        levels.max().unwrap_or(Level::Green)
     }
 }
 
@@ -98,10 +103,15 @@ impl Track {
              been called; {level_then} was in force",
             self.benchmark
         );
+        let alerts = levels
+            .since(since)
+            .filter(|(_, level)| *level > Level::Green)
+            .map(|(called, level)| format!("{}/{level}/{called}", self.benchmark));
         let kind = EventKind::Correction {
             since,
             level_then,
             level_now,
+            alerts: alerts.collect(),
             text,
         };
         Some(self.event(time, kind))

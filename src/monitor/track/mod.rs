@@ -286,11 +286,11 @@ impl Track {
             events.extend(self.refit(policy, time, forecast));
             events.extend(self.watch(policy, time, forecast, context));
         }
-        let (may_fall, latch) = (self.may_fall(), self.latch.clone());
+        let may_fall = self.may_fall();
+        let (latch, levels) = (self.latch.clone(), self.levels.clone());
         let alerts = self.alert(policy, time, forecast.as_ref(), &mut events);
         if !may_fall && self.latch.level() < latch.level() {
-            self.levels.note(time, latch.level());
-            self.latch = latch;
+            (self.latch, self.levels) = (latch, levels);
             return events;
         }
         events.extend(alerts);

@@ -85,7 +85,7 @@ impl Track {
             ..AlertEvidence::default()
         };
         let change = self.latch.raise(policy, &evidence)?;
-        self.levels.note(now, change.level);
+        self.levels.note(now, &self.latch);
         let hours = policy.evacuation_time.as_secs() / 3600;
         let text = format!(
             "benchmark {}: {} ({}); no reading since {newest}; if no collapse has come since, chance {} within the evacuation time ({hours} h) from now on",

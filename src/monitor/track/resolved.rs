@@ -1,7 +1,6 @@
 //! An alert that people end: they know why it was called, and that it is over.
 
 use super::Track;
-use crate::alert::Level;
 use crate::monitor::event::{AlertState, Event, EventKind};
 use crate::monitor::given::Given;
 use crate::reading::Timestamp;
@@ -15,7 +14,7 @@ impl Track {
     pub(in crate::monitor) fn resolve(&mut self, now: Timestamp, given: &Given) -> Option<Event> {
         let (level, since) = self.latch.in_force()?;
         self.latch.resolve(now);
-        self.levels.note(now, Level::Green);
+        self.levels.note(now, &self.latch);
         (self.look, self.kept, self.overdue) = (None, None, None);
         let by = given.by.as_deref().unwrap_or("somebody");
         let why = (given.why.as_ref()).map_or_else(String::new, |why| format!(": {why}"));

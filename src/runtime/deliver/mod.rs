@@ -12,10 +12,10 @@ mod worker;
 pub use runner::{Processes, Run, Runner, run};
 
 use super::delivered::Delivered;
-use super::hook::Alert;
+use super::hook::{Alert, MessageState};
 use super::in_hand::InHand;
 use crate::config::HookConfig;
-use crate::monitor::AlertState;
+use crate::monitor::EventKind;
 use crate::store::DeliveryOutcome;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -203,11 +203,11 @@ impl Dispatcher {
 
     /// Whether this is the end of what waited and was never reported: neither of them is then.
     fn ends_unreported(&self, way: &HookQueue, in_hand: &mut InHand, alert: &Alert) -> bool {
-        if !way.hook.may_wait() || alert.state != AlertState::Resolved {
+        if !way.hook.may_wait() || alert.state != MessageState::Resolved {
             return false;
         }
         let (name, mut firing) = (way.hook.name(), alert.clone());
-        firing.state = AlertState::Firing;
+        firing.state = MessageState::Firing;
         let mut delivered = locked(&self.delivered);
         if delivered.was_notified(&firing, &name) || in_hand.was_tried(&firing) {
             return false;
@@ -288,13 +288,27 @@ impl HookConfig {
     }
 
     /// Whether it is notified of an alert of this level, at a benchmark or the whole site. What reports many benchmarks
-    /// at once stands for theirs; that the clock is wrong concerns everyone.
+    /// at once stands for theirs; that the clock is wrong concerns everyone. Of a correction it is where it asks for these
+    /// and for the level that was in force or the one that would have been.
     fn asks_for(&self, alert: &Alert) -> bool {
         let is_of_the_site = alert.event.benchmark.is_none() && !alert.is_flood();
         let is_ours = self.site == is_of_the_site || alert.is_of_the_clock();
         let is_of_ours = (alert.event.benchmark.as_ref())
             .is_none_or(|one| self.benchmarks.is_empty() || self.benchmarks.contains(one));
-        self.levels.contains(&alert.level) && is_ours && is_of_ours
+        let is_of_our_levels = if let EventKind::Correction {
+            level_then,
+            level_now,
+            ..
+        } = &alert.event.kind
+        {
+            self.extra.corrections
+                && [level_then, level_now]
+                    .iter()
+                    .any(|one| self.levels.contains(one))
+        } else {
+            self.levels.contains(&alert.level)
+        };
+        is_of_our_levels && is_ours && is_of_ours
     }
 }
 

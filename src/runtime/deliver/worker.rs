@@ -3,11 +3,10 @@
 use super::{QUEUE, Retry, Runner, locked};
 use crate::alert::Level;
 use crate::config::HookConfig;
-use crate::monitor::AlertState;
 use crate::reading::BenchmarkId;
 use crate::runtime::clock;
 use crate::runtime::delivered::Delivered;
-use crate::runtime::hook::{Alert, HookOutcome};
+use crate::runtime::hook::{Alert, HookOutcome, MessageState};
 use crate::runtime::in_hand::InHand;
 use crate::store::DeliveryOutcome;
 use std::collections::BTreeMap;
@@ -36,10 +35,13 @@ struct Waiting {
 /// How grave it is: of two that are due the higher goes first.
 fn gravity(alert: &Alert) -> u8 {
     match (alert.level, alert.state) {
-        (Level::Red, AlertState::Firing) => 5,
-        (Level::Orange, AlertState::Firing) => 4,
-        (Level::Unknown, AlertState::Firing) => 3,
-        (Level::Red | Level::Orange | Level::Unknown, AlertState::Resolved) => 2,
+        (Level::Red, MessageState::Firing) => 5,
+        (Level::Orange, MessageState::Firing) => 4,
+        (Level::Unknown, MessageState::Firing) => 3,
+        (
+            Level::Red | Level::Orange | Level::Unknown,
+            MessageState::Resolved | MessageState::Correction,
+        ) => 2,
         (Level::Yellow, _) => 1,
         (Level::Green, _) => 0,
     }
@@ -269,7 +271,7 @@ impl Worker {
     /// the host's clock: a restart neither loses nor renews the time. Whatever that clock does, it is never longer than
     /// the whole.
     fn unacknowledged_wait(&self, alert: &Alert) -> Duration {
-        let (Some(after), AlertState::Firing) = (self.hook.escalate_after, alert.state) else {
+        let (Some(after), MessageState::Firing) = (self.hook.escalate_after, alert.state) else {
             return Duration::ZERO;
         };
         let noted = locked(&self.delivered).noted(alert, &self.hook.name());

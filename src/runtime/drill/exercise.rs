@@ -72,7 +72,7 @@ pub(super) async fn hold(
 
 /// The hooks that drills reach: each at once, for the red of the drill's benchmark alone.
 fn hooks(config: &Config) -> Vec<HookConfig> {
-    let reached = config.hooks.iter().filter(|hook| hook.drills);
+    let reached = config.hooks.iter().filter(|hook| hook.extra.drills);
     let of_the_drill = |hook: &HookConfig| HookConfig {
         levels: vec![Level::Red],
         benchmarks: BTreeSet::new(),

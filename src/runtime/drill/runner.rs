@@ -1,10 +1,10 @@
 //! Runs the hooks of a drill as the daemon runs them, and notes when the first began and which have taken it.
 
 use crate::config::HookConfig;
-use crate::monitor::{AlertState, EventKind};
+use crate::monitor::EventKind;
 use crate::runtime::clock::Stopwatch;
 use crate::runtime::deliver::{Processes, Run, Runner};
-use crate::runtime::hook::{Alert, HookOutcome};
+use crate::runtime::hook::{Alert, HookOutcome, MessageState};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -49,7 +49,7 @@ impl Runner for DrillObserver {
         drop(seen);
         let watched = self.clone();
         Box::pin(async move {
-            let (name, is_end) = (hook.name(), alert.state == AlertState::Resolved);
+            let (name, is_end) = (hook.name(), alert.state == MessageState::Resolved);
             let outcome = Processes.run(hook, alert, attempt).await;
             let mut seen = watched.seen();
             if is_end {

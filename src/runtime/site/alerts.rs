@@ -3,11 +3,11 @@
 use super::flood::OutgoingAlerts;
 use super::{AlertInForce, LEAST_FRESHNESS, LEAST_WATCHED, MOST_UNWRITTEN, Site};
 use crate::alert::{Level, Policy};
-use crate::monitor::{AlertState, Event};
+use crate::monitor::Event;
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::deliver::Dispatcher;
 use crate::runtime::delivered::delivery;
-use crate::runtime::hook::Alert;
+use crate::runtime::hook::{Alert, MessageState};
 use crate::store::StoreError;
 use jiff::SignedDuration;
 
@@ -34,6 +34,10 @@ impl Site {
             let is_due = is_fresh && !self.ends_untold(&alert) || self.is_waited_for(&alert);
             let is_muted = self.is_muted(&alert, now);
             let is_sent = is_due && !is_muted;
+            if alert.is_correction() {
+                to_send.extend(is_sent.then_some(alert));
+                continue;
+            }
             if is_muted && self.is_waited_for(&alert) {
                 self.put_off(&alert);
             }
@@ -179,12 +183,12 @@ impl Site {
         let is_unknown = alert.level == Level::Unknown;
         let place = (alert.event.benchmark.clone(), is_unknown);
         let had = self.standing.get(&place);
-        if had.is_some_and(|had| had.alert.level > alert.level) {
+        if alert.is_correction() || had.is_some_and(|had| had.alert.level > alert.level) {
             return;
         }
         let was_notified = is_sent || had.is_some_and(|had| had.was_notified);
         match alert.state {
-            AlertState::Firing if alert.level != Level::Green => {
+            MessageState::Firing if alert.level != Level::Green => {
                 let standing = AlertInForce {
                     alert,
                     is_sent,
@@ -193,9 +197,10 @@ impl Site {
                 };
                 self.standing.insert(place, standing);
             }
-            AlertState::Firing | AlertState::Resolved => {
+            MessageState::Firing | MessageState::Resolved => {
                 self.standing.remove(&place);
             }
+            MessageState::Correction => (),
         }
     }
 
@@ -218,7 +223,7 @@ impl Site {
     pub(super) fn is_waited_for(&self, alert: &Alert) -> bool {
         let place = (alert.event.benchmark.clone(), alert.level == Level::Unknown);
         let had = self.standing.get(&place);
-        alert.state == AlertState::Resolved
+        alert.state == MessageState::Resolved
             && had.is_some_and(|had| had.was_notified && had.alert.level <= alert.level)
     }
 
@@ -232,7 +237,7 @@ impl Site {
     fn ends_untold(&self, alert: &Alert) -> bool {
         let place = (alert.event.benchmark.clone(), alert.level == Level::Unknown);
         let had = self.standing.get(&place);
-        alert.state == AlertState::Resolved && had.is_some_and(|had| !had.was_notified)
+        alert.state == MessageState::Resolved && had.is_some_and(|had| !had.was_notified)
     }
 
     /// Everything there is has been read: what is in force and was not sent because it began long

@@ -4,7 +4,7 @@
 
 use crate::alert::Level;
 use crate::monitor::{AlertState, Event, EventKind};
-use crate::runtime::hook::{Alert, FLOOD, state_name};
+use crate::runtime::hook::{Alert, FLOOD, MessageState, state_name};
 use std::collections::BTreeMap;
 
 /// Alerts of one level and state that go out singly in one commit.
@@ -64,32 +64,59 @@ fn together(others: &[&Alert]) -> Option<Alert> {
         0 => String::new(),
         rest => format!(" and {rest} more"),
     };
-    let what = match first.state {
-        AlertState::Firing => "at",
-        AlertState::Resolved => "no longer at",
-    };
-    let text = format!(
-        "{} more benchmarks {what} {}: {}{rest}",
-        others.len(),
-        first.level,
-        named.join(", ")
-    );
+    let (count, level, named) = (others.len(), first.level, named.join(", "));
     // That of the first is no other's.
     let key = format!("{FLOOD}/{}", first.key);
+    let alert = |state: AlertState, what: &str| EventKind::Alert {
+        level,
+        state,
+        key: key.clone(),
+        rule: FLOOD.to_owned(),
+        text: format!("{count} more benchmarks {what} {level}: {named}{rest}"),
+    };
+    let kind = match first.state {
+        MessageState::Firing => alert(AlertState::Firing, "at"),
+        MessageState::Resolved => alert(AlertState::Resolved, "no longer at"),
+        MessageState::Correction => corrections(others, |level_then| {
+            format!(
+                "{count} more benchmarks: with the readings that came late or were corrected, {level} would have been \
+                 called; the highest level that was in force is {level_then}: {named}{rest}"
+            )
+        })?,
+    };
     Some(Alert {
         event: Event {
             time,
             benchmark: None,
-            kind: EventKind::Alert {
-                level: first.level,
-                state: first.state,
-                key: key.clone(),
-                rule: FLOOD.to_owned(),
-                text,
-            },
+            kind,
         },
         key,
         failure_time: others.iter().filter_map(|alert| alert.failure_time).min(),
         ..first.clone()
+    })
+}
+
+/// The event of all `others`, which are corrections of one level; `text` is given the highest level that was in force.
+fn corrections(others: &[&Alert], text: impl Fn(Level) -> String) -> Option<EventKind> {
+    let each = others.iter().filter_map(|alert| {
+        let EventKind::Correction {
+            since,
+            level_then,
+            level_now,
+            alerts,
+            ..
+        } = &alert.event.kind
+        else {
+            return None;
+        };
+        Some((*since, *level_then, *level_now, alerts))
+    });
+    let level_then = each.clone().map(|(_, then, ..)| then).max()?;
+    Some(EventKind::Correction {
+        since: each.clone().map(|(since, ..)| since).min()?,
+        level_then,
+        level_now: each.clone().map(|(_, _, now, _)| now).max()?,
+        alerts: each.flat_map(|(.., alerts)| alerts.clone()).collect(),
+        text: text(level_then),
     })
 }
