@@ -35,8 +35,12 @@ const SLOWED: f64 = 0.5;
 /// ratio. Set on simulated slopes: storms, thaws and fits of stick-slip repeat, and a collapse is mostly faster than all
 /// before it.
 const SURVIVED: i32 = 2;
-/// How far the time of a collapse is the law's where the law is sure that one comes; set with Lanzada in view.
-const TIMED: f64 = 0.35;
+/// How far the time of a collapse is the law's where the law is sure that one comes and all lines through inverse velocity
+/// meet zero when it does; and the standard deviation of ln of these times by which 1 - 1/e of that is lost. Set on simulated
+/// slopes of all kinds that fail: a share that did not ask for agreement put the collapse of those that keep no straight line
+/// (exponential, levelled) at half of the time that remained.
+const TIMED: f64 = 0.8;
+const APART: f64 = 0.3;
 /// Over how many shorter scales the growth of the velocity is looked for.
 const GROWN_SCALES: usize = 10;
 /// How far the growth of a slope that runs up departs from a straight line in inverse velocity, and what is left of the
@@ -201,14 +205,14 @@ impl Members {
         (critical.to_bits() == PASSED.to_bits()).then(|| self.law.times())
     }
 
-    /// `network` with a part of it, the larger the surer the law is of a collapse, where the law puts that: the law is the
-    /// sharper where a slope keeps it, and has no say in whether one comes.
+    /// `network` with a part of it, the larger the surer the law is of a collapse and the better the lines agree with it, where
+    /// the law puts that: the law is the sharper where a slope keeps it, and has no say in whether one comes.
     fn timed(&self, network: &Passage) -> Passage {
         let sure = self.law.chance_within(LONGEST_DAYS);
         if sure <= 0.0 {
             return network.clone();
         }
-        let share = TIMED * sure;
+        let share = TIMED * self.agreement(sure) * sure;
         let own = network.times().iter();
         let own = own.map(|(days, chance)| (*days, (1.0 - share) * chance));
         let moved = share * network.chance_within(LONGEST_DAYS) / sure;
@@ -216,6 +220,23 @@ impl Members {
         let soon = soon.take_while(|(days, _)| *days <= LONGEST_DAYS);
         let laws = soon.map(|(days, chance)| (*days, moved * chance));
         Passage::from_times(own.chain(laws).collect())
+    }
+
+    /// How well the law, which puts a collapse into its future with the chance `sure`, and the lines agree on its time: 1 where
+    /// they do, 0 where a line meets no zero.
+    fn agreement(&self, sure: f64) -> f64 {
+        let median = self.law.quantile(0.5 * sure, LONGEST_DAYS);
+        let Some(median) = median.filter(|days| *days > 0.0) else {
+            return 0.0;
+        };
+        if self.lines.iter().any(|line| *line <= 0.0) {
+            return 0.0;
+        }
+        let times = || std::iter::once(median.ln()).chain(self.lines.iter().map(|line| -line.ln()));
+        let count = (1 + LINES.len()) as f64;
+        let mean = times().sum::<f64>() / count;
+        let square: f64 = times().map(|time| (time - mean).powi(2)).sum();
+        (-square / ((count - 1.0) * APART * APART)).exp()
     }
 
     fn expect(&self, days: f64, inputs: &mut Vec<f64>) {

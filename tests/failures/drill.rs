@@ -11,8 +11,9 @@ fn site(more: &str) -> (Site, String) {
          [[cap]]\nfolder = \"cap\"\nsender = \"test@example.org\"\narea = \"here\"\ndrills = true\n\
          [drill]\nevery = \"1h\"\n{more}"
     ));
-    let script = "echo $SLIPWATCH_KEY $SLIPWATCH_BENCHMARK $SLIPWATCH_LEVEL $SLIPWATCH_STATE $SLIPWATCH_STATUS \
-                  $SLIPWATCH_ACKNOWLEDGE_URL >> drilled\ncat >> bodies\n";
+    // The line comes when the body is there.
+    let script = "cat >> bodies\necho $SLIPWATCH_KEY $SLIPWATCH_BENCHMARK $SLIPWATCH_LEVEL $SLIPWATCH_STATE $SLIPWATCH_STATUS \
+                  $SLIPWATCH_ACKNOWLEDGE_URL >> drilled\n";
     fs::write(site.path("drilled.sh"), script).unwrap();
     let address = site.listen();
     let text = fs::read_to_string(site.path("site.toml")).unwrap();
