@@ -6,6 +6,8 @@ use super::problem::Problem;
 use super::refit::{Fitted, jacobian};
 use super::term::Scratch;
 use crate::reading::Quantity;
+use statrs::function::erf::erfc;
+use statrs::function::gamma::checked_gamma_ur;
 
 /// An undeclared load this many of its standard errors from nothing is structure.
 const CLEAR: f64 = 3.0;
@@ -87,22 +89,14 @@ fn products(problem: &Problem, innovations: &[f64]) -> Vec<(f64, f64)> {
     sums.into_iter().map(correlation).collect()
 }
 
+/// The probability that a standard normal number is as far from 0 as `z`, or farther.
 fn two_sided(z: f64) -> f64 {
-    let t = 1.0 / (1.0 + 0.231_641_9 * z.abs());
-    // Abramowitz and Stegun 26.2.17.
-    let poly = t
-        * (0.319_381_530
-            + t * (-0.356_563_782
-                + t * (1.781_477_937 + t * (-1.821_255_978 + t * 1.330_274_429))));
-    (2.0 * poly * (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt()).min(1.0)
+    erfc(z.abs() * std::f64::consts::FRAC_1_SQRT_2)
 }
 
-/// P(chi-square of k degrees > x), by Wilson and Hilferty's cube root.
+/// P(chi-square of k degrees > x).
 fn chi_square_tail(x: f64, k: f64) -> f64 {
-    let spread = 2.0 / (9.0 * k);
-    let z = ((x / k).cbrt() - (1.0 - spread)) / spread.sqrt();
-    let tail = 0.5 * two_sided(z);
-    if z > 0.0 { tail } else { 1.0 - tail }
+    checked_gamma_ur(0.5 * k, 0.5 * x).unwrap_or(1.0)
 }
 
 /// The likeliest noise models of a fit, with and without a load in them.

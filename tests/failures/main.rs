@@ -33,6 +33,7 @@
 //! | 31 | links in messages that are followed, forged, used again | `link` |
 //! | 32 | an alert's whole way breaks without anybody seeing it | `drill` |
 //! | 33 | the disk of the daemon's own record | `recorded` |
+//! | 34 | a state that an earlier version wrote | `upgrade` |
 //!
 //! docs/failure-modes.md says the same for operators.
 //!
@@ -73,4 +74,5 @@ mod sensors;
 mod site;
 mod telling;
 mod time;
+mod upgrade;
 mod view;
