@@ -1,13 +1,14 @@
 //! What the daemon holds: a steady load, a first start, a backlog, many benchmarks. The program itself on real files, with a real hook.
 //!
 //!     cargo bench --bench daemon -- load [--seconds 60] | first | messages [--messages 100000] |
-//!     catchup [--readings 100000] | memory [--most 10000]
+//!     flood [--benchmarks 10000] | catchup [--readings 100000] | memory [--most 10000]
 
 #![expect(clippy::unwrap_used, reason = "a bench fails by panicking")]
 #![expect(clippy::print_stdout, reason = "its figures")]
 #![expect(clippy::disallowed_methods, reason = "it measures by the clock")]
 
 mod broker;
+mod flood;
 
 use jiff::{SignedDuration, Timestamp};
 use rand::{RngExt, SeedableRng};
@@ -42,9 +43,9 @@ fn main() {
         return note_alert(Path::new(folder));
     }
     let number = |flag, default: usize| after(flag).map_or(default, |text| text.parse().unwrap());
-    let all = !args
-        .iter()
-        .any(|arg| ["load", "first", "messages", "catchup", "memory"].contains(&arg.as_str()));
+    let all = !args.iter().any(|arg| {
+        ["load", "first", "messages", "flood", "catchup", "memory"].contains(&arg.as_str())
+    });
     let wants = |name: &str| all || args.iter().any(|arg| arg == name);
     if wants("load") {
         held_load(u32::try_from(number("--seconds", 60)).unwrap());
@@ -54,6 +55,9 @@ fn main() {
     }
     if wants("messages") {
         broker::backlog(100, number("--messages", 100_000));
+    }
+    if wants("flood") {
+        flood::one_row(number("--benchmarks", 10_000));
     }
     if wants("catchup") {
         let readings = number("--readings", 100_000);

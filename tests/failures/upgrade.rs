@@ -76,7 +76,11 @@ fn a_state_that_the_first_version_wrote_keeps_readings_events_and_what_was_not_d
     let status = site.printed(&["status", "--config", "site.toml"]);
     assert!(status.contains("red"), "{status}");
     program.stop();
-    assert!(site.log().contains("brought to this version"), "{}", site.log());
+    assert!(
+        site.log().contains("brought to this version"),
+        "{}",
+        site.log()
+    );
     assert_eq!(site.notified(RED, "firing"), 0, "it had been taken");
     assert_eq!(site.lines("late").len(), 1, "{:?}", site.lines("late"));
     let before = String::from_utf8(unpacked("state-0.1.0-events.ndjson.gz")).unwrap();

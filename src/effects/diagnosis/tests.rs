@@ -102,7 +102,11 @@ fn the_tails_are_those_of_the_normal_and_chi_square_distributions() {
         (3.0, 0.002_699_796_063_260_189),
         (8.0, 1.244_192_114_854_356_8e-15),
     ] {
-        assert!((two_sided(z) / p - 1.0).abs() < 1e-5, "{z} {}", two_sided(z));
+        assert!(
+            (two_sided(z) / p - 1.0).abs() < 1e-5,
+            "{z} {}",
+            two_sided(z)
+        );
     }
     for (x, p) in [
         (10.851, 0.95),
