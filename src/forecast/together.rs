@@ -45,6 +45,10 @@ const OVERTAKEN: f64 = 0.02;
 pub struct FailureTimeLikelihood {
     /// By cell of the grid of failure times, the last for none.
     of_each_time: Vec<f64>,
+    /// Their logarithms.
+    ln_of_each_time: Vec<f64>,
+    /// What its posterior alone says beyond the prior: of a narrow one, as one over its width.
+    sharpness: f64,
 }
 
 /// What all benchmarks of a site predict at one time.
@@ -92,26 +96,33 @@ impl FailureTimeLikelihood {
         let likelihood = density.iter().enumerate().map(|(index, share)| {
             DOUBT + (1.0 - DOUBT) * share / total.max(f64::MIN_POSITIVE) / prior(index)
         });
-        Self {
-            of_each_time: likelihood.collect(),
-        }
+        Self::new(likelihood.collect())
+    }
+
+    fn new(of_each_time: Vec<f64>) -> Self {
+        let ln_of_each_time = of_each_time.iter().map(|one| one.ln()).collect();
+        let mut likelihood = Self {
+            of_each_time,
+            ln_of_each_time,
+            sharpness: 0.0,
+        };
+        likelihood.sharpness = information(&posterior(&[&likelihood], 1.0)).exp();
+        likelihood
     }
 
     /// The same where it counts only with a probability.
     fn believed(&self, probability: f64) -> Self {
         let likelihood = self.of_each_time.iter();
-        Self {
-            of_each_time: likelihood
+        Self::new(
+            likelihood
                 .map(|one| 1.0 - probability + probability * one)
                 .collect(),
-        }
+        )
     }
 
     /// One that says nothing.
     fn nothing() -> Self {
-        Self {
-            of_each_time: vec![1.0; CELLS + 1],
-        }
+        Self::new(vec![1.0; CELLS + 1])
     }
 }
 
@@ -289,9 +300,7 @@ fn belonging(
 
 /// What all of `likelihoods` say under one failure time; `shared`: the correlation of their errors.
 fn combined(likelihoods: &[&FailureTimeLikelihood], shared: f64) -> Density {
-    let sharpness = likelihoods
-        .iter()
-        .map(|likelihood| information(&posterior(&[likelihood], 1.0)).exp());
+    let sharpness = likelihoods.iter().map(|likelihood| likelihood.sharpness);
     let (sum, squares) = sharpness.fold((0.0, 0.0), |(sum, squares), s: f64| {
         (sum + s, squares + s * s)
     });
@@ -305,16 +314,19 @@ fn combined(likelihoods: &[&FailureTimeLikelihood], shared: f64) -> Density {
 
 /// The prior times all likelihoods to the power `weight`, normalised.
 fn posterior(likelihoods: &[&FailureTimeLikelihood], weight: f64) -> Density {
+    let (ln_a_cell, ln_never) = (prior(0).ln(), prior(CELLS).ln());
     let ln = |index: usize| {
         let each = likelihoods
             .iter()
-            .map(|likelihood| likelihood.of_each_time[index].ln());
-        prior(index).ln() + weight * each.sum::<f64>()
+            .map(|likelihood| likelihood.ln_of_each_time[index]);
+        let ln_prior = if index < CELLS { ln_a_cell } else { ln_never };
+        ln_prior + weight * each.sum::<f64>()
     };
     let ln: Vec<f64> = (0..=CELLS).map(ln).collect();
     let best = ln.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let total: f64 = ln.iter().map(|ln| (ln - best).exp()).sum();
-    ln.iter().map(|ln| (ln - best).exp() / total).collect()
+    let shares: Vec<f64> = ln.iter().map(|ln| (ln - best).exp()).collect();
+    let total: f64 = shares.iter().sum();
+    shares.into_iter().map(|share| share / total).collect()
 }
 
 /// What a density says that the prior does not, nats; of a narrow one, e to this grows as one over its width.
