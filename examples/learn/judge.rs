@@ -19,12 +19,13 @@ const CRITICAL: f64 = 1000.0;
 pub(crate) const EVACUATIONS: [f64; 3] = [0.5, 1.0, 3.0];
 /// A slope is to be read so often in an evacuation time.
 const READ: f64 = 4.0;
-/// Chances that call red and orange, and the outlook, days.
-pub(crate) const RED: f64 = 0.05;
+/// How many evacuation times red looks ahead, the chances that call red and orange, and the outlook, days.
+const AHEAD: f64 = 2.0;
+pub(crate) const RED: f64 = 0.2;
 pub(crate) const ORANGE: (f64, f64) = (0.5, 30.0);
 /// Chances from which red could be called instead of [`RED`], and the evacuation time for which that is tried, in
 /// [`EVACUATIONS`].
-pub(crate) const CHANCES: [f64; 6] = [RED, 0.08, 0.12, 0.2, 0.3, 0.5];
+pub(crate) const CHANCES: [f64; 6] = [0.1, 0.15, RED, 0.3, 0.4, 0.6];
 const A_DAY: usize = 1;
 /// Levels stay: another entry within so many days is the same alarm.
 const SAME_ALARM_DAYS: f64 = 3.0;
@@ -61,7 +62,7 @@ pub(crate) struct Replay {
     pub(crate) orange: Alarms,
     /// For each evacuation time that the sampling serves, whether red came so long before the collapse.
     pub(crate) in_time: [Option<bool>; EVACUATIONS.len()],
-    /// Red from each of [`CHANCES`] on, within an evacuation time of a day.
+    /// Red from each of [`CHANCES`] on, where an evacuation takes a day.
     pub(crate) by_chance: [Alarms; CHANCES.len()],
     pub(crate) in_time_by_chance: [Option<bool>; CHANCES.len()],
 }
@@ -187,9 +188,10 @@ fn leads(slope: &Simulated, seed: u64, network: &Network) -> Vec<Lead> {
     judged.collect()
 }
 
-/// How far ahead red looks from a reading: the evacuation time, and until the next reading is due.
+/// How far ahead red looks from a reading: so many evacuation times, and until the next reading is due.
 fn ahead(evacuation: f64, indicators: &Indicators) -> f64 {
-    evacuation + indicators.interval_days().min(2.0 * evacuation)
+    let span = AHEAD * evacuation;
+    span + indicators.interval_days().min(2.0 * span)
 }
 
 /// Chances that levels go by, within each span; none where the evidence leaves none that could call a level.

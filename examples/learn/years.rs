@@ -32,7 +32,7 @@ fn by_chance(
     let mut out = String::from(
         "\n## What another `red_chance` gives\n\n\
          The same years, and lives of the eight families that fail (other seeds than any above or in [families.md](families.md); the network in force \
-         was taught on others of the same families), with red called from another chance within 24 h on. *In time*: of the failing lives read at \
+         was taught on others of the same families), with red called from another chance within 48 h on. *In time*: of the failing lives read at \
          least each 6 h and seen to accelerate for a day or more, those that were red 24 h before the collapse or earlier. Whoever asks for fewer false \
          alarms pays in slopes that are called too late.\n\n| `red_chance` | in time |",
     );
@@ -72,7 +72,7 @@ fn text(families: &[(Family, Vec<Vec<Replay>>)]) -> anyhow::Result<String> {
         "# False alarms a year\n\n\
          Written by `cargo run --release --example learn -- --years`. Each row follows whole years of simulated slopes that stand \
          (src/forecast/world), looked at each six hours, or at each reading where these are further apart, by the network in force, which was taught on other \
-         slopes of these families. Evacuation time 24 h; the chances by which levels go, without the policy's latch; alarms less than three days \
+         slopes of these families. Evacuation time 24 h, so that red looks 48 h ahead; the chances by which levels go, without the policy's latch; alarms less than three days \
          apart are one. What drives a slope: rain 5 to 40 storms a year, frost and thaw 60, a draw-down of the reservoir in most years, 5 to 60 \
          fits of stick-slip, one change of rate, several resets of the instrument, or one acceleration that ends without a collapse \
          (Stopped, Plateau).\n",

@@ -43,9 +43,10 @@ impl Policy {
                 self.critical_velocity_mm_per_day
             ),
             ("chance-within-evacuation-time", _) => format!(
-                "chance of collapse of {} or more within the evacuation time of {} h and until the next reading",
+                "chance of collapse of {} or more within {} ({} h) and until the next reading",
                 self.red_chance,
-                hours(self.evacuation_time)
+                self.red_within_in_words(),
+                hours(self.red_within())
             ),
             ("chance-within-outlook", level) => {
                 let chance = if level == Level::Yellow {
@@ -89,7 +90,7 @@ mod tests {
         let condition = |rule, level| policy.condition(rule, level).unwrap();
         assert_eq!(
             condition("chance-within-evacuation-time", Level::Red),
-            "chance of collapse of 0.05 or more within the evacuation time of 24 h and until the next reading"
+            "chance of collapse of 0.2 or more within twice the evacuation time (48 h) and until the next reading"
         );
         let outlook = |level| condition("chance-within-outlook", level);
         assert!(outlook(Level::Orange).contains("of 0.5 or more within the outlook of 720 h"));

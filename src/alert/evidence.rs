@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 pub struct AlertEvidence {
     /// Data time.
     pub now: Timestamp,
-    /// Chance of a collapse before an evacuation that the next reading calls would end, where there is a forecast.
-    pub chance_within_evacuation_time: Option<f64>,
+    /// Chance of a collapse within [`super::Policy::red_within`] of the next reading, where there is a forecast.
+    pub chance_for_red: Option<f64>,
     /// The same within the outlook.
     pub chance_within_outlook: Option<f64>,
     /// Latest observed velocity, mm/day; `None` before the second reading.

@@ -241,7 +241,7 @@ mod tests {
         let start: Timestamp = "2020-01-01T00:00:00Z".parse().unwrap();
         AlertEvidence {
             now: start + hours.hours(),
-            chance_within_evacuation_time: Some(chance),
+            chance_for_red: Some(chance),
             chance_within_outlook: Some(chance),
             velocity_mm_per_day: Some(velocity),
             settled_velocity_mm_per_day: Some(velocity),

@@ -16,7 +16,7 @@ pub enum Level {
     Yellow,
     /// Failure is more likely than not within the outlook.
     Orange,
-    /// Failure within the time that an evacuation takes cannot be excluded.
+    /// Failure before an evacuation would have ended is too likely.
     Red,
     /// The monitor cannot decide: no data, a sensor fault, a stale model.
     Unknown,

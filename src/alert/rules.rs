@@ -27,7 +27,7 @@ impl Policy {
                 level: Level::Red,
                 rule: "critical-velocity".into(),
             }
-        } else if reaches(evidence.chance_within_evacuation_time, self.red_chance) {
+        } else if reaches(evidence.chance_for_red, self.red_chance) {
             Call {
                 level: Level::Red,
                 rule: "chance-within-evacuation-time".into(),

@@ -348,8 +348,8 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
         drilled(status, zone),
         recorded(status, zone),
     );
-    let legend = "collapse: median of the forecast; chance: of collapse within the evacuation time\n\
-                  and until the next reading is due, by which red is called";
+    let legend = "collapse: median of the forecast; chance: of collapse within twice the\n\
+                  evacuation time (or red_within) of the next reading, by which red is called";
     let alerts = listed("in force", &status.alerts, zone)
         + &listed("ended, and acknowledged by nobody", &status.returned, zone);
     format!("{}\n{table}{legend}\n{}", folded(&head), folded(&alerts))

@@ -10,11 +10,16 @@ use jiff::SignedDuration;
 pub(super) fn policy(mut section: Section<'_>, base: &Policy) -> Policy {
     let evacuation_time = section.parsed("evacuation_time", value::duration);
     let outlook = section.parsed("outlook", value::duration);
+    let red_within = section.parsed("red_within", value::duration);
     let velocity = section.parsed("critical_velocity", value::speed);
     let steady_for = section.parsed("steady_for", value::duration);
     let policy = Policy {
         evacuation_time: given(evacuation_time.as_ref(), base.evacuation_time),
         outlook: given(outlook.as_ref(), base.outlook),
+        red_within: red_within
+            .as_ref()
+            .map(|given| given.value)
+            .or(base.red_within),
         critical_velocity_mm_per_day: velocity
             .map_or(base.critical_velocity_mm_per_day, |given| given.value),
         red_chance: section.chance("red_chance").unwrap_or(base.red_chance),
@@ -79,6 +84,17 @@ fn warn(section: &Section<'_>, policy: &Policy, evacuation_time: Option<&Placed<
                 policy.evacuation_time, policy.outlook
             ),
             "make outlook several times evacuation_time",
+        );
+    }
+    if policy.red_within() < policy.evacuation_time {
+        section.warning(
+            at,
+            format!(
+                "red_within {:#} is shorter than evacuation_time {:#}: red would be called too late",
+                policy.red_within(),
+                policy.evacuation_time
+            ),
+            "leave red_within out: it is twice evacuation_time then",
         );
     }
     if policy.yellow_chance > policy.orange_chance {

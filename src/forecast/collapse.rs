@@ -4,7 +4,7 @@
 //! scale and those around it, in ratios, so that minutes and months are judged alike, and from what others expect
 //! ([`Members`]): the law, and straight lines through inverse velocity. It was taught by simulated slopes that fail and
 //! stand in many ways ([`super::world`]); its weights are in [`super::learned`]. That is what is reported. Levels go by
-//! less: what it says counts for them as far as the slope is sure to accelerate at all ([`super::evidence`]), because
+//! less: what it says counts for them as far as it is not unlikely that the slope accelerates at all ([`super::evidence`]), because
 //! they are asked at every reading; of the rest a small part is left, so that nothing is called impossible.
 
 use super::evidence::{self, Evidence};
@@ -24,6 +24,11 @@ const LONGEST_DAYS: f64 = 1200.0;
 /// which half of that is reached: within days nothing is called that the readings do not show.
 const UNSEEN: f64 = 0.15;
 const UNSEEN_DAYS: f64 = 4.0;
+/// The probability of an acceleration at which half of the chance within days counts for levels, and the days; over longer
+/// spans the probability itself is the factor. Set on simulated slopes: where it was that within days too, red came late to
+/// slopes that their noise hides for long; where it was not over a month, steady creep was orange.
+const NOT_UNLIKELY: f64 = 0.02;
+const NEAR_DAYS: f64 = 6.0;
 /// Steps of the distribution in one doubling of time.
 const STEPS: u32 = 8;
 /// The median velocity, mm/day, last read before a collapse (30 failures, Federico et al. 2012).
@@ -107,7 +112,9 @@ impl Indicators {
     /// The most that levels may be given of a chance within `days`, whatever is expected.
     pub fn most(&self, days: f64) -> f64 {
         let accelerating = evidence::probability(self.evidence.ln_odds_within(days));
-        accelerating + (1.0 - accelerating) * UNSEEN * days / (days + UNSEEN_DAYS)
+        let unlikely = NOT_UNLIKELY * (1.0 + (days / NEAR_DAYS).powi(4));
+        let shown = accelerating * (1.0 + unlikely) / (accelerating + unlikely);
+        shown + (1.0 - shown) * UNSEEN * days / (days + UNSEEN_DAYS)
     }
 
     /// The inputs of every span with its length, days.

@@ -302,7 +302,7 @@ pub struct CalledLevel {
 pub struct LevelChance {
     /// The chance.
     pub chance: f64,
-    /// Within how many hours of the newest reading: for red the evacuation time and the time until the next reading, for
+    /// Within how many hours of the newest reading: for red `red_within` and the time until the next reading, for
     /// orange and yellow the outlook, or five times the record's length where that is shorter.
     pub within_hours: f64,
     /// From which chance on the level is called.

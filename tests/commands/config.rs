@@ -372,7 +372,7 @@ fn an_unknown_key_is_refused_with_the_known_ones() {
     assert_eq!(
         problem("[alert]\nevacuation_tme = \"12h\"\n"),
         "site.toml:11:1: error: unknown key alert.evacuation_tme; known here: evacuation_time, \
-         outlook, critical_velocity, steady_for, red_chance, orange_chance, yellow_chance, threshold, rule"
+         outlook, red_within, critical_velocity, steady_for, red_chance, orange_chance, yellow_chance, threshold, rule"
     );
     assert_eq!(
         problem("[allert]\n"),

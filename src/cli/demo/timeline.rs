@@ -22,8 +22,8 @@ is printed whenever the level of a measured point changes, with the reason:
   yellow   look closer: collapse within 30 days has a chance of 10 % or more, or
            the motion has changed its kind
   orange   prepare: collapse within 30 days has a chance of 50 % or more
-  red      leave: collapse within the time that an evacuation takes, or before
-           the next reading, has a chance of 5 % or more
+  red      leave: collapse within twice the time that an evacuation takes, from
+           the next reading on, has a chance of 20 % or more
   unknown  nothing can be said: no readings, or a sensor at fault
 
 \"54 % in 30 days\" is that chance; at the median date the collapse is as likely
@@ -273,7 +273,7 @@ fn reason(rule: &str, text: &str, moment: Option<&DemoMoment>) -> String {
 fn until_next(text: &str) -> Option<(f64, &str)> {
     let part = text
         .split("; ")
-        .find(|part| part.contains("within the evacuation time"))?;
+        .find(|part| part.contains("until the next reading ("))?;
     let chance = part
         .strip_prefix("chance ")?
         .split(' ')

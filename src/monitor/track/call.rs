@@ -26,11 +26,11 @@ impl LookAhead {
     fn of(policy: &Policy, forecast: Option<&Forecast>) -> Self {
         forecast.map_or(
             Self {
-                red: policy.evacuation_time,
+                red: policy.red_within(),
                 orange: policy.outlook,
             },
             |forecast| Self {
-                red: forecast.to_the_next_reading(policy.evacuation_time),
+                red: forecast.to_the_next_reading(policy.red_within()),
                 orange: forecast.reach(policy),
             },
         )
@@ -51,7 +51,7 @@ impl Track {
         let rates = forecast.map_or(&[][..], |forecast| &forecast.plain.rates);
         let look = self.look.filter(|(until, _)| time < *until);
         let mut evidence = AlertEvidence {
-            chance_within_evacuation_time: within(ahead.red),
+            chance_for_red: within(ahead.red),
             chance_within_outlook: within(ahead.orange),
             causes: look.map(|(_, cause)| cause).into_iter().collect(),
             ..self.observed(time, rates)
@@ -109,7 +109,7 @@ impl Track {
             within_hours: days(span) * 24.0,
             at_least,
         };
-        let red = evidence.chance_within_evacuation_time?;
+        let red = evidence.chance_for_red?;
         let outlook = evidence.chance_within_outlook?;
         Some(CalledLevel {
             level: call.level,
@@ -236,8 +236,11 @@ impl Track {
             change.level,
             change.rule,
             chance(
-                "the evacuation time and until the next reading",
-                evidence.chance_within_evacuation_time,
+                &format!(
+                    "{} and until the next reading",
+                    policy.red_within_in_words()
+                ),
+                evidence.chance_for_red,
                 ahead.red
             ),
             chance(&outlook, evidence.chance_within_outlook, ahead.orange),

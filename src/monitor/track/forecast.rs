@@ -8,7 +8,7 @@ use jiff::SignedDuration;
 
 /// A forecast is the slope's for so many lengths of its record; further ahead it is the prior's, and calls no level.
 const REACH: f64 = 5.0;
-/// Red looks no further beyond the evacuation time for a slope that is read more seldom than once in so many of it.
+/// A span that is asked for is counted from the next reading, which is taken to be no further away than so many spans.
 const MOST_INTERVALS: f64 = 2.0;
 
 /// The forecasts after one reading.
@@ -28,8 +28,7 @@ pub(super) struct UnderKnownLoad {
 }
 
 impl Forecast {
-    /// How far ahead orange and yellow look: as the policy says, if the record is long enough for that; as far as an
-    /// evacuation takes in any case.
+    /// How far ahead orange and yellow look: as the policy says, if the record is long enough for that; as far as red in any case.
     pub(super) fn reach(&self, policy: &Policy) -> SignedDuration {
         let plain = &self.plain;
         let first = plain.rates.first();
@@ -39,7 +38,7 @@ impl Forecast {
         }
         let reach = SignedDuration::try_from_secs_f64(REACH * length * SECONDS_PER_DAY);
         let reach = reach.unwrap_or(policy.outlook);
-        reach.max(policy.evacuation_time).min(policy.outlook)
+        reach.max(policy.red_within()).min(policy.outlook)
     }
 
     /// The forecast that people are given: the known load's where it explains the present, else that of whichever
@@ -59,10 +58,9 @@ impl Forecast {
         }
     }
 
-    /// How far ahead red looks from the newest reading: what this one does not call, the next one may, and an
-    /// evacuation begins then.
-    pub(super) fn to_the_next_reading(&self, evacuation: SignedDuration) -> SignedDuration {
-        to_the_next_reading(&self.plain, evacuation)
+    /// A span, counted from the next reading: what this one does not call, that one may, and people act then.
+    pub(super) fn to_the_next_reading(&self, span: SignedDuration) -> SignedDuration {
+        to_the_next_reading(&self.plain, span)
     }
 
     /// Chance of a collapse within `days`, as the level takes it: what the law under the known load does not explain, it cannot
@@ -93,9 +91,9 @@ impl Forecast {
 }
 
 /// See [`Forecast::to_the_next_reading`].
-pub(super) fn to_the_next_reading(outlook: &Outlook, evacuation: SignedDuration) -> SignedDuration {
-    let most = MOST_INTERVALS * days(evacuation);
+pub(super) fn to_the_next_reading(outlook: &Outlook, span: SignedDuration) -> SignedDuration {
+    let most = MOST_INTERVALS * days(span);
     let interval = outlook.interval_days.min(most) * SECONDS_PER_DAY;
     let interval = SignedDuration::try_from_secs_f64(interval).unwrap_or_default();
-    evacuation.saturating_add(interval)
+    span.saturating_add(interval)
 }

@@ -154,9 +154,9 @@ fn evidence(policy: &Policy, observations: &Observations, now: Timestamp) -> Ale
         LawForecaster::default().update(observations, policy.critical_velocity_mm_per_day);
     let rates = outlook.as_ref().map_or(&[][..], |outlook| &outlook.rates);
     let within = |span| Some(outlook.as_ref()?.chances.chance_within(days(span)));
-    let evacuation = policy.evacuation_time;
-    let ahead = outlook.as_ref().map_or(evacuation, |outlook| {
-        to_the_next_reading(outlook, evacuation)
+    let red_within = policy.red_within();
+    let ahead = outlook.as_ref().map_or(red_within, |outlook| {
+        to_the_next_reading(outlook, red_within)
     });
     let chance = |span| {
         let outlook = outlook.as_ref()?;
@@ -165,7 +165,7 @@ fn evidence(policy: &Policy, observations: &Observations, now: Timestamp) -> Ale
     AlertEvidence {
         now,
         chances: policy.spans().filter_map(chance).collect(),
-        chance_within_evacuation_time: within(ahead),
+        chance_for_red: within(ahead),
         chance_within_outlook: within(policy.outlook),
         velocity_mm_per_day: rates
             .last()

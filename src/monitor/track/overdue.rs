@@ -22,7 +22,7 @@ pub(super) struct Overdue {
     chances: KeptForecast,
     /// Between readings.
     interval: SignedDuration,
-    /// From when on the chance within an evacuation time calls red, if no collapse has come by then.
+    /// From when on the chance within [`Policy::red_within`] calls red, if no collapse has come by then.
     red_from: Timestamp,
 }
 
@@ -34,7 +34,7 @@ impl Overdue {
         let interval = outlook.interval_days * SECONDS_PER_DAY;
         let interval = SignedDuration::try_from_secs_f64(interval).ok()?;
         let is_red = |now: Timestamp| {
-            chances.chance_within(now, days(policy.evacuation_time)) >= policy.red_chance
+            chances.chance_within(now, days(policy.red_within())) >= policy.red_chance
         };
         let looks = (1..=MOST_CHECKS).map_while(|look| {
             let after = policy.evacuation_time.checked_mul(look)? / CHECKS_AN_EVACUATION;
@@ -78,21 +78,22 @@ impl Track {
         let (newest, overdue) = (self.newest?, self.overdue.take()?);
         let chance = overdue
             .chances
-            .chance_within(now, days(policy.evacuation_time));
+            .chance_within(now, days(policy.red_within()));
         let evidence = AlertEvidence {
             now,
-            chance_within_evacuation_time: Some(chance),
+            chance_for_red: Some(chance),
             ..AlertEvidence::default()
         };
         let change = self.latch.raise(policy, &evidence)?;
         self.levels.note(now, &self.latch);
-        let hours = policy.evacuation_time.as_secs() / 3600;
+        let hours = policy.red_within().as_secs() / 3600;
         let text = format!(
-            "benchmark {}: {} ({}); no reading since {newest}; if no collapse has come since, chance {} within the evacuation time ({hours} h) from now on",
+            "benchmark {}: {} ({}); no reading since {newest}; if no collapse has come since, chance {} within {} ({hours} h) from now on",
             self.benchmark,
             change.level,
             change.rule,
-            chance_in_words(chance)
+            chance_in_words(chance),
+            policy.red_within_in_words()
         );
         Some(self.alert_of(now, &change, text))
     }
