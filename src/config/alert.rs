@@ -76,12 +76,13 @@ fn threshold(mut section: Section<'_>) -> Option<Threshold> {
 /// Figures that are each allowed and together cannot mean what was intended.
 fn warn(section: &Section<'_>, policy: &Policy, evacuation_time: Option<&Placed<SignedDuration>>) {
     let at = evacuation_time.map_or(section.at(), |given| &given.at);
-    if policy.evacuation_time > policy.outlook {
+    if policy.red_within() > policy.outlook {
         section.warning(
             at,
             format!(
-                "evacuation_time {:#} is longer than outlook {:#}: red would be called before orange",
-                policy.evacuation_time, policy.outlook
+                "red looks {:#} ahead, further than outlook {:#}: red would be called before orange",
+                policy.red_within(),
+                policy.outlook
             ),
             "make outlook several times evacuation_time",
         );

@@ -261,6 +261,30 @@ fn a_file_converted_there_and_back_is_the_same_file() {
 }
 
 #[test]
+fn red_looks_twice_the_evacuation_time_ahead_or_as_far_as_the_config_says() {
+    let hours = |alert: &str| -> f64 {
+        let text = format!(
+            "[site]\nname = \"Preonzo\"\nstate_dir = \"state\"\n[[source]]\nid = \"a\"\nkind = \"mcap\"\npath = \"*.mcap\"\n[alert]\n{alert}\n"
+        );
+        let (_folder, config) = file("site.toml", &text);
+        let preonzo = recording("preonzo-2012.mcap");
+        let replay = ["replay", &preonzo, "--benchmark", "E3", "--config", &config];
+        let said = out(&slipwatch(&[&replay[..], &["--format", "json"]].concat()).success());
+        let events = said.lines().map(|line| serde_json::from_str(line).unwrap());
+        let called: Vec<serde_json::Value> = events
+            .filter_map(|event: serde_json::Value| event.get("called").cloned())
+            .collect();
+        let last = &called[called.len() - 1]["red"];
+        assert_eq!(last["at_least"], 0.2);
+        last["within_hours"].as_f64().unwrap()
+    };
+    // A day to the next reading.
+    assert!((hours("evacuation_time = \"12h\"") - 48.0).abs() < 0.1);
+    let given = hours("evacuation_time = \"12h\"\nred_within = \"36h\"");
+    assert!((given - 60.0).abs() < 0.1, "{given}");
+}
+
+#[test]
 fn a_replay_is_the_same_bytes_twice_and_at_any_speed() {
     let vaiont = vaiont();
     let replay = ["replay", &vaiont, "--format", "json", "--benchmark", "5"];

@@ -454,12 +454,20 @@ fn what_is_no_toml_is_reported_with_its_place() {
 
 #[test]
 fn a_policy_that_cannot_mean_anything_is_a_warning() {
-    let text = format!("{RIGHT}[alert]\nevacuation_time = \"40d\"\noutlook = \"30d\"\n");
-    let config = config::parse(&text, Path::new("site.toml")).unwrap();
+    let warning = |keys: &str| {
+        let text = format!("{RIGHT}[alert]\n{keys}\n");
+        let config = config::parse(&text, Path::new("site.toml")).unwrap();
+        config.warnings[0].to_string()
+    };
     assert_eq!(
-        config.warnings[0].to_string(),
-        "site.toml:11:19: warning: evacuation_time 960h is longer than outlook 720h: red would be \
+        warning("evacuation_time = \"20d\"\noutlook = \"30d\""),
+        "site.toml:11:19: warning: red looks 960h ahead, further than outlook 720h: red would be \
          called before orange; make outlook several times evacuation_time"
+    );
+    assert_eq!(
+        warning("evacuation_time = \"12h\"\nred_within = \"6h\""),
+        "site.toml:11:19: warning: red_within 6h is shorter than evacuation_time 12h: red would be \
+         called too late; leave red_within out: it is twice evacuation_time then"
     );
 }
 
