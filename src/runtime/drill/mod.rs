@@ -84,7 +84,7 @@ async fn hold(
         }
         tracing::info!("a drill begins");
         record.started = Some(clock::now());
-        match exercise::hold(office, drill, shutdown).await {
+        match Box::pin(exercise::hold(office, drill, shutdown)).await {
             Ok(passed) => record.passes(passed, clock::now()),
             Err(why) => {
                 tracing::error!(why, "the drill failed: an alert might not arrive either");
