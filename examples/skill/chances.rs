@@ -106,7 +106,7 @@ impl Called {
         let days = |span: jiff::SignedDuration| span.as_secs_f64() / 86_400.0;
         let outlook = days(policy.outlook);
         match self {
-            Self::Red => record.chance_within(days(policy.evacuation_time)) >= policy.red_chance,
+            Self::Red => record.chance_within(days(policy.red_within())) >= policy.red_chance,
             Self::Orange => record.chance_within(outlook) >= policy.orange_chance,
             Self::Yellow => record.chance_within(outlook) >= policy.yellow_chance,
         }
@@ -143,7 +143,7 @@ pub(crate) fn share_ever(series: &[&SeriesForecasts], called: Called) -> Option<
 /// The section on levels.
 pub(crate) fn levels_section(out: &mut String, scored: &Scored) {
     let policy = Policy::default();
-    let hours = policy.evacuation_time.as_hours();
+    let hours = policy.red_within().as_hours();
     let days = policy.outlook.as_hours() / 24;
     // Writing to a string cannot fail.
     let _ = writeln!(

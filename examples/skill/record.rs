@@ -8,7 +8,7 @@ use slipwatch::score::{Known, Method, Outcome, is_covered, pit};
 /// A passage is reduced to so many times, each of about the same share of it.
 const MOST_TIMES: u32 = 64;
 /// Chances are given of passing within so many days.
-pub(crate) const HORIZONS_DAYS: [f64; 5] = [0.25, 1.0, 3.0, 10.0, 30.0];
+pub(crate) const HORIZONS_DAYS: [f64; 6] = [0.25, 1.0, 2.0, 3.0, 10.0, 30.0];
 
 /// A series as its records name it.
 #[derive(Debug, Clone)]

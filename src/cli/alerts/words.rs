@@ -86,6 +86,7 @@ fn evidence(alert: &AlertView, clock: &dyn Fn(Timestamp) -> String) -> Vec<Strin
                 velocity_mm_per_day,
                 chance_within_evacuation_time,
                 chance_within_outlook,
+                called,
                 ..
             },
         ..
@@ -102,6 +103,14 @@ fn evidence(alert: &AlertView, clock: &dyn Fn(Timestamp) -> String) -> Vec<Strin
         percent_in_words(*chance_within_evacuation_time),
         percent_in_words(*chance_within_outlook)
     ));
+    if let Some(called) = called {
+        found.push(format!(
+            "chance of collapse by which red is called {} within {:.0} h, red from {}",
+            percent_in_words(called.red.chance),
+            called.red.within_hours,
+            percent_in_words(called.red.at_least)
+        ));
+    }
     found.push(format!(
         "regime {}, unstable with probability {}",
         regime.label,
