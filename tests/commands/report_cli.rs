@@ -52,7 +52,8 @@ fn a_crisis_is_one_page_with_its_figures_levels_search_scorecard_and_sources_and
     assert!(pictures >= 4);
     assert_eq!(page.matches("role=\"img\" aria-label=\"").count(), pictures);
     assert!(page.contains(">E3: residual before the effects<"));
-    // An axis is not drawn around nothing.
+    // What is unlikely is not written as impossible, nor is an axis drawn around nothing.
+    assert!(!page.contains("chance 0.00"));
     assert!(!page.contains("1970-01-01") && !page.contains(">01-01 00:00<"));
     // The levels are those of a replay.
     let replayed = slipwatch(&[&["replay"], &E3[..], &["--format", "json"]].concat());
