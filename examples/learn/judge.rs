@@ -1,8 +1,11 @@
 //! How a network does on slopes of a family that taught it nothing.
 
 use crate::looks::{about_the_end, first, in_two};
+use jiff::SignedDuration;
+use slipwatch::alert::{Policy, to_the_next_reading};
 use slipwatch::fit::Observations;
 use slipwatch::forecast::{Family, GaugeKind, Indicators, Members, Network, Simulated};
+use slipwatch::reading::SECONDS_PER_DAY;
 use slipwatch::score::{Known, METHODS, Outcome, crps_days, is_covered, scored_days};
 use std::collections::BTreeMap;
 
@@ -19,13 +22,9 @@ const CRITICAL: f64 = 1000.0;
 pub(crate) const EVACUATIONS: [f64; 3] = [0.5, 1.0, 3.0];
 /// A slope is to be read so often in an evacuation time.
 const READ: f64 = 4.0;
-/// How many evacuation times red looks ahead, the chances that call red and orange, and the outlook, days.
-const AHEAD: f64 = 2.0;
-pub(crate) const RED: f64 = 0.2;
-pub(crate) const ORANGE: (f64, f64) = (0.5, 30.0);
-/// Chances from which red could be called instead of [`RED`], and the evacuation time for which that is tried, in
+/// Chances from which red could be called instead of the policy's, and the evacuation time for which that is tried, in
 /// [`EVACUATIONS`].
-pub(crate) const CHANCES: [f64; 6] = [0.1, 0.15, RED, 0.3, 0.4, 0.6];
+pub(crate) const CHANCES: [f64; 6] = [0.1, 0.15, 0.2, 0.3, 0.4, 0.6];
 const A_DAY: usize = 1;
 /// Levels stay: another entry within so many days is the same alarm.
 const SAME_ALARM_DAYS: f64 = 3.0;
@@ -188,28 +187,67 @@ fn leads(slope: &Simulated, seed: u64, network: &Network) -> Vec<Lead> {
     judged.collect()
 }
 
-/// How far ahead red looks from a reading: so many evacuation times, and until the next reading is due.
-fn ahead(evacuation: f64, indicators: &Indicators) -> f64 {
-    let span = AHEAD * evacuation;
-    span + indicators.interval_days().min(2.0 * span)
+/// The chances by which levels go after a reading.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Chances {
+    /// By which red is called, for each of [`EVACUATIONS`].
+    red: [f64; EVACUATIONS.len()],
+    /// Within the outlook.
+    pub(crate) outlook: f64,
 }
 
-/// Chances that levels go by, within each span; none where the evidence leaves none that could call a level.
-pub(crate) fn chances(
-    observations: &Observations,
-    network: &Network,
-) -> Option<[f64; EVACUATIONS.len() + 1]> {
-    let indicators = Indicators::of(observations)?;
-    let spans = EVACUATIONS.map(|days| ahead(days, &indicators));
-    let is_quiet = spans.iter().all(|days| indicators.most(*days) < RED);
-    if is_quiet && indicators.most(ORANGE.1) < ORANGE.0 {
-        return Some([0.0; EVACUATIONS.len() + 1]);
+impl Chances {
+    /// By `network`; none where the evidence leaves none that could call a level.
+    pub(crate) fn of(observations: &Observations, network: &Network) -> Option<Self> {
+        let indicators = Indicators::of(observations)?;
+        let policy = Policy::default();
+        let outlook = in_days(policy.outlook);
+        let spans = EVACUATIONS.map(|days| ahead(days, &indicators));
+        let may_be_red = |days: &f64| indicators.most(*days) >= policy.red_chance;
+        if !spans.iter().any(may_be_red) && indicators.most(outlook) < policy.orange_chance {
+            return Some(Self::default());
+        }
+        let found = indicators.collapse_by(network, &Members::of(observations));
+        Some(Self {
+            red: spans.map(|days| found.sure.chance_within(days)),
+            outlook: found.sure.chance_within(outlook),
+        })
     }
-    let found = indicators.collapse_by(network, &Members::of(observations));
-    let within = |index: usize| spans.get(index).copied().unwrap_or(ORANGE.1);
-    Some(std::array::from_fn(|index| {
-        found.sure.chance_within(within(index))
-    }))
+
+    /// The one by which red is called where an evacuation takes a day.
+    pub(crate) fn of_a_day(&self) -> f64 {
+        self.red[A_DAY]
+    }
+
+    /// Whether red is called, for each of [`EVACUATIONS`].
+    fn reds(&self) -> [bool; EVACUATIONS.len()] {
+        self.red
+            .map(|chance| chance >= Policy::default().red_chance)
+    }
+
+    /// Whether red is called where an evacuation takes a day.
+    pub(crate) fn is_red(&self) -> bool {
+        self.reds()[A_DAY]
+    }
+
+    /// Whether orange or red is called there.
+    pub(crate) fn is_orange(&self) -> bool {
+        self.is_red() || self.outlook >= Policy::default().orange_chance
+    }
+}
+
+/// How far ahead red looks from a reading where an evacuation takes so many days: days.
+fn ahead(evacuation: f64, indicators: &Indicators) -> f64 {
+    let policy = Policy {
+        evacuation_time: SignedDuration::from_secs_f64(evacuation * SECONDS_PER_DAY),
+        ..Policy::default()
+    };
+    let interval = indicators.interval_days();
+    in_days(to_the_next_reading(policy.red_within(), interval))
+}
+
+fn in_days(span: SignedDuration) -> f64 {
+    span.as_secs_f64() / SECONDS_PER_DAY
 }
 
 /// One life, asked at each reading, or at so many of them evenly.
@@ -220,24 +258,24 @@ fn replay(slope: &Simulated, network: &Network, most_asked: usize) -> Replay {
     let (mut orange, mut all_years) = (Alarms::default(), 0.0);
     let step = values.len().div_ceil(most_asked);
     for count in (FEWEST..=values.len()).step_by(step) {
-        let Some(chances) = chances(&first(&slope.observations, count), network) else {
+        let Some(chances) = Chances::of(&first(&slope.observations, count), network) else {
             continue;
         };
         let now = values[count - 1].t_days;
         let next = values.get(count - 1 + step);
         let years = next.map_or(0.0, |next| next.t_days - now) / 365.25;
         all_years += years;
-        for (chance, alarms) in chances.iter().zip(&mut reds) {
-            if *chance >= RED {
+        for (is_red, alarms) in chances.reds().into_iter().zip(&mut reds) {
+            if is_red {
                 alarms.add(now, years);
             }
         }
         for (least, alarms) in CHANCES.iter().zip(&mut by_chance) {
-            if chances[A_DAY] >= *least {
+            if chances.of_a_day() >= *least {
                 alarms.add(now, years);
             }
         }
-        if chances[A_DAY] >= RED || chances[EVACUATIONS.len()] >= ORANGE.0 {
+        if chances.is_orange() {
             orange.add(now, years);
         }
     }

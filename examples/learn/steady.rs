@@ -1,6 +1,6 @@
 //! docs/steady-creep.md: steady creep, and a rate that doubles and stays, as loggers read them.
 
-use crate::judge::{FEWEST, ORANGE, RED, chances};
+use crate::judge::{Chances, FEWEST};
 use crate::looks::{first, in_two};
 use crate::source;
 use rand::{Rng, RngExt, SeedableRng};
@@ -124,13 +124,10 @@ fn follow(seed: u64, doubles: bool, network: &Network) -> Called {
         settled: (false, false),
     };
     for count in (begin..=values.len()).step_by(step) {
-        let Some([_, within_a_day, _, within_outlook]) =
-            chances(&first(&observations, count), network)
-        else {
+        let Some(chances) = Chances::of(&first(&observations, count), network) else {
             continue;
         };
-        let is_red = within_a_day >= RED;
-        let is_orange = is_red || within_outlook >= ORANGE.0;
+        let (is_red, is_orange) = (chances.is_red(), chances.is_orange());
         called.ever.0 |= is_red;
         called.ever.1 |= is_orange;
         if values[count - 1].t_days >= settled {

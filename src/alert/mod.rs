@@ -18,5 +18,5 @@ pub use evidence::{AlertCause, AlertEvidence};
 pub use held::Held;
 pub use latch::{Entered, Latch, Transition};
 pub use level::Level;
-pub use policy::{Policy, Threshold};
+pub use policy::{Policy, Threshold, to_the_next_reading};
 pub use rules::Call;

@@ -2,6 +2,7 @@
 
 use super::declared::DeclaredRule;
 use super::level::Level;
+use crate::reading::SECONDS_PER_DAY;
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
 
@@ -49,6 +50,16 @@ pub struct Policy {
 /// Set on simulated slopes: at the same share of collapses called a day before, 0.05 within one evacuation time called red
 /// twice as often on slopes that stand as 0.2 within two.
 const EVACUATIONS_AHEAD: i32 = 2;
+/// The next reading is taken to be no further away than so many of the spans that are counted from it.
+const MOST_INTERVALS: i32 = 2;
+
+/// `span`, counted from the next reading of those that are `interval_days` apart: what this one does not call, that one may,
+/// and people act then.
+pub fn to_the_next_reading(span: SignedDuration, interval_days: f64) -> SignedDuration {
+    let interval = SignedDuration::try_from_secs_f64(interval_days * SECONDS_PER_DAY);
+    let most = span.saturating_mul(MOST_INTERVALS);
+    span.saturating_add(interval.unwrap_or(most).min(most))
+}
 
 impl Policy {
     /// How far ahead red looks.

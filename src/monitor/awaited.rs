@@ -50,7 +50,7 @@ impl Awaited {
     }
 
     /// Those that are awaited.
-    pub(super) fn benchmarks(&self) -> impl Iterator<Item = &BenchmarkId> {
+    pub(super) fn benchmarks(&self) -> impl Iterator<Item = &BenchmarkId> + Clone {
         self.0.keys()
     }
 }

@@ -9,6 +9,7 @@ mod event;
 mod fallen;
 mod given;
 mod history;
+mod in_force;
 mod kept;
 mod measured;
 mod motion;
@@ -49,6 +50,7 @@ use crate::reading::{BenchmarkId, Reading, Sample, Suspicion, Timestamp, Unit};
 use awaited::Awaited;
 use covariates::Covariates;
 use declared::Declarations;
+use in_force::LevelsInForce;
 use jiff::SignedDuration;
 use past::Past;
 use queue::Queue;
@@ -199,6 +201,7 @@ pub struct Monitor {
     sensors: Sensors,
     searches: Vec<SearchJob>,
     site: SiteAlert,
+    in_force: LevelsInForce,
     together: FailureComparisons,
     /// Benchmarks of the config that have given no reading.
     awaited: Awaited,
@@ -228,6 +231,7 @@ impl Monitor {
             sensors: Sensors::default(),
             searches: Vec::new(),
             site: SiteAlert::default(),
+            in_force: LevelsInForce::default(),
             together: FailureComparisons::default(),
             awaited: Awaited::default(),
             late: BTreeSet::new(),
@@ -277,29 +281,9 @@ impl Monitor {
             Input::Trouble { kind, text } => vec![trouble(now, kind, text)],
             Input::Tick => self.pass(now),
         };
-        let is_called = |event: &Event| matches!(event.kind, EventKind::Alert { .. });
-        if events.iter().any(is_called) || matches!(input, Input::Settings(_)) {
-            let levels = self.tracks.iter().map(|(id, track)| (id, track.level()));
-            events.extend(self.site.update(self.settings.site, now, levels));
-        }
-        let is_unknown = |event: &Event| {
-            matches!(
-                event.kind,
-                EventKind::Alert {
-                    level: Level::Unknown,
-                    ..
-                }
-            )
-        };
-        if events.iter().any(is_unknown) || matches!(input, Input::Settings(_)) {
-            let tracks = self.tracks.iter();
-            let unknown = tracks.filter(|(_, track)| track.is_unknown());
-            let unknown: Vec<&BenchmarkId> = unknown
-                .map(|(id, _)| id)
-                .chain(self.awaited.benchmarks())
-                .collect();
-            events.extend(self.site.update_unknown(self.settings.site, now, &unknown));
-        }
+        self.note_levels(input, &events);
+        let of_site = self.site_levels(now, input, &events);
+        events.extend(of_site);
         events.extend(self.compare(now, &events));
         for event in &events {
             self.summary.count(event);

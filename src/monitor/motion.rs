@@ -1,7 +1,8 @@
 //! What the newest rates show by themselves.
 
+use crate::alert::AlertEvidence;
 use crate::fit::{Observations, Rate};
-use crate::reading::Quantity;
+use crate::reading::{Quantity, Timestamp};
 
 /// The line goes through this share of the rates, newest last, and no fewer than [`FEWEST_IN_LINE`].
 const LINE_SHARE: f64 = 0.25;
@@ -61,7 +62,24 @@ pub(super) fn is_new_highest(rates: &[Rate]) -> bool {
     }
 }
 
-pub(super) fn acceleration(rates: &[Rate]) -> Option<f64> {
+/// What `observations` up to `now` and their rates show of the motion.
+pub(super) fn observed(
+    observations: &Observations,
+    rates: &[Rate],
+    now: Timestamp,
+) -> AlertEvidence {
+    let newest = rates.last().map(|rate| rate.velocity);
+    AlertEvidence {
+        now,
+        velocity_mm_per_day: newest.or_else(|| newest_velocity(observations)),
+        settled_velocity_mm_per_day: settled(rates),
+        displacement_mm: displacement_mm(observations),
+        acceleration_mm_per_day2: acceleration(rates),
+        ..AlertEvidence::default()
+    }
+}
+
+fn acceleration(rates: &[Rate]) -> Option<f64> {
     let [.., before, newest] = rates else {
         return None;
     };
@@ -70,7 +88,7 @@ pub(super) fn acceleration(rates: &[Rate]) -> Option<f64> {
 }
 
 /// Displacement since the first reading, mm, where displacement is what is measured.
-pub(super) fn displacement_mm(observations: &Observations) -> Option<f64> {
+fn displacement_mm(observations: &Observations) -> Option<f64> {
     let [first, .., newest] = observations.values.as_slice() else {
         return Some(0.0).filter(|_| observations.quantity == Quantity::Displacement);
     };
@@ -78,7 +96,7 @@ pub(super) fn displacement_mm(observations: &Observations) -> Option<f64> {
 }
 
 /// The velocity that the newest readings show by themselves, mm/day.
-pub(super) fn newest_velocity(observations: &Observations) -> Option<f64> {
+fn newest_velocity(observations: &Observations) -> Option<f64> {
     let values = &observations.values;
     match observations.quantity {
         Quantity::Velocity => values.last().map(|newest| newest.value),

@@ -6,6 +6,7 @@
 use super::awaited::Awaited;
 use super::covariates::Covariates;
 use super::event::Summary;
+use super::in_force::LevelsInForce;
 use super::past::Past;
 use super::queue::Queue;
 use super::search::SearchJob;
@@ -148,6 +149,7 @@ impl Monitor {
         let deadline = |(id, track): (&BenchmarkId, &Track)| Some((track.deadline()?, id.clone()));
         Ok(Self {
             settings: rest.settings,
+            in_force: LevelsInForce::of(&tracks),
             deadlines: tracks.iter().filter_map(deadline).collect(),
             tracks,
             changed: BTreeSet::new(),

@@ -1,6 +1,8 @@
 //! One level for the whole site, from those of its benchmarks.
 
 use super::event::{AlertState, Event, EventKind};
+use super::in_force::LevelsInForce;
+use super::{Input, Monitor};
 use crate::alert::Level;
 use crate::reading::{BenchmarkId, Timestamp};
 use serde::{Deserialize, Serialize};
@@ -18,6 +20,16 @@ pub enum SiteLevel {
     AtLeast(usize),
 }
 
+impl SiteLevel {
+    /// Benchmarks, at least one.
+    fn needed(self) -> usize {
+        match self {
+            Self::Worst => 1,
+            Self::AtLeast(count) => count.max(1),
+        }
+    }
+}
+
 /// The site's level in force.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct SiteAlert {
@@ -29,30 +41,19 @@ pub(super) struct SiteAlert {
 
 impl SiteAlert {
     /// Takes the benchmarks' levels; says how the site's changes.
-    pub(super) fn update<'a>(
+    fn update(
         &mut self,
         rule: Option<SiteLevel>,
         now: Timestamp,
-        levels: impl Iterator<Item = (&'a BenchmarkId, Level)>,
+        in_force: &LevelsInForce,
     ) -> Vec<Event> {
-        let mut levels: Vec<(Level, &BenchmarkId)> = levels
-            .filter(|(_, level)| (Level::Yellow..=Level::Red).contains(level))
-            .map(|(id, level)| (level, id))
-            .collect();
-        levels.sort_by_key(|(level, _)| std::cmp::Reverse(*level));
-        let needed = match rule {
-            Some(SiteLevel::Worst) => 1,
-            Some(SiteLevel::AtLeast(count)) => count.max(1),
-            None => usize::MAX,
-        };
-        let level = levels.get(needed - 1).map(|(level, _)| *level);
+        let level = rule.and_then(|rule| in_force.reached_by(rule.needed()));
         let before = self.in_force;
         if before.map(|(level, _)| level) == level {
             return Vec::new();
         }
         self.in_force = level.map(|level| (level, now));
-        let reach = levels.iter().filter(|(own, _)| Some(*own) >= level);
-        let reach: Vec<&BenchmarkId> = reach.map(|(_, id)| *id).collect();
+        let reach = level.map_or_else(Vec::new, |level| in_force.at_least(level));
         // As at a benchmark: a higher level supersedes the one before it, a lower one follows on its end.
         let fallen = before.filter(|(before, _)| level.is_none_or(|level| level < *before));
         let mut events: Vec<Event> = fallen
@@ -65,38 +66,65 @@ impl SiteAlert {
         );
         events
     }
-}
 
-impl SiteAlert {
     /// Takes the benchmarks of which nothing can be said; says whether that becomes, or ceases to be, true of the
     /// site: where those that are known cannot make its level, or would make a lower one than all together.
-    pub(super) fn update_unknown(
+    fn update_unknown<'a>(
         &mut self,
         rule: Option<SiteLevel>,
         now: Timestamp,
-        unknown: &[&BenchmarkId],
+        unknown: impl Iterator<Item = &'a BenchmarkId> + Clone,
     ) -> Option<Event> {
-        let needed = match rule? {
-            SiteLevel::Worst => 1,
-            SiteLevel::AtLeast(count) => count.max(1),
-        };
-        match (self.unknown, unknown.len() >= needed) {
+        let needed = rule?.needed();
+        let is_unknown = unknown.clone().nth(needed - 1).is_some();
+        match (self.unknown, is_unknown) {
             (None, true) => {
                 self.unknown = Some(now);
-                Some(event(now, Level::Unknown, now, AlertState::Firing, unknown))
-            }
-            (Some(since), false) => {
-                self.unknown = None;
+                let unknown: Vec<&BenchmarkId> = unknown.collect();
                 Some(event(
                     now,
                     Level::Unknown,
-                    since,
-                    AlertState::Resolved,
-                    unknown,
+                    now,
+                    AlertState::Firing,
+                    &unknown,
                 ))
+            }
+            (Some(since), false) => {
+                self.unknown = None;
+                Some(event(now, Level::Unknown, since, AlertState::Resolved, &[]))
             }
             (None, false) | (Some(_), true) => None,
         }
+    }
+}
+
+impl Monitor {
+    /// How the site's level changes, and whether it is unknown, after `events` of benchmarks.
+    pub(super) fn site_levels(
+        &mut self,
+        now: Timestamp,
+        input: &Input,
+        events: &[Event],
+    ) -> Vec<Event> {
+        let rule = self.settings.site;
+        let is_changed = matches!(input, Input::Settings(_));
+        let called = |event: &Event| {
+            let EventKind::Alert { level, .. } = event.kind else {
+                return None;
+            };
+            Some(level)
+        };
+        let levels = || events.iter().filter_map(called);
+        let mut of_site = Vec::new();
+        if is_changed || levels().next().is_some() {
+            of_site.extend(self.site.update(rule, now, &self.in_force));
+        }
+        if is_changed || levels().any(|level| level == Level::Unknown) {
+            let unknown = self.in_force.unknown().iter();
+            let unknown = unknown.chain(self.awaited.benchmarks());
+            of_site.extend(self.site.update_unknown(rule, now, unknown));
+        }
+        of_site
     }
 }
 

@@ -6,6 +6,7 @@
 
 use super::Monitor;
 use super::event::{Event, EventKind, FailureTime, SharedFailure};
+use super::in_force::LevelsInForce;
 use super::kept::KeptForecast;
 use super::track::Track;
 use crate::alert::{Level, Policy};
@@ -27,8 +28,6 @@ const STALE: f64 = 2.0;
 const MOVED: f64 = 0.25;
 /// A benchmark is reported with others from this probability on that it fails with them.
 const BELONGS: f64 = 0.8;
-/// Benchmarks under this level are not compared: forecasts that expect little agree with all others.
-const LEAST: Level = Level::Orange;
 
 /// What has been compared and reported.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -44,7 +43,7 @@ impl FailureComparisons {
         &mut self,
         now: Timestamp,
         policy: &Policy,
-        tracks: &BTreeMap<BenchmarkId, Track>,
+        (tracks, in_force): (&BTreeMap<BenchmarkId, Track>, &LevelsInForce),
         has_changed: bool,
     ) -> Option<Event> {
         let evacuation_days = policy.evacuation_time.as_secs_f64() / SECONDS_PER_DAY;
@@ -52,7 +51,7 @@ impl FailureComparisons {
         if !has_changed && newest.is_some_and(|ago| ago < APART * evacuation_days) {
             return None;
         }
-        let compared = compared(tracks, now, STALE * evacuation_days);
+        let compared = compared(in_force, tracks, now, STALE * evacuation_days);
         if compared.len() < 2 {
             self.kept.clear();
             return self.report(now, Vec::new());
@@ -134,29 +133,24 @@ impl Monitor {
             return None;
         }
         let policy = &self.settings.policy;
-        self.together.update(now, policy, &self.tracks, has_changed)
+        let all = (&self.tracks, &self.in_force);
+        self.together.update(now, policy, all, has_changed)
     }
 }
 
-/// Those at orange or above of which something can be said, the highest levels first.
-fn compared(
+/// Those in alarm of which something can be said now, the highest levels first.
+fn compared<'a>(
+    in_force: &'a LevelsInForce,
     tracks: &BTreeMap<BenchmarkId, Track>,
     now: Timestamp,
     oldest_days: f64,
-) -> Vec<&BenchmarkId> {
-    let is_recent = |track: &Track| {
-        let kept = track.kept_forecast();
+) -> Vec<&'a BenchmarkId> {
+    let is_recent = |id: &&BenchmarkId| {
+        let kept = tracks.get(*id).and_then(Track::kept_forecast);
         kept.is_some_and(|one| days_since(one.time(), now) <= oldest_days)
     };
-    let mut all: Vec<(Level, &BenchmarkId)> = tracks
-        .iter()
-        .filter(|(_, track)| track.level() >= LEAST && !track.is_unknown())
-        .filter(|(_, track)| is_recent(track))
-        .map(|(id, track)| (track.level(), id))
-        .collect();
-    all.sort_by_key(|(level, id)| (std::cmp::Reverse(*level), *id));
-    all.truncate(MOST_COMPARED);
-    let mut ids: Vec<&BenchmarkId> = all.into_iter().map(|(_, id)| id).collect();
+    let recent = in_force.compared().filter(is_recent);
+    let mut ids: Vec<&BenchmarkId> = recent.take(MOST_COMPARED).collect();
     ids.sort();
     ids
 }

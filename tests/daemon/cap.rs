@@ -71,6 +71,22 @@ fn alert(benchmark: &str, level: Level, (state, status): (AlertState, Status)) -
     Alert::new(&event, "Monte \"Toc\" <&>", None, status).unwrap()
 }
 
+/// Readings that came late would have called another level than `red` did.
+fn corrected(red: &Alert) -> Alert {
+    let event = Event {
+        time: "2017-06-06T18:00:00Z".parse().unwrap(),
+        benchmark: red.event.benchmark.clone(),
+        kind: EventKind::Correction {
+            since: red.event.time,
+            level_then: Level::Red,
+            level_now: Level::Orange,
+            alerts: vec![red.key.clone()],
+            text: "orange & not red".to_owned(),
+        },
+    };
+    Alert::new(&event, "Monte \"Toc\" <&>", None, Status::Exercise).unwrap()
+}
+
 /// Writes it; returns the message as text, or none where no file came.
 async fn written(folder: &Path, hook: &HookConfig, alert: &Alert) -> Option<String> {
     let files = || -> BTreeSet<_> {
@@ -212,20 +228,23 @@ async fn a_message_has_what_the_schema_asks_for_and_any_text_in_it() {
 async fn every_message_is_valid_by_the_schema_of_oasis() {
     let (folder, hook) = folder();
     let (firing, resolved) = (AlertState::Firing, AlertState::Resolved);
-    for (level, state) in [
+    let called = [
         (Level::Unknown, firing),
         (Level::Yellow, firing),
         (Level::Orange, firing),
         (Level::Red, firing),
-        (Level::Red, resolved),
-    ] {
-        let alert = alert("<5>", level, (state, Status::Exercise));
-        let message = written(folder.path(), &hook, &alert).await.unwrap();
+    ];
+    let called = called.map(|(level, state)| alert("<5>", level, (state, Status::Exercise)));
+    let corrected = corrected(&called[3]);
+    let end = alert("<5>", Level::Red, (resolved, Status::Exercise));
+    for alert in called.iter().chain([&corrected, &end]) {
+        let message = written(folder.path(), &hook, alert).await.unwrap();
         let file = folder.path().join("message.xml");
         fs::write(&file, message).unwrap();
+        let schema = option_env!("SLIPWATCH_CAP_SCHEMA");
         let done = Command::new("xmllint")
             .args(["--noout", "--nonet", "--schema"])
-            .arg(std::env::var_os("SLIPWATCH_CAP_SCHEMA").unwrap())
+            .arg(schema.expect("what the build found"))
             .arg(&file)
             .output()
             .unwrap();

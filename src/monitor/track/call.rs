@@ -1,41 +1,17 @@
 //! From a refit to the level in force, and the words for it.
 
-use super::forecast::Forecast;
+use super::forecast::{Forecast, LookAhead};
 use super::{Track, days};
 use crate::alert::{AlertCause, AlertEvidence, Entered, Policy, Transition, chance_in_words};
 use crate::fit::Rate;
 use crate::forecast::HORIZON_DAYS;
 use crate::monitor::event::{AlertState, CalledLevel, Event, EventKind, LevelChance};
-use crate::monitor::motion::{
-    acceleration, displacement_mm, moves_backwards, newest_velocity, settled,
-};
+use crate::monitor::motion::{moves_backwards, observed, settled};
 use crate::reading::Timestamp;
 use jiff::SignedDuration;
 
 /// The early quantile of the time of collapse that rules may ask for, as reported.
 pub(super) const EARLY: f64 = 0.05;
-
-/// How far ahead red, and orange and yellow, look from the newest reading.
-#[derive(Debug, Clone, Copy)]
-struct LookAhead {
-    red: SignedDuration,
-    orange: SignedDuration,
-}
-
-impl LookAhead {
-    fn of(policy: &Policy, forecast: Option<&Forecast>) -> Self {
-        forecast.map_or(
-            Self {
-                red: policy.red_within(),
-                orange: policy.outlook,
-            },
-            |forecast| Self {
-                red: forecast.to_the_next_reading(policy.red_within()),
-                orange: forecast.reach(policy),
-            },
-        )
-    }
-}
 
 impl Track {
     /// The level that follows from the evidence; the refit among the events in `refit` gets what it calls for.
@@ -46,16 +22,11 @@ impl Track {
         forecast: Option<&Forecast>,
         refit: &mut [Event],
     ) -> Vec<Event> {
-        let within = |span| forecast.map(|forecast| forecast.chance_within(days(span)));
         let ahead = LookAhead::of(policy, forecast);
         let rates = forecast.map_or(&[][..], |forecast| &forecast.plain.rates);
         let look = self.look.filter(|(until, _)| time < *until);
-        let mut evidence = AlertEvidence {
-            chance_for_red: within(ahead.red),
-            chance_within_outlook: within(ahead.orange),
-            causes: look.map(|(_, cause)| cause).into_iter().collect(),
-            ..self.observed(time, rates)
-        };
+        let mut evidence = ahead.evidence(policy, forecast, self.observed(time, rates));
+        evidence.causes = look.map(|(_, cause)| cause).into_iter().collect();
         let mut events: Vec<Event> = Vec::new();
         // Until it moves forward again: one reading more or less does not change the matter.
         let still = self.backwards && settled(rates).is_some_and(|velocity| velocity < 0.0);
@@ -71,12 +42,6 @@ impl Track {
             self.look_until(policy, time, AlertCause::MovesBackwards);
             evidence.causes.push(AlertCause::MovesBackwards);
         }
-        let chances = policy.spans().filter_map(|span| {
-            let forecast = forecast?;
-            let chance = forecast.chance_within(days(forecast.to_the_next_reading(span)));
-            Some((span, chance))
-        });
-        evidence.chances = chances.collect();
         evidence.early_quantile_days = forecast.and_then(|forecast| {
             let outlook = forecast.in_force(days(policy.outlook));
             outlook.collapse.quantile(EARLY, HORIZON_DAYS)
@@ -157,17 +122,9 @@ impl Track {
 
     /// What the readings show by themselves.
     fn observed(&self, time: Timestamp, rates: &[Rate]) -> AlertEvidence {
-        let shown = &self.history.observations;
         AlertEvidence {
-            now: time,
-            velocity_mm_per_day: rates
-                .last()
-                .map_or_else(|| newest_velocity(shown), |rate| Some(rate.velocity)),
-            settled_velocity_mm_per_day: settled(rates),
-            displacement_mm: displacement_mm(shown),
-            acceleration_mm_per_day2: acceleration(rates),
             has_effect: self.watch.has_effect(),
-            ..AlertEvidence::default()
+            ..observed(&self.history.observations, rates, time)
         }
     }
 

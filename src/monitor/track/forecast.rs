@@ -1,15 +1,13 @@
 //! What one benchmark is forecast to do: by the law without a known load, and by that under the known load beside it.
 
 use super::days;
-use crate::alert::Policy;
+use crate::alert::{AlertEvidence, Policy, to_the_next_reading};
 use crate::forecast::{Outlook, Passage};
 use crate::reading::SECONDS_PER_DAY;
 use jiff::SignedDuration;
 
 /// A forecast is the slope's for so many lengths of its record; further ahead it is the prior's, and calls no level.
 const REACH: f64 = 5.0;
-/// A span that is asked for is counted from the next reading, which is taken to be no further away than so many spans.
-const MOST_INTERVALS: f64 = 2.0;
 
 /// The forecasts after one reading.
 #[derive(Debug)]
@@ -58,9 +56,8 @@ impl Forecast {
         }
     }
 
-    /// A span, counted from the next reading: what this one does not call, that one may, and people act then.
-    pub(super) fn to_the_next_reading(&self, span: SignedDuration) -> SignedDuration {
-        to_the_next_reading(&self.plain, span)
+    fn to_the_next_reading(&self, span: SignedDuration) -> SignedDuration {
+        to_the_next_reading(span, self.plain.interval_days)
     }
 
     /// Chance of a collapse within `days`, as the level takes it: what the law under the known load does not explain, it cannot
@@ -90,10 +87,44 @@ impl Forecast {
     }
 }
 
-/// See [`Forecast::to_the_next_reading`].
-pub(super) fn to_the_next_reading(outlook: &Outlook, span: SignedDuration) -> SignedDuration {
-    let most = MOST_INTERVALS * days(span);
-    let interval = outlook.interval_days.min(most) * SECONDS_PER_DAY;
-    let interval = SignedDuration::try_from_secs_f64(interval).unwrap_or_default();
-    span.saturating_add(interval)
+/// How far ahead red, and orange and yellow, look from the newest reading.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LookAhead {
+    pub(super) red: SignedDuration,
+    pub(super) orange: SignedDuration,
+}
+
+impl LookAhead {
+    pub(super) fn of(policy: &Policy, forecast: Option<&Forecast>) -> Self {
+        forecast.map_or(
+            Self {
+                red: policy.red_within(),
+                orange: policy.outlook,
+            },
+            |forecast| Self {
+                red: forecast.to_the_next_reading(policy.red_within()),
+                orange: forecast.reach(policy),
+            },
+        )
+    }
+
+    /// `observed` with the chances that the rules ask for; without a forecast none.
+    pub(super) fn evidence(
+        self,
+        policy: &Policy,
+        forecast: Option<&Forecast>,
+        observed: AlertEvidence,
+    ) -> AlertEvidence {
+        let within = |span| forecast.map(|forecast| forecast.chance_within(days(span)));
+        let chances = policy.spans().filter_map(|span| {
+            let forecast = forecast?;
+            Some((span, within(forecast.to_the_next_reading(span))?))
+        });
+        AlertEvidence {
+            chance_for_red: within(self.red),
+            chance_within_outlook: within(self.orange),
+            chances: chances.collect(),
+            ..observed
+        }
+    }
 }

@@ -1,13 +1,13 @@
 //! Looking back after late readings: would another level have been called?
 
-use super::forecast::to_the_next_reading;
-use super::{Track, days};
+use super::Track;
+use super::forecast::{Forecast, LookAhead};
 use crate::alert::{AlertEvidence, Held, Latch, Level, Policy};
 use crate::fit::Observations;
 use crate::forecast::LawForecaster;
 use crate::monitor::event::{Event, EventKind};
 use crate::monitor::history::History;
-use crate::monitor::motion::{acceleration, displacement_mm, newest_velocity, settled};
+use crate::monitor::motion::observed;
 use crate::reading::Timestamp;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
@@ -152,27 +152,12 @@ fn highest(
 fn evidence(policy: &Policy, observations: &Observations, now: Timestamp) -> AlertEvidence {
     let outlook =
         LawForecaster::default().update(observations, policy.critical_velocity_mm_per_day);
-    let rates = outlook.as_ref().map_or(&[][..], |outlook| &outlook.rates);
-    let within = |span| Some(outlook.as_ref()?.chances.chance_within(days(span)));
-    let red_within = policy.red_within();
-    let ahead = outlook.as_ref().map_or(red_within, |outlook| {
-        to_the_next_reading(outlook, red_within)
+    let forecast = outlook.map(|plain| Forecast {
+        plain,
+        known_load: None,
     });
-    let chance = |span| {
-        let outlook = outlook.as_ref()?;
-        Some((span, within(to_the_next_reading(outlook, span))?))
-    };
-    AlertEvidence {
-        now,
-        chances: policy.spans().filter_map(chance).collect(),
-        chance_for_red: within(ahead),
-        chance_within_outlook: within(policy.outlook),
-        velocity_mm_per_day: rates
-            .last()
-            .map_or_else(|| newest_velocity(observations), |rate| Some(rate.velocity)),
-        settled_velocity_mm_per_day: settled(rates),
-        displacement_mm: displacement_mm(observations),
-        acceleration_mm_per_day2: acceleration(rates),
-        ..AlertEvidence::default()
-    }
+    let forecast = forecast.as_ref();
+    let rates = forecast.map_or(&[][..], |forecast| &forecast.plain.rates);
+    let observed = observed(observations, rates, now);
+    LookAhead::of(policy, forecast).evidence(policy, forecast, observed)
 }
