@@ -58,14 +58,17 @@ impl Monitor {
                 };
                 let policy = self.settings.policy(benchmark);
                 let next = Some((source, reading));
-                due.push((
-                    benchmark,
-                    Due {
-                        track,
-                        policy,
-                        next,
-                    },
-                ));
+                // A thread costs more than to take what is not judged.
+                if track.may_judge(policy, reading.time, self.phase(reading.time)) {
+                    due.push((
+                        benchmark,
+                        Due {
+                            track,
+                            policy,
+                            next,
+                        },
+                    ));
+                }
             }
         }
         // Nobody else could work beside one.
@@ -78,6 +81,9 @@ impl Monitor {
 
     /// Computes what the next [`super::Notice::BatchEnd`] judges of what queued. Changes no event.
     pub fn prepare_queued(&mut self, workers: &dyn Workers) {
+        if self.reads_past() {
+            return;
+        }
         let queued = self.queue.next();
         let due = queued.filter_map(|benchmark| {
             let track = self.tracks.get(benchmark)?;

@@ -1,11 +1,11 @@
 //! Forecasts that are computed before the reading they rest on is taken.
 
 use super::super::history::{MeasuredAs, Taken};
-use super::{StepContext, Track};
+use super::{Phase, StepContext, Track};
 use crate::alert::Policy;
 use crate::fit::{Ensemble, Observations};
 use crate::forecast::{self, Outlook};
-use crate::reading::Reading;
+use crate::reading::{Reading, Timestamp};
 
 type ComputedOutlook = Option<(Outlook, Option<Ensemble>)>;
 
@@ -37,6 +37,16 @@ impl Prepared {
 }
 
 impl Track {
+    /// Whether a reading of `time` is judged when it is taken, if it is the newest.
+    pub(in crate::monitor) fn may_judge(
+        &self,
+        policy: &Policy,
+        time: Timestamp,
+        phase: Phase,
+    ) -> bool {
+        !phase.is_past && (!phase.is_queue || self.is_long_queued(policy, time))
+    }
+
     /// Computes what a refit after `next`, or after the newest reading, will need; nothing where no refit is to be expected.
     pub(in crate::monitor) fn prepare(
         &self,
@@ -45,17 +55,11 @@ impl Track {
         context: &StepContext<'_>,
     ) -> Prepared {
         let mut prepared = Prepared::default();
-        if context.phase.is_past {
-            return prepared;
-        }
         let critical = policy.critical_velocity_mm_per_day;
         let Some((source, reading)) = next else {
             self.prepare_from(&self.history, critical, context, &mut prepared);
             return prepared;
         };
-        if context.phase.is_queue && !self.is_long_queued(policy, reading.time) {
-            return prepared;
-        }
         let mut history = self.history.clone();
         let is_newest = history.take(source, reading) == Taken::Newest;
         if is_newest && self.awaits_refit(policy, reading.time, &history.observations) {
