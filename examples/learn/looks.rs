@@ -15,6 +15,9 @@ const AFTER: usize = 2;
 const ANYWHERE: usize = 4;
 /// Of so many more looks anywhere, so many are kept in which an acceleration is the likeliest.
 const LIKELIEST: (usize, usize) = (16, 3);
+/// The share of looks that know no more than the newest readings, the logarithm of whose number is even: a slope is watched for
+/// days as well as for years, and its record is no longer because it stands.
+const CUT: f64 = 0.4;
 /// Looks before an end reach back so far, days.
 const FARTHEST_DAYS: f64 = 60.0;
 /// The shortest lead, days.
@@ -174,8 +177,22 @@ pub(crate) fn first(observations: &Observations, count: usize) -> Observations {
     }
 }
 
+/// The first `count` observations, or, in [`CUT`] of all cases, the newest of these alone.
+fn newest(observations: &Observations, (seed, count): (u64, usize)) -> Observations {
+    let mut known = first(observations, count);
+    let index = seed.wrapping_mul(0x9E37_79B9).wrapping_add(count as u64);
+    let mut generator = Pcg64::seed_from_u64(index);
+    if generator.random::<f64>() < CUT && count > FEWEST {
+        let share = (FEWEST as f64 / count as f64).powf(generator.random::<f64>());
+        #[expect(clippy::cast_sign_loss, reason = "a share of a count")]
+        let kept = (share * count as f64).round() as usize;
+        known.values.drain(..count - kept.clamp(FEWEST, count));
+    }
+    known
+}
+
 fn look(slope: &Simulated, seed: u64, count: usize) -> Option<Look> {
-    let known = first(&slope.observations, count);
+    let known = newest(&slope.observations, (seed, count));
     let now = known.values.last()?.t_days;
     let left_days = slope.collapse_days.unwrap_or(slope.end_days) - now;
     if left_days <= 0.0 {

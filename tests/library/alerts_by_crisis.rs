@@ -40,8 +40,9 @@ fn called(events: &[Event], wanted: Level) -> usize {
 /// Hours at a level, from the first reading to the last.
 fn hours(stretches: &[LevelStretch], level: Level) -> f64 {
     let own = stretches.iter().filter(|one| one.level == level);
-    own.map(|one| one.to.duration_since(one.from).as_secs_f64() / 3600.0)
-        .sum()
+    let each = own.map(|one| one.to.duration_since(one.from).as_secs_f64() / 3600.0);
+    // A sum of nothing is -0.
+    each.fold(0.0, |sum, hours| sum + hours)
 }
 
 /// One benchmark's row.

@@ -16,10 +16,11 @@ const DURATIONS: (f64, f64) = (0.3, 600.0);
 /// of that.
 const GROWTH: (f64, f64) = (8.0, 300.0);
 const MOST_GROWTH: (f64, f64) = (100.0, 4000.0);
-/// Readings of an acceleration, and of a whole life, at most.
-const MOST_READINGS: (f64, f64) = (2500.0, 5500.0);
+/// Readings of an acceleration, and of a whole life, at most. So many that how often a slope is read does not say how long it takes:
+/// with 2,500 of them whatever was read each minute collapsed within two days, and a network learnt that.
+const MOST_READINGS: (f64, f64) = (40_000.0, 60_000.0);
 /// Lives of slopes that stand: readings, and days.
-const STANDING_READINGS: (f64, f64) = (60.0, 6000.0);
+const STANDING_READINGS: (f64, f64) = (60.0, 60_000.0);
 const STANDING_DAYS: (f64, f64) = (4.0, 1500.0);
 /// Alpha within this of 1 is an exponential.
 const EXPONENTIAL: f64 = 0.02;
