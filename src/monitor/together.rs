@@ -43,7 +43,8 @@ impl FailureComparisons {
         &mut self,
         now: Timestamp,
         policy: &Policy,
-        (tracks, in_force): (&BTreeMap<BenchmarkId, Track>, &LevelsInForce),
+        tracks: &BTreeMap<BenchmarkId, Track>,
+        in_force: &LevelsInForce,
         has_changed: bool,
     ) -> Option<Event> {
         let evacuation_days = policy.evacuation_time.as_secs_f64() / SECONDS_PER_DAY;
@@ -133,8 +134,9 @@ impl Monitor {
             return None;
         }
         let policy = &self.settings.policy;
-        let all = (&self.tracks, &self.in_force);
-        self.together.update(now, policy, all, has_changed)
+        let (tracks, in_force) = (&self.tracks, &self.in_force);
+        let together = &mut self.together;
+        together.update(now, policy, tracks, in_force, has_changed)
     }
 }
 
