@@ -2,10 +2,10 @@
 
 use crate::looks::{about_the_end, first, in_two};
 use jiff::SignedDuration;
-use slipwatch::alert::{Policy, to_the_next_reading};
+use slipwatch::alert::{AlertEvidence, Held, Level, Policy, to_the_next_reading};
 use slipwatch::fit::Observations;
 use slipwatch::forecast::{Family, GaugeKind, Indicators, Members, Network, Simulated};
-use slipwatch::reading::SECONDS_PER_DAY;
+use slipwatch::reading::{SECONDS_PER_DAY, Timestamp, after_days};
 use slipwatch::score::{Known, METHODS, Outcome, crps_days, is_covered, scored_days};
 use std::collections::BTreeMap;
 
@@ -124,10 +124,10 @@ pub(crate) fn family(family: Family, network: &Network) -> Judged {
 /// Samplings of years, with the years of each family, and how often a year is looked at, at most.
 pub(crate) const YEARS: [(f64, &str, u64); 3] = [
     (1.0 / 144.0, "10 min", 2),
-    (1.0 / 24.0, "1 h", 10),
+    (1.0 / 24.0, "1 h", 6),
     (1.0, "1 d", 60),
 ];
-const LOOKS_A_YEAR: usize = 1461;
+const LOOKS_A_YEAR: usize = 4384;
 
 /// Years of slopes of a family that stands, for each of [`YEARS`].
 pub(crate) fn years(family: Family, network: &Network) -> Vec<Vec<Replay>> {
@@ -203,7 +203,7 @@ impl Chances {
         let policy = Policy::default();
         let outlook = in_days(policy.outlook);
         let spans = EVACUATIONS.map(|days| ahead(days, &indicators));
-        let may_be_red = |days: &f64| indicators.most(*days) >= policy.red_chance;
+        let may_be_red = |days: &f64| indicators.most(*days) >= CHANCES[0];
         if !spans.iter().any(may_be_red) && indicators.most(outlook) < policy.orange_chance {
             return Some(Self::default());
         }
@@ -213,37 +213,62 @@ impl Chances {
             outlook: found.sure.chance_within(outlook),
         })
     }
+}
 
-    /// The one by which red is called where an evacuation takes a day.
-    pub(crate) fn of_a_day(&self) -> f64 {
-        self.red[A_DAY]
+/// The levels of a life by one policy, without its latch.
+#[derive(Debug)]
+pub(crate) struct Calls {
+    policy: Policy,
+    /// In [`EVACUATIONS`].
+    evacuation: usize,
+    held: Held,
+}
+
+impl Calls {
+    /// By the default policy where an evacuation takes a day.
+    pub(crate) fn of_a_day() -> Self {
+        Self::with(A_DAY, Policy::default().red_chance)
     }
 
-    /// Whether red is called, for each of [`EVACUATIONS`].
-    fn reds(&self) -> [bool; EVACUATIONS.len()] {
-        self.red
-            .map(|chance| chance >= Policy::default().red_chance)
+    fn with(evacuation: usize, red_chance: f64) -> Self {
+        Self {
+            policy: Policy {
+                red_chance,
+                ..policy(EVACUATIONS[evacuation])
+            },
+            evacuation,
+            held: Held::default(),
+        }
     }
 
-    /// Whether red is called where an evacuation takes a day.
-    pub(crate) fn is_red(&self) -> bool {
-        self.reds()[A_DAY]
+    /// What the chances after the reading of a day call.
+    pub(crate) fn level(&mut self, now_days: f64, chances: &Chances) -> Level {
+        let mut evidence = AlertEvidence {
+            now: after_days(Timestamp::UNIX_EPOCH, now_days).unwrap_or_default(),
+            chance_for_red: Some(chances.red[self.evacuation]),
+            chance_within_outlook: Some(chances.outlook),
+            ..AlertEvidence::default()
+        };
+        self.held.update(&self.policy, &mut evidence);
+        self.policy.call(&evidence).level
     }
+}
 
-    /// Whether orange or red is called there.
-    pub(crate) fn is_orange(&self) -> bool {
-        self.is_red() || self.outlook >= Policy::default().orange_chance
+/// The default one but for the evacuation time, days.
+fn policy(evacuation: f64) -> Policy {
+    Policy {
+        evacuation_time: SignedDuration::from_secs_f64(evacuation * SECONDS_PER_DAY),
+        ..Policy::default()
     }
 }
 
 /// How far ahead red looks from a reading where an evacuation takes so many days: days.
 fn ahead(evacuation: f64, indicators: &Indicators) -> f64 {
-    let policy = Policy {
-        evacuation_time: SignedDuration::from_secs_f64(evacuation * SECONDS_PER_DAY),
-        ..Policy::default()
-    };
     let interval = indicators.interval_days();
-    in_days(to_the_next_reading(policy.red_within(), interval))
+    in_days(to_the_next_reading(
+        policy(evacuation).red_within(),
+        interval,
+    ))
 }
 
 fn in_days(span: SignedDuration) -> f64 {
@@ -253,8 +278,11 @@ fn in_days(span: SignedDuration) -> f64 {
 /// One life, asked at each reading, or at so many of them evenly.
 fn replay(slope: &Simulated, network: &Network, most_asked: usize) -> Replay {
     let values = &slope.observations.values;
-    let mut reds: [Alarms; EVACUATIONS.len()] = Default::default();
-    let mut by_chance: [Alarms; CHANCES.len()] = Default::default();
+    let red_chance = Policy::default().red_chance;
+    let mut reds: [(Calls, Alarms); EVACUATIONS.len()] =
+        std::array::from_fn(|index| (Calls::with(index, red_chance), Alarms::default()));
+    let mut by_chance =
+        CHANCES.map(|red_chance| (Calls::with(A_DAY, red_chance), Alarms::default()));
     let (mut orange, mut all_years) = (Alarms::default(), 0.0);
     let step = values.len().div_ceil(most_asked);
     for count in (FEWEST..=values.len()).step_by(step) {
@@ -265,20 +293,25 @@ fn replay(slope: &Simulated, network: &Network, most_asked: usize) -> Replay {
         let next = values.get(count - 1 + step);
         let years = next.map_or(0.0, |next| next.t_days - now) / 365.25;
         all_years += years;
-        for (is_red, alarms) in chances.reds().into_iter().zip(&mut reds) {
-            if is_red {
+        let mut add = |(calls, alarms): &mut (Calls, Alarms)| {
+            let level = calls.level(now, &chances);
+            if level == Level::Red {
                 alarms.add(now, years);
             }
+            level
+        };
+        let levels = reds.each_mut().map(&mut add);
+        for one in &mut by_chance {
+            add(one);
         }
-        for (least, alarms) in CHANCES.iter().zip(&mut by_chance) {
-            if chances.of_a_day() >= *least {
-                alarms.add(now, years);
-            }
-        }
-        if chances.is_orange() {
+        if levels[A_DAY] >= Level::Orange {
             orange.add(now, years);
         }
     }
+    let (reds, by_chance) = (
+        reds.map(|(_, alarms)| alarms),
+        by_chance.map(|(_, alarms)| alarms),
+    );
     let in_time = std::array::from_fn(|index| reds[index].in_time(slope, EVACUATIONS[index]));
     let in_time_by_chance =
         std::array::from_fn(|index| by_chance[index].in_time(slope, EVACUATIONS[A_DAY]));

@@ -1,11 +1,12 @@
 //! docs/steady-creep.md: steady creep, and a rate that doubles and stays, as loggers read them.
 
-use crate::judge::{Chances, FEWEST};
+use crate::judge::{Calls, Chances, FEWEST};
 use crate::looks::{first, in_two};
 use crate::source;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
+use slipwatch::alert::Level;
 use slipwatch::fit::Observations;
 use slipwatch::forecast::Network;
 use std::fmt::Write as _;
@@ -123,11 +124,13 @@ fn follow(seed: u64, doubles: bool, network: &Network) -> Called {
         ever: (false, false),
         settled: (false, false),
     };
+    let mut calls = Calls::of_a_day();
     for count in (begin..=values.len()).step_by(step) {
         let Some(chances) = Chances::of(&first(&observations, count), network) else {
             continue;
         };
-        let (is_red, is_orange) = (chances.is_red(), chances.is_orange());
+        let level = calls.level(values[count - 1].t_days, &chances);
+        let (is_red, is_orange) = (level == Level::Red, level >= Level::Orange);
         called.ever.0 |= is_red;
         called.ever.1 |= is_orange;
         if values[count - 1].t_days >= settled {

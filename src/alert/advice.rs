@@ -43,10 +43,13 @@ impl Policy {
                 self.critical_velocity_mm_per_day
             ),
             ("chance-within-evacuation-time", _) => format!(
-                "chance of collapse of {} or more within {} ({} h) and until the next reading",
+                "chance of collapse of {} or more within {} ({} h) and until the next reading, at every reading of {:#}, \
+                 or of {} at one",
                 self.red_chance,
                 self.red_within_in_words(),
-                hours(self.red_within())
+                hours(self.red_within()),
+                self.red_held_for(),
+                self.red_at_once()
             ),
             ("chance-within-outlook", level) => {
                 let chance = if level == Level::Yellow {
@@ -90,7 +93,8 @@ mod tests {
         let condition = |rule, level| policy.condition(rule, level).unwrap();
         assert_eq!(
             condition("chance-within-evacuation-time", Level::Red),
-            "chance of collapse of 0.2 or more within twice the evacuation time (48 h) and until the next reading"
+            "chance of collapse of 0.2 or more within twice the evacuation time (48 h) and until the next reading, at every \
+             reading of 2h, or of 0.5 at one"
         );
         let outlook = |level| condition("chance-within-outlook", level);
         assert!(outlook(Level::Orange).contains("of 0.5 or more within the outlook of 720 h"));

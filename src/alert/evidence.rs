@@ -11,7 +11,9 @@ pub struct AlertEvidence {
     pub now: Timestamp,
     /// Chance of a collapse within [`super::Policy::red_within`] of the next reading, where there is a forecast.
     pub chance_for_red: Option<f64>,
-    /// The same within the outlook.
+    /// Whether that chance was under what calls red not long ago, and is not so large that it calls red at once.
+    pub is_red_pending: bool,
+    /// The chance within the outlook.
     pub chance_within_outlook: Option<f64>,
     /// Latest observed velocity, mm/day; `None` before the second reading.
     pub velocity_mm_per_day: Option<f64>,

@@ -1,8 +1,9 @@
-//! Which declared rules are due: since when their conditions have held.
+//! Which rules are due that ask for some time: since when their conditions have held.
 
 use super::declared::{Condition, DeclaredRule, PREFIX};
 use super::evidence::AlertEvidence;
 use super::policy::Policy;
+use super::rules::RED_CHANCE;
 use crate::reading::Timestamp;
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
@@ -50,43 +51,64 @@ impl Policy {
     }
 }
 
-/// Since when the conditions of each declared rule have held at every reading, by name.
+/// Since when conditions have held at every reading.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Held(BTreeMap<String, Timestamp>);
+pub struct Held {
+    /// Of each declared rule, by name.
+    #[serde(default)]
+    rules: BTreeMap<String, Timestamp>,
+    /// The newest reading at which the chance was under what calls red.
+    #[serde(default)]
+    under_red: Option<Timestamp>,
+}
 
 impl Held {
-    /// Whether nothing holds.
-    pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
-    }
-
     /// The rules whose conditions hold, and have not held for long enough yet.
     pub fn pending(&self, policy: &Policy, evidence: &AlertEvidence) -> Vec<String> {
         let is_pending = |(index, rule): &(usize, &DeclaredRule)| {
-            self.0.contains_key(&rule.name) && !evidence.due.contains(index)
+            self.rules.contains_key(&rule.name) && !evidence.due.contains(index)
         };
         let rules = policy.rules.iter().enumerate().filter(is_pending);
-        rules.map(|(_, rule)| rule.id()).collect()
+        let red = evidence.is_red_pending.then(|| RED_CHANCE.to_owned());
+        red.into_iter()
+            .chain(rules.map(|(_, rule)| rule.id()))
+            .collect()
     }
 
     /// Takes the evidence of one reading and notes in it which rules have held for long enough.
     pub fn update(&mut self, policy: &Policy, evidence: &mut AlertEvidence) {
-        self.0
+        self.update_red(policy, evidence);
+        self.rules
             .retain(|name, _| policy.rules.iter().any(|rule| rule.name == *name));
         for (index, rule) in policy.rules.iter().enumerate() {
             match rule.holds(evidence) {
                 Some(true) => {
-                    let since = *self.0.entry(rule.name.clone()).or_insert(evidence.now);
+                    let since = *self.rules.entry(rule.name.clone()).or_insert(evidence.now);
                     if evidence.now.duration_since(since) >= rule.lasting {
                         evidence.due.push(index);
                     }
                 }
                 Some(false) => {
-                    self.0.remove(&rule.name);
+                    self.rules.remove(&rule.name);
                 }
                 None => {}
             }
         }
+    }
+
+    /// A chance that one reading alone gives calls no red: where readings come often, each is one more chance to be wrong.
+    fn update_red(&mut self, policy: &Policy, evidence: &mut AlertEvidence) {
+        let Some(chance) = evidence.chance_for_red else {
+            return;
+        };
+        if chance < policy.red_chance {
+            self.under_red = Some(evidence.now);
+            return;
+        }
+        let is_new = self
+            .under_red
+            .is_some_and(|under| evidence.now.duration_since(under) <= policy.red_held_for());
+        evidence.is_red_pending = is_new && chance < policy.red_at_once();
     }
 }
 
@@ -183,6 +205,33 @@ mod tests {
             let one = evidence(hours, velocity, chance);
             assert_eq!(called(&policy, &mut held, one).0, level, "{hours}");
         }
+    }
+
+    #[test]
+    fn a_chance_calls_red_once_it_has_held_a_twelfth_of_the_evacuation_time_or_is_large() {
+        let policy = Policy::default();
+        let mut held = Held::default();
+        let mut level = |minutes: i64, chance: f64| {
+            let mut one = AlertEvidence {
+                now: Timestamp::UNIX_EPOCH + minutes.minutes(),
+                chance_for_red: Some(chance),
+                ..AlertEvidence::default()
+            };
+            held.update(&policy, &mut one);
+            let pending = held.pending(&policy, &one);
+            (policy.call(&one).level, pending.len())
+        };
+        // Nothing lower is known of: the first reading is believed.
+        assert_eq!(level(0, 0.3), (Level::Red, 0));
+        assert_eq!(level(10, 0.1), (Level::Green, 0));
+        assert_eq!(level(20, 0.3), (Level::Green, 1));
+        assert_eq!(level(130, 0.3), (Level::Green, 1));
+        assert_eq!(level(131, 0.3), (Level::Red, 0));
+        assert_eq!(level(200, 0.1), (Level::Green, 0));
+        assert_eq!(level(210, 0.5), (Level::Red, 0));
+        // Readings that are further apart have no others between them.
+        assert_eq!(level(1000, 0.1), (Level::Green, 0));
+        assert_eq!(level(2440, 0.2), (Level::Red, 0));
     }
 
     #[test]

@@ -50,6 +50,11 @@ pub struct Policy {
 /// Set on simulated slopes: at the same share of collapses called a day before, 0.05 within one evacuation time called red
 /// twice as often on slopes that stand as 0.2 within two.
 const EVACUATIONS_AHEAD: i32 = 2;
+/// A chance that calls red must have held at every reading of this part of the evacuation time, unless it is so many times as
+/// large. Set on simulated slopes, looked at each hour: a quarter fewer reds on those that stand; of those that fail two in a
+/// hundred are called that part of the time too late.
+const HELD_PART: i32 = 12;
+const TIMES_AS_LARGE: f64 = 2.5;
 /// The next reading is taken to be no further away than so many of the spans that are counted from it.
 const MOST_INTERVALS: i32 = 2;
 
@@ -68,7 +73,17 @@ impl Policy {
         self.red_within.unwrap_or(twice)
     }
 
-    /// The same in words.
+    /// How long a chance must have held at every reading to call red.
+    pub fn red_held_for(&self) -> SignedDuration {
+        self.evacuation_time / HELD_PART
+    }
+
+    /// The chance that calls red at once.
+    pub fn red_at_once(&self) -> f64 {
+        (TIMES_AS_LARGE * self.red_chance).min(f64::midpoint(1.0, self.red_chance))
+    }
+
+    /// [`Policy::red_within`] in words.
     pub fn red_within_in_words(&self) -> &'static str {
         self.red_within
             .map_or("twice the evacuation time", |_| "red_within")

@@ -5,6 +5,9 @@ use super::level::Level;
 use super::policy::{Policy, Threshold};
 use std::borrow::Cow;
 
+/// The rule by which the chance of a collapse calls red.
+pub(super) const RED_CHANCE: &str = "chance-within-evacuation-time";
+
 /// The level that the evidence calls for, and why.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Call {
@@ -27,10 +30,10 @@ impl Policy {
                 level: Level::Red,
                 rule: "critical-velocity".into(),
             }
-        } else if reaches(evidence.chance_for_red, self.red_chance) {
+        } else if reaches(evidence.chance_for_red, self.red_chance) && !evidence.is_red_pending {
             Call {
                 level: Level::Red,
-                rule: "chance-within-evacuation-time".into(),
+                rule: RED_CHANCE.into(),
             }
         } else if reaches(evidence.chance_within_outlook, self.orange_chance) {
             Call {

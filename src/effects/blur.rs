@@ -80,7 +80,7 @@ impl Search<'_> {
         };
         let mut terms: Vec<(f64, Term)> = Vec::new();
         if let Some(ground) = self.ground(&averaged) {
-            for at in candidates::event_times(self.problem) {
+            for at in ground.event_times() {
                 let each = candidates::events(at).into_iter();
                 for term in each.filter(|term| jumps(term.kind)) {
                     let trial = ground.trial(term);

@@ -22,6 +22,9 @@ pub(super) const TIDE: [f64; 4] = [
 const SEASONAL_SHARE: f64 = 0.5;
 /// Times tried for what happens once.
 const EVENT_TIMES: usize = 64;
+/// So many of the largest innovations are tried beside them, of those that are so many times the median size or more.
+const LARGE_INNOVATIONS: usize = 8;
+const LARGE: f64 = 5.0;
 /// Jumps of the reading tried, the largest first.
 const JUMPS: usize = 24;
 /// No event within so many readings of either end: what happens there cannot be distinguished from noise.
@@ -197,6 +200,19 @@ pub(super) fn event_times(problem: &Problem) -> Vec<usize> {
     let (first, end) = (EVENT_MARGIN, problem.used.saturating_sub(EVENT_MARGIN));
     let stride = end.saturating_sub(first).div_ceil(EVENT_TIMES).max(1);
     (first..end).step_by(stride).collect()
+}
+
+/// Those at which the innovations are largest, far above the usual ones. Where noise remembers, an event a few readings away
+/// explains nothing of a jump.
+pub(super) fn times_of_jumps(problem: &Problem, innovations: &[f64]) -> Vec<usize> {
+    let end = problem.used.saturating_sub(EVENT_MARGIN);
+    let range = EVENT_MARGIN..end.min(innovations.len());
+    let mut sizes: Vec<(usize, f64)> = range.map(|at| (at, innovations[at].abs())).collect();
+    let usual = median(sizes.iter().map(|(_, size)| *size).collect());
+    sizes.retain(|(_, size)| *size > LARGE * usual);
+    sizes.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    sizes.truncate(LARGE_INNOVATIONS);
+    sizes.into_iter().map(|(at, _)| at).collect()
 }
 
 /// A jump of the reading before reading `at`.

@@ -1,6 +1,6 @@
 //! Linear algebra of the refits: what a few more columns take off the misfit, under one noise model or the best of several.
 
-use super::noise::Whitener;
+use super::noise::{Memory, Whitener};
 
 /// A column that keeps less than this of its length beside the others adds nothing that rounding would not.
 const LEAST_LEFT: f64 = 1e-5;
@@ -133,6 +133,17 @@ impl Frames {
             }
         }
         least
+    }
+
+    /// Those of the readings that were fitted, under the noise model that makes them likeliest.
+    pub(super) fn innovations(&self) -> &[f64] {
+        let residual = &self.each[self.best()].residual;
+        &residual[..residual.len() - 1]
+    }
+
+    /// Whether the noise model that makes the residual likeliest remembers.
+    pub(super) fn remembers(&self) -> bool {
+        self.each[self.best()].whitener.noise.memory != Memory::None
     }
 
     /// Which of the noise models makes the residual likeliest.

@@ -152,6 +152,8 @@ impl Whitener {
             let weight = problem.weight[i];
             let reads = match (noise.memory, problem.quantity) {
                 (Memory::None, _) => [0.0, 0.0],
+                // A walk in proportion to the velocities beside each reading would follow their jumps, and hide them.
+                (Memory::Reading, _) if problem.is_relative => [0.0, noise.ratio / weight],
                 (Memory::Reading, _) => [0.0, noise.ratio],
                 (Memory::Load, Quantity::Displacement) => [noise.ratio / weight, 0.0],
                 (Memory::Load, Quantity::Velocity) => [0.0, noise.ratio * speed / typical / weight],

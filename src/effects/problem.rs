@@ -41,6 +41,8 @@ pub(super) struct Problem {
     /// The velocity that an undeclared load multiplies, at each reading, mm/day: the plain law's by least
     /// squares, so that every model is judged under the same noise.
     pub(super) seen: Vec<f64>,
+    /// Whether the weights are in proportion to the velocities beside each reading.
+    pub(super) is_relative: bool,
 }
 
 impl Problem {
@@ -62,6 +64,8 @@ impl Problem {
             Some(sigma) => unit_median(sigma.clone()),
             None => weights(observations.quantity, &y, &misfits),
         };
+        let is_relative =
+            sigma.is_none() && weight.iter().any(|one| one.to_bits() != 1.0_f64.to_bits());
         let relative = misfits.iter().zip(&weight).map(|(m, w)| (m / w).abs());
         let least = 1e-9 * y.iter().fold(1e-3_f64, |most, y| most.max(y.abs()));
         let scatter = (median(relative.collect()) / 0.6745).max(least);
@@ -73,6 +77,7 @@ impl Problem {
         let seen = vec![1.0; t.len()];
         Some(Self {
             seen,
+            is_relative,
             quantity: observations.quantity,
             averaging_days: observations.averaging_days,
             epoch,

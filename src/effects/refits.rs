@@ -109,7 +109,7 @@ impl<'a> Search<'a> {
         if others.iter().any(|one| one.gain > self.options.bic_margin) {
             all.extend(others.into_iter().map(|one| {
                 let gain = one.gain;
-                if one.term.kind == Kind::Offset {
+                if is_jump(&one.term, &ground.frames) {
                     return one.judged_by(&without_jumps, gain);
                 }
                 one.judged_by(&alone, gain).judged_by_astronomy()
@@ -384,6 +384,12 @@ impl Refitted {
     pub(super) fn is_its_own_shift(&self, shifted: f64) -> bool {
         self.follows_season && (SIGNIFICANT..AT_RANDOM).contains(&shifted)
     }
+}
+
+/// Whether a term makes one large innovation of the reading, or, where the noise remembers, of the velocity.
+fn is_jump(term: &Term, frames: &Frames) -> bool {
+    let is_of_the_velocity = matches!(term.kind, Kind::LoadStep | Kind::StateReset);
+    term.kind == Kind::Offset || (is_of_the_velocity && frames.remembers())
 }
 
 fn best_of_each_kind(mut trials: Vec<Trial>) -> Vec<Trial> {

@@ -163,8 +163,8 @@ impl Tried {
 pub(super) enum Innovations {
     /// As they are, in another order.
     AsTheyAre,
-    /// No larger than noise has them: where noise walks, a jump of the reading is one innovation, and wherever the order
-    /// puts it, it is that jump again.
+    /// No larger than noise has them: where noise remembers, a jump of the reading or of the velocity is one innovation, and
+    /// wherever the order puts it, it is that jump again.
     WithoutJumps,
 }
 
@@ -177,7 +177,7 @@ pub(super) fn noise_alone(
 ) -> NullGains {
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     let best = &frames.each[frames.best()];
-    let mut innovations = best.residual[..best.residual.len() - 1].to_vec();
+    let mut innovations = frames.innovations().to_vec();
     if kind == Innovations::WithoutJumps {
         let sizes = innovations.iter().map(|u| u.abs()).collect();
         let most = LARGEST * median(sizes) / NORMAL_MEDIAN;

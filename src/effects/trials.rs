@@ -2,7 +2,7 @@
 
 use super::candidates::{
     delays, event_times, events, feedbacks, jumps, of_channel, offset, responses, seasonal,
-    thermal, tides,
+    thermal, tides, times_of_jumps,
 };
 use super::frame::Frames;
 use super::kind::{Form, Kind};
@@ -118,6 +118,15 @@ impl Ground<'_> {
         trials
     }
 
+    /// The readings before which something that happens once is tried.
+    pub(super) fn event_times(&self) -> Vec<usize> {
+        let mut times = event_times(self.problem);
+        times.extend(times_of_jumps(self.problem, self.frames.innovations()));
+        times.sort_unstable();
+        times.dedup();
+        times
+    }
+
     /// Everything that needs no covariate, with the directions it adds.
     pub(super) fn of_itself(&self) -> (Vec<Trial>, Vec<Tried>) {
         let present = |kind: Kind| self.present.iter().any(|term| term.kind == kind);
@@ -127,7 +136,7 @@ impl Ground<'_> {
             .chain(tides(self.problem))
             .chain(feedbacks(self.problem));
         terms.extend(all_along.filter(|term| !present(term.kind)));
-        for at in event_times(self.problem) {
+        for at in self.event_times() {
             terms.extend(events(at));
         }
         let jumps = jumps(self.problem, &self.residual);

@@ -6,11 +6,11 @@ use super::judge::{coefficients, is_label, named};
 use super::kind::Kind;
 use super::noise::{Memory, Whitener};
 use super::problem::Problem;
-use super::refit::{Fitted, jacobian};
+use super::refit::{Fitted, Start, jacobian, refit};
 use super::response::Driver;
 use super::rival::Rival;
 use super::search::{Accepted, SearchResult};
-use super::term::{Act, Scratch, Term, time_of};
+use super::term::{Act, Scratch, Term, law_parameters, time_of};
 use crate::reading::{Quantity, Unit};
 
 /// What the search is concluded to mean.
@@ -28,6 +28,11 @@ pub(super) const LARGEST_REST: f64 = 2.0;
 /// predicted with no more than this share of the error.
 const STANDING_OUT: f64 = 30.0;
 const FAR_BETTER: f64 = 0.1;
+/// So does a jump of the velocity that gains this many times the margin where, so many readings earlier or later, it would
+/// gain less by so many times the margin: what is left is another matter, and no slow load looks like that.
+const SHARP: f64 = 4.0;
+const APART: usize = 3;
+const LOSES: f64 = 2.0;
 /// Most kinds without independent evidence that are accepted together.
 const MOST_LABELS: usize = 2;
 /// 5 and 95 % of a normal distribution, in standard deviations.
@@ -47,18 +52,24 @@ pub(super) fn conclude(
     let only_labels = !accepted.is_empty() && full.terms.iter().all(|term| is_label(term.kind));
     let mut cannot_separate_from = Vec::new();
     let is_whole = !left && accounts_for_all(problem, &full);
-    if only_labels && !is_whole && stands_out(&full, &found.candidates, margin) {
-        // What is left is little beside it.
+    if only_labels && !is_whole {
+        let stands = if stands_out(&full, &found.candidates, margin) {
+            // What is left is little beside it.
+            Some((full.clone(), vec![0]))
+        } else {
+            sharp_alone((problem, bank), (&full, &accepted), (margin, scratch))
+        };
         left = true;
-    } else if only_labels && !is_whole {
-        left = true;
-        for term in &full.terms {
-            cannot_separate_from.push(named(term, drivers));
-            refuse(&mut found.candidates, term.kind);
+        let (stays, kept) = stands.unwrap_or_else(|| (found.null.clone(), Vec::new()));
+        for (index, term) in full.terms.iter().enumerate() {
+            if !kept.contains(&index) {
+                cannot_separate_from.push(named(term, drivers));
+                refuse(&mut found.candidates, (problem, term));
+            }
         }
-        full = found.null.clone();
+        accepted = kept.iter().map(|index| accepted[*index].clone()).collect();
+        full = stays;
         judged = Judged::of((problem, &full), bank, scratch);
-        accepted.clear();
     }
     let mut effects: Vec<Effect> = (0..full.terms.len())
         .map(|index| {
@@ -140,10 +151,67 @@ fn stands_out(full: &Fitted, candidates: &[Candidate], margin: f64) -> bool {
     full.terms.len() == 1 && predicts && one.bic_gain > STANDING_OUT * margin
 }
 
-fn refuse(candidates: &mut [Candidate], kind: Kind) {
+/// The law with those of the accepted terms alone that are jumps of the velocity, few, and each known to within a few readings,
+/// and which of the terms they are; `None` where there are none.
+fn sharp_alone(
+    (problem, bank): (&Problem, &[Whitener]),
+    (full, accepted): (&Fitted, &[Accepted]),
+    (margin, scratch): (f64, &mut Scratch),
+) -> Option<(Fitted, Vec<usize>)> {
+    let is_large = |index: &usize| accepted[*index].bic_gain > SHARP * margin;
+    let sharp = (0..full.terms.len()).filter(is_large);
+    let sharp: Vec<usize> = sharp
+        .filter(|index| is_sharp((problem, bank), (full, *index), (margin, scratch)))
+        .collect();
+    if sharp.is_empty() || sharp.len() > MOST_LABELS {
+        return None;
+    }
+    if sharp.len() == full.terms.len() {
+        return Some((full.clone(), sharp));
+    }
+    let law = full.parameters[..law_parameters(problem)].to_vec();
+    let mut start = Start {
+        parameters: law,
+        terms: Vec::new(),
+        ..Start::at(full)
+    };
+    for index in &sharp {
+        start.terms.push(full.terms[*index].clone());
+        let own = coefficients(problem, full, *index);
+        start.parameters.extend(own);
+    }
+    Some((refit(problem, &start, bank, scratch)?, sharp))
+}
+
+/// Whether a term is a jump of the velocity that a few readings earlier, or later, would gain far less.
+fn is_sharp(
+    (problem, bank): (&Problem, &[Whitener]),
+    (full, index): (&Fitted, usize),
+    (margin, scratch): (f64, &mut Scratch),
+) -> bool {
+    let term = &full.terms[index];
+    let jumps = matches!(term.kind, Kind::LoadStep | Kind::StateReset);
+    let inside = |at: &usize| jumps && *at > APART && at + APART < problem.used;
+    let Some(at) = term.at.filter(inside) else {
+        return false;
+    };
+    let own = bank.iter().filter(|one| one.noise == full.noise);
+    let own: Vec<Whitener> = own.cloned().collect();
+    let mut loses = |at: usize| {
+        let mut start = Start::at(full);
+        start.terms[index].at = Some(at);
+        let there = refit(problem, &start, &own, scratch);
+        there.is_none_or(|there| there.bic(problem) > full.bic(problem) + LOSES * margin)
+    };
+    loses(at - APART) && loses(at + APART)
+}
+
+/// Refuses what was accepted as this term.
+fn refuse(candidates: &mut [Candidate], (problem, term): (&Problem, &Term)) {
+    let at = time_of(problem, term);
     let own = candidates
         .iter_mut()
-        .filter(|one| one.effect == kind && one.rejected_because.is_none());
+        .filter(|one| one.effect == term.kind && one.at == at && one.rejected_because.is_none());
     for one in own {
         one.rejected_because =
             Some("structure is left after it: it is the nearest label, no explanation".to_owned());
