@@ -39,7 +39,9 @@ The law is the slider block of Helmstetter et al. (2004) in one regular equation
    the block change by from one to the next. Extrapolated over the whole block, an effect that only the shape of the readings supports (no channel, no
    tide) may not be worse at all; another may be worse by a fifth at most, where the innovations over the block are no
    worse. Everything else is listed with the reason.
-5. Effects within the margin of each other stand under *cannot be separated from*. Structure that is left is called so.
+5. Effects within the margin of each other stand under *cannot be separated from*. Structure that is left is called so. What only the
+   shape of the readings supports must leave nothing but noise; a jump of the velocity stands beside what is left if it gains 40 or more and would
+   gain less by 20 or more three readings earlier or later.
 
 Two weak priors of the law (`src/effects/prior.rs`: a deviation of 1.5 of ln v, and of .2 of an approach to the steady state within one
 interval) were set with NTOE and Baishuihe below in view; the held-out error of NTOE lay between 12 and 18 mm under others that are as plausible.

@@ -246,7 +246,7 @@ pub(crate) const SUBJECTS: [Subject; 14] = [
         averaging_hours: None,
         until: Some("1988-04-01T00:00:00Z"),
         figures: &["readings"],
-        comment: "Unexplained. The river that was put in does not lower the BIC, and a step of the load at the end of 1987, where the law does change, leaves structure behind and is refused as the nearest label.",
+        comment: "The river that was put in does not lower the BIC by enough. At the end of November 1987, where the law does change, a step of the load is found, from which a change of friction cannot be separated; structure is left beside it, and too few readings follow to hold a block out.",
     },
     Subject {
         name: "vaiont",

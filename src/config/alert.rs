@@ -19,7 +19,8 @@ pub(super) fn policy(mut section: Section<'_>, base: &Policy) -> Policy {
         red_within: red_within
             .as_ref()
             .map(|given| given.value)
-            .or(base.red_within),
+            // The site's goes with the site's evacuation time.
+            .or(base.red_within.filter(|_| evacuation_time.is_none())),
         critical_velocity_mm_per_day: velocity
             .map_or(base.critical_velocity_mm_per_day, |given| given.value),
         red_chance: section.chance("red_chance").unwrap_or(base.red_chance),

@@ -20,11 +20,11 @@ use crate::reading::Timestamp;
 const MOST_EFFECTS: usize = 10;
 /// A search's p-value must lie under this.
 pub(super) const SIGNIFICANT: f64 = 0.01;
-/// The later block is predicted no worse from reading to reading, but for this factor, and no worse over all of it at once.
-/// Both carry the law's own drift, which a slope that runs up lets grow: of what independent data support they may be
-/// worse, extrapolated by the first factor at most, if the block by its innovations is predicted no worse, the law fitted
-/// to all readings on both sides: neither in -2 ln likelihood, by more than this, nor in its errors.
-const MOST_EXTRAPOLATED: f64 = 3.0;
+/// The later block is predicted no worse from reading to reading, but for this factor. The error extrapolated over all of
+/// it carries the law's own drift: of what independent data support it may grow by the first factor at most, and only if the block by
+/// its innovations is predicted no worse, neither in -2 ln likelihood, by more than this, nor in its errors; of what
+/// only the shape of the readings supports it may not grow.
+const MOST_EXTRAPOLATED: f64 = 1.2;
 const WORSE: f64 = 2.0;
 const WORSE_STEPS: f64 = 1.005;
 
@@ -327,17 +327,15 @@ impl Search<'_> {
             return (Some(ratio).filter(|ratio| ratio.is_finite()), Some(grows()));
         }
         let (before, after) = held.errors_of_changes(self.problem);
-        let steps_grow = after > WORSE_STEPS * before;
-        if ratio <= 1.0 && !steps_grow {
+        if after > WORSE_STEPS * before {
+            let share = 100.0 * after / before.max(1e-300);
+            let reason =
+                format!("from reading to reading the held-out error grows to {share:.0} %");
+            return (Some(ratio), Some(reason));
+        }
+        if ratio <= 1.0 {
             return (Some(ratio), None);
         }
-        let grows = || {
-            if !steps_grow {
-                return grows();
-            }
-            let share = 100.0 * after / before.max(1e-300);
-            format!("from reading to reading the held-out error grows to {share:.0} %")
-        };
         if is_label(one.term.kind) {
             return (Some(ratio), Some(grows()));
         }

@@ -286,7 +286,7 @@ pub struct CalledLevel {
     pub level: Level,
     /// The rule that calls it; `quiet` where none does.
     pub rule: String,
-    /// The site's own rules whose conditions hold, and have not held for long enough yet.
+    /// The site's own rules whose conditions hold, and have not held for long enough yet; the rule of red, where its chance has not.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub pending: Vec<String>,
     /// What red is called by.

@@ -78,6 +78,9 @@ fn the_example_config_is_right_and_says_what_it_means() {
     let own = &config.settings.benchmarks[&BenchmarkId::new("upper")];
     assert_eq!(own.rules, policy.rules, "inherited");
     assert_eq!(own.evacuation_time.as_hours(), 6);
+    // The site's 24 h go with its own evacuation time of 12 h.
+    assert_eq!(own.red_within().as_hours(), 12);
+    assert_eq!(policy.red_within().as_hours(), 24);
     assert_eq!(own.thresholds, policy.thresholds, "inherited");
     assert!(config.hooks[0].levels.contains(&Level::Unknown));
     assert!(config.hooks[0].program().is_file(), "the sample hook");

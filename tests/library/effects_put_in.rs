@@ -3,7 +3,7 @@
 use crate::found_again::{Found, Trial, alone};
 use crate::measured::measured;
 use crate::put_in::What;
-use slipwatch::effects::Kind;
+use slipwatch::effects::{Explained, Kind};
 use slipwatch::reading::BenchmarkId;
 use slipwatch::runtime::ingest::{ReadOptions, read_files};
 use std::path::{Path, PathBuf};
@@ -11,12 +11,21 @@ use std::path::{Path, PathBuf};
 /// Seeds of the document's first draws.
 const RESET: u64 = 101;
 const TIDE: u64 = 201;
-/// Of the only step of 21 that is found.
+/// Of the steps of the velocity that are found.
 const STEP: u64 = 3;
 
 /// What was put in, and what was said with and without it.
 fn trial(files: &[PathBuf], benchmark: Option<&str>, drawn: (What, u64)) -> Trial {
-    let (recording, _) = read_files(files, &ReadOptions::default()).unwrap();
+    trial_of(files, benchmark, drawn, &ReadOptions::default())
+}
+
+fn trial_of(
+    files: &[PathBuf],
+    benchmark: Option<&str>,
+    drawn: (What, u64),
+    options: &ReadOptions,
+) -> Trial {
+    let (recording, _) = read_files(files, options).unwrap();
     let benchmark = benchmark.map(BenchmarkId::new);
     let series = recording.series(benchmark.as_ref(), None).unwrap();
     let without = alone(series, &recording.channels);
@@ -73,6 +82,24 @@ fn a_step_of_the_velocity_put_into_blkm_at_salmon_falls_is_found_with_its_size()
     assert!(off.abs() <= 0.15, "{found:?} for {:?}", trial.put_in);
     let held_out = &trial.with.error.held_out_step;
     assert!(held_out.after < held_out.before);
+}
+
+/// The slope runs up to its collapse and leaves structure whatever is put into the law; a jump of its velocity has a date all the same.
+#[test]
+#[cfg_attr(not(measured_data), ignore = "no measured data here")]
+fn a_step_of_the_velocity_put_into_lanzada_is_found_beside_what_is_left() {
+    let options = ReadOptions {
+        averaging: Some(jiff::SignedDuration::from_hours(1)),
+        ..ReadOptions::default()
+    };
+    let file = measured("lanzada_2025_f1.csv");
+    let trial = trial_of(&[file], None, (What::Step, STEP), &options);
+    let found = trial.found().unwrap();
+    let intervals = trial.intervals(found.late_days.unwrap());
+    assert!(intervals.abs() <= 1.0, "{intervals} intervals late");
+    assert_eq!(trial.with.explained, Explained::Partly);
+    let fit = &trial.with.error.fit;
+    assert!(fit.after.unwrap() < 0.2 * fit.before.unwrap(), "{fit:?}");
 }
 
 #[test]

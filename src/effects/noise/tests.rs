@@ -1,8 +1,9 @@
 //! Noise drawn from its own equation comes out white, its size and memory are found, and its state smoothed.
 
 use super::*;
-use crate::effects::fixture::{daily, generator, normals, steady, with_gaps};
+use crate::effects::fixture::{daily, generator, normals, series, steady, with_gaps};
 use crate::effects::frame::Frame;
+use crate::effects::problem::median;
 
 const COUNT: usize = 900;
 /// Substeps from which the gathered load is summed.
@@ -178,4 +179,32 @@ fn a_load_acts_on_no_reading_while_the_slope_stands_still() {
     let smoothed = whitener.smooth(&problem, &vec![0.0; COUNT]);
     let (moving, still) = (smoothed[COUNT / 2].1, smoothed[COUNT - 1].1);
     assert!(moving < 0.2 && still > 0.4, "{moving} {still}");
+}
+
+#[test]
+fn a_walk_does_not_follow_a_jump_of_velocities_that_are_read_with_an_error_in_proportion() {
+    let days = daily(200);
+    let jump = 120;
+    let noise = normals(&mut generator(5), days.len());
+    let level = |i: usize| if i < jump { 10.0 } else { 40.0 };
+    let values: Vec<f64> = (0..days.len())
+        .map(|i| level(i) * (1.0 + 0.03 * noise[i]))
+        .collect();
+    let problem = Problem::new(&series(Quantity::Velocity, &days, &values), &[]).unwrap();
+    assert!(problem.is_relative);
+    let walk = Noise {
+        memory: Memory::Reading,
+        days: f64::INFINITY,
+        ratio: 0.3,
+    };
+    let innovations = Whitener::new(&problem, walk).innovations(&problem.y);
+    let sizes: Vec<f64> = innovations[1..].iter().map(|one| one.abs()).collect();
+    let usual = median(sizes.clone());
+    let largest = (0..sizes.len()).max_by(|a, b| sizes[*a].total_cmp(&sizes[*b]));
+    assert_eq!(largest, Some(jump - 1));
+    assert!(
+        sizes[jump - 1] > 10.0 * usual,
+        "{}",
+        sizes[jump - 1] / usual
+    );
 }
