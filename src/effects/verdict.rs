@@ -53,14 +53,8 @@ pub(super) fn conclude(
     let mut cannot_separate_from = Vec::new();
     let is_whole = !left && accounts_for_all(problem, &full);
     if only_labels && !is_whole {
-        let stands = if stands_out(&full, &found.candidates, margin) {
-            // What is left is little beside it.
-            Some((full.clone(), vec![0]))
-        } else {
-            sharp_alone((problem, bank), (&full, &accepted), (margin, scratch))
-        };
         left = true;
-        let (stays, kept) = stands.unwrap_or_else(|| (found.null.clone(), Vec::new()));
+        let (stays, kept) = what_stands((problem, bank), (found, &full), (margin, scratch));
         for (index, term) in full.terms.iter().enumerate() {
             if !kept.contains(&index) {
                 cannot_separate_from.push(named(term, drivers));
@@ -149,6 +143,22 @@ fn stands_out(full: &Fitted, candidates: &[Candidate], margin: f64) -> bool {
     };
     let predicts = one.held_out.is_some_and(|ratio| ratio < FAR_BETTER);
     full.terms.len() == 1 && predicts && one.bic_gain > STANDING_OUT * margin
+}
+
+/// The law with those of the terms of `full` that stand beside what is left, all of them without independent evidence, and which
+/// these are.
+fn what_stands(
+    (problem, bank): (&Problem, &[Whitener]),
+    (found, full): (&SearchResult, &Fitted),
+    (margin, scratch): (f64, &mut Scratch),
+) -> (Fitted, Vec<usize>) {
+    if stands_out(full, &found.candidates, margin) {
+        // What is left is little beside it.
+        return (full.clone(), vec![0]);
+    }
+    let own = (full, found.accepted.as_slice());
+    let sharp = sharp_alone((problem, bank), own, (margin, scratch));
+    sharp.unwrap_or_else(|| (found.null.clone(), Vec::new()))
 }
 
 /// The law with those of the accepted terms alone that are jumps of the velocity, few, and each known to within a few readings,
