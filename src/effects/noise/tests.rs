@@ -197,14 +197,13 @@ fn a_walk_does_not_follow_a_jump_of_velocities_that_are_read_with_an_error_in_pr
         days: f64::INFINITY,
         ratio: 0.3,
     };
+    // What a law leaves that moves not at all; the walk has followed the first level after some readings.
+    let settled = 60;
     let innovations = Whitener::new(&problem, walk).innovations(&problem.y);
-    let sizes: Vec<f64> = innovations[1..].iter().map(|one| one.abs()).collect();
+    let sizes: Vec<f64> = innovations[settled..].iter().map(|one| one.abs()).collect();
     let usual = median(sizes.clone());
     let largest = (0..sizes.len()).max_by(|a, b| sizes[*a].total_cmp(&sizes[*b]));
-    assert_eq!(largest, Some(jump - 1));
-    assert!(
-        sizes[jump - 1] > 10.0 * usual,
-        "{}",
-        sizes[jump - 1] / usual
-    );
+    assert_eq!(largest, Some(jump - settled));
+    let jump = sizes[jump - settled];
+    assert!(jump > 10.0 * usual, "{jump} {usual}");
 }
