@@ -3,6 +3,7 @@
 use super::evidence::AlertCause;
 use super::level::Level;
 use super::policy::Policy;
+use super::rules::RED_CHANCE;
 
 impl Level {
     /// What is recommended while it is in force.
@@ -42,7 +43,7 @@ impl Policy {
                 "settled velocity of {} mm/day or more",
                 self.critical_velocity_mm_per_day
             ),
-            ("chance-within-evacuation-time", _) => format!(
+            (RED_CHANCE, _) => format!(
                 "chance of collapse of {} or more within {} ({} h) and until the next reading, at every reading of {:#}, \
                  or of {} at one",
                 self.red_chance,

@@ -82,7 +82,7 @@ impl Search<'_> {
         if let Some(ground) = self.ground(&averaged) {
             for at in ground.event_times() {
                 let each = candidates::events(at).into_iter();
-                for term in each.filter(|term| jumps(term.kind)) {
+                for term in each.filter(|term| term.kind.jumps()) {
                     let trial = ground.trial(term);
                     match terms
                         .iter_mut()
@@ -104,9 +104,4 @@ impl Search<'_> {
         })
         .collect()
     }
-}
-
-/// Whether the velocity jumps by it.
-fn jumps(kind: Kind) -> bool {
-    matches!(kind, Kind::LoadStep | Kind::StateReset)
 }

@@ -83,6 +83,11 @@ impl Kind {
         }
     }
 
+    /// Whether the velocity itself jumps by it.
+    pub(super) fn jumps(self) -> bool {
+        matches!(self, Self::LoadStep | Self::StateReset)
+    }
+
     /// Whether it happens once, and in the ground.
     pub(super) fn is_event_of_the_ground(self) -> bool {
         matches!(

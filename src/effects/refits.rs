@@ -388,8 +388,7 @@ impl Refitted {
 
 /// Whether a term makes one large innovation of the reading, or, where the noise remembers, of the velocity.
 fn is_jump(term: &Term, frames: &Frames) -> bool {
-    let is_of_the_velocity = matches!(term.kind, Kind::LoadStep | Kind::StateReset);
-    term.kind == Kind::Offset || (is_of_the_velocity && frames.remembers())
+    term.kind == Kind::Offset || (term.kind.jumps() && frames.remembers())
 }
 
 fn best_of_each_kind(mut trials: Vec<Trial>) -> Vec<Trial> {

@@ -200,8 +200,7 @@ fn is_sharp(
     (margin, scratch): (f64, &mut Scratch),
 ) -> bool {
     let term = &full.terms[index];
-    let jumps = matches!(term.kind, Kind::LoadStep | Kind::StateReset);
-    let inside = |at: &usize| jumps && *at > APART && at + APART < problem.used;
+    let inside = |at: &usize| term.kind.jumps() && *at > APART && at + APART < problem.used;
     let Some(at) = term.at.filter(inside) else {
         return false;
     };
