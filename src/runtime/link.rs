@@ -5,7 +5,7 @@
 
 use super::clock;
 use super::hook::{Alert, MessageState, Status};
-use crate::config::{HookConfig, Links};
+use crate::config::{Config, HookConfig, Links};
 use crate::reading::Timestamp;
 use base64::Engine;
 use base64::engine::general_purpose::{STANDARD, URL_SAFE_NO_PAD};
@@ -105,11 +105,20 @@ fn mac(secret: &[u8], key: &str, status: Status, until: i64) -> io::Result<Hmac<
     Ok(mac)
 }
 
+/// Makes the secret that links by `config` need. Alerts go out in any case, then without a link.
+pub(super) fn make_secret_of(config: &Config) {
+    if let Some(links) = &config.site.links
+        && let Err(error) = make_secret(&links.secret_file)
+    {
+        tracing::error!(%error, "no message will have a link to acknowledge it by");
+    }
+}
+
 /// Makes the secret where there is none yet, for nobody else to read.
 ///
 /// # Errors
 /// When it cannot be written, or what is there cannot be used.
-pub(super) fn make_secret(file: &Path) -> io::Result<()> {
+fn make_secret(file: &Path) -> io::Result<()> {
     if file.try_exists()? {
         return secret(file).map(drop);
     }

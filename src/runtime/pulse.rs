@@ -2,8 +2,9 @@
 
 use super::serve::{Limits, ListenError, ListenOptions, ServedState, Server};
 use super::service::Service;
+use super::view::Facts;
 use super::vitals::Vitals;
-use crate::config::{SiteConfig, TokenError};
+use crate::config::{SiteConfig, Token, TokenError};
 use std::sync::Arc;
 
 /// Nobody could be let in.
@@ -60,6 +61,13 @@ impl Reporting {
             vitals: Arc::new(Vitals::default()),
             service: Service::none(),
             server: None,
+        }
+    }
+
+    /// Those outside are let in by another token, and see another config.
+    pub(super) fn follow(&self, token: Option<Token>, facts: Facts) {
+        if let Some(server) = &self.server {
+            server.follow(token, facts);
         }
     }
 

@@ -60,7 +60,7 @@ pub async fn run(
     if let Err(error) = shutdown::survive_the_file_limit() {
         tracing::warn!(%error, "a limit on the length of files would end this process");
     }
-    make_secret(config);
+    link::make_secret_of(config);
     let behind = ServedState {
         archive: Some(Arc::new(super::archive::Events::of(Arc::clone(&store)))),
         reader: reader(config),
@@ -114,15 +114,6 @@ pub async fn run(
     worked.and(closed.map(drop)).map_err(fail)?;
     followed?;
     Ok(counts)
-}
-
-/// Alerts go out in any case, then without a link.
-fn make_secret(config: &Config) {
-    if let Some(links) = &config.site.links
-        && let Err(error) = link::make_secret(&links.secret_file)
-    {
-        tracing::error!(%error, "no message will have a link to acknowledge it by");
-    }
 }
 
 /// What the page asks, where the site listens. A page that cannot be shown is no reason not to watch.

@@ -5,6 +5,7 @@ use crate::telling::failing;
 use base64::Engine;
 use base64::engine::general_purpose::{STANDARD, URL_SAFE_NO_PAD};
 use hmac::{Hmac, KeyInit, Mac};
+use nix::sys::signal::Signal;
 use std::fs;
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -247,6 +248,51 @@ fn a_link_that_is_forged_expired_foreign_or_over_changes_nothing() {
     );
     program.stop();
     site.proven_events();
+}
+
+#[test]
+fn another_public_address_and_another_token_count_from_the_reload_on() {
+    let (site, address) = site();
+    // Orange by the threshold alone.
+    let program = started(&site, 0..8);
+    link(&site, "5/orange/");
+    let (other, other_token) = ("http://other.example", "fedcba9876543210-of-the-test");
+    let text = fs::read_to_string(site.path("site.toml")).unwrap();
+    let text = text.replace(PUBLIC, other);
+    fs::write(site.path("site.toml"), text).unwrap();
+    fs::write(site.path("token"), other_token).unwrap();
+    assert!(opens(&address, TOKEN) && !opens(&address, other_token));
+    program.signal(Signal::SIGHUP);
+    eventually("the new token", || opens(&address, other_token));
+    assert!(!opens(&address, TOKEN), "the former token still opens");
+    site.append("incoming/5.csv", &failing(8..114));
+    let mut path = String::new();
+    eventually("a link under the new address", || {
+        let lines = site.lines("links");
+        let red = lines.iter().find(|line| line.starts_with("5/red/"));
+        let found = red.and_then(|line| line.split_once(other));
+        path = found.map_or_else(String::new, |(_, path)| path.to_owned());
+        !path.is_empty()
+    });
+    is(&post(&address, &path, (OURS, "by=Eve")), 403, "");
+    let ours = "host: other.example\r\norigin: http://other.example\r\n";
+    let taken = post(&address, &path, (ours, "by=Anna"));
+    is(&taken, 200, "The alert is acknowledged");
+    program.stop();
+    site.proven_events();
+}
+
+/// Whether the daemon lets in whoever knows that token.
+fn opens(address: &str, token: &str) -> bool {
+    let mut stream = TcpStream::connect(address).unwrap();
+    let request = format!(
+        "GET /api/site HTTP/1.1\r\nhost: localhost\r\nauthorization: Bearer {token}\r\n\
+         connection: close\r\n\r\n"
+    );
+    stream.write_all(request.as_bytes()).unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).unwrap();
+    answer.starts_with("HTTP/1.1 200 ")
 }
 
 #[test]

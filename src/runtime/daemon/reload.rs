@@ -2,9 +2,11 @@
 
 use super::{DRAIN_LIMIT, Daemon, TICK, dispatcher};
 use crate::config;
+use crate::runtime::link;
 use crate::runtime::sandbox::OURSELVES;
 use crate::runtime::shutdown::Shutdown;
 use crate::runtime::sources::Sources;
+use crate::runtime::view::Facts;
 use crate::store::StoreError;
 use std::path::Path;
 
@@ -38,13 +40,17 @@ impl Daemon {
         };
         if fresh.site.state_dir != self.config.site.state_dir
             || fresh.site.listen != self.config.site.listen
-            || fresh.site.links != self.config.site.links
         {
-            tracing::error!(
-                "the config is not taken: another state_dir, listen, public_url or acknowledge_within needs a restart"
-            );
+            tracing::error!("the config is not taken: another state_dir or listen needs a restart");
             return Ok(());
         }
+        let token = match fresh.site.token() {
+            Ok(token) => token,
+            Err(error) => {
+                tracing::error!(%error, "the config is not taken: the old one stays in force");
+                return Ok(());
+            }
+        };
         self.pulse.service.reloading();
         // What has been read already is taken under the old config.
         self.sources.stop();
@@ -55,6 +61,9 @@ impl Daemon {
                 return Ok(());
             }
         }
+        // The page takes what the messages hold from here on.
+        link::make_secret_of(&fresh);
+        self.pulse.follow(token, Facts::of(&fresh));
         let events = self.site.change_settings(fresh.settings.clone());
         self.pulse.vitals.note(&events);
         self.site.show(&self.pulse.vitals);

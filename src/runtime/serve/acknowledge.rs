@@ -1,6 +1,7 @@
 //! The page behind the link in an alert's message: it shows the alert, and its button acknowledges it. Plain HTML, no script.
 
 use super::caller::OwnNames;
+use super::routes::NO_SUCH_PAGE;
 use crate::reading::Timestamp;
 use crate::runtime::link::AskedLink;
 use crate::runtime::view::{AlertLife, AlertView, LinkPage, LinkTarget, SiteReader};
@@ -21,21 +22,22 @@ use std::sync::Arc;
 const POLICY: &str =
     "default-src 'none'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'";
 
-/// The routes; none where messages have no links.
+/// The routes; there is no such page while messages have no links.
 pub(super) fn router(reader: Arc<SiteReader>, names: Arc<OwnNames>) -> Router {
-    if reader.links().is_none() {
-        return Router::new();
-    }
     Router::new()
         .route("/acknowledge", get(show).post(acknowledge))
-        .with_state(reader)
-        .layer(from_fn_with_state(names, admit))
+        .with_state(Arc::clone(&reader))
+        .layer(from_fn_with_state((reader, names), admit))
 }
 
+type Admission = (Arc<SiteReader>, Arc<OwnNames>);
+
 /// Under our own names only, and no form of a foreign page.
-async fn admit(State(names): State<Arc<OwnNames>>, request: Request, next: Next) -> Response {
+async fn admit(State((reader, names)): State<Admission>, request: Request, next: Next) -> Response {
     let headers = request.headers();
-    if names.is_our_host(headers) && names.is_our_page(headers) {
+    if reader.links().is_none() {
+        (StatusCode::NOT_FOUND, NO_SUCH_PAGE).into_response()
+    } else if names.is_our_host(headers) && names.is_our_page(headers) {
         next.run(request).await
     } else {
         (StatusCode::FORBIDDEN, "ask under the address of the link\n").into_response()

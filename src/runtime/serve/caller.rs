@@ -1,22 +1,24 @@
 //! Under which names the daemon is asked, and by whose page: a foreign page in a browser reads nothing and orders nothing.
 
-use crate::config::Links;
+use crate::config::{Links, Token};
+use crate::runtime::view::SiteReader;
 use axum::http::{HeaderMap, HeaderName, header};
 use std::net::IpAddr;
+use std::sync::{Arc, PoisonError, RwLock};
 
 /// The names under which a daemon is reached.
 #[derive(Debug, Clone, Default)]
 pub(super) struct OwnNames {
-    links: Option<Links>,
+    reader: Option<Arc<SiteReader>>,
     host_name: Option<String>,
 }
 
 impl OwnNames {
-    /// Those of this machine, and that of `site.public_url` where there is one.
-    pub(super) fn new(links: Option<Links>) -> Self {
+    /// Those of this machine, and that of `site.public_url` where the config in force has one.
+    pub(super) fn new(reader: Option<Arc<SiteReader>>) -> Self {
         let host_name = nix::unistd::gethostname().ok();
         Self {
-            links,
+            reader,
             host_name: host_name.and_then(|name| name.into_string().ok()),
         }
     }
@@ -32,10 +34,15 @@ impl OwnNames {
         let host = text(headers, &header::HOST).unwrap_or("localhost");
         text(headers, &header::ORIGIN).is_none_or(|origin| {
             let (_, name) = origin.split_once("://").unwrap_or_default();
-            let is_public = (self.links.as_ref())
-                .is_some_and(|links| origin.eq_ignore_ascii_case(&links.origin()));
+            let is_public =
+                (self.links()).is_some_and(|links| origin.eq_ignore_ascii_case(&links.origin()));
             is_public || name == host && self.is_ours(host)
         })
+    }
+
+    /// As the config in force has them.
+    fn links(&self) -> Option<Links> {
+        self.reader.as_ref()?.links()
     }
 
     fn is_ours(&self, host: &str) -> bool {
@@ -46,8 +53,26 @@ impl OwnNames {
             is_local && (name.get(..own.len())).is_some_and(|name| name.eq_ignore_ascii_case(own))
         });
         let is_public =
-            (self.links.as_ref()).is_some_and(|links| host.eq_ignore_ascii_case(links.authority()));
+            (self.links()).is_some_and(|links| host.eq_ignore_ascii_case(links.authority()));
         is_machine || is_public || is_this_machine(host) || name.parse::<IpAddr>().is_ok()
+    }
+}
+
+/// What callers must know by the config in force; `None`: nothing.
+#[derive(Debug, Clone)]
+pub(super) struct SharedToken(Arc<RwLock<Option<Arc<Token>>>>);
+
+impl SharedToken {
+    pub(super) fn new(token: Option<Token>) -> Self {
+        Self(Arc::new(RwLock::new(token.map(Arc::new))))
+    }
+
+    pub(super) fn in_force(&self) -> Option<Arc<Token>> {
+        (self.0.read().unwrap_or_else(PoisonError::into_inner)).clone()
+    }
+
+    pub(super) fn change(&self, token: Option<Token>) {
+        *(self.0.write()).unwrap_or_else(PoisonError::into_inner) = token.map(Arc::new);
     }
 }
 

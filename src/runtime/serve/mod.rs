@@ -12,9 +12,10 @@ pub use metrics::CONTENT_TYPE;
 pub use routes::{Archive, ArchiveError, DaemonStatus, Page};
 
 use super::shutdown::{self, Trigger};
-use super::view::SiteReader;
+use super::view::{Facts, SiteReader};
 use super::vitals::Vitals;
 use crate::config::Token;
+use caller::SharedToken;
 use std::io;
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -71,6 +72,8 @@ pub struct ListenError {
 #[derive(Debug)]
 pub struct Server {
     address: SocketAddr,
+    token: SharedToken,
+    reader: Option<Arc<SiteReader>>,
     stop: Trigger,
     task: JoinHandle<()>,
 }
@@ -114,15 +117,31 @@ impl Server {
         let listener = TcpListener::bind(options.listen).await.map_err(fail)?;
         let address = listener.local_addr().map_err(fail)?;
         let (stop, stopped) = shutdown::pair();
-        let limits = options.limits;
-        let router = routes::router(options, vitals, served);
-        let task = tokio::spawn(connections::serve(listener, router, limits, stopped));
+        let token = SharedToken::new(options.token.clone());
+        let reader = served.reader.clone();
+        let router = routes::router(&options, token.clone(), vitals, served);
+        let task = tokio::spawn(connections::serve(
+            listener,
+            router,
+            options.limits,
+            stopped,
+        ));
         tracing::info!(%address, "listening");
         Ok(Self {
             address,
+            token,
+            reader,
             stop,
             task,
         })
+    }
+
+    /// Callers must know another token from here on, and the page shows another config.
+    pub fn follow(&self, token: Option<Token>, facts: Facts) {
+        self.token.change(token);
+        if let Some(reader) = &self.reader {
+            reader.follow(facts);
+        }
     }
 
     /// Where it listens.

@@ -1,8 +1,7 @@
 //! What is answered to which request, and to whom.
 
-use super::caller::{OwnNames, is_this_machine};
+use super::caller::{OwnNames, SharedToken, is_this_machine};
 use super::{ListenOptions, ServedState, acknowledge, metrics, page, views};
-use crate::config::Token;
 use crate::runtime::vitals::{Health, Vitals, VitalsPoint};
 use axum::extract::{DefaultBodyLimit, Query, Request, State};
 use axum::http::{HeaderValue, Method, StatusCode, header};
@@ -66,7 +65,12 @@ impl IntoResponse for ArchiveError {
 
 /// All routes; every one but `/healthz` and the page's own files, which say nothing of the site, asks for the token,
 /// where there is one. Whoever follows the link in a message knows its signature instead.
-pub(super) fn router(options: ListenOptions, vitals: Arc<Vitals>, served: ServedState) -> Router {
+pub(super) fn router(
+    options: &ListenOptions,
+    token: SharedToken,
+    vitals: Arc<Vitals>,
+    served: ServedState,
+) -> Router {
     let mut guarded = Router::new()
         .route("/readyz", get(ready))
         .route("/metrics", get(expose))
@@ -82,30 +86,27 @@ pub(super) fn router(options: ListenOptions, vitals: Arc<Vitals>, served: Served
     let mut open = Router::new()
         .route("/healthz", get(healthy))
         .with_state((vitals, options.limits.turn_time));
-    let links = (served.reader.as_ref()).and_then(|reader| reader.links().cloned());
-    let names = Arc::new(OwnNames::new(links));
+    let names = Arc::new(OwnNames::new(served.reader.clone()));
     if let Some(reader) = served.reader {
         open = open.merge(acknowledge::router(Arc::clone(&reader), Arc::clone(&names)));
         guarded = guarded.merge(views::router(reader));
         open = open.merge(page::router());
     }
     guarded
-        .fallback(|| async { (StatusCode::NOT_FOUND, "no such page\n") })
-        .layer(from_fn_with_state(
-            (options.token.map(Arc::new), names),
-            admit,
-        ))
+        .fallback(|| async { (StatusCode::NOT_FOUND, NO_SUCH_PAGE) })
+        .layer(from_fn_with_state((token, names), admit))
         .merge(open)
         .layer(DefaultBodyLimit::max(LONGEST_BODY))
         .layer(from_fn(refuse_long_bodies))
 }
 
 /// Who may ask: the token, where there is one, and who may know it.
-type Admission = (Option<Arc<Token>>, Arc<OwnNames>);
+type Admission = (SharedToken, Arc<OwnNames>);
 
 /// A caller without the token, a page of another site, and an order under a name that is not ours are refused.
 async fn admit(State((token, names)): State<Admission>, request: Request, next: Next) -> Response {
     let headers = request.headers();
+    let token = token.in_force();
     let is_admitted = match &token {
         Some(token) => bearer(&request).is_some_and(|given| token.is(given)),
         None => is_named_as_this_machine(&request),
@@ -126,6 +127,7 @@ async fn admit(State((token, names)): State<Admission>, request: Request, next: 
     next.run(request).await
 }
 
+pub(super) const NO_SUCH_PAGE: &str = "no such page\n";
 const FOREIGN_PAGE: &str = "a page of another site asks (Origin): only the daemon's own page may\n";
 const FOREIGN_HOST: &str =
     "an order is taken under this machine's name or address, or that of site.public_url (Host)\n";

@@ -79,7 +79,7 @@ impl SiteReader {
     /// # Errors
     /// [`StoreError`].
     pub fn alert(&self, key: &str) -> Result<Option<AlertView>, StoreError> {
-        alert(&self.store, &self.facts.name, key)
+        alert(&self.store, &self.facts().name, key)
     }
 }
 

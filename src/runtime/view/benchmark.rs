@@ -203,10 +203,10 @@ impl SiteReader {
         let span = self.store.span(Some(name))?;
         let (seen, quiet) = self.orders(&levels_now, at, moment)?;
         Ok(Some(BenchmarkView {
-            site: self.facts.name.clone(),
+            site: self.facts().name.clone(),
             version: env!("CARGO_PKG_VERSION"),
-            time_zone: self.facts.time_zone.clone(),
-            takes_orders: self.facts.takes_orders,
+            time_zone: self.facts().time_zone.clone(),
+            takes_orders: self.facts().takes_orders,
             acknowledged: seen,
             silences: quiet,
             standing: self.standing(id, (&levels_now, &alarms), at, moment)?,

@@ -113,7 +113,7 @@ impl SiteReader {
             },
         });
         // Other messages of the same alert have links that are good for longer.
-        let within = (self.facts.links.as_ref()).map_or(SignedDuration::ZERO, |one| one.within);
+        let within = (self.links()).map_or(SignedDuration::ZERO, |one| one.within);
         let forgotten = now.saturating_add(within).unwrap_or(signed.until);
         let name = name(&signed);
         let until = forgotten.max(signed.until);
@@ -129,17 +129,17 @@ impl SiteReader {
     }
 
     /// What links are made of; `None` where messages have none.
-    pub fn links(&self) -> Option<&Links> {
-        self.facts.links.as_ref()
+    pub fn links(&self) -> Option<Links> {
+        self.facts().links.clone()
     }
 
     /// The zone that people there live in.
     pub fn zone(&self) -> TimeZone {
-        TimeZone::get(&self.facts.time_zone).unwrap_or(TimeZone::UTC)
+        TimeZone::get(&self.facts().time_zone).unwrap_or(TimeZone::UTC)
     }
 
     fn signed(&self, asked: &AskedLink) -> Result<Option<SignedLink>, StoreError> {
-        let Some(links) = &self.facts.links else {
+        let Some(links) = self.links() else {
             return Ok(None);
         };
         Ok(link::verified(&links.secret_file, asked)?)

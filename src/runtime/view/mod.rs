@@ -19,6 +19,7 @@ use crate::reading::{BenchmarkId, Timestamp};
 use crate::store::{Heads, Store, StoreError};
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::{Arc, PoisonError, RwLock};
 
 /// The earliest and the latest time that the state can hold.
 const EARLIEST: Timestamp = Timestamp::constant(-9_000_000_000, 0);
@@ -98,7 +99,7 @@ impl Facts {
 pub struct SiteReader {
     /// A connection of its own: a long answer keeps the work loop from nothing.
     store: Store,
-    facts: Facts,
+    facts: RwLock<Arc<Facts>>,
 }
 
 impl SiteReader {
@@ -108,7 +109,18 @@ impl SiteReader {
     /// [`StoreError`].
     pub fn open(folder: &Path, facts: Facts) -> Result<Self, StoreError> {
         let store = Store::look(folder)?;
+        let facts = RwLock::new(Arc::new(facts));
         Ok(Self { store, facts })
+    }
+
+    /// What it shows from here on is by another config.
+    pub fn follow(&self, facts: Facts) {
+        *(self.facts.write()).unwrap_or_else(PoisonError::into_inner) = Arc::new(facts);
+    }
+
+    /// What the config in force says.
+    fn facts(&self) -> Arc<Facts> {
+        Arc::clone(&self.facts.read().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// How far the state has grown.
@@ -129,13 +141,13 @@ impl SiteReader {
 
     /// When the slope collapsed, as far as that was known at `at`; without it, once all has been played.
     fn collapse(&self, at: Option<Timestamp>, now: Timestamp) -> Option<Timestamp> {
-        let ending = self.facts.ending?;
+        let ending = self.facts().ending?;
         let is_known = at.map_or(now >= ending.last_reading, |at| at >= ending.collapse);
         is_known.then_some(ending.collapse)
     }
 
     fn now(&self) -> Result<Timestamp, StoreError> {
-        Ok(match self.facts.now {
+        Ok(match self.facts().now {
             Now::Wall => clock::now(),
             Now::Data => (self.store.newest_step()?).unwrap_or_else(clock::now),
         })

@@ -51,7 +51,7 @@ impl SiteReader {
     /// # Errors
     /// [`OrderError`].
     pub fn ask(&self, asked: &Asked) -> Result<Order, OrderError> {
-        if !self.facts.takes_orders {
+        if !self.facts().takes_orders {
             return Err(OrderError::NotHere);
         }
         let order = self.order(asked)?;
@@ -70,7 +70,7 @@ impl SiteReader {
     fn is_of_a_drill(&self, order: &Order) -> bool {
         let is_acknowledged = matches!(order, Order::Acknowledge { .. });
         let place = order.benchmark().map(BenchmarkId::as_str);
-        self.facts.has_drills && is_acknowledged && place == Some(EXERCISE)
+        self.facts().has_drills && is_acknowledged && place == Some(EXERCISE)
     }
 
     fn order(&self, asked: &Asked) -> Result<Order, OrderError> {

@@ -111,16 +111,16 @@ impl SiteReader {
         let called = called.filter(|level| *level != Level::Unknown).max();
         let benchmarks: Vec<Standing> = benchmarks.collect::<Result<_, _>>()?;
         Ok(SiteView {
-            site: self.facts.name.clone(),
+            site: self.facts().name.clone(),
             version: env!("CARGO_PKG_VERSION"),
-            time_zone: self.facts.time_zone.clone(),
+            time_zone: self.facts().time_zone.clone(),
             now,
             at,
             first: span.map(|(first, _)| first),
             last: span.map(|(_, last)| last),
             collapse: self.collapse(at, now),
-            positions_are: self.facts.positions_are,
-            takes_orders: self.facts.takes_orders,
+            positions_are: self.facts().positions_are,
+            takes_orders: self.facts().takes_orders,
             level: called.unwrap_or(Level::Green),
             unknown_since: levels.get(&(None, Level::Unknown)).map(|event| event.time),
             benchmarks,
@@ -146,7 +146,7 @@ impl SiteReader {
     /// Every benchmark that the config names or that has given a reading.
     pub(super) fn known(&self) -> Result<BTreeSet<BenchmarkId>, StoreError> {
         let mut known: BTreeSet<BenchmarkId> = self.store.benchmarks()?.into_keys().collect();
-        known.extend(self.facts.named.iter().cloned());
+        known.extend(self.facts().named.iter().cloned());
         Ok(known)
     }
 
@@ -174,7 +174,7 @@ impl SiteReader {
             unknown_since,
             newest_reading: newest,
             silent_seconds: newest.map(|newest| moment.duration_since(newest).as_secs().max(0)),
-            position: self.facts.positions.get(&benchmark).cloned(),
+            position: self.facts().positions.get(&benchmark).cloned(),
             forecast_at: None,
             velocity_mm_per_day: None,
             regime: None,

@@ -7,6 +7,7 @@
 
 mod accessible;
 mod chromium;
+mod drill;
 mod found;
 mod pace;
 mod report;

@@ -49,7 +49,9 @@ fn paint_and_frames_with_a_million_readings() {
     browser.type_in(TOKEN);
     browser.press("Enter", 13);
     browser.until("document.documentElement.dataset.shown");
-    for place in ["#/", "#/b/p3"] {
+    // A line of text from the same daemon: what no page of ours can be faster than in this browser.
+    for place in ["nothing-but-a-line-of-text", "#/", "#/b/p3"] {
+        let is_ours = place.starts_with('#');
         let watch = "window.frames_ms = []; (() => { let last = performance.now(); const next = (now) => { frames_ms.push(now - last); last = now; requestAnimationFrame(next); }; requestAnimationFrame(next); })();";
         browser.call(
             "Page.addScriptToEvaluateOnNewDocument",
@@ -57,8 +59,12 @@ fn paint_and_frames_with_a_million_readings() {
         );
         browser.visit("about:blank");
         browser.visit(&site.address(place));
-        browser.until("document.documentElement.dataset.shown");
-        if place != "#/" {
+        browser.until(if is_ours {
+            "document.documentElement.dataset.shown"
+        } else {
+            "performance.getEntriesByName('first-contentful-paint').length > 0 && frames_ms.length > 60"
+        });
+        if place == "#/b/p3" {
             browser.until("document.querySelectorAll('figure.chart canvas').length > 5");
             browser.drag("figure[data-chart=displacement] .u-over", 0.3, 0.6);
             std::thread::sleep(std::time::Duration::from_secs(2));

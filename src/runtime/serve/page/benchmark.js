@@ -44,11 +44,15 @@ export class BenchmarkPage {
     this.headNode.replaceChildren(...this.head(view));
     this.factsNode.replaceChildren(...facts(view));
     this.giveNode.replaceChildren(...(at === null ? [buttons(view, (kind) => this.orders(kind, this.name), ['acknowledge', 'shelve', 'silence', 'resolve', 'unsilence'])] : []));
-    this.charts.draw(view);
-    this.planeNode.replaceChildren(plane(view.forecasts, view.latest?.regime));
-    this.effectsNode.replaceChildren(...effects(view));
-    fillList(this.alertsNode, list(view.alerts, 'No alert so far.', this.name));
-    fillList(this.marksNode, list([...view.marks].reverse(), 'Nothing found, declared or ordered so far.', this.name));
+    // Each in a frame of its own, as the charts are.
+    this.charts.draw(view, [
+      () => {
+        this.effectsNode.replaceChildren(...effects(view));
+        fillList(this.alertsNode, list(view.alerts, 'No alert so far.', this.name));
+        fillList(this.marksNode, list([...view.marks].reverse(), 'Nothing found, declared or ordered so far.', this.name));
+      },
+      () => this.planeNode.replaceChildren(plane(view.forecasts, view.latest?.regime)),
+    ]);
   }
 
   build() {

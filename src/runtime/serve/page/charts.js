@@ -48,16 +48,18 @@ export class Charts {
   restyle() {
     if (!this.view) return;
     this.clear();
-    this.draw(this.view);
+    this.draw(this.view, this.first);
   }
 
-  draw(view) {
+  /** All charts of a view, after what else is drawn with it. */
+  draw(view, first = []) {
     this.view = view;
+    this.first = first;
     this.moment = seconds(view.at ?? view.now);
     this.shades = colours();
     const wanted = charts(view);
     if ([...this.plots.keys()].some((key, index) => wanted[index]?.key !== key)) this.clear();
-    this.queue(wanted.map((one) => () => this.drawn(one)));
+    this.queue([...first, ...wanted.map((one) => () => this.drawn(one))]);
   }
 
   /** Works through these in place of what still waits, one a frame: all charts at once would hold the page up. */
@@ -81,7 +83,10 @@ export class Charts {
     } else {
       this.add(one);
     }
-    this.caption(this.plots.get(one.key), null);
+    // A refresh leaves the value that is being read.
+    const entry = this.plots.get(one.key);
+    const { idx } = entry.plot.cursor;
+    this.caption(entry, idx < one.data[0].length ? idx : null);
   }
 
   /** The whole record with some room for forecasts. */

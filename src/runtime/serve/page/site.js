@@ -37,6 +37,7 @@ export class SitePage {
       el('div', { class: sorted.some((one) => one.position) ? 'two' : '' },
         sketch(sorted, site.positions_are),
         el('section', { class: 'card' }, el('h2', {}, 'In force'), this.force(site, at))),
+      ...(at || !status.drill ? [] : [drills(status.drill)]),
       el('section', { class: 'card' }, el('h2', {}, 'What was said'), list(site.log, 'Nothing yet.')));
     const log = this.view.querySelector('ul.log');
     if (log) log.scrollTop = scrolled;
@@ -67,6 +68,20 @@ export class SitePage {
     if (at === null) nodes.push(buttons(site, (kind) => this.orders(kind, null), ['acknowledge', 'silence', 'unsilence']));
     return nodes;
   }
+}
+
+/** How drills stand, where they are held. */
+function drills(drill) {
+  const passed = drill.passed_at ? [
+    `The last that passed: ${figure(drill.latency_seconds)} s from the readings to the hook`,
+    drill.acknowledged_seconds === null ? '' : `, acknowledged ${span(drill.acknowledged_seconds)} later`,
+    ', ended ', when(drill.passed_at), '.'] : 'None has passed yet.';
+  const alarms = [
+    [drill.failure, ['The newest drill failed: ', drill.failure, '.']],
+    [new Date(drill.overdue_after) < new Date(), ['One should have passed by ', when(drill.overdue_after), '.']]];
+  return el('section', { class: 'card', 'aria-label': 'Drills' }, el('h2', {}, 'Drills'),
+    alarms.filter(([is]) => is).map(([, text]) => el('p', {}, el('strong', {}, text))), el('p', {}, passed),
+    el('p', { class: 'soft' }, `${drill.passed} passed and ${drill.failed} failed since `, when(drill.since), '. In a drill a made-up failure goes from a file to the hooks.'));
 }
 
 /** The buttons for orders, or why there are none. */
