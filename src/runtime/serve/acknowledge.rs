@@ -1,7 +1,6 @@
 //! The page behind the link in an alert's message: it shows the alert, and its button acknowledges it. Plain HTML, no script.
 
-use super::caller::OwnNames;
-use super::routes::NO_SUCH_PAGE;
+use super::caller::{NO_SUCH_PAGE, OwnNames};
 use crate::reading::Timestamp;
 use crate::runtime::link::AskedLink;
 use crate::runtime::view::{AlertLife, AlertView, LinkPage, LinkTarget, SiteReader};
@@ -30,10 +29,14 @@ pub(super) fn router(reader: Arc<SiteReader>, names: Arc<OwnNames>) -> Router {
         .layer(from_fn_with_state((reader, names), admit))
 }
 
-type Admission = (Arc<SiteReader>, Arc<OwnNames>);
+type LinkAdmission = (Arc<SiteReader>, Arc<OwnNames>);
 
 /// Under our own names only, and no form of a foreign page.
-async fn admit(State((reader, names)): State<Admission>, request: Request, next: Next) -> Response {
+async fn admit(
+    State((reader, names)): State<LinkAdmission>,
+    request: Request,
+    next: Next,
+) -> Response {
     let headers = request.headers();
     if reader.links().is_none() {
         (StatusCode::NOT_FOUND, NO_SUCH_PAGE).into_response()

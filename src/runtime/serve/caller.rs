@@ -6,6 +6,9 @@ use axum::http::{HeaderMap, HeaderName, header};
 use std::net::IpAddr;
 use std::sync::{Arc, PoisonError, RwLock};
 
+/// What whoever asks for something else is answered.
+pub(super) const NO_SUCH_PAGE: &str = "no such page\n";
+
 /// The names under which a daemon is reached.
 #[derive(Debug, Clone, Default)]
 pub(super) struct OwnNames {

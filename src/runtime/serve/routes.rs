@@ -1,6 +1,6 @@
 //! What is answered to which request, and to whom.
 
-use super::caller::{OwnNames, SharedToken, is_this_machine};
+use super::caller::{NO_SUCH_PAGE, OwnNames, SharedToken, is_this_machine};
 use super::{ListenOptions, ServedState, acknowledge, metrics, page, views};
 use crate::runtime::vitals::{Health, Vitals, VitalsPoint};
 use axum::extract::{DefaultBodyLimit, Query, Request, State};
@@ -127,7 +127,6 @@ async fn admit(State((token, names)): State<Admission>, request: Request, next: 
     next.run(request).await
 }
 
-pub(super) const NO_SUCH_PAGE: &str = "no such page\n";
 const FOREIGN_PAGE: &str = "a page of another site asks (Origin): only the daemon's own page may\n";
 const FOREIGN_HOST: &str =
     "an order is taken under this machine's name or address, or that of site.public_url (Host)\n";
