@@ -31,8 +31,9 @@ The law is the slider block of Helmstetter et al. (2004) in one regular equation
    for irregular sampling, random walk.
 3. Every kind of effect is tried inside the law, with every channel, as level and as rate, through exponential and gamma
    responses. The law's own parameters are refitted with it, from where they stood and from laws found anew, because beside a poor law
-   everything that is tried gains alike; an event lies between two readings. The best one enters, and the search begins again (*after*). What
-   entered early leaves again where the BIC rises by less than 10 without it.
+   everything that is tried gains alike; an event lies between two readings. The best one enters, and the search begins again (*after*); but
+   where the law that was found with it is the better one without it too, the law before was a poor fit, nothing enters, and the search begins
+   again from that law. What entered early leaves again where the BIC rises by less than 10 without it.
 4. An effect is accepted only if the BIC falls by 10 or more, the sign is one that the ground allows, its memory is short against the
    record, a search where there is nothing on 399 surrogates gains as much in fewer than 1 % of cases, and a later block, held out, is predicted
    no worse by the law and the effects as they were learned before it. Every candidate is judged alike: by what the readings of

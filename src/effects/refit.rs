@@ -93,7 +93,7 @@ impl Start {
     }
 }
 
-/// Starts of the law alone: steady, accelerating, relaxing from above and from below, and soon there.
+/// Starts of the law alone: steady, accelerating, relaxing from above and from below, soon there, and there within the first readings.
 pub(super) fn plain_starts(problem: &Problem) -> Vec<Start> {
     let shapes = [
         (0.0, -2.0, 0.0),
@@ -102,6 +102,7 @@ pub(super) fn plain_starts(problem: &Problem) -> Vec<Start> {
         (-3.0, 1.0, -0.5),
         (1.0, 2.0, -0.5),
         (-20.0, 3.4, -0.8),
+        (-150.0, 5.2, -1.0),
     ];
     let used = problem.used;
     let ends = (used / 5).max(2);

@@ -13,7 +13,7 @@ use super::refit::{Fitted, Start, plain_starts, refit_every_memory};
 use super::response::Driver;
 use super::rival::Rival;
 use super::surrogate::NullGains;
-use super::term::{Act, Scratch, Term, time_of};
+use super::term::{Act, Scratch, Term, law_parameters, time_of};
 use crate::reading::Timestamp;
 
 /// Most effects in one law.
@@ -27,6 +27,9 @@ pub(super) const SIGNIFICANT: f64 = 0.01;
 const MOST_EXTRAPOLATED: f64 = 1.2;
 const WORSE: f64 = 2.0;
 const WORSE_STEPS: f64 = 1.005;
+
+/// By how much of the BIC a fit is better for the search to begin with it again.
+const BETTER: f64 = 1.0;
 
 /// The load steps by less than this where the velocity's own jump goes unseen, e-folds.
 const LEAST_JUMP: f64 = 0.1;
@@ -159,14 +162,23 @@ impl Search<'_> {
         plain: Fitted,
         progress: &mut dyn FnMut(f64),
     ) -> Option<SearchResult> {
-        let null = self.null(&plain)?;
+        let mut plain = plain;
+        let mut null = self.null(&plain)?;
         let mut full = null.clone();
         let mut accepted = Vec::new();
         for round in 0..MOST_EFFECTS {
             progress(0.1 + 0.8 * round as f64 / MOST_EFFECTS as f64);
+            let noted = self.candidates.clone();
             let Some((next, how)) = self.one_more(&full, round) else {
                 break;
             };
+            if let Some(better) = self.better_without(&full, &next) {
+                if accepted.is_empty() {
+                    (plain, null) = (self.nearer(plain, &better), better.clone());
+                }
+                (full, self.candidates) = (better, noted);
+                continue;
+            }
             full = next;
             accepted.extend(how);
             self.drop_needless(&mut full, &mut accepted);
@@ -179,6 +191,23 @@ impl Search<'_> {
             candidates: self.candidates,
             withheld: self.withheld,
         })
+    }
+
+    /// `base` fitted anew from the law that `next` has with one effect more: where that is the better one without this effect too, the
+    /// effect was credited with what a poor fit had missed.
+    fn better_without(&mut self, base: &Fitted, next: &Fitted) -> Option<Fitted> {
+        let mut start = Start::at(base);
+        let law = law_parameters(self.problem);
+        start.parameters[..law].copy_from_slice(&next.parameters[..law]);
+        let fitted = refit_every_memory(self.problem, &start, self.bank, &mut self.scratch)?;
+        (fitted.bic(self.problem) < base.bic(self.problem) - BETTER).then_some(fitted)
+    }
+
+    /// The plain law by least squares from that of `better`, or `plain` where that is nearer to the readings.
+    fn nearer(&mut self, plain: Fitted, better: &Fitted) -> Fitted {
+        let found = best_of_starts(self.problem, &[Start::at(better)], &mut self.scratch);
+        let nearer = found.filter(|found| found.surprise < plain.surprise);
+        nearer.unwrap_or(plain)
     }
 
     /// The best effect that may be added to `base`, refitted with it; an event and the mean that it is seen through are

@@ -1,9 +1,10 @@
 //! A law keeps its motion when it is written in the terms of more readings.
 
 use super::*;
-use crate::effects::fixture::{daily, steady};
+use crate::effects::fixture::{daily, generator, normals, series, steady};
 use crate::effects::kind::Kind;
 use crate::effects::term::MIDDLE;
+use crate::effects::{Options, explain};
 
 const COUNT: usize = 120;
 const PART: usize = 70;
@@ -42,4 +43,31 @@ fn a_law_with_a_rate_limit_moves_alike_in_the_terms_of_more_readings() {
 #[test]
 fn a_law_with_a_changing_geometry_moves_alike_in_the_terms_of_more_readings() {
     moves_alike(Kind::Geometry, Act::PerSlip);
+}
+
+/// Velocities that fall by half within two days, read daily with two gaps, with a noise of 0.6 % of each.
+#[test]
+fn a_slope_that_slows_down_within_its_first_readings_lacks_nothing() {
+    let gap = |day: f64| {
+        if day > 129.0 {
+            33.0
+        } else if day > 34.0 {
+            21.0
+        } else {
+            0.0
+        }
+    };
+    let days: Vec<f64> = daily(292).iter().map(|day| day + gap(*day)).collect();
+    let law = [-1.482, -167.2, 5.197, -1.133];
+    for seed in 1..4 {
+        let mut scratch = Scratch::default();
+        let any = steady(Quantity::Velocity, &days, seed);
+        assert!(scratch.predict(&any, &[], &law));
+        let noise = normals(&mut generator(seed), days.len());
+        let both = scratch.prediction.iter().zip(noise);
+        let values: Vec<f64> = both.map(|(v, noise)| v * (1.0 + 0.006 * noise)).collect();
+        let series = series(Quantity::Velocity, &days, &values);
+        let found = explain(&series, &[], &[], &Options::default(), &mut |_| {});
+        assert_eq!(found.verdict.effect, Kind::None, "seed {seed}");
+    }
 }
