@@ -117,6 +117,16 @@ impl Indicators {
         shown + (1.0 - shown) * UNSEEN * days / (days + UNSEEN_DAYS)
     }
 
+    /// Whether levels may be given a chance within `days` of at least `chance`, whatever is expected.
+    pub fn may_reach(&self, days: f64, chance: f64) -> bool {
+        let days = days + self.scales.centred_before_days;
+        // Between two spans the chance grows to that of the longer one, before the shortest to that of it.
+        let mut counted = spans(&self.scales)
+            .take_while(|(power, span)| *power == 0 || *span < 2.0 * days)
+            .map(|(_, span)| self.most(span));
+        counted.any(|most| most >= chance)
+    }
+
     /// The inputs of every span with its length, days.
     pub fn questions(&self, members: &Members) -> Vec<(f64, [f64; INPUTS])> {
         let each = spans(&self.scales);
@@ -501,6 +511,33 @@ mod tests {
                     < 1e-6
             );
         }
+    }
+
+    #[test]
+    fn what_levels_may_not_reach_they_do_not_reach_however_sure_the_network_is() {
+        let mut sure = Network::silent();
+        sure.direct[0] = 100.0;
+        let jitter = |t: f64| 0.3 * (t * 977.0).sin();
+        let (mut ruled_out, mut open) = (0, 0);
+        for growth in [0.0, 0.02, 0.05, 0.1, 0.2] {
+            let slope = readings(300, 0.125, |t| t + (growth * t).exp() + jitter(t));
+            let indicators = Indicators::of(&slope).unwrap();
+            let chances = indicators.collapse_by(&sure, &Members::of(&slope)).sure;
+            for days in [0.02, 0.3, 1.0, 2.0, 7.0, 30.0, 500.0] {
+                for chance in [0.02, 0.05, 0.2, 0.5] {
+                    if indicators.may_reach(days, chance) {
+                        open += 1;
+                    } else {
+                        ruled_out += 1;
+                        assert!(
+                            chances.chance_within(days) < chance,
+                            "{growth} {days} {chance}"
+                        );
+                    }
+                }
+            }
+        }
+        assert!(ruled_out > 20 && open > 20, "{ruled_out} {open}");
     }
 
     #[test]

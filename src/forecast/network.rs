@@ -73,16 +73,28 @@ impl Network {
     }
 
     fn ln_odds(&self, inputs: &[f64; INPUTS]) -> f64 {
-        let sum = |weights: &[f32; INPUTS]| {
-            let terms = weights.iter().zip(inputs);
-            terms
-                .map(|(weight, input)| f64::from(*weight) * input)
-                .sum::<f64>()
-        };
-        let hidden = self.hidden.iter().zip(&self.output);
-        let units = hidden.map(|(weights, output)| f64::from(*output) * sum(weights).tanh());
-        sum(&self.direct) + units.sum::<f64>()
+        let (together, _) = self.hidden.as_chunks::<TOGETHER>();
+        let hidden = together.iter().flat_map(|units| sums(units, inputs));
+        let units = hidden.zip(&self.output);
+        let units = units.map(|(sum, output)| f64::from(*output) * sum.tanh());
+        let [direct] = sums(&[self.direct], inputs);
+        direct + units.sum::<f64>()
     }
+}
+
+/// Hidden units whose sums are taken side by side, because each addition waits for the one before.
+const TOGETHER: usize = 8;
+const _: () = assert!(HIDDEN.is_multiple_of(TOGETHER));
+
+/// The weighted sum of the inputs for each row of weights.
+fn sums<const ROWS: usize>(weights: &[[f32; INPUTS]; ROWS], inputs: &[f64; INPUTS]) -> [f64; ROWS] {
+    let mut sums = [0.0; ROWS];
+    for (index, input) in inputs.iter().enumerate() {
+        for (sum, row) in sums.iter_mut().zip(weights) {
+            *sum += f64::from(row[index]) * input;
+        }
+    }
+    sums
 }
 
 #[cfg(test)]

@@ -5,13 +5,24 @@
 pub struct Passage {
     /// (days from now, probability), in increasing time.
     times: Vec<(f64, f64)>,
+    /// The probability of passing by each of them.
+    by: Vec<f64>,
 }
 
 impl Passage {
     /// From (days, probability) pairs in any order.
     pub fn from_times(mut times: Vec<(f64, f64)>) -> Self {
         times.sort_by(|a, b| a.0.total_cmp(&b.0));
-        Self { times }
+        Self::of_sorted(times)
+    }
+
+    fn of_sorted(times: Vec<(f64, f64)>) -> Self {
+        let summed = times.iter().scan(0.0, |sum, (_, share)| {
+            *sum += share;
+            Some(*sum)
+        });
+        let by = summed.collect();
+        Self { times, by }
     }
 
     /// The same, every time `pace` times as soon.
@@ -34,15 +45,14 @@ impl Passage {
     /// The same, each chance within a time raised to `power`.
     #[must_use]
     pub fn raised(&self, power: f64) -> Self {
-        let mut within = 0.0_f64;
-        let times = self.times.iter().map(|(days, share)| {
-            let before = within.min(1.0).powf(power);
-            within += share;
-            (*days, within.min(1.0).powf(power) - before)
+        let mut before = 0.0_f64.powf(power);
+        let times = self.times.iter().zip(&self.by).map(|((days, _), by)| {
+            let raised = by.min(1.0).powf(power);
+            let share = raised - before;
+            before = raised;
+            (*days, share)
         });
-        Self {
-            times: times.collect(),
-        }
+        Self::of_sorted(times.collect())
     }
 
     /// (days from now, probability), in increasing time; what is missing to 1 never passes.
@@ -52,20 +62,16 @@ impl Passage {
 
     /// The chance of passage within `days`.
     pub fn chance_within(&self, days: f64) -> f64 {
-        let within = self.times.iter().take_while(|(time, _)| *time <= days);
-        within.fold(0.0, |sum, (_, share)| sum + share).min(1.0)
+        let count = self.times.partition_point(|(time, _)| *time <= days);
+        let within = self.by[..count].last();
+        within.map_or(0.0, |by| by.min(1.0))
     }
 
     /// Days to the unconditional `share` quantile; `None` when it is not reached within `horizon_days`.
     pub fn quantile(&self, share: f64, horizon_days: f64) -> Option<f64> {
-        let mut reached = 0.0;
-        for (days, weight) in &self.times {
-            reached += weight;
-            if reached >= share {
-                return (*days <= horizon_days).then_some(*days);
-            }
-        }
-        None
+        let first = self.by.iter().position(|by| *by >= share)?;
+        let days = self.times[first].0;
+        (days <= horizon_days).then_some(days)
     }
 }
 
@@ -75,9 +81,7 @@ mod tests {
 
     #[test]
     fn raised_chances_keep_their_times_and_grow_within_each() {
-        let passage = Passage {
-            times: vec![(1.0, 0.04), (2.0, 0.12), (90.0, 0.84)],
-        };
+        let passage = Passage::from_times(vec![(1.0, 0.04), (2.0, 0.12), (90.0, 0.84)]);
         let raised = passage.raised(0.5);
         assert!((raised.chance_within(1.0) - 0.2).abs() < 1e-12);
         assert!((raised.chance_within(2.0) - 0.4).abs() < 1e-12);
@@ -87,9 +91,7 @@ mod tests {
 
     #[test]
     fn quantiles_are_unconditional_and_stop_at_the_horizon() {
-        let passage = Passage {
-            times: vec![(1.0, 0.2), (2.0, 0.2), (90.0, 0.2)],
-        };
+        let passage = Passage::from_times(vec![(1.0, 0.2), (2.0, 0.2), (90.0, 0.2)]);
         assert_eq!(passage.quantile(0.05, 30.0), Some(1.0));
         assert_eq!(passage.quantile(0.5, 30.0), None);
         assert_eq!(passage.quantile(0.5, 100.0), Some(90.0));

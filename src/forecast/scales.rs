@@ -81,13 +81,25 @@ struct Curve {
     mm: Vec<f64>,
     /// Integral from the first reading to each, mm days.
     area: Vec<f64>,
+    /// The largest step between two readings from each on, mm.
+    largest_step: Vec<f64>,
 }
 
 /// Block means of one scale, newest first, and which of the blocks hold a reading.
+#[derive(Default)]
 struct Blocks {
     days: f64,
+    /// The integral of the curve to the end of each block and to the beginning of the last, where the means are of it.
+    integrals: Vec<f64>,
     means: Vec<f64>,
     is_read: Vec<bool>,
+}
+
+/// Where one looks at a curve, from its newest reading backwards.
+struct Backwards<'a> {
+    curve: &'a Curve,
+    /// Readings up to that time.
+    before: usize,
 }
 
 impl Scales {
@@ -107,8 +119,9 @@ impl Scales {
         let base_days = interval_days.max(FINEST_BLOCK_DAYS);
         let stated = stated_change(observations.quantity, values);
         let mut each: Vec<Scale> = Vec::new();
+        let mut blocks = Blocks::default();
         for power in 0..MOST_SCALES {
-            let blocks = curve.blocks(power, base_days, interval_days);
+            blocks = curve.blocks(power, (base_days, interval_days), &blocks);
             let Some(scale) = blocks.scale(each.last(), stated, &curve) else {
                 break;
             };
@@ -152,7 +165,17 @@ impl Curve {
             let mean = f64::midpoint(mm[index - 1], mm[index]);
             area[index] = area[index - 1] + mean * (days[index] - days[index - 1]);
         }
-        Self { days, mm, area }
+        let mut largest_step = vec![0.0_f64; mm.len()];
+        for index in (1..mm.len()).rev() {
+            let step = (mm[index] - mm[index - 1]).abs();
+            largest_step[index - 1] = largest_step[index].max(step);
+        }
+        Self {
+            days,
+            mm,
+            area,
+            largest_step,
+        }
     }
 
     fn interval(&self) -> f64 {
@@ -162,35 +185,22 @@ impl Curve {
         *spans.select_nth_unstable_by(middle, f64::total_cmp).1
     }
 
-    /// The reading before `days`, and how far on the way to the next one that is.
-    fn place(&self, days: f64) -> (usize, f64) {
-        let after = self.days.partition_point(|at| *at <= days);
-        let after = after.clamp(1, self.days.len() - 1);
-        let (from, to) = (self.days[after - 1], self.days[after]);
-        (after - 1, ((days - from) / (to - from)).clamp(0.0, 1.0))
+    /// To be asked about ever earlier times, from `days` on.
+    fn backwards(&self, days: f64) -> Backwards<'_> {
+        Backwards {
+            curve: self,
+            before: self.days.partition_point(|at| *at <= days),
+        }
     }
 
-    fn value(&self, days: f64) -> f64 {
-        let (index, share) = self.place(days);
-        self.mm[index] + share * (self.mm[index + 1] - self.mm[index])
-    }
-
-    fn integral(&self, days: f64) -> f64 {
-        let (index, share) = self.place(days);
-        let value = self.mm[index] + share * (self.mm[index + 1] - self.mm[index]);
-        let span = share * (self.days[index + 1] - self.days[index]);
-        self.area[index] + f64::midpoint(self.mm[index], value) * span
-    }
-
-    fn is_read(&self, from: f64, to: f64) -> bool {
-        const ROUNDING: f64 = 1e-9;
-        let first = self.days.partition_point(|at| *at < from - ROUNDING);
-        self.days.get(first).is_some_and(|at| *at <= to + ROUNDING)
-    }
-
-    /// The blocks of one scale. Sparse readings are taken as points at the two shortest scales: a mean over the line
-    /// between two of them would blur the newest motion.
-    fn blocks(&self, power: usize, base_days: f64, interval_days: f64) -> Blocks {
+    /// The blocks of one scale, of which `shorter` are half as long. Sparse readings are taken as points at the two shortest
+    /// scales: a mean over the line between two of them would blur the newest motion.
+    fn blocks(
+        &self,
+        power: usize,
+        (base_days, interval_days): (f64, f64),
+        shorter: &Blocks,
+    ) -> Blocks {
         let days = base_days * f64::powi(2.0, i32::try_from(power).unwrap_or(i32::MAX));
         let length = -self.days[0];
         #[expect(
@@ -199,32 +209,88 @@ impl Curve {
             reason = "a positive number, cut off at the most blocks"
         )]
         let count = ((length / days + 1e-6) as usize).min(MOST_BLOCKS);
+        let end = |block: usize| -(block as f64) * days;
         let is_dense = interval_days < 0.5 * base_days;
-        let mean = |block: usize| {
-            let to = -(block as f64) * days;
-            match power {
-                0 if !is_dense => self.value(to),
-                1 if !is_dense => f64::midpoint(self.value(to), self.value(to - base_days)),
-                _ => (self.integral(to) - self.integral(to - days)) / days,
+        let (mut integrals, mut means) = (Vec::new(), Vec::with_capacity(count));
+        let mut back = self.backwards(0.0);
+        match power {
+            0 if !is_dense => means.extend((0..count).map(|block| back.value(end(block)))),
+            1 if !is_dense => means.extend((0..count).map(|block| {
+                let newer = back.value(end(block));
+                f64::midpoint(newer, back.value(end(block) - base_days))
+            })),
+            _ => {
+                let known = shorter.integrals.iter().step_by(2).take(count + 1);
+                integrals.extend(known);
+                let mut back = self.backwards(end(integrals.len()));
+                let others = integrals.len()..=count;
+                integrals.extend(others.map(|block| back.integral(end(block))));
+                means.extend(integrals.windows(2).map(|pair| (pair[0] - pair[1]) / days));
             }
-        };
-        let is_read = |block: usize| {
-            let to = -(block as f64) * days;
-            self.is_read(to - days, to)
-        };
+        }
         Blocks {
             days,
-            means: (0..count).map(mean).collect(),
-            is_read: (0..count).map(is_read).collect(),
+            is_read: self.are_read(days, count, &shorter.is_read),
+            integrals,
+            means,
         }
+    }
+
+    /// Which of so many blocks hold a reading, of which `shorter` says the same for blocks half as long.
+    fn are_read(&self, days: f64, count: usize, shorter: &[bool]) -> Vec<bool> {
+        const ROUNDING: f64 = 1e-9;
+        let known = shorter.chunks_exact(2).take(count);
+        let mut are_read: Vec<bool> = known.map(|halves| halves[0] || halves[1]).collect();
+        let mut before = self.days.len();
+        for block in are_read.len()..count {
+            let to = -(block as f64) * days;
+            let oldest = to - days - ROUNDING;
+            if before == self.days.len() {
+                before = self.days.partition_point(|at| *at < oldest);
+            }
+            while before > 0 && self.days[before - 1] >= oldest {
+                before -= 1;
+            }
+            are_read.push(self.days.get(before).is_some_and(|at| *at <= to + ROUNDING));
+        }
+        are_read
     }
 
     fn jump(&self, days: f64, usual: f64) -> f64 {
         let from = self.days.partition_point(|at| *at < -2.0 * days);
-        let newest = &self.mm[from..];
-        let motion = newest.first().map_or(0.0, |first| first.abs());
-        let steps = newest.windows(2).map(|pair| (pair[1] - pair[0]).abs());
-        (steps.fold(0.0, f64::max) / motion.max(usual)).min(MOST_JUMP)
+        let motion = self.mm.get(from).map_or(0.0, |first| first.abs());
+        let largest = self.largest_step.get(from).copied().unwrap_or(0.0);
+        (largest / motion.max(usual)).min(MOST_JUMP)
+    }
+}
+
+impl Backwards<'_> {
+    /// The reading before `days`, and how far on the way to the next one that is; `days` is no later than the last one
+    /// that was asked about.
+    fn place(&mut self, days: f64) -> (usize, f64) {
+        let at = &self.curve.days;
+        while self.before > 0 && at[self.before - 1] > days {
+            self.before -= 1;
+        }
+        let after = self.before.clamp(1, at.len() - 1);
+        let (from, to) = (at[after - 1], at[after]);
+        (after - 1, ((days - from) / (to - from)).clamp(0.0, 1.0))
+    }
+
+    /// Displacement, mm.
+    fn value(&mut self, days: f64) -> f64 {
+        let (index, share) = self.place(days);
+        let mm = &self.curve.mm;
+        mm[index] + share * (mm[index + 1] - mm[index])
+    }
+
+    /// Integral of the displacement from the first reading, mm days.
+    fn integral(&mut self, days: f64) -> f64 {
+        let (index, share) = self.place(days);
+        let Curve { days, mm, area, .. } = self.curve;
+        let value = mm[index] + share * (mm[index + 1] - mm[index]);
+        let span = share * (days[index + 1] - days[index]);
+        area[index] + f64::midpoint(mm[index], value) * span
     }
 }
 

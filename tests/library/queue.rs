@@ -75,20 +75,33 @@ fn a_threshold_is_called_at_its_reading_however_many_queue_behind_it() {
     panic!("not called before the queue was over");
 }
 
-#[test]
-fn readings_that_queue_are_judged_once_in_an_evacuation_time_at_least() {
-    let inputs = history(200, |_| 0.0);
+/// When readings that queue are judged, as long as more come.
+fn judged_meanwhile(more: impl Fn(i64) -> f64) -> Vec<Timestamp> {
+    let inputs = history(200, more);
     let (mut monitor, rest) = before(&inputs);
     let mut said = Vec::new();
     for (now, input) in rest {
         said.extend(monitor.step(*now, input));
     }
-    let judged: Vec<Timestamp> = (refits(&said).into_iter())
-        .filter(|(benchmark, ..)| benchmark == "a")
-        .map(|(_, time, _)| time)
-        .collect();
+    // Of each the newest is judged in any case.
+    assert_eq!(refits(&settle(&mut monitor, at(199))).len(), 2);
+    let of_the_first = (refits(&said).into_iter()).filter(|(benchmark, ..)| benchmark == "a");
+    of_the_first.map(|(_, time, _)| time).collect()
+}
+
+#[test]
+fn a_slope_that_accelerates_while_its_readings_queue_is_judged_once_in_an_evacuation_time() {
+    let growth = |hour: i64| 0.5 * ((hour - 40).max(0) as f64 / 30.0).exp();
     // From the first that queued, and from the first after each that was judged.
-    assert_eq!(judged, [64, 89, 114, 139, 164, 189].map(at));
+    assert_eq!(
+        judged_meanwhile(growth),
+        [64, 89, 114, 139, 164, 189].map(at)
+    );
+}
+
+#[test]
+fn a_slope_whose_motion_rules_out_orange_is_judged_when_no_more_readings_queue() {
+    assert_eq!(judged_meanwhile(|_| 0.0), []);
 }
 
 #[test]

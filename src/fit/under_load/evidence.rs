@@ -7,6 +7,8 @@ use super::shape::{BLOCKS, Block, LANES, TablePlace};
 const FEWEST_UNDER_THE_LAW: usize = 4;
 /// Standard deviations, for one rate after another, of a velocity that follows no law.
 const DRIFTS: [f64; 3] = [0.05, 0.15, 0.4];
+/// Rates between two looks at whether a block can still count.
+const LOOKED: usize = 8;
 /// Starts this much less likely than the best, ln, are not counted.
 const NEGLIGIBLE: f64 = 10.0;
 
@@ -40,29 +42,66 @@ pub(super) struct ShapeEvidence {
     pub(super) today: [f64; 3],
 }
 
+/// The times of a record, days before its present, each once: what ends one rate mostly begins the next.
+#[derive(Debug, Clone)]
+pub(super) struct RecordTimes {
+    days: Vec<f64>,
+    /// Where the start, the middle and the end of each rate stand among them.
+    of_rates: Vec<[usize; 3]>,
+}
+
+impl RecordTimes {
+    pub(super) fn of(record: &RateRecord) -> Self {
+        let mut times = Self {
+            days: Vec::with_capacity(2 * record.from.len() + 1),
+            of_rates: Vec::with_capacity(record.from.len()),
+        };
+        let each = record.from.iter().zip(&record.middle).zip(&record.to);
+        for ((from, middle), to) in each {
+            let place = [from, middle, to].map(|days| times.place(*days));
+            times.of_rates.push(place);
+        }
+        times
+    }
+
+    /// Where `days` stands, behind the others where it is not the last of them.
+    fn place(&mut self, days: f64) -> usize {
+        if self.days.last() != Some(&days) {
+            self.days.push(days);
+        }
+        self.days.len() - 1
+    }
+}
+
 impl SlopeTable {
     /// `blocks`: those that are asked about.
-    pub(super) fn new(r: f64, record: &RateRecord, blocks: &[bool]) -> Self {
-        let u = |days: &f64| (r * days).ln_1p();
-        let places = record.from.iter().zip(&record.middle).zip(&record.to);
-        let places: Vec<[TablePlace; 3]> = places
-            .map(|((from, middle), to)| [from, middle, to].map(|days| TablePlace::of(u(days))))
-            .collect();
+    pub(super) fn new(r: f64, times: &RecordTimes, blocks: &[bool]) -> Self {
+        let u: Vec<f64> = times.days.iter().map(|days| (r * days).ln_1p()).collect();
+        let places: Vec<TablePlace> = u.iter().map(|u| TablePlace::of(*u)).collect();
         let predicted = BLOCKS.iter().zip(blocks).map(|(block, is_asked)| {
-            let places: &[[TablePlace; 3]] = if *is_asked { &places } else { &[] };
-            predict(block, places)
+            if *is_asked {
+                predict(block, &places, &times.of_rates)
+            } else {
+                Vec::new()
+            }
         });
+        let predicted = predicted.collect();
         Self {
             r,
-            u: record.middle.iter().map(u).collect(),
-            predicted: predicted.collect(),
+            u: times
+                .of_rates
+                .iter()
+                .map(|[_, middle, _]| u[*middle])
+                .collect(),
+            predicted,
         }
     }
 }
 
-fn predict(block: &Block, places: &[[TablePlace; 3]]) -> Vec<[f64; LANES]> {
-    let mean = |[from, middle, to]: &[TablePlace; 3]| {
-        let (from, middle, to) = (block.ln_y(*from), block.ln_y(*middle), block.ln_y(*to));
+fn predict(block: &Block, places: &[TablePlace], rates: &[[usize; 3]]) -> Vec<[f64; LANES]> {
+    let ln_y: Vec<[f64; LANES]> = places.iter().map(|place| block.ln_y(*place)).collect();
+    let mean = |rate: &[usize; 3]| {
+        let [from, middle, to] = rate.map(|place| &ln_y[place]);
         std::array::from_fn(|lane| {
             // ln of the mean of e^x over an x that falls evenly: ln(sinh(h)/h) above the middle.
             let h2 = 0.25 * (from[lane] - to[lane]).powi(2);
@@ -74,15 +113,14 @@ fn predict(block: &Block, places: &[[TablePlace; 3]]) -> Vec<[f64; LANES]> {
             above - middle[lane]
         })
     };
-    places.iter().map(mean).collect()
+    rates.iter().map(mean).collect()
 }
 
-/// The evidence of each shape of the block of that index; `before`: that of what came before each rate, by no law. A shape
-/// whose evidence, ln, cannot reach `least` has none.
+/// The evidence of each shape of the block of that index. A shape whose evidence, ln, cannot reach `least` has none.
 pub(super) fn weigh(
     record: &RateRecord,
     (block, slope): (usize, &SlopeTable),
-    (gains, before): (&Gains, &[f64]),
+    gains: &Gains,
     least: f64,
     room: &mut Room,
 ) -> [ShapeEvidence; LANES] {
@@ -93,10 +131,16 @@ pub(super) fn weigh(
     let [mut load, mut level, mut velocity_now, mut load_now, mut ln] = [[0.0; LANES]; 5];
     let first = FEWEST_UNDER_THE_LAW.min(count) - 1;
     let mut best = [f64::NEG_INFINITY; LANES];
+    // The sum over starts is no more than all of them at the best.
+    let least = least - ((count - first) as f64).ln();
     for (step, gain) in gains.steps.iter().enumerate() {
+        // What a start has lost to its misses no older one wins back.
+        if step % LOOKED == 0 && cannot_reach(least, &best, &ln, gains.most_outside[step]) {
+            return [NO_EVIDENCE; LANES];
+        }
         let index = count - 1 - step;
         let (read, predicted) = (record.ln_velocity[index], &predicted[index]);
-        let outside = gains.ln_normaliser[step] + before[index];
+        let outside = gains.outside[step];
         let mut total = [0.0; LANES];
         for lane in 0..LANES {
             load[lane] *= gain.keep;
@@ -116,8 +160,6 @@ pub(super) fn weigh(
             }
         }
     }
-    // Their sum is no more than all of them at the best.
-    let least = least - ((count - first) as f64).ln();
     std::array::from_fn(|lane| {
         if best[lane].is_finite() && best[lane] >= least {
             over_starts(gains, room, (first, lane), best[lane])
@@ -125,6 +167,13 @@ pub(super) fn weigh(
             NO_EVIDENCE
         }
     })
+}
+
+/// Whether no lane can reach `least`, of which `best` are the best starts so far, `ln` what the misses have cost, and
+/// `most_outside` the most that an older start has beside them.
+fn cannot_reach(least: f64, best: &[f64; LANES], ln: &[f64; LANES], most_outside: f64) -> bool {
+    let mut lanes = best.iter().zip(ln);
+    lanes.all(|(best, ln)| *best < least && ln + most_outside < least)
 }
 
 const NO_EVIDENCE: ShapeEvidence = ShapeEvidence {

@@ -50,8 +50,11 @@ pub(super) struct Gain {
 #[derive(Debug, Clone)]
 pub(super) struct Gains {
     pub(super) steps: Vec<Gain>,
-    /// Sum of -ln(variance)/2 up to each rate.
-    pub(super) ln_normaliser: Vec<f64>,
+    /// What the evidence of a law that starts at each rate has beside its misses, ln: the sum of -ln(variance)/2 up to it,
+    /// and the evidence of what came before it.
+    pub(super) outside: Vec<f64>,
+    /// The highest of these at each rate and all older ones.
+    pub(super) most_outside: Vec<f64>,
     /// Variances of ln v and f of today, and their covariance, after each rate.
     pub(super) today: Vec<[f64; 3]>,
 }
@@ -74,6 +77,11 @@ pub(super) struct LoadMemory {
 }
 
 impl LoadMemory {
+    /// The scatter of the readings that goes with it.
+    pub(super) fn scatter(&self) -> f64 {
+        self.noise.scatter
+    }
+
     pub(super) fn new(record: &RateRecord, noise: &LoadNoise) -> Self {
         let variance = noise.sigma * noise.sigma;
         let mut ago = 0.0;
@@ -94,57 +102,115 @@ impl LoadMemory {
 }
 
 impl Gains {
-    /// `u`: ln(1 + |r| t) at the middle of each rate, oldest first.
-    pub(super) fn new(record: &RateRecord, memory: &LoadMemory, u: &[f64]) -> Self {
+    /// `u`: ln(1 + |r| t) at the middle of each rate, oldest first; `before`: the evidence of what came before each rate, ln.
+    pub(super) fn new(record: &RateRecord, memory: &LoadMemory, u: &[f64], before: &[f64]) -> Self {
         let noise = &memory.noise;
         let count = record.middle.len();
         let variance = noise.sigma * noise.sigma;
-        // Load, level, velocity of today, load of today.
-        let (f, l) = (variance, LEVEL_VARIANCE);
-        let mut p = [
-            [f, 0.0, f, f],
-            [0.0, l, l, 0.0],
-            [f, l, l + f, f],
-            [f, 0.0, f, f],
-        ];
+        let mut filter = FilterCovariance::of_today(variance);
         let mut gains = Self {
             steps: Vec::with_capacity(count),
-            ln_normaliser: Vec::with_capacity(count),
+            outside: Vec::with_capacity(count),
+            most_outside: Vec::new(),
             today: Vec::with_capacity(count),
         };
         let (mut u_before, mut normaliser) = (0.0, 0.0);
         let of_time = memory.keep.iter().zip(&memory.smoothed);
         for (index, (keep, smoothed)) in (0..count).rev().zip(of_time) {
-            let keep = *keep;
             let e_folds = (u[index] - u_before).max(0.0);
             u_before = u[index];
-            for slot in &mut p[0] {
-                *slot *= keep;
-            }
-            p[0][0] = keep * p[0][0] + variance * (1.0 - keep * keep);
-            (p[1][0], p[2][0], p[3][0]) = (p[0][1], p[0][2], p[0][3]);
-            p[1][1] += DRIFT * DRIFT * e_folds;
+            filter.go_back(*keep, variance, e_folds);
             let error = record.variance(index, noise.scatter);
-            let h: [f64; 4] = std::array::from_fn(|i| p[0][i] + p[1][i]);
-            let s = (h[0] + h[1] + error - smoothed).max(error).max(1e-12);
+            let (gain, s) = filter.read(error, *smoothed);
             normaliser -= 0.5 * s.ln();
             gains.steps.push(Gain {
-                keep,
-                load: h[0] / s,
-                level: h[1] / s,
-                velocity_now: h[2] / s,
-                load_now: h[3] / s,
-                precision: 1.0 / s,
+                keep: *keep,
+                ..gain
             });
-            gains.ln_normaliser.push(normaliser);
-            for (i, row) in p.iter_mut().enumerate() {
-                for (j, slot) in row.iter_mut().enumerate() {
-                    *slot -= h[i] * h[j] / s;
-                }
-            }
-            gains.today.push([p[2][2], p[3][3], p[2][3]]);
+            gains.outside.push(normaliser + before[index]);
+            gains
+                .today
+                .push([filter.velocity, filter.now, filter.velocity_now]);
+        }
+        let mut most = f64::NEG_INFINITY;
+        gains.most_outside = gains.outside.clone();
+        for slot in gains.most_outside.iter_mut().rev() {
+            most = most.max(*slot);
+            *slot = most;
         }
         gains
+    }
+}
+
+/// The covariance of the load f, the level l, and of today's ln v and load: what is not named of the symmetric matrix is
+/// not needed.
+struct FilterCovariance {
+    load: f64,
+    load_level: f64,
+    load_velocity: f64,
+    load_now: f64,
+    level: f64,
+    level_velocity: f64,
+    level_now: f64,
+    velocity: f64,
+    velocity_now: f64,
+    now: f64,
+}
+
+impl FilterCovariance {
+    /// Before anything is read: ln v of today is the level and the load together.
+    fn of_today(variance: f64) -> Self {
+        Self {
+            load: variance,
+            load_level: 0.0,
+            load_velocity: variance,
+            load_now: variance,
+            level: LEVEL_VARIANCE,
+            level_velocity: LEVEL_VARIANCE,
+            level_now: 0.0,
+            velocity: LEVEL_VARIANCE + variance,
+            velocity_now: variance,
+            now: variance,
+        }
+    }
+
+    /// To the rate before: `keep` of the load is left, and the level drifts with the e-folds between.
+    fn go_back(&mut self, keep: f64, variance: f64, e_folds: f64) {
+        self.load = keep * keep * self.load + variance * (1.0 - keep * keep);
+        self.load_level *= keep;
+        self.load_velocity *= keep;
+        self.load_now *= keep;
+        self.level += DRIFT * DRIFT * e_folds;
+    }
+
+    /// Takes a rate of that variance of its error, over which the load's variance loses `smoothed`: its gain, all but
+    /// what is kept of the load, and the variance of the innovation.
+    fn read(&mut self, error: f64, smoothed: f64) -> (Gain, f64) {
+        let load = self.load + self.load_level;
+        let level = self.load_level + self.level;
+        let velocity = self.load_velocity + self.level_velocity;
+        let now = self.load_now + self.level_now;
+        let s = (load + level + error - smoothed).max(error).max(1e-12);
+        let precision = 1.0 / s;
+        let gain = Gain {
+            keep: 1.0,
+            load: load * precision,
+            level: level * precision,
+            velocity_now: velocity * precision,
+            load_now: now * precision,
+            precision,
+        };
+        self.load -= load * gain.load;
+        self.load_level -= load * gain.level;
+        self.load_velocity -= load * gain.velocity_now;
+        self.load_now -= load * gain.load_now;
+        self.level -= level * gain.level;
+        self.level_velocity -= level * gain.velocity_now;
+        self.level_now -= level * gain.load_now;
+        self.velocity -= velocity * gain.velocity_now;
+        self.velocity_now -= velocity * gain.load_now;
+        self.now -= now * gain.load_now;
+        (gain, s)
     }
 }
 

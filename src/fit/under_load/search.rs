@@ -1,6 +1,6 @@
 //! The search over slopes, shapes and noises: coarse, then fine where the evidence is.
 
-use super::evidence::{self, Room, ShapeEvidence, SlopeTable, weigh};
+use super::evidence::{self, RecordTimes, Room, ShapeEvidence, SlopeTable, weigh};
 use super::gains::{Gains, LoadMemory, LoadNoise, RateRecord};
 use super::shape::{BLOCKS, LANES, SHAPES};
 use super::{Cell, KEPT};
@@ -43,9 +43,10 @@ pub(super) fn cells(rates: &[Rate]) -> Option<Vec<Cell>> {
     let all = vec![true; BLOCKS.len()];
     let coarse = search.slopes((search.lowest, search.highest), search.coarse, &all);
     let mut noises = noises(rates);
-    let mut scored = Vec::new();
+    let mut scored: Vec<Scored> = Vec::new();
     for _ in 0..2 {
-        scored = search.sweep(&coarse, &noises[0]);
+        let likeliest = scored.first().map_or(coarse.len() / 2, |best| best.slope);
+        scored = search.sweep(&coarse, likeliest, &noises[0]);
         let best = *scored.first()?;
         search.doubt(&coarse, &best, &noises[0]);
         search.compare(&coarse, &scored, &mut noises);
@@ -65,6 +66,10 @@ struct Scored {
 
 struct GridSearch {
     record: RateRecord,
+    times: RecordTimes,
+    /// The evidence of what came before each rate, by no law, for each scatter of the readings that was asked about since
+    /// a rate was last doubted.
+    befores: BTreeMap<u64, Vec<f64>>,
     interval: f64,
     lowest: f64,
     highest: f64,
@@ -93,6 +98,8 @@ impl GridSearch {
         )]
         let coarse = ((highest / lowest).ln() / COARSE_STEP).ceil() as usize;
         Self {
+            times: RecordTimes::of(&record),
+            befores: BTreeMap::new(),
             record,
             interval,
             lowest,
@@ -113,7 +120,7 @@ impl GridSearch {
         (0..count)
             .map(|index| {
                 let r = lowest * (highest / lowest).powf(at(index));
-                SlopeTable::new(r, &self.record, blocks)
+                SlopeTable::new(r, &self.times, blocks)
             })
             .collect()
     }
@@ -129,29 +136,29 @@ impl GridSearch {
         shape.ln_prior - RARE * r.ln() - 0.5 * (resolved * resolved + kept * kept)
     }
 
-    /// The evidence of what came before each rate, by no law, for each scatter of the readings.
-    fn befores(&self) -> BTreeMap<u64, Vec<f64>> {
-        SCATTERS
-            .map(|scatter| {
-                let before = evidence::before_the_law(&self.record, scatter);
-                (scatter.to_bits(), before)
-            })
-            .into()
+    /// The gains of a slope under a noise.
+    fn gains(&mut self, slope: &SlopeTable, memory: &LoadMemory) -> Gains {
+        let scatter = memory.scatter();
+        let before = self
+            .befores
+            .entry(scatter.to_bits())
+            .or_insert_with(|| evidence::before_the_law(&self.record, scatter));
+        Gains::new(&self.record, memory, &slope.u, before)
     }
 
-    /// Every shape at every slope under one noise, best first.
-    fn sweep(&mut self, slopes: &[SlopeTable], noise: &LoadNoise) -> Vec<Scored> {
-        let before = evidence::before_the_law(&self.record, noise.scatter);
+    /// Every shape at every slope under one noise, best first; the slopes next to `likeliest` are asked about first, so that
+    /// the others are soon known not to count.
+    fn sweep(&mut self, slopes: &[SlopeTable], likeliest: usize, noise: &LoadNoise) -> Vec<Scored> {
         let memory = LoadMemory::new(&self.record, noise);
         let mut scored = Vec::with_capacity(slopes.len() * SHAPES.len());
         let mut best = f64::NEG_INFINITY;
-        for (index, slope) in slopes.iter().enumerate() {
-            let gains = Gains::new(&self.record, &memory, &slope.u);
+        for index in outwards(slopes.len(), likeliest) {
+            let slope = &slopes[index];
+            let gains = self.gains(slope, &memory);
             for (block, of) in BLOCKS.iter().enumerate() {
-                let law = (block, slope);
-                let given = (&gains, &before[..]);
                 let least = best - LEFT_OUT.0 - most_ln_prior(block, slope.r);
-                let found = weigh(&self.record, law, given, least, &mut self.room);
+                let law = (block, slope);
+                let found = weigh(&self.record, law, &gains, least, &mut self.room);
                 for (lane, evidence) in found.iter().enumerate() {
                     let ln = evidence.ln + self.ln_prior(of.first + lane, slope.r, evidence);
                     if ln > best - LEFT_OUT.0 {
@@ -166,6 +173,7 @@ impl GridSearch {
                 }
             }
         }
+        scored.retain(|one| one.ln > best - LEFT_OUT.0);
         scored.sort_by(|a, b| b.ln.total_cmp(&a.ln));
         scored
     }
@@ -173,16 +181,13 @@ impl GridSearch {
     /// Doubts the rates that the best law cannot explain.
     fn doubt(&mut self, slopes: &[SlopeTable], best: &Scored, noise: &LoadNoise) {
         let slope = &slopes[best.slope];
-        let gains = Gains::new(
-            &self.record,
-            &LoadMemory::new(&self.record, noise),
-            &slope.u,
-        );
+        let gains = self.gains(slope, &LoadMemory::new(&self.record, noise));
         let law = (best.block, slope);
         let squares = evidence::misses(&self.record, law, (best.lane, noise.scatter), &gains);
         for (trust, square) in self.record.trust.iter_mut().zip(squares) {
             *trust = ((STUDENT + 1.0) / (STUDENT + square)).min(1.0);
         }
+        self.befores.clear();
     }
 
     /// Orders the noises by their evidence under the best law of each of the best few shapes.
@@ -197,32 +202,37 @@ impl GridSearch {
                 break;
             }
         }
-        let befores = self.befores();
+        // Those of one slope share its gains, those of one block its evaluation.
+        chosen.sort_by_key(|one| (one.slope, one.block));
         for noise in noises.iter_mut() {
-            let before = &befores[&noise.scatter.to_bits()];
             let memory = LoadMemory::new(&self.record, noise);
-            let evidence = chosen.iter().map(|one| {
-                let slope = &slopes[one.slope];
-                let gains = Gains::new(&self.record, &memory, &slope.u);
-                let law = (one.block, slope);
-                let given = (&gains, &before[..]);
-                let found = weigh(&self.record, law, given, f64::NEG_INFINITY, &mut self.room);
-                found[one.lane].ln + SHAPES[BLOCKS[one.block].first + one.lane].ln_prior
-            });
-            noise.ln_evidence = evidence.fold(f64::NEG_INFINITY, f64::max);
+            noise.ln_evidence = f64::NEG_INFINITY;
+            for of_slope in chosen.chunk_by(|one, other| one.slope == other.slope) {
+                let slope = &slopes[of_slope[0].slope];
+                let gains = self.gains(slope, &memory);
+                for of_block in of_slope.chunk_by(|one, other| one.block == other.block) {
+                    let block = of_block[0].block;
+                    let law = (block, slope);
+                    let none = f64::NEG_INFINITY;
+                    let found = weigh(&self.record, law, &gains, none, &mut self.room);
+                    let each = of_block.iter().map(|one| {
+                        found[one.lane].ln + SHAPES[BLOCKS[block].first + one.lane].ln_prior
+                    });
+                    noise.ln_evidence = each.fold(noise.ln_evidence, f64::max);
+                }
+            }
         }
         noises.sort_by(|a, b| b.ln_evidence.total_cmp(&a.ln_evidence));
     }
 
     /// The cells that count, with weights that sum to 1.
     fn fine(&mut self, scored: &[Scored], noises: &[LoadNoise]) -> Vec<Cell> {
-        let best = scored.first().map_or(f64::NEG_INFINITY, |one| one.ln);
-        let counts = |one: &&Scored| one.ln > best - LEFT_OUT.0;
         let blocks: Vec<bool> = (0..BLOCKS.len())
-            .map(|block| scored.iter().filter(counts).any(|one| one.block == block))
+            .map(|block| scored.iter().any(|one| one.block == block))
             .collect();
-        let slopes = || scored.iter().filter(counts).map(|one| one.slope);
+        let slopes = || scored.iter().map(|one| one.slope);
         let (first, last) = (slopes().min().unwrap_or(0), slopes().max().unwrap_or(0));
+        let best = scored.first().map_or(first, |one| one.slope);
         let at = |index: f64| {
             let share = (index / self.coarse as f64).clamp(0.0, 1.0);
             self.lowest * (self.highest / self.lowest).powf(share)
@@ -230,31 +240,31 @@ impl GridSearch {
         let count = ((last - first + 3) * FINER).min(MOST.1);
         let range = (at(first as f64 - 1.0), at(last as f64 + 2.0));
         let slopes = self.slopes(range, count, &blocks);
+        let likeliest = (best - first + 1) * count / (last - first + 3);
         let likely = noises[0].ln_evidence - LEFT_OUT.1;
         let likely = noises.iter().take_while(|noise| noise.ln_evidence > likely);
         let (mut cells, mut heaviest) = (Vec::new(), f64::NEG_INFINITY);
-        let befores = self.befores();
-        for noise in likely.take(MOST.2) {
-            let before = &befores[&noise.scatter.to_bits()];
+        for (rank, noise) in likely.take(MOST.2).enumerate() {
             let memory = LoadMemory::new(&self.record, noise);
-            for slope in &slopes {
-                let gains = Gains::new(&self.record, &memory, &slope.u);
+            for index in outwards(slopes.len(), likeliest) {
+                let slope = &slopes[index];
+                let gains = self.gains(slope, &memory);
                 for block in (0..BLOCKS.len()).filter(|block| blocks[*block]) {
                     let law = (block, slope);
                     let least = heaviest - LEFT_OUT.2 - most_ln_prior(block, slope.r);
-                    let given = (&gains, &before[..]);
-                    let found = weigh(&self.record, law, given, least, &mut self.room);
+                    let found = weigh(&self.record, law, &gains, least, &mut self.room);
                     for (lane, evidence) in found.iter().enumerate() {
                         let cell = self.cell(BLOCKS[block].first + lane, slope, noise, evidence);
                         if cell.weight > heaviest - LEFT_OUT.2 {
                             heaviest = heaviest.max(cell.weight);
-                            cells.push(cell);
+                            cells.push(((rank, index, cell.shape), cell));
                         }
                     }
                 }
             }
         }
-        normalise(cells)
+        cells.sort_by_key(|(place, _)| *place);
+        normalise(cells.into_iter().map(|(_, cell)| cell).collect())
     }
 
     /// A cell whose weight is still the ln of what it is to be.
@@ -288,6 +298,21 @@ fn most_ln_prior(block: usize, r: f64) -> f64 {
         .map(|shape| shape.ln_prior)
         .fold(f64::NEG_INFINITY, f64::max);
     most - RARE * r.ln()
+}
+
+/// Every index under `count`, those next to `middle` first.
+fn outwards(count: usize, middle: usize) -> impl Iterator<Item = usize> {
+    let offsets = 0..=count;
+    let both = offsets.flat_map(move |offset| {
+        let above = Some(middle + offset);
+        let below = if offset > 0 {
+            middle.checked_sub(offset)
+        } else {
+            None
+        };
+        [above, below].into_iter().flatten()
+    });
+    both.filter(move |index| *index < count)
 }
 
 fn normalise(mut cells: Vec<Cell>) -> Vec<Cell> {

@@ -62,7 +62,11 @@ impl Track {
         };
         let mut history = self.history.clone();
         let is_newest = history.take(source, reading) == Taken::Newest;
-        if is_newest && self.awaits_refit(policy, reading.time, &history.observations) {
+        let readings = &history.observations;
+        if is_newest
+            && self.awaits_refit(policy, reading.time, readings)
+            && !(context.phase.is_queue && self.is_quiet(policy, readings))
+        {
             self.prepare_from(&history, critical, context, &mut prepared);
         }
         prepared
