@@ -120,7 +120,7 @@ fn taken(folder: &TempDir, count: usize) -> (f64, f64) {
     let began = Instant::now();
     let daemon = Daemon::start(folder);
     while readings(folder) < count {
-        std::thread::sleep(Duration::from_millis(200));
+        std::thread::sleep(Duration::from_millis(20));
     }
     (began.elapsed().as_secs_f64(), daemon.processor())
 }
@@ -129,7 +129,7 @@ fn taken(folder: &TempDir, count: usize) -> (f64, f64) {
 fn at_rest(folder: &TempDir, count: usize) {
     let _daemon = Daemon::start(folder);
     while readings(folder) < count {
-        std::thread::sleep(Duration::from_millis(200));
+        std::thread::sleep(Duration::from_millis(20));
     }
     let events = || Store::look(&folder.path().join("state")).map_or(0, |store| store.last_step());
     let mut before = -1;

@@ -259,18 +259,27 @@ impl Whitener {
         let used = self.gates.len();
         let columns = columns.map(|column| &column[..used]);
         // Room for the whole motion, which comes last.
-        let mut white = columns.map(|_| Vec::with_capacity(used + 1));
+        let mut white = columns.map(|_| {
+            let mut room = Vec::with_capacity(used + 1);
+            room.resize(used, 0.0);
+            room
+        });
+        let mut into = white.each_mut().map(|room| &mut room[..used]);
         let (mut gathered, mut state) = ([0.0; SIDE_BY_SIDE], [0.0; SIDE_BY_SIDE]);
         for (i, gate) in self.gates.iter().enumerate() {
-            for lane in 0..SIDE_BY_SIDE {
+            let mut innovations = columns.map(|column| column[i]);
+            for (lane, innovation) in innovations.iter_mut().enumerate() {
                 gathered[lane] += gate.gather * state[lane];
                 state[lane] *= gate.decay;
-                let innovation = columns[lane][i] * gate.weight
+                *innovation = *innovation * gate.weight
                     - gate.reads[0] * gathered[lane]
                     - gate.reads[1] * state[lane];
-                gathered[lane] += gate.gain[0] * innovation;
-                state[lane] += gate.gain[1] * innovation;
-                white[lane].push(innovation * gate.scale);
+                gathered[lane] += gate.gain[0] * *innovation;
+                state[lane] += gate.gain[1] * *innovation;
+                *innovation *= gate.scale;
+            }
+            for (room, innovation) in into.iter_mut().zip(innovations) {
+                room[i] = innovation;
             }
         }
         white

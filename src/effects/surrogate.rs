@@ -1,12 +1,13 @@
 //! How much a search finds where there is nothing: covariates at the wrong time, and readings made of noise alone.
 
 use super::candidates::{delays, of_channel, responses};
-use super::frame::{Frame, Frames};
+use super::frame::{Frame, Frames, dot};
 use super::kind::Form;
 use super::linear::Linear;
 use super::problem::{Problem, median};
 use super::response::Driver;
 use super::term::Term;
+use nalgebra::DMatrix;
 use rand::RngExt as _;
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
@@ -31,8 +32,9 @@ pub(super) struct NullGains {
 const LARGEST: f64 = 4.0;
 const NORMAL_MEDIAN: f64 = 0.6745;
 
-/// Series of noise that are searched at once: what is tried is more than the cache holds, and is read once for all of them.
-const AT_ONCE: usize = 8;
+/// Directions that are multiplied at once with all series of noise: a product of matrices reads each of them from the
+/// memory once for many products.
+const AT_ONCE: usize = 128;
 /// How many of the largest null gains are refitted in full.
 const REFITTED: usize = 4;
 
@@ -185,44 +187,76 @@ pub(super) fn noise_alone(
             *innovation = innovation.clamp(-most, most);
         }
     }
-    let mut readings = |_| {
-        innovations.shuffle(&mut random);
-        let readings = best.whitener.colour(&innovations);
-        let each = frames.each.iter();
-        each.map(|frame| {
-            let residual = frame.project_noise(&readings);
-            let misfit = super::frame::dot(&residual, &residual);
-            (residual, misfit)
+    let readings: Vec<Vec<f64>> = (0..count)
+        .map(|_| {
+            innovations.shuffle(&mut random);
+            best.whitener.colour(&innovations)
         })
-        .collect()
-    };
-    let mut gains = Vec::with_capacity(count);
-    while gains.len() < count {
-        let some = AT_ONCE.min(count - gains.len());
-        let left: Vec<Vec<(Vec<f64>, f64)>> = (0..some).map(&mut readings).collect();
-        gains.extend(gains_from(frames, tried, &left));
+        .collect();
+    let before = vec![f64::INFINITY; count];
+    let (mut before, mut least) = (before.clone(), before);
+    for (index, frame) in frames.each.iter().enumerate() {
+        let noise = NoiseInFrame::new(frame, &readings);
+        for (before, misfit) in before.iter_mut().zip(&noise.misfits) {
+            *before = before.min(frame.surprise(*misfit) + frame.cost());
+        }
+        noise.least(frame, (index, tried), &mut least);
     }
+    let gains = before.iter().zip(&least);
     NullGains {
-        gains,
+        gains: gains.map(|(before, least)| before - least).collect(),
         largest: Vec::new(),
     }
 }
 
-/// The best gain over all that was tried for each of several series of noise, of which `left` holds what is left by frame.
-fn gains_from(frames: &Frames, tried: &[Tried], left: &[Vec<(Vec<f64>, f64)>]) -> Vec<f64> {
-    let mut least = vec![f64::INFINITY; left.len()];
-    for one in tried {
-        for (least, left) in least.iter_mut().zip(left) {
-            *least = least.min(one.surprise(frames, left));
+/// Series of noise as one frame sees them: what the model leaves of each, a column a series, and its square.
+struct NoiseInFrame {
+    left: DMatrix<f64>,
+    misfits: Vec<f64>,
+}
+
+impl NoiseInFrame {
+    fn new(frame: &Frame, readings: &[Vec<f64>]) -> Self {
+        let left: Vec<Vec<f64>> = readings
+            .iter()
+            .map(|one| frame.project_noise(one))
+            .collect();
+        let length = left.first().map_or(0, Vec::len);
+        Self {
+            misfits: left.iter().map(|one| dot(one, one)).collect(),
+            left: DMatrix::from_iterator(length, left.len(), left.into_iter().flatten()),
         }
     }
-    let before = |left: &Vec<(Vec<f64>, f64)>| {
-        let each = frames.each.iter().zip(left);
-        each.map(|(frame, (_, misfit))| frame.surprise(*misfit) + frame.cost())
-            .fold(f64::INFINITY, f64::min)
-    };
-    let each = left.iter().zip(least);
-    each.map(|(left, least)| before(left) - least).collect()
+
+    /// The least -2 ln likelihood of each series with one of `tried`, in this frame, which is the one of that index,
+    /// where it is less than `least` has.
+    fn least(&self, frame: &Frame, (index, tried): (usize, &[Tried]), least: &mut [f64]) {
+        let mut from = 0;
+        while from < tried.len() {
+            let (mut rows, mut next) = (0, from);
+            while next < tried.len() && rows < AT_ONCE {
+                rows += tried[next].directions[index].len();
+                next += 1;
+            }
+            let some = &tried[from..next];
+            let directions = some.iter().flat_map(|one| &one.directions[index]);
+            let values = directions.flatten().copied();
+            let directions = DMatrix::from_iterator(self.left.nrows(), rows, values);
+            let products = directions.transpose() * &self.left;
+            for (series, misfit) in self.misfits.iter().enumerate() {
+                let products = products.column(series);
+                let mut row = 0;
+                for one in some {
+                    let last = row + one.directions[index].len();
+                    let taken: f64 = (row..last).map(|row| products[row].powi(2)).sum();
+                    let surprise = frame.surprise(misfit - taken) + frame.cost() + one.cost;
+                    least[series] = least[series].min(surprise);
+                    row = last;
+                }
+            }
+            from = next;
+        }
+    }
 }
 
 #[cfg(test)]
