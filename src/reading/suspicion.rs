@@ -5,11 +5,15 @@ use super::{Quantity, Timestamp};
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
 
-/// Numbers that loggers write where they have no value, as far as their digits go.
+/// Numbers that loggers write where they have no value, as far as their digits go; the least first.
 const MARKS: [f64; 12] = [
     99.0, 999.0, 999.9, 999.99, 6999.0, 7999.0, 8888.0, 9999.0, 9999.9, 32_768.0, 99_999.0,
     999_999.0,
 ];
+/// What a mark has behind its point is nothing, or this at least.
+const LEAST_REST: f64 = 0.9;
+/// Two values are the same within this.
+const ROUNDING: f64 = 1e-9;
 /// So many times the span of the others a mark is away from them.
 const AWAY: f64 = 5.0;
 /// A step of so many times the usual scatter of a step.
@@ -95,12 +99,16 @@ pub fn is_plain(values: &[f64], quantity: Quantity, unit: &str) -> bool {
 /// A fall is more than [`LEAP`] times the median size of a step below the usual one, which is not larger than that median: so
 /// the median size is less than the deepest fall over [`LEAP`] less one.
 fn may_have_fallen(values: &[f64]) -> bool {
-    let steps = || values.windows(2).map(|pair| pair[1] - pair[0]);
-    let deepest = steps().fold(0.0, f64::min);
+    let steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let deepest = steps
+        .iter()
+        .fold(0.0_f64, |a, b| if *b < a { *b } else { a });
     let least = -deepest / (LEAP - 1.0);
-    let count = values.len() - 1;
-    let large = steps().filter(|step| step.abs() >= least).count();
-    large < count - count / 2
+    let large: usize = steps
+        .iter()
+        .map(|step| usize::from(step.abs() >= least))
+        .sum();
+    large < steps.len() - steps.len() / 2
 }
 
 fn may_have_another_scale(values: &[f64], unit: &str) -> bool {
@@ -140,11 +148,15 @@ pub fn of_values(
 }
 
 fn is_mark(value: f64) -> bool {
-    MARKS.iter().any(|mark| same(value.abs(), *mark))
+    let size = value.abs();
+    // Most values are no mark by their digits alone, and each reading asks about hundreds.
+    let rest = size - size.floor();
+    let may_be = size > MARKS[0] - 1.0 && !(ROUNDING..LEAST_REST - ROUNDING).contains(&rest);
+    may_be && MARKS.iter().any(|mark| same(size, *mark))
 }
 
 fn same(one: f64, other: f64) -> bool {
-    (one - other).abs() < 1e-9
+    (one - other).abs() < ROUNDING
 }
 
 /// A number that marks no value elsewhere, far from all others, or from the one before it.
@@ -274,6 +286,18 @@ mod tests {
             if index == marked { -9999.0 } else { value }
         };
         (0..length).map(|index| value(index, rng)).collect()
+    }
+
+    #[test]
+    fn a_mark_is_known_with_either_sign_and_within_rounding() {
+        for mark in MARKS {
+            for value in [mark, -mark, mark + 5e-10, mark - 5e-10] {
+                assert!(is_mark(value), "{value}");
+            }
+            for value in [mark + 0.05, mark - 0.05, mark - 2.0] {
+                assert!(!is_mark(value), "{value}");
+            }
+        }
     }
 
     #[test]

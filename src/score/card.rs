@@ -1,7 +1,7 @@
 //! The scorecard of one benchmark: what each method said at each lead, and how that compares with what came.
 
 use super::measure::{Outcome, crps_days, is_covered, log_score, scored_days};
-use super::{Known, METHODS, WholeRecord};
+use super::{Known, Method, WholeRecord};
 use crate::fit::Observations;
 use crate::forecast::{FEWEST_READINGS, HORIZON_DAYS, Passage};
 use crate::reading::{Channel, Series, Timestamp, after_days, days_since};
@@ -121,16 +121,17 @@ impl WholeRecord {
     }
 }
 
-/// The scorecard of a history that began at `epoch`; `progress` is called after each look with how many are done, of how
-/// many.
+/// The scorecard of a history that began at `epoch`, by `methods`; `progress` is called after each look with how many are
+/// done, of how many.
 pub fn card(
     history: &WholeRecord,
     epoch: Timestamp,
     truth: Truth,
+    methods: &[Method],
     progress: &mut dyn FnMut(u64, u64),
 ) -> Card {
     let mut card = Card {
-        methods: METHODS.iter().map(|method| method.name).collect(),
+        methods: methods.iter().map(|method| method.name).collect(),
         leads: Vec::new(),
         looks: Vec::new(),
     };
@@ -147,7 +148,7 @@ pub fn card(
                     lead_days: lead,
                     known_until: at,
                     remaining_days,
-                    scores: scores(&known, at, Outcome::Failed(remaining_days)),
+                    scores: scores(methods, &known, at, Outcome::Failed(remaining_days)),
                 });
             }
             Truth::Stood => {
@@ -156,7 +157,7 @@ pub fn card(
                 card.looks.push(Evaluation {
                     known_until: at,
                     stood_days,
-                    scores: scores(&known, at, Outcome::Stood(stood_days)),
+                    scores: scores(methods, &known, at, Outcome::Stood(stood_days)),
                 });
             }
         }
@@ -192,11 +193,16 @@ fn looks(history: &WholeRecord, epoch: Timestamp, truth: Truth) -> Vec<(f64, Kno
     }
 }
 
-fn scores(known: &Known, at: Timestamp, outcome: Outcome) -> BTreeMap<&'static str, Score> {
+fn scores(
+    methods: &[Method],
+    known: &Known,
+    at: Timestamp,
+    outcome: Outcome,
+) -> BTreeMap<&'static str, Score> {
     let first = known.observations.values.first();
     let length = first.map_or(0.0, |first| known.now_days - first.t_days);
     let scored = scored_days(length);
-    let each = METHODS.iter().map(|method| {
+    let each = methods.iter().map(|method| {
         let said = (method.forecast)(known);
         (method.name, score(said.as_ref(), at, outcome, scored))
     });
@@ -232,6 +238,7 @@ fn score(said: Option<&Passage>, at: Timestamp, outcome: Outcome, scored: f64) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::score::METHODS;
 
     /// 1/v falls in a line to zero at day 60; read daily.
     fn history(days: u32) -> WholeRecord {
@@ -251,7 +258,8 @@ mod tests {
     fn no_forecast_knows_what_was_read_after_its_lead() {
         let failure = after_days(epoch(), 60.0).unwrap();
         let (whole, part) = (history(60), history(51));
-        let card = |history| card(history, epoch(), Truth::Failed(failure), &mut |_, _| ());
+        let truth = Truth::Failed(failure);
+        let card = |history| card(history, epoch(), truth, METHODS, &mut |_, _| ());
         let (later, earlier) = (card(&whole), card(&part));
         // Five days before, the shorter record has only what it had ten days before.
         for lead in earlier.leads.iter().filter(|lead| lead.lead_days >= 10.0) {
@@ -272,6 +280,7 @@ mod tests {
             &history(60),
             epoch(),
             Truth::Failed(failure),
+            METHODS,
             &mut |_, _| (),
         );
         for lead in &card.leads {
@@ -284,10 +293,16 @@ mod tests {
     #[test]
     fn a_slope_that_stood_has_looks_and_no_leads() {
         let mut seen = 0;
-        let card = card(&history(30), epoch(), Truth::Stood, &mut |done, count| {
-            assert!(done <= count);
-            seen = done;
-        });
+        let card = card(
+            &history(30),
+            epoch(),
+            Truth::Stood,
+            METHODS,
+            &mut |done, count| {
+                assert!(done <= count);
+                seen = done;
+            },
+        );
         assert!(card.leads.is_empty());
         assert_eq!(card.looks.len() as u64, seen);
         assert!(card.looks.iter().all(|look| look.stood_days > 0.0));

@@ -2,9 +2,9 @@
 
 use slipwatch::fit::{Observation, Observations};
 use slipwatch::forecast::{Fate, Life, Passage};
-use slipwatch::reading::{Quantity, days_since};
+use slipwatch::reading::{Quantity, after_days, days_since};
 use slipwatch::runtime::ingest::{ReadOptions, read_files};
-use slipwatch::score::{METHODS, WholeRecord};
+use slipwatch::score::{METHODS, Method, Truth, WholeRecord, card};
 use std::path::Path;
 
 /// Where a record is looked at, tenths of its readings.
@@ -135,7 +135,7 @@ fn every_method_has_something_to_say_of_slopes_that_fail() {
 fn the_names_are_all_different_and_so_are_the_sources_given() {
     for (index, method) in METHODS.iter().enumerate() {
         assert!(!method.source.is_empty(), "{}", method.name);
-        let is_new = |other: &slipwatch::score::Method| other.name != method.name;
+        let is_new = |other: &Method| other.name != method.name;
         assert!(METHODS[..index].iter().all(is_new), "{}", method.name);
     }
 }
@@ -204,4 +204,39 @@ fn no_record_makes_a_method_panic_or_say_what_is_no_time() {
 fn nothing_is_known_before_the_first_reading() {
     let history = of_life(Fate::Failing, 3);
     assert_eq!(history.at(-1.0), None);
+}
+
+#[test]
+fn a_row_more_in_the_table_is_a_rival_more_on_the_scorecard() {
+    let tomorrow = Method {
+        name: "tomorrow",
+        source: "this test",
+        forecast: |_| Some(Passage::from_times(vec![(1.0, 1.0)])),
+    };
+    let methods = [METHODS[0], tomorrow];
+    // A straight line in inverse velocity that meets zero on day 60; read daily.
+    let fall = |day: f64| (day, -100.0 * (1.0 - day / 60.0).ln());
+    let history = WholeRecord {
+        observations: Observations::of_displacements((0..60_u32).map(|day| fall(day.into()))),
+        flow: Vec::new(),
+        critical_mm_per_day: 1000.0,
+    };
+    let epoch = "2020-01-01T00:00:00Z".parse().unwrap();
+    let failure = after_days(epoch, 60.0).unwrap();
+    let card = card(
+        &history,
+        epoch,
+        Truth::Failed(failure),
+        &methods,
+        &mut |_, _| (),
+    );
+    assert_eq!(card.methods, ["panel", "tomorrow"]);
+    assert!(card.leads.len() > 3);
+    for lead in &card.leads {
+        let score = &lead.scores["tomorrow"];
+        let early = lead.remaining_days - 1.0;
+        assert!((score.error_days.unwrap() + early).abs() < 1e-9);
+        assert!((score.crps_days - early).abs() < 1e-9);
+        assert!(lead.scores["panel"].said);
+    }
 }

@@ -140,7 +140,7 @@ fn report(
     );
     let template = "{msg} {bar:40} {pos}/{len} forecasts, {elapsed}";
     let bar = bar::counted(0, template).with_message(format!("benchmark {}", series.benchmark));
-    let mut card = card(&history, epoch, truth, &mut |done, count| {
+    let mut card = card(&history, epoch, truth, METHODS, &mut |done, count| {
         bar.set_length(count);
         bar.set_position(done);
     });

@@ -75,6 +75,8 @@ struct Draft {
     along: f64,
     texture: usize,
     log_posterior: f64,
+    /// ln of the density of the mixture of the proposals so far, each times the number drawn from it.
+    log_mixture: f64,
     log_weight: f64,
 }
 
@@ -89,17 +91,12 @@ struct Effort {
     worth: f64,
 }
 
-/// For an update of a running monitor.
-const QUICK: Effort = Effort {
-    draws: 80,
-    rounds: (3, 6),
-    worth: 70.0,
-};
-/// For one fit that is reported.
-const THOROUGH: Effort = Effort {
-    draws: 128,
-    rounds: (3, 8),
-    worth: 110.0,
+/// Of 90 % intervals of 1,000 drawn series, 86 to 88 % hold the truth (`examples/calibration`); 80 to 86 % where 128 laws a round were to
+/// be worth 110 even draws.
+const EFFORT: Effort = Effort {
+    draws: 512,
+    rounds: (4, 16),
+    worth: 1000.0,
 };
 /// A start this much less probable than the likeliest, in ln, is left out.
 const HOPELESS: f64 = 6.0;
@@ -129,7 +126,7 @@ impl Posterior {
                 found.map(|(_, side)| side)
             })
             .collect();
-        let drafts = draw(&mut bench, &textures, sides, &QUICK);
+        let drafts = draw(&mut bench, &textures, sides, &EFFORT);
         Self::of(&window, &drafts, bench.evaluations)
     }
 
@@ -168,7 +165,7 @@ impl Posterior {
                 found.map(|(_, side)| side)
             })
             .collect();
-        let drafts = draw(&mut bench, &textures, sides, &THOROUGH);
+        let drafts = draw(&mut bench, &textures, sides, &EFFORT);
         Self::of(&window, &drafts, bench.evaluations)
     }
 
@@ -326,15 +323,25 @@ impl<'a> Lot<'a> {
     fn draw(&mut self, bench: &mut ModeBench, textures: &[Texture], (first, number): (u32, u32)) {
         let one = |at| self.next.draw(bench, textures, first + at);
         let fresh: Vec<Draft> = (0..number).filter_map(one).collect();
-        self.drafts.extend(fresh);
-        self.used.push((self.next.clone(), number));
+        let density = |side: &Side<'_>, number: u32, draft: &Draft| {
+            f64::from(number.max(1)).ln() + side.log_density(draft)
+        };
         for draft in &mut self.drafts {
-            let each = self
-                .used
-                .iter()
-                .map(|(side, number)| f64::from((*number).max(1)).ln() + side.log_density(draft));
-            let each: Vec<f64> = each.collect();
-            draft.log_weight = draft.log_posterior - proposal::log_sum(&each);
+            let one = density(&self.next, number, draft);
+            draft.log_mixture = proposal::log_sum(&[draft.log_mixture, one]);
+        }
+        self.used.push((self.next.clone(), number));
+        self.drafts.extend(fresh.into_iter().map(|draft| {
+            let each = self.used.iter();
+            let each = each.map(|(side, number)| density(side, *number, &draft));
+            let log_mixture = proposal::log_sum(&each.collect::<Vec<f64>>());
+            Draft {
+                log_mixture,
+                ..draft
+            }
+        }));
+        for draft in &mut self.drafts {
+            draft.log_weight = draft.log_posterior - draft.log_mixture;
         }
         if let Some(better) = self.next.refitted(&self.drafts) {
             self.next = better;

@@ -153,6 +153,7 @@ impl<'a> Side<'a> {
             along,
             texture: chosen,
             log_posterior,
+            log_mixture: f64::NEG_INFINITY,
             log_weight: f64::NEG_INFINITY,
         })
     }

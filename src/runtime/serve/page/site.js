@@ -51,7 +51,7 @@ export class SitePage {
     const text = counts.filter(([n]) => n > 0).map(([n, level]) => `${n} ${level}`).join(', ');
     return el('div', { class: 'head' }, el('h1', {}, site.site), badge(site.level, 'big'),
       site.unknown_since ? [badge('unknown', 'big'), el('span', {}, 'since ', when(site.unknown_since))] : null,
-      el('span', { class: 'soft' }, `${site.benchmarks.length} benchmarks: ${text || 'none yet'}`));
+      el('span', { class: 'soft' }, `${site.benchmarks.length} benchmark${site.benchmarks.length === 1 ? '' : 's'}: ${text || 'none yet'}`));
   }
 
   force(site, at) {
