@@ -27,7 +27,7 @@ pub enum Notice {
     #[serde(rename = "settles")]
     InBatches,
     /// Readings come faster than they can be judged one by one: each benchmark is judged for its newest at
-    /// [`Notice::BatchEnd`], and at least once in an evacuation time of its readings.
+    /// [`Notice::BatchEnd`], and at least once in an evacuation time of its readings where a forecast may call orange.
     Queue,
     /// Everything that came together has been taken: what came late is judged now, once, and so are the next of the
     /// benchmarks whose readings queued.

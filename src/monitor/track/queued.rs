@@ -1,4 +1,4 @@
-//! Readings of a queue: the newest is judged when it ends, and one in an evacuation time at least.
+//! Readings of a queue: the newest is judged when it ends, and one in an evacuation time at least where orange is possible.
 
 use super::unknown::Reason;
 use super::{PastReview, Prepared, StepContext, Track, days};
