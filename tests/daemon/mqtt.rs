@@ -579,7 +579,7 @@ async fn a_broker_that_refuses_the_subscription_is_reported_and_its_benchmark_is
 /// The benchmarks of a backlog, the readings of each that a daemon knows before it, and those that queue, an hour apart.
 const BENCHMARKS: usize = 10;
 const KNOWN: usize = 20;
-const QUEUED: usize = 300;
+const QUEUED: usize = 1200;
 
 /// Readings of all benchmarks, by time: creep with a jitter, up to now.
 fn backlog(readings: std::ops::Range<usize>) -> Vec<String> {
@@ -645,11 +645,11 @@ impl Daemon {
     }
 
     fn wait(&self, what: &str, claim: impl Fn(&Self) -> bool) {
-        for _ in 0..1200 {
+        for _ in 0..6000 {
             if claim(self) {
                 return;
             }
-            std::thread::sleep(Duration::from_millis(50));
+            std::thread::sleep(Duration::from_millis(10));
         }
         panic!("{what}: {:?}, {} refits", self.durable(), self.refits());
     }
