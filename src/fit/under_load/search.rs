@@ -301,18 +301,10 @@ fn most_ln_prior(block: usize, r: f64) -> f64 {
 }
 
 /// Every index under `count`, those next to `middle` first.
-fn outwards(count: usize, middle: usize) -> impl Iterator<Item = usize> {
-    let offsets = 0..=count;
-    let both = offsets.flat_map(move |offset| {
-        let above = Some(middle + offset);
-        let below = if offset > 0 {
-            middle.checked_sub(offset)
-        } else {
-            None
-        };
-        [above, below].into_iter().flatten()
-    });
-    both.filter(move |index| *index < count)
+fn outwards(count: usize, middle: usize) -> Vec<usize> {
+    let mut indices: Vec<usize> = (0..count).collect();
+    indices.sort_by_key(|index| index.abs_diff(middle));
+    indices
 }
 
 fn normalise(mut cells: Vec<Cell>) -> Vec<Cell> {
