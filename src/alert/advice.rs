@@ -1,5 +1,6 @@
 //! What each level asks people to do, in words; the site's own emergency plan says how.
 
+use super::chance::hours_in_words;
 use super::evidence::AlertCause;
 use super::level::Level;
 use super::policy::Policy;
@@ -33,7 +34,6 @@ impl Level {
 impl Policy {
     /// The condition of a rule with its figures, as words; `None` for a rule that the policy has no figure for.
     pub fn condition(&self, rule: &str, level: Level) -> Option<String> {
-        let hours = |span: jiff::SignedDuration| span.as_secs() / 3600;
         let threshold = |figure: &dyn Fn(&super::Threshold) -> Option<f64>| {
             let own = self.thresholds.iter().filter(|one| one.level == level);
             own.filter_map(figure).reduce(f64::min)
@@ -44,11 +44,11 @@ impl Policy {
                 self.critical_velocity_mm_per_day
             ),
             (RED_CHANCE, _) => format!(
-                "chance of collapse of {} or more within {} ({} h) and until the next reading, at every reading of {:#}, \
+                "chance of collapse of {} or more within {} ({}) and until the next reading, at every reading of {:#}, \
                  or of {} at one",
                 self.red_chance,
                 self.red_within_in_words(),
-                hours(self.red_within()),
+                hours_in_words(self.red_within()),
                 self.red_held_for(),
                 self.red_at_once()
             ),
@@ -59,8 +59,8 @@ impl Policy {
                     self.orange_chance
                 };
                 format!(
-                    "chance of collapse of {chance} or more within the outlook of {} h",
-                    hours(self.outlook)
+                    "chance of collapse of {chance} or more within the outlook of {}",
+                    hours_in_words(self.outlook)
                 )
             }
             ("velocity-threshold", _) => format!(

@@ -1,4 +1,6 @@
-//! A chance in words: one way for alerts, status, reports and the page.
+//! A chance, and a span of time, in words: one way for alerts, status, reports and the page.
+
+use jiff::SignedDuration;
 
 /// Chances under this, or as near to one, are not written as none or as certain.
 const ROUNDED_AWAY: f64 = 0.005;
@@ -25,9 +27,29 @@ pub fn percent_in_words(chance: f64) -> String {
     }
 }
 
+/// `24 h`, `1.5 h`, `25 min`.
+pub fn hours_in_words(span: SignedDuration) -> String {
+    let minutes = span.as_secs() / 60;
+    if minutes < 60 {
+        format!("{minutes} min")
+    } else if minutes % 60 == 0 {
+        format!("{} h", minutes / 60)
+    } else {
+        format!("{:.1} h", span.as_secs_f64() / 3600.0)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_span_is_written_in_hours_and_in_minutes_below_one() {
+        let words = |minutes| hours_in_words(SignedDuration::from_mins(minutes));
+        assert_eq!(words(25), "25 min");
+        assert_eq!(words(90), "1.5 h");
+        assert_eq!(words(48 * 60), "48 h");
+    }
 
     #[test]
     fn no_chance_is_written_as_none_or_as_certain() {

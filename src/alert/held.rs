@@ -75,6 +75,15 @@ impl Held {
             .collect()
     }
 
+    /// Forgets since when a rule has held that is another one now, though by the same name.
+    pub fn forget_changed(&mut self, before: &Policy, now: &Policy) {
+        fn named<'a>(policy: &'a Policy, name: &str) -> Option<&'a DeclaredRule> {
+            policy.rules.iter().find(|rule| rule.name == name)
+        }
+        self.rules
+            .retain(|name, _| named(before, name) == named(now, name));
+    }
+
     /// Takes the evidence of one reading and notes in it which rules have held for long enough.
     pub fn update(&mut self, policy: &Policy, evidence: &mut AlertEvidence) {
         self.update_red(policy, evidence);

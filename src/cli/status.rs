@@ -304,6 +304,9 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
             match (one.is_unknown, one.since) {
                 (true, Some(_)) => format!("{}, unknown", one.level),
                 (true, None) => "unknown".to_owned(),
+                (false, _) if one.alarm_state == AlarmState::OutOfService => {
+                    format!("{}, out of service", one.level)
+                }
                 (false, _) => one.level.to_string(),
             },
             one.newest_reading.map_or_else(dash, clock),
@@ -331,6 +334,17 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
             refused,
             "source {source}: lines, records and files that could not be used: {count}; \
              status --sources shows the first of each kind"
+        );
+    }
+    let serviced = status
+        .benchmarks
+        .iter()
+        .filter(|one| one.alarm_state == AlarmState::OutOfService);
+    for one in serviced {
+        let _ = writeln!(
+            refused,
+            "{}: declared maintenance: its readings are kept and NOT JUDGED; the velocity and the chance are from before it",
+            text::plain(one.benchmark.as_str())
         );
     }
     let suspicions = status.benchmarks.iter().flat_map(|one| &one.suspicions);

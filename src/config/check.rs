@@ -5,6 +5,7 @@ use super::{
     duty, load,
 };
 use crate::alert::Level;
+use crate::monitor::{Declaration, Order, SiteLevel};
 use crate::reading::{BenchmarkId, Quantity};
 use jiff::SignedDuration;
 use schemars::JsonSchema;
@@ -62,6 +63,9 @@ pub fn check(file: &Path) -> Result<ConfigSummary, ConfigError> {
             .chain(unknown_benchmarks(&config))
             .chain(only_escalated(&config))
             .chain(off_duty(&config))
+            .chain(state_dir(&config.site.state_dir))
+            .chain(site_level(&config))
+            .chain(long_maintenance(&config))
             .map(|what| format!("{place}: warning: {what}")),
     );
     Ok(ConfigSummary {
@@ -71,6 +75,49 @@ pub fn check(file: &Path) -> Result<ConfigSummary, ConfigError> {
         benchmarks: config.benchmarks.len(),
         hooks: config.hooks.len(),
         warnings,
+    })
+}
+
+/// Where the daemon can write nothing.
+fn state_dir(folder: &Path) -> Option<String> {
+    let is_other = folder.exists() && !folder.is_dir();
+    is_other.then(|| {
+        format!(
+            "site.state_dir: {} is no folder: the daemon cannot start",
+            folder.display()
+        )
+    })
+}
+
+/// A level of the site that so few benchmarks never reach.
+fn site_level(config: &Config) -> Option<String> {
+    let Some(SiteLevel::AtLeast(needed)) = config.settings.site else {
+        return None;
+    };
+    let named = config.benchmarks.len();
+    (named > 0 && named < needed).then(|| {
+        format!(
+            "the site's level is that of {needed} benchmarks, and the config names {named}: the site never has one"
+        )
+    })
+}
+
+/// Maintenance in which nothing is judged for longer than anything may be silenced.
+fn long_maintenance(config: &Config) -> impl Iterator<Item = String> {
+    config.settings.declared.iter().filter_map(|declared| {
+        let Declaration::Maintenance { until } = declared.kind else {
+            return None;
+        };
+        let span = until.duration_since(declared.time);
+        (span > Order::LONGEST_SILENCE).then(|| {
+            let whose = declared.benchmark.as_ref();
+            let whose = whose.map_or("the site".to_owned(), |id| format!("benchmark {id}"));
+            format!(
+                "event: {whose} is under maintenance from {} until {until}, {} days in which no reading is judged; is that right?",
+                declared.time,
+                span.as_hours() / 24
+            )
+        })
     })
 }
 

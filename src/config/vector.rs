@@ -41,7 +41,7 @@ pub(super) fn vector(section: &mut Section<'_>, unit: Option<Unit>) -> Option<Ve
         .sum::<f64>()
         .sqrt();
     let counts = (components.value.len(), direction.value.len());
-    if counts.0 != counts.1 || !(2..=3).contains(&counts.0) || !(length > 0.0 && length.is_finite())
+    if counts.0 != counts.1 || !(1..=3).contains(&counts.0) || !(length > 0.0 && length.is_finite())
     {
         let what = format!(
             "benchmark.direction is no direction: {} numbers for {} components",

@@ -3,6 +3,7 @@
 mod awaited;
 mod course;
 mod covariates;
+mod deadlines;
 mod declared;
 mod drift;
 mod event;
@@ -49,6 +50,7 @@ use crate::alert::{Level, Policy};
 use crate::reading::{BenchmarkId, Reading, Sample, Suspicion, Timestamp, Unit};
 use awaited::Awaited;
 use covariates::Covariates;
+use deadlines::Deadlines;
 use declared::Declarations;
 use in_force::LevelsInForce;
 use jiff::SignedDuration;
@@ -195,8 +197,8 @@ pub struct Monitor {
     tracks: BTreeMap<BenchmarkId, Track>,
     /// Whose memory is another than when it was last saved.
     changed: BTreeSet<BenchmarkId>,
-    /// When each becomes silent, of those that are not yet.
-    deadlines: BTreeSet<(Timestamp, BenchmarkId)>,
+    /// When each becomes silent, or red without a reading, of those that are not yet.
+    deadlines: Deadlines,
     covariates: Covariates,
     sensors: Sensors,
     searches: Vec<SearchJob>,
@@ -226,7 +228,7 @@ impl Monitor {
             settings,
             tracks: BTreeMap::new(),
             changed: BTreeSet::new(),
-            deadlines: BTreeSet::new(),
+            deadlines: Deadlines::default(),
             covariates: Covariates::default(),
             sensors: Sensors::default(),
             searches: Vec::new(),
@@ -300,7 +302,6 @@ impl Monitor {
     ) -> Vec<Event> {
         self.summary.readings += 1;
         self.sensors.reads(benchmark, reading.time);
-        self.changed.insert(benchmark.clone());
         let context = StepContext {
             phase: self.phase(now),
             covariates: &self.covariates,
@@ -312,7 +313,6 @@ impl Monitor {
             track.accept(now, self.settings.accepted(benchmark));
             track
         });
-        let before = track.deadline();
         let mut events = if reading.time > now {
             track.put_aside(now, source, reading)
         } else {
@@ -324,40 +324,29 @@ impl Monitor {
         self.queue.note(benchmark, track);
         let critical = policy.critical_velocity_mm_per_day;
         self.searches.extend(track.search(critical, &context));
-        let after = track.deadline();
-        self.expect((before, after), benchmark.clone());
+        self.note_changed(benchmark);
         events.extend(self.awaited.end(now, benchmark, "reads"));
         events
     }
 
     fn pass(&mut self, now: Timestamp) -> Vec<Event> {
-        let due = self.deadlines.iter().take_while(|(due, _)| *due <= now);
-        let mut due: Vec<BenchmarkId> = due.map(|(_, id)| id.clone()).collect();
-        due.sort();
         let mut events = Vec::new();
-        for id in due {
+        for id in self.deadlines.due(now) {
             if let Some(track) = self.tracks.get_mut(&id) {
-                let before = track.deadline();
                 let policy = self.settings.policy(&id);
                 events.extend(track.pass(policy, now, self.sensors.fault(&id)));
-                let after = track.deadline();
-                self.changed.insert(id.clone());
-                self.expect((before, after), id);
             }
+            self.note_changed(&id);
         }
         events
     }
 
-    /// Notes when a benchmark becomes silent, which was expected for another time before.
-    fn expect(&mut self, (before, after): (Option<Timestamp>, Option<Timestamp>), id: BenchmarkId) {
-        if before == after {
-            return;
-        }
-        if let Some(before) = before {
-            self.deadlines.remove(&(before, id.clone()));
-        }
-        if let Some(after) = after {
-            self.deadlines.insert((after, id));
+    /// What is known of a benchmark is other than before: it is to be saved, and may be due at another time.
+    fn note_changed(&mut self, id: &BenchmarkId) {
+        let due = self.tracks.get(id).and_then(Track::deadline);
+        self.deadlines.set(id, due);
+        if !self.changed.contains(id) {
+            self.changed.insert(id.clone());
         }
     }
 
@@ -369,17 +358,18 @@ impl Monitor {
             phase: self.phase(now),
             covariates: &self.covariates,
         };
-        let mut moved = Vec::new();
         for (id, track) in &mut self.tracks {
             let declared = Declarations::of(&self.settings.declared, id);
-            let before = track.deadline();
             events.extend(track.accept(now, self.settings.accepted(id)));
+            track.forget_changed_rules(former.policy(id), self.settings.policy(id));
+            if self.settings.explain != Explain::Adopt {
+                events.extend(track.give_up_effects(now));
+            }
             events.extend(track.redeclare(self.settings.policy(id), declared, &context));
-            moved.push(((before, track.deadline()), id.clone()));
         }
-        for (deadlines, id) in moved {
-            self.changed.insert(id.clone());
-            self.expect(deadlines, id);
+        let all: Vec<BenchmarkId> = self.tracks.keys().cloned().collect();
+        for id in &all {
+            self.note_changed(id);
         }
         events
     }
@@ -398,7 +388,6 @@ impl Monitor {
         }
         for id in gone {
             if let Some(mut track) = self.tracks.remove(&id) {
-                self.expect((track.deadline(), None), id.clone());
                 events.extend(track.close(now));
             }
             self.searches.retain(|job| job.benchmark != id);
@@ -406,7 +395,7 @@ impl Monitor {
             self.past.forget(&id);
             self.queue.forget(&id);
             self.walk.take_if(|walk| *walk.benchmark() == id);
-            self.changed.insert(id);
+            self.note_changed(&id);
         }
         events
     }
@@ -440,7 +429,7 @@ impl Monitor {
 
     /// When the monitor wants a [`Input::Tick`] if nothing else comes before.
     pub fn next_deadline(&self) -> Option<Timestamp> {
-        self.deadlines.first().map(|(due, _)| *due)
+        self.deadlines.next()
     }
 
     /// The level in force for a benchmark that has given readings.

@@ -90,7 +90,7 @@ impl Monitor {
             Notice::Behind { benchmark, time } => {
                 if let Some(track) = self.tracks.get_mut(benchmark) {
                     track.is_behind(*time);
-                    self.changed.insert(benchmark.clone());
+                    self.note_changed(benchmark);
                 }
                 Vec::new()
             }
@@ -99,9 +99,11 @@ impl Monitor {
                 time,
                 clock,
             } => {
-                self.changed.insert(benchmark.clone());
                 let track = self.tracks.get_mut(benchmark);
-                track.map_or_else(Vec::new, |track| track.suspect_ahead(now, (*time, *clock)))
+                let events =
+                    track.map_or_else(Vec::new, |track| track.suspect_ahead(now, (*time, *clock)));
+                self.note_changed(benchmark);
+                events
             }
             Notice::ClockWrong { text } => {
                 let since = *self.clock_wrong.get_or_insert(now);
@@ -135,7 +137,7 @@ impl Monitor {
         for id in self.late.clone() {
             if let Some((track, policy, context)) = self.track_at(&id, now) {
                 events.extend(track.judge_batch(policy, &context));
-                self.changed.insert(id);
+                self.note_changed(&id);
             }
         }
         events.extend(self.judge_queued(now));
@@ -148,8 +150,9 @@ impl Monitor {
         let Some(track) = self.tracks.get_mut(benchmark) else {
             return Vec::new();
         };
-        self.changed.insert(benchmark.clone());
-        track.look_back(policy, now).into_iter().collect()
+        let events = track.look_back(policy, now).into_iter().collect();
+        self.note_changed(benchmark);
+        events
     }
 
     /// A benchmark whose late readings are to be looked back on: [`Notice::LookBack`] does it.

@@ -114,20 +114,18 @@ impl Monitor {
         let Order::Resolve { benchmark, given } = order else {
             return events;
         };
-        let mut deadlines = Vec::new();
+        let mut resolved = Vec::new();
         for (id, track) in &mut self.tracks {
             if benchmark.as_ref().is_some_and(|only| only != id) {
                 continue;
             }
-            let before = track.deadline();
             if let Some(event) = track.resolve(now, given) {
                 events.push(event);
-                deadlines.push(((before, track.deadline()), id.clone()));
+                resolved.push(id.clone());
             }
         }
-        for (deadlines, id) in deadlines {
-            self.changed.insert(id.clone());
-            self.expect(deadlines, id);
+        for id in &resolved {
+            self.note_changed(id);
         }
         events
     }

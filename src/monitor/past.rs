@@ -95,7 +95,7 @@ impl Monitor {
             if let Some(newest) = newest {
                 self.past.owed.insert(id.clone(), newest);
             }
-            self.changed.insert(id);
+            self.note_changed(&id);
         }
         events
     }
@@ -120,7 +120,7 @@ impl Monitor {
             self.walk = Some(walk);
         } else {
             events.extend(track.go_on_from(now, walk));
-            self.changed.insert(id);
+            self.note_changed(&id);
         }
         events
     }

@@ -67,7 +67,7 @@ impl Monitor {
             refits += judged.iter().filter(is_refit).count();
             events.extend(judged);
             self.searches.extend(search);
-            self.changed.insert(id);
+            self.note_changed(&id);
         }
         if self.queue.waiting.is_empty() {
             self.queue.is_open = false;

@@ -5,6 +5,7 @@
 
 use super::awaited::Awaited;
 use super::covariates::Covariates;
+use super::deadlines::Deadlines;
 use super::event::Summary;
 use super::in_force::LevelsInForce;
 use super::past::Past;
@@ -146,11 +147,14 @@ impl Monitor {
             }
         }
         let rest = rest.ok_or(SavedError::Incomplete)?;
-        let deadline = |(id, track): (&BenchmarkId, &Track)| Some((track.deadline()?, id.clone()));
+        let mut deadlines = Deadlines::default();
+        for (id, track) in &tracks {
+            deadlines.set(id, track.deadline());
+        }
         Ok(Self {
             settings: rest.settings,
             in_force: LevelsInForce::of(&tracks),
-            deadlines: tracks.iter().filter_map(deadline).collect(),
+            deadlines,
             tracks,
             changed: BTreeSet::new(),
             covariates: rest.covariates,

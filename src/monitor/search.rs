@@ -58,11 +58,13 @@ pub struct SearchFinding {
 
 impl Monitor {
     pub(super) fn found(&mut self, now: Timestamp, finding: &SearchFinding) -> Vec<Event> {
-        self.changed.insert(finding.benchmark.clone());
         let Some((track, policy, context)) = self.track_at(&finding.benchmark, now) else {
             return Vec::new();
         };
-        track.found(policy.critical_velocity_mm_per_day, now, finding, &context)
+        let critical = policy.critical_velocity_mm_per_day;
+        let events = track.found(critical, now, finding, &context);
+        self.note_changed(&finding.benchmark);
+        events
     }
 
     /// How the monitor stands at this step.

@@ -5,7 +5,9 @@ use super::in_force::LevelsInForce;
 use super::{Input, Monitor};
 use crate::alert::Level;
 use crate::reading::{BenchmarkId, Timestamp};
+use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Benchmarks that a text names.
 const MOST_NAMED: usize = 5;
@@ -37,6 +39,9 @@ pub(super) struct SiteAlert {
     /// Since when too many benchmarks are unknown.
     #[serde(default)]
     unknown: Option<Timestamp>,
+    /// Since when each level was in force that was the newest of it: that is in its key.
+    #[serde(default)]
+    newest: BTreeMap<Level, Timestamp>,
 }
 
 impl SiteAlert {
@@ -52,7 +57,7 @@ impl SiteAlert {
         if before.map(|(level, _)| level) == level {
             return Vec::new();
         }
-        self.in_force = level.map(|level| (level, now));
+        self.in_force = level.map(|level| (level, self.begin(level, now)));
         let reach = level.map_or_else(Vec::new, |level| in_force.at_least(level));
         // As at a benchmark: a higher level supersedes the one before it, a lower one follows on its end.
         let fallen = before.filter(|(before, _)| level.is_none_or(|level| level < *before));
@@ -67,26 +72,39 @@ impl SiteAlert {
         events
     }
 
-    /// Takes the benchmarks of which nothing can be said; says whether that becomes, or ceases to be, true of the
-    /// site: where those that are known cannot make its level, or would make a lower one than all together.
-    fn update_unknown<'a>(
+    /// Since when a level is in force that begins at `now`: what ended may begin again at the same data time, as another alert.
+    fn begin(&mut self, level: Level, now: Timestamp) -> Timestamp {
+        let again = self.newest.get(&level).filter(|newest| **newest >= now);
+        let since = again
+            .and_then(|newest| newest.checked_add(SignedDuration::from_secs(1)).ok())
+            .unwrap_or(now);
+        self.newest.insert(level, since);
+        since
+    }
+
+    /// Takes the benchmarks of which nothing can be said, among `all`; says whether that becomes, or ceases to be, true of the
+    /// site: where those that are known cannot make its level, or the unknown ones could by themselves.
+    fn update_unknown(
         &mut self,
         rule: Option<SiteLevel>,
         now: Timestamp,
-        unknown: impl Iterator<Item = &'a BenchmarkId> + Clone,
+        (unknown, all): (&[&BenchmarkId], usize),
     ) -> Option<Event> {
-        let needed = rule?.needed();
-        let is_unknown = unknown.clone().nth(needed - 1).is_some();
+        let is_unknown = !unknown.is_empty()
+            && rule.is_some_and(|rule| {
+                let needed = rule.needed();
+                unknown.len() >= needed || all - unknown.len() < needed
+            });
         match (self.unknown, is_unknown) {
             (None, true) => {
-                self.unknown = Some(now);
-                let unknown: Vec<&BenchmarkId> = unknown.collect();
+                let since = self.begin(Level::Unknown, now);
+                self.unknown = Some(since);
                 Some(event(
                     now,
                     Level::Unknown,
-                    now,
+                    since,
                     AlertState::Firing,
-                    &unknown,
+                    unknown,
                 ))
             }
             (Some(since), false) => {
@@ -121,8 +139,9 @@ impl Monitor {
         }
         if is_changed || levels().any(|level| level == Level::Unknown) {
             let unknown = self.in_force.unknown().iter();
-            let unknown = unknown.chain(self.awaited.benchmarks());
-            of_site.extend(self.site.update_unknown(rule, now, unknown));
+            let unknown: Vec<&BenchmarkId> = unknown.chain(self.awaited.benchmarks()).collect();
+            let all = self.tracks.len() + self.awaited.benchmarks().count();
+            of_site.extend(self.site.update_unknown(rule, now, (&unknown, all)));
         }
         of_site
     }

@@ -61,7 +61,12 @@ impl FailureComparisons {
             let forecast = tracks.get(*id)?.kept_forecast()?.clone();
             Some(((*id).clone(), forecast))
         });
-        self.kept.push((now, forecasts.collect()));
+        let forecasts = forecasts.collect();
+        // Of what changes at one moment the newest is kept: an agreement is judged over the forecasts of some time.
+        if newest.is_some_and(|ago| ago < APART * evacuation_days) {
+            self.kept.pop();
+        }
+        self.kept.push((now, forecasts));
         let excess = self.kept.len().saturating_sub(MOST_KEPT);
         self.kept.drain(..excess);
         let found = self.shared(now, &compared, tracks);

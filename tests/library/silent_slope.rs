@@ -2,11 +2,21 @@
 
 use crate::crisis::policy;
 use slipwatch::alert::Level;
-use slipwatch::monitor::{AlertState, EventKind, Input, Monitor, Settings};
+use slipwatch::monitor::{AlertState, EventKind, Input, Monitor, Notice, Settings};
 use slipwatch::reading::{BenchmarkId, Reading, Timestamp, Unit, after_days, days_since};
 
 /// Six-hourly displacements until `last` days, then none until `end` days; when each level was entered, days.
 fn levels(mm: impl Fn(f64) -> f64, last: f64, end: f64) -> Vec<(f64, Level, String)> {
+    levels_with_late_ones(mm, last, end, f64::INFINITY)
+}
+
+/// The same where from `late_from` days on one more reading comes three hours late after each, in a batch with it.
+fn levels_with_late_ones(
+    mm: impl Fn(f64) -> f64,
+    last: f64,
+    end: f64,
+    late_from: f64,
+) -> Vec<(f64, Level, String)> {
     let start: Timestamp = "2020-01-01T00:00:00Z".parse().unwrap();
     let mut monitor = Monitor::new(Settings {
         policy: policy(24),
@@ -14,26 +24,32 @@ fn levels(mm: impl Fn(f64) -> f64, last: f64, end: f64) -> Vec<(f64, Level, Stri
     });
     let mut events = Vec::new();
     let mut at = 0.0;
+    let reading = |at: f64| Input::Reading {
+        benchmark: BenchmarkId::new("P"),
+        unit: Unit::MM,
+        averaging: None,
+        reading: Reading {
+            time: after_days(start, at).unwrap(),
+            // Whole tenths of mm, as an instrument gives them.
+            value: (mm(at) * 10.0).round() / 10.0,
+            sigma: None,
+        },
+    };
     while at <= last {
         let time = after_days(start, at).unwrap();
-        // Whole tenths of mm, as an instrument gives them.
-        let value = (mm(at) * 10.0).round() / 10.0;
-        let input = Input::Reading {
-            benchmark: BenchmarkId::new("P"),
-            unit: Unit::MM,
-            averaging: None,
-            reading: Reading {
-                time,
-                value,
-                sigma: None,
-            },
-        };
-        events.extend(monitor.step(time, &input));
+        events.extend(monitor.step(time, &reading(at)));
+        if at >= late_from {
+            monitor.step(time, &Input::Notice(Notice::InBatches));
+            events.extend(monitor.step(time, &reading(at - 0.125)));
+            events.extend(monitor.step(time, &Input::Notice(Notice::BatchEnd)));
+        }
         at += 0.25;
     }
     let end = after_days(start, end).unwrap();
     while let Some(due) = monitor.next_deadline().filter(|due| *due <= end) {
         events.extend(monitor.step(due, &Input::Tick));
+        let next = monitor.next_deadline();
+        assert!(next.is_none_or(|next| next > due), "{due} does not pass");
     }
     let entered = events.into_iter().filter_map(|event| {
         let EventKind::Alert {
@@ -60,6 +76,17 @@ fn a_failing_slope_whose_sensor_is_lost_becomes_red_before_its_collapse_without_
     assert!((70.0..80.0).contains(at), "{entered:?}");
     assert!(text.contains("no reading since 2020-03-11"), "{text}");
     assert!(entered.iter().any(|(_, level, _)| *level == Level::Unknown));
+}
+
+#[test]
+fn what_comes_late_keeps_no_benchmark_from_being_judged_when_its_readings_end() {
+    let failing = |t: f64| -60.0 * (1.0 - t / 80.0).ln();
+    let entered = levels_with_late_ones(failing, 70.0, 90.0, 60.0);
+    let after = |level: Level| {
+        let mut all = entered.iter().filter(|(at, _, _)| *at > 70.0);
+        all.any(|(_, entered, _)| *entered == level)
+    };
+    assert!(after(Level::Red) && after(Level::Unknown), "{entered:?}");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! One alert in plain words.
 
-use crate::alert::percent_in_words;
+use crate::alert::{hours_in_words, percent_in_words};
 use crate::cli::text;
 use crate::monitor::{Event, EventKind, FailureTime};
 use crate::reading::Timestamp;
@@ -41,10 +41,12 @@ pub(super) fn shown(alert: &AlertView, zone: &TimeZone) -> String {
     line("valid until", &valid(alert, &clock));
     let settings = &alert.settings;
     let policy = (alert.benchmark.as_ref()).map_or(&settings.policy, |one| settings.policy(one));
-    let hours = policy.evacuation_time.as_secs() / 3600;
     line(
         "evacuation",
-        &format!("takes {hours} h, by the settings then"),
+        &format!(
+            "takes {}, by the settings then",
+            hours_in_words(policy.evacuation_time)
+        ),
     );
     out += &deliveries(&alert.deliveries);
     out += if alert.is_acknowledged {

@@ -26,6 +26,8 @@ const FIRST_CELLS: usize = 200;
 const NAMES_OF_TIMES: [&str; 8] = [
     "time", "date", "stamp", "datum", "zeit", "heure", "fecha", "data",
 ];
+/// Cells that are no date, in a column of dates: a repeated header, a line of totals.
+const MOST_ODD: usize = 20;
 /// Earlier than any recording: a year of two digits read as one of four.
 const EARLIEST: Timestamp = Timestamp::constant(-2_524_608_000, 0);
 
@@ -238,8 +240,33 @@ fn of_numbers(cells: &[String], decimal: DecimalMark) -> Option<TimeFormat> {
     }
 }
 
-/// Every way of writing a date in which all cells can be read, one time of day each.
+/// Every way of writing a date in which all cells can be read, one time of day each. Where there is none, a few cells that are no
+/// date in any way are left out: the daemon sets such lines aside too, and goes on.
 fn matching(cells: &[String], decimal: DecimalMark) -> Vec<TimeFormat> {
+    let all = reading_all(cells, decimal);
+    if !all.is_empty() {
+        return all;
+    }
+    let is_date = |cell: &&String| !reading_all(std::slice::from_ref(*cell), decimal).is_empty();
+    let (mut odd, mut dates) = (0, Vec::new());
+    for cell in cells {
+        if is_date(&cell) {
+            dates.push(cell.clone());
+        } else {
+            odd += 1;
+        }
+        if odd > MOST_ODD {
+            return all;
+        }
+    }
+    if odd < dates.len() {
+        reading_all(&dates, decimal)
+    } else {
+        all
+    }
+}
+
+fn reading_all(cells: &[String], decimal: DecimalMark) -> Vec<TimeFormat> {
     let reads = |format: &TimeFormat, cells: &[String]| {
         let dialect = reader(decimal, format.clone());
         let read = |cell: &String| {
@@ -283,7 +310,7 @@ fn needs_zone(cells: &[String], format: &TimeFormat, decimal: DecimalMark) -> bo
     let dialect = reader(decimal, format.clone());
     let here = LocalClock::default();
     let distinct: BTreeSet<&String> = cells.iter().take(FIRST_CELLS).collect();
-    distinct
-        .into_iter()
-        .any(|cell| dialect.instant(cell, &here).is_err())
+    distinct.into_iter().any(|cell| {
+        dialect.instant(cell, &here).is_err() && dialect.instant(cell, &anywhere()).is_ok()
+    })
 }

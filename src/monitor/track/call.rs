@@ -2,7 +2,9 @@
 
 use super::forecast::{Forecast, LookAhead};
 use super::{Track, days};
-use crate::alert::{AlertCause, AlertEvidence, Entered, Policy, Transition, chance_in_words};
+use crate::alert::{
+    AlertCause, AlertEvidence, Entered, Policy, Transition, chance_in_words, hours_in_words,
+};
 use crate::fit::Rate;
 use crate::forecast::HORIZON_DAYS;
 use crate::monitor::event::{AlertState, CalledLevel, Event, EventKind, LevelChance};
@@ -84,6 +86,11 @@ impl Track {
             orange: of(outlook, ahead.orange, policy.orange_chance),
             yellow: of(outlook, ahead.orange, policy.yellow_chance),
         })
+    }
+
+    /// A rule that the config has changed begins anew, though it has the same name.
+    pub(in crate::monitor) fn forget_changed_rules(&mut self, before: &Policy, now: &Policy) {
+        self.held.forget_changed(before, now);
     }
 
     /// Between two refits: plain thresholds and the site's own rules act at every reading. They may raise the level; it
@@ -174,15 +181,14 @@ impl Track {
         let grounds = grounds(policy, evidence, &change.rule);
         let chance = |name: &str, chance: Option<f64>, span: SignedDuration| {
             chance.map_or_else(String::new, |chance| {
-                let hours = span.as_secs() / 3600;
                 let chance = chance_in_words(chance);
-                format!("; chance {chance} within {name} ({hours} h)")
+                format!("; chance {chance} within {name} ({})", hours_in_words(span))
             })
         };
         let outlook = if ahead.orange < policy.outlook {
-            let hours = policy.outlook.as_secs() / 3600;
             format!(
-                "five times the record's length, which is shorter than the outlook of {hours} h,"
+                "five times the record's length, which is shorter than the outlook of {},",
+                hours_in_words(policy.outlook)
             )
         } else {
             "the outlook".to_owned()

@@ -112,13 +112,12 @@ impl Track {
             return Vec::new();
         };
         let mut events = self.reset(time);
-        if !is_sorted_out && events.is_empty() {
+        if !is_sorted_out && events.is_empty() || self.unknown.has(Reason::Stuck) {
             return events;
         }
         if let Some(forecast) = self.forecast(policy.critical_velocity_mm_per_day, context) {
             events.extend(self.refit(policy, time, &forecast));
-            let alerts = self.alert(policy, time, Some(&forecast), &mut events);
-            events.extend(alerts);
+            self.decide(policy, time, Some(forecast), &mut events);
         }
         events
     }

@@ -286,14 +286,29 @@ impl Track {
             events.extend(self.refit(policy, time, forecast));
             events.extend(self.watch(policy, time, forecast, context));
         }
+        self.decide(policy, time, forecast, &mut events);
+        events
+    }
+
+    /// The level that follows from a forecast, and what the forecast leaves to the time after it. Where the level may not fall,
+    /// because the readings are doubtful, neither it nor what the forecast before left is changed.
+    fn decide(
+        &mut self,
+        policy: &Policy,
+        time: Timestamp,
+        forecast: Option<Forecast>,
+        events: &mut Vec<Event>,
+    ) {
         let may_fall = self.may_fall();
         let (latch, levels) = (self.latch.clone(), self.levels.clone());
-        let alerts = self.alert(policy, time, forecast.as_ref(), &mut events);
+        let mut alerts = self.alert(policy, time, forecast.as_ref(), events);
         if !may_fall && self.latch.level() < latch.level() {
             (self.latch, self.levels) = (latch, levels);
-            return events;
+            alerts.retain(|event| !matches!(event.kind, EventKind::Alert { .. }));
+            events.append(&mut alerts);
+            return;
         }
-        events.extend(alerts);
+        events.append(&mut alerts);
         match &forecast {
             Some(forecast) => self.await_red(policy, time, forecast),
             None => self.overdue = None,
@@ -303,7 +318,6 @@ impl Track {
             let outlook = forecast.in_force(days(policy.outlook));
             KeptForecast::of(time, &outlook.collapse)
         });
-        events
     }
 
     /// The newest forecast, while a level is in force.

@@ -3,7 +3,7 @@
 
 use super::forecast::Forecast;
 use super::{Track, days};
-use crate::alert::{AlertEvidence, Level, Policy, chance_in_words};
+use crate::alert::{AlertEvidence, Level, Policy, chance_in_words, hours_in_words};
 use crate::monitor::event::Event;
 use crate::monitor::kept::KeptForecast;
 use crate::reading::{SECONDS_PER_DAY, Timestamp};
@@ -86,14 +86,14 @@ impl Track {
         };
         let change = self.latch.raise(policy, &evidence)?;
         self.levels.note(now, &self.latch);
-        let hours = policy.red_within().as_secs() / 3600;
         let text = format!(
-            "benchmark {}: {} ({}); no reading since {newest}; if no collapse has come since, chance {} within {} ({hours} h) from now on",
+            "benchmark {}: {} ({}); no reading since {newest}; if no collapse has come since, chance {} within {} ({}) from now on",
             self.benchmark,
             change.level,
             change.rule,
             chance_in_words(chance),
-            policy.red_within_in_words()
+            policy.red_within_in_words(),
+            hours_in_words(policy.red_within())
         );
         Some(self.alert_of(now, &change, text))
     }

@@ -155,6 +155,7 @@ impl Track {
         self.regime = past.regime;
         (self.intercept, self.transition) = (past.intercept, past.transition);
         self.pace = past.pace;
+        self.held = past.held;
         self.record = PastReview::Known;
         let in_force = past.latch.in_force();
         let Some((level, since)) = in_force.filter(|(level, _)| *level > self.latch.level()) else {
@@ -164,6 +165,7 @@ impl Track {
             return events;
         };
         (self.latch, self.levels, self.look) = (past.latch, past.levels, past.look);
+        (self.kept, self.overdue) = (past.kept, past.overdue);
         let text = format!(
             "benchmark {}: {level} since {since}, found in the readings from before the first start; nothing since has ended it",
             self.benchmark

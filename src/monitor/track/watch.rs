@@ -207,6 +207,15 @@ impl Track {
         events
     }
 
+    /// From here on levels go by the law without effects.
+    pub(in crate::monitor) fn give_up_effects(&mut self, time: Timestamp) -> Vec<Event> {
+        let before = self.adopted.take();
+        for known in &mut self.watch.known {
+            known.is_adopted = false;
+        }
+        self.dropped(time, before.as_ref().map(Adopted::law))
+    }
+
     fn known(&self, effect: &Effect) -> KnownEffect {
         let law = self.adopted.as_ref().map(Adopted::law);
         let channel = effect.channel.as_deref();

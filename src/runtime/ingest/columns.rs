@@ -134,6 +134,15 @@ pub(super) fn name_of(column: &str) -> Name<'_> {
     Name::Channel(channel_unit(column))
 }
 
+/// The unit in the name of a column of readings.
+pub fn unit_in_name(column: &str) -> Option<Unit> {
+    if let Name::Measure(_, Measure::Reading(unit)) = name_of(column) {
+        Some(unit)
+    } else {
+        None
+    }
+}
+
 fn measure_at(plain: &str, at: usize, keyword: &str) -> Option<Measure> {
     let rest = &plain[at + keyword.len()..];
     let unit = rest.strip_prefix('_').or_else(|| in_brackets(rest))?;

@@ -24,6 +24,9 @@ use std::path::Path;
 const MOST_VALUES: u64 = 2_000_000;
 /// Readings of a benchmark that say how often it is measured, the latest.
 const LATEST: usize = 200;
+/// Readings from which on a sign is doubted, where of all that they go by this share is backwards.
+const FEWEST_STEPS: usize = 10;
+const HALF: f64 = 0.5;
 /// Bytes that are read at once.
 const PIECE: usize = 64 * 1024;
 
@@ -67,6 +70,8 @@ struct PreviewSoFar {
     benchmarks: BTreeMap<(String, BenchmarkId, Quantity), PreviewTrack>,
     covariates: BTreeMap<(String, String), CovariateView>,
     unwatched: BTreeSet<BenchmarkId>,
+    /// Sources that have readings of a benchmark which the config takes from another one.
+    elsewhere: BTreeSet<(String, BenchmarkId)>,
     accepted: BTreeMap<BenchmarkId, BTreeSet<Suspicion>>,
     values: u64,
 }
@@ -118,6 +123,14 @@ impl PreviewSoFar {
                 view.remarks.push(problem);
             }
         }
+        let elsewhere = self.elsewhere.iter().filter(|(id, _)| *id == source.id);
+        view.remarks.extend(elsewhere.map(|(_, benchmark)| {
+            format!(
+                "it has readings of benchmark {:?}, which its [[benchmark]] takes from another source: they are not read",
+                benchmark.as_str()
+            )
+        }));
+        view.remarks.extend(decoder.doubtful_units());
         view.refused = refused.into_values().collect();
         view.refused.sort_by_key(|refusal| Reverse(refusal.rows));
         view
@@ -233,6 +246,9 @@ impl PreviewSoFar {
         };
         match (decoder.arrival(item), benchmark) {
             (Some(arrival), _) => self.arrival(arrival, source),
+            (None, Some(benchmark)) if decoder.is_elsewhere(&benchmark) => {
+                self.elsewhere.insert((source.to_owned(), benchmark));
+            }
             (None, Some(benchmark)) => {
                 self.unwatched.insert(benchmark);
             }
@@ -394,7 +410,29 @@ impl PreviewTrack {
         let ahead = suspicion::ahead(last.0, now).into_iter();
         let all = ahead.chain(suspicion::of_values(&self.readings, *quantity, unit));
         let not_accepted = all.filter(|one| !self.accepted.contains(&one.kind));
-        not_accepted.map(|one| one.text).collect()
+        let texts = not_accepted.map(|one| one.text);
+        texts.chain(self.moves_backwards()).collect()
+    }
+
+    /// What to do where the displacement falls all along.
+    fn moves_backwards(&self) -> Option<String> {
+        let steps = self.readings.windows(2).map(|pair| pair[1].1 - pair[0].1);
+        let (mut sum, mut sizes) = (0.0, 0.0);
+        for step in steps {
+            sum += step;
+            sizes += step.abs();
+        }
+        let is_displacement = self.view.quantity == Quantity::Displacement;
+        let is_known = self.accepted.contains(&Suspicion::Fall);
+        let falls = is_displacement
+            && !is_known
+            && self.readings.len() >= FEWEST_STEPS
+            && sum < -HALF * sizes;
+        falls.then(|| {
+            "its displacement falls: motion counts as positive, and a slope that moves backwards calls no red; if its sign is \
+             the other way, write components = [\"COLUMN\"] and direction = [-1.0] for this benchmark"
+                .to_owned()
+        })
     }
 }
 

@@ -4,7 +4,8 @@ use crate::config::{Benchmark, Broker, FileSource, SourceKind};
 use crate::monitor::Input;
 use crate::reading::{BenchmarkId, Conventions, Dialect, Quantity, Timestamp, Unit};
 use crate::runtime::ingest::{
-    ColumnMap, Item, Measure, ReadOptions, Remark, TextFormat, TextRows, VectorMap, unpacked_name,
+    ColumnMap, Item, Measure, ReadOptions, Remark, TextFormat, TextRows, VectorMap, unit_in_name,
+    unpacked_name,
 };
 use jiff::SignedDuration;
 use std::collections::BTreeSet;
@@ -34,8 +35,10 @@ pub(in crate::runtime) struct Decoder {
     kind: SourceKind,
     conventions: Conventions,
     dialect: Dialect,
-    /// With none, whatever benchmarks the files name are taken.
+    /// With none, whatever benchmarks the files name are taken, but for those of other sources.
     wanted: Vec<Benchmark>,
+    /// Benchmarks that the config takes from another source.
+    elsewhere: BTreeSet<BenchmarkId>,
     /// What of the source's files has been remarked on, so that a thousand files say it once.
     remarked: Arc<Mutex<BTreeSet<String>>>,
 }
@@ -48,6 +51,7 @@ impl Decoder {
             conventions,
             dialect: source.dialect.clone(),
             wanted: of_source(&source.id, benchmarks),
+            elsewhere: of_others(&source.id, benchmarks),
             remarked: Arc::default(),
         }
     }
@@ -59,6 +63,7 @@ impl Decoder {
             conventions: broker.conventions.clone(),
             dialect: Dialect::default(),
             wanted: of_source(&broker.id, benchmarks),
+            elsewhere: of_others(&broker.id, benchmarks),
             remarked: Arc::default(),
         }
     }
@@ -168,12 +173,34 @@ impl Decoder {
     }
 
     fn knows(&self, benchmark: &BenchmarkId) -> bool {
-        self.wanted.is_empty() || self.wanted(benchmark).is_some()
+        self.wanted(benchmark).is_some() || self.takes_any(benchmark)
+    }
+
+    /// Whether it takes a benchmark that the config does not name for it.
+    fn takes_any(&self, benchmark: &BenchmarkId) -> bool {
+        self.wanted.is_empty() && !self.is_elsewhere(benchmark)
+    }
+
+    /// Whether the config takes a benchmark from another source, and not from this one.
+    pub(in crate::runtime) fn is_elsewhere(&self, benchmark: &BenchmarkId) -> bool {
+        self.elsewhere.contains(benchmark)
+    }
+
+    /// Columns whose name says another unit than the config.
+    pub(in crate::runtime) fn doubtful_units(&self) -> impl Iterator<Item = String> {
+        self.wanted.iter().filter_map(|benchmark| {
+            let (column, unit) = (benchmark.column.as_ref()?, benchmark.unit?);
+            let named = unit_in_name(column).filter(|named| *named != unit)?;
+            Some(format!(
+                "column {column:?} is named as one in {named}, and [[benchmark]] {:?} takes it in {unit}: is its unit right?",
+                benchmark.id.as_str()
+            ))
+        })
     }
 
     fn wants(&self, benchmark: &BenchmarkId, unit: Unit) -> bool {
         let Some(wanted) = self.wanted(benchmark) else {
-            return self.wanted.is_empty();
+            return self.takes_any(benchmark);
         };
         let quantity = wanted.quantity.or(wanted.unit.map(Unit::quantity));
         quantity.is_none_or(|quantity| quantity == unit.quantity())
@@ -199,6 +226,16 @@ impl Decoder {
 /// How the daemon reads a file of this source.
 pub fn options_of(source: &FileSource, benchmarks: &[Benchmark], file: &Path) -> ReadOptions {
     Decoder::new(source, benchmarks).options(&unpacked_name(file))
+}
+
+fn of_others(id: &str, benchmarks: &[Benchmark]) -> BTreeSet<BenchmarkId> {
+    let others = benchmarks.iter().filter(|one| one.source != id);
+    let others = others.map(|one| one.id.clone());
+    let own = |other: &BenchmarkId| {
+        let mut own = benchmarks.iter().filter(|one| one.source == id);
+        own.any(|one| one.id == *other)
+    };
+    others.filter(|other| !own(other)).collect()
 }
 
 fn of_source(id: &str, benchmarks: &[Benchmark]) -> Vec<Benchmark> {
