@@ -36,10 +36,12 @@ The law is the slider block of Helmstetter et al. (2004) in one regular equation
    again from that law. What entered early leaves again where the BIC rises by less than 10 without it.
 4. An effect is accepted only if the BIC falls by 10 or more, the sign is one that the ground allows, its memory is short against the
    record, a search where there is nothing on 399 surrogates gains as much in fewer than 1 % of cases, and a later block, held out, is predicted
-   no worse by the law and the effects as they were learned before it. Every candidate is judged alike: by what the readings of
-   the block change by from one to the next. Extrapolated over the whole block, an effect that only the shape of the readings supports (no channel, no
-   tide) may not be worse at all; another may be worse by a fifth at most, where the innovations over the block are no
-   worse. Everything else is listed with the reason.
+   no worse by the effects as they were learned before it. That is judged by innovations, each reading of the block predicted from
+   those before it, under a law that is fitted to all readings with the effect and without: where the law itself drifts is
+   not in question. An effect that only the shape of the readings supports (no channel, no tide, no season) may have changed the law, and is
+   judged with the law too as it was learned before the block. Extrapolated over the whole block, such an effect may not be
+   worse at all, and another by a fifth at most; a tide, which comes back to where it was and cannot drift, by ten times at most:
+   the rest is the law's. Everything else is listed with the reason.
 5. Effects within the margin of each other stand under *cannot be separated from*. Structure that is left is called so. What only the
    shape of the readings supports must leave nothing but noise; a jump of the velocity stands beside what is left if it gains 40 or more and would
    gain less by 20 or more three readings earlier or later.
@@ -50,10 +52,12 @@ interval) were set with NTOE and Baishuihe below in view; the held-out error of 
 What it assumes: the load acts through the ratio of shear to normal stress only (the state's direct response to normal stress is left
 out); responses are linear; covariates are measured where it matters; what is held out is the last third of the record, or half of
 what follows the last dated effect. Errors are root mean squares of least-squares fits in the unit of the readings, on the same data
-before and after. The held-out errors are given twice. *From reading to reading*: by how much the change from each reading of the
-block to the next is missed, law and effects learned before the block, the covariates known. *Extrapolated*: by how much the
-readings themselves are missed, over the whole block at once. In the second, what the law has drifted by in the first
-months of the block counts again in every later reading, whatever the effect does; so the first is what effects are judged by (but for jumps of the reading and the blur of a mean, which say nothing of what comes), and it rises for none of the series below by more than half a per cent where an effect was accepted. An effect is what the readings are consistent with, and is not proved to cause them.
+before and after. The held-out errors are given twice. *From reading to reading*: by how much each reading of the block is missed where
+it is predicted from those before it, the effects learned before the block, the covariates known, the law fitted to all
+readings. *Extrapolated*: by how much the readings themselves are missed, over the whole block at once, law and effects learned before it.
+In the second, what the law has drifted by in the first months of the block counts again in every later reading, whatever the effect does; so
+the first is what effects are judged by (but for jumps of the reading and the blur of a mean, which say nothing of what
+comes). An effect is what the readings are consistent with, and is not proved to cause them.
 ";
 
 /// The whole document.

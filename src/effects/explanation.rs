@@ -185,8 +185,8 @@ pub struct ErrorChange {
     pub fit: Change,
     /// Over a later block that the fit did not see: extrapolated over all of it.
     pub held_out: Change,
-    /// Over the same block, each reading predicted from the one before it and what the law, learned before the block, moves
-    /// between them.
+    /// Over the same block, each reading predicted from those before it: the effects as they were learned before the block, the
+    /// law fitted to all readings with them and without.
     pub held_out_step: Change,
     /// The first reading of that block.
     pub held_out_from: Option<Timestamp>,

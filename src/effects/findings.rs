@@ -8,7 +8,7 @@ use super::explanation::{
     Structure,
 };
 use super::fresh::{best_of_starts, fresh_starts};
-use super::judge::{HeldOut, held_out, named};
+use super::judge::{HeldOut, held_out, named, step_errors};
 use super::kind::Kind;
 use super::known_load::KnownLoad;
 use super::noise::{Memory, Whitener};
@@ -90,6 +90,10 @@ pub(super) fn findings(
     );
     let both = (&found.null, &full);
     let error = errors(problem, (&found.plain, &after), held.as_ref(), unit);
+    let error = ErrorChange {
+        held_out_step: steps(problem, both, held.as_ref(), (unit, scratch)),
+        ..error
+    };
     let (residual, left) = residual_tests(ground, both, scratch);
     let explained = confirmed(explained, (&full, &noise), &error, &residual);
     let curves = curves(problem, (&found.plain, &after, held.as_ref()), unit, left);
@@ -125,7 +129,35 @@ fn noise_report(full: &Fitted, unit: Unit) -> NoiseReport {
     }
 }
 
-/// Errors of the fit, and over the later block, extrapolated over all of it and from each reading to the next.
+/// Errors over the later block, each reading predicted from those before it; by what the law learned before the block moves
+/// where that cannot be fitted.
+fn steps(
+    problem: &Problem,
+    both: (&Fitted, &Fitted),
+    held: Option<&HeldOut>,
+    (unit, scratch): (Unit, &mut Scratch),
+) -> Change {
+    let Some(held) = held else {
+        return Change::default();
+    };
+    // With nothing added there is nothing to compare.
+    let both = if both.1.terms.is_empty() {
+        (both.1, both.1)
+    } else {
+        both
+    };
+    let known = step_errors(problem, both, (held.from, both.1.terms.len()), scratch);
+    let (before, after) = known.map_or_else(
+        || held.errors_of_changes(problem),
+        |steps| (steps.before, steps.after),
+    );
+    Change {
+        before: Some(before / unit.factor()),
+        after: Some(after / unit.factor()),
+    }
+}
+
+/// Errors of the fit, and extrapolated over the later block.
 fn errors(
     problem: &Problem,
     (before, after): (&Fitted, &Fitted),
@@ -144,7 +176,6 @@ fn errors(
             after: Some(after.rms(problem, 0..n) / factor),
         },
         held_out: change(held.map(|held| held.errors(problem))),
-        held_out_step: change(held.map(|held| held.errors_of_changes(problem))),
         held_out_from: held.and_then(|held| after_days(problem.epoch, problem.t[held.from])),
         ..ErrorChange::none(unit)
     }

@@ -2,9 +2,9 @@
 
 use super::fresh::{best_of_starts, fresh_starts};
 use super::kind::{Form, Kind};
-use super::noise::Whitener;
+use super::noise::{Memory, Noise, Whitener};
 use super::problem::{Problem, median, slips};
-use super::refit::{Fitted, Start, refit};
+use super::refit::{Fitted, Start, likeliest, refit};
 use super::response::Driver;
 use super::rival::Rival;
 use super::term::{Act, Scratch, Term, law_parameters};
@@ -12,6 +12,9 @@ use crate::reading::Quantity;
 
 /// The later block has at least so many readings.
 const FEWEST_HELD_OUT: usize = 5;
+
+/// Coefficients are moved to what was learned before the block in so many steps.
+const MOVES: u32 = 8;
 
 /// A jump that took longer than this, days, may be slip.
 const LONGEST_JUMP_DAYS: f64 = 3.0;
@@ -255,7 +258,7 @@ pub(super) fn without_block(
 ) -> Option<Fitted> {
     let part = problem.trained_on(from);
     let mut starts = fresh_starts(&part, &fitted.terms);
-    starts.push(Start::at(fitted));
+    starts.push(in_units_of(&part, (problem, fitted)));
     best_of_starts(&part, &starts, scratch)
 }
 
@@ -269,41 +272,101 @@ pub(super) struct StepErrors {
     pub(super) surprise: f64,
 }
 
-/// The later block by its innovations, without and with the newest `learned` coefficients of `after` as they were learned
+/// The later block by its innovations, without and with the newest terms of `after`, their coefficients as they were learned
 /// before the block. The law itself is fitted to all readings on both sides: its own extrapolation is not what is in
 /// question. `None` where it cannot be fitted.
 pub(super) fn step_errors(
     problem: &Problem,
     (before, after): (&Fitted, &Fitted),
-    (from, learned): (usize, usize),
+    (from, newest): (usize, usize),
     scratch: &mut Scratch,
 ) -> Option<StepErrors> {
     let part = problem.trained_on(from);
-    let known = [Whitener::new(&part, after.noise)];
-    let early = refit(&part, &Start::at(after), &known, scratch)?;
-    let whole = [Whitener::new(problem, after.noise)];
-    let start = Start {
-        parameters: [
-            &after.parameters[..after.parameters.len() - learned],
-            &early.parameters[early.parameters.len() - learned..],
-        ]
-        .concat(),
-        frozen: learned,
-        ..Start::at(after)
-    };
-    let frozen = refit(problem, &start, &whole, scratch)?;
+    let known = [Whitener::new(
+        &part,
+        noise_in_units_of(&part, (problem, after.noise)),
+    )];
+    let early = refit(
+        &part,
+        &in_units_of(&part, (problem, after)),
+        &known,
+        scratch,
+    )?;
+    let early = in_units_of(problem, (&part, &early));
+    let newest = &after.terms[after.terms.len() - newest..];
+    let learned: usize = newest.iter().map(Term::coefficients).sum();
+    let whole = Whitener::new(problem, after.noise);
+    let frozen = under_learned(problem, after, (&early.parameters, learned), scratch)?;
     let own = Whitener::new(problem, before.noise);
     let errors = |fitted: &Fitted, whitener: &Whitener| {
         let residual = fitted.residual(problem);
         let surprise = whitener.surprise_from(&residual, from, fitted.sigma);
         (whitener.step_errors_from(&residual, from), surprise)
     };
-    let (without, with) = (errors(before, &own), errors(&frozen, &whole[0]));
+    let (without, with) = (errors(before, &own), errors(&frozen, &whole));
     Some(StepErrors {
         before: without.0,
         after: with.0,
         surprise: with.1 - without.1,
     })
+}
+
+/// The law fitted to all readings under the last `learned` of the parameters that a part of them gave: from the law of that part, and
+/// from that of all, its own coefficients moved there step by step, because a law that nearly fails may fail at once under
+/// others.
+fn under_learned(
+    problem: &Problem,
+    after: &Fitted,
+    (early, learned): (&[f64], usize),
+    scratch: &mut Scratch,
+) -> Option<Fitted> {
+    let whole = [Whitener::new(problem, after.noise)];
+    let law = after.parameters.len() - learned;
+    let (own, learned_there) = (&after.parameters[law..], &early[law..]);
+    let mut under = |parameters: &[f64], coefficients: &[f64]| {
+        let start = Start {
+            frozen: coefficients.len(),
+            parameters: [&parameters[..law], coefficients].concat(),
+            ..Start::at(after)
+        };
+        refit(problem, &start, &whole, scratch)
+    };
+    let at_once = under(early, learned_there);
+    let moved = (1..=MOVES).try_fold(after.clone(), |there, k| {
+        let share = f64::from(k) / f64::from(MOVES);
+        let both = own.iter().zip(learned_there);
+        let coefficients: Vec<f64> = both.map(|(own, to)| own + share * (to - own)).collect();
+        under(&there.parameters, &coefficients)
+    });
+    likeliest(problem, at_once.into_iter().chain(moved))
+}
+
+/// A start at a fit to a part of the readings, or to all, in the units of `next`: coefficients of what answers to the
+/// motion are in units of the usual velocity.
+fn in_units_of(next: &Problem, (known, fitted): (&Problem, &Fitted)) -> Start {
+    let faster = next.typical_velocity() / known.typical_velocity();
+    let mut start = Start::at(fitted);
+    let mut from = law_parameters(known);
+    for term in &fitted.terms {
+        let own = &mut start.parameters[from..from + term.coefficients()];
+        if matches!(term.act, Act::PerVelocity | Act::PerSlip) {
+            own.iter_mut().for_each(|one| *one *= faster);
+        }
+        from += term.coefficients();
+    }
+    start.noise = noise_in_units_of(next, (known, fitted.noise));
+    start
+}
+
+/// The same noise in the units of `next`: that of a load is in units of the usual velocity.
+fn noise_in_units_of(next: &Problem, (known, noise): (&Problem, Noise)) -> Noise {
+    if noise.memory != Memory::Load {
+        return noise;
+    }
+    Noise {
+        ratio: noise.ratio * next.typical_velocity() / known.typical_velocity(),
+        ..noise
+    }
 }
 
 /// What a term is called: its kind, and its channel where there is one.

@@ -174,7 +174,6 @@ impl Whitener {
             Quantity::Displacement => problem.typical_velocity() * problem.span(),
             Quantity::Velocity => problem.typical_velocity(),
         };
-        // In units of the white noise.
         let whole = 1.0 / (WHOLE_MOTION * motion).max(problem.scatter);
         Self {
             noise,

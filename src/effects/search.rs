@@ -4,7 +4,7 @@ use super::candidates;
 use super::companions::{go_together, is_rain};
 use super::explanation::Candidate;
 use super::fresh::best_of_starts;
-use super::judge::{block, held_out, is_label, named, objection, step_errors};
+use super::judge::{HeldOut, block, held_out, is_label, named, objection, step_errors};
 use super::kind::Kind;
 use super::noise::Whitener;
 use super::options::Options;
@@ -20,13 +20,14 @@ use crate::reading::Timestamp;
 const MOST_EFFECTS: usize = 10;
 /// A search's p-value must lie under this.
 pub(super) const SIGNIFICANT: f64 = 0.01;
-/// The later block is predicted no worse from reading to reading, but for this factor. The error extrapolated over all of
-/// it carries the law's own drift: of what independent data support it may grow by the first factor at most, and only if the block by
-/// its innovations is predicted no worse, neither in -2 ln likelihood, by more than this, nor in its errors; of what
-/// only the shape of the readings supports it may not grow.
-const MOST_EXTRAPOLATED: f64 = 1.2;
+/// The later block is predicted no worse from reading to reading: neither in -2 ln likelihood, by more than the first, nor in
+/// the errors, by more than the second factor.
 const WORSE: f64 = 2.0;
 const WORSE_STEPS: f64 = 1.005;
+/// The error extrapolated over all of the block carries the law's own drift: of what independent data support it may grow by the
+/// first factor at most. A tide comes back to where it was and cannot drift: what grows there is the law's.
+const MOST_EXTRAPOLATED: f64 = 1.2;
+const MOST_OF_A_TIDE: f64 = 10.0;
 
 /// By how much of the BIC a fit is better for the search to begin with it again.
 const BETTER: f64 = 1.0;
@@ -342,7 +343,11 @@ impl Search<'_> {
     fn held_out(&mut self, base: &Fitted, one: &Refitted) -> (Option<f64>, Option<String>) {
         let share = self.options.held_out_share;
         if block(self.problem, &one.fitted.terms, share).is_none() {
-            return (None, None);
+            // A short record has none, and a step that has only just come says so by its date.
+            let is_late = block(self.problem, &[], share).is_some() && !is_label(one.term.kind);
+            let reason =
+                "an event stands too late for a later block by which to judge it".to_owned();
+            return (None, is_late.then_some(reason));
         }
         let models = (base, &one.fitted);
         let Some(held) = held_out(self.problem, models, share, &mut self.scratch) else {
@@ -351,31 +356,46 @@ impl Search<'_> {
         };
         let (before, after) = held.errors(self.problem);
         let ratio = after / before.max(1e-300);
-        let grows = || format!("the held-out error grows to {:.0} %", 100.0 * ratio);
-        if !ratio.is_finite() || ratio > MOST_EXTRAPOLATED {
-            return (Some(ratio).filter(|ratio| ratio.is_finite()), Some(grows()));
+        if !ratio.is_finite() || ratio > most_extrapolated(one.term.kind) {
+            let reason = format!("the held-out error grows to {:.0} %", 100.0 * ratio);
+            return (Some(ratio).filter(|ratio| ratio.is_finite()), Some(reason));
         }
-        let (before, after) = held.errors_of_changes(self.problem);
-        if after > WORSE_STEPS * before {
+        (
+            Some(ratio),
+            self.worse_from_reading_to_reading(base, one, &held),
+        )
+    }
+
+    /// Why not, by the held-out readings, each predicted from those before it: what only the shape of the readings supports may
+    /// have changed the law, and is judged with the law as it was learned before the block.
+    fn worse_from_reading_to_reading(
+        &mut self,
+        base: &Fitted,
+        one: &Refitted,
+        held: &HeldOut,
+    ) -> Option<String> {
+        let newest = one.fitted.terms.len() - base.terms.len();
+        let models = (base, &one.fitted);
+        let both = (held.from, newest);
+        let (before, after) = if is_label(one.term.kind) {
+            held.errors_of_changes(self.problem)
+        } else {
+            let steps = step_errors(self.problem, models, both, &mut self.scratch);
+            match steps.filter(|steps| steps.after.is_finite() && steps.surprise.is_finite()) {
+                None => return Some("as it is learned before the later block, the readings cannot be fitted with it".to_owned()),
+                Some(steps) if steps.surprise > WORSE => {
+                    let worse = steps.surprise;
+                    return Some(format!(
+                        "the held-out readings are less likely with it, by {worse:.1} in -2 ln likelihood"
+                    ));
+                }
+                Some(steps) => (steps.before, steps.after),
+            }
+        };
+        (after > WORSE_STEPS * before).then(|| {
             let share = 100.0 * after / before.max(1e-300);
-            let reason =
-                format!("from reading to reading the held-out error grows to {share:.0} %");
-            return (Some(ratio), Some(reason));
-        }
-        if ratio <= 1.0 {
-            return (Some(ratio), None);
-        }
-        if is_label(one.term.kind) {
-            return (Some(ratio), Some(grows()));
-        }
-        let newest = one.fitted.terms[base.terms.len()..].iter();
-        let newest = newest.map(Term::coefficients).sum();
-        let both = (base, &one.fitted);
-        let steps = step_errors(self.problem, both, (held.from, newest), &mut self.scratch);
-        let is_no_worse = steps.is_some_and(|steps| {
-            steps.surprise <= WORSE && steps.after <= WORSE_STEPS * steps.before
-        });
-        (Some(ratio), (!is_no_worse).then(grows))
+            format!("from reading to reading the held-out error grows to {share:.0} %")
+        })
     }
 
     pub(super) fn note(
@@ -396,7 +416,9 @@ impl Search<'_> {
             at: time_of(self.problem, term),
             lag_days: term.response.map(|response| response.mean_days),
             bic_gain: one.gain,
-            p_value: Some(one.p_value),
+            // Of what gains too little none is computed.
+            p_value: (one.gain >= self.options.bic_margin || one.p_value < 1.0)
+                .then_some(one.p_value),
             held_out: held,
             rejected_because: reason,
         };
@@ -408,6 +430,16 @@ impl Search<'_> {
             !same || old.rejected_because.is_none()
         });
         self.candidates.push(candidate);
+    }
+}
+
+/// By what factor the held-out error may grow where it is extrapolated over all of the block; what only the shape of the readings
+/// supports may change the law, and with it no error may grow.
+fn most_extrapolated(kind: Kind) -> f64 {
+    match kind {
+        Kind::Tide => MOST_OF_A_TIDE,
+        _ if is_label(kind) => 1.0,
+        _ => MOST_EXTRAPOLATED,
     }
 }
 

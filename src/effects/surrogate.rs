@@ -1,6 +1,6 @@
 //! How much a search finds where there is nothing: covariates at the wrong time, and readings made of noise alone.
 
-use super::candidates::{delays, of_channel, responses};
+use super::candidates::{delays, of_channel, responses, thermal};
 use super::frame::{Frame, Frames, dot};
 use super::kind::Form;
 use super::linear::Linear;
@@ -15,8 +15,6 @@ use rand_pcg::Pcg64Mcg;
 
 /// A covariate is never shifted by less than this share of its record: it would still be at its right time.
 const LEAST_SHIFT: f64 = 0.06;
-/// Fewest exceedances from which a p-value is read off; below, the tail is Gumbel's.
-const FEWEST_EXCEEDANCES: usize = 5;
 /// No p-value is claimed below it.
 const LEAST_P: f64 = 1e-6;
 
@@ -58,7 +56,7 @@ impl NullGains {
             .iter()
             .filter(|null_gains| **null_gains >= gain)
             .count();
-        if above >= FEWEST_EXCEEDANCES {
+        if above > 0 {
             return (above as f64 + 1.0) / (n + 1.0);
         }
         let mean = self.gains.iter().sum::<f64>() / n;
@@ -67,16 +65,23 @@ impl NullGains {
         // Euler's constant places the mean of Gumbel's law.
         let place = mean - 0.577_215_664_9 * scale;
         let tail = -(-(-(gain - place) / scale.max(1e-9)).exp()).exp_m1();
-        let rank = (above as f64 + 1.0) / (n + 1.0);
-        tail.clamp(LEAST_P, 1.0).min(rank.max(LEAST_P))
+        tail.clamp(LEAST_P, 1.0).min(1.0 / (n + 1.0))
     }
+}
+
+/// A covariate that is searched: its place among the channels, and whether it may act on the reading too.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SearchedDriver<'a> {
+    pub(super) index: usize,
+    pub(super) driver: &'a Driver,
+    pub(super) is_temperature: bool,
 }
 
 /// The whole search over every covariate, on covariates shifted round in time (and in every other one run
 /// backwards): all by the same share, so that what they have in common stays.
 pub(super) fn shifted_covariates(
     problem: &Problem,
-    drivers: &[(usize, Driver)],
+    drivers: &[SearchedDriver<'_>],
     (linear, frames): (&Linear, &Frames),
     (count, seed): (usize, u64),
 ) -> NullGains {
@@ -84,15 +89,19 @@ pub(super) fn shifted_covariates(
     let before = frames.surprise();
     let finds = (0..count).filter_map(|k| {
         let share = random.random_range(LEAST_SHIFT..1.0 - LEAST_SHIFT);
-        let each = drivers.iter().filter_map(|(index, driver)| {
+        let each = drivers.iter().filter_map(|one| {
             #[expect(
                 clippy::cast_possible_truncation,
                 clippy::cast_sign_loss,
                 reason = "a share of a length"
             )]
-            let by = (share * driver.len() as f64) as usize;
-            let other = driver.shifted(by, k % 2 == 1);
-            best_response(problem, (*index, &other), (linear, frames))
+            let by = (share * one.driver.len() as f64) as usize;
+            let other = one.driver.shifted(by, k % 2 == 1);
+            let other = SearchedDriver {
+                driver: &other,
+                ..*one
+            };
+            best_response(problem, &other, (linear, frames))
         });
         let best = each.min_by(|a, b| a.1.total_cmp(&b.1))?;
         Some((best.0, before - best.1))
@@ -111,9 +120,10 @@ pub(super) fn shifted_covariates(
 /// itself, which gains less for it.
 fn best_response(
     problem: &Problem,
-    driver: (usize, &Driver),
+    one: &SearchedDriver<'_>,
     (linear, frames): (&Linear, &Frames),
 ) -> Option<(Term, f64)> {
+    let driver = (one.index, one.driver);
     let delays = delays(problem, driver.1);
     let coarse: Vec<f64> = delays.into_iter().step_by(2).collect();
     let each = [Form::Level, Form::Rate]
@@ -121,6 +131,9 @@ fn best_response(
         .flat_map(|form| responses(form, &coarse))
         .filter(|response| response.stages == 2 || response.mean_days == 0.0)
         .filter_map(|response| of_channel(problem, driver, response));
+    let warms = coarse.iter().filter(|_| one.is_temperature);
+    let in_reading = warms.filter_map(|days| thermal(problem, driver, 1, *days));
+    let each = each.chain(in_reading);
     let mut terms = Vec::new();
     let mut columns = Vec::new();
     for term in each {

@@ -10,7 +10,9 @@ use super::linear::Linear;
 use super::noise::{Memory, Whitener};
 use super::problem::Problem;
 use super::response::Driver;
-use super::surrogate::{Innovations, NullGains, Tried, noise_alone, shifted_covariates};
+use super::surrogate::{
+    Innovations, NullGains, SearchedDriver, Tried, noise_alone, shifted_covariates,
+};
 use super::term::Term;
 
 /// A term with its linear gain.
@@ -161,7 +163,14 @@ impl Ground<'_> {
         seed: u64,
     ) -> NullGains {
         let both = (&self.linear, &self.frames);
-        shifted_covariates(self.problem, drivers, both, (count, seed))
+        let known = || self.drivers.iter().zip(self.temperatures);
+        let searched = drivers.iter().map(|(index, driver)| SearchedDriver {
+            index: *index,
+            driver,
+            is_temperature: known().any(|((own, _), is_one)| own == index && *is_one),
+        });
+        let searched: Vec<SearchedDriver<'_>> = searched.collect();
+        shifted_covariates(self.problem, &searched, both, (count, seed))
     }
 
     /// What the search without covariates gains where there is nothing.

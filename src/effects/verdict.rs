@@ -88,6 +88,7 @@ pub(super) fn conclude(
             full = under_memory_of_readings((problem, bank), &full, scratch).unwrap_or(full);
         }
     }
+    let cannot_separate_from = separate(cannot_separate_from, &effects);
     let is_one_channel = cannot_separate_from.iter().all(|one| one.channel.is_none());
     if remembers && !left {
         effects.push(correlated(unit, &full, memory_gain));
@@ -104,13 +105,26 @@ pub(super) fn conclude(
             Kind::None
         }));
     }
-    cannot_separate_from.dedup();
     Verdict {
         effects,
         explained,
         cannot_separate_from,
         full,
     }
+}
+
+/// Each rival once, without what was accepted beside it in the end.
+fn separate(rivals: Vec<Rival>, effects: &[Effect]) -> Vec<Rival> {
+    let mut each: Vec<Rival> = Vec::new();
+    for rival in rivals {
+        let is_accepted = effects
+            .iter()
+            .any(|one| one.effect == rival.kind && one.channel == rival.channel);
+        if !is_accepted && !each.contains(&rival) {
+            each.push(rival);
+        }
+    }
+    each
 }
 
 /// Whether noise that the reading remembers may be what a fit left. With no effect in the law, a load in its noise may be that too.

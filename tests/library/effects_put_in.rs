@@ -102,6 +102,25 @@ fn a_step_of_the_velocity_put_into_lanzada_is_found_beside_what_is_left() {
     assert!(fit.after.unwrap() < 0.2 * fit.before.unwrap(), "{fit:?}");
 }
 
+/// The law's own failure time drifts in the held-out hours before the collapse, with the wave and without; the wave does not.
+#[test]
+#[cfg_attr(not(measured_data), ignore = "no measured data here")]
+fn a_wave_of_the_tides_period_put_into_lanzada_is_found_with_its_size_though_the_law_drifts() {
+    let options = ReadOptions {
+        averaging: Some(jiff::SignedDuration::from_hours(1)),
+        ..ReadOptions::default()
+    };
+    for seed in [TIDE, TIDE + 1, TIDE + 2] {
+        let file = measured("lanzada_2025_f1.csv");
+        let trial = trial_of(&[file], None, (What::Tide, seed), &options);
+        let found = trial.found().unwrap();
+        let off = found.size.unwrap() / trial.put_in.size - 1.0;
+        assert!(off.abs() <= 0.2, "{found:?} for {:?}", trial.put_in);
+        let held_out = &trial.with.error.held_out_step;
+        assert!(held_out.after < held_out.before, "{held_out:?}");
+    }
+}
+
 #[test]
 #[cfg_attr(not(measured_data), ignore = "no measured data here")]
 fn a_reset_put_into_the_height_at_houston_is_found_beside_its_own_four_steps() {
