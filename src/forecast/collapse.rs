@@ -9,17 +9,13 @@
 
 use super::evidence::{self, Evidence};
 use super::learned::LEARNED;
+use super::members::{LONGEST_DAYS, MOST, Members};
 use super::network::{INPUTS, Network};
-use super::{InverseVelocityLine, Passage, Scale, Scales};
-use crate::fit::{LoadPosterior, Observations, Rate, RateOptions};
+use super::{Passage, Scale, Scales};
+use crate::fit::Observations;
 
-/// The velocity whose passage by the law is one of them, mm/day: the same wherever a site draws its own line.
-const PASSED: f64 = 1000.0;
-/// Newest rates through whose inverses straight lines are drawn.
-const LINES: [usize; 3] = [8, 16, 32];
-/// Spans beyond the longest scale that are still asked for, and the longest span, days.
+/// Spans beyond the longest scale that are still asked for.
 const BEYOND: usize = 3;
-const LONGEST_DAYS: f64 = 1200.0;
 /// The share of the network's chance that is left where no acceleration shows, over long spans, and the span, days, at
 /// which half of that is reached: within days nothing is called that the readings do not show.
 const UNSEEN: f64 = 0.15;
@@ -40,12 +36,6 @@ const SLOWED: f64 = 0.5;
 /// ratio. Set on simulated slopes: storms, thaws and fits of stick-slip repeat, and a collapse is mostly faster than all
 /// before it.
 const SURVIVED: i32 = 2;
-/// How far the time of a collapse is the law's where the law is sure that one comes and all lines through inverse velocity
-/// meet zero when it does; and the standard deviation of ln of these times by which 1 - 1/e of that is lost. Set on simulated
-/// slopes of all kinds that fail: a share that did not ask for agreement put the collapse of those that keep no straight line
-/// (exponential, levelled) at half of the time that remained.
-const TIMED: f64 = 0.8;
-const APART: f64 = 0.3;
 /// Over how many shorter scales the growth of the velocity is looked for.
 const GROWN_SCALES: usize = 10;
 /// How far the growth of a slope that runs up departs from a straight line in inverse velocity, and what is left of the
@@ -62,8 +52,9 @@ const ONE_SCALE: f64 = 3.0;
 /// The power of the chances within each time where a collapse is sure to come. Families of simulated slopes that taught
 /// a network nothing collapse sooner than it says (docs/families.md); chosen on these, with the measured series in view.
 const SOONER: f64 = 0.6;
-/// Inputs lie between plus and minus this.
-const MOST: f64 = 3.0;
+/// Readings since an event that are judged by themselves, at least and at most: the work is bounded.
+const FEWEST_LATER: usize = 24;
+const MOST_LATER: usize = 200_000;
 
 /// When a slope is expected to collapse.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,24 +70,29 @@ pub struct Collapse {
 pub struct Indicators {
     scales: Scales,
     evidence: Evidence,
-}
-
-/// What others expect, which the network weighs.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Members {
-    /// Days to [`PASSED`] by the law.
-    law: Passage,
-    /// Of the straight line through the inverses of the newest rates: one over the days from the newest reading to
-    /// where it meets zero; below 0 where it rises.
-    lines: [f64; LINES.len()],
+    /// The same of the readings since an event that stands out of all else: beside it no later acceleration would look like
+    /// one.
+    later: Option<Box<Self>>,
 }
 
 impl Indicators {
     /// Those of `observations`; `None` with too few of them.
     pub fn of(observations: &Observations) -> Option<Self> {
+        let mut whole = Self::of_all(observations)?;
+        let since = whole.scales.disturbed_days;
+        let later = since.and_then(|ago| newest(observations, ago));
+        whole.later = later.and_then(|later| Self::of_all(&later)).map(Box::new);
+        Some(whole)
+    }
+
+    fn of_all(observations: &Observations) -> Option<Self> {
         let scales = Scales::of(observations)?;
         let evidence = Evidence::of(observations, &scales);
-        Some(Self { scales, evidence })
+        Some(Self {
+            scales,
+            evidence,
+            later: None,
+        })
     }
 
     /// Probability that the slope accelerates, against steady motion under its usual fluctuations.
@@ -124,7 +120,9 @@ impl Indicators {
         let mut counted = spans(&self.scales)
             .take_while(|(power, span)| *power == 0 || *span < 2.0 * days)
             .map(|(_, span)| self.most(span));
+        let later = self.later.as_ref();
         counted.any(|most| most >= chance)
+            || later.is_some_and(|later| later.may_reach(days, chance))
     }
 
     /// The inputs of every span with its length, days.
@@ -154,9 +152,12 @@ impl Indicators {
             counted.push((days, sure));
         }
         let centred = self.scales.centred_before_days;
+        let sure = passage(&counted, &members.law, centred);
+        let later = self.later.as_ref();
+        let later = later.map(|later| later.collapse_by(network, members).sure);
         Collapse {
             passage: self.sooner(&members.timed(&passage(&all, &members.law, centred))),
-            sure: passage(&counted, &members.law, centred),
+            sure: later.map_or_else(|| sure.clone(), |later| sure.at_least(&later)),
         }
     }
 
@@ -193,78 +194,16 @@ impl Indicators {
     }
 }
 
-impl Members {
-    /// What they expect after `observations`.
-    pub fn of(observations: &Observations) -> Self {
-        let Some(newest) = observations.values.last() else {
-            return Self::default();
-        };
-        let rates = observations.rates(0..observations.values.len(), RateOptions::default());
-        let posterior = LoadPosterior::fit(&rates);
-        Self::by(&rates, posterior.as_ref(), newest.t_days)
-    }
-
-    /// The same from the rates and the posterior of the law.
-    pub(super) fn by(rates: &[Rate], posterior: Option<&LoadPosterior>, now_days: f64) -> Self {
-        let law = super::panel::passages(rates, posterior, PASSED, now_days);
-        let line = |count: usize| {
-            let newest = &rates[rates.len().saturating_sub(count)..];
-            InverseVelocityLine::approach(newest, now_days).unwrap_or(0.0)
-        };
-        Self {
-            law: Passage::from_times(law),
-            lines: LINES.map(line),
-        }
-    }
-
-    /// (days, probability) of passing `critical` mm/day by the law, where that is the velocity asked of it here.
-    pub(super) fn law_to(&self, critical: f64) -> Option<&[(f64, f64)]> {
-        (critical.to_bits() == PASSED.to_bits()).then(|| self.law.times())
-    }
-
-    /// `network` with a part of it, the larger the surer the law is of a collapse and the better the lines agree with it, where
-    /// the law puts that: the law is the sharper where a slope keeps it, and has no say in whether one comes.
-    fn timed(&self, network: &Passage) -> Passage {
-        let sure = self.law.chance_within(LONGEST_DAYS);
-        if sure <= 0.0 {
-            return network.clone();
-        }
-        let share = TIMED * self.agreement(sure) * sure;
-        let own = network.times().iter();
-        let own = own.map(|(days, chance)| (*days, (1.0 - share) * chance));
-        let moved = share * network.chance_within(LONGEST_DAYS) / sure;
-        let soon = self.law.times().iter();
-        let soon = soon.take_while(|(days, _)| *days <= LONGEST_DAYS);
-        let laws = soon.map(|(days, chance)| (*days, moved * chance));
-        Passage::from_times(own.chain(laws).collect())
-    }
-
-    /// How well the law, which puts a collapse into its future with the chance `sure`, and the lines agree on its time: 1 where
-    /// they do, 0 where a line meets no zero.
-    fn agreement(&self, sure: f64) -> f64 {
-        let median = self.law.quantile(0.5 * sure, LONGEST_DAYS);
-        let Some(median) = median.filter(|days| *days > 0.0) else {
-            return 0.0;
-        };
-        if self.lines.iter().any(|line| *line <= 0.0) {
-            return 0.0;
-        }
-        let times = || std::iter::once(median.ln()).chain(self.lines.iter().map(|line| -line.ln()));
-        let count = (1 + LINES.len()) as f64;
-        let mean = times().sum::<f64>() / count;
-        let square: f64 = times().map(|time| (time - mean).powi(2)).sum();
-        (-square / ((count - 1.0) * APART * APART)).exp()
-    }
-
-    fn expect(&self, days: f64, inputs: &mut Vec<f64>) {
-        let within = [0.5 * days, days, 2.0 * days, f64::INFINITY];
-        for chance in within.map(|span| self.law.chance_within(span)) {
-            inputs.push(0.4 * ((chance + 0.01) / (1.01 - chance)).ln());
-        }
-        for line in self.lines {
-            inputs.push((0.6 * (2.0 * days * line).asinh()).clamp(-MOST, MOST));
-        }
-    }
+/// The newest readings, of the last `days`; `None` where these are too few to show by themselves what is usual.
+fn newest(observations: &Observations, days: f64) -> Option<Observations> {
+    let values = &observations.values;
+    let since = values.last()?.t_days - days;
+    let from = values.partition_point(|one| one.t_days < since);
+    let is_enough = (FEWEST_LATER..=MOST_LATER).contains(&(values.len() - from));
+    is_enough.then(|| Observations {
+        values: values[from..].to_vec(),
+        ..*observations
+    })
 }
 
 /// The share of the chance within the span of scale `power` that is left to a slope that has slowed: since the span, and
@@ -463,7 +402,7 @@ fn setting(view: &View<'_>, ln_odds: f64, inputs: &mut Vec<f64>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::{Observation, ReadingError};
+    use crate::fit::Observation;
     use crate::reading::Quantity;
 
     fn readings(count: u32, interval: f64, at: impl Fn(f64) -> f64) -> Observations {
@@ -485,32 +424,6 @@ mod tests {
     fn collapse(observations: &Observations) -> Collapse {
         let indicators = Indicators::of(observations).unwrap();
         indicators.collapse(&Members::of(observations))
-    }
-
-    #[test]
-    fn the_approach_of_a_line_is_one_over_the_days_left_and_has_no_break_at_a_level_one() {
-        let rates = |gain: f64| -> Vec<Rate> {
-            let days = (0..12).map(f64::from);
-            let rate = days.map(|from| Rate {
-                from,
-                to: from + 1.0,
-                velocity: 1.0 / (0.1 - gain * (from + 0.5)),
-                sigma: 0.0,
-                readings: 1,
-                error: ReadingError::Own,
-            });
-            rate.collect()
-        };
-        let left = 1.0 / InverseVelocityLine::approach(&rates(0.005), 12.0).unwrap();
-        assert!((left - 8.0).abs() < 1e-9, "{left}");
-        for gain in [-1e-9, 0.0, 1e-9] {
-            assert!(
-                InverseVelocityLine::approach(&rates(gain), 12.0)
-                    .unwrap()
-                    .abs()
-                    < 1e-6
-            );
-        }
     }
 
     #[test]

@@ -42,6 +42,27 @@ impl Passage {
         Self::from_times(own.chain(others).collect())
     }
 
+    /// The chance within each time that is the larger of this one's and the other's.
+    #[must_use]
+    pub fn at_least(&self, other: &Self) -> Self {
+        let mut days: Vec<f64> = self
+            .times
+            .iter()
+            .chain(&other.times)
+            .map(|one| one.0)
+            .collect();
+        days.sort_by(f64::total_cmp);
+        days.dedup();
+        let mut before = 0.0;
+        let times = days.into_iter().map(|days| {
+            let chance = self.chance_within(days).max(other.chance_within(days));
+            let share = chance - before;
+            before = chance;
+            (days, share)
+        });
+        Self::of_sorted(times.collect())
+    }
+
     /// The same, each chance within a time raised to `power`.
     #[must_use]
     pub fn raised(&self, power: f64) -> Self {
@@ -78,6 +99,17 @@ impl Passage {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn of_two_passages_the_larger_chance_counts_within_each_time() {
+        let soon = Passage::from_times(vec![(1.0, 0.3), (9.0, 0.1)]);
+        let sure = Passage::from_times(vec![(5.0, 0.9)]);
+        let both = soon.at_least(&sure);
+        for (days, chance) in [(0.5, 0.0), (2.0, 0.3), (6.0, 0.9), (20.0, 0.9)] {
+            assert!((both.chance_within(days) - chance).abs() < 1e-12, "{days}");
+        }
+        assert_eq!(both, sure.at_least(&soon));
+    }
 
     #[test]
     fn raised_chances_keep_their_times_and_grow_within_each() {

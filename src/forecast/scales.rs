@@ -24,6 +24,13 @@ const PRIOR_COUNT: f64 = 2.0;
 const OVERLAP: f64 = 3.0;
 /// Of the degrees of freedom at a scale, what is worth as much at the next longer one.
 const CARRIED: f64 = 0.5;
+/// Fewest changes among which one may stand out, how many standard deviations it does, taken from the median size, blocks within
+/// which it is one event, and the most events that are not usual yet.
+const FEWEST_CHANGES: usize = 32;
+const OUTSTANDING: f64 = 10.0;
+const NORMAL_MEDIAN: f64 = 0.6745;
+const ONE_EVENT: usize = 6;
+const MOST_EVENTS: usize = 2;
 /// The largest ratio of a single step to the motion of a span.
 const MOST_JUMP: f64 = 3.0;
 
@@ -73,6 +80,8 @@ pub struct Scales {
     pub centred_before_days: f64,
     /// At least one.
     pub each: Vec<Scale>,
+    /// How long ago the newest of one or two events was over that stand out of all else in the record, days.
+    pub disturbed_days: Option<f64>,
 }
 
 /// Displacement over time as straight lines between readings; the newest reading is (0, 0).
@@ -120,12 +129,18 @@ impl Scales {
         let stated = stated_change(observations.quantity, values);
         let mut each: Vec<Scale> = Vec::new();
         let mut blocks = Blocks::default();
+        let mut disturbed_days: Option<f64> = None;
         for power in 0..MOST_SCALES {
             blocks = curve.blocks(power, (base_days, interval_days), &blocks);
             let Some(scale) = blocks.scale(each.last(), stated, &curve) else {
                 break;
             };
             each.push(scale);
+            let over = blocks.disturbance();
+            disturbed_days = [disturbed_days, over]
+                .into_iter()
+                .flatten()
+                .reduce(f64::min);
         }
         (!each.is_empty()).then_some(Self {
             base_days,
@@ -133,6 +148,7 @@ impl Scales {
             length_days: -curve.days[0],
             centred_before_days: 0.5 * observations.averaging_days,
             each,
+            disturbed_days,
         })
     }
 }
@@ -347,6 +363,41 @@ impl Blocks {
         })
     }
 
+    /// How long ago, days, the newest was over of one or two events after which the slope slowed down by far more than ever else: a
+    /// slide that stopped, a reset, a few readings that were wrong. What happens more often is usual there.
+    fn disturbance(&self) -> Option<f64> {
+        let count = self.means.len().checked_sub(2)?;
+        if count < FEWEST_CHANGES {
+            return None;
+        }
+        let at = |block: usize| {
+            let [a, b, c] = [0, 1, 2].map(|next| self.means[block + next]);
+            (a - b) - (b - c)
+        };
+        let read = (1..count).filter(|block| self.is_read[*block..block + 3].iter().all(|is| *is));
+        let changes: Vec<(usize, f64)> = read.map(|block| (block, at(block))).collect();
+        let mut sizes: Vec<f64> = changes.iter().map(|(_, change)| change.abs()).collect();
+        if sizes.len() < FEWEST_CHANGES {
+            return None;
+        }
+        let middle = sizes.len() / 2;
+        let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+        if median < LEAST_CHANGE_MM {
+            return None;
+        }
+        let mut outstanding = changes
+            .iter()
+            .filter(|(_, change)| -change > OUTSTANDING * median / NORMAL_MEDIAN)
+            .map(|(block, _)| *block);
+        let newest = outstanding.next()?;
+        let (mut events, mut last) = (1, newest);
+        for block in outstanding {
+            events += usize::from(block > last + ONE_EVENT);
+            last = block;
+        }
+        (events <= MOST_EVENTS).then_some((newest - 1) as f64 * self.days)
+    }
+
     /// The change of velocity over `apart` blocks.
     fn change(&self, apart: usize, stated: f64, prior: Option<Change>) -> Change {
         let means = &self.means;
@@ -430,6 +481,25 @@ mod tests {
             .map(|scale| scale.near.newest / scale.near.usual)
             .fold(0.0, f64::max);
         assert!(most > 100.0, "{most}");
+    }
+
+    #[test]
+    fn one_event_disturbs_a_record_and_what_happens_often_does_not() {
+        // A rough slope: not every step is the same.
+        let rough = |t: f64| t + 0.3 * (7.3 * t).sin();
+        let jumps = |times: &'static [f64]| {
+            move |t: f64| rough(t) + 50.0 * times.iter().filter(|at| t >= **at).count() as f64
+        };
+        let over = |times| {
+            let scales = Scales::of(&readings(1.0, 120, jumps(times)));
+            scales.unwrap().disturbed_days
+        };
+        assert_eq!(over(&[]), None);
+        assert_eq!(over(&[20.0, 40.0, 60.0, 80.0, 100.0]), None);
+        for times in [&[60.0][..], &[30.0, 60.0]] {
+            let ago = over(times).unwrap();
+            assert!((50.0..=59.0).contains(&ago), "{times:?}: {ago}");
+        }
     }
 
     #[test]

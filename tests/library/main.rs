@@ -7,6 +7,7 @@ mod calibration;
 mod crises;
 mod crisis;
 mod declared;
+mod earlier_events;
 mod effects_faults;
 mod effects_groups;
 mod effects_lives;
