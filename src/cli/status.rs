@@ -327,26 +327,7 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
     } else {
         "NO DAEMON RUNS: nothing is watched; what follows is as of its last reading\n"
     };
-    let mut refused = String::new();
-    for (source, count) in &status.quarantined {
-        // Writing to a string cannot fail.
-        let _ = writeln!(
-            refused,
-            "source {source}: lines, records and files that could not be used: {count}; \
-             status --sources shows the first of each kind"
-        );
-    }
-    let serviced = status
-        .benchmarks
-        .iter()
-        .filter(|one| one.alarm_state == AlarmState::OutOfService);
-    for one in serviced {
-        let _ = writeln!(
-            refused,
-            "{}: declared maintenance: its readings are kept and NOT JUDGED; the velocity and the chance are from before it",
-            text::plain(one.benchmark.as_str())
-        );
-    }
+    let refused = not_used(status);
     let suspicions = status.benchmarks.iter().flat_map(|one| &one.suspicions);
     let suspicions: String = suspicions
         .map(|one| text::local(&text::plain(one), zone) + "\n")
@@ -367,6 +348,31 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
     let alerts = listed("in force", &status.alerts, zone)
         + &listed("ended, and acknowledged by nobody", &status.returned, zone);
     format!("{}\n{table}{legend}\n{}", folded(&head), folded(&alerts))
+}
+
+/// What is not used or not judged, a line each: what sources could not give, and readings under maintenance.
+fn not_used(status: &SiteStatus) -> String {
+    let mut lines = String::new();
+    for (source, count) in &status.quarantined {
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            lines,
+            "source {source}: lines, records and files that could not be used: {count}; \
+             status --sources shows the first of each kind"
+        );
+    }
+    let serviced = status
+        .benchmarks
+        .iter()
+        .filter(|one| one.alarm_state == AlarmState::OutOfService);
+    for one in serviced {
+        let _ = writeln!(
+            lines,
+            "{}: declared maintenance: its readings are kept and NOT JUDGED; the velocity and the chance are from before it",
+            text::plain(one.benchmark.as_str())
+        );
+    }
+    lines
 }
 
 /// The events, a line each, under a title; nothing where there are none.

@@ -350,7 +350,9 @@ fn in_units_of(next: &Problem, (known, fitted): (&Problem, &Fitted)) -> Start {
     for term in &fitted.terms {
         let own = &mut start.parameters[from..from + term.coefficients()];
         if matches!(term.act, Act::PerVelocity | Act::PerSlip) {
-            own.iter_mut().for_each(|one| *one *= faster);
+            for one in own {
+                *one *= faster;
+            }
         }
         from += term.coefficients();
     }

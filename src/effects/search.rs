@@ -436,10 +436,12 @@ impl Search<'_> {
 /// By what factor the held-out error may grow where it is extrapolated over all of the block; what only the shape of the readings
 /// supports may change the law, and with it no error may grow.
 fn most_extrapolated(kind: Kind) -> f64 {
-    match kind {
-        Kind::Tide => MOST_OF_A_TIDE,
-        _ if is_label(kind) => 1.0,
-        _ => MOST_EXTRAPOLATED,
+    if kind == Kind::Tide {
+        MOST_OF_A_TIDE
+    } else if is_label(kind) {
+        1.0
+    } else {
+        MOST_EXTRAPOLATED
     }
 }
 
