@@ -24,13 +24,17 @@ const PRIOR_COUNT: f64 = 2.0;
 const OVERLAP: f64 = 3.0;
 /// Of the degrees of freedom at a scale, what is worth as much at the next longer one.
 const CARRIED: f64 = 0.5;
-/// Fewest changes among which one may stand out, how many standard deviations it does, taken from the median size, blocks within
-/// which it is one event, and the most events that are not usual yet.
+/// Fewest changes among which one may stand out, how many standard deviations it does, taken from the median size, and the most
+/// events that are not usual yet.
 const FEWEST_CHANGES: usize = 32;
 const OUTSTANDING: f64 = 10.0;
 const NORMAL_MEDIAN: f64 = 0.6745;
-const ONE_EVENT: usize = 6;
 const MOST_EVENTS: usize = 2;
+/// What lies within so many blocks, or this share of the record, is one event; and an event stands out that is so many times the
+/// largest that is usual.
+const ONE_EVENT: usize = 6;
+const EVENTS: usize = 12;
+const ABOVE_NEXT: f64 = 4.0;
 /// The largest ratio of a single step to the motion of a span.
 const MOST_JUMP: f64 = 3.0;
 
@@ -129,18 +133,20 @@ impl Scales {
         let stated = stated_change(observations.quantity, values);
         let mut each: Vec<Scale> = Vec::new();
         let mut blocks = Blocks::default();
-        let mut disturbed_days: Option<f64> = None;
+        let (mut disturbed_days, mut is_usual) = (None::<f64>, false);
         for power in 0..MOST_SCALES {
             blocks = curve.blocks(power, (base_days, interval_days), &blocks);
             let Some(scale) = blocks.scale(each.last(), stated, &curve) else {
                 break;
             };
             each.push(scale);
-            let over = blocks.disturbance();
-            disturbed_days = [disturbed_days, over]
-                .into_iter()
-                .flatten()
-                .reduce(f64::min);
+            match blocks.disturbance() {
+                Some(Disturbance::Over(days)) => {
+                    disturbed_days = Some(disturbed_days.map_or(days, |other| other.min(days)));
+                }
+                Some(Disturbance::Usual) => is_usual = true,
+                None => {}
+            }
         }
         (!each.is_empty()).then_some(Self {
             base_days,
@@ -148,7 +154,7 @@ impl Scales {
             length_days: -curve.days[0],
             centred_before_days: 0.5 * observations.averaging_days,
             each,
-            disturbed_days,
+            disturbed_days: disturbed_days.filter(|_| !is_usual),
         })
     }
 }
@@ -329,6 +335,30 @@ fn integrated(averaging_days: f64, values: &[Observation]) -> Vec<f64> {
     mm
 }
 
+/// What stands out of a record at one scale.
+enum Disturbance {
+    /// One or two events, of which the newest was over so many days ago.
+    Over(f64),
+    /// More than that: they are usual here.
+    Usual,
+}
+
+/// The largest of these (block, slow-down), largest first, each further than `apart` blocks from the larger ones.
+fn largest_events(slow: &[(usize, f64)], apart: usize) -> [f64; MOST_EVENTS + 1] {
+    let mut largest = [0.0; MOST_EVENTS + 1];
+    let mut places: Vec<usize> = Vec::new();
+    for event in &mut largest {
+        let others = slow
+            .iter()
+            .filter(|(block, _)| places.iter().all(|place| block.abs_diff(*place) > apart));
+        if let Some((block, size)) = others.max_by(|a, b| a.1.total_cmp(&b.1)) {
+            places.push(*block);
+            *event = *size;
+        }
+    }
+    largest
+}
+
 impl Blocks {
     /// What the blocks show; `None` where there are fewer than three. `shorter` is the scale below, `stated` a change
     /// of the stated error, mm.
@@ -363,9 +393,9 @@ impl Blocks {
         })
     }
 
-    /// How long ago, days, the newest was over of one or two events after which the slope slowed down by far more than ever else: a
-    /// slide that stopped, a reset, a few readings that were wrong. What happens more often is usual there.
-    fn disturbance(&self) -> Option<f64> {
+    /// One or two events after which the slope slowed down by far more than ever else: a slide that stopped, a reset, a few
+    /// readings that were wrong. What happens more often is usual there. `None` without any.
+    fn disturbance(&self) -> Option<Disturbance> {
         let count = self.means.len().checked_sub(2)?;
         if count < FEWEST_CHANGES {
             return None;
@@ -385,17 +415,19 @@ impl Blocks {
         if median < LEAST_CHANGE_MM {
             return None;
         }
-        let mut outstanding = changes
-            .iter()
-            .filter(|(_, change)| -change > OUTSTANDING * median / NORMAL_MEDIAN)
-            .map(|(block, _)| *block);
-        let newest = outstanding.next()?;
-        let (mut events, mut last) = (1, newest);
-        for block in outstanding {
-            events += usize::from(block > last + ONE_EVENT);
-            last = block;
+        let slow: Vec<(usize, f64)> = (changes.iter())
+            .filter(|(_, change)| *change < 0.0)
+            .map(|(block, change)| (*block, -change))
+            .collect();
+        let largest = largest_events(&slow, ONE_EVENT.max(count / EVENTS));
+        let least = OUTSTANDING * median / NORMAL_MEDIAN;
+        let next = largest[MOST_EVENTS];
+        if next > least {
+            return Some(Disturbance::Usual);
         }
-        (events <= MOST_EVENTS).then_some((newest - 1) as f64 * self.days)
+        let outstanding = (slow.iter()).filter(|(_, size)| *size > least.max(ABOVE_NEXT * next));
+        let newest = outstanding.map(|(block, _)| *block).min()?;
+        Some(Disturbance::Over((newest - 1) as f64 * self.days))
     }
 
     /// The change of velocity over `apart` blocks.
