@@ -12,7 +12,10 @@ use std::collections::BTreeMap;
 impl Policy {
     /// The declared rule that an alert names.
     pub fn declared_rule(&self, id: &str) -> Option<&DeclaredRule> {
-        let name = id.strip_prefix(PREFIX)?;
+        self.rule_named(id.strip_prefix(PREFIX)?)
+    }
+
+    fn rule_named(&self, name: &str) -> Option<&DeclaredRule> {
         self.rules.iter().find(|rule| rule.name == name)
     }
 
@@ -77,11 +80,8 @@ impl Held {
 
     /// Forgets since when a rule has held that is another one now, though by the same name.
     pub fn forget_changed(&mut self, before: &Policy, now: &Policy) {
-        fn named<'a>(policy: &'a Policy, name: &str) -> Option<&'a DeclaredRule> {
-            policy.rules.iter().find(|rule| rule.name == name)
-        }
         self.rules
-            .retain(|name, _| named(before, name) == named(now, name));
+            .retain(|name, _| before.rule_named(name) == now.rule_named(name));
     }
 
     /// Takes the evidence of one reading and notes in it which rules have held for long enough.

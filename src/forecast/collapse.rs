@@ -153,11 +153,13 @@ impl Indicators {
         }
         let centred = self.scales.centred_before_days;
         let sure = passage(&counted, &members.law, centred);
-        let later = self.later.as_ref();
-        let later = later.map(|later| later.collapse_by(network, members).sure);
+        let sure = match &self.later {
+            Some(later) => sure.at_least(&later.collapse_by(network, members).sure),
+            None => sure,
+        };
         Collapse {
             passage: self.sooner(&members.timed(&passage(&all, &members.law, centred))),
-            sure: later.map_or_else(|| sure.clone(), |later| sure.at_least(&later)),
+            sure,
         }
     }
 
