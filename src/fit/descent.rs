@@ -5,18 +5,24 @@
 
 use super::chart::{Chart, ChartPoint};
 use super::curve::{CurveWindow, Fineness, LawCurve};
+use super::damped::{Damping, Descendable, DescentEnd, StepOutcome, descend};
 use super::record::WeightedRecord;
 use crate::reading::Quantity;
 
 /// Step of the derivative by ln |m|.
 const LN_M_STEP: f64 = 1e-5;
-const FIRST_DAMPING: f64 = 1e-3;
-/// Beyond this damping no step gains any more.
-const MOST_DAMPING: f64 = 1e10;
+const DAMPING: Damping = Damping {
+    first: 1e-3,
+    tighten: 2.0,
+    steeper: 2.0,
+    least_tightened: 0.0,
+    least: 0.0,
+    most: 1e10,
+    most_tries: usize::MAX,
+};
 /// A step that promises less than this share of the least gain is not taken.
 const NO_PROMISE: f64 = 0.1;
 const EASE: f64 = 0.1;
-const TIGHTEN: f64 = 2.0;
 
 /// How far a descent goes.
 #[derive(Debug, Clone, Copy)]
@@ -109,38 +115,19 @@ impl Descent {
         place.at = inside(place.chart, &place.at, holds_m);
         place.cost = self.cost(record, place.chart, &place.at, effort.fineness);
         place.converged = false;
-        let (mut damping, last) = (FIRST_DAMPING, self.evaluations + effort.most_evaluations);
-        while place.cost.is_finite() && self.evaluations < last {
-            let Some(normal) = self.linearise(record, &place, effort.fineness, holds_m) else {
-                break;
-            };
-            let (before, mut tighten) = (place.cost, TIGHTEN);
-            while damping < MOST_DAMPING && self.evaluations < last {
-                let step = damped_step(&normal, damping);
-                let promise = promised(&normal, &step, damping);
-                if promise <= NO_PROMISE * effort.least_gain * place.cost {
-                    place.converged = true;
-                    break;
-                }
-                let there = [0, 1, 2].map(|i| place.at[i] + step[i]);
-                let there = inside(place.chart, &there, holds_m);
-                let cost = self.cost(record, place.chart, &there, effort.fineness);
-                if cost < place.cost {
-                    // Nielsen's rule: a step that kept its promise is taken longer next time.
-                    let kept = 2.0 * (place.cost - cost) / promise - 1.0;
-                    damping *= (1.0 - kept * kept * kept).clamp(EASE, TIGHTEN);
-                    (place.at, place.cost) = (there, cost);
-                    break;
-                }
-                damping *= tighten;
-                tighten *= TIGHTEN;
-            }
-            if before - place.cost <= effort.least_gain * place.cost {
-                place.converged |= before > place.cost || damping >= MOST_DAMPING;
-                break;
-            }
-        }
-        place
+        let last = self.evaluations + effort.most_evaluations;
+        let mut problem = Downhill {
+            descent: self,
+            record,
+            effort,
+            holds_m,
+            last,
+            place,
+            normal: ([[0.0; 3]; 3], [0.0; 3]),
+        };
+        let end = descend(&mut problem, &DAMPING, effort.most_evaluations);
+        problem.place.converged = end == DescentEnd::Converged;
+        problem.place
     }
 
     /// J^T J and J^T r at a place, without the coordinates that a bound holds. The curve must be that
@@ -241,6 +228,62 @@ impl Descent {
             (normal[i][i], gradient[i]) = (1.0, 0.0);
         }
         (normal, gradient)
+    }
+}
+
+/// A descent under way.
+struct Downhill<'a> {
+    descent: &'a mut Descent,
+    record: &'a WeightedRecord,
+    effort: &'a DescentEffort,
+    holds_m: bool,
+    /// Evaluations after which it ends.
+    last: usize,
+    place: SearchPoint,
+    normal: NormalEquations,
+}
+
+impl Descendable for Downhill<'_> {
+    fn linearise(&mut self) -> bool {
+        if !self.place.cost.is_finite() || self.descent.evaluations >= self.last {
+            return false;
+        }
+        let fineness = self.effort.fineness;
+        let normal = (self.descent).linearise(self.record, &self.place, fineness, self.holds_m);
+        if let Some(normal) = normal {
+            self.normal = normal;
+        }
+        normal.is_some()
+    }
+
+    fn step(&mut self, damping: f64) -> StepOutcome {
+        if self.descent.evaluations >= self.last {
+            return StepOutcome::OutOfWork;
+        }
+        let place = self.place;
+        let step = damped_step(&self.normal, damping);
+        let promise = promised(&self.normal, &step, damping);
+        if promise <= NO_PROMISE * self.effort.least_gain * place.cost {
+            return StepOutcome::Converged;
+        }
+        let there = [0, 1, 2].map(|i| place.at[i] + step[i]);
+        let there = inside(place.chart, &there, self.holds_m);
+        let fineness = self.effort.fineness;
+        let cost = (self.descent).cost(self.record, place.chart, &there, fineness);
+        // Not a number is no gain either.
+        if cost < place.cost {
+            (self.place.at, self.place.cost) = (there, cost);
+            let gain = place.cost - cost;
+            // Nielsen's rule: a step that kept its promise is taken longer next time.
+            let kept = 2.0 * gain / promise - 1.0;
+            let ease = (1.0 - kept * kept * kept).clamp(EASE, DAMPING.tighten);
+            return StepOutcome::Gained { gain, ease };
+        }
+        StepOutcome::NoGain
+    }
+
+    fn goes_on(&self, gain: f64) -> bool {
+        gain > self.effort.least_gain * self.place.cost
     }
 }
 

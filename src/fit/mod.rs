@@ -4,6 +4,7 @@ mod chart;
 mod compaction;
 mod constant_load;
 mod curve;
+mod damped;
 mod descent;
 mod global_search;
 mod lattice;
@@ -17,6 +18,7 @@ mod under_load;
 mod unit_m;
 
 pub use constant_load::{ConstantLoad, FitOutcome};
+pub(crate) use damped::{Damping, Descendable, StepOutcome, descend};
 pub use lattice::Lattice;
 pub use point_readings::PointReadings;
 pub use posterior::{Ensemble, Onset, OtherPrior, P_PRIOR, Posterior, Sample as LawSample};

@@ -101,7 +101,7 @@ const EFFORT: Effort = Effort {
 /// A start this much less probable than the likeliest, in ln, is left out.
 const HOPELESS: f64 = 6.0;
 /// Steps of a search before and after the size of the scatter is known.
-const ROUNDS: (u32, u32) = (6, 10);
+const ROUNDS: (usize, usize) = (6, 10);
 /// Where in its range p is when a search starts.
 const FIRST_P: f64 = 0.3;
 /// asinh of kappa L when a search starts.

@@ -4,6 +4,7 @@ use super::past::{PastShape, PastSolution};
 use super::prior::{P_PRIOR, SLOPE_PER_INTERVAL, log_cauchy};
 use super::scatter::Texture;
 use super::window::Window;
+use crate::fit::damped::{Damping, Descendable, DescentEnd, StepOutcome, descend};
 use nalgebra::{Matrix4, Vector4};
 
 /// The coordinates of every search and draw: p; asinh of kappa L; asinh of the change of ln y over the
@@ -57,6 +58,15 @@ pub(super) struct Mode {
 const JACOBIAN_STEP: f64 = 1e-4;
 /// The longest step that a search may take in one coordinate.
 const LONGEST_STEP: f64 = 1.5;
+const DAMPING: Damping = Damping {
+    first: 1e-3,
+    tighten: 8.0,
+    steeper: 1.0,
+    least_tightened: 1e-3,
+    least: 1e-9,
+    most: 1e7,
+    most_tries: usize::MAX,
+};
 /// A gain of less in ln probability is none.
 const LEAST_GAIN: f64 = 5e-3;
 /// Below this kappa L the coordinate of change is no longer corrected for kappa.
@@ -215,6 +225,11 @@ impl ModeProblem<'_> {
         at
     }
 
+    /// What is made least: -ln of the posterior's density.
+    fn cost(&self, texture: &Texture, residuals: &[f64], at: &Point, size: f64) -> f64 {
+        -texture.log_likelihood(self.window, residuals, size) - self.prior(at)
+    }
+
     /// Levenberg-Marquardt from `start`, at most `rounds` steps; the bench is left with the residuals at the
     /// mode and their derivatives there or a small step before. `None` where the start lies outside the
     /// prior's range.
@@ -224,56 +239,84 @@ impl ModeProblem<'_> {
         start: Point,
         texture: &Texture,
         size: f64,
-        rounds: u32,
+        rounds: usize,
     ) -> Option<Mode> {
-        let cost_of = |residuals: &[f64], at: &Point| {
-            -texture.log_likelihood(self.window, residuals, size) - self.prior(at)
-        };
-        let mut at = self.clamp(start);
+        let at = self.clamp(start);
         if !self.evaluate(bench, &at) {
             return None;
         }
-        let mut cost = cost_of(&bench.residuals, &at);
-        let mut damping = 1e-3;
-        let mut here = bench.residuals.clone();
-        for round in 0..=rounds {
-            bench.residuals.copy_from_slice(&here);
-            self.differentiate(bench, &at);
-            if round == rounds {
-                break;
-            }
-            let normal = texture.normal(self.window, &here, &bench.columns, size);
-            let (slope, bend) = self.prior_slope(&at);
-            let mut gained = None;
-            while damping < 1e7 {
-                let mut matrix = normal.information + Matrix4::from_diagonal(&bend);
-                for axis in 0..4 {
-                    matrix[(axis, axis)] *= 1.0 + damping;
-                }
-                let step = matrix
-                    .cholesky()
-                    .map_or_else(Point::zeros, |root| root.solve(&(slope - normal.gradient)));
-                let there = at + step.map(|one| one.clamp(-LONGEST_STEP, LONGEST_STEP));
-                let there = self.clamp(there);
-                let new = if self.evaluate(bench, &there) {
-                    cost_of(&bench.residuals, &there)
-                } else {
-                    f64::INFINITY
-                };
-                if new < cost {
-                    gained = Some(cost - new);
-                    (at, cost) = (there, new);
-                    here.copy_from_slice(&bench.residuals);
-                    damping = (damping * 0.1).max(1e-9);
-                    break;
-                }
-                damping = (damping * 8.0).max(1e-3);
-            }
-            if gained.is_none_or(|gain| gain < LEAST_GAIN) {
-                bench.residuals.copy_from_slice(&here);
-                break;
-            }
+        let mut climb = Uphill {
+            problem: self,
+            texture,
+            size,
+            at,
+            cost: self.cost(texture, &bench.residuals, &at, size),
+            here: bench.residuals.clone(),
+            normal: Matrix4::zeros(),
+            slope: Point::zeros(),
+            bench,
+        };
+        let end = descend(&mut climb, &DAMPING, rounds);
+        climb.bench.residuals.copy_from_slice(&climb.here);
+        if end == DescentEnd::OutOfRounds {
+            self.differentiate(climb.bench, &climb.at);
         }
+        let Uphill { at, cost, .. } = climb;
         cost.is_finite().then_some(Mode { at, cost })
+    }
+}
+
+/// A search for a mode under way.
+struct Uphill<'a> {
+    problem: &'a ModeProblem<'a>,
+    texture: &'a Texture,
+    size: f64,
+    bench: &'a mut ModeBench,
+    at: Point,
+    cost: f64,
+    /// The residuals at that point.
+    here: Vec<f64>,
+    /// What a step is found from.
+    normal: Matrix4<f64>,
+    slope: Point,
+}
+
+impl Descendable for Uphill<'_> {
+    fn linearise(&mut self) -> bool {
+        self.bench.residuals.copy_from_slice(&self.here);
+        self.problem.differentiate(self.bench, &self.at);
+        let (window, columns) = (self.problem.window, &self.bench.columns);
+        let moments = self.texture.normal(window, &self.here, columns, self.size);
+        let (slope, bend) = self.problem.prior_slope(&self.at);
+        self.normal = moments.information + Matrix4::from_diagonal(&bend);
+        self.slope = slope - moments.gradient;
+        true
+    }
+
+    fn step(&mut self, damping: f64) -> StepOutcome {
+        let mut matrix = self.normal;
+        for axis in 0..4 {
+            matrix[(axis, axis)] *= 1.0 + damping;
+        }
+        let step = matrix.cholesky();
+        let step = step.map_or_else(Point::zeros, |root| root.solve(&self.slope));
+        let there = self.at + step.map(|one| one.clamp(-LONGEST_STEP, LONGEST_STEP));
+        let there = self.problem.clamp(there);
+        if !self.problem.evaluate(self.bench, &there) {
+            return StepOutcome::NoGain;
+        }
+        let residuals = &self.bench.residuals;
+        let cost = (self.problem).cost(self.texture, residuals, &there, self.size);
+        if cost < self.cost {
+            let gain = self.cost - cost;
+            (self.at, self.cost) = (there, cost);
+            self.here.copy_from_slice(&self.bench.residuals);
+            return StepOutcome::Gained { gain, ease: 0.1 };
+        }
+        StepOutcome::NoGain
+    }
+
+    fn goes_on(&self, gain: f64) -> bool {
+        gain >= LEAST_GAIN
     }
 }
