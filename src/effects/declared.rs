@@ -268,7 +268,7 @@ impl Search<'_> {
         })
     }
 
-    /// With the chance that its kind, at the delays or times that it may have, gains as much where there is nothing.
+    /// With the chance that its kind, at the delays or times that it may have, gains as much without any effect.
     fn as_declared(&mut self, base: &Fitted, one: Refitted, cause: &Cause) -> Option<Refitted> {
         let (count, seed) = (self.options.surrogates, self.options.seed);
         let ground = self.ground(base)?;

@@ -119,13 +119,13 @@ impl<'a> Judged<'a> {
     ) -> Option<Self> {
         let columns = jacobian(problem, fitted, scratch);
         let residual = fitted.residual(problem);
-        let surprise = |whitener: &Whitener| {
+        let deviance = |whitener: &Whitener| {
             let frame = Frame::new(whitener.clone(), &residual, &columns);
-            frame.surprise(frame.misfit) + frame.cost()
+            frame.deviance(frame.misfit) + frame.cost()
         };
         let best = |of: &dyn Fn(Memory) -> bool| {
             let own = bank.iter().filter(|whitener| of(whitener.noise.memory));
-            own.map(|whitener| (whitener, surprise(whitener)))
+            own.map(|whitener| (whitener, deviance(whitener)))
                 .min_by(|a, b| a.1.total_cmp(&b.1))
         };
         let (plain, plain_bic) = best(&|memory| memory != Memory::Load)?;

@@ -4,7 +4,7 @@ use super::channels::distinct;
 use super::explanation::{Candidate, Effect, Explained, Explanation, SettingsReport};
 use super::faults::inspect;
 use super::findings::{Findings, findings};
-use super::judge::is_label;
+use super::judge::fits_any_bend;
 use super::kind::{FaultKind, Kind};
 use super::options::Options;
 use super::outlook::forecast_change;
@@ -39,7 +39,7 @@ pub fn explain(
 }
 
 /// The explanation that `look` comes to, of the readings and covariates without their faults; the second argument of it:
-/// whether the values are no readings.
+/// whether the values are not raw readings.
 pub(super) fn explained_by(
     series: &Series,
     channels: &[Channel],
@@ -143,7 +143,7 @@ fn with_partition(
     }
     let own = std::mem::replace(&mut findings.verdict, partition);
     let nothing = matches!(own.effect, Kind::Unexplained | Kind::None);
-    if !nothing && !is_label(own.effect) && !own.effect.is_of_the_reading() {
+    if !nothing && !fits_any_bend(own.effect) && !own.effect.is_of_the_reading() {
         let partition = std::mem::replace(&mut findings.verdict, own);
         findings.also.insert(0, partition);
     } else if !nothing {
@@ -152,7 +152,7 @@ fn with_partition(
     findings
 }
 
-/// Searches for what the law lacks; with what is to be remarked of it. `is_drawn`: the values are no readings.
+/// Searches for what the law lacks; with what is to be remarked of it. `is_drawn`: the values are not raw readings.
 fn look(
     (series, channels): (&Series, &[Channel]),
     is_drawn: bool,
@@ -191,7 +191,7 @@ fn look(
     (without_conclusions(findings, withheld.is_some()), remarks)
 }
 
-/// Of values that are no readings no noise is concluded, nor that nothing is there where something was withheld.
+/// Of values that are not raw readings no noise is concluded, nor that nothing is there where something was withheld.
 fn without_conclusions(mut findings: Findings, has_withheld: bool) -> Findings {
     if findings.verdict.effect == Kind::CorrelatedNoise {
         findings.verdict = Effect::of(Kind::Unexplained);

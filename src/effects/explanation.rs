@@ -69,7 +69,7 @@ pub struct Effect {
     pub channel: Option<String>,
     /// Whether by the covariate's value or its rate of change.
     pub form: Option<Form>,
-    /// Chance that the search finds as much where there is nothing, everything tried counted.
+    /// Chance that the search finds as much without any effect, everything tried counted.
     pub p_value: Option<f64>,
     /// Mean of the response, days.
     pub lag_days: Option<f64>,

@@ -36,8 +36,8 @@ impl Frame {
     }
 
     /// -2 ln likelihood, the size of the noise profiled out, were the misfit `misfit`.
-    pub(super) fn surprise(&self, misfit: f64) -> f64 {
-        self.whitener.surprise(misfit)
+    pub(super) fn deviance(&self, misfit: f64) -> f64 {
+        self.whitener.deviance(misfit)
     }
 
     /// What the noise model's parameters cost in the BIC.
@@ -109,27 +109,27 @@ impl Frames {
     }
 
     /// The least -2 ln likelihood over the noise models, with what their own parameters cost.
-    pub(super) fn surprise(&self) -> f64 {
+    pub(super) fn deviance(&self) -> f64 {
         let each = self.each.iter();
-        each.map(|frame| frame.surprise(frame.misfit) + frame.cost())
+        each.map(|frame| frame.deviance(frame.misfit) + frame.cost())
             .fold(f64::INFINITY, f64::min)
     }
 
     /// The same with `columns` added.
-    pub(super) fn surprise_with(&self, columns: &[Vec<f64>]) -> f64 {
+    pub(super) fn deviance_with(&self, columns: &[Vec<f64>]) -> f64 {
         let each = self.each.iter().map(|frame| {
             let taken = Frame::taken(&frame.new_directions(columns), &frame.residual);
-            frame.surprise(frame.misfit - taken) + frame.cost()
+            frame.deviance(frame.misfit - taken) + frame.cost()
         });
         each.fold(f64::INFINITY, f64::min)
     }
 
     /// The same with each of `columns` alone.
-    pub(super) fn surprise_with_each(&self, columns: &[Vec<f64>]) -> Vec<f64> {
+    pub(super) fn deviance_with_each(&self, columns: &[Vec<f64>]) -> Vec<f64> {
         let mut least = vec![f64::INFINITY; columns.len()];
         for frame in &self.each {
             for (least, taken) in least.iter_mut().zip(frame.taken_by_each(columns)) {
-                *least = least.min(frame.surprise(frame.misfit - taken) + frame.cost());
+                *least = least.min(frame.deviance(frame.misfit - taken) + frame.cost());
             }
         }
         least
@@ -148,9 +148,9 @@ impl Frames {
 
     /// Which of the noise models makes the residual likeliest.
     pub(super) fn best(&self) -> usize {
-        let surprise = |frame: &Frame| frame.surprise(frame.misfit) + frame.cost();
+        let deviance = |frame: &Frame| frame.deviance(frame.misfit) + frame.cost();
         let order =
-            |a: &usize, b: &usize| surprise(&self.each[*a]).total_cmp(&surprise(&self.each[*b]));
+            |a: &usize, b: &usize| deviance(&self.each[*a]).total_cmp(&deviance(&self.each[*b]));
         (0..self.each.len()).min_by(order).unwrap_or_default()
     }
 }
@@ -160,11 +160,11 @@ impl Frames {
 pub(super) fn likeliest(bank: &[Whitener], residual: &[f64], jacobian: &[Vec<f64>]) -> usize {
     let mut columns = slices(jacobian);
     columns.push(residual);
-    let surprise = |whitener: &Whitener| {
+    let deviance = |whitener: &Whitener| {
         let misfit = left_of_last(&whitener.whiten_all(&columns));
-        whitener.surprise(misfit) + whitener.cost()
+        whitener.deviance(misfit) + whitener.cost()
     };
-    let each = bank.iter().map(surprise).enumerate();
+    let each = bank.iter().map(deviance).enumerate();
     let best = each.min_by(|a, b| a.1.total_cmp(&b.1));
     best.map_or(0, |(index, _)| index)
 }

@@ -162,7 +162,7 @@ pub(super) fn best_of_starts(
         .iter()
         .filter_map(|start| towards(problem, start, &white[0], (FIRST_STEPS, scratch)))
         .collect();
-    first.sort_by(|a, b| a.surprise.total_cmp(&b.surprise));
+    first.sort_by(|a, b| a.deviance.total_cmp(&b.deviance));
     let leading: Vec<Start> = first.iter().take(FOLLOWED).map(Start::at).collect();
     let best = refit_from(problem, &leading, &white, scratch)?;
     // What goes along a narrow valley has not arrived after one fit's steps.

@@ -13,7 +13,7 @@ use super::ready::Ready;
 use super::refit::Fitted;
 use super::search::Search;
 use super::term::{Scratch, Term};
-use super::trials::{Ground, Trial};
+use super::trials::{Trial, TrialBase};
 use crate::reading::{Channel, Series, Timestamp, after_days, days_since};
 use std::fmt;
 
@@ -132,7 +132,7 @@ pub(super) fn put_in(
 
 /// The shapes of a cause that take most off the misfit, of a covariate one by its level and one by its rate; none where it
 /// has no shape here.
-fn promising(ground: &Ground, cause: &Cause) -> Vec<Trial> {
+fn promising(ground: &TrialBase, cause: &Cause) -> Vec<Trial> {
     let each = shapes(ground, cause).into_iter();
     let mut best: Vec<Trial> = Vec::new();
     for trial in each.map(|term| ground.trial(term)) {
@@ -147,7 +147,7 @@ fn promising(ground: &Ground, cause: &Cause) -> Vec<Trial> {
 }
 
 /// Everything that a cause may look like: its delays, its times, its periods.
-pub(super) fn shapes(ground: &Ground, cause: &Cause) -> Vec<Term> {
+pub(super) fn shapes(ground: &TrialBase, cause: &Cause) -> Vec<Term> {
     let problem = ground.problem;
     match cause.kind {
         Kind::Hydrological | Kind::Thermal => of_cause(ground, cause),
@@ -172,7 +172,7 @@ pub(super) fn shapes(ground: &Ground, cause: &Cause) -> Vec<Term> {
 }
 
 /// The responses of its covariate, in the load or, of a temperature, in the reading.
-fn of_cause(ground: &Ground, cause: &Cause) -> Vec<Term> {
+fn of_cause(ground: &TrialBase, cause: &Cause) -> Vec<Term> {
     let mut drivers = ground.drivers.iter();
     let Some((index, driver)) =
         drivers.find(|(_, driver)| Some(&driver.name) == cause.channel.as_ref())

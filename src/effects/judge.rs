@@ -269,7 +269,7 @@ pub(super) struct StepErrors {
     pub(super) before: f64,
     pub(super) after: f64,
     /// How much worse it is predicted with the terms, in -2 ln likelihood.
-    pub(super) surprise: f64,
+    pub(super) deviance: f64,
 }
 
 /// The later block by its innovations, without and with the newest terms of `after`, their coefficients as they were learned
@@ -300,14 +300,14 @@ pub(super) fn step_errors(
     let own = Whitener::new(problem, before.noise);
     let errors = |fitted: &Fitted, whitener: &Whitener| {
         let residual = fitted.residual(problem);
-        let surprise = whitener.surprise_from(&residual, from, fitted.sigma);
-        (whitener.step_errors_from(&residual, from), surprise)
+        let deviance = whitener.deviance_from(&residual, from, fitted.sigma);
+        (whitener.step_errors_from(&residual, from), deviance)
     };
     let (without, with) = (errors(before, &own), errors(&frozen, &whole));
     Some(StepErrors {
         before: without.0,
         after: with.0,
-        surprise: with.1 - without.1,
+        deviance: with.1 - without.1,
     })
 }
 
@@ -390,9 +390,9 @@ pub(super) fn coefficients<'a>(problem: &Problem, fitted: &'a Fitted, index: usi
     &fitted.parameters[from..from + fitted.terms[index].coefficients()]
 }
 
-/// Whether a kind is called by what the readings themselves look like, without independent evidence: then it must
-/// account for everything, or it is but the nearest label.
-pub(super) fn is_label(kind: Kind) -> bool {
+/// Whether a kind is recognised by the shape of the readings alone, without a covariate or a date of its own: such a kind follows
+/// almost any bend, so it must account for everything that is left, or it explains nothing.
+pub(super) fn fits_any_bend(kind: Kind) -> bool {
     matches!(
         kind,
         Kind::LoadStep | Kind::StateReset | Kind::FrictionChange | Kind::RateLimit | Kind::Geometry

@@ -103,7 +103,7 @@ impl Noise {
 
 /// One reading's share of the filter; the state is what displacement has gathered, and what remembers.
 #[derive(Debug, Clone, Copy)]
-struct Gate {
+struct FilterStep {
     /// What is gathered until here for one unit of the state before.
     gather: f64,
     /// What is left of the state.
@@ -121,7 +121,7 @@ struct Gate {
 #[derive(Debug, Clone)]
 pub(super) struct Whitener {
     pub(super) noise: Noise,
-    gates: Vec<Gate>,
+    steps: Vec<FilterStep>,
     /// Sum of ln variance.
     pub(super) log_determinant: f64,
     /// Scale of one more reading, that of the whole motion.
@@ -136,7 +136,7 @@ impl Whitener {
     /// For the first `problem.used` readings.
     pub(super) fn new(problem: &Problem, noise: Noise) -> Self {
         let used = problem.used;
-        let mut gates = Vec::with_capacity(used);
+        let mut steps = Vec::with_capacity(used);
         let mut log_determinant = 0.0;
         let typical = problem.typical_velocity();
         let stationary = if noise.days.is_finite() { 1.0 } else { 0.0 };
@@ -161,7 +161,7 @@ impl Whitener {
             let (gain, variance, after) = update(p, reads);
             p = after;
             log_determinant += variance.ln() + 2.0 * weight.ln();
-            gates.push(Gate {
+            steps.push(FilterStep {
                 gather,
                 decay,
                 reads,
@@ -177,7 +177,7 @@ impl Whitener {
         let whole = 1.0 / (WHOLE_MOTION * motion).max(problem.scatter);
         Self {
             noise,
-            gates,
+            steps,
             log_determinant,
             whole,
             quantity: problem.quantity,
@@ -206,7 +206,7 @@ impl Whitener {
     }
 
     fn whole_motion(&self, column: &[f64]) -> f64 {
-        let used = &column[..self.gates.len()];
+        let used = &column[..self.steps.len()];
         let motion = match self.quantity {
             Quantity::Displacement => used[used.len() - 1] - used[0],
             Quantity::Velocity => used.iter().sum::<f64>() / used.len() as f64,
@@ -215,34 +215,34 @@ impl Whitener {
     }
 
     /// -2 ln likelihood of innovations whose squares sum up to `misfit`, the size of the noise profiled out.
-    pub(super) fn surprise(&self, misfit: f64) -> f64 {
-        let n = self.gates.len() as f64;
+    pub(super) fn deviance(&self, misfit: f64) -> f64 {
+        let n = self.steps.len() as f64;
         n * (misfit.max(1e-300) / n).ln() + self.log_determinant
     }
 
     /// What the noise's own parameters cost in the BIC.
     pub(super) fn cost(&self) -> f64 {
-        self.noise.parameters() * (self.gates.len() as f64).ln()
+        self.noise.parameters() * (self.steps.len() as f64).ln()
     }
 
     /// The same without the whole motion.
     pub(super) fn innovations(&self, column: &[f64]) -> Vec<f64> {
         if self.noise.memory == Memory::None {
             let scaled = self
-                .gates
+                .steps
                 .iter()
                 .zip(column)
-                .map(|(gate, value)| value * gate.weight);
+                .map(|(step, value)| value * step.weight);
             return scaled.collect();
         }
         let (mut gathered, mut state) = (0.0, 0.0);
-        let each = self.gates.iter().zip(column).map(|(gate, value)| {
-            gathered += gate.gather * state;
-            state *= gate.decay;
-            let innovation = value * gate.weight - gate.reads[0] * gathered - gate.reads[1] * state;
-            gathered += gate.gain[0] * innovation;
-            state += gate.gain[1] * innovation;
-            innovation * gate.scale
+        let each = self.steps.iter().zip(column).map(|(step, value)| {
+            gathered += step.gather * state;
+            state *= step.decay;
+            let innovation = value * step.weight - step.reads[0] * gathered - step.reads[1] * state;
+            gathered += step.gain[0] * innovation;
+            state += step.gain[1] * innovation;
+            innovation * step.scale
         });
         each.collect()
     }
@@ -255,7 +255,7 @@ impl Whitener {
         if self.noise.memory == Memory::None {
             return columns.map(|column| self.innovations(column));
         }
-        let used = self.gates.len();
+        let used = self.steps.len();
         let columns = columns.map(|column| &column[..used]);
         // Room for the whole motion, which comes last.
         let mut white = columns.map(|_| {
@@ -265,17 +265,17 @@ impl Whitener {
         });
         let mut into = white.each_mut().map(|room| &mut room[..used]);
         let (mut gathered, mut state) = ([0.0; SIDE_BY_SIDE], [0.0; SIDE_BY_SIDE]);
-        for (i, gate) in self.gates.iter().enumerate() {
+        for (i, step) in self.steps.iter().enumerate() {
             let mut innovations = columns.map(|column| column[i]);
             for (lane, innovation) in innovations.iter_mut().enumerate() {
-                gathered[lane] += gate.gather * state[lane];
-                state[lane] *= gate.decay;
-                *innovation = *innovation * gate.weight
-                    - gate.reads[0] * gathered[lane]
-                    - gate.reads[1] * state[lane];
-                gathered[lane] += gate.gain[0] * *innovation;
-                state[lane] += gate.gain[1] * *innovation;
-                *innovation *= gate.scale;
+                gathered[lane] += step.gather * state[lane];
+                state[lane] *= step.decay;
+                *innovation = *innovation * step.weight
+                    - step.reads[0] * gathered[lane]
+                    - step.reads[1] * state[lane];
+                gathered[lane] += step.gain[0] * *innovation;
+                state[lane] += step.gain[1] * *innovation;
+                *innovation *= step.scale;
             }
             for (room, innovation) in into.iter_mut().zip(innovations) {
                 room[i] = innovation;
@@ -285,11 +285,11 @@ impl Whitener {
     }
 
     /// -2 ln likelihood of the readings from `from` on, given those before, with white noise of `sigma`.
-    pub(super) fn surprise_from(&self, errors: &[f64], from: usize, sigma: f64) -> f64 {
+    pub(super) fn deviance_from(&self, errors: &[f64], from: usize, sigma: f64) -> f64 {
         let innovations = self.innovations(errors);
-        let each = innovations.iter().zip(&self.gates).skip(from);
-        each.map(|(u, gate)| {
-            let deviation = sigma / (gate.scale * gate.weight);
+        let each = innovations.iter().zip(&self.steps).skip(from);
+        each.map(|(u, step)| {
+            let deviation = sigma / (step.scale * step.weight);
             (u / sigma).powi(2) + 2.0 * deviation.ln()
         })
         .sum()
@@ -298,22 +298,22 @@ impl Whitener {
     /// Root mean square errors of the readings from `from` on, each predicted from those before it, mm or mm/day.
     pub(super) fn step_errors_from(&self, errors: &[f64], from: usize) -> f64 {
         let innovations = self.innovations(errors);
-        let each = innovations.iter().zip(&self.gates).skip(from);
-        let squares = each.map(|(u, gate)| (u / (gate.scale * gate.weight)).powi(2));
+        let each = innovations.iter().zip(&self.steps).skip(from);
+        let squares = each.map(|(u, step)| (u / (step.scale * step.weight)).powi(2));
         (squares.sum::<f64>() / (errors.len() - from) as f64).sqrt()
     }
 
     /// The column whose innovations these are.
     pub(super) fn colour(&self, innovations: &[f64]) -> Vec<f64> {
         let (mut gathered, mut state) = (0.0, 0.0);
-        let each = self.gates.iter().zip(innovations).map(|(gate, u)| {
-            gathered += gate.gather * state;
-            state *= gate.decay;
-            let innovation = u / gate.scale;
+        let each = self.steps.iter().zip(innovations).map(|(step, u)| {
+            gathered += step.gather * state;
+            state *= step.decay;
+            let innovation = u / step.scale;
             let value =
-                (innovation + gate.reads[0] * gathered + gate.reads[1] * state) / gate.weight;
-            gathered += gate.gain[0] * innovation;
-            state += gate.gain[1] * innovation;
+                (innovation + step.reads[0] * gathered + step.reads[1] * state) / step.weight;
+            gathered += step.gain[0] * innovation;
+            state += step.gain[1] * innovation;
             value
         });
         each.collect()
@@ -385,9 +385,9 @@ impl Whitener {
             0.0
         };
         let (mut mean, mut p): ([f64; 2], Covariance) = ([0.0; 2], [0.0, 0.0, stationary]);
-        let mut path = Vec::with_capacity(self.gates.len());
+        let mut path = Vec::with_capacity(self.steps.len());
         let typical = problem.typical_velocity();
-        for (i, gate) in self.gates.iter().enumerate() {
+        for (i, step) in self.steps.iter().enumerate() {
             let dt = if i > 0 {
                 problem.t[i] - problem.t[i - 1]
             } else {
@@ -396,8 +396,8 @@ impl Whitener {
             let (gather, decay, q) = transition(problem, self.noise, dt, problem.seen[i] / typical);
             let ahead = [mean[0] + gather * mean[1], decay * mean[1]];
             let p_ahead = advance(p, gather, decay, q);
-            let (gain, _, after) = update(p_ahead, gate.reads);
-            let off = column[i] * gate.weight - gate.reads[0] * ahead[0] - gate.reads[1] * ahead[1];
+            let (gain, _, after) = update(p_ahead, step.reads);
+            let off = column[i] * step.weight - step.reads[0] * ahead[0] - step.reads[1] * ahead[1];
             mean = [ahead[0] + gain[0] * off, ahead[1] + gain[1] * off];
             p = after;
             path.push((gather, decay, ahead, p_ahead, mean, p));

@@ -234,7 +234,7 @@ fn weights(quantity: Quantity, y: &[f64], misfits: &[f64]) -> Vec<f64> {
         return ones;
     }
     let level = unit_median(level.iter().map(|v| v.max(floor)).collect());
-    let surprise = |weight: &[f64]| {
+    let deviance = |weight: &[f64]| {
         let scaled = misfits.iter().zip(weight).map(|(m, w)| (m / w).abs());
         let size = median(scaled.collect()).max(1e-300);
         let logs = weight.iter().map(|w| w.ln()).sum::<f64>();
@@ -244,7 +244,7 @@ fn weights(quantity: Quantity, y: &[f64], misfits: &[f64]) -> Vec<f64> {
             .map(|(m, w)| 2.0 * (m / w / size / 2.0).powi(2).ln_1p());
         weight.len() as f64 * size.ln() + logs + tails.sum::<f64>()
     };
-    if surprise(&level) < surprise(&ones) {
+    if deviance(&level) < deviance(&ones) {
         level
     } else {
         ones

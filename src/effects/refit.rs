@@ -6,6 +6,7 @@ use super::noise::{Memory, Noise, Whitener};
 use super::prior::Prior;
 use super::problem::Problem;
 use super::term::{Act, Scratch, Term, law_parameters, read};
+use crate::fit::{Damping, Descendable, StepOutcome, descend};
 use crate::model::Driven;
 use crate::reading::Quantity;
 use nalgebra::{DMatrix, DVector};
@@ -14,6 +15,15 @@ use nalgebra::{DMatrix, DVector};
 const MOST_STEPS: usize = 20;
 /// A step that lowers the misfit by less than this share ends the fit.
 const CONVERGED: f64 = 1e-5;
+const DAMPING: Damping = Damping {
+    first: 1e-3,
+    tighten: 6.0,
+    steeper: 1.0,
+    least_tightened: 0.0,
+    least: 1e-9,
+    most: f64::INFINITY,
+    most_tries: 8,
+};
 /// Rounds of 'which noise, then which law': the third no longer changes the choice.
 const NOISE_ROUNDS: usize = 4;
 
@@ -28,7 +38,7 @@ pub(super) struct Fitted {
     /// The model's velocity at every reading, mm/day.
     pub(super) velocity: Vec<f64>,
     /// -2 ln likelihood of the fitted readings.
-    pub(super) surprise: f64,
+    pub(super) deviance: f64,
     /// Standard deviation of the white noise (of weight 1).
     pub(super) sigma: f64,
 }
@@ -38,7 +48,7 @@ impl Fitted {
     pub(super) fn bic(&self, problem: &Problem) -> f64 {
         let terms: f64 = self.terms.iter().map(Term::parameters).sum();
         let count = law_parameters(problem) as f64 + terms + self.noise.parameters();
-        self.surprise + count * (problem.used as f64).ln()
+        self.deviance + count * (problem.used as f64).ln()
     }
 
     /// Readings less prediction, of the fitted ones.
@@ -281,7 +291,7 @@ impl ParameterPoint {
         let velocity = |&node: &usize| self.driven.velocity[node];
         Fitted {
             terms: terms.to_vec(),
-            surprise: whitener.surprise(misfit),
+            deviance: whitener.deviance(misfit),
             sigma: (misfit / problem.used as f64).sqrt(),
             noise: whitener.noise,
             parameters: self.parameters.clone(),
@@ -360,60 +370,96 @@ impl ParameterPoint {
 
     /// Damped steps of Gauss and Newton under `noise`, its shape held at the start's velocity.
     fn descend(
-        mut self,
+        self,
         problem: &Problem,
         start: &Start,
         whitener: &Whitener,
         (most_steps, scratch): (usize, &mut Scratch),
     ) -> Self {
-        let terms = start.terms.as_slice();
-        let prior = Prior::of(problem, terms);
-        let mut innovations = whitener.whiten(&self.residual(problem));
-        let mut damping = 1e-3;
-        for _ in 0..most_steps {
-            let columns = self.jacobian(problem, terms, scratch);
-            let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
-            let mut white = whitener.whiten_all(&columns);
-            for column in white.iter_mut().rev().take(start.frozen) {
-                column.fill(0.0);
-            }
-            let misfit = dot(&innovations, &innovations);
-            let variance = (misfit / problem.used as f64).max(1e-300);
-            let objective = misfit / variance + prior.misfit(&self.parameters);
-            let (normal, mut slope) =
-                normal_equations(&white, &innovations, variance, &prior, &self.parameters);
-            for k in self.parameters.len() - start.frozen..self.parameters.len() {
-                slope[k] = 0.0;
-            }
-            let mut moved = None;
-            for _ in 0..8 {
-                let Some(step) = solve(&normal, &slope, damping) else {
-                    damping *= 10.0;
-                    continue;
-                };
-                let parameters = self.parameters.iter().zip(step.iter()).map(|(p, s)| p + s);
-                let there = parameters.collect();
-                if let Some(point) = Self::at(problem, terms, there, scratch) {
-                    let trial = whitener.whiten(&point.residual(problem));
-                    let sum = dot(&trial, &trial);
-                    let value = sum / variance + prior.misfit(&point.parameters);
-                    if value < objective {
-                        moved = Some((point, trial, objective - value));
-                        break;
-                    }
-                }
-                damping *= 6.0;
-            }
-            let Some((point, trial, fall)) = moved else {
-                break;
-            };
-            (self, innovations) = (point, trial);
-            damping = (damping * 0.2).max(1e-9);
-            if fall < CONVERGED * problem.used as f64 {
-                break;
-            }
+        let innovations = whitener.whiten(&self.residual(problem));
+        let mut refit = Refitting {
+            problem,
+            start,
+            whitener,
+            prior: Prior::of(problem, &start.terms),
+            point: self,
+            innovations,
+            scratch,
+            variance: 1.0,
+            objective: f64::INFINITY,
+            normal: (DMatrix::zeros(0, 0), DVector::zeros(0)),
+        };
+        descend(&mut refit, &DAMPING, most_steps);
+        refit.point
+    }
+}
+
+/// A fit under way.
+struct Refitting<'a> {
+    problem: &'a Problem,
+    start: &'a Start,
+    whitener: &'a Whitener,
+    prior: Prior,
+    point: ParameterPoint,
+    innovations: Vec<f64>,
+    scratch: &'a mut Scratch,
+    /// Of the noise, held while steps are tried.
+    variance: f64,
+    objective: f64,
+    /// J^T J and J^T r.
+    normal: (DMatrix<f64>, DVector<f64>),
+}
+
+impl Descendable for Refitting<'_> {
+    fn linearise(&mut self) -> bool {
+        let (problem, frozen) = (self.problem, self.start.frozen);
+        let columns = (self.point).jacobian(problem, &self.start.terms, self.scratch);
+        let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+        let mut white = self.whitener.whiten_all(&columns);
+        for column in white.iter_mut().rev().take(frozen) {
+            column.fill(0.0);
         }
-        self
+        let misfit = dot(&self.innovations, &self.innovations);
+        let parameters = &self.point.parameters;
+        self.variance = (misfit / problem.used as f64).max(1e-300);
+        self.objective = misfit / self.variance + self.prior.misfit(parameters);
+        let (normal, mut slope) = normal_equations(
+            &white,
+            &self.innovations,
+            self.variance,
+            &self.prior,
+            parameters,
+        );
+        for k in parameters.len() - frozen..parameters.len() {
+            slope[k] = 0.0;
+        }
+        self.normal = (normal, slope);
+        true
+    }
+
+    fn step(&mut self, damping: f64) -> StepOutcome {
+        let (normal, slope) = &self.normal;
+        let Some(step) = solve(normal, slope, damping) else {
+            return StepOutcome::NoGain;
+        };
+        let (problem, terms) = (self.problem, self.start.terms.as_slice());
+        let parameters = self.point.parameters.iter().zip(step.iter());
+        let there = parameters.map(|(p, s)| p + s).collect();
+        let Some(point) = ParameterPoint::at(problem, terms, there, self.scratch) else {
+            return StepOutcome::NoGain;
+        };
+        let trial = self.whitener.whiten(&point.residual(problem));
+        let value = dot(&trial, &trial) / self.variance + self.prior.misfit(&point.parameters);
+        if value < self.objective {
+            (self.point, self.innovations) = (point, trial);
+            let gain = self.objective - value;
+            return StepOutcome::Gained { gain, ease: 0.2 };
+        }
+        StepOutcome::NoGain
+    }
+
+    fn goes_on(&self, gain: f64) -> bool {
+        gain >= CONVERGED * self.problem.used as f64
     }
 }
 

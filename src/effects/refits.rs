@@ -11,7 +11,7 @@ use super::response::Response;
 use super::search::{Refitted, SIGNIFICANT, Search};
 use super::surrogate::{Innovations, NullGains};
 use super::term::{Act, Term};
-use super::trials::{Ground, Trial, shortlist};
+use super::trials::{Trial, TrialBase, shortlist};
 use std::cell::LazyCell;
 
 /// Most candidates refitted for one place: the best of each covariate, and of the kinds that need none.
@@ -43,7 +43,7 @@ const STRIDES: [Stride; 4] = [
 
 impl<'a> Search<'a> {
     /// What stands before a search for one more effect than `base` has.
-    pub(super) fn ground<'b>(&mut self, base: &'b Fitted) -> Option<Ground<'b>>
+    pub(super) fn ground<'b>(&mut self, base: &'b Fitted) -> Option<TrialBase<'b>>
     where
         'a: 'b,
     {
@@ -55,7 +55,7 @@ impl<'a> Search<'a> {
         let columns = jacobian(self.problem, base, &mut self.scratch);
         let residual = base.residual(self.problem);
         let bank = shortlist(&Frames::new(self.bank, &residual, &columns));
-        Some(Ground {
+        Some(TrialBase {
             problem: self.problem,
             drivers: self.drivers,
             temperatures: self.temperatures,
@@ -217,7 +217,7 @@ impl<'a> Search<'a> {
             levels.extend(refit(problem, &start, &white, &mut self.scratch));
         }
         // By least squares first as well: from there the fit finds what a noise that remembers would hide.
-        levels.sort_by(|a, b| a.surprise.total_cmp(&b.surprise));
+        levels.sort_by(|a, b| a.deviance.total_cmp(&b.deviance));
         for level in levels.iter().take(LEVELS) {
             let start = under_likeliest(problem, level, bank, &mut self.scratch);
             fits.extend(refit(problem, &start, bank, &mut self.scratch));

@@ -4,7 +4,7 @@ use super::candidates;
 use super::companions::{go_together, is_rain};
 use super::explanation::Candidate;
 use super::fresh::best_of_starts;
-use super::judge::{HeldOut, block, held_out, is_label, named, objection, step_errors};
+use super::judge::{HeldOut, block, fits_any_bend, held_out, named, objection, step_errors};
 use super::kind::Kind;
 use super::noise::Whitener;
 use super::options::Options;
@@ -39,7 +39,8 @@ const LEAST_JUMP: f64 = 0.1;
 const ASTRONOMICAL: f64 = 20.0;
 
 /// Why nothing is concluded from a drawn or interpolated curve by its shape alone.
-const NO_READINGS: &str = "the values are no readings: they are smoother than any instrument's";
+const NO_READINGS: &str =
+    "the values are not raw readings: they are smoother than any instrument gives";
 
 /// One effect that was accepted.
 #[derive(Debug, Clone)]
@@ -50,7 +51,7 @@ pub(super) struct Accepted {
     pub(super) ties: Vec<Rival>,
 }
 
-/// What would be accepted of values that are no readings, were they readings.
+/// What would be accepted of values that are not raw readings, were they readings.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Withheld {
     pub(super) kind: Kind,
@@ -68,7 +69,7 @@ pub(super) struct SearchResult {
     /// By term of `full`.
     pub(super) accepted: Vec<Accepted>,
     pub(super) candidates: Vec<Candidate>,
-    /// What gains most, in the last round, of what was refused because the values are no readings.
+    /// What gains most, in the last round, of what was refused because the values are not raw readings.
     pub(super) withheld: Option<Withheld>,
 }
 
@@ -79,7 +80,7 @@ pub(super) struct Search<'a> {
     pub(super) temperatures: &'a [bool],
     pub(super) bank: &'a [Whitener],
     pub(super) options: &'a Options,
-    /// Whether the values are no readings: smoother than any instrument's.
+    /// Whether the values are not raw readings: smoother than any instrument's.
     pub(super) is_drawn: bool,
     pub(super) scratch: Scratch,
     pub(super) candidates: Vec<Candidate>,
@@ -207,7 +208,7 @@ impl Search<'_> {
     /// The plain law by least squares from that of `better`, or `plain` where that is nearer to the readings.
     fn nearer(&mut self, plain: Fitted, better: &Fitted) -> Fitted {
         let found = best_of_starts(self.problem, &[Start::at(better)], &mut self.scratch);
-        let nearer = found.filter(|found| found.surprise < plain.surprise);
+        let nearer = found.filter(|found| found.deviance < plain.deviance);
         nearer.unwrap_or(plain)
     }
 
@@ -309,7 +310,7 @@ impl Search<'_> {
         }
         if one.p_value >= SIGNIFICANT {
             let reason = format!(
-                "a search where there is nothing gains as much in {:.0} % of cases",
+                "without any effect a search gains as much in {:.0} % of cases",
                 100.0 * one.p_value
             );
             return (None, Some(reason));
@@ -344,7 +345,8 @@ impl Search<'_> {
         let share = self.options.held_out_share;
         if block(self.problem, &one.fitted.terms, share).is_none() {
             // A short record has none, and a step that has only just come says so by its date.
-            let is_late = block(self.problem, &[], share).is_some() && !is_label(one.term.kind);
+            let is_late =
+                block(self.problem, &[], share).is_some() && !fits_any_bend(one.term.kind);
             let reason =
                 "an event stands too late for a later block by which to judge it".to_owned();
             return (None, is_late.then_some(reason));
@@ -377,14 +379,14 @@ impl Search<'_> {
         let newest = one.fitted.terms.len() - base.terms.len();
         let models = (base, &one.fitted);
         let both = (held.from, newest);
-        let (before, after) = if is_label(one.term.kind) {
+        let (before, after) = if fits_any_bend(one.term.kind) {
             held.errors_of_changes(self.problem)
         } else {
             let steps = step_errors(self.problem, models, both, &mut self.scratch);
-            match steps.filter(|steps| steps.after.is_finite() && steps.surprise.is_finite()) {
+            match steps.filter(|steps| steps.after.is_finite() && steps.deviance.is_finite()) {
                 None => return Some("as it is learned before the later block, the readings cannot be fitted with it".to_owned()),
-                Some(steps) if steps.surprise > WORSE => {
-                    let worse = steps.surprise;
+                Some(steps) if steps.deviance > WORSE => {
+                    let worse = steps.deviance;
                     return Some(format!(
                         "the held-out readings are less likely with it, by {worse:.1} in -2 ln likelihood"
                     ));
@@ -438,7 +440,7 @@ impl Search<'_> {
 fn most_extrapolated(kind: Kind) -> f64 {
     if kind == Kind::Tide {
         MOST_OF_A_TIDE
-    } else if is_label(kind) {
+    } else if fits_any_bend(kind) {
         1.0
     } else {
         MOST_EXTRAPOLATED

@@ -1,4 +1,4 @@
-//! How much a search finds where there is nothing: covariates at the wrong time, and readings made of noise alone.
+//! How much a search finds without any effect: covariates at the wrong time, and readings made of noise alone.
 
 use super::candidates::{delays, of_channel, responses, thermal};
 use super::frame::{Frame, Frames, dot};
@@ -18,7 +18,7 @@ const LEAST_SHIFT: f64 = 0.06;
 /// No p-value is claimed below it.
 const LEAST_P: f64 = 1e-6;
 
-/// The null gains: the best gains of many searches where there is nothing to find.
+/// The null gains: the best gains of many searches without any effect.
 #[derive(Debug, Clone, Default)]
 pub(super) struct NullGains {
     gains: Vec<f64>,
@@ -45,7 +45,7 @@ impl NullGains {
         self
     }
 
-    /// The chance that a search where there is nothing gains as much: by rank, and beyond the largest by Gumbel's law for maxima.
+    /// The chance that a search without any effect gains as much: by rank, and beyond the largest by Gumbel's law for maxima.
     pub(super) fn p_value(&self, gain: f64) -> f64 {
         let n = self.gains.len() as f64;
         if self.gains.is_empty() {
@@ -86,7 +86,7 @@ pub(super) fn shifted_covariates(
     (count, seed): (usize, u64),
 ) -> NullGains {
     let mut random = Pcg64Mcg::seed_from_u64(seed);
-    let before = frames.surprise();
+    let before = frames.deviance();
     let finds = (0..count).filter_map(|k| {
         let share = random.random_range(LEAST_SHIFT..1.0 - LEAST_SHIFT);
         let each = drivers.iter().filter_map(|one| {
@@ -140,8 +140,8 @@ fn best_response(
         columns.extend(linear.columns(problem, &term));
         terms.push(term);
     }
-    let surprises = frames.surprise_with_each(&columns);
-    let each = terms.into_iter().zip(surprises);
+    let deviances = frames.deviance_with_each(&columns);
+    let each = terms.into_iter().zip(deviances);
     each.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
@@ -163,10 +163,10 @@ impl Tried {
     }
 
     /// The least -2 ln likelihood with it, and its cost, for what is left of readings in each frame.
-    pub(super) fn surprise(&self, frames: &Frames, left: &[(Vec<f64>, f64)]) -> f64 {
+    pub(super) fn deviance(&self, frames: &Frames, left: &[(Vec<f64>, f64)]) -> f64 {
         let each = frames.each.iter().zip(&self.directions).zip(left);
         each.map(|((frame, directions), (residual, misfit))| {
-            frame.surprise(misfit - Frame::taken(directions, residual)) + frame.cost()
+            frame.deviance(misfit - Frame::taken(directions, residual)) + frame.cost()
         })
         .fold(f64::INFINITY, f64::min)
             + self.cost
@@ -211,7 +211,7 @@ pub(super) fn noise_alone(
     for (index, frame) in frames.each.iter().enumerate() {
         let noise = NoiseInFrame::new(frame, &readings);
         for (before, misfit) in before.iter_mut().zip(&noise.misfits) {
-            *before = before.min(frame.surprise(*misfit) + frame.cost());
+            *before = before.min(frame.deviance(*misfit) + frame.cost());
         }
         noise.least(frame, (index, tried), &mut least);
     }
@@ -262,8 +262,8 @@ impl NoiseInFrame {
                 for one in some {
                     let last = row + one.directions[index].len();
                     let taken: f64 = (row..last).map(|row| products[row].powi(2)).sum();
-                    let surprise = frame.surprise(misfit - taken) + frame.cost() + one.cost;
-                    least[series] = least[series].min(surprise);
+                    let deviance = frame.deviance(misfit - taken) + frame.cost() + one.cost;
+                    least[series] = least[series].min(deviance);
                     row = last;
                 }
             }

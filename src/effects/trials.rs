@@ -24,7 +24,7 @@ pub(super) struct Trial {
 }
 
 /// What stands before a search for one more effect.
-pub(super) struct Ground<'a> {
+pub(super) struct TrialBase<'a> {
     pub(super) problem: &'a Problem,
     pub(super) drivers: &'a [(usize, Driver)],
     /// Whether each driver is a temperature.
@@ -46,7 +46,7 @@ pub(super) fn shortlist(frames: &Frames) -> Vec<Whitener> {
             .each
             .iter()
             .filter(|frame| frame.whitener.noise.memory == memory);
-        let Some(best) = own.min_by(|a, b| a.surprise(a.misfit).total_cmp(&b.surprise(b.misfit)))
+        let Some(best) = own.min_by(|a, b| a.deviance(a.misfit).total_cmp(&b.deviance(b.misfit)))
         else {
             continue;
         };
@@ -62,7 +62,7 @@ pub(super) fn shortlist(frames: &Frames) -> Vec<Whitener> {
     list
 }
 
-impl Ground<'_> {
+impl TrialBase<'_> {
     /// The BIC's price of a term.
     pub(super) fn cost(&self, term: &Term) -> f64 {
         term.parameters() * (self.problem.used as f64).ln()
@@ -90,7 +90,7 @@ impl Ground<'_> {
 
     pub(super) fn trial(&self, term: Term) -> Trial {
         let columns = self.linear.columns(self.problem, &term);
-        let gain = self.frames.surprise() - self.frames.surprise_with(&columns) - self.cost(&term);
+        let gain = self.frames.deviance() - self.frames.deviance_with(&columns) - self.cost(&term);
         Trial { term, gain }
     }
 
@@ -148,14 +148,14 @@ impl Ground<'_> {
             let one = self.tried(&term);
             let left = self.frames.each.iter();
             let left: Vec<(Vec<f64>, f64)> = left.map(|f| (f.residual.clone(), f.misfit)).collect();
-            let gain = self.frames.surprise() - one.surprise(&self.frames, &left);
+            let gain = self.frames.deviance() - one.deviance(&self.frames, &left);
             trials.push(Trial { term, gain });
             tried.push(one);
         }
         (trials, tried)
     }
 
-    /// What the search over these covariates gains where there is nothing.
+    /// What the search over these covariates gains without any effect.
     pub(super) fn null_gains_of(
         &self,
         drivers: &[(usize, Driver)],
@@ -173,7 +173,7 @@ impl Ground<'_> {
         shifted_covariates(self.problem, &searched, both, (count, seed))
     }
 
-    /// What the search without covariates gains where there is nothing.
+    /// What the search without covariates gains without any effect.
     pub(super) fn null_gains_of_noise(
         &self,
         tried: (&[Tried], Innovations),

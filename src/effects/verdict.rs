@@ -2,7 +2,7 @@
 
 use super::diagnosis::Judged;
 use super::explanation::{Candidate, Effect, Explained};
-use super::judge::{coefficients, is_label, named};
+use super::judge::{coefficients, fits_any_bend, named};
 use super::kind::Kind;
 use super::noise::{Memory, Whitener};
 use super::problem::Problem;
@@ -52,7 +52,8 @@ pub(super) fn conclude(
     let mut accepted = found.accepted.clone();
     let mut judged = Judged::of((problem, &full), bank, scratch);
     let mut left = judged.as_ref().map_or(0.0, Judged::load_gain) > margin;
-    let only_labels = !accepted.is_empty() && full.terms.iter().all(|term| is_label(term.kind));
+    let only_labels =
+        !accepted.is_empty() && full.terms.iter().all(|term| fits_any_bend(term.kind));
     let mut cannot_separate_from = Vec::new();
     let is_whole = !left && accounts_for_all(problem, &full);
     if only_labels && !is_whole {
@@ -76,7 +77,7 @@ pub(super) fn conclude(
         })
         .collect();
     // What independent data support comes first.
-    effects.sort_by_key(|effect| is_label(effect.effect));
+    effects.sort_by_key(|effect| fits_any_bend(effect.effect));
     let memory_gain = judged.as_ref().map_or(0.0, Judged::memory_gain);
     let remembers = memory_gain > margin && may_remember(&full);
     if remembers && !left && effects.is_empty() {
@@ -262,8 +263,10 @@ fn refuse(candidates: &mut [Candidate], (problem, term): (&Problem, &Term)) {
         .iter_mut()
         .filter(|one| one.effect == term.kind && one.at == at && one.rejected_because.is_none());
     for one in own {
-        one.rejected_because =
-            Some("structure is left after it: it is the nearest label, no explanation".to_owned());
+        one.rejected_because = Some(
+            "structure is left after it, and it can follow almost any bend: no explanation"
+                .to_owned(),
+        );
     }
 }
 

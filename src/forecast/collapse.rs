@@ -3,7 +3,7 @@
 //! One small network gives the chance of a collapse within the span of a scale of [`Scales`] from the motion at that
 //! scale and those around it, in ratios, so that minutes and months are judged alike, and from what others expect
 //! ([`Members`]): the law, and straight lines through inverse velocity. It was taught by simulated slopes that fail and
-//! stand in many ways ([`super::world`]); its weights are in [`super::learned`]. That is what is reported. Levels go by
+//! stand in many ways (`studies/src/world`); its weights are in [`super::learned`]. That is what is reported. Levels go by
 //! less: what it says counts for them as far as it is not unlikely that the slope accelerates at all ([`super::evidence`]), because
 //! they are asked at every reading; of the rest a small part is left, so that nothing is called impossible.
 

@@ -1,5 +1,5 @@
 //! The network that gives the chance of a collapse: its weights stand in learned.txt, written by
-//! `cargo run --release --example learn`.
+//! `cargo run --release -p studies --bin learn`.
 
 use super::network::Network;
 use std::sync::LazyLock;

@@ -3,22 +3,16 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod alerts_by_crisis;
-mod calibration;
 mod crises;
 mod crisis;
 mod declared;
 mod earlier_events;
 mod effects_faults;
 mod effects_groups;
-mod effects_lives;
 mod effects_measured;
 mod effects_monitor;
-mod effects_put_in;
 mod effects_searches;
 mod first_start;
-#[path = "../../examples/loop/found_again.rs"]
-#[expect(dead_code, reason = "the document shows more than is claimed here")]
-mod found_again;
 mod global_minimum;
 mod hostile;
 mod ingest;
@@ -38,15 +32,10 @@ mod monitor;
 mod mutated_files;
 mod orders;
 mod parallel;
-#[path = "../../examples/loop/put_in.rs"]
-#[expect(dead_code, reason = "the document shows more than is claimed here")]
-mod put_in;
 mod queue;
-mod reconstructions;
 mod recordings;
 mod refit_policy;
 mod score_methods;
-mod seed;
 mod silent_slope;
 mod site_level;
 mod site_together;

@@ -1,9 +1,6 @@
 //! Measured series that may be read here but not redistributed. A test of them is ignored where `build.rs` has not
 //! found their folder.
 
-#[path = "../measured/mod.rs"]
-mod folder;
-
 use std::path::PathBuf;
 
 /// The file of that name.
@@ -12,5 +9,5 @@ use std::path::PathBuf;
 ///
 /// Where it is not there.
 pub(crate) fn measured(name: &str) -> PathBuf {
-    folder::measured(name).unwrap_or_else(|| panic!("{name} is not among the measured series"))
+    studies::measured(name).unwrap_or_else(|| panic!("{name} is not among the measured series"))
 }

@@ -1,12 +1,8 @@
 //! The recordings in the repository are whole, attributed, and what was measured.
 
-#[path = "../../examples/archive_digitised.rs"]
-#[allow(dead_code, reason = "its main is not called")]
-mod archive_digitised;
-
 use crate::measured::measured;
 use slipwatch::reading::{BenchmarkId, Recording};
-use slipwatch::runtime::ingest::{ReadOptions, encode_mcap, read_files};
+use slipwatch::runtime::ingest::{ReadOptions, read_files};
 use std::path::{Path, PathBuf};
 
 fn folder() -> PathBuf {
@@ -77,35 +73,6 @@ fn the_century_recordings_are_what_was_measured() {
 }
 
 #[test]
-fn the_digitised_recordings_come_out_of_their_csv_files_byte_for_byte() {
-    for digitised in &archive_digitised::ALL {
-        let recording = digitised.recording(&folder()).unwrap();
-        let mut bytes = std::io::Cursor::new(Vec::new());
-        encode_mcap(&recording, &mut bytes).unwrap();
-        let committed = std::fs::read(folder().join(digitised.file)).unwrap();
-        assert!(committed == bytes.into_inner(), "{}", digitised.file);
-    }
-}
-
-#[test]
-fn the_digitised_recordings_are_attributed_and_carry_their_error() {
-    for digitised in &archive_digitised::ALL {
-        let recording = read(folder().join(digitised.file));
-        let said = &recording.provenance;
-        assert_eq!(said["kind"], "measured (digitised)");
-        assert_eq!(said["licence"], "CC BY 4.0");
-        assert!(said["attribution"].contains("Ma et al., IEEE Access 13, 2025"));
-        assert!(said["outcome"].contains("collapsed"));
-        for series in &recording.series {
-            for reading in &series.readings {
-                let sigma = reading.sigma.unwrap();
-                assert!((0.4..=1.5).contains(&sigma), "{}", series.benchmark);
-            }
-        }
-    }
-}
-
-#[test]
 fn preonzo_holds_five_extensometers_and_longjingcun_one_series() {
     let counts = |file: &str| -> Vec<(String, usize)> {
         let recording = read(folder().join(file));
@@ -136,16 +103,5 @@ fn preonzo_pauses_from_8_to_12_may_and_then_speeds_up_to_the_end() {
         let (before, pause, after) = (f64::max(rate(5), rate(6)), rate(9), rate(12));
         assert!(pause < before, "{}: {before}, {pause}", series.benchmark);
         assert!(after > 1.5 * pause, "{}: {after}", series.benchmark);
-    }
-}
-
-#[test]
-#[cfg_attr(not(measured_data), ignore = "no measured data here")]
-fn the_digitised_recordings_hold_the_values_that_were_digitised() {
-    for digitised in &archive_digitised::ALL {
-        let name = format!("{}.csv", digitised.source);
-        let file = measured(&name);
-        let kept = std::fs::read(folder().join("digitised").join(&name)).unwrap();
-        assert!(kept == std::fs::read(file).unwrap(), "{name}");
     }
 }

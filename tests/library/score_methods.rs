@@ -1,11 +1,12 @@
 //! The methods that are scored know the past alone, and no record breaks them.
 
 use slipwatch::fit::{Observation, Observations};
-use slipwatch::forecast::{Fate, Life, Passage};
+use slipwatch::forecast::Passage;
 use slipwatch::reading::{Quantity, after_days, days_since};
 use slipwatch::runtime::ingest::{ReadOptions, read_files};
 use slipwatch::score::{METHODS, Method, Truth, WholeRecord, card};
 use std::path::Path;
+use studies::{Fate, Life};
 
 /// Where a record is looked at, tenths of its readings.
 const LOOKS: [usize; 3] = [2, 6, 9];

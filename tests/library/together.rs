@@ -3,13 +3,13 @@
 use crate::measured::measured;
 use assert_cmd::Command;
 use jiff::SignedDuration;
-use slipwatch::forecast::{Fate, Life};
 use slipwatch::inversion::{
     FittedFailureTime, Inversion, InversionOptions, TogetherReport, together,
 };
 use slipwatch::reading::{BenchmarkId, Reading, Series, Timestamp, Unit, after_days, days_since};
 use slipwatch::runtime::ingest::{ReadOptions, read_files};
 use std::path::{Path, PathBuf};
+use studies::{Fate, Life};
 
 const START: &str = "2001-01-01T00:00:00Z";
 

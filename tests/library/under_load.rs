@@ -7,10 +7,11 @@
 
 use crate::measured::measured;
 use slipwatch::fit::{Observation, Observations};
-use slipwatch::forecast::{Fate, HORIZON_DAYS, LawForecaster, Life, Outlook};
+use slipwatch::forecast::{HORIZON_DAYS, LawForecaster, Outlook};
 use slipwatch::reading::{Quantity, Series, Timestamp, days_since};
 use slipwatch::runtime::ingest::{ReadOptions, read_files};
 use std::path::{Path, PathBuf};
+use studies::{Fate, Life};
 
 /// 1 m/day.
 const CRITICAL: f64 = 1000.0;

@@ -1,6 +1,6 @@
 //! Rows that repeat earlier rows exactly, where chance would hardly have them equal.
 //!
-//! The surprise of a copy, in nats, is summed over its rows: of the first value by its resolution and
+//! The information of a copy, in nats, is summed over its rows: of the first value by its resolution and
 //! how densely the values lie there, of each further one by what usually follows the one before it,
 //! and of the covariates of the same rows by how rare their values are.
 
@@ -81,9 +81,9 @@ impl Companion {
         is_same && self.shares[b] <= RARE
     }
 
-    /// The surprise that rows `a` and `b` have the same value, where all before it are the same;
-    /// `None` where it is not. A companion that always agrees with those surprises nobody.
-    fn surprise(&self, a: usize, b: usize) -> Option<f64> {
+    /// The information that rows `a` and `b` have the same value, where all before it are the same;
+    /// `None` where it is not. A companion that always agrees adds nothing.
+    fn information(&self, a: usize, b: usize) -> Option<f64> {
         if self.symbols[a]? != self.symbols[b]? {
             return None;
         }
@@ -105,7 +105,7 @@ pub(super) fn copied_rows(trace: &Trace, companions: &[Companion]) -> Vec<Copied
     let pairs = 0.5 * (trace.len() as f64).powi(2);
     let mut copies: Vec<Copied> = blocks(&language.values, companions)
         .into_iter()
-        .filter(|copy| pairs * (-surprise(copy, &language, companions)).exp() < CHANCE)
+        .filter(|copy| pairs * (-information(copy, &language, companions)).exp() < CHANCE)
         .collect();
     copies.sort_by_key(|copy| (copy.newer, copy.older));
     copies.dedup_by(|later, kept| later.newer < kept.newer + kept.rows);
@@ -116,14 +116,14 @@ pub(super) fn copied_rows(trace: &Trace, companions: &[Companion]) -> Vec<Copied
     copies
 }
 
-fn surprise(copy: &Copied, language: &Language, companions: &[Companion]) -> f64 {
+fn information(copy: &Copied, language: &Language, companions: &[Companion]) -> f64 {
     let further: f64 = (1..copy.rows)
-        .map(|row| language.surprise_of_next(copy.newer + row))
+        .map(|row| language.information_of_next(copy.newer + row))
         .sum();
     let beside: f64 = (0..copy.rows)
         .filter(|_| copy.newer - copy.older > NEAR)
         .flat_map(|row| companions.iter().map(move |one| (one, row)))
-        .filter_map(|(one, row)| one.surprise(copy.older + row, copy.newer + row))
+        .filter_map(|(one, row)| one.information(copy.older + row, copy.newer + row))
         .sum();
     language.first[copy.newer] + further + beside
 }
@@ -145,7 +145,7 @@ impl Language {
         // Differences carry the rounding of two values.
         let steps = symbols(&trace.increments(), 10.0 * scale);
         Self {
-            first: first_surprises(trace, &values),
+            first: first_information(trace, &values),
             of_values: Following::of(&values),
             of_steps: Following::of(&steps),
             values,
@@ -155,13 +155,13 @@ impl Language {
 
     /// Surprise of the value at `row`, the one before it known: by values or by steps, whichever
     /// makes less of it. Rain returns to zero, and a level rests.
-    fn surprise_of_next(&self, row: usize) -> f64 {
+    fn information_of_next(&self, row: usize) -> f64 {
         let by_value = self
             .of_values
-            .surprise(self.values[row - 1], self.values[row]);
+            .information(self.values[row - 1], self.values[row]);
         let by_step = if row >= 2 {
             self.of_steps
-                .surprise(self.steps[row - 2], self.steps[row - 1])
+                .information(self.steps[row - 2], self.steps[row - 1])
         } else {
             f64::INFINITY
         };
@@ -171,23 +171,23 @@ impl Language {
 
 /// By the resolution of a value and how densely values lie about it, and by how often it stands
 /// besides the copy and the original.
-fn first_surprises(trace: &Trace, symbols: &[u32]) -> Vec<f64> {
+fn first_information(trace: &Trace, symbols: &[u32]) -> Vec<f64> {
     let count = trace.len();
     let counts = counted(symbols);
     let steps = resolutions(&trace.values);
     let mut order: Vec<usize> = (0..count).collect();
     order.sort_by(|&a, &b| trace.values[a].total_cmp(&trace.values[b]));
     let reach = (count / 20).clamp(3, 50);
-    let mut surprises = vec![0.0; count];
+    let mut information = vec![0.0; count];
     for (place, &row) in order.iter().enumerate() {
         let low = place.saturating_sub(reach);
         let high = (place + reach).min(count - 1);
         let width = trace.values[order[high]] - trace.values[order[low]];
         let within = (high - low) as f64 * steps[row] / width.max(steps[row]);
         let others = counts[&symbols[row]].saturating_sub(2) as f64;
-        surprises[row] = -(within.max(others) / count as f64).min(1.0).ln();
+        information[row] = -(within.max(others) / count as f64).min(1.0).ln();
     }
-    surprises
+    information
 }
 
 /// How often each symbol follows each.
@@ -211,7 +211,7 @@ impl Following {
     }
 
     /// Without the two occurrences that are the original and the copy themselves.
-    fn surprise(&self, before: u32, after: u32) -> f64 {
+    fn information(&self, before: u32, after: u32) -> f64 {
         let besides =
             |count: Option<&usize>| count.map_or(0, |count| count.saturating_sub(2)) as f64;
         let general = besides(self.single.get(&after)).max(1.0) / self.total;

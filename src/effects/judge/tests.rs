@@ -26,7 +26,7 @@ fn fitted(term: Term, own: &[f64]) -> Fitted {
         noise: Noise::WHITE,
         prediction: Vec::new(),
         velocity: Vec::new(),
-        surprise: 0.0,
+        deviance: 0.0,
         sigma: 1.0,
     }
 }

@@ -122,14 +122,14 @@ fn noise_is_likeliest_under_its_own_memory() {
                 ratio: 3.0,
             };
             let (readings, _) = drawn(&problem, of(12.0), 7);
-            let surprise = |days: &f64| {
+            let deviance = |days: &f64| {
                 let frame = Frame::new(Whitener::new(&problem, of(*days)), &readings, &[]);
-                frame.surprise(frame.misfit)
+                frame.deviance(frame.misfit)
             };
             let tried = [1.5, 4.0, 12.0, 36.0, 108.0];
             let best = tried
                 .into_iter()
-                .min_by(|a, b| surprise(a).total_cmp(&surprise(b)))
+                .min_by(|a, b| deviance(a).total_cmp(&deviance(b)))
                 .unwrap();
             assert!(
                 (best - 12.0_f64).abs() < 1e-9,

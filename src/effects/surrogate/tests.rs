@@ -1,4 +1,4 @@
-//! A search where there is nothing is judged by what other searches find where there is nothing.
+//! A search without any effect is judged by what other searches find without any effect.
 
 use super::*;
 use crate::effects::fixture::{channel, daily, generator, normals, series};

@@ -1,0 +1,10 @@
+//! What only studies of the monitor need: simulated slopes whose end is known, which forecasts learn from and are judged by, and
+//! where the project and measured series lie. The programs in `src/bin` write the project's tables.
+
+mod folders;
+mod life;
+mod world;
+
+pub use folders::{measured, project};
+pub use life::{Corpus, Fate, Life};
+pub use world::{Family, GaugeKind, Simulated};
