@@ -176,6 +176,82 @@ fn what_was_written_before_a_rotation_is_read_from_the_old_file() {
 }
 
 #[test]
+fn a_file_that_its_writer_holds_open_is_read_on_wherever_it_goes() {
+    for to in ["5.csv.1", "archive/5.csv", ""] {
+        let mut bench = Bench::new("csv");
+        fs::create_dir(bench.path("archive")).unwrap();
+        bench.write("5.csv", &format!("{HEADER}{}", row(1, 1.0)));
+        assert_eq!(bench.news(), ["5:1"]);
+        let mut writer = OpenOptions::new()
+            .append(true)
+            .open(bench.path("5.csv"))
+            .unwrap();
+        // What was written just before it went is read too.
+        writer.write_all(row(2, 2.0).as_bytes()).unwrap();
+        if to.is_empty() {
+            fs::remove_file(bench.path("5.csv")).unwrap();
+        } else {
+            fs::rename(bench.path("5.csv"), bench.path(to)).unwrap();
+        }
+        assert_eq!(bench.news(), ["5:2"], "{to}");
+        for day in 3..6 {
+            // Nothing came between two looks.
+            assert!(bench.news().is_empty() && bench.news().is_empty());
+            writer
+                .write_all(row(day, f64::from(day)).as_bytes())
+                .unwrap();
+            assert_eq!(bench.news(), [format!("5:{day}")], "{to}");
+        }
+        bench.write("5.csv", &format!("{HEADER}{}", row(7, 7.0)));
+        writer.write_all(row(6, 6.0).as_bytes()).unwrap();
+        assert_eq!(bench.news(), ["5:6", "5:7"], "{to}");
+    }
+}
+
+#[test]
+fn files_that_are_rotated_again_and_again_are_each_read_on() {
+    let mut bench = Bench::new("csv");
+    let mut writers: Vec<File> = Vec::new();
+    for day in 1..5 {
+        for number in (1..day).rev() {
+            let (from, to) = (format!("5.csv.{}", number - 1), format!("5.csv.{number}"));
+            let from = if number == 1 { "5.csv" } else { &from };
+            fs::rename(bench.path(from), bench.path(&to)).unwrap();
+        }
+        bench.write("5.csv", &format!("{HEADER}{}", row(day, f64::from(day))));
+        assert_eq!(bench.news(), [format!("5:{day}")]);
+        let writer = OpenOptions::new().append(true).open(bench.path("5.csv"));
+        writers.push(writer.unwrap());
+    }
+    for (day, mut writer) in (10..).zip(writers) {
+        writer.write_all(row(day, 0.5).as_bytes()).unwrap();
+    }
+    assert_eq!(bench.news(), ["5:0.5"; 4]);
+}
+
+#[test]
+fn a_bounded_number_of_files_that_have_gone_is_read_on() {
+    let mut bench = Bench::new("csv");
+    fs::create_dir(bench.path("archive")).unwrap();
+    for number in 0..100 {
+        bench.write(
+            &format!("{number}.csv"),
+            &format!("{HEADER}{}", row(1, 1.0)),
+        );
+    }
+    assert_eq!(bench.news().len(), 100);
+    for number in 0..100 {
+        let name = format!("{number}.csv");
+        fs::rename(bench.path(&name), bench.path("archive").join(&name)).unwrap();
+    }
+    assert!(bench.news().is_empty());
+    for number in 0..100 {
+        bench.append(&format!("archive/{number}.csv"), &row(2, 2.0));
+    }
+    assert_eq!(bench.news().len(), 64);
+}
+
+#[test]
 fn a_deleted_file_that_comes_back_is_read_again() {
     let mut bench = Bench::new("csv");
     bench.write("5.csv", &format!("{HEADER}{}", row(1, 1.0)));

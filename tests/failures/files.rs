@@ -2,6 +2,7 @@
 
 use crate::site::{Site, eventually};
 use std::fs::{self, OpenOptions};
+use std::io::Write;
 
 fn row(day: u32) -> String {
     format!("2020-01-{day:02}T00:00:00Z,{day}\n")
@@ -45,6 +46,49 @@ fn a_file_copied_and_truncated_is_read_again_and_a_possible_gap_is_said_once_eac
     assert_eq!((gaps(&site), site.values().len()), (2, 19), "said again");
     let events = site.proven_events();
     assert!(events.contains("5.csv: cut off at"), "{events}");
+}
+
+/// As a logger that keeps its file open while logrotate renames it, or an archive takes it away; over a restart too.
+#[test]
+fn rows_that_are_written_to_a_file_after_it_was_renamed_or_moved_are_read() {
+    let site = Site::new("");
+    fs::create_dir(site.path("archive")).unwrap();
+    for name in ["5.csv", "6.csv"] {
+        let text = format!("{HEADER}{}", rows(1..4));
+        site.append(&format!("incoming/{name}"), &text);
+    }
+    let mut program = site.caught_up();
+    let open = |name: &str| {
+        let mut options = OpenOptions::new();
+        options.append(true).open(site.path(name)).unwrap()
+    };
+    let mut writers = [open("incoming/5.csv"), open("incoming/6.csv")];
+    fs::rename(site.path("incoming/5.csv"), site.path("incoming/5.csv.1")).unwrap();
+    fs::rename(site.path("incoming/6.csv"), site.path("archive/6.csv")).unwrap();
+    eventually("both have gone", || {
+        site.log().matches("read on").count() == 2
+    });
+    for (day, count) in [(4, 8), (5, 10), (6, 12)] {
+        // Longer than between two looks.
+        std::thread::sleep(std::time::Duration::from_millis(2500));
+        for writer in &mut writers {
+            writer.write_all(row(day).as_bytes()).unwrap();
+        }
+        eventually("what was added", || site.values().len() == count);
+        if day == 4 {
+            program.stop();
+            program = site.caught_up();
+        }
+    }
+    site.append("incoming/5.csv", &format!("{HEADER}{}", rows(7..8)));
+    eventually("the new file", || site.values().len() == 13);
+    program.stop();
+    assert_eq!(gaps(&site), 0);
+    let events = site.proven_events();
+    assert!(
+        events.contains("\"6\"") && !events.contains("csv"),
+        "{events}"
+    );
 }
 
 /// 4.

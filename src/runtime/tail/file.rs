@@ -5,6 +5,7 @@ use super::position::{FileId, Saved};
 use super::records::{self, Channels, HEADER_BYTES, MAGIC, NextRecord, RawMessage};
 use super::text::{BadLine, LinesRead, TextReader, Unpacking};
 use crate::reading::Timestamp;
+use crate::runtime::clock::Stopwatch;
 use crate::runtime::ingest::{IngestError, Item, decode_message, is_packed};
 use crate::runtime::site::is_logged;
 use std::collections::VecDeque;
@@ -42,12 +43,16 @@ pub(super) struct FileTail {
     pub(super) mark: Vec<u8>,
     /// As of the last look that found nothing more; the file is opened only when it differs.
     idle: Option<Glance>,
+    /// When it was last written to, as of the last read.
+    modified: (i64, i64),
     pub(super) pending: VecDeque<Arrival>,
     pub(super) quarantined: u64,
     /// The last error, so that it is logged once.
     trouble: Option<String>,
-    /// Where we were when the file was last found under another name.
-    left_at: Option<u64>,
+    /// It is held open, perhaps, so that it can be read wherever it goes.
+    pub(super) held: Option<File>,
+    /// Where it is no longer under its name.
+    pub(super) departed: Option<Departed>,
     /// Bytes read since the last value.
     pub(super) valueless: u64,
     /// Whether its turn ended before it had been read to its end.
@@ -60,6 +65,17 @@ pub(super) struct FileTail {
     pub(super) safe: Saved,
     /// As [`FileTail::moved`] last reported it.
     pub(super) reported: Saved,
+}
+
+/// Since when a file is read on that is no longer under its name, and how.
+#[derive(Debug)]
+pub(super) struct Departed {
+    /// Runs since it last grew, or went.
+    pub(super) grew: Stopwatch,
+    /// Where we were then.
+    pub(super) at: u64,
+    /// Whether it has no name that we know: it is read while it is held open, and a restart does not find it.
+    pub(super) is_nameless: bool,
 }
 
 #[derive(Debug)]
@@ -119,10 +135,12 @@ impl FileTail {
             place: None,
             mark: Vec::new(),
             idle: None,
+            modified: (0, 0),
             pending: VecDeque::new(),
             quarantined: 0,
             trouble: None,
-            left_at: None,
+            held: None,
+            departed: None,
             valueless: 0,
             has_more: false,
             is_restored: false,
@@ -135,23 +153,6 @@ impl FileTail {
     /// Whether this is no longer the file under its name.
     pub(super) fn is_other_than(&self, place: FileId) -> bool {
         self.place.is_some_and(|own| own != place)
-    }
-
-    /// The file is no longer under its name: finds it in its folder under another, so that what
-    /// was written before a rotation is read. `None` when it is not there or nothing came since.
-    pub(super) fn leave(&mut self) -> Option<PathBuf> {
-        if self.left_at == Some(self.at) {
-            return None;
-        }
-        let place = self.place?;
-        let entries = std::fs::read_dir(self.path.parent()?).ok()?;
-        let path = entries.flatten().find_map(|entry| {
-            let metadata = entry.metadata().ok()?;
-            (FileId::of(&metadata) == place).then(|| entry.path())
-        })?;
-        self.left_at = Some(self.at);
-        self.path.clone_from(&path);
-        Some(path)
     }
 
     /// Reads until something is pending, there is no more for now, or its turn is over.
@@ -197,13 +198,40 @@ impl FileTail {
         }
     }
 
+    /// When it was last written to, as of the last read.
+    pub(super) fn modified(&self) -> (i64, i64) {
+        self.modified
+    }
+
+    /// The file under its name, or the one that is held where that is another one by now, until the next look at the
+    /// folder.
+    fn glance(&self) -> io::Result<Glance> {
+        let named = std::fs::metadata(&self.path).map(|metadata| Glance::at(&metadata));
+        match (&self.held, named) {
+            (Some(_), Ok(named)) if self.place == Some(named.place) => Ok(named),
+            (Some(held), _) => Ok(Glance::at(&held.metadata()?)),
+            (None, named) => named,
+        }
+    }
+
+    fn open(&self) -> io::Result<File> {
+        let named = File::open(&self.path);
+        let Some(held) = &self.held else {
+            return named;
+        };
+        match named {
+            Ok(named) if self.place == Some(FileId::of(&named.metadata()?)) => Ok(named),
+            Ok(_) | Err(_) => held.try_clone(),
+        }
+    }
+
     /// One read; `false` when there is no more for now.
     fn advance(&mut self) -> io::Result<bool> {
-        let glance = Glance::at(&std::fs::metadata(&self.path)?);
+        let glance = self.glance()?;
         if self.idle == Some(glance) {
             return Ok(false);
         }
-        let file = File::open(&self.path)?;
+        let file = self.open()?;
         self.is_restored = false;
         let glance = Glance::at(&file.metadata()?);
         if !self.is_same(&file, glance)? {
@@ -218,6 +246,7 @@ impl FileTail {
             self.at = 0;
         }
         self.place = Some(glance.place);
+        self.modified = glance.modified;
         let before = self.at;
         match &self.content {
             Content::Text(_) => self.read_text(&file)?,

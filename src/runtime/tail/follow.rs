@@ -1,6 +1,7 @@
 //! Follows the files of all sources and puts what they hold in the order of its measurement.
 
 use super::decode::{Arrival, Decoder};
+use super::departed::{MOST_DEPARTED, hold_newest};
 use super::file::FileTail;
 use super::position::FileId;
 use super::reorder::Reorder;
@@ -10,6 +11,7 @@ use crate::runtime::clock::Stopwatch;
 use crate::store::Position;
 use jiff::SignedDuration;
 use std::collections::{BTreeMap, BTreeSet};
+use std::ffi::OsStr;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -51,6 +53,15 @@ struct Followed {
     /// What could not be used in files that are gone, and of all its files what has been reported.
     quarantined_in_gone: u64,
     quarantined_told: u64,
+}
+
+impl Followed {
+    /// Whether the pattern asks for a file of this name.
+    fn takes(&self, path: &Path) -> bool {
+        let name = path.file_name().and_then(OsStr::to_str);
+        path.parent() == Some(self.pattern.folder())
+            && name.is_some_and(|name| is_ours(&self.pattern, &self.decoder, name))
+    }
 }
 
 /// Every followed file, and which folders to look for more.
@@ -154,6 +165,7 @@ impl Follower {
                 file.refill();
                 self.heads.extend(head(key.clone(), file));
             }
+            hold_newest(self.files.values_mut());
         }
         let (mut direct, mut read) = (Vec::new(), 0);
         while read < BATCH
@@ -203,6 +215,9 @@ impl Follower {
     fn positions(&mut self) -> Vec<Position> {
         let mut positions = std::mem::take(&mut self.gone);
         for ((source, path), file) in &mut self.files {
+            if file.is_nameless() {
+                continue;
+            }
             let moved = file.moved().map(|body| Position {
                 name: name(&self.sources[*source].id, path),
                 body: Some(body),
@@ -235,23 +250,13 @@ impl Follower {
             .filter(|(key, file)| is_gone(key, file))
             .map(|(key, _)| key.clone())
             .collect();
-        for key in gone {
-            let Some(mut file) = self.files.remove(&key) else {
-                continue;
-            };
-            let name = name(&self.sources[key.0].id, &key.1);
-            self.gone.push((key.0, Position { name, body: None }));
-            let moved = file.leave().map(|path| (key.0, path));
-            if let Some(moved) = moved.filter(|moved| !present.contains_key(moved)) {
-                tracing::info!(file = %key.1.display(), now = %moved.1.display(), "renamed");
-                self.files.insert(moved, file);
-            } else {
-                tracing::info!(file = %key.1.display(), "gone");
-                if file.is_lost(&key.1) {
-                    self.lost.push(file.lost());
-                }
-                self.sources[key.0].quarantined_in_gone += file.quarantined;
-            }
+        // All of them first: the new name of one may be the former name of another.
+        let gone: Vec<(FileKey, FileTail)> = gone
+            .into_iter()
+            .filter_map(|key| self.files.remove_entry(&key))
+            .collect();
+        for (key, file) in gone {
+            self.depart(key, file, &present);
         }
         for key in present.into_keys() {
             if !self.files.contains_key(&key) {
@@ -262,6 +267,56 @@ impl Follower {
                 self.files.insert(key, file);
             }
         }
+    }
+
+    /// A file is no longer under its name: it is followed on under another, or forgotten.
+    fn depart(&mut self, key: FileKey, mut file: FileTail, present: &BTreeMap<FileKey, FileId>) {
+        // After a restart the config may be another one, and ask for other files.
+        let is_asked_for = !file.is_restored || self.sources[key.0].takes(&file.origin);
+        let moved = is_asked_for.then(|| file.leave()).flatten();
+        let moved = moved.map(|path| (key.0, path));
+        let moved = moved.filter(|moved| !present.contains_key(moved));
+        let has_room = || {
+            let departed = self
+                .files
+                .values()
+                .filter(|file| file.has_rested().is_some());
+            departed.count() < MOST_DEPARTED
+        };
+        if moved.as_ref() == Some(&key) {
+            self.files.insert(key, file);
+            return;
+        }
+        let name = name(&self.sources[key.0].id, &key.1);
+        self.gone.push((key.0, Position { name, body: None }));
+        let Some(moved) = moved else {
+            tracing::info!(file = %key.1.display(), "gone");
+            if file.is_lost(&key.1) {
+                self.lost.push(file.lost());
+            }
+            self.sources[key.0].quarantined_in_gone += file.quarantined;
+            return;
+        };
+        if !has_room() {
+            self.let_one_go();
+        }
+        tracing::info!(file = %key.1.display(), now = %moved.1.display(), "gone from its name, and read on for as long as it grows");
+        self.files.insert(moved, file);
+    }
+
+    /// Forgets the file that has not grown for the longest time after it had gone.
+    fn let_one_go(&mut self) {
+        let departed = self.files.iter();
+        let departed = departed.filter_map(|(key, file)| Some((file.has_rested()?, key)));
+        let Some(key) = departed.max().map(|(_, key)| key.clone()) else {
+            return;
+        };
+        if let Some(file) = self.files.remove(&key) {
+            tracing::info!(file = %key.1.display(), "no longer read on: too many files have gone");
+            self.sources[key.0].quarantined_in_gone += file.quarantined;
+        }
+        let name = name(&self.sources[key.0].id, &key.1);
+        self.gone.push((key.0, Position { name, body: None }));
     }
 
     fn list(&mut self) -> BTreeMap<FileKey, FileId> {
@@ -320,16 +375,18 @@ fn name(source: &str, path: &Path) -> String {
     format!("{source}:{}", path.display())
 }
 
+fn is_ours(pattern: &FilePattern, decoder: &Decoder, name: &str) -> bool {
+    let packed = name.strip_suffix(".gz").filter(|_| decoder.takes_packed());
+    pattern.matches(name) || packed.is_some_and(|name| pattern.matches(name))
+}
+
 /// Files, and what has a name that is no text.
 pub(in crate::runtime) type Listed = (Vec<(PathBuf, FileId)>, Vec<PathBuf>);
 
 /// The files of the pattern, packed ones among them where the source has text; and those that would be, if their names
 /// were text.
 pub(in crate::runtime) fn list(pattern: &FilePattern, decoder: &Decoder) -> io::Result<Listed> {
-    let is_ours = |name: &str| {
-        let packed = name.strip_suffix(".gz").filter(|_| decoder.takes_packed());
-        pattern.matches(name) || packed.is_some_and(|name| pattern.matches(name))
-    };
+    let is_ours = |name: &str| is_ours(pattern, decoder, name);
     let (mut files, mut not_text) = (Vec::new(), Vec::new());
     for entry in std::fs::read_dir(pattern.folder())? {
         let entry = entry?;

@@ -8,6 +8,7 @@
 //! them; whoever takes the values drops what it has seen.
 
 mod decode;
+mod departed;
 mod file;
 mod follow;
 mod gap;
