@@ -86,6 +86,10 @@ pub enum TimeFault {
     NotThePattern,
     /// It is no number of seconds or milliseconds since 1970.
     NotUnix,
+    /// It is a number of seconds since 1970, where one of milliseconds was expected.
+    SecondsNotMilliseconds,
+    /// Its year has two digits, where four were expected.
+    ShortYear,
     /// It is no number of days since 1900.
     NotExcel,
     /// It may be such a number of days, where none was expected.
@@ -119,6 +123,12 @@ impl TimeFault {
             Self::NotThePattern => "a time as time_format (--time-format) says",
             Self::NotUnix => {
                 "seconds since 1970, as time_format (--time-format) says; unix_ms for milliseconds"
+            }
+            Self::SecondsNotMilliseconds => {
+                "milliseconds since 1970, as time_format (--time-format) says; unix for seconds"
+            }
+            Self::ShortYear => {
+                "a year of four digits, as %Y in time_format (--time-format) says; %y for two"
             }
             Self::NotExcel => "days since 1900, as time_format (--time-format) = excel says",
             Self::LikeExcel => {

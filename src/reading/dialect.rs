@@ -40,7 +40,11 @@ impl Dialect {
                 from_milliseconds(seconds.map(|one| one * 1e3)).ok_or(TimeFault::NotUnix)
             }
             TimeFormat::UnixMilliseconds => {
-                from_milliseconds(self.number(text)).ok_or(TimeFault::NotUnix)
+                let milliseconds = self.number(text);
+                if milliseconds.is_some_and(|one| SECONDS_OF_NOW.contains(&one)) {
+                    return Err(TimeFault::SecondsNotMilliseconds);
+                }
+                from_milliseconds(milliseconds).ok_or(TimeFault::NotUnix)
             }
             TimeFormat::ExcelDays => {
                 let days = self.number(text).filter(|days| EXCEL_DAYS.contains(days));
@@ -158,6 +162,10 @@ pub enum TimeFormat {
 
 /// The year 5138; what is larger is not in seconds.
 const LATEST_UNIX_SECOND: f64 = 1e11;
+/// From 1973 to 2286 in seconds; as milliseconds they would all lie in early 1970.
+const SECONDS_OF_NOW: std::ops::Range<f64> = 1e8..1e10;
+/// The first year of four digits that is taken: jiff reads `26` as a year by `%Y` too.
+const FIRST_LONG_YEAR: i16 = 100;
 /// From 1900 to 2173.
 const EXCEL_DAYS: std::ops::Range<f64> = 1.0..100_000.0;
 /// Day 0 of Excel's dates after February 1900.
@@ -205,6 +213,9 @@ fn by_pattern(pattern: &str, text: &str, clock: &LocalClock) -> Result<Timestamp
         return read.to_timestamp().map_err(|_| TimeFault::NotThePattern);
     }
     let date = read.to_date().map_err(|_| TimeFault::NotThePattern)?;
+    if (0..FIRST_LONG_YEAR).contains(&date.year()) {
+        return Err(TimeFault::ShortYear);
+    }
     let time = match read.hour() {
         None => Time::midnight(),
         Some(_) => read.to_time().map_err(|_| TimeFault::NotThePattern)?,
@@ -297,9 +308,13 @@ mod tests {
                 "2017-07-06T12:00:00Z",
             ),
             ("%d.%m.%Y %H:%M", "07/06/2017 17:00", "NotThePattern"),
+            ("%d.%m.%Y %H:%M", "06.07.17 17:00", "ShortYear"),
+            ("%d.%m.%y %H:%M", "06.07.17 17:00", "2017-07-06T15:00:00Z"),
             ("unix", "1499353200", "2017-07-06T15:00:00Z"),
             ("unix", "1499353200000", "NotUnix"),
             ("unix_ms", "1499353200000", "2017-07-06T15:00:00Z"),
+            ("unix_ms", "1499353200", "SecondsNotMilliseconds"),
+            ("unix_ms", "60000", "1970-01-01T00:01:00Z"),
             ("excel", "42922.708333333", "2017-07-06T15:00:00Z"),
             ("excel", "1499353200", "NotExcel"),
             ("rfc3339", "06/07/2017 17:00", "LikeDayOrMonthFirst"),

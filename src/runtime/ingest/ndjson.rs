@@ -148,8 +148,12 @@ impl NdjsonRows {
             | Value::Object(_) => return Err(fields.fail("name", name.to_string(), "a name")),
         };
         let conventions = &self.options.conventions;
-        let text = fields.text("time")?.unwrap_or_default();
-        let time = (self.options.dialect.instant(text, &conventions.clock))
+        let text = match object.get("time") {
+            // As time_format = "unix" has it.
+            Some(Value::Number(number)) => number.to_string(),
+            Some(_) | None => fields.text("time")?.unwrap_or_default().to_owned(),
+        };
+        let time = (self.options.dialect.instant(&text, &conventions.clock))
             .map_err(|fault| fields.fail("time", format!("{text:?}"), fault.expected()))?;
         let value = object.get("value");
         let topic = match kind {
