@@ -31,6 +31,14 @@ const LARGE_M: f64 = 100.0;
 /// A reading that is further ahead of the clock was given a wrong time; a logger's clock is off by minutes.
 pub const AHEAD: SignedDuration = SignedDuration::from_mins(10);
 
+/// Time zones differ by whole hours, a few by half an hour, seconds, and by 14 h at most.
+const HALF_HOUR_S: f64 = 1800.0;
+const MOST_HALF_HOURS: u32 = 28;
+/// The newest reading is some minutes old, seconds; of a half hour less, as it is rare. Clocks differ by two minutes.
+const UNDER_S: f64 = 900.0;
+const UNDER_HALF_S: f64 = 300.0;
+const OVER_S: f64 = 120.0;
+
 /// The kinds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -78,9 +86,30 @@ pub fn ahead(newest: Timestamp, now: Timestamp) -> Option<DatedSuspicion> {
         kind: Suspicion::Ahead,
         at: newest,
         text: format!(
-            "the last reading, {newest}, is {ahead:#} ahead of this machine's clock: is the time_zone of the source right, and dst, and the clock itself?"
+            "the last reading, {newest}, is {ahead:#} ahead of this machine's clock: is the time_zone of the source right, and dst, and the clock itself?{}",
+            like_a_zone(ahead).map_or_else(String::new, |hint| format!(" {hint}"))
         ),
     })
+}
+
+/// What to do where readings are ahead of the clock by about as much as one time zone is of another.
+pub fn like_a_zone(ahead: SignedDuration) -> Option<String> {
+    let ahead_s = ahead.as_secs_f64();
+    let is_near = |half_hours: &u32| {
+        let zone_s = f64::from(*half_hours) * HALF_HOUR_S;
+        let under_s = if half_hours.is_multiple_of(2) {
+            UNDER_S
+        } else {
+            UNDER_HALF_S
+        };
+        (-under_s..=OVER_S).contains(&(ahead_s - zone_s))
+    };
+    let half_hours = (1..=MOST_HALF_HOURS).find(is_near)?;
+    let hours = f64::from(half_hours) / 2.0;
+    Some(format!(
+        "About {hours} h ahead is what a logger gives that writes local time: set time_zone in its [[source]] to the zone of \
+         the logger's clock; where its times state an offset, or Z, correct the logger"
+    ))
 }
 
 /// Whether readings of these values give no rise to any suspicion, as far as it can be known without sorting them; what
@@ -286,6 +315,24 @@ mod tests {
             if index == marked { -9999.0 } else { value }
         };
         (0..length).map(|index| value(index, rng)).collect()
+    }
+
+    #[test]
+    fn what_is_ahead_by_whole_hours_may_be_in_local_time_and_what_is_not_is_not() {
+        let hint = |seconds: i64| like_a_zone(SignedDuration::from_secs(seconds));
+        for (seconds, hours) in [
+            (8 * 3600, "8 h"),
+            (28_171, "8 h"),
+            (19_790, "5.5 h"),
+            (50_460, "14 h"),
+        ] {
+            let hint = hint(seconds).unwrap();
+            assert!(hint.contains(&format!("About {hours} ahead")), "{hint}");
+            assert!(hint.contains("time_zone in its [[source]]"), "{hint}");
+        }
+        for seconds in [0, 660, 7 * 3600 + 1200, 40 * 86_400, -28_800] {
+            assert_eq!(hint(seconds), None, "{seconds}");
+        }
     }
 
     #[test]

@@ -135,3 +135,30 @@ fn what_an_unset_clock_gave_first_does_not_disarm_a_displacement_threshold() {
     assert!(events.contains("displacement-threshold"), "{events}");
     assert!(events.contains("clock-not-set"), "{events}");
 }
+
+/// A logger that writes local time without saying so, eight hours ahead.
+#[test]
+fn readings_that_are_whole_hours_ahead_are_said_to_be_perhaps_in_another_zone() {
+    let site = Site::new("");
+    let now = clock::now();
+    let rows = (0..60).map(|row| {
+        let time = now + SignedDuration::from_hours(8) - SignedDuration::from_mins(10 * (59 - row));
+        format!("{time},{row}\n")
+    });
+    site.append(
+        "incoming/5.csv",
+        &format!("{HEADER}{}", rows.collect::<String>()),
+    );
+    let program = site.caught_up();
+    eventually("that the clock is doubted", || {
+        site.notified("site/unknown/clock/", "firing") == 1
+    });
+    program.stop();
+    let events = site.proven_events();
+    let fault = events
+        .lines()
+        .find(|line| line.contains("the host's clock says"));
+    let fault = fault.unwrap_or_else(|| panic!("{events}"));
+    assert!(fault.contains("About 8 h ahead"), "{fault}");
+    assert!(fault.contains("set time_zone in its [[source]]"), "{fault}");
+}

@@ -23,6 +23,41 @@ const MOST_JUDGED: usize = 8;
 /// So many values of a kind that are set aside are logged one by one; then each time their number has doubled.
 const LOGGED: u64 = 16;
 
+/// Why a daemon does not take a value, by its time alone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(in crate::runtime) enum Untimely {
+    /// It lies ahead of the clock.
+    Future,
+    /// Before 1678, where nothing was measured.
+    BeforeAll,
+    /// On the first day of 1970.
+    WithoutClock,
+}
+
+/// Whether, and why, a value of `time` is not taken while it is `latest`.
+pub(in crate::runtime) fn untimely(time: Timestamp, latest: Timestamp) -> Option<Untimely> {
+    if time.duration_since(latest) > clock::TOLERANCE {
+        Some(Untimely::Future)
+    } else if time < BEFORE_ALL {
+        Some(Untimely::BeforeAll)
+    } else if CLOCKLESS.contains(&time) {
+        Some(Untimely::WithoutClock)
+    } else {
+        None
+    }
+}
+
+/// What to do where readings say that it is `now`, and the host's clock says `wall`.
+fn clock_wrong(now: Timestamp, wall: Timestamp) -> String {
+    let hint = suspicion::like_a_zone(now.duration_since(wall));
+    let hint = hint.map_or_else(String::new, |hint| {
+        format!(". Or is the clock right? {hint}")
+    });
+    format!(
+        "the host's clock says {wall}, and there are readings of {now}: set it; what lies ahead of it waits{hint}"
+    )
+}
+
 /// Whether the value that is set aside as number `total` is logged.
 pub(in crate::runtime) fn is_logged(total: u64) -> bool {
     total <= LOGGED || total.is_power_of_two()
@@ -104,9 +139,11 @@ impl Site {
 
     /// Whether the value is not to be taken now: it is from the future, or no clock gives its time.
     fn is_set_aside(&mut self, arrival: &Arrival, wall: Timestamp) -> bool {
-        let time = arrival.time;
         let latest = self.keeper.now(wall).max(wall);
-        if time.duration_since(latest) > clock::TOLERANCE {
+        let Some(why) = untimely(arrival.time, latest) else {
+            return false;
+        };
+        if why == Untimely::Future {
             if self.sinks.store.is_some()
                 && (self.keeper.is_behind(wall) || self.may_prove_it(arrival))
             {
@@ -115,13 +152,13 @@ impl Site {
             self.set_aside(arrival);
             return true;
         }
-        if self.sinks.store.is_none() || (time >= BEFORE_ALL && !CLOCKLESS.contains(&time)) {
+        if self.sinks.store.is_none() {
             return false;
         }
         self.counts.without_clock += 1;
-        let total = self.counts.without_clock;
+        let (time, total) = (arrival.time, self.counts.without_clock);
         if !is_logged(total) {
-        } else if time < BEFORE_ALL {
+        } else if why == Untimely::BeforeAll {
             tracing::warn!(%time, what = arrival.input.series_name(), "measured before 1678: quarantined");
         } else {
             tracing::warn!(%time, what = arrival.input.series_name(), total, "measured on the first day of 1970, as by a logger whose clock is not set: quarantined");
@@ -312,10 +349,9 @@ impl Site {
             (true, None) => {
                 let held = self.held.len();
                 tracing::error!(%wall, site_time = %now, held, "the host's clock is wrong: earlier than readings that are known");
-                let text = format!(
-                    "the host's clock says {wall}, and there are readings of {now}: set it; what lies ahead of it waits"
-                );
-                Notice::ClockWrong { text }
+                Notice::ClockWrong {
+                    text: clock_wrong(now, wall),
+                }
             }
             (false, Some(_)) => {
                 tracing::warn!(%wall, "the host's clock is right again");

@@ -14,13 +14,13 @@ mod returned;
 mod timekeeper;
 mod unproven;
 
-pub(super) use arrivals::is_logged;
+pub(super) use arrivals::{Untimely, is_logged, untimely};
 pub use mute::Mute;
+pub(super) use unproven::Unproven;
 
 use crowd::MessageRush;
 use returned::Returned;
 use timekeeper::Timekeeper;
-use unproven::Unproven;
 
 use crate::monitor::{Event, EventKind, Input, Monitor, Order, RESET_FOUND, SUSPECT, Settings};
 use crate::reading::{BenchmarkId, Timestamp};
@@ -51,8 +51,8 @@ const STEPS_A_BENCHMARK: usize = 20;
 const STEPS_UNJUDGED: usize = 10;
 /// The site's own part of the memory, beside those of the monitor.
 const OWN: &str = "\0site";
-/// Before all readings.
-const BEFORE_ALL: Timestamp = Timestamp::constant(-9_223_372_036, 0);
+/// Before all readings: the data time of what is said before there is one.
+pub const BEFORE_ALL: Timestamp = Timestamp::constant(-9_223_372_036, 0);
 
 /// Where a site's events go.
 #[derive(Debug)]

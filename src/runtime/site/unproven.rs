@@ -23,7 +23,7 @@ const NEAR: SignedDuration = SignedDuration::from_hours(6);
 
 /// What came before the past had been read.
 #[derive(Debug, Default)]
-pub(super) struct Unproven {
+pub(in crate::runtime) struct Unproven {
     is_over: bool,
     /// The newest readings that came, by benchmark, as far as the clock allows them.
     came: BTreeMap<BenchmarkId, Timestamp>,
@@ -38,7 +38,7 @@ impl Unproven {
     }
 
     /// A reading was taken.
-    pub(super) fn comes(&mut self, benchmark: &BenchmarkId, time: Timestamp) {
+    pub(in crate::runtime) fn comes(&mut self, benchmark: &BenchmarkId, time: Timestamp) {
         if !self.is_over {
             let newest = self.came.entry(benchmark.clone()).or_insert(time);
             *newest = time.max(*newest);
@@ -46,7 +46,12 @@ impl Unproven {
     }
 
     /// Whether a reading ahead of the clock goes on from what is known, as far as `newest`.
-    fn continues(&mut self, benchmark: &BenchmarkId, time: Timestamp, newest: Timestamp) -> bool {
+    pub(in crate::runtime) fn continues(
+        &mut self,
+        benchmark: &BenchmarkId,
+        time: Timestamp,
+        newest: Timestamp,
+    ) -> bool {
         let (last, count) = self.ahead.get(benchmark).copied().unwrap_or((newest, 0));
         let continues = !self.is_over && time.duration_since(last) <= GOES_ON;
         if continues {
@@ -57,7 +62,7 @@ impl Unproven {
     }
 
     /// The past has been read: how late it is at least, where the clock is behind. `None` the next time.
-    fn proven(&mut self, wall: Timestamp) -> Option<Timestamp> {
+    pub(in crate::runtime) fn proven(&mut self, wall: Timestamp) -> Option<Timestamp> {
         let speaks_for_it = |(benchmark, newest): (&BenchmarkId, &Timestamp)| {
             !self.ahead.contains_key(benchmark) && wall.duration_since(*newest) <= NEAR
         };
