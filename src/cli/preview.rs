@@ -98,10 +98,14 @@ fn benchmark_lines(text: &mut String, benchmark: &BenchmarkPreview, zone: &TimeZ
         quantity,
         unit,
         readings,
+        corrected,
+        repeated,
+        ahead,
         first,
         last,
         every_s,
         suspicions,
+        remarks,
     } = benchmark;
     let every = every_s.map_or(String::new(), |seconds| {
         format!(", every {:#}", SignedDuration::from_secs(seconds))
@@ -116,6 +120,17 @@ fn benchmark_lines(text: &mut String, benchmark: &BenchmarkPreview, zone: &TimeZ
             "  {which} {time}{}  {value} {unit}",
             there(*time, zone)
         );
+    }
+    let dropped = [
+        (corrected, "corrected by another reading of the same time"),
+        (repeated, "dropped, the same again"),
+        (ahead, "refused, ahead of this machine's clock"),
+    ];
+    for (count, what) in dropped.iter().filter(|(count, _)| **count > 0) {
+        let _ = writeln!(text, "  {what}: {count}");
+    }
+    for line in remarks {
+        let _ = writeln!(text, "  {line}");
     }
     for line in suspicions {
         let _ = writeln!(text, "  suspicion: {line}");

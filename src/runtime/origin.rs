@@ -79,7 +79,7 @@ impl Origins {
                 break;
             }
             let fed = text.feed(&bytes);
-            for item in fed.items {
+            for (_, item) in fed.items {
                 let arrival = decoder.arrival(item);
                 if let Some(token) = arrival.and_then(|arrival| token(&arrival.input)) {
                     let file = file.to_owned();

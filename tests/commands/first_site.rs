@@ -138,6 +138,98 @@ fn a_day_above_twelve_decides_which_number_is_the_month() {
 }
 
 #[test]
+fn what_init_writes_passes_check_whatever_the_file_is_called_and_has() {
+    let both = rows(30, |time, value| format!("{time}+02:00,{value},12\n"));
+    let both = format!("time,P1_displacement_mm,P1_velocity_mm_per_day\n{both}");
+    let body = rows(30, |time, value| {
+        format!("\"{}\",{value}\n", time.strftime("%F %T"))
+    });
+    let toa5 = format!(
+        "\"TOA5\",\"CR1000\",\"CR1000\",\"1\",\"OS\",\"CPU:p.CR1\",\"2\",\"Hourly\"\n\"TIMESTAMP\",\"P1_displacement\"\n\"TS\",\"mm\"\n\"\",\"Smp\"\n{body}"
+    );
+    let unix = unix_messages(30);
+    let cases: [(&str, &str, &[&str], &str); 5] = [
+        ("both.csv", &both, &[], "quantity = \"displacement\""),
+        (
+            "logger.csv",
+            &toa5,
+            &["--time-zone", "UTC"],
+            "kind = \"toa5\"",
+        ),
+        (
+            "my slope's.csv",
+            &plain(30),
+            &[],
+            "path = \"my slope's.csv\"",
+        ),
+        ("-x.csv", &plain(30), &[], "path = \"-x.csv\""),
+        (
+            "unix.ndjson",
+            &unix,
+            &["--time-format", "unix"],
+            "time_format = \"unix\"",
+        ),
+    ];
+    for (name, text, flags, wanted) in cases {
+        let office = Office::with(&[(name, text)]);
+        let path = format!("./{name}");
+        let said = office.done(&[&["init", &path], flags].concat());
+        let config = fs::read_to_string(office.path("site.toml")).unwrap();
+        assert!(config.contains(wanted), "no {wanted:?} in {config}");
+        let checked = office.done(&["check", "site.toml"]);
+        assert!(checked.contains("30 readings"), "{checked}");
+        assert!(!checked.contains("not watched"), "{checked}");
+        // A shell takes the commands that it names as they stand.
+        for line in said
+            .lines()
+            .filter(|line| line.contains("slipwatch replay "))
+        {
+            let (command, _) = line.split_once("  what it").unwrap();
+            let command = command.trim().replacen("slipwatch", PROGRAM, 1);
+            let mut shell = Command::new("sh");
+            let output = shell
+                .args(["-c", &command])
+                .current_dir(office.folder.path());
+            let (exit, _, err) = ended(&output.output().unwrap());
+            assert_eq!(exit, 0, "{command}: {err}");
+        }
+    }
+}
+
+#[test]
+fn init_says_of_a_file_without_readings_what_it_has_and_suggests_no_wrong_unit() {
+    let row = "2017-06-01T00:00:00Z";
+    let cases = [
+        (
+            format!("time,remark\n{row},rain\n"),
+            "none of its columns (time, remark) holds numbers",
+        ),
+        (
+            format!("time,d_um\n{row},4\n"),
+            "--column \"d_um=P1:displacement:UNIT\"; a UNIT is mm, cm",
+        ),
+        (
+            format!("time,rate_mm_per_min\n{row},4\n"),
+            "--column \"rate_mm_per_min=P1:velocity:UNIT\"",
+        ),
+        (
+            format!("time,way_cm\n{row},4\n"),
+            "--column \"way_cm=P1:displacement:cm\"",
+        ),
+        ("time,P1_displacement_mm\n".to_owned(), "found no row"),
+    ];
+    for (text, wanted) in cases {
+        let office = Office::with(&[("slope.csv", &text)]);
+        let (exit, _, said) = office.say(&["init", "slope.csv"]);
+        assert!(
+            exit != 0 && said.contains(wanted),
+            "no {wanted:?} in {said}"
+        );
+        assert!(!office.path("site.toml").exists(), "{text}");
+    }
+}
+
+#[test]
 fn init_writes_over_no_config_unasked() {
     let office = Office::with(&[("slope.csv", &plain(5)), ("site.toml", "mine")]);
     let said = office.refused(2, &["init", "slope.csv"]);
@@ -324,6 +416,203 @@ fn check_shows_the_rows_that_are_refused_each_kind_once() {
         json["preview"]["sources"][0]["refused"][0]["rows"], 20_000,
         "{json}"
     );
+}
+
+/// One case of what a source's files hold: its keys, its files, what the first benchmark's readings, corrections and
+/// repetitions are, and what is said.
+struct Counted<'a> {
+    source: &'a str,
+    files: Vec<(&'a str, String)>,
+    counts: Option<(u64, u64, u64)>,
+    said: &'a [&'a str],
+}
+
+fn hourly(count: i64, time: impl Fn(jiff::Timestamp) -> String) -> String {
+    let start: jiff::Timestamp = "2026-10-23T12:00:00Z".parse().unwrap();
+    let rows = (0..count).map(|hour| {
+        let at = start + jiff::SignedDuration::from_hours(hour);
+        let value = 0.5 * hour as f64 + 0.01 * (hour * hour) as f64;
+        format!("{},{value:.3}\n", time(at))
+    });
+    rows.collect()
+}
+
+/// Messages whose time is a number of seconds, an hour apart.
+fn unix_messages(count: i64) -> String {
+    (0..count).fold(String::new(), |mut text, hour| {
+        let time = 1_792_756_800 + 3600 * hour;
+        let _ = writeln!(
+            text,
+            r#"{{"benchmark": "P1", "time": {time}, "value": {hour}, "unit": "mm"}}"#
+        );
+        text
+    })
+}
+
+fn other_kinds() -> [Counted<'static>; 2] {
+    let table = hourly(60, |time| time.to_string());
+    [
+        Counted {
+            source: "kind = \"mcap\"",
+            files: vec![("a.csv", format!("time,P1_displacement_mm\n{table}"))],
+            counts: None,
+            said: &["a.csv: found \"time,P1_displacement_mm\", expected an MCAP recording"],
+        },
+        Counted {
+            source: "kind = \"ndjson\"\ntime_format = \"unix\"",
+            files: vec![("a.ndjson", unix_messages(12))],
+            counts: Some((12, 0, 0)),
+            said: &["last  2026-10-23T23:00:00Z  11 mm"],
+        },
+    ]
+}
+
+fn counted_cases() -> Vec<Counted<'static>> {
+    const HEADER: &str = "time,P1_displacement_mm\n";
+    let with = |rows: String| format!("{HEADER}{rows}");
+    let utc = |count| hourly(count, |time| time.to_string());
+    let second_file = with(utc(60).replace("0.510", "0.512").replace("1.040", "1.050"));
+    let metres = "2026-10-24T00:00:00Z,0.0295\n";
+    let rome = jiff::tz::TimeZone::get("Europe/Rome").unwrap();
+    let local = hourly(60, |time| {
+        time.to_zoned(rome.clone()).strftime("%F %H:%M").to_string()
+    });
+    vec![
+        Counted {
+            source: "kind = \"csv\"\ntime_format = \"%d.%m.%Y %H:%M\"\ntime_zone = \"UTC\"",
+            files: vec![(
+                "a.csv",
+                with(hourly(60, |time| {
+                    time.strftime("%d.%m.%y %H:%M").to_string()
+                })),
+            )],
+            counts: None,
+            said: &[
+                "60 rows, the first: ",
+                "a.csv, line 2, column \"time\": found \"23.10.26 12:00\"",
+                "%y for two",
+            ],
+        },
+        Counted {
+            source: "kind = \"csv\"\ntime_format = \"unix_ms\"",
+            files: vec![(
+                "a.csv",
+                with(hourly(60, |time| time.as_second().to_string())),
+            )],
+            counts: None,
+            said: &["a.csv, line 2, column \"time\"", "unix for seconds"],
+        },
+        Counted {
+            source: "kind = \"csv\"",
+            files: vec![("a.csv", with(utc(60))), ("b.csv", second_file)],
+            counts: Some((60, 2, 58)),
+            said: &[
+                "corrected by another reading of the same time: 2",
+                "b.csv, line 3: another reading of 2026-10-23T13:00:00Z: found 0.512 mm, and 0.51 mm before",
+            ],
+        },
+        Counted {
+            source: "kind = \"csv\"\ntime_format = \"%Y-%m-%d %H:%M\"\ntime_zone = \"Europe/Rome\"\ndst = \"earlier\"",
+            files: vec![("a.csv", with(local))],
+            counts: Some((59, 1, 0)),
+            said: &["a.csv, line 39: another reading", "dst = \"standard\""],
+        },
+        Counted {
+            source: "kind = \"csv\"",
+            files: vec![
+                ("a.csv", with(utc(12))),
+                ("b.csv", format!("time,P1_displacement_m\n{metres}")),
+            ],
+            counts: Some((13, 0, 0)),
+            said: &[
+                "b.csv, line 2: found m, and mm before",
+                "last  2026-10-24T00:00:00Z  29.5 mm",
+            ],
+        },
+        Counted {
+            source: "kind = \"csv\"",
+            files: vec![(
+                "a.csv",
+                format!("{}time,P1_displacement_m\n{metres}", with(utc(12))),
+            )],
+            counts: Some((12, 0, 0)),
+            said: &[
+                "a.csv, line 15: its unit was mm and is m, expected the unit that the file began with",
+            ],
+        },
+        Counted {
+            source: "kind = \"csv\"",
+            files: vec![(
+                "a.csv",
+                format!("{HEADER}1970-01-01T01:00:00Z,4\n{}", utc(12)),
+            )],
+            counts: Some((12, 0, 0)),
+            said: &["a.csv, line 2, \"P1\": found 1970-01-01T01:00:00Z, expected another day"],
+        },
+        Counted {
+            source: "kind = \"csv\"",
+            files: vec![(
+                "a.csv",
+                format!("{}2417-01-01T01:00:00Z,4\n", with(utc(12))),
+            )],
+            counts: Some((12, 0, 0)),
+            said: &[
+                "refused, ahead of this machine's clock: 1",
+                "a.csv, line 14, \"P1\": found 2417-01-01T01:00:00Z",
+            ],
+        },
+    ]
+}
+
+#[test]
+fn check_counts_as_readings_what_the_daemon_takes_and_says_what_it_refuses() {
+    for Counted {
+        source,
+        files,
+        counts,
+        said,
+    } in counted_cases()
+    {
+        let config = format!(
+            "[site]\nname = \"Toc\"\nstate_dir = \"state\"\n[[source]]\nid = \"logger\"\n{source}\npath = \"in/a*\"\n[[benchmark]]\nid = \"P1\"\n"
+        );
+        let config = if files.len() > 1 {
+            config.replace("in/a*", "in/*.csv")
+        } else {
+            config
+        };
+        let office = Office::with(&[("site.toml", &config)]);
+        fs::create_dir(office.path("in")).unwrap();
+        for (name, text) in &files {
+            fs::write(office.path("in").join(name), text).unwrap();
+        }
+        let (exit, out, err) = office.say(&["check", "site.toml"]);
+        assert_eq!(exit, i32::from(counts.is_none()), "{source}: {out}{err}");
+        for part in said {
+            assert!(out.contains(part), "{source}: no {part:?} in {out}{err}");
+        }
+        let (_, json, _) = office.say(&["check", "site.toml", "--format", "json"]);
+        let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+        let one = &json["preview"]["benchmarks"][0];
+        let number = |key: &str| one[key].as_u64();
+        let counted = number("readings")
+            .zip(number("corrected"))
+            .zip(number("repeated"));
+        assert_eq!(
+            counted,
+            counts.map(|(a, b, c)| ((a, b), c)),
+            "{source}: {json}"
+        );
+        // The daemon takes each correction too.
+        let daemon = office.run_logged(&["run", "site.toml"]);
+        let (readings, corrected, repeated) = counts.unwrap_or_default();
+        let taken = format!("taken={} repeated={repeated} ", readings + corrected);
+        office.until("all is read", || office.log().contains("caught up"));
+        let log = office.log();
+        let line = log.lines().find(|line| line.contains("caught up")).unwrap();
+        assert!(line.contains(&taken), "{source}: no {taken:?} in {log}");
+        drop(daemon);
+    }
 }
 
 #[test]

@@ -4,14 +4,14 @@ mod dialect;
 mod text;
 mod times;
 
-use super::args::{FileArgs, OutputArgs, OutputFormat};
+use super::args::{DialectArgs, FileArgs, OutputArgs, OutputFormat};
 use super::check;
 use super::exit::{self, UsageError};
 use crate::config::{SourceKind, value};
-use crate::reading::{BenchmarkId, Dialect, Quantity, SummerTime, Unit};
+use crate::reading::{BenchmarkId, Dialect, Quantity, SummerTime, TimeFormat, Unit};
 use crate::runtime::ingest::{
     FileSurvey, Meaning, Measure, ReadOptions, TextFormat, look_through, read_with_remarks, survey,
-    unpacked_name,
+    text_format_of, unit_in_name, unpacked_name,
 };
 use dialect::Written;
 use jiff::SignedDuration;
@@ -78,6 +78,8 @@ struct PlannedBenchmark {
     /// Its column and unit, where the column's name does not say whose readings it holds.
     column: Option<(String, String)>,
     is_velocity: bool,
+    /// Whether the file has its velocity too: one of both is monitored.
+    has_both: bool,
 }
 
 /// Writes the config, checks it, and says what to do next.
@@ -124,8 +126,7 @@ fn plan(args: &Args) -> anyhow::Result<InitPlan> {
         match held(file, &source, args)? {
             Ok(found) => {
                 for benchmark in found {
-                    let key = (benchmark.id.clone(), benchmark.is_velocity);
-                    if let Some(other) = benchmarks.insert(key, benchmark) {
+                    if let Some(other) = benchmarks.insert(benchmark.id.clone(), benchmark) {
                         problems.push(twice(file, &other));
                     }
                 }
@@ -183,7 +184,7 @@ fn kind_of(file: &Path) -> anyhow::Result<SourceKind> {
         .unwrap_or_default()
         .to_string_lossy()
         .to_ascii_lowercase();
-    let format = TextFormat::of_extension(&ending).map_or(ending.as_str(), |format| format.name);
+    let format = text_format_of(file).map_or(ending.as_str(), |format| format.name);
     let kind = SourceKind::ALL
         .into_iter()
         .find(|kind| kind.name() == format);
@@ -210,7 +211,10 @@ fn written(
             dialect::written(&survey, &args.file.dialect)
         }
         SourceKind::Ndjson | SourceKind::Toa5 | SourceKind::Mcap => Ok(Written {
-            dialect: Dialect::default(),
+            dialect: Dialect {
+                time_format: stated_format(kind, &args.file.dialect),
+                ..Dialect::default()
+            },
             needs_zone: kind == SourceKind::Toa5,
         }),
     };
@@ -224,6 +228,14 @@ fn written(
         }
         Ok(written)
     }))
+}
+
+/// How times are written where nothing but the flag says it.
+fn stated_format(kind: SourceKind, stated: &DialectArgs) -> TimeFormat {
+    let stated = stated.time_format.clone();
+    stated
+        .filter(|_| kind == SourceKind::Ndjson)
+        .unwrap_or_default()
 }
 
 /// The benchmarks that the file holds, or which flag names them.
@@ -251,12 +263,27 @@ fn held(
             source: source.id.clone(),
             column: stated(benchmark, *unit),
             is_velocity: unit.quantity() == Quantity::Velocity,
+            has_both: false,
         });
     let found: Vec<PlannedBenchmark> = found.collect();
     if found.is_empty() {
         return Ok(Err(without_readings(file, &looked)));
     }
-    Ok(Ok(found))
+    Ok(Ok(one_quantity_each(found)))
+}
+
+/// The displacement of each benchmark that has its velocity too: the config names each benchmark once.
+fn one_quantity_each(mut found: Vec<PlannedBenchmark>) -> Vec<PlannedBenchmark> {
+    let with = |velocity: bool, found: &[PlannedBenchmark]| -> BTreeSet<String> {
+        let of_it = found.iter().filter(|one| one.is_velocity == velocity);
+        of_it.map(|one| one.id.clone()).collect()
+    };
+    let (displacements, velocities) = (with(false, &found), with(true, &found));
+    found.retain(|one| !one.is_velocity || !displacements.contains(&one.id));
+    for one in &mut found {
+        one.has_both = !one.is_velocity && velocities.contains(&one.id);
+    }
+    found
 }
 
 fn look(file: &Path, kind: SourceKind, options: &ReadOptions) -> anyhow::Result<FileSurvey> {
@@ -277,13 +304,46 @@ fn without_readings(file: &Path, looked: &FileSurvey) -> String {
         matches!(meaning, Meaning::Covariate { .. }).then_some(name.as_str())
     });
     let numbers: Vec<&str> = numbers.collect();
-    let example = format!("{}=P1:displacement:mm", numbers.first().unwrap_or(&"NAME"));
+    let named = "no column is named as readings are ([ID_]displacement_UNIT or [ID_]velocity_UNIT)";
+    let Some(first) = numbers.first() else {
+        let columns: Vec<&str> = looked
+            .columns
+            .iter()
+            .map(|(name, _)| name.as_str())
+            .collect();
+        return match &columns[..] {
+            [] => format!(
+                "{}: found no message and no row with a reading; give a file that has some",
+                file.display()
+            ),
+            columns => format!(
+                "{}: {named}, and none of its columns ({}) holds numbers; give a file that has some",
+                file.display(),
+                columns.join(", ")
+            ),
+        };
+    };
+    let (quantity, unit) = match unit_at_end(first) {
+        Some(unit) => (unit.quantity().name(), unit.column_suffix()),
+        // The name says nothing of a unit, or one that is not known.
+        None if first.contains("_per_") => ("velocity", "UNIT".to_owned()),
+        None if first.contains('_') => ("displacement", "UNIT".to_owned()),
+        None => ("displacement", "mm".to_owned()),
+    };
+    let example = format!("{first}=P1:{quantity}:{unit}");
     format!(
-        "{}: no column is named as readings are ([ID_]displacement_UNIT or [ID_]velocity_UNIT); its columns of numbers are \
-         {}: say which of them has the readings of which point, in which unit, as in --column {example:?}",
+        "{}: {named}; its columns of numbers are \
+         {}: say which of them has the readings of which point, in which unit, as in --column {example:?}; a UNIT is mm, cm, m, \
+         in or ft, or one of these per h, day or yr (mm_per_day): what is in another one must be converted first",
         file.display(),
         numbers.join(", ")
     )
+}
+
+/// The unit that a column's name ends with, after a `_`.
+fn unit_at_end(column: &str) -> Option<Unit> {
+    let ends = column.match_indices('_').map(|(at, _)| &column[at + 1..]);
+    unit_in_name(column).or_else(|| ends.into_iter().find_map(|end| Unit::parse(end).ok()))
 }
 
 fn source_id(file: &Path, before: &[PlannedSource]) -> String {
@@ -386,14 +446,25 @@ fn say_next(args: &Args) -> anyhow::Result<()> {
 /// Columns of a command, beside which stands what it does.
 const WIDTH: usize = 46;
 
+/// The path as a shell takes it for one word.
+fn in_shell(path: &Path) -> String {
+    let text = path.display().to_string();
+    let is_plain = |letter: char| letter.is_alphanumeric() || "/._-+:,@%".contains(letter);
+    let text = if text.starts_with('-') {
+        format!("./{text}")
+    } else {
+        text
+    };
+    if !text.is_empty() && text.chars().all(is_plain) {
+        return text;
+    }
+    format!("'{}'", text.replace('\'', "'\\''"))
+}
+
 /// The commands that come next, and what each does.
 fn next(args: &Args) -> Vec<(String, &'static str)> {
-    let config = args.output_config.display();
-    let files: Vec<String> = args
-        .files
-        .iter()
-        .map(|file| file.display().to_string())
-        .collect();
+    let config = in_shell(&args.output_config);
+    let files: Vec<String> = args.files.iter().map(|file| in_shell(file)).collect();
     let mut next = vec![
         (
             format!("slipwatch doctor {config}"),

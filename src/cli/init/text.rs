@@ -36,6 +36,11 @@ pub(super) fn config(plan: &InitPlan) -> String {
                 quoted(unit)
             );
         }
+        if benchmark.has_both {
+            text.push_str(
+                "quantity = \"displacement\"         # or \"velocity\": its file has both, and one of them is monitored\n",
+            );
+        }
         if benchmark.is_velocity {
             text.push_str("# averaging = \"1h\"                 # if each velocity is the mean of the time before it\n");
         }

@@ -10,6 +10,9 @@ use std::sync::OnceLock;
 /// Most that is unpacked of one file, bytes: what packs a thousandfold must not fill the memory.
 const MOST_UNPACKED: u64 = 512 << 20;
 
+/// Bytes that show what a file is.
+const FIRST: u64 = 64;
+
 /// Whether the name says that the file is packed.
 pub fn is_packed(file: &Path) -> bool {
     file.extension()
@@ -66,6 +69,20 @@ pub(super) fn shown_name(file: &Path) -> PathBuf {
         PathBuf::from("stdin")
     } else {
         unpacked_name(file)
+    }
+}
+
+/// How the file begins, unpacked; nothing where it cannot be read: whoever reads it says why.
+pub(super) fn first_bytes(file: &Path) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let read = if is_packed(file) {
+        unpack(file).and_then(|packed| packed.take(FIRST).read_to_end(&mut bytes))
+    } else {
+        File::open(file).and_then(|plain| plain.take(FIRST).read_to_end(&mut bytes))
+    };
+    match read {
+        Ok(_) => bytes,
+        Err(_) => Vec::new(),
     }
 }
 

@@ -49,6 +49,7 @@ pub use text_format::{LineReader, TextFormat};
 pub use text_formats::TEXT_FORMATS;
 pub use toa5::TOA5;
 pub use units::FileUnits;
+pub(super) use units::UNIT_WAS;
 pub use vector::VectorMap;
 
 use crate::reading::{
@@ -154,7 +155,7 @@ impl Format {
         let name = bytes::unpacked_name(file);
         let extension = name.extension().unwrap_or_default().to_string_lossy();
         let extension = extension.to_ascii_lowercase();
-        if let Some(format) = TextFormat::of_extension(&extension) {
+        if let Some(format) = text_format_of(file) {
             return Ok(Self::Text(format));
         }
         match extension.as_str() {
@@ -183,6 +184,17 @@ impl Format {
         let format = formats.find(|one| (one.begins)(text)).unwrap_or(&CSV);
         Ok(Self::Text(format))
     }
+}
+
+/// The format of a text file by the ending of its name; `None` where it is that of none. A logger's table is one whatever
+/// its file is called.
+pub fn text_format_of(file: &Path) -> Option<&'static TextFormat> {
+    let name = bytes::unpacked_name(file);
+    let extension = name.extension().unwrap_or_default().to_string_lossy();
+    let format = TextFormat::of_extension(&extension.to_ascii_lowercase())?;
+    let is_table = || (TOA5.begins)(&bytes::first_bytes(file));
+    let is_toa5 = format.name == CSV.name && is_table();
+    Some(if is_toa5 { &TOA5 } else { format })
 }
 
 /// How a recording begins.

@@ -5,6 +5,9 @@ use crate::reading::{BenchmarkId, Unit};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
+/// What is said in place of a reading whose unit is another than before begins with this.
+pub(in crate::runtime) const UNIT_WAS: &str = "its unit was";
+
 /// The unit of each quantity of each benchmark so far; to be kept with the place in the file.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(transparent)]
@@ -36,7 +39,7 @@ impl FileUnits {
                 return Item::Missing {
                     benchmark: benchmark.clone(),
                     time: reading.time,
-                    what: format!("its unit was {known} and is {unit}"),
+                    what: format!("{UNIT_WAS} {known} and is {unit}"),
                 };
             }
         }

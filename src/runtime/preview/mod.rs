@@ -1,5 +1,8 @@
 //! What the files of a site hold now, as the daemon would take it: a look before it starts.
 
+mod recording;
+mod track;
+mod unfed;
 mod view;
 
 pub use view::{
@@ -7,66 +10,78 @@ pub use view::{
 };
 
 use super::clock;
-use super::ingest::{IngestError, Item, Meaning, ReadOptions, is_packed, read_files, unpack};
+use super::ingest::{IngestError, Item, Meaning, UNIT_WAS, is_packed, unpack};
+use super::site::{Unproven, Untimely, untimely};
 use super::tail::{Arrival, BadLine, Decoder, LinesRead, TextReader, list};
 use crate::config::{Config, FileSource, SourceKind};
 use crate::monitor::Input;
 use crate::reading::{
-    BenchmarkId, LocalClock, Quantity, Recording, SummerTime, Suspicion, Timestamp, suspicion,
+    BenchmarkId, LocalClock, Quantity, SummerTime, Suspicion, Timestamp, suspicion,
 };
+use recording::read_recording;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::{self, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use track::{FilePlace, PreviewTrack};
 
 /// Values that are looked at, so that years of history cost a bounded time.
 const MOST_VALUES: u64 = 2_000_000;
-/// Readings of a benchmark that say how often it is measured, the latest.
-const LATEST: usize = 200;
-/// Readings from which on a sign is doubted, where of all that they go by this share is backwards.
-const FEWEST_STEPS: usize = 10;
-const HALF: f64 = 0.5;
 /// Bytes that are read at once.
 const PIECE: usize = 64 * 1024;
+/// What every refusal of a value ahead of the clock is counted under.
+const AHEAD: &str = "ahead of the clock";
 
 /// Looks at the files of `config`.
 pub fn preview(config: &Config) -> Preview {
     let mut look = PreviewSoFar {
         accepted: config.settings.accepted.clone(),
+        now: clock::now(),
         ..PreviewSoFar::default()
     };
     for source in &config.sources {
-        let view = look.source(source, &Decoder::new(source, &config.benchmarks));
-        look.views.push(view);
+        look.source(source, &Decoder::new(source, &config.benchmarks));
     }
-    let unfed = look.unfed(config);
-    let now = clock::now();
-    Preview {
-        is_whole: look.values <= MOST_VALUES,
-        sources: look.views,
-        benchmarks: look
-            .benchmarks
-            .into_values()
-            .map(|track| track.finish(now))
-            .collect(),
-        covariates: look.covariates.into_values().collect(),
-        unwatched: look.unwatched,
-        unfed,
-    }
+    let mut preview = look.finish(config);
+    preview.unfed = unfed::unfed(&preview, config);
+    preview
 }
 
+/// What has been seen of one source.
 #[derive(Debug)]
-struct PreviewTrack {
-    view: BenchmarkPreview,
-    /// Suspicions that people have looked into.
-    accepted: BTreeSet<Suspicion>,
-    readings: Vec<(Timestamp, f64)>,
+struct SourceSoFar {
+    view: SourceView,
+    files: Vec<PathBuf>,
+    /// What is wrong with rows, by kind.
+    refused: BTreeMap<String, Refusal>,
+}
+
+impl SourceSoFar {
+    fn name(&self, (file, line): FilePlace) -> String {
+        let file = self
+            .files
+            .get(file)
+            .map_or_else(String::new, |file| file.display().to_string());
+        if line == 0 {
+            file
+        } else {
+            format!("{file}, line {line}")
+        }
+    }
+
+    fn refuse(&mut self, kind: String, first: impl FnOnce() -> String) {
+        let refusal = self.refused.entry(kind).or_insert_with(|| Refusal {
+            rows: 0,
+            first: first(),
+        });
+        refusal.rows += 1;
+    }
 }
 
 #[derive(Debug, Default)]
 struct PreviewSoFar {
-    views: Vec<SourceView>,
+    sources: Vec<SourceSoFar>,
     benchmarks: BTreeMap<(String, BenchmarkId, Quantity), PreviewTrack>,
     covariates: BTreeMap<(String, String), CovariateView>,
     unwatched: BTreeSet<BenchmarkId>,
@@ -74,110 +89,96 @@ struct PreviewSoFar {
     elsewhere: BTreeSet<(String, BenchmarkId)>,
     accepted: BTreeMap<BenchmarkId, BTreeSet<Suspicion>>,
     values: u64,
+    now: Timestamp,
 }
 
-/// What is wrong with lines, by kind.
-type Refusals = BTreeMap<String, Refusal>;
-
 impl PreviewSoFar {
-    fn source(&mut self, source: &FileSource, decoder: &Decoder) -> SourceView {
-        let mut view = SourceView {
-            id: source.id.clone(),
-            kind: source.kind.name(),
-            path: source.pattern.to_string(),
-            times: times(&source.conventions.clock, source.kind),
-            files: 0,
-            layouts: Vec::new(),
-            refused: Vec::new(),
-            remarks: Vec::new(),
+    fn source(&mut self, source: &FileSource, decoder: &Decoder) {
+        let mut so_far = SourceSoFar {
+            view: SourceView {
+                id: source.id.clone(),
+                kind: source.kind.name(),
+                path: source.pattern.to_string(),
+                times: times(&source.conventions.clock, source.kind),
+                files: 0,
+                layouts: Vec::new(),
+                refused: Vec::new(),
+                remarks: Vec::new(),
+            },
+            files: Vec::new(),
+            refused: BTreeMap::new(),
         };
-        let (mut files, not_text) = match list(&source.pattern, decoder) {
-            Ok(listed) => listed,
+        match list(&source.pattern, decoder) {
+            Ok((files, not_text)) => {
+                so_far.files = files.into_iter().map(|(file, _)| file).collect();
+                so_far.files.sort();
+                let unreadable = not_text.iter().map(|file| {
+                    format!(
+                        "{}: its name is no UTF-8: it is not read; rename it",
+                        file.display()
+                    )
+                });
+                so_far.view.remarks.extend(unreadable);
+            }
             Err(error) => {
                 let folder = source.pattern.folder().display();
-                view.remarks.push(format!("cannot list {folder}: {error}"));
-                return view;
+                let problem = format!("cannot list {folder}: {error}");
+                so_far.view.remarks.push(problem);
+                self.sources.push(so_far);
+                return;
             }
-        };
-        files.sort_by(|one, other| one.0.cmp(&other.0));
-        view.files = files.len();
-        let unreadable = not_text.iter().map(|file| {
-            format!(
-                "{}: its name is no UTF-8: it is not read; rename it",
-                file.display()
-            )
-        });
-        view.remarks.extend(unreadable);
-        let mut refused = Refusals::new();
-        for (file, _) in files {
+        }
+        so_far.view.files = so_far.files.len();
+        for number in 0..so_far.files.len() {
             if self.values > MOST_VALUES {
                 break;
             }
-            let looked = match source.kind {
-                SourceKind::Mcap => self.recording(&file, &source.id, decoder),
-                SourceKind::Csv | SourceKind::Ndjson | SourceKind::Toa5 => {
-                    self.text(&file, decoder, &mut view, &mut refused)
+            match source.kind {
+                SourceKind::Mcap => {
+                    if let Err(problem) = self.recording(number, decoder, &mut so_far) {
+                        so_far.refuse(without_digits(&problem), || problem);
+                    }
                 }
-            };
-            if let Err(problem) = looked {
-                view.remarks.push(problem);
+                SourceKind::Csv | SourceKind::Ndjson | SourceKind::Toa5 => {
+                    let looked = self.text(number, decoder, &mut so_far);
+                    so_far.view.remarks.extend(looked.err());
+                }
             }
         }
         let elsewhere = self.elsewhere.iter().filter(|(id, _)| *id == source.id);
-        view.remarks.extend(elsewhere.map(|(_, benchmark)| {
+        so_far.view.remarks.extend(elsewhere.map(|(_, benchmark)| {
             format!(
                 "it has readings of benchmark {:?}, which its [[benchmark]] takes from another source: they are not read",
                 benchmark.as_str()
             )
         }));
-        view.remarks.extend(decoder.doubtful_units());
-        view.refused = refused.into_values().collect();
-        view.refused.sort_by_key(|refusal| Reverse(refusal.rows));
-        view
+        so_far.view.remarks.extend(decoder.doubtful_units());
+        self.sources.push(so_far);
     }
 
-    fn recording(&mut self, file: &Path, source: &str, decoder: &Decoder) -> Result<(), String> {
-        let read = read_files(&[file.to_owned()], &ReadOptions::default());
-        let (
-            Recording {
-                series, channels, ..
-            },
-            _,
-        ) = read.map_err(|error| error.to_string())?;
-        for series in series {
-            for reading in series.readings {
-                let (benchmark, unit) = (series.benchmark.clone(), series.unit);
-                let averaging = series.averaging;
-                let item = Item::Reading {
-                    benchmark,
-                    unit,
-                    averaging,
-                    reading,
-                };
-                self.item(item, source, decoder);
+    fn recording(
+        &mut self,
+        number: usize,
+        decoder: &Decoder,
+        so_far: &mut SourceSoFar,
+    ) -> Result<(), String> {
+        let file = so_far.files[number].clone();
+        read_recording(&file, |found| {
+            match found {
+                Ok(item) => self.item(item, (number, 0), decoder, so_far),
+                Err(problem) => so_far.refuse(without_digits(&problem), || problem),
             }
-        }
-        for channel in channels {
-            for sample in channel.samples {
-                let (channel, unit) = (channel.name.clone(), channel.unit.clone());
-                let item = Item::Sample {
-                    channel,
-                    unit,
-                    sample,
-                };
-                self.item(item, source, decoder);
-            }
-        }
-        Ok(())
+            self.values <= MOST_VALUES
+        })
     }
 
     fn text(
         &mut self,
-        file: &Path,
+        number: usize,
         decoder: &Decoder,
-        view: &mut SourceView,
-        refused: &mut Refusals,
+        so_far: &mut SourceSoFar,
     ) -> Result<(), String> {
+        let file = &so_far.files[number].clone();
         let Some(rows) = decoder.text_rows(file) else {
             return Ok(());
         };
@@ -197,11 +198,12 @@ impl PreviewSoFar {
             };
             let fed = text.feed(bytes);
             let is_lost = fed.is_lost;
-            self.fed(fed, decoder, view, refused);
+            self.fed(fed, number, decoder, so_far);
             if count == 0 || is_lost || self.values > MOST_VALUES {
                 break;
             }
         }
+        let view = &mut so_far.view;
         if text.is_within_a_line() && self.values <= MOST_VALUES {
             let file = file.display();
             view.remarks.push(format!(
@@ -212,43 +214,34 @@ impl PreviewSoFar {
         Ok(())
     }
 
-    fn fed(
-        &mut self,
-        fed: LinesRead,
-        decoder: &Decoder,
-        view: &mut SourceView,
-        refused: &mut Refusals,
-    ) {
-        for item in fed.items {
-            self.item(item, &view.id, decoder);
+    fn fed(&mut self, fed: LinesRead, file: usize, decoder: &Decoder, so_far: &mut SourceSoFar) {
+        for (line, item) in fed.items {
+            self.item(item, (file, line), decoder, so_far);
         }
+        let remarks = &mut so_far.view.remarks;
         for remark in fed.remarks {
-            let is_new = view
-                .remarks
-                .iter()
-                .all(|one| !one.starts_with(&remark.about));
-            view.remarks.extend(is_new.then(|| remark.to_string()));
+            let is_new = remarks.iter().all(|one| !one.starts_with(&remark.about));
+            remarks.extend(is_new.then(|| remark.to_string()));
         }
         for line in &fed.bad {
-            let refusal = refused.entry(kind_of(line)).or_insert_with(|| Refusal {
-                rows: 0,
-                first: shown(line),
-            });
-            refusal.rows += 1;
+            so_far.refuse(kind_of(line), || shown(line));
         }
     }
 
-    fn item(&mut self, item: Item, source: &str, decoder: &Decoder) {
+    fn item(&mut self, item: Item, place: FilePlace, decoder: &Decoder, so_far: &mut SourceSoFar) {
         self.values += 1;
         let benchmark = match &item {
             Item::Reading { benchmark, .. } => Some(benchmark.clone()),
             Item::Sample { .. } | Item::Missing { .. } => None,
         };
         match (decoder.arrival(item), benchmark) {
-            (Some(arrival), _) => self.arrival(arrival, source),
+            (Some(arrival), _) => self.arrival(arrival, place, so_far),
             (None, Some(benchmark)) if decoder.is_elsewhere(&benchmark) => {
-                self.elsewhere.insert((source.to_owned(), benchmark));
+                let source = so_far.view.id.clone();
+                self.elsewhere.insert((source, benchmark));
             }
+            // Its other quantity is read.
+            (None, Some(benchmark)) if decoder.knows(&benchmark) => {}
             (None, Some(benchmark)) => {
                 self.unwatched.insert(benchmark);
             }
@@ -256,183 +249,145 @@ impl PreviewSoFar {
         }
     }
 
-    fn arrival(&mut self, arrival: Arrival, source: &str) {
+    fn arrival(&mut self, arrival: Arrival, place: FilePlace, so_far: &mut SourceSoFar) {
         let time = arrival.time;
-        if let Input::Sample { channel, unit, .. } = arrival.input {
-            let key = (source.to_owned(), channel.clone());
-            let view = self.covariates.entry(key).or_insert_with(|| CovariateView {
+        let why = untimely(time, self.now);
+        if let Some(why) = why {
+            let what = arrival.input.series_name().to_owned();
+            let (kind, expected) = expected_time(why, time, self.now);
+            let at = so_far.name(place);
+            so_far.refuse(kind.to_owned(), || {
+                format!("{at}, {what:?}: found {time}, expected {expected}")
+            });
+        }
+        let source = so_far.view.id.clone();
+        if let Input::Missing { what, .. } = arrival.input {
+            if what.starts_with(UNIT_WAS) {
+                let at = so_far.name(place);
+                so_far.refuse(what.clone(), || {
+                    format!("{at}: {what}, expected the unit that the file began with")
+                });
+            }
+        } else if why.is_none()
+            && let Input::Sample { channel, unit, .. } = arrival.input
+        {
+            self.sample(CovariateView {
                 name: channel,
                 unit,
-                source: source.to_owned(),
+                source,
                 values: 0,
                 first: time,
                 last: time,
             });
-            view.values += 1;
-            (view.first, view.last) = (view.first.min(time), view.last.max(time));
-        } else if let Input::Reading {
-            benchmark,
-            unit,
-            reading,
-            ..
-        } = arrival.input
-        {
-            let key = (source.to_owned(), benchmark.clone(), unit.quantity());
-            let here = (time, reading.value);
-            let accepted = self.accepted.get(&benchmark).cloned().unwrap_or_default();
-            let track = self.benchmarks.entry(key).or_insert_with(|| PreviewTrack {
-                view: BenchmarkPreview {
-                    id: benchmark,
-                    source: source.to_owned(),
-                    quantity: unit.quantity(),
-                    unit: unit.to_string(),
-                    readings: 0,
-                    first: here,
-                    last: here,
-                    every_s: None,
-                    suspicions: Vec::new(),
-                },
-                accepted,
-                readings: Vec::new(),
-            });
-            track.take(here);
-        }
-    }
-
-    /// What the config names and the files do not have.
-    fn unfed(&self, config: &Config) -> Vec<Unfed> {
-        if self.values > MOST_VALUES {
-            return Vec::new();
-        }
-        let mut unfed = Vec::new();
-        for view in &self.views {
-            let has = |id: &BenchmarkId| {
-                self.benchmarks
-                    .keys()
-                    .any(|key| key.0 == view.id && key.1 == *id)
-            };
-            let mut named = config
-                .benchmarks
-                .iter()
-                .filter(|one| one.source == view.id)
-                .peekable();
-            let is_open = named.peek().is_none();
-            let absent = named
-                .filter(|one| !has(&one.id))
-                .map(|one| Some(one.id.clone()));
-            let mut absent: Vec<Option<BenchmarkId>> = absent.collect();
-            if is_open
-                && view.files > 0
-                && self.benchmarks.keys().all(|key| key.0 != view.id)
-                && self.covariates.keys().all(|key| key.0 != view.id)
-            {
-                absent.push(None);
-            }
-            unfed.extend(absent.into_iter().map(|benchmark| Unfed {
-                text: self.why(view, benchmark.as_ref()),
+        } else if why.is_none_or(|why| why == Untimely::Future)
+            && let Input::Reading {
                 benchmark,
-                source: view.id.clone(),
-            }));
-        }
-        if unfed.is_empty() && self.benchmarks.is_empty() && config.brokers.is_empty() {
-            unfed.push(Unfed {
-                benchmark: None,
-                source: String::new(),
-                text: format!(
-                    "no file has readings of a benchmark: nothing is watched; {NAME_THEM}"
-                ),
+                unit,
+                reading,
+                ..
+            } = arrival.input
+        {
+            let key = (source.clone(), benchmark.clone(), unit.quantity());
+            let accepted = self.accepted.get(&benchmark).cloned().unwrap_or_default();
+            let here = (time, reading.value);
+            let track = self.benchmarks.entry(key).or_insert_with(|| {
+                let view = BenchmarkPreview::new(benchmark, source, unit, here);
+                PreviewTrack::new(view, unit, accepted)
             });
+            track.take(here, unit, place, why.is_some());
         }
-        unfed
     }
 
-    fn why(&self, view: &SourceView, benchmark: Option<&BenchmarkId>) -> String {
-        let SourceView { id, path, .. } = view;
-        let whose = benchmark.map_or_else(
-            || format!("source {id:?}"),
-            |benchmark| format!("benchmark {:?}", benchmark.as_str()),
-        );
-        if view.files == 0 {
-            return format!("{whose}: there is no file {path}; is the path right?");
+    fn sample(&mut self, one: CovariateView) {
+        let (first, last) = (one.first, one.last);
+        let key = (one.source.clone(), one.name.clone());
+        let view = self.covariates.entry(key).or_insert(one);
+        view.values += 1;
+        (view.first, view.last) = (view.first.min(first), view.last.max(last));
+    }
+
+    /// Whether a daemon on a first start would take the readings that lie ahead of the clock, and call the clock wrong.
+    fn proves_the_clock_wrong(&self) -> bool {
+        let mut unproven = Unproven::default();
+        for ((_, id, _), track) in &self.benchmarks {
+            let (ahead, newest) = track.times_ahead();
+            let Some(newest) = newest else { continue };
+            unproven.comes(id, newest);
+            for time in ahead {
+                unproven.continues(id, time, newest);
+            }
         }
-        if benchmark.is_none() {
-            return format!("{whose}: its files have no reading of any benchmark; {NAME_THEM}");
+        unproven.proven(self.now).is_some()
+    }
+
+    fn finish(mut self, config: &Config) -> Preview {
+        let proves = self.proves_the_clock_wrong();
+        let mut benchmarks = Vec::new();
+        for ((id, ..), track) in std::mem::take(&mut self.benchmarks) {
+            let so_far = self.sources.iter().find(|one| one.view.id == id);
+            let source = config.sources.iter().find(|one| one.id == id);
+            let zone = source.and_then(|source| source.conventions.clock.zone.as_ref());
+            let name = |place| so_far.map_or_else(String::new, |one| one.name(place));
+            benchmarks.push(track.finish(self.now, proves, zone, &name));
         }
-        let others: Vec<&str> = self.unwatched.iter().map(BenchmarkId::as_str).collect();
-        let hint = match &others[..] {
-            [] => NAME_THEM.to_owned(),
-            others => format!(
-                "they have {}, which no [[benchmark]] names; is the id right?",
-                others.join(", ")
-            ),
-        };
-        format!(
-            "{whose}: the files that are there have no reading of it, and it is not watched; {hint}"
-        )
+        doubt_second_quantities(&mut benchmarks);
+        let sources = self.sources.into_iter().map(|mut one| {
+            if proves && one.refused.remove(AHEAD).is_some() {
+                one.view.remarks.push(
+                    "readings go on beyond this machine's clock: the daemon takes them, and reports its clock as wrong"
+                        .to_owned(),
+                );
+            }
+            one.view.refused = one.refused.into_values().collect();
+            one.view.refused.sort_by_key(|refusal| Reverse(refusal.rows));
+            one.view
+        });
+        Preview {
+            is_whole: self.values <= MOST_VALUES,
+            sources: sources.collect(),
+            benchmarks,
+            covariates: self.covariates.into_values().collect(),
+            unwatched: self.unwatched,
+            unfed: Vec::new(),
+        }
     }
 }
 
-/// How a column comes to be a benchmark's.
-const NAME_THEM: &str = "name the column [ID_]displacement_UNIT or [ID_]velocity_UNIT, or say in [[benchmark]] its column and unit";
-
-impl PreviewTrack {
-    fn take(&mut self, here: (Timestamp, f64)) {
-        let view = &mut self.view;
-        view.readings += 1;
-        if here.0 < view.first.0 {
-            view.first = here;
+/// The kind of a refusal by time, and what was expected.
+fn expected_time(why: Untimely, time: Timestamp, now: Timestamp) -> (&'static str, String) {
+    match why {
+        Untimely::Future => {
+            let hint = suspicion::like_a_zone(time.duration_since(now));
+            let hint = hint.map_or_else(String::new, |hint| format!("; {hint}"));
+            let expected = format!(
+                "a time no more than an hour ahead of this machine's clock, {now:.0}{hint}"
+            );
+            (AHEAD, expected)
         }
-        if here.0 >= view.last.0 {
-            view.last = here;
+        Untimely::BeforeAll => ("too early", "a time from 1678 on".to_owned()),
+        Untimely::WithoutClock => (
+            "no clock",
+            "another day than the first of 1970, where a logger starts whose clock is not set"
+                .to_owned(),
+        ),
+    }
+}
+
+/// The monitor goes by the quantity of a benchmark that it reads first.
+fn doubt_second_quantities(benchmarks: &mut [BenchmarkPreview]) {
+    let all: Vec<(BenchmarkId, Quantity)> = benchmarks
+        .iter()
+        .map(|one| (one.id.clone(), one.quantity))
+        .collect();
+    for one in benchmarks {
+        let is_other =
+            |(id, quantity): &&(BenchmarkId, Quantity)| *id == one.id && *quantity != one.quantity;
+        if let Some((_, other)) = all.iter().find(is_other) {
+            one.remarks.push(format!(
+                "its files have its {other} too, and the one that is read first is monitored: write quantity = \"{}\" or quantity = \"{other}\" for this benchmark",
+                one.quantity
+            ));
         }
-        self.readings.push(here);
-    }
-
-    fn finish(mut self, now: Timestamp) -> BenchmarkPreview {
-        let times: BTreeSet<Timestamp> = self.readings.iter().map(|reading| reading.0).collect();
-        let latest: Vec<Timestamp> = times.into_iter().rev().take(LATEST).collect();
-        let pairs = latest.iter().zip(latest.iter().skip(1));
-        let mut gaps: Vec<i64> = pairs.map(|(b, a)| b.duration_since(*a).as_secs()).collect();
-        gaps.sort_unstable();
-        self.view.every_s = gaps.get(gaps.len() / 2).copied();
-        self.view.suspicions = self.suspicions(now);
-        self.view
-    }
-
-    fn suspicions(&mut self, now: Timestamp) -> Vec<String> {
-        self.readings.sort_by_key(|(time, _)| *time);
-        let BenchmarkPreview {
-            last,
-            quantity,
-            unit,
-            ..
-        } = &self.view;
-        let ahead = suspicion::ahead(last.0, now).into_iter();
-        let all = ahead.chain(suspicion::of_values(&self.readings, *quantity, unit));
-        let not_accepted = all.filter(|one| !self.accepted.contains(&one.kind));
-        let texts = not_accepted.map(|one| one.text);
-        texts.chain(self.moves_backwards()).collect()
-    }
-
-    /// What to do where the displacement falls all along.
-    fn moves_backwards(&self) -> Option<String> {
-        let steps = self.readings.windows(2).map(|pair| pair[1].1 - pair[0].1);
-        let (mut sum, mut sizes) = (0.0, 0.0);
-        for step in steps {
-            sum += step;
-            sizes += step.abs();
-        }
-        let is_displacement = self.view.quantity == Quantity::Displacement;
-        let is_known = self.accepted.contains(&Suspicion::Fall);
-        let falls = is_displacement
-            && !is_known
-            && self.readings.len() >= FEWEST_STEPS
-            && sum < -HALF * sizes;
-        falls.then(|| {
-            "its displacement falls: motion counts as positive, and a slope that moves backwards calls no red; if its sign is \
-             the other way, write components = [\"COLUMN\"] and direction = [-1.0] for this benchmark"
-                .to_owned()
-        })
     }
 }
 
@@ -464,11 +419,12 @@ fn kind_of(line: &BadLine) -> String {
         Some(IngestError::Field {
             column, expected, ..
         }) => format!("{column} {expected}"),
-        _ => line
-            .error
-            .to_string()
-            .replace(|c: char| c.is_ascii_digit(), ""),
+        _ => without_digits(&line.error.to_string()),
     }
+}
+
+fn without_digits(text: &str) -> String {
+    text.replace(|c: char| c.is_ascii_digit(), "")
 }
 
 fn shown(line: &BadLine) -> String {

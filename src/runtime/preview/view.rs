@@ -1,6 +1,6 @@
 //! What a look at a site's files has found.
 
-use crate::reading::{BenchmarkId, Quantity, Timestamp};
+use crate::reading::{BenchmarkId, Quantity, Timestamp, Unit};
 use crate::runtime::ingest::Meaning;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -86,8 +86,14 @@ pub struct BenchmarkPreview {
     pub quantity: Quantity,
     /// Their unit.
     pub unit: String,
-    /// How many there are.
+    /// How many the daemon would take, one of each time.
     pub readings: u64,
+    /// Of these, how often a reading of the same time was corrected by another value: the last one counts.
+    pub corrected: u64,
+    /// Rows that say again what another one says: they are dropped.
+    pub repeated: u64,
+    /// Readings that lie so far ahead of the clock that the daemon does not take them.
+    pub ahead: u64,
     /// The earliest, its time and value.
     pub first: (Timestamp, f64),
     /// The latest, its time and value.
@@ -96,6 +102,34 @@ pub struct BenchmarkPreview {
     pub every_s: Option<i64>,
     /// What in them hardly means what was intended, with its evidence.
     pub suspicions: Vec<String>,
+    /// The first correction, and where the unit changes.
+    pub remarks: Vec<String>,
+}
+
+impl BenchmarkPreview {
+    /// Before anything is counted; `first` is a reading of it.
+    pub(super) fn new(
+        id: BenchmarkId,
+        source: String,
+        unit: Unit,
+        first: (Timestamp, f64),
+    ) -> Self {
+        Self {
+            id,
+            source,
+            quantity: unit.quantity(),
+            unit: unit.to_string(),
+            readings: 0,
+            corrected: 0,
+            repeated: 0,
+            ahead: 0,
+            first,
+            last: first,
+            every_s: None,
+            suspicions: Vec::new(),
+            remarks: Vec::new(),
+        }
+    }
 }
 
 /// One covariate.

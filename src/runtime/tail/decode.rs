@@ -172,7 +172,8 @@ impl Decoder {
         }
     }
 
-    fn knows(&self, benchmark: &BenchmarkId) -> bool {
+    /// Whether it takes readings of the benchmark.
+    pub(in crate::runtime) fn knows(&self, benchmark: &BenchmarkId) -> bool {
         self.wanted(benchmark).is_some() || self.takes_any(benchmark)
     }
 

@@ -337,7 +337,7 @@ impl FileTail {
                 tracing::info!(file = %self.path.display(), "{remark}");
             }
         }
-        for item in fed.items {
+        for (_, item) in fed.items {
             self.expect(item);
         }
         let mut bad = fed.bad.into_iter();

@@ -22,7 +22,8 @@ pub(in crate::runtime) struct BadLine {
 /// What came of some bytes.
 #[derive(Debug, Default)]
 pub(in crate::runtime) struct LinesRead {
-    pub(in crate::runtime) items: Vec<Item>,
+    /// Each with its line.
+    pub(in crate::runtime) items: Vec<(u64, Item)>,
     pub(in crate::runtime) bad: Vec<BadLine>,
     /// The file does not begin as it should: the last of `bad` says why, and nothing follows.
     pub(in crate::runtime) is_lost: bool,
@@ -115,7 +116,9 @@ impl TextReader {
         let taken = self.rows.take(number, &text);
         let mut items = taken.items;
         items.sort_by(|a, b| order(a).cmp(&order(b)));
-        let guarded = items.into_iter().map(|item| self.units.guard(item));
+        let guarded = items
+            .into_iter()
+            .map(|item| (number, self.units.guard(item)));
         fed.items.extend(guarded);
         fed.remarks.extend(taken.remarks);
         (text, taken.fault.map(Into::into))

@@ -1,0 +1,238 @@
+//! The readings of one quantity of a benchmark, counted as the daemon takes them.
+
+use super::view::BenchmarkPreview;
+use crate::reading::{Quantity, Suspicion, Timestamp, Unit, suspicion};
+use jiff::tz::TimeZone;
+use std::collections::BTreeSet;
+
+/// Readings of a benchmark that say how often it is measured, the latest.
+const LATEST: usize = 200;
+/// Readings from which on a sign is doubted, where of all that they go by this share is backwards.
+const FEWEST_STEPS: usize = 10;
+const HALF: f64 = 0.5;
+
+/// Where a value stands: the number of its file among those of the source, and its line; 0 in a recording.
+pub(super) type FilePlace = (usize, u64);
+
+/// One reading as it stands in a file.
+#[derive(Debug, Clone, Copy)]
+struct ReadValue {
+    time: Timestamp,
+    /// In the track's unit.
+    value: f64,
+    place: FilePlace,
+}
+
+#[derive(Debug)]
+pub(super) struct PreviewTrack {
+    pub(super) view: BenchmarkPreview,
+    unit: Unit,
+    /// Suspicions that people have looked into.
+    accepted: BTreeSet<Suspicion>,
+    readings: Vec<ReadValue>,
+    /// Those that lie further ahead of the clock than a daemon takes.
+    ahead: Vec<ReadValue>,
+    /// The first reading in another unit.
+    other_unit: Option<(Unit, FilePlace)>,
+}
+
+/// What became of the readings of one time.
+#[derive(Debug, Default)]
+struct MergedReadings {
+    corrected: u64,
+    repeated: u64,
+    /// The first correction: the reading and what stood there before.
+    first: Option<(ReadValue, f64)>,
+}
+
+impl PreviewTrack {
+    pub(super) fn new(view: BenchmarkPreview, unit: Unit, accepted: BTreeSet<Suspicion>) -> Self {
+        Self {
+            view,
+            unit,
+            accepted,
+            readings: Vec::new(),
+            ahead: Vec::new(),
+            other_unit: None,
+        }
+    }
+
+    /// A reading in `unit`, which the daemon takes, or holds where it lies too far ahead.
+    pub(super) fn take(
+        &mut self,
+        (time, value): (Timestamp, f64),
+        unit: Unit,
+        place: FilePlace,
+        is_ahead: bool,
+    ) {
+        let value = if unit == self.unit {
+            value
+        } else {
+            self.other_unit.get_or_insert((unit, place));
+            value * unit.factor() / self.unit.factor()
+        };
+        let one = ReadValue { time, value, place };
+        let list = if is_ahead {
+            &mut self.ahead
+        } else {
+            &mut self.readings
+        };
+        list.push(one);
+    }
+
+    /// When its readings were measured that lie ahead of the clock, and when the newest other one was.
+    pub(super) fn times_ahead(&self) -> (Vec<Timestamp>, Option<Timestamp>) {
+        let mut ahead: Vec<Timestamp> = self.ahead.iter().map(|one| one.time).collect();
+        ahead.sort_unstable();
+        (ahead, self.readings.iter().map(|one| one.time).max())
+    }
+
+    /// What there is to say of it; those ahead of the clock count where they prove it to be wrong. `name` shows a place.
+    pub(super) fn finish(
+        mut self,
+        now: Timestamp,
+        ahead_count: bool,
+        zone: Option<&TimeZone>,
+        name: &dyn Fn(FilePlace) -> String,
+    ) -> BenchmarkPreview {
+        if ahead_count {
+            self.readings.append(&mut self.ahead);
+        }
+        let newest = self
+            .readings
+            .iter()
+            .chain(&self.ahead)
+            .map(|one| one.time)
+            .max();
+        let merged = self.merge();
+        self.view.readings = self.readings.len() as u64;
+        (self.view.corrected, self.view.repeated) = (merged.corrected, merged.repeated);
+        self.view.ahead = self.ahead.len() as u64;
+        if self.readings.is_empty() {
+            self.readings.append(&mut self.ahead);
+        }
+        if let (Some(first), Some(last)) = (self.readings.first(), self.readings.last()) {
+            self.view.first = (first.time, first.value);
+            self.view.last = (last.time, last.value);
+        }
+        let latest: Vec<Timestamp> = self
+            .readings
+            .iter()
+            .rev()
+            .take(LATEST)
+            .map(|one| one.time)
+            .collect();
+        let pairs = latest.iter().zip(latest.iter().skip(1));
+        let mut gaps: Vec<i64> = pairs.map(|(b, a)| b.duration_since(*a).as_secs()).collect();
+        gaps.sort_unstable();
+        self.view.every_s = gaps.get(gaps.len() / 2).copied();
+        self.view.suspicions = self.suspicions(newest, now);
+        self.view.remarks = self.remarks(&merged, zone, name);
+        self.view
+    }
+
+    /// Puts them in order, one of each time: the last that is another than those before it.
+    fn merge(&mut self) -> MergedReadings {
+        self.readings.sort_by_key(|one| one.time);
+        let mut merged = MergedReadings::default();
+        let mut kept: Vec<ReadValue> = Vec::with_capacity(self.readings.len());
+        let mut seen: Vec<u64> = Vec::new();
+        for one in self.readings.drain(..) {
+            match kept.last_mut().filter(|last| last.time == one.time) {
+                None => {
+                    seen.clear();
+                    kept.push(one);
+                }
+                Some(_) if seen.contains(&one.value.to_bits()) => merged.repeated += 1,
+                Some(last) => {
+                    merged.corrected += 1;
+                    merged.first.get_or_insert((one, last.value));
+                    *last = one;
+                }
+            }
+            seen.push(one.value.to_bits());
+        }
+        self.readings = kept;
+        merged
+    }
+
+    fn remarks(
+        &self,
+        merged: &MergedReadings,
+        zone: Option<&TimeZone>,
+        name: &dyn Fn(FilePlace) -> String,
+    ) -> Vec<String> {
+        let mut remarks = Vec::new();
+        let unit = self.unit;
+        if let Some((one, before)) = merged.first {
+            let twice = zone.filter(|zone| is_shown_twice(one.time, zone));
+            let why = twice.map_or(String::new(), |_| {
+                "; the clocks are put back then and show this hour twice: a logger that is never put back needs dst = \"standard\", \
+                 and another one times with an offset"
+                    .to_owned()
+            });
+            remarks.push(format!(
+                "{}: another reading of {}: found {} {unit}, and {before} {unit} before; the last one counts{why}",
+                name(one.place),
+                one.time,
+                one.value,
+            ));
+        }
+        if let Some((other, place)) = self.other_unit {
+            remarks.push(format!(
+                "{}: found {other}, and {unit} before: each is taken in its own unit, and shown in {unit}; is the header right?",
+                name(place)
+            ));
+        }
+        remarks
+    }
+
+    fn suspicions(&self, newest: Option<Timestamp>, now: Timestamp) -> Vec<String> {
+        let ahead = newest
+            .and_then(|newest| suspicion::ahead(newest, now))
+            .into_iter();
+        let values: Vec<(Timestamp, f64)> = self
+            .readings
+            .iter()
+            .map(|one| (one.time, one.value))
+            .collect();
+        let all = ahead.chain(suspicion::of_values(
+            &values,
+            self.view.quantity,
+            &self.view.unit,
+        ));
+        let not_accepted = all.filter(|one| !self.accepted.contains(&one.kind));
+        let texts = not_accepted.map(|one| one.text);
+        texts.chain(self.moves_backwards()).collect()
+    }
+
+    /// What to do where the displacement falls all along.
+    fn moves_backwards(&self) -> Option<String> {
+        let steps = self
+            .readings
+            .windows(2)
+            .map(|pair| pair[1].value - pair[0].value);
+        let (mut sum, mut sizes) = (0.0, 0.0);
+        for step in steps {
+            sum += step;
+            sizes += step.abs();
+        }
+        let is_displacement = self.view.quantity == Quantity::Displacement;
+        let is_known = self.accepted.contains(&Suspicion::Fall);
+        let falls = is_displacement
+            && !is_known
+            && self.readings.len() >= FEWEST_STEPS
+            && sum < -HALF * sizes;
+        falls.then(|| {
+            "its displacement falls: motion counts as positive, and a slope that moves backwards calls no red; if its sign is \
+             the other way, write components = [\"COLUMN\"] and direction = [-1.0] for this benchmark"
+                .to_owned()
+        })
+    }
+}
+
+/// Whether the clocks of the zone show the time of this instant twice.
+fn is_shown_twice(time: Timestamp, zone: &TimeZone) -> bool {
+    let local = zone.to_datetime(time);
+    zone.to_ambiguous_timestamp(local).is_ambiguous()
+}

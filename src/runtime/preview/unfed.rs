@@ -1,0 +1,81 @@
+//! What the config names and the files do not have.
+
+use super::view::{Preview, Refusal, SourceView, Unfed};
+use crate::config::Config;
+use crate::reading::BenchmarkId;
+
+/// How a column comes to be a benchmark's.
+const NAME_THEM: &str = "name the column [ID_]displacement_UNIT or [ID_]velocity_UNIT, or say in [[benchmark]] its column and unit";
+
+/// By what `preview` shows of the files; nothing where they were not all read.
+pub(super) fn unfed(preview: &Preview, config: &Config) -> Vec<Unfed> {
+    if !preview.is_whole {
+        return Vec::new();
+    }
+    let fed = || preview.benchmarks.iter().filter(|one| one.readings > 0);
+    let mut unfed = Vec::new();
+    for view in &preview.sources {
+        let has = |id: &BenchmarkId| fed().any(|one| one.source == view.id && one.id == *id);
+        let mut named = config
+            .benchmarks
+            .iter()
+            .filter(|one| one.source == view.id)
+            .peekable();
+        let is_open = named.peek().is_none();
+        let absent = named
+            .filter(|one| !has(&one.id))
+            .map(|one| Some(one.id.clone()));
+        let mut absent: Vec<Option<BenchmarkId>> = absent.collect();
+        if is_open
+            && view.files > 0
+            && fed().all(|one| one.source != view.id)
+            && preview.covariates.iter().all(|one| one.source != view.id)
+        {
+            absent.push(None);
+        }
+        unfed.extend(absent.into_iter().map(|benchmark| Unfed {
+            text: why(preview, view, benchmark.as_ref()),
+            benchmark,
+            source: view.id.clone(),
+        }));
+    }
+    if unfed.is_empty() && fed().next().is_none() && config.brokers.is_empty() {
+        unfed.push(Unfed {
+            benchmark: None,
+            source: String::new(),
+            text: format!("no file has readings of a benchmark: nothing is watched; {NAME_THEM}"),
+        });
+    }
+    unfed
+}
+
+fn why(preview: &Preview, view: &SourceView, benchmark: Option<&BenchmarkId>) -> String {
+    let SourceView { id, path, .. } = view;
+    let whose = benchmark.map_or_else(
+        || format!("source {id:?}"),
+        |benchmark| format!("benchmark {:?}", benchmark.as_str()),
+    );
+    if view.files == 0 {
+        return format!("{whose}: there is no file {path}; is the path right?");
+    }
+    let refused = view.refused.first();
+    let refused = refused.map(|one| {
+        let Refusal { rows, first } = one;
+        format!("the daemon refuses what they have ({rows} times), the first: {first}")
+    });
+    if benchmark.is_none() {
+        let hint = refused.unwrap_or_else(|| NAME_THEM.to_owned());
+        return format!("{whose}: its files have no reading of any benchmark; {hint}");
+    }
+    let others: Vec<&str> = preview.unwatched.iter().map(BenchmarkId::as_str).collect();
+    let hint = match &others[..] {
+        [] => refused.unwrap_or_else(|| NAME_THEM.to_owned()),
+        others => format!(
+            "they have {}, which no [[benchmark]] names; is the id right?",
+            others.join(", ")
+        ),
+    };
+    format!(
+        "{whose}: the files that are there have no reading of it, and it is not watched; {hint}"
+    )
+}
