@@ -4,6 +4,7 @@
 //! the outbox follow from them and are written with them, and so is how far each file has been read: nothing is
 //! acknowledged before it, and a restart goes on exactly where the last commit left off.
 
+mod access;
 mod batch;
 mod checkpoint;
 mod evidence;
@@ -51,6 +52,21 @@ pub enum StoreError {
     Missing {
         /// The folder.
         folder: PathBuf,
+    },
+    /// This user may not use it.
+    #[error(
+        "{} cannot be {what} by user {us}: run this as {owner}, whose the state folder is (sudo -u {owner} slipwatch ...), or let this user read and write there",
+        .path.display()
+    )]
+    Denied {
+        /// The file or folder.
+        path: PathBuf,
+        /// What is not allowed.
+        what: &'static str,
+        /// Who we are.
+        us: String,
+        /// Whom the folder belongs to.
+        owner: String,
     },
     /// Another daemon works on it.
     #[error("state folder {}: another slipwatch is at work on it", .folder.display())]
@@ -191,8 +207,12 @@ impl Store {
     /// # Errors
     /// [`StoreError`].
     pub fn look(folder: &Path) -> Result<Self, StoreError> {
+        Self::look_at(folder).map_err(|error| access::explained(error, folder))
+    }
+
+    fn look_at(folder: &Path) -> Result<Self, StoreError> {
         let file = folder.join(FILE);
-        if !file.exists() {
+        if !file.try_exists()? {
             let folder = folder.to_owned();
             return Err(StoreError::Missing { folder });
         }

@@ -2,13 +2,14 @@
 
 use super::sealed::unseal;
 use super::series::{Catalogue, StoredSeries};
-use super::{Store, StoreError, timestamp};
+use super::{Store, StoreError, access, timestamp};
 use crate::monitor::{Input, MemoryPart, Notice, Order, SearchFinding, Settings};
 use crate::reading::{BenchmarkId, Reading, Sample, Timestamp};
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, params};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::path::Path;
 
 /// Steps read at once.
 const CHUNK: i64 = 4096;
@@ -240,10 +241,15 @@ impl Store {
     pub fn ask(&self, order: &Order) -> Result<(), StoreError> {
         let body = serde_json::to_string(order);
         let body = body.map_err(|error| StoreError::Unreadable(error.to_string()))?;
-        self.inner()
-            .connection
-            .execute("INSERT INTO command (body) VALUES (?1)", [body])?;
-        Ok(())
+        let inner = self.inner();
+        let connection = &inner.connection;
+        let written = connection.execute("INSERT INTO command (body) VALUES (?1)", [body]);
+        let folder = connection.path().map(Path::new).and_then(Path::parent);
+        match (written, folder) {
+            (Ok(_), _) => Ok(()),
+            (Err(error), Some(folder)) => Err(access::explained(error.into(), folder)),
+            (Err(error), None) => Err(error.into()),
+        }
     }
 
     /// Lines, records and files that could not be used, a source, since the state began.

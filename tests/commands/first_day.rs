@@ -236,6 +236,94 @@ fn the_end_of_an_alert_that_falls_into_a_silence_is_sent_after_it_and_a_red_keep
     drop(daemon);
 }
 
+/// As somebody who is not the daemon's user: in a shell of their own, or by a cron job.
+#[test]
+fn who_may_not_read_the_state_is_told_which_path_and_whose_it_is() {
+    let office = Office::with(&[
+        ("slope.csv", &plain(30)),
+        ("site.toml", &site("slope.csv", "")),
+    ]);
+    let daemon = office.run(&["run", "site.toml"]);
+    office.status_until("P1");
+    drop(daemon);
+    let mode = |name: &str, mode: u32| {
+        fs::set_permissions(office.path(name), fs::Permissions::from_mode(mode)).unwrap();
+    };
+    mode(".", 0o755);
+    let as_other = |args: &[&str]| {
+        let mut command = office.command(args);
+        if nix::unistd::Uid::effective().is_root() {
+            use std::os::unix::process::CommandExt;
+            command.uid(65_534).gid(65_534);
+        }
+        ended(&command.output().unwrap())
+    };
+    for (folder, file, wanted) in [
+        (0o000, 0o600, "state cannot be looked into by user"),
+        (0o755, 0o000, "state/slipwatch.db cannot be read by user"),
+        (0o555, 0o444, "cannot be written to by user"),
+    ] {
+        mode("state/slipwatch.db", file);
+        mode("state", folder);
+        for args in [&STATUS[..], &["events", "--config", "site.toml"]] {
+            let (exit, _, err) = as_other(args);
+            assert!(exit == 74 || exit == 1, "{exit}: {err}");
+            assert!(err.contains(wanted), "no {wanted:?} in {err}");
+            assert!(
+                err.contains("run this as ") && err.contains("sudo -u"),
+                "{err}"
+            );
+        }
+        mode("state", 0o755);
+    }
+}
+
+#[test]
+fn a_benchmark_that_never_reads_is_dated_by_the_clock_and_not_by_the_year_1677() {
+    let more = "[[benchmark]]\nid = \"P1\"\n[[benchmark]]\nid = \"P9\"\n[[hook]]\nrun = [\"/bin/sh\", \"hook.sh\"]\nlevels = [\"unknown\"]\n\
+                [[cap]]\nfolder = \"cap\"\nlevels = [\"unknown\"]\nsender = \"a@b.org\"\narea = \"here\"\n";
+    let office = Office::with(&[
+        ("site.toml", &site("slope*.csv", more)),
+        (
+            "hook.sh",
+            "echo $SLIPWATCH_TIME >> hook.txt\ncat >> hook.txt\n",
+        ),
+    ]);
+    let before = clock::now();
+    let daemon = office.run(&["run", "site.toml"]);
+    office.until("it is reported", || !written(&office).is_empty());
+    let first = written(&office)[0].parse::<Timestamp>().unwrap();
+    let apart = first.duration_since(before).abs();
+    assert!(apart < SignedDuration::from_mins(5), "{first}");
+    for args in [
+        &STATUS[..],
+        &["alerts", "list", "--config", "site.toml"],
+        &["events", "--config", "site.toml"],
+    ] {
+        let text = office.done(args);
+        assert!(
+            text.contains("before any reading") && !text.contains("1677"),
+            "{text}"
+        );
+    }
+    let status = json(&office, &STATUS);
+    assert_eq!(
+        status["benchmarks"][0]["unknown_since"],
+        serde_json::Value::Null,
+        "{status}"
+    );
+    assert_eq!(status["benchmarks"][0]["is_unknown"], true, "{status}");
+    drop(daemon);
+    for file in fs::read_dir(office.path("cap"))
+        .into_iter()
+        .flatten()
+        .flatten()
+    {
+        let text = fs::read_to_string(file.path()).unwrap_or_default();
+        assert!(!text.contains("<value>1677"), "{text}");
+    }
+}
+
 #[test]
 fn text_has_the_clocks_of_the_site_and_json_has_utc() {
     let config =
