@@ -6,6 +6,7 @@ use crate::monitor::{
     AlertState, Event, EventKind, FailureTime, SharedFailure, Summary, Unexplained,
 };
 use crate::reading::{BenchmarkId, Timestamp};
+use crate::runtime::site::BEFORE_ALL;
 use jiff::tz::TimeZone;
 use textwrap::{Options, WordSplitter};
 
@@ -71,7 +72,7 @@ const MINUTE: &str = "0000-00-00T00:00";
 
 /// To the minute, as a clock there shows it.
 pub(super) fn clock(time: Timestamp, zone: &TimeZone) -> String {
-    if *zone == TimeZone::UTC {
+    if *zone == TimeZone::UTC || time <= BEFORE_ALL {
         return minute(time);
     }
     let local = time.to_zoned(zone.clone());
@@ -282,6 +283,9 @@ fn forecast(failure: &FailureTime) -> String {
 
 /// To the minute: people read this, and no forecast is finer.
 fn minute(time: Timestamp) -> String {
+    if time <= BEFORE_ALL {
+        return "before any reading".to_owned();
+    }
     time.strftime("%Y-%m-%d %H:%MZ").to_string()
 }
 

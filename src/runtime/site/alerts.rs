@@ -1,7 +1,7 @@
 //! The commit: what has happened is made durable, then the hooks are notified.
 
 use super::flood::OutgoingAlerts;
-use super::{AlertInForce, LEAST_FRESHNESS, LEAST_WATCHED, MOST_UNWRITTEN, Site};
+use super::{AlertInForce, BEFORE_ALL, LEAST_FRESHNESS, LEAST_WATCHED, MOST_UNWRITTEN, Site};
 use crate::alert::{Level, Policy};
 use crate::monitor::Event;
 use crate::reading::{BenchmarkId, Timestamp};
@@ -27,8 +27,12 @@ impl Site {
     pub fn commit(&mut self, wall: Timestamp) -> Result<(), StoreError> {
         let now = self.keeper.now(wall);
         let mut to_send = Vec::new();
-        for alert in std::mem::take(&mut self.fresh) {
+        for mut alert in std::mem::take(&mut self.fresh) {
             let age = now.duration_since(alert.event.time);
+            if alert.event.time <= BEFORE_ALL {
+                // Before the first reading there is no data time: people are told when it was decided.
+                alert.event.time = now;
+            }
             let is_fresh =
                 age <= self.freshness(alert.event.benchmark.as_ref()) || self.never_read(&alert);
             let is_due = is_fresh && !self.ends_untold(&alert) || self.is_waited_for(&alert);

@@ -70,6 +70,8 @@ export function axisDate(seconds) {
 
 /** A time element that says the exact instant too. */
 export function when(time) {
+  // Before the first reading there is no data time.
+  if (Date.parse(time) <= -9223372036000) return el('span', {}, 'before any reading');
   return el('time', { datetime: time, title: time }, minute(time));
 }
 
