@@ -13,6 +13,8 @@ use crate::runtime::clock;
 use crate::runtime::drilled::DrillRecord;
 use crate::runtime::preview::{Preview, preview};
 use crate::runtime::record::standing::RecordStanding;
+use crate::runtime::reloaded::{ConfigRefusal, sources_without_files};
+use crate::runtime::site::BEFORE_ALL;
 use crate::runtime::standing::{InForce, acknowledged, closed, every, in_force, orders, silences};
 use crate::store::Store;
 use jiff::tz::TimeZone;
@@ -57,7 +59,7 @@ pub(super) struct StatusStanding {
     alarm_state: AlarmState,
     /// Since when.
     since: Option<Timestamp>,
-    /// Since when nothing can be said of it: no data, a sensor fault.
+    /// Since when nothing can be said of it: no data, a sensor fault. Null too where it has been so before any reading.
     unknown_since: Option<Timestamp>,
     /// Whether nothing can be said of it now; so it is before its first reading.
     is_unknown: bool,
@@ -116,6 +118,10 @@ pub(super) struct SiteStatus {
     is_drill_overdue: bool,
     /// How the record in MCAP files stands, where one is kept.
     record: Option<RecordStanding>,
+    /// Why the config file as it is now is not in force; null where it is.
+    config_refusal: Option<ConfigRefusal>,
+    /// Sources of which there is no file now, a line each.
+    sources_without_files: Vec<String>,
     /// What the files hold, where that was asked for.
     preview: Option<Preview>,
 }
@@ -185,6 +191,7 @@ fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
         .drill
         .as_ref()
         .and_then(|_| DrillRecord::read(&config.site.state_dir));
+    let sources_without_files = sources_without_files(&config);
     let zone = config.site.time_zone;
     let status = SiteStatus {
         site: config.site.name,
@@ -192,7 +199,7 @@ fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
         steps: store.last_step(),
         alerts_waiting: store.waiting()?.len(),
         bytes: store.bytes()?,
-        site_unknown_since: levels.get(&(None, Level::Unknown)).map(|event| event.time),
+        site_unknown_since: levels.get(&(None, Level::Unknown)).and_then(dated),
         is_running: Store::is_held(&config.site.state_dir),
         acknowledged: acknowledged(&orders, &levels),
         returned: alarms.returned().into_iter().cloned().collect(),
@@ -206,6 +213,8 @@ fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
         drill,
         record: (config.site.record.as_ref())
             .and_then(|_| RecordStanding::read(&config.site.state_dir)),
+        config_refusal: ConfigRefusal::read(&config.site.state_dir),
+        sources_without_files,
         preview,
     };
     Ok((status, zone))
@@ -236,7 +245,7 @@ fn stands(
             None
         };
         if *level == Level::Unknown {
-            (standing.unknown_since, standing.is_unknown) = (Some(event.time), true);
+            (standing.unknown_since, standing.is_unknown) = (dated(event), true);
             standing.unknown_reason = reason;
         } else {
             (standing.level, standing.since) = (*level, Some(event.time));
@@ -259,6 +268,11 @@ fn stands(
         standing.called = called.as_deref().cloned();
     }
     standing
+}
+
+/// When it was said; before the first reading there is no data time.
+fn dated(event: &Event) -> Option<Timestamp> {
+    Some(event.time).filter(|time| *time > BEFORE_ALL)
 }
 
 /// The suspicions that have not ended, by benchmark.
@@ -353,6 +367,20 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
 /// What is not used or not judged, a line each: what sources could not give, and readings under maintenance.
 fn not_used(status: &SiteStatus) -> String {
     let mut lines = String::new();
+    if let Some(why) = status
+        .config_refusal
+        .as_ref()
+        .and_then(|one| one.refused.as_ref())
+    {
+        let why = text::plain(why);
+        let _ = writeln!(
+            lines,
+            "CONFIG NOT TAKEN at its reload, the one before is in force: {why}"
+        );
+    }
+    for line in &status.sources_without_files {
+        let _ = writeln!(lines, "{}", text::plain(line));
+    }
     for (source, count) in &status.quarantined {
         // Writing to a string cannot fail.
         let _ = writeln!(

@@ -104,6 +104,7 @@ impl Daemon {
         progress: &watch::Sender<Progress>,
     ) -> Result<(), StoreError> {
         self.note_closed()?;
+        self.config_is_taken();
         let mut hangup = signal(SignalKind::hangup())?;
         let (mut tick, mut asked) = (Self::ticks(), shutdown.clone());
         loop {

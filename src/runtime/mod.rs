@@ -27,6 +27,7 @@ pub mod preview;
 pub mod progress;
 pub mod pulse;
 pub mod record;
+pub mod reloaded;
 pub mod replay;
 pub mod run;
 pub mod sampling;

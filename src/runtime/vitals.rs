@@ -77,6 +77,8 @@ pub struct Health {
     pub database_bytes: Option<u64>,
     /// How the record stands; `None` where none is kept.
     pub record: Option<RecordStanding>,
+    /// Why the config file as it is now was not taken at a reload; `None` where it is in force.
+    pub config_refused: Option<String>,
 }
 
 impl Health {

@@ -1,6 +1,6 @@
 //! 20 and 21: configs that change under a daemon at work.
 
-use crate::site::{Site, eventually};
+use crate::site::{Site, eventually, get};
 use nix::sys::signal::Signal;
 
 const BENCHMARKS: &str = "[[benchmark]]\nid = \"4\"\nsource = \"logger\"\n\
@@ -60,6 +60,52 @@ fn a_wrong_config_on_sighup_is_not_taken_and_a_benchmark_taken_out_is_closed_and
     assert!(!is_notified("5/red", "resolved"), "5 is still watched");
     program.stop();
     site.proven_events();
+}
+
+/// A config that is refused, and one that is right but for the path of its source, are seen by those who look.
+#[test]
+fn a_config_that_is_not_taken_and_a_mistyped_path_are_reported_and_no_longer_when_mended() {
+    let site = Site::new(POLICY);
+    let address = site.listen();
+    site.append("incoming/5.csv", &failing("5"));
+    let program = site.caught_up();
+    let right = std::fs::read_to_string(site.path("site.toml")).unwrap();
+    let reload = |text: &str| {
+        std::fs::write(site.path("site.toml"), text).unwrap();
+        program.signal(Signal::SIGHUP);
+    };
+    let refused = || get(&address, "/metrics").contains("slipwatch_config_refused 1");
+    assert!(!refused());
+    reload(&right.replace("evacuation_time = \"3h\"", "evacuation_time = \"never\""));
+    eventually("that it is refused", refused);
+    assert!(get(&address, "/api/status").contains("\"config_refused\":\""));
+    std::fs::write(site.path("site.toml"), &right).unwrap();
+    let status = site.printed(&["status", "--config", "site.toml"]);
+    assert!(status.contains("CONFIG NOT TAKEN"), "{status}");
+    reload(&right.replace("incoming/*.csv", "incomming/*.csv"));
+    eventually("that it is taken", || !refused());
+    eventually("that there is no file", || {
+        site.events().contains("\"kind\":\"no-file\"")
+    });
+    let status = site
+        .printed(&["status", "--config", "site.toml"])
+        .replace("\n    ", " ");
+    assert!(!status.contains("CONFIG NOT TAKEN"), "{status}");
+    assert!(status.contains("source \"logger\": the folder"), "{status}");
+    reload(&right);
+    eventually("the right one", || {
+        site.log().matches("the config is taken").count() == 2
+    });
+    program.stop();
+    let events = site.proven_events();
+    let kinds = |kind: &str| events.matches(&format!("\"kind\":\"{kind}\"")).count();
+    // That there is no recording either is no news.
+    assert_eq!(
+        (kinds("config-refused"), kinds("no-file")),
+        (1, 1),
+        "{events}"
+    );
+    assert!(events.contains("evacuation_time"), "{events}");
 }
 
 /// 21. A hook that is at work while the config changes is waited for.

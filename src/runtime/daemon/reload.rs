@@ -1,11 +1,14 @@
 //! The daemon takes up another config.
 
 use super::{DRAIN_LIMIT, Daemon, TICK, dispatcher};
-use crate::config;
+use crate::config::{self, Config, Token};
+use crate::monitor::Input;
 use crate::runtime::link;
+use crate::runtime::reloaded::{ConfigRefusal, sources_without_files};
 use crate::runtime::sandbox::OURSELVES;
 use crate::runtime::shutdown::Shutdown;
 use crate::runtime::sources::Sources;
+use crate::runtime::tail::Arrival;
 use crate::runtime::view::Facts;
 use crate::store::StoreError;
 use std::path::Path;
@@ -26,30 +29,59 @@ impl Daemon {
         }
     }
 
-    /// Goes by the config file as it is now, all of it or nothing.
-    pub(super) async fn reload(&mut self, shutdown: &Shutdown) -> Result<(), StoreError> {
-        let fresh = match config::load(&self.config.file) {
-            Ok(mut fresh) => {
-                fresh.wall_in_hooks(Path::new(OURSELVES));
-                fresh
-            }
-            Err(error) => {
-                tracing::error!(%error, "the config is not taken: the old one stays in force");
-                return Ok(());
-            }
-        };
+    /// The config file as it is now with its token, or why it cannot be taken.
+    fn fresh_config(&self) -> Result<(Config, Option<Token>), String> {
+        let mut fresh = config::load(&self.config.file).map_err(|error| error.to_string())?;
+        fresh.wall_in_hooks(Path::new(OURSELVES));
         if fresh.site.state_dir != self.config.site.state_dir
             || fresh.site.listen != self.config.site.listen
         {
-            tracing::error!("the config is not taken: another state_dir or listen needs a restart");
-            return Ok(());
+            return Err("another state_dir or listen needs a restart".to_owned());
         }
-        let token = match fresh.site.token() {
-            Ok(token) => token,
-            Err(error) => {
-                tracing::error!(%error, "the config is not taken: the old one stays in force");
-                return Ok(());
-            }
+        let token = fresh.site.token().map_err(|error| error.to_string())?;
+        Ok((fresh, token))
+    }
+
+    /// The old config stays in force; nothing else says so than this.
+    fn refuse_config(&mut self, why: String) -> Result<(), StoreError> {
+        tracing::error!(error = %why, "the config is not taken: the old one stays in force");
+        let text =
+            format!("the config file is not taken, and the one before stays in force: {why}");
+        self.show_refusal(&ConfigRefusal {
+            refused: Some(why),
+            since: Some((self.wall)()),
+        });
+        self.report("config-refused", text)
+    }
+
+    fn show_refusal(&self, refusal: &ConfigRefusal) {
+        (self.pulse.vitals).update(|health| health.config_refused.clone_from(&refusal.refused));
+        if let Err(error) = refusal.write(&self.config.site.state_dir) {
+            tracing::warn!(%error, "that cannot be kept for slipwatch status");
+        }
+    }
+
+    /// What is in force now is the config file as it is.
+    pub(in crate::runtime) fn config_is_taken(&self) {
+        if ConfigRefusal::read(&self.config.site.state_dir).is_some() {
+            self.show_refusal(&ConfigRefusal::default());
+        }
+    }
+
+    /// A fault that concerns the whole site, among the events.
+    fn report(&mut self, kind: &str, text: String) -> Result<(), StoreError> {
+        let (time, kind) = ((self.wall)(), kind.to_owned());
+        let input = Input::Trouble { kind, text };
+        let events = self.site.take(&Arrival { time, input }, time)?;
+        self.pulse.vitals.note(&events);
+        self.commit()
+    }
+
+    /// Goes by the config file as it is now, all of it or nothing.
+    pub(super) async fn reload(&mut self, shutdown: &Shutdown) -> Result<(), StoreError> {
+        let (fresh, token) = match self.fresh_config() {
+            Ok(fresh) => fresh,
+            Err(why) => return self.refuse_config(why),
         };
         self.pulse.service.reloading();
         // What has been read already is taken under the old config.
@@ -75,9 +107,19 @@ impl Daemon {
         if let Some(beside) = &mut self.beside {
             beside.follow(&fresh).await;
         }
+        let were_fileless = sources_without_files(&self.config);
         (self.is_up_to_date, self.config) = (false, fresh);
         self.pulse.service.ready("watching");
         tracing::info!(file = %self.config.file.display(), "the config is taken");
+        self.config_is_taken();
+        let fileless = sources_without_files(&self.config);
+        for line in fileless
+            .into_iter()
+            .filter(|line| !were_fileless.contains(line))
+        {
+            tracing::warn!("{line}");
+            self.report("no-file", line)?;
+        }
         Ok(())
     }
 }

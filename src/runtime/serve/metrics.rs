@@ -81,6 +81,11 @@ fn trouble(sheet: &mut Sheet<'_>, health: &Health) -> fmt::Result {
             flag((health.record.as_ref()).is_some_and(|record| record.failure.is_some())),
         ),
         (
+            "config_refused",
+            "1 while the config file is not in force: it was not taken at a reload",
+            flag(health.config_refused.is_some()),
+        ),
+        (
             "silences",
             "Orders in force by which alerts are not reported",
             health.silences.len() as f64,

@@ -1,0 +1,51 @@
+//! Whether the config file as it is now is in force: kept in the state folder, for those who ask the state.
+
+use super::kept;
+use super::tail::{Decoder, list};
+use crate::config::Config;
+use crate::reading::Timestamp;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::io;
+use std::path::Path;
+
+/// In the state folder.
+const FILE: &str = "config.json";
+
+/// Why the config file that a daemon was asked to take up is not in force.
+#[derive(Debug, Clone, Default, PartialEq, Eq, JsonSchema, Serialize, Deserialize)]
+#[schemars(rename = "ConfigRefusal")]
+pub struct ConfigRefusal {
+    /// What is wrong with it; `None` where it is in force.
+    pub refused: Option<String>,
+    /// Since when, by the host's clock.
+    pub since: Option<Timestamp>,
+}
+
+impl ConfigRefusal {
+    /// As it stands in a state folder; `None` where the config is in force.
+    pub fn read(state_dir: &Path) -> Option<Self> {
+        kept::read(&state_dir.join(FILE)).filter(|kept: &Self| kept.refused.is_some())
+    }
+
+    pub(super) fn write(&self, state_dir: &Path) -> io::Result<()> {
+        kept::write(state_dir, FILE, self)
+    }
+}
+
+/// A line for each source of which there is no file now: its path may be mistyped.
+pub fn sources_without_files(config: &Config) -> Vec<String> {
+    let sources = config.sources.iter().filter_map(|source| {
+        let decoder = Decoder::new(source, &config.benchmarks);
+        let (id, pattern) = (&source.id, &source.pattern);
+        match list(pattern, &decoder) {
+            Ok((files, _)) if !files.is_empty() => None,
+            Ok(_) => Some(format!("source {id:?}: there is no file {pattern}; is the path right?")),
+            Err(error) => {
+                let folder = pattern.folder().display();
+                Some(format!("source {id:?}: the folder {folder} cannot be listed ({error}); is the path right?"))
+            }
+        }
+    });
+    sources.collect()
+}
