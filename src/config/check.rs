@@ -4,7 +4,7 @@ use super::{
     Config, ConfigError, DutyHours, FileSource, HookConfig, Secret, SiteConfig, Token, TokenError,
     duty, load,
 };
-use crate::alert::Level;
+use crate::alert::{Level, Threshold};
 use crate::monitor::{Declaration, Order, SiteLevel};
 use crate::reading::{BenchmarkId, Quantity};
 use jiff::SignedDuration;
@@ -13,6 +13,11 @@ use serde::Serialize;
 use std::fmt;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
+
+/// Longer than so a reading hardly waits for earlier ones with intent,
+const LONGEST_REORDER: SignedDuration = SignedDuration::from_hours(24);
+/// nor does an evacuation take longer than so.
+const LONGEST_EVACUATION: SignedDuration = SignedDuration::from_hours(30 * 24);
 
 /// What a right config amounts to.
 #[derive(Debug, Clone, PartialEq, Eq, JsonSchema, Serialize)]
@@ -66,6 +71,9 @@ pub fn check(file: &Path) -> Result<ConfigSummary, ConfigError> {
             .chain(state_dir(&config.site.state_dir))
             .chain(site_level(&config))
             .chain(long_maintenance(&config))
+            .chain(config.sources.iter().filter_map(long_reorder))
+            .chain(long_evacuation(&config))
+            .chain(lost_thresholds(&config))
             .map(|what| format!("{place}: warning: {what}")),
     );
     Ok(ConfigSummary {
@@ -119,6 +127,72 @@ fn long_maintenance(config: &Config) -> impl Iterator<Item = String> {
             )
         })
     })
+}
+
+/// Alerts that wait for days because the readings do.
+fn long_reorder(source: &FileSource) -> Option<String> {
+    (source.reorder > LONGEST_REORDER).then(|| {
+        format!(
+            "source {:?}: reorder = {:#}: every reading waits so long for earlier ones, and so does every alert, where none \
+             comes that is newer; is that right?",
+            source.id, source.reorder
+        )
+    })
+}
+
+/// An evacuation that takes months: red would be called for what lies years ahead.
+fn long_evacuation(config: &Config) -> impl Iterator<Item = String> {
+    let site = (None, &config.settings.policy);
+    let own = config.settings.benchmarks.iter();
+    let own = own.map(|(id, policy)| (Some(id), policy));
+    let of_site = config.settings.policy.evacuation_time;
+    let all = std::iter::once(site).chain(own);
+    all.filter_map(move |(id, policy)| {
+        let span = policy.evacuation_time;
+        let is_its_own = id.is_none() || span != of_site;
+        (is_its_own && span > LONGEST_EVACUATION).then(|| {
+            let whose = id.map_or(String::new(), |id| format!("benchmark {:?}: ", id.as_str()));
+            format!(
+                "{whose}evacuation_time = {span:#}, {} days: red looks {:#} ahead; is that right?",
+                span.as_hours() / 24,
+                policy.red_within()
+            )
+        })
+    })
+}
+
+/// Thresholds of the site that do not hold for a benchmark which has some of its own.
+fn lost_thresholds(config: &Config) -> impl Iterator<Item = String> {
+    let site = &config.settings.policy.thresholds;
+    config.settings.benchmarks.iter().filter_map(move |(id, policy)| {
+        let own = figures(&policy.thresholds);
+        let has = |level, name| own.iter().any(|one| one.0 == level && one.1 == name);
+        let site = figures(site).into_iter();
+        let lost = site.filter(|(level, name, _)| !has(*level, *name));
+        let lost = lost.map(|(level, name, figure)| format!("{level} at {name} {figure}"));
+        let lost: Vec<String> = lost.collect();
+        (!lost.is_empty()).then(|| {
+            format!(
+                "benchmark {:?}: its own thresholds stand in the place of all of [alert]; these do not hold for it: {}; \
+                 write them for the benchmark too where they are to hold",
+                id.as_str(),
+                lost.join(", ")
+            )
+        })
+    })
+}
+
+/// Each figure of the thresholds: its level, what it is of, and the figure with its unit.
+fn figures(thresholds: &[Threshold]) -> Vec<(Level, &'static str, String)> {
+    let of = |one: &Threshold| {
+        [
+            ("velocity", one.velocity_mm_per_day, "mm/day"),
+            ("displacement", one.displacement_mm, "mm"),
+            ("acceleration", one.acceleration_mm_per_day2, "mm/day/day"),
+        ]
+        .map(|(name, figure, unit)| Some((one.level, name, format!("{} {unit}", figure?))))
+    };
+    thresholds.iter().flat_map(of).flatten().collect()
 }
 
 fn missing_folder(source: &FileSource) -> Option<String> {

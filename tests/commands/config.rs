@@ -475,6 +475,47 @@ fn a_policy_that_cannot_mean_anything_is_a_warning() {
 }
 
 #[test]
+fn check_warns_of_spans_that_can_hardly_be_meant_and_of_thresholds_that_a_benchmark_loses() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("site.toml");
+    let warnings = |text: &str| {
+        std::fs::write(&file, text).unwrap();
+        config::check(&file).unwrap().warnings.join("\n")
+    };
+    let threshold = |table: &str, level: &str, figure: &str| {
+        format!("[[{table}.threshold]]\nlevel = \"{level}\"\n{figure}\n")
+    };
+    let own = "[[benchmark]]\nid = \"5\"\n[benchmark.alert]\n";
+    let text = |reorder: &str, evacuation: &str| {
+        format!(
+            "[site]\nname = \"Toc\"\nstate_dir = \"state\"\n[[source]]\nid = \"logger\"\nkind = \"csv\"\n\
+             path = \"*.csv\"\nreorder = \"{reorder}\"\n[alert]\nevacuation_time = \"{evacuation}\"\noutlook = \"400d\"\n{}{}{own}{}",
+            threshold("alert", "orange", "velocity = \"5 mm/day\""),
+            threshold(
+                "alert",
+                "red",
+                "velocity = \"50 mm/day\"\ndisplacement = \"1 m\""
+            ),
+            threshold("benchmark.alert", "red", "velocity = \"80 mm/day\""),
+        )
+    };
+    let said = warnings(&text("10d", "60d"));
+    for part in [
+        "source \"logger\": reorder = 240h",
+        "evacuation_time = 1440h, 60 days",
+        "these do not hold for it: orange at velocity 5 mm/day, red at displacement 1000 mm;",
+    ] {
+        assert!(said.contains(part), "no {part:?} in {said}");
+    }
+    let said = warnings(&text("24h", "30d"));
+    assert!(
+        !said.contains("reorder") && !said.contains("evacuation_time ="),
+        "{said}"
+    );
+    assert!(!said.contains("red at velocity"), "it has its own: {said}");
+}
+
+#[test]
 fn check_warns_when_the_sampling_cannot_protect_and_when_the_hook_is_missing() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("site.toml");
