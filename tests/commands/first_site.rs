@@ -450,11 +450,10 @@ fn unix_messages(count: i64) -> String {
 }
 
 fn other_kinds() -> [Counted<'static>; 2] {
-    let table = hourly(60, |time| time.to_string());
     [
         Counted {
             source: "kind = \"mcap\"",
-            files: vec![("a.csv", format!("time,P1_displacement_mm\n{table}"))],
+            files: vec![("a.csv", table(&in_utc(60)))],
             counts: None,
             said: &["a.csv: found \"time,P1_displacement_mm\", expected an MCAP recording"],
         },
@@ -467,25 +466,27 @@ fn other_kinds() -> [Counted<'static>; 2] {
     ]
 }
 
-fn counted_cases() -> Vec<Counted<'static>> {
-    const HEADER: &str = "time,P1_displacement_mm\n";
-    let with = |rows: String| format!("{HEADER}{rows}");
-    let utc = |count| hourly(count, |time| time.to_string());
-    let second_file = with(utc(60).replace("0.510", "0.512").replace("1.040", "1.050"));
-    let metres = "2026-10-24T00:00:00Z,0.0295\n";
-    let rome = jiff::tz::TimeZone::get("Europe/Rome").unwrap();
-    let local = hourly(60, |time| {
-        time.to_zoned(rome.clone()).strftime("%F %H:%M").to_string()
-    });
-    vec![
+const COUNTED: &str = "time,P1_displacement_mm\n";
+const METRES: &str = "2026-10-24T00:00:00Z,0.0295\n";
+
+fn table(rows: &str) -> String {
+    format!("{COUNTED}{rows}")
+}
+
+fn in_utc(count: i64) -> String {
+    hourly(count, |time| time.to_string())
+}
+
+/// Times that cannot be meant.
+fn of_times() -> [Counted<'static>; 4] {
+    let short = hourly(60, |time| time.strftime("%d.%m.%y %H:%M").to_string());
+    let seconds = hourly(60, |time| time.as_second().to_string());
+    let unset = format!("1970-01-01T01:00:00Z,4\n{}", in_utc(12));
+    let ahead = format!("{}2417-01-01T01:00:00Z,4\n", in_utc(12));
+    [
         Counted {
             source: "kind = \"csv\"\ntime_format = \"%d.%m.%Y %H:%M\"\ntime_zone = \"UTC\"",
-            files: vec![(
-                "a.csv",
-                with(hourly(60, |time| {
-                    time.strftime("%d.%m.%y %H:%M").to_string()
-                })),
-            )],
+            files: vec![("a.csv", table(&short))],
             counts: None,
             said: &[
                 "60 rows, the first: ",
@@ -495,16 +496,41 @@ fn counted_cases() -> Vec<Counted<'static>> {
         },
         Counted {
             source: "kind = \"csv\"\ntime_format = \"unix_ms\"",
-            files: vec![(
-                "a.csv",
-                with(hourly(60, |time| time.as_second().to_string())),
-            )],
+            files: vec![("a.csv", table(&seconds))],
             counts: None,
             said: &["a.csv, line 2, column \"time\"", "unix for seconds"],
         },
         Counted {
             source: "kind = \"csv\"",
-            files: vec![("a.csv", with(utc(60))), ("b.csv", second_file)],
+            files: vec![("a.csv", table(&unset))],
+            counts: Some((12, 0, 0)),
+            said: &["a.csv, line 2, \"P1\": found 1970-01-01T01:00:00Z, expected another day"],
+        },
+        Counted {
+            source: "kind = \"csv\"",
+            files: vec![("a.csv", table(&ahead))],
+            counts: Some((12, 0, 0)),
+            said: &[
+                "refused, ahead of this machine's clock: 1",
+                "a.csv, line 14, \"P1\": found 2417-01-01T01:00:00Z",
+            ],
+        },
+    ]
+}
+
+/// Readings that come twice, and units that change.
+fn of_values() -> [Counted<'static>; 4] {
+    let corrected = in_utc(60)
+        .replace("0.510", "0.512")
+        .replace("1.040", "1.050");
+    let rome = jiff::tz::TimeZone::get("Europe/Rome").unwrap();
+    let there = |time: jiff::Timestamp| time.to_zoned(rome.clone()).strftime("%F %H:%M");
+    let local = hourly(60, |time| there(time).to_string());
+    let in_metres = format!("time,P1_displacement_m\n{METRES}");
+    [
+        Counted {
+            source: "kind = \"csv\"",
+            files: vec![("a.csv", table(&in_utc(60))), ("b.csv", table(&corrected))],
             counts: Some((60, 2, 58)),
             said: &[
                 "corrected by another reading of the same time: 2",
@@ -513,16 +539,13 @@ fn counted_cases() -> Vec<Counted<'static>> {
         },
         Counted {
             source: "kind = \"csv\"\ntime_format = \"%Y-%m-%d %H:%M\"\ntime_zone = \"Europe/Rome\"\ndst = \"earlier\"",
-            files: vec![("a.csv", with(local))],
+            files: vec![("a.csv", table(&local))],
             counts: Some((59, 1, 0)),
             said: &["a.csv, line 39: another reading", "dst = \"standard\""],
         },
         Counted {
             source: "kind = \"csv\"",
-            files: vec![
-                ("a.csv", with(utc(12))),
-                ("b.csv", format!("time,P1_displacement_m\n{metres}")),
-            ],
+            files: vec![("a.csv", table(&in_utc(12))), ("b.csv", in_metres.clone())],
             counts: Some((13, 0, 0)),
             said: &[
                 "b.csv, line 2: found m, and mm before",
@@ -531,34 +554,10 @@ fn counted_cases() -> Vec<Counted<'static>> {
         },
         Counted {
             source: "kind = \"csv\"",
-            files: vec![(
-                "a.csv",
-                format!("{}time,P1_displacement_m\n{metres}", with(utc(12))),
-            )],
+            files: vec![("a.csv", format!("{}{in_metres}", table(&in_utc(12))))],
             counts: Some((12, 0, 0)),
             said: &[
                 "a.csv, line 15: its unit was mm and is m, expected the unit that the file began with",
-            ],
-        },
-        Counted {
-            source: "kind = \"csv\"",
-            files: vec![(
-                "a.csv",
-                format!("{HEADER}1970-01-01T01:00:00Z,4\n{}", utc(12)),
-            )],
-            counts: Some((12, 0, 0)),
-            said: &["a.csv, line 2, \"P1\": found 1970-01-01T01:00:00Z, expected another day"],
-        },
-        Counted {
-            source: "kind = \"csv\"",
-            files: vec![(
-                "a.csv",
-                format!("{}2417-01-01T01:00:00Z,4\n", with(utc(12))),
-            )],
-            counts: Some((12, 0, 0)),
-            said: &[
-                "refused, ahead of this machine's clock: 1",
-                "a.csv, line 14, \"P1\": found 2417-01-01T01:00:00Z",
             ],
         },
     ]
@@ -571,7 +570,10 @@ fn check_counts_as_readings_what_the_daemon_takes_and_says_what_it_refuses() {
         files,
         counts,
         said,
-    } in counted_cases()
+    } in of_times()
+        .into_iter()
+        .chain(of_values())
+        .chain(other_kinds())
     {
         let config = format!(
             "[site]\nname = \"Toc\"\nstate_dir = \"state\"\n[[source]]\nid = \"logger\"\n{source}\npath = \"in/a*\"\n[[benchmark]]\nid = \"P1\"\n"
