@@ -18,7 +18,7 @@ pub(super) const MOST_DEPARTED: usize = 64;
 /// A file that has another name by now is let go when it has not grown for so long: loggers write once a day too.
 const RENAMED_FOR: Duration = Duration::from_secs(48 * 60 * 60);
 /// So is one that has no name any more. Its room on the disk becomes free only then.
-const REMOVED_FOR: Duration = Duration::from_secs(10 * 60);
+const REMOVED_FOR: Duration = Duration::from_secs(2 * 60);
 
 /// Where a file is that has gone.
 enum Whereabouts {
