@@ -74,7 +74,7 @@ fn a_config_that_is_not_taken_and_a_mistyped_path_are_reported_and_no_longer_whe
         std::fs::write(site.path("site.toml"), text).unwrap();
         program.signal(Signal::SIGHUP);
     };
-    let refused = || get(&address, "/metrics").contains("slipwatch_config_refused 1");
+    let refused = || get(&address, "/metrics").contains("\nslipwatch_config_refused 1");
     assert!(!refused());
     reload(&right.replace("evacuation_time = \"3h\"", "evacuation_time = \"never\""));
     eventually("that it is refused", refused);
