@@ -207,10 +207,13 @@ impl FileTail {
     /// folder.
     fn glance(&self) -> io::Result<Glance> {
         let named = std::fs::metadata(&self.path).map(|metadata| Glance::at(&metadata));
+        let is_gone = |error: &io::Error| error.kind() == io::ErrorKind::NotFound;
         match (&self.held, named) {
             (Some(_), Ok(named)) if self.place == Some(named.place) => Ok(named),
-            (Some(held), _) => Ok(Glance::at(&held.metadata()?)),
-            (None, named) => named,
+            (Some(held), named) if named.as_ref().err().is_none_or(is_gone) => {
+                Ok(Glance::at(&held.metadata()?))
+            }
+            (_, named) => named,
         }
     }
 
@@ -221,6 +224,8 @@ impl FileTail {
         };
         match named {
             Ok(named) if self.place == Some(FileId::of(&named.metadata()?)) => Ok(named),
+            // Whoever may not open it any more does not read it either.
+            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
             Ok(_) | Err(_) => held.try_clone(),
         }
     }
