@@ -55,10 +55,11 @@ impl Daemon {
     }
 
     fn show_refusal(&self, refusal: &ConfigRefusal) {
-        (self.pulse.vitals).update(|health| health.config_refused.clone_from(&refusal.refused));
         if let Err(error) = refusal.write(&self.config.site.state_dir) {
             tracing::warn!(%error, "that cannot be kept for slipwatch status");
         }
+        // Last, so that whoever sees it here finds it in the status too.
+        (self.pulse.vitals).update(|health| health.config_refused.clone_from(&refusal.refused));
     }
 
     /// What is in force now is the config file as it is.
