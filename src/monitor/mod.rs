@@ -318,7 +318,7 @@ impl Monitor {
         } else {
             track.take(policy, source, reading, &context)
         };
-        if self.in_batches && track.owes_look_back() {
+        if self.in_batches && track.has_look_back() {
             self.late.insert(benchmark.clone());
         }
         self.queue.note(benchmark, track);

@@ -188,3 +188,182 @@ fn value<T: for<'de> Deserialize<'de>>(name: &str, body: &[u8]) -> Result<T, Sav
         source,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::alert::Level;
+    use crate::monitor::{Input, Notice};
+    use crate::reading::{Reading, Unit};
+    use flate2::read::GzDecoder;
+    use jiff::ToSpan;
+    use serde_json::Value;
+    use std::io::Read;
+    use std::path::Path;
+
+    /// What the map of a benchmark held when a track had no parts: states with these fields are on disks.
+    const NAMES: [&str; 29] = [
+        "accepted",
+        "adopted",
+        "ahead",
+        "backwards",
+        "benchmark",
+        "declared",
+        "faulted",
+        "held",
+        "history",
+        "intercept",
+        "kept",
+        "latch",
+        "levels",
+        "look",
+        "lookback",
+        "newest",
+        "others",
+        "overdue",
+        "owes",
+        "pace",
+        "panel",
+        "queued_since",
+        "record",
+        "regime",
+        "silence",
+        "spoilt_by",
+        "transition",
+        "unknown",
+        "watch",
+    ];
+
+    fn time(hour: i64) -> Timestamp {
+        let start: Timestamp = "2020-01-01T00:00:00Z".parse().unwrap();
+        start + hour.hours()
+    }
+
+    fn input(hour: i64, value: f64) -> Input {
+        Input::Reading {
+            benchmark: BenchmarkId::new("a"),
+            unit: Unit::MM,
+            averaging: None,
+            reading: Reading {
+                time: time(hour),
+                value,
+                sigma: None,
+            },
+        }
+    }
+
+    /// A monitor of a slope that runs away, with something in nearly every field: a reading far ahead that waits, one that
+    /// came late and has not been judged, a sensor that was stuck, a level in force.
+    fn monitor() -> Monitor {
+        let mut monitor = Monitor::new(Settings::default());
+        for hour in 0..106 {
+            let left = (120 - if hour < 100 { hour.min(90) } else { hour }) as f64;
+            monitor.step(time(hour), &input(hour, 200.0 * (120.0 / left).ln()));
+        }
+        monitor.step(time(106), &input(400, 900.0));
+        monitor.step(time(106), &Input::Notice(Notice::InBatches));
+        monitor.step(time(106), &input(50, 110.0));
+        monitor
+    }
+
+    fn saved(monitor: &mut Monitor) -> Vec<MemoryPart> {
+        let all: Vec<BenchmarkId> = monitor.tracks.keys().cloned().collect();
+        for id in &all {
+            monitor.note_changed(id);
+        }
+        monitor.save().unwrap()
+    }
+
+    fn map(part: &MemoryPart) -> Value {
+        rmp_serde::from_slice(part.body.as_ref().unwrap()).unwrap()
+    }
+
+    /// Whether all that `old` has stands in `new`, which may have more.
+    fn is_kept(old: &Value, new: &Value) -> bool {
+        match (old, new) {
+            (Value::Object(old), Value::Object(new)) => old
+                .iter()
+                .all(|(key, value)| new.get(key).is_some_and(|one| is_kept(value, one))),
+            _ => old == new,
+        }
+    }
+
+    #[test]
+    fn a_benchmark_is_one_map_of_the_fields_that_earlier_versions_wrote() {
+        let parts = saved(&mut monitor());
+        let Value::Object(map) = map(&parts[0]) else {
+            panic!("no map");
+        };
+        let mut names: Vec<&str> = map.keys().map(String::as_str).collect();
+        names.sort_unstable();
+        assert_eq!(names, NAMES);
+        assert!(map["owes"] == true && map["ahead"].is_object() && map["lookback"].is_object());
+    }
+
+    #[test]
+    fn what_is_written_is_read_to_the_bit_and_goes_on_as_the_one_that_wrote_it() {
+        let mut before = monitor();
+        let parts = saved(&mut before);
+        let mut after = Monitor::restore(&parts).unwrap();
+        assert_eq!(saved(&mut after), parts);
+        let end = Input::Notice(Notice::BatchEnd);
+        let mut said = 0;
+        for hour in 107..116 {
+            let reading = input(hour, 200.0 * (120.0 / (120 - hour) as f64).ln());
+            for input in [&reading, &end] {
+                let events = before.step(time(hour), input);
+                assert_eq!(events, after.step(time(hour), input));
+                said += events.len();
+            }
+        }
+        assert!(said > 9);
+        assert_eq!(saved(&mut after), saved(&mut before));
+    }
+
+    #[test]
+    fn a_past_that_is_being_gone_through_is_read_too() {
+        let mut before = Monitor::new(Settings::default());
+        before.step(time(0), &Input::Notice(Notice::Past));
+        for hour in 0..100 {
+            before.step(time(hour), &input(hour, 0.1 * (hour * hour) as f64));
+        }
+        before.step(time(100), &Input::Notice(Notice::Current));
+        before.step(time(100), &Input::Notice(Notice::Retrace));
+        assert!(before.walk.is_some());
+        let mut after = Monitor::restore(&saved(&mut before)).unwrap();
+        while before.owes_past() {
+            let retrace = Input::Notice(Notice::Retrace);
+            assert_eq!(
+                before.step(time(100), &retrace),
+                after.step(time(100), &retrace)
+            );
+        }
+        assert_eq!(saved(&mut after), saved(&mut before));
+    }
+
+    #[test]
+    fn what_the_first_version_saved_is_read_and_nothing_of_it_is_lost() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference/state-0.1.0.db.gz");
+        let mut bytes = Vec::new();
+        GzDecoder::new(std::fs::File::open(file).unwrap())
+            .read_to_end(&mut bytes)
+            .unwrap();
+        let copy = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(copy.path(), bytes).unwrap();
+        let connection = rusqlite::Connection::open(copy.path()).unwrap();
+        let mut query = connection.prepare("SELECT name, body FROM memory").unwrap();
+        let parts = query.query_map([], |row| {
+            let (name, body) = (row.get(0)?, Some(row.get(1)?));
+            Ok(MemoryPart { name, body })
+        });
+        let parts: Vec<MemoryPart> = parts.unwrap().map(Result::unwrap).collect();
+        // What the runtime keeps beside the monitor's parts is none of them.
+        let ours = |part: &&MemoryPart| !part.name.starts_with('\0');
+        let parts: Vec<MemoryPart> = parts.iter().filter(ours).cloned().collect();
+        let mut monitor = Monitor::restore(&parts).unwrap();
+        assert_eq!(monitor.level(&BenchmarkId::new("5")), Some(Level::Red));
+        let old = parts.iter().find(|part| part.name == "5").unwrap();
+        let new = saved(&mut monitor);
+        assert!(is_kept(&map(old), &map(&new[0])), "{:?}", map(&new[0]));
+    }
+}

@@ -8,6 +8,8 @@ use jiff::SignedDuration;
 
 /// A forecast is the slope's for so many lengths of its record; further ahead it is the prior's, and calls no level.
 const REACH: f64 = 5.0;
+/// The early quantile of the time of collapse that rules may ask for, as reported.
+pub(super) const EARLY: f64 = 0.05;
 
 /// The forecasts after one reading.
 #[derive(Debug)]

@@ -1,54 +1,41 @@
 //! One benchmark: each new reading grows t_max, refits, and may change regime, intercept and level.
 
-mod adopted;
-mod ahead;
-mod call;
-mod declared;
+mod alarm;
+mod batch;
+mod effects;
 mod forecast;
-mod lookback;
-mod overdue;
-mod pace;
+mod forecaster;
 mod past;
-mod prepared;
-mod queued;
+mod pending;
+mod quality;
+mod record;
 mod refit;
-mod resolved;
-mod sensor;
-mod suspicion;
-mod unknown;
-mod watch;
+mod saved;
 
 use super::Explain;
 use super::covariates::Covariates;
 use super::declared::Declarations;
-use super::drift::Drift;
-use super::event::{AlertState, Event, EventKind};
-use super::history::{History, MeasuredAs, Taken};
+use super::event::Event;
+use super::given::Given;
+use super::history::{MeasuredAs, Taken};
 use super::kept::KeptForecast;
-use super::silence::Silence;
-use crate::alert::{AlertCause, Held, Latch, Level, Policy};
+use crate::alert::{AlertCause, Level, Policy};
 use crate::fit::Rate;
-use crate::forecast::LawForecaster;
-use crate::reading::{BenchmarkId, Reading, SECONDS_PER_DAY, Suspicion, Timestamp, days_since};
-use crate::regime::Tracker;
-use adopted::Adopted;
-use ahead::HeldReading;
+use crate::reading::{BenchmarkId, Reading, SECONDS_PER_DAY, Suspicion, Timestamp};
+use alarm::{Alarm, BesideForecast};
 use forecast::Forecast;
+use forecaster::Forecaster;
 use jiff::SignedDuration;
-use lookback::{Levels, Lookback};
-use overdue::Overdue;
-use pace::Pace;
-use past::PastReview;
+use pending::Pending;
+use quality::DataQuality;
+use record::BenchmarkRecord;
+use refit::FitChanges;
+use saved::SavedTrack;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
-use unknown::{Reason, Unknown};
-use watch::Watch;
 
+pub(super) use forecaster::Prepared;
 pub(super) use past::{PAST, PastReplay};
-pub(super) use prepared::Prepared;
-
-/// So many readings in a row with one value are a stuck sensor, or a resolution too coarse to show it.
-const STUCK: usize = 24;
 
 /// What a step of a benchmark depends on beside its readings.
 #[derive(Debug, Clone, Copy)]
@@ -71,71 +58,31 @@ pub(super) struct Phase {
     pub(super) is_queue: bool,
 }
 
-/// Everything the monitor knows of one benchmark.
+/// Everything the monitor knows of one benchmark. Each part keeps its own state; what one needs of another it is given.
+///
+/// On disk the parts' fields stand side by side in one map, as they did when a track had no parts: no two parts may have a field
+/// of one name, and each field stands in [`SavedTrack`] too.
 #[derive(Debug, Serialize, Deserialize)]
+#[serde(from = "SavedTrack")]
 pub(super) struct Track {
-    benchmark: BenchmarkId,
-    history: History,
-    panel: LawForecaster,
-    regime: Tracker,
-    intercept: Drift,
-    transition: Drift,
-    latch: Latch,
-    /// Since when the site's own rules have held.
-    #[serde(default)]
-    held: Held,
-    silence: Silence,
-    /// Until when something that happened calls for attention, and what.
-    look: Option<(Timestamp, AlertCause)>,
-    faulted: bool,
-    backwards: bool,
-    newest: Option<Timestamp>,
-    #[serde(default)]
-    pace: Pace,
-    watch: Watch,
-    /// The law under the known load that forecasts and levels go by.
-    adopted: Option<Adopted>,
-    /// What people declare for it.
-    #[serde(default)]
-    declared: Declarations,
-    #[serde(default)]
-    levels: Levels,
-    /// What came late and is to be looked back on with the next newest reading.
-    #[serde(default)]
-    lookback: Option<Lookback>,
-    /// What makes it unknown.
-    #[serde(default)]
-    unknown: Unknown,
-    /// A reading that lies far ahead of all others.
-    #[serde(default)]
-    ahead: Option<HeldReading>,
-    /// By how much its readings jump to and fro, where they are spoilt.
-    #[serde(default)]
-    spoilt_by: Option<f64>,
-    /// Readings of a second quantity in a row.
-    #[serde(default)]
-    others: u32,
-    /// Something came late and has not been judged.
-    #[serde(default)]
-    owes: bool,
-    /// The first reading of a queue that has not been judged, nor has one after it.
-    #[serde(default)]
-    queued_since: Option<Timestamp>,
-    /// The newest forecast, while a level is in force.
-    #[serde(default)]
-    kept: Option<KeptForecast>,
-    /// What that leaves to the time after it.
-    #[serde(default)]
-    overdue: Option<Overdue>,
-    /// Suspicions that people have looked into, and that do not hold.
-    #[serde(default)]
-    accepted: BTreeSet<Suspicion>,
-    /// Whether its past has been gone through.
-    #[serde(default)]
-    record: PastReview,
-    /// Forecasts computed ahead, for the next reading alone.
-    #[serde(skip)]
-    prepared: Prepared,
+    /// What has been read.
+    #[serde(flatten)]
+    record: BenchmarkRecord,
+    /// Whether that can be believed.
+    #[serde(flatten)]
+    quality: DataQuality,
+    /// What is forecast.
+    #[serde(flatten)]
+    forecaster: Forecaster,
+    /// What refits have reported.
+    #[serde(flatten)]
+    changes: FitChanges,
+    /// What is called.
+    #[serde(flatten)]
+    alarm: Alarm,
+    /// What is still to be done.
+    #[serde(flatten)]
+    pending: Pending,
 }
 
 impl Track {
@@ -146,51 +93,13 @@ impl Track {
         declared: Declarations,
     ) -> Self {
         Self {
-            declared,
-            levels: Levels::default(),
-            lookback: None,
-            unknown: Unknown::default(),
-            ahead: None,
-            spoilt_by: None,
-            others: 0,
-            owes: false,
-            queued_since: None,
-            kept: None,
-            overdue: None,
-            accepted: BTreeSet::new(),
-            record: PastReview::Known,
-            prepared: Prepared::default(),
-            benchmark,
-            history: History::new(source, epoch),
-            panel: LawForecaster::default(),
-            regime: Tracker::default(),
-            intercept: Drift::default(),
-            transition: Drift::default(),
-            latch: Latch::default(),
-            held: Held::default(),
-            silence: Silence::default(),
-            look: None,
-            faulted: false,
-            backwards: false,
-            newest: None,
-            pace: Pace::default(),
-            watch: Watch::default(),
-            adopted: None,
+            record: BenchmarkRecord::new(benchmark, source, epoch, declared),
+            quality: DataQuality::default(),
+            forecaster: Forecaster::default(),
+            changes: FitChanges::default(),
+            alarm: Alarm::default(),
+            pending: Pending::default(),
         }
-    }
-
-    pub(super) fn level(&self) -> Level {
-        self.latch.level()
-    }
-
-    pub(super) fn deadline(&self) -> Option<Timestamp> {
-        let each = [self.silent_at(), self.overdue_at()];
-        each.into_iter().flatten().min()
-    }
-
-    fn silent_at(&self) -> Option<Timestamp> {
-        let (newest, due) = (self.silence.newest()?, self.silence.deadline()?);
-        Some(self.declared.put_off(newest, due))
     }
 
     /// Takes one reading, and the one before it that waited for this.
@@ -201,12 +110,17 @@ impl Track {
         reading: &Reading,
         context: &StepContext<'_>,
     ) -> Vec<Event> {
-        let mut events = self.judge_ahead(policy, reading.time, context);
+        let waited = self.record.take_confirmed(reading.time, context.phase.now);
+        let mut events = match waited {
+            Some((source, waited)) => self.take_one(policy, source, &waited, context),
+            None => {
+                let contradicted = self.record.contradict_ahead(reading.time);
+                contradicted.into_iter().collect()
+            }
+        };
         events.extend(self.take_one(policy, source, reading, context));
-        self.prepared = Prepared::default();
-        if self.record == PastReview::Owed {
-            events.retain(|event| !event.kind.is_of_the_record());
-        }
+        self.forecaster.forget_prepared();
+        self.pending.hold_back(&mut events);
         events
     }
 
@@ -217,81 +131,142 @@ impl Track {
         reading: &Reading,
         context: &StepContext<'_>,
     ) -> Vec<Event> {
-        let mut events = self.declared_with(reading.time);
-        if self.history.is_left_out(&self.declared, reading.time) {
+        let mut events = self.record.declared_with(reading.time);
+        if self.record.is_left_out(reading.time) {
             events.extend(self.leave_out(source, reading));
             return events;
         }
-        if self.unknown.has(Reason::Stuck) && self.history.is_repeated_by(source, reading) {
-            events.extend(self.go_on_stuck(reading.time));
+        if self.quality.is_stuck() && self.record.history().is_repeated_by(source, reading) {
+            // It is no reading, but the benchmark is not silent.
+            self.record.note_newest(reading.time);
+            events.extend(self.read_again(reading.time, reading.time));
             return events;
         }
         // For the look back, which begins with the first that comes late.
-        let is_late = self.newest.is_some_and(|newest| reading.time <= newest);
-        let before =
-            (is_late && self.lookback.is_none()).then(|| self.history.observations.clone());
-        let taken = self.history.take(source, reading);
-        events.extend(self.complaint(taken, reading.time));
+        let begins_late = self.record.is_late(reading.time) && !self.pending.has_look_back();
+        let before = begins_late.then(|| self.record.observations().clone());
+        let taken = self.record.take(source, reading);
+        events.extend(self.quality.complaint(&self.record, taken, reading.time));
         match taken {
             Taken::OtherQuantity => {
-                events.extend(self.count_other(reading.time));
+                events.extend(self.quality.count_other(&self.record, reading.time));
                 return events;
             }
             Taken::Known | Taken::OutOfRange(_) => return events,
             Taken::Newest => {
-                self.newest = Some(reading.time);
-                self.watch.count();
-                events.extend(self.unstick(reading.time));
+                self.record.note_newest(reading.time);
+                self.forecaster.count_reading();
+                events.extend(self.quality.unstick(&mut self.record, reading.time));
             }
             // What came late or was corrected is judged at once, as of the newest reading.
-            Taken::Late | Taken::Corrected(_) => self.note_late(reading.time, before),
+            Taken::Late | Taken::Corrected(_) => {
+                let levels = self.alarm.levels();
+                self.pending.note_late(reading.time, before, levels);
+            }
         }
-        events.extend(self.count_own(reading.time));
-        let time = self.newest.unwrap_or(reading.time);
-        events.extend(self.reset(time));
-        events.extend(self.reads_again(time, reading.time));
-        events.extend(self.leave_out_clockless(time));
+        events.extend(self.quality.count_own(&self.record, reading.time));
+        let time = self.record.newest().unwrap_or(reading.time);
+        events.extend(self.record.reset(time));
+        events.extend(self.read_again(time, reading.time));
+        events.extend(self.record.leave_out_clockless(time));
         if taken == Taken::Newest {
-            events.extend(self.find_reset(time));
-            events.extend(self.judge_sensor(time));
-            events.extend(self.suspect(source, time));
+            events.extend(self.doubt(source, time));
             if !context.phase.in_batches {
                 events.extend(self.look_back(policy, time));
             }
         }
-        let is_owed = context.phase.in_batches && taken != Taken::Newest;
-        self.owes |= is_owed;
-        if context.phase.is_past {
-            return events;
-        }
-        let is_stuck = self.unknown.has(Reason::Stuck);
-        if is_owed
-            || is_stuck
-            || !self.is_refit_due(policy, taken, reading.time)
-            || context.phase.is_queue && self.waits(policy, time)
-        {
-            events.extend(self.raise(policy, time));
-            return events;
-        }
-        events.extend(self.judge(policy, time, context));
+        events.extend(self.judge_where_due(policy, taken, (reading.time, time), context));
         events
+    }
+
+    /// Keeps a reading that is not to count.
+    fn leave_out(&mut self, source: MeasuredAs, reading: &Reading) -> Vec<Event> {
+        let Some(mut events) = self.record.leave_out(source, reading) else {
+            return Vec::new();
+        };
+        let now = self.record.data_time(reading.time);
+        events.extend(self.read_again(now, reading.time));
+        events
+    }
+
+    /// The end of a silence, where the reading of `time` is one.
+    fn read_again(&mut self, now: Timestamp, time: Timestamp) -> Option<Event> {
+        self.quality.read_again(&mut self.record, now, time)
+    }
+
+    /// After the newest reading, of `time`: whether what is read can be what a slope does.
+    fn doubt(&mut self, source: MeasuredAs, time: Timestamp) -> Vec<Event> {
+        let mut events = Vec::new();
+        if !self.quality.is_accepted(Suspicion::Fall) {
+            events.extend(self.record.find_reset(time));
+        }
+        let level = self.level();
+        events.extend(self.quality.judge_sensor(&mut self.record, level, time));
+        events.extend(self.quality.suspect(&self.record, source, time));
+        events
+    }
+
+    /// After a reading of `time`, the newest being that of `newest`: a refit where one is due now; where not, thresholds and
+    /// the site's own rules act by themselves.
+    fn judge_where_due(
+        &mut self,
+        policy: &Policy,
+        taken: Taken,
+        (time, newest): (Timestamp, Timestamp),
+        context: &StepContext<'_>,
+    ) -> Vec<Event> {
+        let waits_for_batch = context.phase.in_batches && taken != Taken::Newest;
+        if waits_for_batch {
+            self.pending.note_unjudged_late();
+        }
+        if context.phase.is_past {
+            return Vec::new();
+        }
+        if waits_for_batch
+            || self.quality.is_stuck()
+            || !self.is_refit_due(policy, taken, time)
+            || context.phase.is_queue && self.waits(policy, newest)
+        {
+            let beside = beside(&self.record, &self.forecaster, &self.quality);
+            let raised = self.alarm.raise(beside, policy, newest);
+            return raised.into_iter().collect();
+        }
+        self.judge(policy, newest, context)
+    }
+
+    fn is_refit_due(&mut self, policy: &Policy, taken: Taken, time: Timestamp) -> bool {
+        let observations = self.record.observations();
+        (self.forecaster).is_refit_due(policy, observations, taken, time)
     }
 
     /// What follows from the readings as they are now.
     fn judge(&mut self, policy: &Policy, time: Timestamp, context: &StepContext<'_>) -> Vec<Event> {
+        self.pending.is_judged();
         let mut events = Vec::new();
-        (self.owes, self.queued_since) = (false, None);
-        let forecast = self.forecast(policy.critical_velocity_mm_per_day, context);
+        let critical = policy.critical_velocity_mm_per_day;
+        let history = self.record.history();
+        let forecast = self.forecaster.forecast(history, critical, context);
         if let Some(forecast) = &forecast {
             events.extend(self.refit(policy, time, forecast));
-            events.extend(self.watch(policy, time, forecast, context));
+            let record = &self.record;
+            if let Some(event) = self.forecaster.watch(record, time, forecast, context) {
+                let cause = AlertCause::UnexplainedResidual;
+                self.alarm.attend(policy, time, cause);
+                events.push(event);
+            }
         }
         self.decide(policy, time, forecast, &mut events);
         events
     }
 
-    /// The level that follows from a forecast, and what the forecast leaves to the time after it. Where the level may not fall,
-    /// because the readings are doubtful, neither it nor what the forecast before left is changed.
+    fn refit(&mut self, policy: &Policy, time: Timestamp, forecast: &Forecast) -> Vec<Event> {
+        let (events, causes) = self.changes.refit(&self.record, policy, time, forecast);
+        for cause in causes {
+            self.alarm.attend(policy, time, cause);
+        }
+        events
+    }
+
     fn decide(
         &mut self,
         policy: &Policy,
@@ -299,110 +274,41 @@ impl Track {
         forecast: Option<Forecast>,
         events: &mut Vec<Event>,
     ) {
-        let may_fall = self.may_fall();
-        let (latch, levels) = (self.latch.clone(), self.levels.clone());
-        let mut alerts = self.alert(policy, time, forecast.as_ref(), events);
-        if !may_fall && self.latch.level() < latch.level() {
-            (self.latch, self.levels) = (latch, levels);
-            alerts.retain(|event| !matches!(event.kind, EventKind::Alert { .. }));
-            events.append(&mut alerts);
-            return;
-        }
-        events.append(&mut alerts);
-        match &forecast {
-            Some(forecast) => self.await_red(policy, time, forecast),
-            None => self.overdue = None,
-        }
-        let is_kept = self.latch.level() > Level::Green;
-        self.kept = forecast.filter(|_| is_kept).map(|forecast| {
-            let outlook = forecast.in_force(days(policy.outlook));
-            KeptForecast::of(time, &outlook.collapse)
-        });
+        let beside = beside(&self.record, &self.forecaster, &self.quality);
+        self.alarm.decide(beside, policy, time, forecast, events);
     }
 
-    /// The newest forecast, while a level is in force.
-    pub(super) fn kept_forecast(&self) -> Option<&KeptForecast> {
-        self.kept.as_ref()
-    }
-
-    /// Rates of the whole record, and `now` on its clock, days.
-    pub(super) fn rates_at(&self, now: Timestamp) -> (Vec<Rate>, f64) {
-        let now_days = days_since(self.history.epoch, now);
-        (self.history.rates(), now_days)
-    }
-
-    /// What comes now was measured long before `time`, which it is by the clock.
-    pub(super) fn is_behind(&mut self, time: Timestamp) {
-        self.silence.is_behind(time);
-    }
-
-    /// Whether something that came late is still to be looked back on.
-    pub(super) fn owes_look_back(&self) -> bool {
-        self.lookback.is_some()
-    }
-
-    /// One more reading of a stuck sensor: it is none, but the benchmark is not silent.
-    fn go_on_stuck(&mut self, time: Timestamp) -> Option<Event> {
-        self.newest = Some(time);
-        self.reads_again(time, time)
-    }
-
-    /// What the laws predict after the newest reading.
-    fn forecast(&mut self, critical: f64, context: &StepContext<'_>) -> Option<Forecast> {
-        let (history, prepared) = (&self.history, &mut self.prepared);
-        let by = |readings: &_, critical| prepared.outlook(readings, critical);
-        let plain = (self.panel).update_by(&history.observations, critical, by)?;
-        let known_load = self.adopted.as_mut().and_then(|adopted| {
-            let channels = context.covariates.list();
-            adopted.forecast(history, &channels, critical, &plain, prepared)
-        });
-        Some(Forecast { plain, known_load })
-    }
-
-    /// What is wrong with a reading, where something is.
-    fn complaint(&mut self, taken: Taken, time: Timestamp) -> Option<Event> {
-        let (kind, text) = match taken {
-            Taken::Newest if self.history.identical() == STUCK => {
-                let text = format!(
-                    "benchmark {}: {STUCK} readings in a row are the same",
-                    self.benchmark
-                );
-                ("stuck", text)
-            }
-            Taken::Newest | Taken::Known => return None,
-            Taken::Late => (
-                "out-of-order",
-                format!("the reading of {time} came after later ones"),
-            ),
-            Taken::Corrected(before) => {
-                let text = format!(
-                    "the reading of {time} was corrected; it was {before} {}",
-                    self.unit()
-                );
-                ("corrected", text)
-            }
-            Taken::OutOfRange(value) => {
-                let text = format!(
-                    "the reading of {time} is {value:e} {}: no slope does that",
-                    self.unit()
-                );
-                ("out-of-range", text)
-            }
-            Taken::OtherQuantity if self.faulted => return None,
-            Taken::OtherQuantity => {
-                self.faulted = true;
-                let text = format!(
-                    "benchmark {} gives a second quantity; only the first is monitored",
-                    self.benchmark
-                );
-                ("second-quantity", text)
-            }
+    /// Goes by other declarations from here on, and looks again at the readings that it has where they concern some.
+    pub(super) fn redeclare(
+        &mut self,
+        policy: &Policy,
+        declared: Declarations,
+        context: &StepContext<'_>,
+    ) -> Vec<Event> {
+        let Some(changed) = self.record.redeclare(declared) else {
+            return Vec::new();
         };
-        Some(self.fault(
-            self.newest.map_or(time, |newest| newest.max(time)),
-            kind,
-            text,
-        ))
+        let (time, mut events) = (changed.time, changed.events);
+        if !changed.is_other || self.quality.is_stuck() {
+            return events;
+        }
+        let critical = policy.critical_velocity_mm_per_day;
+        let history = self.record.history();
+        if let Some(forecast) = self.forecaster.forecast(history, critical, context) {
+            events.extend(self.refit(policy, time, &forecast));
+            self.decide(policy, time, Some(forecast), &mut events);
+        }
+        events
+    }
+
+    /// Keeps a reading of a time that has not come yet, as far as anybody knows.
+    pub(super) fn put_aside(
+        &mut self,
+        now: Timestamp,
+        source: MeasuredAs,
+        reading: &Reading,
+    ) -> Vec<Event> {
+        vec![self.record.put_aside(now, source, reading)]
     }
 
     /// Data time has come to `now` without a reading; `fault` is what the sensor gives instead.
@@ -412,83 +318,120 @@ impl Track {
         now: Timestamp,
         fault: Option<&str>,
     ) -> Vec<Event> {
-        let mut events: Vec<Event> = self.judge_overdue(policy, now).into_iter().collect();
-        if self.silent_at().is_some_and(|due| due <= now) {
-            events.extend(self.falls_silent(now, fault));
+        let overdue = self.alarm.judge_overdue(&self.record, policy, now);
+        let mut events: Vec<Event> = overdue.into_iter().collect();
+        if self.record.silent_at().is_some_and(|due| due <= now) {
+            let level = self.level();
+            let silent = (self.quality).fall_silent(&mut self.record, now, fault, level);
+            events.extend(silent);
         }
-        events
-    }
-
-    fn falls_silent(&mut self, now: Timestamp, fault: Option<&str>) -> Vec<Event> {
-        let Some(newest) = self.silence.begins() else {
-            return Vec::new();
-        };
-        let latched = match self.latch.level() {
-            Level::Green | Level::Unknown => String::new(),
-            level @ (Level::Yellow | Level::Orange | Level::Red) => {
-                format!("; {level} stays in force")
-            }
-        };
-        let fault = fault.map_or_else(String::new, |what| format!("; the sensor gives {what}"));
-        let text = format!(
-            "benchmark {}: no reading since {newest}{fault}{latched}",
-            self.benchmark
-        );
-        let mut events = vec![self.fault(now, "no-data", text.clone())];
-        events.extend(self.begins_unknown((now, newest), Reason::NoData, text));
         events
     }
 
     /// The benchmark is no longer watched: what is in force at it ends.
     pub(super) fn close(&mut self, now: Timestamp) -> Vec<Event> {
-        let text = format!("benchmark {} is no longer watched", self.benchmark);
-        let mut events: Vec<Event> = self.ends_all_unknown(now, &text).into_iter().collect();
-        if let Some((level, since)) = self.latch.in_force() {
-            let kind = EventKind::Alert {
-                level,
-                state: AlertState::Resolved,
-                key: format!("{}/{level}/{since}", self.benchmark),
-                rule: "removed".to_owned(),
-                text,
-            };
-            events.push(self.event(now, kind));
-        }
-        events
+        let text = format!("benchmark {} is no longer watched", self.record.benchmark());
+        let unknown = (self.quality).ends_all_unknown(&mut self.record, now, &text);
+        let removed = self.alarm.removed(&self.record, now, text);
+        unknown.into_iter().chain(removed).collect()
     }
 
-    fn look_until(&mut self, policy: &Policy, time: Timestamp, cause: AlertCause) {
-        self.look = time
-            .checked_add(policy.steady_for)
-            .ok()
-            .map(|until| (until, cause));
+    /// Whether the level in force would have been another one, had everything come in time.
+    pub(super) fn look_back(&mut self, policy: &Policy, time: Timestamp) -> Option<Event> {
+        self.pending.look_back(&self.record, policy, time)
     }
 
-    fn fault(&self, time: Timestamp, kind: &str, text: String) -> Event {
-        self.event(
-            time,
-            EventKind::Fault {
-                kind: kind.to_owned(),
-                text,
-            },
-        )
+    /// Ends the level in force, because people say so. What is known of the slope stays.
+    pub(super) fn resolve(&mut self, now: Timestamp, given: &Given) -> Option<Event> {
+        self.alarm.resolve(&self.record, now, given)
     }
 
-    fn event(&self, time: Timestamp, kind: EventKind) -> Event {
-        Event {
-            time,
-            kind,
-            benchmark: Some(self.benchmark.clone()),
-        }
+    /// Goes by other suspicions that people have looked into.
+    pub(super) fn accept(&mut self, now: Timestamp, accepted: BTreeSet<Suspicion>) -> Vec<Event> {
+        self.quality.accept(&self.record, now, accepted)
     }
 
-    fn unit(&self) -> &'static str {
-        match self.history.observations.quantity {
-            crate::reading::Quantity::Displacement => "mm",
-            crate::reading::Quantity::Velocity => "mm/day",
-        }
+    /// A rule that the config has changed begins anew, though it has the same name.
+    pub(super) fn forget_changed_rules(&mut self, before: &Policy, now: &Policy) {
+        self.alarm.forget_changed_rules(before, now);
+    }
+
+    /// The newest reading, of `time`, came while the clock said `clock`.
+    pub(super) fn suspect_ahead(
+        &mut self,
+        now: Timestamp,
+        (time, clock): (Timestamp, Timestamp),
+    ) -> Vec<Event> {
+        (self.quality).suspect_ahead(&self.record, now, (time, clock))
+    }
+
+    /// What comes now was measured long before `time`, which it is by the clock.
+    pub(super) fn is_behind(&mut self, time: Timestamp) {
+        self.record.is_behind(time);
+    }
+
+    pub(super) fn level(&self) -> Level {
+        self.alarm.level()
+    }
+
+    /// The newest forecast, while a level is in force.
+    pub(super) fn kept_forecast(&self) -> Option<&KeptForecast> {
+        self.alarm.kept_forecast()
+    }
+
+    /// When it becomes silent, or red without a reading.
+    pub(super) fn deadline(&self) -> Option<Timestamp> {
+        let each = [self.record.silent_at(), self.alarm.overdue_at(&self.record)];
+        each.into_iter().flatten().min()
+    }
+
+    /// Rates of the whole record, and `now` on its clock, days.
+    pub(super) fn rates_at(&self, now: Timestamp) -> (Vec<Rate>, f64) {
+        self.record.rates_at(now)
+    }
+
+    /// Whether something that came late is still to be looked back on.
+    pub(super) fn has_look_back(&self) -> bool {
+        self.pending.has_look_back()
+    }
+
+    /// Whether nothing can be said of it now.
+    pub(super) fn is_unknown(&self) -> bool {
+        self.quality.is_unknown() || self.record.is_silent()
+    }
+
+    /// Whether it gives no readings.
+    pub(super) fn is_silent(&self) -> bool {
+        self.record.is_silent()
+    }
+
+    /// Whether its times lie ahead of the clock.
+    pub(super) fn is_ahead(&self) -> bool {
+        self.quality.is_ahead()
+    }
+
+    /// Whether a reading of `time` lies so far after the newest one that the logger's clock may have jumped.
+    pub(super) fn leaps(&self, time: Timestamp) -> bool {
+        self.record.leaps(time)
+    }
+}
+
+/// What a level rests on beside the forecast.
+fn beside<'a>(
+    record: &'a BenchmarkRecord,
+    forecaster: &Forecaster,
+    quality: &DataQuality,
+) -> BesideForecast<'a> {
+    BesideForecast {
+        record,
+        has_effect: forecaster.has_effect(),
+        shows_motion: quality.shows_motion(),
     }
 }
 
 fn days(span: SignedDuration) -> f64 {
     span.as_secs_f64() / SECONDS_PER_DAY
 }
+
+#[cfg(test)]
+mod fixture;

@@ -1,12 +1,11 @@
 //! A benchmark's past, gone through after its newest reading has been judged: what would have been, had each reading
 //! been judged as it came.
 
-use super::{Reason, StepContext, Track};
+use super::{StepContext, Track};
 use crate::alert::{Level, Policy};
 use crate::monitor::declared::Declarations;
 use crate::monitor::event::{AlertState, Event, EventKind};
-use crate::monitor::history::MeasuredAs;
-use crate::reading::{BenchmarkId, Quantity, Reading, Timestamp, Unit};
+use crate::reading::{BenchmarkId, Reading, Timestamp};
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
 
@@ -19,14 +18,6 @@ const ALL_FOR: SignedDuration = SignedDuration::from_hours(90 * 24);
 /// The rule of a level that comes from the past.
 pub(in crate::monitor) const PAST: &str = "past";
 const DAY: SignedDuration = SignedDuration::from_hours(24);
-
-/// Whether the readings from before a first start have been gone through.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) enum PastReview {
-    #[default]
-    Known,
-    Owed,
-}
 
 /// A benchmark's past, as far as it has been gone through.
 #[derive(Debug, Serialize, Deserialize)]
@@ -46,7 +37,7 @@ pub(in crate::monitor) struct PastReplay {
 
 impl PastReplay {
     pub(in crate::monitor) fn benchmark(&self) -> &BenchmarkId {
-        &self.track.benchmark
+        self.track.record.benchmark()
     }
 
     /// Whether a refit of `time` is reported.
@@ -64,7 +55,7 @@ impl PastReplay {
 
 impl Track {
     pub(in crate::monitor) fn newest(&self) -> Option<Timestamp> {
-        self.newest
+        self.record.newest()
     }
 
     /// Judges the newest reading, of `time`.
@@ -74,12 +65,12 @@ impl Track {
         time: Timestamp,
         context: &StepContext<'_>,
     ) -> Vec<Event> {
-        self.record = PastReview::Owed;
-        if self.unknown.has(Reason::Stuck) {
+        self.pending.begin_past();
+        if self.quality.is_stuck() {
             return Vec::new();
         }
         let mut events = self.judge(policy, time, context);
-        events.retain(|event| !event.kind.is_of_the_record());
+        self.pending.hold_back(&mut events);
         events
     }
 
@@ -87,9 +78,10 @@ impl Track {
     pub(in crate::monitor) fn past(&self, until: Timestamp) -> PastReplay {
         // Declared resets are taken off what is kept.
         let declared = Declarations::default();
-        let (source, epoch) = (self.source(), self.history.epoch);
-        let mut track = Self::new(self.benchmark.clone(), source, epoch, declared);
-        track.accepted.clone_from(&self.accepted);
+        let record = &self.record;
+        let (source, epoch) = (record.source(), record.history().epoch);
+        let mut track = Self::new(record.benchmark().clone(), source, epoch, declared);
+        track.quality = self.quality.anew();
         PastReplay {
             track: Box::new(track),
             at_days: None,
@@ -106,7 +98,7 @@ impl Track {
         policy: &Policy,
         context: &StepContext<'_>,
     ) -> (Vec<Event>, bool) {
-        let values = &self.history.observations.values;
+        let values = &self.record.observations().values;
         let from = walk
             .at_days
             .map_or(0, |at| values.partition_point(|one| one.t_days <= at));
@@ -116,7 +108,7 @@ impl Track {
                 return (events, true);
             }
             walk.at_days = Some(one.t_days);
-            let Some(time) = self.history.time(one.t_days) else {
+            let Some(time) = self.record.history().time(one.t_days) else {
                 continue;
             };
             let reading = Reading {
@@ -126,7 +118,8 @@ impl Track {
             };
             let mut context = *context;
             context.phase.now = time;
-            let said = walk.track.take(policy, self.source(), &reading, &context);
+            let source = self.record.source();
+            let said = walk.track.take(policy, source, &reading, &context);
             for event in said {
                 if matches!(event.kind, EventKind::Refit { .. }) {
                     refits += 1;
@@ -137,7 +130,7 @@ impl Track {
                     walk.episode.push(event);
                 }
             }
-            if walk.track.latch.level() == Level::Green {
+            if walk.track.level() == Level::Green {
                 events.append(&mut walk.episode);
             }
         }
@@ -151,48 +144,31 @@ impl Track {
         past: PastReplay,
     ) -> Vec<Event> {
         let (past, mut events) = (*past.track, past.episode);
-        self.panel = past.panel;
-        self.regime = past.regime;
-        (self.intercept, self.transition) = (past.intercept, past.transition);
-        self.pace = past.pace;
-        self.held = past.held;
-        self.record = PastReview::Known;
-        let in_force = past.latch.in_force();
-        let Some((level, since)) = in_force.filter(|(level, _)| *level > self.latch.level()) else {
-            if self.latch.level() == Level::Green {
+        self.forecaster.go_on_from(past.forecaster);
+        self.changes = past.changes;
+        self.pending.end_past();
+        let Some((level, since)) = self.alarm.go_on_from(past.alarm) else {
+            if self.level() == Level::Green {
                 events.extend(events.last().and_then(|last| ended(now, last)));
             }
             return events;
         };
-        (self.latch, self.levels, self.look) = (past.latch, past.levels, past.look);
-        (self.kept, self.overdue) = (past.kept, past.overdue);
+        let benchmark = self.record.benchmark();
         let text = format!(
-            "benchmark {}: {level} since {since}, found in the readings from before the first start; nothing since has ended it",
-            self.benchmark
+            "benchmark {benchmark}: {level} since {since}, found in the readings from before the first start; nothing since has \
+             ended it"
         );
         let kind = EventKind::Alert {
             level,
             state: AlertState::Firing,
-            key: format!("{}/{level}/{since}", self.benchmark),
+            key: format!("{benchmark}/{level}/{since}"),
             rule: PAST.to_owned(),
             text,
         };
-        events.push(self.event(now, kind));
+        events.push(self.record.event(now, kind));
         // What a sensor at the end of its range gives is judged by the level.
-        events.extend(self.judge_sensor(now));
+        events.extend(self.quality.judge_sensor(&mut self.record, level, now));
         events
-    }
-
-    /// Where the readings come from as they are kept.
-    fn source(&self) -> MeasuredAs {
-        let unit = match self.history.observations.quantity {
-            Quantity::Displacement => Unit::MM,
-            Quantity::Velocity => Unit::MM_PER_DAY,
-        };
-        MeasuredAs {
-            unit,
-            averaging: self.history.averaging(),
-        }
     }
 }
 

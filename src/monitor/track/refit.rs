@@ -1,30 +1,133 @@
-//! What a refit says: the regime, the failure time, and predicted times that moved.
+//! What a refit says: the regime, the failure time, and what of both is other than at the refits before.
 
-use super::call::EARLY;
-use super::forecast::Forecast;
-use super::{Track, days};
+use super::days;
+use super::forecast::{EARLY, Forecast};
+use super::record::BenchmarkRecord;
 use crate::alert::{AlertCause, Policy};
 use crate::forecast::{HORIZON_DAYS, InverseVelocityLine, Outlook, Passage};
-use crate::monitor::drift;
+use crate::monitor::drift::{self, Drift};
 use crate::monitor::event::{
     Event, EventKind, FailureTime, InverseVelocity, Plain, RegimeReport, Unexplained,
 };
 use crate::monitor::recent;
 use crate::reading::{Timestamp, after_days};
-use crate::regime::{Regime, label};
+use crate::regime::{Regime, Tracker, label};
+use serde::Serialize;
 
 /// An intercept beyond this many lengths of the record is no prediction.
 const FARTHEST_INTERCEPT: f64 = 3.0;
 
-impl Track {
+/// What refits have reported so far of a benchmark, from which the next one may differ.
+#[derive(Debug, Default, Serialize)]
+pub(super) struct FitChanges {
+    regime: Tracker,
+    intercept: Drift,
+    transition: Drift,
+}
+
+/// The times that a refit predicts, days.
+#[derive(Debug, Clone, Copy)]
+struct PredictedTimes {
+    line: Option<InverseVelocityLine>,
+    intercept: Option<f64>,
+    transition: Option<f64>,
+    /// Length of the record.
+    length: f64,
+}
+
+impl FitChanges {
+    pub(super) fn from_saved(regime: Tracker, intercept: Drift, transition: Drift) -> Self {
+        Self {
+            regime,
+            intercept,
+            transition,
+        }
+    }
+
+    /// What the refit of `time` says, and what of it calls for attention, in order.
     pub(super) fn refit(
         &mut self,
+        record: &BenchmarkRecord,
         policy: &Policy,
         time: Timestamp,
         forecast: &Forecast,
-    ) -> Vec<Event> {
+    ) -> (Vec<Event>, Vec<AlertCause>) {
         // The line and the inflection are those of what is observed, whatever explains it.
         let outlook = &forecast.plain;
+        let predicted = PredictedTimes::of(outlook);
+        let mut causes = Vec::new();
+        let mut events = vec![refit_event(record, policy, time, forecast, predicted)];
+        let in_force = forecast.in_force(days(policy.outlook));
+        events.extend(self.flip(record, time, in_force, &mut causes));
+        events.extend(surprise(record, time, forecast, &mut causes));
+        events.extend(self.drifts(record, time, outlook, predicted, &mut causes));
+        (events, causes)
+    }
+
+    /// What of the intercept and the transition time has moved.
+    fn drifts(
+        &mut self,
+        record: &BenchmarkRecord,
+        time: Timestamp,
+        outlook: &Outlook,
+        predicted: PredictedTimes,
+        causes: &mut Vec<AlertCause>,
+    ) -> Vec<Event> {
+        let now = outlook.now_days;
+        let least = (predicted.length / 40.0).max(0.02);
+        let mut events = Vec::new();
+        if let Some(moved) = self.intercept.update(now, predicted.intercept, least) {
+            let expected = outlook
+                .law
+                .and_then(|law| drift::expected_by_the_law(&law, recent(&outlook.rates), now));
+            if moved.to_days < moved.from_days {
+                causes.push(AlertCause::InterceptDriftingIn);
+            }
+            let kind = |from, to| EventKind::InterceptDrift {
+                from,
+                to,
+                drift_days_per_day: moved.drift_days_per_day,
+                expected_days_per_day: expected,
+            };
+            events.extend(drift_event(record, time, moved, kind));
+        }
+        let transition = predicted.transition;
+        if let Some(moved) = self.transition.update(now, transition, 2.0 * least) {
+            if moved.to_days < moved.from_days {
+                causes.push(AlertCause::TransitionDriftingIn);
+            }
+            let kind = |from, to| EventKind::TransitionDrift {
+                from,
+                to,
+                drift_days_per_day: moved.drift_days_per_day,
+            };
+            events.extend(drift_event(record, time, moved, kind));
+        }
+        events
+    }
+
+    fn flip(
+        &mut self,
+        record: &BenchmarkRecord,
+        time: Timestamp,
+        outlook: &Outlook,
+        causes: &mut Vec<AlertCause>,
+    ) -> Option<Event> {
+        let flip = self.regime.update(&outlook.regimes)?;
+        if flip.to == Regime::UnstableAccelerating && flip.from != Regime::Undetermined {
+            causes.push(AlertCause::RegimeFlip);
+        }
+        let kind = EventKind::RegimeFlip {
+            from: flip.from,
+            to: flip.to,
+            probability: flip.probability,
+        };
+        Some(record.event(time, kind))
+    }
+}
+
+impl PredictedTimes {
+    fn of(outlook: &Outlook) -> Self {
         let now = outlook.now_days;
         let line = InverseVelocityLine::fit(recent(&outlook.rates));
         let length = now - outlook.rates.first().map_or(now, |rate| rate.from);
@@ -39,149 +142,95 @@ impl Track {
             .and_then(|law| law.transition_days())
             .map(|days| now + days)
             .filter(|days| *days > now && *days < now + FARTHEST_INTERCEPT * length);
-        let mut events =
-            vec![self.refit_event(policy, time, forecast, line, intercept, transition)];
-        events.extend(self.flip(policy, time, forecast.in_force(days(policy.outlook))));
-        events.extend(self.surprise(policy, time, forecast));
-        let least = (length / 40.0).max(0.02);
-        events.extend(self.drifts(policy, time, outlook, intercept, transition, least));
-        events
-    }
-
-    /// A reading that the law in force did not expect.
-    fn surprise(&mut self, policy: &Policy, time: Timestamp, forecast: &Forecast) -> Option<Event> {
-        let surprise_nats = forecast.surprise_nats()?;
-        if self.declared.is_shaken(time) {
-            return None;
-        }
-        self.look_until(policy, time, AlertCause::UnexplainedResidual);
-        let unexplained = Unexplained::Reading {
-            surprise_nats,
-            velocity_mm_per_day: forecast.plain.rates.last().map(|rate| rate.velocity),
-        };
-        Some(self.event(time, EventKind::UnexplainedResidual(unexplained)))
-    }
-
-    /// What of the intercept and the transition time has moved, by `least` days.
-    fn drifts(
-        &mut self,
-        policy: &Policy,
-        time: Timestamp,
-        outlook: &Outlook,
-        intercept: Option<f64>,
-        transition: Option<f64>,
-        least: f64,
-    ) -> Vec<Event> {
-        let now = outlook.now_days;
-        let mut events = Vec::new();
-        if let Some(moved) = self.intercept.update(now, intercept, least) {
-            let expected = outlook
-                .law
-                .and_then(|law| drift::expected_by_the_law(&law, recent(&outlook.rates), now));
-            if moved.to_days < moved.from_days {
-                self.look_until(policy, time, AlertCause::InterceptDriftingIn);
-            }
-            events.extend(
-                self.drift_event(time, moved, |from, to| EventKind::InterceptDrift {
-                    from,
-                    to,
-                    drift_days_per_day: moved.drift_days_per_day,
-                    expected_days_per_day: expected,
-                }),
-            );
-        }
-        if let Some(moved) = self.transition.update(now, transition, 2.0 * least) {
-            if moved.to_days < moved.from_days {
-                self.look_until(policy, time, AlertCause::TransitionDriftingIn);
-            }
-            events.extend(
-                self.drift_event(time, moved, |from, to| EventKind::TransitionDrift {
-                    from,
-                    to,
-                    drift_days_per_day: moved.drift_days_per_day,
-                }),
-            );
-        }
-        events
-    }
-
-    fn refit_event(
-        &self,
-        policy: &Policy,
-        time: Timestamp,
-        forecast: &Forecast,
-        line: Option<InverseVelocityLine>,
-        intercept: Option<f64>,
-        transition: Option<f64>,
-    ) -> Event {
-        let at = |days: Option<f64>| days.and_then(|days| after_days(self.history.epoch, days));
-        let outlook = forecast.in_force(days(policy.outlook));
-        let plain = forecast.known_load.as_ref().map(|known_load| {
-            Box::new(Plain {
-                regime: report(&forecast.plain),
-                failure_time: self.reported(forecast.plain.now_days, &forecast.plain.collapse),
-                is_explained: known_load.is_explained,
-            })
-        });
-        self.event(
-            time,
-            EventKind::Refit {
-                t_max: time,
-                regime: report(outlook),
-                failure_time: self.reported(outlook.now_days, &outlook.collapse),
-                critical_velocity_time: Box::new(self.reported(outlook.now_days, &outlook.passage)),
-                probability_of_acceleration: outlook.accelerating,
-                inverse_velocity: InverseVelocity {
-                    failure_time: at(intercept),
-                    r_squared: line.map(|line| line.r_squared),
-                },
-                transition_time: at(transition),
-                velocity_mm_per_day: forecast.plain.rates.last().map(|rate| rate.velocity),
-                chance_within_evacuation_time: forecast.chance_within(days(policy.evacuation_time)),
-                chance_within_outlook: forecast.chance_within(days(policy.outlook)),
-                called: None,
-                plain,
-            },
-        )
-    }
-
-    fn reported(&self, now_days: f64, passage: &Passage) -> FailureTime {
-        let quantile = |share| {
-            let days = passage.quantile(share, HORIZON_DAYS)?;
-            after_days(self.history.epoch, now_days + days)
-        };
-        FailureTime {
-            low: quantile(EARLY),
-            median: quantile(0.5),
-            high: quantile(0.95),
-            probability: passage.chance_within(HORIZON_DAYS),
-            horizon_days: HORIZON_DAYS,
+        Self {
+            line,
+            intercept,
+            transition,
+            length,
         }
     }
+}
 
-    fn flip(&mut self, policy: &Policy, time: Timestamp, outlook: &Outlook) -> Option<Event> {
-        let flip = self.regime.update(&outlook.regimes)?;
-        if flip.to == Regime::UnstableAccelerating && flip.from != Regime::Undetermined {
-            self.look_until(policy, time, AlertCause::RegimeFlip);
-        }
-        let kind = EventKind::RegimeFlip {
-            from: flip.from,
-            to: flip.to,
-            probability: flip.probability,
-        };
-        Some(self.event(time, kind))
+/// A reading that the law in force did not expect.
+fn surprise(
+    record: &BenchmarkRecord,
+    time: Timestamp,
+    forecast: &Forecast,
+    causes: &mut Vec<AlertCause>,
+) -> Option<Event> {
+    let surprise_nats = forecast.surprise_nats()?;
+    if record.is_shaken(time) {
+        return None;
     }
+    causes.push(AlertCause::UnexplainedResidual);
+    let unexplained = Unexplained::Reading {
+        surprise_nats,
+        velocity_mm_per_day: forecast.plain.rates.last().map(|rate| rate.velocity),
+    };
+    Some(record.event(time, EventKind::UnexplainedResidual(unexplained)))
+}
 
-    fn drift_event(
-        &self,
-        time: Timestamp,
-        moved: drift::MovedIntercept,
-        kind: impl FnOnce(Timestamp, Timestamp) -> EventKind,
-    ) -> Option<Event> {
-        let from = after_days(self.history.epoch, moved.from_days)?;
-        let to = after_days(self.history.epoch, moved.to_days)?;
-        Some(self.event(time, kind(from, to)))
+fn refit_event(
+    record: &BenchmarkRecord,
+    policy: &Policy,
+    time: Timestamp,
+    forecast: &Forecast,
+    predicted: PredictedTimes,
+) -> Event {
+    let epoch = record.history().epoch;
+    let at = |days: Option<f64>| days.and_then(|days| after_days(epoch, days));
+    let outlook = forecast.in_force(days(policy.outlook));
+    let plain = forecast.known_load.as_ref().map(|known_load| {
+        Box::new(Plain {
+            regime: report(&forecast.plain),
+            failure_time: reported(epoch, forecast.plain.now_days, &forecast.plain.collapse),
+            is_explained: known_load.is_explained,
+        })
+    });
+    let kind = EventKind::Refit {
+        t_max: time,
+        regime: report(outlook),
+        failure_time: reported(epoch, outlook.now_days, &outlook.collapse),
+        critical_velocity_time: Box::new(reported(epoch, outlook.now_days, &outlook.passage)),
+        probability_of_acceleration: outlook.accelerating,
+        inverse_velocity: InverseVelocity {
+            failure_time: at(predicted.intercept),
+            r_squared: predicted.line.map(|line| line.r_squared),
+        },
+        transition_time: at(predicted.transition),
+        velocity_mm_per_day: forecast.plain.rates.last().map(|rate| rate.velocity),
+        chance_within_evacuation_time: forecast.chance_within(days(policy.evacuation_time)),
+        chance_within_outlook: forecast.chance_within(days(policy.outlook)),
+        called: None,
+        plain,
+    };
+    record.event(time, kind)
+}
+
+fn reported(epoch: Timestamp, now_days: f64, passage: &Passage) -> FailureTime {
+    let quantile = |share| {
+        let days = passage.quantile(share, HORIZON_DAYS)?;
+        after_days(epoch, now_days + days)
+    };
+    FailureTime {
+        low: quantile(EARLY),
+        median: quantile(0.5),
+        high: quantile(0.95),
+        probability: passage.chance_within(HORIZON_DAYS),
+        horizon_days: HORIZON_DAYS,
     }
+}
+
+fn drift_event(
+    record: &BenchmarkRecord,
+    time: Timestamp,
+    moved: drift::MovedIntercept,
+    kind: impl FnOnce(Timestamp, Timestamp) -> EventKind,
+) -> Option<Event> {
+    let epoch = record.history().epoch;
+    let from = after_days(epoch, moved.from_days)?;
+    let to = after_days(epoch, moved.to_days)?;
+    Some(record.event(time, kind(from, to)))
 }
 
 fn report(outlook: &Outlook) -> RegimeReport {
@@ -193,5 +242,31 @@ fn report(outlook: &Outlook) -> RegimeReport {
         probabilities: outlook.regimes.clone(),
         r_per_day: outlook.law.map(|law| law.r),
         kappa_per_day: outlook.law.map(|law| law.kappa),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::forecast::LawForecaster;
+    use crate::monitor::track::fixture::{at, record};
+
+    #[test]
+    fn a_refit_is_reported_first_and_a_reading_that_nobody_expected_calls_for_attention() {
+        let record = record((0..48).map(f64::from));
+        let policy = Policy::default();
+        let mut panel = LawForecaster::default();
+        let mut plain = panel.update(record.observations(), 1000.0).unwrap();
+        plain.surprise_nats = Some(12.0);
+        let forecast = Forecast {
+            plain,
+            known_load: None,
+        };
+        let (events, causes) = FitChanges::default().refit(&record, &policy, at(47), &forecast);
+        assert!(matches!(events[0].kind, EventKind::Refit { .. }));
+        assert!(
+            causes.contains(&AlertCause::UnexplainedResidual),
+            "{causes:?}"
+        );
     }
 }

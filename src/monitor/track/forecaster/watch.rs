@@ -1,13 +1,14 @@
 //! The watch over the residual: looks at it now and then, says when it has structure, and asks for a search.
 
+use super::Forecaster;
 use super::adopted::Adopted;
-use super::forecast::Forecast;
-use super::{StepContext, Track};
-use crate::alert::{AlertCause, Policy};
 use crate::effects::{Effect, Kind, KnownLoad, Rival, residual_structure};
 use crate::forecast::measurably_moves;
 use crate::monitor::event::{Event, EventKind, Unexplained};
 use crate::monitor::search::{MOST_READINGS, SearchFinding, SearchJob};
+use crate::monitor::track::StepContext;
+use crate::monitor::track::forecast::Forecast;
+use crate::monitor::track::record::BenchmarkRecord;
 use crate::monitor::{Explain, search};
 use crate::reading::{Series, Timestamp, days_since};
 use serde::{Deserialize, Serialize};
@@ -26,7 +27,7 @@ const SAME_TIME: f64 = 0.05;
 
 /// When was looked, what was said, what was asked for.
 #[derive(Debug, Default, Serialize, Deserialize)]
-pub(super) struct Watch {
+pub(in crate::monitor::track) struct Watch {
     taken: u64,
     looked: u64,
     searched: u64,
@@ -87,21 +88,21 @@ impl Watch {
     }
 }
 
-impl Track {
-    /// Looks at the residual of the law in force, where it is time to.
-    pub(super) fn watch(
+impl Forecaster {
+    /// Looks at the residual of the law in force, where it is time to; what it shows calls for attention.
+    pub(in crate::monitor::track) fn watch(
         &mut self,
-        policy: &Policy,
+        record: &BenchmarkRecord,
         time: Timestamp,
         forecast: &Forecast,
         context: &StepContext<'_>,
     ) -> Option<Event> {
-        if self.declared.is_shaken(time) || !self.watch.is_due() {
+        if record.is_shaken(time) || !self.watch.is_due() {
             return None;
         }
         let moves = measurably_moves(&forecast.plain.rates);
         let found = if moves {
-            residual_structure(&self.in_force(context))
+            residual_structure(&self.in_force(record, context))
         } else {
             None
         };
@@ -112,32 +113,36 @@ impl Track {
             return None;
         }
         let found = worth?;
-        self.look_until(policy, time, AlertCause::UnexplainedResidual);
         let kind = Unexplained::Structure {
             bic_gain: found.bic_gain,
             load_sd: found.load_sd,
-            since: self.by_calendar(found.since, context),
+            since: self.by_calendar(record, found.since, context),
         };
-        Some(self.event(time, EventKind::UnexplainedResidual(kind)))
+        Some(record.event(time, EventKind::UnexplainedResidual(kind)))
     }
 
     /// The readings as the law in force sees them: by the load's clock, where one is adopted.
-    fn in_force(&self, context: &StepContext<'_>) -> Series {
+    fn in_force(&self, record: &BenchmarkRecord, context: &StepContext<'_>) -> Series {
+        let history = record.history();
         let by_clock = self.adopted.as_ref().and_then(|adopted| {
             let channels = context.covariates.list();
-            adopted.readings(&self.history, &channels)
+            adopted.readings(history, &channels)
         });
-        let observations = by_clock.as_ref().unwrap_or(&self.history.observations);
-        self.history
-            .series(&self.benchmark, observations, MOST_TESTED)
+        let observations = by_clock.as_ref().unwrap_or(&history.observations);
+        history.series(record.benchmark(), observations, MOST_TESTED)
     }
 
     /// When that was, of a time by the clock of the law in force.
-    fn by_calendar(&self, time: Timestamp, context: &StepContext<'_>) -> Timestamp {
+    fn by_calendar(
+        &self,
+        record: &BenchmarkRecord,
+        time: Timestamp,
+        context: &StepContext<'_>,
+    ) -> Timestamp {
         let channels = context.covariates.list();
         let adopted = self.adopted.as_ref();
         adopted
-            .and_then(|adopted| adopted.by_calendar(&self.history, &channels, time))
+            .and_then(|adopted| adopted.by_calendar(record.history(), &channels, time))
             .unwrap_or(time)
     }
 
@@ -151,32 +156,32 @@ impl Track {
     }
 
     /// The search that is to be made after this reading, where one is.
-    pub(in crate::monitor) fn search(
+    pub(in crate::monitor::track) fn search(
         &mut self,
+        record: &BenchmarkRecord,
         critical: f64,
         context: &StepContext<'_>,
     ) -> Option<SearchJob> {
         if !self.wants_search(context.phase.explain) {
             return None;
         }
-        let observations = &self.history.observations;
-        let series = self
-            .history
-            .series(&self.benchmark, observations, MOST_READINGS);
+        let history = record.history();
+        let series = history.series(record.benchmark(), &history.observations, MOST_READINGS);
         let first = series.readings.first()?.time;
         let last = series.readings.last()?.time;
         let channels = context
             .covariates
             .beside(first, last, search::MOST_CHANNELS);
-        let asked = self.newest.unwrap_or(last);
+        let asked = record.newest().unwrap_or(last);
         self.watch.is_searching = true;
         self.watch.searched = self.watch.taken;
         Some(SearchJob::new(series, channels, asked, critical))
     }
 
     /// Takes what a search came to: reports the effects, and forecasts by them where the site wants that.
-    pub(in crate::monitor) fn found(
+    pub(in crate::monitor::track) fn found(
         &mut self,
+        record: &BenchmarkRecord,
         critical: f64,
         time: Timestamp,
         finding: &SearchFinding,
@@ -190,17 +195,19 @@ impl Track {
             && is_separable(finding)
         {
             let channels = context.covariates.list();
-            self.adopted = Some(Adopted::new(known_load, &self.history, &channels, critical));
+            let adopted = Adopted::new(known_load, record.history(), &channels, critical);
+            self.adopted = Some(adopted);
         }
-        let mut events = self.dropped(time, before.as_ref().map(Adopted::law));
+        let mut events = self.dropped(record, time, before.as_ref().map(Adopted::law));
         let known: Vec<KnownEffect> = finding
             .effects
             .iter()
             .map(|effect| self.known(effect))
             .collect();
         for (effect, known) in finding.effects.iter().zip(&known) {
-            if !self.is_reported(known) {
-                events.push(self.effect_event(time, effect, finding, known.is_adopted));
+            if !self.is_reported(record, known) {
+                let kind = effect_found(effect, finding, known.is_adopted);
+                events.push(record.event(time, kind));
             }
         }
         self.watch.known = known;
@@ -208,12 +215,16 @@ impl Track {
     }
 
     /// From here on levels go by the law without effects.
-    pub(in crate::monitor) fn give_up_effects(&mut self, time: Timestamp) -> Vec<Event> {
+    pub(in crate::monitor::track) fn give_up_effects(
+        &mut self,
+        record: &BenchmarkRecord,
+        time: Timestamp,
+    ) -> Vec<Event> {
         let before = self.adopted.take();
         for known in &mut self.watch.known {
             known.is_adopted = false;
         }
-        self.dropped(time, before.as_ref().map(Adopted::law))
+        self.dropped(record, time, before.as_ref().map(Adopted::law))
     }
 
     fn known(&self, effect: &Effect) -> KnownEffect {
@@ -227,10 +238,9 @@ impl Track {
         }
     }
 
-    fn is_reported(&self, new: &KnownEffect) -> bool {
-        let record = self
-            .newest
-            .map_or(0.0, |newest| days_since(self.history.epoch, newest));
+    fn is_reported(&self, record: &BenchmarkRecord, new: &KnownEffect) -> bool {
+        let newest = record.newest();
+        let length = newest.map_or(0.0, |newest| record.history().days(newest));
         self.watch.known.iter().any(|old| {
             let apart = match (old.at, new.at) {
                 (Some(old), Some(new)) => days_since(old, new).abs(),
@@ -238,11 +248,16 @@ impl Track {
                 (Some(_), None) | (None, Some(_)) => f64::INFINITY,
             };
             let at = new.at;
-            apart <= SAME_TIME * record && *new == KnownEffect { at, ..old.clone() }
+            apart <= SAME_TIME * length && *new == KnownEffect { at, ..old.clone() }
         })
     }
 
-    fn dropped(&self, time: Timestamp, before: Option<&KnownLoad>) -> Vec<Event> {
+    fn dropped(
+        &self,
+        record: &BenchmarkRecord,
+        time: Timestamp,
+        before: Option<&KnownLoad>,
+    ) -> Vec<Event> {
         let law = self.adopted.as_ref().map(Adopted::law);
         let parts = before.map_or(&[][..], |law| &law.parts);
         let gone = parts
@@ -253,32 +268,25 @@ impl Track {
                 effect: part.kind(),
                 channel: part.channel().map(str::to_owned),
             };
-            self.event(time, kind)
+            record.event(time, kind)
         })
         .collect()
     }
+}
 
-    fn effect_event(
-        &self,
-        time: Timestamp,
-        effect: &Effect,
-        finding: &SearchFinding,
-        adopted: bool,
-    ) -> Event {
-        let kind = EventKind::EffectFound {
-            effect: effect.effect,
-            channel: effect.channel.clone(),
-            form: effect.form,
-            at: effect.at,
-            lag_days: effect.lag_days,
-            bic_gain: effect.bic_gain,
-            p_value: effect.p_value,
-            explained: finding.explained,
-            cannot_separate_from: finding.cannot_separate_from.clone(),
-            adopted,
-            undeclared_load: finding.undeclared_load.clone(),
-        };
-        self.event(time, kind)
+fn effect_found(effect: &Effect, finding: &SearchFinding, adopted: bool) -> EventKind {
+    EventKind::EffectFound {
+        effect: effect.effect,
+        channel: effect.channel.clone(),
+        form: effect.form,
+        at: effect.at,
+        lag_days: effect.lag_days,
+        bic_gain: effect.bic_gain,
+        p_value: effect.p_value,
+        explained: finding.explained,
+        cannot_separate_from: finding.cannot_separate_from.clone(),
+        adopted,
+        undeclared_load: finding.undeclared_load.clone(),
     }
 }
 
@@ -302,4 +310,30 @@ fn is_separable(finding: &SearchFinding) -> bool {
         effects.any(|effect| effect.effect == rival.kind)
     };
     finding.cannot_separate_from.iter().all(same_kind)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_residual_is_looked_at_from_forty_readings_on_and_after_each_eighth_more() {
+        let mut watch = Watch::default();
+        let mut looked = Vec::new();
+        for reading in 1..=60 {
+            watch.count();
+            if watch.is_due() {
+                looked.push(reading);
+            }
+        }
+        assert_eq!(looked, [40, 45, 51, 58]);
+    }
+
+    #[test]
+    fn structure_is_news_when_it_is_new_or_has_doubled() {
+        let mut watch = Watch::default();
+        let gains = [None, Some(30.0), Some(50.0), Some(60.0), None, Some(30.0)];
+        let news = gains.map(|gain| watch.is_news(gain));
+        assert_eq!(news, [false, true, false, true, false, true]);
+    }
 }

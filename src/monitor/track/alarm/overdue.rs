@@ -1,11 +1,14 @@
 //! A benchmark whose next reading does not come is judged again as time passes: a collapse that was forecast comes nearer
 //! without readings too.
 
-use super::forecast::Forecast;
-use super::{Track, days};
+use super::Alarm;
+use super::call::alert_of;
 use crate::alert::{AlertEvidence, Level, Policy, chance_in_words, hours_in_words};
 use crate::monitor::event::Event;
 use crate::monitor::kept::KeptForecast;
+use crate::monitor::track::days;
+use crate::monitor::track::forecast::Forecast;
+use crate::monitor::track::record::BenchmarkRecord;
 use crate::reading::{SECONDS_PER_DAY, Timestamp};
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
@@ -17,7 +20,7 @@ const MOST_CHECKS: i32 = 2000;
 
 /// What the newest forecast leaves to the time after it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Overdue {
+pub(in crate::monitor::track) struct Overdue {
     /// The chances that levels go by.
     chances: KeptForecast,
     /// Between readings.
@@ -56,7 +59,7 @@ impl Overdue {
     }
 }
 
-impl Track {
+impl Alarm {
     /// Keeps what the forecast of `time` leaves to the time after it, while a level below red is in force.
     pub(super) fn await_red(&mut self, policy: &Policy, time: Timestamp, forecast: &Forecast) {
         let may_rise = matches!(self.latch.level(), Level::Yellow | Level::Orange);
@@ -66,16 +69,24 @@ impl Track {
     }
 
     /// When red is due, if no reading comes.
-    pub(super) fn overdue_at(&self) -> Option<Timestamp> {
-        let newest = self.newest?;
+    pub(in crate::monitor::track) fn overdue_at(
+        &self,
+        record: &BenchmarkRecord,
+    ) -> Option<Timestamp> {
+        let newest = record.newest()?;
         let due = self.overdue.as_ref()?.due(newest);
-        Some(self.declared.put_off(newest, due))
+        Some(record.put_off(newest, due))
     }
 
     /// Red, where `now` has come to when it is due without a reading.
-    pub(super) fn judge_overdue(&mut self, policy: &Policy, now: Timestamp) -> Option<Event> {
-        self.overdue_at().filter(|due| *due <= now)?;
-        let (newest, overdue) = (self.newest?, self.overdue.take()?);
+    pub(in crate::monitor::track) fn judge_overdue(
+        &mut self,
+        record: &BenchmarkRecord,
+        policy: &Policy,
+        now: Timestamp,
+    ) -> Option<Event> {
+        self.overdue_at(record).filter(|due| *due <= now)?;
+        let (newest, overdue) = (record.newest()?, self.overdue.take()?);
         let chance = overdue
             .chances
             .chance_within(now, days(policy.red_within()));
@@ -88,13 +99,13 @@ impl Track {
         self.levels.note(now, &self.latch);
         let text = format!(
             "benchmark {}: {} ({}); no reading since {newest}; if no collapse has come since, chance {} within {} ({}) from now on",
-            self.benchmark,
+            record.benchmark(),
             change.level,
             change.rule,
             chance_in_words(chance),
             policy.red_within_in_words(),
             hours_in_words(policy.red_within())
         );
-        Some(self.alert_of(now, &change, text))
+        Some(alert_of(record, now, &change, text))
     }
 }

@@ -1,35 +1,41 @@
 //! An alert that people end: they know why it was called, and that it is over.
 
-use super::Track;
+use super::Alarm;
 use crate::monitor::event::{AlertState, Event, EventKind};
 use crate::monitor::given::Given;
+use crate::monitor::track::record::BenchmarkRecord;
 use crate::reading::Timestamp;
 
 /// The rule of an alert that people have ended.
 const BY_PEOPLE: &str = "resolved-by-people";
 
-impl Track {
+impl Alarm {
     /// Ends the level in force. What is known of the slope stays, so that the next reading calls the level again, as a new
     /// alert, if it still calls for it. What cannot be said (`unknown`) is no level and stays.
-    pub(in crate::monitor) fn resolve(&mut self, now: Timestamp, given: &Given) -> Option<Event> {
+    pub(in crate::monitor::track) fn resolve(
+        &mut self,
+        record: &BenchmarkRecord,
+        now: Timestamp,
+        given: &Given,
+    ) -> Option<Event> {
         let (level, since) = self.latch.in_force()?;
         self.latch.resolve(now);
         self.levels.note(now, &self.latch);
-        (self.look, self.kept, self.overdue) = (None, None, None);
+        (self.attention_until, self.kept, self.overdue) = (None, None, None);
         let by = given.by.as_deref().unwrap_or("somebody");
         let why = (given.why.as_ref()).map_or_else(String::new, |why| format!(": {why}"));
         let text = format!(
             "benchmark {}: {level} ends ({BY_PEOPLE}); resolved by {by}{why}; the next reading calls it again if it still \
              calls for it",
-            self.benchmark
+            record.benchmark()
         );
         let kind = EventKind::Alert {
             level,
             state: AlertState::Resolved,
-            key: format!("{}/{level}/{since}", self.benchmark),
+            key: format!("{}/{level}/{since}", record.benchmark()),
             rule: BY_PEOPLE.to_owned(),
             text,
         };
-        Some(self.event(now, kind))
+        Some(record.event(now, kind))
     }
 }

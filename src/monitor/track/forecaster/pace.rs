@@ -1,9 +1,9 @@
 //! Which readings lead to a refit: by data time and the readings alone, so that a replay refits where the daemon did.
 
-use super::super::history::Taken;
-use super::Track;
+use super::Forecaster;
 use crate::alert::Policy;
 use crate::fit::Observations;
+use crate::monitor::history::Taken;
 use crate::reading::Timestamp;
 use serde::{Deserialize, Serialize};
 
@@ -14,19 +14,26 @@ const REFITS_AN_EVACUATION: i32 = 96;
 
 /// Where the last refits were.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub(super) struct Pace {
+pub(in crate::monitor::track) struct Pace {
     /// The newest reading as of the last refit.
     newest: Option<Timestamp>,
     /// Since then: the reading in the past that last led to one.
     past: Option<Timestamp>,
 }
 
-impl Track {
-    /// Whether this reading leads to a refit; if not, it is part of the record that the next one rests on.
-    pub(super) fn is_refit_due(&mut self, policy: &Policy, taken: Taken, time: Timestamp) -> bool {
+impl Forecaster {
+    /// Whether this reading, after which `observations` are those that count, leads to a refit; if not, it is part of the record
+    /// that the next one rests on.
+    pub(in crate::monitor::track) fn is_refit_due(
+        &mut self,
+        policy: &Policy,
+        observations: &Observations,
+        taken: Taken,
+        time: Timestamp,
+    ) -> bool {
         let is_young = self.watch.taken() <= YOUNG;
         if taken == Taken::Newest {
-            let is_due = self.awaits_refit(policy, time, &self.history.observations);
+            let is_due = self.awaits_refit(policy, time, observations);
             if is_due {
                 (self.pace.newest, self.pace.past) = (Some(time), None);
             }
@@ -40,7 +47,7 @@ impl Track {
     }
 
     /// Whether a newest reading of `time` leads to a refit, where `observations` end with it.
-    pub(super) fn awaits_refit(
+    pub(in crate::monitor::track) fn awaits_refit(
         &self,
         policy: &Policy,
         time: Timestamp,

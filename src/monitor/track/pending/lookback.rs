@@ -1,57 +1,24 @@
 //! Looking back after late readings: would another level have been called?
 
-use super::Track;
-use super::forecast::{Forecast, LookAhead};
+use super::Pending;
 use crate::alert::{AlertEvidence, Held, Latch, Level, Policy};
 use crate::fit::Observations;
 use crate::forecast::LawForecaster;
 use crate::monitor::event::{Event, EventKind};
 use crate::monitor::history::History;
 use crate::monitor::motion::observed;
+use crate::monitor::track::alarm::Levels;
+use crate::monitor::track::forecast::{Forecast, LookAhead};
+use crate::monitor::track::record::BenchmarkRecord;
 use crate::reading::Timestamp;
 use serde::{Deserialize, Serialize};
-use std::collections::VecDeque;
 
 /// Forecasts of one look back, over the readings as they were and as they are.
 const MOST_FORECASTS: usize = 64;
-/// Changes of level that are remembered.
-const MOST_LEVELS: usize = 64;
-
-/// Which levels were in force, and from when on.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub(super) struct Levels {
-    changes: VecDeque<(Timestamp, Level)>,
-}
-
-impl Levels {
-    /// What is in force at `time`, noted by when it was called: that is in its alert's key.
-    pub(super) fn note(&mut self, time: Timestamp, latch: &Latch) {
-        let (level, time) = latch.in_force().unwrap_or((Level::Green, time));
-        let last = self.changes.back().map_or(Level::Green, |(_, last)| *last);
-        if level != last {
-            self.changes.push_back((time, level));
-        }
-        if self.changes.len() > MOST_LEVELS {
-            self.changes.pop_front();
-        }
-    }
-
-    /// Those in force at `since` or later, the oldest first.
-    fn since(&self, since: Timestamp) -> impl Iterator<Item = (Timestamp, Level)> {
-        let at = self.changes.partition_point(|(time, _)| *time <= since);
-        self.changes.iter().skip(at.saturating_sub(1)).copied()
-    }
-
-    /// The highest of them.
-    fn highest_since(&self, since: Timestamp) -> Level {
-        let levels = self.since(since).map(|(_, level)| level);
-        levels.max().unwrap_or(Level::Green)
-    }
-}
 
 /// What came late since the last newest reading.
 #[derive(Debug, Serialize, Deserialize)]
-pub(super) struct Lookback {
+pub(in crate::monitor::track) struct Lookback {
     /// The earliest of it.
     since: Timestamp,
     /// The readings before any of it came.
@@ -60,16 +27,27 @@ pub(super) struct Lookback {
     levels: Levels,
 }
 
-impl Track {
-    /// A reading of `time` came late, or was corrected; `before` are the readings without it, where it is the first.
-    pub(super) fn note_late(&mut self, time: Timestamp, before: Option<Observations>) {
+impl Pending {
+    /// Whether what came late is still to be looked back on.
+    pub(in crate::monitor::track) fn has_look_back(&self) -> bool {
+        self.lookback.is_some()
+    }
+
+    /// A reading of `time` came late, or was corrected; `before` are the readings without it, where it is the first, and
+    /// `levels` those that were in force.
+    pub(in crate::monitor::track) fn note_late(
+        &mut self,
+        time: Timestamp,
+        before: Option<Observations>,
+        levels: &Levels,
+    ) {
         if let Some(lookback) = &mut self.lookback {
             lookback.since = lookback.since.min(time);
         } else if let Some(before) = before {
             self.lookback = Some(Lookback {
                 since: time,
                 before,
-                levels: self.levels.clone(),
+                levels: levels.clone(),
             });
         }
     }
@@ -78,8 +56,9 @@ impl Track {
     ///
     /// The same rules go over the readings as they were known and as they are now, each by a scratch latch: what
     /// these leave out (an adopted effect, a regime's flip) is left out of both, and makes no difference.
-    pub(in crate::monitor) fn look_back(
+    pub(in crate::monitor::track) fn look_back(
         &mut self,
+        record: &BenchmarkRecord,
         policy: &Policy,
         time: Timestamp,
     ) -> Option<Event> {
@@ -88,25 +67,25 @@ impl Track {
             before,
             levels,
         } = self.lookback.take()?;
+        let (benchmark, history) = (record.benchmark(), record.history());
         let level_then = levels.highest_since(since);
-        let known_then = highest(policy, &self.history, &before, since);
+        let known_then = highest(policy, history, &before, since);
         // Without the newest reading: that is judged by itself.
-        let mut now = self.history.observations.clone();
+        let mut now = history.observations.clone();
         let newest = before.values.last()?.t_days;
         now.values.retain(|one| one.t_days <= newest);
-        let level_now = highest(policy, &self.history, &now, since);
+        let level_now = highest(policy, history, &now, since);
         if level_now == known_then || level_now == level_then {
             return None;
         }
         let text = format!(
-            "benchmark {}: with the readings since {since} that came late or were corrected, {level_now} would have \
-             been called; {level_then} was in force",
-            self.benchmark
+            "benchmark {benchmark}: with the readings since {since} that came late or were corrected, {level_now} would have \
+             been called; {level_then} was in force"
         );
         let alerts = levels
             .since(since)
             .filter(|(_, level)| *level > Level::Green)
-            .map(|(called, level)| format!("{}/{level}/{called}", self.benchmark));
+            .map(|(called, level)| format!("{benchmark}/{level}/{called}"));
         let kind = EventKind::Correction {
             since,
             level_then,
@@ -114,7 +93,7 @@ impl Track {
             alerts: alerts.collect(),
             text,
         };
-        Some(self.event(time, kind))
+        Some(record.event(time, kind))
     }
 }
 

@@ -1,13 +1,13 @@
 //! The law with the effects that were found, of one benchmark: its forecast, and whether it explains how fast the
 //! slope is now.
 
-use super::forecast::UnderKnownLoad;
 use super::prepared::Prepared;
 use crate::effects::{self, ByClock};
 use crate::fit::Observations;
 use crate::forecast::{LawForecaster, Outlook};
 use crate::monitor::history::History;
 use crate::monitor::motion::{fastest, is_new_highest, settled};
+use crate::monitor::track::forecast::UnderKnownLoad;
 use crate::reading::{Channel, Timestamp, after_days};
 use serde::{Deserialize, Serialize};
 
@@ -24,7 +24,7 @@ const TOO_FAST: f64 = 0.1;
 
 /// A law under a known load in use.
 #[derive(Debug, Serialize, Deserialize)]
-pub(super) struct Adopted {
+pub(in crate::monitor::track) struct Adopted {
     #[serde(rename = "fuller")]
     known_load: effects::KnownLoad,
     /// ln of the mean pace over the record in which it was found: the log-load that counts as none.

@@ -1,0 +1,219 @@
+//! Whether a benchmark's readings can be what a slope does: a sensor that stands still, or that jumps to and fro, says
+//! nothing, and least of all that the slope has slowed down.
+
+use super::DataQuality;
+use super::unknown::Reason;
+use crate::alert::Level;
+use crate::monitor::event::Event;
+use crate::monitor::track::record::BenchmarkRecord;
+use crate::reading::Timestamp;
+
+/// Readings of a second quantity in a row that are reported, where the first quantity has hardly been read.
+const FEW_OTHERS: u32 = 3;
+/// And where it has.
+const MANY_OTHERS: u32 = 24;
+/// A benchmark with fewer readings has hardly been read.
+const HARDLY_READ: usize = 3;
+
+impl DataQuality {
+    /// After the newest reading, of `time`, at which `level` is in force: whether the sensor is stuck, or its readings are
+    /// spoilt.
+    pub(in crate::monitor::track) fn judge_sensor(
+        &mut self,
+        record: &mut BenchmarkRecord,
+        level: Level,
+        time: Timestamp,
+    ) -> Vec<Event> {
+        let mut events = Vec::new();
+        if let Some((count, since)) = record.history().stuck() {
+            let what = "are the same, as this sensor never gave them before: it is stuck";
+            events.extend(self.sticks(record, time, (count, since), what));
+        } else if level >= Level::Orange
+            && let Some((count, since, around)) = record.history().stands_at_the_end()
+        {
+            record.note_range_end(Some(around));
+            let what = "only jitter where a fast motion ended at once: the sensor is stuck, or at the end of its range";
+            events.extend(self.sticks(record, time, (count, since), what));
+        }
+        let was_spoilt = self.spoilt_by.is_some();
+        self.spoilt_by = record.history().spoilt(self.spoilt_by);
+        let is_spoilt = self.spoilt_by.is_some();
+        if is_spoilt && !was_spoilt {
+            let text = format!(
+                "benchmark {}: many of the latest readings jump to and fro: they cannot be true",
+                record.benchmark()
+            );
+            events.push(record.fault(time, "spoilt-readings", text.clone()));
+            events.extend(self.begins_unknown(record, (time, time), Reason::Spoilt, text));
+        } else if was_spoilt && !is_spoilt {
+            let text = format!(
+                "benchmark {} reads as a slope does again",
+                record.benchmark()
+            );
+            events.extend(self.ends_unknown(record, (time, time), Reason::Spoilt, text));
+        }
+        events
+    }
+
+    /// So many readings since a time say nothing, as it turns out at `time`.
+    fn sticks(
+        &mut self,
+        record: &mut BenchmarkRecord,
+        time: Timestamp,
+        (count, since): (usize, Timestamp),
+        what: &str,
+    ) -> Vec<Event> {
+        record.forget_repeats(count);
+        let text = format!(
+            "benchmark {}: {count} readings in a row {what}",
+            record.benchmark()
+        );
+        let mut events = vec![record.fault(time, "stuck-sensor", text.clone())];
+        events.extend(self.begins_unknown(record, (time, since), Reason::Stuck, text));
+        events
+    }
+
+    /// The stuck sensor gives another value, at `time`.
+    pub(in crate::monitor::track) fn unstick(
+        &mut self,
+        record: &mut BenchmarkRecord,
+        time: Timestamp,
+    ) -> Option<Event> {
+        if !self.is_stuck() {
+            return None;
+        }
+        record.note_range_end(None);
+        let text = format!(
+            "benchmark {}: its readings change again",
+            record.benchmark()
+        );
+        self.ends_unknown(record, (time, time), Reason::Stuck, text)
+    }
+
+    /// One more reading of a second quantity.
+    pub(in crate::monitor::track) fn count_other(
+        &mut self,
+        record: &BenchmarkRecord,
+        time: Timestamp,
+    ) -> Option<Event> {
+        self.others = self.others.saturating_add(1);
+        let observations = record.observations();
+        let most = if observations.values.len() < HARDLY_READ {
+            FEW_OTHERS
+        } else {
+            MANY_OTHERS
+        };
+        if self.others != most {
+            return None;
+        }
+        let text = format!(
+            "benchmark {}: gives no {} any more, which is what is monitored, but another quantity",
+            record.benchmark(),
+            observations.quantity.name()
+        );
+        self.begins_unknown(record, (time, time), Reason::SecondQuantity, text)
+    }
+
+    /// A reading of the quantity that is monitored.
+    pub(in crate::monitor::track) fn count_own(
+        &mut self,
+        record: &BenchmarkRecord,
+        time: Timestamp,
+    ) -> Option<Event> {
+        self.others = 0;
+        if !self.unknown.has(Reason::SecondQuantity) {
+            return None;
+        }
+        let text = format!(
+            "benchmark {} gives what is monitored again",
+            record.benchmark()
+        );
+        self.ends_unknown(record, (time, time), Reason::SecondQuantity, text)
+    }
+
+    /// Data time has come to `now`, when silence is due; `fault` is what the sensor gives instead, and `level` what is in
+    /// force.
+    pub(in crate::monitor::track) fn fall_silent(
+        &mut self,
+        record: &mut BenchmarkRecord,
+        now: Timestamp,
+        fault: Option<&str>,
+        level: Level,
+    ) -> Vec<Event> {
+        let Some(newest) = record.begin_silence() else {
+            return Vec::new();
+        };
+        let latched = match level {
+            Level::Green | Level::Unknown => String::new(),
+            level @ (Level::Yellow | Level::Orange | Level::Red) => {
+                format!("; {level} stays in force")
+            }
+        };
+        let fault = fault.map_or_else(String::new, |what| format!("; the sensor gives {what}"));
+        let text = format!(
+            "benchmark {}: no reading since {newest}{fault}{latched}",
+            record.benchmark()
+        );
+        let mut events = vec![record.fault(now, "no-data", text.clone())];
+        events.extend(self.begins_unknown(record, (now, newest), Reason::NoData, text));
+        events
+    }
+
+    /// The end of a silence, where the reading of `time` is one.
+    pub(in crate::monitor::track) fn read_again(
+        &mut self,
+        record: &mut BenchmarkRecord,
+        now: Timestamp,
+        time: Timestamp,
+    ) -> Option<Event> {
+        let since = record.break_silence(time)?;
+        let text = format!("benchmark {} reads again", record.benchmark());
+        self.ends_unknown(record, (now, since), Reason::NoData, text)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::monitor::track::fixture::{at, record};
+
+    fn is_fault(event: &Event, of: &str) -> bool {
+        matches!(&event.kind, crate::monitor::EventKind::Fault { kind, .. } if kind == of)
+    }
+
+    #[test]
+    fn a_sensor_that_repeats_a_value_is_stuck_until_it_gives_another() {
+        let moving = (0..20).map(|hour| f64::from(hour * hour));
+        let mut record = record(moving.chain([400.0; 8]));
+        let mut quality = DataQuality::default();
+        let events = quality.judge_sensor(&mut record, Level::Green, at(27));
+        assert!(is_fault(&events[0], "stuck-sensor") && events.len() == 2);
+        assert!(quality.is_stuck() && quality.shows_motion());
+        assert_eq!(record.observations().values.len(), 21);
+        assert!(quality.unstick(&mut record, at(28)).is_some());
+        assert!(!quality.is_unknown());
+    }
+
+    #[test]
+    fn three_readings_of_another_quantity_are_enough_where_the_first_was_hardly_read() {
+        let mut quality = DataQuality::default();
+        let hardly = record([0.0]);
+        let said = (0..4).map(|hour| quality.count_other(&hardly, at(hour)).is_some());
+        assert_eq!(said.collect::<Vec<bool>>(), [false, false, true, false]);
+        assert!(quality.count_own(&hardly, at(5)).is_some());
+        let read = record((0..9).map(f64::from));
+        let said = (0..24).filter(|hour| quality.count_other(&read, at(*hour)).is_some());
+        assert_eq!(said.collect::<Vec<i64>>(), [23]);
+    }
+
+    #[test]
+    fn a_silence_ends_with_the_first_reading_after_it() {
+        let mut record = record((0..9).map(f64::from));
+        let mut quality = DataQuality::default();
+        let events = quality.fall_silent(&mut record, at(20), Some("NAN"), Level::Red);
+        assert!(is_fault(&events[0], "no-data") && events.len() == 2);
+        assert!(quality.is_unknown() && record.is_silent());
+        assert!(quality.read_again(&mut record, at(21), at(21)).is_some());
+        assert!(!quality.is_unknown() && !record.is_silent());
+    }
+}

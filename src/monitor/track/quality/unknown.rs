@@ -1,0 +1,178 @@
+//! Why nothing can be said of a benchmark: one alert, however many reasons there are for it at once.
+
+use super::DataQuality;
+use crate::alert::Level;
+use crate::monitor::event::{AlertState, Event, EventKind, SUSPECT_ENDS};
+use crate::monitor::track::record::BenchmarkRecord;
+use crate::reading::{Suspicion, Timestamp};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+
+/// A reason.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Reason {
+    /// It gives no readings.
+    NoData,
+    /// It repeats its last value.
+    Stuck,
+    /// Many of its readings cannot be true.
+    Spoilt,
+    /// It gives another quantity than the one that is monitored.
+    SecondQuantity,
+    /// Its readings hardly mean what was intended.
+    Suspect(Suspicion),
+}
+
+impl Reason {
+    /// The rule's name in the alert.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::NoData => "no-data",
+            Self::Stuck => "stuck-sensor",
+            Self::Spoilt => "spoilt-readings",
+            Self::SecondQuantity => "second-quantity",
+            Self::Suspect(Suspicion::Ahead) => "suspect-ahead",
+            Self::Suspect(Suspicion::Mark) => "suspect-mark",
+            Self::Suspect(Suspicion::Fall) => "suspect-fall",
+            Self::Suspect(Suspicion::Scale) => "suspect-scale",
+        }
+    }
+}
+
+impl Reason {
+    /// The kind of the fault that says its end.
+    pub(super) fn end_name(self) -> String {
+        format!("{}{SUSPECT_ENDS}", self.name())
+    }
+}
+
+/// The reasons there are, and since when there is one.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub(in crate::monitor::track) struct Unknown {
+    reasons: BTreeSet<Reason>,
+    since: Option<Timestamp>,
+    /// When the one before began, which has ended.
+    #[serde(default)]
+    before: Option<Timestamp>,
+}
+
+impl Unknown {
+    pub(super) fn has(&self, reason: Reason) -> bool {
+        self.reasons.contains(&reason)
+    }
+
+    /// Whether the alert is in force.
+    pub(super) fn is_in_force(&self) -> bool {
+        self.since.is_some()
+    }
+}
+
+impl DataQuality {
+    /// There is `reason` for it from now on, after the reading of `since`; the alert, where it is the first reason.
+    pub(super) fn begins_unknown(
+        &mut self,
+        record: &BenchmarkRecord,
+        (now, since): (Timestamp, Timestamp),
+        reason: Reason,
+        text: String,
+    ) -> Option<Event> {
+        let unknown = &mut self.unknown;
+        let is_first = unknown.reasons.is_empty();
+        unknown.reasons.insert(reason);
+        if !is_first {
+            return None;
+        }
+        // A sensor that is found stuck at the reading after which it was silent is another alert than the silence.
+        let is_other = unknown.before.is_none_or(|before| since > before);
+        let since = if is_other { since } else { now };
+        unknown.since = Some(since);
+        let state = AlertState::Firing;
+        Some(alert(record, (now, since), state, reason, text))
+    }
+
+    /// `reason` has ended, which began after the reading of `since` where nothing else was the matter; the end of the
+    /// alert, where there is no other.
+    pub(super) fn ends_unknown(
+        &mut self,
+        record: &BenchmarkRecord,
+        (now, since): (Timestamp, Timestamp),
+        reason: Reason,
+        text: String,
+    ) -> Option<Event> {
+        let unknown = &mut self.unknown;
+        unknown.reasons.remove(&reason);
+        if !unknown.reasons.is_empty() {
+            return None;
+        }
+        let since = unknown.since.take().unwrap_or(since);
+        unknown.before = Some(since);
+        let state = AlertState::Resolved;
+        Some(alert(record, (now, since), state, reason, text))
+    }
+
+    /// Everything ends, the silence too; `None` where nothing was the matter.
+    pub(in crate::monitor::track) fn ends_all_unknown(
+        &mut self,
+        record: &mut BenchmarkRecord,
+        now: Timestamp,
+        text: &str,
+    ) -> Option<Event> {
+        let silent = record.end_silence();
+        let unknown = &mut self.unknown;
+        let reason = unknown.reasons.first().copied();
+        unknown.reasons.clear();
+        let since = unknown.since.take().or(silent)?;
+        unknown.before = Some(since);
+        let reason = reason.unwrap_or(Reason::NoData);
+        let (state, text) = (AlertState::Resolved, text.to_owned());
+        Some(alert(record, (now, since), state, reason, text))
+    }
+}
+
+/// When it began is part of the key, so that each time is reported again.
+fn alert(
+    record: &BenchmarkRecord,
+    (time, since): (Timestamp, Timestamp),
+    state: AlertState,
+    reason: Reason,
+    text: String,
+) -> Event {
+    let kind = EventKind::Alert {
+        level: Level::Unknown,
+        state,
+        key: format!("{}/{}/{since}", record.benchmark(), Level::Unknown),
+        rule: reason.name().to_owned(),
+        text,
+    };
+    record.event(time, kind)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::monitor::track::fixture::{at, record};
+
+    #[test]
+    fn two_reasons_are_one_alert_that_ends_with_the_second_of_them() {
+        let (mut quality, record) = (DataQuality::default(), record([0.0]));
+        let stuck = Reason::Stuck;
+        let begin = |quality: &mut DataQuality, hour, reason| {
+            quality.begins_unknown(&record, (at(hour), at(hour)), reason, String::new())
+        };
+        let end = |quality: &mut DataQuality, hour, reason| {
+            quality.ends_unknown(&record, (at(hour), at(hour)), reason, String::new())
+        };
+        assert!(begin(&mut quality, 1, stuck).is_some());
+        assert!(begin(&mut quality, 2, Reason::Spoilt).is_none());
+        assert!(end(&mut quality, 3, stuck).is_none() && quality.is_unknown());
+        assert!(end(&mut quality, 4, Reason::Spoilt).is_some() && !quality.is_unknown());
+        // What begins anew no later than the one before began is another alert: its key has the time at which it is found.
+        let again = quality.begins_unknown(&record, (at(5), at(1)), stuck, String::new());
+        let kind = again.map(|event| event.kind);
+        assert!(
+            matches!(&kind, Some(EventKind::Alert { key, .. }) if key.ends_with(&at(5).to_string())),
+            "{kind:?}"
+        );
+    }
+}
