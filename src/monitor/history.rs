@@ -30,7 +30,7 @@ pub(super) enum Taken {
     Corrected(f64),
     /// It was known.
     Known,
-    /// It lies beyond anything a slope does, in the science's unit.
+    /// It is larger than [`FARTHEST`], in the science's unit.
     OutOfRange(f64),
     /// It measures another quantity than the benchmark's first reading did.
     OtherQuantity,
@@ -40,7 +40,7 @@ pub(super) enum Taken {
 const MOST_ASIDE: usize = 4096;
 
 /// No displacement in mm, or velocity in mm/day, is larger: a thousand kilometres.
-const FARTHEST: f64 = 1e9;
+pub(super) const FARTHEST: f64 = 1e9;
 
 /// The readings of one benchmark.
 #[derive(Debug, Clone, Serialize, Deserialize)]

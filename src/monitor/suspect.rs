@@ -1,4 +1,4 @@
-//! What the readings of one benchmark show of the sensor itself: that it stands still, jumps to and fro, or has no clock.
+//! What the readings of one benchmark show of the sensor itself: that it stands still, jumps back and forth, or has no clock.
 
 use super::history::History;
 use crate::fit::Observation;

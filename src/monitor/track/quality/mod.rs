@@ -6,7 +6,7 @@ mod unknown;
 
 use super::record::BenchmarkRecord;
 use crate::monitor::event::Event;
-use crate::monitor::history::Taken;
+use crate::monitor::history::{FARTHEST, Taken};
 use crate::reading::{Suspicion, Timestamp};
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -110,7 +110,9 @@ impl DataQuality {
                 ("corrected", text)
             }
             Taken::OutOfRange(value) => {
-                let text = format!("the reading of {time} is {value:e} {unit}: no slope does that");
+                let text = format!(
+                    "the reading of {time} is {value:e} {unit}: beyond {FARTHEST:e} {unit}, which no slope reaches; it is left out"
+                );
                 ("out-of-range", text)
             }
             Taken::OtherQuantity if self.is_second_reported => return None,

@@ -1,5 +1,5 @@
-//! Whether a benchmark's readings can be what a slope does: a sensor that stands still, or that jumps to and fro, says
-//! nothing, and least of all that the slope has slowed down.
+//! Whether a benchmark's readings can be motion: a sensor that repeats one value, or whose readings jump back and forth from
+//! one to the next, says nothing, and least of all that the slope has slowed down.
 
 use super::DataQuality;
 use super::unknown::Reason;
@@ -35,19 +35,20 @@ impl DataQuality {
             let what = "only jitter where a fast motion ended at once: the sensor is stuck, or at the end of its range";
             events.extend(self.sticks(record, time, (count, since), what));
         }
-        let was_spoilt = self.spoilt_by.is_some();
-        self.spoilt_by = record.history().spoilt(self.spoilt_by);
-        let is_spoilt = self.spoilt_by.is_some();
-        if is_spoilt && !was_spoilt {
+        let before = self.spoilt_by;
+        self.spoilt_by = record.history().spoilt(before);
+        if let (None, Some(by)) = (before, self.spoilt_by) {
             let text = format!(
-                "benchmark {}: many of the latest readings jump to and fro: they cannot be true",
-                record.benchmark()
+                "benchmark {}: many of the latest readings jump back and forth by about {by:.3} {} from one reading to the next; \
+                 no slope reverses by that much, so they are not its motion",
+                record.benchmark(),
+                record.unit()
             );
             events.push(record.fault(time, "spoilt-readings", text.clone()));
             events.extend(self.begins_unknown(record, (time, time), Reason::Spoilt, text));
-        } else if was_spoilt && !is_spoilt {
+        } else if before.is_some() && self.spoilt_by.is_none() {
             let text = format!(
-                "benchmark {} reads as a slope does again",
+                "benchmark {}: its readings no longer jump back and forth",
                 record.benchmark()
             );
             events.extend(self.ends_unknown(record, (time, time), Reason::Spoilt, text));

@@ -59,7 +59,7 @@ impl BenchmarkRecord {
         events
     }
 
-    /// Takes off a fall that no slope makes and that the newest readings confirm: a reset that nobody declared. Where they come
+    /// Takes off a fall too large for a slope that moves upslope and that the newest readings confirm: a reset that nobody declared. Where they come
     /// back it is put on again.
     pub(in crate::monitor::track) fn find_reset(&mut self, now: Timestamp) -> Option<Event> {
         if let Some(found) = self.declared.newest_found()
@@ -76,11 +76,11 @@ impl BenchmarkRecord {
         let (time, jump) = self.history.fallen_back()?;
         self.declared.find_reset(time, jump);
         self.history.reset(&self.declared);
+        let (benchmark, by) = (&self.benchmark, -jump);
         let text = format!(
-            "benchmark {}: its readings fell by {:.3} mm at {time} and went on from there; no slope does that, so it is taken \
-             for a reset of the instrument and is no motion. Declare it with [[event]] kind = \"reset\"; if the slope did fall, \
-             set accept = [\"fall\"] for this benchmark",
-            self.benchmark, -jump
+            "benchmark {benchmark}: its readings fell by {by:.3} mm at {time}, within one interval between readings, and went on \
+             from there; no slope moves upslope by that much in that time, so it is taken for a reset of the instrument and is no \
+             motion. Declare it with [[event]] kind = \"reset\"; if the slope did fall, set accept = [\"fall\"] for this benchmark"
         );
         Some(self.fault(now, RESET_FOUND, text))
     }
