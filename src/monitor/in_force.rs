@@ -1,9 +1,7 @@
 //! Which benchmarks are at a level, which are unknown, and which can be compared: an alert at one of ten thousand benchmarks
 //! looks at no other.
 
-use super::event::{Event, EventKind};
 use super::track::Track;
-use super::{Input, Monitor};
 use crate::alert::Level;
 use crate::reading::BenchmarkId;
 use std::cmp::Reverse;
@@ -35,7 +33,7 @@ impl LevelsInForce {
     }
 
     /// Whether no level has changed unnoticed; of many benchmarks it is not asked.
-    fn is_true(&self, tracks: &BTreeMap<BenchmarkId, Track>) -> bool {
+    pub(super) fn is_true(&self, tracks: &BTreeMap<BenchmarkId, Track>) -> bool {
         if tracks.len() > MANY {
             return true;
         }
@@ -44,7 +42,7 @@ impl LevelsInForce {
     }
 
     /// A benchmark's track may have changed; `None`: it is gone.
-    fn note(&mut self, id: &BenchmarkId, track: Option<&Track>) {
+    pub(super) fn note(&mut self, id: &BenchmarkId, track: Option<&Track>) {
         let level = track.map(Track::level);
         let raised = level.filter(|level| (Level::Yellow..=Level::Red).contains(level));
         let before = match raised {
@@ -99,38 +97,5 @@ impl LevelsInForce {
     /// Those whose forecasts are compared, the highest level first.
     pub(super) fn compared(&self) -> impl Iterator<Item = &BenchmarkId> {
         self.compared.iter().map(|(_, id)| id)
-    }
-}
-
-impl Monitor {
-    /// What `input` has led to: of one benchmark the events name it, else every one may have changed.
-    pub(super) fn note_levels(&mut self, input: &Input, events: &[Event]) {
-        match input {
-            Input::Settings(_) => self.in_force = LevelsInForce::of(&self.tracks),
-            Input::Notice(_) | Input::Order(_) if !events.is_empty() => {
-                self.in_force = LevelsInForce::of(&self.tracks);
-            }
-            Input::Reading { .. }
-            | Input::Missing { .. }
-            | Input::Trouble { .. }
-            | Input::Sample { .. }
-            | Input::Found(_)
-            | Input::Notice(_)
-            | Input::Order(_)
-            | Input::Tick => {
-                let is_of_level = |event: &&Event| {
-                    matches!(
-                        event.kind,
-                        EventKind::Alert { .. } | EventKind::Refit { .. }
-                    )
-                };
-                for event in events.iter().filter(is_of_level) {
-                    if let Some(id) = &event.benchmark {
-                        self.in_force.note(id, self.tracks.get(id));
-                    }
-                }
-            }
-        }
-        debug_assert!(self.in_force.is_true(&self.tracks), "{input:?} {events:?}");
     }
 }

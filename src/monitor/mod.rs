@@ -1,6 +1,8 @@
 //! The state machine that owns every benchmark: readings in, events out, no clock and no files.
 
 mod awaited;
+mod batches;
+mod benchmarks;
 mod course;
 mod covariates;
 mod deadlines;
@@ -16,15 +18,16 @@ mod measured;
 mod motion;
 mod notice;
 mod order;
+mod outages;
 mod parallel;
 mod past;
-mod queue;
 mod saved;
 mod search;
 mod sensor;
 mod silence;
 mod site;
 mod suspect;
+mod tally;
 mod together;
 mod track;
 mod undeclared;
@@ -48,20 +51,19 @@ pub use undeclared::UndeclaredLoad;
 
 use crate::alert::{Level, Policy};
 use crate::reading::{BenchmarkId, Reading, Sample, Suspicion, Timestamp, Unit};
-use awaited::Awaited;
+use batches::Batches;
+use benchmarks::Benchmarks;
 use covariates::Covariates;
-use deadlines::Deadlines;
 use declared::Declarations;
-use in_force::LevelsInForce;
 use jiff::SignedDuration;
+use outages::Outages;
 use past::Past;
-use queue::Queue;
-use sensor::Sensors;
 use serde::{Deserialize, Serialize};
 use site::SiteAlert;
 use std::collections::{BTreeMap, BTreeSet};
+use tally::Tally;
 use together::FailureComparisons;
-use track::{PastReplay, StepContext, Track};
+use track::{StepContext, Track};
 
 /// What the monitor is given.
 #[derive(Debug, Clone, PartialEq)]
@@ -194,31 +196,15 @@ impl Settings {
 #[derive(Debug)]
 pub struct Monitor {
     settings: Settings,
-    tracks: BTreeMap<BenchmarkId, Track>,
-    /// Whose memory is another than when it was last saved.
-    changed: BTreeSet<BenchmarkId>,
-    /// When each becomes silent, or red without a reading, of those that are not yet.
-    deadlines: Deadlines,
+    benchmarks: Benchmarks,
     covariates: Covariates,
-    sensors: Sensors,
     searches: Vec<SearchJob>,
     site: SiteAlert,
-    in_force: LevelsInForce,
     together: FailureComparisons,
-    /// Benchmarks of the config that have given no reading.
-    awaited: Awaited,
-    /// Benchmarks with late readings that are to be looked back on.
-    late: BTreeSet<BenchmarkId>,
-    /// Whether [`Notice::BatchEnd`] says when what came late is judged.
-    in_batches: bool,
-    /// Since when the host's clock is wrong.
-    clock_wrong: Option<Timestamp>,
-    /// What of the past is still to be done, and the benchmark whose past is being gone through.
+    outages: Outages,
     past: Past,
-    walk: Option<PastReplay>,
-    queue: Queue,
-    summary: Summary,
-    last_time: Option<Timestamp>,
+    batches: Batches,
+    tally: Tally,
 }
 
 impl Monitor {
@@ -226,30 +212,21 @@ impl Monitor {
     pub fn new(settings: Settings) -> Self {
         Self {
             settings,
-            tracks: BTreeMap::new(),
-            changed: BTreeSet::new(),
-            deadlines: Deadlines::default(),
+            benchmarks: Benchmarks::default(),
             covariates: Covariates::default(),
-            sensors: Sensors::default(),
             searches: Vec::new(),
             site: SiteAlert::default(),
-            in_force: LevelsInForce::default(),
             together: FailureComparisons::default(),
-            awaited: Awaited::default(),
-            late: BTreeSet::new(),
-            in_batches: false,
-            clock_wrong: None,
+            outages: Outages::default(),
             past: Past::default(),
-            walk: None,
-            queue: Queue::default(),
-            summary: Summary::default(),
-            last_time: None,
+            batches: Batches::default(),
+            tally: Tally::default(),
         }
     }
 
     /// Takes one input at `now` (data time, never going back) and says what follows from it.
     pub fn step(&mut self, now: Timestamp, input: &Input) -> Vec<Event> {
-        self.last_time = Some(now);
+        self.tally.begin_step(now);
         let mut events = match input {
             Input::Reading {
                 benchmark,
@@ -283,13 +260,11 @@ impl Monitor {
             Input::Trouble { kind, text } => vec![trouble(now, kind, text)],
             Input::Tick => self.pass(now),
         };
-        self.note_levels(input, &events);
+        self.benchmarks.note_levels(input, &events);
         let of_site = self.site_levels(now, input, &events);
         events.extend(of_site);
         events.extend(self.compare(now, &events));
-        for event in &events {
-            self.summary.count(event);
-        }
+        self.tally.count(&events);
         events
     }
 
@@ -300,14 +275,14 @@ impl Monitor {
         source: history::MeasuredAs,
         reading: &Reading,
     ) -> Vec<Event> {
-        self.summary.readings += 1;
-        self.sensors.reads(benchmark, reading.time);
+        self.tally.count_reading();
+        self.outages.note_reading(benchmark, reading.time);
         let context = StepContext {
             phase: self.phase(now),
             covariates: &self.covariates,
         };
         let policy = self.settings.policy(benchmark);
-        let track = self.tracks.entry(benchmark.clone()).or_insert_with(|| {
+        let track = self.benchmarks.get_or_begin(benchmark, || {
             let declared = Declarations::of(&self.settings.declared, benchmark);
             let mut track = Track::new(benchmark.clone(), source, reading.time, declared);
             track.accept(now, self.settings.accepted(benchmark));
@@ -318,36 +293,24 @@ impl Monitor {
         } else {
             track.take(policy, source, reading, &context)
         };
-        if self.in_batches && track.has_look_back() {
-            self.late.insert(benchmark.clone());
-        }
-        self.queue.note(benchmark, track);
+        self.batches.note(benchmark, track);
         let critical = policy.critical_velocity_mm_per_day;
         self.searches.extend(track.search(critical, &context));
-        self.note_changed(benchmark);
-        events.extend(self.awaited.end(now, benchmark, "reads"));
+        self.benchmarks.note_changed(benchmark);
+        events.extend(self.outages.end_awaiting(now, benchmark, "reads"));
         events
     }
 
     fn pass(&mut self, now: Timestamp) -> Vec<Event> {
         let mut events = Vec::new();
-        for id in self.deadlines.due(now) {
-            if let Some(track) = self.tracks.get_mut(&id) {
+        for id in self.benchmarks.due(now) {
+            if let Some(track) = self.benchmarks.get_mut(&id) {
                 let policy = self.settings.policy(&id);
-                events.extend(track.pass(policy, now, self.sensors.fault(&id)));
+                events.extend(track.pass(policy, now, self.outages.sensor_fault(&id)));
             }
-            self.note_changed(&id);
+            self.benchmarks.note_changed(&id);
         }
         events
-    }
-
-    /// What is known of a benchmark is other than before: it is to be saved, and may be due at another time.
-    fn note_changed(&mut self, id: &BenchmarkId) {
-        let due = self.tracks.get(id).and_then(Track::deadline);
-        self.deadlines.set(id, due);
-        if !self.changed.contains(id) {
-            self.changed.insert(id.clone());
-        }
     }
 
     /// Goes by other settings from here on. What was in force at a benchmark that is no longer watched ends.
@@ -358,7 +321,7 @@ impl Monitor {
             phase: self.phase(now),
             covariates: &self.covariates,
         };
-        for (id, track) in &mut self.tracks {
+        for (id, track) in self.benchmarks.each_mut() {
             let declared = Declarations::of(&self.settings.declared, id);
             events.extend(track.accept(now, self.settings.accepted(id)));
             track.forget_changed_rules(former.policy(id), self.settings.policy(id));
@@ -367,35 +330,33 @@ impl Monitor {
             }
             events.extend(track.redeclare(self.settings.policy(id), declared, &context));
         }
-        let all: Vec<BenchmarkId> = self.tracks.keys().cloned().collect();
+        let all: Vec<BenchmarkId> = self.benchmarks.all().keys().cloned().collect();
         for id in &all {
-            self.note_changed(id);
+            self.benchmarks.note_changed(id);
         }
         events
     }
 
     fn unwatch(&mut self, now: Timestamp, former: &Watched) -> Vec<Event> {
-        let gone: Vec<BenchmarkId> = (self.tracks.keys())
+        let gone: Vec<BenchmarkId> = (self.benchmarks.all().keys())
             .filter(|id| self.settings.watched.drops(id, former))
             .cloned()
             .collect();
         let mut events = Vec::new();
-        let awaited: Vec<BenchmarkId> = self.awaited.benchmarks().cloned().collect();
+        let awaited: Vec<BenchmarkId> = self.outages.awaited().cloned().collect();
         for id in awaited {
             if !self.settings.watched.named.contains(&id) {
-                events.extend(self.awaited.end(now, &id, "is no longer watched"));
+                events.extend(self.outages.end_awaiting(now, &id, "is no longer watched"));
             }
         }
         for id in gone {
-            if let Some(mut track) = self.tracks.remove(&id) {
+            if let Some(mut track) = self.benchmarks.remove(&id) {
                 events.extend(track.close(now));
             }
             self.searches.retain(|job| job.benchmark != id);
-            self.late.remove(&id);
             self.past.forget(&id);
-            self.queue.forget(&id);
-            self.walk.take_if(|walk| *walk.benchmark() == id);
-            self.note_changed(&id);
+            self.batches.forget(&id);
+            self.benchmarks.note_changed(&id);
         }
         events
     }
@@ -408,7 +369,7 @@ impl Monitor {
         what: &str,
     ) -> Vec<Event> {
         let declared = Declarations::of(&self.settings.declared, benchmark);
-        if declared.is_maintained(time) || !self.sensors.fails(benchmark, time, what) {
+        if declared.is_maintained(time) || !self.outages.note_missing(benchmark, time, what) {
             return Vec::new();
         }
         let kind = EventKind::Fault {
@@ -429,21 +390,17 @@ impl Monitor {
 
     /// When the monitor wants a [`Input::Tick`] if nothing else comes before.
     pub fn next_deadline(&self) -> Option<Timestamp> {
-        self.deadlines.next()
+        self.benchmarks.next_deadline()
     }
 
     /// The level in force for a benchmark that has given readings.
     pub fn level(&self, benchmark: &BenchmarkId) -> Option<Level> {
-        self.tracks.get(benchmark).map(Track::level)
+        self.benchmarks.get(benchmark).map(Track::level)
     }
 
     /// The last line of a replay: what was taken in and said so far.
     pub fn summary(&self) -> Option<Event> {
-        Some(Event {
-            time: self.last_time?,
-            benchmark: None,
-            kind: EventKind::Summary(self.summary),
-        })
+        self.tally.event()
     }
 }
 

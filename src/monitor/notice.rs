@@ -68,11 +68,11 @@ impl Monitor {
         match notice {
             Notice::Watching => {
                 let silent = self.never_read();
-                let each = silent.iter().map(|id| self.awaited.begin(now, id));
+                let each = silent.iter().map(|id| self.outages.begin_awaiting(now, id));
                 each.flatten().collect()
             }
             Notice::InBatches => {
-                self.in_batches = true;
+                self.batches.begin();
                 Vec::new()
             }
             Notice::Past => {
@@ -82,15 +82,15 @@ impl Monitor {
             Notice::Current => self.judge_current(now),
             Notice::Retrace => self.retrace(now),
             Notice::Queue => {
-                self.queue.open();
+                self.batches.open_queue();
                 Vec::new()
             }
             Notice::BatchEnd => self.end_batch(now),
             Notice::LookBack(benchmark) => self.look_back(now, benchmark),
             Notice::Behind { benchmark, time } => {
-                if let Some(track) = self.tracks.get_mut(benchmark) {
+                if let Some(track) = self.benchmarks.get_mut(benchmark) {
                     track.is_behind(*time);
-                    self.note_changed(benchmark);
+                    self.benchmarks.note_changed(benchmark);
                 }
                 Vec::new()
             }
@@ -99,111 +99,73 @@ impl Monitor {
                 time,
                 clock,
             } => {
-                let track = self.tracks.get_mut(benchmark);
+                let track = self.benchmarks.get_mut(benchmark);
                 let events =
                     track.map_or_else(Vec::new, |track| track.suspect_ahead(now, (*time, *clock)));
-                self.note_changed(benchmark);
+                self.benchmarks.note_changed(benchmark);
                 events
             }
             Notice::ClockWrong { text } => {
-                let since = *self.clock_wrong.get_or_insert(now);
+                let since = self.outages.begin_clock_wrong(now);
                 clock_fault(now, since, AlertState::Firing, text)
             }
-            Notice::ClockRight { text } => self.clock_wrong.take().map_or_else(Vec::new, |since| {
-                clock_fault(now, since, AlertState::Resolved, text)
-            }),
+            Notice::ClockRight { text } => self
+                .outages
+                .end_clock_wrong()
+                .map_or_else(Vec::new, |since| {
+                    clock_fault(now, since, AlertState::Resolved, text)
+                }),
         }
     }
 
     fn never_read(&self) -> Vec<BenchmarkId> {
         let named = self.settings.watched.named.iter();
         named
-            .filter(|id| !self.tracks.contains_key(id))
+            .filter(|id| self.benchmarks.get(id).is_none())
             .cloned()
             .collect()
     }
 
     /// Whether benchmarks of the config have given no reading, and nobody has been notified.
     pub fn misses_some(&self) -> bool {
-        let awaited: BTreeSet<&BenchmarkId> = self.awaited.benchmarks().collect();
+        let awaited: BTreeSet<&BenchmarkId> = self.outages.awaited().collect();
         self.never_read().iter().any(|id| !awaited.contains(id))
-    }
-
-    fn end_batch(&mut self, now: Timestamp) -> Vec<Event> {
-        let mut events = Vec::new();
-        if self.past.is_open() {
-            return events;
-        }
-        for id in self.late.clone() {
-            if let Some((track, policy, context)) = self.track_at(&id, now) {
-                events.extend(track.judge_batch(policy, &context));
-                self.note_changed(&id);
-            }
-        }
-        events.extend(self.judge_queued(now));
-        events
-    }
-
-    fn look_back(&mut self, now: Timestamp, benchmark: &BenchmarkId) -> Vec<Event> {
-        self.late.remove(benchmark);
-        let policy = self.settings.policy(benchmark);
-        let Some(track) = self.tracks.get_mut(benchmark) else {
-            return Vec::new();
-        };
-        let events = track.look_back(policy, now).into_iter().collect();
-        self.note_changed(benchmark);
-        events
-    }
-
-    /// A benchmark whose late readings are to be looked back on: [`Notice::LookBack`] does it.
-    pub fn late(&self) -> Option<&BenchmarkId> {
-        self.late.first()
     }
 
     /// Whether a reading of `time` lies so far after all others of its benchmark that its time may be wrong.
     pub fn leaps(&self, benchmark: &BenchmarkId, time: Timestamp) -> bool {
-        let track = self.tracks.get(benchmark);
+        let track = self.benchmarks.get(benchmark);
         track.is_some_and(|track| track.leaps(time))
     }
 
     /// Whether nothing can be said of a benchmark now: of one of the config also before its first reading.
     pub fn is_unknown(&self, benchmark: &BenchmarkId) -> bool {
-        match self.tracks.get(benchmark) {
+        match self.benchmarks.get(benchmark) {
             Some(track) => track.is_unknown(),
             None => self.settings.watched.named.contains(benchmark),
         }
     }
 
-    /// Whether what comes late is judged only at [`Notice::BatchEnd`].
-    pub fn takes_batches(&self) -> bool {
-        self.in_batches
-    }
-
     /// Whether a benchmark that has given readings is silent.
     pub fn is_silent(&self, benchmark: &BenchmarkId) -> bool {
-        let track = self.tracks.get(benchmark);
+        let track = self.benchmarks.get(benchmark);
         track.is_some_and(Track::is_silent)
     }
 
     /// Whether the times of a benchmark's readings lie ahead of the clock.
     pub fn is_ahead(&self, benchmark: &BenchmarkId) -> bool {
-        let track = self.tracks.get(benchmark);
+        let track = self.benchmarks.get(benchmark);
         track.is_some_and(Track::is_ahead)
     }
 
     /// Since when the host's clock is wrong.
     pub fn clock_wrong(&self) -> Option<Timestamp> {
-        self.clock_wrong
+        self.outages.clock_wrong()
     }
 }
 
 /// That the clock is wrong since `since`, or no longer is.
-pub(super) fn clock_fault(
-    time: Timestamp,
-    since: Timestamp,
-    state: AlertState,
-    text: &str,
-) -> Vec<Event> {
+fn clock_fault(time: Timestamp, since: Timestamp, state: AlertState, text: &str) -> Vec<Event> {
     let event = |kind| Event {
         time,
         kind,

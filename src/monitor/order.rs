@@ -115,7 +115,7 @@ impl Monitor {
             return events;
         };
         let mut resolved = Vec::new();
-        for (id, track) in &mut self.tracks {
+        for (id, track) in self.benchmarks.each_mut() {
             if benchmark.as_ref().is_some_and(|only| only != id) {
                 continue;
             }
@@ -125,7 +125,7 @@ impl Monitor {
             }
         }
         for id in &resolved {
-            self.note_changed(id);
+            self.benchmarks.note_changed(id);
         }
         events
     }

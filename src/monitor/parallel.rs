@@ -51,7 +51,7 @@ impl Monitor {
                 break;
             }
             count += 1;
-            if let Some(track) = self.tracks.get(benchmark) {
+            if let Some(track) = self.benchmarks.get(benchmark) {
                 let source = history::MeasuredAs {
                     unit: *unit,
                     averaging: *averaging,
@@ -84,9 +84,9 @@ impl Monitor {
         if self.reads_past() {
             return;
         }
-        let queued = self.queue.next();
+        let queued = self.batches.next();
         let due = queued.filter_map(|benchmark| {
-            let track = self.tracks.get(benchmark)?;
+            let track = self.benchmarks.get(benchmark)?;
             let policy = self.settings.policy(benchmark);
             let next = None;
             Some((
@@ -118,7 +118,7 @@ impl Monitor {
         let tasks = tasks.map(|((_, due), (_, result))| -> Task<'_> {
             let now = due
                 .next
-                .map_or(self.last_time, |(_, reading)| Some(reading.time));
+                .map_or(self.tally.last_time(), |(_, reading)| Some(reading.time));
             let phase = self.phase(now.unwrap_or_default());
             let context = StepContext { phase, covariates };
             Box::new(move || *result = due.track.prepare(due.policy, due.next, &context))
@@ -129,7 +129,7 @@ impl Monitor {
 
     fn keep(&mut self, prepared: Vec<(BenchmarkId, Prepared)>) {
         for (id, prepared) in prepared {
-            if let Some(track) = self.tracks.get_mut(&id) {
+            if let Some(track) = self.benchmarks.get_mut(&id) {
                 track.keep(prepared);
             }
         }

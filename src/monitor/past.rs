@@ -4,7 +4,7 @@
 use super::Monitor;
 use super::event::{Event, EventKind};
 use super::notice::Notice;
-use super::track::{PAST, StepContext};
+use super::track::{PAST, PastReplay, StepContext};
 use super::{Input, Track};
 use crate::alert::{Level, Policy};
 use crate::reading::{BenchmarkId, Timestamp};
@@ -16,7 +16,7 @@ const AT_ONCE: usize = 2048;
 const MOST_REFITS: usize = 16;
 
 /// What of the past is still to be done.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct Past {
     /// The past is being read: readings are taken, and none is judged.
     is_open: bool,
@@ -24,6 +24,9 @@ pub(super) struct Past {
     current: BTreeSet<BenchmarkId>,
     /// Those whose past is still to be gone through, and the reading that was judged first.
     owed: BTreeMap<BenchmarkId, Timestamp>,
+    /// The one whose past is being gone through; a part of the memory by itself.
+    #[serde(skip)]
+    walk: Option<PastReplay>,
 }
 
 impl Past {
@@ -38,6 +41,17 @@ impl Past {
     pub(super) fn forget(&mut self, benchmark: &BenchmarkId) {
         self.current.remove(benchmark);
         self.owed.remove(benchmark);
+        self.walk.take_if(|walk| walk.benchmark() == benchmark);
+    }
+
+    /// The past that is being gone through.
+    pub(super) fn walk(&self) -> Option<&PastReplay> {
+        self.walk.as_ref()
+    }
+
+    /// The same, with this past being gone through.
+    pub(super) fn with_walk(self, walk: Option<PastReplay>) -> Self {
+        Self { walk, ..self }
     }
 }
 
@@ -67,13 +81,13 @@ impl Monitor {
 
     /// Whether there are benchmarks whose past [`Notice::Retrace`] is to go through.
     pub fn owes_past(&self) -> bool {
-        self.walk.is_some() || !self.past.owed.is_empty()
+        self.past.walk.is_some() || !self.past.owed.is_empty()
     }
 
     /// The past has been read: judges the newest reading of the next benchmarks.
     pub(super) fn judge_current(&mut self, now: Timestamp) -> Vec<Event> {
         if std::mem::take(&mut self.past.is_open) {
-            self.past.current = self.tracks.keys().cloned().collect();
+            self.past.current = self.benchmarks.all().keys().cloned().collect();
         }
         let (mut events, mut refits) = (Vec::new(), 0);
         for _ in 0..AT_ONCE {
@@ -95,19 +109,19 @@ impl Monitor {
             if let Some(newest) = newest {
                 self.past.owed.insert(id.clone(), newest);
             }
-            self.note_changed(&id);
+            self.benchmarks.note_changed(&id);
         }
         events
     }
 
     /// Goes on through the past of a benchmark.
     pub(super) fn retrace(&mut self, now: Timestamp) -> Vec<Event> {
-        if self.walk.is_none()
+        if self.past.walk.is_none()
             && let Some((id, until)) = self.past.owed.pop_first()
         {
-            self.walk = self.tracks.get(&id).map(|track| track.past(until));
+            self.past.walk = self.benchmarks.get(&id).map(|track| track.past(until));
         }
-        let Some(mut walk) = self.walk.take() else {
+        let Some(mut walk) = self.past.walk.take() else {
             return Vec::new();
         };
         let id = walk.benchmark().clone();
@@ -117,10 +131,10 @@ impl Monitor {
         (context.phase.is_past, context.phase.is_queue) = (false, false);
         let (mut events, has_more) = track.walk(&mut walk, policy, &context);
         if has_more {
-            self.walk = Some(walk);
+            self.past.walk = Some(walk);
         } else {
             events.extend(track.go_on_from(now, walk));
-            self.note_changed(&id);
+            self.benchmarks.note_changed(&id);
         }
         events
     }

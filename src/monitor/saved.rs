@@ -3,22 +3,20 @@
 //! A part for each benchmark, so that only what has changed since the last time is written, and one for the rest.
 //! The bytes are MessagePack with the fields' names: floats come back bit for bit, infinities too.
 
-use super::awaited::Awaited;
+use super::batches::Batches;
+use super::benchmarks::Benchmarks;
 use super::covariates::Covariates;
-use super::deadlines::Deadlines;
-use super::event::Summary;
-use super::in_force::LevelsInForce;
+use super::outages::Outages;
 use super::past::Past;
-use super::queue::Queue;
 use super::search::SearchJob;
-use super::sensor::Sensors;
 use super::site::SiteAlert;
+use super::tally::Tally;
 use super::together::FailureComparisons;
 use super::track::{PastReplay, Track};
 use super::{Monitor, Settings};
-use crate::reading::{BenchmarkId, Timestamp};
+use crate::reading::BenchmarkId;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// The part that belongs to no benchmark.
 const REST: &str = "";
@@ -58,30 +56,42 @@ pub enum SavedError {
     Incomplete,
 }
 
-#[derive(Debug, Serialize, Deserialize)]
+/// What is read of the part that belongs to no benchmark.
+#[derive(Debug, Deserialize)]
 struct Rest {
     settings: Settings,
     covariates: Covariates,
-    sensors: Sensors,
     searches: Vec<SearchJob>,
     #[serde(default)]
     site: SiteAlert,
     #[serde(default)]
     together: FailureComparisons,
-    #[serde(default)]
-    awaited: Awaited,
-    #[serde(default)]
-    late: BTreeSet<BenchmarkId>,
-    #[serde(default, rename = "settles")]
-    in_batches: bool,
-    #[serde(default)]
-    clock_wrong: Option<Timestamp>,
+    // Their fields stand beside the others, as all did in the first version; they hold little.
+    #[serde(flatten)]
+    outages: Outages,
     #[serde(default)]
     past: Past,
-    #[serde(default)]
-    queue: Queue,
-    summary: Summary,
-    last_time: Option<Timestamp>,
+    #[serde(flatten)]
+    batches: Batches,
+    #[serde(flatten)]
+    tally: Tally,
+}
+
+/// What is written of it: the same fields.
+#[derive(Debug, Serialize)]
+struct RestOf<'a> {
+    settings: &'a Settings,
+    covariates: &'a Covariates,
+    searches: &'a [SearchJob],
+    site: &'a SiteAlert,
+    together: &'a FailureComparisons,
+    #[serde(flatten)]
+    outages: &'a Outages,
+    past: &'a Past,
+    #[serde(flatten)]
+    batches: &'a Batches,
+    #[serde(flatten)]
+    tally: &'a Tally,
 }
 
 impl Monitor {
@@ -91,30 +101,24 @@ impl Monitor {
     /// # Errors
     /// [`SavedError::Unwritable`].
     pub fn save(&self) -> Result<Vec<MemoryPart>, SavedError> {
-        let mut parts = Vec::with_capacity(self.changed.len() + 1);
-        for id in &self.changed {
-            let track = self.tracks.get(id);
+        let mut parts = Vec::new();
+        for (id, track) in self.benchmarks.changed() {
             let body = track.map(|track| bytes(id.as_str(), track)).transpose()?;
             let name = id.as_str().to_owned();
             parts.push(MemoryPart { name, body });
         }
-        let rest = Rest {
-            settings: self.settings.clone(),
-            covariates: self.covariates.clone(),
-            sensors: self.sensors.clone(),
-            searches: self.searches.clone(),
-            site: self.site.clone(),
-            together: self.together.clone(),
-            awaited: self.awaited.clone(),
-            late: self.late.clone(),
-            in_batches: self.in_batches,
-            clock_wrong: self.clock_wrong,
-            past: self.past.clone(),
-            queue: self.queue.clone(),
-            summary: self.summary,
-            last_time: self.last_time,
+        let rest = RestOf {
+            settings: &self.settings,
+            covariates: &self.covariates,
+            searches: &self.searches,
+            site: &self.site,
+            together: &self.together,
+            outages: &self.outages,
+            past: &self.past,
+            batches: &self.batches,
+            tally: &self.tally,
         };
-        let walk = self.walk.as_ref();
+        let walk = self.past.walk();
         let body = walk.map(|walk| bytes(WALK, walk)).transpose()?;
         let name = WALK.to_owned();
         parts.push(MemoryPart { name, body });
@@ -126,7 +130,7 @@ impl Monitor {
 
     /// What [`Monitor::save`] gave is kept safely.
     pub fn is_saved(&mut self) {
-        self.changed.clear();
+        self.benchmarks.are_saved();
     }
 
     /// The monitor whose [`Monitor::save`] gave these parts, the latest of each name.
@@ -147,30 +151,17 @@ impl Monitor {
             }
         }
         let rest = rest.ok_or(SavedError::Incomplete)?;
-        let mut deadlines = Deadlines::default();
-        for (id, track) in &tracks {
-            deadlines.set(id, track.deadline());
-        }
         Ok(Self {
             settings: rest.settings,
-            in_force: LevelsInForce::of(&tracks),
-            deadlines,
-            tracks,
-            changed: BTreeSet::new(),
+            benchmarks: Benchmarks::restored(tracks),
             covariates: rest.covariates,
-            sensors: rest.sensors,
             searches: rest.searches,
             site: rest.site,
             together: rest.together,
-            awaited: rest.awaited,
-            late: rest.late,
-            in_batches: rest.in_batches,
-            clock_wrong: rest.clock_wrong,
-            past: rest.past,
-            queue: rest.queue,
-            walk,
-            summary: rest.summary,
-            last_time: rest.last_time,
+            outages: rest.outages,
+            past: rest.past.with_walk(walk),
+            batches: rest.batches,
+            tally: rest.tally,
         })
     }
 }
@@ -194,7 +185,7 @@ mod tests {
     use super::*;
     use crate::alert::Level;
     use crate::monitor::{Input, Notice};
-    use crate::reading::{Reading, Unit};
+    use crate::reading::{Reading, Timestamp, Unit};
     use flate2::read::GzDecoder;
     use jiff::ToSpan;
     use serde_json::Value;
@@ -267,9 +258,9 @@ mod tests {
     }
 
     fn saved(monitor: &mut Monitor) -> Vec<MemoryPart> {
-        let all: Vec<BenchmarkId> = monitor.tracks.keys().cloned().collect();
+        let all: Vec<BenchmarkId> = monitor.benchmarks.all().keys().cloned().collect();
         for id in &all {
-            monitor.note_changed(id);
+            monitor.benchmarks.note_changed(id);
         }
         monitor.save().unwrap()
     }
@@ -301,6 +292,34 @@ mod tests {
     }
 
     #[test]
+    fn what_belongs_to_no_benchmark_is_one_map_of_the_fields_that_earlier_versions_wrote() {
+        let parts = saved(&mut monitor());
+        let rest = parts.iter().find(|part| part.name == REST).unwrap();
+        let Value::Object(map) = map(rest) else {
+            panic!("no map");
+        };
+        let mut names: Vec<&str> = map.keys().map(String::as_str).collect();
+        names.sort_unstable();
+        let before = [
+            "awaited",
+            "clock_wrong",
+            "covariates",
+            "last_time",
+            "late",
+            "past",
+            "queue",
+            "searches",
+            "sensors",
+            "settings",
+            "settles",
+            "site",
+            "summary",
+            "together",
+        ];
+        assert_eq!(names, before);
+    }
+
+    #[test]
     fn what_is_written_is_read_to_the_bit_and_goes_on_as_the_one_that_wrote_it() {
         let mut before = monitor();
         let parts = saved(&mut before);
@@ -329,7 +348,7 @@ mod tests {
         }
         before.step(time(100), &Input::Notice(Notice::Current));
         before.step(time(100), &Input::Notice(Notice::Retrace));
-        assert!(before.walk.is_some());
+        assert!(before.past.walk().is_some());
         let mut after = Monitor::restore(&saved(&mut before)).unwrap();
         while before.owes_past() {
             let retrace = Input::Notice(Notice::Retrace);

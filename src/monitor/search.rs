@@ -63,7 +63,7 @@ impl Monitor {
         };
         let critical = policy.critical_velocity_mm_per_day;
         let events = track.found(critical, now, finding, &context);
-        self.note_changed(&finding.benchmark);
+        self.benchmarks.note_changed(&finding.benchmark);
         events
     }
 
@@ -72,9 +72,9 @@ impl Monitor {
         Phase {
             explain: self.settings.explain,
             now,
-            in_batches: self.in_batches,
+            in_batches: self.batches.are_in_use(),
             is_past: self.past.is_open(),
-            is_queue: self.queue.is_open(),
+            is_queue: self.batches.is_queue(),
         }
     }
 
@@ -89,7 +89,7 @@ impl Monitor {
             covariates: &self.covariates,
         };
         let policy = self.settings.policy(benchmark);
-        Some((self.tracks.get_mut(benchmark)?, policy, context))
+        Some((self.benchmarks.get_mut(benchmark)?, policy, context))
     }
 
     /// The searches asked for since the last call, one a benchmark at most; each is to be answered by an

@@ -135,12 +135,13 @@ impl Monitor {
         let levels = || events.iter().filter_map(called);
         let mut of_site = Vec::new();
         if is_changed || levels().next().is_some() {
-            of_site.extend(self.site.update(rule, now, &self.in_force));
+            of_site.extend(self.site.update(rule, now, self.benchmarks.in_force()));
         }
         if is_changed || levels().any(|level| level == Level::Unknown) {
-            let unknown = self.in_force.unknown().iter();
-            let unknown: Vec<&BenchmarkId> = unknown.chain(self.awaited.benchmarks()).collect();
-            let all = self.tracks.len() + self.awaited.benchmarks().count();
+            let awaited = self.outages.awaited();
+            let unknown = self.benchmarks.in_force().unknown().iter();
+            let unknown: Vec<&BenchmarkId> = unknown.chain(awaited.clone()).collect();
+            let all = self.benchmarks.all().len() + awaited.count();
             of_site.extend(self.site.update_unknown(rule, now, (&unknown, all)));
         }
         of_site

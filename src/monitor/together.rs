@@ -131,7 +131,10 @@ impl Monitor {
             .iter()
             .any(|event| matches!(event.kind, EventKind::Alert { .. }));
         let is_new = |event: &Event| {
-            let track = event.benchmark.as_ref().and_then(|id| self.tracks.get(id));
+            let track = event
+                .benchmark
+                .as_ref()
+                .and_then(|id| self.benchmarks.get(id));
             matches!(event.kind, EventKind::Refit { .. })
                 && track.is_some_and(|track| track.level() > Level::Green)
         };
@@ -139,7 +142,7 @@ impl Monitor {
             return None;
         }
         let policy = &self.settings.policy;
-        let (tracks, in_force) = (&self.tracks, &self.in_force);
+        let (tracks, in_force) = (self.benchmarks.all(), self.benchmarks.in_force());
         let together = &mut self.together;
         together.update(now, policy, tracks, in_force, has_changed)
     }

@@ -110,14 +110,14 @@ impl Track {
         reading: &Reading,
         context: &StepContext<'_>,
     ) -> Vec<Event> {
-        let waited = self.record.take_confirmed(reading.time, context.phase.now);
-        let mut events = match waited {
-            Some((source, waited)) => self.take_one(policy, source, &waited, context),
-            None => {
+        let now = context.phase.now;
+        let mut events =
+            if let Some((source, waited)) = self.record.take_confirmed(reading.time, now) {
+                self.take_one(policy, source, &waited, context)
+            } else {
                 let contradicted = self.record.contradict_ahead(reading.time);
                 contradicted.into_iter().collect()
-            }
-        };
+            };
         events.extend(self.take_one(policy, source, reading, context));
         self.forecaster.forget_prepared();
         self.pending.hold_back(&mut events);
