@@ -34,7 +34,7 @@ pub enum Declaration {
         /// Its end.
         until: Timestamp,
     },
-    /// A reading that nobody expected within an hour asks for no look.
+    /// An unexpected reading within an hour of it raises no yellow.
     Blast,
 }
 

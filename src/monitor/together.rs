@@ -87,7 +87,7 @@ impl FailureComparisons {
             let medians = forecasts.values().filter_map(|one| one.left_days(time));
             medians.fold(HORIZON_DAYS, f64::min).max(0.0)
         };
-        let looks: Vec<Snapshot> = self
+        let snapshots: Vec<Snapshot> = self
             .kept
             .iter()
             .map(|(time, forecasts)| Snapshot {
@@ -103,7 +103,7 @@ impl FailureComparisons {
             .filter_map(|id| Some(tracks.get(*id)?.rates_at(now)))
             .collect();
         let rates: Vec<(&[Rate], f64)> = rates.iter().map(|(rates, at)| (&**rates, *at)).collect();
-        groups(&looks, &Dependence::measured(&rates))
+        groups(&snapshots, &Dependence::measured(&rates))
     }
 
     fn report(&mut self, now: Timestamp, shared: Vec<SharedFailure>) -> Option<Event> {

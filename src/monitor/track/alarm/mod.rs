@@ -25,7 +25,7 @@ pub(super) struct Alarm {
     latch: Latch,
     /// Since when the site's own rules have held.
     held: Held,
-    /// Until when something that happened calls for attention, and what.
+    /// What happened that calls at least yellow, and until when it does.
     #[serde(rename = "look")]
     attention_until: Option<(Timestamp, AlertCause)>,
     /// Whether the slope is taken to move upslope.
@@ -96,7 +96,7 @@ impl Alarm {
         self.kept.as_ref()
     }
 
-    /// Something happened at `time` that calls for attention as long as a slope must be steady for its level to fall.
+    /// Something happened at `time` that calls at least yellow, for as long as a slope must be steady for its level to fall.
     pub(super) fn attend(&mut self, policy: &Policy, time: Timestamp, cause: AlertCause) {
         let until = time.checked_add(policy.steady_for).ok();
         self.attention_until = until.map(|until| (until, cause));

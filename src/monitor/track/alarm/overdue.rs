@@ -39,12 +39,12 @@ impl Overdue {
         let is_red = |now: Timestamp| {
             chances.chance_within(now, days(policy.red_within())) >= policy.red_chance
         };
-        let looks = (1..=MOST_CHECKS).map_while(|look| {
-            let after = policy.evacuation_time.checked_mul(look)? / CHECKS_AN_EVACUATION;
+        let checks = (1..=MOST_CHECKS).map_while(|check| {
+            let after = policy.evacuation_time.checked_mul(check)? / CHECKS_AN_EVACUATION;
             let now = time.checked_add(interval.checked_add(after)?).ok()?;
             (after <= policy.outlook).then_some(now)
         });
-        let red_from = looks.into_iter().find(|now| is_red(*now))?;
+        let red_from = checks.into_iter().find(|now| is_red(*now))?;
         Some(Self {
             chances,
             interval,

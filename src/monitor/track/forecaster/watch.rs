@@ -1,4 +1,4 @@
-//! The watch over the residual: looks at it now and then, says when it has structure, and asks for a search.
+//! The watch over the residual: tests it now and then, says when it has structure, and asks for a search.
 
 use super::Forecaster;
 use super::adopted::Adopted;
@@ -25,15 +25,18 @@ const WORTH_REPORTING: f64 = 0.3;
 /// Two finds of one event lie no further apart than this share of the record.
 const SAME_TIME: f64 = 0.05;
 
-/// When was looked, what was said, what was asked for.
+/// When the residual was last tested, what was reported of it, and the search asked for; all counted in readings.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub(in crate::monitor::track) struct Watch {
+    /// Readings so far.
     taken: u64,
+    /// Of them at the last test,
     looked: u64,
+    /// and at the last search.
     searched: u64,
     /// A search has been asked for and has not come back.
     is_searching: bool,
-    /// As of the last look.
+    /// As of the last test.
     has_structure: bool,
     /// The structure last reported.
     #[serde(rename = "told")]
@@ -51,7 +54,7 @@ struct KnownEffect {
 }
 
 impl Watch {
-    /// One more reading; says whether it is time to look: an eighth more than the last time.
+    /// Whether the residual is to be tested: an eighth more readings than the last time.
     fn is_due(&mut self) -> bool {
         let due = self.taken >= FEWEST && 8 * self.taken >= 9 * self.looked;
         if due {
@@ -89,7 +92,7 @@ impl Watch {
 }
 
 impl Forecaster {
-    /// Looks at the residual of the law in force, where it is time to; what it shows calls for attention.
+    /// Tests the residual of the law in force, where that is due; what it shows calls for attention.
     pub(in crate::monitor::track) fn watch(
         &mut self,
         record: &BenchmarkRecord,
@@ -317,16 +320,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_residual_is_looked_at_from_forty_readings_on_and_after_each_eighth_more() {
+    fn the_residual_is_tested_from_forty_readings_on_and_after_each_eighth_more() {
         let mut watch = Watch::default();
-        let mut looked = Vec::new();
+        let mut tested = Vec::new();
         for reading in 1..=60 {
             watch.count();
             if watch.is_due() {
-                looked.push(reading);
+                tested.push(reading);
             }
         }
-        assert_eq!(looked, [40, 45, 51, 58]);
+        assert_eq!(tested, [40, 45, 51, 58]);
     }
 
     #[test]
