@@ -410,6 +410,24 @@ struct Refitting<'a> {
     normal: (DMatrix<f64>, DVector<f64>),
 }
 
+impl Refitting<'_> {
+    fn normal_equations(&self, columns: &[Vec<f64>]) -> (DMatrix<f64>, DVector<f64>) {
+        let k = columns.len();
+        let (mut normal, mut slope) = (DMatrix::zeros(k, k), DVector::zeros(k));
+        for i in 0..k {
+            for j in 0..=i {
+                let value = dot(&columns[i], &columns[j]) / self.variance;
+                normal[(i, j)] = value;
+                normal[(j, i)] = value;
+            }
+            slope[i] = dot(&columns[i], &self.innovations) / self.variance;
+        }
+        let parameters = &self.point.parameters;
+        (self.prior).weigh_in(parameters, (&mut normal, &mut slope));
+        (normal, slope)
+    }
+}
+
 impl Descendable for Refitting<'_> {
     fn linearise(&mut self) -> bool {
         let (problem, frozen) = (self.problem, self.start.frozen);
@@ -423,13 +441,7 @@ impl Descendable for Refitting<'_> {
         let parameters = &self.point.parameters;
         self.variance = (misfit / problem.used as f64).max(1e-300);
         self.objective = misfit / self.variance + self.prior.misfit(parameters);
-        let (normal, mut slope) = normal_equations(
-            &white,
-            &self.innovations,
-            self.variance,
-            &self.prior,
-            parameters,
-        );
+        let (normal, mut slope) = self.normal_equations(&white);
         for k in parameters.len() - frozen..parameters.len() {
             slope[k] = 0.0;
         }
@@ -461,28 +473,6 @@ impl Descendable for Refitting<'_> {
     fn goes_on(&self, gain: f64) -> bool {
         gain >= CONVERGED * self.problem.used as f64
     }
-}
-
-fn normal_equations(
-    columns: &[Vec<f64>],
-    innovations: &[f64],
-    variance: f64,
-    prior: &Prior,
-    parameters: &[f64],
-) -> (DMatrix<f64>, DVector<f64>) {
-    let k = columns.len();
-    let mut normal = DMatrix::zeros(k, k);
-    let mut slope = DVector::zeros(k);
-    for i in 0..k {
-        for j in 0..=i {
-            let value = dot(&columns[i], &columns[j]) / variance;
-            normal[(i, j)] = value;
-            normal[(j, i)] = value;
-        }
-        slope[i] = dot(&columns[i], innovations) / variance;
-    }
-    prior.weigh_in(parameters, (&mut normal, &mut slope));
-    (normal, slope)
 }
 
 fn solve(normal: &DMatrix<f64>, slope: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
