@@ -78,21 +78,22 @@ pub struct Indicators {
 impl Indicators {
     /// Those of `observations`; `None` with too few of them.
     pub fn of(observations: &Observations) -> Option<Self> {
-        let mut whole = Self::of_all(observations)?;
+        let mut whole = Self::by(observations, Scales::of(observations)?);
         let since = whole.scales.disturbed_days;
         let later = since.and_then(|ago| newest(observations, ago));
-        whole.later = later.and_then(|later| Self::of_all(&later)).map(Box::new);
+        whole.later = later.and_then(|later| {
+            let scales = Scales::at(&later, later.values.len())?;
+            Some(Box::new(Self::by(&later, scales)))
+        });
         Some(whole)
     }
 
-    fn of_all(observations: &Observations) -> Option<Self> {
-        let scales = Scales::of(observations)?;
-        let evidence = Evidence::of(observations, &scales);
-        Some(Self {
+    fn by(observations: &Observations, scales: Scales) -> Self {
+        Self {
+            evidence: Evidence::of(observations, &scales),
             scales,
-            evidence,
             later: None,
-        })
+        }
     }
 
     /// Probability that the slope accelerates, against steady motion under its usual fluctuations.
@@ -139,6 +140,20 @@ impl Indicators {
 
     /// The same by another network.
     pub fn collapse_by(&self, network: &Network, members: &Members) -> Collapse {
+        let (all, sure) = self.chances_by(network, members);
+        let sure = match &self.later {
+            Some(later) => sure.at_least(&later.chances_by(network, members).1),
+            None => sure,
+        };
+        let all = passage(&all, &members.law, self.scales.centred_before_days);
+        Collapse {
+            passage: self.sooner(&members.timed(&all)),
+            sure,
+        }
+    }
+
+    /// The chance within each span, (days, chance), and as much of it as levels go by.
+    fn chances_by(&self, network: &Network, members: &Members) -> (Vec<(f64, f64)>, Passage) {
         let (mut reached, mut sure) = (0.0_f64, 0.0_f64);
         let (mut all, mut counted) = (Vec::new(), Vec::new());
         let accelerating = self.accelerating();
@@ -152,15 +167,7 @@ impl Indicators {
             counted.push((days, sure));
         }
         let centred = self.scales.centred_before_days;
-        let sure = passage(&counted, &members.law, centred);
-        let sure = match &self.later {
-            Some(later) => sure.at_least(&later.collapse_by(network, members).sure),
-            None => sure,
-        };
-        Collapse {
-            passage: self.sooner(&members.timed(&passage(&all, &members.law, centred))),
-            sure,
-        }
+        (all, passage(&counted, &members.law, centred))
     }
 
     /// `passage` with each chance within a time raised to a power that falls to [`SOONER`] as it is sure that the slope

@@ -116,13 +116,17 @@ struct Backwards<'a> {
 }
 
 impl Scales {
-    /// The scales of all `observations`; `None` with too few of them.
+    /// The scales of all `observations`, with what stands out of them; `None` with too few of them.
     pub fn of(observations: &Observations) -> Option<Self> {
-        Self::at(observations, observations.values.len())
+        Self::walk(observations, observations.values.len(), true)
     }
 
-    /// The scales of the first `count` observations.
+    /// The scales of the first `count` observations; no event is looked for.
     pub fn at(observations: &Observations, count: usize) -> Option<Self> {
+        Self::walk(observations, count, false)
+    }
+
+    fn walk(observations: &Observations, count: usize, events: bool) -> Option<Self> {
         let values = observations.values.get(..count)?;
         if values.len() < FEWEST_READINGS {
             return None;
@@ -140,6 +144,9 @@ impl Scales {
                 break;
             };
             each.push(scale);
+            if !events {
+                continue;
+            }
             match blocks.disturbance() {
                 Some(Disturbance::Over(days)) => {
                     disturbed_days = Some(disturbed_days.map_or(days, |other| other.min(days)));
