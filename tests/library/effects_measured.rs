@@ -10,7 +10,9 @@ use slipwatch::effects::{
 };
 use slipwatch::reading::{BenchmarkId, Recording, Series, Timestamp, days_since};
 use slipwatch::runtime::ingest::{ReadOptions, read_files};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, OnceLock};
 
 fn read(files: &[PathBuf]) -> Recording {
     read_files(files, &ReadOptions::default()).unwrap().0
@@ -44,6 +46,18 @@ fn explained(recording: &Recording, benchmark: Option<&str>) -> Explanation {
     explained_with(recording, benchmark, &Options::default())
 }
 
+/// What was found in a benchmark of files, by their names: several tests ask the same.
+type Found = BTreeMap<(Vec<PathBuf>, Option<String>), Arc<OnceLock<Explanation>>>;
+static FOUND: Mutex<Found> = Mutex::new(BTreeMap::new());
+
+/// What is found in files as they are; searched for once.
+fn explained_in(files: &[PathBuf], benchmark: Option<&str>) -> Explanation {
+    let key = (files.to_vec(), benchmark.map(str::to_owned));
+    let once = FOUND.lock().unwrap().entry(key).or_default().clone();
+    once.get_or_init(|| explained(&read(files), benchmark))
+        .clone()
+}
+
 fn time(text: &str) -> Timestamp {
     text.parse().unwrap()
 }
@@ -70,7 +84,7 @@ fn less(one: &[f64], other: &[f64]) -> Vec<f64> {
 /// The lake drives both benchmarks; the bounds are fit and held-out error, mm.
 fn the_lake_drives(benchmark: &str, fit: f64, held_out: f64) {
     let file = measured("salmon_falls_2017.csv");
-    let said = explained(&read(&[file]), Some(benchmark));
+    let said = explained_in(&[file], Some(benchmark));
     let lake = &said.verdict;
     assert_eq!(lake.effect, Kind::Hydrological);
     let channel = lake.channel.as_deref().unwrap();
@@ -117,7 +131,7 @@ fn the_later_block_is_predicted_no_worse_from_reading_to_reading_by_what_was_acc
         (&tide, None),
     ];
     for (files, benchmark) in all {
-        let said = explained(&read(files), benchmark);
+        let said = explained_in(files, benchmark);
         assert_ne!(said.explained, Explained::None);
         let error = &said.error.held_out_step;
         let (before, after) = (error.before.unwrap(), error.after.unwrap());
@@ -140,7 +154,7 @@ fn within_a_day(times: &[Timestamp], day: &str) -> bool {
 #[cfg_attr(not(measured_data), ignore = "no measured data here")]
 fn resets_of_the_salmon_falls_loggers_are_faults_on_their_three_days() {
     let file = measured("salmon_falls_2017.csv");
-    let said = explained(&read(&[file]), Some("ntoe"));
+    let said = explained_in(&[file], Some("ntoe"));
     for day in ["2017-06-06", "2017-09-10", "2018-01-23"] {
         assert!(
             within_a_day(&resets(&said), day),
@@ -175,7 +189,7 @@ fn an_uncorrected_lake_logger_alone_is_found_to_drive_blkm_with_its_reset_named(
 #[cfg_attr(not(measured_data), ignore = "no measured data here")]
 fn the_falling_reservoir_takes_a_third_off_the_error_of_bazimens_monthly_rate_inside_the_law() {
     let file = measured("bazimen_2006.csv");
-    let said = explained(&read(&[file]), None);
+    let said = explained_in(&[file], None);
     let first = &said.verdict;
     assert_eq!(first.effect, Kind::Hydrological);
     assert_eq!(first.channel.as_deref(), Some("reservoir_level_m"));
@@ -197,7 +211,7 @@ fn the_falling_reservoir_takes_a_third_off_the_error_of_bazimens_monthly_rate_in
 #[cfg_attr(not(measured_data), ignore = "no measured data here")]
 fn baishuihes_copied_row_is_named_and_the_slope_explained_in_part() {
     let file = measured("baishuihe_2006.csv");
-    let said = explained(&read(&[file]), None);
+    let said = explained_in(&[file], None);
     assert!(said.flags.iter().any(|flag| flag == "repeated-rows"));
     let copied = said.faults.iter().find(|fault| fault.channel.is_none());
     let copied = copied.unwrap();
@@ -238,7 +252,7 @@ fn the_tide_of_columbia_glacier_is_the_moons_and_takes_a_fifth_off_the_scatter_a
 {
     let files = ["columbia_1985_marker1.csv", "columbia_1985_rain.csv"];
     let [speed, rain] = files.map(measured);
-    let said = explained(&read(&[speed, rain]), None);
+    let said = explained_in(&[speed, rain], None);
     assert_eq!(said.verdict.effect, Kind::Tide);
     let hours = 24.0 * said.verdict.period_days.unwrap();
     assert!((hours - 12.42).abs() < 0.01, "{hours} h");
@@ -259,7 +273,7 @@ fn the_tide_of_columbia_glacier_is_the_moons_and_takes_a_fifth_off_the_scatter_a
 #[cfg_attr(not(measured_data), ignore = "no measured data here")]
 fn houstons_height_steps_are_offsets_and_no_motion() {
     let file = measured("houston_msfx_2013.csv");
-    let said = explained(&read(&[file]), Some("up"));
+    let said = explained_in(&[file], Some("up"));
     let large = effects(&said).into_iter().filter(|effect| {
         let size = effect.size.unwrap_or(0.0).abs();
         effect.effect == Kind::Offset && (45.0..=85.0).contains(&size)

@@ -15,10 +15,14 @@ use slipwatch::runtime::ingest::{ReadOptions, convert};
 use std::fs;
 use std::path::Path;
 
-/// Damaged copies of each file.
-const COPIES: usize = 1500;
+/// Damaged copies of each file, unless `MUTATED_COPIES` says otherwise.
+const COPIES: usize = 300;
 /// Files are cut to this, so that damage often meets what is read first.
 const LONGEST: usize = 6000;
+
+fn copies() -> usize {
+    std::env::var("MUTATED_COPIES").map_or(COPIES, |text| text.parse().unwrap())
+}
 
 /// What damage is made of: signs that mean something to either reader.
 const SIGNS: [&[u8]; 12] = [
@@ -98,7 +102,7 @@ fn damage_text(extension: &str, seed: u64, read: fn(&[u8])) {
         convert(&recording, &file, &ReadOptions::default(), &mut |_| {}).unwrap();
         let mut bytes = fs::read(&file).unwrap();
         bytes.truncate(LONGEST);
-        for _ in 0..COPIES {
+        for _ in 0..copies() {
             read(&damage(&bytes, &mut generator));
         }
     }
@@ -109,7 +113,7 @@ fn no_damage_to_an_mcap_file_brings_its_readers_down() {
     let mut generator = Pcg64::seed_from_u64(12);
     for recording in recordings() {
         let bytes = fs::read(&recording).unwrap();
-        for _ in 0..COPIES {
+        for _ in 0..copies() {
             entry::mcap(&damage(&bytes, &mut generator));
         }
     }
@@ -118,7 +122,7 @@ fn no_damage_to_an_mcap_file_brings_its_readers_down() {
 #[test]
 fn bytes_of_no_kind_bring_no_reader_down() {
     let mut generator = Pcg64::seed_from_u64(13);
-    for _ in 0..COPIES {
+    for _ in 0..copies() {
         let count = generator.random_range(0..400);
         let bytes: Vec<u8> = (0..count).map(|_| generator.random()).collect();
         entry::csv(&bytes);
