@@ -167,7 +167,7 @@ impl Form {
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum FaultKind {
-    /// A covariate's zero jumped: its sensor was moved or set anew.
+    /// A covariate's zero jumped: its sensor was moved or set again.
     Reset,
     /// Rows that repeat earlier rows.
     RepeatedRows,

@@ -195,7 +195,7 @@ impl Search<'_> {
         })
     }
 
-    /// `base` fitted anew from the law that `next` has with one effect more: where that is the better one without this effect too, the
+    /// `base` fitted again from the law that `next` has with one effect more: where that is the better one without this effect too, the
     /// effect was credited with what a poor fit had missed.
     fn better_without(&mut self, base: &Fitted, next: &Fitted) -> Option<Fitted> {
         let mut start = Start::at(base);

@@ -364,7 +364,7 @@ mod tests {
     #[test]
     fn readings_too_close_to_be_told_apart_are_averaged_and_noise_that_lasts_is_not_averaged_away()
     {
-        // A tenth of a mm to and fro each minute, and the same for an hour each.
+        // A tenth of a mm up or down each minute, and the same for an hour each.
         let minutes = 1440_u32;
         let at = |noise: &dyn Fn(u32) -> f64| {
             let values: Vec<(f64, f64)> = (0..minutes)

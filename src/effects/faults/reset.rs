@@ -1,4 +1,4 @@
-//! A covariate's zero jumps: its sensor was moved or set anew. Found by quiet before and after.
+//! A covariate's zero jumps: its sensor was moved or set again. Found by quiet before and after.
 
 use super::nature::Nature;
 use super::trace::{Trace, extreme, median, resolution, robust_deviation};

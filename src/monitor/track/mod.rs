@@ -351,7 +351,7 @@ impl Track {
         self.quality.accept(&self.record, now, accepted)
     }
 
-    /// A rule that the config has changed begins anew, though it has the same name.
+    /// A rule that the config has changed begins again, though it has the same name.
     pub(super) fn forget_changed_rules(&mut self, before: &Policy, now: &Policy) {
         self.alarm.forget_changed_rules(before, now);
     }

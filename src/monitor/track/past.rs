@@ -81,7 +81,7 @@ impl Track {
         let record = &self.record;
         let (source, epoch) = (record.source(), record.history().epoch);
         let mut track = Self::new(record.benchmark().clone(), source, epoch, declared);
-        track.quality = self.quality.anew();
+        track.quality = self.quality.begun_again();
         PastReplay {
             track: Box::new(track),
             at_days: None,

@@ -1,4 +1,4 @@
-//! The files of a daemon's record: `PATH-000001.mcap` and on, each begun anew, the oldest removed.
+//! The files of a daemon's record: `PATH-000001.mcap` and on, each started again, the oldest removed.
 
 use std::ffi::OsStr;
 use std::fs::{self, File};

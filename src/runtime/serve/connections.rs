@@ -29,7 +29,7 @@ pub(super) async fn serve(
     let mut open = JoinSet::new();
     let mut oldest: VecDeque<AbortHandle> = VecDeque::new();
     loop {
-        // Whatever has ended is let go of, or the set would grow for ever.
+        // Whatever has ended is removed, or the set would grow for ever.
         while open.try_join_next().is_some() {}
         let accepted = tokio::select! {
             () = stopped.requested() => return,

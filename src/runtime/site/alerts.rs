@@ -30,7 +30,7 @@ impl Site {
         for mut alert in std::mem::take(&mut self.fresh) {
             let age = now.duration_since(alert.event.time);
             if alert.event.time <= BEFORE_ALL {
-                // Before the first reading there is no data time: people are told when it was decided.
+                // Before the first reading there is no data time: people are given the time of the decision.
                 alert.event.time = now;
             }
             let is_fresh =

@@ -13,9 +13,9 @@ use std::time::Duration;
 
 /// Files that are held open, those written to last: what is moved to another folder, or removed, can be read only so.
 const MOST_OPEN: usize = 128;
-/// Files that are read on after they have gone; beyond, the one that has not grown for the longest time is let go.
+/// Files that are read on after they have gone; beyond, the one that has not grown for the longest time is closed.
 pub(super) const MOST_DEPARTED: usize = 64;
-/// A file that has another name by now is let go when it has not grown for so long: loggers write once a day too.
+/// A file that has another name by now is closed when it has not grown for so long: loggers write once a day too.
 const RENAMED_FOR: Duration = Duration::from_secs(48 * 60 * 60);
 /// So is one that has no name any more. Its room on the disk becomes free only then.
 const REMOVED_FOR: Duration = Duration::from_secs(2 * 60);

@@ -88,7 +88,7 @@ impl Alarm {
         })
     }
 
-    /// A rule that the config has changed begins anew, though it has the same name.
+    /// A rule that the config has changed begins again, though it has the same name.
     pub(in crate::monitor::track) fn forget_changed_rules(
         &mut self,
         before: &Policy,

@@ -51,7 +51,7 @@ impl DataQuality {
     }
 
     /// That of a benchmark of which nothing has been read, with the same accepted suspicions.
-    pub(super) fn anew(&self) -> Self {
+    pub(super) fn begun_again(&self) -> Self {
         Self {
             accepted: self.accepted.clone(),
             ..Self::default()

@@ -167,7 +167,7 @@ mod tests {
         assert!(begin(&mut quality, 2, Reason::Spoilt).is_none());
         assert!(end(&mut quality, 3, stuck).is_none() && quality.is_unknown());
         assert!(end(&mut quality, 4, Reason::Spoilt).is_some() && !quality.is_unknown());
-        // What begins anew no later than the one before began is another alert: its key has the time at which it is found.
+        // What begins again no later than the one before began is another alert: its key has the time at which it is found.
         let again = quality.begins_unknown(&record, (at(5), at(1)), stuck, String::new());
         let kind = again.map(|event| event.kind);
         assert!(

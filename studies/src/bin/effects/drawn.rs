@@ -1,6 +1,6 @@
 //! One series with a known effect in it, from its seed.
 //!
-//! How draws are conditioned: everything is drawn anew until the slope outlives the record, its velocity
+//! How draws are conditioned: everything is drawn again until the slope outlives the record, its velocity
 //! spans no more than a factor of `MOST_SPAN`, and each effect inside the law would show by itself: the noise
 //! is set so that what the best constant-load law leaves of the noiseless motion with that effect alone has
 //! an rms of `SHOWS` times the noise (log-uniform, for the weakest effect), and draws in which this noise is no

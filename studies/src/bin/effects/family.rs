@@ -93,7 +93,7 @@ impl Family {
     pub(crate) fn recipe(self, rng: &mut Pcg64) -> Recipe {
         let kinds = match self {
             Self::Of(Kind::None) => Vec::new(),
-            // A mean is told from what it blurs: a step, or the last rise.
+            // A mean is recognised by what it blurs: a step, or the last rise.
             Self::Of(Kind::IntervalMean) if so(rng, 0.5) => {
                 vec![Kind::IntervalMean, Kind::LoadStep]
             }

@@ -10,7 +10,7 @@ pub(crate) enum SlopeEffect {
     Load(Vec<(f64, f64)>),
     /// y is multiplied by `factor` at `day`.
     StateReset { day: f64, factor: f64 },
-    /// Another law from `day` on, begun anew with y = 1 at the velocity reached.
+    /// Another law from `day` on, started again with y = 1 at the velocity reached.
     FrictionChange { day: f64, law: Law },
     /// f = -eta v, eta in days over the unit of length.
     RateLimit { eta: f64 },

@@ -24,7 +24,7 @@ const FOOT: &str = "
 Every series has 150 to 1,500 readings of a slope that creeps, accelerates, saturates, hardens or settles, hourly to
 monthly, in part uneven and with gaps, with white noise (one in eight with effects has an AR(1) beside it, whose
 naming is not counted), and one to four covariates of which at most one or two have to do with the slope. One series in
-four has one to three benchmarks beside it that move in proportion. The effect stands inside the law. A series is drawn anew
+four has one to three benchmarks beside it that move in proportion. The effect stands inside the law. A series is drawn again
 until the slope outlives the record, its velocity spans less than a factor of 300, and each effect inside the law shows: what the
 best constant-load law leaves of the noiseless motion with that effect alone has an rms of 3 to 30 times the noise
 (log-uniform, for the weakest effect). That says that an effect can be seen, not that it can be distinguished from others. Offsets are 8

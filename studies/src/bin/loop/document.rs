@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 
 /// A series with what was found in it.
 #[derive(Debug)]
-pub(crate) struct Told {
+pub(crate) struct ExplainedSubject {
     pub(crate) subject: &'static Subject,
     pub(crate) explanation: Explanation,
     /// File and caption.
@@ -30,7 +30,7 @@ The law is the slider block of Helmstetter et al. (2004) in one regular equation
 2. The law under a constant load is fitted (*before*). Its residual is judged by its innovations, under a bank of noises: white, AR(1)
    for irregular sampling, random walk.
 3. Every kind of effect is tried inside the law, with every channel, as level and as rate, through exponential and gamma
-   responses. The law's own parameters are refitted with it, from where they stood and from laws found anew, because beside a poor law
+   responses. The law's own parameters are refitted with it, from where they stood and from laws found again, because beside a poor law
    everything that is tried gains alike; an event lies between two readings. The best one enters, and the search begins again (*after*); but
    where the law that was found with it is the better one without it too, the law before was a poor fit, nothing enters, and the search begins
    again from that law. What entered early leaves again where the BIC rises by less than 10 without it.
@@ -61,17 +61,17 @@ comes). An effect is what the readings are consistent with, and is not proved to
 ";
 
 /// The whole document.
-pub(crate) fn text(told: &[Told]) -> String {
+pub(crate) fn text(explained: &[ExplainedSubject]) -> String {
     let mut out = METHOD.to_owned();
     out.push_str("\n## All series\n\nError before → after.\n\n");
     out.push_str(
         "| series | readings | first effect | fit | held out, from reading to reading | held out, extrapolated | unit |\n|---|---|---|---|---|---|---|\n",
     );
-    for Told {
+    for ExplainedSubject {
         subject,
         explanation,
         ..
-    } in told
+    } in explained
     {
         let verdict = &explanation.verdict;
         let channel = verdict.channel.as_deref();
@@ -86,14 +86,14 @@ pub(crate) fn text(told: &[Told]) -> String {
             error_cells(explanation)
         );
     }
-    for one in told {
+    for one in explained {
         section(&mut out, one);
     }
     out
 }
 
-fn section(out: &mut String, told: &Told) {
-    let (subject, explanation) = (told.subject, &told.explanation);
+fn section(out: &mut String, one: &ExplainedSubject) {
+    let (subject, explanation) = (one.subject, &one.explanation);
     let _ = writeln!(out, "\n## {}\n\n{}\n", subject.heading, subject.origin);
     let _ = writeln!(out, "- Verdict: {}.", effect(&explanation.verdict));
     for also in &explanation.also {
@@ -131,7 +131,7 @@ fn section(out: &mut String, told: &Told) {
     }
     let _ = writeln!(out, "\n{}", subject.comment);
     out.push_str(&refused(explanation));
-    for (file, caption) in &told.figures {
+    for (file, caption) in &one.figures {
         let _ = writeln!(out, "\n![{caption}](loop/{file})");
     }
 }

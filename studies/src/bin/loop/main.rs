@@ -4,7 +4,7 @@
 //! redistributed and is not at hand, its section is left out and the run says so.
 #![expect(
     clippy::print_stderr,
-    reason = "what is left out is told to who runs it"
+    reason = "what is left out is reported to the user"
 )]
 
 mod document;
@@ -17,7 +17,7 @@ mod tables;
 mod tests;
 
 use anyhow::{Context, Result};
-use document::Told;
+use document::ExplainedSubject;
 use slipwatch::figures::pictures;
 use subjects::{SUBJECTS, Subject};
 
@@ -25,7 +25,7 @@ fn main() -> Result<()> {
     let docs = studies::project().join("docs");
     let folder = docs.join("loop");
     std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
-    let mut told = Vec::new();
+    let mut explained = Vec::new();
     for subject in &SUBJECTS {
         let Some(explanation) = subject.explained()? else {
             eprintln!("left out: {} (no measured data)", subject.heading);
@@ -42,7 +42,7 @@ fn main() -> Result<()> {
             figures.push((name, picture.caption));
         }
         let subject: &Subject = subject;
-        told.push(Told {
+        explained.push(ExplainedSubject {
             subject,
             explanation,
             figures,
@@ -50,6 +50,6 @@ fn main() -> Result<()> {
     }
     let put_in = injected::section(&injected::all()?);
     let file = docs.join("closing-the-loop.md");
-    std::fs::write(&file, document::text(&told) + &put_in)
+    std::fs::write(&file, document::text(&explained) + &put_in)
         .with_context(|| file.display().to_string())
 }
