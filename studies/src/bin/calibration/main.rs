@@ -1,7 +1,9 @@
 //! Whether the posterior's probabilities hold, on series drawn from its own prior.
 //!
-//!     cargo run --release -p studies --bin calibration            1,000 series, the law from the first reading on
-//!     cargo run --release -p studies --bin calibration 1000 onset  the same with starts to be found, as `fit` does
+//! ```text
+//! cargo run --release -p studies --bin calibration            1,000 series, the law from the first reading on
+//! cargo run --release -p studies --bin calibration 1000 onset  the same with starts to be found, as `fit` does
+//! ```
 //!
 //! A central interval of 90 % should hold the truth nine times in ten, and of what is said to have a
 //! probability of 30 % three in ten should be so. "failure" is the interval of the failure time with "never"
