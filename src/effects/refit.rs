@@ -16,13 +16,10 @@ const MOST_STEPS: usize = 20;
 /// A step that lowers the misfit by less than this share ends the fit.
 const CONVERGED: f64 = 1e-5;
 const DAMPING: Damping = Damping {
-    first: 1e-3,
     tighten: 6.0,
-    steeper: 1.0,
-    least_tightened: 0.0,
     least: 1e-9,
-    most: f64::INFINITY,
     most_tries: 8,
+    ..Damping::PLAIN
 };
 /// Rounds of 'which noise, then which law': the third no longer changes the choice.
 const NOISE_ROUNDS: usize = 4;

@@ -18,6 +18,19 @@ pub(crate) struct Damping {
     pub(crate) most_tries: usize,
 }
 
+impl Damping {
+    /// Goes up by a factor of 10 for as long as it takes.
+    pub(crate) const PLAIN: Self = Self {
+        first: 1e-3,
+        tighten: 10.0,
+        steeper: 1.0,
+        least_tightened: 0.0,
+        least: 0.0,
+        most: f64::INFINITY,
+        most_tries: usize::MAX,
+    };
+}
+
 /// What a step came to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum StepOutcome {
@@ -142,13 +155,10 @@ mod tests {
     }
 
     const SCHEDULE: Damping = Damping {
-        first: 1e-3,
         tighten: 8.0,
-        steeper: 1.0,
-        least_tightened: 0.0,
         least: 1e-9,
         most: 1e7,
-        most_tries: usize::MAX,
+        ..Damping::PLAIN
     };
 
     #[test]

@@ -12,13 +12,10 @@ use crate::reading::Quantity;
 /// Step of the derivative by ln |m|.
 const LN_M_STEP: f64 = 1e-5;
 const DAMPING: Damping = Damping {
-    first: 1e-3,
     tighten: 2.0,
     steeper: 2.0,
-    least_tightened: 0.0,
-    least: 0.0,
     most: 1e10,
-    most_tries: usize::MAX,
+    ..Damping::PLAIN
 };
 /// A step that promises less than this share of the least gain is not taken.
 const NO_PROMISE: f64 = 0.1;

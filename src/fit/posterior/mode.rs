@@ -59,13 +59,11 @@ const JACOBIAN_STEP: f64 = 1e-4;
 /// The longest step that a search may take in one coordinate.
 const LONGEST_STEP: f64 = 1.5;
 const DAMPING: Damping = Damping {
-    first: 1e-3,
     tighten: 8.0,
-    steeper: 1.0,
     least_tightened: 1e-3,
     least: 1e-9,
     most: 1e7,
-    most_tries: usize::MAX,
+    ..Damping::PLAIN
 };
 /// A gain of less in ln probability is none.
 const LEAST_GAIN: f64 = 5e-3;

@@ -276,19 +276,11 @@ impl Follower {
         let moved = is_asked_for.then(|| file.leave()).flatten();
         let moved = moved.map(|path| (key.0, path));
         let moved = moved.filter(|moved| !present.contains_key(moved));
-        let has_room = || {
-            let departed = self
-                .files
-                .values()
-                .filter(|file| file.has_rested().is_some());
-            departed.count() < MOST_DEPARTED
-        };
         if moved.as_ref() == Some(&key) {
             self.files.insert(key, file);
             return;
         }
-        let name = name(&self.sources[key.0].id, &key.1);
-        self.gone.push((key.0, Position { name, body: None }));
+        self.forget_position(&key);
         let Some(moved) = moved else {
             tracing::info!(file = %key.1.display(), "gone");
             if file.is_lost(&key.1) {
@@ -297,26 +289,33 @@ impl Follower {
             self.sources[key.0].quarantined_in_gone += file.quarantined;
             return;
         };
-        if !has_room() {
-            self.let_one_go();
-        }
+        self.make_room();
         tracing::info!(file = %key.1.display(), now = %moved.1.display(), "gone from its name, and read on for as long as it grows");
         self.files.insert(moved, file);
     }
 
-    /// Forgets the file that has not grown for the longest time after it had gone.
-    fn let_one_go(&mut self) {
+    /// Where there are as many files that have gone as may be: closes the one that has not grown for the longest time.
+    fn make_room(&mut self) {
         let departed = self.files.iter();
         let departed = departed.filter_map(|(key, file)| Some((file.has_rested()?, key)));
-        let Some(key) = departed.max().map(|(_, key)| key.clone()) else {
+        let departed: Vec<_> = departed.collect();
+        if departed.len() < MOST_DEPARTED {
+            return;
+        }
+        let Some(key) = departed.into_iter().max().map(|(_, key)| key.clone()) else {
             return;
         };
         if let Some(file) = self.files.remove(&key) {
             tracing::info!(file = %key.1.display(), "no longer read on: too many files have gone");
             self.sources[key.0].quarantined_in_gone += file.quarantined;
         }
-        let name = name(&self.sources[key.0].id, &key.1);
-        self.gone.push((key.0, Position { name, body: None }));
+        self.forget_position(&key);
+    }
+
+    /// The store has no position of a file of this name any more.
+    fn forget_position(&mut self, (source, path): &FileKey) {
+        let name = name(&self.sources[*source].id, path);
+        self.gone.push((*source, Position { name, body: None }));
     }
 
     fn list(&mut self) -> BTreeMap<FileKey, FileId> {
