@@ -18,7 +18,7 @@ const FOOT: &str = "
 - *left open*: of those not right, the right kind stands under `cannot_separate_from`.
 - *wrong ones called*: the first effect named in the series that are not right.
 - *held-out error after / given the truth*: the median of the rms over the held-out block over that of the law which was
-  told what is there (kinds, channels and about when), fitted to the same readings; *within 15 %*: where this is at most
+  given what is there (kinds, channels and about when), fitted to the same readings; *within 15 %*: where this is at most
   1.15, of those in which it can be seen.
 
 Every series has 150 to 1,500 readings of a slope that creeps, accelerates, saturates, hardens or settles, hourly to
