@@ -47,14 +47,14 @@ pub struct Policy {
 }
 
 /// Red looks so many evacuation times ahead. A collapse that is sure to come within one is reported too late for an evacuation.
-/// Set on simulated slopes: at the same share of collapses called a day before, 0.05 within one evacuation time called red
-/// twice as often on slopes that stand as 0.2 within two.
+/// Set on simulated slopes: at the same share of collapses called a day before, a chance within one evacuation time called red
+/// twice as often on slopes that stand as one within two.
 const EVACUATIONS_AHEAD: i32 = 2;
 /// A chance that calls red must have held at every reading of this part of the evacuation time, unless it is so many times as
-/// large. Set on simulated slopes, looked at each hour: a quarter fewer reds on those that stand; of those that fail two in a
-/// hundred are called that part of the time too late.
+/// large. Set on simulated slopes: at the same share of collapses called a day before, a longer or a shorter time gives as many
+/// reds on those that stand.
 const HELD_PART: i32 = 12;
-const TIMES_AS_LARGE: f64 = 2.5;
+const TIMES_AS_LARGE: f64 = 1.5;
 /// The next reading is taken to be no further away than so many of the spans that are counted from it.
 const MOST_INTERVALS: i32 = 2;
 
@@ -97,9 +97,9 @@ impl Default for Policy {
             outlook: SignedDuration::from_hours(30 * 24),
             red_within: None,
             critical_velocity_mm_per_day: 1000.0,
-            red_chance: 0.2,
-            orange_chance: 0.5,
-            yellow_chance: 0.1,
+            red_chance: 0.3,
+            orange_chance: 0.7,
+            yellow_chance: 0.3,
             thresholds: Vec::new(),
             rules: Vec::new(),
             steady_for: SignedDuration::from_hours(7 * 24),

@@ -22,8 +22,9 @@ const UNSEEN: f64 = 0.15;
 const UNSEEN_DAYS: f64 = 4.0;
 /// The probability of an acceleration at which half of the chance within days counts for levels, and the days; over longer
 /// spans the probability itself is the factor. Set on simulated slopes: where it was that within days too, red came late to
-/// slopes that their noise hides for long; where it was not over a month, steady creep was orange.
-const NOT_UNLIKELY: f64 = 0.02;
+/// slopes that their noise hides for long; where it was not over a month, steady creep was orange. At the same collapses called
+/// in time, .02 called as many reds on slopes that stand.
+const NOT_UNLIKELY: f64 = 0.001;
 const NEAR_DAYS: f64 = 6.0;
 /// Steps of the distribution in one doubling of time.
 const STEPS: u32 = 8;
@@ -38,20 +39,18 @@ const SLOWED: f64 = 0.5;
 const SURVIVED: i32 = 2;
 /// Over how many shorter scales the growth of the velocity is looked for.
 const GROWN_SCALES: usize = 10;
-/// How far the growth of a slope that runs up departs from a straight line in inverse velocity, and what is left of the
-/// chance that levels go by where the velocity has stopped growing: half of the published failures paused or came in
-/// pieces (10 of 19), and most of what pauses does so for good. Set on simulated slopes: with a quarter left, and by the one
-/// scale alone that speaks most against growth, a rate that doubles and stays was red for weeks.
-const ROUGH: f64 = 0.8;
-const PAUSED: f64 = 0.1;
-/// The same for the chance that is reported, where it is not sure that the slope accelerates; and the most, ln, that one
-/// scale can speak for growth.
+/// How far the growth of a slope that runs up departs from a straight line in inverse velocity, and what is left of the chance
+/// that is reported where the velocity has stopped growing and it is not sure that the slope accelerates; and the most, ln, that
+/// one scale can speak for growth.
 const UNEVEN: f64 = 0.4;
 const STEADY: f64 = 0.1;
 const ONE_SCALE: f64 = 3.0;
 /// The power of the chances within each time where a collapse is sure to come. Families of simulated slopes that taught
 /// a network nothing collapse sooner than it says (docs/families.md); chosen on these, with the measured series in view.
 const SOONER: f64 = 0.6;
+/// The share of the chance by the readings since an event that counts for levels: most events are followed by others of their
+/// kind. Set on simulated slopes: the whole of it calls a tenth more reds on those that stand.
+const LATER: f64 = 0.6;
 /// Readings since an event that are judged by themselves, at least and at most: the work is bounded.
 const FEWEST_LATER: usize = 24;
 const MOST_LATER: usize = 200_000;
@@ -123,7 +122,7 @@ impl Indicators {
             .map(|(_, span)| self.most(span));
         let later = self.later.as_ref();
         counted.any(|most| most >= chance)
-            || later.is_some_and(|later| later.may_reach(days, chance))
+            || later.is_some_and(|later| later.may_reach(days, chance / LATER))
     }
 
     /// The inputs of every span with its length, days.
@@ -142,12 +141,16 @@ impl Indicators {
     pub fn collapse_by(&self, network: &Network, members: &Members) -> Collapse {
         let (all, sure) = self.chances_by(network, members);
         let sure = match &self.later {
-            Some(later) => sure.at_least(&later.chances_by(network, members).1),
+            Some(later) => {
+                let (_, since) = later.chances_by(network, members);
+                sure.at_least(&Passage::default().pooled(&since, LATER))
+            }
             None => sure,
         };
         let all = passage(&all, &members.law, self.scales.centred_before_days);
+        let agreed = members.agreed();
         Collapse {
-            passage: self.sooner(&members.timed(&all)),
+            passage: self.sooner(&members.timed(&all, agreed), agreed),
             sure,
         }
     }
@@ -158,11 +161,10 @@ impl Indicators {
         let (mut all, mut counted) = (Vec::new(), Vec::new());
         let accelerating = self.accelerating();
         for (power, days) in spans(&self.scales) {
-            let chance = network.chance(&self.inputs(members, (power, days)));
             let creeps = (1.0 - accelerating) * (1.0 - may_grow(&self.scales, (power, days)));
-            reached = reached.max(chance * (1.0 - creeps));
-            let going = goes_on(&self.scales, power) * keeps_growing(&self.scales, (power, days));
-            sure = sure.max(self.most(days) * chance * going);
+            let chance = network.chance(&self.inputs(members, (power, days))) * (1.0 - creeps);
+            reached = reached.max(chance);
+            sure = sure.max(self.most(days) * chance * goes_on(&self.scales, power));
             all.push((days, reached));
             counted.push((days, sure));
         }
@@ -171,12 +173,14 @@ impl Indicators {
     }
 
     /// `passage` with each chance within a time raised to a power that falls to [`SOONER`] as it is sure that the slope
-    /// accelerates, or as likely as not that it collapses at all. Steady slopes keep theirs.
-    fn sooner(&self, passage: &Passage) -> Passage {
+    /// accelerates, or as likely as not that it collapses at all. Steady slopes keep theirs, and so do slopes on whose time of
+    /// collapse the law and the lines are `agreed`, 0 to 1: with the power, lines of inverse velocity that nothing bends
+    /// came out at two thirds of the time that remained, and at four fifths without.
+    fn sooner(&self, passage: &Passage, agreed: f64) -> Passage {
         let square = passage.chance_within(LONGEST_DAYS).powi(2);
         let likely = square / (square + 0.25);
         let coming = 1.0 - (1.0 - self.accelerating()) * (1.0 - likely);
-        passage.raised(1.0 - (1.0 - SOONER) * coming)
+        passage.raised(1.0 - (1.0 - SOONER) * coming * (1.0 - agreed))
     }
 
     /// What the chance of a collapse within the span of scale `power`, which may lie beyond the scales, rests on.
@@ -226,18 +230,10 @@ fn goes_on(scales: &Scales, power: usize) -> f64 {
     (since.exp() / SLOWED).min(1.0) * ever.exp().min(1.0).powi(SURVIVED)
 }
 
-/// The share of the chance within the span of a scale and so many days that levels keep of a slope whose velocity may have stopped
-/// growing: every scale that speaks against growth counts, and none for it, because after a step of the rate the scales that
-/// hold the step show growth that is over.
-fn keeps_growing(scales: &Scales, span: (usize, f64)) -> f64 {
-    let against = growth(scales, span, ROUGH).map(|ln| ln.min(0.0));
-    PAUSED + (1.0 - PAUSED) * share(against.sum())
-}
-
 /// The share of the chance within such a span that is reported of a slope that may creep steadily: all scales
 /// count together.
 fn may_grow(scales: &Scales, span: (usize, f64)) -> f64 {
-    let each = growth(scales, span, UNEVEN).map(|ln| ln.min(ONE_SCALE));
+    let each = growth(scales, span).map(|ln| ln.min(ONE_SCALE));
     STEADY + (1.0 - STEADY) * share(each.sum())
 }
 
@@ -247,17 +243,17 @@ fn share(ln_ratio: f64) -> f64 {
     2.0 * ratio / (1.0 + ratio)
 }
 
-/// ln of the likelihood ratio of growth against none, at the scale `power`, whose span is `span` days, and each shorter one. A straight line in inverse
-/// velocity that meets zero after the span D grows by s / (D + 2 s) of itself from one block of s days to the next;
-/// `rough` is the standard deviation of that, as a share of it.
-fn growth(scales: &Scales, (power, span): (usize, f64), rough: f64) -> impl Iterator<Item = f64> {
+/// ln of the likelihood ratio of growth against none, at the scale `power`, whose span is `span` days, and each shorter one. A
+/// straight line in inverse velocity that meets zero after the span D grows by s / (D + 2 s) of itself from one block of s days
+/// to the next; [`UNEVEN`] is the standard deviation of that, as a share of it.
+fn growth(scales: &Scales, (power, span): (usize, f64)) -> impl Iterator<Item = f64> {
     let shorter = power.saturating_sub(GROWN_SCALES);
     let last = (power + 1).min(scales.each.len());
     let each = scales.each.get(shorter..last).unwrap_or_default().iter();
     each.map(move |scale| {
         let moved = ln_above(scale.velocity, error(scale)).exp() * scale.days;
         let expected = moved * scale.days / (span + 2.0 * scale.days);
-        let deviation = scale.near.usual.hypot(rough * expected);
+        let deviation = scale.near.usual.hypot(UNEVEN * expected);
         expected * (scale.near.newest - 0.5 * expected) / (deviation * deviation)
     })
 }

@@ -58,14 +58,14 @@ impl Members {
         (critical.to_bits() == PASSED.to_bits()).then(|| self.law.times())
     }
 
-    /// `network` with a part of it, the larger the surer the law is of a collapse and the better the lines agree with it, where
-    /// the law puts that: the law is the sharper where a slope keeps it, and has no say in whether one comes.
-    pub(super) fn timed(&self, network: &Passage) -> Passage {
-        let sure = self.law.chance_within(LONGEST_DAYS);
-        if sure <= 0.0 {
+    /// `network` with a part of it, the larger the better law and lines are [agreed](Self::agreed), where the law puts that: the
+    /// law is the sharper where a slope keeps it, and has no say in whether a collapse comes.
+    pub(super) fn timed(&self, network: &Passage, agreed: f64) -> Passage {
+        let share = TIMED * agreed;
+        if share <= 0.0 {
             return network.clone();
         }
-        let share = TIMED * self.agreement(sure) * sure;
+        let sure = self.law.chance_within(LONGEST_DAYS);
         let own = network.times().iter();
         let own = own.map(|(days, chance)| (*days, (1.0 - share) * chance));
         let moved = share * network.chance_within(LONGEST_DAYS) / sure;
@@ -73,6 +73,15 @@ impl Members {
         let soon = soon.take_while(|(days, _)| *days <= LONGEST_DAYS);
         let laws = soon.map(|(days, chance)| (*days, moved * chance));
         Passage::from_times(own.chain(laws).collect())
+    }
+
+    /// How sure the law is of a collapse whose time the lines agree with, 0 to 1.
+    pub(super) fn agreed(&self) -> f64 {
+        let sure = self.law.chance_within(LONGEST_DAYS);
+        if sure <= 0.0 {
+            return 0.0;
+        }
+        self.agreement(sure) * sure
     }
 
     /// How well the law, which puts a collapse into its future with the chance `sure`, and the lines agree on its time: 1 where

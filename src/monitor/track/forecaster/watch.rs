@@ -2,7 +2,7 @@
 
 use super::Forecaster;
 use super::adopted::Adopted;
-use crate::effects::{Effect, Kind, KnownLoad, Rival, residual_structure};
+use crate::effects::{Effect, Kind, KnownLoad, Part, Rival, residual_structure};
 use crate::forecast::measurably_moves;
 use crate::monitor::event::{Event, EventKind, Unexplained};
 use crate::monitor::search::{MOST_READINGS, SearchFinding, SearchJob};
@@ -192,11 +192,10 @@ impl Forecaster {
     ) -> Vec<Event> {
         self.watch.is_searching = false;
         let before = self.adopted.take();
-        let known_load = supported(finding);
-        if context.phase.explain == Explain::Adopt
-            && !known_load.parts.is_empty()
-            && is_separable(finding)
-        {
+        let length = record.newest();
+        let length = length.map_or(0.0, |newest| record.history().days(newest));
+        let known_load = adoptable(finding, before.as_ref().map(Adopted::law), length);
+        if context.phase.explain == Explain::Adopt && !known_load.parts.is_empty() {
             let channels = context.covariates.list();
             let adopted = Adopted::new(known_load, record.history(), &channels, critical);
             self.adopted = Some(adopted);
@@ -294,15 +293,29 @@ fn effect_found(effect: &Effect, finding: &SearchFinding, adopted: bool) -> Even
 }
 
 /// The effects that something besides the motion supports: a covariate, the calendar, the instrument. A
-/// step of the load that only the motion shows may as well be the failure's own beginning.
-fn supported(finding: &SearchFinding) -> KnownLoad {
+/// step of the load that only the motion shows may as well be the failure's own beginning. Where the readings do not distinguish
+/// the effects from others, an offset of the instrument by which forecasts go already, `before`, stays: whatever moves the slope
+/// since says nothing of a jump that lies behind. `length_days`: of the record.
+fn adoptable(finding: &SearchFinding, before: Option<&KnownLoad>, length_days: f64) -> KnownLoad {
+    let is_separable = is_separable(finding);
+    let stays = |part: &&Part| {
+        part.kind() != Kind::LoadStep
+            && (is_separable || before.is_some_and(|law| has_offset(law, part, length_days)))
+    };
     let parts = finding.known_load.parts.iter();
     KnownLoad {
-        parts: parts
-            .filter(|part| part.kind() != Kind::LoadStep)
-            .cloned()
-            .collect(),
+        parts: parts.filter(stays).cloned().collect(),
     }
+}
+
+/// Whether `part` is an offset that `law` has at the same time.
+fn has_offset(law: &KnownLoad, part: &Part, length_days: f64) -> bool {
+    let Part::Offset { at: new, .. } = part else {
+        return false;
+    };
+    let is_near = |at: &Timestamp| days_since(*at, *new).abs() <= SAME_TIME * length_days;
+    let mut parts = law.parts.iter();
+    parts.any(|old| matches!(old, Part::Offset { at, .. } if is_near(at)))
 }
 
 /// Whether the readings distinguish the effects from everything else: another covariate of the same kind that does as
@@ -318,6 +331,8 @@ fn is_separable(finding: &SearchFinding) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::effects::Explained;
+    use crate::reading::{BenchmarkId, after_days};
 
     #[test]
     fn the_residual_is_tested_from_forty_readings_on_and_after_each_eighth_more() {
@@ -330,6 +345,33 @@ mod tests {
             }
         }
         assert_eq!(tested, [40, 45, 51, 58]);
+    }
+
+    #[test]
+    fn an_offset_that_is_adopted_stays_when_what_came_later_has_rivals() {
+        let offset = |day: f64| Part::Offset {
+            at: after_days(Timestamp::UNIX_EPOCH, day).unwrap(),
+            size: 100.0,
+        };
+        let rival = Rival::from(Kind::RateLimit);
+        let mut finding = SearchFinding {
+            benchmark: BenchmarkId::new("a"),
+            effects: vec![Effect::of(Kind::Offset), Effect::of(Kind::FrictionChange)],
+            explained: Explained::Partly,
+            cannot_separate_from: vec![rival],
+            known_load: KnownLoad {
+                parts: vec![offset(50.2), offset(80.0)],
+            },
+            undeclared_load: None,
+        };
+        let before = KnownLoad {
+            parts: vec![offset(50.0)],
+        };
+        let adopted = |finding: &SearchFinding, before| adoptable(finding, before, 100.0).parts;
+        assert_eq!(adopted(&finding, Some(&before)), [offset(50.2)]);
+        assert!(adopted(&finding, None).is_empty());
+        finding.cannot_separate_from.clear();
+        assert_eq!(adopted(&finding, None).len(), 2);
     }
 
     #[test]
