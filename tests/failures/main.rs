@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | 1 | a file is truncated, or copied and truncated | `files` here; `a_truncated_file...`, `a_file_that_was_truncated...` in tests/daemon/follow.rs |
 //! | 2 | inodes used again, files that begin alike | tests/daemon/follow.rs (`an_atomically_replaced...`, `a_deleted_file...`, `..._named_after`) |
-//! | 3 | rotation | tests/daemon/follow.rs (`what_was_written_before_a_rotation...`, the packed files); the model in `model` |
+//! | 3 | rotation | tests/daemon/follow.rs (`what_was_written_before_a_rotation...`, the packed files), tests/daemon/follow/gone.rs; the model in `model` |
 //! | 4 | replaced, deleted, links that turn, folders and mounts that go | `files`, `machine`, `model`; tests/daemon/daemon.rs |
 //! | 5 6 7 | partial, spoilt and endless lines | src/runtime/tail/lines.rs, tests/daemon/follow.rs |
 //! | 8 | torn JSON | tests/library/ingest_ndjson.rs, tests/daemon/follow.rs |

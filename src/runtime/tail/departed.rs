@@ -3,9 +3,10 @@
 
 use super::file::{Content, Departed, FileTail};
 use super::position::{FileId, Saved};
-use crate::runtime::clock::Stopwatch;
+use crate::reading::Timestamp;
+use crate::runtime::clock::{self, Stopwatch};
 use std::cmp::Reverse;
-use std::fs::File;
+use std::fs::{File, Metadata};
 use std::os::fd::AsRawFd;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
@@ -13,8 +14,6 @@ use std::time::Duration;
 
 /// Files that are held open, those written to last: what is moved to another folder, or removed, can be read only so.
 const MOST_OPEN: usize = 128;
-/// Files that are read on after they have gone; beyond, the one that has not grown for the longest time is closed.
-pub(super) const MOST_DEPARTED: usize = 64;
 /// A file that has another name by now is closed when it has not grown for so long: loggers write once a day too.
 const RENAMED_FOR: Duration = Duration::from_secs(48 * 60 * 60);
 /// So is one that has no name any more. Its room on the disk becomes free only then.
@@ -26,17 +25,26 @@ enum Whereabouts {
     Nameless(PathBuf),
 }
 
+/// What becomes of a file that is no longer under its name.
+pub(super) enum Departure {
+    /// It is read on, there.
+    To(PathBuf),
+    /// Nothing more is expected of it.
+    Over,
+    /// Nobody knows where it is.
+    Untraced,
+}
+
 impl FileTail {
-    /// The file is no longer under its name: finds where it is, so that what was, and is, written to it is read. `None`
-    /// when that is not known, or when nothing has come for long.
-    pub(super) fn leave(&mut self) -> Option<PathBuf> {
-        let place = self.place?;
-        if matches!(self.content, Content::Complete | Content::Refused) {
-            return None;
+    /// The file is no longer under its name: finds where it is, so that what was, and is, written to it is read.
+    pub(super) fn leave(&mut self) -> Departure {
+        if self.place.is_none() || matches!(self.content, Content::Complete | Content::Refused) {
+            return Departure::Over;
         }
-        let (path, is_nameless) = match self.whereabouts(place)? {
-            Whereabouts::Named(path) => (path, false),
-            Whereabouts::Nameless(path) => (path, true),
+        let (path, is_nameless) = match self.whereabouts() {
+            Some(Whereabouts::Named(path)) => (path, false),
+            Some(Whereabouts::Nameless(path)) => (path, true),
+            None => return Departure::Untraced,
         };
         let same = self.departed.take().filter(|one| one.at == self.at);
         let grew = same.map_or_else(Stopwatch::start, |one| one.grew);
@@ -46,36 +54,52 @@ impl FileTail {
             RENAMED_FOR
         };
         if grew.elapsed() > limit {
-            return None;
+            return Departure::Over;
         }
         self.departed = Some(Departed {
             grew,
             at: self.at,
             is_nameless,
         });
-        if self.path != path {
-            self.path.clone_from(&path);
-            // It is kept under its new name from the next look on.
-            self.reported = Saved::default();
-            self.safe.origin = Some(self.origin.clone());
-        }
-        Some(path)
+        Departure::To(path)
     }
 
-    fn whereabouts(&self, place: FileId) -> Option<Whereabouts> {
-        let is_here =
-            |path: &Path| std::fs::metadata(path).is_ok_and(|it| FileId::of(&it) == place);
-        if is_here(&self.path) {
+    /// It is kept under this name from now on.
+    pub(super) fn rename(&mut self, path: &Path) {
+        self.path = path.to_owned();
+        self.reported = Saved::default();
+        self.safe.origin = (self.origin != self.path).then(|| self.origin.clone());
+        // What was written to it before it went is read before it counts as read.
+        self.idle = None;
+    }
+
+    /// Whether the file at `path` is this one. Once a file is removed that nobody holds open, its number may be that of
+    /// another one: then what was read last is to stand there too.
+    pub(super) fn is_at(&self, path: &Path) -> bool {
+        let found = std::fs::metadata(path).map(|metadata| FileId::of(&metadata));
+        if self.place.is_none() || found.ok() != self.place {
+            return false;
+        }
+        match self.at {
+            _ if self.held.is_some() => true,
+            // Nothing has been read of it: its names are all that is known.
+            0 => path == self.path || path == self.origin,
+            _ => self.goes_on(path),
+        }
+    }
+
+    fn whereabouts(&self) -> Option<Whereabouts> {
+        if self.is_at(&self.path) {
             return Some(Whereabouts::Named(self.path.clone()));
         }
         let held = self.held.as_ref();
         let inode = held.and_then(|file| file.metadata().ok());
         let is_removed = inode.as_ref().is_some_and(|inode| inode.nlink() == 0);
-        if !is_removed && let Some(path) = self.in_its_folder(place) {
+        if !is_removed && let Some(path) = self.in_its_folder() {
             return Some(Whereabouts::Named(path));
         }
         let name = (!is_removed).then(|| name_of(held?)).flatten();
-        if let Some(name) = name.filter(|name| is_here(name)) {
+        if let Some(name) = name.filter(|name| self.is_at(name)) {
             return Some(Whereabouts::Named(name));
         }
         // No file has this name, as long as this one is held.
@@ -84,22 +108,35 @@ impl FileTail {
         Some(Whereabouts::Nameless(name.into()))
     }
 
-    fn in_its_folder(&self, place: FileId) -> Option<PathBuf> {
+    fn in_its_folder(&self) -> Option<PathBuf> {
+        let is_it = |metadata: &Metadata| Some(FileId::of(metadata)) == self.place;
         let entries = std::fs::read_dir(self.path.parent()?).ok()?;
-        entries.flatten().find_map(|entry| {
-            let metadata = entry.metadata().ok()?;
-            (FileId::of(&metadata) == place).then(|| entry.path())
-        })
+        // Not what a link leads to: that is elsewhere.
+        let mut own = entries
+            .flatten()
+            .filter(|entry| entry.metadata().is_ok_and(|metadata| is_it(&metadata)));
+        own.find_map(|entry| Some(entry.path()).filter(|path| self.is_at(path)))
+    }
+
+    /// Whether it has not been written to for so long that nothing more is expected of it.
+    pub(super) fn is_old(&self) -> bool {
+        let (seconds, nanoseconds) = self.modified;
+        let nanoseconds = i32::try_from(nanoseconds).unwrap_or_default();
+        let Ok(modified) = Timestamp::new(seconds, nanoseconds) else {
+            return true;
+        };
+        let age = Duration::try_from(clock::now().duration_since(modified));
+        age.is_ok_and(|age| age > RENAMED_FOR)
+    }
+
+    /// Whether nothing more was in it when it was last looked at, or it could not be read.
+    pub(super) fn is_read_out(&self) -> bool {
+        self.idle.is_some() || self.trouble.is_some()
     }
 
     /// Whether it is read although it has no name that a restart would find it by.
     pub(super) fn is_nameless(&self) -> bool {
         self.departed.as_ref().is_some_and(|one| one.is_nameless)
-    }
-
-    /// How long a file that has gone has not grown.
-    pub(super) fn has_rested(&self) -> Option<Duration> {
-        Some(self.departed.as_ref()?.grew.elapsed())
     }
 
     /// Keeps it open, if it is still the one that is read.
@@ -118,7 +155,7 @@ pub(super) fn hold_newest<'a>(files: impl Iterator<Item = &'a mut FileTail>) {
         |file: &FileTail| matches!(file.content, Content::Text(_) | Content::Mcap { .. });
     let (mut growing, others): (Vec<_>, Vec<_>) =
         files.partition(|file| file.place.is_some() && may_grow(file));
-    growing.sort_by_key(|file| Reverse((file.is_nameless(), file.modified())));
+    growing.sort_by_key(|file| Reverse((file.is_nameless(), file.modified)));
     let kept = growing.len().min(MOST_OPEN);
     for file in others.into_iter().chain(growing.drain(kept..)) {
         file.held = None;

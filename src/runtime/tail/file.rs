@@ -42,13 +42,13 @@ pub(super) struct FileTail {
     /// The last bytes before `at`: another file of the same number and size has others.
     pub(super) mark: Vec<u8>,
     /// As of the last look that found nothing more; the file is opened only when it differs.
-    idle: Option<Glance>,
+    pub(super) idle: Option<Glance>,
     /// When it was last written to, as of the last read.
-    modified: (i64, i64),
+    pub(super) modified: (i64, i64),
     pub(super) pending: VecDeque<Arrival>,
     pub(super) quarantined: u64,
     /// The last error, so that it is logged once.
-    trouble: Option<String>,
+    pub(super) trouble: Option<String>,
     /// It is held open, perhaps, so that it can be read wherever it goes.
     pub(super) held: Option<File>,
     /// Where it is no longer under its name.
@@ -108,7 +108,7 @@ impl Content {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Glance {
+pub(super) struct Glance {
     place: FileId,
     size: u64,
     modified: (i64, i64),
@@ -198,11 +198,6 @@ impl FileTail {
         }
     }
 
-    /// When it was last written to, as of the last read.
-    pub(super) fn modified(&self) -> (i64, i64) {
-        self.modified
-    }
-
     /// The file under its name, or the one that is held where that is another one by now, until the next look at the
     /// folder.
     fn glance(&self) -> io::Result<Glance> {
@@ -242,8 +237,18 @@ impl FileTail {
         if !self.is_same(&file, glance)? {
             let is_read =
                 self.at > 0 && !matches!(self.content, Content::Refused | Content::Complete);
+            if self.departed.is_some() {
+                // What has left its name is read on, and nothing else in its place.
+                if is_read {
+                    let gap = self.lost("cut off, or another file, and no longer under its name");
+                    self.pending.push_back(gap);
+                    self.content = Content::Complete;
+                }
+                self.idle = Some(glance);
+                return Ok(false);
+            }
             if is_read && self.place == Some(glance.place) {
-                self.report_gap(glance.size);
+                self.report_cut(glance.size);
             } else {
                 tracing::info!(file = %self.path.display(), at = self.at, "another file: read from its start");
             }
@@ -268,19 +273,6 @@ impl FileTail {
             matches!(self.content, Content::Mcap { suspect: Some(at), .. } if at == self.at);
         self.idle = (!moved && !suspect).then_some(glance);
         Ok(moved)
-    }
-
-    /// The same file, and what we have read of it is no longer there: what was written after our last look and cut
-    /// off before this one cannot be known.
-    fn report_gap(&mut self, size: u64) {
-        let (file, at) = (self.path.display(), self.at);
-        tracing::warn!(%file, at, size, "cut off while it was followed: read from its start, readings may be missing");
-        let name = self.path.file_name().unwrap_or_default().to_string_lossy();
-        let text = format!(
-            "{name}: cut off at {size} bytes after {at} had been read; what was written just before may be missing"
-        );
-        let gap = self.gap(text);
-        self.pending.push_back(gap);
     }
 
     pub(super) fn mark_start(&self) -> u64 {

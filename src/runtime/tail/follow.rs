@@ -1,9 +1,8 @@
 //! Follows the files of all sources and puts what they hold in the order of its measurement.
 
 use super::decode::{Arrival, Decoder};
-use super::departed::{MOST_DEPARTED, hold_newest};
+use super::departed::hold_newest;
 use super::file::FileTail;
-use super::position::FileId;
 use super::reorder::Reorder;
 use crate::config::{Benchmark, FilePattern, FileSource};
 use crate::reading::Timestamp;
@@ -11,8 +10,6 @@ use crate::runtime::clock::Stopwatch;
 use crate::store::Position;
 use jiff::SignedDuration;
 use std::collections::{BTreeMap, BTreeSet};
-use std::ffi::OsStr;
-use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -37,49 +34,40 @@ pub struct ArrivalBatch {
 }
 
 /// A source's number and a path.
-type FileKey = (usize, PathBuf);
+pub(super) type FileKey = (usize, PathBuf);
 
 /// The [`Arrival::rank`] of a file's next value, and the file.
 type Head = (Timestamp, bool, String, FileKey);
 
 /// One source.
 #[derive(Debug)]
-struct Followed {
-    id: String,
-    pattern: FilePattern,
-    decoder: Arc<Decoder>,
+pub(super) struct Followed {
+    pub(super) id: String,
+    pub(super) pattern: FilePattern,
+    pub(super) decoder: Arc<Decoder>,
     /// Where values wait for earlier ones.
-    reorder: Option<Reorder>,
+    pub(super) reorder: Option<Reorder>,
     /// What could not be used in files that are gone, and of all its files what has been reported.
-    quarantined_in_gone: u64,
+    pub(super) quarantined_in_gone: u64,
     quarantined_told: u64,
-}
-
-impl Followed {
-    /// Whether the pattern asks for a file of this name.
-    fn takes(&self, path: &Path) -> bool {
-        let name = path.file_name().and_then(OsStr::to_str);
-        path.parent() == Some(self.pattern.folder())
-            && name.is_some_and(|name| is_ours(&self.pattern, &self.decoder, name))
-    }
 }
 
 /// Every followed file, and which folders to look for more.
 #[derive(Debug)]
 pub struct Follower {
-    sources: Vec<Followed>,
-    files: BTreeMap<FileKey, FileTail>,
+    pub(super) sources: Vec<Followed>,
+    pub(super) files: BTreeMap<FileKey, FileTail>,
     /// The earliest pending value of each file; between two rounds there is none.
     heads: BTreeSet<Head>,
-    missing: BTreeSet<PathBuf>,
+    pub(super) missing: BTreeSet<PathBuf>,
     /// Runs since the last look at the files.
     looked: Option<Stopwatch>,
-    /// Positions that nobody needs any more.
-    gone: Vec<(usize, Position)>,
+    /// Positions that are to be kept, or forgotten, whatever still waits.
+    pub(super) at_once: Vec<Position>,
     /// What may be missing of files that are gone.
-    lost: Vec<Arrival>,
+    pub(super) lost: Vec<Arrival>,
     /// Files whose names are no text, as they were reported.
-    not_text: BTreeSet<PathBuf>,
+    pub(super) not_text: BTreeSet<PathBuf>,
 }
 
 impl Follower {
@@ -97,7 +85,12 @@ impl Follower {
             quarantined_in_gone: 0,
             quarantined_told: 0,
         };
-        let sources: Vec<Followed> = sources.iter().map(of).collect();
+        let mut sources: Vec<Followed> = sources.iter().map(of).collect();
+        for source in &mut sources {
+            if let Some(reorder) = &mut source.reorder {
+                reorder.restore(saved, &source.id);
+            }
+        }
         let files = saved
             .iter()
             .filter_map(|(name, body)| restored(&sources, name, body));
@@ -107,7 +100,7 @@ impl Follower {
             heads: BTreeSet::new(),
             missing: BTreeSet::new(),
             looked: None,
-            gone: Vec::new(),
+            at_once: Vec::new(),
             lost: Vec::new(),
             not_text: BTreeSet::new(),
         }
@@ -175,7 +168,10 @@ impl Follower {
                 continue;
             };
             read += 1;
-            match (&mut self.sources[key.0].reorder, file.pending.pop_front()) {
+            // What a restart could not read again does not wait.
+            let reorder = self.sources[key.0].reorder.as_mut();
+            let reorder = reorder.filter(|_| !file.is_nameless());
+            match (reorder, file.pending.pop_front()) {
                 (Some(reorder), Some(arrival)) => reorder.take(arrival, wall),
                 (None, arrival) => direct.extend(arrival),
                 (Some(_), None) => {}
@@ -213,20 +209,15 @@ impl Follower {
 
     /// What has changed of how far the files may be acknowledged: not past what still waits.
     fn positions(&mut self) -> Vec<Position> {
-        let mut positions = std::mem::take(&mut self.gone);
+        let mut free = std::mem::take(&mut self.at_once);
         for ((source, path), file) in &mut self.files {
-            if file.is_nameless() {
-                continue;
-            }
-            let moved = file.moved().map(|body| Position {
-                name: name(&self.sources[*source].id, path),
+            let source = &mut self.sources[*source];
+            let Some(body) = file.moved() else { continue };
+            let position = Position {
+                name: name(&source.id, path),
                 body: Some(body),
-            });
-            positions.extend(moved.map(|position| (*source, position)));
-        }
-        let mut free = Vec::new();
-        for (source, position) in positions {
-            match &mut self.sources[source].reorder {
+            };
+            match &mut source.reorder {
                 Some(reorder) => reorder.note(position),
                 None => free.push(position),
             }
@@ -235,117 +226,6 @@ impl Follower {
         let reorders = reorders.filter_map(|source| source.reorder.as_mut());
         free.extend(reorders.flat_map(Reorder::positions));
         free
-    }
-
-    /// Looks for files that have come or gone.
-    fn rescan(&mut self) {
-        let present = self.list();
-        let is_gone = |key: &FileKey, file: &FileTail| match present.get(key) {
-            None => true,
-            Some(place) => file.is_other_than(*place),
-        };
-        let gone: Vec<FileKey> = self
-            .files
-            .iter()
-            .filter(|(key, file)| is_gone(key, file))
-            .map(|(key, _)| key.clone())
-            .collect();
-        // All of them first: the new name of one may be the former name of another.
-        let gone: Vec<(FileKey, FileTail)> = gone
-            .into_iter()
-            .filter_map(|key| self.files.remove_entry(&key))
-            .collect();
-        for (key, file) in gone {
-            self.depart(key, file, &present);
-        }
-        for key in present.into_keys() {
-            if !self.files.contains_key(&key) {
-                tracing::info!(file = %key.1.display(), "followed");
-                let source = &self.sources[key.0];
-                let decoder = Arc::clone(&source.decoder);
-                let file = FileTail::new(key.1.clone(), decoder);
-                self.files.insert(key, file);
-            }
-        }
-    }
-
-    /// A file is no longer under its name: it is followed on under another, or forgotten.
-    fn depart(&mut self, key: FileKey, mut file: FileTail, present: &BTreeMap<FileKey, FileId>) {
-        // After a restart the config may be another one, and ask for other files.
-        let is_asked_for = !file.is_restored || self.sources[key.0].takes(&file.origin);
-        let moved = is_asked_for.then(|| file.leave()).flatten();
-        let moved = moved.map(|path| (key.0, path));
-        let moved = moved.filter(|moved| !present.contains_key(moved));
-        if moved.as_ref() == Some(&key) {
-            self.files.insert(key, file);
-            return;
-        }
-        self.forget_position(&key);
-        let Some(moved) = moved else {
-            tracing::info!(file = %key.1.display(), "gone");
-            if file.is_lost(&key.1) {
-                self.lost.push(file.lost());
-            }
-            self.sources[key.0].quarantined_in_gone += file.quarantined;
-            return;
-        };
-        self.make_room();
-        tracing::info!(file = %key.1.display(), now = %moved.1.display(), "gone from its name, and read on for as long as it grows");
-        self.files.insert(moved, file);
-    }
-
-    /// Where there are as many files that have gone as may be: closes the one that has not grown for the longest time.
-    fn make_room(&mut self) {
-        let departed = self.files.iter();
-        let departed = departed.filter_map(|(key, file)| Some((file.has_rested()?, key)));
-        let departed: Vec<_> = departed.collect();
-        if departed.len() < MOST_DEPARTED {
-            return;
-        }
-        let Some(key) = departed.into_iter().max().map(|(_, key)| key.clone()) else {
-            return;
-        };
-        if let Some(file) = self.files.remove(&key) {
-            tracing::info!(file = %key.1.display(), "no longer read on: too many files have gone");
-            self.sources[key.0].quarantined_in_gone += file.quarantined;
-        }
-        self.forget_position(&key);
-    }
-
-    /// The store has no position of a file of this name any more.
-    fn forget_position(&mut self, (source, path): &FileKey) {
-        let name = name(&self.sources[*source].id, path);
-        self.gone.push((*source, Position { name, body: None }));
-    }
-
-    fn list(&mut self) -> BTreeMap<FileKey, FileId> {
-        let mut present = BTreeMap::new();
-        for (index, source) in self.sources.iter_mut().enumerate() {
-            let pattern = &source.pattern;
-            match list(pattern, &source.decoder) {
-                Ok((files, not_text)) => {
-                    self.missing.remove(pattern.folder());
-                    for path in not_text {
-                        if self.not_text.insert(path.clone()) {
-                            tracing::warn!(file = ?path, "its name is no UTF-8: it is not read; rename it");
-                            source.quarantined_in_gone += 1;
-                        }
-                    }
-                    let keyed = files
-                        .into_iter()
-                        .map(|(path, place)| ((index, path), place));
-                    present.extend(keyed);
-                }
-                Err(error) => {
-                    let folder = pattern.folder().to_owned();
-                    if !self.missing.contains(&folder) {
-                        tracing::warn!(folder = %folder.display(), %error, "cannot list; will look again");
-                        self.missing.insert(folder);
-                    }
-                }
-            }
-        }
-        present
     }
 }
 
@@ -370,40 +250,6 @@ fn head(key: FileKey, file: &FileTail) -> Option<Head> {
 }
 
 /// What a position is kept under: its source and its path.
-fn name(source: &str, path: &Path) -> String {
+pub(super) fn name(source: &str, path: &Path) -> String {
     format!("{source}:{}", path.display())
-}
-
-fn is_ours(pattern: &FilePattern, decoder: &Decoder, name: &str) -> bool {
-    let packed = name.strip_suffix(".gz").filter(|_| decoder.takes_packed());
-    pattern.matches(name) || packed.is_some_and(|name| pattern.matches(name))
-}
-
-/// Files, and what has a name that is no text.
-pub(in crate::runtime) type Listed = (Vec<(PathBuf, FileId)>, Vec<PathBuf>);
-
-/// The files of the pattern, packed ones among them where the source has text; and those that would be, if their names
-/// were text.
-pub(in crate::runtime) fn list(pattern: &FilePattern, decoder: &Decoder) -> io::Result<Listed> {
-    let is_ours = |name: &str| is_ours(pattern, decoder, name);
-    let (mut files, mut not_text) = (Vec::new(), Vec::new());
-    for entry in std::fs::read_dir(pattern.folder())? {
-        let entry = entry?;
-        let name = entry.file_name();
-        match name.to_str() {
-            Some(name) if is_ours(name) => {}
-            None if is_ours(&name.to_string_lossy()) => {
-                not_text.push(entry.path());
-                continue;
-            }
-            Some(_) | None => continue,
-        }
-        // Not the entry's own: a link counts as the file that it leads to.
-        if let Ok(metadata) = std::fs::metadata(entry.path())
-            && metadata.is_file()
-        {
-            files.push((entry.path(), FileId::of(&metadata)));
-        }
-    }
-    Ok((files, not_text))
 }

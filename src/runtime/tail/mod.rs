@@ -16,13 +16,14 @@ pub mod lines;
 mod position;
 pub mod records;
 mod reorder;
+mod rescan;
 mod saved;
 mod text;
 
 pub(super) use decode::Decoder;
 pub use decode::{Arrival, options_of};
-pub(super) use follow::list;
 pub use follow::{ArrivalBatch, Follower};
+pub(super) use rescan::list;
 pub(super) use text::{BadLine, LinesRead, TextReader};
 
 use super::clock::{self, Stopwatch};

@@ -32,6 +32,17 @@ pub(super) struct Reorder {
     due: Option<OrderKey>,
     /// Each may be acknowledged once everything below its number has gone out.
     positions: VecDeque<(u64, Position)>,
+    /// What a restart goes on from, a file: what was acknowledged last.
+    acknowledged: BTreeMap<String, Vec<u8>>,
+}
+
+/// How it stood with a file that is under its name no more.
+#[derive(Debug, Default)]
+pub(super) struct Forgotten {
+    /// What was acknowledged of it last.
+    pub(super) acknowledged: Option<Vec<u8>>,
+    /// Whether something of it had not gone out.
+    pub(super) waits: bool,
 }
 
 impl Reorder {
@@ -46,7 +57,17 @@ impl Reorder {
             newest: None,
             due: None,
             positions: VecDeque::new(),
+            acknowledged: BTreeMap::new(),
         }
+    }
+
+    /// What an earlier process acknowledged of the files of the source `id`.
+    pub(super) fn restore(&mut self, saved: &[(String, Vec<u8>)], id: &str) {
+        let own = saved.iter().filter(|(name, _)| {
+            let source = name.split_once(':');
+            source.is_some_and(|(source, _)| source == id)
+        });
+        self.acknowledged.extend(own.cloned());
     }
 
     /// Holds a value that came at `wall`.
@@ -79,6 +100,26 @@ impl Reorder {
             }
             self.positions.extend(kept.into_iter().rev());
         }
+    }
+
+    /// Drops what is known of a file's name.
+    pub(super) fn forget(&mut self, name: &str) -> Forgotten {
+        let before = self.positions.len();
+        self.positions.retain(|(_, position)| position.name != name);
+        Forgotten {
+            acknowledged: self.acknowledged.remove(name),
+            waits: self.positions.len() < before,
+        }
+    }
+
+    /// The file goes by this name from now on; no more of it is acknowledged than before.
+    pub(super) fn keep(&mut self, name: &str, body: &[u8]) {
+        self.acknowledged.insert(name.to_owned(), body.to_owned());
+    }
+
+    /// Lets everything go out that waits: a restart could not read it again.
+    pub(super) fn flush(&mut self) {
+        self.due = self.due.max(self.held.keys().next_back().copied());
     }
 
     /// The values that need not wait any longer at `wall`, in the order of their measurement, `most` of them.
@@ -131,9 +172,15 @@ impl Reorder {
         let many = self
             .positions
             .partition_point(|(number, _)| *number <= reached);
-        self.positions
-            .drain(..many)
+        let reached: Vec<Position> = (self.positions.drain(..many))
             .map(|(_, position)| position)
-            .collect()
+            .collect();
+        for Position { name, body } in &reached {
+            match body {
+                Some(body) => self.acknowledged.insert(name.clone(), body.clone()),
+                None => self.acknowledged.remove(name),
+            };
+        }
+        reached
     }
 }

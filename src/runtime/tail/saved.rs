@@ -3,7 +3,8 @@
 use super::decode::Decoder;
 use super::file::{Content, FileTail};
 use super::position::{Saved, SavedContent};
-use super::text::TextReader;
+use super::records::Channels;
+use super::text::{SavedText, TextReader};
 use std::error::Error;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -55,6 +56,26 @@ impl FileTail {
             .ok()?;
         self.reported = self.safe.clone();
         Some(body)
+    }
+
+    /// What a restart goes on from where the file has another name now, and no more of it counts as read than
+    /// `acknowledged` says.
+    pub(super) fn kept(&self, acknowledged: Option<&[u8]>) -> Option<Vec<u8>> {
+        let from_its_start = || Saved {
+            place: self.place,
+            content: match &self.content {
+                Content::Text(_) => SavedContent::Text(SavedText::default()),
+                Content::Mcap { .. } => SavedContent::Mcap(Channels::default()),
+                Content::Packed(_) | Content::Refused | Content::Complete => SavedContent::Anew,
+            },
+            ..Saved::default()
+        };
+        let saved = acknowledged.and_then(|body| rmp_serde::from_slice(body).ok());
+        let saved = Saved {
+            origin: Some(self.origin.clone()),
+            ..saved.unwrap_or_else(from_its_start)
+        };
+        rmp_serde::to_vec_named(&saved).ok()
     }
 
     /// Everything up to here has been handed out.
