@@ -97,11 +97,11 @@ fn rows_that_are_written_to_a_file_after_it_was_renamed_or_moved_are_read() {
 /// Files that have gone when another config is taken, of one of which values wait for earlier ones.
 #[test]
 fn a_reload_goes_on_with_a_file_that_was_moved_and_says_that_a_removed_one_is_read_no_more() {
-    let site = Site::new("");
-    fs::create_dir(site.path("archive")).unwrap();
-    let config = fs::read_to_string(site.path("site.toml")).unwrap();
-    let with_reorder = config.replacen("kind = \"csv\"", "kind = \"csv\"\nreorder = \"2h\"", 1);
-    fs::write(site.path("site.toml"), with_reorder).unwrap();
+    let late = "[[source]]\nid = \"late\"\nkind = \"csv\"\npath = \"late/*.csv\"\n";
+    let site = Site::new(&format!("{late}reorder = \"2h\"\n"));
+    for folder in ["late", "archive"] {
+        fs::create_dir(site.path(folder)).unwrap();
+    }
     let now = clock::now();
     let recent: String = (0..9)
         .map(|number| {
@@ -112,8 +112,8 @@ fn a_reload_goes_on_with_a_file_that_was_moved_and_says_that_a_removed_one_is_re
         })
         .collect();
     site.append("incoming/5.csv", &format!("{HEADER}{}", rows(1..6)));
-    site.append("incoming/6.csv", &format!("{HEADER}{}", rows(1..6)));
-    site.append("incoming/6.csv", &recent);
+    site.append("late/6.csv", &format!("{HEADER}{}", rows(1..6)));
+    site.append("late/6.csv", &recent);
     let program = site.caught_up();
     eventually("what need not wait", || site.values().len() == 10);
     let mut writer = OpenOptions::new();
@@ -121,14 +121,14 @@ fn a_reload_goes_on_with_a_file_that_was_moved_and_says_that_a_removed_one_is_re
         .append(true)
         .open(site.path("incoming/5.csv"))
         .unwrap();
-    fs::rename(site.path("incoming/6.csv"), site.path("archive/6.csv")).unwrap();
+    fs::rename(site.path("late/6.csv"), site.path("archive/6.csv")).unwrap();
     fs::remove_file(site.path("incoming/5.csv")).unwrap();
     eventually("both have gone", || {
         site.log().matches("read on").count() == 2
     });
     writer.write_all(row(6).as_bytes()).unwrap();
     eventually("a row without a name", || site.values().len() == 11);
-    fs::write(site.path("site.toml"), config).unwrap();
+    site.configure(late);
     program.signal(Signal::SIGHUP);
     eventually("what has waited", || site.values().len() == 20);
     eventually("that readings may be missing", || gaps(&site) == 1);
