@@ -1,6 +1,7 @@
 //! One alert as Prometheus Alertmanager takes it at `POST /api/v2/alerts`.
 
 use super::hook::{Alert, MessageState};
+use super::site::BEFORE_ALL;
 use crate::monitor::EventKind;
 use crate::reading::Timestamp;
 use jiff::SignedDuration;
@@ -25,7 +26,8 @@ pub(super) fn body(alert: &Alert, link: Option<&str>) -> Result<Vec<u8>, serde_j
     let (starts_at, ends_at) = match alert.state {
         MessageState::Firing => (time, time.checked_add(STANDS_FOR).ok()),
         MessageState::Resolved | MessageState::Correction => {
-            (since(alert).unwrap_or(time), Some(time))
+            let called = alert.called.or_else(|| since(alert)).unwrap_or(time);
+            (called.min(time), Some(time))
         }
     };
     let benchmark = alert.event.benchmark.as_ref();
@@ -52,7 +54,8 @@ pub(super) fn body(alert: &Alert, link: Option<&str>) -> Result<Vec<u8>, serde_j
     }]))
 }
 
-/// When it was called: the end of its key.
+/// When it was called: the end of its key, where it was not called before there was any reading.
 fn since(alert: &Alert) -> Option<Timestamp> {
-    alert.key.rsplit_once('/')?.1.parse().ok()
+    let time = alert.key.rsplit_once('/')?.1.parse().ok();
+    time.filter(|time| *time > BEFORE_ALL)
 }

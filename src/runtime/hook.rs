@@ -94,6 +94,9 @@ pub struct Alert {
     pub site: String,
     /// The benchmark's forecast of failure when the alert was called, its median.
     pub failure_time: Option<Timestamp>,
+    /// Of an end: the time that people were given of its call; none in an outbox of older versions.
+    #[serde(default)]
+    pub called: Option<Timestamp>,
     /// Whether it means what it says.
     pub status: Status,
 }
@@ -159,6 +162,7 @@ impl Alert {
             event: event.clone(),
             site: site.to_owned(),
             failure_time,
+            called: None,
             status,
         })
     }

@@ -245,6 +245,22 @@ impl Store {
         noted.map(timestamp).transpose()
     }
 
+    /// The time that hooks were given of this key, level and state; `None` where none was.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn time_given(
+        &self,
+        (key, level, state): (&str, &str, &str),
+    ) -> Result<Option<Timestamp>, StoreError> {
+        let inner = self.inner();
+        let mut query = inner.connection.prepare_cached(
+            "SELECT min(time) FROM outbox WHERE key = ?1 AND level = ?2 AND state = ?3",
+        )?;
+        let given: Option<i64> = query.query_row(params![key, level, state], |row| row.get(0))?;
+        given.map(timestamp).transpose()
+    }
+
     /// Has what was given up, or closed, wait again, as if it had never been tried; says how many deliveries that are. The daemon
     /// takes them at its next start, or when it takes its config again.
     ///

@@ -576,6 +576,70 @@ impl Drop for Watching {
     }
 }
 
+impl Watching {
+    fn over(folder: &Path) -> Self {
+        let log = std::fs::File::create(folder.join("log")).unwrap();
+        let daemon = Command::new(env!("CARGO_BIN_EXE_slipwatch"))
+            .args(["run", "site.toml"])
+            .current_dir(folder)
+            .stdout(Stdio::null())
+            .stderr(log)
+            .spawn();
+        Self(daemon.unwrap())
+    }
+}
+
+/// What is unknown before the first reading is dated by the clock, and the first reading may be older than that.
+#[tokio::test(flavor = "multi_thread")]
+async fn alertmanager_gets_no_end_before_its_beginning_where_the_first_reading_is_old() {
+    for dies_between in [false, true] {
+        let receiver = Receiver::answering(&[200]);
+        let folder = tempfile::tempdir().unwrap();
+        let site = text(&format!(
+            "[[benchmark]]\nid = \"P1\"\nsource = \"logger\"\n\
+             [[webhook]]\nurl = \"{}\"\nformat = \"alertmanager\"\nlevels = [\"unknown\"]\n",
+            receiver.url
+        ));
+        std::fs::write(folder.path().join("site.toml"), site).unwrap();
+        let mut daemon = Watching::over(folder.path());
+        let taken = || -> Vec<serde_json::Value> {
+            let bodies = receiver.got().into_iter();
+            bodies
+                .map(|one| serde_json::from_str::<serde_json::Value>(&one.body).unwrap()[0].clone())
+                .collect()
+        };
+        eventually("it fires", || taken().len() == 1).await;
+        if dies_between {
+            // The answer is noted after the request has come.
+            tokio::time::sleep(Duration::from_millis(500)).await;
+            drop(daemon);
+            daemon = Watching::over(folder.path());
+        }
+        let now = slipwatch::runtime::clock::now();
+        let rows: Vec<String> = (0..20)
+            .map(|row| {
+                let time = now - jiff::SignedDuration::from_mins(10 * (22 - row));
+                format!("{time},{row}\n")
+            })
+            .collect();
+        let csv = format!("time,P1_displacement_mm\n{}", rows.concat());
+        std::fs::write(folder.path().join("slope.csv"), csv).unwrap();
+        eventually("it ends", || taken().len() == 2).await;
+        drop(daemon);
+        let taken = taken();
+        let (fires, ends) = (&taken[0], &taken[1]);
+        assert_eq!(fires["labels"], ends["labels"]);
+        assert_eq!(fires["startsAt"], ends["startsAt"], "{taken:?}");
+        let time = |one: &serde_json::Value| {
+            let text = one.as_str().unwrap();
+            text.parse::<jiff::Timestamp>().unwrap()
+        };
+        let (begins, ends) = (time(&fires["startsAt"]), time(&ends["endsAt"]));
+        assert!(begins <= ends, "{taken:?}");
+        assert!(now.duration_since(begins).abs() < jiff::SignedDuration::from_mins(5));
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn heartbeats_come_for_as_long_as_the_site_is_watched_and_no_longer() {
     let taking = Receiver::answering(&[200]);
@@ -597,14 +661,7 @@ async fn heartbeats_come_for_as_long_as_the_site_is_watched_and_no_longer() {
         .collect();
     let csv = format!("time,P1_displacement_mm\n{}", rows.concat());
     std::fs::write(folder.path().join("slope.csv"), csv).unwrap();
-    let log = std::fs::File::create(folder.path().join("log")).unwrap();
-    let daemon = Command::new(env!("CARGO_BIN_EXE_slipwatch"))
-        .args(["run", "site.toml"])
-        .current_dir(folder.path())
-        .stdout(Stdio::null())
-        .stderr(log)
-        .spawn();
-    let daemon = Watching(daemon.unwrap());
+    let daemon = Watching::over(folder.path());
     eventually("both are asked", || {
         taking.got().len() >= 3 && refusing.got().len() >= 3
     })

@@ -33,6 +33,7 @@ impl Site {
                 // Before the first reading there is no data time: people are given the time of the decision.
                 alert.event.time = now;
             }
+            self.date_end(&mut alert);
             let is_fresh =
                 age <= self.freshness(alert.event.benchmark.as_ref()) || self.never_read(&alert);
             let is_due = is_fresh && !self.ends_untold(&alert) || self.is_waited_for(&alert);
@@ -223,6 +224,21 @@ impl Site {
         due
     }
 
+    /// Gives the end of an alert the time that people were given of its call: before the first reading that is the time of
+    /// the decision, and the reading that ends it may have been measured earlier.
+    pub(super) fn date_end(&self, alert: &mut Alert) {
+        let place = (alert.event.benchmark.clone(), alert.level == Level::Unknown);
+        let had = self.standing.get(&place);
+        if alert.state == MessageState::Resolved
+            && let Some(had) = had.filter(|had| had.alert.key == alert.key)
+            && had.alert.event.time > BEFORE_ALL
+        {
+            let called = had.alert.event.time;
+            alert.called = Some(called);
+            alert.event.time = alert.event.time.max(called);
+        }
+    }
+
     /// Whether it is the end of what people have been notified of.
     pub(super) fn is_waited_for(&self, alert: &Alert) -> bool {
         let place = (alert.event.benchmark.clone(), alert.level == Level::Unknown);
@@ -271,6 +287,9 @@ impl Site {
                 || self.is_watched(one.alert.event.benchmark.as_ref(), now))
                 && !self.is_muted(&one.alert, now)
             {
+                if one.alert.event.time <= BEFORE_ALL {
+                    one.alert.event.time = now;
+                }
                 to_send.push(one.alert.clone());
                 (one.is_sent, one.was_notified) = (true, true);
                 let counted = u64::from(one.alert.event.benchmark.is_some());

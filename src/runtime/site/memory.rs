@@ -2,8 +2,8 @@
 
 use super::mute::Mute;
 use super::{
-    AlertInForce, AlertPlace, Counts, OWN, STEPS_A_BENCHMARK, STEPS_A_MEMORY, STEPS_UNJUDGED,
-    Sinks, Site,
+    AlertInForce, AlertPlace, BEFORE_ALL, Counts, OWN, STEPS_A_BENCHMARK, STEPS_A_MEMORY,
+    STEPS_UNJUDGED, Sinks, Site,
 };
 use crate::alert::Level;
 use crate::monitor::{Input, MemoryPart, Monitor, SavedError, SearchJob, Settings};
@@ -137,7 +137,12 @@ impl Site {
                 }
                 self.steps_since_memory += 1;
             }
-            for alert in std::mem::take(&mut self.fresh) {
+            for mut alert in std::mem::take(&mut self.fresh) {
+                if alert.event.time <= BEFORE_ALL {
+                    let given = store.time_given(identity(&alert))?;
+                    alert.event.time = given.unwrap_or(BEFORE_ALL);
+                }
+                self.date_end(&mut alert);
                 let is_sent = store.is_noted(identity(&alert), None, None)?;
                 // What is due is noted with the step itself: this one fell into a silence.
                 if !is_sent && self.is_waited_for(&alert) {
