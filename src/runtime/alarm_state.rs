@@ -64,6 +64,8 @@ struct NewestAlert {
 #[derive(Debug)]
 pub struct Alarms {
     newest: BTreeMap<Option<BenchmarkId>, NewestAlert>,
+    /// The alerts in force which say that nothing is known of a place: they stand beside its level.
+    unknown: BTreeMap<Option<BenchmarkId>, Event>,
     /// Orders by which nobody is notified.
     silences: Vec<Event>,
     /// Benchmarks under declared maintenance; `None`: the whole site.
@@ -81,9 +83,13 @@ impl Alarms {
         alerts.retain(is_known);
         // Those of the past before a first start come after those of the present.
         alerts.sort_by_key(|event| event.time);
-        let mut newest = BTreeMap::new();
+        let (mut newest, mut unknown) = (BTreeMap::new(), BTreeMap::new());
         for event in alerts {
-            take(&mut newest, event);
+            if level(&event) == Some(Level::Unknown) {
+                take_unknown(&mut unknown, event);
+            } else {
+                take(&mut newest, event);
+            }
         }
         let mut orders = orders(store)?;
         orders.retain(is_known);
@@ -94,6 +100,7 @@ impl Alarms {
         declared.retain(is_known);
         Ok(Self {
             newest,
+            unknown,
             silences: silences(&orders, now),
             out_of_service: (declared.into_iter())
                 .filter(|event| is_under_maintenance(event, now))
@@ -105,8 +112,7 @@ impl Alarms {
     /// How that of a place stands, `None` of the whole site, where its newest forecast calls for `called`.
     pub fn state(&self, place: Option<&BenchmarkId>, called: Option<&CalledLevel>) -> AlarmState {
         let newest = self.newest.get(&place.cloned());
-        let is_here = |at: Option<&BenchmarkId>| at.is_none() || at == place;
-        if self.out_of_service.iter().any(|one| is_here(one.as_ref())) {
+        if self.is_out_of_service(place) {
             return AlarmState::OutOfService;
         }
         if let Some(muted) = self.muted(place, newest) {
@@ -128,7 +134,13 @@ impl Alarms {
         }
     }
 
-    /// How one alert stands: as its place does where it is the newest there.
+    fn is_out_of_service(&self, place: Option<&BenchmarkId>) -> bool {
+        let is_here = |at: Option<&BenchmarkId>| at.is_none() || at == place;
+        self.out_of_service.iter().any(|one| is_here(one.as_ref()))
+    }
+
+    /// How one alert stands: as its place does where it is the newest there. One of the level `unknown` stands beside
+    /// the place's level, and for itself.
     pub fn state_of(
         &self,
         alert: &Event,
@@ -141,10 +153,27 @@ impl Alarms {
         if is_newest {
             return self.state(place, called);
         }
+        let unknown = self.unknown.get(&alert.benchmark);
+        if unknown.is_some_and(|one| key(one) == key(alert)) {
+            return self.state_of_unknown(place, is_acknowledged);
+        }
         if is_acknowledged {
             AlarmState::Normal
         } else {
             AlarmState::ReturnedUnacknowledged
+        }
+    }
+
+    /// How one stands that is in force: shelving a level leaves it as it is, and no forecast calls for it.
+    fn state_of_unknown(&self, place: Option<&BenchmarkId>, is_acknowledged: bool) -> AlarmState {
+        if self.is_out_of_service(place) {
+            AlarmState::OutOfService
+        } else if self.muted(place, None) == Some(AlarmState::Suppressed) {
+            AlarmState::Suppressed
+        } else if is_acknowledged {
+            AlarmState::Acknowledged
+        } else {
+            AlarmState::Unacknowledged
         }
     }
 
@@ -188,11 +217,15 @@ impl Alarms {
 
 impl NewestAlert {
     fn level(&self) -> Option<Level> {
-        if let EventKind::Alert { level, .. } = &self.event.kind {
-            Some(*level)
-        } else {
-            None
-        }
+        level(&self.event)
+    }
+}
+
+fn level(event: &Event) -> Option<Level> {
+    if let EventKind::Alert { level, .. } = &event.kind {
+        Some(*level)
+    } else {
+        None
     }
 }
 
@@ -204,14 +237,29 @@ fn key(event: &Event) -> Option<&str> {
     }
 }
 
-/// Takes one alert event; what is unknown is no level.
-fn take(newest: &mut BTreeMap<Option<BenchmarkId>, NewestAlert>, event: Event) {
-    let EventKind::Alert { level, state, .. } = &event.kind else {
+/// Takes one alert event of the level `unknown`.
+fn take_unknown(unknown: &mut BTreeMap<Option<BenchmarkId>, Event>, event: Event) {
+    let EventKind::Alert { state, .. } = &event.kind else {
         return;
     };
-    if *level == Level::Unknown {
-        return;
+    match state {
+        AlertState::Firing => {
+            unknown.insert(event.benchmark.clone(), event);
+        }
+        AlertState::Resolved => {
+            let standing = unknown.get(&event.benchmark);
+            if standing.is_some_and(|one| key(one) == key(&event)) {
+                unknown.remove(&event.benchmark);
+            }
+        }
     }
+}
+
+/// Takes one alert event of another level.
+fn take(newest: &mut BTreeMap<Option<BenchmarkId>, NewestAlert>, event: Event) {
+    let EventKind::Alert { state, .. } = &event.kind else {
+        return;
+    };
     match state {
         AlertState::Firing => {
             let one = NewestAlert {

@@ -78,6 +78,48 @@ fn three_readings_and_then_silence_are_unknown() {
     site.proven_events();
 }
 
+/// The alert of what is unknown stands beside the level of its benchmark.
+#[test]
+fn an_unknown_in_force_is_unacknowledged_until_somebody_acknowledges_it() {
+    let site = Site::new("[[benchmark]]\nid = \"5\"\nsource = \"logger\"\n");
+    let program = site.caught_up();
+    eventually("notified", || site.notified("5/unknown/", "firing") == 1);
+    let state = || {
+        let words = ["--config", "site.toml", "--format", "json"];
+        let alert = site.printed(&[&["alerts", "show", "5/unknown"], &words[..]].concat());
+        let alert: serde_json::Value = serde_json::from_str(&alert).unwrap();
+        (alert["state"].clone(), alert["alarm_state"].clone())
+    };
+    assert_eq!(state(), ("firing".into(), "unacknowledged".into()));
+    let ask = |words: &[&str]| {
+        let words = [
+            &["alerts"],
+            words,
+            &["--by", "Ada", "--config", "site.toml"],
+        ]
+        .concat();
+        assert!(site.ask(&words).status.success(), "{words:?}");
+    };
+    ask(&["ack"]);
+    eventually("acknowledged", || {
+        state() == ("firing".into(), "acknowledged".into())
+    });
+    ask(&["silence", "--for", "1h"]);
+    eventually("silenced", || {
+        state() == ("firing".into(), "suppressed".into())
+    });
+    ask(&["unsilence"]);
+    eventually("not silenced", || {
+        state() == ("firing".into(), "acknowledged".into())
+    });
+    site.append("incoming/5.csv", &format!("{HEADER}{}", failing(0..114)));
+    eventually("its end", || {
+        state() == ("resolved".into(), "normal".into())
+    });
+    program.stop();
+    site.proven_events();
+}
+
 #[test]
 fn a_benchmark_that_is_unknown_is_so_after_a_restart_too() {
     let site = Site::new("");
