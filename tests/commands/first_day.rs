@@ -421,6 +421,50 @@ fn stdin_is_a_file_in_any_format() {
 }
 
 #[test]
+fn a_named_pipe_is_read_once_and_as_a_file_is() {
+    let office = Office::with(&[("slope.csv", &plain(5000))]);
+    office.done(&["convert", "slope.csv", "from_file.ndjson"]);
+    let made = std::process::Command::new("mkfifo")
+        .arg(office.path("pipe.csv"))
+        .status();
+    assert!(made.unwrap().success());
+    let (pipe, text) = (office.path("pipe.csv"), plain(5000));
+    // Where nobody reads it to its end this thread is left behind.
+    std::thread::spawn(move || fs::write(pipe, text));
+    let mut command = office.command(&["convert", "pipe.csv", "from_pipe.ndjson"]);
+    let mut convert = crate::office::Daemon(command.stdout(Stdio::null()).spawn().unwrap());
+    let mut ended = None;
+    for _ in 0..crate::office::ATTEMPTS {
+        ended = convert.0.try_wait().unwrap();
+        if ended.is_some() {
+            break;
+        }
+        std::thread::sleep(crate::office::PAUSE);
+    }
+    assert!(ended.is_some_and(|status| status.success()), "{ended:?}");
+    let read = |name: &str| fs::read_to_string(office.path(name)).unwrap();
+    assert!(read("from_pipe.ndjson") == read("from_file.ndjson"));
+}
+
+#[test]
+fn a_loggers_table_in_a_csv_file_is_known_behind_a_byte_order_mark() {
+    let body = (0..30).fold(String::new(), |mut text, hour| {
+        let (day, hour_of_day) = (1 + hour / 24, hour % 24);
+        let _ = writeln!(text, "\"2017-06-{day:02} {hour_of_day:02}:00:00\",{hour}");
+        text
+    });
+    let text = format!(
+        "\u{feff}\"TOA5\",\"CR1000\",\"CR1000\",\"1\",\"OS\",\"CPU:p.CR1\",\"2\",\"Hourly\"\n\"TIMESTAMP\",\"P1_displacement\"\n\"TS\",\"mm\"\n\"\",\"Smp\"\n{body}"
+    );
+    let office = Office::with(&[("slope.csv", &text)]);
+    let fit = office.done(&["fit", "slope.csv", "--format", "json"]);
+    assert!(fit.contains("\"readings\":30"), "{fit}");
+    office.done(&["init", "slope.csv", "--time-zone", "UTC"]);
+    let config = fs::read_to_string(office.path("site.toml")).unwrap();
+    assert!(config.contains("kind = \"toa5\""), "{config}");
+}
+
+#[test]
 fn every_example_of_a_message_is_a_line_that_a_file_may_hold() {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/messages.md");
     let page = fs::read_to_string(page).unwrap();

@@ -72,9 +72,13 @@ pub(super) fn shown_name(file: &Path) -> PathBuf {
     }
 }
 
-/// How the file begins, unpacked; nothing where it cannot be read: whoever reads it says why.
+/// How the file begins, unpacked; nothing where it cannot be read: whoever reads it says why. Nothing of a pipe either, which
+/// can be read but once.
 pub(super) fn first_bytes(file: &Path) -> Vec<u8> {
     let mut bytes = Vec::new();
+    if !file.is_file() {
+        return bytes;
+    }
     let read = if is_packed(file) {
         unpack(file).and_then(|packed| packed.take(FIRST).read_to_end(&mut bytes))
     } else {

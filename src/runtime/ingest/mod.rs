@@ -175,13 +175,11 @@ impl Format {
             file: "stdin".into(),
             source,
         })?;
-        let text = all.strip_prefix("\u{feff}".as_bytes()).unwrap_or(all);
-        let text = text.trim_ascii_start();
         if all.starts_with(MCAP_MAGIC) {
             return Ok(Self::Mcap);
         }
         let mut formats = TEXT_FORMATS.into_iter();
-        let format = formats.find(|one| (one.begins)(text)).unwrap_or(&CSV);
+        let format = formats.find(|one| begins_as(one, all)).unwrap_or(&CSV);
         Ok(Self::Text(format))
     }
 }
@@ -192,9 +190,15 @@ pub fn text_format_of(file: &Path) -> Option<&'static TextFormat> {
     let name = bytes::unpacked_name(file);
     let extension = name.extension().unwrap_or_default().to_string_lossy();
     let format = TextFormat::of_extension(&extension.to_ascii_lowercase())?;
-    let is_table = || (TOA5.begins)(&bytes::first_bytes(file));
+    let is_table = || begins_as(&TOA5, &bytes::first_bytes(file));
     let is_toa5 = format.name == CSV.name && is_table();
     Some(if is_toa5 { &TOA5 } else { format })
+}
+
+/// Whether these first bytes are those of a file of the format, behind a byte order mark and white space.
+fn begins_as(format: &TextFormat, first: &[u8]) -> bool {
+    let text = first.strip_prefix("\u{feff}".as_bytes());
+    (format.begins)(text.unwrap_or(first).trim_ascii_start())
 }
 
 /// How a recording begins.
