@@ -45,6 +45,39 @@ struct MergedReadings {
     first: Option<(ReadValue, f64)>,
 }
 
+impl MergedReadings {
+    /// The one of `all`, which are of one time, that the daemon takes last. A value that comes again after its correction is
+    /// a repetition where another one follows, as in a file that is read again, and has been corrected back where none does.
+    fn newest(&mut self, all: &[ReadValue]) -> Option<ReadValue> {
+        let (first, others) = all.split_first()?;
+        let mut newest = *first;
+        if others.is_empty() {
+            return Some(newest);
+        }
+        let mut seen = BTreeSet::from([first.value.to_bits()]);
+        for one in others {
+            if seen.insert(one.value.to_bits()) {
+                self.is_corrected(newest, *one);
+                newest = *one;
+            } else {
+                self.repeated += 1;
+            }
+        }
+        let last = *all.last()?;
+        if last.value.to_bits() != newest.value.to_bits() {
+            self.repeated -= 1;
+            self.is_corrected(newest, last);
+            newest = last;
+        }
+        Some(newest)
+    }
+
+    fn is_corrected(&mut self, before: ReadValue, by: ReadValue) {
+        self.corrected += 1;
+        self.first.get_or_insert((by, before.value));
+    }
+}
+
 impl PreviewTrack {
     pub(super) fn new(view: BenchmarkPreview, unit: Unit, accepted: BTreeSet<Suspicion>) -> Self {
         Self {
@@ -131,27 +164,12 @@ impl PreviewTrack {
         self.view
     }
 
-    /// Puts them in order, one of each time: the last that is another than those before it.
+    /// Puts them in order, one of each time: the last one that was read.
     fn merge(&mut self) -> MergedReadings {
         self.readings.sort_by_key(|one| one.time);
         let mut merged = MergedReadings::default();
-        let mut kept: Vec<ReadValue> = Vec::with_capacity(self.readings.len());
-        let mut seen: Vec<u64> = Vec::new();
-        for one in self.readings.drain(..) {
-            match kept.last_mut().filter(|last| last.time == one.time) {
-                None => {
-                    seen.clear();
-                    kept.push(one);
-                }
-                Some(_) if seen.contains(&one.value.to_bits()) => merged.repeated += 1,
-                Some(last) => {
-                    merged.corrected += 1;
-                    merged.first.get_or_insert((one, last.value));
-                    *last = one;
-                }
-            }
-            seen.push(one.value.to_bits());
-        }
+        let of_each_time = self.readings.chunk_by(|one, next| one.time == next.time);
+        let kept = of_each_time.filter_map(|all| merged.newest(all)).collect();
         self.readings = kept;
         merged
     }
