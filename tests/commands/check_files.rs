@@ -1,6 +1,6 @@
 //! What `check` says of files in which much is wrong, beside what the daemon does with them.
 
-use crate::office::{Office, site};
+use crate::office::{Office, plain, site};
 use jiff::{SignedDuration, Timestamp};
 use slipwatch::runtime::clock::{self, Stopwatch};
 use std::fmt::Write as _;
@@ -82,5 +82,147 @@ fn many_readings_of_one_time_take_no_longer_to_look_at_than_others() {
     assert!(
         of_one < 2 * of_many + Duration::from_secs(2),
         "{of_one:?} and {of_many:?}"
+    );
+}
+
+/// A text of other letters for each number, and no digit.
+fn letters(mut number: u32) -> String {
+    let mut text = String::new();
+    for _ in 0..6 {
+        text.push(char::from(b'a' + u8::try_from(number % 26).unwrap()));
+        number /= 26;
+    }
+    text
+}
+
+/// Bytes without any order, the same each time.
+fn rubbish(count: usize) -> Vec<u8> {
+    let mut state = 1_u64;
+    let next = |_| {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        state.to_le_bytes()[7]
+    };
+    (0..count).map(next).collect()
+}
+
+#[test]
+fn rows_that_are_wrong_in_the_same_way_are_one_kind_whatever_stands_in_them() {
+    let messages = (0..60_000).fold(String::new(), |mut text, row| {
+        let wrong = letters(row);
+        let _ = match row % 3 {
+            0 => writeln!(text, r#"{{"benchmark": "P1", "time": "{wrong}", "value": 1}}"#),
+            1 => writeln!(text, "{wrong}"),
+            _ => writeln!(
+                text,
+                r#"{{"benchmark": "{wrong}", "time": "2020-01-01T00:00:00Z", "value": 1, "unit": "{wrong}"}}"#
+            ),
+        };
+        text
+    });
+    let config = site("in/*", "").replace("\"csv\"", "\"ndjson\"");
+    let office = Office::with(&[("site.toml", &config)]);
+    fs::create_dir(office.path("in")).unwrap();
+    fs::write(office.path("in/a.ndjson"), messages).unwrap();
+    let refused = looked(&office)["sources"][0]["refused"].clone();
+    let rows: Vec<u64> = (refused.as_array().unwrap().iter())
+        .map(|one| one["rows"].as_u64().unwrap())
+        .collect();
+    assert_eq!(rows, [20_000; 3], "{refused}");
+
+    let office = Office::with(&[("site.toml", &site("in/*", ""))]);
+    fs::create_dir(office.path("in")).unwrap();
+    let text = [HEADER.as_bytes(), &rubbish(4_000_000)].concat();
+    fs::write(office.path("in/a.csv"), text).unwrap();
+    let (_, out, err) = office.say(&["check", "site.toml"]);
+    assert!(out.contains("refused: "), "{out}{err}");
+    assert!(out.lines().count() < 60, "{out}");
+}
+
+#[test]
+fn bad_rows_count_to_what_is_looked_at() {
+    let config = site("a.ndjson", "").replace("\"csv\"", "\"ndjson\"");
+    let office = Office::with(&[
+        ("a.ndjson", &"x\n".repeat(2_100_000)),
+        ("site.toml", &config),
+    ]);
+    assert_eq!(looked(&office)["is_whole"], false);
+}
+
+#[test]
+fn readings_ahead_of_the_clock_are_refused_where_a_daemon_is_at_work_that_refuses_them() {
+    let office = Office::with(&[
+        ("slope.csv", &format!("{HEADER}{}", half_hourly(-60..0))),
+        ("site.toml", &site("slope.csv", "")),
+    ]);
+    let daemon = office.run_logged(&["run", "site.toml"]);
+    office.until("all is read", || office.log().contains("caught up"));
+    let rows = fs::read_to_string(office.path("slope.csv")).unwrap() + &half_hourly(4..10);
+    fs::write(office.path("slope.csv"), &rows).unwrap();
+    office.until("they are set aside", || {
+        office.log().matches("measured in the future").count() == 6
+    });
+    let is_refused = || {
+        let one = &looked(&office)["benchmarks"][0];
+        assert_eq!((&one["readings"], &one["ahead"]), (&60.into(), &6.into()));
+        let out = office.done(&["check", "site.toml"]);
+        assert!(out.contains("refused: 6 rows"), "{out}");
+        assert!(!out.contains("its clock as wrong"), "{out}");
+    };
+    is_refused();
+    drop(daemon);
+    is_refused();
+
+    // The same rows, all there when a daemon starts for the first time.
+    let office = Office::with(&[("slope.csv", &rows), ("site.toml", &site("slope.csv", ""))]);
+    let all_count = || {
+        let one = &looked(&office)["benchmarks"][0];
+        assert_eq!((&one["readings"], &one["ahead"]), (&66.into(), &0.into()));
+    };
+    let says = |wanted: &str| office.done(&["check", "site.toml"]).contains(wanted);
+    assert!(says("a daemon that starts now, on a new state, takes them"));
+    all_count();
+    let daemon = office.run_logged(&["run", "site.toml"]);
+    office.until("the daemon has taken them", || {
+        says("the daemon has taken such")
+    });
+    all_count();
+    drop(daemon);
+}
+
+#[test]
+fn a_benchmark_that_nothing_feeds_is_explained_by_its_own_source() {
+    let more = "[[source]]\nid = \"other\"\nkind = \"csv\"\npath = \"other.csv\"\n\
+                [[benchmark]]\nid = \"P1\"\nsource = \"logger\"\n[[benchmark]]\nid = \"Q1\"\nsource = \"other\"\n";
+    let unreadable = plain(30).replace("2017-06-", "June-");
+    let other = plain(30).replace(
+        "P1_displacement_mm",
+        "Q1_displacement_mm,Q7_displacement_mm",
+    );
+    let other = other.replace('\n', ",1\n").replacen(",1\n", "\n", 1);
+    let office = Office::with(&[
+        ("slope.csv", &unreadable),
+        ("other.csv", &other),
+        ("site.toml", &site("slope.csv", more)),
+    ]);
+    let said = office.refused(1, &["check", "site.toml"]);
+    let line = said.lines().find(|line| line.contains("\"P1\"")).unwrap();
+    assert!(
+        line.contains("refuses what they have (30 times)") && line.contains("found \"June-"),
+        "{said}"
+    );
+    assert!(!line.contains("Q7"), "{said}");
+    let out = office.say(&["check", "site.toml"]).1;
+    assert!(out.contains("not watched: Q7"), "{out}");
+
+    // Where its own source has another one and refused rows too, both are said.
+    let both = plain(30).replace("P1_", "P7_") + "yesterday,1\n";
+    fs::write(office.path("slope.csv"), both).unwrap();
+    let said = office.refused(1, &["check", "site.toml"]);
+    let line = said.lines().find(|line| line.contains("\"P1\"")).unwrap();
+    assert!(
+        line.contains("they have P7") && line.contains("found \"yesterday\""),
+        "{said}"
     );
 }

@@ -1,6 +1,7 @@
 //! What the files of a site hold now, as the daemon would take it: a look before it starts.
 
 mod recording;
+mod refused;
 mod track;
 mod unfed;
 mod view;
@@ -10,23 +11,24 @@ pub use view::{
 };
 
 use super::clock;
-use super::ingest::{IngestError, Item, Meaning, UNIT_WAS, is_packed, unpack};
+use super::ingest::{Item, Meaning, UNIT_WAS, is_packed, unpack};
 use super::site::{Unproven, Untimely, untimely};
-use super::tail::{Arrival, BadLine, Decoder, LinesRead, TextReader, list};
+use super::tail::{Arrival, Decoder, LinesRead, TextReader, list};
 use crate::config::{Config, FileSource, SourceKind};
 use crate::monitor::Input;
 use crate::reading::{
     BenchmarkId, LocalClock, Quantity, SummerTime, Suspicion, Timestamp, suspicion,
 };
+use crate::store::Store;
 use recording::read_recording;
-use std::cmp::Reverse;
+use refused::{RefusedKinds, RefusedRow};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use track::{FilePlace, PreviewTrack};
 
-/// Values that are looked at, so that years of history cost a bounded time.
+/// Values and bad rows that are looked at, so that years of history cost a bounded time.
 const MOST_VALUES: u64 = 2_000_000;
 /// Bytes that are read at once.
 const PIECE: usize = 64 * 1024;
@@ -53,8 +55,7 @@ pub fn preview(config: &Config) -> Preview {
 struct SourceSoFar {
     view: SourceView,
     files: Vec<PathBuf>,
-    /// What is wrong with rows, by kind.
-    refused: BTreeMap<String, Refusal>,
+    refused: RefusedKinds,
 }
 
 impl SourceSoFar {
@@ -69,14 +70,6 @@ impl SourceSoFar {
             format!("{file}, line {line}")
         }
     }
-
-    fn refuse(&mut self, kind: String, first: impl FnOnce() -> String) {
-        let refusal = self.refused.entry(kind).or_insert_with(|| Refusal {
-            rows: 0,
-            first: first(),
-        });
-        refusal.rows += 1;
-    }
 }
 
 #[derive(Debug, Default)]
@@ -84,7 +77,6 @@ struct PreviewSoFar {
     sources: Vec<SourceSoFar>,
     benchmarks: BTreeMap<(String, BenchmarkId, Quantity), PreviewTrack>,
     covariates: BTreeMap<(String, String), CovariateView>,
-    unwatched: BTreeSet<BenchmarkId>,
     /// Sources that have readings of a benchmark which the config takes from another one.
     elsewhere: BTreeSet<(String, BenchmarkId)>,
     accepted: BTreeMap<BenchmarkId, BTreeSet<Suspicion>>,
@@ -104,9 +96,10 @@ impl PreviewSoFar {
                 layouts: Vec::new(),
                 refused: Vec::new(),
                 remarks: Vec::new(),
+                unwatched: BTreeSet::new(),
             },
             files: Vec::new(),
-            refused: BTreeMap::new(),
+            refused: RefusedKinds::default(),
         };
         match list(&source.pattern, decoder) {
             Ok((files, not_text)) => {
@@ -136,7 +129,7 @@ impl PreviewSoFar {
             match source.kind {
                 SourceKind::Mcap => {
                     if let Err(problem) = self.recording(number, decoder, &mut so_far) {
-                        so_far.refuse(without_digits(&problem), || problem);
+                        so_far.refused.row(RefusedRow::of_text(problem));
                     }
                 }
                 SourceKind::Csv | SourceKind::Ndjson | SourceKind::Toa5 => {
@@ -166,7 +159,10 @@ impl PreviewSoFar {
         read_recording(&file, |found| {
             match found {
                 Ok(item) => self.item(item, (number, 0), decoder, so_far),
-                Err(problem) => so_far.refuse(without_digits(&problem), || problem),
+                Err(row) => {
+                    self.values += 1;
+                    so_far.refused.row(row);
+                }
             }
             self.values <= MOST_VALUES
         })
@@ -224,7 +220,8 @@ impl PreviewSoFar {
             remarks.extend(is_new.then(|| remark.to_string()));
         }
         for line in &fed.bad {
-            so_far.refuse(kind_of(line), || shown(line));
+            self.values += 1;
+            so_far.refused.row(RefusedRow::of_line(line));
         }
     }
 
@@ -243,7 +240,7 @@ impl PreviewSoFar {
             // Its other quantity is read.
             (None, Some(benchmark)) if decoder.knows(&benchmark) => {}
             (None, Some(benchmark)) => {
-                self.unwatched.insert(benchmark);
+                so_far.view.unwatched.insert(benchmark);
             }
             (None, None) => {}
         }
@@ -256,7 +253,7 @@ impl PreviewSoFar {
             let what = arrival.input.series_name().to_owned();
             let (kind, expected) = expected_time(why, time, self.now);
             let at = so_far.name(place);
-            so_far.refuse(kind.to_owned(), || {
+            so_far.refused.count(kind, || {
                 format!("{at}, {what:?}: found {time}, expected {expected}")
             });
         }
@@ -264,7 +261,7 @@ impl PreviewSoFar {
         if let Input::Missing { what, .. } = arrival.input {
             if what.starts_with(UNIT_WAS) {
                 let at = so_far.name(place);
-                so_far.refuse(what.clone(), || {
+                so_far.refused.count(&what, || {
                     format!("{at}: {what}, expected the unit that the file began with")
                 });
             }
@@ -306,6 +303,21 @@ impl PreviewSoFar {
         (view.first, view.last) = (view.first.min(first), view.last.max(last));
     }
 
+    /// Why the readings that lie ahead of the clock are taken; `None` where they are refused. A daemon on a first start
+    /// judges by the files whether the clock is wrong, and one with a state has shown there whether it found it so.
+    fn why_ahead_is_taken(&self, state_dir: &Path) -> Option<&'static str> {
+        if matches!(Store::file(state_dir).try_exists(), Ok(false)) {
+            return self.proves_the_clock_wrong().then_some(
+                "readings go on beyond this machine's clock: a daemon that starts now, on a new state, takes them, and reports its clock as wrong",
+            );
+        }
+        let known = Store::look(state_dir).and_then(|store| store.benchmarks());
+        let newest = known.ok()?.into_values().max()?;
+        (newest.duration_since(self.now) > clock::TOLERANCE).then_some(
+            "readings go on beyond this machine's clock: the daemon has taken such, and reports its clock as wrong",
+        )
+    }
+
     /// Whether a daemon on a first start would take the readings that lie ahead of the clock, and call the clock wrong.
     fn proves_the_clock_wrong(&self) -> bool {
         let mut unproven = Unproven::default();
@@ -321,33 +333,34 @@ impl PreviewSoFar {
     }
 
     fn finish(mut self, config: &Config) -> Preview {
-        let proves = self.proves_the_clock_wrong();
+        let taken = self.why_ahead_is_taken(&config.site.state_dir);
         let mut benchmarks = Vec::new();
         for ((id, ..), track) in std::mem::take(&mut self.benchmarks) {
             let so_far = self.sources.iter().find(|one| one.view.id == id);
             let source = config.sources.iter().find(|one| one.id == id);
             let zone = source.and_then(|source| source.conventions.clock.zone.as_ref());
             let name = |place| so_far.map_or_else(String::new, |one| one.name(place));
-            benchmarks.push(track.finish(self.now, proves, zone, &name));
+            benchmarks.push(track.finish(self.now, taken.is_some(), zone, &name));
         }
         doubt_second_quantities(&mut benchmarks);
         let sources = self.sources.into_iter().map(|mut one| {
-            if proves && one.refused.remove(AHEAD).is_some() {
-                one.view.remarks.push(
-                    "readings go on beyond this machine's clock: the daemon takes them, and reports its clock as wrong"
-                        .to_owned(),
-                );
+            if let Some(why) = taken
+                && one.refused.forget(AHEAD)
+            {
+                one.view.remarks.push(why.to_owned());
             }
-            one.view.refused = one.refused.into_values().collect();
-            one.view.refused.sort_by_key(|refusal| Reverse(refusal.rows));
+            one.view.refused = one.refused.sorted();
             one.view
         });
+        let sources: Vec<SourceView> = sources.collect();
         Preview {
             is_whole: self.values <= MOST_VALUES,
-            sources: sources.collect(),
+            unwatched: (sources.iter())
+                .flat_map(|one| one.unwatched.iter().cloned())
+                .collect(),
+            sources,
             benchmarks,
             covariates: self.covariates.into_values().collect(),
-            unwatched: self.unwatched,
             unfed: Vec::new(),
         }
     }
@@ -410,29 +423,6 @@ fn keep_layout(view: &mut SourceView, file: &Path, meanings: Vec<(String, Meanin
             files: 1,
             columns,
         }),
-    }
-}
-
-/// Two lines with the same are wrong in the same way.
-fn kind_of(line: &BadLine) -> String {
-    match line.error.downcast_ref::<IngestError>() {
-        Some(IngestError::Field {
-            column, expected, ..
-        }) => format!("{column} {expected}"),
-        _ => without_digits(&line.error.to_string()),
-    }
-}
-
-fn without_digits(text: &str) -> String {
-    text.replace(|c: char| c.is_ascii_digit(), "")
-}
-
-fn shown(line: &BadLine) -> String {
-    let text = line.error.to_string();
-    if line.error.is::<IngestError>() {
-        text
-    } else {
-        format!("line {}: {text}", line.number)
     }
 }
 

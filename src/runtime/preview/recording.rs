@@ -1,5 +1,6 @@
 //! What an MCAP recording holds, framed and decoded as the daemon does it.
 
+use super::refused::RefusedRow;
 use crate::runtime::ingest::{Item, decode_message};
 use crate::runtime::tail::records::{Channels, HEADER_BYTES, MAGIC, NextRecord, frame};
 use std::fs::File;
@@ -15,7 +16,7 @@ const SHOWN: usize = 40;
 /// What is wrong with the whole file.
 pub(super) fn read_recording(
     file: &Path,
-    mut each: impl FnMut(Result<Item, String>) -> bool,
+    mut each: impl FnMut(Result<Item, RefusedRow>) -> bool,
 ) -> Result<(), String> {
     let fail = |error: io::Error| format!("cannot read {}: {error}", file.display());
     let mut reader = io::BufReader::new(File::open(file).map_err(fail)?);
@@ -62,7 +63,7 @@ pub(super) fn read_recording(
             .read_to_end(&mut body)
             .map_err(fail)?;
         let goes_on = match channels.decode(opcode, &body) {
-            Err(error) => each(Err(format!("{}: {error}", file.display()))),
+            Err(error) => each(Err(RefusedRow::of_text(named(file, &error)))),
             Ok(messages) => messages.iter().all(|message| {
                 let decoded = decode_message(
                     &message.topic,
@@ -72,7 +73,7 @@ pub(super) fn read_recording(
                 );
                 match decoded {
                     Ok(item) => item.is_none_or(|item| each(Ok(item))),
-                    Err(error) => each(Err(format!("{}: {error}", file.display()))),
+                    Err(error) => each(Err(RefusedRow::of_message(&error, named(file, &error)))),
                 }
             }),
         };
@@ -81,6 +82,10 @@ pub(super) fn read_recording(
         }
     }
     Ok(())
+}
+
+fn named(file: &Path, error: &impl std::fmt::Display) -> String {
+    format!("{}: {error}", file.display())
 }
 
 fn not_mcap(file: &Path, start: &[u8]) -> String {

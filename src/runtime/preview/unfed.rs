@@ -34,7 +34,7 @@ pub(super) fn unfed(preview: &Preview, config: &Config) -> Vec<Unfed> {
             absent.push(None);
         }
         unfed.extend(absent.into_iter().map(|benchmark| Unfed {
-            text: why(preview, view, benchmark.as_ref()),
+            text: why(view, benchmark.as_ref()),
             benchmark,
             source: view.id.clone(),
         }));
@@ -49,7 +49,7 @@ pub(super) fn unfed(preview: &Preview, config: &Config) -> Vec<Unfed> {
     unfed
 }
 
-fn why(preview: &Preview, view: &SourceView, benchmark: Option<&BenchmarkId>) -> String {
+fn why(view: &SourceView, benchmark: Option<&BenchmarkId>) -> String {
     let SourceView { id, path, .. } = view;
     let whose = benchmark.map_or_else(
         || format!("source {id:?}"),
@@ -67,13 +67,17 @@ fn why(preview: &Preview, view: &SourceView, benchmark: Option<&BenchmarkId>) ->
         let hint = refused.unwrap_or_else(|| NAME_THEM.to_owned());
         return format!("{whose}: its files have no reading of any benchmark; {hint}");
     }
-    let others: Vec<&str> = preview.unwatched.iter().map(BenchmarkId::as_str).collect();
-    let hint = match &others[..] {
-        [] => refused.unwrap_or_else(|| NAME_THEM.to_owned()),
-        others => format!(
+    let others: Vec<&str> = view.unwatched.iter().map(BenchmarkId::as_str).collect();
+    let others = (!others.is_empty()).then(|| {
+        format!(
             "they have {}, which no [[benchmark]] names; is the id right?",
             others.join(", ")
-        ),
+        )
+    });
+    let hints: Vec<String> = [others, refused].into_iter().flatten().collect();
+    let hint = match &hints[..] {
+        [] => NAME_THEM.to_owned(),
+        hints => hints.join("; "),
     };
     format!(
         "{whose}: the files that are there have no reading of it, and it is not watched; {hint}"

@@ -43,6 +43,9 @@ pub struct SourceView {
     pub refused: Vec<Refusal>,
     /// What else there is to know.
     pub remarks: Vec<String>,
+    /// Benchmarks in its files that no `[[benchmark]]` asks for.
+    #[serde(skip)]
+    pub(super) unwatched: BTreeSet<BenchmarkId>,
 }
 
 /// The columns of one file or of several.
