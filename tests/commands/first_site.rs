@@ -123,6 +123,41 @@ fn init_writes_nothing_where_a_file_leaves_something_open_and_names_the_flag() {
 }
 
 #[test]
+fn init_names_the_flag_where_nothing_but_the_times_of_messages_is_wrong() {
+    let messages = |time: &dyn Fn(i64) -> String| {
+        (0..30).fold(String::new(), |mut text, hour| {
+            let time = time(hour);
+            let _ = writeln!(
+                text,
+                r#"{{"benchmark": "P1", "time": {time}, "value": {hour}, "unit": "mm"}}"#
+            );
+            text
+        })
+    };
+    let local = |hour: i64| format!("\"2026-10-{:02}T{:02}:00:00\"", 1 + hour / 24, hour % 24);
+    let of_rows = (0..30).fold(String::new(), |mut text, hour| {
+        let _ = writeln!(
+            text,
+            r#"{{"time": {}, "P1_displacement_mm": {hour}}}"#,
+            local(hour)
+        );
+        text
+    });
+    for (text, flag, value) in [
+        (unix_messages(30), "--time-format", "unix"),
+        (messages(&local), "--time-zone", "UTC"),
+        (of_rows, "--time-zone", "UTC"),
+    ] {
+        let office = Office::with(&[("a.ndjson", &text)]);
+        let said = office.refused(2, &["init", "a.ndjson"]);
+        assert!(said.contains(flag), "{said}");
+        assert!(said.contains("a.ndjson, line 1"), "{said}");
+        assert_eq!(said.matches("a.ndjson").count(), 1, "{said}");
+        office.done(&["init", "a.ndjson", flag, value]);
+    }
+}
+
+#[test]
 fn a_day_above_twelve_decides_which_number_is_the_month() {
     let american = rows(24 * 20, |time, value| {
         format!("{},{value}\n", time.strftime("%m/%d/%Y %I:%M %p"))

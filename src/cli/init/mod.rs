@@ -3,6 +3,7 @@
 mod dialect;
 mod text;
 mod times;
+mod unnamed;
 
 use super::args::{DialectArgs, FileArgs, OutputArgs, OutputFormat};
 use super::check;
@@ -10,8 +11,8 @@ use super::exit::{self, UsageError};
 use crate::config::{SourceKind, value};
 use crate::reading::{BenchmarkId, Dialect, Quantity, SummerTime, TimeFormat, Unit};
 use crate::runtime::ingest::{
-    FileSurvey, Meaning, Measure, ReadOptions, TextFormat, look_through, read_with_remarks, survey,
-    text_format_of, unit_in_name, unpacked_name,
+    FileSurvey, Measure, ReadOptions, TextFormat, look_through, read_with_remarks, survey,
+    text_format_of, unpacked_name,
 };
 use dialect::Written;
 use jiff::SignedDuration;
@@ -20,6 +21,7 @@ use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use unnamed::without_readings;
 
 /// Write a site's config from files of readings: what they hold, how they are written, what to do next
 ///
@@ -296,54 +298,6 @@ fn look(file: &Path, kind: SourceKind, options: &ReadOptions) -> anyhow::Result<
         });
     };
     Ok(look_through(format, file, options)?)
-}
-
-/// Which flag names the readings of a file where no column does.
-fn without_readings(file: &Path, looked: &FileSurvey) -> String {
-    let numbers = looked.columns.iter().filter_map(|(name, meaning)| {
-        matches!(meaning, Meaning::Covariate { .. }).then_some(name.as_str())
-    });
-    let numbers: Vec<&str> = numbers.collect();
-    let named = "no column is named as readings are ([ID_]displacement_UNIT or [ID_]velocity_UNIT)";
-    let Some(first) = numbers.first() else {
-        let columns: Vec<&str> = looked
-            .columns
-            .iter()
-            .map(|(name, _)| name.as_str())
-            .collect();
-        return match &columns[..] {
-            [] => format!(
-                "{}: found no message and no row with a reading; give a file that has some",
-                file.display()
-            ),
-            columns => format!(
-                "{}: {named}, and none of its columns ({}) holds numbers; give a file that has some",
-                file.display(),
-                columns.join(", ")
-            ),
-        };
-    };
-    let (quantity, unit) = match unit_at_end(first) {
-        Some(unit) => (unit.quantity().name(), unit.column_suffix()),
-        // The name says nothing of a unit, or one that is not known.
-        None if first.contains("_per_") => ("velocity", "UNIT".to_owned()),
-        None if first.contains('_') => ("displacement", "UNIT".to_owned()),
-        None => ("displacement", "mm".to_owned()),
-    };
-    let example = format!("{first}=P1:{quantity}:{unit}");
-    format!(
-        "{}: {named}; its columns of numbers are \
-         {}: say which of them has the readings of which point, in which unit, as in --column {example:?}; a UNIT is mm, cm, m, \
-         in or ft, or one of these per h, day or yr (mm_per_day): what is in another one must be converted first",
-        file.display(),
-        numbers.join(", ")
-    )
-}
-
-/// The unit that a column's name ends with, after a `_`.
-fn unit_at_end(column: &str) -> Option<Unit> {
-    let ends = column.match_indices('_').map(|(at, _)| &column[at + 1..]);
-    unit_in_name(column).or_else(|| ends.into_iter().find_map(|end| Unit::parse(end).ok()))
 }
 
 fn source_id(file: &Path, before: &[PlannedSource]) -> String {

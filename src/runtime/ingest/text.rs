@@ -174,6 +174,8 @@ pub struct FileSurvey {
     pub columns: Vec<(String, Meaning)>,
     /// Whose readings it has, in which units.
     pub readings: BTreeSet<(BenchmarkId, Unit)>,
+    /// What is wrong with the first row that cannot be used.
+    pub fault: Option<IngestError>,
 }
 
 /// Looks through a text file.
@@ -195,8 +197,9 @@ pub fn look_through(
             Err(_) => latin1(text).unwrap_or_default(),
         };
         let taken = rows.take(line, &text);
-        if let Some(fault) = taken.fault.filter(|_| rows.is_lost()) {
-            return Err(fault);
+        match taken.fault {
+            Some(fault) if rows.is_lost() => return Err(fault),
+            fault => looked.fault = looked.fault.or(fault),
         }
         looked
             .readings
