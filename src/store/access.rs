@@ -1,16 +1,21 @@
 //! Who may use a state: what is said where the system does not let this user.
 
 use super::{FILE, StoreError};
-use nix::unistd::{Uid, User};
+use nix::errno::Errno;
+use nix::fcntl::{AT_FDCWD, AtFlags};
+use nix::unistd::{AccessFlags, Uid, User, faccessat};
 use rusqlite::ErrorCode;
-use std::fs::{File, OpenOptions};
 use std::io;
 use std::os::unix::fs::MetadataExt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// The error itself or, where it comes of what this user may not do in the state folder, one that says what to do.
+/// What the name of the database ends with, and those of the files beside it.
+const FILES: [&str; 3] = ["", "-wal", "-shm"];
+
+/// The error itself or, where it comes of what the system does not let this user do in the state folder, one that says what
+/// to do.
 pub(super) fn explained(error: StoreError, folder: &Path) -> StoreError {
-    let is_denied = if let StoreError::Sqlite(error) = &error {
+    let may_be_refused = if let StoreError::Sqlite(error) = &error {
         matches!(
             error.sqlite_error_code(),
             Some(ErrorCode::ReadOnly | ErrorCode::CannotOpen | ErrorCode::PermissionDenied)
@@ -18,25 +23,38 @@ pub(super) fn explained(error: StoreError, folder: &Path) -> StoreError {
     } else {
         matches!(&error, StoreError::Io(error) if error.kind() == io::ErrorKind::PermissionDenied)
     };
-    if !is_denied {
+    if !may_be_refused {
         return error;
     }
-    let file = folder.join(FILE);
-    let (path, what) = if file.metadata().is_err() {
-        (folder, "looked into")
-    } else if File::open(&file).is_err() {
-        (file.as_path(), "read")
-    } else if OpenOptions::new().write(true).open(&file).is_err() {
-        (file.as_path(), "written to")
-    } else {
-        (folder, "written to")
-    };
-    StoreError::Denied {
-        path: path.to_owned(),
-        what,
-        us: name_of(Uid::effective()),
-        owner: owner_of(folder),
+    match refusal(folder) {
+        Some((path, what, Errno::EACCES | Errno::EPERM)) => StoreError::Denied {
+            path,
+            what,
+            us: name_of(Uid::effective()),
+            owner: owner_of(folder),
+        },
+        Some((path, _, Errno::EROFS)) => StoreError::ReadOnlyDisk { path },
+        // The database failed for another reason: it is a folder, say.
+        Some(_) | None => error,
     }
+}
+
+/// What the system does not let us do there, and why. Nothing is opened: to close a file of a database gives up the locks
+/// that this program has on it.
+fn refusal(folder: &Path) -> Option<(PathBuf, &'static str, Errno)> {
+    let ask = |path: &Path, what, mode| {
+        let refused = faccessat(AT_FDCWD, path, mode, AtFlags::AT_EACCESS);
+        let errno = refused.err().filter(|errno| *errno != Errno::ENOENT)?;
+        Some((path.to_owned(), what, errno))
+    };
+    let each = |what, mode| {
+        let mut files = FILES.iter();
+        files.find_map(|end| ask(&folder.join(format!("{FILE}{end}")), what, mode))
+    };
+    ask(folder, "looked into", AccessFlags::X_OK)
+        .or_else(|| each("read", AccessFlags::R_OK))
+        .or_else(|| each("written to", AccessFlags::W_OK))
+        .or_else(|| ask(folder, "written to", AccessFlags::W_OK))
 }
 
 /// Whom the folder belongs to.

@@ -68,6 +68,15 @@ pub enum StoreError {
         /// Whom the folder belongs to.
         owner: String,
     },
+    /// Nobody may write there.
+    #[error(
+        "{} is on a read-only file system, and a state is opened for writing even where it is only looked at: mount it for writing, or copy the state folder and give the copy as state_dir",
+        .path.display()
+    )]
+    ReadOnlyDisk {
+        /// The file or folder.
+        path: PathBuf,
+    },
     /// Another daemon works on it.
     #[error("state folder {}: another slipwatch is at work on it", .folder.display())]
     InUse {

@@ -465,6 +465,21 @@ fn a_loggers_table_in_a_csv_file_is_known_behind_a_byte_order_mark() {
 }
 
 #[test]
+fn a_state_that_no_user_could_open_is_no_matter_of_the_user() {
+    let office = Office::with(&[
+        ("slope.csv", &plain(30)),
+        ("site.toml", &site("slope.csv", "")),
+    ]);
+    fs::create_dir_all(office.path("state/slipwatch.db")).unwrap();
+    let (exit, out, err) = office.say(&STATUS);
+    assert!(exit != 0 && out.is_empty(), "{exit}: {out}");
+    assert!(
+        err.contains("unable to open database file") && !err.contains("by user"),
+        "{err}"
+    );
+}
+
+#[test]
 fn every_example_of_a_message_is_a_line_that_a_file_may_hold() {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/messages.md");
     let page = fs::read_to_string(page).unwrap();

@@ -1,6 +1,6 @@
 //! 17: a database that must not be touched.
 
-use crate::site::{Site, eventually, get};
+use crate::site::{Site, command, eventually, get, has_own_mounts};
 use crate::telling::failing;
 use rusqlite::Connection;
 use std::fs;
@@ -191,4 +191,32 @@ fn a_bit_that_flips_while_the_daemon_runs_is_reported() {
         get(&listen, "/metrics").contains("slipwatch_store_damaged 1")
     });
     program.stop();
+}
+
+#[test]
+#[cfg_attr(
+    not(has_own_mounts),
+    ignore = "a process may not have mounts of its own here"
+)]
+fn a_state_on_a_read_only_file_system_is_said_to_be_there() {
+    if !has_own_mounts("database::a_state_on_a_read_only_file_system_is_said_to_be_there") {
+        return;
+    }
+    let site = used();
+    let state = site.path("state");
+    let folder = state.to_str().unwrap();
+    command(&["mount", "--bind", folder, folder]);
+    command(&["mount", "-o", "remount,bind,ro", folder]);
+    for words in [
+        &["status", "--config", "site.toml"][..],
+        &["alerts", "silence", "--for", "1h", "--config", "site.toml"],
+    ] {
+        let output = site.ask(words);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(!output.status.success(), "{said}");
+        assert!(
+            said.contains("is on a read-only file system") && !said.contains("by user"),
+            "{said}"
+        );
+    }
 }
