@@ -209,13 +209,14 @@ fn is_pattern(pattern: &str) -> bool {
 
 fn by_pattern(pattern: &str, text: &str, clock: &LocalClock) -> Result<Timestamp, TimeFault> {
     let read = BrokenDownTime::parse(pattern, text).map_err(|_| TimeFault::NotThePattern)?;
+    let date = read.to_date().map_err(|_| TimeFault::NotThePattern);
+    if (date.as_ref()).is_ok_and(|date| (0..FIRST_LONG_YEAR).contains(&date.year())) {
+        return Err(TimeFault::ShortYear);
+    }
     if read.offset().is_some() {
         return read.to_timestamp().map_err(|_| TimeFault::NotThePattern);
     }
-    let date = read.to_date().map_err(|_| TimeFault::NotThePattern)?;
-    if (0..FIRST_LONG_YEAR).contains(&date.year()) {
-        return Err(TimeFault::ShortYear);
-    }
+    let date = date?;
     let time = match read.hour() {
         None => Time::midnight(),
         Some(_) => read.to_time().map_err(|_| TimeFault::NotThePattern)?,
@@ -310,6 +311,12 @@ mod tests {
             ("%d.%m.%Y %H:%M", "07/06/2017 17:00", "NotThePattern"),
             ("%d.%m.%Y %H:%M", "06.07.17 17:00", "ShortYear"),
             ("%d.%m.%y %H:%M", "06.07.17 17:00", "2017-07-06T15:00:00Z"),
+            ("%d.%m.%Y %H:%M %z", "06.07.17 17:00 +0200", "ShortYear"),
+            (
+                "%d.%m.%y %H:%M %z",
+                "06.07.17 17:00 +0200",
+                "2017-07-06T15:00:00Z",
+            ),
             ("unix", "1499353200", "2017-07-06T15:00:00Z"),
             ("unix", "1499353200000", "NotUnix"),
             ("unix_ms", "1499353200000", "2017-07-06T15:00:00Z"),
