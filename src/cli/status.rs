@@ -192,6 +192,7 @@ fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
         .as_ref()
         .and_then(|_| DrillRecord::read(&config.site.state_dir));
     let sources_without_files = sources_without_files(&config);
+    let is_running = Store::is_held(&config.site.state_dir);
     let zone = config.site.time_zone;
     let status = SiteStatus {
         site: config.site.name,
@@ -200,7 +201,7 @@ fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
         alerts_waiting: store.waiting()?.len(),
         bytes: store.bytes()?,
         site_unknown_since: levels.get(&(None, Level::Unknown)).and_then(dated),
-        is_running: Store::is_held(&config.site.state_dir),
+        is_running,
         acknowledged: acknowledged(&orders, &levels),
         returned: alarms.returned().into_iter().cloned().collect(),
         silences: silences(&orders, clock::now()),
@@ -213,7 +214,8 @@ fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
         drill,
         record: (config.site.record.as_ref())
             .and_then(|_| RecordStanding::read(&config.site.state_dir)),
-        config_refusal: ConfigRefusal::read(&config.site.state_dir),
+        // Nothing is in force where no daemon runs; the next one takes the file as it is then.
+        config_refusal: ConfigRefusal::read(&config.site.state_dir).filter(|_| is_running),
         sources_without_files,
         preview,
     };

@@ -108,6 +108,35 @@ fn a_config_that_is_not_taken_and_a_mistyped_path_are_reported_and_no_longer_whe
     assert!(events.contains("evacuation_time"), "{events}");
 }
 
+/// The next daemon takes the file as it is then.
+#[test]
+fn where_no_daemon_runs_no_config_is_said_to_be_in_force() {
+    let site = Site::new(POLICY);
+    let address = site.listen();
+    site.append("incoming/5.csv", &failing("5"));
+    let program = site.caught_up();
+    let right = std::fs::read_to_string(site.path("site.toml")).unwrap();
+    std::fs::write(site.path("site.toml"), right.replace("[site]", "[site")).unwrap();
+    program.signal(Signal::SIGHUP);
+    eventually("that it is refused", || {
+        get(&address, "/metrics").contains("\nslipwatch_config_refused 1")
+    });
+    // It reads the file itself.
+    let output = site.ask(&["status", "--config", "site.toml"]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        !output.status.success() && said.contains("site.toml"),
+        "{said}"
+    );
+    std::fs::write(site.path("site.toml"), &right).unwrap();
+    let status = || site.printed(&["status", "--config", "site.toml"]);
+    assert!(status().contains("CONFIG NOT TAKEN"), "{}", status());
+    program.stop();
+    let status = status();
+    assert!(status.contains("NO DAEMON RUNS"), "{status}");
+    assert!(!status.contains("CONFIG NOT TAKEN"), "{status}");
+}
+
 /// 21. A hook that is at work while the config changes is waited for.
 #[test]
 fn what_a_hook_is_being_sent_while_the_config_changes_is_reported_once() {
