@@ -97,7 +97,7 @@ impl Default for Policy {
             outlook: SignedDuration::from_hours(30 * 24),
             red_within: None,
             critical_velocity_mm_per_day: 1000.0,
-            red_chance: 0.3,
+            red_chance: 0.27,
             orange_chance: 0.7,
             yellow_chance: 0.3,
             thresholds: Vec::new(),

@@ -78,7 +78,7 @@ fn an_alert_says_what_called_it_who_has_it_and_who_has_seen_it_why_and_over_whic
     let text = show(&site, &[]);
     for words in [
         "level        red",
-        "chance of collapse of 0.3 or more within twice the evacuation time (6 h)",
+        "chance of collapse of 0.27 or more within twice the evacuation time (6 h)",
         "chance of collapse by which red is called ",
         "Evacuate the area",
         "velocity ",

@@ -25,7 +25,7 @@ pub(crate) const EVACUATIONS: [f64; 3] = [0.5, 1.0, 3.0];
 const READ: f64 = 4.0;
 /// Chances from which red could be called instead of the policy's, and the evacuation time for which that is tried, in
 /// [`EVACUATIONS`].
-pub(crate) const CHANCES: [f64; 6] = [0.1, 0.15, 0.2, 0.3, 0.4, 0.6];
+pub(crate) const CHANCES: [f64; 6] = [0.15, 0.2, 0.27, 0.35, 0.45, 0.6];
 const A_DAY: usize = 1;
 /// Levels stay: another entry within so many days is the same alarm.
 const SAME_ALARM_DAYS: f64 = 3.0;
