@@ -66,7 +66,7 @@ impl FileTail {
 
     /// It is kept under this name from now on.
     pub(super) fn rename(&mut self, path: &Path) {
-        self.path = path.to_owned();
+        path.clone_into(&mut self.path);
         self.reported = Saved::default();
         self.safe.origin = (self.origin != self.path).then(|| self.origin.clone());
         // What was written to it before it went is read before it counts as read.

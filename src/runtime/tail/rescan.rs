@@ -31,7 +31,7 @@ struct Listing {
 }
 
 /// What becomes of a file that is not under its name.
-enum Outcome {
+enum GoneFile {
     Stays,
     Moves(FileKey),
     /// It is read no more; what may be missing of it is said, if anything.
@@ -79,16 +79,16 @@ impl Follower {
         let mut moves = Vec::new();
         for (key, mut file) in gone {
             match self.outcome(&key, &mut file, &listing) {
-                Outcome::Stays => {
+                GoneFile::Stays => {
                     self.files.insert(key, file);
                 }
-                Outcome::Moves(to) => {
+                GoneFile::Moves(to) => {
                     let forgotten = self.forget(&key);
                     let name = name(&self.sources[key.0].id, &key.1);
                     self.at_once.push(Position { name, body: None });
                     moves.push((key, to, file, forgotten));
                 }
-                Outcome::Closed(lost) => self.close(&key, &file, lost),
+                GoneFile::Closed(lost) => self.close(&key, &file, lost),
             }
         }
         for (from, to, file, forgotten) in moves {
@@ -106,9 +106,9 @@ impl Follower {
         }
     }
 
-    fn outcome(&self, key: &FileKey, file: &mut FileTail, listing: &Listing) -> Outcome {
+    fn outcome(&self, key: &FileKey, file: &mut FileTail, listing: &Listing) -> GoneFile {
         if !self.sources[key.0].still_asks_for(file) {
-            return self.without_trace(key, file);
+            return without_trace(key, file);
         }
         let listed = file.place.and_then(|place| listing.paths.get(&place));
         if listed.is_some_and(|path| file.is_at(path)) {
@@ -116,36 +116,27 @@ impl Follower {
             let is_back = listing.files.get(&first) == file.place.as_ref();
             return if is_back && !self.files.contains_key(&first) {
                 file.departed = None;
-                Outcome::Moves(first)
+                GoneFile::Moves(first)
             } else {
                 // Read there, from its start.
-                Outcome::Closed(None)
+                GoneFile::Closed(None)
             };
         }
         match file.leave() {
-            Departure::To(path) if path == key.1 => Outcome::Stays,
+            Departure::To(path) if path == key.1 => GoneFile::Stays,
             Departure::To(path) => {
                 let to = (key.0, path);
                 // It came there after the folders were listed: the next look reads it there, from its start.
                 let is_listed = listing.files.contains_key(&to);
                 if is_listed {
-                    Outcome::Closed(None)
+                    GoneFile::Closed(None)
                 } else {
-                    Outcome::Moves(to)
+                    GoneFile::Moves(to)
                 }
             }
-            Departure::Over => Outcome::Closed(None),
-            Departure::Untraced => self.without_trace(key, file),
+            Departure::Over => GoneFile::Closed(None),
+            Departure::Untraced => without_trace(key, file),
         }
-    }
-
-    fn without_trace(&self, key: &FileKey, file: &FileTail) -> Outcome {
-        let what = if file.is_restored {
-            "gone since the last stop"
-        } else {
-            "gone, and not found again"
-        };
-        Outcome::Closed(file.is_lost(&key.1).then_some(what))
     }
 
     /// A file has another name: it is followed on under that.
@@ -264,6 +255,15 @@ impl Follower {
 fn is_ours(pattern: &FilePattern, decoder: &Decoder, name: &str) -> bool {
     let packed = name.strip_suffix(".gz").filter(|_| decoder.takes_packed());
     pattern.matches(name) || packed.is_some_and(|name| pattern.matches(name))
+}
+
+fn without_trace(key: &FileKey, file: &FileTail) -> GoneFile {
+    let what = if file.is_restored {
+        "gone since the last stop"
+    } else {
+        "gone, and not found again"
+    };
+    GoneFile::Closed(file.is_lost(&key.1).then_some(what))
 }
 
 /// Files, and what has a name that is no text.

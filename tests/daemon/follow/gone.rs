@@ -2,10 +2,10 @@
 
 use super::{Bench, HEADER, row, row_at};
 use jiff::SignedDuration;
+use slipwatch::runtime::clock;
 use std::fs::{self, File, OpenOptions};
 use std::io::Write;
 use std::os::unix::fs::symlink;
-use std::time::{Duration, SystemTime};
 
 const SOURCE: &str = "[[source]]\nid = \"s\"\nkind = \"csv\"\npath = \"in/*.csv\"\n";
 
@@ -35,8 +35,8 @@ impl Bench {
 
     /// When it was written to last, seconds ago.
     fn date(&self, name: &str, age: u32) {
-        let then = SystemTime::now() - Duration::from_secs(age.into());
-        self.writer(name).set_modified(then).unwrap();
+        let then = clock::now() - SignedDuration::from_secs(age.into());
+        self.writer(name).set_modified(then.into()).unwrap();
     }
 }
 
