@@ -23,8 +23,8 @@ const UNSEEN_DAYS: f64 = 4.0;
 /// The probability of an acceleration at which half of the chance within days counts for levels, and the days; over longer
 /// spans the probability itself is the factor. Set on simulated slopes: where it was that within days too, red came late to
 /// slopes that their noise hides for long; where it was not over a month, steady creep was orange. At as many reds on those that
-/// stand, .02 calls two or three in a hundred collapses fewer in time.
-const NOT_UNLIKELY: f64 = 0.001;
+/// stand, .02 calls one in a hundred collapses fewer in time, and .001 one more, but rules hardly anything out.
+const NOT_UNLIKELY: f64 = 0.006;
 const NEAR_DAYS: f64 = 6.0;
 /// Steps of the distribution in one doubling of time.
 const STEPS: u32 = 8;
