@@ -50,7 +50,7 @@ impl Policy {
                 self.red_within_in_words(),
                 hours_in_words(self.red_within()),
                 self.red_held_for(),
-                self.red_at_once()
+                (1000.0 * self.red_at_once()).round() / 1000.0
             ),
             ("chance-within-outlook", level) => {
                 let chance = if level == Level::Yellow {
@@ -94,12 +94,12 @@ mod tests {
         let condition = |rule, level| policy.condition(rule, level).unwrap();
         assert_eq!(
             condition("chance-within-evacuation-time", Level::Red),
-            "chance of collapse of 0.2 or more within twice the evacuation time (48 h) and until the next reading, at every \
-             reading of 2h, or of 0.5 at one"
+            "chance of collapse of 0.27 or more within twice the evacuation time (48 h) and until the next reading, at every \
+             reading of 2h, or of 0.405 at one"
         );
         let outlook = |level| condition("chance-within-outlook", level);
-        assert!(outlook(Level::Orange).contains("of 0.5 or more within the outlook of 720 h"));
-        assert!(outlook(Level::Yellow).contains("of 0.1 or more"));
+        assert!(outlook(Level::Orange).contains("of 0.7 or more within the outlook of 720 h"));
+        assert!(outlook(Level::Yellow).contains("of 0.3 or more"));
         assert_eq!(policy.condition("velocity-threshold", Level::Red), None);
         assert_eq!(policy.condition("no-data", Level::Unknown), None);
     }

@@ -240,7 +240,7 @@ mod tests {
         assert_eq!(level(210, 0.5), (Level::Red, 0));
         // Readings that are further apart have no others between them.
         assert_eq!(level(1000, 0.1), (Level::Green, 0));
-        assert_eq!(level(2440, 0.2), (Level::Red, 0));
+        assert_eq!(level(2440, 0.3), (Level::Red, 0));
     }
 
     #[test]

@@ -252,7 +252,7 @@ mod tests {
     fn red_at_hundred() -> (Policy, Latch) {
         let (policy, mut latch) = (Policy::default(), Latch::default());
         assert_eq!(
-            latch.update(&policy, &evidence(0, 0.2, 100.0))[0].level,
+            latch.update(&policy, &evidence(0, 0.3, 100.0))[0].level,
             Level::Red
         );
         (policy, latch)
@@ -325,7 +325,7 @@ mod tests {
             (Level::Orange, "velocity-threshold")
         );
         assert_eq!(
-            latch.update(&policy, &evidence(1, 0.2, 60.0))[0].level,
+            latch.update(&policy, &evidence(1, 0.3, 60.0))[0].level,
             Level::Red
         );
     }

@@ -275,7 +275,7 @@ fn red_looks_twice_the_evacuation_time_ahead_or_as_far_as_the_config_says() {
             .filter_map(|event: serde_json::Value| event.get("called").cloned())
             .collect();
         let last = &called[called.len() - 1]["red"];
-        assert_eq!(last["at_least"], 0.2);
+        assert_eq!(last["at_least"], 0.27);
         last["within_hours"].as_f64().unwrap()
     };
     // A day to the next reading.

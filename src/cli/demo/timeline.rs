@@ -19,14 +19,14 @@ Four archived slopes, played to the monitor as it would have lived them. A line
 is printed whenever the level of a measured point changes, with the reason:
 
   green    nothing to do; every point begins so
-  yellow   look closer: collapse within 30 days has a chance of 10 % or more, or
+  yellow   look closer: collapse within 30 days has a chance of 30 % or more, or
            the motion has changed its kind
-  orange   prepare: collapse within 30 days has a chance of 50 % or more
+  orange   prepare: collapse within 30 days has a chance of 70 % or more
   red      leave: collapse within twice the time that an evacuation takes, from
-           the next reading on, has a chance of 20 % or more
+           the next reading on, has a chance of 27 % or more
   unknown  nothing can be said: no readings, or a sensor at fault
 
-\"54 % in 30 days\" is that chance; at the median date the collapse is as likely
+\"74 % in 30 days\" is that chance; at the median date the collapse is as likely
 to come before as after. A level falls only when the slope has slowed down or
 has been steady for long enough.
 
