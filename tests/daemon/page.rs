@@ -88,7 +88,7 @@ fn a_moment_is_shown_as_it_was_known_then() {
     };
     assert_eq!(level(red)["level"], "red");
     let then = level(&before.to_string());
-    assert_eq!(then["level"], "orange");
+    assert_eq!(then["level"], "yellow");
     let newest = refits.iter().rfind(is_before).unwrap();
     assert_eq!(then["failure_time"], newest["failure_time"]);
     let answer = site.json(&format!("/api/benchmark?id=E3&at={before}"));
@@ -97,7 +97,7 @@ fn a_moment_is_shown_as_it_was_known_then() {
     assert_eq!(forecasts.last().unwrap()["time"], newest["time"]);
     assert_eq!(
         answer["levels"].as_array().unwrap().last().unwrap()["level"],
-        "orange"
+        "yellow"
     );
     let t = answer["readings"]["t"].as_array().unwrap();
     assert!(
