@@ -148,7 +148,8 @@ fn wet_spring() -> Measured {
 }
 
 #[test]
-fn a_wet_spring_raises_no_orange_and_a_smaller_chance_where_its_effect_is_adopted_than_where_it_is_reported() {
+fn a_wet_spring_raises_no_orange_and_a_smaller_chance_where_its_effect_is_adopted_than_where_it_is_reported()
+ {
     let wet = wet_spring();
     let finding = (250, found(STANDS));
     let adopted = play(&mut monitor(Explain::Adopt), &wet, Some(&finding));
