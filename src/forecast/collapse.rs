@@ -442,7 +442,7 @@ mod tests {
             let indicators = Indicators::of(&slope).unwrap();
             let chances = indicators.collapse_by(&sure, &Members::of(&slope)).sure;
             for days in [0.02, 0.3, 1.0, 2.0, 7.0, 30.0, 500.0] {
-                for chance in [0.05, 0.2, 0.5, 0.7] {
+                for chance in [0.02, 0.05, 0.2, 0.5, 0.7] {
                     if indicators.may_reach(days, chance) {
                         open += 1;
                     } else {

@@ -154,12 +154,12 @@ fn a_wet_spring_raises_no_orange_and_a_smaller_chance_where_its_effect_is_adopte
     let finding = (250, found(STANDS));
     let adopted = play(&mut monitor(Explain::Adopt), &wet, Some(&finding));
     assert_eq!(grave(&adopted, 250), []);
-    let told = play(&mut monitor(Explain::Report), &wet, Some(&finding));
+    let reported = play(&mut monitor(Explain::Report), &wet, Some(&finding));
     let highest = |events: &[Event]| {
         let later = chances(events).into_iter().filter(|(day, ..)| *day > 250);
         later.map(|(_, chance, _)| chance).fold(0.0, f64::max)
     };
-    let (without, with) = (highest(&told), highest(&adopted));
+    let (without, with) = (highest(&reported), highest(&adopted));
     assert!(with < 0.5 * without, "{with} {without}");
 }
 

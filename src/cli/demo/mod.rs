@@ -73,7 +73,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     let mut out = io::stdout().lock();
     let (mut table, mut ends) = (vec![verdict::HEAD.to_owned()], Vec::new());
-    writeln!(out, "{}", timeline::LEGEND)?;
+    writeln!(out, "{}", timeline::legend())?;
     let runtime = asynchronous()?;
     for crisis in &CRISES {
         let mut recording = recording(folder.path(), crisis)?;

@@ -1,7 +1,7 @@
 //! A crisis as it unfolds: a line for each change of a level, with its reason; then velocity, level and forecast as marks.
 
 use super::marks::{self, MarkScale};
-use crate::alert::{Level, percent_in_words};
+use crate::alert::{Level, Policy, percent_in_words};
 use crate::cli::text::plain;
 use crate::monitor::{AlertState, Event, EventKind, FailureTime};
 use crate::reading::{BenchmarkId, Timestamp, days_since};
@@ -14,16 +14,20 @@ const MOST_LINES: usize = 12;
 const MARKS: usize = 52;
 
 /// What is printed before the first crisis.
-pub(super) const LEGEND: &str = "\
+pub(super) fn legend() -> String {
+    let policy = Policy::default();
+    let percent = |chance: f64| (100.0 * chance).round();
+    format!(
+        "\
 Four archived slopes, played to the monitor as it would have lived them. A line
 is printed whenever the level of a measured point changes, with the reason:
 
   green    nothing to do; every point begins so
-  yellow   look closer: collapse within 30 days has a chance of 30 % or more, or
+  yellow   look closer: collapse within 30 days has a chance of {} % or more, or
            the motion has changed its kind
-  orange   prepare: collapse within 30 days has a chance of 70 % or more
+  orange   prepare: collapse within 30 days has a chance of {} % or more
   red      leave: collapse within twice the time that an evacuation takes, from
-           the next reading on, has a chance of 27 % or more
+           the next reading on, has a chance of {} % or more
   unknown  nothing can be said: no readings, or a sensor at fault
 
 \"74 % in 30 days\" is that chance; at the median date the collapse is as likely
@@ -33,7 +37,12 @@ has been steady for long enough.
 Below stand, over the same time, from left to right: the velocity, from the
 slowest to the fastest (logarithmic); the level (. green, y, o, r); the days
 that were left to the collapse by the forecast of that time, from the fewest to
-the most (logarithmic), blank where no collapse was likely.";
+the most (logarithmic), blank where no collapse was likely.",
+        percent(policy.yellow_chance),
+        percent(policy.orange_chance),
+        percent(policy.red_chance)
+    )
+}
 
 /// What the monitor said with one reading.
 #[derive(Debug, Clone, Copy)]

@@ -8,7 +8,7 @@ use crate::runtime::tail::lines::LineFault;
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
-/// Kinds of rows that are told apart; the rows of any others are counted together.
+/// Kinds of rows that are counted apart; the rows of any others are counted together.
 const MOST_KINDS: usize = 30;
 /// What the rows of further kinds are counted under.
 const OTHERS: &str = "";
