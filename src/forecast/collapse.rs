@@ -150,7 +150,7 @@ impl Indicators {
         let all = passage(&all, &members.law, self.scales.centred_before_days);
         let agreed = members.agreed();
         Collapse {
-            passage: self.sooner(&members.timed(&all, agreed), agreed),
+            passage: self.sooner(&members.timed(&all, agreed), members.is_timed(agreed)),
             sure,
         }
     }
@@ -174,13 +174,13 @@ impl Indicators {
 
     /// `passage` with each chance within a time raised to a power that falls to [`SOONER`] as it is sure that the slope
     /// accelerates, or as likely as not that it collapses at all. Steady slopes keep theirs, and so do slopes on whose time of
-    /// collapse the law and the lines are `agreed`, 0 to 1: with the power, lines of inverse velocity that nothing bends
-    /// came out at two thirds of the time that remained, and at four fifths without.
-    fn sooner(&self, passage: &Passage, agreed: f64) -> Passage {
+    /// collapse law and lines agree, or that keep Voight's relation (`is_timed`, 0 to 1): with the power, lines of inverse
+    /// velocity that nothing bends came out at two thirds of the time that remained, and at four fifths without.
+    fn sooner(&self, passage: &Passage, is_timed: f64) -> Passage {
         let square = passage.chance_within(LONGEST_DAYS).powi(2);
         let likely = square / (square + 0.25);
         let coming = 1.0 - (1.0 - self.accelerating()) * (1.0 - likely);
-        passage.raised(1.0 - (1.0 - SOONER) * coming * (1.0 - agreed))
+        passage.raised(1.0 - (1.0 - SOONER) * coming * (1.0 - is_timed))
     }
 
     /// What the chance of a collapse within the span of scale `power`, which may lie beyond the scales, rests on.

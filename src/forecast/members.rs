@@ -1,6 +1,7 @@
 //! What others expect of a slope, which the network of [`super::collapse`] weighs: the law, and straight lines through inverse
 //! velocity.
 
+use super::free_exponent::FreeExponent;
 use super::{InverseVelocityLine, Passage};
 use crate::fit::{LoadPosterior, Observations, Rate, RateOptions};
 
@@ -14,6 +15,10 @@ const LINES: [usize; 3] = [8, 16, 32];
 /// (exponential, levelled) at half of the time that remained.
 const TIMED: f64 = 0.8;
 const APART: f64 = 0.3;
+/// How far the time of a collapse is that of Voight's relation where that is kept to the letter.
+const BY_VOIGHT: f64 = 0.8;
+/// How much less of it counts where law and lines agree already.
+const AGREED: f64 = 0.5;
 /// Inputs lie between plus and minus this.
 pub(super) const MOST: f64 = 3.0;
 /// The longest span that is asked for, days.
@@ -27,6 +32,8 @@ pub struct Members {
     /// Of the straight line through the inverses of the newest rates: one over the days from the newest reading to
     /// where it meets zero; below 0 where it rises.
     lines: [f64; LINES.len()],
+    /// By Voight's relation with any exponent.
+    free: Option<FreeExponent>,
 }
 
 impl Members {
@@ -50,6 +57,7 @@ impl Members {
         Self {
             law: Passage::from_times(law),
             lines: LINES.map(line),
+            free: FreeExponent::fit(rates, now_days),
         }
     }
 
@@ -58,21 +66,25 @@ impl Members {
         (critical.to_bits() == PASSED.to_bits()).then(|| self.law.times())
     }
 
-    /// `network` with a part of it, the larger the better law and lines are [agreed](Self::agreed), where the law puts that: the
-    /// law is the sharper where a slope keeps it, and has no say in whether a collapse comes.
+    /// `network` with a part of it where Voight's relation puts that, the larger the better it is kept, and then a part where the law
+    /// does, the larger the better law and lines are [agreed](Self::agreed): they are the sharper where a slope keeps
+    /// them, and have no say in whether a collapse comes.
     pub(super) fn timed(&self, network: &Passage, agreed: f64) -> Passage {
-        let share = TIMED * agreed;
-        if share <= 0.0 {
-            return network.clone();
-        }
-        let sure = self.law.chance_within(LONGEST_DAYS);
-        let own = network.times().iter();
-        let own = own.map(|(days, chance)| (*days, (1.0 - share) * chance));
-        let moved = share * network.chance_within(LONGEST_DAYS) / sure;
-        let soon = self.law.times().iter();
-        let soon = soon.take_while(|(days, _)| *days <= LONGEST_DAYS);
-        let laws = soon.map(|(days, chance)| (*days, moved * chance));
-        Passage::from_times(own.chain(laws).collect())
+        let by_voight = match &self.free {
+            Some(free) => {
+                let share = BY_VOIGHT * free.is_kept * (1.0 - AGREED * agreed);
+                moved(network, &free.passage, share)
+            }
+            None => network.clone(),
+        };
+        moved(&by_voight, &self.law, TIMED * agreed)
+    }
+
+    /// How sure it is when a collapse comes, if one does, 0 to 1: where law and lines are [agreed](Self::agreed), or
+    /// Voight's relation is kept.
+    pub(super) fn is_timed(&self, agreed: f64) -> f64 {
+        let kept = self.free.as_ref().map_or(0.0, |free| free.is_kept);
+        agreed.max(kept)
     }
 
     /// How sure the law is of a collapse whose time the lines agree with, 0 to 1.
@@ -110,6 +122,21 @@ impl Members {
             inputs.push((0.6 * (2.0 * days * line).asinh()).clamp(-MOST, MOST));
         }
     }
+}
+
+/// `network` with that share of its chances at the times of `to`.
+fn moved(network: &Passage, to: &Passage, share: f64) -> Passage {
+    let sure = to.chance_within(LONGEST_DAYS);
+    if share <= 0.0 || sure <= 0.0 {
+        return network.clone();
+    }
+    let own = network.times().iter();
+    let own = own.map(|(days, chance)| (*days, (1.0 - share) * chance));
+    let moved = share * network.chance_within(LONGEST_DAYS) / sure;
+    let soon = to.times().iter();
+    let soon = soon.take_while(|(days, _)| *days <= LONGEST_DAYS);
+    let times = soon.map(|(days, chance)| (*days, moved * chance));
+    Passage::from_times(own.chain(times).collect())
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 mod collapse;
 mod dependence;
 mod evidence;
+mod free_exponent;
 mod learned;
 mod line;
 mod members;

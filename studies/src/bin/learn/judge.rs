@@ -204,8 +204,8 @@ impl Chances {
         let policy = Policy::default();
         let outlook = in_days(policy.outlook);
         let spans = EVACUATIONS.map(|days| ahead(days, &indicators));
-        let may_be_red = |days: &f64| indicators.most(*days) >= CHANCES[0];
-        if !spans.iter().any(may_be_red) && indicators.most(outlook) < policy.orange_chance {
+        let may_be_red = |days: &f64| indicators.may_reach(*days, CHANCES[0]);
+        if !spans.iter().any(may_be_red) && !indicators.may_reach(outlook, policy.orange_chance) {
             return Some(Self::default());
         }
         let found = indicators.collapse_by(network, &Members::of(observations));
