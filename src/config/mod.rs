@@ -166,6 +166,39 @@ pub struct Benchmark {
     pub position: Option<Vec<f64>>,
 }
 
+impl Benchmark {
+    /// What decides which numbers its readings are, in words that stay the same from version to version: with other ones they mean
+    /// something else.
+    pub fn read_as(&self, conventions: &Conventions) -> String {
+        let mut words = Vec::new();
+        words.extend(
+            self.column
+                .as_ref()
+                .map(|column| format!("column {column:?}")),
+        );
+        words.extend(self.unit.map(|unit| format!("unit {unit}")));
+        words.extend(self.quantity.map(|quantity| quantity.name().to_owned()));
+        if let Some(Vector {
+            components,
+            direction,
+            unit,
+        }) = &self.vector
+        {
+            words.push(format!(
+                "components {components:?} in {unit} along {direction:?}"
+            ));
+        }
+        let span = self
+            .averaging
+            .map(|span| format!("averaging {} s", span.as_secs()));
+        words.extend(span);
+        let zone = conventions.clock.zone.as_ref();
+        let zone = zone.and_then(jiff::tz::TimeZone::iana_name);
+        words.extend(zone.map(|zone| format!("time zone {zone}")));
+        words.join(", ")
+    }
+}
+
 /// `[[webhook]]`: an address that alerts are sent to.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Webhook {

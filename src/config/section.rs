@@ -2,12 +2,12 @@
 
 use super::table::{Placed, Section, unique};
 use super::{
-    Benchmark, Config, FileSource, SiteConfig, alert, declared, drill, heartbeat, hook, link,
-    record, source, value, vector,
+    Benchmark, Broker, Config, FileSource, SiteConfig, alert, declared, drill, heartbeat, hook,
+    link, record, source, value, vector,
 };
 use crate::alert::Policy;
 use crate::monitor::{Explain, Settings, SiteLevel, Watched};
-use crate::reading::{BenchmarkId, Quantity, Suspicion, Unit};
+use crate::reading::{BenchmarkId, Conventions, Quantity, Suspicion, Unit};
 use jiff::SignedDuration;
 use jiff::tz::TimeZone;
 use std::collections::{BTreeMap, BTreeSet};
@@ -31,7 +31,7 @@ pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
         .collect();
     let (benchmarks, own) = benchmarks(root, &known, &policy);
     let declared = declared::events(root, &benchmarks);
-    let watched = watched(&known, &benchmarks);
+    let watched = watched(&sources, &brokers, &benchmarks);
     let mut hooks = hook::hooks(root, base);
     if let Some(site) = &site {
         for hook in &mut hooks {
@@ -147,12 +147,22 @@ fn explain(mut section: Section<'_>) -> Explain {
 }
 
 /// Where every source has benchmarks of its own, no others are watched.
-fn watched(sources: &[&str], benchmarks: &[Benchmark]) -> Watched {
-    let names_its_own = |source: &&str| benchmarks.iter().any(|one| one.source == **source);
-    let ids = benchmarks.iter().map(|benchmark| benchmark.id.clone());
+fn watched(sources: &[FileSource], brokers: &[Broker], benchmarks: &[Benchmark]) -> Watched {
+    let of_files = sources.iter().map(|one| (&one.id, &one.conventions));
+    let of_brokers = brokers.iter().map(|one| (&one.id, &one.conventions));
+    let known: Vec<(&String, &Conventions)> = of_files.chain(of_brokers).collect();
+    let names_its_own = |(source, _): &(&String, _)| {
+        let mut sources = benchmarks.iter().map(|one| &one.source);
+        sources.any(|one| one == *source)
+    };
+    let read_as = benchmarks.iter().filter_map(|benchmark| {
+        let (_, conventions) = known.iter().find(|(id, _)| **id == benchmark.source)?;
+        Some((benchmark.id.clone(), benchmark.read_as(conventions)))
+    });
     Watched {
-        named: ids.collect(),
-        is_open: !sources.iter().all(names_its_own),
+        named: benchmarks.iter().map(|one| one.id.clone()).collect(),
+        is_open: !known.iter().all(names_its_own),
+        read_as: read_as.collect(),
     }
 }
 

@@ -146,6 +146,9 @@ pub struct Watched {
     pub named: BTreeSet<BenchmarkId>,
     /// Whether whatever else comes is watched too.
     pub is_open: bool,
+    /// What decides which numbers the readings of each are; none in a state of older versions.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub read_as: BTreeMap<BenchmarkId, String>,
 }
 
 /// Whatever comes.
@@ -154,6 +157,7 @@ impl Default for Watched {
         Self {
             named: BTreeSet::new(),
             is_open: true,
+            read_as: BTreeMap::new(),
         }
     }
 }
@@ -164,6 +168,13 @@ impl Watched {
     fn drops(&self, benchmark: &BenchmarkId, former: &Self) -> bool {
         let was_named = former.named.contains(benchmark);
         !self.named.contains(benchmark) && (was_named || !self.is_open)
+    }
+
+    /// What the readings of `benchmark` are read as, where that is something else than under `former`.
+    fn changed(&self, benchmark: &BenchmarkId, former: &Self) -> Option<&str> {
+        let now = self.read_as.get(benchmark)?;
+        let before = former.read_as.get(benchmark)?;
+        (now != before).then_some(now)
     }
 }
 
@@ -324,7 +335,8 @@ impl Monitor {
         for (id, track) in self.benchmarks.each_mut() {
             let declared = Declarations::of(&self.settings.declared, id);
             events.extend(track.accept(now, self.settings.accepted(id)));
-            track.forget_changed_rules(former.policy(id), self.settings.policy(id));
+            let policy = self.settings.policy(id);
+            events.extend(track.change_policy(former.policy(id), policy, &context));
             if self.settings.explain != Explain::Adopt {
                 events.extend(track.give_up_effects(now));
             }
@@ -337,10 +349,20 @@ impl Monitor {
         events
     }
 
+    /// Ends what is known of benchmarks that are no longer watched, and of those whose readings mean something else from here on: to
+    /// these the sources give what the files hold anew.
     fn unwatch(&mut self, now: Timestamp, former: &Watched) -> Vec<Event> {
-        let gone: Vec<BenchmarkId> = (self.benchmarks.all().keys())
-            .filter(|id| self.settings.watched.drops(id, former))
-            .cloned()
+        let watched = &self.settings.watched;
+        let gone: Vec<(BenchmarkId, String)> = (self.benchmarks.all().keys())
+            .filter_map(|id| {
+                let why = if watched.drops(id, former) {
+                    "is no longer watched".to_owned()
+                } else {
+                    let read_as = watched.changed(id, former)?;
+                    format!("is read as {read_as} from here on: its readings are taken anew")
+                };
+                Some((id.clone(), format!("benchmark {id} {why}")))
+            })
             .collect();
         let mut events = Vec::new();
         let awaited: Vec<BenchmarkId> = self.outages.awaited().cloned().collect();
@@ -349,9 +371,15 @@ impl Monitor {
                 events.extend(self.outages.end_awaiting(now, &id, "is no longer watched"));
             }
         }
-        for id in gone {
+        for (id, why) in gone {
             if let Some(mut track) = self.benchmarks.remove(&id) {
-                events.extend(track.close(now));
+                events.extend(track.close(now, &why));
+            }
+            if self.settings.watched.named.contains(&id) {
+                events.push(Event {
+                    benchmark: Some(id.clone()),
+                    ..trouble(now, "read-anew", &why)
+                });
             }
             self.searches.retain(|job| job.benchmark != id);
             self.past.forget(&id);
@@ -423,6 +451,7 @@ mod tests {
         let watched = |named: &[&str], is_open| Watched {
             named: named.iter().copied().map(BenchmarkId::new).collect(),
             is_open,
+            read_as: BTreeMap::new(),
         };
         for (former, now, is_dropped) in [
             (watched(&["4", "5"], true), watched(&["4"], true), true),

@@ -10,7 +10,6 @@ pub(super) use publish::publish;
 pub(super) use session::MOST_UNACKNOWLEDGED;
 
 use super::clock::Stopwatch;
-use super::ingest::FileUnits;
 use super::shutdown::Shutdown;
 use super::site::is_logged;
 use super::tail::{Arrival, Decoder};
@@ -93,7 +92,6 @@ pub async fn follow(
     let mut reader = Reader {
         source: broker.id.clone(),
         decoder: Decoder::of_messages(&broker, &benchmarks),
-        units: FileUnits::default(),
         quarantined: 0,
     };
     let room = Arc::new(Semaphore::new(MOST_VALUES as usize));
@@ -159,7 +157,6 @@ async fn send(
 struct Reader {
     source: String,
     decoder: Decoder,
-    units: FileUnits,
     /// Lines and whole messages that could not be used.
     quarantined: u64,
 }
@@ -188,7 +185,7 @@ impl Reader {
             (Some(mut rows), Ok(text)) => {
                 for (line, number) in text.lines().zip(1..) {
                     let taken = rows.take(number, line);
-                    let items = taken.items.into_iter().map(|item| self.units.guard(item));
+                    let items = taken.items.into_iter();
                     arrivals.extend(items.filter_map(|item| self.decoder.arrival(item)));
                     faults.extend(taken.fault.map(Into::into));
                 }
@@ -249,7 +246,6 @@ mod tests {
         let mut reader = Reader {
             source: broker.id.clone(),
             decoder: Decoder::of_messages(broker, &config.benchmarks),
-            units: FileUnits::default(),
             quarantined: 0,
         };
         let (arrivals, quarantined) = reader.read("site/P1/displacement", payload.as_bytes());

@@ -70,6 +70,7 @@ mod orders;
 mod past;
 mod record;
 mod recorded;
+mod reread;
 mod sensors;
 mod site;
 mod telling;

@@ -116,3 +116,37 @@ fn a_benchmark_that_gave_one_velocity_and_then_displacements_is_unknown() {
     program.stop();
     site.proven_events();
 }
+
+#[test]
+fn a_cell_that_is_no_number_hides_no_other_value_of_its_row() {
+    // A rain gauge that fails beside a slope that moves, and one sensor beside another.
+    for (header, row, fault) in [
+        ("5_velocity_mm_per_day,rain_mm", "80,ERR", ""),
+        (
+            "4_velocity_mm_per_day,5_velocity_mm_per_day",
+            "ERR,80",
+            "benchmark 4: no reading",
+        ),
+    ] {
+        let threshold = "[[alert.threshold]]\nlevel = \"red\"\nvelocity = \"50 mm/day\"\n";
+        let site = Site::new(&format!("{POLICY}{threshold}"));
+        site.append("incoming/x.csv", &format!("time,{header}\n"));
+        let at = |hours| clock::now() - SignedDuration::from_hours(hours);
+        for hours in (10..24).rev() {
+            site.append("incoming/x.csv", &format!("{},1,1\n", at(hours)));
+        }
+        let program = site.caught_up();
+        for hours in (0..10).rev() {
+            site.append("incoming/x.csv", &format!("{},{row}\n", at(hours)));
+        }
+        eventually("a red", || site.notified("5/red/", "firing") == 1);
+        eventually("the rest", || {
+            site.values().iter().filter(|one| one.0 == "5").count() == 24
+        });
+        program.stop();
+        let events = site.proven_events();
+        assert!(events.contains(fault), "{events}");
+        let log = site.log();
+        assert!(log.contains("ERR"), "the line is in quarantine: {log}");
+    }
+}

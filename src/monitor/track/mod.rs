@@ -329,10 +329,9 @@ impl Track {
     }
 
     /// The benchmark is no longer watched: what is in force at it ends.
-    pub(super) fn close(&mut self, now: Timestamp) -> Vec<Event> {
-        let text = format!("benchmark {} is no longer watched", self.record.benchmark());
-        let unknown = (self.quality).ends_all_unknown(&mut self.record, now, &text);
-        let removed = self.alarm.removed(&self.record, now, text);
+    pub(super) fn close(&mut self, now: Timestamp, why: &str) -> Vec<Event> {
+        let unknown = (self.quality).ends_all_unknown(&mut self.record, now, why);
+        let removed = self.alarm.removed(&self.record, now, why.to_owned());
         unknown.into_iter().chain(removed).collect()
     }
 
@@ -351,9 +350,21 @@ impl Track {
         self.quality.accept(&self.record, now, accepted)
     }
 
-    /// A rule that the config has changed begins again, though it has the same name.
-    pub(super) fn forget_changed_rules(&mut self, before: &Policy, now: &Policy) {
+    /// Goes by another policy from here on. A rule that the config has changed begins again, though it has the same name, and the newest
+    /// reading is judged by the thresholds as they are now.
+    pub(super) fn change_policy(
+        &mut self,
+        before: &Policy,
+        now: &Policy,
+        context: &StepContext<'_>,
+    ) -> Option<Event> {
         self.alarm.forget_changed_rules(before, now);
+        let newest = self.record.newest()?;
+        if context.phase.is_past || self.quality.is_stuck() {
+            return None;
+        }
+        let beside = beside(&self.record, &self.forecaster, &self.quality);
+        (self.alarm).raise_by_change(beside, (before, now), newest)
     }
 
     /// The newest reading, of `time`, came while the clock said `clock`.

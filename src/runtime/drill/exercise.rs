@@ -19,7 +19,7 @@ use crate::runtime::sources::Sources;
 use crate::runtime::standing::every;
 use crate::store::Store;
 use jiff::SignedDuration;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::fs::{self, OpenOptions};
 use std::io::{self, Write as _};
@@ -279,6 +279,7 @@ impl Exercise {
             watched: Watched {
                 named: BTreeSet::new(),
                 is_open: false,
+                read_as: BTreeMap::new(),
             },
             ..self.daemon.config.settings.clone()
         };

@@ -66,6 +66,10 @@ impl LineReader for CsvReader {
         table.map_or_else(Vec::new, TableRows::take_remarks)
     }
 
+    fn take_fault(&mut self) -> Option<IngestError> {
+        self.rows.as_mut()?.table.as_mut()?.take_fault()
+    }
+
     fn meanings(&self) -> Vec<(String, Meaning)> {
         self.table().map_or_else(Vec::new, TableRows::meanings)
     }

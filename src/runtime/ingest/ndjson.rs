@@ -67,6 +67,12 @@ impl LineReader for NdjsonRows {
         tables.flat_map(TableRows::take_remarks).collect()
     }
 
+    fn take_fault(&mut self) -> Option<IngestError> {
+        let tables = self.tables.values_mut();
+        let faults: Vec<IngestError> = tables.filter_map(TableRows::take_fault).collect();
+        faults.into_iter().next()
+    }
+
     fn meanings(&self) -> Vec<(String, Meaning)> {
         self.tables.values().flat_map(TableRows::meanings).collect()
     }

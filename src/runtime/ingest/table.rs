@@ -23,6 +23,8 @@ pub(super) struct TableRows {
     numeric: Vec<bool>,
     /// What has been found out and not been reported.
     remarks: Vec<Remark>,
+    /// What of the last row could not be used, where the rest could.
+    fault: Option<IngestError>,
 }
 
 impl TableRows {
@@ -32,6 +34,7 @@ impl TableRows {
             filled: vec![false; layout.names.len()],
             numeric: vec![false; layout.names.len()],
             remarks: std::mem::take(&mut layout.remarks),
+            fault: None,
             vectors: vector::claim(&mut layout, &options.vectors),
             layout,
             options: options.clone(),
@@ -43,7 +46,8 @@ impl TableRows {
         &self.layout.names
     }
 
-    /// What one row holds; `line` is its number in the file.
+    /// What one row holds; `line` is its number in the file. A cell that is no number costs its own value alone: what is wrong with
+    /// it is to be asked with [`TableRows::take_fault`].
     pub(super) fn items(
         &mut self,
         line: u64,
@@ -67,7 +71,10 @@ impl TableRows {
             items,
             numbers,
             texts,
+            fault,
+            ..
         } = row.items()?;
+        self.fault = fault;
         for index in numbers {
             self.numeric[index] = true;
         }
@@ -110,6 +117,11 @@ impl TableRows {
         }
     }
 
+    /// What of the last row could not be used.
+    pub(super) fn take_fault(&mut self) -> Option<IngestError> {
+        self.fault.take()
+    }
+
     /// What has been found out since it was last asked.
     pub(super) fn take_remarks(&mut self) -> Vec<Remark> {
         std::mem::take(&mut self.remarks)
@@ -148,6 +160,17 @@ struct Met {
     numbers: Vec<usize>,
     /// Columns of covariates with text.
     texts: Vec<usize>,
+    /// Benchmarks whose reading is no number, and what stands there.
+    unread: Vec<(BenchmarkId, String)>,
+    /// The first of the cells that are wrong.
+    fault: Option<IngestError>,
+}
+
+impl Met {
+    /// Sets a cell aside.
+    fn set_aside(&mut self, fault: IngestError) {
+        self.fault = self.fault.take().or(Some(fault));
+    }
 }
 
 /// What stands in a cell.
@@ -175,9 +198,21 @@ impl TableRow<'_> {
                     benchmark,
                     unit,
                     sigma,
-                } => met
-                    .items
-                    .extend(self.reading(time, index, benchmark, *unit, *sigma)?),
+                } => {
+                    let sigma = sigma.map_or(Ok(None), |sigma| self.sigma(sigma, *unit));
+                    let sigma = sigma.unwrap_or_else(|fault| {
+                        met.set_aside(fault);
+                        None
+                    });
+                    match self.reading(time, (index, benchmark), *unit, sigma) {
+                        Ok(item) => met.items.extend(item),
+                        Err(fault) => {
+                            let what = self.cells[index].to_owned();
+                            met.unread.push((benchmark.clone(), what));
+                            met.set_aside(fault);
+                        }
+                    }
+                }
                 Column::Channel { unit } => match self.cell(index) {
                     Ok(TableCell::Number(value)) => {
                         met.numbers
@@ -189,7 +224,7 @@ impl TableRow<'_> {
                         });
                     }
                     Ok(TableCell::Empty | TableCell::Missing) => {}
-                    Err(fault) if self.rows.numeric[index] => return Err(fault),
+                    Err(fault) if self.rows.numeric[index] => met.set_aside(fault),
                     Err(_) => met.texts.push(index),
                 },
                 Column::Time
@@ -200,7 +235,24 @@ impl TableRow<'_> {
             }
         }
         for vector in &self.rows.vectors {
-            met.items.extend(self.vector(time, vector)?);
+            match self.vector(time, vector) {
+                Ok(item) => met.items.extend(item),
+                Err(fault) => {
+                    let what = "a component that is no number".to_owned();
+                    met.unread.push((vector.benchmark.clone(), what));
+                    met.set_aside(fault);
+                }
+            }
+        }
+        // A row of which nothing can be used may be torn, and says nothing of its sensors.
+        if !met.items.is_empty() {
+            let unread = std::mem::take(&mut met.unread).into_iter();
+            met.items
+                .extend(unread.map(|(benchmark, what)| Item::Missing {
+                    benchmark,
+                    time,
+                    what: what.chars().take(SHOWN).collect(),
+                }));
         }
         Ok(met)
     }
@@ -248,12 +300,10 @@ impl TableRow<'_> {
     fn reading(
         &self,
         time: Timestamp,
-        index: usize,
-        benchmark: &BenchmarkId,
+        (index, benchmark): (usize, &BenchmarkId),
         unit: Unit,
-        sigma: Option<SigmaColumn>,
+        sigma: Option<f64>,
     ) -> Result<Option<Item>, IngestError> {
-        let sigma = sigma.map_or(Ok(None), |sigma| self.sigma(sigma, unit))?;
         Ok(match self.cell(index)? {
             TableCell::Empty => None,
             TableCell::Missing => Some(Item::Missing {

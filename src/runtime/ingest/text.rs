@@ -53,6 +53,8 @@ impl TextRows {
     pub fn take(&mut self, line: u64, text: &str) -> LineResult {
         let mut taken = self.0.take(line, text);
         taken.remarks.extend(self.0.take_remarks());
+        let of_a_cell = self.0.take_fault();
+        taken.fault = taken.fault.or(of_a_cell);
         taken
     }
 

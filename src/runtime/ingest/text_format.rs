@@ -38,6 +38,11 @@ pub trait LineReader: Debug + Send {
         Vec::new()
     }
 
+    /// What of the last line could not be used, where the rest of it could.
+    fn take_fault(&mut self) -> Option<IngestError> {
+        None
+    }
+
     /// What the columns are taken for, by what has been read so far; none for messages, each of which says it.
     fn meanings(&self) -> Vec<(String, Meaning)> {
         Vec::new()

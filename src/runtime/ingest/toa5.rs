@@ -45,6 +45,10 @@ impl LineReader for Toa5Rows {
         (self.table.as_mut()).map_or_else(Vec::new, TableRows::take_remarks)
     }
 
+    fn take_fault(&mut self) -> Option<IngestError> {
+        self.table.as_mut()?.take_fault()
+    }
+
     fn meanings(&self) -> Vec<(String, Meaning)> {
         (self.table.as_ref()).map_or_else(Vec::new, TableRows::meanings)
     }

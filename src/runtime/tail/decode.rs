@@ -8,7 +8,7 @@ use crate::runtime::ingest::{
     unpacked_name,
 };
 use jiff::SignedDuration;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -54,6 +54,13 @@ impl Decoder {
             elsewhere: of_others(&source.id, benchmarks),
             remarked: Arc::default(),
         }
+    }
+
+    /// What decides which numbers the readings of each benchmark are that the config names.
+    pub(super) fn read_as(&self) -> BTreeMap<BenchmarkId, String> {
+        let each = self.wanted.iter();
+        each.map(|one| (one.id.clone(), one.read_as(&self.conventions)))
+            .collect()
     }
 
     /// For messages, each of which is a text of NDJSON.

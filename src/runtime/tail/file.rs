@@ -34,7 +34,7 @@ pub(super) struct FileTail {
     pub(super) path: PathBuf,
     /// The name under which it was found first: a benchmark may be named after it, whatever it is renamed to.
     pub(super) origin: PathBuf,
-    decoder: Arc<Decoder>,
+    pub(super) decoder: Arc<Decoder>,
     pub(super) content: Content,
     /// Everything before this has been read.
     pub(super) at: u64,

@@ -59,7 +59,8 @@ pub async fn follow(
     let mut watch = FolderWatch::new(follower.folders());
     let mut rescan = tokio::time::interval(RESCAN);
     rescan.set_missed_tick_behavior(MissedTickBehavior::Delay);
-    while !shutdown.is_requested() {
+    // At least once, so that it is kept of which benchmarks the files are read from here on.
+    loop {
         watch.renew();
         let looking = Stopwatch::start();
         let batch;
@@ -75,8 +76,12 @@ pub async fn follow(
             batch.has_more && batch.arrivals.is_empty(),
         );
         tokio::select! {
+            biased;
             sent = batches.send(batch) => if sent.is_err() { return Ok(()) },
             () = shutdown.requested() => return Ok(()),
+        }
+        if shutdown.is_requested() {
+            return Ok(());
         }
         if rests {
             tokio::select! {
@@ -92,7 +97,6 @@ pub async fn follow(
             }
         }
     }
-    Ok(())
 }
 
 /// One watcher for all folders.

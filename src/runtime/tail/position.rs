@@ -2,7 +2,9 @@
 
 use super::records::Channels;
 use super::text::SavedText;
+use crate::reading::BenchmarkId;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::fs::Metadata;
 use std::os::unix::fs::MetadataExt;
 use std::path::PathBuf;
@@ -33,6 +35,9 @@ pub(super) struct Saved {
     /// The name under which it was found first, where it was renamed since.
     #[serde(default)]
     pub(super) origin: Option<PathBuf>,
+    /// What decided which numbers the readings of each benchmark were; none where an older version has written this.
+    #[serde(default)]
+    pub(super) read_as: Option<BTreeMap<BenchmarkId, String>>,
 }
 
 /// What of a file's content a restart needs.

@@ -22,8 +22,13 @@ impl FileTail {
         let saved: Saved = rmp_serde::from_slice(body)?;
         let origin = saved.origin.clone().unwrap_or_else(|| path.clone());
         let rows = decoder.text_rows(&origin);
+        let is_read_anew = saved.misses(&decoder);
         let mut file = Self::new(origin, decoder);
         file.path = path;
+        if is_read_anew {
+            tracing::info!(file = %file.path.display(), "read from its start: the config takes other readings from it");
+            return Ok(file);
+        }
         file.content = match (saved.content.clone(), rows) {
             (SavedContent::Text(text), Some(rows)) => {
                 Content::Text(Box::new(TextReader::restored(rows, text)?))
@@ -41,8 +46,12 @@ impl FileTail {
         file.at = saved.at;
         file.place = saved.place;
         file.mark.clone_from(&saved.mark);
-        file.safe = saved.clone();
-        file.reported = saved;
+        file.reported = saved.clone();
+        // From here on these readings are taken from it, though it may not grow.
+        file.safe = Saved {
+            read_as: Some(file.decoder.read_as()),
+            ..saved
+        };
         Ok(file)
     }
 
@@ -96,6 +105,20 @@ impl FileTail {
             mark: self.mark.clone(),
             content,
             origin: (self.origin != self.path).then(|| self.origin.clone()),
+            read_as: Some(self.decoder.read_as()),
         };
+    }
+}
+
+impl Saved {
+    /// Whether the file has been read without readings that the config takes from it now: of benchmarks that it did not name then,
+    /// or that were read as something else.
+    fn misses(&self, decoder: &Decoder) -> bool {
+        let Some(before) = &self.read_as else {
+            return false;
+        };
+        let now = decoder.read_as();
+        now.iter()
+            .any(|(id, read_as)| before.get(id) != Some(read_as))
     }
 }

@@ -97,6 +97,22 @@ impl Alarm {
         self.held.forget_changed(before, now);
     }
 
+    /// The config has changed from `former`: what the newest reading, of `time`, passes of the new thresholds and rules and did not pass
+    /// of the former ones is called at once, not with the next reading.
+    pub(in crate::monitor::track) fn raise_by_change(
+        &mut self,
+        beside: BesideForecast<'_>,
+        (former, policy): (&Policy, &Policy),
+        time: Timestamp,
+    ) -> Option<Event> {
+        if former.thresholds == policy.thresholds && former.rules == policy.rules {
+            return None;
+        }
+        let evidence = beside.evidence(time, &beside.record.history().rates());
+        let is_more = policy.call(&evidence).level > former.call(&evidence).level;
+        is_more.then(|| self.raise(beside, policy, time)).flatten()
+    }
+
     /// Between two refits: plain thresholds and the site's own rules act at every reading. They may raise the level; it
     /// falls only where there is a forecast too.
     pub(in crate::monitor::track) fn raise(
