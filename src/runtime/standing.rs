@@ -1,7 +1,7 @@
 //! What stands at a moment, from the events in a site's state: alerts in force, orders, who has seen what.
 
 use crate::alert::Level;
-use crate::monitor::{AlertState, Event, EventKind, OrderKind};
+use crate::monitor::{AlertState, Event, EventKind, Order, OrderKind};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::store::{Store, StoreError};
 use std::collections::BTreeMap;
@@ -101,6 +101,25 @@ pub fn silences(orders: &[Event], now: Timestamp) -> Vec<Event> {
         }
     }
     standing
+}
+
+/// The silence of the whole site that stands at `now` where `order` ends that of one benchmark alone: it would change nothing.
+///
+/// # Errors
+/// [`StoreError`].
+pub fn silence_of_the_site(
+    store: &Store,
+    order: &Order,
+    now: Timestamp,
+) -> Result<Option<Event>, StoreError> {
+    let Order::Unsilence {
+        benchmark: Some(_), ..
+    } = order
+    else {
+        return Ok(None);
+    };
+    let standing = silences(&orders(store)?, now);
+    Ok(standing.into_iter().find(|one| one.benchmark.is_none()))
 }
 
 /// Who has seen what is in force: acknowledgements since its alert was called.

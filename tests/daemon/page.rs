@@ -189,6 +189,25 @@ fn an_order_needs_the_token_a_name_and_a_span_that_is_allowed() {
 }
 
 #[test]
+fn the_silence_of_the_whole_site_is_not_ended_for_one_benchmark_without_a_word() {
+    let site = Site::start();
+    let headers = format!("Authorization: Bearer {TOKEN}\r\nContent-Type: application/json\r\n");
+    let silence = json!({ "order": "silence", "by": "Anna", "seconds": 3600 });
+    assert_eq!(order(&site, &headers, &silence).0, 200);
+    let start = slipwatch::runtime::clock::Stopwatch::start();
+    while site.events("order").is_empty() && start.elapsed().as_secs() < 60 {
+        std::thread::sleep(std::time::Duration::from_millis(100));
+    }
+    let one = json!({ "order": "unsilence", "benchmark": "E3", "by": "Anna" });
+    let (status, said) = order(&site, &headers, &one);
+    assert_eq!(status, 422, "{said}");
+    assert!(said.contains("the whole site is silenced"), "{said}");
+    assert!(said.contains("by Anna"), "{said}");
+    let all = json!({ "order": "unsilence", "by": "Anna" });
+    assert_eq!(order(&site, &headers, &all).0, 200);
+}
+
+#[test]
 fn the_stream_tells_each_event_once_with_its_number_and_ends_by_itself() {
     let site = Site::start();
     let request = format!(

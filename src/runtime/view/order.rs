@@ -2,9 +2,10 @@
 
 use super::{EARLIEST, SiteReader};
 use crate::config::EXERCISE;
-use crate::monitor::{Given, Order, OrderedBy};
+use crate::monitor::{EventKind, Given, Order, OrderedBy};
 use crate::reading::BenchmarkId;
 use crate::runtime::clock;
+use crate::runtime::standing::silence_of_the_site;
 use crate::store::StoreError;
 use jiff::SignedDuration;
 use schemars::JsonSchema;
@@ -60,6 +61,18 @@ impl SiteReader {
             && !self.is_of_a_drill(&order)
         {
             return wrong(format!("there is no benchmark {benchmark}"));
+        }
+        let now = self.now()?;
+        if let Some(silence) = silence_of_the_site(&self.store, &order, now)? {
+            let EventKind::Order { until, given, .. } = &silence.kind else {
+                return wrong("the whole site is silenced".to_owned());
+            };
+            let until = until.map_or_else(String::new, |until| format!(" until {until}"));
+            let by = given.by.as_deref();
+            let by = by.map_or_else(String::new, |by| format!(" by {by}"));
+            return wrong(format!(
+                "benchmark: the whole site is silenced{until}{by}, which unsilence without a benchmark ends"
+            ));
         }
         tracing::warn!(?order, "an order came over the network");
         self.store.ask(&order)?;
