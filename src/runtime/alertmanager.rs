@@ -1,9 +1,10 @@
-//! One alert as Prometheus Alertmanager takes it at `POST /api/v2/alerts`.
+//! An alert, and what ends with it, as Prometheus Alertmanager takes them at `POST /api/v2/alerts`.
 
 use super::hook::{Alert, MessageState};
 use super::site::BEFORE_ALL;
+use crate::alert::Level;
 use crate::monitor::EventKind;
-use crate::reading::Timestamp;
+use crate::reading::{BenchmarkId, Timestamp};
 use jiff::SignedDuration;
 use serde_json::json;
 
@@ -11,8 +12,44 @@ use serde_json::json;
 /// ended, so it states an end that no crisis reaches.
 const STANDS_FOR: SignedDuration = SignedDuration::from_hours(365 * 24);
 
-/// A list of this one alert. Its labels are the same when it fires and when it ends: by these it is known.
-pub(super) fn body(alert: &Alert, link: Option<&str>) -> Result<Vec<u8>, serde_json::Error> {
+/// A list of this alert and of what ends with it: the lower levels that it has superseded, and at the end of what was reported
+/// together each of these. The labels are the same when an alert fires and when it ends: by these it is known. `levels`:
+/// what the receiver asks for.
+pub(super) fn body(
+    alert: &Alert,
+    levels: &[Level],
+    link: Option<&str>,
+) -> Result<Vec<u8>, serde_json::Error> {
+    let time = alert.event.time;
+    let (starts_at, ends_at) = match alert.state {
+        MessageState::Firing => (time, time.checked_add(STANDS_FOR).unwrap_or(time)),
+        MessageState::Resolved | MessageState::Correction => {
+            let called = alert.called.or_else(|| since(&alert.key)).unwrap_or(time);
+            (called.min(time), time)
+        }
+    };
+    let benchmark = alert.event.benchmark.as_ref();
+    let own = (benchmark, alert.level, alert.key.as_str());
+    let mut all = vec![entry(alert, own, (starts_at, ends_at), link)];
+    let earlier = (alert.earlier.iter()).filter(|one| levels.contains(&one.level));
+    let earlier = earlier.map(|one| (one.benchmark.as_ref(), one.level, one.key.as_str()));
+    let members = (alert.many.iter().flat_map(|many| &many.members))
+        .filter(|_| alert.state == MessageState::Resolved);
+    let members = members.map(|one| (one.benchmark.as_ref(), alert.level, one.key.as_str()));
+    for one in earlier.chain(members) {
+        let called = since(one.2).unwrap_or(time);
+        all.push(entry(alert, one, (called.min(time), time), None));
+    }
+    serde_json::to_vec(&all)
+}
+
+/// An alert by its benchmark, level and key, with what `alert` says.
+fn entry(
+    alert: &Alert,
+    (benchmark, level, key): (Option<&BenchmarkId>, Level, &str),
+    (starts_at, ends_at): (Timestamp, Timestamp),
+    link: Option<&str>,
+) -> serde_json::Value {
     let (mut rule, mut text) = ("", "");
     if let EventKind::Alert {
         rule: own_rule,
@@ -22,40 +59,30 @@ pub(super) fn body(alert: &Alert, link: Option<&str>) -> Result<Vec<u8>, serde_j
     {
         (rule, text) = (own_rule, own_text);
     }
-    let time = alert.event.time;
-    let (starts_at, ends_at) = match alert.state {
-        MessageState::Firing => (time, time.checked_add(STANDS_FOR).ok()),
-        MessageState::Resolved | MessageState::Correction => {
-            let called = alert.called.or_else(|| since(alert)).unwrap_or(time);
-            (called.min(time), Some(time))
-        }
-    };
-    let benchmark = alert.event.benchmark.as_ref();
-    let benchmark = benchmark.map_or_else(String::new, ToString::to_string);
     // A label without text is the same to it as no label.
-    serde_json::to_vec(&json!([{
+    json!({
         "labels": {
             "alertname": "slipwatch",
             "site": alert.site,
-            "benchmark": benchmark,
-            "level": alert.level.name(),
+            "benchmark": benchmark.map_or_else(String::new, ToString::to_string),
+            "level": level.name(),
             "status": alert.status.name(),
-            "key": alert.key,
+            "key": key,
         },
         "annotations": {
             "summary": text,
             "rule": rule,
-            "recommended": alert.level.recommended(),
+            "recommended": level.recommended(),
             "acknowledge_url": link.unwrap_or_default(),
             "failure_time": alert.failure_time.map(|time| time.to_string()).unwrap_or_default(),
         },
         "startsAt": starts_at,
         "endsAt": ends_at,
-    }]))
+    })
 }
 
 /// When it was called: the end of its key, where it was not called before there was any reading.
-fn since(alert: &Alert) -> Option<Timestamp> {
-    let time = alert.key.rsplit_once('/')?.1.parse().ok();
+fn since(key: &str) -> Option<Timestamp> {
+    let time = key.rsplit_once('/')?.1.parse().ok();
     time.filter(|time| *time > BEFORE_ALL)
 }

@@ -16,7 +16,7 @@ use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
 use std::fs::{self, File};
 use std::io::{self, Write as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Messages that a chain names; the oldest go.
 const LONGEST_CHAIN: usize = 50;
@@ -44,18 +44,38 @@ enum MessageType {
 
 /// Writes `alert` into the folder; where its file is there already it is written again, the same.
 pub(super) fn write(cap: &CapFolder, alert: &Alert) -> HookOutcome {
-    match written(cap, alert, clock::now()) {
+    let now = clock::now();
+    let all = written(cap, alert, now).and_then(|()| end_members(cap, alert, now));
+    match all {
         Ok(()) => HookOutcome::Done,
         Err(error) => HookOutcome::NotStarted(format!("{}: {error}", cap.folder.display())),
     }
 }
 
-fn written(cap: &CapFolder, alert: &Alert, now: Timestamp) -> io::Result<()> {
-    let chains = cap.folder.join("chains");
-    fs::create_dir_all(&chains)?;
-    let place = chains.join(format!("{}.json", short(&place(alert))));
-    let mut chain = read(&place)?;
-    let identifier = format!(
+/// At the end of what was reported together: ends the chains of those that had been reported singly. A chain that has begun anew
+/// since goes on.
+fn end_members(cap: &CapFolder, alert: &Alert, now: Timestamp) -> io::Result<()> {
+    let members = alert.many.iter().flat_map(|many| &many.members);
+    for one in members.filter(|_| alert.state == MessageState::Resolved) {
+        let benchmark = one.benchmark.as_ref();
+        let end = alert.end_of(benchmark, alert.level, &one.key);
+        let earlier = (alert.earlier.iter()).filter(|earlier| earlier.benchmark == one.benchmark);
+        let ends = earlier.map(|one| alert.end_of(benchmark, one.level, &one.key));
+        let begun: Vec<String> = ends
+            .chain([end.clone()])
+            .map(|end| identifier(&end.beginning()))
+            .collect();
+        let chain = read(&chain_file(cap, &end))?;
+        let is_its_own = chain.iter().any(|one| begun.contains(&one.identifier));
+        if is_its_own {
+            written(cap, &end, now)?;
+        }
+    }
+    Ok(())
+}
+
+fn identifier(alert: &Alert) -> String {
+    format!(
         "slipwatch-{}",
         short(&format!(
             "{}\n{}\n{}\n{}\n{}",
@@ -65,7 +85,20 @@ fn written(cap: &CapFolder, alert: &Alert, now: Timestamp) -> io::Result<()> {
             state_name(alert.state),
             alert.status.name()
         ))
-    );
+    )
+}
+
+/// Where the chain of messages stands that `alert` belongs to.
+fn chain_file(cap: &CapFolder, alert: &Alert) -> PathBuf {
+    let name = format!("{}.json", short(&place(alert)));
+    cap.folder.join("chains").join(name)
+}
+
+fn written(cap: &CapFolder, alert: &Alert, now: Timestamp) -> io::Result<()> {
+    fs::create_dir_all(cap.folder.join("chains"))?;
+    let place = chain_file(cap, alert);
+    let mut chain = read(&place)?;
+    let identifier = identifier(alert);
     let is_cancel = alert.state == MessageState::Resolved;
     let known = chain.iter().position(|one| one.identifier == identifier);
     let at = if let Some(at) = known {

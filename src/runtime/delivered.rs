@@ -16,7 +16,7 @@ type DeliveredKey = (String, &'static str, &'static str, String);
 /// The receipts of all hooks: in the state or, for a replay, only in memory.
 #[derive(Debug, Default)]
 pub struct Delivered {
-    /// What came to its end while this program ran: taken, or acknowledged in time.
+    /// What came to its end while this program ran: taken, called off by people, or over.
     ended: BTreeMap<DeliveredKey, DeliveryOutcome>,
     unwritten: Vec<(Delivery, DeliveryOutcome)>,
     store: Option<Arc<Store>>,
@@ -48,14 +48,31 @@ impl Delivered {
         }
     }
 
-    /// Whether `hook` has taken this alert, or is not to get it because somebody acknowledged it in time.
+    /// Whether nothing more is to be tried with this alert at `hook`: it has taken it, somebody acknowledged or silenced it
+    /// in time, or it was over before.
     pub fn has(&self, alert: &Alert, hook: &str) -> bool {
-        self.was_notified(alert, hook) || self.stands(alert, hook, DeliveryOutcome::Acknowledged)
+        matches!(
+            self.outcome(alert, hook),
+            Some(
+                DeliveryOutcome::Delivered
+                    | DeliveryOutcome::Acknowledged
+                    | DeliveryOutcome::Silenced
+                    | DeliveryOutcome::Over
+            )
+        )
     }
 
     /// Whether `hook` has taken this alert.
     pub(super) fn was_notified(&self, alert: &Alert, hook: &str) -> bool {
-        self.stands(alert, hook, DeliveryOutcome::Delivered)
+        self.outcome(alert, hook) == Some(DeliveryOutcome::Delivered)
+    }
+
+    /// Whether `hook` is not to get this alert because people see to it already.
+    pub(super) fn is_called_off(&self, alert: &Alert, hook: &str) -> bool {
+        matches!(
+            self.outcome(alert, hook),
+            Some(DeliveryOutcome::Acknowledged | DeliveryOutcome::Silenced)
+        )
     }
 
     /// When `hook` was first to get this alert, by the host's clock; `None` where no state says it.
@@ -68,19 +85,17 @@ impl Delivered {
         self.store.as_ref()?.noted(identity, hook).ok()?
     }
 
-    /// Whether this alert has come to this end at `hook`.
-    fn stands(&self, alert: &Alert, hook: &str, fate: DeliveryOutcome) -> bool {
+    /// What has become of this alert at `hook`; `None` where nothing says it.
+    fn outcome(&self, alert: &Alert, hook: &str) -> Option<DeliveryOutcome> {
         let (level, state) = (alert.level.name(), state_name(alert.state));
         let receipt = (alert.key.clone(), level, state, hook.to_owned());
         if let Some(ended) = self.ended.get(&receipt) {
-            return *ended == fate;
+            return Some(*ended);
         }
-        let stored = self
-            .store
-            .as_ref()
-            .map(|store| store.is_noted((&alert.key, level, state), Some(hook), Some(fate)));
+        let store = self.store.as_ref()?;
         // Twice is better than never.
-        stored.is_some_and(|stored| stored.unwrap_or(false))
+        let stored = store.outcome_of((&alert.key, level, state), hook);
+        stored.unwrap_or(None)
     }
 
     /// How often `hook` has been tried with this alert before this program ran.
@@ -95,6 +110,35 @@ impl Delivered {
         stored.map_or(0, |stored| stored.unwrap_or(0))
     }
 
+    /// Notes what became of this alert at `hook`, to be made durable with many others by [`Delivered::commit`].
+    ///
+    /// # Errors
+    /// When it cannot be written as bytes.
+    pub(super) fn put_down(
+        &mut self,
+        alert: &Alert,
+        hook: &str,
+        fate: DeliveryOutcome,
+    ) -> Result<(), StoreError> {
+        let (level, state) = (alert.level.name(), state_name(alert.state));
+        let receipt = (alert.key.clone(), level, state, hook.to_owned());
+        match fate {
+            DeliveryOutcome::Delivered
+            | DeliveryOutcome::Acknowledged
+            | DeliveryOutcome::Silenced => {
+                self.ended.insert(receipt, fate);
+            }
+            DeliveryOutcome::Over => {
+                self.ended.entry(receipt).or_insert(fate);
+            }
+            DeliveryOutcome::Waiting | DeliveryOutcome::Dead | DeliveryOutcome::Closed => {}
+        }
+        if self.store.is_some() && self.unwritten.len() < MOST_UNWRITTEN {
+            self.unwritten.push((delivery(alert, hook)?, fate));
+        }
+        Ok(())
+    }
+
     /// Notes what became of this alert at `hook`: in any case until the daemon stops, and on a full disk no longer
     /// than that unless [`Delivered::commit`] finds room.
     ///
@@ -106,17 +150,7 @@ impl Delivered {
         hook: &str,
         fate: DeliveryOutcome,
     ) -> Result<(), StoreError> {
-        if matches!(
-            fate,
-            DeliveryOutcome::Delivered | DeliveryOutcome::Acknowledged
-        ) {
-            let (level, state) = (alert.level.name(), state_name(alert.state));
-            self.ended
-                .insert((alert.key.clone(), level, state, hook.to_owned()), fate);
-        }
-        if self.store.is_some() && self.unwritten.len() < MOST_UNWRITTEN {
-            self.unwritten.push((delivery(alert, hook)?, fate));
-        }
+        self.put_down(alert, hook, fate)?;
         self.commit()
     }
 

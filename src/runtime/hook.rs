@@ -1,10 +1,11 @@
 //! Runs one hook once: cleaned environment, alert on stdin, own process group, killed at its timeout.
 
+use super::many::{EarlierLevel, ManyAlerts};
 use super::sandbox;
 use crate::alert::Level;
 use crate::config::HookConfig;
 use crate::monitor::{AlertState, CLOCK_FAULT, Event, EventKind};
-use crate::reading::Timestamp;
+use crate::reading::{BenchmarkId, Timestamp};
 use nix::sys::signal::{Signal, kill, killpg};
 use nix::unistd::Pid;
 use schemars::JsonSchema;
@@ -97,6 +98,12 @@ pub struct Alert {
     /// Of an end: the time that people were given of its call; none in an outbox of older versions.
     #[serde(default)]
     pub called: Option<Timestamp>,
+    /// The lower levels of its benchmark that it, or the level that it ends, followed on: the lowest first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub earlier: Vec<EarlierLevel>,
+    /// What it reports together, where it stands for many; none in an outbox of older versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub many: Option<ManyAlerts>,
     /// Whether it means what it says.
     pub status: Status,
 }
@@ -163,8 +170,36 @@ impl Alert {
             site: site.to_owned(),
             failure_time,
             called: None,
+            earlier: Vec::new(),
+            many: None,
             status,
         })
+    }
+
+    /// The message of its beginning, by which receipts know that.
+    pub(super) fn beginning(&self) -> Self {
+        let state = MessageState::Firing;
+        Self {
+            state,
+            ..self.clone()
+        }
+    }
+
+    /// Of an end: the same for another alert that ends with it, by its own key.
+    pub(super) fn end_of(&self, benchmark: Option<&BenchmarkId>, level: Level, key: &str) -> Self {
+        let mut end = self.clone();
+        (end.level, end.key, end.called, end.many) = (level, key.to_owned(), None, None);
+        end.event.benchmark = benchmark.cloned();
+        end.earlier.retain(|one| one.level < level);
+        if let EventKind::Alert {
+            level: own_level,
+            key: own_key,
+            ..
+        } = &mut end.event.kind
+        {
+            (*own_level, *own_key) = (level, key.to_owned());
+        }
+        end
     }
 
     /// Whether it is tried until a hook has taken it: people's safety depends on it.

@@ -18,6 +18,8 @@ struct Entry {
     is_tried: bool,
     /// Superseded, or resolved: not worth another attempt.
     is_over: bool,
+    /// Silenced or shelved: no attempt is made for now.
+    is_muted: bool,
 }
 
 /// The alerts in one worker's hand, its queue included.
@@ -25,8 +27,8 @@ struct Entry {
 pub(super) struct InHand(BTreeMap<AlertIdentity, Entry>);
 
 impl InHand {
-    /// Takes `alert` in hand; `false` when it is there already.
-    pub(super) fn take(&mut self, alert: &Alert) -> bool {
+    /// Takes `alert` in hand, for no attempt while `is_muted`; `false` when it is there already.
+    pub(super) fn take(&mut self, alert: &Alert, is_muted: bool) -> bool {
         let token = token(alert);
         if self.0.contains_key(&token) {
             return false;
@@ -37,6 +39,7 @@ impl InHand {
             of_many: alert.is_flood().then(|| Box::new(alert.clone())),
             is_tried: false,
             is_over: false,
+            is_muted,
         };
         self.0.insert(token, entry);
         true
@@ -47,6 +50,19 @@ impl InHand {
         self.0
             .get(&token(alert))
             .is_some_and(|entry| entry.is_tried)
+    }
+
+    /// Notes of each alert whether it is silenced or shelved, by its place and level.
+    pub(super) fn mute(&mut self, is_muted: &dyn Fn(Option<&BenchmarkId>, Level) -> bool) {
+        for ((_, level, _), entry) in &mut self.0 {
+            entry.is_muted = is_muted(entry.benchmark.as_ref(), *level);
+        }
+    }
+
+    /// Whether no attempt is made for it for now.
+    pub(super) fn is_muted(&self, alert: &Alert) -> bool {
+        let entry = self.0.get(&token(alert));
+        entry.is_some_and(|entry| entry.is_muted)
     }
 
     /// The alerts that report many benchmarks at once.

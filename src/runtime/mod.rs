@@ -21,6 +21,7 @@ pub mod ingest;
 mod kept;
 mod link;
 pub mod log;
+pub mod many;
 pub mod mqtt;
 pub mod origin;
 pub mod preview;

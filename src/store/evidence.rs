@@ -29,7 +29,7 @@ pub struct DeliveryRow {
     pub level: String,
     /// `firing` or `resolved`.
     pub state: String,
-    /// `waiting`, `delivered`, `over`, `dead`, `closed` or `acknowledged`.
+    /// `waiting`, `delivered`, `over`, `dead`, `closed`, `acknowledged` or `silenced`.
     pub status: String,
     /// Attempts that have ended.
     pub attempts: u32,

@@ -42,8 +42,10 @@ pub enum DeliveryOutcome {
     Dead,
     /// The config has no such hook any more, or that hook does not ask for it any more.
     Closed,
-    /// Somebody acknowledged it before this hook, which is an escalation, was due.
+    /// Somebody acknowledged it before this hook had taken it.
     Acknowledged,
+    /// Somebody silenced or shelved it before this hook, which is an escalation, was due.
+    Silenced,
 }
 
 impl DeliveryOutcome {
@@ -51,7 +53,7 @@ impl DeliveryOutcome {
     fn attempt(self) -> i64 {
         match self {
             Self::Waiting | Self::Delivered | Self::Dead => 1,
-            Self::Over | Self::Closed | Self::Acknowledged => 0,
+            Self::Over | Self::Closed | Self::Acknowledged | Self::Silenced => 0,
         }
     }
 
@@ -63,7 +65,21 @@ impl DeliveryOutcome {
             Self::Dead => "dead",
             Self::Closed => "closed",
             Self::Acknowledged => "acknowledged",
+            Self::Silenced => "silenced",
         }
+    }
+
+    fn named(name: &str) -> Option<Self> {
+        let all = [
+            Self::Waiting,
+            Self::Delivered,
+            Self::Over,
+            Self::Dead,
+            Self::Closed,
+            Self::Acknowledged,
+            Self::Silenced,
+        ];
+        all.into_iter().find(|one| one.name() == name)
     }
 }
 
@@ -210,6 +226,44 @@ impl Store {
         ])?)
     }
 
+    /// How a hook's delivery with this key, level and state stands; `None` where it was never noted.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn outcome_of(
+        &self,
+        (key, level, state): (&str, &str, &str),
+        hook: &str,
+    ) -> Result<Option<DeliveryOutcome>, StoreError> {
+        let inner = self.inner();
+        let mut query = inner.connection.prepare_cached(
+            "SELECT status FROM outbox WHERE key = ?1 AND level = ?2 AND state = ?3 AND hook = ?4",
+        )?;
+        let mut rows = query.query(params![key, level, state, hook])?;
+        let status: Option<String> = rows.next()?.map_or(Ok(None), |row| row.get(0))?;
+        Ok(status.and_then(|status| DeliveryOutcome::named(&status)))
+    }
+
+    /// The bodies of the alerts whose key begins so that have gone to some hook, of whose end none was noted.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn without_end(&self, begins: &str) -> Result<Vec<Vec<u8>>, StoreError> {
+        let inner = self.inner();
+        let mut query = inner.connection.prepare(
+            "SELECT id, key, level, state, hook, time, body FROM outbox AS own
+             WHERE substr(key, 1, length(?1)) = ?1 AND state = 'firing'
+             AND NOT EXISTS (SELECT 1 FROM outbox WHERE key = own.key AND state = 'resolved')
+             GROUP BY key ORDER BY min(id)",
+        )?;
+        let mut rows = query.query(params![begins])?;
+        let mut bodies = Vec::new();
+        while let Some(row) = rows.next()? {
+            bodies.extend(body(row)?);
+        }
+        Ok(bodies)
+    }
+
     /// How often a hook has been tried with this key, level and state, over restarts too.
     ///
     /// # Errors
@@ -261,16 +315,41 @@ impl Store {
         given.map(timestamp).transpose()
     }
 
-    /// Has what was given up, or closed, wait again, as if it had never been tried; says how many deliveries that are. The daemon
-    /// takes them at its next start, or when it takes its config again.
+    /// Has what was given up, or closed, wait again, as if it had never been tried, but for alerts that `is_over` by their
+    /// bodies. Says how many deliveries wait again and how many were left out. The daemon takes them at its next start, or
+    /// when it takes its config again.
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn redeliver(&self) -> Result<usize, StoreError> {
-        let again = "UPDATE outbox SET status = ?1, attempts = 0, sum = ?2
-                     WHERE status IN ('dead', 'closed')";
+    pub fn redeliver(&self, is_over: &dyn Fn(&[u8]) -> bool) -> Result<(usize, usize), StoreError> {
+        let mut inner = self.inner();
+        let transaction = inner.connection.transaction()?;
+        let (mut again, mut left_out) = (Vec::new(), 0);
+        {
+            let mut query = transaction.prepare(
+                "SELECT id, key, level, state, hook, time, body FROM outbox
+                 WHERE status IN ('dead', 'closed') ORDER BY id",
+            )?;
+            let mut rows = query.query([])?;
+            while let Some(row) = rows.next()? {
+                let id: i64 = row.get(0)?;
+                if body(row)?.is_some_and(|body| is_over(&body)) {
+                    left_out += 1;
+                } else {
+                    again.push(id);
+                }
+            }
+        }
         let sum = standing_sum(WAITING, 0);
-        Ok((self.inner().connection).execute(again, params![WAITING, sum])?)
+        for id in &again {
+            transaction
+                .prepare_cached(
+                    "UPDATE outbox SET status = ?2, attempts = 0, sum = ?3 WHERE id = ?1",
+                )?
+                .execute(params![id, WAITING, sum])?;
+        }
+        transaction.commit()?;
+        Ok((again.len(), left_out))
     }
 
     /// Notes what became of deliveries; with those that were not noted before.
@@ -384,9 +463,13 @@ impl Inner {
         for (delivery, fate) in outcomes {
             delivery.insert(&transaction, WAITING)?;
             let standing = DeliveryState::of(&transaction, delivery)?;
-            let is_done = |row: &DeliveryState| {
-                row.status == DeliveryOutcome::Delivered.name()
-                    || row.status == DeliveryOutcome::Acknowledged.name()
+            // An attempt that was under way while somebody acknowledged it may still have gone well.
+            let is_done = |row: &DeliveryState| match DeliveryOutcome::named(&row.status) {
+                Some(DeliveryOutcome::Delivered) => true,
+                Some(DeliveryOutcome::Acknowledged | DeliveryOutcome::Silenced) => {
+                    *fate != DeliveryOutcome::Delivered
+                }
+                _ => false,
             };
             if let Some(row) = standing.filter(|row| !is_done(row)) {
                 row.becomes(&transaction, *fate, row.attempts + fate.attempt())?;

@@ -110,7 +110,7 @@ fn thin_outbox(connection: &Connection, before: i64) -> Result<bool, StoreError>
         "DELETE FROM outbox WHERE id IN (
              SELECT id FROM outbox AS own WHERE time < ?1
              AND EXISTS (SELECT 1 FROM outbox WHERE key = own.key AND state = 'resolved' AND time < ?1)
-             AND NOT EXISTS (SELECT 1 FROM outbox WHERE key = own.key AND status NOT IN ('delivered', 'over', 'closed', 'acknowledged'))
+             AND NOT EXISTS (SELECT 1 FROM outbox WHERE key = own.key AND status NOT IN ('delivered', 'over', 'closed', 'acknowledged', 'silenced'))
              LIMIT ?2)",
         [before, PIECE],
     )?;

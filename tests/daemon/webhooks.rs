@@ -701,3 +701,53 @@ async fn heartbeats_come_for_as_long_as_the_site_is_watched_and_no_longer() {
     drop(daemon);
     assert_eq!(taking.got().len(), before);
 }
+
+/// A row of a file of velocities, mm/day.
+fn row(now: jiff::Timestamp, velocity: f64) -> String {
+    format!("{now},{velocity}\n")
+}
+
+/// By the labels that it began with.
+#[tokio::test(flavor = "multi_thread")]
+async fn alertmanager_gets_the_end_of_an_orange_that_a_red_supersedes() {
+    let receiver = Receiver::answering(&[200]);
+    let folder = tempfile::tempdir().unwrap();
+    let site = text(&format!(
+        "[alert]\nevacuation_time = \"3h\"\n\
+         [[alert.threshold]]\nlevel = \"orange\"\nvelocity = \"20 mm/day\"\n\
+         [[alert.threshold]]\nlevel = \"red\"\nvelocity = \"50 mm/day\"\n\
+         [[webhook]]\nurl = \"{}\"\nformat = \"alertmanager\"\nlevels = [\"orange\", \"red\"]\n",
+        receiver.url
+    ));
+    std::fs::write(folder.path().join("site.toml"), site).unwrap();
+    let now = slipwatch::runtime::clock::now();
+    let mut csv = "time,5_velocity_mm_per_day\n".to_owned();
+    for minutes in [55, 45, 35, 25, 15] {
+        csv += &row(now - jiff::SignedDuration::from_mins(minutes), 1.0);
+    }
+    let file = folder.path().join("slope.csv");
+    std::fs::write(&file, &csv).unwrap();
+    let _daemon = Watching::over(folder.path());
+    let log = || std::fs::read_to_string(folder.path().join("log")).unwrap();
+    eventually("the past", || log().contains("caught up")).await;
+    let append = |text: &str| {
+        let file = std::fs::File::options().append(true).open(&file);
+        file.unwrap().write_all(text.as_bytes()).unwrap();
+    };
+    append(&row(now - jiff::SignedDuration::from_mins(5), 30.0));
+    eventually("the orange", || receiver.got().len() == 1).await;
+    append(&row(now, 80.0));
+    eventually("the red", || receiver.got().len() == 2).await;
+    let body = |number: usize| -> Vec<serde_json::Value> {
+        serde_json::from_str(&receiver.got()[number].body).unwrap()
+    };
+    let (orange, red) = (body(0), body(1));
+    assert_eq!((orange.len(), red.len()), (1, 2), "{red:?}");
+    assert_eq!(red[0]["labels"]["level"], "red");
+    assert_eq!(red[1]["labels"], orange[0]["labels"]);
+    let time =
+        |value: &serde_json::Value| -> jiff::Timestamp { value.as_str().unwrap().parse().unwrap() };
+    assert!(time(&red[0]["endsAt"]) > now, "{red:?}");
+    assert_eq!(time(&red[1]["endsAt"]), time(&red[0]["startsAt"]));
+    assert_eq!(red[1]["startsAt"], orange[0]["startsAt"]);
+}

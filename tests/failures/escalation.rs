@@ -145,7 +145,7 @@ fn a_silence_that_covers_an_alert_calls_its_escalation_off_and_one_elsewhere_doe
     assert_eq!(standing(&site), ("waiting".to_owned(), 0));
     silence(&[]);
     eventually("that it is called off", || {
-        standing(&site) == ("acknowledged".to_owned(), 0)
+        standing(&site) == ("silenced".to_owned(), 0)
     });
     program.stop();
 }

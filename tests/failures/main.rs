@@ -26,7 +26,7 @@
 //! | 24 | the host's clock, one wrong time stamp, a clock that was never set | `time`; src/runtime/site/timekeeper.rs |
 //! | 25 | sensors that are stuck, spoilt, or give another quantity | `sensors`; src/monitor/suspect.rs |
 //! | 26 | files, messages and brokers that give nothing | `feeds`; tests/daemon/mqtt.rs |
-//! | 27 | backlogs, corrections, silences, slow hooks, hooks of the site | `telling`; tests/daemon/hooks.rs |
+//! | 27 | backlogs, corrections, silences, slow hooks, hooks of the site | `telling`, `reach`; tests/daemon/hooks.rs |
 //! | 28 | what an operator is to see: what never read, restarts, a state that is gone, forged names | `view` |
 //! | 29 | much of it at once, for ten thousand hours | tests/hostile_hours |
 //! | 30 | a first start on history; a row and its correction, read again | `past`; tests/library/first_start.rs |
@@ -68,6 +68,7 @@ mod machine;
 mod model;
 mod orders;
 mod past;
+mod reach;
 mod record;
 mod recorded;
 mod reread;

@@ -10,17 +10,21 @@ use super::state::SiteArgs;
 use super::text;
 use crate::alert::Level;
 use crate::config::{Config, EXERCISE, value};
-use crate::monitor::{Given, Order, OrderedBy};
+use crate::monitor::{EventKind, Given, Order, OrderedBy};
 use crate::reading::BenchmarkId;
 use crate::runtime::alarm_state::Alarms;
 use crate::runtime::clock;
-use crate::runtime::standing::{acknowledged, closed, in_force, orders, silences};
+use crate::runtime::hook::{Alert, MessageState};
+use crate::runtime::standing::{
+    acknowledged, closed, in_force, orders, silence_of_the_site, silences,
+};
 use crate::store::Store;
 use anyhow::Context;
 use clap::Subcommand;
 use jiff::SignedDuration;
 use schemars::JsonSchema;
 use serde::Serialize;
+use std::collections::BTreeSet;
 use std::io::Write;
 
 /// List the alerts in force, acknowledge or end them, or have no hook run for a time
@@ -161,6 +165,13 @@ pub(super) fn run(args: &AlertsArgs) -> anyhow::Result<()> {
     {
         anyhow::bail!("benchmark {benchmark} has given no readings yet");
     }
+    if let Some(silence) = silence_of_the_site(&store, &order, clock::now())? {
+        let silence = text::line(&silence, &config.site.time_zone);
+        anyhow::bail!(
+            "the whole site is silenced, which unsilence without --benchmark ends: {}",
+            silence.trim()
+        );
+    }
     if !is_of_a_drill && config.drill.is_none() {
         needs_an_alert(&store, &order)?;
     }
@@ -300,14 +311,46 @@ fn limit(span: SignedDuration, longest: SignedDuration) -> anyhow::Result<()> {
 pub(super) struct Redelivered {
     /// Deliveries that wait again.
     deliveries: usize,
+    /// Deliveries that do not: of the beginning of alerts that are over.
+    left_out: usize,
+}
+
+/// Whether this is the beginning of an alert that is not in force any more, by the keys of those that are.
+fn is_over(body: &[u8], in_force: &BTreeSet<String>) -> bool {
+    let Ok(alert) = rmp_serde::from_slice::<Alert>(body) else {
+        return false;
+    };
+    let stands = match &alert.many {
+        Some(many) => (many.members.iter()).any(|one| in_force.contains(&one.key)),
+        // One of an older version does not say what it reports.
+        None => alert.is_flood() || in_force.contains(&alert.key),
+    };
+    alert.state == MessageState::Firing && !stands
 }
 
 fn redeliver(site: &SiteArgs) -> anyhow::Result<()> {
     let (_, store) = site.open()?;
-    let deliveries = store.redeliver()?;
-    site.output.print(&Redelivered { deliveries }, |again| {
+    let in_force = in_force(&store, None)?;
+    let keys = (in_force.values()).filter_map(|event| {
+        if let EventKind::Alert { key, .. } = &event.kind {
+            Some(key.clone())
+        } else {
+            None
+        }
+    });
+    let keys: BTreeSet<String> = keys.collect();
+    let (deliveries, left_out) = store.redeliver(&|body| is_over(body, &keys))?;
+    let again = Redelivered {
+        deliveries,
+        left_out,
+    };
+    site.output.print(&again, |again| {
+        let left_out = match again.left_out {
+            0 => String::new(),
+            count => format!("{count} are left out: their alerts are over\n"),
+        };
         format!(
-            "{} deliveries wait again; the daemon makes them at its next start or reload\n",
+            "{} deliveries wait again; the daemon makes them at its next start or reload\n{left_out}",
             again.deliveries
         )
     })

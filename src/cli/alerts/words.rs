@@ -167,7 +167,9 @@ fn deliveries(rows: &[DeliveryRow]) -> String {
     for row in rows {
         let meaning = match row.status.as_str() {
             "waiting" if row.attempts == 0 => "has not been run yet",
-            "acknowledged" => "was not run: somebody acknowledged it in time",
+            "acknowledged" if row.attempts == 0 => "was not run: somebody acknowledged it in time",
+            "acknowledged" => "did not take it and is not tried again: somebody acknowledged it",
+            "silenced" => "was not run: it was silenced or shelved before it was due",
             "waiting" => "is still tried",
             "delivered" => "has taken it",
             "over" => "did not get it: it was over, superseded or reported together with others",

@@ -14,9 +14,12 @@ pub use runner::{Processes, Run, Runner, run};
 use super::delivered::Delivered;
 use super::hook::{Alert, MessageState};
 use super::in_hand::InHand;
+use crate::alert::Level;
 use crate::config::HookConfig;
 use crate::monitor::EventKind;
+use crate::reading::BenchmarkId;
 use crate::store::DeliveryOutcome;
+use std::collections::BTreeSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -73,6 +76,35 @@ struct HookQueue {
     in_hand: Arc<Mutex<InHand>>,
 }
 
+/// What one hook is to receive.
+#[derive(Debug)]
+pub(super) struct HookShare {
+    /// Which hook it is, counted from 0.
+    pub(super) place: usize,
+    /// Its name.
+    pub(super) name: String,
+    /// The benchmarks that it asks for; empty: all.
+    pub(super) audience: BTreeSet<BenchmarkId>,
+    /// What it receives.
+    pub(super) alerts: Vec<Alert>,
+    /// Ends that one of those reports, or whose beginning the hook did not receive.
+    pub(super) reported: Vec<Alert>,
+}
+
+/// Without the ends that the end of a flood reports, and these.
+fn without_reported(alerts: Vec<Alert>) -> (Vec<Alert>, Vec<Alert>) {
+    let ends = alerts
+        .iter()
+        .filter(|alert| alert.state == MessageState::Resolved);
+    let members = ends.filter_map(|end| end.many.as_ref());
+    let keys: BTreeSet<String> = members
+        .flat_map(|many| many.members.iter().map(|one| one.key.clone()))
+        .collect();
+    alerts
+        .into_iter()
+        .partition(|alert| alert.state != MessageState::Resolved || !keys.contains(&alert.key))
+}
+
 /// The way to all hooks.
 #[derive(Debug)]
 pub struct Dispatcher {
@@ -122,14 +154,96 @@ impl Dispatcher {
     /// have it in hand. Never waits: what finds a queue full is not taken in hand, and said to be;
     /// `false` then.
     pub fn offer(&self, alert: &Alert) -> bool {
+        self.offer_where(alert, false, &|_| true)
+    }
+
+    /// The same for those hooks that are `meant`; no attempt is made while `is_muted`, until [`Dispatcher::mute`] says
+    /// otherwise.
+    pub(super) fn offer_where(
+        &self,
+        alert: &Alert,
+        is_muted: bool,
+        meant: &dyn Fn(&HookConfig) -> bool,
+    ) -> bool {
         self.supersede(alert);
         let mut is_taken = true;
         for way in &self.hooks {
-            if way.hook.asks_for(alert) {
-                is_taken &= self.offer_to(way, alert);
+            if way.hook.asks_for(alert) && meant(&way.hook) {
+                is_taken &= self.offer_to(way, alert, is_muted);
             }
         }
         is_taken
+    }
+
+    /// Hands these alerts to the hook of a [`HookShare`].
+    pub(super) fn offer_share(&self, place: usize, alerts: &[Alert]) {
+        let Some(way) = self.hooks.get(place) else {
+            return;
+        };
+        for alert in alerts {
+            locked(&way.in_hand).supersede(alert);
+            self.offer_to(way, alert, false);
+        }
+    }
+
+    /// What each hook is to receive of `alerts`.
+    pub(super) fn shares(&self, alerts: &[Alert]) -> Vec<HookShare> {
+        let each = self.hooks.iter().enumerate();
+        each.map(|(place, way)| {
+            let (mut own, mut unreported) = (Vec::new(), Vec::new());
+            for alert in alerts {
+                if let Some(share) = self.share(way, alert) {
+                    own.push(share);
+                } else if way.hook.asks_for(alert) {
+                    unreported.push(alert.clone());
+                }
+            }
+            let (alerts, mut reported) = without_reported(own);
+            reported.append(&mut unreported);
+            HookShare {
+                place,
+                name: way.hook.name(),
+                audience: way.hook.benchmarks.clone(),
+                alerts,
+                reported,
+            }
+        })
+        .collect()
+    }
+
+    /// What a hook is to receive where `alert` has come. An end goes to those who received the beginning: where that was one of
+    /// a lower level, by its own key. Where neither was sent because it waited, or was called off, the end is not either.
+    fn share(&self, way: &HookQueue, alert: &Alert) -> Option<Alert> {
+        let asks = way.hook.asks_for(alert);
+        if alert.state != MessageState::Resolved {
+            return asks.then(|| alert.clone());
+        }
+        let is_its_own = asks && (!alert.is_flood() || way.hook.is_audience_of(alert));
+        if is_its_own && self.has_received(way, &alert.beginning()) {
+            return Some(alert.clone());
+        }
+        let ends = alert.earlier.iter().rev().filter(|_| !alert.is_flood());
+        let ends = ends.map(|one| alert.end_of(one.benchmark.as_ref(), one.level, &one.key));
+        let mut received =
+            ends.filter(|end| way.hook.asks_for(end) && self.has_received(way, &end.beginning()));
+        received.next().or_else(|| {
+            let is_due = is_its_own && !self.is_unsent(way, &alert.beginning());
+            is_due.then(|| alert.clone())
+        })
+    }
+
+    /// Whether this one, which the hook has not been run for, waited or was called off.
+    fn is_unsent(&self, way: &HookQueue, alert: &Alert) -> bool {
+        let delivered = locked(&self.delivered);
+        way.hook.may_wait() || delivered.is_called_off(alert, &way.hook.name())
+    }
+
+    /// Whether a hook has been run for this alert, whatever came of it.
+    fn has_received(&self, way: &HookQueue, alert: &Alert) -> bool {
+        let name = way.hook.name();
+        let was_tried = locked(&way.in_hand).was_tried(alert);
+        let delivered = locked(&self.delivered);
+        was_tried || delivered.was_notified(alert, &name) || delivered.attempts(alert, &name) > 0
     }
 
     /// The names of the hooks that ask for such an alert.
@@ -142,7 +256,7 @@ impl Dispatcher {
             .collect()
     }
 
-    /// Makes the receipts durable that found no room on the disk before.
+    /// Makes the receipts durable that are not yet, as those that found no room on the disk before.
     pub fn commit(&self) {
         if let Err(error) = locked(&self.delivered).commit() {
             tracing::warn!(%error, "receipts lost: a restart may send their alerts again");
@@ -156,18 +270,24 @@ impl Dispatcher {
         }
     }
 
-    /// Somebody has seen `alert`: it is not tried again, and where it waits for its escalation or for somebody on duty it is not sent.
+    /// Somebody has seen `alert`: no hook that has not taken it is tried, or tried again; from the next [`Dispatcher::commit`] on
+    /// also after a restart.
     pub fn end(&self, alert: &Alert) {
         for way in &self.hooks {
             locked(&way.in_hand).end(alert);
-            self.call_off(way, alert);
+            if way.hook.asks_for(alert) {
+                self.call_off(way, alert, DeliveryOutcome::Acknowledged);
+            }
         }
     }
 
-    /// Somebody sees to `alert`: where it waits for its escalation or for somebody on duty it is not sent.
+    /// Somebody sees to `alert`: where it waits for its escalation it is not sent; [`Dispatcher::commit`] as above.
     pub fn spare(&self, alert: &Alert) {
-        for way in self.hooks.iter().filter(|way| way.hook.may_wait()) {
-            self.call_off(way, alert);
+        for way in &self.hooks {
+            let is_escalation = way.hook.escalate_after.is_some() && way.hook.asks_for(alert);
+            if is_escalation && !self.has_received(way, alert) {
+                self.call_off(way, alert, DeliveryOutcome::Silenced);
+            }
         }
     }
 
@@ -175,41 +295,70 @@ impl Dispatcher {
     pub fn end_those_of_many(&self) {
         for way in &self.hooks {
             let of_many = locked(&way.in_hand).of_many();
-            for alert in &of_many {
+            for alert in (of_many.iter()).filter(|alert| alert.state != MessageState::Resolved) {
                 locked(&way.in_hand).end(alert);
-                self.call_off(way, alert);
+                self.call_off(way, alert, DeliveryOutcome::Acknowledged);
             }
         }
     }
 
-    /// Notes durably that an alert that may wait is not sent, where that has not begun.
-    fn call_off(&self, way: &HookQueue, alert: &Alert) {
+    /// Nobody is notified, for now, of what is muted by its place and level; of everything else they are.
+    pub(super) fn mute(&self, is_muted: &dyn Fn(Option<&BenchmarkId>, Level) -> bool) {
+        for way in &self.hooks {
+            locked(&way.in_hand).mute(is_muted);
+        }
+    }
+
+    /// What `alert` reports is over: it is not tried any more.
+    pub(super) fn is_over(&self, alert: &Alert) {
+        for way in &self.hooks {
+            locked(&way.in_hand).end(alert);
+        }
+    }
+
+    /// What waited for these hooks, and is over by now, is not sent to them.
+    pub(super) fn leave_out(&self, alert: &Alert, hooks: &[String]) {
+        for name in hooks {
+            let key = &alert.key;
+            tracing::info!(hook = name, key, "over before it was reported");
+            if let Err(error) = locked(&self.delivered).note(alert, name, DeliveryOutcome::Over) {
+                tracing::warn!(hook = name, key, %error, "no receipt: a restart looks at it again");
+            }
+        }
+    }
+
+    /// Notes that a hook is not to be tried, or tried again, with an alert that it has not taken: durable from the next
+    /// [`Dispatcher::commit`] on.
+    fn call_off(&self, way: &HookQueue, alert: &Alert, fate: DeliveryOutcome) {
         let name = way.hook.name();
         let mut in_hand = locked(&way.in_hand);
-        if !way.hook.may_wait() || !way.hook.asks_for(alert) || in_hand.was_tried(alert) {
-            return;
-        }
         let mut delivered = locked(&self.delivered);
-        if delivered.has(alert, &name) || delivered.attempts(alert, &name) > 0 {
+        if delivered.has(alert, &name) {
             return;
         }
         in_hand.end(alert);
         let key = &alert.key;
-        tracing::info!(hook = name, key, "acknowledged in time: not sent");
-        if let Err(error) = delivered.note(alert, &name, DeliveryOutcome::Acknowledged) {
+        tracing::info!(hook = name, key, ?fate, "not sent, or not tried again");
+        if let Err(error) = delivered.put_down(alert, &name, fate) {
             tracing::warn!(hook = name, key, %error, "no receipt: a restart may send it");
         }
     }
 
-    /// Whether this is the end of what waited and was never reported: neither of them is then.
+    /// Whether this is the end of what was called off, or waited, and was never reported: neither of them is then.
     fn ends_unreported(&self, way: &HookQueue, in_hand: &mut InHand, alert: &Alert) -> bool {
-        if !way.hook.may_wait() || alert.state != MessageState::Resolved {
+        // Of what ends together only what was reported is named.
+        if alert.state != MessageState::Resolved || alert.is_flood() {
             return false;
         }
-        let (name, mut firing) = (way.hook.name(), alert.clone());
-        firing.state = MessageState::Firing;
+        let (name, firing) = (way.hook.name(), alert.beginning());
         let mut delivered = locked(&self.delivered);
-        if delivered.was_notified(&firing, &name) || in_hand.was_tried(&firing) {
+        if !way.hook.may_wait() && !delivered.is_called_off(&firing, &name) {
+            return false;
+        }
+        if delivered.was_notified(&firing, &name)
+            || in_hand.was_tried(&firing)
+            || delivered.attempts(&firing, &name) > 0
+        {
             return false;
         }
         in_hand.end(&firing);
@@ -222,7 +371,7 @@ impl Dispatcher {
         true
     }
 
-    fn offer_to(&self, way: &HookQueue, alert: &Alert) -> bool {
+    fn offer_to(&self, way: &HookQueue, alert: &Alert, is_muted: bool) -> bool {
         let (name, key) = (way.hook.name(), &alert.key);
         // In hand first: a worker notes the receipt before it lets go.
         let mut in_hand = locked(&way.in_hand);
@@ -236,7 +385,7 @@ impl Dispatcher {
             }
             return true;
         }
-        if !in_hand.take(alert) {
+        if !in_hand.take(alert, is_muted) {
             return true;
         }
         if locked(&self.delivered).has(alert, &name) {
@@ -287,14 +436,24 @@ impl HookConfig {
         self.escalate_after.is_some() || self.hours.is_some()
     }
 
+    /// Whether a message of many benchmarks was made for hooks that ask for the same ones.
+    pub(super) fn is_audience_of(&self, alert: &Alert) -> bool {
+        let many = alert.many.as_ref();
+        many.is_none_or(|many| many.audience == self.benchmarks)
+    }
+
     /// Whether it is notified of an alert of this level, at a benchmark or the whole site. What reports many benchmarks
-    /// at once stands for theirs; that the clock is wrong concerns everyone. Of a correction it is where it asks for these
+    /// at once stands for theirs, each of which it is to ask for; that the clock is wrong concerns everyone. Of a correction it is where it asks for these
     /// and for the level that was in force or the one that would have been.
     fn asks_for(&self, alert: &Alert) -> bool {
         let is_of_the_site = alert.event.benchmark.is_none() && !alert.is_flood();
         let is_ours = self.site == is_of_the_site || alert.is_of_the_clock();
-        let is_of_ours = (alert.event.benchmark.as_ref())
-            .is_none_or(|one| self.benchmarks.is_empty() || self.benchmarks.contains(one));
+        let is_mine = |place: Option<&BenchmarkId>| {
+            self.benchmarks.is_empty() || place.is_none_or(|one| self.benchmarks.contains(one))
+        };
+        let is_of_ours = is_mine(alert.event.benchmark.as_ref())
+            && (alert.many.iter().flat_map(|many| &many.members))
+                .all(|one| is_mine(one.benchmark.as_ref()));
         let is_of_our_levels = if let EventKind::Correction {
             level_then,
             level_now,

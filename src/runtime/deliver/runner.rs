@@ -56,7 +56,7 @@ pub async fn run(hook: &HookConfig, alert: &Alert, attempt: u32) -> HookOutcome 
     };
     let body = match to.format {
         WebhookFormat::Slipwatch => alert.body(attempt, link.as_deref()),
-        WebhookFormat::Alertmanager => alertmanager::body(alert, link.as_deref()),
+        WebhookFormat::Alertmanager => alertmanager::body(alert, &hook.levels, link.as_deref()),
     };
     let outcome = match body {
         Ok(body) => webhook::send(to, alert, body, hook.timeout).await,

@@ -3,7 +3,7 @@
 use super::{QUEUE, Retry, Runner, locked};
 use crate::alert::Level;
 use crate::config::HookConfig;
-use crate::reading::BenchmarkId;
+use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::clock;
 use crate::runtime::delivered::Delivered;
 use crate::runtime::hook::{Alert, HookOutcome, MessageState};
@@ -18,6 +18,12 @@ use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
 use tokio::time::Instant;
 
+/// So long at most until what waits for its escalation or for somebody on duty is looked at again: the host's clock may be
+/// corrected meanwhile.
+const LOOK_AGAIN: Duration = Duration::from_secs(30);
+/// The same of what is silenced or shelved, which people may end.
+const LOOK_AGAIN_MUTED: Duration = Duration::from_secs(1);
+
 /// Runs of one hook at a time, each for another benchmark.
 const MOST_AT_ONCE: usize = 4;
 
@@ -28,7 +34,9 @@ struct Waiting {
     attempt: u32,
     /// Not tried since the start.
     is_new: bool,
-    /// It waits for an acknowledgement, or for somebody on duty: until it is due it is not sent on the way out either.
+    /// An escalation: from when on it does not wait for an acknowledgement any more, and when it was noted.
+    escalation: Option<(Instant, Option<Timestamp>)>,
+    /// It waits for an acknowledgement, for somebody on duty or for the end of a silence: it is not sent on the way out either.
     is_held: bool,
 }
 
@@ -139,10 +147,11 @@ impl Worker {
     /// Starts the most severe alert that is due; on the way out everything is.
     fn start_next(&mut self, open: bool) -> bool {
         self.drop_what_is_over(open);
+        self.hold_back(open);
         let now = clock::later(Duration::ZERO);
         let due = self.waiting.iter();
         let due = due.take_while(|((due, _), _)| !open || *due <= now);
-        let due = due.filter(|((due, _), waiting)| !waiting.is_held || *due <= now);
+        let due = due.filter(|(_, waiting)| !waiting.is_held);
         let free = due.filter(|(_, waiting)| self.is_free(waiting));
         let next = free.max_by_key(|((due, number), waiting)| {
             (gravity(&waiting.alert), std::cmp::Reverse((*due, *number)))
@@ -161,13 +170,41 @@ impl Worker {
         true
     }
 
+    /// Of what is due: what waits for its escalation, for somebody on duty or for the end of a silence waits on.
+    fn hold_back(&mut self, open: bool) {
+        let now = clock::later(Duration::ZERO);
+        let off_duty = self.duty_wait();
+        let in_hand = locked(&self.in_hand);
+        let due = (self.waiting.iter_mut()).take_while(|((due, _), _)| !open || *due <= now);
+        let mut later = Vec::new();
+        for (turn, waiting) in due {
+            let wait = self
+                .hook
+                .unacknowledged_wait(waiting.escalation, now)
+                .max(off_duty);
+            let wait = if in_hand.is_muted(&waiting.alert) {
+                LOOK_AGAIN_MUTED
+            } else {
+                wait.min(LOOK_AGAIN)
+            };
+            waiting.is_held = wait > Duration::ZERO;
+            if waiting.is_held {
+                later.push((*turn, now + wait));
+            }
+        }
+        drop(in_hand);
+        for (turn, due) in later {
+            if let Some(waiting) = self.waiting.remove(&turn) {
+                self.waiting.insert((due, turn.1), waiting);
+            }
+        }
+    }
+
     /// What was superseded or resolved while it waited, as far as it is due.
     fn drop_what_is_over(&mut self, open: bool) {
         let now = clock::later(Duration::ZERO);
         let due = self.waiting.iter();
         // An escalation that is called off does not wait for its time, nor what is over for somebody on duty.
-        let looks_ahead = !open || self.hook.may_wait();
-        let due = due.take_while(|((due, _), _)| looks_ahead || *due <= now);
         let due = due.filter(|((due, _), waiting)| !open || waiting.is_held || *due <= now);
         let over = due.filter(|(_, waiting)| self.is_over(&waiting.alert));
         let over: Vec<Turn> = over.map(|(turn, _)| *turn).collect();
@@ -210,6 +247,7 @@ impl Worker {
                 alert: waiting.alert.clone(),
                 attempt: attempt.saturating_add(1),
                 is_new: false,
+                escalation: None,
                 is_held: false,
             };
             self.wait(again, clock::later(delay));
@@ -246,39 +284,39 @@ impl Worker {
 
     fn drop_over(&mut self, alert: &Alert) {
         let (hook, key) = (self.hook.name(), &alert.key);
-        tracing::error!(hook, key, "alert not delivered before it was over");
-        self.lost += 1;
+        let is_called_off = locked(&self.delivered).is_called_off(alert, &hook);
+        if is_called_off {
+            tracing::info!(hook, key, "not tried again: people see to it");
+        } else {
+            tracing::error!(hook, key, "alert not delivered before it was over");
+            self.lost += 1;
+        }
         self.let_go(alert, DeliveryOutcome::Over);
     }
 
     fn begin(&mut self, alert: Alert) {
         let before = locked(&self.delivered).attempts(&alert, &self.hook.name());
-        let held = if before == 0 {
-            self.unacknowledged_wait(&alert).max(self.duty_wait())
-        } else {
-            Duration::ZERO
-        };
+        let escalation = (before == 0).then(|| self.escalation(&alert)).flatten();
         let waiting = Waiting {
             alert,
             attempt: before.saturating_add(1),
             is_new: true,
-            is_held: held > Duration::ZERO,
+            escalation,
+            is_held: false,
         };
-        self.wait(waiting, clock::later(held));
+        self.wait(waiting, clock::later(Duration::ZERO));
     }
 
-    /// How long an escalation still waits for an acknowledgement. It is counted from when the alert came into the outbox, by
-    /// the host's clock: a restart neither loses nor renews the time. Whatever that clock does, it is never longer than
-    /// the whole.
-    fn unacknowledged_wait(&self, alert: &Alert) -> Duration {
-        let (Some(after), MessageState::Firing) = (self.hook.escalate_after, alert.state) else {
-            return Duration::ZERO;
-        };
+    /// Until when an escalation waits for an acknowledgement, and when it was noted. The time is counted from when the alert came
+    /// into the outbox, by the host's clock: a restart neither loses nor renews it. Whatever that clock does, it is never
+    /// longer than the whole.
+    fn escalation(&self, alert: &Alert) -> Option<(Instant, Option<Timestamp>)> {
+        if alert.state != MessageState::Firing {
+            return None;
+        }
+        let after = self.hook.escalate_after?;
         let noted = locked(&self.delivered).noted(alert, &self.hook.name());
-        let gone = noted.map(|noted| clock::now().duration_since(noted));
-        // Before the beginning there is only a clock that was set back.
-        let gone = gone.and_then(|gone| Duration::try_from(gone).ok());
-        after.saturating_sub(gone.unwrap_or(Duration::ZERO))
+        Some((clock::later(after), noted))
     }
 
     /// How long nobody behind the hook is on duty yet.
@@ -291,6 +329,24 @@ impl Worker {
         self.taken += 1;
         self.untried += usize::from(waiting.is_new);
         self.waiting.insert((due, self.taken), waiting);
+    }
+}
+
+impl HookConfig {
+    /// How long an escalation still waits for an acknowledgement at `now`.
+    fn unacknowledged_wait(
+        &self,
+        escalation: Option<(Instant, Option<Timestamp>)>,
+        now: Instant,
+    ) -> Duration {
+        let (Some(after), Some((latest, noted))) = (self.escalate_after, escalation) else {
+            return Duration::ZERO;
+        };
+        let gone = noted.map(|noted| clock::now().duration_since(noted));
+        // Before the beginning there is only a clock that was set back.
+        let gone = gone.and_then(|gone| Duration::try_from(gone).ok());
+        let left = after.saturating_sub(gone.unwrap_or(Duration::ZERO));
+        left.min(latest.saturating_duration_since(now))
     }
 }
 

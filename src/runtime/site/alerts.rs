@@ -1,13 +1,17 @@
 //! The commit: what has happened is made durable, then the hooks are notified.
 
 use super::flood::OutgoingAlerts;
-use super::{AlertInForce, BEFORE_ALL, LEAST_FRESHNESS, LEAST_WATCHED, MOST_UNWRITTEN, Site};
+use super::{
+    AlertInForce, Attention, BEFORE_ALL, LEAST_FRESHNESS, LEAST_WATCHED, MOST_UNWRITTEN, Site,
+};
 use crate::alert::{Level, Policy};
+use crate::config::HookConfig;
 use crate::monitor::Event;
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::deliver::Dispatcher;
 use crate::runtime::delivered::delivery;
 use crate::runtime::hook::{Alert, MessageState};
+use crate::runtime::many::EarlierLevel;
 use crate::store::StoreError;
 use jiff::SignedDuration;
 
@@ -34,6 +38,7 @@ impl Site {
                 alert.event.time = now;
             }
             self.date_end(&mut alert);
+            self.follow_on(&mut alert);
             let is_fresh =
                 age <= self.freshness(alert.event.benchmark.as_ref()) || self.never_read(&alert);
             let is_due = is_fresh && !self.ends_untold(&alert) || self.is_waited_for(&alert);
@@ -57,56 +62,58 @@ impl Site {
             }
             self.stand(alert, is_sent);
         }
+        for end in self.ended_floods(now) {
+            if self.is_muted(&end, now) {
+                self.put_off(&end);
+            } else {
+                to_send.push(end);
+            }
+        }
+        self.mute_what_is_in_hand(now);
         self.record_and_send(&to_send)
     }
 
     fn record_and_send(&mut self, alerts: &[Alert]) -> Result<(), StoreError> {
-        let OutgoingAlerts {
-            sent,
-            reported_together,
-        } = OutgoingAlerts::of(alerts);
-        for alert in &sent {
-            self.note(alert)?;
-        }
-        for alert in &reported_together {
-            self.note_reported_together(alert)?;
+        let shares = self.sinks.alerts.as_ref();
+        let shares = shares.map_or_else(Vec::new, |dispatcher| dispatcher.shares(alerts));
+        let mut to_offer = Vec::new();
+        for share in shares {
+            let OutgoingAlerts {
+                sent,
+                reported_together,
+            } = OutgoingAlerts::of(&share.alerts, &share.audience);
+            for alert in &sent {
+                self.stand_for_many(alert);
+                if self.sinks.store.is_some() {
+                    self.batch.deliver(delivery(alert, &share.name)?);
+                }
+            }
+            for alert in reported_together.iter().chain(&share.reported) {
+                self.note_reported_together(alert, &share.name)?;
+            }
+            to_offer.push((share.place, sent));
         }
         let recorded = self.record();
-        for alert in &sent {
-            self.send(alert);
-        }
-        if let Some(alerts) = &self.sinks.alerts {
-            alerts.commit();
+        if let Some(dispatcher) = &self.sinks.alerts {
+            for alert in alerts {
+                dispatcher.supersede(alert);
+            }
+            for (place, sent) in to_offer {
+                dispatcher.offer_share(place, &sent);
+            }
+            dispatcher.commit();
         }
         recorded
     }
 
-    /// Puts an alert into the outbox, for each hook that asks for it.
-    fn note(&mut self, alert: &Alert) -> Result<(), StoreError> {
-        if self.sinks.store.is_some()
-            && let Some(dispatcher) = &self.sinks.alerts
-        {
-            for hook in dispatcher.asking(alert) {
-                self.batch.deliver(delivery(alert, &hook)?);
-            }
-        }
-        Ok(())
-    }
-
-    /// Notes that an alert of many benchmarks reports this one too.
-    fn note_reported_together(&mut self, alert: &Alert) -> Result<(), StoreError> {
+    /// Notes that an alert of many benchmarks reports this one to a hook too.
+    fn note_reported_together(&mut self, alert: &Alert, hook: &str) -> Result<(), StoreError> {
         let place = (alert.event.benchmark.clone(), alert.level == Level::Unknown);
         if let Some(standing) = self.standing.get_mut(&place) {
             standing.is_reported_together |= standing.alert.key == alert.key;
         }
-        let Some(dispatcher) = &self.sinks.alerts else {
-            return Ok(());
-        };
-        dispatcher.supersede(alert);
         if self.sinks.store.is_some() {
-            for hook in dispatcher.asking(alert) {
-                self.batch.tell_together(delivery(alert, &hook)?);
-            }
+            self.batch.tell_together(delivery(alert, hook)?);
         }
         Ok(())
     }
@@ -199,6 +206,7 @@ impl Site {
                     is_sent,
                     was_notified,
                     is_reported_together: false,
+                    attention: Attention::Awaited,
                 };
                 self.standing.insert(place, standing);
             }
@@ -236,6 +244,26 @@ impl Site {
             let called = had.alert.event.time;
             alert.called = Some(called);
             alert.event.time = alert.event.time.max(called);
+        }
+    }
+
+    /// Notes the lower levels that it follows on, or that end with it: who received one of these, and no higher one, receives
+    /// its end.
+    pub(super) fn follow_on(&self, alert: &mut Alert) {
+        let place = (alert.event.benchmark.clone(), alert.level == Level::Unknown);
+        let Some(AlertInForce { alert: had, .. }) = self.standing.get(&place) else {
+            return;
+        };
+        let follows = alert.state == MessageState::Firing && had.level < alert.level;
+        if follows || had.key == alert.key {
+            alert.earlier.clone_from(&had.earlier);
+        }
+        if follows {
+            alert.earlier.push(EarlierLevel {
+                benchmark: had.event.benchmark.clone(),
+                level: had.level,
+                key: had.key.clone(),
+            });
         }
     }
 
@@ -280,8 +308,15 @@ impl Site {
         for one in standing.values_mut() {
             if one.is_sent {
                 // Again: there may have been no room for it. The hooks that have it ignore it.
-                if one.alert.must_arrive() && !one.is_reported_together {
-                    self.send(&one.alert);
+                // Nor does one that was reported together go singly to those who received that.
+                if one.alert.must_arrive()
+                    && one.attention == Attention::Awaited
+                    && !self.is_muted(&one.alert, now)
+                {
+                    let together = one.is_reported_together;
+                    self.send_where(&one.alert, false, &|hook| {
+                        !together || !hook.benchmarks.is_empty()
+                    });
                 }
             } else if (self.never_read(&one.alert)
                 || self.is_watched(one.alert.event.benchmark.as_ref(), now))
@@ -297,6 +332,7 @@ impl Site {
             }
         }
         self.standing = standing;
+        self.offer_floods_again(now);
         if !to_send.is_empty() {
             self.record_and_send(&to_send)?;
         }
@@ -323,9 +359,15 @@ impl Site {
         newest.is_some_and(|newest| wall.duration_since(*newest) <= limit)
     }
 
-    pub(super) fn send(&self, alert: &Alert) {
+    /// Offers it to those of the hooks that are `meant`; they wait with it while it `is_muted`.
+    pub(super) fn send_where(
+        &self,
+        alert: &Alert,
+        is_muted: bool,
+        meant: &dyn Fn(&HookConfig) -> bool,
+    ) {
         if let Some(alerts) = &self.sinks.alerts {
-            alerts.offer(alert);
+            alerts.offer_where(alert, is_muted, meant);
         }
     }
 

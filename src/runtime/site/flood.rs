@@ -4,18 +4,21 @@
 
 use crate::alert::Level;
 use crate::monitor::{AlertState, Event, EventKind};
+use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::hook::{Alert, FLOOD, MessageState, state_name};
-use std::collections::BTreeMap;
+use crate::runtime::many::{FloodMember, ManyAlerts};
+use std::collections::{BTreeMap, BTreeSet};
+use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// Alerts of one level and state that go out singly in one commit.
 const MOST_AT_ONCE: usize = 10;
 /// Benchmarks that one message names.
 const NAMED: usize = 20;
 
-/// What becomes of the alerts of one commit.
+/// What becomes of the alerts of one commit that a hook is to receive.
 #[derive(Debug, Default)]
 pub(super) struct OutgoingAlerts {
-    /// The hooks are given these.
+    /// The hook is given these.
     pub(super) sent: Vec<Alert>,
     /// One of those reports these.
     pub(super) reported_together: Vec<Alert>,
@@ -23,11 +26,12 @@ pub(super) struct OutgoingAlerts {
 
 impl OutgoingAlerts {
     /// All of `alerts`, in their order, or of each level and state the first ten by forecast time of failure and one
-    /// that stands for the others.
-    pub(super) fn of(alerts: &[Alert]) -> Self {
+    /// that stands for the others. `audience`: the benchmarks that the hook asks for, none where it asks for all.
+    pub(super) fn of(alerts: &[Alert], audience: &BTreeSet<BenchmarkId>) -> Self {
         let mut outgoing = Self::default();
         let mut groups: BTreeMap<(Level, &str), Vec<&Alert>> = BTreeMap::new();
-        for alert in alerts {
+        // The end of a flood stands for many already.
+        for alert in alerts.iter().filter(|alert| !alert.is_flood()) {
             let group = (alert.level, state_name(alert.state));
             groups.entry(group).or_default().push(alert);
         }
@@ -35,13 +39,15 @@ impl OutgoingAlerts {
             alerts.clone_into(&mut outgoing.sent);
             return outgoing;
         }
+        let ends = alerts.iter().filter(|alert| alert.is_flood());
+        outgoing.sent.extend(ends.cloned());
         // The most severe level first.
         for mut group in groups.into_values().rev() {
             if group.len() > MOST_AT_ONCE + 1 {
                 group.sort_by_key(|alert| (alert.failure_time.is_none(), alert.failure_time));
                 let others = group.split_off(MOST_AT_ONCE);
                 outgoing.sent.extend(group.into_iter().cloned());
-                outgoing.sent.extend(together(&others));
+                outgoing.sent.extend(together(&others, audience));
                 outgoing
                     .reported_together
                     .extend(others.into_iter().cloned());
@@ -54,19 +60,23 @@ impl OutgoingAlerts {
 }
 
 /// The alert that stands for `others`, which are of one level and state; `None` where there are none.
-fn together(others: &[&Alert]) -> Option<Alert> {
+fn together(others: &[&Alert], audience: &BTreeSet<BenchmarkId>) -> Option<Alert> {
     let first = *others.first()?;
     let time = others.iter().map(|alert| alert.event.time).max()?;
-    let named: Vec<&str> = (others.iter().take(NAMED))
-        .filter_map(|alert| Some(alert.event.benchmark.as_ref()?.as_str()))
-        .collect();
-    let rest = match others.len().saturating_sub(named.len()) {
-        0 => String::new(),
-        rest => format!(" and {rest} more"),
+    let members = others.iter().map(|alert| FloodMember {
+        benchmark: alert.event.benchmark.clone(),
+        key: alert.key.clone(),
+    });
+    let many = ManyAlerts {
+        audience: audience.clone(),
+        members: members.collect(),
     };
-    let (count, level, named) = (others.len(), first.level, named.join(", "));
-    // That of the first is no other's.
-    let key = format!("{FLOOD}/{}", first.key);
+    let (count, level) = (others.len(), first.level);
+    let (named, rest) = names(&many.members);
+    // Hooks that ask for different benchmarks may have the same first one, not the same members.
+    let mut hasher = DefaultHasher::new();
+    (others.iter().map(|alert| &alert.key)).for_each(|key| key.hash(&mut hasher));
+    let key = format!("{FLOOD}/{:08x}/{}", hasher.finish() >> 32, first.key);
     let alert = |state: AlertState, what: &str| EventKind::Alert {
         level,
         state,
@@ -92,8 +102,40 @@ fn together(others: &[&Alert]) -> Option<Alert> {
         },
         key,
         failure_time: others.iter().filter_map(|alert| alert.failure_time).min(),
+        earlier: (others.iter().flat_map(|alert| alert.earlier.clone())).collect(),
+        many: Some(many),
         ..first.clone()
     })
+}
+
+/// The first benchmarks of `members`, and how many more there are.
+fn names(members: &[FloodMember]) -> (String, String) {
+    let named: Vec<&str> = (members.iter().take(NAMED))
+        .filter_map(|one| Some(one.benchmark.as_ref()?.as_str()))
+        .collect();
+    let rest = match members.len().saturating_sub(named.len()) {
+        0 => String::new(),
+        rest => format!(" and {rest} more"),
+    };
+    (named.join(", "), rest)
+}
+
+/// The end of what `flood` has reported, at `time`, by the same key.
+pub(super) fn end(flood: &Alert, time: Timestamp) -> Alert {
+    let members = flood.many.as_ref().map_or(&[][..], |many| &many.members);
+    let ((named, rest), count, level) = (names(members), members.len(), flood.level);
+    let mut end = flood.clone();
+    end.state = MessageState::Resolved;
+    end.called = Some(flood.event.time);
+    end.event.time = time.max(flood.event.time);
+    end.event.kind = EventKind::Alert {
+        level,
+        state: AlertState::Resolved,
+        key: flood.key.clone(),
+        rule: FLOOD.to_owned(),
+        text: format!("{count} more benchmarks no longer at {level}: {named}{rest}"),
+    };
+    end
 }
 
 /// The event of all `others`, which are corrections of one level; `text` is given the highest level that was in force.

@@ -2,14 +2,17 @@
 
 use super::mute::Mute;
 use super::{
-    AlertInForce, AlertPlace, BEFORE_ALL, Counts, OWN, STEPS_A_BENCHMARK, STEPS_A_MEMORY,
-    STEPS_UNJUDGED, Sinks, Site,
+    AlertInForce, AlertPlace, Attention, BEFORE_ALL, Counts, OWN, STEPS_A_BENCHMARK,
+    STEPS_A_MEMORY, STEPS_UNJUDGED, Sinks, Site,
 };
 use crate::alert::Level;
-use crate::monitor::{Input, MemoryPart, Monitor, SavedError, SearchJob, Settings};
+use crate::monitor::{
+    AlertState, Event, EventKind, Input, MemoryPart, Monitor, SavedError, SearchJob, Settings,
+};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::delivered::delivery;
-use crate::runtime::hook::{Alert, state_name};
+use crate::runtime::hook::{Alert, MessageState, state_name};
+use crate::runtime::standing::every;
 use crate::runtime::vitals::Vitals;
 use crate::store::{Delivery, DeliveryOutcome, Recorded, Store, StoreError};
 use serde::{Deserialize, Serialize};
@@ -56,7 +59,11 @@ impl Site {
             tracing::warn!(%error, "the memory cannot be used: everything that was taken in is gone through again");
             step = 0;
         }
+        // What was sent, or called off, stands in the outbox.
+        let alerts = site.sinks.alerts.take();
         site.catch_up(&store, step, turn)?;
+        site.sinks.alerts = alerts;
+        site.recall_floods(&store)?;
         site.wait_for_hooks()?;
         if *site.monitor.settings() != settings || store.last_step() == 0 {
             site.change_settings(settings);
@@ -136,24 +143,32 @@ impl Site {
                     self.searches.note(job);
                 }
                 self.steps_since_memory += 1;
-            }
-            for mut alert in std::mem::take(&mut self.fresh) {
-                if alert.event.time <= BEFORE_ALL {
-                    let given = store.time_given(identity(&alert))?;
-                    alert.event.time = given.unwrap_or(BEFORE_ALL);
-                }
-                self.date_end(&mut alert);
-                let is_sent = store.is_noted(identity(&alert), None, None)?;
-                // What is due is noted with the step itself: this one fell into a silence.
-                if !is_sent && self.is_waited_for(&alert) {
-                    self.put_off(&alert);
-                }
-                self.stand(alert, is_sent);
+                // Before the next step: it may be an order that concerns them.
+                self.stand_again(store)?;
             }
         }
         tracing::info!(steps = after - from, of = after, "stored steps replayed");
         self.settings = self.monitor.settings().clone();
         self.searches.resume();
+        Ok(())
+    }
+
+    /// What a step led to that is taken again.
+    fn stand_again(&mut self, store: &Store) -> Result<(), StoreError> {
+        for mut alert in std::mem::take(&mut self.fresh) {
+            if alert.event.time <= BEFORE_ALL {
+                let given = store.time_given(identity(&alert))?;
+                alert.event.time = given.unwrap_or(BEFORE_ALL);
+            }
+            self.date_end(&mut alert);
+            self.follow_on(&mut alert);
+            let is_sent = store.is_noted(identity(&alert), None, None)?;
+            // What is due is noted with the step itself: this one fell into a silence.
+            if !is_sent && self.is_waited_for(&alert) {
+                self.put_off(&alert);
+            }
+            self.stand(alert, is_sent);
+        }
         Ok(())
     }
 
@@ -182,9 +197,54 @@ impl Site {
             closed => closed?,
         }
         for alert in &waiting {
-            self.send(alert);
+            self.take_up(&store, alert)?;
+        }
+        if let Some(alerts) = &self.sinks.alerts {
+            alerts.commit();
         }
         Ok(())
+    }
+
+    /// Hands an alert that waited to its hooks, but not the beginning of what is over, or was acknowledged.
+    fn take_up(&self, store: &Store, alert: &Alert) -> Result<(), StoreError> {
+        let Some(alerts) = &self.sinks.alerts else {
+            return Ok(());
+        };
+        let is_beginning = alert.state == MessageState::Firing;
+        let standing = self.standing.get(&place(alert));
+        let standing = standing.filter(|one| one.alert.key == alert.key);
+        if is_beginning && standing.is_some_and(|one| one.attention == Attention::Acknowledged) {
+            alerts.end(alert);
+            return Ok(());
+        }
+        let awaited = store.awaited(identity(alert))?;
+        if is_beginning && standing.is_none() && self.is_over(store, alert)? {
+            alerts.leave_out(alert, &awaited);
+            return Ok(());
+        }
+        // Of what is reported together, and of an end, others may have been notified by another message.
+        let is_for_all = is_beginning && !alert.is_flood();
+        self.send_where(alert, self.may_be_muted(alert), &|hook| {
+            is_for_all || awaited.contains(&hook.name())
+        });
+        Ok(())
+    }
+
+    /// Whether an alert that does not stand has ended, or a higher level has come.
+    fn is_over(&self, store: &Store, alert: &Alert) -> Result<bool, StoreError> {
+        if alert.is_flood() {
+            // One of an older version does not name its members.
+            return Ok(alert.many.is_some() && !self.has_in_force(alert));
+        }
+        // What is unknown for several reasons has one place for all of them.
+        if alert.level != Level::Unknown && self.standing.contains_key(&place(alert)) {
+            return Ok(true);
+        }
+        let ends = |event: &Event| {
+            matches!(&event.kind, EventKind::Alert { key, state: AlertState::Resolved, .. }
+                if *key == alert.key)
+        };
+        Ok(every(store, "alert")?.iter().any(ends))
     }
 
     /// What waits for a hook that is not in the config any more, or that does not ask for it any more, is closed, and
@@ -272,6 +332,11 @@ fn announce_closed(ended: &[Delivery]) {
             "alerts waited for a hook that does not ask for them any more: they are closed, and go to the hooks that do"
         );
     }
+}
+
+/// Where an alert stands.
+fn place(alert: &Alert) -> AlertPlace {
+    (alert.event.benchmark.clone(), alert.level == Level::Unknown)
 }
 
 /// What the outbox knows an alert by.

@@ -11,6 +11,7 @@ mod flood;
 mod memory;
 mod mute;
 mod returned;
+mod standing_floods;
 mod timekeeper;
 mod unproven;
 
@@ -20,6 +21,7 @@ pub(super) use unproven::Unproven;
 
 use crowd::MessageRush;
 use returned::Returned;
+use standing_floods::StandingFlood;
 use timekeeper::Timekeeper;
 
 use crate::monitor::{Event, EventKind, Input, Monitor, Order, RESET_FOUND, SUSPECT, Settings};
@@ -96,6 +98,19 @@ struct AlertInForce {
     /// Whether an alert of many benchmarks has reported it too.
     #[serde(default, rename = "is_told_together")]
     is_reported_together: bool,
+    /// Whether somebody has seen it.
+    #[serde(default)]
+    attention: Attention,
+}
+
+/// What people do about an alert in force.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+enum Attention {
+    /// Nobody has acknowledged it.
+    #[default]
+    Awaited,
+    /// Somebody has: hooks that have not taken it are not notified of it any more, nor those that a config adds.
+    Acknowledged,
 }
 
 /// One site at work.
@@ -121,6 +136,8 @@ pub struct Site {
     fresh: Vec<Alert>,
     /// What is in force: neither resolved nor superseded.
     standing: BTreeMap<AlertPlace, AlertInForce>,
+    /// What stands for many, by its key, until all of these are over.
+    floods: BTreeMap<String, StandingFlood>,
     /// Who asked not to be notified.
     mutes: Vec<Mute>,
     /// Ends of alerts that people were notified of, which fell into a silence: they are sent after it.
@@ -158,6 +175,7 @@ impl Site {
             failure_times: BTreeMap::new(),
             fresh: Vec::new(),
             standing: BTreeMap::new(),
+            floods: BTreeMap::new(),
             mutes: Vec::new(),
             put_off: Vec::new(),
             counts: Counts::default(),

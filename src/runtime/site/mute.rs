@@ -1,6 +1,6 @@
 //! Who asked not to be notified, of what, until when: never for longer than an order may last, whatever the clock says.
 
-use super::Site;
+use super::{Attention, Site};
 use crate::alert::Level;
 use crate::monitor::Order;
 use crate::reading::{BenchmarkId, Timestamp};
@@ -51,13 +51,15 @@ impl Site {
                 let seen = all.filter(|((place, _), one)| is_seen(place, &one.alert.key));
                 for (_, one) in seen {
                     (one.is_sent, one.was_notified) = (true, true);
+                    one.attention = Attention::Acknowledged;
                     if let Some(alerts) = &self.sinks.alerts {
                         alerts.end(&one.alert);
                     }
                 }
-                if let (None, None, Some(alerts)) = (benchmark, alert, &self.sinks.alerts) {
-                    alerts.end_those_of_many();
+                if let (None, None) = (benchmark, alert) {
+                    self.acknowledge_floods();
                 }
+                self.keep_receipts();
             }
             Order::Shelve {
                 benchmark, until, ..
@@ -88,7 +90,7 @@ impl Site {
         self.spare_what_is_muted(benchmark, up_to);
     }
 
-    /// Whoever has an alert shelved or silenced sees to it: it is not escalated.
+    /// Whoever has an alert shelved or silenced sees to it: it is not escalated. What waits for somebody on duty waits on.
     fn spare_what_is_muted(&self, benchmark: Option<&BenchmarkId>, up_to: Option<Level>) {
         let Some(alerts) = &self.sinks.alerts else {
             return;
@@ -98,6 +100,16 @@ impl Site {
             if is_here && up_to.is_none_or(|up_to| one.alert.level <= up_to) {
                 alerts.spare(&one.alert);
             }
+        }
+        if benchmark.is_none() {
+            self.spare_floods();
+        }
+        self.keep_receipts();
+    }
+
+    fn keep_receipts(&self) {
+        if let Some(alerts) = &self.sinks.alerts {
+            alerts.commit();
         }
     }
 
@@ -110,10 +122,34 @@ impl Site {
 
     /// Whether nobody is to be notified of this alert at `now`.
     pub(super) fn is_muted(&self, alert: &Alert, now: Timestamp) -> bool {
+        let place = (alert.event.benchmark.as_ref(), alert.level);
+        self.is_covered(place, |mute| mute.is_in_force(now))
+    }
+
+    /// Whether somebody asked not to be notified of it, and that may last still: until the next commit says it by the clock.
+    pub(super) fn may_be_muted(&self, alert: &Alert) -> bool {
+        let place = (alert.event.benchmark.as_ref(), alert.level);
+        self.is_covered(place, |_| true)
+    }
+
+    /// Has the hooks wait with what they have in hand where nobody is to be notified of it at `now`.
+    pub(super) fn mute_what_is_in_hand(&self, now: Timestamp) {
+        if let Some(alerts) = &self.sinks.alerts {
+            alerts.mute(&|place, level| {
+                self.is_covered((place, level), |mute| mute.is_in_force(now))
+            });
+        }
+    }
+
+    fn is_covered(
+        &self,
+        (place, level): (Option<&BenchmarkId>, Level),
+        lasts: impl Fn(&Mute) -> bool,
+    ) -> bool {
         self.mutes.iter().any(|mute| {
-            let here = mute.benchmark.is_none() || mute.benchmark == alert.event.benchmark;
-            let low = mute.up_to.is_none_or(|up_to| alert.level <= up_to);
-            here && low && mute.is_in_force(now)
+            let here = mute.benchmark.is_none() || mute.benchmark.as_ref() == place;
+            let low = mute.up_to.is_none_or(|up_to| level <= up_to);
+            here && low && lasts(mute)
         })
     }
 }
