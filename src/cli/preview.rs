@@ -3,7 +3,9 @@
 use super::text::clock;
 use crate::reading::Timestamp;
 use crate::runtime::ingest::Meaning;
-use crate::runtime::preview::{BenchmarkPreview, ColumnView, CovariateView, Preview, SourceView};
+use crate::runtime::preview::{
+    BenchmarkPreview, ColumnView, CovariateView, Preview, Refusal, SourceView,
+};
 use jiff::SignedDuration;
 use jiff::tz::TimeZone;
 use std::fmt::Write as _;
@@ -64,15 +66,20 @@ fn source_lines(text: &mut String, source: &SourceView) {
         }
     }
     for refusal in &source.refused {
-        let rows = match refusal.rows {
-            1 => "1 row".to_owned(),
-            many => format!("{many} rows"),
-        };
-        let _ = writeln!(text, "  refused: {rows}, the first: {}", refusal.first);
+        let _ = writeln!(text, "  refused: {}", refused(refusal));
     }
     for remark in &source.remarks {
         let _ = writeln!(text, "  {remark}");
     }
+}
+
+/// How many rows of one kind cannot be used, and the first.
+pub(super) fn refused(refusal: &Refusal) -> String {
+    let rows = match refusal.rows {
+        1 => "1 row".to_owned(),
+        many => format!("{many} rows"),
+    };
+    format!("{rows}, the first: {}", refusal.first)
 }
 
 fn meaning(column: &ColumnView) -> String {
@@ -101,6 +108,8 @@ fn benchmark_lines(text: &mut String, benchmark: &BenchmarkPreview, zone: &TimeZ
         corrected,
         repeated,
         ahead,
+        missing,
+        out_of_range,
         first,
         last,
         every_s,
@@ -128,6 +137,12 @@ fn benchmark_lines(text: &mut String, benchmark: &BenchmarkPreview, zone: &TimeZ
     ];
     for (count, what) in dropped.iter().filter(|(count, _)| **count > 0) {
         let _ = writeln!(text, "  {what}: {count}");
+    }
+    if *missing > 0 {
+        let _ = writeln!(
+            text,
+            "  missing: {missing}, of these out of range: {out_of_range}"
+        );
     }
     for line in remarks {
         let _ = writeln!(text, "  {line}");

@@ -41,7 +41,7 @@ pub use vector::Vector;
 
 use crate::alert::Level;
 use crate::monitor::Settings;
-use crate::reading::{BenchmarkId, Conventions, Dialect, Quantity, Unit};
+use crate::reading::{BenchmarkId, Conventions, Dialect, Quantity, Timestamp, Unit};
 use jiff::SignedDuration;
 use problem::ConfigProblems;
 use std::cell::RefCell;
@@ -141,6 +141,8 @@ pub struct FileSource {
     pub conventions: Conventions,
     /// How its tables are written.
     pub dialect: Dialect,
+    /// Day 0 of a column `t_days`, where the config says it.
+    pub epoch: Option<Timestamp>,
     /// Values wait this long for earlier ones; zero: not at all.
     pub reorder: SignedDuration,
 }

@@ -3,10 +3,12 @@
 use super::table::{Section, unique};
 use super::{Broker, FilePattern, FileSource, SourceKind, broker, value};
 use crate::reading::{
-    Conventions, DecimalMark, Delimiter, Dialect, LocalClock, MissingValues, SummerTime, TimeFormat,
+    Conventions, DecimalMark, Delimiter, Dialect, LocalClock, MissingValues, SummerTime,
+    TimeFormat, Timestamp,
 };
 use jiff::SignedDuration;
 use std::collections::BTreeSet;
+use std::ops::Range;
 use std::path::Path;
 
 /// The words for the kinds.
@@ -69,6 +71,7 @@ fn source(
         .and_then(|_| section.parsed("path", |text| FilePattern::parse(text, base)));
     let conventions = conventions(&mut section, kind);
     let dialect = dialect(&mut section, kind);
+    let epoch = epoch(&mut section, kind);
     let reorder = section.parsed("reorder", value::duration_or_none);
     section.finish();
     let StatedKind::Files(kind) = kind? else {
@@ -80,6 +83,7 @@ fn source(
         pattern: pattern?.value,
         conventions,
         dialect,
+        epoch,
         reorder: reorder.map_or(SignedDuration::ZERO, |given| given.value),
     }))
 }
@@ -97,19 +101,41 @@ fn dialect(section: &mut Section<'_>, kind: Option<StatedKind>) -> Dialect {
         ("time_format", time_format.as_ref().map(|given| &given.at)),
     ];
     for (key, at) in given {
-        if let Some(at) = at.filter(|_| kind.is_some_and(|kind| !kind.takes(key))) {
-            section.error(
-                at,
-                format!("source.{key} does nothing for this kind"),
-                "leave it out, or write kind = \"csv\"",
-            );
-        }
+        refuse_idle(section, kind, key, at);
     }
     Dialect {
         delimiter: delimiter.map(|given| given.value),
         decimal: decimal.map_or_else(DecimalMark::default, |given| given.value),
         time_columns: time_columns.map_or_else(Vec::new, |given| given.value),
         time_format: time_format.map_or_else(TimeFormat::default, |given| given.value),
+    }
+}
+
+/// Day 0 of a column `t_days`, which only tables have.
+fn epoch(section: &mut Section<'_>, kind: Option<StatedKind>) -> Option<Timestamp> {
+    let epoch = section.parsed("epoch", value::instant);
+    refuse_idle(
+        section,
+        kind,
+        "epoch",
+        epoch.as_ref().map(|given| &given.at),
+    );
+    epoch.map(|given| given.value)
+}
+
+/// Refuses a key, which stands there, where it means nothing for the kind.
+fn refuse_idle(
+    section: &mut Section<'_>,
+    kind: Option<StatedKind>,
+    key: &str,
+    at: Option<&Range<usize>>,
+) {
+    if let Some(at) = at.filter(|_| kind.is_some_and(|kind| !kind.takes(key))) {
+        section.error(
+            at,
+            format!("source.{key} does nothing for this kind"),
+            "leave it out, or write kind = \"csv\"",
+        );
     }
 }
 

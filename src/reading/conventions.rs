@@ -238,6 +238,13 @@ impl MissingValues {
         }
     }
 
+    /// Whether a mark, where it is one, is that of a value out of the instrument's range: INF, or a Campbell logger's -7999 or
+    /// -99999.
+    pub fn is_out_of_range(mark: &str) -> bool {
+        let number = mark.trim().parse::<f64>();
+        number.is_ok_and(|number| number.is_infinite() || LOGGER_CODES.contains(&number))
+    }
+
     /// Whether a number is such a mark.
     pub fn has_number(&self, number: f64) -> bool {
         self.numbers.contains(&number)

@@ -215,3 +215,49 @@ fn a_benchmark_that_nothing_feeds_is_explained_by_its_own_source() {
         "{said}"
     );
 }
+
+#[test]
+fn marks_of_no_value_are_counted_for_each_benchmark() {
+    let rows: String = (0..40)
+        .map(|hour| {
+            let cell = |marks: &[(i64, &str)]| {
+                let mark = marks.iter().find(|(at, _)| *at == hour);
+                mark.map_or(format!("{hour}.5"), |(_, mark)| (*mark).to_owned())
+            };
+            let one = cell(&[(3, "NAN"), (4, "nan"), (5, "INF"), (6, "-INF"), (7, "")]);
+            let two = cell(&[(9, "\"NAN\"")]);
+            format!(
+                "2020-01-0{}T{:02}:00:00Z,{one},{two}\n",
+                1 + hour / 24,
+                hour % 24
+            )
+        })
+        .collect();
+    let text = format!("time,P1_displacement_mm,P2_displacement_mm\n{rows}");
+    let office = Office::with(&[("slope.csv", &text), ("site.toml", &site("slope.csv", ""))]);
+    let preview = looked(&office);
+    let counts = |at: usize| {
+        let one = &preview["benchmarks"][at];
+        (
+            one["readings"].clone(),
+            one["missing"].clone(),
+            one["out_of_range"].clone(),
+        )
+    };
+    assert_eq!(counts(0), (35.into(), 4.into(), 2.into()), "{preview}");
+    assert_eq!(counts(1), (39.into(), 1.into(), 0.into()), "{preview}");
+    for args in [
+        &["check", "site.toml"][..],
+        &["init", "slope.csv", "--force"],
+    ] {
+        let said = office.done(args);
+        assert!(
+            said.contains("missing: 4, of these out of range: 2"),
+            "{said}"
+        );
+        assert!(
+            said.contains("missing: 1, of these out of range: 0"),
+            "{said}"
+        );
+    }
+}

@@ -45,6 +45,7 @@ fn the_example_config_is_right_and_says_what_it_means() {
         [
             SourceKind::Csv,
             SourceKind::Csv,
+            SourceKind::Csv,
             SourceKind::Toa5,
             SourceKind::Mcap
         ]
@@ -52,7 +53,9 @@ fn the_example_config_is_right_and_says_what_it_means() {
     let office = &config.sources[1].dialect;
     assert_eq!(office.time_columns, ["Date", "Time"]);
     assert_eq!(office.number("12,5"), Some(12.5));
-    let campbell = &config.sources[2].conventions;
+    let day_zero = "2017-01-01T00:00:00Z".parse().unwrap();
+    assert_eq!(config.sources[2].epoch, Some(day_zero));
+    let campbell = &config.sources[3].conventions;
     assert_eq!(campbell.clock.summer_time, SummerTime::Standard);
     assert_eq!(campbell.clock.zone, Some(config.site.time_zone.clone()));
     assert!(campbell.missing.has("9999.0") && campbell.missing.has("BAD"));

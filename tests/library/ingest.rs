@@ -160,7 +160,10 @@ fn a_bad_line_or_header_is_named() {
         ("time,a_displacement_mm\n1577836800,1\n", "unix"),
         ("time,t_days,x\n1,2,3\n", "a second column gives the time"),
         ("time,x,x\n1,2,3\n", "column \"x\": the name stands twice"),
-        ("time,x,\n1,2,3\n", "a column without a name"),
+        (
+            "time,x,\n2017-06-01T00:00:00Z,2,3\n",
+            "a name for this column",
+        ),
         ("time\n2020-01-01T00:00:00Z\n", "the only column"),
         (
             "time,velocity_kmh\n2020-01-01T00:00:00Z,1\n",

@@ -29,6 +29,8 @@ pub(super) enum Column {
     },
     /// Neither: a logger's record number.
     Ignored,
+    /// The header has no name for it: its cells must be empty.
+    Nameless,
 }
 
 /// What a column is taken for, for a person to see.
@@ -82,7 +84,7 @@ impl Column {
                 unit: unit.to_string(),
             },
             Self::Channel { unit } => Meaning::Covariate { unit: unit.clone() },
-            Self::Ignored => Meaning::Unused,
+            Self::Ignored | Self::Nameless => Meaning::Unused,
         }
     }
 }
@@ -313,6 +315,7 @@ impl Layout {
     fn by_name(name: &str, dialect: &Dialect) -> Result<ByName, (&'static str, &'static str)> {
         let stated = &dialect.time_columns;
         Ok(match name_of(name) {
+            _ if name.is_empty() => Err(Column::Nameless),
             _ if stated.iter().any(|one| one == name) => Err(Column::Time),
             Name::Measure(id, measure) => Ok((id.map(BenchmarkId::new), measure)),
             Name::WithoutUnit => return Err(("a reading without a known unit", A_UNIT)),
@@ -346,9 +349,7 @@ impl Layout {
 
     /// What is wrong with a name after those `before` it, and what was expected.
     fn name_is_right(name: &String, before: &[String]) -> Result<(), (&'static str, &'static str)> {
-        if name.is_empty() {
-            Err(("a column without a name", "a name for every column"))
-        } else if before.contains(name) {
+        if !name.is_empty() && before.contains(name) {
             Err(("the name stands twice", "every name once"))
         } else {
             Ok(())
@@ -372,7 +373,8 @@ impl Layout {
                 expected,
             ));
         }
-        if columns.len() == 1 {
+        let has_name = |column: &&Column| !matches!(column, Column::Nameless);
+        if columns.iter().filter(has_name).count() == 1 {
             let expected =
                 "a column named [ID_]displacement_UNIT or [ID_]velocity_UNIT, or a covariate";
             return Err(fail(&names[time], "it is the only column", expected));
@@ -400,6 +402,14 @@ impl Layout {
             }
         }
         Ok(())
+    }
+
+    /// How many columns without a name stand at the end, behind a last mark between cells.
+    pub(super) fn nameless_at_end(&self) -> usize {
+        let from_end = self.columns.iter().rev();
+        from_end
+            .take_while(|column| matches!(column, Column::Nameless))
+            .count()
     }
 
     /// Gives every standard error to the reading of its benchmark that has its kind of unit.

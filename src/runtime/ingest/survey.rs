@@ -19,7 +19,8 @@ pub struct Survey {
     pub delimiter: Delimiter,
     /// The cells of its first line.
     pub names: Vec<String>,
-    /// The cells of each column below, as many as its first line has; rows with another number of cells are left out.
+    /// The cells of each column below, as many as its first line has; rows with another number of cells are left out, but for
+    /// those that lack only what has no name.
     pub columns: Vec<Vec<String>>,
     /// How it is encoded, where that is not UTF-8.
     pub encoding: Option<Remark>,
@@ -62,11 +63,15 @@ pub fn survey(file: &Path, delimiter: Option<Delimiter>) -> Result<Survey, Inges
     if names.is_empty() {
         return Err(empty("header"));
     }
+    // Behind a last mark there may be nothing, with no name.
+    let unnamed = names.iter().rev().take_while(|name| name.is_empty());
+    let least = names.len() - unnamed.count();
     let mut columns = vec![Vec::new(); names.len()];
     for line in lines.take(MOST_ROWS) {
-        if splitter.split(&line, &mut cells).is_ok() && cells.len() == names.len() {
-            for (column, cell) in columns.iter_mut().zip(&cells) {
-                column.push(cell.to_owned());
+        if splitter.split(&line, &mut cells).is_ok() && (least..=names.len()).contains(&cells.len())
+        {
+            for (index, column) in columns.iter_mut().enumerate() {
+                column.push(cells.get(index).unwrap_or_default().to_owned());
             }
         }
     }

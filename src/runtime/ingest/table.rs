@@ -54,7 +54,8 @@ impl TableRows {
         cells: &StringRecord,
     ) -> Result<Vec<Item>, IngestError> {
         let expected = self.layout.names.len();
-        if cells.len() != expected {
+        let least = expected - self.layout.nameless_at_end();
+        if !(least..=expected).contains(&cells.len()) {
             return Err(IngestError::Line {
                 file: self.file.clone(),
                 line,
@@ -130,6 +131,7 @@ impl TableRows {
     /// What each column is taken for.
     pub(super) fn meanings(&self) -> Vec<(String, Meaning)> {
         let columns = self.layout.names.iter().zip(&self.layout.columns);
+        let has_name = |(_, (name, _)): &(usize, (&String, &Column))| !name.is_empty();
         let meaning = |(index, (name, column)): (usize, (&String, &Column))| {
             let is_channel = matches!(column, Column::Channel { .. });
             let meaning = match (self.filled[index], self.numeric[index]) {
@@ -139,14 +141,18 @@ impl TableRows {
             };
             (name.clone(), meaning)
         };
-        columns.enumerate().map(meaning).collect()
+        columns.enumerate().filter(has_name).map(meaning).collect()
     }
 
     /// The first column that should hold readings, or their times, and has held nothing so far.
     pub(super) fn unfilled(&self) -> Option<&String> {
         let columns = self.layout.columns.iter().zip(&self.filled);
-        let is_needed =
-            |column: &Column| !matches!(column, Column::Channel { .. } | Column::Ignored);
+        let is_needed = |column: &Column| {
+            !matches!(
+                column,
+                Column::Channel { .. } | Column::Ignored | Column::Nameless
+            )
+        };
         let mut empty = columns.zip(&self.layout.names);
         empty.find_map(|((column, filled), name)| (!filled && is_needed(column)).then_some(name))
     }
@@ -227,6 +233,7 @@ impl TableRow<'_> {
                     Err(fault) if self.rows.numeric[index] => met.set_aside(fault),
                     Err(_) => met.texts.push(index),
                 },
+                Column::Nameless => self.nothing(index)?,
                 Column::Time
                 | Column::Days
                 | Column::Sigma
@@ -255,6 +262,17 @@ impl TableRow<'_> {
                 }));
         }
         Ok(met)
+    }
+
+    /// Whether a column that has no name holds nothing.
+    fn nothing(&self, index: usize) -> Result<(), IngestError> {
+        match self.cells.get(index) {
+            None | Some("") => Ok(()),
+            Some(_) => Err(self.fail(
+                index,
+                "an empty cell, or a name for this column in the header",
+            )),
+        }
     }
 
     /// The projection of a vector; with a component missing it is missing as a whole.

@@ -6,6 +6,7 @@ mod track;
 mod unfed;
 mod view;
 
+pub use refused::{RefusedKinds, RefusedRow};
 pub use view::{
     BenchmarkPreview, ColumnView, CovariateView, LayoutView, Preview, Refusal, SourceView, Unfed,
 };
@@ -17,11 +18,10 @@ use super::tail::{Arrival, Decoder, LinesRead, TextReader, list};
 use crate::config::{Config, FileSource, SourceKind};
 use crate::monitor::Input;
 use crate::reading::{
-    BenchmarkId, LocalClock, Quantity, SummerTime, Suspicion, Timestamp, suspicion,
+    BenchmarkId, LocalClock, MissingValues, Quantity, SummerTime, Suspicion, Timestamp, suspicion,
 };
 use crate::store::Store;
 use recording::read_recording;
-use refused::{RefusedKinds, RefusedRow};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::{self, Read};
@@ -32,6 +32,8 @@ use track::{FilePlace, PreviewTrack};
 const MOST_VALUES: u64 = 2_000_000;
 /// Bytes that are read at once.
 const PIECE: usize = 64 * 1024;
+/// What is said of a table of days where nothing says when they are counted from.
+const DAY_ZERO: &str = "column \"t_days\": day 0 is taken as 2000-01-01T00:00:00Z; if it is another one, set epoch in [[source]] (--epoch)";
 /// What every refusal of a value ahead of the clock is counted under.
 const AHEAD: &str = "ahead of the clock";
 
@@ -97,6 +99,7 @@ impl PreviewSoFar {
                 refused: Vec::new(),
                 remarks: Vec::new(),
                 unwatched: BTreeSet::new(),
+                missing: BTreeMap::new(),
             },
             files: Vec::new(),
             refused: RefusedKinds::default(),
@@ -199,14 +202,19 @@ impl PreviewSoFar {
                 break;
             }
         }
+        let meanings = text.meanings();
         let view = &mut so_far.view;
+        if decoder.is_day_zero_open() && meanings.iter().any(is_days) {
+            let is_new = view.remarks.iter().all(|one| one != DAY_ZERO);
+            view.remarks.extend(is_new.then(|| DAY_ZERO.to_owned()));
+        }
         if text.is_within_a_line() && self.values <= MOST_VALUES {
             let file = file.display();
             view.remarks.push(format!(
                 "{file}: its last line has no line break, and is read once it has one"
             ));
         }
-        keep_layout(view, file, text.meanings());
+        keep_layout(view, file, meanings);
         Ok(())
     }
 
@@ -221,7 +229,8 @@ impl PreviewSoFar {
         }
         for line in &fed.bad {
             self.values += 1;
-            so_far.refused.row(RefusedRow::of_line(line));
+            let name = so_far.name((file, 0));
+            so_far.refused.row(RefusedRow::of_line(line, &name));
         }
     }
 
@@ -258,12 +267,21 @@ impl PreviewSoFar {
             });
         }
         let source = so_far.view.id.clone();
-        if let Input::Missing { what, .. } = arrival.input {
+        if let Input::Missing {
+            benchmark, what, ..
+        } = arrival.input
+        {
             if what.starts_with(UNIT_WAS) {
                 let at = so_far.name(place);
                 so_far.refused.count(&what, || {
                     format!("{at}: {what}, expected the unit that the file began with")
                 });
+            } else {
+                let (all, out_of_range) = so_far.view.missing.entry(benchmark).or_default();
+                // Of a component the mark is followed by its column.
+                let mark = what.split(" in ").next().unwrap_or_default();
+                *all += 1;
+                *out_of_range += u64::from(MissingValues::is_out_of_range(mark));
             }
         } else if why.is_none()
             && let Input::Sample { channel, unit, .. } = arrival.input
@@ -340,7 +358,10 @@ impl PreviewSoFar {
             let source = config.sources.iter().find(|one| one.id == id);
             let zone = source.and_then(|source| source.conventions.clock.zone.as_ref());
             let name = |place| so_far.map_or_else(String::new, |one| one.name(place));
-            benchmarks.push(track.finish(self.now, taken.is_some(), zone, &name));
+            let mut view = track.finish(self.now, taken.is_some(), zone, &name);
+            let missing = so_far.and_then(|one| one.view.missing.get(&view.id));
+            (view.missing, view.out_of_range) = missing.copied().unwrap_or_default();
+            benchmarks.push(view);
         }
         doubt_second_quantities(&mut benchmarks);
         let sources = self.sources.into_iter().map(|mut one| {
@@ -384,6 +405,11 @@ fn expected_time(why: Untimely, time: Timestamp, now: Timestamp) -> (&'static st
                 .to_owned(),
         ),
     }
+}
+
+/// Whether a column gives times in days.
+fn is_days((name, meaning): &(String, Meaning)) -> bool {
+    *meaning == Meaning::Time && name.eq_ignore_ascii_case("t_days")
 }
 
 /// The monitor goes by the quantity of a benchmark that it reads first.

@@ -15,21 +15,26 @@ const OTHERS: &str = "";
 
 /// What is wrong with a row, and what is said of it where it is the first of its kind.
 #[derive(Debug)]
-pub(super) struct RefusedRow {
+pub struct RefusedRow {
     kind: String,
     text: String,
 }
 
 impl RefusedRow {
-    /// A line of a text.
-    pub(super) fn of_line(line: &BadLine) -> Self {
-        let text = line.error.to_string();
-        if let Some(error) = line.error.downcast_ref::<IngestError>() {
-            return Self {
-                kind: kind_of(error),
-                text,
-            };
+    /// A row or message of a file.
+    pub fn of_fault(fault: &IngestError) -> Self {
+        Self {
+            kind: kind_of(fault),
+            text: fault.to_string(),
         }
+    }
+
+    /// A line of a text; `file` is its name.
+    pub(super) fn of_line(line: &BadLine, file: &str) -> Self {
+        if let Some(fault) = line.error.downcast_ref::<IngestError>() {
+            return Self::of_fault(fault);
+        }
+        let text = line.error.to_string();
         let kind = match line.error.downcast_ref::<LineFault>() {
             Some(LineFault::TooLong) => "too long".to_owned(),
             Some(LineFault::NotUtf8 { .. }) => "encoding".to_owned(),
@@ -38,7 +43,7 @@ impl RefusedRow {
         };
         Self {
             kind,
-            text: format!("line {}: {text}", line.number),
+            text: format!("{file}, line {}: {text}", line.number),
         }
     }
 
@@ -59,12 +64,13 @@ impl RefusedRow {
     }
 }
 
-/// The refusals of one source, by kind.
+/// The refusals of one source or file, by kind.
 #[derive(Debug, Default)]
-pub(super) struct RefusedKinds(BTreeMap<String, Refusal>);
+pub struct RefusedKinds(BTreeMap<String, Refusal>);
 
 impl RefusedKinds {
-    pub(super) fn row(&mut self, row: RefusedRow) {
+    /// Counts a row.
+    pub fn row(&mut self, row: RefusedRow) {
         let RefusedRow { kind, text } = row;
         if self.0.contains_key(&kind) || self.0.len() < MOST_KINDS {
             self.count(&kind, || text);
@@ -89,7 +95,7 @@ impl RefusedKinds {
     }
 
     /// What most rows are refused for stands first.
-    pub(super) fn sorted(self) -> Vec<Refusal> {
+    pub fn sorted(self) -> Vec<Refusal> {
         let mut all: Vec<Refusal> = self.0.into_values().collect();
         all.sort_by_key(|refusal| Reverse(refusal.rows));
         all

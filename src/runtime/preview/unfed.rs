@@ -74,7 +74,11 @@ fn why(view: &SourceView, benchmark: Option<&BenchmarkId>) -> String {
             others.join(", ")
         )
     });
-    let hints: Vec<String> = [others, refused].into_iter().flatten().collect();
+    let missing = benchmark.and_then(|benchmark| view.missing.get(benchmark));
+    let missing = missing.map(|(all, _)| {
+        format!("they have a mark of no value where its readings should be ({all} times)")
+    });
+    let hints: Vec<String> = [others, missing, refused].into_iter().flatten().collect();
     let hint = match &hints[..] {
         [] => NAME_THEM.to_owned(),
         hints => hints.join("; "),

@@ -4,7 +4,7 @@ use crate::reading::{BenchmarkId, Quantity, Timestamp, Unit};
 use crate::runtime::ingest::Meaning;
 use schemars::JsonSchema;
 use serde::Serialize;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 /// What lies in the files of a site now.
@@ -46,6 +46,9 @@ pub struct SourceView {
     /// Benchmarks in its files that no `[[benchmark]]` asks for.
     #[serde(skip)]
     pub(super) unwatched: BTreeSet<BenchmarkId>,
+    /// Marks of no value in the place of readings: how many, and how many of them for a value out of range.
+    #[serde(skip)]
+    pub(super) missing: BTreeMap<BenchmarkId, (u64, u64)>,
 }
 
 /// The columns of one file or of several.
@@ -97,6 +100,10 @@ pub struct BenchmarkPreview {
     pub repeated: u64,
     /// Readings that lie so far ahead of the clock that the daemon does not take them.
     pub ahead: u64,
+    /// Readings that should be there and are not: marks of no value, such as NAN or INF.
+    pub missing: u64,
+    /// Of the missing ones, how many were out of the instrument's range: INF, or a Campbell logger's -7999 or -99999.
+    pub out_of_range: u64,
     /// The earliest, its time and value.
     pub first: (Timestamp, f64),
     /// The latest, its time and value.
@@ -126,6 +133,8 @@ impl BenchmarkPreview {
             corrected: 0,
             repeated: 0,
             ahead: 0,
+            missing: 0,
+            out_of_range: 0,
             first,
             last: first,
             every_s: None,

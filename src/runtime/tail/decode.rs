@@ -35,6 +35,8 @@ pub(in crate::runtime) struct Decoder {
     kind: SourceKind,
     conventions: Conventions,
     dialect: Dialect,
+    /// Day 0 of a column `t_days`, where the config says it.
+    epoch: Option<Timestamp>,
     /// With none, whatever benchmarks the files name are taken, but for those of other sources.
     wanted: Vec<Benchmark>,
     /// Benchmarks that the config takes from another source.
@@ -50,6 +52,7 @@ impl Decoder {
             kind: source.kind,
             conventions,
             dialect: source.dialect.clone(),
+            epoch: source.epoch,
             wanted: of_source(&source.id, benchmarks),
             elsewhere: of_others(&source.id, benchmarks),
             remarked: Arc::default(),
@@ -69,6 +72,7 @@ impl Decoder {
             kind: SourceKind::Ndjson,
             conventions: broker.conventions.clone(),
             dialect: Dialect::default(),
+            epoch: None,
             wanted: of_source(&broker.id, benchmarks),
             elsewhere: of_others(&broker.id, benchmarks),
             remarked: Arc::default(),
@@ -119,6 +123,7 @@ impl Decoder {
                 measure: Measure::Reading(unit),
             })
         });
+        let defaults = ReadOptions::default();
         let of_a_column = self.wanted.iter().filter(|one| one.column.is_some());
         ReadOptions {
             columns: columns.collect(),
@@ -126,8 +131,14 @@ impl Decoder {
             vectors: vectors.collect(),
             conventions: self.conventions.clone(),
             dialect: self.dialect.clone(),
-            ..ReadOptions::default()
+            epoch: self.epoch.unwrap_or(defaults.epoch),
+            ..defaults
         }
+    }
+
+    /// Whether nothing says when day 0 was of the columns `t_days` that its tables may have.
+    pub(in crate::runtime) fn is_day_zero_open(&self) -> bool {
+        self.kind == SourceKind::Csv && self.epoch.is_none() && self.dialect.time_columns.is_empty()
     }
 
     /// Whether files that are packed belong to the source too.
@@ -234,6 +245,16 @@ impl Decoder {
 /// How the daemon reads a file of this source.
 pub fn options_of(source: &FileSource, benchmarks: &[Benchmark], file: &Path) -> ReadOptions {
     Decoder::new(source, benchmarks).options(&unpacked_name(file))
+}
+
+/// Whether the daemon takes readings of a benchmark, in this unit, from the files of this source.
+pub fn is_taken(
+    source: &FileSource,
+    benchmarks: &[Benchmark],
+    benchmark: &BenchmarkId,
+    unit: Unit,
+) -> bool {
+    Decoder::new(source, benchmarks).wants(benchmark, unit)
 }
 
 fn of_others(id: &str, benchmarks: &[Benchmark]) -> BTreeSet<BenchmarkId> {

@@ -21,7 +21,7 @@ mod saved;
 mod text;
 
 pub(super) use decode::Decoder;
-pub use decode::{Arrival, options_of};
+pub use decode::{Arrival, is_taken, options_of};
 pub use follow::{ArrivalBatch, Follower};
 pub(super) use rescan::list;
 pub(super) use text::{BadLine, LinesRead, TextReader};
