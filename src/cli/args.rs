@@ -64,16 +64,16 @@ pub struct FileArgs {
     /// Each velocity is the mean of so long a time before it, such as 1h
     #[arg(long, value_name = "DURATION", value_parser = value::duration)]
     pub averaging: Option<SignedDuration>,
-    /// Day 0 of a column `t_days`
-    #[arg(long, value_name = "TIME", default_value = "2000-01-01T00:00:00Z")]
-    pub epoch: Timestamp,
+    /// Day 0 of a column `t_days` [default: 2000-01-01T00:00:00Z]
+    #[arg(long, value_name = "TIME", value_parser = value::instant)]
+    pub epoch: Option<Timestamp>,
     /// The zone of times that state no offset, such as Europe/Rome
     #[arg(long, value_name = "ZONE", value_parser = value::time_zone)]
     pub time_zone: Option<TimeZone>,
     /// What a local time means that came twice or never: reject, earlier, later, or standard for a
-    /// clock that is never changed
-    #[arg(long, value_name = "POLICY", default_value = "reject", value_parser = SummerTime::parse)]
-    pub dst: SummerTime,
+    /// clock that is never changed [default: reject]
+    #[arg(long, value_name = "POLICY", value_parser = SummerTime::parse)]
+    pub dst: Option<SummerTime>,
     /// A further mark for a missing value, such as -7999
     #[arg(long, value_name = "VALUE", allow_hyphen_values = true)]
     pub missing: Vec<String>,
@@ -119,15 +119,16 @@ impl FileArgs {
         self.missing.iter().for_each(|mark| missing.add(mark));
         let clock = LocalClock {
             zone: self.time_zone.clone(),
-            summer_time: self.dst,
+            summer_time: self.dst.unwrap_or_default(),
         };
+        let defaults = ReadOptions::default();
         ReadOptions {
-            epoch: self.epoch,
+            epoch: self.epoch.unwrap_or(defaults.epoch),
             columns: self.columns.clone(),
             averaging: self.averaging,
             conventions: Conventions { clock, missing },
             dialect: self.dialect.dialect(),
-            ..ReadOptions::default()
+            ..defaults
         }
     }
 }

@@ -11,6 +11,7 @@ mod drill;
 mod explain_cli;
 mod first_day;
 mod first_site;
+mod init_flags;
 mod office;
 #[cfg(feature = "parquet")]
 mod parquet;

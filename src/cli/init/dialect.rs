@@ -2,7 +2,7 @@
 
 use super::times::{self, FoundTimes};
 use crate::cli::args::DialectArgs;
-use crate::reading::{DecimalMark, Delimiter, Dialect};
+use crate::reading::{DecimalMark, Dialect};
 use crate::runtime::ingest::Survey;
 
 /// What a table's cells and the flags say of it.
@@ -11,6 +11,8 @@ pub(super) struct Written {
     pub(super) dialect: Dialect,
     /// Whether its times say nothing of their zone.
     pub(super) needs_zone: bool,
+    /// Whether they are days since a day 0, in a column `t_days`.
+    pub(super) is_in_days: bool,
 }
 
 /// How the table is written, or what the file leaves open.
@@ -19,7 +21,7 @@ pub(super) fn written(survey: &Survey, stated: &DialectArgs) -> Result<Written, 
     let decimal_mark = decimal.clone().unwrap_or_default();
     let time = times::find(survey, stated, decimal_mark);
     match (decimal, time) {
-        (Ok(decimal), Ok(found)) => Ok(in_words(survey.delimiter, decimal, found)),
+        (Ok(decimal), Ok(found)) => Ok(in_words(survey, decimal, found)),
         (decimal, time) => {
             let problems = [decimal.err(), time.err()];
             Err(problems.into_iter().flatten().collect())
@@ -27,10 +29,15 @@ pub(super) fn written(survey: &Survey, stated: &DialectArgs) -> Result<Written, 
     }
 }
 
-fn in_words(delimiter: Delimiter, decimal: DecimalMark, found: FoundTimes) -> Written {
+fn in_words(survey: &Survey, decimal: DecimalMark, found: FoundTimes) -> Written {
+    let has = |wanted: &str| {
+        let mut names = survey.names.iter();
+        names.any(|name| name.eq_ignore_ascii_case(wanted))
+    };
     Written {
+        is_in_days: found.columns.is_empty() && has("t_days") && !has("time"),
         dialect: Dialect {
-            delimiter: Some(delimiter),
+            delimiter: Some(survey.delimiter),
             decimal,
             time_columns: found.columns,
             time_format: found.format,

@@ -1,27 +1,29 @@
 //! `init FILE...`: from files of readings to a site file.
 
 mod dialect;
+mod long;
+mod said;
 mod text;
 mod times;
 mod unnamed;
 
-use super::args::{DialectArgs, FileArgs, OutputArgs, OutputFormat};
+use super::args::{DialectArgs, FileArgs, OutputArgs};
 use super::check;
 use super::exit::{self, UsageError};
 use crate::config::{SourceKind, value};
-use crate::reading::{BenchmarkId, Dialect, Quantity, SummerTime, TimeFormat, Unit};
+use crate::reading::{BenchmarkId, Dialect, Quantity, SummerTime, TimeFormat, Timestamp, Unit};
 use crate::runtime::ingest::{
     FileSurvey, Measure, ReadOptions, TextFormat, look_through, read_with_remarks, survey,
     text_format_of, unpacked_name,
 };
+use anyhow::Context;
 use dialect::Written;
 use jiff::SignedDuration;
-use schemars::JsonSchema;
-use serde::Serialize;
+pub(super) use said::ConfigWritten;
+use said::{say_next, say_written};
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use unnamed::without_readings;
+use unnamed::{covariates_alone, without_readings};
 
 /// Write a site's config from files of readings: what they hold, how they are written, what to do next
 ///
@@ -61,6 +63,8 @@ struct InitPlan {
     missing: Vec<String>,
     sources: Vec<PlannedSource>,
     benchmarks: Vec<PlannedBenchmark>,
+    /// Of every velocity, where that is said.
+    averaging: Option<String>,
     evacuation_time: Option<String>,
     hook: Option<String>,
 }
@@ -71,6 +75,17 @@ struct PlannedSource {
     kind: SourceKind,
     path: String,
     dialect: Dialect,
+    /// Day 0, where its times are days.
+    day_zero: Option<DayZero>,
+    /// Whether it has covariates and no benchmark.
+    is_beside: bool,
+}
+
+/// When the days of a table are counted from.
+#[derive(Debug)]
+enum DayZero {
+    Stated(Timestamp),
+    Open,
 }
 
 #[derive(Debug)]
@@ -94,7 +109,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         )));
     }
     let plan = plan(args)?;
-    std::fs::write(config, text::config(&plan))?;
+    say_idle(&plan, args);
+    std::fs::write(config, text::config(&plan))
+        .with_context(|| format!("cannot write {}", config.display()))?;
     say_written(args, &plan)?;
     check::check(config, args.output, true)?;
     say_next(args)
@@ -105,7 +122,7 @@ fn usage(problem: String) -> anyhow::Error {
 }
 
 fn plan(args: &Args) -> anyhow::Result<InitPlan> {
-    let mut problems = Vec::new();
+    let (mut problems, mut beside) = (Vec::new(), Vec::new());
     let (mut sources, mut benchmarks) = (Vec::new(), BTreeMap::new());
     for file in &args.files {
         let kind = kind_of(file)?;
@@ -119,14 +136,20 @@ fn plan(args: &Args) -> anyhow::Result<InitPlan> {
                 continue;
             }
         };
-        let source = PlannedSource {
+        let day_zero = written.is_in_days.then(|| {
+            let stated = args.file.epoch.map(DayZero::Stated);
+            stated.unwrap_or(DayZero::Open)
+        });
+        let mut source = PlannedSource {
             id: source_id(file, &sources),
             kind,
             path: relative(file, &args.output_config)?,
             dialect: written.dialect,
+            day_zero,
+            is_beside: false,
         };
         match held(file, &source, args)? {
-            Ok(found) => {
+            FoundInFile::Benchmarks(found) => {
                 for benchmark in found {
                     if let Some(other) = benchmarks.insert(benchmark.id.clone(), benchmark) {
                         problems.push(twice(file, &other));
@@ -134,7 +157,24 @@ fn plan(args: &Args) -> anyhow::Result<InitPlan> {
                 }
                 sources.push(source);
             }
-            Err(problem) => problems.push(problem),
+            FoundInFile::Covariates(names, problem) => {
+                beside.push((file, names, problem));
+                source.is_beside = true;
+                sources.push(source);
+            }
+            FoundInFile::Nothing(problem) => problems.push(problem),
+        }
+    }
+    for (file, names, problem) in beside {
+        if benchmarks.is_empty() {
+            problems.push(problem);
+        } else {
+            exit::complain(&format_args!(
+                "{}: it is taken for covariates alone ({}), as a source without benchmarks; if one of them has the readings \
+                 of a point, say so with --column",
+                file.display(),
+                names.join(", ")
+            ));
         }
     }
     if !problems.is_empty() {
@@ -148,15 +188,35 @@ fn plan(args: &Args) -> anyhow::Result<InitPlan> {
             .as_ref()
             .and_then(|zone| zone.iana_name())
             .map(str::to_owned),
-        dst: summer_word(args.file.dst),
+        dst: args.file.dst.and_then(summer_word),
         missing: args.file.missing.clone(),
         sources,
         benchmarks: benchmarks.into_values().collect(),
-        evacuation_time: args
-            .evacuation_time
-            .map(|span| format!("{}s", span.as_secs())),
+        averaging: args.file.averaging.map(in_words),
+        evacuation_time: args.evacuation_time.map(in_seconds),
         hook: args.hook.clone(),
     })
+}
+
+fn in_seconds(span: SignedDuration) -> String {
+    format!("{}s", span.as_secs())
+}
+
+/// `1h` of an hour.
+fn in_words(span: SignedDuration) -> String {
+    humantime::format_duration(span.unsigned_abs()).to_string()
+}
+
+/// Says of flags that no file is there for.
+fn say_idle(plan: &InitPlan, args: &Args) {
+    let in_days = plan.sources.iter().any(|source| source.day_zero.is_some());
+    if args.file.epoch.is_some() && !in_days {
+        exit::complain(&"--epoch says nothing here: no file has a column t_days");
+    }
+    let velocities = plan.benchmarks.iter().any(|one| one.is_velocity);
+    if args.file.averaging.is_some() && !velocities {
+        exit::complain(&"--averaging says nothing here: no benchmark is watched by its velocity");
+    }
 }
 
 fn twice(file: &Path, other: &PlannedBenchmark) -> String {
@@ -210,7 +270,15 @@ fn written(
             if let Some(remark) = &survey.encoding {
                 exit::complain(&format_args!("{}: {remark}", file.display()));
             }
-            dialect::written(&survey, &args.file.dialect)
+            let written = dialect::written(&survey, &args.file.dialect);
+            written.and_then(|written| {
+                let columns = &args.file.columns;
+                let is_mapped = |name: &str| columns.iter().any(|map| map.column == name);
+                match long::names_of_points(&survey, &written.dialect, &is_mapped) {
+                    Some(problem) => Err(vec![problem]),
+                    None => Ok(written),
+                }
+            })
         }
         SourceKind::Ndjson | SourceKind::Toa5 | SourceKind::Mcap => Ok(Written {
             dialect: Dialect {
@@ -218,6 +286,7 @@ fn written(
                 ..Dialect::default()
             },
             needs_zone: kind == SourceKind::Toa5,
+            is_in_days: false,
         }),
     };
     Ok(found.and_then(|written| {
@@ -240,12 +309,16 @@ fn stated_format(kind: SourceKind, stated: &DialectArgs) -> TimeFormat {
         .unwrap_or_default()
 }
 
-/// The benchmarks that the file holds, or which flag names them.
-fn held(
-    file: &Path,
-    source: &PlannedSource,
-    args: &Args,
-) -> anyhow::Result<Result<Vec<PlannedBenchmark>, String>> {
+/// What a file holds.
+enum FoundInFile {
+    Benchmarks(Vec<PlannedBenchmark>),
+    /// Covariates by their names, and what is said of it where no other file has a benchmark.
+    Covariates(Vec<String>, String),
+    /// What is wrong with it, or which flag names its benchmarks.
+    Nothing(String),
+}
+
+fn held(file: &Path, source: &PlannedSource, args: &Args) -> anyhow::Result<FoundInFile> {
     let options = ReadOptions {
         dialect: source.dialect.clone(),
         ..args.file.options()
@@ -269,9 +342,13 @@ fn held(
         });
     let found: Vec<PlannedBenchmark> = found.collect();
     if found.is_empty() {
-        return Ok(Err(without_readings(file, &looked)));
+        let problem = without_readings(file, &looked);
+        return Ok(match covariates_alone(&looked) {
+            Some(names) => FoundInFile::Covariates(names, problem),
+            None => FoundInFile::Nothing(problem),
+        });
     }
-    Ok(Ok(one_quantity_each(found)))
+    Ok(FoundInFile::Benchmarks(one_quantity_each(found)))
 }
 
 /// The displacement of each benchmark that has its velocity too: the config names each benchmark once.
@@ -341,107 +418,4 @@ fn site_name(args: &Args) -> String {
         .clone()
         .or(folder)
         .unwrap_or_else(|| "site".to_owned())
-}
-
-/// What was written; the answer of `check` follows.
-#[derive(Debug, JsonSchema, Serialize)]
-pub(super) struct ConfigWritten<'a> {
-    /// The file.
-    config: &'a Path,
-    /// The benchmarks in it.
-    benchmarks: Vec<&'a str>,
-    /// What to do next: each command, and why.
-    next: Vec<(String, &'static str)>,
-}
-
-fn say_written(args: &Args, plan: &InitPlan) -> anyhow::Result<()> {
-    let mut stdout = std::io::stdout().lock();
-    let config = args.output_config.display();
-    match args.output.format {
-        OutputFormat::Text => {
-            let (sources, benchmarks) = (plan.sources.len(), plan.benchmarks.len());
-            writeln!(
-                stdout,
-                "wrote {config} (sources: {sources}, benchmarks: {benchmarks}); it is checked now\n"
-            )?;
-        }
-        OutputFormat::Json => {
-            let ids = plan
-                .benchmarks
-                .iter()
-                .map(|benchmark| benchmark.id.as_str());
-            let written = ConfigWritten {
-                config: &args.output_config,
-                benchmarks: ids.collect(),
-                next: next(args),
-            };
-            writeln!(stdout, "{}", serde_json::to_string(&written)?)?;
-        }
-    }
-    Ok(())
-}
-
-fn say_next(args: &Args) -> anyhow::Result<()> {
-    if args.output.format == OutputFormat::Json {
-        return Ok(());
-    }
-    let mut stdout = std::io::stdout().lock();
-    writeln!(
-        stdout,
-        "\nIs all this as you meant it? If not, edit {}. Then:",
-        args.output_config.display()
-    )?;
-    for (command, what) in next(args) {
-        writeln!(stdout, "  {command:WIDTH$}  {what}")?;
-    }
-    Ok(())
-}
-
-/// Columns of a command, beside which stands what it does.
-const WIDTH: usize = 46;
-
-/// The path as a shell takes it for one word.
-fn in_shell(path: &Path) -> String {
-    let text = path.display().to_string();
-    let is_plain = |letter: char| letter.is_alphanumeric() || "/._-+:,@%".contains(letter);
-    let text = if text.starts_with('-') {
-        format!("./{text}")
-    } else {
-        text
-    };
-    if !text.is_empty() && text.chars().all(is_plain) {
-        return text;
-    }
-    format!("'{}'", text.replace('\'', "'\\''"))
-}
-
-/// The commands that come next, and what each does.
-fn next(args: &Args) -> Vec<(String, &'static str)> {
-    let config = in_shell(&args.output_config);
-    let files: Vec<String> = args.files.iter().map(|file| in_shell(file)).collect();
-    let mut next = vec![
-        (
-            format!("slipwatch doctor {config}"),
-            "is this machine right for it",
-        ),
-        (
-            format!("slipwatch replay {} --config {config}", files.join(" ")),
-            "what it would have said so far",
-        ),
-    ];
-    if args.hook.is_some() {
-        next.push((
-            format!("slipwatch hook test --config {config}"),
-            "run the hook once, marked as a test",
-        ));
-    }
-    next.push((
-        format!("slipwatch run {config}"),
-        "watch, until it is stopped",
-    ));
-    next.push((
-        format!("slipwatch status --config {config}"),
-        "how the site stands, while it runs",
-    ));
-    next
 }

@@ -1,7 +1,7 @@
 //! The site file that is written: what was found, and what can be added, in comments.
 
-use super::InitPlan;
 use super::times::word;
+use super::{DayZero, InitPlan};
 use crate::config::SourceKind;
 use crate::reading::{DecimalMark, Delimiter, TimeFormat};
 use std::fmt::Write as _;
@@ -41,7 +41,13 @@ pub(super) fn config(plan: &InitPlan) -> String {
                 "quantity = \"displacement\"         # or \"velocity\": its file has both, and one of them is monitored\n",
             );
         }
-        if benchmark.is_velocity {
+        if let Some(averaging) = plan.averaging.as_ref().filter(|_| benchmark.is_velocity) {
+            let line = format!("averaging = {}", quoted(averaging));
+            let _ = writeln!(
+                text,
+                "{line:35}# each velocity is the mean of the time before it"
+            );
+        } else if benchmark.is_velocity {
             text.push_str("# averaging = \"1h\"                 # if each velocity is the mean of the time before it\n");
         }
         text.push('\n');
@@ -53,7 +59,12 @@ pub(super) fn config(plan: &InitPlan) -> String {
 fn source_lines(text: &mut String, source: &super::PlannedSource, plan: &InitPlan) {
     let _ = write!(
         text,
-        "\n[[source]]\nid = {}\nkind = \"{}\"\npath = {}\n",
+        "\n{}[[source]]\nid = {}\nkind = \"{}\"\npath = {}\n",
+        if source.is_beside {
+            "# Covariates alone: none of its columns is a point.\n"
+        } else {
+            ""
+        },
         quoted(&source.id),
         source.kind.name(),
         quoted(&source.path)
@@ -75,6 +86,16 @@ fn source_lines(text: &mut String, source: &super::PlannedSource, plan: &InitPla
     if !plan.missing.is_empty() {
         let marks: Vec<String> = plan.missing.iter().map(|mark| quoted(mark)).collect();
         let _ = writeln!(text, "missing = [{}]", marks.join(", "));
+    }
+    match &source.day_zero {
+        Some(DayZero::Stated(epoch)) => {
+            let line = format!("epoch = {}", quoted(&epoch.to_string()));
+            let _ = writeln!(text, "{line:35}# day 0 of t_days");
+        }
+        Some(DayZero::Open) => text.push_str(
+            "# epoch = \"2000-01-01T00:00:00Z\"   # day 0 of t_days, if it is another one\n",
+        ),
+        None => {}
     }
     let dialect = &source.dialect;
     if let Some(delimiter @ (Delimiter::Semicolon | Delimiter::Tab)) = dialect.delimiter {

@@ -19,7 +19,7 @@ pub(super) fn without_readings(file: &Path, looked: &FileSurvey) -> String {
     });
     let numbers: Vec<&str> = numbers.collect();
     let named = "no column is named as readings are ([ID_]displacement_UNIT or [ID_]velocity_UNIT)";
-    let Some(first) = numbers.first() else {
+    if numbers.is_empty() {
         let columns: Vec<&str> = looked
             .columns
             .iter()
@@ -36,7 +36,13 @@ pub(super) fn without_readings(file: &Path, looked: &FileSurvey) -> String {
                 columns.join(", ")
             ),
         };
-    };
+    }
+    let of_points = looked
+        .columns
+        .iter()
+        .filter(|(name, meaning)| numbers.contains(&name.as_str()) && !is_covariate(name, meaning));
+    let first = of_points.map(|(name, _)| name.as_str()).next();
+    let first = first.unwrap_or("NAME");
     let (quantity, unit) = match unit_at_end(first) {
         Some(unit) => (unit.quantity().name(), unit.column_suffix()),
         // The name says nothing of a unit, or one that is not known.
@@ -52,6 +58,64 @@ pub(super) fn without_readings(file: &Path, looked: &FileSurvey) -> String {
         file.display(),
         numbers.join(", ")
     )
+}
+
+/// The covariates of a file, where it has numbers and each column of them is named as no reading is.
+pub(super) fn covariates_alone(looked: &FileSurvey) -> Option<Vec<String>> {
+    let numbers = looked
+        .columns
+        .iter()
+        .filter(|(_, meaning)| matches!(meaning, Meaning::Covariate { .. }));
+    let numbers: Vec<&(String, Meaning)> = numbers.collect();
+    let are_all = numbers
+        .iter()
+        .all(|(name, meaning)| is_covariate(name, meaning));
+    let names = numbers.iter().map(|(name, _)| name.clone());
+    (are_all && !numbers.is_empty()).then(|| names.collect())
+}
+
+/// Parts of the names of what acts on a slope, or on its instruments, in lower case.
+const OF_COVARIATES: [&str; 27] = [
+    "rain",
+    "regen",
+    "niederschlag",
+    "precip",
+    "pioggia",
+    "pluie",
+    "lluvia",
+    "snow",
+    "schnee",
+    "temp",
+    "level",
+    "pegel",
+    "water",
+    "wasser",
+    "pore",
+    "piezo",
+    "press",
+    "druck",
+    "baro",
+    "batt",
+    "volt",
+    "akku",
+    "humid",
+    "feucht",
+    "discharge",
+    "abfluss",
+    "inflow",
+];
+
+/// Whether a column's name, or the unit in it, says that it holds no readings.
+fn is_covariate(name: &str, meaning: &Meaning) -> bool {
+    let plain = name.to_lowercase();
+    let is_levelling = plain.contains("levelling") || plain.contains("leveling");
+    let of_covariates = OF_COVARIATES.iter().any(|part| plain.contains(part));
+    let unit = if let Meaning::Covariate { unit } = meaning {
+        unit.as_deref()
+    } else {
+        None
+    };
+    (of_covariates && !is_levelling) || unit.is_some_and(|unit| Unit::parse(unit).is_err())
 }
 
 /// The unit that a column's name ends with, after a `_`.

@@ -1,0 +1,199 @@
+//! What `init` makes of flags and of files that are not one table of readings.
+
+use crate::office::{Office, plain, rows, site};
+use std::fs;
+use std::path::Path;
+
+fn written(office: &Office) -> String {
+    fs::read_to_string(office.path("site.toml")).unwrap()
+}
+
+/// A table of days, six hours apart.
+fn of_days(count: i64) -> String {
+    let body: String = (0..count)
+        .map(|row| format!("{},{}\n", 0.25 * row as f64, 0.1 * row as f64))
+        .collect();
+    format!("t_days,P1_displacement_mm\n{body}")
+}
+
+#[test]
+fn day_0_of_a_table_is_written_and_watched_and_said_where_it_is_assumed() {
+    let office = Office::with(&[("slope.csv", &of_days(40))]);
+    let said = office.done(&["init", "slope.csv", "--epoch", "2021-03-01T00:00:00Z"]);
+    let config = written(&office);
+    assert!(
+        config.contains("epoch = \"2021-03-01T00:00:00Z\""),
+        "{config}"
+    );
+    assert!(said.contains("first 2021-03-01T00:00:00Z"), "{said}");
+    assert!(!said.contains("day 0 is taken"), "{said}");
+    let replay = ["replay", "slope.csv", "--config", "site.toml"];
+    let events = office.done(&[&replay[..], &["--format", "json"]].concat());
+    assert!(
+        events.contains("2021-03-10T18:00:00Z") && !events.contains("2000-01"),
+        "{events}"
+    );
+    let daemon = office.run(&["run", "site.toml"]);
+    office.status_until("2021-03-10 18:00");
+    drop(daemon);
+
+    let office = Office::with(&[("slope.csv", &of_days(40))]);
+    for args in [&["init", "slope.csv"][..], &["check", "site.toml"]] {
+        let said = office.done(args);
+        assert!(
+            said.contains("day 0 is taken as 2000-01-01T00:00:00Z") && said.contains("--epoch"),
+            "{said}"
+        );
+    }
+    let office = Office::with(&[("slope.csv", &plain(20))]);
+    let (exit, _, said) = office.say(&["init", "slope.csv", "--epoch", "2021-03-01T00:00:00Z"]);
+    assert!(
+        exit == 0 && said.contains("no file has a column t_days"),
+        "{said}"
+    );
+}
+
+#[test]
+fn an_epoch_is_of_tables_alone() {
+    let config = "[site]\nname = \"Toc\"\nstate_dir = \"state\"\n[[source]]\nid = \"a\"\nkind = \"ndjson\"\npath = \"*.ndjson\"\nepoch = \"2021-03-01T00:00:00Z\"\n";
+    let office = Office::with(&[("site.toml", config)]);
+    let said = office.refused(78, &["check", "site.toml"]);
+    assert!(
+        said.contains("source.epoch does nothing for this kind"),
+        "{said}"
+    );
+}
+
+#[test]
+fn the_span_of_means_is_written_for_velocities() {
+    let body = rows(40, |time, value| format!("{time}+02:00,{value},{value}\n"));
+    let text = format!("time,P1_velocity_mm_per_h,P2_displacement_mm\n{body}");
+    let office = Office::with(&[("slope.csv", &text)]);
+    office.done(&["init", "slope.csv", "--averaging", "1h"]);
+    let config = written(&office);
+    assert_eq!(
+        config.matches("\naveraging = \"1h\"").count(),
+        1,
+        "{config}"
+    );
+    let of_p1 = config.find("id = \"P1\"").unwrap();
+    assert!(
+        config[of_p1..].find("averaging").unwrap() < config[of_p1..].find("id = \"P2\"").unwrap()
+    );
+}
+
+#[test]
+fn a_table_with_one_row_a_point_is_refused_with_what_to_do() {
+    let long = |name: &str, together: bool| {
+        let body = rows(60, |time, value| {
+            let second = if together { "00" } else { "30" };
+            let date = time.strftime("%FT%H");
+            format!(
+                "{date}:00:00Z,P1,{value}\n{date}:00:{second}Z,P2,{}\n",
+                50.0 + value
+            )
+        });
+        format!("time,{name},displacement_mm\n{body}")
+    };
+    for text in [long("point", true), long("wo", true), long("Prisma", false)] {
+        let office = Office::with(&[("slope.csv", &text)]);
+        let said = office.refused(2, &["init", "slope.csv"]);
+        for part in [
+            "slope.csv: column",
+            "looks like the names of points, one row a point (P1, P2)",
+            "split the file",
+            "\"benchmark\": \"P1\"",
+        ] {
+            assert!(said.contains(part), "no {part:?} in {said}");
+        }
+        assert!(!office.path("site.toml").exists());
+    }
+    // A column of remarks, or of the state of an instrument, names no point.
+    let body = rows(60, |time, value| {
+        let state = if time.hour() % 2 == 0 { "ok" } else { "weak" };
+        format!("{time}+02:00,{value},{state},Meier\n")
+    });
+    let text = format!("time,P1_displacement_mm,sensor_status,observer\n{body}");
+    Office::with(&[("slope.csv", &text)]).done(&["init", "slope.csv"]);
+}
+
+#[test]
+fn a_file_of_covariates_alone_goes_beside_one_with_readings() {
+    let rain = rows(60, |time, _| format!("{time}+02:00,0.2\n"));
+    let rain = format!("time,rain_mm\n{rain}");
+    let unknown = rain.replace("rain_mm", "lower");
+    let files = [
+        ("rain.csv", rain.as_str()),
+        ("slope.csv", &plain(60)),
+        ("lower.csv", &unknown),
+    ];
+    let office = Office::with(&files);
+    let (exit, out, err) = office.say(&["init", "rain.csv", "slope.csv"]);
+    assert_eq!(exit, 0, "{out}{err}");
+    assert!(
+        err.contains("rain.csv: it is taken for covariates alone (rain_mm)"),
+        "{err}"
+    );
+    assert!(out.contains("covariate rain_mm (rain): 60 values"), "{out}");
+    assert!(out.contains("sources: 2, benchmarks: 1"), "{out}");
+    office.done(&["check", "site.toml"]);
+    // By itself it is none, and no rain is the example of a reading.
+    let said = office.refused(2, &["init", "rain.csv", "--force"]);
+    assert!(
+        said.contains("--column \"NAME=P1:displacement:mm\""),
+        "{said}"
+    );
+    // What may be a reading is asked for.
+    let said = office.refused(2, &["init", "slope.csv", "lower.csv", "--force"]);
+    assert!(
+        said.contains("--column \"lower=P1:displacement:mm\""),
+        "{said}"
+    );
+    let both = rows(60, |time, value| format!("{time}+02:00,0.2,{value}\n"));
+    let both = format!("time,rain_mm,way_cm\n{both}");
+    let office = Office::with(&[("slope.csv", &both)]);
+    let said = office.refused(2, &["init", "slope.csv"]);
+    assert!(
+        said.contains("--column \"way_cm=P1:displacement:cm\""),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_column_without_a_name_is_passed_over_where_it_is_empty() {
+    let rows = rows(30, |time, value| format!("{time}+02:00;{value};\n"));
+    let with = format!("time;P1_displacement_mm;\n{rows}");
+    let short = with
+        .replace(";\n2017", "\n2017")
+        .replacen("mm\n", "mm;\n", 1);
+    for text in [&with, &short] {
+        let office = Office::with(&[("slope.csv", text)]);
+        let said = office.done(&["init", "slope.csv"]);
+        assert!(said.contains("30 readings of displacement"), "{said}");
+        let fit = office.done(&["fit", "slope.csv"]);
+        assert!(fit.contains("30 readings"), "{fit}");
+    }
+    let filled = with.replacen(";\n2017-06-01T05", ";7\n2017-06-01T05", 1);
+    assert_ne!(filled, with);
+    let office = Office::with(&[("slope.csv", &filled)]);
+    let said = office.refused(65, &["fit", "slope.csv"]);
+    assert!(
+        said.contains("found \"7\"") && said.contains("a name for this column"),
+        "{said}"
+    );
+}
+
+#[test]
+fn what_cannot_be_written_or_read_is_named() {
+    let office = Office::with(&[("slope.csv", &plain(30))]);
+    let config = "/nonexistent/folder/site.toml";
+    assert!(!Path::new("/nonexistent").exists());
+    let said = office.refused(74, &["init", "slope.csv", "-o", config]);
+    assert!(said.contains(config), "{said}");
+    let torn = plain(30).replacen("2017-06-01T05", "\0\0\0", 1);
+    fs::write(office.path("slope.csv"), torn).unwrap();
+    fs::write(office.path("site.toml"), site("slope.csv", "")).unwrap();
+    let said = office.done(&["check", "site.toml"]);
+    let line = said.lines().find(|line| line.contains("NUL")).unwrap();
+    assert!(line.contains("slope.csv, line 7"), "{line}");
+}
