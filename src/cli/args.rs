@@ -2,15 +2,14 @@
 
 use super::exit;
 use crate::alert::Policy;
-use crate::config::{Config, value};
+use crate::config::value;
 use crate::reading::{
     BenchmarkId, Conventions, DecimalMark, Delimiter, Dialect, Disorder, LocalClock, MissingValues,
     Quantity, Recording, SelectError, Series, SummerTime, TimeFormat, Timestamp,
 };
 use crate::runtime::ingest::{
-    ColumnMap, FilesRead, IngestError, ReadOptions, read_channels, read_each, read_with_remarks,
+    ColumnMap, FilesRead, IngestError, ReadOptions, read_channels, read_with_remarks,
 };
-use crate::runtime::tail::options_of;
 use jiff::SignedDuration;
 use jiff::tz::TimeZone;
 use serde::Serialize;
@@ -54,6 +53,20 @@ impl OutputArgs {
         Ok(())
     }
 }
+
+/// The names of the arguments that say what a file means.
+pub(super) const FILE_FLAGS: [&str; 10] = [
+    "columns",
+    "averaging",
+    "epoch",
+    "time_zone",
+    "dst",
+    "missing",
+    "delimiter",
+    "decimal",
+    "time_columns",
+    "time_format",
+];
 
 /// What files do not say of themselves.
 #[derive(Debug, Clone, clap::Args)]
@@ -131,6 +144,57 @@ impl FileArgs {
             ..defaults
         }
     }
+
+    /// The flags that are given, each with the key of a config that says the same.
+    pub(super) fn stated(&self) -> Vec<(&'static str, &'static str)> {
+        let dialect = &self.dialect;
+        let all = [
+            (
+                !self.columns.is_empty(),
+                "--column",
+                "column and unit of [[benchmark]]",
+            ),
+            (
+                self.averaging.is_some(),
+                "--averaging",
+                "averaging of [[benchmark]]",
+            ),
+            (self.epoch.is_some(), "--epoch", "epoch of [[source]]"),
+            (
+                self.time_zone.is_some(),
+                "--time-zone",
+                "time_zone of [[source]]",
+            ),
+            (self.dst.is_some(), "--dst", "dst of [[source]]"),
+            (
+                !self.missing.is_empty(),
+                "--missing",
+                "missing of [[source]]",
+            ),
+            (
+                dialect.delimiter.is_some(),
+                "--delimiter",
+                "delimiter of [[source]]",
+            ),
+            (
+                dialect.decimal.is_some(),
+                "--decimal",
+                "decimal of [[source]]",
+            ),
+            (
+                !dialect.time_columns.is_empty(),
+                "--time-column",
+                "time_column of [[source]]",
+            ),
+            (
+                dialect.time_format.is_some(),
+                "--time-format",
+                "time_format of [[source]]",
+            ),
+        ];
+        let given = all.into_iter().filter(|(is_given, ..)| *is_given);
+        given.map(|(_, flag, key)| (flag, key)).collect()
+    }
 }
 
 /// Which readings, and what they mean: common to all commands that read some.
@@ -179,27 +243,12 @@ impl ReadingArgs {
         self.joined(read_with_remarks(&self.files, &options)?, &options)
     }
 
-    /// The same, where the files of a site's sources are written as its config says.
-    ///
-    /// # Errors
-    /// As [`ReadingArgs::load`].
-    pub fn load_as_of(&self, config: &Config) -> Result<Loaded, IngestError> {
-        let options = self.file.options();
-        let of = |file: &PathBuf| {
-            let source = config
-                .sources
-                .iter()
-                .find(|source| source.pattern.is_of(file));
-            let own = source.map(|source| options_of(source, &config.benchmarks, file));
-            own.unwrap_or_else(|| options.clone())
-        };
-        let own: Vec<ReadOptions> = self.files.iter().map(of).collect();
-        let files = self.files.iter().map(PathBuf::as_path).zip(&own);
-        self.joined(read_each(&files.collect::<Vec<_>>())?, &options)
-    }
-
     /// With the covariates that stand in files of their own.
-    fn joined(&self, read: FilesRead, options: &ReadOptions) -> Result<Loaded, IngestError> {
+    pub(super) fn joined(
+        &self,
+        read: FilesRead,
+        options: &ReadOptions,
+    ) -> Result<Loaded, IngestError> {
         let FilesRead {
             mut recording,
             mut disorder,
@@ -236,6 +285,12 @@ impl ReadingArgs {
         recording.series(benchmark.as_ref(), self.quantity)
     }
 
+    fn allows(&self, series: &Series) -> bool {
+        let benchmark = self.benchmark.as_deref();
+        benchmark.is_none_or(|id| series.benchmark.as_str() == id)
+            && self.quantity.is_none_or(|one| series.quantity() == one)
+    }
+
     /// Keeps the series that `--benchmark` and `--quantity` allow, however many.
     ///
     /// # Errors
@@ -246,11 +301,7 @@ impl ReadingArgs {
         {
             return Err(error);
         }
-        recording.series.retain(|series| {
-            let benchmark = self.benchmark.as_deref();
-            benchmark.is_none_or(|id| series.benchmark.as_str() == id)
-                && self.quantity.is_none_or(|one| series.quantity() == one)
-        });
+        recording.series.retain(|series| self.allows(series));
         Ok(())
     }
 

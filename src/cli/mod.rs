@@ -30,6 +30,7 @@ mod status;
 mod sweep;
 mod table;
 mod text;
+mod watched;
 
 use crate::runtime::log;
 use clap::{Parser, Subcommand};

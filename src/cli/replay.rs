@@ -1,11 +1,12 @@
 //! `replay FILE...`: the monitor over recorded readings, in data time.
 
-use super::args::{OutputFormat, ReadingArgs};
+use super::args::{FILE_FLAGS, OutputFormat, ReadingArgs};
 use super::bar::{self, BarInTime};
 use super::columnar::{RowSink, TableArgs};
 use super::demo::timeline::Timeline;
+use super::exit::UsageError;
 use super::run::asynchronous;
-use super::{exit, text};
+use super::{exit, text, watched};
 use crate::config::{self, Config, value};
 use crate::monitor::{Event, Settings};
 use crate::reading::{BenchmarkId, Quantity, Recording, SelectError, Series, Timestamp};
@@ -41,7 +42,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "max|N", default_value = "max", value_parser = pace)]
     speed: ReplayPace,
     /// Play what the daemon of this state folder took in, in the order in which it did, instead of files
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["hooks", "quantity"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["hooks", "quantity", "files", "channels"], conflicts_with_all = FILE_FLAGS)]
     state: Option<PathBuf>,
     /// Stop at this time of the data
     #[arg(long, value_name = "TIME", value_parser = value::instant)]
@@ -73,7 +74,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         exit::complain(warning);
     }
     let loaded = match &config {
-        Some(config) => args.readings.load_as_of(config)?,
+        Some(config) => watched::load(&args.readings, config)?,
         None => args.readings.load()?,
     };
     let mut recording = loaded.recording;
@@ -127,6 +128,12 @@ fn cut(recording: &mut Recording, until: Timestamp) {
 
 /// Prints the events of the stored input; with `--benchmark` those of one benchmark and of the site as a whole.
 fn run_state(args: &Args, folder: &Path) -> anyhow::Result<()> {
+    let has_figure =
+        args.readings.evacuation_time.is_some() || args.readings.critical_velocity.is_some();
+    if args.config.is_none() && has_figure {
+        let text = "--evacuation-time and --critical-velocity change a policy: with --state give the one that they change with --config";
+        return Err(UsageError(text.to_owned()).into());
+    }
     let store = Store::look(folder)
         .with_context(|| format!("cannot read the state in {}", folder.display()))?;
     let wanted = args.readings.benchmark.as_ref().map(BenchmarkId::new);

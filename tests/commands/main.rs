@@ -18,6 +18,7 @@ mod parquet;
 mod plot_cli;
 mod progress;
 mod record;
+mod replay_config;
 mod report_cli;
 mod schema;
 mod score_cli;

@@ -4,7 +4,7 @@ mod material;
 mod page;
 mod sections;
 
-use super::args::{OutputArgs, ReadingArgs};
+use super::args::{FILE_FLAGS, OutputArgs, ReadingArgs};
 use super::exit::UsageError;
 use super::state::FileWritten;
 use crate::config::value;
@@ -22,7 +22,7 @@ pub(super) struct Args {
     #[command(flatten)]
     readings: ReadingArgs,
     /// The site whose daemon's state is reported, instead of files
-    #[arg(long, value_name = "CONFIG", conflicts_with_all = ["files", "channels", "failure_time", "no_failure"])]
+    #[arg(long, value_name = "CONFIG", conflicts_with_all = ["files", "channels", "failure_time", "no_failure", "quantity", "evacuation_time", "critical_velocity"], conflicts_with_all = FILE_FLAGS)]
     config: Option<PathBuf>,
     /// Of a state: only this last stretch of its data, such as 7d
     #[arg(long, value_name = "DURATION", requires = "config", value_parser = value::duration)]

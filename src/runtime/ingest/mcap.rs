@@ -9,6 +9,7 @@ use super::bytes::{is_stdin, stdin};
 use super::collect::Collector;
 use super::mcap_stream::{GROWING, PROVENANCE};
 use super::message::{MessageError, Topic, decode_message, is_said};
+use super::taken::BadRows;
 use super::{IngestError, Item, ReadOptions};
 use crate::reading::{Disorder, Recording};
 use ::mcap::McapError;
@@ -27,6 +28,7 @@ const RECORD_LENGTH_LIMIT: usize = 64 << 20;
 pub(super) fn read_mcap(
     file: &Path,
     options: &ReadOptions,
+    bad: &mut BadRows<'_>,
     progress: &mut dyn FnMut(f64),
 ) -> Result<(Recording, Disorder), IngestError> {
     let length = file.metadata().map_or(0, |metadata| metadata.len());
@@ -67,7 +69,7 @@ pub(super) fn read_mcap(
             }
             LinearReadEvent::Record { opcode, data } => {
                 let record = ::mcap::parse_record(opcode, data);
-                contents.take(record.map_err(|source| contents.damaged(source))?)?;
+                contents.take(record.map_err(|source| contents.damaged(source))?, bad)?;
             }
         }
     }
@@ -115,7 +117,7 @@ impl<'a> Contents<'a> {
         clippy::wildcard_enum_match_arm,
         reason = "records that hold no readings, among them kinds yet to be invented"
     )]
-    fn take(&mut self, record: Record<'_>) -> Result<(), IngestError> {
+    fn take(&mut self, record: Record<'_>, bad: &mut BadRows<'_>) -> Result<(), IngestError> {
         match record {
             Record::Channel(channel) => {
                 let known = self.channels.get(&channel.id);
@@ -134,10 +136,14 @@ impl<'a> Contents<'a> {
                     let unknown = McapError::UnknownChannel(header.sequence, header.channel_id);
                     return Err(self.damaged(unknown));
                 };
-                let item = decode_checked(channel, header.publish_time, &data)
-                    .map_err(|problem| self.message(problem))?;
-                if let Some(item) = item {
-                    self.collect(&channel.topic.clone(), item)?;
+                match decode_checked(channel, header.publish_time, &data) {
+                    Ok(None) => {}
+                    Ok(Some(item)) => {
+                        if let Err(fault) = self.collect(&channel.topic.clone(), item) {
+                            bad.meet(fault)?;
+                        }
+                    }
+                    Err(problem) => bad.meet(self.message(problem))?,
                 }
             }
             Record::Metadata(metadata) if metadata.name == PROVENANCE => {

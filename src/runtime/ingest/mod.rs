@@ -52,6 +52,8 @@ pub use units::FileUnits;
 pub(super) use units::UNIT_WAS;
 pub use vector::VectorMap;
 
+use taken::BadRows;
+
 use crate::reading::{
     BenchmarkId, Channel, Conventions, Dialect, Disorder, Quantity, Reading, Recording, Sample,
     Unit,
@@ -249,7 +251,7 @@ fn read_watched(
 ) -> Result<FilesRead, IngestError> {
     let each: Vec<(&Path, &ReadOptions)> =
         paths.iter().map(|path| (path.as_path(), options)).collect();
-    let read = read_each_watched(&each, progress)?;
+    let read = read_taking(&each, &mut BadRows::Refuse, progress)?;
     for map in &options.columns {
         if !read.columns.contains(&map.column) {
             return Err(IngestError::NoSuchColumn {
@@ -261,30 +263,37 @@ fn read_watched(
     Ok(read)
 }
 
-/// The same for files that are each to be read in their own way.
+/// Reads one file; a row or message that cannot be used is handed to `aside`, and the rest is read, as the daemon does: a column
+/// without a value is no fault then, nor a column of the options that is not there.
 ///
 /// # Errors
-/// As [`read_files`], but for columns of the options that no file has.
-pub fn read_each(files: &[(&Path, &ReadOptions)]) -> Result<FilesRead, IngestError> {
-    read_each_watched(files, &mut |_| {})
+/// [`IngestError`] where the whole file cannot be used.
+pub fn read_beside(
+    file: &Path,
+    options: &ReadOptions,
+    aside: &mut dyn FnMut(IngestError),
+) -> Result<FilesRead, IngestError> {
+    let each = [(file, options)];
+    read_taking(&each, &mut BadRows::SetAside(aside), &mut |_| {})
 }
 
-fn read_each_watched(
+fn read_taking(
     files: &[(&Path, &ReadOptions)],
+    bad: &mut BadRows<'_>,
     progress: &mut dyn FnMut(f64),
 ) -> Result<FilesRead, IngestError> {
     let (mut parts, mut read) = (Vec::new(), FilesRead::default());
     for (path, options) in files {
         let (recording, met) = match Format::of(path)? {
             Format::Text(format) => {
-                let table = text::read_text(format, path, options, progress)?;
+                let table = text::read_text(format, path, options, bad, progress)?;
                 read.columns.extend(table.columns);
                 let remarks = table.remarks.into_iter();
                 read.remarks
                     .extend(remarks.map(|one| (path.to_path_buf(), one)));
                 (table.recording, table.disorder)
             }
-            Format::Mcap => mcap::read_mcap(path, options, progress)?,
+            Format::Mcap => mcap::read_mcap(path, options, bad, progress)?,
         };
         parts.push(recording);
         read.disorder += met;

@@ -1,6 +1,7 @@
 //! What came of one line of a text file.
 
 use super::{IngestError, Item};
+use std::fmt;
 
 /// What came of one line.
 #[derive(Debug, Default)]
@@ -11,6 +12,41 @@ pub struct LineResult {
     pub fault: Option<IngestError>,
     /// What has been found out about the file, each once.
     pub remarks: Vec<Remark>,
+}
+
+/// What becomes of a row or message that cannot be used.
+pub(super) enum BadRows<'a> {
+    /// The whole file is refused.
+    Refuse,
+    /// It is handed on, and the rest is read.
+    SetAside(&'a mut dyn FnMut(IngestError)),
+}
+
+impl BadRows<'_> {
+    /// Meets one that cannot be used.
+    pub(super) fn meet(&mut self, fault: IngestError) -> Result<(), IngestError> {
+        match self {
+            Self::Refuse => Err(fault),
+            Self::SetAside(aside) => {
+                aside(fault);
+                Ok(())
+            }
+        }
+    }
+
+    pub(super) fn are_set_aside(&self) -> bool {
+        matches!(self, Self::SetAside(_))
+    }
+}
+
+impl fmt::Debug for BadRows<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(if self.are_set_aside() {
+            "SetAside"
+        } else {
+            "Refuse"
+        })
+    }
 }
 
 /// Something that a person should know of a file of which nothing is lost by it.

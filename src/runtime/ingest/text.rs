@@ -4,10 +4,11 @@ use super::bytes::read_bytes;
 use super::collect::Collector;
 use super::columns::Meaning;
 use super::encoding::{Transcoder, latin1};
-use super::taken::{LineResult, Remark};
+use super::taken::{BadRows, LineResult, Remark};
 use super::text_format::{LineReader, TextFormat};
 use super::{IngestError, Item, ReadOptions};
 use crate::reading::{BenchmarkId, Disorder, Recording, Unit};
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::Path;
@@ -93,11 +94,12 @@ pub(super) struct Table {
     pub(super) remarks: Vec<Remark>,
 }
 
-/// Reads a whole file; the first fault is an error.
+/// Reads a whole file; what cannot be used of it meets `bad`.
 pub(super) fn read_text(
     format: &TextFormat,
     file: &Path,
     options: &ReadOptions,
+    bad: &mut BadRows<'_>,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Table, IngestError> {
     let bytes = read_bytes(file)?;
@@ -111,26 +113,35 @@ pub(super) fn read_text(
         if line % LINES_A_LOOK == 0 {
             progress(done as f64 / bytes.len() as f64);
         }
-        let taken = match std::str::from_utf8(text) {
-            Ok(text) => rows.take(line, text),
-            Err(_) => rows.take(line, &not_utf8(&rows, file, line, text, &mut remarks)?),
+        let text = match std::str::from_utf8(text) {
+            Ok(text) => Ok(Cow::Borrowed(text)),
+            Err(_) => not_utf8(&rows, file, line, text, &mut remarks).map(Cow::Owned),
+        };
+        let taken = match text {
+            Ok(text) => rows.take(line, &text),
+            Err(fault) => Err(fault).into(),
         };
         remarks.extend(taken.remarks);
         if let Some(fault) = taken.fault {
-            return Err(fault);
+            if rows.is_lost() {
+                return Err(fault);
+            }
+            bad.meet(fault)?;
         }
         for item in taken.items {
-            collected
-                .add(item)
-                .map_err(|odd| IngestError::Inconsistent {
+            if let Err(odd) = collected.add(item) {
+                bad.meet(IngestError::Inconsistent {
                     file: file.into(),
                     line,
                     found: odd.found,
                     expected: odd.expected,
                 })?;
+            }
         }
     }
-    rows.0.finish()?;
+    if !bad.are_set_aside() {
+        rows.0.finish()?;
+    }
     let columns = rows.0.columns().to_vec();
     let (recording, disorder) = collected.finish(BTreeMap::new());
     if recording.series.is_empty() && recording.channels.is_empty() && disorder.missing == 0 {
