@@ -1,6 +1,6 @@
 //! Flags that several commands share, and the loading of what they name.
 
-use super::exit;
+use super::exit::{self, NoSuchReadings};
 use crate::alert::Policy;
 use crate::config::value;
 use crate::reading::{
@@ -285,6 +285,12 @@ impl ReadingArgs {
         recording.series(benchmark.as_ref(), self.quantity)
     }
 
+    /// The series that `--benchmark` and `--quantity` allow, however many.
+    pub(super) fn fitting<'a>(&self, recording: &'a Recording) -> Vec<&'a Series> {
+        let all = recording.series.iter();
+        all.filter(|series| self.allows(series)).collect()
+    }
+
     fn allows(&self, series: &Series) -> bool {
         let benchmark = self.benchmark.as_deref();
         benchmark.is_none_or(|id| series.benchmark.as_str() == id)
@@ -315,6 +321,43 @@ impl ReadingArgs {
             ..base.clone()
         }
     }
+}
+
+/// Refuses a window of time, from `from` to `until`, in which none of these has a reading.
+pub(super) fn refuse_empty(
+    series: &[&Series],
+    from: Option<Timestamp>,
+    until: Option<Timestamp>,
+) -> Result<(), NoSuchReadings> {
+    let times = || {
+        let readings = series.iter().flat_map(|one| &one.readings);
+        readings.map(|reading| reading.time)
+    };
+    let is_within = |time: Timestamp| {
+        from.is_none_or(|from| from <= time) && until.is_none_or(|until| time <= until)
+    };
+    if times().any(is_within) {
+        return Ok(());
+    }
+    if let (Some(from), Some(until)) = (from, until)
+        && from > until
+    {
+        return Err(NoSuchReadings(format!(
+            "--from {from} is later than --until {until}: no reading lies between them"
+        )));
+    }
+    let names: Vec<&str> = series.iter().map(|one| one.benchmark.as_str()).collect();
+    let window = [("from", from), ("until", until)].into_iter();
+    let window = window.filter_map(|(word, time)| Some(format!(" {word} {}", time?)));
+    let (first, last) = (times().min(), times().max());
+    let span = first.zip(last).map_or_else(String::new, |(first, last)| {
+        format!(": expected a time among its readings, {first} to {last}")
+    });
+    Err(NoSuchReadings(format!(
+        "benchmark {}: no reading{}{span}",
+        names.join(", "),
+        window.collect::<String>()
+    )))
 }
 
 /// Warns on stderr of rows that were not in order.

@@ -39,6 +39,11 @@ pub(super) struct AsUser(pub(super) String, pub(super) Option<u8>);
 #[error("{0}")]
 pub(super) struct UsageError(pub(super) String);
 
+/// Readings that are there and are none of those that are asked for, or too few of them.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub(super) struct NoSuchReadings(pub(super) String);
+
 /// Writes a line to stderr; nothing can be done when that fails.
 pub(super) fn complain(what: &dyn Display) {
     let _ = writeln!(io::stderr(), "{what}");
@@ -86,6 +91,7 @@ fn code_of(error: &(dyn Error + 'static)) -> Option<u8> {
     let table = [
         (error.is::<UsageError>() || error.is::<LawError>(), USAGE),
         (error.is::<SelectError>() || error.is::<MergeError>(), DATA),
+        (error.is::<NoSuchReadings>(), DATA),
         (error.is::<ConfigError>(), CONFIG),
         (error.is::<SandboxError>(), NOT_RUN),
         (error.is::<io::Error>() || error.is::<StoreError>(), IO),

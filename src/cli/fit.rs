@@ -1,6 +1,6 @@
 //! `fit FILE`: one inversion.
 
-use super::args::{OutputArgs, ReadingArgs};
+use super::args::{OutputArgs, ReadingArgs, refuse_empty};
 use super::bar;
 use super::columnar::TableArgs;
 use super::table::{TextTable, number, time};
@@ -70,6 +70,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let mut recording = args.readings.load()?.recording;
     args.readings.narrow(&mut recording)?;
     let options = args.inversion.options(&args.readings);
+    let all: Vec<&Series> = recording.series.iter().collect();
+    refuse_empty(&all, options.from, options.until)?;
     let count = recording.series.len() as u64;
     let mut table = args.output.table::<FitReport>()?;
     let format = args.output.lines();
@@ -229,17 +231,21 @@ fn notes(report: &FitReport) -> String {
              (see the minima below), the best one may be an extreme among them: go by the interval.\n",
         );
     }
-    let unstable = |regime: &FittedRegime| regime.probability_unstable;
-    let under_load = report.regime_under_load.as_ref();
-    if let (Some(constant), Some(load)) = (unstable(&report.regime), under_load.and_then(unstable))
-        && (constant - load).abs() > DISAGREE
-    {
-        out.push_str(
-            "The two regimes differ. The first lets the load change, and is what the monitor goes by; go by it too. The\n\
-             second, the parameters and the minima take the load for constant over the whole record.\n",
-        );
+    if regimes_differ(&report.regime, report.regime_under_load.as_ref()) {
+        out.push_str(REGIMES_DIFFER);
     }
     out
+}
+
+/// What is said where they do.
+pub(super) const REGIMES_DIFFER: &str = "The two regimes differ. The first lets the load change, and is what the monitor goes by; go by it too. The\n\
+     second, the parameters and the minima take the load for constant over the whole record.\n";
+
+/// Whether the regime under a constant load and that where it may change say something else.
+pub(super) fn regimes_differ(constant: &FittedRegime, load: Option<&FittedRegime>) -> bool {
+    let unstable = |regime: &FittedRegime| regime.probability_unstable;
+    let both = unstable(constant).zip(load.and_then(unstable));
+    both.is_some_and(|(constant, load)| (constant - load).abs() > DISAGREE)
 }
 
 /// Whether the best fit lies outside of the interval.

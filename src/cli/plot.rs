@@ -1,13 +1,13 @@
 //! `plot FILE...`: one benchmark's crisis as one SVG or PNG, drawn from a replay.
 
 use super::args::ReadingArgs;
-use super::exit::UsageError;
+use super::exit::{NoSuchReadings, UsageError};
 use super::{explain, picture, replay};
 use crate::alert::Policy;
 use crate::figures::{Replayed, pictures};
 use crate::monitor::{Event, Settings};
 use crate::reading::{Recording, Series, Timestamp};
-use anyhow::{Context, bail};
+use anyhow::bail;
 use jiff::civil::Date;
 use jiff::tz::TimeZone;
 use std::io::Write;
@@ -108,11 +108,11 @@ fn residual(args: &Args) -> anyhow::Result<String> {
     );
     let found = pictures(&explanation);
     let picture = found.into_iter().find(|picture| picture.name == "residual");
-    let picture = picture.with_context(|| {
-        format!(
+    let picture = picture.ok_or_else(|| {
+        NoSuchReadings(format!(
             "benchmark {}: too few readings for a residual",
             series.benchmark
-        )
+        ))
     })?;
     Ok(picture.svg)
 }
@@ -132,7 +132,9 @@ fn check_times(args: &Args, series: &Series) -> anyhow::Result<()> {
         let until = args
             .until
             .map_or_else(String::new, |until| format!(" up to {until}"));
-        bail!(UsageError(format!("benchmark {id} has no readings{until}")));
+        bail!(NoSuchReadings(format!(
+            "benchmark {id} has no readings{until}"
+        )));
     };
     let (first, last) = (first.time, last.time);
     if let Some(at) = args.at.iter().find(|at| !(first..=last).contains(at)) {
@@ -145,7 +147,7 @@ fn check_times(args: &Args, series: &Series) -> anyhow::Result<()> {
         let text = format!(
             "--failure-time {failure} lies before the readings of benchmark {id}: expected a time after {first}"
         );
-        bail!(UsageError(text));
+        bail!(NoSuchReadings(text));
     }
     Ok(())
 }

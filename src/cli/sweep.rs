@@ -1,8 +1,9 @@
 //! `sweep FILE`: the inversion over growing `t_max`, a row each.
 
-use super::args::{OutputArgs, ReadingArgs};
+use super::args::{OutputArgs, ReadingArgs, refuse_empty};
 use super::bar;
-use super::fit::InversionArgs;
+use super::exit::NoSuchReadings;
+use super::fit::{InversionArgs, REGIMES_DIFFER, regimes_differ};
 use super::table::{TextTable, number, time};
 use crate::alert::percent_in_words;
 use crate::inversion::{SweepOptions, SweepReport, SweepRow, sweep_showing};
@@ -38,6 +39,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let loaded = args.readings.load()?;
     let series = args.readings.series(&loaded.recording)?;
     let options = args.inversion.options(&args.readings);
+    refuse_empty(&[series], options.from, options.until)?;
     let steps = SweepOptions {
         first: args.t_max.first,
         last: args.t_max.last,
@@ -48,6 +50,15 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         bar::share(&bar, share);
     });
     bar.finish_and_clear();
+    if report.rows.is_empty() {
+        let whole = [series.readings.first(), series.readings.last()];
+        let [first, last] = whole.map(|reading| time(reading.map(|reading| reading.time)));
+        let text = format!(
+            "benchmark {}: --t-max leaves nothing to invert: expected FIRST..LAST within its readings, {first} to {last}",
+            series.benchmark
+        );
+        return Err(NoSuchReadings(text).into());
+    }
     args.output.print(&report, text)
 }
 
@@ -80,6 +91,8 @@ fn text(report: &SweepReport) -> String {
         "n".to_owned(),
         "regime".to_owned(),
         "unstable".to_owned(),
+        "under constant load".to_owned(),
+        "unstable".to_owned(),
         "m".to_owned(),
         "x_i".to_owned(),
         "transition".to_owned(),
@@ -94,11 +107,19 @@ fn text(report: &SweepReport) -> String {
         table.row(cells(row));
     }
     let (benchmark, quantity) = (&report.benchmark, report.quantity);
-    format!("benchmark {benchmark}, {quantity} in {unit}, readings from {first}\n\n{table}")
+    let mut rows = report.rows.iter();
+    let differ = rows.any(|row| regimes_differ(&row.regime, row.regime_under_load.as_ref()));
+    let note = if differ { REGIMES_DIFFER } else { "" };
+    format!("benchmark {benchmark}, {quantity} in {unit}, readings from {first}\n\n{table}{note}")
 }
 
-fn cells(row: &SweepRow) -> [String; 13] {
+fn cells(row: &SweepRow) -> [String; 15] {
     let percent = |share: Option<f64>| share.map_or("-".to_owned(), percent_in_words);
+    // First what the monitor goes by.
+    let (first, second) = match &row.regime_under_load {
+        Some(load) => (load, Some(&row.regime)),
+        None => (&row.regime, None),
+    };
     let minima = row.alternatives.range_of_m();
     let minima = minima.map_or("-".to_owned(), |(low, high)| {
         format!("{}: m {low:.2} to {high:.2}", row.alternatives.0.len())
@@ -111,8 +132,10 @@ fn cells(row: &SweepRow) -> [String; 13] {
     [
         time(Some(row.t_max)),
         row.readings.to_string(),
-        row.regime.label.to_string(),
-        percent(row.regime.probability_unstable),
+        first.label.to_string(),
+        percent(first.probability_unstable),
+        second.map_or("-".to_owned(), |regime| regime.label.to_string()),
+        percent(second.and_then(|regime| regime.probability_unstable)),
         number(row.m),
         number(row.x_i),
         time(row.transition_time),

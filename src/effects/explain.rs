@@ -18,7 +18,7 @@ use super::verdict::conclude;
 use crate::reading::{Channel, Series, Timestamp};
 
 /// Said of a record with which nothing can be tried.
-pub(super) const TOO_FEW: &str = "There are too few readings to distinguish anything from noise.";
+pub const TOO_FEW: &str = "There are too few readings to distinguish anything from noise.";
 
 /// Explains `series` by what its law lacks, from `channels` beside it; `neighbours` are the other
 /// benchmarks of the slope. `progress` is called with the share done, 0 to 1.

@@ -44,7 +44,7 @@ mod watch;
 
 pub use by_clock::ByClock;
 pub use declared::explain_given;
-pub use explain::explain;
+pub use explain::{TOO_FEW, explain};
 pub use explanation::{
     Candidate, Change, Curves, DeclaredEffect, Effect, ErrorChange, Explained, Explanation, Fault,
     ForecastChange, NoiseReport, ResidualTests, SettingsReport, Structure,

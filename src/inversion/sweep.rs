@@ -54,8 +54,10 @@ pub struct SweepRow {
     pub t_max: Timestamp,
     /// How many were used.
     pub readings: usize,
-    /// Which regime, with what probability.
+    /// Which regime, with what probability, the load being constant.
     pub regime: FittedRegime,
+    /// The same where the load may change undeclared: what the monitor goes by. `None` with too few readings.
+    pub regime_under_load: Option<FittedRegime>,
     /// m of the best fit.
     pub m: Option<f64>,
     /// Its initial state.
@@ -141,6 +143,7 @@ impl SweepRow {
             t_max,
             readings: report.readings,
             regime: report.regime,
+            regime_under_load: report.regime_under_load,
             m: report.parameters.m.best,
             x_i: report.parameters.x_i.best,
             transition_time: report.transition_time,

@@ -193,8 +193,12 @@ fn exit_codes_are_those_of_every_command() {
 #[test]
 fn a_span_without_readings_is_said_and_is_no_crash() {
     let (_folder, path) = slope();
-    let done = explain(&[text_of(&path), "--until", "1999-01-01T00:00:00Z"]).success();
-    assert!(out(&done).contains("0 readings, - to -"), "{}", out(&done));
+    let done = explain(&[text_of(&path), "--until", "1999-01-01T00:00:00Z"]).code(65);
+    let said = err(&done);
+    assert!(
+        said.contains("no reading until 1999-01-01T00:00:00Z"),
+        "{said}"
+    );
 }
 
 #[test]

@@ -22,3 +22,4 @@ mod replay_config;
 mod report_cli;
 mod schema;
 mod score_cli;
+mod windows;

@@ -2,7 +2,7 @@
 
 use crate::cli::table::time;
 use crate::effects::{
-    DeclaredEffect, Effect, Explained, Explanation, Form, Kind, Rival, Structure, Together,
+    DeclaredEffect, Effect, Explained, Explanation, Form, Kind, Rival, Structure, TOO_FEW, Together,
 };
 use crate::reading::BenchmarkId;
 
@@ -20,6 +20,9 @@ pub(super) fn verdict(explanation: &Explanation) -> String {
             "{benchmark}: nothing of what was declared stands{}",
             most_marked(&explanation.residual.structure)
         ),
+        Kind::None if explanation.remarks.iter().any(|one| one == TOO_FEW) => {
+            format!("{benchmark}: nothing can be said of what the law lacks")
+        }
         Kind::None => format!(
             "{benchmark}: the residual cannot be distinguished from noise; these readings show nothing that the law lacks"
         ),

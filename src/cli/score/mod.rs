@@ -6,12 +6,14 @@ mod warning;
 
 use super::args::{OutputArgs, ReadingArgs};
 use super::columnar::TableArgs;
+use super::exit::NoSuchReadings;
 use super::{bar, exit, picture};
 use crate::alert::Policy;
 use crate::figures;
+use crate::plot::escaped;
 use crate::reading::{Recording, Series, Timestamp, days_since};
 use crate::score::{Card, METHODS, Truth, WholeRecord, card};
-use anyhow::{Context, ensure};
+use anyhow::ensure;
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -54,6 +56,23 @@ pub(super) struct ScoreReport {
     warning: Warning,
 }
 
+impl ScoreReport {
+    /// What is said where no forecast could have been made.
+    fn nothing(&self) -> Option<String> {
+        (self.card.leads.is_empty() && self.card.looks.is_empty()).then(|| {
+            let before = match self.failure_time {
+                Some(_) => " not long before the failure",
+                None => "",
+            };
+            format!(
+                "benchmark {}: too few readings for a forecast, and nothing to score: expected ten or more, half an \
+                 hour apart or more,{before}",
+                self.benchmark
+            )
+        })
+    }
+}
+
 /// Reads the files and prints a scorecard for each benchmark.
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let mut recording = args.readings.load()?.recording;
@@ -69,6 +88,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let output = OutputArgs { format };
     for (index, series) in recording.series.iter().enumerate() {
         let report = report(args.failure_time, &recording, series, &policy)?;
+        if let Some(problem) = report.nothing() {
+            if count == 1 {
+                return Err(NoSuchReadings(problem).into());
+            }
+            exit::complain(&problem);
+        }
         if let Some(file) = &args.plot {
             let svg = figures::life_expectancy(&report.card, report.failure_time);
             picture::write(file, &svg)?;
@@ -96,6 +121,9 @@ pub(super) fn part(
     policy: &Policy,
 ) -> anyhow::Result<String> {
     let report = report(failure_time, recording, series, policy)?;
+    if let Some(problem) = report.nothing() {
+        return Ok(format!("<p>{}</p>\n", escaped(&problem)));
+    }
     let svg = figures::life_expectancy(&report.card, failure_time);
     Ok(format!(
         "<figure>\n{svg}</figure>\n<p>{}</p>\n<div class=\"wide scores\">{}</div>\n",
@@ -127,11 +155,11 @@ fn report(
         }
     };
     let epoch = series.readings.first().map(|reading| reading.time);
-    let epoch = epoch.with_context(|| {
-        format!(
+    let epoch = epoch.ok_or_else(|| {
+        NoSuchReadings(format!(
             "benchmark {}: expected readings before --failure-time",
             series.benchmark
-        )
+        ))
     })?;
     let history = WholeRecord::of(
         &series,

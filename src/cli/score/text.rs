@@ -98,17 +98,17 @@ fn looks(report: &ScoreReport) -> TextTable {
             .iter()
             .filter_map(|look| of(&look.scores))
             .collect();
-        let count = scores.len().max(1) as f64;
-        let crps = scores.iter().map(|score| score.crps_days).sum::<f64>() / count;
+        let sum = scores.iter().map(|score| score.crps_days).sum::<f64>();
+        let crps = (!scores.is_empty()).then(|| sum / scores.len() as f64);
         let highest = scores
             .iter()
             .map(|score| score.probability)
-            .fold(0.0, f64::max);
+            .max_by(f64::total_cmp);
         let said = scores.iter().filter(|score| score.said).count();
         table.row([
             (*method).to_owned(),
-            format!("{crps:.2}"),
-            chance_in_words(highest),
+            crps.map_or("-".to_owned(), |crps| format!("{crps:.2}")),
+            highest.map_or("-".to_owned(), chance_in_words),
             format!("{said} of {}", scores.len()),
         ]);
     }
