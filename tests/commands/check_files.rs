@@ -218,7 +218,7 @@ fn a_benchmark_that_nothing_feeds_is_explained_by_its_own_source() {
 
 #[test]
 fn marks_of_no_value_are_counted_for_each_benchmark() {
-    let rows: String = (0..40)
+    let rows: Vec<String> = (0..40)
         .map(|hour| {
             let cell = |marks: &[(i64, &str)]| {
                 let mark = marks.iter().find(|(at, _)| *at == hour);
@@ -233,6 +233,7 @@ fn marks_of_no_value_are_counted_for_each_benchmark() {
             )
         })
         .collect();
+    let rows = rows.concat();
     let text = format!("time,P1_displacement_mm,P2_displacement_mm\n{rows}");
     let office = Office::with(&[("slope.csv", &text), ("site.toml", &site("slope.csv", ""))]);
     let preview = looked(&office);

@@ -10,10 +10,10 @@ fn written(office: &Office) -> String {
 
 /// A table of days, six hours apart.
 fn of_days(count: i64) -> String {
-    let body: String = (0..count)
+    let rows: Vec<String> = (0..count)
         .map(|row| format!("{},{}\n", 0.25 * row as f64, 0.1 * row as f64))
         .collect();
-    format!("t_days,P1_displacement_mm\n{body}")
+    format!("t_days,P1_displacement_mm\n{}", rows.concat())
 }
 
 #[test]

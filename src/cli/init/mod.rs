@@ -169,12 +169,7 @@ fn plan(args: &Args) -> anyhow::Result<InitPlan> {
         if benchmarks.is_empty() {
             problems.push(problem);
         } else {
-            exit::complain(&format_args!(
-                "{}: it is taken for covariates alone ({}), as a source without benchmarks; if one of them has the readings \
-                 of a point, say so with --column",
-                file.display(),
-                names.join(", ")
-            ));
+            say_beside(file, &names);
         }
     }
     if !problems.is_empty() {
@@ -200,6 +195,16 @@ fn plan(args: &Args) -> anyhow::Result<InitPlan> {
 
 fn in_seconds(span: SignedDuration) -> String {
     format!("{}s", span.as_secs())
+}
+
+/// Says of a file that no point is watched by it.
+fn say_beside(file: &Path, covariates: &[String]) {
+    exit::complain(&format_args!(
+        "{}: it is taken for covariates alone ({}), as a source without benchmarks; if one of them has the readings of a point, \
+         say so with --column",
+        file.display(),
+        covariates.join(", ")
+    ));
 }
 
 /// `1h` of an hour.
