@@ -171,7 +171,7 @@ pub struct Benchmark {
 impl Benchmark {
     /// What decides which numbers its readings are, in words that stay the same from version to version: with other ones they mean
     /// something else.
-    pub fn read_as(&self, conventions: &Conventions) -> String {
+    pub fn read_as(&self, conventions: &Conventions, epoch: Option<Timestamp>) -> String {
         let mut words = Vec::new();
         words.extend(
             self.column
@@ -197,6 +197,7 @@ impl Benchmark {
         let zone = conventions.clock.zone.as_ref();
         let zone = zone.and_then(jiff::tz::TimeZone::iana_name);
         words.extend(zone.map(|zone| format!("time zone {zone}")));
+        words.extend(epoch.map(|epoch| format!("day 0 on {epoch}")));
         words.join(", ")
     }
 }

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::alert::Policy;
 use crate::monitor::{Explain, Settings, SiteLevel, Watched};
-use crate::reading::{BenchmarkId, Conventions, Quantity, Suspicion, Unit};
+use crate::reading::{BenchmarkId, Conventions, Quantity, Suspicion, Timestamp, Unit};
 use jiff::SignedDuration;
 use jiff::tz::TimeZone;
 use std::collections::{BTreeMap, BTreeSet};
@@ -148,16 +148,20 @@ fn explain(mut section: Section<'_>) -> Explain {
 
 /// Where every source has benchmarks of its own, no others are watched.
 fn watched(sources: &[FileSource], brokers: &[Broker], benchmarks: &[Benchmark]) -> Watched {
-    let of_files = sources.iter().map(|one| (&one.id, &one.conventions));
-    let of_brokers = brokers.iter().map(|one| (&one.id, &one.conventions));
-    let known: Vec<(&String, &Conventions)> = of_files.chain(of_brokers).collect();
-    let names_its_own = |(source, _): &(&String, _)| {
+    let of_files = sources
+        .iter()
+        .map(|one| (&one.id, &one.conventions, one.epoch));
+    let of_brokers = brokers.iter().map(|one| (&one.id, &one.conventions, None));
+    let known: Vec<(&String, &Conventions, Option<Timestamp>)> =
+        of_files.chain(of_brokers).collect();
+    let names_its_own = |(source, ..): &(&String, _, _)| {
         let mut sources = benchmarks.iter().map(|one| &one.source);
         sources.any(|one| one == *source)
     };
     let read_as = benchmarks.iter().filter_map(|benchmark| {
-        let (_, conventions) = known.iter().find(|(id, _)| **id == benchmark.source)?;
-        Some((benchmark.id.clone(), benchmark.read_as(conventions)))
+        let source = known.iter().find(|(id, ..)| **id == benchmark.source);
+        let (_, conventions, epoch) = source?;
+        Some((benchmark.id.clone(), benchmark.read_as(conventions, *epoch)))
     });
     Watched {
         named: benchmarks.iter().map(|one| one.id.clone()).collect(),

@@ -63,7 +63,7 @@ struct MovingRate {
 
 /// The law of the most likely power with one time that remains and one roughness, in one window.
 #[derive(Debug, Clone, Copy)]
-struct Cell {
+struct ExponentCell {
     window: usize,
     remains: f64,
     roughness: f64,
@@ -73,7 +73,7 @@ struct Cell {
     ln_prior: f64,
 }
 
-/// Sums over the rates of a window that are the same for every time that remains: of the weights, of their logarithms, and of
+/// ShapeSums over the rates of a window that are the same for every time that remains: of the weights, of their logarithms, and of
 /// y and its square times the weights.
 #[derive(Debug, Clone, Copy, Default)]
 struct Fixed {
@@ -85,7 +85,7 @@ struct Fixed {
 
 /// Weighted sums of x, b, x y, b y, x x, x b and b b over the rates of a window: ln v = c + p x + p (p + 1) b, where x is
 /// -ln of the time that remained and b what the length of a rate adds to its mean.
-type Sums = [f64; 7];
+type ShapeSums = [f64; 7];
 
 impl FreeExponent {
     /// After `rates`, the newest last; `None` with too few of them that move.
@@ -109,11 +109,11 @@ impl FreeExponent {
             cell.ln_likelihood += before[cell.window];
         }
         let share = independent(&points, &law)?;
-        let ln = |cell: &Cell| share * cell.ln_likelihood + cell.ln_prior;
+        let ln = |cell: &ExponentCell| share * cell.ln_likelihood + cell.ln_prior;
         let most = law.iter().map(ln).fold(f64::NEG_INFINITY, f64::max);
         let weights: Vec<f64> = law.iter().map(|cell| (ln(cell) - most).exp()).collect();
         let all: f64 = weights.iter().sum();
-        let mean = |of: &dyn Fn(&Cell) -> f64| {
+        let mean = |of: &dyn Fn(&ExponentCell) -> f64| {
             let each = law.iter().zip(&weights);
             each.map(|(cell, weight)| weight * of(cell)).sum::<f64>() / all
         };
@@ -134,7 +134,7 @@ impl FreeExponent {
     }
 }
 
-impl Cell {
+impl ExponentCell {
     /// Whether the law says when it ends.
     fn ends(&self, points: &[MovingRate]) -> bool {
         let grown = self.power * (1.0 + length(points, self.window) / self.remains).ln();
@@ -182,7 +182,7 @@ fn without_a_law(points: &[MovingRate]) -> [f64; WINDOWS.len()] {
 }
 
 /// The laws of all windows, roughnesses and times that remain, the last of these fastest.
-fn law(points: &[MovingRate]) -> Vec<Cell> {
+fn law(points: &[MovingRate]) -> Vec<ExponentCell> {
     let windows = windows(points);
     let (low, high) = (
         REMAINS.0 * length(points, 0),
@@ -195,7 +195,7 @@ fn law(points: &[MovingRate]) -> Vec<Cell> {
     let shapes: Vec<Vec<[f64; 3]>> = remains.iter().map(|days| shape(points, *days)).collect();
     let fixed = ROUGHNESSES.map(|roughness| fixed(points, roughness));
     let weights = ROUGHNESSES.map(|roughness| weights(points, roughness));
-    let mut sums: Vec<Sums> = vec![[0.0; 7]; TIMES * ROUGHNESSES.len()];
+    let mut sums: Vec<ShapeSums> = vec![[0.0; 7]; TIMES * ROUGHNESSES.len()];
     let mut law = Vec::with_capacity(windows * sums.len());
     let mut from = 0;
     for (window, count) in WINDOWS[..windows].iter().enumerate() {
@@ -213,7 +213,7 @@ fn law(points: &[MovingRate]) -> Vec<Cell> {
     law
 }
 
-fn add(sums: &mut Sums, weights: &[f64], shape: &[[f64; 3]]) {
+fn add(sums: &mut ShapeSums, weights: &[f64], shape: &[[f64; 3]]) {
     for (weight, [y, x, b]) in weights.iter().zip(shape) {
         let (wx, wb) = (weight * x, weight * b);
         let more = [wx, wb, wx * y, wb * y, wx * x, wx * b, wb * b];
@@ -257,7 +257,11 @@ fn fixed(points: &[MovingRate], roughness: f64) -> Vec<Fixed> {
 }
 
 /// The law of the most likely power, by Newton's steps from that without the length of the rates.
-fn cell(fixed: &Fixed, sums: &Sums, (window, remains, roughness): (usize, f64, f64)) -> Cell {
+fn cell(
+    fixed: &Fixed,
+    sums: &ShapeSums,
+    (window, remains, roughness): (usize, f64, f64),
+) -> ExponentCell {
     let [x, b, xy, by, xx, xb, bb] = *sums;
     let [mean_y, mean_x, mean_b] = [fixed.y, x, b].map(|sum| sum / fixed.weight);
     let yy = fixed.yy - fixed.y * mean_y;
@@ -278,7 +282,7 @@ fn cell(fixed: &Fixed, sums: &Sums, (window, remains, roughness): (usize, f64, f
     let squares = straight + square * (2.0 * (power * xb - by) + square * bb);
     let from_usual = (power / USUAL_POWER.0).ln() / USUAL_POWER.1;
     let spread = USUAL_POWER.1 * power;
-    Cell {
+    ExponentCell {
         window,
         remains,
         roughness,
@@ -289,8 +293,8 @@ fn cell(fixed: &Fixed, sums: &Sums, (window, remains, roughness): (usize, f64, f
 }
 
 /// The share of the rates that are independent of each other, by the autocorrelation of their misfits to the best law.
-fn independent(points: &[MovingRate], law: &[Cell]) -> Option<f64> {
-    let posterior = |cell: &Cell| cell.ln_likelihood + cell.ln_prior;
+fn independent(points: &[MovingRate], law: &[ExponentCell]) -> Option<f64> {
+    let posterior = |cell: &ExponentCell| cell.ln_likelihood + cell.ln_prior;
     let best = law.iter();
     let best = best.max_by(|a, b| posterior(a).total_cmp(&posterior(b)))?;
     let points = &points[..WINDOWS[best.window]];

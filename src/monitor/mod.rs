@@ -176,6 +176,11 @@ impl Watched {
         let before = former.read_as.get(benchmark)?;
         (now != before).then_some(now)
     }
+
+    /// Whether what is known of `benchmark` ends when this follows on `former`.
+    pub(crate) fn ends(&self, benchmark: &BenchmarkId, former: &Self) -> bool {
+        self.drops(benchmark, former) || self.changed(benchmark, former).is_some()
+    }
 }
 
 /// What is done about a residual that the law does not explain; it is watched and reported in any case.
@@ -214,6 +219,8 @@ pub struct Monitor {
     together: FailureComparisons,
     outages: Outages,
     past: Past,
+    /// How often what was known of a benchmark has been dropped.
+    dropped: BTreeMap<BenchmarkId, u32>,
     batches: Batches,
     tally: Tally,
 }
@@ -230,6 +237,7 @@ impl Monitor {
             together: FailureComparisons::default(),
             outages: Outages::default(),
             past: Past::default(),
+            dropped: BTreeMap::new(),
             batches: Batches::default(),
             tally: Tally::default(),
         }
@@ -295,7 +303,8 @@ impl Monitor {
         let policy = self.settings.policy(benchmark);
         let track = self.benchmarks.get_or_begin(benchmark, || {
             let declared = Declarations::of(&self.settings.declared, benchmark);
-            let mut track = Track::new(benchmark.clone(), source, reading.time, declared);
+            let dropped = self.dropped.get(benchmark).copied().unwrap_or(0);
+            let mut track = Track::new(benchmark.clone(), source, reading.time, declared, dropped);
             track.accept(now, self.settings.accepted(benchmark));
             track
         });
@@ -375,6 +384,8 @@ impl Monitor {
             if let Some(mut track) = self.benchmarks.remove(&id) {
                 events.extend(track.close(now, &why));
             }
+            let times = self.dropped.entry(id.clone()).or_default();
+            *times = times.saturating_add(1);
             if self.settings.watched.named.contains(&id) {
                 events.push(Event {
                     benchmark: Some(id.clone()),

@@ -71,6 +71,8 @@ struct Rest {
     outages: Outages,
     #[serde(default)]
     past: Past,
+    #[serde(default)]
+    dropped: BTreeMap<BenchmarkId, u32>,
     #[serde(flatten)]
     batches: Batches,
     #[serde(flatten)]
@@ -88,6 +90,7 @@ struct RestOf<'a> {
     #[serde(flatten)]
     outages: &'a Outages,
     past: &'a Past,
+    dropped: &'a BTreeMap<BenchmarkId, u32>,
     #[serde(flatten)]
     batches: &'a Batches,
     #[serde(flatten)]
@@ -115,6 +118,7 @@ impl Monitor {
             together: &self.together,
             outages: &self.outages,
             past: &self.past,
+            dropped: &self.dropped,
             batches: &self.batches,
             tally: &self.tally,
         };
@@ -160,6 +164,7 @@ impl Monitor {
             together: rest.together,
             outages: rest.outages,
             past: rest.past.with_walk(walk),
+            dropped: rest.dropped,
             batches: rest.batches,
             tally: rest.tally,
         })

@@ -198,13 +198,13 @@ fn what_waits_for_the_next_shift_outlasts_a_silence_and_nobody_is_said_to_have_a
 fn after_the_end_of_a_shift_nothing_is_tried_again_and_nothing_is_escalated() {
     let (duty, until) = hours(60, 10);
     let site = one_benchmark(&format!(
-        "{FAILING}{duty}{}levels = [\"red\"]\nescalate_after = \"10s\"\n{duty}",
+        "{FAILING}{duty}{}levels = [\"red\"]\nescalate_after = \"12s\"\n{duty}",
         note("chief")
     ));
     let program = site.caught_up();
     moves(&site, 80.0);
     eventually("an attempt", || count(&site, "failed", "5/red/") >= 1);
-    while clock::now() < until + SignedDuration::from_secs(14) {
+    while clock::now() < until + SignedDuration::from_secs(16) {
         std::thread::sleep(Duration::from_millis(200));
     }
     program.stop();

@@ -276,10 +276,16 @@ fn a_file_followed_row_by_row_gives_what_the_whole_file_gives() {
 
     let mut lines = text.lines().zip(1..);
     let mut rows = CsvRows::new(&file, lines.next().unwrap().0, &options).unwrap();
-    let bad = rows
+    let rest = rows
         .row(2, "2020-01-01T00:00:00Z,1,0.5,nonsense,3")
-        .unwrap_err();
+        .unwrap();
+    let bad = rows.take_fault().unwrap();
     assert!(bad.to_string().contains("nonsense"), "{bad}");
+    assert_eq!(
+        rest.len(),
+        3,
+        "a, the rain, and that b is missing: {rest:?}"
+    );
     let items: Vec<Item> = lines
         .flat_map(|(text, line)| rows.row(line, text).unwrap())
         .collect();

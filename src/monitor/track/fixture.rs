@@ -27,7 +27,7 @@ pub(super) fn reading(hour: i64, value: f64) -> Reading {
 /// A record of these displacements, mm.
 pub(super) fn record(values: impl IntoIterator<Item = f64>) -> BenchmarkRecord {
     let (id, declared) = (BenchmarkId::new("a"), Declarations::default());
-    let mut record = BenchmarkRecord::new(id, DISPLACEMENT, at(0), declared);
+    let mut record = BenchmarkRecord::new(id, DISPLACEMENT, at(0), declared, 0);
     for (hour, value) in (0..).zip(values) {
         record.take(DISPLACEMENT, &reading(hour, value));
         record.note_newest(at(hour));

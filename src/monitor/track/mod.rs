@@ -91,9 +91,10 @@ impl Track {
         source: MeasuredAs,
         epoch: Timestamp,
         declared: Declarations,
+        dropped: u32,
     ) -> Self {
         Self {
-            record: BenchmarkRecord::new(benchmark, source, epoch, declared),
+            record: BenchmarkRecord::new(benchmark, source, epoch, declared, dropped),
             quality: DataQuality::default(),
             forecaster: Forecaster::default(),
             changes: FitChanges::default(),

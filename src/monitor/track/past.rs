@@ -80,7 +80,13 @@ impl Track {
         let declared = Declarations::default();
         let record = &self.record;
         let (source, epoch) = (record.source(), record.history().epoch);
-        let mut track = Self::new(record.benchmark().clone(), source, epoch, declared);
+        let mut track = Self::new(
+            record.benchmark().clone(),
+            source,
+            epoch,
+            declared,
+            record.dropped(),
+        );
         track.quality = self.quality.begun_again();
         PastReplay {
             track: Box::new(track),
@@ -161,7 +167,7 @@ impl Track {
         let kind = EventKind::Alert {
             level,
             state: AlertState::Firing,
-            key: format!("{benchmark}/{level}/{since}"),
+            key: self.record.alert_key(level, since),
             rule: PAST.to_owned(),
             text,
         };

@@ -32,6 +32,8 @@ pub(super) struct SavedTrack {
     declared: Declarations,
     #[serde(default)]
     ahead: Option<HeldReading>,
+    #[serde(default)]
+    dropped: u32,
 
     #[serde(default)]
     unknown: Unknown,
@@ -85,6 +87,7 @@ impl From<SavedTrack> for Track {
                 saved.newest,
                 saved.declared,
                 saved.ahead,
+                saved.dropped,
             ),
             quality: DataQuality::from_saved(
                 saved.unknown,

@@ -67,7 +67,7 @@ impl LineReader for CsvReader {
     }
 
     fn take_fault(&mut self) -> Option<IngestError> {
-        self.rows.as_mut()?.table.as_mut()?.take_fault()
+        self.rows.as_mut()?.take_fault()
     }
 
     fn meanings(&self) -> Vec<(String, Meaning)> {
@@ -153,7 +153,8 @@ impl CsvRows {
     /// # Errors
     /// [`IngestError::Line`] or [`IngestError::Field`] names the place; the parser is unharmed and takes
     /// the next row. [`IngestError::Header`] for a header that is not understood: no row is taken
-    /// before one that is.
+    /// before one that is. A cell that is no number costs its own value alone: see
+    /// [`CsvRows::take_fault`].
     pub fn row(&mut self, line: u64, text: &str) -> Result<Vec<Item>, IngestError> {
         let expected = self.columns().len();
         self.splitter
@@ -179,6 +180,11 @@ impl CsvRows {
                 line,
             }),
         }
+    }
+
+    /// What of the last row could not be used, where the rest of it could.
+    pub fn take_fault(&mut self) -> Option<IngestError> {
+        self.table.as_mut()?.take_fault()
     }
 
     /// A logger that starts again writes its header again; no other row has the name of a time for a time.

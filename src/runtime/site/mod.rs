@@ -277,6 +277,13 @@ impl Site {
             let latest = known.entry(benchmark.clone()).or_insert(reading.time);
             *latest = reading.time.max(*latest);
         }
+        if let Input::Settings(settings) = input {
+            // Their readings come again, and are new to what is known from here on.
+            let former = &self.monitor.settings().watched;
+            let stays = |id: &BenchmarkId| !settings.watched.ends(id, former);
+            self.newest.retain(|id, _| stays(id));
+            self.ahead.retain(|id, _| stays(id));
+        }
         if let Input::Order(order) = input {
             self.apply(order);
         }

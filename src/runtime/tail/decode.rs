@@ -62,7 +62,7 @@ impl Decoder {
     /// What decides which numbers the readings of each benchmark are that the config names.
     pub(super) fn read_as(&self) -> BTreeMap<BenchmarkId, String> {
         let each = self.wanted.iter();
-        each.map(|one| (one.id.clone(), one.read_as(&self.conventions)))
+        each.map(|one| (one.id.clone(), one.read_as(&self.conventions, self.epoch)))
             .collect()
     }
 

@@ -179,7 +179,7 @@ pub(super) fn alert_of(
     let kind = EventKind::Alert {
         level: change.level,
         state,
-        key: format!("{}/{}/{}", record.benchmark(), change.level, change.since),
+        key: record.alert_key(change.level, change.since),
         rule: change.rule.clone().into_owned(),
         text,
     };

@@ -160,7 +160,7 @@ impl Alarm {
         let kind = EventKind::Alert {
             level,
             state: AlertState::Resolved,
-            key: format!("{}/{level}/{since}", record.benchmark()),
+            key: record.alert_key(level, since),
             rule: "removed".to_owned(),
             text,
         };

@@ -85,7 +85,7 @@ impl Pending {
         let alerts = levels
             .since(since)
             .filter(|(_, level)| *level > Level::Green)
-            .map(|(called, level)| format!("{benchmark}/{level}/{called}"));
+            .map(|(called, level)| record.alert_key(level, called));
         let kind = EventKind::Correction {
             since,
             level_then,

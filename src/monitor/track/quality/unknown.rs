@@ -141,7 +141,7 @@ fn alert(
     let kind = EventKind::Alert {
         level: Level::Unknown,
         state,
-        key: format!("{}/{}/{since}", record.benchmark(), Level::Unknown),
+        key: record.alert_key(Level::Unknown, since),
         rule: reason.name().to_owned(),
         text,
     };

@@ -3,6 +3,7 @@
 mod ahead;
 mod declared;
 
+use crate::alert::Level;
 use crate::fit::{Observations, Rate};
 use crate::monitor::declared::Declarations;
 use crate::monitor::event::{Event, EventKind};
@@ -30,6 +31,9 @@ pub(super) struct BenchmarkRecord {
     declared: Declarations,
     /// A reading that lies far ahead of all others.
     ahead: Option<HeldReading>,
+    /// How often what was known of the benchmark has been dropped before.
+    #[serde(default)]
+    dropped: u32,
 }
 
 impl BenchmarkRecord {
@@ -38,9 +42,11 @@ impl BenchmarkRecord {
         source: MeasuredAs,
         epoch: Timestamp,
         declared: Declarations,
+        dropped: u32,
     ) -> Self {
         Self {
             benchmark,
+            dropped,
             history: History::new(source, epoch),
             silence: Silence::default(),
             newest: None,
@@ -56,9 +62,11 @@ impl BenchmarkRecord {
         newest: Option<Timestamp>,
         declared: Declarations,
         ahead: Option<HeldReading>,
+        dropped: u32,
     ) -> Self {
         Self {
             benchmark,
+            dropped,
             history,
             silence,
             newest,
@@ -82,6 +90,21 @@ impl BenchmarkRecord {
     /// When the newest reading came, those included by which a stuck sensor repeats its last value.
     pub(super) fn newest(&self) -> Option<Timestamp> {
         self.newest
+    }
+
+    /// How often what was known of the benchmark has been dropped before.
+    pub(super) fn dropped(&self) -> u32 {
+        self.dropped
+    }
+
+    /// The key of an alert in force since `since`: no other one of this benchmark has it, an earlier one of the same readings
+    /// neither.
+    pub(super) fn alert_key(&self, level: Level, since: Timestamp) -> String {
+        let benchmark = &self.benchmark;
+        match self.dropped {
+            0 => format!("{benchmark}/{level}/{since}"),
+            times => format!("{benchmark}/{level}/{}/{since}", times.saturating_add(1)),
+        }
     }
 
     /// The time of what follows from a reading of `time`: data time does not go back.
