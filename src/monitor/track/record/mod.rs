@@ -46,12 +46,12 @@ impl BenchmarkRecord {
     ) -> Self {
         Self {
             benchmark,
-            dropped,
             history: History::new(source, epoch),
             silence: Silence::default(),
             newest: None,
             declared,
             ahead: None,
+            dropped,
         }
     }
 
@@ -66,12 +66,12 @@ impl BenchmarkRecord {
     ) -> Self {
         Self {
             benchmark,
-            dropped,
             history,
             silence,
             newest,
             declared,
             ahead,
+            dropped,
         }
     }
 
