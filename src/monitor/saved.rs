@@ -90,6 +90,7 @@ struct RestOf<'a> {
     #[serde(flatten)]
     outages: &'a Outages,
     past: &'a Past,
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     dropped: &'a BTreeMap<BenchmarkId, u32>,
     #[serde(flatten)]
     batches: &'a Batches,

@@ -32,8 +32,13 @@ pub(super) struct BenchmarkRecord {
     /// A reading that lies far ahead of all others.
     ahead: Option<HeldReading>,
     /// How often what was known of the benchmark has been dropped before.
-    #[serde(default)]
+    #[serde(skip_serializing_if = "was_never_dropped")]
     dropped: u32,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde calls it")]
+fn was_never_dropped(times: &u32) -> bool {
+    *times == 0
 }
 
 impl BenchmarkRecord {
