@@ -106,7 +106,7 @@ impl Indicators {
     }
 
     /// The most that levels may be given of a chance within `days`, whatever is expected.
-    pub fn most(&self, days: f64) -> f64 {
+    fn most(&self, days: f64) -> f64 {
         let accelerating = evidence::probability(self.evidence.ln_odds_within(days));
         let unlikely = NOT_UNLIKELY * (1.0 + (days / NEAR_DAYS).powi(4));
         let shown = accelerating * (1.0 + unlikely) / (accelerating + unlikely);

@@ -4,7 +4,7 @@ use super::sealed::{seal, unseal};
 use super::sum::sum;
 use super::{Inner, Store, StoreError, nanoseconds, timestamp};
 use crate::reading::Timestamp;
-use rusqlite::types::ValueRef;
+use rusqlite::types::{FromSql, ValueRef};
 use rusqlite::{Connection, Row, params};
 
 /// A delivery that no hook has taken yet.
@@ -232,15 +232,10 @@ impl Store {
     /// [`StoreError`].
     pub fn outcome_of(
         &self,
-        (key, level, state): (&str, &str, &str),
+        identity: (&str, &str, &str),
         hook: &str,
     ) -> Result<Option<DeliveryOutcome>, StoreError> {
-        let inner = self.inner();
-        let mut query = inner.connection.prepare_cached(
-            "SELECT status FROM outbox WHERE key = ?1 AND level = ?2 AND state = ?3 AND hook = ?4",
-        )?;
-        let mut rows = query.query(params![key, level, state, hook])?;
-        let status: Option<String> = rows.next()?.map_or(Ok(None), |row| row.get(0))?;
+        let status: Option<String> = self.of_delivery("status", identity, hook)?;
         Ok(status.and_then(|status| DeliveryOutcome::named(&status)))
     }
 
@@ -268,17 +263,9 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn attempts(
-        &self,
-        (key, level, state): (&str, &str, &str),
-        hook: &str,
-    ) -> Result<u32, StoreError> {
-        let inner = self.inner();
-        let mut query = inner.connection.prepare_cached(
-            "SELECT attempts FROM outbox WHERE key = ?1 AND level = ?2 AND state = ?3 AND hook = ?4",
-        )?;
-        let mut rows = query.query(params![key, level, state, hook])?;
-        Ok(rows.next()?.map_or(Ok(0), |row| row.get(0))?)
+    pub fn attempts(&self, identity: (&str, &str, &str), hook: &str) -> Result<u32, StoreError> {
+        let attempts = self.of_delivery("attempts", identity, hook)?;
+        Ok(attempts.unwrap_or(0))
     }
 
     /// When a hook's delivery was noted, by the host's clock; `None` where it was not, or by an earlier version.
@@ -287,16 +274,26 @@ impl Store {
     /// [`StoreError`].
     pub fn noted(
         &self,
-        (key, level, state): (&str, &str, &str),
+        identity: (&str, &str, &str),
         hook: &str,
     ) -> Result<Option<Timestamp>, StoreError> {
+        let noted: Option<Option<i64>> = self.of_delivery("noted", identity, hook)?;
+        noted.flatten().map(timestamp).transpose()
+    }
+
+    /// A column of a hook's delivery with this key, level and state; `None` where it was never noted.
+    fn of_delivery<T: FromSql>(
+        &self,
+        column: &'static str,
+        (key, level, state): (&str, &str, &str),
+        hook: &str,
+    ) -> Result<Option<T>, StoreError> {
         let inner = self.inner();
-        let mut query = inner.connection.prepare_cached(
-            "SELECT noted FROM outbox WHERE key = ?1 AND level = ?2 AND state = ?3 AND hook = ?4",
-        )?;
+        let mut query = inner.connection.prepare_cached(&format!(
+            "SELECT {column} FROM outbox WHERE key = ?1 AND level = ?2 AND state = ?3 AND hook = ?4"
+        ))?;
         let mut rows = query.query(params![key, level, state, hook])?;
-        let noted: Option<i64> = rows.next()?.map_or(Ok(None), |row| row.get(0))?;
-        noted.map(timestamp).transpose()
+        Ok(rows.next()?.map(|row| row.get(0)).transpose()?)
     }
 
     /// The time that hooks were given of this key, level and state; `None` where none was.

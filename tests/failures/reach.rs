@@ -105,13 +105,19 @@ fn standing(site: &Site, hook: &str) -> String {
         .unwrap_or_default()
 }
 
+/// The daemon, after the failing hook has been run for the red of a benchmark so many times or more.
+fn after_attempts(site: &Site, attempts: usize) -> Program {
+    let program = site.caught_up();
+    moves(site, 80.0);
+    eventually("attempts", || count(site, "failed", "5/red/") >= attempts);
+    program
+}
+
 #[test]
 fn what_is_acknowledged_is_tried_no_more_also_after_a_restart_nor_sent_to_a_hook_that_a_reload_adds()
  {
     let site = one_benchmark(FAILING);
-    let program = site.caught_up();
-    moves(&site, 80.0);
-    eventually("two attempts", || count(&site, "failed", "5/red/") >= 2);
+    let program = after_attempts(&site, 2);
     alerts(&site, &["ack", "--benchmark", "5"]);
     taken(&site, "acknowledge");
     let attempts = count(&site, "failed", "");
@@ -140,9 +146,7 @@ fn what_is_acknowledged_is_tried_no_more_also_after_a_restart_nor_sent_to_a_hook
 #[test]
 fn a_silence_holds_for_a_hook_that_fails_and_for_one_that_a_reload_adds_until_it_is_over() {
     let site = one_benchmark(FAILING);
-    let program = site.caught_up();
-    moves(&site, 80.0);
-    eventually("an attempt", || count(&site, "failed", "5/red/") >= 1);
+    let program = after_attempts(&site, 1);
     alerts(&site, &["silence", "--for", "1h"]);
     taken(&site, "silence");
     let attempts = count(&site, "failed", "");
@@ -201,9 +205,7 @@ fn after_the_end_of_a_shift_nothing_is_tried_again_and_nothing_is_escalated() {
         "{FAILING}{duty}{}levels = [\"red\"]\nescalate_after = \"12s\"\n{duty}",
         note("chief")
     ));
-    let program = site.caught_up();
-    moves(&site, 80.0);
-    eventually("an attempt", || count(&site, "failed", "5/red/") >= 1);
+    let program = after_attempts(&site, 1);
     while clock::now() < until + SignedDuration::from_secs(16) {
         std::thread::sleep(Duration::from_millis(200));
     }
@@ -381,9 +383,7 @@ fn the_silence_of_the_whole_site_is_not_ended_for_one_benchmark_without_a_word()
 #[test]
 fn what_is_over_is_not_delivered_again_as_if_it_were_in_force() {
     let site = one_benchmark(FAILING);
-    let program = site.caught_up();
-    moves(&site, 80.0);
-    eventually("an attempt", || count(&site, "failed", "5/red/") >= 1);
+    let program = after_attempts(&site, 1);
     let right = fs::read_to_string(site.path("site.toml")).unwrap();
     fs::write(site.path("site.toml"), right.replace(FAILING, "")).unwrap();
     reload_with(&site, &program, "");

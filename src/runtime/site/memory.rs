@@ -7,7 +7,7 @@ use super::{
 };
 use crate::alert::Level;
 use crate::monitor::{
-    AlertState, Event, EventKind, Input, MemoryPart, Monitor, SavedError, SearchJob, Settings,
+    AlertState, EventKind, Input, MemoryPart, Monitor, SavedError, SearchJob, Settings,
 };
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::delivered::delivery;
@@ -16,7 +16,7 @@ use crate::runtime::standing::every;
 use crate::runtime::vitals::Vitals;
 use crate::store::{Delivery, DeliveryOutcome, Recorded, Store, StoreError};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// What the site remembers beside the monitor.
@@ -196,8 +196,9 @@ impl Site {
             Err(error) if error.is_full() => tracing::warn!(%error, "deliveries are not closed"),
             closed => closed?,
         }
+        let mut ended = EndedKeys::default();
         for alert in &waiting {
-            self.take_up(&store, alert)?;
+            self.take_up(&store, alert, &mut ended)?;
         }
         if let Some(alerts) = &self.sinks.alerts {
             alerts.commit();
@@ -206,7 +207,12 @@ impl Site {
     }
 
     /// Hands an alert that waited to its hooks, but not the beginning of what is over, or was acknowledged.
-    fn take_up(&self, store: &Store, alert: &Alert) -> Result<(), StoreError> {
+    fn take_up(
+        &self,
+        store: &Store,
+        alert: &Alert,
+        ended: &mut EndedKeys,
+    ) -> Result<(), StoreError> {
         let Some(alerts) = &self.sinks.alerts else {
             return Ok(());
         };
@@ -218,7 +224,7 @@ impl Site {
             return Ok(());
         }
         let awaited = store.awaited(identity(alert))?;
-        if is_beginning && standing.is_none() && self.is_over(store, alert)? {
+        if is_beginning && standing.is_none() && self.is_over(store, alert, ended)? {
             alerts.leave_out(alert, &awaited);
             return Ok(());
         }
@@ -231,7 +237,12 @@ impl Site {
     }
 
     /// Whether an alert that does not stand has ended, or a higher level has come.
-    fn is_over(&self, store: &Store, alert: &Alert) -> Result<bool, StoreError> {
+    fn is_over(
+        &self,
+        store: &Store,
+        alert: &Alert,
+        ended: &mut EndedKeys,
+    ) -> Result<bool, StoreError> {
         if alert.is_flood() {
             // One of an older version does not name its members.
             return Ok(alert.many.is_some() && !self.has_in_force(alert));
@@ -240,11 +251,7 @@ impl Site {
         if alert.level != Level::Unknown && self.standing.contains_key(&place(alert)) {
             return Ok(true);
         }
-        let ends = |event: &Event| {
-            matches!(&event.kind, EventKind::Alert { key, state: AlertState::Resolved, .. }
-                if *key == alert.key)
-        };
-        Ok(every(store, "alert")?.iter().any(ends))
+        ended.has(store, &alert.key)
     }
 
     /// What waits for a hook that is not in the config any more, or that does not ask for it any more, is closed, and
@@ -334,13 +341,41 @@ fn announce_closed(ended: &[Delivery]) {
     }
 }
 
+/// The keys of all alerts that have ended, read where one is asked for.
+#[derive(Debug, Default)]
+struct EndedKeys(Option<BTreeSet<String>>);
+
+impl EndedKeys {
+    fn has(&mut self, store: &Store, key: &str) -> Result<bool, StoreError> {
+        let keys = match &mut self.0 {
+            Some(keys) => keys,
+            keys => {
+                let ended = every(store, "alert")?.into_iter().filter_map(|event| {
+                    if let EventKind::Alert {
+                        key,
+                        state: AlertState::Resolved,
+                        ..
+                    } = event.kind
+                    {
+                        Some(key)
+                    } else {
+                        None
+                    }
+                });
+                keys.insert(ended.collect())
+            }
+        };
+        Ok(keys.contains(key))
+    }
+}
+
 /// Where an alert stands.
 fn place(alert: &Alert) -> AlertPlace {
     (alert.event.benchmark.clone(), alert.level == Level::Unknown)
 }
 
 /// What the outbox knows an alert by.
-fn identity(alert: &Alert) -> (&str, &str, &str) {
+pub(super) fn identity(alert: &Alert) -> (&str, &str, &str) {
     let Alert {
         key, level, state, ..
     } = alert;

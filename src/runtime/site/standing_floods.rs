@@ -1,9 +1,10 @@
 //! What was reported together stands by one key until all of it is over, and its end goes to those who received its beginning.
 
+use super::memory::identity;
 use super::{BEFORE_ALL, Site, flood};
 use crate::alert::Level;
 use crate::reading::Timestamp;
-use crate::runtime::hook::{Alert, FLOOD, MessageState, state_name};
+use crate::runtime::hook::{Alert, FLOOD, MessageState};
 use crate::runtime::many::FloodMember;
 use crate::store::{DeliveryOutcome, Store, StoreError};
 
@@ -36,14 +37,9 @@ impl Site {
                 continue;
             };
             self.stand_for_many(&alert);
-            let identity = (
-                alert.key.as_str(),
-                alert.level.name(),
-                state_name(alert.state),
-            );
             let seen = Some(DeliveryOutcome::Acknowledged);
             if let Some(one) = self.floods.get_mut(&alert.key) {
-                one.is_acknowledged = store.is_noted(identity, None, seen)?;
+                one.is_acknowledged = store.is_noted(identity(&alert), None, seen)?;
             }
         }
         Ok(())

@@ -39,6 +39,8 @@ pub(in crate::runtime) struct Decoder {
     epoch: Option<Timestamp>,
     /// With none, whatever benchmarks the files name are taken, but for those of other sources.
     wanted: Vec<Benchmark>,
+    /// See [`Decoder::read_as`]; each place in a file that is kept has it too.
+    read_as: Arc<BTreeMap<BenchmarkId, String>>,
     /// Benchmarks that the config takes from another source.
     elsewhere: BTreeSet<BenchmarkId>,
     /// What of the source's files has been remarked on, so that a thousand files say it once.
@@ -48,22 +50,26 @@ pub(in crate::runtime) struct Decoder {
 impl Decoder {
     pub(in crate::runtime) fn new(source: &FileSource, benchmarks: &[Benchmark]) -> Self {
         let conventions = source.conventions.clone();
+        let wanted = of_source(&source.id, benchmarks);
+        let read_as = wanted.iter().map(|one| {
+            let read_as = one.read_as(&conventions, source.epoch);
+            (one.id.clone(), read_as)
+        });
         Self {
             kind: source.kind,
+            read_as: Arc::new(read_as.collect()),
             conventions,
             dialect: source.dialect.clone(),
             epoch: source.epoch,
-            wanted: of_source(&source.id, benchmarks),
+            wanted,
             elsewhere: of_others(&source.id, benchmarks),
             remarked: Arc::default(),
         }
     }
 
-    /// What decides which numbers the readings of each benchmark are that the config names.
-    pub(super) fn read_as(&self) -> BTreeMap<BenchmarkId, String> {
-        let each = self.wanted.iter();
-        each.map(|one| (one.id.clone(), one.read_as(&self.conventions, self.epoch)))
-            .collect()
+    /// What decides which numbers the readings of each benchmark are that the config names; none of messages, which keep no place.
+    pub(super) fn read_as(&self) -> &Arc<BTreeMap<BenchmarkId, String>> {
+        &self.read_as
     }
 
     /// For messages, each of which is a text of NDJSON.
@@ -74,6 +80,7 @@ impl Decoder {
             dialect: Dialect::default(),
             epoch: None,
             wanted: of_source(&broker.id, benchmarks),
+            read_as: Arc::default(),
             elsewhere: of_others(&broker.id, benchmarks),
             remarked: Arc::default(),
         }

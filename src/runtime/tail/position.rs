@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use std::fs::Metadata;
 use std::os::unix::fs::MetadataExt;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Which file it is, as the file system counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -37,7 +38,7 @@ pub(super) struct Saved {
     pub(super) origin: Option<PathBuf>,
     /// What decided which numbers the readings of each benchmark were; none where an older version has written this.
     #[serde(default)]
-    pub(super) read_as: Option<BTreeMap<BenchmarkId, String>>,
+    pub(super) read_as: Option<Arc<BTreeMap<BenchmarkId, String>>>,
 }
 
 /// What of a file's content a restart needs.

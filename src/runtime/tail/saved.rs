@@ -49,7 +49,7 @@ impl FileTail {
         file.reported = saved.clone();
         // From here on these readings are taken from it, though it may not grow.
         file.safe = Saved {
-            read_as: Some(file.decoder.read_as()),
+            read_as: Some(Arc::clone(file.decoder.read_as())),
             ..saved
         };
         Ok(file)
@@ -105,7 +105,7 @@ impl FileTail {
             mark: self.mark.clone(),
             content,
             origin: (self.origin != self.path).then(|| self.origin.clone()),
-            read_as: Some(self.decoder.read_as()),
+            read_as: Some(Arc::clone(self.decoder.read_as())),
         };
     }
 }
