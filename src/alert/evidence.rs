@@ -19,6 +19,8 @@ pub struct AlertEvidence {
     pub velocity_mm_per_day: Option<f64>,
     /// The median of the latest few, which neither an outlier nor a reset moves: what a level falls by.
     pub settled_velocity_mm_per_day: Option<f64>,
+    /// Its standard error by the readings' own, mm/day; 0 where none is known.
+    pub settled_error_mm_per_day: f64,
     /// Displacement since the first reading, mm, for benchmarks that measure it.
     pub displacement_mm: Option<f64>,
     /// Latest observed acceleration, mm/day per day.

@@ -2,7 +2,7 @@
 //!
 //! A forecast that changes its mind does not lower a level. What does: the slope has slowed to half the
 //! highest velocity seen at this level, without gaining, for a whole evacuation time in which the evidence
-//! called for less; or it has held a velocity under the critical one, without gaining, for the stated time.
+//! called for less, or never moved by more than its readings err; or it has held a velocity under the critical one, without gaining, for the stated time.
 
 use super::evidence::AlertEvidence;
 use super::level::Level;
@@ -60,6 +60,8 @@ struct SteadyStretch {
 const FEWEST_READINGS: usize = 4;
 /// Motion that does not gain stays under this factor of what it was when the stretch began.
 const STEADY_GAIN: f64 = 1.2;
+/// A settled velocity differs from another, or from rest, that is so many times its standard error.
+const CLEAR: f64 = 4.0;
 /// Observed deceleration: this share of the highest velocity at the level.
 const SLOWED_TO: f64 = 0.5;
 
@@ -77,7 +79,12 @@ impl Default for Latch {
 
 impl SteadyStretch {
     /// One more reading of the stretch, or a new one, or none where `holds` is not the case.
-    fn go_on(stretch: Option<Self>, holds: Holds, now: Timestamp, velocity: f64) -> Option<Self> {
+    fn go_on(
+        stretch: Option<Self>,
+        holds: Holds,
+        now: Timestamp,
+        (velocity, error): (f64, f64),
+    ) -> Option<Self> {
         if holds == Holds::No {
             return None;
         }
@@ -86,7 +93,8 @@ impl SteadyStretch {
             velocity,
             readings: 0,
         };
-        let going_on = stretch.filter(|stretch| velocity <= STEADY_GAIN * stretch.velocity);
+        let most = |stretch: &Self| STEADY_GAIN * stretch.velocity + CLEAR * error;
+        let going_on = stretch.filter(|stretch| velocity <= most(stretch));
         let stretch = going_on.unwrap_or(begin);
         Some(Self {
             readings: stretch.readings + 1,
@@ -160,10 +168,15 @@ impl Latch {
         };
         self.peak_velocity = self.peak_velocity.max(velocity);
         let less = call.level < self.level;
-        let slowed = less && velocity <= SLOWED_TO * self.peak_velocity;
+        let error = evidence.settled_error_mm_per_day;
+        // Motion that never stood out of its error has not to slow down.
+        let is_slow =
+            velocity <= SLOWED_TO * self.peak_velocity || self.peak_velocity <= CLEAR * error;
+        let slowed = less && is_slow;
         let steady = less && velocity < policy.critical_velocity_mm_per_day;
-        self.slow = SteadyStretch::go_on(self.slow, slowed.into(), evidence.now, velocity);
-        self.steady = SteadyStretch::go_on(self.steady, steady.into(), evidence.now, velocity);
+        let motion = (velocity, error);
+        self.slow = SteadyStretch::go_on(self.slow, slowed.into(), evidence.now, motion);
+        self.steady = SteadyStretch::go_on(self.steady, steady.into(), evidence.now, motion);
     }
 
     fn reason_to_fall(
@@ -328,5 +341,40 @@ mod tests {
             latch.update(&policy, &evidence(1, 0.3, 60.0))[0].level,
             Level::Red
         );
+    }
+
+    #[test]
+    fn noise_neither_breaks_a_deceleration_nor_is_it_motion_that_has_to_slow_down() {
+        let (policy, mut latch) = red_at_hundred();
+        let noisy = |hour: i64, chance, velocity: f64| AlertEvidence {
+            settled_error_mm_per_day: 1.0,
+            ..evidence(
+                hour,
+                chance,
+                velocity + 1.5 * f64::from(u8::from(hour % 3 == 0)),
+            )
+        };
+        let mut fallen = None;
+        for hour in 1..60 {
+            let left = latch.update(&policy, &noisy(hour, 0.0, 2.0));
+            if fallen.is_none() && !left.is_empty() {
+                fallen = Some(hour);
+            }
+        }
+        assert_eq!(fallen, Some(25));
+        let mut latch = Latch::default();
+        latch.update(&policy, &noisy(0, 0.3, 0.5));
+        assert_eq!(latch.level(), Level::Red);
+        for hour in 1..30 {
+            latch.update(&policy, &noisy(hour, 0.0, 0.5));
+        }
+        assert_eq!(latch.level(), Level::Green);
+        // Without an error a gain is a gain.
+        let (_, mut latch) = red_at_hundred();
+        for hour in 1..60 {
+            let velocity = 2.0 + 1.5 * f64::from(u8::from(hour % 3 == 0));
+            latch.update(&policy, &evidence(hour, 0.0, velocity));
+        }
+        assert_eq!(latch.level(), Level::Red);
     }
 }

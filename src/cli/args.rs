@@ -360,7 +360,7 @@ pub(super) fn refuse_empty(
     )))
 }
 
-/// Warns on stderr of rows that were not in order.
+/// Warns on stderr of values that were not in order.
 pub(super) fn warn_of(disorder: Disorder) {
     let kinds = [
         ("repeated an earlier one", disorder.repeated, "dropped"),
@@ -375,7 +375,7 @@ pub(super) fn warn_of(disorder: Disorder) {
             "put in order",
         ),
         (
-            "hold a mark for a missing value where a reading should be",
+            "are a mark for a missing value where a reading should be",
             disorder.missing,
             "left out",
         ),
@@ -386,10 +386,10 @@ pub(super) fn warn_of(disorder: Disorder) {
             "warning: files of a daemon's record without an end: {files} (read as far as they go)"
         ));
     }
-    for (what, rows, remedy) in kinds {
-        if rows > 0 {
+    for (what, values, remedy) in kinds {
+        if values > 0 {
             exit::complain(&format_args!(
-                "warning: rows that {what}: {rows} ({remedy})"
+                "warning: values that {what}: {values} ({remedy})"
             ));
         }
     }

@@ -24,7 +24,7 @@ const DISAGREE: f64 = 0.5;
 ///
 /// Several benchmarks are inverted one by one, and then asked which of them fail together, and when.
 /// The best fit and its rms are those of the constant-load law by unweighted least squares. Intervals
-/// bound 90 %. Failure is the first passage of --critical-velocity. A table has a row a benchmark, and not
+/// bound 90 %. Failure is the collapse; the first passage of --critical-velocity stands beside it. A table has a row a benchmark, and not
 /// which fail together.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {

@@ -32,7 +32,9 @@ impl SiteArgs {
     }
 }
 
-/// Print a site's events, oldest first, as `replay` does
+/// Print a site's events as `replay` does, in the order in which they were found
+///
+/// On a first start the newest readings are judged before those of the past, so that older events stand after newer ones.
 #[derive(Debug, clap::Args)]
 pub(super) struct EventsArgs {
     #[command(flatten)]

@@ -109,7 +109,13 @@ fn text(report: &SweepReport) -> String {
     let (benchmark, quantity) = (&report.benchmark, report.quantity);
     let mut rows = report.rows.iter();
     let differ = rows.any(|row| regimes_differ(&row.regime, row.regime_under_load.as_ref()));
-    let note = if differ { REGIMES_DIFFER } else { "" };
+    let note = if report.rows.is_empty() {
+        "too few readings for a fit: the table has no row\n"
+    } else if differ {
+        REGIMES_DIFFER
+    } else {
+        ""
+    };
     format!("benchmark {benchmark}, {quantity} in {unit}, readings from {first}\n\n{table}{note}")
 }
 

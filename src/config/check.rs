@@ -79,7 +79,7 @@ pub fn check(file: &Path) -> Result<ConfigSummary, ConfigError> {
     Ok(ConfigSummary {
         site: config.site.name,
         state_dir: config.site.state_dir,
-        sources: config.sources.len(),
+        sources: config.sources.len() + config.brokers.len(),
         benchmarks: config.benchmarks.len(),
         hooks: config.hooks.len(),
         warnings,

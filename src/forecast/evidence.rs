@@ -24,6 +24,9 @@ const ONE_READING: f64 = 2.5;
 /// no more than the first figure plus the second one a day.
 const DAILY_BLOCKS: (f64, f64) = (1.0 / 12.0, 2.0);
 const DAILY_FREEDOM: (f64, f64) = (2.0, 1.5);
+/// Within the first day of a record a wave that nobody has seen whole is in all shorter blocks as well: a still night, and then the
+/// morning. Over about so many days, with this power, that ends.
+const FIRST_DAY: (f64, i32) = (0.8, 8);
 /// Blocks of so many times a span show an acceleration that ends within it.
 const SHOWN: f64 = 4.0;
 /// ln of a Bayes factor beyond which nothing changes.
@@ -81,15 +84,23 @@ fn summed(scales: &Scales) -> Vec<(f64, f64)> {
 }
 
 fn odds(scales: &Scales, scale: &Scale) -> f64 {
-    let is_daily = (DAILY_BLOCKS.0..DAILY_BLOCKS.1).contains(&scale.days);
-    let most = if is_daily {
-        DAILY_FREEDOM.0 + DAILY_FREEDOM.1 * scales.length_days
-    } else {
-        f64::INFINITY
-    };
+    let most = most_freedom(scales.length_days, scale.days);
     let factor = |change: &Change| ln_bayes_factor(change, most).min(SURE).exp();
     let prior = RATE_OF_A_SCALE / 365.25 * scale.days;
     prior * f64::midpoint(factor(&scale.near), factor(&scale.far))
+}
+
+/// The most degrees of freedom of blocks of so many days in a record of so many.
+fn most_freedom(length_days: f64, block_days: f64) -> f64 {
+    let a_day = DAILY_FREEDOM.1 * length_days;
+    if block_days >= DAILY_BLOCKS.1 {
+        f64::INFINITY
+    } else if block_days >= DAILY_BLOCKS.0 {
+        DAILY_FREEDOM.0 + a_day
+    } else {
+        let over = (length_days / FIRST_DAY.0).powi(FIRST_DAY.1);
+        DAILY_FREEDOM.0 + a_day * (1.0 + over)
+    }
 }
 
 /// ln of the density of a change that is [`SPREAD`] times as wide as usual and above 0, over that of a usual one; the
@@ -146,5 +157,23 @@ mod tests {
         assert!(factor(6.0, 200.0) > 1e5);
         assert!(factor(6.0, 3.0) < 100.0);
         assert!(factor(-6.0, 200.0) < 1.0);
+    }
+
+    #[test]
+    fn the_first_morning_of_a_record_is_hardly_evidence_and_after_two_days_short_blocks_are() {
+        let morning = most_freedom(0.35, 0.02);
+        assert!(factor_of(50.0, morning) < 1000.0, "{morning}");
+        assert!(most_freedom(2.0, 0.02) > 1000.0);
+        assert!(most_freedom(2.0, 0.5) < 6.0 && most_freedom(2.0, 4.0).is_infinite());
+    }
+
+    fn factor_of(z: f64, most_freedom: f64) -> f64 {
+        let change = Change {
+            newest: z,
+            usual: 1.0,
+            freedom: 100.0,
+            largest: 0.0,
+        };
+        ln_bayes_factor(&change, most_freedom).exp()
     }
 }

@@ -8,6 +8,9 @@ const REMEMBERED: usize = 24;
 const FEWEST: usize = 8;
 /// A reading this much less likely than the usual one stands out: once in some thousand readings by chance.
 const STANDS_OUT_NATS: f64 = 7.0;
+/// And by so many times what the most surprising of the latest ones did: where noise is as large as the motion, a velocity's logarithm
+/// is off again and again.
+const ABOVE_LARGEST: f64 = 1.5;
 
 /// Remembers how likely the latest readings were.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -28,8 +31,10 @@ impl Surprise {
         if usual.len() < FEWEST {
             return None;
         }
-        let surprise = usual[usual.len() / 2] - log_density;
-        (surprise > STANDS_OUT_NATS).then_some(surprise.min(1e3))
+        let median = usual[usual.len() / 2];
+        let (surprise, largest) = (median - log_density, median - usual[0]);
+        let stands_out = surprise > STANDS_OUT_NATS.max(ABOVE_LARGEST * largest);
+        stands_out.then_some(surprise.min(1e3))
     }
 }
 
@@ -45,5 +50,8 @@ mod tests {
         }
         assert!(surprise.of(-12.0).is_some());
         assert_eq!(surprise.of(-1.0), None);
+        // What comes again and again is usual.
+        assert_eq!(surprise.of(-14.0), None);
+        assert!(surprise.of(-30.0).is_some());
     }
 }

@@ -107,7 +107,7 @@ pub struct FittedRegime {
     pub probabilities: BTreeMap<Regime, Option<f64>>,
 }
 
-/// First passage of the critical velocity; quantiles are unconditional.
+/// When the slope collapses, or passes the critical velocity, by the field that it stands in; quantiles are unconditional.
 #[derive(Debug, Clone, Copy, PartialEq, JsonSchema, Serialize)]
 pub struct FittedFailureTime {
     /// 5 % quantile.
@@ -116,11 +116,11 @@ pub struct FittedFailureTime {
     pub median: Option<Timestamp>,
     /// 95 % quantile.
     pub high: Option<Timestamp>,
-    /// Chance of passage within the horizon; `None` with too few readings for a forecast.
+    /// Chance of it within the horizon; `None` with too few readings for a forecast.
     pub probability: Option<f64>,
     /// How far the forecast looks, days.
     pub horizon_days: f64,
-    /// Chance of passage within the evacuation time; for the text.
+    /// Chance of it within the evacuation time; for the text.
     #[serde(skip)]
     pub chance_within_evacuation_time: Option<f64>,
 }

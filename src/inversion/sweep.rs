@@ -64,7 +64,7 @@ pub struct SweepRow {
     pub x_i: Option<f64>,
     /// Inflection of its velocity.
     pub transition_time: Option<Timestamp>,
-    /// When the critical velocity is passed.
+    /// When the slope collapses.
     pub failure_time: FittedFailureTime,
     /// The straight line through inverse velocity.
     pub inverse_velocity: FittedInverseVelocity,

@@ -5,6 +5,7 @@ use crate::alert::Level;
 use crate::reading::{BenchmarkId, Timestamp};
 use schemars::JsonSchema;
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// A level and how long it was in force.
 #[derive(Debug, Clone, Copy, PartialEq, JsonSchema, Serialize)]
@@ -51,6 +52,29 @@ pub fn levels_in(
     (levels.until(last), unknown)
 }
 
+/// `events` by the times that they are of: those of the past before a first start are found after those of the present. No alert ends
+/// before it has begun, as by time one does whose end came with a backlog.
+pub fn by_time(events: Vec<Event>) -> Vec<Event> {
+    let mut begun: BTreeMap<String, Timestamp> = BTreeMap::new();
+    let mut placed: Vec<(Timestamp, Event)> = Vec::with_capacity(events.len());
+    for event in events {
+        let mut place = event.time;
+        if let EventKind::Alert { key, state, .. } = &event.kind {
+            match state {
+                AlertState::Firing => {
+                    begun.insert(key.clone(), event.time);
+                }
+                AlertState::Resolved => {
+                    place = begun.get(key).map_or(place, |begun| place.max(*begun));
+                }
+            }
+        }
+        placed.push((place, event));
+    }
+    placed.sort_by_key(|(place, _)| *place);
+    placed.into_iter().map(|(_, event)| event).collect()
+}
+
 /// A level as it changes.
 #[derive(Debug)]
 struct LevelCourse {
@@ -91,5 +115,34 @@ impl LevelCourse {
             to: end.max(self.since),
         });
         self.past
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_end_that_a_backlog_brings_stands_after_the_beginning() {
+        let at = |hour: i64| Timestamp::from_second(3600 * hour).unwrap();
+        let alert = |hour, key: &str, state| Event {
+            time: at(hour),
+            benchmark: None,
+            kind: EventKind::Alert {
+                level: Level::Unknown,
+                state,
+                key: key.to_owned(),
+                rule: String::new(),
+                text: String::new(),
+            },
+        };
+        let events = vec![
+            alert(20, "present", AlertState::Firing),
+            alert(12, "present", AlertState::Resolved),
+            alert(5, "past", AlertState::Firing),
+            alert(7, "past", AlertState::Resolved),
+        ];
+        let placed = [2, 3, 0, 1].map(|index: usize| events[index].clone());
+        assert_eq!(by_time(events), placed);
     }
 }

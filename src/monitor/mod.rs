@@ -32,7 +32,7 @@ mod together;
 mod track;
 mod undeclared;
 
-pub use course::{LevelStretch, levels_in};
+pub use course::{LevelStretch, by_time, levels_in};
 pub use declared::{Declaration, Declared};
 pub use event::{
     AlertState, CalledLevel, Event, EventKind, FailureTime, InverseVelocity, LevelChance, Plain,

@@ -44,6 +44,17 @@ pub(super) fn settled(rates: &[Rate]) -> Option<f64> {
     latest.get(latest.len() / 2).copied()
 }
 
+/// The standard error of the median of the latest rates, mm/day.
+fn settled_error(rates: &[Rate]) -> f64 {
+    // Of a normal variable that of the median is 1.25 times that of the mean.
+    const OF_THE_MEDIAN: f64 = 1.25;
+    let latest = &rates[rates.len().saturating_sub(SETTLED)..];
+    let mut errors: Vec<f64> = latest.iter().map(|rate| rate.sigma).collect();
+    errors.sort_by(f64::total_cmp);
+    let middle = errors.get(errors.len() / 2).copied().unwrap_or(0.0);
+    OF_THE_MEDIAN * middle / (SETTLED as f64).sqrt()
+}
+
 /// The highest settled velocity, mm/day.
 pub(super) fn fastest(rates: &[Rate]) -> Option<f64> {
     let windows = rates.windows(SETTLED);
@@ -73,6 +84,7 @@ pub(super) fn observed(
         now,
         velocity_mm_per_day: newest.or_else(|| newest_velocity(observations)),
         settled_velocity_mm_per_day: settled(rates),
+        settled_error_mm_per_day: settled_error(rates),
         displacement_mm: displacement_mm(observations),
         acceleration_mm_per_day2: acceleration(rates),
         ..AlertEvidence::default()

@@ -3,7 +3,7 @@
 
 use super::standing::{every, may_be_of, orders, silences};
 use crate::alert::Level;
-use crate::monitor::{AlertState, CalledLevel, Event, EventKind, OrderKind};
+use crate::monitor::{AlertState, CalledLevel, Event, EventKind, OrderKind, by_time};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::store::{Store, StoreError};
 use schemars::JsonSchema;
@@ -79,10 +79,8 @@ impl Alarms {
     /// [`StoreError`].
     pub fn read(store: &Store, at: Option<Timestamp>, now: Timestamp) -> Result<Self, StoreError> {
         let is_known = |event: &Event| at.is_none_or(|at| event.time <= at);
-        let mut alerts = every(store, "alert")?;
+        let mut alerts = by_time(every(store, "alert")?);
         alerts.retain(is_known);
-        // Those of the past before a first start come after those of the present.
-        alerts.sort_by_key(|event| event.time);
         let (mut newest, mut unknown) = (BTreeMap::new(), BTreeMap::new());
         for event in alerts {
             if level(&event) == Some(Level::Unknown) {

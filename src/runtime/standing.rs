@@ -1,7 +1,7 @@
 //! What stands at a moment, from the events in a site's state: alerts in force, orders, who has seen what.
 
 use crate::alert::Level;
-use crate::monitor::{AlertState, Event, EventKind, Order, OrderKind};
+use crate::monitor::{AlertState, Event, EventKind, Order, OrderKind, by_time};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::store::{Store, StoreError};
 use std::collections::BTreeMap;
@@ -15,10 +15,7 @@ pub type InForce = BTreeMap<(Option<BenchmarkId>, Level), Event>;
 /// [`StoreError`].
 pub fn in_force(store: &Store, until: Option<Timestamp>) -> Result<InForce, StoreError> {
     let mut standing = InForce::new();
-    let mut alerts = every(store, "alert")?;
-    // Those of the past before a first start come after those of the present.
-    alerts.sort_by_key(|event| event.time);
-    for event in alerts {
+    for mut event in by_time(every(store, "alert")?) {
         if until.is_some_and(|until| event.time > until) {
             continue;
         }
@@ -31,6 +28,10 @@ pub fn in_force(store: &Store, until: Option<Timestamp>) -> Result<InForce, Stor
         let (level, state, place) = (*level, *state, event.benchmark.clone());
         match state {
             AlertState::Firing => {
+                // One level stands here since it was first called, also where the past before a first start called it.
+                if let Some(called) = standing.get(&(place.clone(), level)) {
+                    event.time = called.time;
+                }
                 standing.retain(|(own, lower), _| {
                     *own != place || (*lower == Level::Unknown) != (level == Level::Unknown)
                 });

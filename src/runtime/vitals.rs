@@ -245,6 +245,8 @@ impl Vitals {
     pub fn read(&self, benchmark: &BenchmarkId, time: Timestamp, events: &[Event], took: Duration) {
         let mut points = locked(&self.points);
         let point = points.entry(benchmark.clone()).or_default();
+        // A benchmark that the config names is unknown until it has read.
+        point.is_unknown &= point.newest.is_some();
         point.newest = point.newest.max(Some(time));
         point.surprise_nats = 0.0;
         let is_refit = |event: &Event| {

@@ -385,9 +385,9 @@ fn disorder_in_the_data_is_a_warning() {
     let (_folder, path) = file("a.csv", text);
     let said = err(&slipwatch(&["replay", &path]).success());
     for part in [
-        "rows that repeated an earlier one: 1",
-        "rows that gave another value for a time already read: 1",
-        "rows that stood before an earlier time: 2",
+        "values that repeated an earlier one: 1",
+        "values that gave another value for a time already read: 1",
+        "values that stood before an earlier time: 2",
     ] {
         assert!(said.contains(part), "{part} is not in: {said}");
     }

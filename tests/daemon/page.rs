@@ -110,7 +110,12 @@ fn a_moment_is_shown_as_it_was_known_then() {
     assert_eq!(empty["latest"], Value::Null);
     assert_eq!(empty["standing"]["is_unknown"], true);
     assert_eq!(site.get("/api/benchmark?id=nobody").0, 404);
-    assert_eq!(site.get("/api/site?at=yesterday").0, 400);
+    let (status, text) = site.get("/api/site?at=yesterday");
+    assert_eq!(status, 400);
+    assert!(
+        text.contains("at: found \"yesterday\", expected a time such as"),
+        "{text}"
+    );
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Sensors that fail without falling silent.
 
-use crate::site::{Program, Site, eventually};
+use crate::site::{Program, Site, eventually, get};
 use crate::telling::failing;
 use jiff::SignedDuration;
 use slipwatch::runtime::clock;
@@ -149,4 +149,36 @@ fn a_cell_that_is_no_number_hides_no_other_value_of_its_row() {
         let log = site.log();
         assert!(log.contains("ERR"), "the line is in quarantine: {log}");
     }
+}
+
+/// The readings that end an outage were measured before the alarm that it gave.
+#[test]
+fn a_benchmark_that_reads_again_with_a_backlog_is_unknown_nowhere() {
+    let site = Site::new("");
+    let address = site.listen();
+    let start = clock::now() - SignedDuration::from_hours(240);
+    let row = |hour: i64| {
+        let moved = 0.1 * hour as f64 + 0.05 * (1.7 * hour as f64).sin();
+        format!("{},{moved:.3}\n", start + SignedDuration::from_hours(hour))
+    };
+    let before: String = (0..200).map(row).collect();
+    site.append("incoming/5.csv", &format!("{HEADER}{before}"));
+    let program = site.caught_up();
+    eventually("unknown", || site.notified("5/unknown/", "firing") == 1);
+    let backlog: String = (200..240).map(row).collect();
+    site.append("incoming/5.csv", &backlog);
+    eventually("its end", || site.notified("5/unknown/", "resolved") == 1);
+    let status = || site.printed(&["status", "--config", "site.toml", "--format", "json"]);
+    let is_known = || {
+        let listed = site.printed(&["alerts", "list", "--config", "site.toml"]);
+        !status().contains("\"is_unknown\":true")
+            && !listed.contains("unknown")
+            && get(&address, "/api/site").contains("\"is_unknown\":false")
+    };
+    eventually("known again", is_known);
+    program.stop();
+    let program = site.caught_up();
+    assert!(is_known(), "{}", status());
+    program.stop();
+    site.proven_events();
 }

@@ -278,3 +278,26 @@ fn a_search_that_is_at_work_does_not_hold_the_work_loop() {
     assert!(get(&listen, "/healthz").contains("200 OK"));
     program.stop();
 }
+
+/// A benchmark that the config names is unknown until it has read, on a first start with history too.
+#[test]
+fn a_named_benchmark_with_history_is_not_unknown_in_the_metrics() {
+    let site = Site::new("[[benchmark]]\nid = \"5\"\n");
+    let listen = site.listen();
+    let rows: String = (0..60)
+        .map(|hour| {
+            let time = clock::now() - SignedDuration::from_hours(60 - hour);
+            format!(
+                "{time},{:.2}\n",
+                0.3 * hour as f64 + 0.1 * (hour as f64).sin()
+            )
+        })
+        .collect();
+    site.append("incoming/5.csv", &format!("{HEADER}{rows}"));
+    let program = site.caught_up();
+    eventually("known", || {
+        let metrics = get(&listen, "/metrics");
+        metrics.contains("slipwatch_benchmark_unknown{benchmark=\"5\"} 0")
+    });
+    program.stop();
+}

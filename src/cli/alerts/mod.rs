@@ -163,7 +163,9 @@ pub(super) fn run(args: &AlertsArgs) -> anyhow::Result<()> {
         && !is_known(benchmark)
         && !store.benchmarks()?.contains_key(benchmark)
     {
-        anyhow::bail!("benchmark {benchmark} has given no readings yet");
+        anyhow::bail!(
+            "there is no benchmark {benchmark}: the config names none, and none has given a reading"
+        );
     }
     if let Some(silence) = silence_of_the_site(&store, &order, clock::now())? {
         let silence = text::line(&silence, &config.site.time_zone);

@@ -24,7 +24,7 @@ pub(super) fn show(args: &ShowArgs) -> anyhow::Result<()> {
     let (config, store) = args.site.open()?;
     let Some(alert) = view::alert(&store, &config.site.name, &args.key)? else {
         let text = format!(
-            "no alert {:?}: `slipwatch alerts list --format json` and `slipwatch events --kind alert` show the keys",
+            "no alert {:?}: `slipwatch alerts list --format json` and `slipwatch events --kind alert --format json` show the keys",
             args.key
         );
         return Err(UsageError(text).into());

@@ -128,7 +128,7 @@ fn alert_lines(text: &mut String, plan: &InitPlan) {
         text,
         "[alert]\n{evacuation:35}# how long it takes to bring everyone out; red looks twice so far ahead\n\
          # outlook = \"30d\"                # yellow and orange look so far ahead\n\
-         # critical_velocity = \"1 m/day\"  # passing this is failure\n\n\
+         # critical_velocity = \"1 m/day\"  # its passage is forecast beside the collapse\n\n\
          # A program that is run when a level is entered or left; it gets the alert as JSON on stdin.\n"
     );
     match &plan.hook {

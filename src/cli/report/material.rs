@@ -4,7 +4,7 @@ use super::Args;
 use crate::alert::Policy;
 use crate::cli::replay;
 use crate::config;
-use crate::monitor::{Event, Settings};
+use crate::monitor::{Event, Settings, by_time};
 use crate::reading::{
     BenchmarkId, Channel, Quantity, Reading, Recording, Sample, Series, Timestamp, Unit,
 };
@@ -27,7 +27,7 @@ pub(super) struct Material {
     pub(super) title: String,
     /// Readings and covariates.
     pub(super) recording: Recording,
-    /// What the monitor said, oldest first.
+    /// What the monitor said, by the times that it is of.
     pub(super) events: Vec<Event>,
     /// Events before this are not listed.
     pub(super) listed_from: Timestamp,
@@ -188,7 +188,7 @@ fn events(store: &Store) -> anyhow::Result<Vec<Event>> {
     loop {
         let chunk = store.events(after, None, None)?;
         let Some((last, _)) = chunk.last() else {
-            return Ok(events);
+            return Ok(by_time(events));
         };
         after = *last;
         for (_, body) in &chunk {

@@ -3,8 +3,8 @@
 use super::hours;
 use crate::alert::{Level, Policy};
 use crate::cli::replay;
-use crate::monitor::{AlertState, EventKind, Settings};
-use crate::reading::{Channel, Recording, Series, Timestamp};
+use crate::monitor::{Event, Settings, levels_in};
+use crate::reading::{BenchmarkId, Channel, Recording, Series, Timestamp};
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -46,46 +46,25 @@ pub(super) fn of(
         ..Settings::default()
     };
     let events = replay::events(&recording, &settings, Some(until))?;
-    let changes: Vec<_> = events
-        .iter()
-        .filter_map(|event| {
-            let EventKind::Alert { level, state, .. } = &event.kind else {
-                return None;
-            };
-            Some((event.time, *level, *state))
-        })
-        .collect();
     let first = series.readings.first().map_or(until, |first| first.time);
-    Ok(warning(&changes, first, until))
+    Ok(warning(&events, &series.benchmark, (first, until)))
 }
 
 fn warning(
-    changes: &[(Timestamp, Level, AlertState)],
-    first: Timestamp,
-    until: Timestamp,
+    events: &[Event],
+    benchmark: &BenchmarkId,
+    (first, until): (Timestamp, Timestamp),
 ) -> Warning {
+    let (mut stretches, unknown) = levels_in(events, Some(benchmark), (first, until));
+    stretches.retain(|stretch| stretch.level != Level::Green);
+    stretches.extend(unknown);
     let begun = |level| {
-        let mut begun = changes
-            .iter()
-            .filter(|(_, one, state)| *one == level && *state == AlertState::Firing);
-        begun.next().map(|(time, ..)| *time)
+        let mut of_level = stretches.iter().filter(|stretch| stretch.level == level);
+        of_level.next().map(|stretch| stretch.from)
     };
     let mut hours_at: BTreeMap<Level, f64> = BTreeMap::new();
-    let mut since: BTreeMap<Level, Timestamp> = BTreeMap::new();
-    for (time, level, state) in changes {
-        match state {
-            AlertState::Firing => {
-                since.entry(*level).or_insert(*time);
-            }
-            AlertState::Resolved => {
-                if let Some(from) = since.remove(level) {
-                    *hours_at.entry(*level).or_default() += hours(from, *time);
-                }
-            }
-        }
-    }
-    for (level, from) in since {
-        *hours_at.entry(level).or_default() += hours(from, until);
+    for stretch in &stretches {
+        *hours_at.entry(stretch.level).or_default() += hours(stretch.from, stretch.to);
     }
     let length = hours(first, until);
     let at = |level| hours_at.get(&level).copied().unwrap_or(0.0);
@@ -107,20 +86,34 @@ fn warning(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::monitor::{AlertState, EventKind};
 
     #[test]
-    fn hours_are_counted_from_firing_to_resolved_and_to_the_end() {
+    fn a_level_is_in_force_until_it_ends_or_a_higher_one_is_called() {
         let at = |hour: i64| Timestamp::from_second(hour * 3600).unwrap();
-        let changes = [
-            (at(10), Level::Orange, AlertState::Firing),
-            (at(12), Level::Orange, AlertState::Resolved),
-            (at(20), Level::Red, AlertState::Firing),
+        let benchmark = BenchmarkId::new("P").unwrap();
+        let change = |hour, level, state| Event {
+            time: at(hour),
+            benchmark: Some(benchmark.clone()),
+            kind: EventKind::Alert {
+                level,
+                state,
+                key: format!("P/{hour}"),
+                rule: String::new(),
+                text: String::new(),
+            },
+        };
+        let events = [
+            change(10, Level::Orange, AlertState::Firing),
+            change(12, Level::Orange, AlertState::Resolved),
+            change(15, Level::Orange, AlertState::Firing),
+            change(20, Level::Red, AlertState::Firing),
         ];
-        let warning = warning(&changes, at(0), at(24));
+        let warning = warning(&events, &benchmark, (at(0), at(24)));
         assert_eq!(warning.first_red, Some(at(20)));
         assert_eq!(warning.first_yellow, None);
-        assert!((warning.hours_at[&Level::Orange] - 2.0).abs() < 1e-12);
+        assert!((warning.hours_at[&Level::Orange] - 7.0).abs() < 1e-12);
         assert!((warning.hours_at[&Level::Red] - 4.0).abs() < 1e-12);
-        assert!((warning.hours_per_year - 0.25 * YEAR_HOURS).abs() < 1e-9);
+        assert!((warning.hours_per_year - 11.0 / 24.0 * YEAR_HOURS).abs() < 1e-9);
     }
 }

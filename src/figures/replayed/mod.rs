@@ -7,7 +7,7 @@ mod regime;
 
 use crate::figures::day;
 use crate::fit::{Observations, Rate, RateOptions};
-use crate::monitor::{Event, EventKind, FailureTime};
+use crate::monitor::{Event, EventKind, FailureTime, LevelChance};
 use crate::plot::{Axis, BLACK, Mark};
 use crate::reading::{Series, Timestamp, after_days};
 
@@ -32,9 +32,12 @@ struct ReplayedRefit {
     /// The probability of kappa above 0, and of r above 0.
     unstable: f64,
     accelerating: f64,
-    /// The chance of a collapse.
-    within_evacuation_time: f64,
-    within_outlook: f64,
+    /// The chances of a collapse by which red and orange are called; in states of old versions those within the evacuation time
+    /// and the outlook.
+    for_red: f64,
+    for_orange: f64,
+    /// By what they are called; `None` in states of old versions.
+    called_by: Option<(LevelChance, LevelChance)>,
 }
 
 /// Width of the sheets.
@@ -91,6 +94,7 @@ impl<'a> Replayed<'a> {
                 regime,
                 chance_within_evacuation_time,
                 chance_within_outlook,
+                called,
                 ..
             } = &event.kind
             else {
@@ -102,8 +106,11 @@ impl<'a> Replayed<'a> {
                 intercept: inverse_velocity.failure_time,
                 unstable: regime.probability_unstable,
                 accelerating: regime.probability_accelerating,
-                within_evacuation_time: *chance_within_evacuation_time,
-                within_outlook: *chance_within_outlook,
+                for_red: (called.as_ref())
+                    .map_or(*chance_within_evacuation_time, |called| called.red.chance),
+                for_orange: (called.as_ref())
+                    .map_or(*chance_within_outlook, |called| called.orange.chance),
+                called_by: called.as_ref().map(|called| (called.red, called.orange)),
             })
         })
     }

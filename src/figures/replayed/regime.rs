@@ -3,11 +3,24 @@
 use super::{Replayed, ReplayedRefit, WIDTH, levels};
 use crate::figures::day;
 use crate::figures::in_time::{every_few, line};
+use crate::monitor::LevelChance;
 use crate::plot::{Axis, BLUE, GREY, Legend, Mark, Panel, RED, Stack};
 
 /// Heights of both panels, in the sheet's units.
 const PROBABILITIES: f64 = 220.0;
 const CHANCES: f64 = 140.0;
+
+/// What a chance is of by which `level` is called, and from which on; in states of old versions it is another one.
+fn within(level: &str, called_by: Option<LevelChance>) -> String {
+    match called_by {
+        Some(by) => format!(
+            "within {:.0} h: {level} from {:.0} % (dotted)",
+            by.within_hours,
+            100.0 * by.at_least
+        ),
+        None => format!("that {level} was called by"),
+    }
+}
 
 impl Replayed<'_> {
     /// The figure, one SVG text.
@@ -33,16 +46,22 @@ impl Replayed<'_> {
                 line(over_time(|refit| refit.accelerating), BLUE, "6 3"),
             ),
         ];
-        let chances = vec![
+        let called_by = refits.last().and_then(|newest| newest.called_by);
+        let (by_red, by_orange) = called_by.unzip();
+        let mut chances = vec![
             (
-                "within the evacuation time".to_owned(),
-                line(over_time(|refit| refit.within_evacuation_time), RED, ""),
+                within("red", by_red),
+                line(over_time(|refit| refit.for_red), RED, ""),
             ),
             (
-                "within the outlook".to_owned(),
-                line(over_time(|refit| refit.within_outlook), BLUE, "6 3"),
+                within("orange", by_orange),
+                line(over_time(|refit| refit.for_orange), BLUE, "6 3"),
             ),
         ];
+        for (called_by, colour) in [(by_red, RED), (by_orange, BLUE)] {
+            let limit = called_by.map(|by| vec![(x.from, by.at_least), (x.to, by.at_least)]);
+            chances.extend(limit.map(|limit| (String::new(), line(limit, colour, "1 3"))));
+        }
         Stack {
             description: format!(
                 "{title}. The probability of instability and of acceleration, the chance of a collapse, and the levels in force."

@@ -237,8 +237,12 @@ fn report(outlook: &Outlook) -> RegimeReport {
     let of = |regime| outlook.regimes.get(&regime).copied().unwrap_or(0.0);
     RegimeReport {
         label: label(&outlook.regimes),
-        probability_unstable: of(Regime::UnstableAccelerating) + of(Regime::UnstableDecelerating),
-        probability_accelerating: of(Regime::UnstableAccelerating) + of(Regime::StableAccelerating),
+        // Rounding may bring a sum above 1.
+        probability_unstable: (of(Regime::UnstableAccelerating) + of(Regime::UnstableDecelerating))
+            .min(1.0),
+        probability_accelerating: (of(Regime::UnstableAccelerating)
+            + of(Regime::StableAccelerating))
+        .min(1.0),
         probabilities: outlook.regimes.clone(),
         r_per_day: outlook.law.map(|law| law.r),
         kappa_per_day: outlook.law.map(|law| law.kappa),

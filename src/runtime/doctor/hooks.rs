@@ -74,9 +74,11 @@ pub(super) fn finding(hook: &HookConfig) -> Finding {
 
 /// Whether a message could be written there, or the folder be made.
 fn writable(folder: &Path) -> nix::Result<()> {
+    // The last ancestor of a relative path is empty, and is the folder one is in.
+    let here = Path::new(".");
     let there = folder.ancestors().find(|folder| folder.is_dir());
     access(
-        there.unwrap_or(folder),
+        there.unwrap_or(if folder.is_relative() { here } else { folder }),
         AccessFlags::W_OK | AccessFlags::X_OK,
     )
 }

@@ -9,7 +9,7 @@ use super::level_now::LevelsNow;
 use super::standing::RecordStanding;
 use super::topics::TopicWriter;
 use crate::config::{Config, RecordFiles};
-use crate::monitor::{Event, Measured};
+use crate::monitor::{Event, Measured, by_time};
 use crate::reading::Timestamp;
 use crate::runtime::clock::{self, Stopwatch};
 use crate::runtime::standing::every_until;
@@ -238,10 +238,9 @@ impl Recorder {
     /// Opens the state, and learns which levels are in force where the record goes on.
     fn look(&mut self) -> Result<Store, RecordError> {
         let store = Store::look(&self.state_dir)?;
-        let mut alerts = every_until(&store, "alert", self.standing.event)?;
-        alerts.sort_by_key(|event| event.time);
-        for alert in &alerts {
-            self.levels.take(alert);
+        let alerts = every_until(&store, "alert", self.standing.event)?;
+        for alert in by_time(alerts) {
+            self.levels.take(&alert);
         }
         Ok(store)
     }

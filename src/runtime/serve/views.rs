@@ -13,9 +13,11 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use axum::{Json, Router};
 use futures_util::stream;
-use serde::Deserialize;
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer};
 use std::convert::Infallible;
 use std::fmt::Write as _;
+use std::str::FromStr;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -83,7 +85,27 @@ async fn blocking<T: Send + 'static>(
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct StreamMoment {
+    #[serde(default, deserialize_with = "instant")]
     at: Option<Timestamp>,
+}
+
+/// What a query gives for a time.
+fn instant<'de, D: Deserializer<'de>>(given: D) -> Result<Option<Timestamp>, D::Error> {
+    parsed(given, "a time such as 2026-11-26T08:00:00Z")
+}
+
+/// What a query gives for a count.
+fn count<'de, D: Deserializer<'de>>(given: D) -> Result<Option<usize>, D::Error> {
+    parsed(given, "a whole number, 0 or more")
+}
+
+fn parsed<'de, D: Deserializer<'de>, T: FromStr>(
+    given: D,
+    expected: &str,
+) -> Result<Option<T>, D::Error> {
+    let text = String::deserialize(given)?;
+    let found = text.parse().map(Some);
+    found.map_err(|_| D::Error::custom(format!("found {text:?}, expected {expected}")))
 }
 
 async fn site(
@@ -99,9 +121,13 @@ async fn site(
 #[serde(deny_unknown_fields)]
 struct OfBenchmark {
     id: String,
+    #[serde(default, deserialize_with = "instant")]
     at: Option<Timestamp>,
+    #[serde(default, deserialize_with = "instant")]
     from: Option<Timestamp>,
+    #[serde(default, deserialize_with = "instant")]
     to: Option<Timestamp>,
+    #[serde(default, deserialize_with = "count")]
     buckets: Option<usize>,
 }
 

@@ -165,9 +165,10 @@ fn call(store: &Store, asked: &str) -> Result<Option<StoredCall>, StoreError> {
             continue;
         };
         let is_it = key == asked;
+        // A benchmark is named in full, so that P1 is not P10; what stands after it need not be.
         let begins = key
             .strip_prefix(asked)
-            .is_some_and(|rest| rest.starts_with('/'));
+            .is_some_and(|rest| rest.starts_with('/') || asked.contains('/'));
         if *state != AlertState::Firing || !is_it && !begins {
             continue;
         }
@@ -207,15 +208,16 @@ fn end(alerts: &[Event], call: &Event) -> (AlertLife, Option<Timestamp>) {
             continue;
         };
         if key == own_key && *state == AlertState::Resolved {
-            return (AlertLife::Resolved, Some(event.time));
+            // The end that a backlog brings is of readings from before the beginning.
+            return (AlertLife::Resolved, Some(event.time.max(call.time)));
         }
         let is_beside = (*level == Level::Unknown) != (*own_level == Level::Unknown);
         let replaces = event.benchmark == call.benchmark
             && !is_beside
             && *state == AlertState::Firing
             && key != own_key
-            && event.time >= call.time
-            && level > own_level;
+            && (level > own_level && event.time >= call.time
+                || level == own_level && event.time > call.time);
         if replaces {
             superseded = Some(superseded.map_or(event.time, |known| known.min(event.time)));
         }

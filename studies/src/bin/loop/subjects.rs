@@ -281,7 +281,7 @@ pub(crate) const SUBJECTS: [Subject; 14] = [
         averaging_hours: None,
         until: None,
         figures: &[],
-        comment: "The step of 46 mm in the same storm follows the rain too, and a jump of the state cannot be distinguished from it. Extrapolated over the held-out block the error falls to a third; reading by reading it hardly falls.",
+        comment: "The step of 46 mm in the same storm follows the rain too, and a jump of the state cannot be distinguished from it. Over the held-out block the error falls to about a third, extrapolated and from reading to reading.",
     },
     Subject {
         name: "preonzo",
