@@ -4,7 +4,7 @@ use super::declared::Declarations;
 use super::motion::settled;
 use crate::fit::{Observation, Observations, Rate, RateOptions};
 use crate::reading::{
-    BenchmarkId, Quantity, Reading, SECONDS_PER_DAY, Series, Timestamp, Unit, days_since,
+    BenchmarkId, FARTHEST, Quantity, Reading, SECONDS_PER_DAY, Series, Timestamp, Unit, days_since,
     instant_after_days,
 };
 use jiff::SignedDuration;
@@ -38,9 +38,6 @@ pub(super) enum Taken {
 
 /// Readings set aside that are remembered.
 const MOST_ASIDE: usize = 4096;
-
-/// No displacement in mm, or velocity in mm/day, is larger: a thousand kilometres.
-pub(super) const FARTHEST: f64 = 1e9;
 
 /// The readings of one benchmark.
 #[derive(Debug, Clone, Serialize, Deserialize)]

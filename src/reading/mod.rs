@@ -5,6 +5,7 @@
 
 mod conventions;
 mod dialect;
+mod figure;
 mod recording;
 mod series;
 pub mod suspicion;
@@ -16,7 +17,7 @@ pub use jiff::Timestamp;
 pub use recording::{MergeError, Recording, SelectError};
 pub use series::{Channel, Disorder, Reading, Sample, Series};
 pub use suspicion::Suspicion;
-pub use unit::{LengthUnit, Quantity, TimeUnit, Unit, UnitError};
+pub use unit::{FARTHEST, LengthUnit, Quantity, TimeUnit, Unit, UnitError};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,7 +1,7 @@
 //! What in a benchmark's readings hardly means what was intended: a wrong unit, a wrong zone, a mark for no value, a
 //! reset that nobody declared.
 
-use super::{Quantity, Timestamp};
+use super::{Quantity, Timestamp, figure, whole_figure};
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
 
@@ -206,8 +206,10 @@ fn mark(readings: &[(Timestamp, f64)]) -> Option<(f64, DatedSuspicion)> {
     let (count, at) = (marked.clone().count(), marked.next_back()?.0);
     (away > AWAY * (high - low) || is_leap).then(|| {
         let text = format!(
-            "{value} stands {count} times, first at {first}, and all other readings lie between {low} and {high}: \
-             if it means that there is no value, add missing = [{value}] to the source"
+            "{value} stands {count} times, first at {first}, and all other readings lie between {} and {}: \
+             if it means that there is no value, add missing = [{value}] to the source",
+            whole_figure(low),
+            whole_figure(high)
         );
         let kind = Suspicion::Mark;
         (value, DatedSuspicion { kind, at, text })
@@ -247,10 +249,10 @@ fn fall(readings: &[(Timestamp, f64)], unit: &str) -> Option<DatedSuspicion> {
         kind: Suspicion::Fall,
         at,
         text: format!(
-            "between {before} and {at} it fell by {:.3} {unit}, {:.0} times the usual scatter of a step: \
+            "between {before} and {at} it fell by {} {unit}, {} times the usual scatter of a step: \
              if the sensor was reset, declare it with [[event]] kind = \"reset\"",
-            -step,
-            (usual - step) / scatter
+            figure(-step, 3),
+            figure((usual - step) / scatter, 0)
         ),
     })
 }
@@ -268,7 +270,8 @@ fn scale(readings: &[(Timestamp, f64)], unit: &str) -> Option<DatedSuspicion> {
     }
     if unit == "m" && moved > LARGE_M {
         return Some(evidence(format!(
-            "the readings span {moved:.0} m: if they are millimetres, say unit = \"mm\""
+            "the readings span {} m: if they are millimetres, say unit = \"mm\"",
+            figure(moved, 0)
         )));
     }
     let is_whole = |value: f64| (value - value.round()).abs() < 1e-6;
