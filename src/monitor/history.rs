@@ -272,7 +272,13 @@ impl History {
         let taken_off = self.taken_off(new.t_days);
         new.value -= taken_off;
         let values = &mut self.observations.values;
-        let at = values.partition_point(|old| old.t_days < new.t_days);
+        // Nearly all are later than all others: the search would fetch far more of the record from memory.
+        let is_newest = values.last().is_none_or(|last| last.t_days < new.t_days);
+        let at = if is_newest {
+            values.len()
+        } else {
+            values.partition_point(|old| old.t_days < new.t_days)
+        };
         match values.get_mut(at) {
             None => {
                 values.push(new);
@@ -307,6 +313,9 @@ impl History {
     pub(super) fn values_as_read(&self, unit: Unit, most: usize) -> Vec<f64> {
         let values = &self.observations.values;
         let newest = &values[values.len().saturating_sub(most)..];
+        if [Unit::MM, Unit::MM_PER_DAY].contains(&unit) {
+            return newest.iter().map(|one| one.value).collect();
+        }
         let factor = unit.factor();
         newest.iter().map(|one| one.value / factor).collect()
     }

@@ -10,6 +10,8 @@ const MARKS: [f64; 12] = [
     99.0, 999.0, 999.9, 999.99, 6999.0, 7999.0, 8888.0, 9999.0, 9999.9, 32_768.0, 99_999.0,
     999_999.0,
 ];
+/// No mark is as small as this.
+const UNDER_MARKS: f64 = 98.0;
 /// What a mark has behind its point is nothing, or this at least.
 const LEAST_REST: f64 = 0.9;
 /// Two values are the same within this.
@@ -118,37 +120,43 @@ pub fn is_plain(values: &[f64], quantity: Quantity, unit: &str) -> bool {
     if values.len() < FEWEST {
         return true;
     }
-    if values.iter().any(|value| is_mark(*value)) {
+    let (low, high) = ends(values);
+    if low.abs().max(high.abs()) > UNDER_MARKS && values.iter().any(|value| is_mark(*value)) {
         return false;
     }
     quantity != Quantity::Displacement
-        || !may_have_fallen(values) && !may_have_another_scale(values, unit)
+        || !may_have_fallen(values) && !may_have_another_scale(values, high - low, unit)
+}
+
+/// The least and the greatest of these values.
+fn ends(values: &[f64]) -> (f64, f64) {
+    let low = values
+        .iter()
+        .fold(f64::INFINITY, |a, b| if *b < a { *b } else { a });
+    let high = values
+        .iter()
+        .fold(f64::NEG_INFINITY, |a, b| if *b > a { *b } else { a });
+    (low, high)
 }
 
 /// A fall is more than [`LEAP`] times the median size of a step below the usual one, which is not larger than that median: so
 /// the median size is less than the deepest fall over [`LEAP`] less one.
 fn may_have_fallen(values: &[f64]) -> bool {
-    let steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let deepest = steps
-        .iter()
-        .fold(0.0_f64, |a, b| if *b < a { *b } else { a });
+    let steps = || values.windows(2).map(|pair| pair[1] - pair[0]);
+    let deepest = steps().fold(0.0_f64, |a, b| if b < a { b } else { a });
     let least = -deepest / (LEAP - 1.0);
-    let large: usize = steps
-        .iter()
-        .map(|step| usize::from(step.abs() >= least))
-        .sum();
-    large < steps.len() - steps.len() / 2
+    let large: usize = steps().map(|step| usize::from(step.abs() >= least)).sum();
+    let count = values.len().saturating_sub(1);
+    large < count - count / 2
 }
 
-fn may_have_another_scale(values: &[f64], unit: &str) -> bool {
-    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+fn may_have_another_scale(values: &[f64], moved: f64, unit: &str) -> bool {
     match unit {
-        "m" => high - low > LARGE_M,
-        "mm" => {
+        "m" => moved > LARGE_M,
+        "mm" if moved < SMALL_MM => {
             let steps = values.windows(2).map(|pair| (pair[1] - pair[0]).abs());
             let small = steps.filter(|step| *step <= SMALL_STEP_MM).count();
-            high - low < SMALL_MM && small > (values.len() - 1) / 2
+            small > (values.len() - 1) / 2
         }
         _ => false,
     }
@@ -180,7 +188,7 @@ fn is_mark(value: f64) -> bool {
     let size = value.abs();
     // Most values are no mark by their digits alone, and each reading asks about hundreds.
     let rest = size - size.floor();
-    let may_be = size > MARKS[0] - 1.0 && !(ROUNDING..LEAST_REST - ROUNDING).contains(&rest);
+    let may_be = !(ROUNDING..LEAST_REST - ROUNDING).contains(&rest);
     may_be && MARKS.iter().any(|mark| same(size, *mark))
 }
 
@@ -208,6 +216,9 @@ fn mark(readings: &[(Timestamp, f64)]) -> Option<(f64, DatedSuspicion)> {
         let text = format!(
             "{value} stands {count} times, first at {first}, and all other readings lie between {} and {}: \
              if it means that there is no value, add missing = [{value}] to the source",
+    if size <= UNDER_MARKS {
+        return false;
+    }
             whole_figure(low),
             whole_figure(high)
         );

@@ -7,7 +7,8 @@ use crate::monitor::event::Event;
 use crate::monitor::history::MeasuredAs;
 use crate::monitor::track::record::BenchmarkRecord;
 use crate::reading::suspicion::{self, DatedSuspicion};
-use crate::reading::{Suspicion, Timestamp};
+use crate::reading::{Suspicion, Timestamp, Unit};
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 
 /// The latest readings that are examined.
@@ -26,7 +27,10 @@ impl DataQuality {
         let (unit, history) = (source.unit, record.history());
         let quantity = history.observations.quantity;
         let values = history.values_as_read(unit, INSPECTED);
-        let name = unit.to_string();
+        let name = match unit {
+            Unit::Length(length) => Cow::Borrowed(length.symbol()),
+            Unit::Rate(..) => Cow::Owned(unit.to_string()),
+        };
         let mut found = Vec::new();
         if !suspicion::is_plain(&values, quantity, &name) {
             let readings = history.as_read(unit, INSPECTED);
