@@ -30,6 +30,9 @@ const SMALL_MM: f64 = 2.0;
 const SMALL_STEP_MM: f64 = 0.02;
 /// A slope that moved by more m than this may be in mm.
 const LARGE_M: f64 = 100.0;
+/// A suspicion of another unit goes on until a figure is so many times beyond where it begins: readings about there would raise and
+/// end it again and again.
+const BEYOND: f64 = 2.0;
 /// A reading that is further ahead of the clock was given a wrong time; a logger's clock is off by minutes.
 pub const AHEAD: SignedDuration = SignedDuration::from_mins(10);
 
@@ -162,6 +165,33 @@ fn may_have_another_scale(values: &[f64], moved: f64, unit: &str) -> bool {
     }
 }
 
+/// Whether readings of these values, which gave rise to the suspicion of another unit before, do not clearly contradict it. What is
+/// a mark for no value says nothing of that.
+pub fn may_still_have_another_scale(values: &[f64], unit: &str) -> bool {
+    let values: Vec<f64> = values
+        .iter()
+        .copied()
+        .filter(|value| !is_mark(*value))
+        .collect();
+    let (low, high) = ends(&values);
+    let moved = high - low;
+    match unit {
+        "m" => moved > LARGE_M / BEYOND,
+        "mm" => {
+            let steps = values.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+            let usual = median(steps);
+            moved < BEYOND * SMALL_MM
+                && usual.is_none_or(|usual| usual <= BEYOND * SMALL_STEP_MM)
+                && values.iter().all(|value| is_whole(value * 1e3))
+        }
+        _ => false,
+    }
+}
+
+fn is_whole(value: f64) -> bool {
+    (value - value.round()).abs() < 1e-6
+}
+
 /// What the values of readings in `unit`, in order of time, give rise to.
 pub fn of_values(
     readings: &[(Timestamp, f64)],
@@ -186,6 +216,9 @@ pub fn of_values(
 
 fn is_mark(value: f64) -> bool {
     let size = value.abs();
+    if size <= UNDER_MARKS {
+        return false;
+    }
     // Most values are no mark by their digits alone, and each reading asks about hundreds.
     let rest = size - size.floor();
     let may_be = !(ROUNDING..LEAST_REST - ROUNDING).contains(&rest);
@@ -216,9 +249,6 @@ fn mark(readings: &[(Timestamp, f64)]) -> Option<(f64, DatedSuspicion)> {
         let text = format!(
             "{value} stands {count} times, first at {first}, and all other readings lie between {} and {}: \
              if it means that there is no value, add missing = [{value}] to the source",
-    if size <= UNDER_MARKS {
-        return false;
-    }
             whole_figure(low),
             whole_figure(high)
         );
@@ -285,7 +315,6 @@ fn scale(readings: &[(Timestamp, f64)], unit: &str) -> Option<DatedSuspicion> {
             figure(moved, 0)
         )));
     }
-    let is_whole = |value: f64| (value - value.round()).abs() < 1e-6;
     let in_thousandths = readings.iter().all(|(_, value)| is_whole(value * 1e3))
         && readings.iter().any(|(_, value)| !is_whole(value * 1e2));
     let is_small = moved > 0.0

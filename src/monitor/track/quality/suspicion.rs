@@ -17,12 +17,13 @@ const INSPECTED: usize = 200;
 const CALM: usize = 24;
 
 impl DataQuality {
-    /// After the newest reading, of `time`.
+    /// After the newest reading, of `time`. `holds_scale`: a suspicion of another scale goes on until the readings contradict it.
     pub(in crate::monitor::track) fn suspect(
         &mut self,
         record: &BenchmarkRecord,
         source: MeasuredAs,
         time: Timestamp,
+        holds_scale: bool,
     ) -> Vec<Event> {
         let (unit, history) = (source.unit, record.history());
         let quantity = history.observations.quantity;
@@ -43,6 +44,13 @@ impl DataQuality {
         let mut events = Vec::new();
         for kind in [Suspicion::Mark, Suspicion::Fall, Suspicion::Scale] {
             let evidence = found.iter().find(|one| one.kind == kind);
+            let stands = kind == Suspicion::Scale
+                && holds_scale
+                && evidence.is_none()
+                && self.unknown.has(Reason::Suspect(kind));
+            if stands && suspicion::may_still_have_another_scale(&values, &name) {
+                continue;
+            }
             events.extend(self.weigh(record, time, kind, evidence));
         }
         events
