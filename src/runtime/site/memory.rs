@@ -27,6 +27,8 @@ struct SiteMemory {
     newest: BTreeMap<BenchmarkId, Timestamp>,
     #[serde(default)]
     ahead: BTreeMap<BenchmarkId, Timestamp>,
+    #[serde(default)]
+    read_anew: BTreeMap<BenchmarkId, i64>,
     failure_times: BTreeMap<Option<BenchmarkId>, Timestamp>,
     standing: Vec<(AlertPlace, AlertInForce)>,
     mutes: Vec<Mute>,
@@ -108,7 +110,7 @@ impl Site {
             .for_each(|job| self.searches.note(job));
         self.now = own.now;
         self.newest = own.newest;
-        self.ahead = own.ahead;
+        (self.ahead, self.read_anew) = (own.ahead, own.read_anew);
         self.failure_times = own.failure_times;
         self.standing = own.standing.into_iter().collect();
         self.mutes = own.mutes;
@@ -138,6 +140,9 @@ impl Site {
                     row.input,
                     Input::Reading { .. } | Input::Sample { .. }
                 ));
+                if let Input::Settings(settings) = &row.input {
+                    self.forget_values(settings, row.seq - 1);
+                }
                 self.follow(row.now, &row.input);
                 for job in self.monitor.searches() {
                     self.searches.note(job);
@@ -306,6 +311,7 @@ impl Site {
         };
         let saved = self.monitor.save().map_err(|error| error.to_string());
         let own = rmp_serde::to_vec_named(&own).map_err(|error| error.to_string());
+            read_anew: self.read_anew.clone(),
         match saved.and_then(|parts| Ok((parts, own?))) {
             Ok((mut parts, own)) => {
                 let body = Some(own);
