@@ -311,6 +311,21 @@ fn a_flood_keeps_its_key_to_its_end_and_a_hook_of_some_benchmarks_receives_these
     eventually("as many CAP messages", || {
         (messages("Alert"), messages("Cancel")) == (11, 11)
     });
+    for headline in [
+        "Toc, 30 more benchmarks: red",
+        "Toc, 30 more benchmarks: red ends",
+    ] {
+        let wanted = format!("<headline>{headline}</headline>");
+        let files = fs::read_dir(site.path("cap"))
+            .unwrap()
+            .map(|file| file.unwrap().path());
+        let texts = files.filter_map(|file| fs::read_to_string(file).ok());
+        assert_eq!(
+            texts.filter(|text| text.contains(&wanted)).count(),
+            1,
+            "{headline}"
+        );
+    }
     program.stop();
     let lines = site.lines("notified");
     let keys: Vec<&str> = (lines.iter())
