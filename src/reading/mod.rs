@@ -12,7 +12,8 @@ pub mod suspicion;
 mod unit;
 
 pub use conventions::{Conventions, LocalClock, MissingValues, SummerTime, TimeFault};
-pub use dialect::{DecimalMark, Delimiter, Dialect, TimeFormat};
+pub use dialect::{DecimalMark, Delimiter, Dialect, MOST_SKIPPED, TimeFormat};
+pub use figure::{figure, whole_figure};
 pub use jiff::Timestamp;
 pub use recording::{MergeError, Recording, SelectError};
 pub use series::{Channel, Disorder, Reading, Sample, Series};
