@@ -1,7 +1,7 @@
 //! A backlog of messages that a real Mosquitto kept: taken by a daemon that knows nothing yet, by one that knows its benchmarks, and
 //! without the monitor.
 
-use crate::{Daemon, floor};
+use crate::{Daemon, floor, readings};
 use jiff::Timestamp;
 use rumqttc::{AsyncClient, Event, MqttOptions, Packet, QoS};
 use slipwatch::config;
@@ -103,16 +103,6 @@ fn site(port: u16) -> TempDir {
     );
     fs::write(folder.path().join("site.toml"), text).unwrap();
     folder
-}
-
-/// Readings that are durable.
-fn readings(folder: &TempDir) -> usize {
-    let count = || -> rusqlite::Result<i64> {
-        let file = folder.path().join("state/slipwatch.db");
-        let database = rusqlite::Connection::open(file)?;
-        database.query_row("SELECT count(series) FROM step", [], |row| row.get(0))
-    };
-    usize::try_from(count().unwrap_or(0)).unwrap()
 }
 
 /// Waits until so many readings are durable; seconds and seconds of the processor since the daemon started.

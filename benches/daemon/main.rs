@@ -183,6 +183,16 @@ fn steps(folder: &TempDir) -> i64 {
     Store::look(&folder.path().join("state")).map_or(0, |store| store.last_step())
 }
 
+/// Readings that are durable: steps are also notices of time and of the clock.
+fn readings(folder: &TempDir) -> usize {
+    let count = || -> rusqlite::Result<i64> {
+        let file = folder.path().join("state/slipwatch.db");
+        let database = rusqlite::Connection::open(file)?;
+        database.query_row("SELECT count(series) FROM step", [], |row| row.get(0))
+    };
+    usize::try_from(count().unwrap_or(0)).unwrap()
+}
+
 /// The alerts in force, as the program lists them.
 fn in_force(folder: &TempDir) -> String {
     let listed = Command::new(env!("CARGO_BIN_EXE_slipwatch"))
@@ -204,7 +214,7 @@ fn held_load(seconds: u32) {
     wait_for(&folder, BENCHMARKS * HISTORY);
     std::thread::sleep(Duration::from_secs(3));
     let standing = in_force(&folder);
-    let (before, memory) = (steps(&folder), daemon.megabytes());
+    let (before, memory) = (readings(&folder), daemon.megabytes());
     let began = Instant::now();
     let mut appended: Vec<i128> = Vec::new();
     let (mut lags, mut middle) = ([0, 0], memory);
@@ -230,7 +240,7 @@ fn held_load(seconds: u32) {
             middle = daemon.megabytes();
         }
         if number % READINGS_A_SECOND == 0 && number > 0 {
-            let lag = i64::from(number) - (steps(&folder) - before);
+            let lag = (number as usize).saturating_sub(readings(&folder) - before);
             lags[half] = lag.max(lags[half]);
         }
     }
@@ -257,7 +267,7 @@ fn held_load(seconds: u32) {
          appended to hook started, {} alerts ({stood} benchmarks stood at a level before): p50 {:.1} ms, p90 {:.1} ms, p99 {:.1} ms",
         lags[0],
         lags[1],
-        i64::try_from(appended.len()).unwrap() - (steps(&folder) - before),
+        appended.len().saturating_sub(readings(&folder) - before),
         daemon.megabytes(),
         latencies.len(),
         share(50),

@@ -2,7 +2,7 @@
 
 use super::evidence::{AlertCause, AlertEvidence};
 use super::level::Level;
-use crate::reading::SECONDS_PER_DAY;
+use crate::reading::{SECONDS_PER_DAY, figure};
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
 
@@ -98,7 +98,9 @@ impl Condition {
     /// In words, with the figure of the evidence where there is one.
     fn words(&self, evidence: Option<&AlertEvidence>) -> String {
         let shown = |value: Option<f64>, unit: &str| {
-            value.map_or_else(String::new, |value| format!(" ({value:.3}{unit})"))
+            value.map_or_else(String::new, |value| {
+                format!(" ({}{unit})", figure(value, 3))
+            })
         };
         let of = |figure: fn(&AlertEvidence) -> Option<f64>| evidence.and_then(figure);
         match *self {

@@ -4,8 +4,8 @@ use super::exit::{self, NoSuchReadings};
 use crate::alert::Policy;
 use crate::config::value;
 use crate::reading::{
-    BenchmarkId, Conventions, DecimalMark, Delimiter, Dialect, Disorder, LocalClock, MissingValues,
-    Quantity, Recording, SelectError, Series, SummerTime, TimeFormat, Timestamp,
+    BenchmarkId, Conventions, DecimalMark, Delimiter, Dialect, Disorder, LocalClock, MOST_SKIPPED,
+    MissingValues, Quantity, Recording, SelectError, Series, SummerTime, TimeFormat, Timestamp,
 };
 use crate::runtime::ingest::{
     ColumnMap, FilesRead, IngestError, ReadOptions, read_channels, read_with_remarks,
@@ -55,7 +55,7 @@ impl OutputArgs {
 }
 
 /// The names of the arguments that say what a file means.
-pub(super) const FILE_FLAGS: [&str; 10] = [
+pub(super) const FILE_FLAGS: [&str; 11] = [
     "columns",
     "averaging",
     "epoch",
@@ -66,6 +66,7 @@ pub(super) const FILE_FLAGS: [&str; 10] = [
     "decimal",
     "time_columns",
     "time_format",
+    "skip_lines",
 ];
 
 /// What files do not say of themselves.
@@ -111,6 +112,10 @@ pub struct DialectArgs {
     /// [default: rfc3339]
     #[arg(long, value_name = "FORMAT", value_parser = TimeFormat::parse)]
     pub time_format: Option<TimeFormat>,
+    /// So many lines stand before the header of a table, such as the instrument's name; lines that begin with # are passed over
+    /// without it [default: 0]
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u64).range(..=MOST_SKIPPED))]
+    pub skip_lines: Option<u64>,
 }
 
 impl DialectArgs {
@@ -121,6 +126,7 @@ impl DialectArgs {
             decimal: self.decimal.unwrap_or_default(),
             time_columns: self.time_columns.clone(),
             time_format: self.time_format.clone().unwrap_or_default(),
+            skip_lines: self.skip_lines.unwrap_or_default(),
         }
     }
 }
@@ -190,6 +196,11 @@ impl FileArgs {
                 dialect.time_format.is_some(),
                 "--time-format",
                 "time_format of [[source]]",
+            ),
+            (
+                dialect.skip_lines.is_some(),
+                "--skip-lines",
+                "skip_lines of [[source]]",
             ),
         ];
         let given = all.into_iter().filter(|(is_given, ..)| *is_given);

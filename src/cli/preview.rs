@@ -1,7 +1,7 @@
 //! What a site's files hold, for people.
 
 use super::text::clock;
-use crate::reading::Timestamp;
+use crate::reading::{Timestamp, whole_figure};
 use crate::runtime::ingest::Meaning;
 use crate::runtime::preview::{
     BenchmarkPreview, ColumnView, CovariateView, Preview, Refusal, SourceView,
@@ -126,8 +126,9 @@ fn benchmark_lines(text: &mut String, benchmark: &BenchmarkPreview, zone: &TimeZ
     for (which, (time, value)) in [("first", first), ("last ", last)] {
         let _ = writeln!(
             text,
-            "  {which} {time}{}  {value} {unit}",
-            there(*time, zone)
+            "  {which} {time}{}  {} {unit}",
+            there(*time, zone),
+            whole_figure(*value)
         );
     }
     let dropped = [

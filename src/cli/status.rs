@@ -7,7 +7,7 @@ use super::table::TextTable;
 use super::text;
 use crate::alert::{Level, chance_in_words};
 use crate::monitor::{CalledLevel, Event, EventKind, SUSPECT, SUSPECT_ENDS};
-use crate::reading::{BenchmarkId, Timestamp};
+use crate::reading::{BenchmarkId, Timestamp, figure};
 use crate::runtime::alarm_state::{AlarmState, Alarms};
 use crate::runtime::clock;
 use crate::runtime::drilled::DrillRecord;
@@ -326,7 +326,7 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
                 (false, _) => one.level.to_string(),
             },
             one.newest_reading.map_or_else(dash, clock),
-            velocity.map_or_else(dash, |velocity| format!("{velocity:.3}")),
+            velocity.map_or_else(dash, |velocity| figure(velocity, 3)),
             one.failure_time.map_or_else(dash, day),
             chance(one.chance()),
         ]);

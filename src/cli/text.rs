@@ -5,7 +5,7 @@ use crate::effects::{Kind, Rival};
 use crate::monitor::{
     AlertState, Event, EventKind, FailureTime, SharedFailure, Summary, Unexplained,
 };
-use crate::reading::{BenchmarkId, Timestamp};
+use crate::reading::{BenchmarkId, Timestamp, figure};
 use crate::runtime::site::BEFORE_ALL;
 use jiff::tz::TimeZone;
 use textwrap::{Options, WordSplitter};
@@ -103,8 +103,9 @@ fn what(kind: &EventKind) -> String {
             velocity_mm_per_day,
             ..
         } => {
-            let velocity = velocity_mm_per_day
-                .map_or_else(String::new, |velocity| format!(", {velocity:.3} mm/day"));
+            let velocity = velocity_mm_per_day.map_or_else(String::new, |velocity| {
+                format!(", {} mm/day", figure(velocity, 3))
+            });
             let failure = forecast(failure_time);
             format!("refit: {}{velocity}, {failure}", regime.label)
         }
@@ -198,8 +199,8 @@ fn unexplained(what: &Unexplained) -> String {
             surprise_nats,
             velocity_mm_per_day,
         } => {
-            let velocity =
-                velocity_mm_per_day.map_or_else(String::new, |v| format!(", {v:.3} mm/day"));
+            let velocity = velocity_mm_per_day
+                .map_or_else(String::new, |v| format!(", {} mm/day", figure(v, 3)));
             format!(
                 "unexplained residual: e^{surprise_nats:.0} times less likely than the usual reading{velocity}"
             )

@@ -56,6 +56,7 @@ pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
             declared,
             site: Some(site_level),
             accepted: own.accepted,
+            holds_scale: true,
         },
         hooks,
         heartbeats,

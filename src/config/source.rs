@@ -1,10 +1,10 @@
 //! `[[source]]`: where readings come from, and how they are written there.
 
-use super::table::{Section, unique};
+use super::table::{Placed, Section, unique};
 use super::{Broker, FilePattern, FileSource, SourceKind, broker, value};
 use crate::reading::{
-    Conventions, DecimalMark, Delimiter, Dialect, LocalClock, MissingValues, SummerTime,
-    TimeFormat, Timestamp,
+    Conventions, DecimalMark, Delimiter, Dialect, LocalClock, MOST_SKIPPED, MissingValues,
+    SummerTime, TimeFormat, Timestamp,
 };
 use jiff::SignedDuration;
 use std::collections::BTreeSet;
@@ -94,11 +94,13 @@ fn dialect(section: &mut Section<'_>, kind: Option<StatedKind>) -> Dialect {
     let decimal = section.parsed("decimal", DecimalMark::parse);
     let time_columns = section.text_or_texts("time_column");
     let time_format = section.parsed("time_format", TimeFormat::parse);
+    let skip_lines = skip_lines(section);
     let given = [
         ("delimiter", delimiter.as_ref().map(|given| &given.at)),
         ("decimal", decimal.as_ref().map(|given| &given.at)),
         ("time_column", time_columns.as_ref().map(|given| &given.at)),
         ("time_format", time_format.as_ref().map(|given| &given.at)),
+        ("skip_lines", skip_lines.as_ref().map(|given| &given.at)),
     ];
     for (key, at) in given {
         refuse_idle(section, kind, key, at);
@@ -108,7 +110,25 @@ fn dialect(section: &mut Section<'_>, kind: Option<StatedKind>) -> Dialect {
         decimal: decimal.map_or_else(DecimalMark::default, |given| given.value),
         time_columns: time_columns.map_or_else(Vec::new, |given| given.value),
         time_format: time_format.map_or_else(TimeFormat::default, |given| given.value),
+        skip_lines: skip_lines.map_or(0, |given| given.value),
     }
+}
+
+/// How many lines stand before the header.
+fn skip_lines(section: &mut Section<'_>) -> Option<Placed<u64>> {
+    let given = section.number("skip_lines")?;
+    let lines = (0..=MOST_SKIPPED).find(|lines| (*lines as f64).total_cmp(&given.value).is_eq());
+    if lines.is_none() {
+        section.error(
+            &given.at,
+            format!("source.skip_lines = {} is no number of lines", given.value),
+            format!("write a whole number from 0 to {MOST_SKIPPED}, such as skip_lines = 2"),
+        );
+    }
+    lines.map(|value| Placed {
+        value,
+        at: given.at,
+    })
 }
 
 /// Day 0 of a column `t_days`, which only tables have.

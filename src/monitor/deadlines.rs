@@ -13,18 +13,20 @@ pub(super) struct Deadlines {
 impl Deadlines {
     /// From here on `benchmark` is to be judged at `due`, and at no other time.
     pub(super) fn set(&mut self, benchmark: &BenchmarkId, due: Option<Timestamp>) {
-        if self.of.get(benchmark).copied() == due {
-            return;
-        }
-        let before = match due {
-            Some(due) => {
-                self.by_time.insert((due, benchmark.clone()));
-                self.of.insert(benchmark.clone(), due)
-            }
-            None => self.of.remove(benchmark),
+        let before = match (self.of.get_mut(benchmark), due) {
+            (Some(own), Some(due)) if *own == due => return,
+            (Some(own), Some(due)) => Some(std::mem::replace(own, due)),
+            (Some(_), None) => self.of.remove(benchmark),
+            (None, Some(due)) => self.of.insert(benchmark.clone(), due),
+            (None, None) => return,
         };
-        if let Some(before) = before {
-            self.by_time.remove(&(before, benchmark.clone()));
+        let mut place = (before.unwrap_or_default(), benchmark.clone());
+        if before.is_some() {
+            self.by_time.remove(&place);
+        }
+        if let Some(due) = due {
+            place.0 = due;
+            self.by_time.insert(place);
         }
     }
 

@@ -1,7 +1,7 @@
 //! What people declare to have done to the site or its instruments, and which readings it concerns.
 
 use super::event::{Event, EventKind};
-use crate::reading::{BenchmarkId, Timestamp};
+use crate::reading::{BenchmarkId, Timestamp, figure};
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
 
@@ -216,7 +216,12 @@ impl Declared {
                 None,
                 jump.map_or_else(
                     || format!("reset at {at}: the velocity over it is left out"),
-                    |jump| format!("reset at {at}: a jump of {jump:.3} mm is no motion"),
+                    |jump| {
+                        format!(
+                            "reset at {at}: a jump of {} mm is no motion",
+                            figure(jump, 3)
+                        )
+                    },
                 ),
             ),
             Declaration::Maintenance { until } => (

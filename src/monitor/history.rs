@@ -4,7 +4,7 @@ use super::declared::Declarations;
 use super::motion::settled;
 use crate::fit::{Observation, Observations, Rate, RateOptions};
 use crate::reading::{
-    BenchmarkId, Quantity, Reading, SECONDS_PER_DAY, Series, Timestamp, Unit, days_since,
+    BenchmarkId, FARTHEST, Quantity, Reading, SECONDS_PER_DAY, Series, Timestamp, Unit, days_since,
     instant_after_days,
 };
 use jiff::SignedDuration;
@@ -38,9 +38,6 @@ pub(super) enum Taken {
 
 /// Readings set aside that are remembered.
 const MOST_ASIDE: usize = 4096;
-
-/// No displacement in mm, or velocity in mm/day, is larger: a thousand kilometres.
-pub(super) const FARTHEST: f64 = 1e9;
 
 /// The readings of one benchmark.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -275,7 +272,13 @@ impl History {
         let taken_off = self.taken_off(new.t_days);
         new.value -= taken_off;
         let values = &mut self.observations.values;
-        let at = values.partition_point(|old| old.t_days < new.t_days);
+        // Nearly all are later than all others: the search would fetch far more of the record from memory.
+        let is_newest = values.last().is_none_or(|last| last.t_days < new.t_days);
+        let at = if is_newest {
+            values.len()
+        } else {
+            values.partition_point(|old| old.t_days < new.t_days)
+        };
         match values.get_mut(at) {
             None => {
                 values.push(new);
@@ -310,6 +313,9 @@ impl History {
     pub(super) fn values_as_read(&self, unit: Unit, most: usize) -> Vec<f64> {
         let values = &self.observations.values;
         let newest = &values[values.len().saturating_sub(most)..];
+        if [Unit::MM, Unit::MM_PER_DAY].contains(&unit) {
+            return newest.iter().map(|one| one.value).collect();
+        }
         let factor = unit.factor();
         newest.iter().map(|one| one.value / factor).collect()
     }

@@ -117,7 +117,7 @@ pub enum Input {
 }
 
 /// What a monitor needs to know of its site.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// The alert policy.
     pub policy: Policy,
@@ -137,6 +137,25 @@ pub struct Settings {
     /// Suspicions that people have looked into, and that do not hold.
     #[serde(default)]
     pub accepted: BTreeMap<BenchmarkId, BTreeSet<Suspicion>>,
+    /// Whether a suspicion of another scale goes on until the readings clearly contradict it; not in a state of older versions, in
+    /// which it ended with the first reading that alone would not have raised it.
+    #[serde(default)]
+    pub holds_scale: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            policy: Policy::default(),
+            benchmarks: BTreeMap::new(),
+            explain: Explain::default(),
+            watched: Watched::default(),
+            declared: Vec::new(),
+            site: None,
+            accepted: BTreeMap::new(),
+            holds_scale: true,
+        }
+    }
 }
 
 /// The benchmarks that are watched.

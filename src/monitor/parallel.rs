@@ -29,12 +29,15 @@ struct Due<'a> {
 
 impl Monitor {
     /// Computes what the readings at the beginning of `next` lead to; of how many inputs, so that the caller asks again
-    /// after these: as far as they are readings, each of another benchmark. Changes no event.
+    /// after these: as far as they are readings, each of another benchmark, or while nothing is judged. Changes no event.
     pub fn prepare<'a>(
         &mut self,
         next: impl Iterator<Item = &'a Input>,
         workers: &dyn Workers,
     ) -> usize {
+        if self.reads_past() {
+            return MOST_TOGETHER;
+        }
         let (mut seen, mut due) = (BTreeSet::new(), Vec::new());
         let mut count = 0;
         for input in next.take(MOST_TOGETHER) {

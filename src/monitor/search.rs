@@ -75,6 +75,7 @@ impl Monitor {
             in_batches: self.batches.are_in_use(),
             is_past: self.past.is_open(),
             is_queue: self.batches.is_queue(),
+            holds_scale: self.settings.holds_scale,
         }
     }
 

@@ -153,6 +153,9 @@ impl History {
     /// the first and the last of them, and how many.
     pub(super) fn forget_clockless(&mut self) -> Option<(Timestamp, Timestamp, usize)> {
         let values = &self.observations.values;
+        if values.last()?.t_days - values.first()?.t_days <= APART_DAYS {
+            return None;
+        }
         let looked_at = values.len().saturating_sub(1).min(MOST_CLOCKLESS);
         let count =
             (1..=looked_at).find(|at| values[*at].t_days - values[at - 1].t_days > APART_DAYS)?;

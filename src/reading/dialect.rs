@@ -16,7 +16,12 @@ pub struct Dialect {
     pub time_columns: Vec<String>,
     /// How a time is written.
     pub time_format: TimeFormat,
+    /// So many lines stand before the header.
+    pub skip_lines: u64,
 }
+
+/// More lines stand before no header.
+pub const MOST_SKIPPED: u64 = 1000;
 
 impl Dialect {
     /// The instant that a time of such a file means.

@@ -5,18 +5,20 @@
 
 mod conventions;
 mod dialect;
+mod figure;
 mod recording;
 mod series;
 pub mod suspicion;
 mod unit;
 
 pub use conventions::{Conventions, LocalClock, MissingValues, SummerTime, TimeFault};
-pub use dialect::{DecimalMark, Delimiter, Dialect, TimeFormat};
+pub use dialect::{DecimalMark, Delimiter, Dialect, MOST_SKIPPED, TimeFormat};
+pub use figure::{figure, whole_figure};
 pub use jiff::Timestamp;
 pub use recording::{MergeError, Recording, SelectError};
 pub use series::{Channel, Disorder, Reading, Sample, Series};
 pub use suspicion::Suspicion;
-pub use unit::{LengthUnit, Quantity, TimeUnit, Unit, UnitError};
+pub use unit::{FARTHEST, LengthUnit, Quantity, TimeUnit, Unit, UnitError};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,7 +1,7 @@
 //! What in a benchmark's readings hardly means what was intended: a wrong unit, a wrong zone, a mark for no value, a
 //! reset that nobody declared.
 
-use super::{Quantity, Timestamp};
+use super::{Quantity, Timestamp, figure, whole_figure};
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
 
@@ -10,6 +10,8 @@ const MARKS: [f64; 12] = [
     99.0, 999.0, 999.9, 999.99, 6999.0, 7999.0, 8888.0, 9999.0, 9999.9, 32_768.0, 99_999.0,
     999_999.0,
 ];
+/// No mark is as small as this.
+const UNDER_MARKS: f64 = 98.0;
 /// What a mark has behind its point is nothing, or this at least.
 const LEAST_REST: f64 = 0.9;
 /// Two values are the same within this.
@@ -28,6 +30,9 @@ const SMALL_MM: f64 = 2.0;
 const SMALL_STEP_MM: f64 = 0.02;
 /// A slope that moved by more m than this may be in mm.
 const LARGE_M: f64 = 100.0;
+/// A suspicion of another unit goes on until a figure is so many times beyond where it begins: readings about there would raise and
+/// end it again and again.
+const BEYOND: f64 = 2.0;
 /// A reading that is further ahead of the clock was given a wrong time; a logger's clock is off by minutes.
 pub const AHEAD: SignedDuration = SignedDuration::from_mins(10);
 
@@ -118,40 +123,73 @@ pub fn is_plain(values: &[f64], quantity: Quantity, unit: &str) -> bool {
     if values.len() < FEWEST {
         return true;
     }
-    if values.iter().any(|value| is_mark(*value)) {
+    let (low, high) = ends(values);
+    if low.abs().max(high.abs()) > UNDER_MARKS && values.iter().any(|value| is_mark(*value)) {
         return false;
     }
     quantity != Quantity::Displacement
-        || !may_have_fallen(values) && !may_have_another_scale(values, unit)
+        || !may_have_fallen(values) && !may_have_another_scale(values, high - low, unit)
+}
+
+/// The least and the greatest of these values.
+fn ends(values: &[f64]) -> (f64, f64) {
+    let low = values
+        .iter()
+        .fold(f64::INFINITY, |a, b| if *b < a { *b } else { a });
+    let high = values
+        .iter()
+        .fold(f64::NEG_INFINITY, |a, b| if *b > a { *b } else { a });
+    (low, high)
 }
 
 /// A fall is more than [`LEAP`] times the median size of a step below the usual one, which is not larger than that median: so
 /// the median size is less than the deepest fall over [`LEAP`] less one.
 fn may_have_fallen(values: &[f64]) -> bool {
-    let steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let deepest = steps
-        .iter()
-        .fold(0.0_f64, |a, b| if *b < a { *b } else { a });
+    let steps = || values.windows(2).map(|pair| pair[1] - pair[0]);
+    let deepest = steps().fold(0.0_f64, |a, b| if b < a { b } else { a });
     let least = -deepest / (LEAP - 1.0);
-    let large: usize = steps
-        .iter()
-        .map(|step| usize::from(step.abs() >= least))
-        .sum();
-    large < steps.len() - steps.len() / 2
+    let large: usize = steps().map(|step| usize::from(step.abs() >= least)).sum();
+    let count = values.len().saturating_sub(1);
+    large < count - count / 2
 }
 
-fn may_have_another_scale(values: &[f64], unit: &str) -> bool {
-    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+fn may_have_another_scale(values: &[f64], moved: f64, unit: &str) -> bool {
     match unit {
-        "m" => high - low > LARGE_M,
-        "mm" => {
+        "m" => moved > LARGE_M,
+        "mm" if moved < SMALL_MM => {
             let steps = values.windows(2).map(|pair| (pair[1] - pair[0]).abs());
             let small = steps.filter(|step| *step <= SMALL_STEP_MM).count();
-            high - low < SMALL_MM && small > (values.len() - 1) / 2
+            small > (values.len() - 1) / 2
         }
         _ => false,
     }
+}
+
+/// Whether readings of these values, which gave rise to the suspicion of another unit before, do not clearly contradict it. What is
+/// a mark for no value says nothing of that.
+pub fn may_still_have_another_scale(values: &[f64], unit: &str) -> bool {
+    let values: Vec<f64> = values
+        .iter()
+        .copied()
+        .filter(|value| !is_mark(*value))
+        .collect();
+    let (low, high) = ends(&values);
+    let moved = high - low;
+    match unit {
+        "m" => moved > LARGE_M / BEYOND,
+        "mm" => {
+            let steps = values.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+            let usual = median(steps);
+            moved < BEYOND * SMALL_MM
+                && usual.is_none_or(|usual| usual <= BEYOND * SMALL_STEP_MM)
+                && values.iter().all(|value| is_whole(value * 1e3))
+        }
+        _ => false,
+    }
+}
+
+fn is_whole(value: f64) -> bool {
+    (value - value.round()).abs() < 1e-6
 }
 
 /// What the values of readings in `unit`, in order of time, give rise to.
@@ -178,9 +216,12 @@ pub fn of_values(
 
 fn is_mark(value: f64) -> bool {
     let size = value.abs();
+    if size <= UNDER_MARKS {
+        return false;
+    }
     // Most values are no mark by their digits alone, and each reading asks about hundreds.
     let rest = size - size.floor();
-    let may_be = size > MARKS[0] - 1.0 && !(ROUNDING..LEAST_REST - ROUNDING).contains(&rest);
+    let may_be = !(ROUNDING..LEAST_REST - ROUNDING).contains(&rest);
     may_be && MARKS.iter().any(|mark| same(size, *mark))
 }
 
@@ -206,8 +247,10 @@ fn mark(readings: &[(Timestamp, f64)]) -> Option<(f64, DatedSuspicion)> {
     let (count, at) = (marked.clone().count(), marked.next_back()?.0);
     (away > AWAY * (high - low) || is_leap).then(|| {
         let text = format!(
-            "{value} stands {count} times, first at {first}, and all other readings lie between {low} and {high}: \
-             if it means that there is no value, add missing = [{value}] to the source"
+            "{value} stands {count} times, first at {first}, and all other readings lie between {} and {}: \
+             if it means that there is no value, add missing = [{value}] to the source",
+            whole_figure(low),
+            whole_figure(high)
         );
         let kind = Suspicion::Mark;
         (value, DatedSuspicion { kind, at, text })
@@ -247,10 +290,10 @@ fn fall(readings: &[(Timestamp, f64)], unit: &str) -> Option<DatedSuspicion> {
         kind: Suspicion::Fall,
         at,
         text: format!(
-            "between {before} and {at} it fell by {:.3} {unit}, {:.0} times the usual scatter of a step: \
+            "between {before} and {at} it fell by {} {unit}, {} times the usual scatter of a step: \
              if the sensor was reset, declare it with [[event]] kind = \"reset\"",
-            -step,
-            (usual - step) / scatter
+            figure(-step, 3),
+            figure((usual - step) / scatter, 0)
         ),
     })
 }
@@ -268,10 +311,10 @@ fn scale(readings: &[(Timestamp, f64)], unit: &str) -> Option<DatedSuspicion> {
     }
     if unit == "m" && moved > LARGE_M {
         return Some(evidence(format!(
-            "the readings span {moved:.0} m: if they are millimetres, say unit = \"mm\""
+            "the readings span {} m: if they are millimetres, say unit = \"mm\"",
+            figure(moved, 0)
         )));
     }
-    let is_whole = |value: f64| (value - value.round()).abs() < 1e-6;
     let in_thousandths = readings.iter().all(|(_, value)| is_whole(value * 1e3))
         && readings.iter().any(|(_, value)| !is_whole(value * 1e2));
     let is_small = moved > 0.0

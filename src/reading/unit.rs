@@ -5,6 +5,9 @@ use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::fmt;
 
+/// No displacement in mm, or velocity in mm/day, is larger: a thousand kilometres.
+pub const FARTHEST: f64 = 1e9;
+
 /// What a reading measures.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, JsonSchema, Serialize, Deserialize,
@@ -160,6 +163,11 @@ impl Unit {
             Self::Length(length) => length.millimetres(),
             Self::Rate(length, time) => length.millimetres() / time.days(),
         }
+    }
+
+    /// Whether a reading of `value` in this unit may be one of a slope: it is no larger than [`FARTHEST`].
+    pub fn is_within_reach(self, value: f64) -> bool {
+        (value * self.factor()).abs() <= FARTHEST
     }
 
     /// The suffix of a file column: `mm`, `mm_per_day`.

@@ -246,16 +246,7 @@ fn info(out: &mut String, cap: &CapFolder, (alert, level): (&Alert, Level), kind
         Level::Green => ("None", "Past", "Minor"),
         Level::Unknown => ("Monitor", "Unknown", "Unknown"),
     };
-    let place = alert.event.benchmark.as_ref().map_or_else(
-        || "the whole site".to_owned(),
-        |benchmark| format!("benchmark {benchmark}"),
-    );
-    let what = match alert.state {
-        MessageState::Firing => "",
-        MessageState::Resolved => " ends",
-        MessageState::Correction => " is in force; what was called before is corrected",
-    };
-    let headline = format!("{}, {place}: {level}{what}", alert.site);
+    let headline = headline(alert, level);
     *out += "  <info>\n";
     element(out, 2, ("language", "en"));
     element(out, 2, ("category", "Geo"));
@@ -288,6 +279,23 @@ fn info(out: &mut String, cap: &CapFolder, (alert, level): (&Alert, Level), kind
         element(out, 3, ("polygon", polygon));
     }
     *out += "    </area>\n  </info>\n";
+}
+
+/// Which site, where in it, which level. What reports many benchmarks says how many: that is what makes it urgent.
+fn headline(alert: &Alert, level: Level) -> String {
+    let place = match (&alert.event.benchmark, &alert.many) {
+        (Some(benchmark), _) => format!("benchmark {benchmark}"),
+        (None, Some(many)) => format!("{} more benchmarks", many.members.len()),
+        // As an earlier version has kept it.
+        (None, None) if alert.is_flood() => "many benchmarks".to_owned(),
+        (None, None) => "the whole site".to_owned(),
+    };
+    let what = match alert.state {
+        MessageState::Firing => "",
+        MessageState::Resolved => " ends",
+        MessageState::Correction => " is in force; what was called before is corrected",
+    };
+    format!("{}, {place}: {level}{what}", alert.site)
 }
 
 fn parameters(

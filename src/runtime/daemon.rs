@@ -32,6 +32,8 @@ pub(super) const DRAIN_LIMIT: Duration = Duration::from_secs(20);
 const URGENT: Duration = Duration::from_secs(2);
 /// When nothing has come for this long, what queued is judged.
 const QUIET: Duration = Duration::from_millis(50);
+/// So many steps of a backlog of files are written together: to write a page once for many values costs less than once a batch.
+const MOST_TOGETHER_WRITTEN: usize = 8_000;
 /// How often time is let pass when nothing arrives.
 const TICK: Duration = Duration::from_secs(1);
 
@@ -198,6 +200,10 @@ impl Daemon {
         }
         self.release()?;
         self.end_batch()?;
+        if !batch.caught_up && self.may_commit_later() {
+            self.is_up_to_date = false;
+            return Ok(());
+        }
         self.commit()?;
         // Also while years of backlog come in: the state is not to hold all of their refits at once.
         self.thin()?;
@@ -345,6 +351,15 @@ impl Daemon {
             return self.site.commit((self.wall)());
         }
         Ok(())
+    }
+
+    /// Whether a batch of a backlog may be committed with the next one, which waits already.
+    fn may_commit_later(&self) -> bool {
+        !self.sources.batches.is_empty()
+            && self.site.uncommitted() < MOST_TOGETHER_WRITTEN
+            && !self.site.is_waiting()
+            && self.since_commit.elapsed() < URGENT
+            && !self.site.is_urgent((self.wall)())
     }
 
     fn commit(&mut self) -> Result<(), StoreError> {

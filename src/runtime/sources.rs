@@ -6,6 +6,7 @@ use super::tail::{self, ArrivalBatch, Follower};
 use crate::config::Config;
 use crate::store::{Store, StoreError};
 use std::collections::VecDeque;
+use std::task::{Context, Waker};
 use tokio::sync::mpsc;
 use tokio::task::{JoinError, JoinHandle};
 
@@ -14,8 +15,9 @@ const BATCHES: usize = 4;
 /// Messages that may wait to be taken, or to be acknowledged.
 pub(super) const MESSAGES: usize = mqtt::MOST_UNACKNOWLEDGED as usize;
 
-/// Messages that are looked at together at most.
-const FEW: usize = 32;
+/// Messages that are looked at together at most; with half of them left more are asked for. Each time the channel is asked it wakes
+/// whoever waits for room in it.
+const FEW: usize = 256;
 
 /// The sources at work.
 #[derive(Debug)]
@@ -83,12 +85,20 @@ impl Sources {
 
     /// Adds the messages that have come by now to those that wait to be taken, a few at once, as far as there is room.
     pub(super) fn receive_more(&mut self, waiting: &mut VecDeque<ReceivedMessage>) {
-        while waiting.len() < FEW
-            && self.unacknowledged.len() + waiting.len() < MESSAGES
-            && let Ok(message) = self.deliveries.try_recv()
-        {
-            waiting.push_back(message);
+        if waiting.len() > FEW / 2 {
+            return;
         }
+        let room = MESSAGES.saturating_sub(self.unacknowledged.len() + waiting.len());
+        let most = room.min(FEW - waiting.len());
+        let mut more = Vec::new();
+        if most > 0 {
+            // What has come by now; `recv` sees to being woken by the next.
+            let mut context = Context::from_waker(Waker::noop());
+            let _ = self
+                .deliveries
+                .poll_recv_many(&mut context, &mut more, most);
+        }
+        waiting.extend(more);
     }
 
     /// Whether another message may wait to be acknowledged.

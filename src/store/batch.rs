@@ -2,14 +2,15 @@
 
 use super::outbox::{DeliveryOutcome, WAITING};
 use super::sealed::seal;
-use super::series::{self, StoredSeries};
+use super::series::{self, Catalogue, StoredSeries};
 use super::sum::sum;
 use super::{Inner, Store, StoreError, nanoseconds};
-use crate::monitor::{Event, Input, MemoryPart};
-use crate::reading::Timestamp;
+use crate::monitor::{Event, Input, Measured, MemoryPart};
+use crate::reading::{BenchmarkId, Timestamp};
 use rusqlite::types::ValueRef;
-use rusqlite::{Connection, params};
-use std::collections::BTreeMap;
+use rusqlite::{Connection, Statement, params};
+use std::collections::{BTreeMap, HashMap};
+use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// How far one file has been read.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -27,10 +28,12 @@ pub struct Batch {
     steps: Vec<(Timestamp, Input)>,
     /// Each with the number of its step in this batch.
     events: Vec<(usize, Event)>,
-    /// The values of the steps: what is known although it is not written yet.
-    values: BTreeMap<(StoredSeries, Timestamp), f64>,
-    /// Values that were corrected within this batch.
-    former: BTreeMap<(StoredSeries, Timestamp), Vec<f64>>,
+    /// Of each step the one before it with a value of the same name and time.
+    before: Vec<Option<usize>>,
+    /// The last step with a value of a name and time, by their hash: what is known although it is not written yet.
+    latest: HashMap<u64, usize>,
+    /// From which step on values of these benchmarks are known.
+    forgotten: BTreeMap<BenchmarkId, usize>,
     positions: BTreeMap<String, Option<Vec<u8>>>,
     memory: Option<Vec<MemoryPart>>,
     outbox: Vec<super::Delivery>,
@@ -42,14 +45,12 @@ pub struct Batch {
 impl Batch {
     /// Notes a step and the events that followed from it.
     pub fn step(&mut self, now: Timestamp, input: &Input, events: &[Event]) {
-        if let Some(measured) = input.measured() {
-            let place = (StoredSeries::of(&measured), measured.time());
-            if let Some(former) = self.values.insert(place.clone(), measured.value()) {
-                self.former.entry(place).or_default().push(former);
-            }
-        }
+        let step = self.steps.len();
+        let before = input
+            .measured()
+            .and_then(|measured| self.latest.insert(place(&measured), step));
+        self.before.push(before);
         self.steps.push((now, input.clone()));
-        let step = self.steps.len() - 1;
         self.events
             .extend(events.iter().map(|event| (step, event.clone())));
     }
@@ -100,13 +101,40 @@ impl Batch {
             && self.commands.is_empty()
     }
 
-    /// The values that this batch has for the same series and time, the newest first.
-    fn known(&self, series: &StoredSeries, time: Timestamp) -> Vec<f64> {
-        let place = (series.clone(), time);
-        let former = self.former.get(&place).into_iter().flatten().rev();
-        let newest = self.values.get(&place).into_iter();
-        newest.chain(former).copied().collect()
+    /// What this batch has of the benchmark so far is not known any more: its readings come again, and count again.
+    pub fn forget(&mut self, benchmark: &BenchmarkId) {
+        self.forgotten.insert(benchmark.clone(), self.steps.len());
     }
+
+    /// The values that this batch has for the same series and time, the newest first.
+    fn known(&self, measured: &Measured<'_>) -> Vec<f64> {
+        let from = match measured {
+            Measured::Reading { benchmark, .. } => self.forgotten.get(*benchmark).copied(),
+            Measured::Sample { .. } => None,
+        };
+        let (series, from) = (StoredSeries::of(measured), from.unwrap_or(0));
+        let mut values = Vec::new();
+        let mut next = self.latest.get(&place(measured)).copied();
+        while let Some(step) = next.filter(|step| *step >= from) {
+            // Others may have the same hash.
+            let own = self.steps[step].1.measured();
+            let own = own.filter(|own| own.time() == measured.time() && series.is_of(own));
+            values.extend(own.map(|own| own.value()));
+            next = self.before[step];
+        }
+        values
+    }
+}
+
+/// Of a value's name and time.
+fn place(measured: &Measured<'_>) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    match measured {
+        Measured::Reading { benchmark, .. } => benchmark.hash(&mut hasher),
+        Measured::Sample { channel, .. } => channel.hash(&mut hasher),
+    }
+    measured.time().hash(&mut hasher);
+    hasher.finish()
 }
 
 /// Whether a value is known.
@@ -135,31 +163,30 @@ impl Store {
         inner.committed(batch.steps.len() + batch.events.len(), written)
     }
 
-    /// Whether the value has been taken before: in `batch`, or in what is written.
+    /// Whether the value has been taken before: in `batch`, or in what is written after step number `after`.
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn has(&self, batch: &Batch, input: &Input) -> Result<Presence, StoreError> {
+    pub fn has(&self, batch: &Batch, input: &Input, after: i64) -> Result<Presence, StoreError> {
         let Some(measured) = input.measured() else {
             return Ok(Presence::No);
         };
-        let series = StoredSeries::of(&measured);
         let (time, value) = (measured.time(), measured.value());
-        let in_batch = batch.known(&series, time);
+        let in_batch = batch.known(&measured);
         if (in_batch.first()).is_some_and(|known| known.to_bits() == value.to_bits()) {
             return Ok(Presence::Yes);
         }
         let inner = self.inner();
-        let factor = match &series {
-            StoredSeries::Benchmark(_, unit, _) => unit.factor(),
-            StoredSeries::Channel(..) => 1.0,
+        let factor = match &measured {
+            Measured::Reading { unit, .. } => unit.factor(),
+            Measured::Sample { .. } => 1.0,
         };
         let mut written: Vec<(i64, f64)> = Vec::new();
-        for (number, own) in inner.catalogue.alike(&series) {
-            let mut query = inner
-                .connection
-                .prepare_cached("SELECT seq, value FROM step WHERE series = ?1 AND time = ?2")?;
-            let mut rows = query.query(params![number, nanoseconds(time)?])?;
+        for (number, own) in inner.catalogue.alike(&measured) {
+            let mut query = inner.connection.prepare_cached(
+                "SELECT seq, value FROM step WHERE series = ?1 AND time = ?2 AND seq > ?3",
+            )?;
+            let mut rows = query.query(params![number, nanoseconds(time)?, after])?;
             while let Some(row) = rows.next()? {
                 let value: f64 = row.get(1)?;
                 written.push((row.get(0)?, value * own));
@@ -189,29 +216,9 @@ impl Inner {
         } = self;
         let transaction =
             connection.transaction_with_behavior(rusqlite::TransactionBehavior::Immediate)?;
-        let mut fresh: BTreeMap<StoredSeries, i64> = BTreeMap::new();
-        for series in batch
-            .steps
-            .iter()
-            .filter_map(|(_, input)| input.measured())
-            .map(|measured| StoredSeries::of(&measured))
-        {
-            if catalogue.number(&series).is_none() && !fresh.contains_key(&series) {
-                let number = catalogue.next() + i64::try_from(fresh.len()).unwrap_or(i64::MAX);
-                series::insert(&transaction, number, &series)?;
-                fresh.insert(series, number);
-            }
-        }
-        let number = |series: &StoredSeries| {
-            catalogue
-                .number(series)
-                .or_else(|| fresh.get(series).copied())
-        };
-        let (mut last_step, mut last_event) = (*steps, *events);
-        for (now, input) in &batch.steps {
-            last_step += 1;
-            insert_step(&transaction, last_step, *now, input, &number)?;
-        }
+        let mut fresh = Catalogue::default();
+        let last_step = insert_steps(&transaction, *steps, batch, (catalogue, &mut fresh))?;
+        let mut last_event = *events;
         let mut latest = BTreeMap::new();
         for (step, event) in &batch.events {
             last_event += 1;
@@ -244,34 +251,68 @@ impl Inner {
         }
         transaction.commit()?;
         (*steps, *events) = (last_step, last_event);
-        for (series, number) in fresh {
-            catalogue.note(number, series);
-        }
+        catalogue.append(fresh);
         Ok(())
     }
 }
 
-fn insert_step(
+/// Writes the steps of `batch` behind number `last`, with the series that are not in the first of `catalogues` yet: these into the
+/// second too. The number of the last.
+fn insert_steps(
     connection: &Connection,
-    seq: i64,
-    now: Timestamp,
-    input: &Input,
-    number: &dyn Fn(&StoredSeries) -> Option<i64>,
-) -> Result<(), StoreError> {
+    mut last: i64,
+    batch: &Batch,
+    (catalogue, fresh): (&Catalogue, &mut Catalogue),
+) -> Result<i64, StoreError> {
     let mut insert = connection.prepare_cached(
         "INSERT INTO step (seq, now, series, time, value, sigma, body, sum) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
     )?;
-    let (own, number, time, value, sigma, body) = if let Some(measured) = input.measured() {
+    for (now, input) in &batch.steps {
+        let number = match input.measured() {
+            None => None,
+            Some(measured) => {
+                let known = catalogue.number_of(&measured);
+                Some(match known.or_else(|| fresh.number_of(&measured)) {
+                    Some(number) => number,
+                    None => add_series(connection, &measured, (catalogue, fresh))?,
+                })
+            }
+        };
+        last += 1;
+        insert_step(&mut insert, (last, *now), input, number)?;
+    }
+    Ok(last)
+}
+
+/// Writes the series of a value, which is not known yet; its number.
+fn add_series(
+    connection: &Connection,
+    measured: &Measured<'_>,
+    (catalogue, fresh): (&Catalogue, &mut Catalogue),
+) -> Result<i64, StoreError> {
+    let number = catalogue.next() + i64::try_from(fresh.len()).unwrap_or(i64::MAX);
+    let series = StoredSeries::of(measured);
+    series::insert(connection, number, &series)?;
+    fresh.note(number, series);
+    Ok(number)
+}
+
+fn insert_step(
+    insert: &mut Statement<'_>,
+    (seq, now): (i64, Timestamp),
+    input: &Input,
+    number: Option<i64>,
+) -> Result<(), StoreError> {
+    let (own, time, value, sigma, body) = if let Some(measured) = input.measured() {
         let own = (now != measured.time())
             .then(|| nanoseconds(now))
             .transpose()?;
         let time = nanoseconds(measured.time())?;
-        let number = number(&StoredSeries::of(&measured));
         let value = Some(measured.value());
-        (own, number, Some(time), value, measured.sigma(), None)
+        (own, Some(time), value, measured.sigma(), None)
     } else {
         let body = super::read::encode(input)?;
-        (Some(nanoseconds(now)?), None, None, None, None, body)
+        (Some(nanoseconds(now)?), None, None, None, body)
     };
     let integer = |value: Option<i64>| value.map_or(ValueRef::Null, ValueRef::Integer);
     let real = |value: Option<f64>| value.map_or(ValueRef::Null, ValueRef::Real);

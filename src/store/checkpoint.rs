@@ -5,8 +5,8 @@
 
 use super::{Inner, StoreError};
 
-/// After so many rows the log is moved,
-const ROWS: usize = 2_000;
+/// After so many rows the log is moved: a page that many commits change is then written once for all of them,
+const ROWS: usize = 8_000;
 /// or after so many commits.
 const COMMITS: usize = 500;
 

@@ -156,7 +156,8 @@ impl Store {
         Ok(rows.collect::<Result<_, _>>()?)
     }
 
-    /// Ends deliveries that nothing will make, and has their alerts wait for other hooks in the same transaction.
+    /// Ends deliveries that nothing will make, and has their alerts wait for other hooks in the same transaction. `singly`: what one of
+    /// those was to report too, and waits by itself now.
     ///
     /// # Errors
     /// [`StoreError`].
@@ -164,10 +165,11 @@ impl Store {
         &self,
         ended: &[Delivery],
         instead: &[Delivery],
+        singly: &[Delivery],
     ) -> Result<(), StoreError> {
         let mut inner = self.inner();
         inner.trusted()?;
-        let written = inner.close_deliveries(ended, instead);
+        let written = inner.close_deliveries(ended, instead, singly);
         inner.committed(ended.len(), written)
     }
 
@@ -437,10 +439,20 @@ impl Inner {
         &mut self,
         ended: &[Delivery],
         instead: &[Delivery],
+        singly: &[Delivery],
     ) -> Result<(), StoreError> {
         let transaction = self.connection.transaction()?;
         for delivery in instead {
             delivery.insert(&transaction, WAITING)?;
+        }
+        for delivery in singly {
+            delivery.insert(&transaction, WAITING)?;
+            let standing = DeliveryState::of(&transaction, delivery)?;
+            // Over: it was reported by the one that is closed now.
+            let is_over = |row: &DeliveryState| row.status == DeliveryOutcome::Over.name();
+            if let Some(row) = standing.filter(is_over) {
+                row.becomes(&transaction, DeliveryOutcome::Waiting, row.attempts)?;
+            }
         }
         for one in ended {
             let standing = DeliveryState::of(&transaction, one)?;

@@ -19,10 +19,10 @@ pub(super) enum StoredSeries {
 /// All series that have been seen, both ways.
 #[derive(Debug, Default)]
 pub(super) struct Catalogue {
-    numbers: BTreeMap<StoredSeries, i64>,
     series: BTreeMap<i64, StoredSeries>,
-    /// By whether it is a benchmark's, and name.
-    names: BTreeMap<(bool, String), Vec<i64>>,
+    /// By name.
+    benchmarks: BTreeMap<String, Vec<i64>>,
+    channels: BTreeMap<String, Vec<i64>>,
 }
 
 impl StoredSeries {
@@ -42,10 +42,25 @@ impl StoredSeries {
 }
 
 impl StoredSeries {
-    fn name(&self) -> (bool, String) {
-        match self {
-            Self::Channel(name, _) => (false, name.clone()),
-            Self::Benchmark(benchmark, ..) => (true, benchmark.as_str().to_owned()),
+    /// Whether this is the series of a value.
+    pub(super) fn is_of(&self, measured: &Measured<'_>) -> bool {
+        match (self, measured) {
+            (
+                Self::Channel(name, unit),
+                Measured::Sample {
+                    channel, unit: own, ..
+                },
+            ) => name == channel && unit.as_deref() == *own,
+            (
+                Self::Benchmark(id, unit, averaging),
+                Measured::Reading {
+                    benchmark,
+                    unit: own,
+                    averaging: mean,
+                    ..
+                },
+            ) => id == *benchmark && unit == own && averaging == mean,
+            (Self::Channel(..) | Self::Benchmark(..), _) => false,
         }
     }
 }
@@ -74,9 +89,11 @@ impl Catalogue {
     }
 
     pub(super) fn note(&mut self, number: i64, series: StoredSeries) {
-        let name = series.name();
-        self.names.entry(name).or_default().push(number);
-        self.numbers.insert(series.clone(), number);
+        let (names, name) = match &series {
+            StoredSeries::Channel(name, _) => (&mut self.channels, name.as_str()),
+            StoredSeries::Benchmark(benchmark, ..) => (&mut self.benchmarks, benchmark.as_str()),
+        };
+        names.entry(name.to_owned()).or_default().push(number);
         self.series.insert(number, series);
     }
 
@@ -84,24 +101,46 @@ impl Catalogue {
         self.series.get(&number)
     }
 
-    pub(super) fn number(&self, series: &StoredSeries) -> Option<i64> {
-        self.numbers.get(series).copied()
+    /// The number of the series of a value; every step asks for one.
+    pub(super) fn number_of(&self, measured: &Measured<'_>) -> Option<i64> {
+        let is_it = |number: &&i64| {
+            self.series
+                .get(number)
+                .is_some_and(|one| one.is_of(measured))
+        };
+        self.named(measured).iter().find(is_it).copied()
+    }
+
+    /// All numbers of series of the name that a value's has.
+    fn named(&self, measured: &Measured<'_>) -> &[i64] {
+        let numbers = match measured {
+            Measured::Sample { channel, .. } => self.channels.get(*channel),
+            Measured::Reading { benchmark, .. } => self.benchmarks.get(benchmark.as_str()),
+        };
+        numbers.map_or(&[][..], Vec::as_slice)
+    }
+
+    /// Adds those of another catalogue.
+    pub(super) fn append(&mut self, other: Self) {
+        for (number, series) in other.series {
+            self.note(number, series);
+        }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.series.len()
     }
 
     /// The numbers of series that measure the same, with the factor to a common unit.
-    pub(super) fn alike(&self, series: &StoredSeries) -> Vec<(i64, f64)> {
-        let numbers = self
-            .names
-            .get(&series.name())
-            .map_or(&[][..], Vec::as_slice);
-        let factor = |number: &i64| match (series, self.series.get(number)?) {
-            (StoredSeries::Channel(..), StoredSeries::Channel(..)) => Some((*number, 1.0)),
-            (StoredSeries::Benchmark(_, unit, _), StoredSeries::Benchmark(_, own, _)) => {
+    pub(super) fn alike(&self, measured: &Measured<'_>) -> Vec<(i64, f64)> {
+        let factor = |number: &i64| match (measured, self.series.get(number)?) {
+            (Measured::Sample { .. }, StoredSeries::Channel(..)) => Some((*number, 1.0)),
+            (Measured::Reading { unit, .. }, StoredSeries::Benchmark(_, own, _)) => {
                 (unit.quantity() == own.quantity()).then_some((*number, own.factor()))
             }
-            (StoredSeries::Channel(..) | StoredSeries::Benchmark(..), _) => None,
+            (Measured::Sample { .. } | Measured::Reading { .. }, _) => None,
         };
-        numbers.iter().filter_map(factor).collect()
+        self.named(measured).iter().filter_map(factor).collect()
     }
 
     /// The number after the last.

@@ -558,6 +558,16 @@ fn how_a_source_writes_its_tables_is_checked() {
             "14:15: error: source.time_column is of type integer, not a string",
         ),
         (
+            "csv",
+            "skip_lines = 1.5\n",
+            "14:14: error: source.skip_lines = 1.5 is no number of lines; write a whole number from 0 to 1000",
+        ),
+        (
+            "ndjson",
+            "skip_lines = 2\n",
+            "14:14: error: source.skip_lines does nothing for this kind; leave it out",
+        ),
+        (
             "toa5",
             "decimal = \"comma\"\n",
             "14:11: error: source.decimal does nothing for this kind; leave it out",

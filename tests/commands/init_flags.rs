@@ -197,3 +197,49 @@ fn what_cannot_be_written_or_read_is_named() {
     let line = said.lines().find(|line| line.contains("NUL")).unwrap();
     assert!(line.contains("slope.csv, line 7"), "{line}");
 }
+
+#[test]
+fn lines_before_the_header_are_passed_over_by_init_replay_and_the_daemon_also_after_a_restart() {
+    let text = format!("Crackmeter 7;Toc\nserial 4711\n{}", plain(40));
+    let office = Office::with(&[("slope.csv", &text)]);
+    let (_, _, said) = office.say(&["init", "slope.csv"]);
+    assert!(said.contains("--skip-lines"), "{said}");
+    office.refused(65, &["replay", "slope.csv"]);
+    office.done(&["init", "slope.csv", "--skip-lines", "2"]);
+    let config = written(&office);
+    assert!(config.contains("skip_lines = 2"), "{config}");
+    office.done(&["replay", "slope.csv", "--skip-lines", "2"]);
+    let daemon = office.run(&["run", "site.toml"]);
+    office.status_until("2017-06-02 13:00");
+    drop(daemon);
+    let more = rows(42, |time, value| format!("{time}+02:00,{value}\n"));
+    let more: String = more
+        .lines()
+        .skip(40)
+        .map(|row| format!("{row}\n"))
+        .collect();
+    fs::write(office.path("slope.csv"), format!("{text}{more}")).unwrap();
+    let daemon = office.run_logged(&["run", "site.toml"]);
+    office.status_until("2017-06-02 15:00");
+    drop(daemon);
+    let log = office.log();
+    assert!(
+        !log.contains("line quarantined") && !log.contains("no position"),
+        "{log}"
+    );
+    // Other lines before it: the file is read anew, and what is known of it dropped.
+    fs::write(
+        office.path("site.toml"),
+        config.replace("skip_lines = 2", "skip_lines = 3"),
+    )
+    .unwrap();
+    fs::write(
+        office.path("slope.csv"),
+        format!("a new firmware\n{text}{more}"),
+    )
+    .unwrap();
+    let daemon = office.run_logged(&["run", "site.toml"]);
+    office.until("read anew", || office.log().contains("caught up"));
+    drop(daemon);
+    assert!(office.log().contains("repeated=42"), "{}", office.log());
+}

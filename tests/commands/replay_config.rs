@@ -55,7 +55,7 @@ fn a_flag_that_the_config_stands_over_is_refused_with_the_key_to_set() {
         ),
         ("site.toml", &site("slope.csv", "")),
     ]);
-    let cases: [(&[&str], &str); 10] = [
+    let cases: [(&[&str], &str); 11] = [
         (&["--missing", "-7999"], "missing of [[source]]"),
         (&["--time-zone", "Europe/Rome"], "time_zone of [[source]]"),
         (&["--dst", "standard"], "dst of [[source]]"),
@@ -64,6 +64,7 @@ fn a_flag_that_the_config_stands_over_is_refused_with_the_key_to_set() {
         (&["--decimal", "point"], "decimal of [[source]]"),
         (&["--time-column", "time"], "time_column of [[source]]"),
         (&["--time-format", "rfc3339"], "time_format of [[source]]"),
+        (&["--skip-lines", "0"], "skip_lines of [[source]]"),
         (&["--averaging", "1h"], "averaging of [[benchmark]]"),
         (
             &["--column", "P1_displacement_mm=P7:displacement:mm"],

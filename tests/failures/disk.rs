@@ -106,7 +106,7 @@ fn fails_to_sync(path: Option<&str>) {
     words.extend(path.iter().flat_map(|path| ["-P", path]));
     let tracer = tamper(&site, &program, &words);
     // More than the log holds before it is moved into the database.
-    let rain = (0..2500).map(|row: i64| {
+    let rain = (0..9000).map(|row: i64| {
         let time = jiff::Timestamp::from_second(1_577_836_800 + 60 * row).unwrap();
         format!("{time},0\n")
     });

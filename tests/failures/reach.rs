@@ -311,6 +311,21 @@ fn a_flood_keeps_its_key_to_its_end_and_a_hook_of_some_benchmarks_receives_these
     eventually("as many CAP messages", || {
         (messages("Alert"), messages("Cancel")) == (11, 11)
     });
+    for headline in [
+        "Toc, 30 more benchmarks: red",
+        "Toc, 30 more benchmarks: red ends",
+    ] {
+        let wanted = format!("<headline>{headline}</headline>");
+        let files = fs::read_dir(site.path("cap"))
+            .unwrap()
+            .map(|file| file.unwrap().path());
+        let texts = files.filter_map(|file| fs::read_to_string(file).ok());
+        assert_eq!(
+            texts.filter(|text| text.contains(&wanted)).count(),
+            1,
+            "{headline}"
+        );
+    }
     program.stop();
     let lines = site.lines("notified");
     let keys: Vec<&str> = (lines.iter())
@@ -331,6 +346,46 @@ fn a_flood_keeps_its_key_to_its_end_and_a_hook_of_some_benchmarks_receives_these
         "{two:?}"
     );
     site.proven_events();
+}
+
+/// A hook that fails as long as the file `works` is not there.
+const FLAKY: &str = "[ -e works ] && echo $SLIPWATCH_KEY $SLIPWATCH_STATE >> flaky\n";
+
+#[test]
+fn a_hook_that_a_reload_has_ask_for_some_benchmarks_receives_these_of_a_flood_that_it_has_not_taken()
+ {
+    for restarts in [false, true] {
+        let hook = "[[hook]]\nrun = [\"/bin/sh\", \"flaky.sh\"]\nlevels = [\"red\"]\n";
+        let site = site(&forty_and_the_village(), hook);
+        fs::write(site.path("flaky.sh"), FLAKY).unwrap();
+        let program = site.caught_up();
+        forty_move(&site);
+        eventually("the flood", || site.notified("flood/", "firing") == 1);
+        let config = fs::read_to_string(site.path("site.toml")).unwrap();
+        let some = format!("{hook}benchmarks = [\"b3\", \"b39\", \"village\"]\n");
+        fs::write(site.path("site.toml"), config.replace(hook, &some)).unwrap();
+        let program = if restarts {
+            program.stop();
+            site.caught_up()
+        } else {
+            program.signal(Signal::SIGHUP);
+            eventually("the config", || site.log().contains("the config is taken"));
+            program
+        };
+        fs::write(site.path("works"), "").unwrap();
+        eventually("both", || count(&site, "flaky", "firing") == 2);
+        resolves(&site);
+        eventually("both ends", || count(&site, "flaky", "resolved") == 2);
+        program.stop();
+        let lines = site.lines("flaky");
+        let of = |name: &str| lines.iter().filter(|line| line.starts_with(name)).count();
+        assert_eq!(
+            (lines.len(), of("b3/red/"), of("b39/red/")),
+            (4, 2, 2),
+            "{lines:?}"
+        );
+        site.proven_events();
+    }
 }
 
 #[test]

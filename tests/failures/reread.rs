@@ -143,3 +143,31 @@ fn a_threshold_that_is_lowered_is_called_by_the_newest_reading() {
     program.stop();
     site.proven_events();
 }
+
+#[test]
+fn rows_out_of_order_come_anew_with_the_others_also_after_a_restart() {
+    let with_b = format!("{}{}{POLICY}", benchmark("a", ""), benchmark("b", ""));
+    let site = Site::new(&with_b);
+    let text = both();
+    let mut lines: Vec<&str> = text.lines().collect();
+    lines.swap(50, 51);
+    lines.swap(80, 84);
+    site.append("incoming/x.csv", &(lines.join("\n") + "\n"));
+    let program = site.caught_up();
+    let of = |name: &str| {
+        let values = site.values().into_iter();
+        values.filter(|(id, ..)| id == name).count()
+    };
+    eventually("all readings", || (of("a"), of("b")) == (114, 114));
+    reload(&site, &program, &format!("{}{POLICY}", benchmark("a", "")));
+    program.stop();
+    site.caught_up().stop();
+    site.configure(&with_b);
+    let program = site.caught_up();
+    eventually("b's anew", || of("b") == 228);
+    program.stop();
+    // What was known before counts no second time.
+    site.caught_up().stop();
+    assert_eq!((of("a"), of("b")), (114, 228));
+    site.proven_events();
+}

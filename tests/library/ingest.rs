@@ -6,8 +6,8 @@ use jiff::{SignedDuration, Timestamp};
 use proptest::prelude::*;
 use slipwatch::reading::{BenchmarkId, Disorder, Reading, Recording, Series, Unit};
 use slipwatch::runtime::ingest::{
-    CsvRows, IngestError, Item, ReadOptions, convert, encode_mcap, read_channels, read_files,
-    write_csv, write_mcap,
+    CsvRows, IngestError, Item, ReadOptions, convert, encode_mcap, read_beside, read_channels,
+    read_files, write_csv, write_mcap,
 };
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -417,7 +417,8 @@ prop_compose! {
         rows.into_iter()
             .map(|(nanosecond, (value, sigma))| Reading {
                 time: Timestamp::from_nanosecond(i128::from(nanosecond)).unwrap(),
-                value,
+                // What no slope reaches is refused.
+                value: if value.abs() > 1e9 { 1.0 / value } else { value },
                 sigma: sigma.map(f64::abs),
             })
             .collect()
@@ -491,4 +492,64 @@ fn marks_for_missing_values_are_left_out_and_counted_and_the_file_is_read_on() {
     let file = write(&folder, "x.csv", text);
     let (recording, disorder) = read_files(&[file], &options).unwrap();
     assert_eq!((recording.series.len(), disorder.missing), (0, 3));
+}
+
+#[test]
+fn a_reading_that_no_slope_reaches_is_refused_with_its_place_and_costs_its_own_value_alone() {
+    let text = "time,a_displacement_m,b_displacement_m\n2020-01-01T00:00:00Z,1e6,1\n2020-01-02T00:00:00Z,1e308,2\n";
+    let error = read_text(text).unwrap_err().to_string();
+    for part in ["prism.csv", "line 3", "a_displacement_m", "1e308", "1e9 mm"] {
+        assert!(error.contains(part), "{part} is not in: {error}");
+    }
+    let folder = TempDir::new().unwrap();
+    let line = r#"{"benchmark":"a","time":"2020-01-01T00:00:00Z","value":-1e300,"unit":"mm/h"}"#;
+    let file = write(&folder, "x.ndjson", &format!("{line}\n"));
+    let error = read(&file).unwrap_err().to_string();
+    for part in ["line 1", "-1e300 mm/h", "1e9 mm/day"] {
+        assert!(error.contains(part), "{part} is not in: {error}");
+    }
+    let file = write(&folder, "y.csv", text);
+    let mut aside = 0;
+    let read = read_beside(&file, &ReadOptions::default(), &mut |_| aside += 1).unwrap();
+    let counts: Vec<usize> = (read.recording.series.iter())
+        .map(|series| series.readings.len())
+        .collect();
+    assert_eq!((aside, counts), (1, vec![1, 2]));
+}
+
+#[test]
+fn what_stands_before_a_header_is_passed_over_where_it_is_said_or_begins_as_a_remark() {
+    let table = "time,a_displacement_mm\n2020-01-01T00:00:00Z,1\n2020-01-02T00:00:00Z,nonsense\n";
+    let folder = TempDir::new().unwrap();
+    let skipping = |skip_lines: u64, text: &str| {
+        let file = write(&folder, "x.csv", text);
+        let mut options = ReadOptions::default();
+        options.dialect.skip_lines = skip_lines;
+        let mut faults = Vec::new();
+        let read = read_beside(&file, &options, &mut |fault| faults.push(fault.to_string()));
+        read.map(|read| (read.recording.series[0].readings.len(), faults))
+    };
+    let station = format!("Crackmeter 7;Toc\n\n{table}");
+    for (skip_lines, text, line) in [
+        (0, format!("# Crackmeter 7, Toc\n#\n\n{table}"), 6),
+        (1, station.clone(), 5),
+        (2, station.clone(), 5),
+        (0, format!("\u{feff}# Crackmeter 7\n{table}"), 4),
+    ] {
+        let (readings, faults) = skipping(skip_lines, &text).unwrap();
+        assert_eq!((readings, faults.len()), (1, 1), "{text}");
+        assert!(faults[0].contains(&format!("line {line},")), "{faults:?}");
+    }
+    let error = skipping(0, &station).unwrap_err().to_string();
+    assert!(error.contains("skip_lines (--skip-lines)"), "{error}");
+    // A header may begin so too.
+    let mut options = ReadOptions::default();
+    options.dialect.time_columns = vec!["#time".to_owned()];
+    let file = write(
+        &folder,
+        "x.csv",
+        &format!("#{}", table.replace("nonsense", "2")),
+    );
+    let (recording, _) = read_files(&[file], &options).unwrap();
+    assert_eq!(recording.series[0].readings.len(), 2);
 }

@@ -23,7 +23,7 @@ pub(crate) fn made_up() -> Recording {
                 readings: vec![
                     reading("1963-08-02T00:00:00Z", 5.0, Some(0.1)),
                     reading("1963-08-02T00:00:00.000000001Z", 0.1 + 0.2, None),
-                    reading("1971-01-01T00:00:00Z", 1e300, Some(5e-324)),
+                    reading("1971-01-01T00:00:00Z", 1.0e9, Some(5e-324)),
                 ],
             },
             Series {

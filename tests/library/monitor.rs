@@ -401,3 +401,39 @@ fn a_rule_of_the_site_fires_when_its_conditions_have_held_for_as_long_as_it_asks
         assert!(text.contains(part), "{part}: {text}");
     }
 }
+
+#[test]
+fn a_suspicion_of_another_scale_is_raised_once_where_readings_hover_about_its_bounds_and_ends_where_they_leave_them()
+ {
+    let value = |hour: i64| {
+        let t = hour as f64;
+        let hovers = 0.0099 * t.min(700.0) + 0.05 * (t / 7.0).sin();
+        ((hovers + 0.05 * (t - 700.0).max(0.0)) * 1e3).round() / 1e3
+    };
+    let readings: Vec<(Timestamp, f64)> = (0..900)
+        .map(|hour| (start() + hour.hours(), value(hour)))
+        .collect();
+    let said = |holds_scale: bool| {
+        let mut monitor = Monitor::new(Settings {
+            holds_scale,
+            ..Settings::default()
+        });
+        let mut said = Vec::new();
+        for (hour, reading) in (0..).zip(&readings) {
+            for event in play(&mut monitor, &[*reading]) {
+                if let EventKind::Fault { kind, .. } = &event.kind
+                    && kind.starts_with("suspect-scale")
+                {
+                    said.push((hour, kind.clone()));
+                }
+            }
+        }
+        said
+    };
+    let held = said(true);
+    assert_eq!(held.len(), 2, "{held:?}");
+    assert!(held[0].0 < 100 && held[1].0 > 700, "{held:?}");
+    // A state of an earlier version is gone through again as it was.
+    let before = said(false);
+    assert!(before.len() > 4, "{before:?}");
+}

@@ -3,7 +3,7 @@
 use crate::alert::{hours_in_words, percent_in_words};
 use crate::cli::text;
 use crate::monitor::{Event, EventKind, FailureTime};
-use crate::reading::Timestamp;
+use crate::reading::{Timestamp, figure};
 use crate::runtime::view::{AlertLife, AlertView};
 use crate::store::DeliveryRow;
 use jiff::tz::TimeZone;
@@ -98,7 +98,7 @@ fn evidence(alert: &AlertView, clock: &dyn Fn(Timestamp) -> String) -> Vec<Strin
     };
     let mut found = vec![format!("refit with the readings until {}", clock(*time))];
     if let Some(velocity) = velocity_mm_per_day {
-        found.push(format!("velocity {velocity:.3} mm/day"));
+        found.push(format!("velocity {} mm/day", figure(*velocity, 3)));
     }
     found.push(format!(
         "chance of collapse within the evacuation time {}, within the outlook {}",

@@ -1,7 +1,7 @@
 //! A series as a row of marks.
 
 use crate::alert::Level;
-use crate::reading::{Timestamp, days_since};
+use crate::reading::{Timestamp, days_since, figure};
 
 /// From low to high.
 const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
@@ -50,13 +50,10 @@ impl MarkScale {
 
     /// The lowest and the highest value.
     pub(super) fn ends(&self) -> String {
-        let figure = |value: f64| {
-            let decimals = usize::from(value < 10.0);
-            format!("{value:.decimals$}")
-        };
+        let shown = |value: f64| figure(value, usize::from(value < 10.0));
         self.span.map_or_else(
             || "none".to_owned(),
-            |(low, high)| format!("{}-{}", figure(low), figure(high)),
+            |(low, high)| format!("{}-{}", shown(low), shown(high)),
         )
     }
 }

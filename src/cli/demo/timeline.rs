@@ -4,7 +4,7 @@ use super::marks::{self, MarkScale};
 use crate::alert::{Level, Policy, percent_in_words};
 use crate::cli::text::plain;
 use crate::monitor::{AlertState, Event, EventKind, FailureTime};
-use crate::reading::{BenchmarkId, Timestamp, days_since};
+use crate::reading::{BenchmarkId, Timestamp, days_since, figure};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -259,7 +259,7 @@ fn reason(rule: &str, text: &str, moment: Option<&DemoMoment>) -> String {
     };
     let velocity = moment
         .velocity_mm_per_day
-        .map_or_else(String::new, |v| format!("{v:.1} mm/day; "));
+        .map_or_else(String::new, |v| format!("{} mm/day; ", figure(v, 1)));
     let median = moment
         .failure
         .median

@@ -21,7 +21,11 @@ pub(super) fn written(survey: &Survey, stated: &DialectArgs) -> Result<Written, 
     let decimal_mark = decimal.clone().unwrap_or_default();
     let time = times::find(survey, stated, decimal_mark);
     match (decimal, time) {
-        (Ok(decimal), Ok(found)) => Ok(in_words(survey, decimal, found)),
+        (Ok(decimal), Ok(found)) => {
+            let mut written = in_words(survey, decimal, found);
+            written.dialect.skip_lines = stated.skip_lines.unwrap_or_default();
+            Ok(written)
+        }
         (decimal, time) => {
             let problems = [decimal.err(), time.err()];
             Err(problems.into_iter().flatten().collect())
@@ -41,6 +45,7 @@ fn in_words(survey: &Survey, decimal: DecimalMark, found: FoundTimes) -> Written
             decimal,
             time_columns: found.columns,
             time_format: found.format,
+            skip_lines: 0,
         },
         needs_zone: found.needs_zone,
     }

@@ -271,7 +271,7 @@ fn written(
     let has_zone = args.file.time_zone.is_some();
     let found = match kind {
         SourceKind::Csv => {
-            let survey = survey(file, args.file.dialect.delimiter)?;
+            let survey = survey(file, &args.file.dialect.dialect())?;
             if let Some(remark) = &survey.encoding {
                 exit::complain(&format_args!("{}: {remark}", file.display()));
             }

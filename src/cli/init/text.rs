@@ -117,6 +117,10 @@ fn source_lines(text: &mut String, source: &super::PlannedSource, plan: &InitPla
     if dialect.time_format != TimeFormat::Rfc3339 {
         let _ = writeln!(text, "time_format = {}", quoted(word(&dialect.time_format)));
     }
+    if dialect.skip_lines > 0 {
+        let line = format!("skip_lines = {}", dialect.skip_lines);
+        let _ = writeln!(text, "{line:35}# so many stand before the header");
+    }
 }
 
 fn alert_lines(text: &mut String, plan: &InitPlan) {

@@ -94,7 +94,7 @@ fn place(survey: &Survey, name: &str) -> Result<usize, String> {
     let place = survey.names.iter().position(|one| one == name);
     place.ok_or_else(|| {
         format!(
-            "there is no column {name:?} for --time-column; the first line has {:?}",
+            "there is no column {name:?} for --time-column; the header has {:?}",
             survey.names
         )
     })
@@ -131,8 +131,9 @@ fn columns(survey: &Survey, decimal: DecimalMark) -> Result<TimeColumns, String>
         ([date], []) => Ok(TimeColumns::Times(vec![*date])),
         ([date], [time]) => Ok(TimeColumns::Times(vec![*date, *time])),
         ([], _) => Err(format!(
-            "no column gives a time that is known; the first line has {:?}: give --time-column NAME (twice where date and \
-             time stand in two), and --time-format, such as \"%d.%m.%Y %H:%M\"",
+            "no column gives a time that is known; the header has {:?}: give --time-column NAME (twice where date and \
+             time stand in two), and --time-format, such as \"%d.%m.%Y %H:%M\"; where other lines stand before the header, \
+             --skip-lines COUNT",
             survey.names
         )),
         (several, of_day) => {

@@ -8,7 +8,7 @@ use crate::cli::{explain, score, text};
 use crate::figures::{self, Replayed};
 use crate::monitor::{Event, EventKind, FailureTime, levels_in};
 use crate::plot::escaped;
-use crate::reading::{Series, Timestamp, days_since};
+use crate::reading::{Series, Timestamp, days_since, figure};
 use jiff::tz::TimeZone;
 use std::fmt::Write as _;
 
@@ -34,7 +34,7 @@ pub(super) fn summary(material: &Material, series: &Series) -> String {
     if let Some((velocity, failure)) = newest_forecast(material, series) {
         // Writing to a string cannot fail.
         let _ = match velocity {
-            Some(velocity) => write!(out, "; {velocity:.3} mm/day"),
+            Some(velocity) => write!(out, "; {} mm/day", figure(velocity, 3)),
             None => Ok(()),
         };
         let _ = write!(

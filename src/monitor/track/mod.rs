@@ -46,6 +46,7 @@ pub(super) struct StepContext<'a> {
 
 /// What holds for all benchmarks at one step.
 #[derive(Debug, Clone, Copy)]
+#[expect(clippy::struct_excessive_bools, reason = "each holds by itself")]
 pub(super) struct Phase {
     pub(super) explain: Explain,
     /// Data time.
@@ -56,6 +57,8 @@ pub(super) struct Phase {
     pub(super) is_past: bool,
     /// Whether readings come faster than they can be judged: each benchmark is judged for its newest.
     pub(super) is_queue: bool,
+    /// Whether a suspicion of another scale goes on until the readings clearly contradict it.
+    pub(super) holds_scale: bool,
 }
 
 /// Everything the monitor knows of one benchmark. Each part keeps its own state; what one needs of another it is given.
@@ -171,7 +174,7 @@ impl Track {
         events.extend(self.read_again(time, reading.time));
         events.extend(self.record.leave_out_clockless(time));
         if taken == Taken::Newest {
-            events.extend(self.doubt(source, time));
+            events.extend(self.doubt(source, time, context.phase));
             if !context.phase.in_batches {
                 events.extend(self.look_back(policy, time));
             }
@@ -196,14 +199,15 @@ impl Track {
     }
 
     /// After the newest reading, of `time`: whether what is read can be what a slope does.
-    fn doubt(&mut self, source: MeasuredAs, time: Timestamp) -> Vec<Event> {
+    fn doubt(&mut self, source: MeasuredAs, time: Timestamp, phase: Phase) -> Vec<Event> {
         let mut events = Vec::new();
         if !self.quality.is_accepted(Suspicion::Fall) {
             events.extend(self.record.find_reset(time));
         }
         let level = self.level();
         events.extend(self.quality.judge_sensor(&mut self.record, level, time));
-        events.extend(self.quality.suspect(&self.record, source, time));
+        let doubts = (self.quality).suspect(&self.record, source, time, phase.holds_scale);
+        events.extend(doubts);
         events
     }
 

@@ -362,7 +362,7 @@ impl Layout {
         fail: impl Fn(&str, &'static str, &'static str) -> IngestError,
     ) -> Result<usize, IngestError> {
         let is_time = |column: &&Column| matches!(column, Column::Time | Column::Days);
-        let expected = "one column named time (RFC 3339) or t_days, or time_column (--time-column) with the name of the one that gives the time; comma-separated fields, or semicolons or tabs in the header too";
+        let expected = "one column named time (RFC 3339) or t_days, or time_column (--time-column) with the name of the one that gives the time; comma-separated fields, or semicolons or tabs in the header too; where other lines stand before the header, skip_lines (--skip-lines) with their number";
         let Some(time) = columns.iter().position(|column| is_time(&column)) else {
             return Err(fail("time", "there is no such column", expected));
         };

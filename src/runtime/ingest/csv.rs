@@ -11,7 +11,7 @@ use super::table_write::write_csv;
 use super::taken::{LineResult, Remark};
 use super::text_format::{LineReader, TextFormat};
 use super::{IngestError, Item, ReadOptions};
-use crate::reading::Delimiter;
+use crate::reading::{Delimiter, Dialect};
 use ::csv::StringRecord;
 use std::path::{Path, PathBuf};
 
@@ -25,7 +25,7 @@ pub static CSV: TextFormat = TextFormat {
     states_averaging: false,
 };
 
-/// Reads one file line by line: the first line is a header.
+/// Reads one file line by line: the first line is a header, but for remarks and what the dialect passes over.
 #[derive(Debug)]
 struct CsvReader {
     file: PathBuf,
@@ -48,12 +48,30 @@ impl CsvReader {
     }
 }
 
+/// What a line of remarks begins with.
+const COMMENT: char = '#';
+
+/// Whether a line before the header is none: one of those that the config passes over, a remark, or a blank one after these. What
+/// begins as a remark and has the columns of the time that the config names is the header.
+pub(super) fn stands_before_header(line: u64, text: &str, dialect: &Dialect) -> bool {
+    if line <= dialect.skip_lines {
+        return true;
+    }
+    let text = text.trim_start_matches('\u{feff}').trim();
+    let has_times = !dialect.time_columns.is_empty()
+        && dialect.time_columns.iter().all(|one| text.contains(one));
+    text.starts_with(COMMENT) && !has_times || text.is_empty() && line > 1
+}
+
 impl LineReader for CsvReader {
     fn take(&mut self, line: u64, text: &str) -> LineResult {
         if let Some(rows) = &mut self.rows {
             return rows.row(line, text).into();
         }
-        let rows = CsvRows::new(&self.file, text, &self.options);
+        if stands_before_header(line, text, &self.options.dialect) {
+            return LineResult::default();
+        }
+        let rows = CsvRows::at_line((line, text), &self.file, &self.options);
         rows.map(|rows| {
             self.rows = Some(rows);
             Vec::new()
@@ -100,7 +118,7 @@ impl LineReader for CsvReader {
 pub struct CsvRows {
     file: PathBuf,
     options: ReadOptions,
-    /// The line in force; none where the latest one was not understood.
+    /// The line in force, behind as many as are passed over; none where the latest one was not understood.
     header: Vec<String>,
     table: Option<TableRows>,
     splitter: Splitter,
@@ -114,6 +132,15 @@ impl CsvRows {
     /// [`IngestError::Header`], [`IngestError::BadHeader`] or [`IngestError::Empty`] says what is wrong
     /// with the header.
     pub fn new(file: &Path, header: &str, options: &ReadOptions) -> Result<Self, IngestError> {
+        Self::at_line((1, header), file, options)
+    }
+
+    /// The same of a header on a later line.
+    fn at_line(
+        (line, header): (u64, &str),
+        file: &Path,
+        options: &ReadOptions,
+    ) -> Result<Self, IngestError> {
         let header = header.strip_prefix('\u{feff}').unwrap_or(header);
         let stated = options.dialect.delimiter;
         let delimiter = stated.unwrap_or_else(|| Delimiter::of_header(header));
@@ -129,7 +156,7 @@ impl CsvRows {
             .split(header, &mut rows.cells)
             .map_err(|found| IngestError::BadHeader {
                 file: file.into(),
-                line: 1,
+                line,
                 found,
             })?;
         if rows.cells.iter().all(str::is_empty) {
@@ -138,7 +165,7 @@ impl CsvRows {
                 missing: "header",
             });
         }
-        rows.read_header(1, header)?;
+        rows.read_header(line, header)?;
         Ok(rows)
     }
 
@@ -207,7 +234,9 @@ impl CsvRows {
         let names = self.cells.iter().map(str::to_owned).collect();
         let layout = Layout::new(&self.file, line, names, &self.options)?;
         self.table = Some(TableRows::new(&self.file, layout, &self.options));
-        self.header = vec![text.to_owned()];
+        // A reader that goes on from a later line takes them as the file's first: blank ones pass for those before the header.
+        let skipped = (0..self.options.dialect.skip_lines).map(|_| String::new());
+        self.header = skipped.chain([text.to_owned()]).collect();
         Ok(())
     }
 

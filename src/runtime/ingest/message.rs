@@ -9,7 +9,7 @@
 
 use super::Item;
 use super::columns::channel_unit;
-use crate::reading::{BenchmarkId, Quantity, Reading, Sample, Timestamp, Unit};
+use crate::reading::{BenchmarkId, Quantity, Reading, Sample, Timestamp, Unit, whole_figure};
 use jiff::SignedDuration;
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -23,6 +23,10 @@ pub(super) const TIME_BASE: &str = "time_base";
 pub(super) const UNIX: &str = "unix";
 /// What precedes the instant in a time base that is not 1970.
 pub(super) const SINCE: &str = "seconds since ";
+
+/// What a reading may be.
+pub(super) const WITHIN_REACH: &str = "a reading of 1e9 mm (1000 km), or 1e9 mm/day, at most, which no slope exceeds; \
+     if it means that there is no value, add it to missing (--missing)";
 
 /// A message on one of our topics that is no reading.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -175,7 +179,7 @@ impl<'a> Fields<'a> {
         Ok(match meant {
             Topic::Benchmark(benchmark, quantity) => Item::Reading {
                 benchmark,
-                unit: self.unit(quantity)?,
+                unit: self.reaching(value, quantity)?,
                 averaging: self.averaging(metadata)?,
                 reading: Reading {
                     time,
@@ -268,6 +272,16 @@ impl<'a> Fields<'a> {
             .ok()
             .filter(|unit| unit.quantity() == quantity)
             .ok_or_else(|| self.fail("unit", format!("{text:?}"), expected))
+    }
+
+    /// The unit, in which `value` is not larger than what any slope moves by.
+    fn reaching(&self, value: f64, quantity: Quantity) -> Result<Unit, MessageError> {
+        let unit = self.unit(quantity)?;
+        if unit.is_within_reach(value) {
+            return Ok(unit);
+        }
+        let found = format!("{} {unit}", whole_figure(value));
+        Err(self.fail("value", found, WITHIN_REACH))
     }
 
     fn sigma(&self) -> Result<Option<f64>, MessageError> {

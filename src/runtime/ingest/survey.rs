@@ -1,10 +1,11 @@
 //! The cells of a table as they stand, before anyone has said what they mean.
 
 use super::bytes::read_bytes;
+use super::csv::stands_before_header;
 use super::encoding::{Transcoder, latin1};
 use super::split::Splitter;
 use super::{IngestError, Remark};
-use crate::reading::Delimiter;
+use crate::reading::{Delimiter, Dialect};
 use ::csv::StringRecord;
 use std::borrow::Cow;
 use std::path::Path;
@@ -17,20 +18,21 @@ const MOST_ROWS: usize = 200_000;
 pub struct Survey {
     /// What parts its cells.
     pub delimiter: Delimiter,
-    /// The cells of its first line.
+    /// The cells of its header.
     pub names: Vec<String>,
-    /// The cells of each column below, as many as its first line has; rows with another number of cells are left out, but for
+    /// The cells of each column below, as many as its header has; rows with another number of cells are left out, but for
     /// those that lack only what has no name.
     pub columns: Vec<Vec<String>>,
     /// How it is encoded, where that is not UTF-8.
     pub encoding: Option<Remark>,
 }
 
-/// Reads `file`, whose cells are parted by `delimiter` or, with none, as its first line shows.
+/// Reads `file`, whose cells are parted as `dialect` says or, where it does not, as its header shows; of the dialect nothing else counts
+/// than this, the lines before the header and the columns of the time.
 ///
 /// # Errors
 /// [`IngestError`] where it cannot be read, or has no header or no row.
-pub fn survey(file: &Path, delimiter: Option<Delimiter>) -> Result<Survey, IngestError> {
+pub fn survey(file: &Path, dialect: &Dialect) -> Result<Survey, IngestError> {
     let bytes = read_bytes(file)?;
     let mut transcoder = Transcoder::default();
     let bytes = transcoder.feed(&bytes);
@@ -49,31 +51,45 @@ pub fn survey(file: &Path, delimiter: Option<Delimiter>) -> Result<Survey, Inges
         file: file.into(),
         missing,
     };
-    let header = lines.next().unwrap_or_default();
+    let (line, header) = (1..)
+        .zip(lines.by_ref())
+        .find(|(line, text)| !stands_before_header(*line, text, dialect))
+        .unwrap_or_default();
     let header = header.strip_prefix('\u{feff}').unwrap_or(&header);
-    let delimiter = delimiter.unwrap_or_else(|| Delimiter::of_header(header));
+    let delimiter = (dialect.delimiter).unwrap_or_else(|| Delimiter::of_header(header));
     let (mut splitter, mut cells) = (Splitter::new(delimiter), StringRecord::new());
     let split = splitter.split(header, &mut cells);
     split.map_err(|found| IngestError::BadHeader {
         file: file.into(),
-        line: 1,
+        line,
         found,
     })?;
-    let names: Vec<String> = cells.iter().map(str::to_owned).collect();
+    let mut names: Vec<String> = cells.iter().map(str::to_owned).collect();
     if names.is_empty() {
         return Err(empty("header"));
     }
     // Behind a last mark there may be nothing, with no name.
     let unnamed = names.iter().rev().take_while(|name| name.is_empty());
     let least = names.len() - unnamed.count();
-    let mut columns = vec![Vec::new(); names.len()];
+    let (mut columns, mut is_other_table) = (vec![Vec::new(); names.len()], false);
     for line in lines.take(MOST_ROWS) {
         if splitter.split(&line, &mut cells).is_ok() && (least..=names.len()).contains(&cells.len())
         {
             for (index, column) in columns.iter_mut().enumerate() {
                 column.push(cells.get(index).unwrap_or_default().to_owned());
             }
+        } else {
+            is_other_table |= !line.trim().is_empty();
         }
+    }
+    if is_other_table && columns.iter().all(Vec::is_empty) {
+        return Err(IngestError::Header {
+            file: file.into(),
+            line,
+            column: names.swap_remove(0),
+            problem: "no row below has as many cells",
+            expected: "the header of the rows; where other lines stand before it, skip_lines (--skip-lines) with their number",
+        });
     }
     if columns.iter().all(Vec::is_empty) {
         return Err(empty("row"));

@@ -1,6 +1,7 @@
 //! Rows of a table whose columns are understood: cells in, readings and covariates out.
 
 use super::columns::{Column, Layout, Meaning, SigmaColumn};
+use super::message::WITHIN_REACH;
 use super::vector::{self, VectorColumns};
 use super::{IngestError, Item, ReadOptions, Remark};
 use crate::reading::{BenchmarkId, DecimalMark, Reading, Sample, Timestamp, Unit, after_days};
@@ -302,11 +303,11 @@ impl TableRow<'_> {
         if let Some(name) = absent.first() {
             return Ok(missing(format!("nothing in {name}")));
         }
-        if !value.is_finite() {
-            let (index, _) = vector.components[0];
-            return Err(self.fail(index, "components whose sum is a finite number"));
-        }
         let (unit, sigma) = (vector.unit, None);
+        if !unit.is_within_reach(value) {
+            let (index, _) = vector.components[0];
+            return Err(self.fail(index, "components whose sum is a finite number of 1e9 mm (1000 km), or 1e9 mm/day, at most"));
+        }
         Ok(Some(Item::Reading {
             benchmark: vector.benchmark.clone(),
             unit,
@@ -329,6 +330,9 @@ impl TableRow<'_> {
                 time,
                 what: self.cells[index].to_owned(),
             }),
+            TableCell::Number(value) if !unit.is_within_reach(value) => {
+                return Err(self.fail(index, WITHIN_REACH));
+            }
             TableCell::Number(value) => Some(Item::Reading {
                 benchmark: benchmark.clone(),
                 unit,

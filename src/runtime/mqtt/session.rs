@@ -17,7 +17,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 /// Messages that a broker may send before the first of them is acknowledged.
-pub(crate) const MOST_UNACKNOWLEDGED: u16 = 1024;
+pub(crate) const MOST_UNACKNOWLEDGED: u16 = 8192;
 /// Longest packet that is taken from the broker at all, bytes: the longest there can be. What is too long is set aside
 /// and acknowledged; refused, it would come again for ever, and nothing behind it.
 const LONGEST_PACKET: u32 = 268_435_455 + 5;

@@ -159,6 +159,11 @@ impl Site {
         }
     }
 
+    /// Steps since the last commit.
+    pub(in crate::runtime) fn uncommitted(&self) -> usize {
+        self.batch.steps()
+    }
+
     /// Searches that are at work.
     pub fn searching(&self) -> usize {
         self.searches.jobs().count()

@@ -80,7 +80,9 @@ impl Site {
         if let Some(store) = &self.sinks.store
             && !self.is_latest(arrival)
         {
-            let known = store.has(&self.batch, &arrival.input)?;
+            let benchmark = arrival.input.read_benchmark();
+            let anew = benchmark.and_then(|one| self.read_anew.get(one));
+            let known = store.has(&self.batch, &arrival.input, anew.copied().unwrap_or(0))?;
             if known == Presence::Corrected && self.returned.waits(arrival) {
                 self.counts.repeated += 1;
                 return Ok(Vec::new());

@@ -27,6 +27,8 @@ struct SiteMemory {
     newest: BTreeMap<BenchmarkId, Timestamp>,
     #[serde(default)]
     ahead: BTreeMap<BenchmarkId, Timestamp>,
+    #[serde(default)]
+    read_anew: BTreeMap<BenchmarkId, i64>,
     failure_times: BTreeMap<Option<BenchmarkId>, Timestamp>,
     standing: Vec<(AlertPlace, AlertInForce)>,
     mutes: Vec<Mute>,
@@ -108,7 +110,7 @@ impl Site {
             .for_each(|job| self.searches.note(job));
         self.now = own.now;
         self.newest = own.newest;
-        self.ahead = own.ahead;
+        (self.ahead, self.read_anew) = (own.ahead, own.read_anew);
         self.failure_times = own.failure_times;
         self.standing = own.standing.into_iter().collect();
         self.mutes = own.mutes;
@@ -138,6 +140,9 @@ impl Site {
                     row.input,
                     Input::Reading { .. } | Input::Sample { .. }
                 ));
+                if let Input::Settings(settings) = &row.input {
+                    self.forget_values(settings, row.seq - 1);
+                }
                 self.follow(row.now, &row.input);
                 for job in self.monitor.searches() {
                     self.searches.note(job);
@@ -184,17 +189,14 @@ impl Site {
             one.is_reported_together |=
                 store.is_noted(identity, None, Some(DeliveryOutcome::Over))?;
         }
-        let mut waiting = Vec::new();
-        for body in store.waiting()? {
-            match rmp_serde::from_slice::<Alert>(&body) {
-                Ok(alert) => waiting.push(alert),
-                Err(error) => tracing::error!(%error, "an alert that waited cannot be read"),
-            }
-        }
+        let mut waiting = waiting_alerts(&store)?;
         match self.close_what_nobody_takes(&store, &waiting) {
             // The next start does it.
             Err(error) if error.is_full() => tracing::warn!(%error, "deliveries are not closed"),
-            closed => closed?,
+            Ok(true) => waiting = waiting_alerts(&store)?,
+            closed => {
+                closed?;
+            }
         }
         let mut ended = EndedKeys::default();
         for alert in &waiting {
@@ -255,12 +257,17 @@ impl Site {
     }
 
     /// What waits for a hook that is not in the config any more, or that does not ask for it any more, is closed, and
-    /// waits for the hooks that ask for it now.
-    fn close_what_nobody_takes(&self, store: &Store, waiting: &[Alert]) -> Result<(), StoreError> {
+    /// waits for the hooks that ask for it now. Of what reports many benchmarks together a hook that asks for some of them now
+    /// receives these singly. Whether there was any.
+    fn close_what_nobody_takes(
+        &self,
+        store: &Store,
+        waiting: &[Alert],
+    ) -> Result<bool, StoreError> {
         let Some(dispatcher) = &self.sinks.alerts else {
-            return Ok(());
+            return Ok(false);
         };
-        let (mut ended, mut instead) = (Vec::new(), Vec::new());
+        let (mut ended, mut instead, mut singly) = (Vec::new(), Vec::new(), Vec::new());
         for alert in waiting {
             let asking = dispatcher.asking(alert);
             let awaited = store.awaited(identity(alert))?;
@@ -272,12 +279,22 @@ impl Site {
             for hook in asking.iter().filter(|_| !gone.is_empty()) {
                 instead.push(delivery(alert, hook)?);
             }
+            if gone.is_empty() || alert.state != MessageState::Firing {
+                continue;
+            }
+            for member in self.members_in_force(alert) {
+                for hook in dispatcher.asking(member) {
+                    if gone.contains(&&hook) {
+                        singly.push(delivery(member, &hook)?);
+                    }
+                }
+            }
         }
         if !ended.is_empty() {
-            store.close_deliveries(&ended, &instead)?;
+            store.close_deliveries(&ended, &instead, &singly)?;
             announce_closed(&ended);
         }
-        Ok(())
+        Ok(!ended.is_empty())
     }
 
     /// The memory as of the last step, where it is time to save it.
@@ -294,6 +311,7 @@ impl Site {
             now: self.now,
             newest: self.newest.clone(),
             ahead: self.ahead.clone(),
+            read_anew: self.read_anew.clone(),
             failure_times: self.failure_times.clone(),
             standing: self
                 .standing
@@ -322,6 +340,18 @@ impl Site {
             }
         }
     }
+}
+
+/// The alerts that some hook has not taken yet.
+fn waiting_alerts(store: &Store) -> Result<Vec<Alert>, StoreError> {
+    let mut waiting = Vec::new();
+    for body in store.waiting()? {
+        match rmp_serde::from_slice::<Alert>(&body) {
+            Ok(alert) => waiting.push(alert),
+            Err(error) => tracing::error!(%error, "an alert that waited cannot be read"),
+        }
+    }
+    Ok(waiting)
 }
 
 /// Says it once a hook, not once a delivery: there may be thousands.

@@ -153,6 +153,8 @@ pub struct Site {
     returned: Returned,
     /// Messages that come so fast that the past is not over yet.
     crowd: MessageRush,
+    /// Up to which step the state has readings of a benchmark that do not count any more: they come again, and are new then.
+    read_anew: BTreeMap<BenchmarkId, i64>,
     /// Of which silent benchmarks it is known how late their readings come, and what time it was then.
     behind: BTreeMap<BenchmarkId, Timestamp>,
 }
@@ -185,6 +187,7 @@ impl Site {
             held: VecDeque::new(),
             returned: Returned::default(),
             crowd: MessageRush::default(),
+            read_anew: BTreeMap::new(),
             behind: BTreeMap::new(),
         }
     }
@@ -252,6 +255,10 @@ impl Site {
     }
 
     fn step(&mut self, now: Timestamp, input: &Input) -> Vec<Event> {
+        if let (Input::Settings(settings), Some(store)) = (input, &self.sinks.store) {
+            let unwritten = i64::try_from(self.batch.steps()).unwrap_or(0);
+            self.forget_values(settings, store.last_step() + unwritten);
+        }
         let events = self.follow(now, input);
         if self.sinks.store.is_some() {
             self.batch.step(now, input, &events);
@@ -259,6 +266,20 @@ impl Site {
             self.steps_since_memory += 1;
         }
         events
+    }
+
+    /// The readings up to step number `last` of what these settings end do not count any more.
+    fn forget_values(&mut self, settings: &Settings, last: i64) {
+        let former = &self.monitor.settings().watched;
+        let read = self.newest.keys().chain(self.ahead.keys());
+        let ended: BTreeSet<BenchmarkId> = read
+            .filter(|id| settings.watched.ends(id, former))
+            .cloned()
+            .collect();
+        for id in ended {
+            self.batch.forget(&id);
+            self.read_anew.insert(id, last);
+        }
     }
 
     /// The monitor's step, and what the site itself remembers of it.

@@ -81,6 +81,20 @@ impl Site {
         })
     }
 
+    /// The alerts in force that it reports.
+    pub(super) fn members_in_force<'a>(
+        &'a self,
+        flood: &'a Alert,
+    ) -> impl Iterator<Item = &'a Alert> {
+        let is_unknown = flood.level == Level::Unknown;
+        let members = flood.many.iter().flat_map(|many| &many.members);
+        members.filter_map(move |member| {
+            let place = (member.benchmark.clone(), is_unknown);
+            let standing = &self.standing.get(&place)?.alert;
+            (standing.key == member.key).then_some(standing)
+        })
+    }
+
     fn has(&self, flood: &Alert, is_it: impl Fn(&Alert, &FloodMember) -> bool) -> bool {
         let is_unknown = flood.level == Level::Unknown;
         let mut members = flood.many.iter().flat_map(|many| &many.members);

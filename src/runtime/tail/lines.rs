@@ -63,6 +63,11 @@ impl Lines {
         lines
     }
 
+    /// The number of the last whole line.
+    pub fn number(&self) -> u64 {
+        self.number
+    }
+
     /// Whether the text is in UTF-16.
     pub fn is_utf16(&self) -> bool {
         self.transcoder.is_utf16()

@@ -68,6 +68,12 @@ impl TextReader {
                 return Err(fault);
             }
         }
+        if !saved.header.is_empty() && rows.is_lost() {
+            return Err(IngestError::NoHeader {
+                file: "the file".into(),
+                line: saved.lines.number(),
+            });
+        }
         Ok(Self {
             lines: saved.lines,
             rows,

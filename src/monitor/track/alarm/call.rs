@@ -10,7 +10,7 @@ use crate::monitor::motion::{moves_backwards, settled};
 use crate::monitor::track::days;
 use crate::monitor::track::forecast::{EARLY, Forecast, LookAhead};
 use crate::monitor::track::record::BenchmarkRecord;
-use crate::reading::Timestamp;
+use crate::reading::{Timestamp, figure};
 use jiff::SignedDuration;
 
 impl Alarm {
@@ -200,7 +200,7 @@ fn text(
     let velocity = evidence
         .velocity_mm_per_day
         .map_or_else(String::new, |velocity| {
-            format!("; velocity {velocity:.3} mm/day")
+            format!("; velocity {} mm/day", figure(velocity, 3))
         });
     let grounds = grounds(policy, evidence, &change.rule);
     let chance = |name: &str, chance: Option<f64>, span: SignedDuration| {
@@ -237,17 +237,19 @@ fn text(
 
 /// The figures that a rule rests on, where the text has them nowhere else.
 fn grounds(policy: &Policy, evidence: &AlertEvidence, rule: &str) -> String {
-    let figure = |name: &str, value: Option<f64>, unit: &str| {
-        value.map_or_else(String::new, |value| format!("; {name} {value:.3} {unit}"))
+    let shown = |name: &str, value: Option<f64>, unit: &str| {
+        value.map_or_else(String::new, |value| {
+            format!("; {name} {} {unit}", figure(value, 3))
+        })
     };
     match (rule, policy.declared_rule(rule)) {
         (_, Some(declared)) => format!("; {}", declared.words(Some(evidence))),
-        ("displacement-threshold", None) => figure(
+        ("displacement-threshold", None) => shown(
             "displacement since the first reading",
             evidence.displacement_mm,
             "mm",
         ),
-        ("acceleration-threshold", None) => figure(
+        ("acceleration-threshold", None) => shown(
             "acceleration",
             evidence.acceleration_mm_per_day2,
             "mm/day per day",

@@ -6,8 +6,8 @@ mod unknown;
 
 use super::record::BenchmarkRecord;
 use crate::monitor::event::Event;
-use crate::monitor::history::{FARTHEST, Taken};
-use crate::reading::{Suspicion, Timestamp};
+use crate::monitor::history::Taken;
+use crate::reading::{FARTHEST, Suspicion, Timestamp, whole_figure};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use unknown::Reason;
@@ -106,7 +106,10 @@ impl DataQuality {
                 format!("the reading of {time} came after later ones"),
             ),
             Taken::Corrected(before) => {
-                let text = format!("the reading of {time} was corrected; it was {before} {unit}");
+                let text = format!(
+                    "the reading of {time} was corrected; it was {} {unit}",
+                    whole_figure(before)
+                );
                 ("corrected", text)
             }
             Taken::OutOfRange(value) => {

@@ -6,7 +6,7 @@ use super::unknown::Reason;
 use crate::alert::Level;
 use crate::monitor::event::Event;
 use crate::monitor::track::record::BenchmarkRecord;
-use crate::reading::Timestamp;
+use crate::reading::{Timestamp, figure};
 
 /// Readings of a second quantity in a row that are reported, where the first quantity has hardly been read.
 const FEW_OTHERS: u32 = 3;
@@ -39,9 +39,10 @@ impl DataQuality {
         self.spoilt_by = record.history().spoilt(before);
         if let (None, Some(by)) = (before, self.spoilt_by) {
             let text = format!(
-                "benchmark {}: many of the latest readings jump back and forth by about {by:.3} {} from one reading to the next; \
+                "benchmark {}: many of the latest readings jump back and forth by about {} {} from one reading to the next; \
                  no slope reverses by that much, so they are not its motion",
                 record.benchmark(),
+                figure(by, 3),
                 record.unit()
             );
             events.push(record.fault(time, "spoilt-readings", text.clone()));

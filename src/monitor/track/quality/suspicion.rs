@@ -7,7 +7,8 @@ use crate::monitor::event::Event;
 use crate::monitor::history::MeasuredAs;
 use crate::monitor::track::record::BenchmarkRecord;
 use crate::reading::suspicion::{self, DatedSuspicion};
-use crate::reading::{Suspicion, Timestamp};
+use crate::reading::{Suspicion, Timestamp, Unit};
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 
 /// The latest readings that are examined.
@@ -16,17 +17,21 @@ const INSPECTED: usize = 200;
 const CALM: usize = 24;
 
 impl DataQuality {
-    /// After the newest reading, of `time`.
+    /// After the newest reading, of `time`. `holds_scale`: a suspicion of another scale goes on until the readings contradict it.
     pub(in crate::monitor::track) fn suspect(
         &mut self,
         record: &BenchmarkRecord,
         source: MeasuredAs,
         time: Timestamp,
+        holds_scale: bool,
     ) -> Vec<Event> {
         let (unit, history) = (source.unit, record.history());
         let quantity = history.observations.quantity;
         let values = history.values_as_read(unit, INSPECTED);
-        let name = unit.to_string();
+        let name = match unit {
+            Unit::Length(length) => Cow::Borrowed(length.symbol()),
+            Unit::Rate(..) => Cow::Owned(unit.to_string()),
+        };
         let mut found = Vec::new();
         if !suspicion::is_plain(&values, quantity, &name) {
             let readings = history.as_read(unit, INSPECTED);
@@ -39,6 +44,13 @@ impl DataQuality {
         let mut events = Vec::new();
         for kind in [Suspicion::Mark, Suspicion::Fall, Suspicion::Scale] {
             let evidence = found.iter().find(|one| one.kind == kind);
+            let stands = kind == Suspicion::Scale
+                && holds_scale
+                && evidence.is_none()
+                && self.unknown.has(Reason::Suspect(kind));
+            if stands && suspicion::may_still_have_another_scale(&values, &name) {
+                continue;
+            }
             events.extend(self.weigh(record, time, kind, evidence));
         }
         events

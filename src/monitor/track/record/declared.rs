@@ -4,7 +4,7 @@ use super::BenchmarkRecord;
 use crate::monitor::declared::Declarations;
 use crate::monitor::event::{Event, RESET_FOUND, RESET_RETURNED};
 use crate::monitor::history::MeasuredAs;
-use crate::reading::{Reading, Timestamp};
+use crate::reading::{Reading, Timestamp, figure};
 
 impl BenchmarkRecord {
     /// What takes effect with the reading of `time`.
@@ -78,9 +78,10 @@ impl BenchmarkRecord {
         self.history.reset(&self.declared);
         let (benchmark, by) = (&self.benchmark, -jump);
         let text = format!(
-            "benchmark {benchmark}: its readings fell by {by:.3} mm at {time}, within one interval between readings, and went on \
+            "benchmark {benchmark}: its readings fell by {} mm at {time}, within one interval between readings, and went on \
              from there; no slope moves upslope by that much in that time, so it is taken for a reset of the instrument and is no \
-             motion. Declare it with [[event]] kind = \"reset\"; if the slope did fall, set accept = [\"fall\"] for this benchmark"
+             motion. Declare it with [[event]] kind = \"reset\"; if the slope did fall, set accept = [\"fall\"] for this benchmark",
+            figure(by, 3)
         );
         Some(self.fault(now, RESET_FOUND, text))
     }
