@@ -19,7 +19,7 @@ pub use dependence::Dependence;
 pub use evidence::RATE_PER_YEAR;
 pub use line::InverseVelocityLine;
 pub use members::Members;
-pub use network::{HIDDEN, INPUTS, Network};
+pub use network::{INPUTS, Network, UNITS};
 pub use panel::{FEWEST_READINGS, HORIZON_DAYS, LawForecaster, Outlook, by_the_law};
 pub(crate) use panel::{measurably_moves, outlook};
 pub use passage::Passage;

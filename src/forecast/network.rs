@@ -2,8 +2,10 @@
 
 /// Numbers that the network is given of one span.
 pub const INPUTS: usize = 55;
-/// Hidden units: 32 of each of four networks that were taught apart, and whose mean is taken.
-pub const HIDDEN: usize = 4 * 32;
+/// Hidden units: those of eight networks that were taught apart, and whose mean is taken.
+const HIDDEN: usize = 8 * UNITS;
+/// Hidden units of one of them.
+pub const UNITS: usize = 32;
 
 /// Weights of a network from [`INPUTS`] numbers to a chance.
 #[derive(Debug, Clone, PartialEq)]

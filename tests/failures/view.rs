@@ -282,7 +282,7 @@ fn a_search_that_is_at_work_does_not_hold_the_work_loop() {
 /// A benchmark that the config names is unknown until it has read, on a first start with history too.
 #[test]
 fn a_named_benchmark_with_history_is_not_unknown_in_the_metrics() {
-    let site = Site::new("[[benchmark]]\nid = \"5\"\n");
+    let site = Site::new("[[benchmark]]\nid = \"5\"\nsource = \"logger\"\n");
     let listen = site.listen();
     let rows: String = (0..60)
         .map(|hour| {

@@ -196,7 +196,7 @@ impl<'a> Host<'a> {
             },
         };
         let store = self.store().expect("the daemon runs");
-        store.has(&Batch::default(), &input).unwrap() != Presence::No
+        store.has(&Batch::default(), &input, 0).unwrap() != Presence::No
     }
 }
 

@@ -91,7 +91,7 @@ mod tests {
     #[test]
     fn a_level_is_in_force_until_it_ends_or_a_higher_one_is_called() {
         let at = |hour: i64| Timestamp::from_second(hour * 3600).unwrap();
-        let benchmark = BenchmarkId::new("P").unwrap();
+        let benchmark = BenchmarkId::new("P");
         let change = |hour, level, state| Event {
             time: at(hour),
             benchmark: Some(benchmark.clone()),

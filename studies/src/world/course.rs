@@ -12,6 +12,11 @@ const LAST_VELOCITIES: (f64, f64) = (2.0, 60_000.0);
 /// From the onset to the collapse: median, days, and decades; and its bounds.
 const DURATION: (f64, f64) = (25.0, 0.8);
 const DURATIONS: (f64, f64) = (0.3, 600.0);
+/// Of how many intervals between readings an acceleration is at least. With six a slope that is read daily and collapses within a week was
+/// in no family, while bursts of a few readings that stop were, and the network learnt to call none of them.
+const FEWEST_INTERVALS: f64 = 3.0;
+/// The quiet time before an acceleration, in multiples of that.
+const QUIET: (f64, f64) = (0.1, 60.0);
 /// By how much the velocity grows: at least; at most if read daily, times the root of the readings a day; and the bounds
 /// of that.
 const GROWTH: (f64, f64) = (8.0, 300.0);
@@ -128,7 +133,7 @@ impl Course {
             0.0
         } else {
             let most = (MOST_READINGS.1 * gauge.interval - duration).clamp(0.0, 1200.0);
-            (duration * log_uniform(generator, 0.1, 10.0)).min(most)
+            (duration * log_uniform(generator, QUIET.0, QUIET.1)).min(most)
         };
         let often = gauge.interval.recip();
         let median = LAST_VELOCITY.0 * often.max(1.0).powf(0.25);
@@ -139,7 +144,7 @@ impl Course {
         let error = gauge.error();
         let slip = (3.0 * first + 0.1 * last) * duration;
         let is_seen = slip > 8.0 * error && 0.15 * last * duration > 4.0 * error;
-        if !is_seen || duration < 6.0 * gauge.interval {
+        if !is_seen || duration < FEWEST_INTERVALS * gauge.interval {
             return None;
         }
         let mut stretches = Vec::new();

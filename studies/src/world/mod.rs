@@ -201,7 +201,7 @@ impl Simulated {
         let course = Course::draw(family, &gauge, generator)?;
         let path = onward::path(&course, family, gauge.interval, generator);
         let visible_days = path.visible(&course, gauge.error());
-        if family.fails() && course.end - visible_days < 4.0 * gauge.interval {
+        if family.fails() && course.end - visible_days < 2.0 * gauge.interval {
             return None;
         }
         let readings = gauge.read(&path, family, generator);

@@ -4,11 +4,10 @@ use crate::looks::in_two;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
-use slipwatch::forecast::{HIDDEN, INPUTS, Network};
+use slipwatch::forecast::{INPUTS, Network, UNITS};
 
 /// Networks that are taught from different first weights; the mean of their ln odds is steadier where nothing was learnt.
 pub(crate) const NETWORKS: usize = 4;
-const UNITS: usize = HIDDEN / NETWORKS;
 const BATCH: usize = 256;
 /// The first step, and its least share.
 const STEP: (f32, f32) = (0.004, 0.02);

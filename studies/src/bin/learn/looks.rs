@@ -21,7 +21,9 @@ const LIKELIEST: (usize, usize) = (16, 3);
 const CUT: f64 = 0.4;
 /// Looks before an end reach back so far, days.
 const FARTHEST_DAYS: f64 = 60.0;
-/// The shortest lead, days.
+/// The shortest lead, intervals between readings: of looks that teach, and of looks that judge.
+const LAST_LOOK: (f64, f64) = (1.0, 2.0);
+/// The same, days.
 const SHORTEST_DAYS: f64 = 1.0 / 24.0;
 /// The share of the standing slopes that the first network is asked about, at how many readings, and the looks that are
 /// kept of each slope: by the chance within a day and within thirty.
@@ -130,7 +132,7 @@ fn at(slope: &Simulated, seed: u64) -> Vec<Look> {
     let mut generator = Pcg64::seed_from_u64(seed ^ 0x5555);
     let mut counts = Vec::new();
     if let Some(end) = slope.collapse_days.or(slope.stopped_days) {
-        counts.extend(about(slope, end, &mut generator));
+        counts.extend(about(slope, (end, LAST_LOOK.0), &mut generator));
     }
     let mut anywhere = || generator.random_range(FEWEST..=values.len());
     counts.extend((0..ANYWHERE).map(|_| anywhere()));
@@ -149,10 +151,11 @@ fn at(slope: &Simulated, seed: u64) -> Vec<Look> {
     looks.collect()
 }
 
-/// Counts of readings at leads spread evenly in their logarithm, since the acceleration could be seen.
-fn about(slope: &Simulated, end: f64, generator: &mut impl Rng) -> Vec<usize> {
+/// Counts of readings at leads spread evenly in their logarithm, since the acceleration could be seen, of so many `intervals` between
+/// readings or more.
+fn about(slope: &Simulated, (end, intervals): (f64, f64), generator: &mut impl Rng) -> Vec<usize> {
     let values = &slope.observations.values;
-    let shortest = (2.0 * slope.interval_days).max(SHORTEST_DAYS);
+    let shortest = (intervals * slope.interval_days).max(SHORTEST_DAYS);
     let seen = end - slope.visible_days.min(end);
     let longest = FARTHEST_DAYS.min(seen).max(1.2 * shortest);
     let mut lead = || shortest * (longest / shortest).powf(generator.random::<f64>());
@@ -168,7 +171,8 @@ fn about(slope: &Simulated, end: f64, generator: &mut impl Rng) -> Vec<usize> {
 
 /// Counts of readings before the end of a slope that judges.
 pub(crate) fn about_the_end(slope: &Simulated, end: f64, seed: u64) -> Vec<usize> {
-    about(slope, end, &mut Pcg64::seed_from_u64(seed ^ 0x5555))
+    let mut generator = Pcg64::seed_from_u64(seed ^ 0x5555);
+    about(slope, (end, LAST_LOOK.1), &mut generator)
 }
 
 pub(crate) fn first(observations: &Observations, count: usize) -> Observations {
