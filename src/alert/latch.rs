@@ -2,7 +2,8 @@
 //!
 //! A forecast that changes its mind does not lower a level. What does: the slope has slowed to half the
 //! highest velocity seen at this level, without gaining, for a whole evacuation time in which the evidence
-//! called for less, or never moved by more than its readings err; or it has held a velocity under the critical one, without gaining, for the stated time.
+//! called for less; or it has held a velocity under the critical one, without gaining, for the stated time. What
+//! lies within the error of a velocity is no gain, and motion that never stood out of it has not to slow down.
 
 use super::evidence::AlertEvidence;
 use super::level::Level;

@@ -162,18 +162,8 @@ mod tests {
     #[test]
     fn the_first_morning_of_a_record_is_hardly_evidence_and_after_two_days_short_blocks_are() {
         let morning = most_freedom(0.35, 0.02);
-        assert!(factor_of(50.0, morning) < 1000.0, "{morning}");
+        assert!(factor(50.0, morning) < 1000.0, "{morning}");
         assert!(most_freedom(2.0, 0.02) > 1000.0);
         assert!(most_freedom(2.0, 0.5) < 6.0 && most_freedom(2.0, 4.0).is_infinite());
-    }
-
-    fn factor_of(z: f64, most_freedom: f64) -> f64 {
-        let change = Change {
-            newest: z,
-            usual: 1.0,
-            freedom: 100.0,
-            largest: 0.0,
-        };
-        ln_bayes_factor(&change, most_freedom).exp()
     }
 }

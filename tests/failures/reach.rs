@@ -338,14 +338,19 @@ fn a_flood_keeps_its_key_to_its_end_and_a_hook_of_some_benchmarks_receives_these
         (22, 0),
         "{lines:?}"
     );
-    let two = site.lines("two");
-    let of = |name: &str| two.iter().filter(|line| line.starts_with(name)).count();
-    assert_eq!(
-        (two.len(), of("b3/red/"), of("b39/red/")),
-        (4, 2, 2),
-        "{two:?}"
-    );
+    received_two_of_the_forty(&site, "two");
     site.proven_events();
+}
+
+/// The hook that writes this file received beginning and end of b3 and of b39, and nothing else.
+fn received_two_of_the_forty(site: &Site, file: &str) {
+    let lines = site.lines(file);
+    let of = |name: &str| lines.iter().filter(|line| line.starts_with(name)).count();
+    assert_eq!(
+        (lines.len(), of("b3/red/"), of("b39/red/")),
+        (4, 2, 2),
+        "{lines:?}"
+    );
 }
 
 /// A hook that fails as long as the file `works` is not there.
@@ -377,13 +382,7 @@ fn a_hook_that_a_reload_has_ask_for_some_benchmarks_receives_these_of_a_flood_th
         resolves(&site);
         eventually("both ends", || count(&site, "flaky", "resolved") == 2);
         program.stop();
-        let lines = site.lines("flaky");
-        let of = |name: &str| lines.iter().filter(|line| line.starts_with(name)).count();
-        assert_eq!(
-            (lines.len(), of("b3/red/"), of("b39/red/")),
-            (4, 2, 2),
-            "{lines:?}"
-        );
+        received_two_of_the_forty(&site, "flaky");
         site.proven_events();
     }
 }

@@ -10,16 +10,18 @@ use crate::plot::{Axis, BLUE, GREY, Legend, Mark, Panel, RED, Stack};
 const PROBABILITIES: f64 = 220.0;
 const CHANCES: f64 = 140.0;
 
-/// What a chance is of by which `level` is called, and from which on; in states of old versions it is another one.
-fn within(level: &str, called_by: Option<LevelChance>) -> String {
-    match called_by {
-        Some(by) => format!(
-            "within {:.0} h: {level} from {:.0} % (dotted)",
-            by.within_hours,
-            100.0 * by.at_least
-        ),
-        None => format!("that {level} was called by"),
-    }
+/// Within what time the chance is by which `level` is called, and from which chance on; `otherwise` where the state does not say.
+fn within(level: &str, called_by: Option<LevelChance>, otherwise: &str) -> String {
+    called_by.map_or_else(
+        || otherwise.to_owned(),
+        |by| {
+            format!(
+                "within {:.0} h: {level} from {:.0} % (dotted)",
+                by.within_hours,
+                100.0 * by.at_least
+            )
+        },
+    )
 }
 
 impl Replayed<'_> {
@@ -50,11 +52,11 @@ impl Replayed<'_> {
         let (by_red, by_orange) = called_by.unzip();
         let mut chances = vec![
             (
-                within("red", by_red),
+                within("red", by_red, "within the evacuation time"),
                 line(over_time(|refit| refit.for_red), RED, ""),
             ),
             (
-                within("orange", by_orange),
+                within("orange", by_orange, "within the outlook"),
                 line(over_time(|refit| refit.for_orange), BLUE, "6 3"),
             ),
         ];

@@ -75,10 +75,11 @@ pub(super) fn finding(hook: &HookConfig) -> Finding {
 /// Whether a message could be written there, or the folder be made.
 fn writable(folder: &Path) -> nix::Result<()> {
     // The last ancestor of a relative path is empty, and is the folder one is in.
-    let here = Path::new(".");
-    let there = folder.ancestors().find(|folder| folder.is_dir());
+    let is_here = |folder: &Path| folder.as_os_str().is_empty();
+    let each = folder.ancestors();
+    let mut each = each.map(|one| if is_here(one) { Path::new(".") } else { one });
     access(
-        there.unwrap_or(if folder.is_relative() { here } else { folder }),
+        each.find(|folder| folder.is_dir()).unwrap_or(folder),
         AccessFlags::W_OK | AccessFlags::X_OK,
     )
 }
