@@ -115,6 +115,29 @@ fn explained(family: Family, name: &str, drawn: &Drawn, refused: bool) -> Outcom
         outcome.called
     );
     if refused && !outcome.right_kind() {
+        let (of_all, given) = (&explanation.error.fit, given_the_truth(drawn));
+        let _ = writeln!(
+            std::io::stderr(),
+            "    {} readings of {:?}; left of the fit: {:?} by the plain law, {:?} as explained, {given:?} given the truth; explained {:?}, not separated {:?}",
+            drawn.truth.readings,
+            drawn.series.quantity(),
+            of_all.before,
+            of_all.after,
+            explanation.explained,
+            explanation.cannot_separate_from
+        );
+        for one in &drawn.truth.effects {
+            let _ = writeln!(
+                std::io::stderr(),
+                "    there: {} ({}) {:?}, at {:?}, size {:?}, {:.1} noises",
+                one.effect,
+                one.what,
+                one.channel,
+                one.at,
+                one.size,
+                one.rms_over_noise
+            );
+        }
         for one in &explanation.candidates {
             let _ = writeln!(
                 std::io::stderr(),
@@ -129,6 +152,14 @@ fn explained(family: Family, name: &str, drawn: &Drawn, refused: bool) -> Outcom
         }
     }
     outcome
+}
+
+/// What the fit of the law that was given the truth leaves, in the readings' unit.
+fn given_the_truth(drawn: &Drawn) -> Option<f64> {
+    let causes = score::causes(&drawn.truth)?;
+    let options = effects::Options::default();
+    let error = effects::error_given(&drawn.series, &drawn.channels, &causes, None, &options)?;
+    error.fit.after
 }
 
 fn families(names: &[String]) -> Result<Vec<Family>> {

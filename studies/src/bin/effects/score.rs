@@ -164,20 +164,22 @@ fn held_out(drawn: &Drawn, explanation: &Explanation) -> Option<f64> {
     Some(after / reference_error(drawn, from)?)
 }
 
-/// What the held-out error is measured by: that of the law given the true effects, fitted to the same readings; none where
-/// no label fits the truth.
-fn reference_error(drawn: &Drawn, from: Timestamp) -> Option<f64> {
-    let truth = &drawn.truth;
+/// The effects that are there as causes to be given to a law; none where no label fits the truth.
+pub(crate) fn causes(truth: &Truth) -> Option<Vec<Cause>> {
     let label = |one: &TrueEffect| one.effect != Kind::Unexplained;
-    if !truth.effects.iter().all(label) {
-        return None;
-    }
-    let causes = truth.effects.iter().map(|one| Cause {
+    let cause = |one: &TrueEffect| Cause {
         kind: one.effect,
         channel: one.channel.clone(),
         at: one.at,
-    });
-    let causes: Vec<Cause> = causes.collect();
+    };
+    let all = truth.effects.iter();
+    all.clone().all(label).then(|| all.map(cause).collect())
+}
+
+/// What the held-out error is measured by: that of the law given the true effects, fitted to the same readings; none where
+/// no label fits the truth.
+fn reference_error(drawn: &Drawn, from: Timestamp) -> Option<f64> {
+    let causes = causes(&drawn.truth)?;
     let (series, channels) = (&drawn.series, &drawn.channels);
     let options = Options::default();
     error_given(series, channels, &causes, Some(from), &options)?
