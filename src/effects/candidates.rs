@@ -195,6 +195,11 @@ pub(super) fn events(at: usize) -> [Term; 4] {
     })
 }
 
+/// A load of that course at the nodes, which nothing measures and no kind names.
+pub(super) fn slow(course: Vec<f64>) -> Term {
+    plain(Kind::Unexplained, Act::Load(vec![course]))
+}
+
 /// The readings at which an event is tried, evenly over the record.
 pub(super) fn event_times(problem: &Problem) -> Vec<usize> {
     let (first, end) = (EVENT_MARGIN, problem.used.saturating_sub(EVENT_MARGIN));

@@ -168,6 +168,7 @@ impl DeclaredLaw {
             accepted: Vec::new(),
             candidates: self.candidates,
             withheld: None,
+            has_slow_load: false,
         };
         let of_all = (found, verdict);
         let findings = findings(series.unit, ground, of_all, options, &mut scratch);

@@ -26,6 +26,7 @@ pub mod remarks;
 mod together;
 
 mod channels;
+mod choice;
 mod linear;
 mod noise;
 mod prior;
@@ -34,8 +35,10 @@ mod ready;
 mod refit;
 mod refits;
 mod response;
+mod rise;
 mod rival;
 mod search;
+mod slow;
 mod surrogate;
 mod term;
 mod trials;

@@ -200,7 +200,7 @@ impl<'a> Search<'a> {
     }
 
     /// The best joint fit with one more term as it is.
-    fn best_start(&mut self, base: &Fitted, term: &Term) -> Option<Fitted> {
+    pub(super) fn best_start(&mut self, base: &Fitted, term: &Term) -> Option<Fitted> {
         let (problem, bank) = (self.problem, self.bank);
         let white = [Whitener::new(problem, Noise::WHITE)];
         let mut fits: Vec<Fitted> = Vec::new();

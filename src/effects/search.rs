@@ -1,10 +1,9 @@
 //! The search: one effect after another, each refitted with the law and judged, while any earns its place.
 
 use super::candidates;
-use super::companions::{go_together, is_rain};
 use super::explanation::Candidate;
 use super::fresh::best_of_starts;
-use super::judge::{HeldOut, block, fits_any_bend, held_out, named, objection, step_errors};
+use super::judge::{HeldOut, block, fits_any_bend, held_out, objection, step_errors};
 use super::kind::Kind;
 use super::noise::Whitener;
 use super::options::Options;
@@ -71,6 +70,19 @@ pub(super) struct SearchResult {
     pub(super) candidates: Vec<Candidate>,
     /// What gains most, in the last round, of what was refused because the values are not raw readings.
     pub(super) withheld: Option<Withheld>,
+    /// Whether a load that nothing measures accounts for what is left better than any effect.
+    pub(super) has_slow_load: bool,
+}
+
+/// What was said of a candidate: its held-out error over that without it, and why it is refused.
+pub(super) type Judgement = (Option<f64>, Option<String>);
+
+/// What may be added to a law.
+pub(super) enum OneMore {
+    /// Effects, the law refitted with them.
+    Effect(Fitted, Vec<Accepted>),
+    /// No effect: a load that nothing measures, with which the law was refitted, explains more than any.
+    SlowLoad(Fitted),
 }
 
 /// A search at work.
@@ -112,7 +124,7 @@ impl Refitted {
 
     /// Whether it is a step of the load by which the velocity itself hardly jumps: all that it does is to change the pace
     /// at which the slope ages, which is a change of its friction.
-    fn hardly_jumps(&self) -> bool {
+    pub(super) fn hardly_jumps(&self) -> bool {
         let size = self.fitted.parameters.last();
         matches!(self.term.act, Act::Step) && size.is_some_and(|size| size.abs() < LEAST_JUMP)
     }
@@ -168,11 +180,14 @@ impl Search<'_> {
         let mut null = self.null(&plain)?;
         let mut full = null.clone();
         let mut accepted = Vec::new();
+        let mut has_slow_load = false;
         for round in 0..MOST_EFFECTS {
             progress(0.1 + 0.8 * round as f64 / MOST_EFFECTS as f64);
             let noted = self.candidates.clone();
-            let Some((next, how)) = self.one_more(&full, round) else {
-                break;
+            let (next, how) = match self.one_more(&full, round) {
+                Some(OneMore::Effect(next, how)) => (next, how),
+                Some(OneMore::SlowLoad(next)) => (next, Vec::new()),
+                None => break,
             };
             if let Some(better) = self.better_without(&full, &next) {
                 if accepted.is_empty() {
@@ -180,6 +195,10 @@ impl Search<'_> {
                 }
                 (full, self.candidates) = (better, noted);
                 continue;
+            }
+            has_slow_load = how.is_empty();
+            if has_slow_load {
+                break;
             }
             full = next;
             accepted.extend(how);
@@ -192,6 +211,7 @@ impl Search<'_> {
             accepted,
             candidates: self.candidates,
             withheld: self.withheld,
+            has_slow_load,
         })
     }
 
@@ -212,94 +232,8 @@ impl Search<'_> {
         nearer.unwrap_or(plain)
     }
 
-    /// The best effect that may be added to `base`, refitted with it; an event and the mean that it is seen through are
-    /// added together.
-    fn one_more(&mut self, base: &Fitted, round: usize) -> Option<(Fitted, Vec<Accepted>)> {
-        self.withheld = None;
-        let mut refitted = self.refits(base, round)?;
-        if let Some((both, how)) = self.averaged_event(base, &refitted) {
-            let (held, reason) = self.judged(base, &both);
-            let is_taken = reason.is_none();
-            for term in &both.fitted.terms[base.terms.len()..] {
-                self.note(term, &both, held, reason.clone());
-            }
-            if is_taken {
-                return Some((both.fitted, how));
-            }
-        }
-        refitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        prefer_independent_evidence(&mut refitted, self.options.bic_margin);
-        self.prefer_rain(&mut refitted);
-        let mut chosen: Option<(usize, Vec<Rival>)> = None;
-        for (k, one) in refitted.iter().enumerate() {
-            let (held, reason) = self.judged(base, one);
-            let term = one.fitted.terms.last()?;
-            if let (Some((first, ties)), None) = (&mut chosen, &reason) {
-                let best = &refitted[*first];
-                let same = best.term.kind == one.term.kind && best.term.channel == one.term.channel;
-                let is_near = one.gain > best.gain - self.options.bic_margin;
-                if !same && (is_near || go_together(&best.term, term)) {
-                    ties.push(named(term, self.drivers));
-                }
-            }
-            let taken = chosen.is_none() && reason.is_none();
-            let reason = match (&chosen, reason) {
-                (Some((first, _)), None) => Some(self.beaten_by(&refitted[*first], one)),
-                (_, reason) => reason,
-            };
-            self.note(term, one, held, reason);
-            if taken {
-                chosen = Some((k, Vec::new()));
-            }
-        }
-        let (k, ties) = chosen?;
-        let one = refitted.swap_remove(k);
-        let how = Accepted {
-            bic_gain: one.gain,
-            p_value: one.p_value,
-            ties,
-        };
-        let how = one.with_season(how, self.problem);
-        Some((one.fitted, vec![how]))
-    }
-
-    /// Among what the BIC cannot separate from the first, rain goes before what it feeds.
-    fn prefer_rain(&self, refitted: &mut [Refitted]) {
-        let Some((first, others)) = refitted.split_first() else {
-            return;
-        };
-        let leads = |one: &Refitted| {
-            let is_near = (one.gain - first.gain).abs() < self.options.bic_margin;
-            is_near && is_rain(&one.term, self.drivers) && go_together(&one.term, &first.term)
-        };
-        if !is_rain(&first.term, self.drivers)
-            && let Some(place) = others.iter().position(leads)
-        {
-            refitted[..=place + 1].rotate_right(1);
-        }
-    }
-
-    fn beaten_by(&self, best: &Refitted, one: &Refitted) -> String {
-        let name = best
-            .fitted
-            .terms
-            .last()
-            .map(|term| named(term, self.drivers).to_string());
-        let name = name.unwrap_or_default();
-        let behind = best.gain - one.gain;
-        if behind < self.options.bic_margin {
-            format!("cannot be separated from {name}: the BIC differs by {behind:.0}")
-        } else {
-            format!("{name} explains the same by {behind:.0} more of the BIC")
-        }
-    }
-
     /// Why not; `None` for what may be accepted. The held-out error with it over that without comes first.
-    pub(super) fn judged(
-        &mut self,
-        base: &Fitted,
-        one: &Refitted,
-    ) -> (Option<f64>, Option<String>) {
+    pub(super) fn judged(&mut self, base: &Fitted, one: &Refitted) -> Judgement {
         let margin = self.options.bic_margin;
         if one.gain < margin {
             let reason = format!(
@@ -322,6 +256,10 @@ impl Search<'_> {
             self.withhold(one);
             return (None, Some(NO_READINGS.to_owned()));
         }
+        if one.term.kind == Kind::Offset && self.takes_several_readings(&one.fitted) {
+            let reason = "the jump goes on over the readings beside it: motion looks the same";
+            return (None, Some(reason.to_owned()));
+        }
         // A jump, or the blur of a mean, says nothing of what comes.
         if matches!(one.term.kind, Kind::Offset | Kind::IntervalMean) {
             return (None, None);
@@ -341,7 +279,7 @@ impl Search<'_> {
     }
 
     /// The held-out error with `one` over that without, and why it is evidence against it.
-    fn held_out(&mut self, base: &Fitted, one: &Refitted) -> (Option<f64>, Option<String>) {
+    fn held_out(&mut self, base: &Fitted, one: &Refitted) -> Judgement {
         let share = self.options.held_out_share;
         if block(self.problem, &one.fitted.terms, share).is_none() {
             // A short record has none, and a step that has only just come says so by its date.
@@ -450,41 +388,4 @@ fn most_extrapolated(kind: Kind) -> f64 {
 /// Whether a covariate or known astronomy supports a kind, and not the shape of the curve alone.
 fn has_independent_evidence(kind: Kind) -> bool {
     matches!(kind, Kind::Hydrological | Kind::Thermal | Kind::Tide)
-}
-
-/// Among what the BIC cannot separate from the best, an effect that a covariate supports goes first, and then
-/// the simplest; a change of friction goes before a step of the load that hardly jumps. A covariate that follows the year goes before the bare season if it leaves the smaller error.
-fn prefer_independent_evidence(refitted: &mut [Refitted], margin: f64) {
-    let Some(best) = refitted.first().map(|one| one.gain) else {
-        return;
-    };
-    let near = refitted.partition_point(|one| one.gain > best - margin);
-    refitted[..near].sort_by(|a, b| {
-        let has_channel = |one: &Refitted| one.term.channel.is_some();
-        let simpler = a.term.parameters().total_cmp(&b.term.parameters());
-        has_channel(b)
-            .cmp(&has_channel(a))
-            .then(simpler)
-            .then(b.gain.total_cmp(&a.gain))
-    });
-    let place = |kind: Kind| refitted.iter().position(|one| one.term.kind == kind);
-    if let (Some(step), Some(friction)) = (place(Kind::LoadStep), place(Kind::FrictionChange))
-        && step < friction
-        && friction < near
-        && refitted[step].hardly_jumps()
-    {
-        refitted[step..=friction].rotate_right(1);
-    }
-    let season = refitted
-        .iter()
-        .position(|one| one.term.kind == Kind::Seasonal);
-    let follower = refitted
-        .iter()
-        .position(|one| one.follows_season && one.p_value < SIGNIFICANT);
-    if let (Some(season), Some(follower)) = (season, follower)
-        && season < follower
-        && refitted[follower].rms < refitted[season].rms
-    {
-        refitted[season..=follower].rotate_right(1);
-    }
 }

@@ -51,7 +51,8 @@ pub(super) fn conclude(
     let mut full = found.full.clone();
     let mut accepted = found.accepted.clone();
     let mut judged = Judged::of((problem, &full), bank, scratch);
-    let mut left = judged.as_ref().map_or(0.0, Judged::load_gain) > margin;
+    let load_gain = judged.as_ref().map_or(0.0, Judged::load_gain);
+    let mut left = found.has_slow_load || load_gain > margin;
     let only_labels =
         !accepted.is_empty() && full.terms.iter().all(|term| fits_any_bend(term.kind));
     let mut cannot_separate_from = Vec::new();

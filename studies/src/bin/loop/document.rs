@@ -41,8 +41,11 @@ The law is the slider block of Helmstetter et al. (2004) in one regular equation
    not in question. An effect that only the shape of the readings supports (no channel, no tide, no season) may have changed the law, and is
    judged with the law too as it was learned before the block. Extrapolated over the whole block, such an effect may not be
    worse at all, and another by a fifth at most; a tide, which comes back to where it was and cannot drift, by ten times at most:
-   the rest is the law's. Everything else is listed with the reason.
-5. Effects within the margin of each other stand under *cannot be separated from*. Structure that is left is called so. What only the
+   the rest is the law's. What is no tide and not of the reading must also account for the readings as well, within the margin, as a load
+   does that changes over a while, or comes and goes, and that nothing measures; a rise over several readings is no reset. Everything
+   else is listed with the reason.
+5. Effects within the margin of each other stand under *cannot be separated from*; of jumps of the velocity that one comes first
+   which asks less of the law by its priors. Structure that is left is called so. What only the
    shape of the readings supports must leave nothing but noise; a jump of the velocity stands beside what is left if it gains 40 or more and would
    gain less by 20 or more three readings earlier or later.
 

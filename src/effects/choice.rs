@@ -1,0 +1,214 @@
+//! Which of the refitted candidates enters the law: the best that may be accepted, unless a load that nothing measures explains more.
+
+use super::companions::{go_together, is_rain};
+use super::judge::named;
+use super::kind::Kind;
+use super::prior::Prior;
+use super::refit::Fitted;
+use super::rival::Rival;
+use super::search::{Accepted, Judgement, OneMore, Refitted, SIGNIFICANT, Search};
+
+impl Search<'_> {
+    /// The best effect that may be added to `base`, refitted with it; an event and the mean that it is seen through are
+    /// added together.
+    pub(super) fn one_more(&mut self, base: &Fitted, round: usize) -> Option<OneMore> {
+        self.withheld = None;
+        let mut refitted = self.refits(base, round)?;
+        if let Some(found) = self.averaged(base, &refitted) {
+            return Some(found);
+        }
+        refitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        prefer_independent_evidence(&mut refitted, self.options.bic_margin);
+        self.prefer_rain(&mut refitted);
+        let judged = refitted.iter().map(|one| self.judged(base, one));
+        let mut judged: Vec<Judgement> = judged.collect();
+        let first = self.first_of(&refitted, &judged);
+        let open = |judged: &[Judgement], k: usize| judged[k].1.is_none();
+        let most = (0..refitted.len()).filter(|k| open(&judged, *k));
+        let most = most.map(|k| refitted[k].gain).fold(f64::MIN, f64::max);
+        let slower = first.and_then(|k| self.slower(base, refitted[k].term.kind, most));
+        if let Some((_, reason)) = &slower {
+            for one in judged.iter_mut().filter(|one| one.1.is_none()) {
+                one.1 = Some(reason.clone());
+            }
+        }
+        let chosen = first.filter(|_| slower.is_none());
+        let ties = chosen.map(|k| self.ties((&refitted, k), &judged));
+        for (k, one) in refitted.iter().enumerate() {
+            let (held, reason) = judged[k].clone();
+            let beaten = chosen.filter(|first| *first != k && reason.is_none());
+            let reason = beaten.map_or(reason, |first| Some(self.beaten_by(&refitted[first], one)));
+            let term = one.fitted.terms.last()?;
+            self.note(term, one, held, reason);
+        }
+        if let Some((found, _)) = slower {
+            return Some(found);
+        }
+        let one = refitted.swap_remove(chosen?);
+        let how = Accepted {
+            bic_gain: one.gain,
+            p_value: one.p_value,
+            ties: ties.unwrap_or_default(),
+        };
+        let how = one.with_season(how, self.problem);
+        Some(OneMore::Effect(one.fitted, vec![how]))
+    }
+
+    /// The first that may be accepted. Of jumps of the velocity that the BIC cannot separate, that one which asks less of the law:
+    /// which parameters are likely before any reading is part of what the fit goes by.
+    fn first_of(&self, refitted: &[Refitted], judged: &[Judgement]) -> Option<usize> {
+        let first = judged.iter().position(|one| one.1.is_none())?;
+        let best = &refitted[first];
+        if !best.term.kind.jumps() {
+            return Some(first);
+        }
+        let score = |k: usize| {
+            let fitted = &refitted[k].fitted;
+            let prior = Prior::of(self.problem, &fitted.terms);
+            refitted[k].gain - prior.misfit(&fitted.parameters)
+        };
+        let rivals = (0..refitted.len()).filter(|k| {
+            let one = &refitted[*k];
+            let is_near = (one.gain - best.gain).abs() < self.options.bic_margin;
+            judged[*k].1.is_none() && is_near && one.term.kind.jumps()
+        });
+        rivals.max_by(|a, b| score(*a).total_cmp(&score(*b)))
+    }
+
+    /// An event and the mean that it is seen through, where both together may be accepted.
+    fn averaged(&mut self, base: &Fitted, refitted: &[Refitted]) -> Option<OneMore> {
+        let (both, how) = self.averaged_event(base, refitted)?;
+        let (held, reason) = self.judged(base, &both);
+        let is_taken = reason.is_none();
+        let slower = if is_taken {
+            self.slower(base, both.term.kind, both.gain)
+        } else {
+            None
+        };
+        let reason = slower
+            .as_ref()
+            .map_or(reason, |slower| Some(slower.1.clone()));
+        for term in &both.fitted.terms[base.terms.len()..] {
+            self.note(term, &both, held, reason.clone());
+        }
+        match slower {
+            Some((found, _)) => Some(found),
+            None => is_taken.then_some(OneMore::Effect(both.fitted, how)),
+        }
+    }
+
+    /// The slow load that explains more by the margin than an effect of that kind, or any other, which gain `most`, with why
+    /// they are refused for it; `None` where there is none.
+    fn slower(&mut self, base: &Fitted, kind: Kind, most: f64) -> Option<(OneMore, String)> {
+        // A jump of the reading, or its temperature, is no load, and nothing slow comes and goes with the moon.
+        if matches!(kind, Kind::Offset | Kind::Thermal | Kind::Tide) {
+            return None;
+        }
+        let slow = self.slow_load(base)?;
+        let more = slow.gain - most;
+        let wins = more >= self.options.bic_margin;
+        let of_itself = if wins {
+            "nothing that was tried acts so: the load itself is not explained".to_owned()
+        } else {
+            format!(
+                "an effect that was tried explains the same by {:.0} more of the BIC",
+                -more
+            )
+        };
+        self.note_slow(&slow, of_itself);
+        wins.then(|| {
+            let reason = format!(
+                "a load that changes over a while, and that nothing measures, explains the same by {more:.0} more of the BIC"
+            );
+            (OneMore::SlowLoad(slow.fitted), reason)
+        })
+    }
+
+    /// What may be accepted as well and cannot be separated from the one of that index.
+    fn ties(&self, (refitted, first): (&[Refitted], usize), judged: &[Judgement]) -> Vec<Rival> {
+        let best = &refitted[first];
+        let each = refitted.iter().zip(judged).enumerate();
+        let others = each.filter(|(k, (_, judged))| *k != first && judged.1.is_none());
+        let mut ties = Vec::new();
+        for (_, (one, _)) in others {
+            let Some(term) = one.fitted.terms.last() else {
+                continue;
+            };
+            let same = best.term.kind == one.term.kind && best.term.channel == one.term.channel;
+            let is_near = one.gain > best.gain - self.options.bic_margin;
+            if !same && (is_near || go_together(&best.term, term)) {
+                ties.push(named(term, self.drivers));
+            }
+        }
+        ties
+    }
+
+    /// Among what the BIC cannot separate from the first, rain goes before what it feeds.
+    fn prefer_rain(&self, refitted: &mut [Refitted]) {
+        let Some((first, others)) = refitted.split_first() else {
+            return;
+        };
+        let leads = |one: &Refitted| {
+            let is_near = (one.gain - first.gain).abs() < self.options.bic_margin;
+            is_near && is_rain(&one.term, self.drivers) && go_together(&one.term, &first.term)
+        };
+        if !is_rain(&first.term, self.drivers)
+            && let Some(place) = others.iter().position(leads)
+        {
+            refitted[..=place + 1].rotate_right(1);
+        }
+    }
+
+    fn beaten_by(&self, best: &Refitted, one: &Refitted) -> String {
+        let name = best
+            .fitted
+            .terms
+            .last()
+            .map(|term| named(term, self.drivers).to_string());
+        let name = name.unwrap_or_default();
+        let behind = best.gain - one.gain;
+        if behind < self.options.bic_margin {
+            let behind = behind.abs();
+            format!("cannot be separated from {name}: the BIC differs by {behind:.0}")
+        } else {
+            format!("{name} explains the same by {behind:.0} more of the BIC")
+        }
+    }
+}
+
+/// Among what the BIC cannot separate from the best, an effect that a covariate supports goes first, and then
+/// the simplest; a change of friction goes before a step of the load that hardly jumps. A covariate that follows the year goes before the bare season if it leaves the smaller error.
+fn prefer_independent_evidence(refitted: &mut [Refitted], margin: f64) {
+    let Some(best) = refitted.first().map(|one| one.gain) else {
+        return;
+    };
+    let near = refitted.partition_point(|one| one.gain > best - margin);
+    refitted[..near].sort_by(|a, b| {
+        let has_channel = |one: &Refitted| one.term.channel.is_some();
+        let simpler = a.term.parameters().total_cmp(&b.term.parameters());
+        has_channel(b)
+            .cmp(&has_channel(a))
+            .then(simpler)
+            .then(b.gain.total_cmp(&a.gain))
+    });
+    let place = |kind: Kind| refitted.iter().position(|one| one.term.kind == kind);
+    if let (Some(step), Some(friction)) = (place(Kind::LoadStep), place(Kind::FrictionChange))
+        && step < friction
+        && friction < near
+        && refitted[step].hardly_jumps()
+    {
+        refitted[step..=friction].rotate_right(1);
+    }
+    let season = refitted
+        .iter()
+        .position(|one| one.term.kind == Kind::Seasonal);
+    let follower = refitted
+        .iter()
+        .position(|one| one.follows_season && one.p_value < SIGNIFICANT);
+    if let (Some(season), Some(follower)) = (season, follower)
+        && season < follower
+        && refitted[follower].rms < refitted[season].rms
+    {
+        refitted[season..=follower].rotate_right(1);
+    }
+}
