@@ -16,7 +16,7 @@ use super::truth::{TrueLaw, TrueNoise, Truth};
 use super::{ground, instrument};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
-use slipwatch::effects::Kind;
+use slipwatch::effects::{self, Kind};
 use slipwatch::fit::{ConstantLoad, Exponent, PointReadings};
 use slipwatch::reading::{Channel, Quantity, Sample, Series};
 
@@ -138,6 +138,9 @@ fn attempt(rng: &mut Pcg64, family: Family, recipe: &Recipe) -> Option<Drawn> {
         Place::SlopeEffect(_) => None,
     });
     let (series, prediction) = slope.read(rng, instruments.chain(&background))?;
+    if !plan.slope_effects().is_empty() && !shows(&slope, &series, &prediction) {
+        return None;
+    }
     let (neighbours, groups) = read::neighbours(rng, &slope, plan.has(Kind::Partition))?;
     let truth = truth(family, &scene, plan, (&slope, background.as_ref()));
     let mut drawn = Drawn {
@@ -231,6 +234,22 @@ fn noise(
         }
     }
     (noise > least && noise < most).then_some(noise)
+}
+
+/// Whether the plain law leaves as much of the readings without noise as the weakest effect must show, fitted by the second of the
+/// program's searches too: where the first ends in a poor law, an effect seems to show that the better law accounts for.
+fn shows(slope: &Slope, series: &Series, prediction: &[f64]) -> bool {
+    let mut noiseless = series.clone();
+    for (reading, value) in noiseless.readings.iter_mut().zip(prediction) {
+        reading.value = *value;
+    }
+    let left = effects::error_given(&noiseless, &[], &[], None, &effects::Options::default());
+    let noise = match slope.scene.quantity {
+        Quantity::Displacement => slope.noise,
+        Quantity::Velocity => slope.noise * root_mean_square(prediction),
+    };
+    left.and_then(|error| error.fit.before)
+        .is_some_and(|left| left >= SHOWS.0 * noise)
 }
 
 /// How many mm the slope slips where its path slips 1.

@@ -27,7 +27,7 @@ naming is not counted), and one to four covariates of which at most one or two h
 four has one to three benchmarks beside it that move in proportion. The effect stands inside the law. A series is drawn again
 until the slope outlives the record, its velocity spans less than a factor of 300, and each effect inside the law shows: what the
 best constant-load law leaves of the noiseless motion with that effect alone has an rms of 3 to 30 times the noise
-(log-uniform, for the weakest effect). That says that an effect can be seen, not that it can be distinguished from others. Offsets are 8
+(log-uniform, for the weakest effect), and the plain law of `explain`, a second search for it, leaves 3 times the noise too. That says that an effect can be seen, not that it can be distinguished from others. Offsets are 8
 to 40 noises, temperature's part of the reading 3 to 12, an AR(1) 1.5 to 4 times the white noise, a random walk's step 0.3
 to 1 of it; means over an interval stand over steps of the load or the last rise before a failure. `outside` has a
 ramp, a pulse, a random walk or a chirp of the load, or a driver whose channel is not given.
