@@ -27,7 +27,7 @@ const SHAPE: f64 = 2.0;
 
 /// How it goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Shape {
+enum SlowShape {
     /// From nothing to a new level.
     Ramp,
     /// As a bell does, up and down again.
@@ -37,7 +37,7 @@ enum Shape {
 /// One such load; days since the first node.
 #[derive(Debug, Clone, Copy)]
 struct SlowLoad {
-    shape: Shape,
+    shape: SlowShape,
     /// When a ramp begins, or the middle of a pulse.
     at: f64,
     /// The ramp's length, or the pulse's standard deviation.
@@ -56,8 +56,8 @@ pub(super) struct SlowFit {
 impl SlowLoad {
     fn each(problem: &Problem) -> Vec<Self> {
         let (first, span) = (problem.t[0], problem.span());
-        let ramps = RAMPS.map(|share| (Shape::Ramp, share));
-        let pulses = PULSES.map(|share| (Shape::Pulse, share));
+        let ramps = RAMPS.map(|share| (SlowShape::Ramp, share));
+        let pulses = PULSES.map(|share| (SlowShape::Pulse, share));
         let mut all = Vec::new();
         for (shape, share) in ramps.into_iter().chain(pulses) {
             for place in 0..PLACES {
@@ -74,8 +74,8 @@ impl SlowLoad {
     fn is_within(&self, problem: &Problem) -> bool {
         let (first, last, span) = (problem.t[0], problem.t[problem.used - 1], problem.span());
         let (shortest, end) = match self.shape {
-            Shape::Ramp => (SHORTEST_RAMP, self.at + 0.5 * self.days),
-            Shape::Pulse => (SHORTEST_PULSE, self.at),
+            SlowShape::Ramp => (SHORTEST_RAMP, self.at + 0.5 * self.days),
+            SlowShape::Pulse => (SHORTEST_PULSE, self.at),
         };
         self.at >= first && end <= last && self.days >= shortest * span && self.days <= span
     }
@@ -84,8 +84,8 @@ impl SlowLoad {
         let of = |t: &f64| {
             let passed = (t - self.at) / self.days;
             match self.shape {
-                Shape::Ramp => passed.clamp(0.0, 1.0),
-                Shape::Pulse => (-0.5 * passed * passed).exp(),
+                SlowShape::Ramp => passed.clamp(0.0, 1.0),
+                SlowShape::Pulse => (-0.5 * passed * passed).exp(),
             }
         };
         slow(problem.nodes.iter().map(of).collect())
@@ -123,7 +123,7 @@ impl Search<'_> {
             .frames
             .deviance_with_each(&columns.collect::<Vec<_>>());
         let mut best: Option<SlowFit> = None;
-        for shape in [Shape::Ramp, Shape::Pulse] {
+        for shape in [SlowShape::Ramp, SlowShape::Pulse] {
             let own = all.iter().zip(&deviances);
             let own = own.filter(|(one, _)| one.shape == shape);
             let Some((load, _)) = own.min_by(|a, b| a.1.total_cmp(b.1)) else {
@@ -186,8 +186,8 @@ impl Search<'_> {
     /// Writes down that a slow load was tried, and what it came to.
     pub(super) fn note_slow(&mut self, slow: &SlowFit, reason: String) {
         let begins = match slow.load.shape {
-            Shape::Ramp => slow.load.at,
-            Shape::Pulse => slow.load.at - slow.load.days,
+            SlowShape::Ramp => slow.load.at,
+            SlowShape::Pulse => slow.load.at - slow.load.days,
         };
         self.candidates
             .retain(|old| old.effect != Kind::Unexplained);
