@@ -7,6 +7,7 @@ use super::prior::Prior;
 use super::refit::Fitted;
 use super::rival::Rival;
 use super::search::{Accepted, Judgement, OneMore, Refitted, SIGNIFICANT, Search};
+use super::slow::SlowFit;
 
 impl Search<'_> {
     /// The best effect that may be added to `base`, refitted with it; an event and the mean that it is seen through are
@@ -26,7 +27,7 @@ impl Search<'_> {
         let open = |judged: &[Judgement], k: usize| judged[k].1.is_none();
         let most = (0..refitted.len()).filter(|k| open(&judged, *k));
         let most = most.map(|k| refitted[k].gain).fold(f64::MIN, f64::max);
-        let slower = first.and_then(|k| self.slower(base, refitted[k].term.kind, most));
+        let slower = first.and_then(|k| self.slower(base, &refitted[k], most));
         if let Some((_, reason)) = &slower {
             for one in judged.iter_mut().filter(|one| one.1.is_none()) {
                 one.1 = Some(reason.clone());
@@ -81,7 +82,7 @@ impl Search<'_> {
         let (held, reason) = self.judged(base, &both);
         let is_taken = reason.is_none();
         let slower = if is_taken {
-            self.slower(base, both.term.kind, both.gain)
+            self.slower(base, &both, both.gain)
         } else {
             None
         };
@@ -97,31 +98,58 @@ impl Search<'_> {
         }
     }
 
-    /// The slow load that explains more by the margin than an effect of that kind, or any other, which gain `most`, with why
-    /// they are refused for it; `None` where there is none.
-    fn slower(&mut self, base: &Fitted, kind: Kind, most: f64) -> Option<(OneMore, String)> {
+    /// What enters, or ends the search, in place of effects that gain `most`, the first of them being `one`, with why they are refused:
+    /// a slow load that explains more by the margin, or an event that does as well as it. `None` where there is no such load.
+    fn slower(&mut self, base: &Fitted, one: &Refitted, most: f64) -> Option<(OneMore, String)> {
         // A jump of the reading, or its temperature, is no load, and nothing slow comes and goes with the moon.
-        if matches!(kind, Kind::Offset | Kind::Thermal | Kind::Tide) {
+        if matches!(one.term.kind, Kind::Offset | Kind::Thermal | Kind::Tide) {
             return None;
         }
         let slow = self.slow_load(base)?;
         let more = slow.gain - most;
-        let wins = more >= self.options.bic_margin;
-        let of_itself = if wins {
-            "nothing that was tried acts so: the load itself is not explained".to_owned()
-        } else {
-            format!(
-                "an effect that was tried explains the same by {:.0} more of the BIC",
-                -more
-            )
-        };
-        self.note_slow(&slow, of_itself);
-        wins.then(|| {
-            let reason = format!(
-                "a load that changes over a while, and that nothing measures, explains the same by {more:.0} more of the BIC"
+        if more < self.options.bic_margin {
+            let less = -more;
+            self.note_slow(
+                &slow,
+                format!("an effect that was tried explains the same by {less:.0} more of the BIC"),
             );
-            (OneMore::SlowLoad(slow.fitted), reason)
-        })
+            return None;
+        }
+        if let Some(found) = self.event_after_all(base, &slow, one.p_value) {
+            return Some(found);
+        }
+        self.note_slow(
+            &slow,
+            "nothing that was tried acts so: the load itself is not explained".to_owned(),
+        );
+        let reason = format!(
+            "a load that changes over a while, and that nothing measures, explains the same by {more:.0} more of the BIC"
+        );
+        Some((OneMore::SlowLoad(slow.fitted), reason))
+    }
+
+    /// The event that accounts for the readings as well as the slow load, where it may be accepted; it gains more than what had this
+    /// p-value.
+    fn event_after_all(
+        &mut self,
+        base: &Fitted,
+        slow: &SlowFit,
+        p_value: f64,
+    ) -> Option<(OneMore, String)> {
+        let (one, ties) = self.event_instead(base, slow)?;
+        let one = Refitted { p_value, ..one };
+        let (held, reason) = self.judged(base, &one);
+        if reason.is_some() {
+            return None;
+        }
+        self.note(&one.term, &one, held, None);
+        let how = Accepted {
+            bic_gain: one.gain,
+            p_value,
+            ties,
+        };
+        let reason = format!("{} from a better law explains more", one.term.kind);
+        Some((OneMore::Effect(one.fitted, vec![how]), reason))
     }
 
     /// What may be accepted as well and cannot be separated from the one of that index.

@@ -226,7 +226,7 @@ impl<'a> Search<'a> {
     }
 
     /// Refines the newest term's shape, and fits once more under every noise model.
-    fn sharpen(&mut self, fitted: &mut Fitted) {
+    pub(super) fn sharpen(&mut self, fitted: &mut Fitted) {
         for stride in STRIDES {
             self.refine(fitted, stride);
         }

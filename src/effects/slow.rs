@@ -2,13 +2,14 @@
 //! a load that answers to the motion, or a covariate follows such a load part of the way and gains much by it; so what is
 //! accepted of them must account for the readings as well as the slow load does.
 
-use super::candidates::slow;
+use super::candidates::{events, slow};
 use super::explanation::Candidate;
 use super::kind::Kind;
 use super::noise::Whitener;
 use super::problem::Problem;
-use super::refit::{Fitted, Start, refit};
-use super::search::Search;
+use super::refit::{Fitted, Start, likeliest, refit};
+use super::rival::Rival;
+use super::search::{Refitted, Search};
 use super::term::Term;
 use crate::reading::after_days;
 
@@ -91,6 +92,19 @@ impl SlowLoad {
         slow(problem.nodes.iter().map(of).collect())
     }
 
+    /// When it begins to change, when it changes most or turns, and when it ends.
+    fn turns(&self) -> [f64; 3] {
+        let first = match self.shape {
+            SlowShape::Ramp => self.at,
+            SlowShape::Pulse => self.at - self.days,
+        };
+        let step = match self.shape {
+            SlowShape::Ramp => 0.5 * self.days,
+            SlowShape::Pulse => self.days,
+        };
+        [first, first + step, first + 2.0 * step]
+    }
+
     /// Longer, shorter, later and earlier by a share of its length.
     fn beside(&self, stride: f64) -> [Self; 4] {
         let longer = |factor: f64| Self {
@@ -160,6 +174,68 @@ impl Search<'_> {
         })
     }
 
+    /// The likeliest event about where the slow load changes, found from the law that was found with that load, and the kinds that do as
+    /// well: beside a poor law an event seldom finds its place, and the slow load stands for it. `None` where none
+    /// comes within the margin of the load.
+    pub(super) fn event_instead(
+        &mut self,
+        base: &Fitted,
+        slow: &SlowFit,
+    ) -> Option<(Refitted, Vec<Rival>)> {
+        let (problem, margin) = (self.problem, self.options.bic_margin);
+        let mut each: Vec<Fitted> = Vec::new();
+        for kind in [Kind::LoadStep, Kind::StateReset, Kind::FrictionChange] {
+            let nearest = self.event_from(slow, kind);
+            each.extend(nearest.map(|mut fitted| {
+                self.sharpen(&mut fitted);
+                fitted
+            }));
+        }
+        each.sort_by(|a, b| a.bic(problem).total_cmp(&b.bic(problem)));
+        let fitted = each.first()?.clone();
+        let gain = base.bic(problem) - fitted.bic(problem);
+        let near = each.iter().skip(1);
+        let near = near.filter(|other| other.bic(problem) < fitted.bic(problem) + margin);
+        let kinds = near.filter_map(|other| Some(Rival::from(other.terms.last()?.kind)));
+        let ties = kinds.collect();
+        let one = Refitted {
+            term: fitted.terms.last()?.clone(),
+            fitted,
+            rms: f64::INFINITY,
+            follows_season: false,
+            gain,
+            p_value: 1.0,
+        };
+        (gain > slow.gain - margin).then_some((one, ties))
+    }
+
+    /// The likeliest event of that kind at one of the turns of the slow load, in place of it.
+    fn event_from(&mut self, slow: &SlowFit, kind: Kind) -> Option<Fitted> {
+        let problem = self.problem;
+        let mut law = Start::at(&slow.fitted);
+        law.terms.pop();
+        let size = law.parameters.pop()?;
+        let mut fits: Vec<Fitted> = Vec::new();
+        for day in slow.load.turns() {
+            let at = problem.t.partition_point(|t| *t < day);
+            if at < 2 || at + 2 >= problem.used {
+                continue;
+            }
+            for term in events(at).iter().filter(|term| term.kind == kind) {
+                let first = if kind == Kind::LoadStep {
+                    size
+                } else if kind == Kind::StateReset {
+                    -size
+                } else {
+                    term.starts()[0]
+                };
+                let start = law.clone().with_size(term, first);
+                fits.extend(refit(problem, &start, self.bank, &mut self.scratch));
+            }
+        }
+        likeliest(problem, fits.into_iter())
+    }
+
     /// The best of the loads one stride away, where it is better.
     fn nearer_load(
         &mut self,
@@ -185,10 +261,7 @@ impl Search<'_> {
 
     /// Writes down that a slow load was tried, and what it came to.
     pub(super) fn note_slow(&mut self, slow: &SlowFit, reason: String) {
-        let begins = match slow.load.shape {
-            SlowShape::Ramp => slow.load.at,
-            SlowShape::Pulse => slow.load.at - slow.load.days,
-        };
+        let [begins, _, _] = slow.load.turns();
         self.candidates
             .retain(|old| old.effect != Kind::Unexplained);
         self.candidates.push(Candidate {
