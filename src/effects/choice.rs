@@ -1,7 +1,7 @@
 //! Which of the refitted candidates enters the law: the best that may be accepted, unless a load that nothing measures explains more.
 
 use super::companions::{go_together, is_rain};
-use super::judge::named;
+use super::judge::{block, named};
 use super::kind::Kind;
 use super::prior::Prior;
 use super::refit::Fitted;
@@ -105,6 +105,9 @@ impl Search<'_> {
         if matches!(one.term.kind, Kind::Offset | Kind::Thermal | Kind::Tide) {
             return None;
         }
+        // What has only just come says so by its date: whether it came at once or over a while nothing after it shows.
+        let share = self.options.held_out_share;
+        block(self.problem, &one.fitted.terms, share)?;
         let slow = self.slow_load(base)?;
         let more = slow.gain - most;
         if more < self.options.bic_margin {

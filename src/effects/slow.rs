@@ -18,9 +18,9 @@ const PLACES: usize = 24;
 /// Lengths of ramps, and standard deviations of pulses, as shares of the record.
 const RAMPS: [f64; 5] = [0.08, 0.15, 0.25, 0.4, 0.6];
 const PULSES: [f64; 4] = [0.025, 0.05, 0.1, 0.2];
-/// What is shorter is an event.
-const SHORTEST_RAMP: f64 = 0.06;
-const SHORTEST_PULSE: f64 = 0.02;
+/// What is shorter, as a share of the record or in readings, is an event, or not seen to be none.
+const SHORTEST_RAMP: (f64, f64) = (0.06, 8.0);
+const SHORTEST_PULSE: (f64, f64) = (0.02, 3.0);
 /// By what factor the length, and by what share of it the place, is moved at once.
 const STRIDES: [f64; 3] = [0.5, 0.2, 0.07];
 /// What its place and its length cost beside its size.
@@ -78,7 +78,8 @@ impl SlowLoad {
             SlowShape::Ramp => (SHORTEST_RAMP, self.at + 0.5 * self.days),
             SlowShape::Pulse => (SHORTEST_PULSE, self.at),
         };
-        self.at >= first && end <= last && self.days >= shortest * span && self.days <= span
+        let shortest = (shortest.0 * span).max(shortest.1 * problem.spacing);
+        self.at >= first && end <= last && self.days >= shortest && self.days <= span
     }
 
     fn term(&self, problem: &Problem) -> Term {
