@@ -26,6 +26,7 @@ mod search;
 mod sensor;
 mod silence;
 mod site;
+mod spoilt;
 mod suspect;
 mod tally;
 mod together;

@@ -70,12 +70,8 @@ impl Silence {
         self.silent
     }
 
-    /// The usual spacing; `None` while it is unknown.
-    pub(super) fn usual(&self) -> Option<SignedDuration> {
-        (self.spacings.len() >= 3).then(|| self.median())?
-    }
-
-    fn median(&self) -> Option<SignedDuration> {
+    /// The usual spacing as far as it is known: from two readings on.
+    pub(super) fn median(&self) -> Option<SignedDuration> {
         let mut sorted: Vec<SignedDuration> = self.spacings.iter().copied().collect();
         sorted.sort_unstable();
         sorted.get(sorted.len() / 2).copied()

@@ -1,4 +1,4 @@
-//! What the readings of one benchmark show of the sensor itself: that it stands still, jumps back and forth, or has no clock.
+//! What the readings of one benchmark show of the sensor itself: that it stands still, or has no clock.
 
 use super::history::History;
 use crate::fit::Observation;
@@ -15,21 +15,15 @@ const COARSE: f64 = 0.1;
 /// The chance under which as many equal readings are no chance.
 const NO_CHANCE: f64 = 1e-6;
 
-/// Readings that stand at the end of a sensor's range, as many as are examined; and those of the motion before them.
-const STANDING: usize = 6;
+/// How many of the newest readings are examined for standing at the end of a sensor's range, and the fewest of the motion before
+/// them: as many as stand, where there are so many.
+const STANDING: [usize; 4] = [6, 12, 24, 48];
 const MOVING: usize = 4;
-/// They lie within this share of what the motion before them would have made of their time.
-const JITTER: f64 = 0.005;
-
-/// The readings that are examined for spikes.
-const INSPECTED: RangeInclusive<usize> = 18..=36;
-/// A spike stands out by so many times what its neighbours differ by,
-const SPIKE: f64 = 20.0;
-/// and by so many steps of the sensor's resolution.
-const STEPS: f64 = 20.0;
-/// The share of spikes from which on the readings are spoilt, and the least number of them. Of noise alone 3 % are.
-const SPOILT: f64 = 0.26;
-const FEWEST_SPIKES: usize = 5;
+/// They lie within this share of what the motion before them would have made in their time. Readings at the top of a daily wave
+/// lie within a sixth.
+const JITTER: f64 = 0.1;
+/// They have no trend of so many standard errors.
+const TREND: f64 = 3.0;
 
 /// Days on which the clocks of loggers and receivers start when nobody has set them.
 const FIRST_DAYS: [(i16, i8, i8); 5] = [
@@ -67,36 +61,38 @@ impl History {
         is_stuck.then(|| Some((count, self.time(values[first].t_days)?)))?
     }
 
-    /// Whether the newest readings stand, but for a jitter, farther than any before them, while those just before them
-    /// moved there, two hundred times as far in the same time or more: how many, the time of the first, and between which values.
+    /// Whether the newest readings stand, but for a jitter, where those just before them moved to, ten times as far in the same
+    /// time or more: how many, the time of the first, and between which values.
     ///
     /// A slope that slows down has readings in between.
     pub(super) fn stands_at_the_end(&self) -> Option<(usize, Timestamp, (f64, f64))> {
+        STANDING.iter().find_map(|count| self.stands_for(*count))
+    }
+
+    fn stands_for(&self, count: usize) -> Option<(usize, Timestamp, (f64, f64))> {
         let values = &self.observations.values;
-        let first = values.len().checked_sub(STANDING)?;
-        let (before, standing) = values.split_at(first);
-        let moving = &before[before.len().checked_sub(MOVING)?..];
-        let velocity = |pair: &[Observation]| {
-            (pair[1].value - pair[0].value) / (pair[1].t_days - pair[0].t_days)
-        };
-        let velocities = || moving.windows(2).map(velocity);
-        let slowest = velocities().map(f64::abs).fold(f64::INFINITY, f64::min);
-        let is_upwards = velocities().all(|velocity| velocity > 0.0);
-        let is_downwards = velocities().all(|velocity| velocity < 0.0);
-        let span = standing[STANDING - 1].t_days - standing[0].t_days;
-        let extent = |of: &[Observation]| {
-            let values = || of.iter().map(|one| one.value);
-            (
-                values().fold(f64::INFINITY, f64::min),
-                values().fold(f64::NEG_INFINITY, f64::max),
-            )
-        };
+        let (before, standing) = values.split_at(values.len().checked_sub(count)?);
+        let moving = &before[before.len().saturating_sub(count)..];
+        if moving.len() < MOVING {
+            return None;
+        }
+        let slower = mean_velocity(moving).abs();
+        let slower = slower.min(mean_velocity(&moving[moving.len() / 2 - 1..]).abs());
+        let is_upwards = mean_velocity(moving) > 0.0;
+        let span = standing[count - 1].t_days - standing[0].t_days;
         let ((low, high), (lowest, highest)) = (extent(standing), extent(before));
-        let is_beyond = is_upwards && low >= highest || is_downwards && high <= lowest;
         let jitter = high - low;
-        let stands = is_beyond && jitter > 0.0 && jitter <= JITTER * slowest * span;
+        let is_beyond = if is_upwards {
+            low + jitter >= highest
+        } else {
+            high - jitter <= lowest
+        };
+        let stands = is_beyond
+            && jitter > 0.0
+            && jitter <= JITTER * slower * span
+            && goes_to_and_fro(standing);
         let around = (low - jitter, high + jitter);
-        stands.then(|| Some((STANDING, self.time(standing[0].t_days)?, around)))?
+        stands.then(|| Some((count, self.time(standing[0].t_days)?, around)))?
     }
 
     /// Whether a reading of this value, as the monitor takes it, repeats the newest one.
@@ -112,41 +108,6 @@ impl History {
     pub(super) fn forget_repeats(&mut self, count: usize) {
         let kept = self.observations.values.len() + 1 - count.max(1);
         self.observations.values.truncate(kept);
-    }
-
-    /// Whether many of the newest readings lie far off both neighbours, which agree: by how much, in the middle.
-    ///
-    /// Where they were spoilt `before`, by so much, they are so until no more than a few lie a third of that off both
-    /// neighbours: on a slope that grows fast the neighbours differ as well.
-    pub(super) fn spoilt(&self, before: Option<f64>) -> Option<f64> {
-        let values = &self.observations.values;
-        let latest = &values[values.len().saturating_sub(*INSPECTED.end())..];
-        if latest.len() < *INSPECTED.start() {
-            return before;
-        }
-        let step = resolution(latest);
-        let size_of = |three: &[Observation]| {
-            let (rise, fall) = (
-                three[1].value - three[0].value,
-                three[2].value - three[1].value,
-            );
-            let size = rise.abs().min(fall.abs());
-            let stands_out = match before {
-                Some(before) => size > before / 3.0,
-                None => size > SPIKE * (rise + fall).abs() && size > STEPS * step,
-            };
-            (rise * fall < 0.0 && stands_out).then_some(size)
-        };
-        let mut sizes: Vec<f64> = latest.windows(3).filter_map(size_of).collect();
-        sizes.sort_by(f64::total_cmp);
-        let least = (SPOILT * (latest.len() - 2) as f64).max(FEWEST_SPIKES as f64);
-        let least = if before.is_some() { 0.5 * least } else { least };
-        let middle = sizes.get(sizes.len() / 2).copied();
-        if sizes.len() as f64 >= least {
-            before.or(middle)
-        } else {
-            None
-        }
     }
 
     /// Takes out the readings at the beginning that lie on a day on which unset clocks start, far from all others:
@@ -179,14 +140,42 @@ fn are_equal(one: &Observation, other: &Observation) -> bool {
     one.value.to_bits() == other.value.to_bits()
 }
 
-/// The least that a reading differs by from one of the next two, where it does.
-fn resolution(values: &[Observation]) -> f64 {
-    let next = values.windows(2).map(|pair| pair[1].value - pair[0].value);
-    let after = values
-        .windows(3)
-        .map(|three| three[2].value - three[0].value);
-    let steps = next.chain(after).map(f64::abs).filter(|step| *step > 0.0);
-    steps.fold(f64::INFINITY, f64::min)
+/// From the first of `values` to the last, a day.
+fn mean_velocity(values: &[Observation]) -> f64 {
+    match values {
+        [first, .., last] => (last.value - first.value) / (last.t_days - first.t_days),
+        _ => 0.0,
+    }
+}
+
+/// The lowest and the highest of `values`.
+fn extent(values: &[Observation]) -> (f64, f64) {
+    let each = || values.iter().map(|one| one.value);
+    (
+        each().fold(f64::INFINITY, f64::min),
+        each().fold(f64::NEG_INFINITY, f64::max),
+    )
+}
+
+/// Whether `values` go both ways, without a trend of [`TREND`] standard errors.
+fn goes_to_and_fro(values: &[Observation]) -> bool {
+    let (mut is_rising, mut is_falling) = (true, true);
+    for pair in values.windows(2) {
+        is_rising &= pair[1].value >= pair[0].value;
+        is_falling &= pair[1].value <= pair[0].value;
+    }
+    let count = values.len() as f64;
+    let mean = |of: fn(&Observation) -> f64| values.iter().map(of).sum::<f64>() / count;
+    let (middle, level) = (mean(|one| one.t_days), mean(|one| one.value));
+    let sum = |of: &dyn Fn(f64, f64) -> f64| {
+        let each = values.iter();
+        each.map(|one| of(one.t_days - middle, one.value - level))
+            .sum::<f64>()
+    };
+    let spread = sum(&|days, _| days * days);
+    let slope = sum(&|days, value| days * value) / spread;
+    let scatter = sum(&|days, value| (value - slope * days).powi(2)) / (count - 2.0);
+    !is_rising && !is_falling && slope * slope * spread <= TREND * TREND * scatter
 }
 
 fn is_first_day(time: Timestamp) -> bool {
@@ -207,6 +196,7 @@ mod tests {
     use super::*;
     use crate::reading::{Reading, Unit};
     use jiff::ToSpan;
+    use std::f64::consts::TAU;
 
     fn history(values: impl IntoIterator<Item = f64>) -> History {
         let start: Timestamp = "2020-01-01T00:00:00Z".parse().unwrap();
@@ -263,6 +253,27 @@ mod tests {
                 .map(|value| -value),
         );
         assert!(downwards.stands_at_the_end().is_some());
+        // Ten millimetres a day each hour, and each ten minutes: what one interval moves is the noise.
+        for (step, jitter, stand) in [(0.42, 0.1, 6..=12), (0.07, 0.04, 6..=48)] {
+            let moving = move |hour: u32| f64::from(hour) * step + jitter * noise(hour);
+            let end = move |hour: u32| 60.0 * step + jitter * (0.5 + noise(hour));
+            let all = |count: usize| (0..60).map(moving).chain((60..).map(end)).take(60 + count);
+            let found = (1..=48).find(|count| history(all(*count)).stands_at_the_end().is_some());
+            assert!(
+                found.is_some_and(|count| stand.contains(&count)),
+                "{found:?}"
+            );
+        }
+        // The top of a wave is none, however little the noise.
+        for jitter in [0.0, 0.01, 0.05, 0.3] {
+            for end in 40..400 {
+                let wave = |at: u32| 2.0 * (f64::from(at) * TAU / 144.0).sin() + jitter * noise(at);
+                assert!(
+                    history((0..end).map(wave)).stands_at_the_end().is_none(),
+                    "{end}"
+                );
+            }
+        }
         // As fast as the noise, nobody can say.
         let creeping = history((0..36).map(|hour| f64::from(hour.min(30)) * 0.2 + noise(hour)));
         assert!(creeping.stands_at_the_end().is_none());
@@ -280,36 +291,6 @@ mod tests {
             let failing =
                 |hour: u32| 200.0 * (120.0 / (120.0 - f64::from(hour))).ln() + noise(hour);
             assert!(history((0..end).map(failing)).stands_at_the_end().is_none());
-        }
-    }
-
-    #[test]
-    fn spikes_and_signs_that_alternate_are_spoilt_and_noise_and_acceleration_are_not() {
-        let slope = |hour: u32| 200.0 * (120.0 / (120.0 - f64::from(hour))).ln() + noise(hour);
-        let third = |hour: u32| if hour.is_multiple_of(3) { 300.0 } else { 0.0 };
-        let sign = |hour: u32| if hour.is_multiple_of(2) { 1.0 } else { -1.0 };
-        assert!(
-            history((0..80).map(|hour| slope(hour) + third(hour)))
-                .spoilt(None)
-                .is_some()
-        );
-        assert!(
-            history((40..80).map(|hour| slope(hour) * sign(hour)))
-                .spoilt(None)
-                .is_some()
-        );
-        // Near its end the slope itself moves as much from one reading to the next.
-        let late = history((0..119).map(|hour| slope(hour) + third(hour)));
-        assert!(late.spoilt(Some(300.0)).is_some());
-        assert!(history((0..119).map(slope)).spoilt(Some(300.0)).is_none());
-        for end in 18..119 {
-            assert_eq!(history((0..end).map(slope)).spoilt(None), None, "{end}");
-        }
-        for end in 18..2000 {
-            let latest = (end - 18..end).map(noise);
-            assert_eq!(history(latest).spoilt(None), None, "{end}");
-            let coarse = (end - 18..end).map(|hour| noise(hour).round());
-            assert_eq!(history(coarse).spoilt(None), None, "{end}");
         }
     }
 

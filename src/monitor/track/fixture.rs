@@ -24,11 +24,17 @@ pub(super) fn reading(hour: i64, value: f64) -> Reading {
     }
 }
 
-/// A record of these displacements, mm.
+/// A record of these displacements, mm, one an hour.
 pub(super) fn record(values: impl IntoIterator<Item = f64>) -> BenchmarkRecord {
+    record_each(1, values)
+}
+
+/// The same, so many hours apart.
+pub(super) fn record_each(hours: i64, values: impl IntoIterator<Item = f64>) -> BenchmarkRecord {
     let (id, declared) = (BenchmarkId::new("a"), Declarations::default());
     let mut record = BenchmarkRecord::new(id, DISPLACEMENT, at(0), declared, 0);
-    for (hour, value) in (0..).zip(values) {
+    for (index, value) in (0..).zip(values) {
+        let hour = index * hours;
         record.take(DISPLACEMENT, &reading(hour, value));
         record.note_newest(at(hour));
         record.break_silence(at(hour));

@@ -178,12 +178,13 @@ impl BenchmarkRecord {
         self.silence.is_behind(time);
     }
 
-    /// Whether a reading of `time` lies so far after the newest one that the logger's clock may have jumped. Without a
-    /// usual spacing nobody knows.
+    /// Whether a reading of `time` lies so far after the newest one that the logger's clock may have jumped. Where hardly
+    /// anything has been read, the spacings that there are count.
     pub(super) fn leaps(&self, time: Timestamp) -> bool {
-        let (Some(newest), Some(usual)) = (self.newest, self.silence.usual()) else {
+        let Some(newest) = self.newest else {
             return false;
         };
+        let usual = self.silence.median().unwrap_or(SignedDuration::ZERO);
         let least = usual
             .checked_mul(LEAP_SPACINGS)
             .unwrap_or(SignedDuration::MAX)
@@ -254,7 +255,7 @@ impl BenchmarkRecord {
 
 #[cfg(test)]
 mod tests {
-    use crate::monitor::track::fixture::{DISPLACEMENT, at, reading, record};
+    use crate::monitor::track::fixture::{DISPLACEMENT, at, reading, record, record_each};
 
     #[test]
     fn a_reading_leaps_only_far_beyond_the_usual_spacing_and_not_where_one_waits_before_it() {
@@ -264,6 +265,16 @@ mod tests {
         record.put_aside(at(12), DISPLACEMENT, &reading(100, 3.0));
         assert!(!record.leaps(at(101)));
         assert!(record.leaps(at(99)));
+    }
+
+    #[test]
+    fn a_benchmark_that_has_hardly_been_read_waits_with_a_reading_far_ahead_too() {
+        for count in 1..4 {
+            let record = record((0..count).map(f64::from));
+            assert!(record.leaps(at(720)), "{count}");
+        }
+        let weekly = record_each(168, [0.0, 1.0]);
+        assert!(!weekly.leaps(at(3 * 168)));
     }
 
     #[test]
