@@ -31,6 +31,10 @@ impl Level {
     }
 }
 
+fn rounded(chance: f64) -> f64 {
+    (1000.0 * chance).round() / 1000.0
+}
+
 impl Policy {
     /// The condition of a rule with its figures, as words; `None` for a rule that the policy has no figure for.
     pub fn condition(&self, rule: &str, level: Level) -> Option<String> {
@@ -44,13 +48,14 @@ impl Policy {
                 self.critical_velocity_mm_per_day
             ),
             (RED_CHANCE, _) => format!(
-                "chance of collapse of {} or more within {} ({}) and until the next reading, at every reading of {:#}, \
-                 or of {} at one",
+                "chance of collapse of {} or more within {} ({}) and until the next reading, and of {} or more in the mean over \
+                 some {:#}, or of {} at one reading",
                 self.red_chance,
                 self.red_within_in_words(),
                 hours_in_words(self.red_within()),
-                self.red_held_for(),
-                (1000.0 * self.red_at_once()).round() / 1000.0
+                rounded(self.red_mean_chance()),
+                self.red_course(),
+                rounded(self.red_at_once())
             ),
             ("chance-within-outlook", level) => {
                 let chance = if level == Level::Yellow {

@@ -54,15 +54,27 @@ impl Policy {
     }
 }
 
-/// Since when conditions have held at every reading.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// Chances under the one and over the other count for their course as these: what is next to impossible for years leaves no lasting
+/// mark.
+const COUNTED: (f64, f64) = (0.01, 0.99);
+
+/// Since when conditions have held at every reading, and the course of the chance that calls red.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Held {
     /// Of each declared rule, by name.
     #[serde(default)]
     rules: BTreeMap<String, Timestamp>,
-    /// The newest reading at which the chance was under what calls red.
+    /// The course of the chance that calls red.
     #[serde(default)]
-    under_red: Option<Timestamp>,
+    red: Option<Course>,
+}
+
+/// The course of a chance up to a reading.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct Course {
+    at: Timestamp,
+    /// Mean ln of its odds, the newest counting most.
+    ln_odds: f64,
 }
 
 impl Held {
@@ -110,15 +122,26 @@ impl Held {
         let Some(chance) = evidence.chance_for_red else {
             return;
         };
-        if chance < policy.red_chance {
-            self.under_red = Some(evidence.now);
-            return;
-        }
-        let is_new = self
-            .under_red
-            .is_some_and(|under| evidence.now.duration_since(under) <= policy.red_held_for());
-        evidence.is_red_pending = is_new && chance < policy.red_at_once();
+        let newest = ln_odds(chance);
+        let mean = self.red.map_or(newest, |course| {
+            let since = evidence.now.duration_since(course.at).as_secs_f64();
+            let kept = (-since.max(0.0) / policy.red_course().as_secs_f64()).exp();
+            newest + (course.ln_odds - newest) * kept
+        });
+        self.red = Some(Course {
+            at: evidence.now,
+            ln_odds: mean,
+        });
+        evidence.is_red_pending = chance >= policy.red_chance
+            && chance < policy.red_at_once()
+            && mean < ln_odds(policy.red_mean_chance());
     }
+}
+
+fn ln_odds(chance: f64) -> f64 {
+    let (least, most) = COUNTED;
+    let chance = chance.clamp(least, most);
+    (chance / (1.0 - chance)).ln()
 }
 
 #[cfg(test)]
@@ -217,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn a_chance_calls_red_once_it_has_held_a_twelfth_of_the_evacuation_time_or_is_large() {
+    fn a_chance_calls_red_by_its_course_over_half_an_evacuation_time_or_where_it_is_large() {
         let policy = Policy::default();
         let mut held = Held::default();
         let mut level = |minutes: i64, chance: f64| {
@@ -232,15 +255,38 @@ mod tests {
         };
         // Nothing lower is known of: the first reading is believed.
         assert_eq!(level(0, 0.3), (Level::Red, 0));
-        assert_eq!(level(10, 0.1), (Level::Green, 0));
-        assert_eq!(level(20, 0.3), (Level::Green, 1));
-        assert_eq!(level(130, 0.3), (Level::Green, 1));
-        assert_eq!(level(131, 0.3), (Level::Red, 0));
-        assert_eq!(level(200, 0.1), (Level::Green, 0));
-        assert_eq!(level(210, 0.5), (Level::Red, 0));
+        // After a quiet day it takes a while, the less the higher it is.
+        assert_eq!(level(24 * 60, 0.02), (Level::Green, 0));
+        for minutes in (24 * 60 + 10..40 * 60).step_by(10) {
+            assert_eq!(level(minutes, 0.3), (Level::Green, 1), "{minutes}");
+        }
+        assert_eq!(level(45 * 60, 0.4), (Level::Red, 0));
+        assert_eq!(level(72 * 60, 0.02), (Level::Green, 0));
+        assert_eq!(level(72 * 60 + 10, 0.59), (Level::Green, 1));
+        assert_eq!(level(72 * 60 + 20, 0.6), (Level::Red, 0));
+        // A dip does not begin it anew.
+        assert_eq!(level(90 * 60, 0.5), (Level::Red, 0));
+        assert_eq!(level(90 * 60 + 10, 0.1), (Level::Green, 0));
+        assert_eq!(level(90 * 60 + 20, 0.3), (Level::Red, 0));
         // Readings that are further apart have no others between them.
-        assert_eq!(level(1000, 0.1), (Level::Green, 0));
-        assert_eq!(level(2440, 0.3), (Level::Red, 0));
+        assert_eq!(level(114 * 60, 0.02), (Level::Green, 0));
+        assert_eq!(level(138 * 60, 0.3), (Level::Red, 0));
+    }
+
+    #[test]
+    fn what_calls_red_at_once_and_in_the_mean_goes_by_the_odds() {
+        let policy = Policy::default();
+        let is_near = |one: f64, other: f64| (one - other).abs() < 5e-4;
+        assert!(is_near(policy.red_mean_chance(), 0.198));
+        assert!(is_near(policy.red_at_once(), 0.597));
+        for red_chance in [0.0, 0.01, 0.5, 0.99, 1.0] {
+            let policy = Policy {
+                red_chance,
+                ..Policy::default()
+            };
+            assert!(policy.red_mean_chance() <= red_chance, "{red_chance}");
+            assert!((red_chance..=1.0).contains(&policy.red_at_once()));
+        }
     }
 
     #[test]

@@ -41,8 +41,13 @@ pub enum Entered {
 pub struct Latch {
     level: Level,
     since: Option<Timestamp>,
-    /// Highest settled velocity since the level was entered, mm/day.
+    /// Settled velocity at which the level was entered, and the highest since that stood out of its error, mm/day.
+    #[serde(default)]
+    first_velocity: f64,
     peak_velocity: f64,
+    /// Whether there was one.
+    #[serde(default = "of_earlier_versions")]
+    has_stood_out: bool,
     /// While the evidence calls for less: the motion at half the peak velocity or under.
     slow: Option<SteadyStretch>,
     /// While the evidence calls for less: the motion under the critical velocity.
@@ -63,15 +68,22 @@ const FEWEST_READINGS: usize = 4;
 const STEADY_GAIN: f64 = 1.2;
 /// A settled velocity differs from another, or from rest, that is so many times its standard error.
 const CLEAR: f64 = 4.0;
-/// Observed deceleration: this share of the highest velocity at the level.
+/// Observed deceleration: this share of the highest velocity at the level, and under that at which the level was entered. After a
+/// part has failed the rest may creep on at a tenth of the highest velocity, and faster than when people were called out.
 const SLOWED_TO: f64 = 0.5;
+
+fn of_earlier_versions() -> bool {
+    true
+}
 
 impl Default for Latch {
     fn default() -> Self {
         Self {
             level: Level::Green,
             since: None,
+            first_velocity: 0.0,
             peak_velocity: 0.0,
+            has_stood_out: false,
             slow: None,
             steady: None,
         }
@@ -167,17 +179,28 @@ impl Latch {
         let Some(velocity) = evidence.settled_velocity_mm_per_day.map(f64::abs) else {
             return;
         };
-        self.peak_velocity = self.peak_velocity.max(velocity);
         let less = call.level < self.level;
         let error = evidence.settled_error_mm_per_day;
+        // What is no larger than its error is no peak: readings that are spoilt would raise it, and then seem to slow down.
+        if velocity > CLEAR * error {
+            self.peak_velocity = self.peak_velocity.max(velocity);
+            self.has_stood_out = true;
+        }
         // Motion that never stood out of its error has not to slow down.
-        let is_slow =
-            velocity <= SLOWED_TO * self.peak_velocity || self.peak_velocity <= CLEAR * error;
+        let is_slow = self.has_slowed_to(velocity, error) || !self.has_stood_out;
         let slowed = less && is_slow;
         let steady = less && velocity < policy.critical_velocity_mm_per_day;
         let motion = (velocity, error);
         self.slow = SteadyStretch::go_on(self.slow, slowed.into(), evidence.now, motion);
         self.steady = SteadyStretch::go_on(self.steady, steady.into(), evidence.now, motion);
+    }
+
+    fn has_slowed_to(&self, velocity: f64, error: f64) -> bool {
+        // States of earlier versions do not have the first velocity.
+        let is_under_first =
+            self.first_velocity <= 0.0 || velocity <= self.first_velocity + CLEAR * error;
+        // What the error is larger than has not been seen to slow down.
+        velocity + error <= SLOWED_TO * self.peak_velocity && is_under_first
     }
 
     fn reason_to_fall(
@@ -236,10 +259,13 @@ impl Latch {
 
     fn begin(&mut self, evidence: &AlertEvidence, level: Level) {
         let velocity = evidence.settled_velocity_mm_per_day.map_or(0.0, f64::abs);
+        let has_stood_out = velocity > CLEAR * evidence.settled_error_mm_per_day;
         *self = Self {
             level,
             since: Some(evidence.now),
-            peak_velocity: velocity,
+            first_velocity: velocity,
+            peak_velocity: if has_stood_out { velocity } else { 0.0 },
+            has_stood_out,
             ..Self::default()
         };
     }
@@ -342,6 +368,36 @@ mod tests {
             latch.update(&policy, &evidence(1, 0.3, 60.0))[0].level,
             Level::Red
         );
+    }
+
+    #[test]
+    fn what_goes_on_after_a_part_has_failed_faster_than_at_the_call_has_not_slowed_down() {
+        let (policy, mut latch) = (Policy::default(), Latch::default());
+        latch.update(&policy, &evidence(0, 0.3, 10.0));
+        latch.update(&policy, &evidence(1, 0.3, 120.0));
+        for hour in 2..=7 * 24 {
+            latch.update(&policy, &evidence(hour, 0.0, 25.0));
+            assert_eq!(latch.level(), Level::Red, "hour {hour}");
+        }
+        let mut slower = latch.clone();
+        for hour in 0..=25 {
+            slower.update(&policy, &evidence(7 * 24 + hour, 0.0, 8.0));
+        }
+        assert_eq!(slower.level(), Level::Green);
+    }
+
+    #[test]
+    fn readings_that_are_spoilt_raise_no_peak_from_which_motion_seems_to_slow_down() {
+        let (policy, mut latch) = red_at_hundred();
+        for hour in 1..7 * 24 {
+            let wild = [9000.0, -4000.0, 300.0, -2000.0][usize::try_from(hour % 4).unwrap()];
+            let spoilt = AlertEvidence {
+                settled_error_mm_per_day: if hour < 12 { 3000.0 } else { 300.0 },
+                ..evidence(hour, 0.0, if hour < 40 { wild } else { wild / 4.0 })
+            };
+            latch.update(&policy, &spoilt);
+            assert_eq!(latch.level(), Level::Red, "hour {hour}");
+        }
     }
 
     #[test]

@@ -50,11 +50,13 @@ pub struct Policy {
 /// Set on simulated slopes: at the same share of collapses called a day before, a chance within one evacuation time called red
 /// twice as often on slopes that stand as one within two.
 const EVACUATIONS_AHEAD: i32 = 2;
-/// A chance that calls red must have held at every reading of this part of the evacuation time, unless it is so many times as
-/// large. Set on simulated slopes: at the same share of collapses called a day before, a longer or a shorter time gives as many
-/// reds on those that stand.
-const HELD_PART: i32 = 12;
-const TIMES_AS_LARGE: f64 = 1.5;
+/// A chance calls red by its course too: the mean of the ln of its odds, each earlier value counting the less the longer ago it was,
+/// by a factor of e in this part of the evacuation time, has come to odds of this share of those that call red; unless the newest
+/// has so many times these odds. Set on simulated slopes (docs/false-alarms.md): without it, or over a sixth of the time, red was called
+/// 1.5 to 2 times as often on slopes that stand read each hour or oftener, and one collapse in a hundred more was called a day before.
+const COURSE_PART: i32 = 2;
+const MEAN_ODDS: f64 = 2.0 / 3.0;
+const ODDS_AT_ONCE: f64 = 4.0;
 /// The next reading is taken to be no further away than so many of the spans that are counted from it.
 const MOST_INTERVALS: i32 = 2;
 
@@ -66,6 +68,11 @@ pub fn to_the_next_reading(span: SignedDuration, interval_days: f64) -> SignedDu
     span.saturating_add(interval.unwrap_or(most).min(most))
 }
 
+/// The chance whose odds are so many times those of `chance`.
+fn with_odds_times(chance: f64, factor: f64) -> f64 {
+    factor * chance / (1.0 - chance + factor * chance)
+}
+
 impl Policy {
     /// How far ahead red looks.
     pub fn red_within(&self) -> SignedDuration {
@@ -73,14 +80,19 @@ impl Policy {
         self.red_within.unwrap_or(twice)
     }
 
-    /// How long a chance must have held at every reading to call red.
-    pub fn red_held_for(&self) -> SignedDuration {
-        self.evacuation_time / HELD_PART
+    /// Over what time the mean chance is taken that calls red: each value counts the less by a factor of e after so long.
+    pub fn red_course(&self) -> SignedDuration {
+        self.evacuation_time / COURSE_PART
+    }
+
+    /// The mean chance over [`Policy::red_course`] that calls red beside [`Policy::red_chance`].
+    pub fn red_mean_chance(&self) -> f64 {
+        with_odds_times(self.red_chance, MEAN_ODDS)
     }
 
     /// The chance that calls red at once.
     pub fn red_at_once(&self) -> f64 {
-        (TIMES_AS_LARGE * self.red_chance).min(f64::midpoint(1.0, self.red_chance))
+        with_odds_times(self.red_chance, ODDS_AT_ONCE)
     }
 
     /// [`Policy::red_within`] in words.

@@ -73,7 +73,7 @@ fn text(families: &[(Family, Vec<Vec<Replay>>)]) -> anyhow::Result<String> {
         "# False alarms a year\n\n\
          Written by `cargo run --release -p studies --bin learn -- --years`. Each row follows whole years of simulated slopes that stand \
          (studies/src/world), looked at each two hours, or at each reading where these are further apart, by the network in force, which was taught on other \
-         slopes of these families. Evacuation time 24 h, so that red looks 48 h ahead; the policy's rules, without its latch: a chance calls red once it has held two hours, or is half as large again as that which calls red; alarms less than three days \
+         slopes of these families. Evacuation time 24 h, so that red looks 48 h ahead; the policy's rules, without its latch: a chance calls red once it has come to .2 in the mean over some twelve hours as well (of the ln of its odds), or to .6 at one look; alarms less than three days \
          apart are one. What drives a slope: rain 5 to 40 storms a year, frost and thaw 60, a draw-down of the reservoir in most years, 5 to 60 \
          fits of stick-slip, one change of rate, several resets of the instrument, or one acceleration that ends without a collapse \
          (Stopped, Plateau).\n",
