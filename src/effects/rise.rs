@@ -24,22 +24,49 @@ impl Search<'_> {
         let frame = Frame::new(noise.clone(), &fitted.residual(problem), &columns);
         let places = (at.saturating_sub(BESIDE).max(1)..=at + BESIDE)
             .filter(|place| *place != at && *place < problem.used);
-        let goes_on = |place: &usize| {
-            let further = offset(problem, *place);
-            let cost = further.parameters() * (problem.used as f64).ln();
-            let Act::Reading(steps) = &further.act else {
+        let steps = places.filter_map(|place| match offset(problem, place).act {
+            Act::Reading(steps) => Some(steps),
+            _ => None,
+        });
+        let mut steps: Vec<Vec<f64>> = steps.flatten().collect();
+        let cost = offset(problem, at).parameters() * (problem.used as f64).ln();
+        let mut residual = frame.residual.clone();
+        // One after the other: a jump beside another is like it, and gains with it.
+        let mut taken = Vec::new();
+        while taken.len() < SEVERAL {
+            let Some((place, moved, unit)) = further(&frame, &taken, &steps, (&residual, *size))
+            else {
                 return false;
             };
-            let directions = frame.new_directions(steps);
-            let taken = directions.first().map(|unit| dot(unit, &frame.residual));
-            taken.is_some_and(|taken| {
-                let gain =
-                    frame.deviance(frame.misfit) - frame.deviance(frame.misfit - taken * taken);
-                taken * size > 0.0 && gain - cost >= self.options.bic_margin
-            })
-        };
-        places.filter(goes_on).count() >= SEVERAL
+            let before = dot(&residual, &residual);
+            let gain = frame.deviance(before) - frame.deviance(before - moved * moved);
+            if gain - cost < self.options.bic_margin {
+                return false;
+            }
+            for (left, along) in residual.iter_mut().zip(&unit) {
+                *left -= moved * along;
+            }
+            taken.push(steps.swap_remove(place));
+        }
+        true
     }
+}
+
+/// Beside those that are `taken`, the one of `steps` that takes most off a residual and goes the way of `size`: which, how much, and its
+/// direction.
+fn further(
+    frame: &Frame,
+    taken: &[Vec<f64>],
+    steps: &[Vec<f64>],
+    (residual, size): (&[f64], f64),
+) -> Option<(usize, f64, Vec<f64>)> {
+    let each = steps.iter().enumerate().filter_map(|(place, step)| {
+        let columns: Vec<Vec<f64>> = taken.iter().chain([step]).cloned().collect();
+        let unit = frame.new_directions(&columns).pop()?;
+        let moved = dot(&unit, residual);
+        (moved * size > 0.0).then_some((place, moved, unit))
+    });
+    each.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
 }
 
 #[cfg(test)]

@@ -137,14 +137,22 @@ impl Search<'_> {
         let deviances = ground
             .frames
             .deviance_with_each(&columns.collect::<Vec<_>>());
+        let own = all.iter().zip(&deviances);
+        let mut own: Vec<(&SlowLoad, &f64)> = own.collect();
+        own.sort_by(|a, b| a.1.total_cmp(b.1));
         let mut best: Option<SlowFit> = None;
         for shape in [SlowShape::Ramp, SlowShape::Pulse] {
-            let own = all.iter().zip(&deviances);
-            let own = own.filter(|(one, _)| one.shape == shape);
-            let Some((load, _)) = own.min_by(|a, b| a.1.total_cmp(b.1)) else {
-                continue;
-            };
-            let fitted = self.with_slow_load(base, *load);
+            // Beside a poor law the likeliest may lie far from where the load changes: the likeliest of each length is fitted.
+            let mut fits: Vec<(Fitted, SlowLoad)> = Vec::new();
+            for (load, _) in own.iter().filter(|(one, _)| one.shape == shape) {
+                if fits.iter().all(|(_, other)| other.days != load.days) {
+                    let fitted = self.best_start(base, &load.term(problem));
+                    fits.extend(fitted.map(|fitted| (fitted, **load)));
+                }
+            }
+            let each = fits.into_iter();
+            let first = each.min_by(|a, b| a.0.bic(problem).total_cmp(&b.0.bic(problem)));
+            let fitted = first.map(|(fitted, load)| self.slow_fit(base, fitted, load));
             best = best
                 .into_iter()
                 .chain(fitted)
@@ -153,11 +161,10 @@ impl Search<'_> {
         best
     }
 
-    /// The joint fit with such a load, its place and length moved while that helps.
-    fn with_slow_load(&mut self, base: &Fitted, load: SlowLoad) -> Option<SlowFit> {
+    /// A joint fit with such a load, its place and length moved while that helps.
+    fn slow_fit(&mut self, base: &Fitted, fitted: Fitted, load: SlowLoad) -> SlowFit {
         let problem = self.problem;
-        let mut fitted = self.best_start(base, &load.term(problem))?;
-        let mut load = load;
+        let (mut fitted, mut load) = (fitted, load);
         for stride in STRIDES {
             while let Some((next, other)) = self.nearer_load(&fitted, load, stride) {
                 (fitted, load) = (next, other);
@@ -168,11 +175,11 @@ impl Search<'_> {
             fitted = last;
         }
         let shape = SHAPE * (problem.used as f64).ln();
-        Some(SlowFit {
+        SlowFit {
             gain: base.bic(problem) - fitted.bic(problem) - shape,
             fitted,
             load,
-        })
+        }
     }
 
     /// The likeliest event about where the slow load changes, found from the law that was found with that load, and the kinds that do as
