@@ -138,6 +138,57 @@ fn a_benchmark_that_is_unknown_is_so_after_a_restart_too() {
     program.stop();
 }
 
+/// Without the saved memory every step is gone through again, which takes a while.
+#[test]
+fn what_was_unknown_is_shown_so_before_the_stored_steps_have_been_gone_through() {
+    let site = Site::new("[[benchmark]]\nid = \"absent\"\nsource = \"logger\"\n");
+    let listen = site.listen();
+    let silent = ["5", "6", "7", "8"];
+    let benchmarks =
+        silent.map(|id| format!("[[benchmark]]\nid = \"{id}\"\nsource = \"logger\"\n"));
+    let text = fs::read_to_string(site.path("site.toml")).unwrap();
+    fs::write(
+        site.path("site.toml"),
+        format!("{text}{}", benchmarks.concat()),
+    )
+    .unwrap();
+    for id in silent {
+        let file = format!("incoming/{id}.csv");
+        site.append(&file, &format!("{HEADER}{}", failing(0..60)));
+    }
+    let all = ["5", "6", "7", "8", "absent"];
+    let missing = || {
+        let (metrics, status) = (get(&listen, "/metrics"), get(&listen, "/api/status"));
+        let line = |id: &&str| format!("slipwatch_benchmark_unknown{{benchmark=\"{id}\"}} 1");
+        let mut missing: Vec<&str> = all
+            .into_iter()
+            .filter(|id| !metrics.contains(&line(id)))
+            .collect();
+        if status.matches("\"is_unknown\":true").count() != all.len() {
+            missing.push("status");
+        }
+        missing
+    };
+    let program = site.caught_up();
+    eventually("unknown", || missing().is_empty());
+    program.stop();
+    let database = rusqlite::Connection::open(site.path("state/slipwatch.db")).unwrap();
+    database.execute("DELETE FROM memory", []).unwrap();
+    drop(database);
+    let program = site.start(&[]);
+    eventually("a start", || site.log().contains("listening"));
+    for _ in 0..200 {
+        let (is_over, missing) = (site.log().contains("caught up"), missing());
+        assert!(missing.is_empty(), "{missing:?}: {}", site.log());
+        if is_over {
+            break;
+        }
+    }
+    eventually("caught up", || site.log().contains("caught up"));
+    assert!(missing().is_empty());
+    program.stop();
+}
+
 #[test]
 fn a_state_folder_that_was_removed_is_not_ready() {
     let site = Site::new("");
