@@ -384,9 +384,10 @@ fn start(hook: &HookConfig, variables: &[(&str, String)], run: &str) -> Result<C
         .map_err(|error| format!("{}: {error}", program.display()))
 }
 
-/// What the kernel takes as a variable's value: no NUL, not too long, cut between characters.
+/// What the kernel takes as a variable's value, and any script can print: no control characters, not too long, cut between characters.
+/// Written out they would come to life again: the `echo` of some shells makes a line break of `\n`.
 fn capped(value: &str) -> String {
-    let clean = value.replace('\0', " ");
+    let clean = value.replace(char::is_control, " ");
     let mut end = clean.len().min(LONGEST_VALUE);
     while !clean.is_char_boundary(end) {
         end -= 1;
@@ -450,5 +451,6 @@ mod tests {
         assert_eq!(capped(&long).len(), LONGEST_VALUE);
         assert_eq!(capped(&format!("a{long}")).len(), LONGEST_VALUE - 1);
         assert_eq!(capped("a\0b"), "a b");
+        assert_eq!(capped("x\n7  red\u{1b}[2J"), "x 7  red [2J");
     }
 }

@@ -220,8 +220,9 @@ fn two_thousand_connections_that_ask_nothing_shut_nobody_out() {
 }
 
 #[test]
-fn a_name_with_a_line_break_in_it_forges_no_line_of_the_status_or_the_log() {
+fn a_name_with_a_line_break_in_it_forges_no_line_anywhere() {
     let site = Site::new("");
+    let listen = site.listen();
     let forged = "x\n7  red  2026-01-01\u{1b}[2J";
     fs::write(site.path("incoming/5.mcap"), recording(forged)).unwrap();
     let program = site.caught_up();
@@ -232,6 +233,28 @@ fn a_name_with_a_line_break_in_it_forges_no_line_of_the_status_or_the_log() {
         "{status}"
     );
     assert!(!status.contains('\u{1b}'), "{status}");
+    let checked = site.ask(&["check", "site.toml"]);
+    for said in [&checked.stdout, &checked.stderr] {
+        let said = String::from_utf8_lossy(said);
+        assert!(
+            !said.lines().any(|line| line.starts_with("7  red")) && !said.contains('\u{1b}'),
+            "{said}"
+        );
+    }
+    let checked = String::from_utf8_lossy(&checked.stdout);
+    assert!(checked.contains(r"benchmark x\n7  red"), "{checked}");
+    let metrics = get(&listen, "/metrics");
+    // The format's own line break, and a backslash that stands for itself.
+    let label = r#"slipwatch_benchmark_level{benchmark="x\n7  red  2026-01-01\\u{1b}[2J"}"#;
+    assert!(metrics.contains(label), "{metrics}");
+    eventually("notified", || !site.lines("notified").is_empty());
+    let notified = fs::read_to_string(site.path("notified")).unwrap();
+    // The hook's echo makes one space of several.
+    assert!(
+        notified.starts_with("x 7 red 2026-01-01 [2J/unknown/"),
+        "{notified}"
+    );
+    assert_eq!(notified.lines().count(), 1, "{notified}");
     program.stop();
     assert!(
         !site.log().lines().any(|line| line.starts_with("7  red")),
@@ -249,14 +272,19 @@ fn recording(name: &str) -> Vec<u8> {
     let channel = writer
         .add_channel(0, &topic, "json", &BTreeMap::default())
         .unwrap();
+    // So long ago that the benchmark has fallen silent, and not so long that nobody is to be notified of it.
+    let time = clock::now() - SignedDuration::from_hours(20 * 24);
+    let nanoseconds = u64::try_from(time.as_nanosecond()).unwrap();
     let header = mcap::records::MessageHeader {
         channel_id: channel,
         sequence: 0,
-        log_time: 1_577_836_800_000_000_000,
-        publish_time: 1_577_836_800_000_000_000,
+        log_time: nanoseconds,
+        publish_time: nanoseconds,
     };
-    let body = br#"{"time":"2020-01-01T00:00:00Z","value":1.0,"unit":"mm"}"#;
-    writer.write_to_known_channel(&header, body).unwrap();
+    let body = format!(r#"{{"time":"{time}","value":1.0,"unit":"mm"}}"#);
+    writer
+        .write_to_known_channel(&header, body.as_bytes())
+        .unwrap();
     writer.finish().unwrap();
     drop(writer);
     bytes.into_inner()
