@@ -58,7 +58,10 @@ const FILES: [(&str, &[&str]); 2] = [
     ),
     (
         "has_faketime",
-        &["/usr/lib/x86_64-linux-gnu/faketime/libfaketime.so.1"],
+        &[
+            "/usr/lib/x86_64-linux-gnu/faketime/libfaketime.so.1",
+            "/usr/lib/aarch64-linux-gnu/faketime/libfaketime.so.1",
+        ],
     ),
 ];
 

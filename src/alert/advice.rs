@@ -49,12 +49,12 @@ impl Policy {
             ),
             (RED_CHANCE, _) => format!(
                 "chance of collapse of {} or more within {} ({}) and until the next reading, and of {} or more in the mean over \
-                 some {:#}, or of {} at one reading",
+                 some {}, or of {} at one reading",
                 self.red_chance,
                 self.red_within_in_words(),
                 hours_in_words(self.red_within()),
                 rounded(self.red_mean_chance()),
-                self.red_course(),
+                hours_in_words(self.red_course()),
                 rounded(self.red_at_once())
             ),
             ("chance-within-outlook", level) => {
@@ -99,8 +99,8 @@ mod tests {
         let condition = |rule, level| policy.condition(rule, level).unwrap();
         assert_eq!(
             condition("chance-within-evacuation-time", Level::Red),
-            "chance of collapse of 0.27 or more within twice the evacuation time (48 h) and until the next reading, at every \
-             reading of 2h, or of 0.405 at one"
+            "chance of collapse of 0.27 or more within twice the evacuation time (48 h) and until the next reading, and of \
+             0.198 or more in the mean over some 12 h, or of 0.597 at one reading"
         );
         let outlook = |level| condition("chance-within-outlook", level);
         assert!(outlook(Level::Orange).contains("of 0.7 or more within the outlook of 720 h"));

@@ -3,6 +3,7 @@
 use super::args::{OutputArgs, OutputFormat};
 use super::{exit, preview as text};
 use crate::config::{self, ConfigError, ConfigProblem, ConfigSummary};
+use crate::reading::plain;
 use crate::runtime::preview::{Preview, preview};
 use crate::runtime::sampling;
 use schemars::JsonSchema;
@@ -67,7 +68,7 @@ pub(super) fn check(file: &Path, output: OutputArgs, looks_at_files: bool) -> an
                 None
             };
             for warning in &summary.warnings {
-                exit::complain(&warning);
+                exit::complain(&plain(warning));
             }
             if json {
                 let (summary, preview) = (&summary, preview.as_ref());
@@ -77,6 +78,7 @@ pub(super) fn check(file: &Path, output: OutputArgs, looks_at_files: bool) -> an
                 let is_fed = preview
                     .as_ref()
                     .is_none_or(|preview| preview.unfed.is_empty());
+                let summary = plain(&summary.to_string());
                 writeln!(stdout, "{}{summary}", if is_fed { "" } else { "not " })?;
                 if let Some(preview) = &preview {
                     let zone = config::load(file)?.site.time_zone;

@@ -1,6 +1,6 @@
 //! What a site's files hold, for people.
 
-use super::text::clock;
+use super::text::{clock, plain};
 use crate::reading::{Timestamp, whole_figure};
 use crate::runtime::ingest::Meaning;
 use crate::runtime::preview::{
@@ -8,7 +8,6 @@ use crate::runtime::preview::{
 };
 use jiff::SignedDuration;
 use jiff::tz::TimeZone;
-use std::fmt::Write as _;
 
 /// The sources with their columns, the benchmarks and the covariates.
 pub(super) fn shown(preview: &Preview, zone: &TimeZone) -> String {
@@ -23,15 +22,22 @@ pub(super) fn shown(preview: &Preview, zone: &TimeZone) -> String {
         covariate_line(&mut text, covariate);
     }
     for id in &preview.unwatched {
-        let _ = writeln!(
-            text,
-            "\nnot watched: {id} is in the files, and no [[benchmark]] names it"
+        text.push('\n');
+        put(
+            &mut text,
+            &format!("not watched: {id} is in the files, and no [[benchmark]] names it"),
         );
     }
     if !preview.is_whole {
         text.push_str("\nonly the first values were read, there are very many\n");
     }
     text
+}
+
+/// One line: what stands in a file makes no other of it.
+fn put(text: &mut String, line: &str) {
+    text.push_str(&plain(line));
+    text.push('\n');
 }
 
 fn source_lines(text: &mut String, source: &SourceView) {
@@ -48,28 +54,29 @@ fn source_lines(text: &mut String, source: &SourceView) {
         1 => "1 file".to_owned(),
         many => format!("{many} files"),
     };
-    let _ = writeln!(
+    text.push('\n');
+    put(
         text,
-        "\nsource {id} ({kind}): {path}, {files}; times {times}"
+        &format!("source {id} ({kind}): {path}, {files}; times {times}"),
     );
     for layout in &source.layouts {
         let more = match layout.files {
             1 => String::new(),
             many => format!(" and {} more with the same columns", many - 1),
         };
-        let _ = writeln!(text, "  {}{more}", layout.file.display());
+        put(text, &format!("  {}{more}", layout.file.display()));
         let columns = layout.columns.iter();
         let width = columns.map(|column| column.name.chars().count()).max();
         for column in &layout.columns {
             let (name, width) = (&column.name, width.unwrap_or_default());
-            let _ = writeln!(text, "    {name:width$}  {}", meaning(column));
+            put(text, &format!("    {name:width$}  {}", meaning(column)));
         }
     }
     for refusal in &source.refused {
-        let _ = writeln!(text, "  refused: {}", refused(refusal));
+        put(text, &format!("  refused: {}", refused(refusal)));
     }
     for remark in &source.remarks {
-        let _ = writeln!(text, "  {remark}");
+        put(text, &format!("  {remark}"));
     }
 }
 
@@ -119,16 +126,19 @@ fn benchmark_lines(text: &mut String, benchmark: &BenchmarkPreview, zone: &TimeZ
     let every = every_s.map_or(String::new(), |seconds| {
         format!(", every {:#}", SignedDuration::from_secs(seconds))
     });
-    let _ = writeln!(
+    text.push('\n');
+    put(
         text,
-        "\nbenchmark {id} ({source}): {readings} readings of {quantity}{every}"
+        &format!("benchmark {id} ({source}): {readings} readings of {quantity}{every}"),
     );
     for (which, (time, value)) in [("first", first), ("last ", last)] {
-        let _ = writeln!(
+        put(
             text,
-            "  {which} {time}{}  {} {unit}",
-            there(*time, zone),
-            whole_figure(*value)
+            &format!(
+                "  {which} {time}{}  {} {unit}",
+                there(*time, zone),
+                whole_figure(*value)
+            ),
         );
     }
     let dropped = [
@@ -137,19 +147,19 @@ fn benchmark_lines(text: &mut String, benchmark: &BenchmarkPreview, zone: &TimeZ
         (ahead, "refused, ahead of this machine's clock"),
     ];
     for (count, what) in dropped.iter().filter(|(count, _)| **count > 0) {
-        let _ = writeln!(text, "  {what}: {count}");
+        put(text, &format!("  {what}: {count}"));
     }
     if *missing > 0 {
-        let _ = writeln!(
+        put(
             text,
-            "  missing: {missing}, of these out of range: {out_of_range}"
+            &format!("  missing: {missing}, of these out of range: {out_of_range}"),
         );
     }
     for line in remarks {
-        let _ = writeln!(text, "  {line}");
+        put(text, &format!("  {line}"));
     }
     for line in suspicions {
-        let _ = writeln!(text, "  suspicion: {line}");
+        put(text, &format!("  suspicion: {line}"));
     }
 }
 
@@ -173,8 +183,9 @@ fn covariate_line(text: &mut String, covariate: &CovariateView) {
     let unit = unit
         .as_ref()
         .map_or(String::new(), |unit| format!(", {unit}"));
-    let _ = writeln!(
+    text.push('\n');
+    put(
         text,
-        "\ncovariate {name} ({source}): {values} values{unit}, {first} to {last}"
+        &format!("covariate {name} ({source}): {values} values{unit}, {first} to {last}"),
     );
 }

@@ -5,6 +5,7 @@ use crate::effects::{Kind, Rival};
 use crate::monitor::{
     AlertState, Event, EventKind, FailureTime, SharedFailure, Summary, Unexplained,
 };
+pub(super) use crate::reading::plain;
 use crate::reading::{BenchmarkId, Timestamp, figure};
 use crate::runtime::site::BEFORE_ALL;
 use jiff::tz::TimeZone;
@@ -77,22 +78,6 @@ pub(super) fn clock(time: Timestamp, zone: &TimeZone) -> String {
     }
     let local = time.to_zoned(zone.clone());
     local.strftime("%Y-%m-%d %H:%M %Z").to_string()
-}
-
-/// The text with its control characters written out: a name with a line break in it forges no line.
-pub(super) fn plain(text: &str) -> String {
-    if !text.chars().any(char::is_control) {
-        return text.to_owned();
-    }
-    let mut plain = String::with_capacity(text.len() + 8);
-    for letter in text.chars() {
-        if letter.is_control() {
-            plain.extend(letter.escape_default());
-        } else {
-            plain.push(letter);
-        }
-    }
-    plain
 }
 
 fn what(kind: &EventKind) -> String {

@@ -199,6 +199,16 @@ impl Search<'_> {
                 fitted
             }));
         }
+        each.retain(|fitted| {
+            // A change of the friction follows almost any bend, and is to account for the readings better than the slow load.
+            let newest = fitted.terms.last().map(|term| term.kind);
+            let least = if newest == Some(Kind::FrictionChange) {
+                slow.gain + margin
+            } else {
+                slow.gain - margin
+            };
+            base.bic(problem) - fitted.bic(problem) > least
+        });
         each.sort_by(|a, b| a.bic(problem).total_cmp(&b.bic(problem)));
         let fitted = each.first()?.clone();
         let gain = base.bic(problem) - fitted.bic(problem);
@@ -214,7 +224,7 @@ impl Search<'_> {
             gain,
             p_value: 1.0,
         };
-        (gain > slow.gain - margin).then_some((one, ties))
+        Some((one, ties))
     }
 
     /// The likeliest event of that kind at one of the turns of the slow load, in place of it.

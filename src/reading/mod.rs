@@ -6,6 +6,7 @@
 mod conventions;
 mod dialect;
 mod figure;
+mod plain;
 mod recording;
 mod series;
 pub mod suspicion;
@@ -15,6 +16,7 @@ pub use conventions::{Conventions, LocalClock, MissingValues, SummerTime, TimeFa
 pub use dialect::{DecimalMark, Delimiter, Dialect, MOST_SKIPPED, TimeFormat};
 pub use figure::{figure, whole_figure};
 pub use jiff::Timestamp;
+pub use plain::plain;
 pub use recording::{MergeError, Recording, SelectError};
 pub use series::{Channel, Disorder, Reading, Sample, Series};
 pub use suspicion::Suspicion;

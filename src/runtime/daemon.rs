@@ -12,7 +12,7 @@ use super::progress::Progress;
 use super::pulse::Reporting;
 use super::sandbox;
 use super::shutdown::Shutdown;
-use super::site::Site;
+use super::site::{Site, announce_ends};
 use super::sources::Sources;
 use super::tail::{Arrival, ArrivalBatch};
 use crate::config::Config;
@@ -380,6 +380,7 @@ impl Daemon {
             health.is_clock_wrong = self.site.is_clock_wrong();
             health.held = held;
             health.log_lines_lost = log::lost();
+            announce_ends(&health.silences, &silences);
             health.silences = silences;
             health.is_paused = is_paused;
             health.readings = counts.taken;

@@ -1,18 +1,18 @@
 //! Runs one hook once: cleaned environment, alert on stdin, own process group, killed at its timeout.
 
+mod processes;
+
 use super::many::{EarlierLevel, ManyAlerts};
 use super::sandbox;
 use crate::alert::Level;
 use crate::config::HookConfig;
 use crate::monitor::{AlertState, CLOCK_FAULT, Event, EventKind};
 use crate::reading::{BenchmarkId, Timestamp};
-use nix::sys::signal::{Signal, kill, killpg};
-use nix::unistd::Pid;
+use processes::{ProcessGroup, RUN, kill_all_of, run_name};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::os::unix::process::ExitStatusExt;
 use std::process::{ExitStatus, Stdio};
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWriteExt};
@@ -23,8 +23,6 @@ use tokio::task::JoinHandle;
 const KEPT_VARIABLES: [&str; 4] = ["PATH", "HOME", "LANG", "TZ"];
 /// Longest value of a variable, bytes.
 const LONGEST_VALUE: usize = 4096;
-/// The variable by which a run's processes are known.
-const RUN: &str = "SLIPWATCH_RUN";
 /// How much of a hook's output is kept, bytes a stream.
 const LONGEST_OUTPUT: usize = 64 * 1024;
 /// After the hook's end: how long what it has just written may take to arrive.
@@ -322,7 +320,7 @@ pub(super) async fn run_program(
         Ok(body) => body,
         Err(error) => return HookOutcome::NotStarted(error.to_string()),
     };
-    let mut group = ProcessGroup::of(&child);
+    let mut group = ProcessGroup::of(&child, &run);
     let writer = child.stdin.take().map(|mut stdin| {
         // A hook may leave stdin unread: its closing the pipe is no error, its filling up only
         // holds this task, which ends with the hook.
@@ -336,12 +334,16 @@ pub(super) async fn run_program(
     let outcome = match ended {
         Ok(Ok(status)) => {
             group.leave();
-            outcome(status)
+            let outcome = outcome(status);
+            // It is run again: what each attempt leaves behind would pile up. One that went well may leave something at work.
+            if outcome != HookOutcome::Done {
+                let _ = tokio::task::spawn_blocking(move || kill_all_of(&run)).await;
+            }
+            outcome
         }
         Ok(Err(error)) => HookOutcome::NotStarted(error.to_string()),
         Err(_elapsed) => {
-            group.kill();
-            let _ = tokio::task::spawn_blocking(move || kill_all_of(&run)).await;
+            let _ = tokio::task::spawn_blocking(move || group.kill()).await;
             // Reaps the child; a process stuck in the kernel must not hold the alerts up.
             let _ = tokio::time::timeout(KILL_GRACE, child.wait()).await;
             HookOutcome::TimedOut
@@ -353,38 +355,6 @@ pub(super) async fn run_program(
     let (stdout, stderr) = tokio::join!(finish(stdout), finish(stderr));
     tracing::info!(hook = ?hook.run, key = alert.key, attempt, ?outcome, stdout, stderr, "hook ended");
     outcome
-}
-
-/// What a run's processes have in their environment, and no others.
-fn run_name() -> String {
-    static RUNS: AtomicU64 = AtomicU64::new(0);
-    let number = RUNS.fetch_add(1, Ordering::Relaxed);
-    format!("{}-{number}", std::process::id())
-}
-
-/// Ends what a run has started and what has left its group, as by `setsid`.
-fn kill_all_of(run: &str) {
-    let mark = format!("{RUN}={run}");
-    let is_of_it = |environment: &[u8]| {
-        environment
-            .split(|byte| *byte == 0)
-            .any(|one| one == mark.as_bytes())
-    };
-    let Ok(processes) = std::fs::read_dir("/proc") else {
-        return;
-    };
-    for process in processes.flatten() {
-        let number = process
-            .file_name()
-            .to_str()
-            .and_then(|name| name.parse().ok());
-        let Some(number) = number else { continue };
-        // It may have ended meanwhile, or be another user's.
-        let environment = std::fs::read(process.path().join("environ"));
-        if environment.is_ok_and(|environment| is_of_it(&environment)) {
-            let _ = kill(Pid::from_raw(number), Signal::SIGKILL);
-        }
-    }
 }
 
 fn start(hook: &HookConfig, variables: &[(&str, String)], run: &str) -> Result<Child, String> {
@@ -414,9 +384,10 @@ fn start(hook: &HookConfig, variables: &[(&str, String)], run: &str) -> Result<C
         .map_err(|error| format!("{}: {error}", program.display()))
 }
 
-/// What the kernel takes as a variable's value: no NUL, not too long, cut between characters.
+/// What the kernel takes as a variable's value, and any script can print: no control characters, not too long, cut between characters.
+/// Written out they would come to life again: the `echo` of some shells makes a line break of `\n`.
 fn capped(value: &str) -> String {
-    let clean = value.replace('\0', " ");
+    let clean = value.replace(char::is_control, " ");
     let mut end = clean.len().min(LONGEST_VALUE);
     while !clean.is_char_boundary(end) {
         end -= 1;
@@ -429,34 +400,6 @@ fn outcome(status: ExitStatus) -> HookOutcome {
         (Some(0), _) => HookOutcome::Done,
         (Some(code), _) => HookOutcome::Failed(code),
         (None, signal) => HookOutcome::Signalled(signal.unwrap_or_default()),
-    }
-}
-
-/// A hook's process group, killed when the run is given up half-way.
-#[derive(Debug)]
-struct ProcessGroup(Option<Pid>);
-
-impl ProcessGroup {
-    fn of(child: &Child) -> Self {
-        let id = child.id().and_then(|id| i32::try_from(id).ok());
-        Self(id.map(Pid::from_raw))
-    }
-
-    /// The hook has ended by itself; its number may soon be another process's.
-    fn leave(&mut self) {
-        self.0 = None;
-    }
-
-    fn kill(&mut self) {
-        if let Some(group) = self.0.take() {
-            let _ = killpg(group, Signal::SIGKILL);
-        }
-    }
-}
-
-impl Drop for ProcessGroup {
-    fn drop(&mut self) {
-        self.kill();
     }
 }
 
@@ -508,5 +451,6 @@ mod tests {
         assert_eq!(capped(&long).len(), LONGEST_VALUE);
         assert_eq!(capped(&format!("a{long}")).len(), LONGEST_VALUE - 1);
         assert_eq!(capped("a\0b"), "a b");
+        assert_eq!(capped("x\n7  red\u{1b}[2J"), "x 7  red [2J");
     }
 }

@@ -29,12 +29,16 @@ pub struct Reporting {
 }
 
 impl Reporting {
-    /// Starts to listen, where the site does, and notifies the service manager that we are up.
+    /// Starts to listen, where the site does, and notifies the service manager that we are up. `vitals`: what is shown from the
+    /// first moment on.
     ///
     /// # Errors
     /// [`ReportingError`].
-    pub async fn start(site: &SiteConfig, served: ServedState) -> Result<Self, ReportingError> {
-        let vitals = Arc::new(Vitals::default());
+    pub async fn start(
+        site: &SiteConfig,
+        vitals: Arc<Vitals>,
+        served: ServedState,
+    ) -> Result<Self, ReportingError> {
         let server = match site.listen {
             None => None,
             Some(listen) => {

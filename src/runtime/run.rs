@@ -12,9 +12,14 @@ use super::serve::ServedState;
 use super::shutdown::{self, Shutdown};
 use super::site::{Counts, Sinks, Site};
 use super::sources::Sources;
+use super::standing::in_force;
 use super::view::{Facts, SiteReader};
+use super::vitals::Vitals;
+use crate::alert::Level;
 use crate::config::Config;
+use crate::reading::BenchmarkId;
 use crate::store::{Store, StoreError};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 use tokio::sync::watch;
@@ -65,7 +70,9 @@ pub async fn run(
         archive: Some(Arc::new(super::archive::Events::of(Arc::clone(&store)))),
         reader: reader(config),
     };
-    let mut pulse = Reporting::start(&config.site, behind).await?;
+    let vitals = Arc::new(Vitals::default());
+    show_stored(config, &store, &vitals).map_err(fail)?;
+    let mut pulse = Reporting::start(&config.site, vitals, behind).await?;
     let sinks = Sinks {
         store: Some(Arc::clone(&store)),
         alerts: Some(dispatcher(config, &store)),
@@ -75,6 +82,7 @@ pub async fn run(
     let resume = || Site::resume(name, config.settings.clone(), sinks, &mut || pulse.turn());
     let site = tokio::task::block_in_place(resume).map_err(fail)?;
     site.show(&pulse.vitals);
+    pulse.vitals.retain(|benchmark| site.shows(benchmark));
     for (source, count) in store.quarantined().map_err(fail)? {
         pulse.vitals.quarantined(&source, count);
     }
@@ -114,6 +122,28 @@ pub async fn run(
     worked.and(closed.map(drop)).map_err(fail)?;
     followed?;
     Ok(counts)
+}
+
+/// Shows how the benchmarks stood when the last events were written: until the steps since then are gone through again nothing newer is
+/// known, and a benchmark that is unknown is not to look as if it were not.
+fn show_stored(config: &Config, store: &Store, vitals: &Vitals) -> Result<(), StoreError> {
+    let read = store.benchmarks()?;
+    let standing = in_force(store, None)?;
+    let named = config.settings.watched.named.iter();
+    let all: BTreeSet<&BenchmarkId> = read.keys().chain(named).collect();
+    for benchmark in all {
+        let newest = read.get(benchmark).copied();
+        let own = standing
+            .keys()
+            .filter(|(place, _)| place.as_ref() == Some(benchmark));
+        let (unknown, called): (Vec<Level>, Vec<Level>) = own
+            .map(|(_, level)| *level)
+            .partition(|level| *level == Level::Unknown);
+        let level = called.into_iter().max().unwrap_or(Level::Green);
+        let is_unknown = newest.is_none() || !unknown.is_empty();
+        vitals.resume(benchmark, newest, level, is_unknown);
+    }
+    Ok(())
 }
 
 /// What the page asks, where the site listens. A page that cannot be shown is no reason not to watch.

@@ -270,6 +270,11 @@ impl Vitals {
         self.note(events);
     }
 
+    /// Shows these benchmarks only, of those that are shown.
+    pub(super) fn retain(&self, is_shown: impl Fn(&BenchmarkId) -> bool) {
+        locked(&self.points).retain(|benchmark, _| is_shown(benchmark));
+    }
+
     /// How a benchmark stood when the daemon last stopped.
     pub fn resume(
         &self,

@@ -4,7 +4,7 @@ use super::outbox::{DeliveryOutcome, WAITING};
 use super::sealed::seal;
 use super::series::{self, Catalogue, StoredSeries};
 use super::sum::sum;
-use super::{Inner, Store, StoreError, nanoseconds};
+use super::{Inner, Store, StoreError, latest, nanoseconds};
 use crate::monitor::{Event, Input, Measured, MemoryPart};
 use crate::reading::{BenchmarkId, Timestamp};
 use rusqlite::types::ValueRef;
@@ -219,7 +219,7 @@ impl Inner {
         let mut fresh = Catalogue::default();
         let last_step = insert_steps(&transaction, *steps, batch, (catalogue, &mut fresh))?;
         let mut last_event = *events;
-        let mut latest = BTreeMap::new();
+        let mut newest = BTreeMap::new();
         for (step, event) in &batch.events {
             last_event += 1;
             let is_past = batch.steps[*step].1.makes_up(event);
@@ -228,11 +228,11 @@ impl Inner {
             if let Some(benchmark) = &event.benchmark
                 && !is_past
             {
-                latest.insert((benchmark, event.kind.name()), body);
+                newest.insert((benchmark, event.kind.name()), body);
             }
         }
-        for ((benchmark, kind), body) in latest {
-            keep_latest(&transaction, (benchmark.as_str(), kind), &body)?;
+        for ((benchmark, kind), body) in newest {
+            latest::keep(&transaction, (benchmark.as_str(), kind), &body)?;
         }
         for (name, body) in &batch.positions {
             keep(&transaction, "position", name, body.as_deref())?;
@@ -354,19 +354,6 @@ fn insert_event(
         )?
         .execute(params![seq, step, time, kind, benchmark, body, sum])?;
     Ok(body)
-}
-
-fn keep_latest(
-    connection: &Connection,
-    (benchmark, kind): (&str, &str),
-    body: &str,
-) -> Result<(), StoreError> {
-    connection
-        .prepare_cached(
-            "INSERT OR REPLACE INTO latest (benchmark, kind, body) VALUES (?1, ?2, ?3)",
-        )?
-        .execute(params![benchmark, kind, body])?;
-    Ok(())
 }
 
 fn write_memory(

@@ -8,6 +8,7 @@ mod access;
 mod batch;
 mod checkpoint;
 mod evidence;
+mod latest;
 mod link;
 mod outbox;
 mod past;

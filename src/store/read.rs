@@ -178,19 +178,6 @@ impl Store {
         Ok(steps)
     }
 
-    /// The JSON of the newest event of `kind` at each benchmark.
-    ///
-    /// # Errors
-    /// [`StoreError`].
-    pub fn latest(&self, kind: &str) -> Result<Vec<String>, StoreError> {
-        let inner = self.inner();
-        let mut query = inner
-            .connection
-            .prepare_cached("SELECT body FROM latest WHERE kind = ?1 ORDER BY benchmark")?;
-        let rows = query.query_map([kind], |row| row.get(0))?;
-        Ok(rows.collect::<Result<_, _>>()?)
-    }
-
     /// Every benchmark that has given readings, with the time of its newest one.
     ///
     /// # Errors

@@ -1,13 +1,13 @@
 //! The tables, their version, and what is refused.
 
-use super::StoreError;
+use super::{StoreError, latest, series};
 use rusqlite::Connection;
 
 /// Marks the file as ours: "slip".
 const APPLICATION: i32 = 0x736c_6970;
 
 /// One step for each version: `MIGRATIONS[n]` leads from version n to n + 1.
-const MIGRATIONS: [&str; 6] = ["
+const MIGRATIONS: [&str; 7] = ["
     CREATE TABLE series (
         id INTEGER PRIMARY KEY,
         -- 0: a covariate; 1: readings of a benchmark
@@ -111,7 +111,15 @@ const MIGRATIONS: [&str; 6] = ["
         link TEXT PRIMARY KEY,
         until INTEGER NOT NULL
     ) STRICT, WITHOUT ROWID;
+",
+// Of all other columns; what stands there by then is taken for what was written.
+"
+    ALTER TABLE series ADD COLUMN sum INTEGER;
+    ALTER TABLE latest ADD COLUMN sum INTEGER;
 "];
+
+/// From this version on each series, and each of the newest events, has a sum.
+const SEALED: usize = 7;
 
 /// The version that this program writes.
 pub(super) const VERSION: usize = MIGRATIONS.len();
@@ -126,6 +134,10 @@ pub(super) fn migrate(connection: &mut Connection) -> Result<(), StoreError> {
         connection.transaction_with_behavior(rusqlite::TransactionBehavior::Immediate)?;
     for step in &MIGRATIONS[found..] {
         transaction.execute_batch(step)?;
+    }
+    if found < SEALED {
+        series::seal_all(&transaction)?;
+        latest::seal_all(&transaction)?;
     }
     transaction.pragma_update(None, "application_id", APPLICATION)?;
     let version = i64::try_from(VERSION).unwrap_or(i64::MAX);

@@ -1,11 +1,17 @@
 //! The series that values belong to, by number.
 
 use super::StoreError;
+use super::sum::{is_whole, sum};
 use crate::monitor::Measured;
 use crate::reading::{BenchmarkId, Unit};
 use jiff::SignedDuration;
-use rusqlite::{Connection, params};
+use rusqlite::types::ValueRef;
+use rusqlite::{Connection, Row, params};
 use std::collections::BTreeMap;
+
+/// Rows after a number, so many, each with its sum behind its values.
+pub(super) const ROWS: &str = "SELECT id, is_reading, name, unit, averaging, sum FROM series
+     WHERE id > ?1 ORDER BY id LIMIT ?2";
 
 /// What values of one series have in common.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -68,10 +74,15 @@ impl StoredSeries {
 impl Catalogue {
     pub(super) fn load(connection: &Connection) -> Result<Self, StoreError> {
         let mut catalogue = Self::default();
-        let mut query =
-            connection.prepare("SELECT id, is_reading, name, unit, averaging FROM series")?;
-        let mut rows = query.query([])?;
+        let mut query = connection.prepare(ROWS)?;
+        let mut rows = query.query([0, i64::MAX])?;
         while let Some(row) = rows.next()? {
+            // Its values would go to another benchmark, or count for another length.
+            if !is_as_written(row)? {
+                let number = row.get_ref(0)?;
+                let detail = format!("row {number:?} of the table series is not what was written");
+                return Err(StoreError::Damaged { detail });
+            }
             let (name, unit): (String, Option<String>) = (row.get(2)?, row.get(3)?);
             let series = if row.get(1)? {
                 let unit = Unit::parse(unit.as_deref().unwrap_or_default())
@@ -149,28 +160,50 @@ impl Catalogue {
     }
 }
 
+/// Whether a row of [`ROWS`] is what was written.
+pub(super) fn is_as_written(row: &Row<'_>) -> rusqlite::Result<bool> {
+    is_whole(row, 0..5)
+}
+
+/// Gives each row its sum, taken for what was written.
+pub(super) fn seal_all(connection: &Connection) -> Result<(), StoreError> {
+    let mut query = connection.prepare(ROWS)?;
+    let mut rows = query.query([0, i64::MAX])?;
+    while let Some(row) = rows.next()? {
+        let number: i64 = row.get(0)?;
+        let values = (0..5).map(|index| row.get_ref(index));
+        let values: Vec<ValueRef<'_>> = values.collect::<Result<_, _>>()?;
+        connection
+            .prepare_cached("UPDATE series SET sum = ?2 WHERE id = ?1")?
+            .execute([number, sum(&values)])?;
+    }
+    Ok(())
+}
+
 pub(super) fn insert(
     connection: &Connection,
     number: i64,
     series: &StoredSeries,
 ) -> Result<(), StoreError> {
-    let mut insert = connection.prepare_cached(
-        "INSERT INTO series (id, is_reading, name, unit, averaging) VALUES (?1, ?2, ?3, ?4, ?5)",
-    )?;
-    match series {
-        StoredSeries::Channel(name, unit) => {
-            insert.execute(params![number, false, name, unit, None::<i64>])?;
-        }
+    let (is_reading, name, unit, averaging) = match series {
+        StoredSeries::Channel(name, unit) => (false, name.as_str(), unit.clone(), None),
         StoredSeries::Benchmark(benchmark, unit, averaging) => {
             let averaging = averaging.and_then(|span| i64::try_from(span.as_nanos()).ok());
-            insert.execute(params![
-                number,
-                true,
-                benchmark.as_str(),
-                unit.to_string(),
-                averaging
-            ])?;
+            (true, benchmark.as_str(), Some(unit.to_string()), averaging)
         }
-    }
+    };
+    let own = unit.as_deref().map(str::as_bytes);
+    let sum = sum(&[
+        ValueRef::Integer(number),
+        ValueRef::Integer(is_reading.into()),
+        ValueRef::Text(name.as_bytes()),
+        own.map_or(ValueRef::Null, ValueRef::Text),
+        averaging.map_or(ValueRef::Null, ValueRef::Integer),
+    ]);
+    connection
+        .prepare_cached(
+            "INSERT INTO series (id, is_reading, name, unit, averaging, sum) VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
+        )?
+        .execute(params![number, is_reading, name, unit, averaging, sum])?;
     Ok(())
 }

@@ -1,6 +1,8 @@
 //! The sum of a row's values: a bit that flips on the disk is seen.
 
+use rusqlite::Row;
 use rusqlite::types::ValueRef;
+use std::ops::Range;
 
 /// FNV-1a, 64 bits: its offset and its prime.
 const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
@@ -34,4 +36,13 @@ pub(super) fn sum(values: &[ValueRef<'_>]) -> i64 {
         }
     }
     hash.cast_signed()
+}
+
+/// Whether the sum, which stands behind the values in these columns, is theirs.
+pub(super) fn is_whole(row: &Row<'_>, values: Range<usize>) -> rusqlite::Result<bool> {
+    let behind = values.end;
+    let all: Vec<ValueRef<'_>> = values
+        .map(|index| row.get_ref(index))
+        .collect::<Result<_, _>>()?;
+    Ok(row.get_ref(behind)? == ValueRef::Integer(sum(&all)))
 }

@@ -1,8 +1,7 @@
 //! Each row of what was taken in, said and is to be delivered is compared with its sum, piece by piece.
 
-use super::sum::sum;
-use super::{Store, StoreError, outbox};
-use rusqlite::types::ValueRef;
+use super::sum::is_whole;
+use super::{Store, StoreError, latest, outbox, series};
 use rusqlite::{Connection, Row};
 
 /// Rows that are looked at in one go.
@@ -12,18 +11,24 @@ const PIECE: i64 = 2000;
 type IsWhole = fn(&Row<'_>) -> Result<bool, StoreError>;
 
 /// The rows of each table, and how they are looked at.
-const TABLES: [(&str, &str, IsWhole); 3] = [
+const TABLES: [(&str, &str, IsWhole); 5] = [
+    ("series", series::ROWS, |row| {
+        Ok(series::is_as_written(row)?)
+    }),
+    ("latest", latest::ROWS, |row| {
+        Ok(latest::is_as_written(row)?)
+    }),
     (
         "step",
         "SELECT seq, now, series, time, value, sigma, body, sum FROM step
          WHERE seq > ?1 AND sum IS NOT NULL ORDER BY seq LIMIT ?2",
-        |row| is_whole(row, 7),
+        |row| Ok(is_whole(row, 0..7)?),
     ),
     (
         "event",
         "SELECT seq, step, time, kind, benchmark, body, sum FROM event
          WHERE seq > ?1 AND sum IS NOT NULL ORDER BY seq LIMIT ?2",
-        |row| is_whole(row, 6),
+        |row| Ok(is_whole(row, 0..6)?),
     ),
     (
         "outbox",
@@ -47,12 +52,11 @@ impl Store {
     /// [`StoreError::Damaged`] where a row is not what was written.
     pub fn verify(&self, verified: &mut Verified) -> Result<bool, StoreError> {
         let inner = self.inner();
-        let (table, ..) = TABLES[verified.table];
         if let Some(after) = piece(&inner.connection, *verified)? {
             verified.after = after;
             return Ok(false);
         }
-        let is_last = table == TABLES[TABLES.len() - 1].0;
+        let is_last = verified.table + 1 == TABLES.len();
         *verified = Verified {
             table: if is_last { 0 } else { verified.table + 1 },
             after: 0,
@@ -61,12 +65,12 @@ impl Store {
     }
 }
 
-/// The number of the last row of the next piece; `None` at the end.
+/// The number of the last row of the next piece; `None` where there are no more behind it, but those that come meanwhile.
 fn piece(connection: &Connection, verified: Verified) -> Result<Option<i64>, StoreError> {
     let (table, query, is_whole) = TABLES[verified.table];
     let mut query = connection.prepare_cached(query)?;
     let mut rows = query.query([verified.after, PIECE])?;
-    let mut last = None;
+    let (mut last, mut count) = (None, 0);
     while let Some(row) = rows.next()? {
         let number = row.get_ref(0)?;
         if !is_whole(row)? {
@@ -74,13 +78,7 @@ fn piece(connection: &Connection, verified: Verified) -> Result<Option<i64>, Sto
             return Err(StoreError::Damaged { detail });
         }
         last = Some(row.get(0)?);
+        count += 1;
     }
-    Ok(last)
-}
-
-/// Whether the sum, which stands behind so many values, is theirs.
-fn is_whole(row: &Row<'_>, values: usize) -> Result<bool, StoreError> {
-    let all = (0..values).map(|index| row.get_ref(index));
-    let all: Vec<ValueRef<'_>> = all.collect::<Result<_, _>>()?;
-    Ok(row.get_ref(values)? == ValueRef::Integer(sum(&all)))
+    Ok(last.filter(|_| count == PIECE))
 }

@@ -127,7 +127,7 @@ async fn it_is_ready_only_when_the_past_is_read_and_the_store_takes_writes() {
 async fn metrics_are_openmetrics_text_with_every_figure_and_escaped_names() {
     let vitals = Arc::new(Vitals::default());
     let time: Timestamp = "2017-06-06T17:00:00Z".parse().unwrap();
-    let (odd, took) = ("a \"quoted\"\\\nname", Duration::from_millis(20));
+    let (odd, took) = ("a \"quoted\"\\\n\u{1b}name", Duration::from_millis(20));
     vitals.read(
         &BenchmarkId::new(odd),
         time,
@@ -146,7 +146,7 @@ async fn metrics_are_openmetrics_text_with_every_figure_and_escaped_names() {
     let kind = format!("content-type: {CONTENT_TYPE}");
     assert!(answer.head.contains(&kind), "{}", answer.head);
     assert!(answer.body.ends_with("# EOF\n"), "{}", answer.body);
-    let label = "{benchmark=\"a \\\"quoted\\\"\\\\\\nname\"}";
+    let label = "{benchmark=\"a \\\"quoted\\\"\\\\\\n\\\\u{1b}name\"}";
     for line in [
         "slipwatch_readings_total 67".to_owned(),
         "slipwatch_quarantined_total{source=\"logger\"} 3".to_owned(),

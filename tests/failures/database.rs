@@ -123,6 +123,40 @@ fn a_flipped_bit_in_what_was_taken_or_said_is_seen_at_the_next_start() {
     site.caught_up().stop();
 }
 
+/// Values would go to another benchmark, or count for another length; `status` would show another figure.
+#[test]
+fn a_flipped_bit_in_what_a_series_is_or_in_a_newest_event_is_seen_by_whoever_opens_the_state() {
+    let site = used();
+    let file = site.path("state/slipwatch.db");
+    let whole = fs::read(&file).unwrap();
+    let replay = &["replay", "--state", "state"][..];
+    let status = &["status", "--config", "site.toml"][..];
+    for (change, looks) in [
+        ("UPDATE series SET name = '4' WHERE name = '5'", replay),
+        ("UPDATE series SET unit = 'm' WHERE unit = 'mm'", replay),
+        (
+            "UPDATE latest SET body = replace(body, '1', '3') WHERE kind = 'refit'",
+            status,
+        ),
+        (
+            "UPDATE latest SET benchmark = '4' WHERE kind = 'refit'",
+            status,
+        ),
+    ] {
+        fs::write(&file, &whole).unwrap();
+        let database = Connection::open(&file).unwrap();
+        assert_eq!(database.execute(change, []).unwrap(), 1, "{change}");
+        drop(database);
+        is_refused(&site, "is not what was written");
+        let output = site.ask(looks);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(74), "{change}: {said}");
+        assert!(said.contains("restore a backup"), "{change}: {said}");
+    }
+    fs::write(&file, &whole).unwrap();
+    site.caught_up().stop();
+}
+
 #[test]
 fn a_flipped_bit_in_the_memory_or_a_position_is_seen_and_both_are_made_anew() {
     let site = used();
@@ -177,20 +211,24 @@ fn a_flipped_bit_in_what_hooks_are_to_be_sent_is_seen_at_the_next_start() {
 
 #[test]
 fn a_bit_that_flips_while_the_daemon_runs_is_reported() {
-    let site = used();
-    let listen = site.listen();
-    let program = site.caught_up();
-    eventually("ready", || get(&listen, "/readyz").contains("200 OK"));
-    let database = Connection::open(site.path("state/slipwatch.db")).unwrap();
-    let flip =
-        "UPDATE event SET body = replace(body, '1', '3') WHERE seq = (SELECT min(seq) FROM event)";
-    assert_eq!(database.execute(flip, []).unwrap(), 1);
-    drop(database);
-    eventually("notified", || !get(&listen, "/readyz").contains("200 OK"));
-    eventually("in the metrics", || {
-        get(&listen, "/metrics").contains("slipwatch_store_damaged 1")
-    });
-    program.stop();
+    for flip in [
+        "UPDATE event SET body = replace(body, '1', '3') WHERE seq = (SELECT min(seq) FROM event)",
+        "UPDATE series SET unit = 'm' WHERE unit = 'mm'",
+        "UPDATE latest SET body = replace(body, '1', '3') WHERE kind = 'refit'",
+    ] {
+        let site = used();
+        let listen = site.listen();
+        let program = site.caught_up();
+        eventually("ready", || get(&listen, "/readyz").contains("200 OK"));
+        let database = Connection::open(site.path("state/slipwatch.db")).unwrap();
+        assert_eq!(database.execute(flip, []).unwrap(), 1, "{flip}");
+        drop(database);
+        eventually(flip, || !get(&listen, "/readyz").contains("200 OK"));
+        eventually("in the metrics", || {
+            get(&listen, "/metrics").contains("slipwatch_store_damaged 1")
+        });
+        program.stop();
+    }
 }
 
 #[test]

@@ -159,7 +159,10 @@ fn a_daemon_that_stood_still_reads_what_came_meanwhile() {
 
 /// The daemon by a clock that is ahead of ours by what stands in the file `ahead`.
 pub(crate) fn by_another_clock(site: &Site) -> Program {
-    let library = "/usr/lib/x86_64-linux-gnu/faketime/libfaketime.so.1";
+    let library = format!(
+        "/usr/lib/{}-linux-gnu/faketime/libfaketime.so.1",
+        std::env::consts::ARCH
+    );
     let ahead = site.path("ahead");
     let program = site.start(&[
         "env",

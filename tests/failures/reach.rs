@@ -169,6 +169,18 @@ fn a_silence_holds_for_a_hook_that_fails_and_for_one_that_a_reload_adds_until_it
     site.proven_events();
 }
 
+#[test]
+fn a_silence_that_runs_out_by_itself_is_said_to_be_over() {
+    let site = one_benchmark("");
+    let program = site.caught_up();
+    alerts(&site, &["silence", "--for", "5s"]);
+    taken(&site, "silence");
+    eventually("its end", || {
+        site.log().contains("were not reported has ended")
+    });
+    program.stop();
+}
+
 /// From so long before now until so long after, by UTC; and its end.
 fn hours(before: i64, after: i64) -> (String, Timestamp) {
     let time = |seconds: i64| clock::now() + SignedDuration::from_secs(seconds);

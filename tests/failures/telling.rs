@@ -206,14 +206,39 @@ fn a_child_that_leaves_its_hooks_group_does_not_outlive_the_attempt() {
     let program = site.caught_up();
     eventually("two attempts", || site.lines("children").len() >= 2);
     let first = site.lines("children").swap_remove(0);
-    eventually("its end", || {
-        let stat = fs::read_to_string(format!("/proc/{first}/stat")).unwrap_or_default();
-        stat.is_empty() || stat.contains(") Z ")
-    });
+    eventually("its end", || has_ended(&first));
     program.let_go();
     for child in site.lines("children") {
         let _ = std::process::Command::new("kill").arg(child).status();
     }
+}
+
+#[test]
+fn what_a_hook_that_fails_leaves_behind_does_not_outlive_the_attempt_either() {
+    let site = Site::new(POLICY);
+    let script = "[ $SLIPWATCH_LEVEL = red ] || exit 0\n\
+                  setsid sh -c 'echo $$ >> children; sleep 300' &\nsleep 0.2\nexit 1\n";
+    fs::write(site.path("hook.sh"), script).unwrap();
+    site.append(
+        "incoming/5.csv",
+        &format!("time,displacement_mm\n{}", failing(0..114)),
+    );
+    let program = site.caught_up();
+    eventually("two attempts", || site.lines("children").len() >= 2);
+    let first = site.lines("children").swap_remove(0);
+    eventually("its end", || has_ended(&first));
+    program.stop();
+    for child in site.lines("children") {
+        let is_over = has_ended(&child);
+        let _ = std::process::Command::new("kill").arg(&child).status();
+        assert!(is_over, "one outlives the daemon");
+    }
+}
+
+/// Whether a process is there no more.
+fn has_ended(process: &str) -> bool {
+    let stat = fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
+    stat.is_empty() || stat.contains(") Z ")
 }
 
 /// All that a program printed.

@@ -2,6 +2,7 @@
 
 use crate::site::{Site, eventually};
 use flate2::read::GzDecoder;
+use rusqlite::Connection;
 use serde_json::Value;
 use std::fs;
 use std::io::Read;
@@ -81,6 +82,14 @@ fn a_state_that_the_first_version_wrote_keeps_readings_events_and_what_was_not_d
         "{}",
         site.log()
     );
+    let database = Connection::open(site.path("state/slipwatch.db")).unwrap();
+    for table in ["series", "latest"] {
+        let query = format!("SELECT count(*), count(sum) FROM {table}");
+        let (rows, sums): (i64, i64) = database
+            .query_row(&query, [], |row| Ok((row.get(0)?, row.get(1)?)))
+            .unwrap();
+        assert!(rows > 0 && sums == rows, "{table}: {sums} of {rows}");
+    }
     assert_eq!(site.notified(RED, "firing"), 0, "it had been taken");
     assert_eq!(site.lines("late").len(), 1, "{:?}", site.lines("late"));
     let before = String::from_utf8(unpacked("state-0.1.0-events.ndjson.gz")).unwrap();

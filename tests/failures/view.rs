@@ -138,6 +138,57 @@ fn a_benchmark_that_is_unknown_is_so_after_a_restart_too() {
     program.stop();
 }
 
+/// Without the saved memory every step is gone through again, which takes a while.
+#[test]
+fn what_was_unknown_is_shown_so_before_the_stored_steps_have_been_gone_through() {
+    let site = Site::new("[[benchmark]]\nid = \"absent\"\nsource = \"logger\"\n");
+    let listen = site.listen();
+    let silent = ["5", "6", "7", "8"];
+    let benchmarks =
+        silent.map(|id| format!("[[benchmark]]\nid = \"{id}\"\nsource = \"logger\"\n"));
+    let text = fs::read_to_string(site.path("site.toml")).unwrap();
+    fs::write(
+        site.path("site.toml"),
+        format!("{text}{}", benchmarks.concat()),
+    )
+    .unwrap();
+    for id in silent {
+        let file = format!("incoming/{id}.csv");
+        site.append(&file, &format!("{HEADER}{}", failing(0..60)));
+    }
+    let all = ["5", "6", "7", "8", "absent"];
+    let missing = || {
+        let (metrics, status) = (get(&listen, "/metrics"), get(&listen, "/api/status"));
+        let line = |id: &&str| format!("slipwatch_benchmark_unknown{{benchmark=\"{id}\"}} 1");
+        let mut missing: Vec<&str> = all
+            .into_iter()
+            .filter(|id| !metrics.contains(&line(id)))
+            .collect();
+        if status.matches("\"is_unknown\":true").count() != all.len() {
+            missing.push("status");
+        }
+        missing
+    };
+    let program = site.caught_up();
+    eventually("unknown", || missing().is_empty());
+    program.stop();
+    let database = rusqlite::Connection::open(site.path("state/slipwatch.db")).unwrap();
+    database.execute("DELETE FROM memory", []).unwrap();
+    drop(database);
+    let program = site.start(&[]);
+    eventually("a start", || site.log().contains("listening"));
+    for _ in 0..200 {
+        let (is_over, missing) = (site.log().contains("caught up"), missing());
+        assert!(missing.is_empty(), "{missing:?}: {}", site.log());
+        if is_over {
+            break;
+        }
+    }
+    eventually("caught up", || site.log().contains("caught up"));
+    assert!(missing().is_empty());
+    program.stop();
+}
+
 #[test]
 fn a_state_folder_that_was_removed_is_not_ready() {
     let site = Site::new("");
@@ -169,8 +220,9 @@ fn two_thousand_connections_that_ask_nothing_shut_nobody_out() {
 }
 
 #[test]
-fn a_name_with_a_line_break_in_it_forges_no_line_of_the_status_or_the_log() {
+fn a_name_with_a_line_break_in_it_forges_no_line_anywhere() {
     let site = Site::new("");
+    let listen = site.listen();
     let forged = "x\n7  red  2026-01-01\u{1b}[2J";
     fs::write(site.path("incoming/5.mcap"), recording(forged)).unwrap();
     let program = site.caught_up();
@@ -181,6 +233,28 @@ fn a_name_with_a_line_break_in_it_forges_no_line_of_the_status_or_the_log() {
         "{status}"
     );
     assert!(!status.contains('\u{1b}'), "{status}");
+    let checked = site.ask(&["check", "site.toml"]);
+    for said in [&checked.stdout, &checked.stderr] {
+        let said = String::from_utf8_lossy(said);
+        assert!(
+            !said.lines().any(|line| line.starts_with("7  red")) && !said.contains('\u{1b}'),
+            "{said}"
+        );
+    }
+    let checked = String::from_utf8_lossy(&checked.stdout);
+    assert!(checked.contains(r"benchmark x\n7  red"), "{checked}");
+    let metrics = get(&listen, "/metrics");
+    // The format's own line break, and a backslash that stands for itself.
+    let label = r#"slipwatch_benchmark_level{benchmark="x\n7  red  2026-01-01\\u{1b}[2J"}"#;
+    assert!(metrics.contains(label), "{metrics}");
+    eventually("notified", || !site.lines("notified").is_empty());
+    let notified = fs::read_to_string(site.path("notified")).unwrap();
+    // The hook's echo makes one space of several.
+    assert!(
+        notified.starts_with("x 7 red 2026-01-01 [2J/unknown/"),
+        "{notified}"
+    );
+    assert_eq!(notified.lines().count(), 1, "{notified}");
     program.stop();
     assert!(
         !site.log().lines().any(|line| line.starts_with("7  red")),
@@ -198,14 +272,19 @@ fn recording(name: &str) -> Vec<u8> {
     let channel = writer
         .add_channel(0, &topic, "json", &BTreeMap::default())
         .unwrap();
+    // So long ago that the benchmark has fallen silent, and not so long that nobody is to be notified of it.
+    let time = clock::now() - SignedDuration::from_hours(20 * 24);
+    let nanoseconds = u64::try_from(time.as_nanosecond()).unwrap();
     let header = mcap::records::MessageHeader {
         channel_id: channel,
         sequence: 0,
-        log_time: 1_577_836_800_000_000_000,
-        publish_time: 1_577_836_800_000_000_000,
+        log_time: nanoseconds,
+        publish_time: nanoseconds,
     };
-    let body = br#"{"time":"2020-01-01T00:00:00Z","value":1.0,"unit":"mm"}"#;
-    writer.write_to_known_channel(&header, body).unwrap();
+    let body = format!(r#"{{"time":"{time}","value":1.0,"unit":"mm"}}"#);
+    writer
+        .write_to_known_channel(&header, body.as_bytes())
+        .unwrap();
     writer.finish().unwrap();
     drop(writer);
     bytes.into_inner()

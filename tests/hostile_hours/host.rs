@@ -98,7 +98,11 @@ impl<'a> Host<'a> {
         let site = Site::resume(&self.config.site.name, settings, sinks, &mut || {}).unwrap();
         let pulse = self
             .runtime
-            .block_on(Reporting::start(&self.config.site, ServedState::default()))
+            .block_on(Reporting::start(
+                &self.config.site,
+                Arc::default(),
+                ServedState::default(),
+            ))
             .unwrap();
         site.show(&pulse.vitals);
         let (stop, stopped) = shutdown::pair();

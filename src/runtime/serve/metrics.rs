@@ -1,7 +1,7 @@
 //! The metrics, as OpenMetrics 1.0 text. Names are part of the interface: `deploy/` queries them.
 
 use crate::alert::Level;
-use crate::reading::{BenchmarkId, Timestamp};
+use crate::reading::{BenchmarkId, Timestamp, plain};
 use crate::runtime::clock;
 use crate::runtime::drilled::DrillRecord;
 use crate::runtime::vitals::{Health, Vitals, VitalsPoint};
@@ -225,7 +225,7 @@ fn counts(sheet: &mut Sheet<'_>, health: &Health) -> fmt::Result {
         .0
         .encode_descriptor("quarantined", about, None, MetricType::Counter)?;
     for (source, count) in &health.quarantined {
-        let labels = [("source", source.as_str())];
+        let labels = [("source", label_value(source))];
         ConstCounter::new(*count).encode(family.encode_family(&labels)?)?;
     }
     Ok(())
@@ -287,6 +287,12 @@ fn seconds(time: Timestamp) -> f64 {
     time.as_millisecond() as f64 / 1e3
 }
 
+/// The format has a way to write a line break, which stays; of other control characters it knows nothing.
+fn label_value(text: &str) -> String {
+    let lines: Vec<String> = text.split('\n').map(plain).collect();
+    lines.join("\n")
+}
+
 struct Sheet<'a>(DescriptorEncoder<'a>);
 
 impl Sheet<'_> {
@@ -312,7 +318,7 @@ impl Sheet<'_> {
             .0
             .encode_descriptor(name, about, None, MetricType::Gauge)?;
         for (of, value) in values {
-            ConstGauge::new(value).encode(family.encode_family(&[(label, of)])?)?;
+            ConstGauge::new(value).encode(family.encode_family(&[(label, label_value(of))])?)?;
         }
         Ok(())
     }

@@ -89,6 +89,12 @@ impl Site {
         }
     }
 
+    /// Whether it is one of those that [`Site::show`] shows.
+    pub(in crate::runtime) fn shows(&self, benchmark: &BenchmarkId) -> bool {
+        let named = &self.monitor.settings().watched.named;
+        self.newest.contains_key(benchmark) || named.contains(benchmark)
+    }
+
     fn remember(&mut self, recorded: &Recorded) -> Result<(), SavedError> {
         let (own, parts): (Vec<MemoryPart>, Vec<MemoryPart>) = recorded
             .parts

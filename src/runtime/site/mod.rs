@@ -17,6 +17,7 @@ mod unproven;
 
 pub(super) use arrivals::{Untimely, is_logged, untimely};
 pub use mute::Mute;
+pub(super) use mute::announce_ends;
 pub(super) use unproven::Unproven;
 
 use crowd::MessageRush;

@@ -36,6 +36,20 @@ impl Mute {
     }
 }
 
+/// Says in the log which of those that stood before stand no more: also one that ran out by itself.
+pub(in crate::runtime) fn announce_ends(before: &[Mute], now: &[Mute]) {
+    for mute in before.iter().filter(|mute| !now.contains(mute)) {
+        let Mute {
+            benchmark, until, ..
+        } = mute;
+        tracing::warn!(
+            ?benchmark,
+            %until,
+            "an order by which alerts were not reported has ended"
+        );
+    }
+}
+
 impl Site {
     /// Does what people ask for, as far as it concerns who is notified.
     pub(super) fn apply(&mut self, order: &Order) {
