@@ -95,6 +95,20 @@ fn a_benchmark_whose_readings_alternate_in_sign_is_unknown() {
     spoils(|number, value| if number % 2 == 0 { -value } else { value });
 }
 
+/// Between 0 and 1, the same each time.
+fn drawn(number: usize) -> f64 {
+    let mixed = u32::try_from(number).unwrap().wrapping_mul(2_654_435_761) ^ 0x9e37_79b9;
+    f64::from(mixed.wrapping_mul(2_246_822_519) >> 8) / f64::from(1_u32 << 24)
+}
+
+#[test]
+fn a_benchmark_of_which_half_of_the_readings_lie_anywhere_is_unknown() {
+    spoils(|number, value| {
+        let is_wild = number >= 60 && drawn(number + 3001) < 0.5;
+        value + f64::from(u8::from(is_wild)) * 600.0 * (drawn(number + 7001) - 0.5)
+    });
+}
+
 #[test]
 fn a_benchmark_that_gave_one_velocity_and_then_displacements_is_unknown() {
     let site = Site::new(POLICY);
