@@ -118,8 +118,8 @@ const MOST_ARGUMENTS: usize = 7;
 /// Functions that take more: of two states with their covariances, and of a whole course.
 const WITH_MORE: [&str; 3] = ["effect", "smooth_pair", "voight"];
 
-/// Names of types that stand more than once: the flags of each command, and three that do not yet say what distinguishes them.
-const NAMED_TWICE: [&str; 4] = ["Args", "Change", "Kind", "Sample"];
+/// Names of types that stand more than once: the flags of each command.
+const NAMED_TWICE: [&str; 1] = ["Args"];
 
 /// One source file: its module's path and the text of what is not a test.
 struct Source {

@@ -21,7 +21,7 @@ pub use constant_load::{ConstantLoad, FitOutcome};
 pub(crate) use damped::{Damping, Descendable, StepOutcome, descend};
 pub use lattice::Lattice;
 pub use point_readings::PointReadings;
-pub use posterior::{Ensemble, Onset, OtherPrior, P_PRIOR, Posterior, Sample as LawSample};
+pub use posterior::{Ensemble, LawSample, Onset, OtherPrior, P_PRIOR, Posterior};
 pub(crate) use rates::displacement_sigma;
 pub use rates::{FINEST_DAYS, Observation, Observations, Rate, RateOptions, ReadingError};
 pub use solution::{EndOfSearch, Exponent, Solution};

@@ -9,7 +9,7 @@
 //! often the slope is looked at in between. Summed over the scales the prior rate is at most [`RATE_PER_YEAR`].
 
 use super::Scales;
-use super::scales::{Change, Scale};
+use super::scales::{Scale, VelocityChange};
 use crate::fit::Observations;
 
 /// Prior rate of accelerations, a year, at one scale.
@@ -85,7 +85,7 @@ fn summed(scales: &Scales) -> Vec<(f64, f64)> {
 
 fn odds(scales: &Scales, scale: &Scale) -> f64 {
     let most = most_freedom(scales.length_days, scale.days);
-    let factor = |change: &Change| ln_bayes_factor(change, most).min(SURE).exp();
+    let factor = |change: &VelocityChange| ln_bayes_factor(change, most).min(SURE).exp();
     let prior = RATE_OF_A_SCALE / 365.25 * scale.days;
     prior * f64::midpoint(factor(&scale.near), factor(&scale.far))
 }
@@ -105,7 +105,7 @@ fn most_freedom(length_days: f64, block_days: f64) -> f64 {
 
 /// ln of the density of a change that is [`SPREAD`] times as wide as usual and above 0, over that of a usual one; the
 /// side is smooth, so that no reading switches it.
-fn ln_bayes_factor(change: &Change, most_freedom: f64) -> f64 {
+fn ln_bayes_factor(change: &VelocityChange, most_freedom: f64) -> f64 {
     let z = change.newest / change.usual;
     let freedom = change.freedom.min(most_freedom);
     let wide = 1.0 + SPREAD * SPREAD;
@@ -120,7 +120,7 @@ mod tests {
     use super::*;
 
     fn factor(z: f64, freedom: f64) -> f64 {
-        let change = Change {
+        let change = VelocityChange {
             newest: z,
             usual: 1.0,
             freedom,

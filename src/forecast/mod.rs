@@ -23,5 +23,5 @@ pub use network::{INPUTS, Network, UNITS};
 pub use panel::{FEWEST_READINGS, HORIZON_DAYS, LawForecaster, Outlook, by_the_law};
 pub(crate) use panel::{measurably_moves, outlook};
 pub use passage::Passage;
-pub use scales::{Change, Scale, Scales};
+pub use scales::{Scale, Scales, VelocityChange};
 pub use together::{FailureTimeLikelihood, Group, Snapshot, groups};

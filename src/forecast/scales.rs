@@ -40,7 +40,7 @@ const MOST_JUMP: f64 = 3.0;
 
 /// A change of velocity as a change of displacement over equal blocks, mm, with what is usual for it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Change {
+pub struct VelocityChange {
     /// The newest one, mm; above 0 is faster.
     pub newest: f64,
     /// Standard deviation of such changes before, mm, from those that slow down: a noise slows down as often as it
@@ -64,9 +64,9 @@ pub struct Scale {
     /// See [`Scale::highest_velocity`].
     pub median_velocity: f64,
     /// From one block to the next.
-    pub near: Change,
+    pub near: VelocityChange,
     /// From one block to the third before it.
-    pub far: Change,
+    pub far: VelocityChange,
     /// Largest step between two readings over the motion of the two newest blocks.
     pub jump: f64,
 }
@@ -376,7 +376,7 @@ impl Blocks {
         }
         let prior = shorter.map(|scale| scale.near);
         let near = self.change(1, stated, prior);
-        let first = Change {
+        let first = VelocityChange {
             freedom: PRIOR_COUNT,
             ..near
         };
@@ -438,7 +438,7 @@ impl Blocks {
     }
 
     /// The change of velocity over `apart` blocks.
-    fn change(&self, apart: usize, stated: f64, prior: Option<Change>) -> Change {
+    fn change(&self, apart: usize, stated: f64, prior: Option<VelocityChange>) -> VelocityChange {
         let means = &self.means;
         let last = apart + 1;
         let at = |block: usize| {
@@ -463,7 +463,7 @@ impl Blocks {
         let known = prior.map_or(least, |prior| prior.usual);
         let square = (squares + PRIOR_COUNT * known * known) / (count + PRIOR_COUNT);
         let carried = prior.map_or(0.0, |prior| prior.freedom - PRIOR_COUNT);
-        Change {
+        VelocityChange {
             newest: if means.len() > last { at(0) } else { 0.0 },
             usual: square.sqrt().max(LEAST_CHANGE_MM),
             freedom: PRIOR_COUNT + count / OVERLAP + CARRIED * carried,

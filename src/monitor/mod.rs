@@ -285,7 +285,7 @@ impl Monitor {
                 what,
             } => self.missing(now, benchmark, *time, what),
             Input::Found(finding) => self.found(now, finding),
-            Input::Notice(notice) => self.heed(now, notice),
+            Input::Notice(notice) => self.take_notice(now, notice),
             Input::Sample {
                 channel,
                 unit,

@@ -64,7 +64,7 @@ pub enum Notice {
 }
 
 impl Monitor {
-    pub(super) fn heed(&mut self, now: Timestamp, notice: &Notice) -> Vec<Event> {
+    pub(super) fn take_notice(&mut self, now: Timestamp, notice: &Notice) -> Vec<Event> {
         match notice {
             Notice::Watching => {
                 let silent = self.never_read();

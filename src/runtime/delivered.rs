@@ -114,7 +114,7 @@ impl Delivered {
     ///
     /// # Errors
     /// When it cannot be written as bytes.
-    pub(super) fn put_down(
+    pub(super) fn record_outcome(
         &mut self,
         alert: &Alert,
         hook: &str,
@@ -150,7 +150,7 @@ impl Delivered {
         hook: &str,
         fate: DeliveryOutcome,
     ) -> Result<(), StoreError> {
-        self.put_down(alert, hook, fate)?;
+        self.record_outcome(alert, hook, fate)?;
         self.commit()
     }
 

@@ -76,7 +76,7 @@ impl Batch {
     }
 
     /// Notes that another alert reports this to a hook too.
-    pub fn tell_together(&mut self, delivery: super::Delivery) {
+    pub fn deliver_together(&mut self, delivery: super::Delivery) {
         self.reported_by_another.push(delivery);
     }
 

@@ -263,27 +263,45 @@ async fn what_was_acknowledged_does_not_come_again_and_what_was_not_does() {
     second.end().await;
 }
 
+/// Publishes a message of 17 MiB, and a reading after it.
+async fn publish_long_and_next(broker: &Mosquitto) -> tokio::task::JoinHandle<()> {
+    let long = "x".repeat(17 << 20);
+    let mut options = MqttOptions::new("long writer", "127.0.0.1", broker.port);
+    options.set_max_packet_size(32 << 20, 32 << 20);
+    let (client, mut connection) = AsyncClient::new(options, 4);
+    for payload in [long, message(1)] {
+        client
+            .publish("site/5/displacement", QoS::AtLeastOnce, false, payload)
+            .await
+            .unwrap();
+    }
+    tokio::spawn(async move {
+        let _client = client;
+        while connection.poll().await.is_ok() {}
+    })
+}
+
+#[tokio::test(flavor = "multi_thread")]
+#[cfg_attr(not(has_mosquitto), ignore = "Mosquitto was not found by build.rs")]
+async fn a_daemon_counts_a_message_that_is_too_long_and_takes_what_comes_after_it() {
+    let broker = Mosquitto::start();
+    let daemon = Daemon::start_with(&broker, "");
+    daemon.wait("at work", |daemon| daemon.text("log").contains("connected"));
+    tokio::time::sleep(Duration::from_millis(1500)).await;
+    let writer = publish_long_and_next(&broker).await;
+    daemon.wait("what comes after it", |daemon| daemon.durable() == (1, 1));
+    let log = daemon.text("log");
+    assert!(log.contains("quarantined"), "{log}");
+    writer.abort();
+}
+
 #[tokio::test(flavor = "multi_thread")]
 #[cfg_attr(not(has_mosquitto), ignore = "Mosquitto was not found by build.rs")]
 async fn a_message_that_is_too_long_is_set_aside_and_what_comes_after_it_is_taken() {
     let broker = Mosquitto::start();
     let mut source = Source::start(&broker);
     tokio::time::sleep(Duration::from_millis(1500)).await;
-    let long = "x".repeat(17 << 20);
-    let options = {
-        let mut options = MqttOptions::new("long writer", "127.0.0.1", broker.port);
-        options.set_max_packet_size(32 << 20, 32 << 20);
-        options
-    };
-    let (client, mut connection) = AsyncClient::new(options, 4);
-    let topic = "site/5/displacement";
-    for payload in [long, message(1)] {
-        client
-            .publish(topic, QoS::AtLeastOnce, false, payload)
-            .await
-            .unwrap();
-    }
-    let writer = tokio::spawn(async move { while connection.poll().await.is_ok() {} });
+    let writer = publish_long_and_next(&broker).await;
     let delivery = source.next().await;
     assert_eq!((values(&delivery), delivery.quarantined), (vec![], 1));
     delivery.receipt.acknowledge().await.unwrap();

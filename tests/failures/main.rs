@@ -13,7 +13,7 @@
 //! | 11 | marks for no value | tests/library/ingest_toa5.rs, tests/daemon/follow.rs, tests/library/monitor.rs |
 //! | 12 | no watches | `files`: none left to the user |
 //! | 13 | a file that cannot be read, no file descriptors | `files`, `machine` (ESTALE, EIO, EACCES through strace; EMFILE) |
-//! | 14 | the disk is full | `disk` (a full tmpfs); tests/daemon/crisis.rs (a limit on the length of files) |
+//! | 14 | the disk is full | `disk` (a full tmpfs); tests/daemon/daemon/crisis.rs (a limit on the length of files) |
 //! | 15 | killed at any moment, at any system call | `killed` |
 //! | 16 | a sync fails: at the start, of a commit, of the database | `disk` |
 //! | 17 | a database that is damaged, newer, foreign, in use | `database` |

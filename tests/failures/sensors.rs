@@ -196,3 +196,35 @@ fn a_benchmark_that_reads_again_with_a_backlog_is_unknown_nowhere() {
     program.stop();
     site.proven_events();
 }
+
+/// 14.
+#[test]
+fn steady_creep_is_reported_as_neither_orange_nor_red() {
+    let site = Site::new("");
+    let start = clock::now() - SignedDuration::from_hours(400);
+    for benchmark in 5..8 {
+        let seed = 100_003 * benchmark;
+        let rows: String = (0..400)
+            .map(|hour| {
+                // 2.4 mm/day, with a noise of .3 mm.
+                let noise: f64 = (0..12).map(|part| drawn(seed + 12 * hour + part)).sum();
+                let time = start + SignedDuration::from_hours(i64::try_from(hour).unwrap());
+                format!("{time},{:.3}\n", 0.1 * hour as f64 + 0.3 * (noise - 6.0))
+            })
+            .collect();
+        site.append(
+            &format!("incoming/{benchmark}.csv"),
+            &format!("{HEADER}{rows}"),
+        );
+    }
+    let program = site.caught_up();
+    eventually("everything", || site.values().len() == 1200);
+    program.stop();
+    let events = site.proven_events();
+    for benchmark in 5..8 {
+        for level in ["orange", "red"] {
+            let key = format!("{benchmark}/{level}/");
+            assert_eq!(site.notified(&key, "firing"), 0, "{key}: {events}");
+        }
+    }
+}

@@ -43,13 +43,13 @@ impl Radio {
 
     /// The connection is a new one: what was not acknowledged is sent again.
     pub(crate) fn reconnect(&mut self) {
-        self.heed();
+        self.take_notice();
         for (_, was_sent) in self.kept.values_mut() {
             *was_sent = false;
         }
     }
 
-    fn heed(&mut self) {
+    fn take_notice(&mut self) {
         while let Ok(number) = self.acknowledged.try_recv() {
             self.kept.remove(&number);
         }
@@ -57,7 +57,7 @@ impl Radio {
 
     /// What is sent now, and whether red is due once it has been read.
     pub(crate) fn send(&mut self, random: &mut Pcg64) -> Vec<(ReceivedMessage, Measured)> {
-        self.heed();
+        self.take_notice();
         if self.is_away {
             return Vec::new();
         }
@@ -81,7 +81,7 @@ impl Radio {
     }
 
     pub(crate) fn is_empty(&mut self) -> bool {
-        self.heed();
+        self.take_notice();
         self.kept.is_empty()
     }
 }

@@ -11,7 +11,7 @@ const LEAST_COVERAGE: f64 = 0.6;
 /// Readings further apart than so many steps have nothing between them.
 const WIDEST_GAP_STEPS: f64 = 2.1;
 /// A reading this far, in robust standard deviations, outside what stands on either side is stray.
-const STRAY: f64 = 6.0;
+const OUTLYING: f64 = 6.0;
 /// A difference this far, in robust standard deviations, from the neighbours' is a jump.
 const JUMP: f64 = 5.0;
 /// A jump spreads over so many steps at most.
@@ -102,7 +102,7 @@ fn without_strays(path: &AlignmentPath) -> AlignmentPath {
         let share = (three[1].0 - three[0].0) / (three[2].0 - three[0].0).max(f64::MIN_POSITIVE);
         three[1].1 - three[0].1 - share * (three[2].1 - three[0].1)
     };
-    let limit = STRAY * spread(&path.windows(3).map(bend).collect::<Vec<f64>>());
+    let limit = OUTLYING * spread(&path.windows(3).map(bend).collect::<Vec<f64>>());
     let is_stray = |three: &[(f64, f64)]| {
         let (low, high) = (three[0].1.min(three[2].1), three[0].1.max(three[2].1));
         limit > 0.0 && (three[1].1 > high + limit || three[1].1 < low - limit)

@@ -9,7 +9,7 @@ const BREAK_OVER_DRIFT: f64 = 3.0;
 const CHANGED_BEFORE: f64 = 6.0;
 /// Correlation of successive innovations left by the break, in its standard errors, from which on the ratio
 /// follows no break at all, and from which on something is left to explain.
-const WANDERING: f64 = 3.5;
+const WITH_MEMORY: f64 = 3.5;
 const LEFT: f64 = 2.0;
 /// A drift before the break of less than this share of the change is none.
 const DRIFT_SHARE: f64 = 0.2;
@@ -134,7 +134,7 @@ impl<'a> Pair<'a> {
             return Err("the ratio of the velocities had been changing before");
         }
         let memory = lag_one(&fitted.left);
-        if memory * count.sqrt() > WANDERING {
+        if memory * count.sqrt() > WITH_MEMORY {
             return Err("the ratio of the velocities drifts, break or not");
         }
         let inflation = ((1.0 + memory.max(0.0)) / (1.0 - memory.clamp(0.0, 0.9))).max(1.0);

@@ -32,7 +32,7 @@ use window::Window;
 
 /// One law out of the posterior, with t = 0 at the present.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Sample {
+pub struct LawSample {
     /// The law.
     pub law: Law,
     /// Its share of the probability.
@@ -45,7 +45,7 @@ pub struct Ensemble {
     /// The present: the time of the last reading used, days.
     pub now_days: f64,
     /// The laws; their weights sum to 1.
-    pub samples: Vec<Sample>,
+    pub samples: Vec<LawSample>,
     /// Relative scatter of a rate about the law.
     pub scatter: f64,
 }
@@ -91,7 +91,7 @@ struct Effort {
     worth: f64,
 }
 
-/// Of 90 % intervals of 1,000 drawn series, 86 to 88 % hold the truth (`examples/calibration`); 80 to 86 % where 128 laws a round were to
+/// Of 90 % intervals of 1,000 drawn series, 86 to 88 % hold the truth (studies/src/bin/calibration); 80 to 86 % where 128 laws a round were to
 /// be worth 110 even draws.
 const EFFORT: Effort = Effort {
     draws: 512,
@@ -183,7 +183,7 @@ impl Posterior {
         let mut spans_days = Vec::with_capacity(drafts.len());
         let (mut log_size, mut squares) = (0.0, 0.0);
         for (draft, weight) in weighed {
-            samples.push(Sample {
+            samples.push(LawSample {
                 law: draft.law,
                 weight,
             });

@@ -1,7 +1,7 @@
 //! The same laws under other priors: what the readings say, and what is taken for granted.
 
 use super::prior::{CAUCHY_SCALE, P_PRIOR};
-use super::{Ensemble, Posterior, Sample};
+use super::{Ensemble, LawSample, Posterior};
 use crate::model::Law;
 
 /// Scale of the wider priors on kappa L and r L.
@@ -57,8 +57,8 @@ impl Posterior {
     /// The ensemble under another prior, by weighing the same laws again.
     pub fn under(&self, prior: OtherPrior) -> Ensemble {
         let samples = self.ensemble.samples.iter().zip(&self.spans_days);
-        let mut samples: Vec<Sample> = samples
-            .map(|(sample, span)| Sample {
+        let mut samples: Vec<LawSample> = samples
+            .map(|(sample, span)| LawSample {
                 law: sample.law,
                 weight: sample.weight * prior.ratio(&sample.law, *span),
             })

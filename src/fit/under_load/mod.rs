@@ -27,7 +27,7 @@ mod gains;
 mod search;
 mod shape;
 
-use super::posterior::{Ensemble, Sample};
+use super::posterior::{Ensemble, LawSample};
 use super::rates::Rate;
 use crate::model::Law;
 use crate::regime::Regime;
@@ -129,7 +129,7 @@ impl LoadPosterior {
             cell.weight * (cell.variances.0 + cell.scatter.powi(2) + 0.5 * cell.sigma.powi(2))
         };
         let scatter = (heaviest.iter().map(variance).sum::<f64>() / total).sqrt();
-        let samples = heaviest.iter().map(|cell| Sample {
+        let samples = heaviest.iter().map(|cell| LawSample {
             law: cell.law(),
             weight: cell.weight / total,
         });

@@ -339,7 +339,7 @@ impl Dispatcher {
         in_hand.end(alert);
         let key = &alert.key;
         tracing::info!(hook = name, key, ?fate, "not sent, or not tried again");
-        if let Err(error) = delivered.put_down(alert, &name, fate) {
+        if let Err(error) = delivered.record_outcome(alert, &name, fate) {
             tracing::warn!(hook = name, key, %error, "no receipt: a restart may send it");
         }
     }

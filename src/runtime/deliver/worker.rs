@@ -216,7 +216,7 @@ impl Worker {
                 self.untried -= 1;
                 let (hook, key) = (self.hook.name(), &waiting.alert.key);
                 tracing::info!(hook, key, "superseded before it was reported");
-                self.let_go(&waiting.alert, DeliveryOutcome::Over);
+                self.finish(&waiting.alert, DeliveryOutcome::Over);
             } else {
                 self.drop_over(&waiting.alert);
             }
@@ -228,7 +228,7 @@ impl Worker {
         let attempt = waiting.attempt;
         let goes_on = waiting.alert.must_arrive() || attempt < self.retry.attempts;
         if outcome == Some(&HookOutcome::Done) {
-            self.let_go(&waiting.alert, DeliveryOutcome::Delivered);
+            self.finish(&waiting.alert, DeliveryOutcome::Delivered);
         } else if self.is_over(&waiting.alert) {
             self.drop_over(&waiting.alert);
         } else if open && goes_on {
@@ -260,12 +260,12 @@ impl Worker {
             } else {
                 DeliveryOutcome::Waiting
             };
-            self.let_go(&waiting.alert, fate);
+            self.finish(&waiting.alert, fate);
         }
     }
 
     /// Notes what became of an alert, then lets go of it.
-    fn let_go(&self, alert: &Alert, fate: DeliveryOutcome) {
+    fn finish(&self, alert: &Alert, fate: DeliveryOutcome) {
         self.note(alert, fate);
         locked(&self.in_hand).release(alert);
     }
@@ -291,7 +291,7 @@ impl Worker {
             tracing::error!(hook, key, "alert not delivered before it was over");
             self.lost += 1;
         }
-        self.let_go(alert, DeliveryOutcome::Over);
+        self.finish(alert, DeliveryOutcome::Over);
     }
 
     fn begin(&mut self, alert: Alert) {

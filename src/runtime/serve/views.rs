@@ -27,7 +27,7 @@ const POLL_INTERVAL: Duration = Duration::from_secs(1);
 /// ever, and all end before [`super::Limits::request_time`].
 const MOST_POLLS: u32 = 20;
 /// Events sent in one round; after more of them the next round follows at once.
-const MOST_TOLD: usize = 500;
+const MOST_SENT: usize = 500;
 
 /// The routes.
 pub(super) fn router(reader: Arc<SiteReader>) -> Router {
@@ -232,8 +232,8 @@ impl StreamPosition {
         } else {
             Vec::new()
         };
-        self.is_behind = fresh.len() > MOST_TOLD;
-        fresh.truncate(MOST_TOLD);
+        self.is_behind = fresh.len() > MOST_SENT;
+        fresh.truncate(MOST_SENT);
         let mut text = String::new();
         for (number, body) in &fresh {
             let _ = write!(text, "id: {number}\nevent: change\ndata: {body}\n\n");

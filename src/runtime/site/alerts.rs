@@ -41,7 +41,7 @@ impl Site {
             self.follow_on(&mut alert);
             let is_fresh =
                 age <= self.freshness(alert.event.benchmark.as_ref()) || self.never_read(&alert);
-            let is_due = is_fresh && !self.ends_untold(&alert) || self.is_waited_for(&alert);
+            let is_due = is_fresh && !self.ends_unreported(&alert) || self.is_waited_for(&alert);
             let is_muted = self.is_muted(&alert, now);
             let is_sent = is_due && !is_muted;
             if alert.is_correction() {
@@ -113,7 +113,7 @@ impl Site {
             standing.is_reported_together |= standing.alert.key == alert.key;
         }
         if self.sinks.store.is_some() {
-            self.batch.tell_together(delivery(alert, hook)?);
+            self.batch.deliver_together(delivery(alert, hook)?);
         }
         Ok(())
     }
@@ -287,7 +287,7 @@ impl Site {
     }
 
     /// Whether it is the end of what nobody has been notified of.
-    fn ends_untold(&self, alert: &Alert) -> bool {
+    fn ends_unreported(&self, alert: &Alert) -> bool {
         let place = (alert.event.benchmark.clone(), alert.level == Level::Unknown);
         let had = self.standing.get(&place);
         alert.state == MessageState::Resolved && had.is_some_and(|had| !had.was_notified)

@@ -49,7 +49,7 @@ pub(super) struct Followed {
     pub(super) reorder: Option<Reorder>,
     /// What could not be used in files that are gone, and of all its files what has been reported.
     pub(super) quarantined_in_gone: u64,
-    quarantined_told: u64,
+    quarantined_reported: u64,
 }
 
 /// Every followed file, and which folders to look for more.
@@ -83,7 +83,7 @@ impl Follower {
             decoder: Arc::new(Decoder::new(source, benchmarks)),
             reorder: (source.reorder > SignedDuration::ZERO).then(|| Reorder::new(source.reorder)),
             quarantined_in_gone: 0,
-            quarantined_told: 0,
+            quarantined_reported: 0,
         };
         let mut sources: Vec<Followed> = sources.iter().map(of).collect();
         for source in &mut sources {
@@ -138,7 +138,7 @@ impl Follower {
         for index in 0..self.sources.len() {
             let total = self.quarantined_of(index);
             let source = &mut self.sources[index];
-            let more = total - std::mem::replace(&mut source.quarantined_told, total);
+            let more = total - std::mem::replace(&mut source.quarantined_reported, total);
             if more > 0 {
                 new.insert(source.id.clone(), more);
             }
