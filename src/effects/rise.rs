@@ -24,9 +24,12 @@ impl Search<'_> {
         let frame = Frame::new(noise.clone(), &fitted.residual(problem), &columns);
         let places = (at.saturating_sub(BESIDE).max(1)..=at + BESIDE)
             .filter(|place| *place != at && *place < problem.used);
-        let steps = places.filter_map(|place| match offset(problem, place).act {
-            Act::Reading(steps) => Some(steps),
-            _ => None,
+        let steps = places.filter_map(|place| {
+            if let Act::Reading(steps) = offset(problem, place).act {
+                Some(steps)
+            } else {
+                None
+            }
         });
         let mut steps: Vec<Vec<f64>> = steps.flatten().collect();
         let cost = offset(problem, at).parameters() * (problem.used as f64).ln();

@@ -145,7 +145,10 @@ impl Search<'_> {
             // Beside a poor law the likeliest may lie far from where the load changes: the likeliest of each length is fitted.
             let mut fits: Vec<(Fitted, SlowLoad)> = Vec::new();
             for (load, _) in own.iter().filter(|(one, _)| one.shape == shape) {
-                if fits.iter().all(|(_, other)| other.days != load.days) {
+                if fits
+                    .iter()
+                    .all(|(_, other)| other.days.to_bits() != load.days.to_bits())
+                {
                     let fitted = self.best_start(base, &load.term(problem));
                     fits.extend(fitted.map(|fitted| (fitted, **load)));
                 }

@@ -144,6 +144,11 @@ fn steps(values: &[Observation]) -> Vec<f64> {
 /// The one of `sizes` that this share of them lies under.
 fn of_all(mut sizes: Vec<f64>, share: f64) -> Option<f64> {
     let last = sizes.len().checked_sub(1)?;
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a share of a count"
+    )]
     let at = ((share * sizes.len() as f64) as usize).min(last);
     let (_, size, _) = sizes.select_nth_unstable_by(at, f64::total_cmp);
     Some(*size)
@@ -250,7 +255,7 @@ mod tests {
 
     #[test]
     fn blocks_of_readings_that_are_off_together_are_spoilt() {
-        let off = |hour: u32| f64::from(u8::from(hour / 3 % 2 == 0));
+        let off = |hour: u32| f64::from(u8::from((hour / 3).is_multiple_of(2)));
         let blocks = |end: u32| history((0..end).map(|hour| slope(hour) + 300.0 * off(hour)));
         let by = blocks(60).spoilt(None);
         assert!(by.is_some_and(|by| (290.0..310.0).contains(&by)), "{by:?}");
@@ -272,7 +277,7 @@ mod tests {
             // Read twice a day, in a spring after a winter under snow.
             let wave = |half: u32| {
                 let amplitude = 0.01 * (f64::from(half.saturating_sub(200)) / 20.0).exp().min(60.0);
-                let sign = if half % 2 == 0 { 1.0 } else { -1.0 };
+                let sign = if half.is_multiple_of(2) { 1.0 } else { -1.0 };
                 amplitude * sign * (0.5 + noise(half)) + 0.01 * normal(half)
             };
             assert_eq!(history((0..end).map(wave)).spoilt(None), None, "{end}");
