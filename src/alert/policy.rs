@@ -52,8 +52,8 @@ pub struct Policy {
 const EVACUATIONS_AHEAD: i32 = 2;
 /// A chance calls red by its course too: the mean of the ln of its odds, each earlier value counting the less the longer ago it was,
 /// by a factor of e in this part of the evacuation time, has come to odds of this share of those that call red; unless the newest
-/// has so many times these odds. Set on simulated slopes (docs/false-alarms.md): without it, or over a sixth of the time, red was called
-/// 1.5 to 2 times as often on slopes that stand read each hour or oftener, and one collapse in a hundred more was called a day before.
+/// has so many times these odds. Set on simulated slopes (docs/false-alarms.md): without it red was called 1.3 times as often on
+/// slopes that stand and are read each hour, 1.9 times each ten minutes, and one collapse in a hundred more was called a day before.
 const COURSE_PART: i32 = 2;
 const MEAN_ODDS: f64 = 2.0 / 3.0;
 const ODDS_AT_ONCE: f64 = 4.0;
