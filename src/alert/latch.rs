@@ -41,13 +41,11 @@ pub enum Entered {
 pub struct Latch {
     level: Level,
     since: Option<Timestamp>,
-    /// Settled velocity at which the level was entered, and the highest since that stood out of its error, mm/day.
+    /// Settled velocity at which the level was entered, and the highest since that stood out of its error, 0 where none
+    /// did, mm/day.
     #[serde(default)]
     first_velocity: f64,
     peak_velocity: f64,
-    /// Whether there was one.
-    #[serde(default = "of_earlier_versions")]
-    has_stood_out: bool,
     /// While the evidence calls for less: the motion at half the peak velocity or under.
     slow: Option<SteadyStretch>,
     /// While the evidence calls for less: the motion under the critical velocity.
@@ -72,10 +70,6 @@ const CLEAR: f64 = 4.0;
 /// part has failed the rest may creep on at a tenth of the highest velocity, and faster than when people were called out.
 const SLOWED_TO: f64 = 0.5;
 
-fn of_earlier_versions() -> bool {
-    true
-}
-
 impl Default for Latch {
     fn default() -> Self {
         Self {
@@ -83,7 +77,6 @@ impl Default for Latch {
             since: None,
             first_velocity: 0.0,
             peak_velocity: 0.0,
-            has_stood_out: false,
             slow: None,
             steady: None,
         }
@@ -184,10 +177,9 @@ impl Latch {
         // What is no larger than its error is no peak: readings that are spoilt would raise it, and then seem to slow down.
         if velocity > CLEAR * error {
             self.peak_velocity = self.peak_velocity.max(velocity);
-            self.has_stood_out = true;
         }
         // Motion that never stood out of its error has not to slow down.
-        let is_slow = self.has_slowed_to(velocity, error) || !self.has_stood_out;
+        let is_slow = self.has_slowed_to(velocity, error) || self.peak_velocity <= 0.0;
         let slowed = less && is_slow;
         let steady = less && velocity < policy.critical_velocity_mm_per_day;
         let motion = (velocity, error);
@@ -265,7 +257,6 @@ impl Latch {
             since: Some(evidence.now),
             first_velocity: velocity,
             peak_velocity: if has_stood_out { velocity } else { 0.0 },
-            has_stood_out,
             ..Self::default()
         };
     }

@@ -10,6 +10,8 @@ mod declared;
 mod drift;
 mod event;
 mod fallen;
+#[cfg(test)]
+mod fixture;
 mod given;
 mod history;
 mod in_force;

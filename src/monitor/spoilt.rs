@@ -166,38 +166,8 @@ fn resolution(values: &[Observation]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::history::MeasuredAs;
-    use super::*;
-    use crate::reading::{Reading, Timestamp, Unit};
-    use jiff::ToSpan;
-
-    fn history(values: impl IntoIterator<Item = f64>) -> History {
-        history_of(Unit::MM, values)
-    }
-
-    fn history_of(unit: Unit, values: impl IntoIterator<Item = f64>) -> History {
-        let start: Timestamp = "2020-01-01T00:00:00Z".parse().unwrap();
-        let source = MeasuredAs {
-            unit,
-            averaging: None,
-        };
-        let mut history = History::new(source, start);
-        for (hour, value) in (0..).zip(values) {
-            let reading = Reading {
-                time: start + i64::from(hour).hours(),
-                value,
-                sigma: None,
-            };
-            history.take(source, &reading);
-        }
-        history
-    }
-
-    /// Between 0 and 1, the same each time.
-    fn noise(seed: u32) -> f64 {
-        let mixed = seed.wrapping_mul(2_654_435_761) ^ 0x9e37_79b9;
-        f64::from(mixed.wrapping_mul(2_246_822_519) >> 8) / f64::from(1_u32 << 24)
-    }
+    use super::super::fixture::{history, history_of, noise};
+    use crate::reading::Unit;
 
     fn slope(hour: u32) -> f64 {
         200.0 * (120.0 / (120.0 - f64::from(hour))).ln() + noise(hour)

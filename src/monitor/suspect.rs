@@ -192,35 +192,12 @@ fn is_first_day(time: Timestamp) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use super::super::fixture::{history, noise};
     use super::super::history::MeasuredAs;
     use super::*;
     use crate::reading::{Reading, Unit};
     use jiff::ToSpan;
     use std::f64::consts::TAU;
-
-    fn history(values: impl IntoIterator<Item = f64>) -> History {
-        let start: Timestamp = "2020-01-01T00:00:00Z".parse().unwrap();
-        let source = MeasuredAs {
-            unit: Unit::MM,
-            averaging: None,
-        };
-        let mut history = History::new(source, start);
-        for (hour, value) in (0..).zip(values) {
-            let reading = Reading {
-                time: start + i64::from(hour).hours(),
-                value,
-                sigma: None,
-            };
-            history.take(source, &reading);
-        }
-        history
-    }
-
-    /// Between 0 and 1, the same each time.
-    fn noise(seed: u32) -> f64 {
-        let mixed = seed.wrapping_mul(2_654_435_761) ^ 0x9e37_79b9;
-        f64::from(mixed.wrapping_mul(2_246_822_519) >> 8) / f64::from(1_u32 << 24)
-    }
 
     #[test]
     fn a_fine_sensor_that_repeats_its_value_is_stuck_and_a_coarse_one_is_not() {
