@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a bench fails by panicking")]
 
 use divan::{Bencher, black_box};
-use slipwatch::fit::{Observation, Observations, Posterior, RateOptions};
+use slipwatch::fit::{Assumptions, LawDraws, Observation, Observations, RateOptions};
 use slipwatch::forecast::LawForecaster;
 use slipwatch::model::{Accuracy, Law, Load, LoadedLaw, Motion, Sensitivities, Trajectory};
 use slipwatch::reading::{BenchmarkId, Quantity, days_since};
@@ -75,7 +75,7 @@ fn a_year_under_daily_loads(bencher: Bencher, accuracy: Accuracy) {
 #[divan::bench]
 fn posterior_of_67_readings(bencher: Bencher) {
     let rates = observations().rates(0..READINGS, RateOptions::default());
-    bencher.bench(|| Posterior::fit(black_box(&rates)));
+    bencher.bench(|| LawDraws::of(black_box(&rates), &Assumptions::CONSTANT_LOAD));
 }
 
 /// Hourly displacements of a slope that accelerates for ever more slowly, kept as a monitor keeps them.

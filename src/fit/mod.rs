@@ -10,7 +10,6 @@ mod global_search;
 mod lattice;
 mod newest_slope;
 mod point_readings;
-mod posterior;
 mod quasi_random;
 mod rates;
 mod record;
@@ -22,8 +21,9 @@ pub use constant_load::{ConstantLoad, FitOutcome};
 pub(crate) use damped::{Damping, Descendable, StepOutcome, descend};
 pub use lattice::Lattice;
 pub use point_readings::PointReadings;
-pub use posterior::{Ensemble, LawSample, Onset, OtherPrior, P_PRIOR, Posterior};
 pub(crate) use rates::displacement_sigma;
 pub use rates::{FINEST_DAYS, Observation, Observations, Rate, RateOptions, ReadingError};
 pub use solution::{EndOfSearch, Exponent, Solution};
-pub use under_load::LoadPosterior;
+pub use under_load::{
+    Assumptions, Ensemble, LawDraws, LawSample, LoadPosterior, Onset, OtherPrior, P_PRIOR,
+};

@@ -1,12 +1,12 @@
 //! The law's parameters at its start: the best fit's, which starts at the first reading, and what the
-//! posterior leaves open, each law of it at its own onset.
+//! posterior of a constant load leaves open, each law of it at its own onset.
 //!
 //! A bound is null where it is the prior's and not the readings': m's where more than 4 % of the
 //! probability stands in the outermost 5 % of the prior's range of p on that side, the others' where
 //! most of the tail beyond the bound does; those of `x_i`, T and D also where m may be on either side of 1.
 
 use super::{Inversion, law_in_mm_per_day};
-use crate::fit::{Exponent, LawSample, P_PRIOR, Posterior, Solution};
+use crate::fit::{Exponent, LawDraws, LawSample, P_PRIOR, Solution};
 use crate::model::{Accuracy, Law, Trajectory};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -78,7 +78,7 @@ pub(super) fn best(inversion: &Inversion, solution: Option<&Solution>) -> Parame
 pub(super) fn parameters(
     inversion: &Inversion,
     solution: Option<&Solution>,
-    posterior: Option<&Posterior>,
+    posterior: Option<&LawDraws>,
 ) -> Parameters {
     let best = best(inversion, solution);
     let samples = posterior.map_or_else(Vec::new, |posterior| at_start(inversion, posterior));
@@ -126,7 +126,7 @@ enum BoundSide {
 }
 
 /// The posterior's laws, which start at the last rate, followed back to where each begins to hold.
-fn at_start(inversion: &Inversion, posterior: &Posterior) -> Vec<Drawn> {
+fn at_start(inversion: &Inversion, posterior: &LawDraws) -> Vec<Drawn> {
     let back = |(sample, span): (&LawSample, &f64)| {
         let past = Trajectory::solve(&sample.law.reversed(), *span, Accuracy::Fit);
         let law = sample.law.from_y(past.at(*span)?.y);

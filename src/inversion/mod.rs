@@ -1,7 +1,8 @@
 //! One inversion as it is reported: the best fit, what the readings leave open, and what follows from it.
 //!
-//! The best fit and the alternatives are those of the constant-load law by unweighted least squares;
-//! intervals and regime come from the posterior, the failure time from the panel that the monitor uses.
+//! The best fit and the alternatives are those of the constant-load law by unweighted least squares. The regime comes from the
+//! posterior twice: where the load may change, as the monitor has it, and in its special case of a constant load, of which the
+//! intervals of the parameters are too. The failure time comes from the panel that the monitor uses.
 
 mod estimate;
 mod growth;
@@ -18,7 +19,8 @@ pub use sweep::{SweepOptions, SweepReport, SweepRow, sweep, sweep_showing};
 pub use together::{ApartReport, GroupReport, TogetherReport, together};
 
 use crate::fit::{
-    ConstantLoad, Exponent, Observations, PointReadings, Posterior, Rate, RateOptions, Solution,
+    Assumptions, ConstantLoad, Exponent, LawDraws, Observations, PointReadings, Rate, RateOptions,
+    Solution,
 };
 use crate::forecast::{HORIZON_DAYS, InverseVelocityLine, outlook};
 use crate::model::Law;
@@ -120,9 +122,9 @@ impl Inversion {
         // A stuck instrument's readings have a posterior too, and it would name a regime.
         let is_informative = !least_squares.outcome.says_nothing();
         let posterior = is_informative
-            .then(|| Posterior::over_onsets(&rates))
+            .then(|| LawDraws::of(&rates, &Assumptions::CONSTANT_LOAD))
             .flatten();
-        let onset = posterior.as_ref().map(Posterior::onset);
+        let onset = posterior.as_ref().map(LawDraws::onset);
         let regime = FittedRegime::of(posterior.as_ref());
         let best = least_squares.best();
         let first = self.series.readings.first().map(|reading| reading.time);

@@ -2,7 +2,7 @@
 
 use super::estimate::{self, Estimate, Parameters};
 use super::{Inversion, InversionOptions};
-use crate::fit::{ConstantLoad, Ensemble, OtherPrior, Posterior};
+use crate::fit::{ConstantLoad, Ensemble, LawDraws, OtherPrior};
 use crate::forecast::{HORIZON_DAYS, Outlook, Passage};
 use crate::reading::{BenchmarkId, Quantity, SECONDS_PER_DAY, Timestamp, Unit, after_days};
 use crate::regime::{Regime, label};
@@ -25,7 +25,7 @@ pub struct FitReport {
     pub first: Option<Timestamp>,
     /// The last one used.
     pub last: Option<Timestamp>,
-    /// Since when the law holds, by the posterior's median; before that the slope creeps.
+    /// Since when the law holds, by the posterior's median; before that the velocity follows no law.
     pub onset: Option<Timestamp>,
     /// 5 % quantile.
     pub onset_low: Option<Timestamp>,
@@ -162,7 +162,7 @@ impl Alternatives {
 }
 
 impl FittedRegime {
-    pub(super) fn of(posterior: Option<&Posterior>) -> Self {
+    pub(super) fn of(posterior: Option<&LawDraws>) -> Self {
         let Some(posterior) = posterior else {
             return Self {
                 label: Regime::Undetermined,
@@ -201,7 +201,7 @@ impl FittedRegime {
 
 impl UnderPrior {
     /// The stated prior first, then the others.
-    pub(super) fn each(inversion: &Inversion, posterior: Option<&Posterior>) -> Vec<Self> {
+    pub(super) fn each(inversion: &Inversion, posterior: Option<&LawDraws>) -> Vec<Self> {
         let Some(posterior) = posterior else {
             return Vec::new();
         };

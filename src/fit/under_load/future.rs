@@ -1,6 +1,7 @@
 //! When a velocity will be passed: each law run on, its load and its drift drawn on the way.
 
-use super::{Cell, DRIFT, LoadPosterior};
+use super::assumptions::Assumptions;
+use super::{Cell, LoadPosterior};
 use crate::fit::quasi_random::{halton, normal_quantile};
 use std::sync::LazyLock;
 
@@ -67,7 +68,7 @@ impl Cell {
         };
         let left = (of_load - along * self.covariance).max(0.0);
         let load = self.load + along * (now - self.ln_velocity) + left.sqrt() * z[1];
-        let pace = (IN_TIME * DRIFT * z[4]).exp();
+        let pace = (IN_TIME * Assumptions::CHANGING_LOAD.drift * z[4]).exp();
         let mut days = shape.days_to(ln_velocity - (now - load)) / self.r;
         for _ in 0..ROUNDS {
             let memories = if days.is_finite() {

@@ -3,7 +3,7 @@
 //! The state is the load f, the level l of ln v about the law, and two things of today that stay: ln v and
 //! f. Variances do not depend on what is read, so a table of gains serves every shape.
 
-use super::DRIFT;
+use super::assumptions::Assumptions;
 
 /// The rates as the filter sees them.
 #[derive(Debug, Clone)]
@@ -18,6 +18,11 @@ pub(super) struct RateRecord {
     pub(super) centre: f64,
     /// Weight of each rate, 1 but for outliers.
     pub(super) trust: Vec<f64>,
+    /// Whether the error comes from the readings at the two ends, of which each may be the neighbour's too.
+    pub(super) is_of_ends: Vec<bool>,
+    /// The scatter's share of variance that is left in a rate that is a mean of several.
+    pub(super) white: Vec<f64>,
+    pub(super) assumed: Assumptions,
 }
 
 /// One guess at the load and at the scatter of the readings.
@@ -27,6 +32,8 @@ pub(super) struct LoadNoise {
     pub(super) sigma: f64,
     /// LoadMemory of the load, days.
     pub(super) tau: f64,
+    /// How much of the variance of a difference of readings is theirs, and so shared with its neighbours.
+    pub(super) shared: f64,
     pub(super) ln_evidence: f64,
 }
 
@@ -38,6 +45,10 @@ pub(super) const LEVEL_VARIANCE: f64 = 4.0;
 pub(super) struct Gain {
     /// The share of the load that is left from the rate after it.
     pub(super) keep: f64,
+    /// What the error of the reading at its end moves it by, where the rate after it begins with that reading; and what it
+    /// moves of the error of the reading at its start.
+    pub(super) shared: f64,
+    pub(super) end: f64,
     pub(super) load: f64,
     pub(super) level: f64,
     pub(super) velocity_now: f64,
@@ -59,10 +70,38 @@ pub(super) struct Gains {
     pub(super) today: Vec<[f64; 3]>,
 }
 
+/// Degrees of freedom of an outlier's error.
+const STUDENT: f64 = 4.0;
+
 impl RateRecord {
-    /// The variance of a rate's error.
+    /// Doubts the rates that miss by these squares of standard deviations.
+    pub(super) fn doubt(&mut self, squares: &[f64]) {
+        let undoubted = self.assumed.undoubted;
+        for (trust, square) in self.trust.iter_mut().zip(squares) {
+            *trust = ((STUDENT + undoubted) / (STUDENT + square)).min(1.0);
+        }
+    }
+
+    /// The variance of a rate's error, and of its scatter.
     pub(super) fn variance(&self, index: usize, scatter: f64) -> f64 {
-        (self.error[index].powi(2) + scatter * scatter) / self.trust[index]
+        (self.error[index].powi(2) + scatter * scatter * self.white[index]) / self.trust[index]
+    }
+
+    /// The same but for what is of the readings at its two ends, and how much the error of each of those moves it.
+    fn own_and_ends(&self, index: usize, noise: &LoadNoise) -> (f64, f64) {
+        let all = self.variance(index, noise.scatter);
+        if noise.shared > 0.0 && self.is_of_ends[index] {
+            let of_ends = noise.shared * self.error[index].powi(2) / self.trust[index];
+            (all - of_ends, (0.5 * of_ends).sqrt())
+        } else {
+            (all, 0.0)
+        }
+    }
+
+    /// Whether the rate ends with the reading that the one after it begins with.
+    fn ends_where_next_begins(&self, index: usize) -> bool {
+        let next = self.from.get(index + 1);
+        next.is_some_and(|next| next.to_bits() == self.to[index].to_bits())
     }
 }
 
@@ -119,12 +158,17 @@ impl Gains {
         for (index, (keep, smoothed)) in (0..count).rev().zip(of_time) {
             let e_folds = (u[index] - u_before).max(0.0);
             u_before = u[index];
-            filter.go_back(*keep, variance, e_folds);
-            let error = record.variance(index, noise.scatter);
-            let (gain, s) = filter.read(error, *smoothed);
+            filter.go_back(*keep, variance, record.assumed.drift.powi(2) * e_folds);
+            let is_shared = record.ends_where_next_begins(index);
+            if !is_shared {
+                filter.at_a_new_reading();
+            }
+            let (error, ends) = record.own_and_ends(index, noise);
+            let (gain, s) = filter.read(error, *smoothed, ends);
             normaliser -= 0.5 * s.ln();
             gains.steps.push(Gain {
                 keep: *keep,
+                shared: if is_shared { gain.shared } else { 0.0 },
                 ..gain
             });
             gains.outside.push(normaliser + before[index]);
@@ -142,8 +186,8 @@ impl Gains {
     }
 }
 
-/// The covariance of the load f, the level l, and of today's ln v and load: what is not named of the symmetric matrix is
-/// not needed.
+/// The covariance of the load f, the level l, of today's ln v and load, and of the error of the reading at the start of the
+/// rate taken last: what is not named of the symmetric matrix is not needed.
 struct FilterCovariance {
     load: f64,
     load_level: f64,
@@ -155,6 +199,11 @@ struct FilterCovariance {
     velocity: f64,
     velocity_now: f64,
     now: f64,
+    end: f64,
+    end_load: f64,
+    end_level: f64,
+    end_velocity: f64,
+    end_now: f64,
 }
 
 impl FilterCovariance {
@@ -171,29 +220,49 @@ impl FilterCovariance {
             velocity: LEVEL_VARIANCE + variance,
             velocity_now: variance,
             now: variance,
+            end: 1.0,
+            end_load: 0.0,
+            end_level: 0.0,
+            end_velocity: 0.0,
+            end_now: 0.0,
         }
     }
 
-    /// To the rate before: `keep` of the load is left, and the level drifts with the e-folds between.
-    fn go_back(&mut self, keep: f64, variance: f64, e_folds: f64) {
+    /// To the rate before: `keep` of the load is left, and the level drifts by the variance `drifted`.
+    fn go_back(&mut self, keep: f64, variance: f64, drifted: f64) {
         self.load = keep * keep * self.load + variance * (1.0 - keep * keep);
         self.load_level *= keep;
         self.load_velocity *= keep;
         self.load_now *= keep;
-        self.level += DRIFT * DRIFT * e_folds;
+        self.end_load *= keep;
+        self.level += drifted;
     }
 
-    /// Takes a rate of that variance of its error, over which the load's variance loses `smoothed`: its gain, all but
-    /// what is kept of the load, and the variance of the innovation.
-    fn read(&mut self, error: f64, smoothed: f64) -> (Gain, f64) {
-        let load = self.load + self.load_level;
-        let level = self.load_level + self.level;
-        let velocity = self.load_velocity + self.level_velocity;
-        let now = self.load_now + self.level_now;
-        let s = (load + level + error - smoothed).max(error).max(1e-12);
+    /// The next rate ends with a reading that no rate so far has begun with.
+    fn at_a_new_reading(&mut self) {
+        self.end = 1.0;
+        self.end_load = 0.0;
+        self.end_level = 0.0;
+        self.end_velocity = 0.0;
+        self.end_now = 0.0;
+    }
+
+    /// Takes a rate of that variance of its error, over which the load's variance loses `smoothed`, and which the readings at
+    /// its two ends move by `ends` each: its gain, all but what is kept of the load, and the variance of the innovation.
+    fn read(&mut self, error: f64, smoothed: f64, ends: f64) -> (Gain, f64) {
+        let load = self.load + self.load_level + ends * self.end_load;
+        let level = self.load_level + self.level + ends * self.end_level;
+        let velocity = self.load_velocity + self.level_velocity + ends * self.end_velocity;
+        let now = self.load_now + self.level_now + ends * self.end_now;
+        let of_ends = ends * (self.end_load + self.end_level + ends * (self.end + 1.0));
+        let s = (load + level + (error + of_ends) - smoothed)
+            .max(error)
+            .max(1e-12);
         let precision = 1.0 / s;
         let gain = Gain {
             keep: 1.0,
+            shared: ends,
+            end: -ends * precision,
             load: load * precision,
             level: level * precision,
             velocity_now: velocity * precision,
@@ -210,6 +279,11 @@ impl FilterCovariance {
         self.velocity -= velocity * gain.velocity_now;
         self.velocity_now -= velocity * gain.load_now;
         self.now -= now * gain.load_now;
+        self.end_load = -gain.end * load;
+        self.end_level = -gain.end * level;
+        self.end_velocity = -gain.end * velocity;
+        self.end_now = -gain.end * now;
+        self.end = 1.0 + gain.end * ends;
         (gain, s)
     }
 }

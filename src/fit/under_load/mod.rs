@@ -1,50 +1,80 @@
-//! The posterior of the law under a load that nobody declared, by quadrature: deterministic, and a
-//! function of the readings alone.
+//! The posterior of the law. What is assumed of the load and of the scatter is an argument ([`Assumptions`]): it may have changed
+//! undeclared, which is what the monitor goes by, or it was constant, the special case that `fit` gives parameters of.
 //!
 //! The velocity is that of the law times e^f. Beside the law's parameters, three things are uncertain:
 //!
-//! - the log-load f, Ornstein-Uhlenbeck with a standard deviation and a memory of its own;
-//! - the law itself: seen from the present, ln v drifts off by [`DRIFT`] for each e-fold of the time to
-//!   failure that one looks back, so that old readings weigh less than new ones;
+//! - the log-load f, Ornstein-Uhlenbeck with a standard deviation and a memory of its own; under a constant load that is
+//!   scatter which remembers, and no part of the law;
+//! - the law itself: seen from the present, ln v drifts off with each e-fold of the time to failure that one looks back, so
+//!   that old readings weigh less than new ones; under a constant load it does not;
 //! - where the law begins: before its start, which may be any reading, the velocity is a random walk.
 //!
-//! The law is taken in the coordinates of the present. Its shape, p and the ratio of healing to
-//! acceleration, runs over a table (`shape`); its slope r over a grid of ln r; the velocity and the load
-//! of today are integrated exactly, by a linear filter that runs from the present into the past
-//! (`gains`), which gives the evidence of every start in one pass (`evidence`).
+//! The law is taken in the coordinates of the present. The velocity and the load of today are integrated exactly, by a linear
+//! filter that runs from the present into the past (`gains`), which gives the evidence of every start in one pass
+//! (`evidence`). What is left, the shape (p and the ratio of healing to acceleration), the slope r and the noise, is gone through
+//! in two ways. [`LoadPosterior`] runs over a table of shapes (`shape`) and a grid of ln r (`search`): deterministic and fast,
+//! for forecasts with every reading. [`LawDraws`] begins there and draws laws between those of the table (`space`, `walk`):
+//! intervals of parameters need draws of what is continuous.
 //!
-//! Priors: nearly uniform in ln r (falling as r^-0.1), from 1/(50 lengths of the record), and no more than
+//! Priors (`prior`): nearly uniform in ln r (falling as r^-0.1), from 1/(50 lengths of the record), and no more than
 //! 1/5000 of one over the newest sampling interval, to twice that, where r times the interval is also
 //! half-normal with standard deviation 1.5; accelerating and slowing
-//! down alike, m above 1 with probability [`UNSTABLE`]; ln of the velocity that a stable slope will keep
-//! half-normal above 2 mm/day with standard deviation 1 (a slope that keeps a velocity mostly keeps a low
-//! one: "very slow" ends at 4.4 mm/day, Cruden and Varnes 1996); f, its memory and the scatter of the
-//! readings over the grids below, each point alike. An outlier's error has the tails of Student's t.
+//! down alike. Where the load may change, of the slopes that are watched: m above 1 with probability 0.65, and ln of the velocity
+//! that a stable slope will keep half-normal above 2 mm/day with standard deviation 1 (a slope that keeps a velocity mostly
+//! keeps a low one: "very slow" ends at 4.4 mm/day, Cruden and Varnes 1996). Under a constant load either side of m = 1 alike,
+//! and any velocity: the readings alone decide. f, its memory and the scatter of the
+//! readings over grids, each point alike; drawn laws have continuous ones (`space`). An outlier's error has the tails of Student's t.
 
+mod assumptions;
+mod draws;
 mod evidence;
 mod future;
 mod gains;
+mod other_prior;
+mod past;
+mod prior;
 mod search;
 mod shape;
+mod space;
+mod walk;
 
-use super::posterior::{Ensemble, LawSample};
+pub use assumptions::Assumptions;
+pub use draws::{LawDraws, Onset};
+pub use other_prior::OtherPrior;
+pub use prior::P_PRIOR;
+
 use super::rates::Rate;
 use crate::model::Law;
 use crate::regime::Regime;
+use search::GridSearch;
+use serde::{Deserialize, Serialize};
 use shape::Shape;
 use std::collections::BTreeMap;
 
-/// Standard deviation of ln v about the law for each e-fold of the time to failure: learnt on Lanzada
-/// 2025, whose inverse velocity bends, and no narrower for simulated slopes that keep the law exactly.
-const DRIFT: f64 = 0.2;
-/// Prior probability of m > 1.
-const UNSTABLE: f64 = 0.65;
-/// Prior of what a stable slope will keep: mm/day, and the standard deviation of ln v above it.
-const KEPT: (f64, f64) = (2.0, 1.0);
 /// Fewest rates.
 const FEWEST: usize = 5;
 /// The heaviest laws, by which a next reading is predicted.
 const HEAVIEST: usize = 64;
+
+/// One law out of the posterior, with t = 0 at the present.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct LawSample {
+    /// The law.
+    pub law: Law,
+    /// Its share of the probability.
+    pub weight: f64,
+}
+
+/// A weighted sample of laws that agree with the readings.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Ensemble {
+    /// The present: the time of the last reading used, days.
+    pub now_days: f64,
+    /// The laws; their weights sum to 1.
+    pub samples: Vec<LawSample>,
+    /// Relative scatter of a rate about the law.
+    pub scatter: f64,
+}
 
 /// A law, with what the readings say of the velocity and of the load of today.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -93,7 +123,8 @@ impl LoadPosterior {
         if rates.len() < FEWEST || !moves {
             return None;
         }
-        let cells = search::cells(rates)?;
+        let mut search = GridSearch::new(rates, &Assumptions::CHANGING_LOAD);
+        let cells = search.cells(rates)?;
         Some(Self {
             now_days: rates.last()?.to,
             cells,

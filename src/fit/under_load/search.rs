@@ -1,11 +1,12 @@
 //! The search over slopes, shapes and noises: coarse, then fine where the evidence is.
 
 use super::evidence::{self, RecordTimes, Room, ShapeEvidence, SlopeTable, weigh};
+use super::Cell;
+use super::assumptions::Assumptions;
 use super::gains::{Gains, LoadMemory, LoadNoise, RateRecord};
+use super::prior::{RARE, SlopePrior};
 use super::shape::{BLOCKS, LANES, SHAPES};
-use super::{Cell, KEPT};
-use crate::fit::Rate;
-use crate::fit::newest_slope::{SLOPE_PER_INTERVAL, newest_interval_days};
+use crate::fit::{Rate, ReadingError};
 use std::collections::BTreeMap;
 
 /// Grids of the scatter of the readings, of the load's standard deviation, and of its memory over the span
@@ -13,12 +14,6 @@ use std::collections::BTreeMap;
 const SCATTERS: [f64; 2] = [0.02, 0.06];
 const SIGMAS: [f64; 3] = [0.05, 0.12, 0.3];
 const MEMORIES: [f64; 3] = [0.02, 0.08, 0.32];
-/// Slopes: from this share of 1/length to this many of 1/interval.
-const SLOPES: (f64, f64) = (0.02, 2.0);
-/// And the slowest, at most, in 1/interval.
-const SLOWEST: f64 = 2e-4;
-/// The prior of ln r falls as r to the minus this: few slopes are met in their last days.
-const RARE: f64 = 0.1;
 /// Steps of ln r: in the coarse pass, and how many of the fine one make one of them.
 const COARSE_STEP: f64 = 0.45;
 const FINER: usize = 2;
@@ -29,30 +24,13 @@ const MOST: (usize, usize, usize) = (40, 32, 5);
 const LEFT_OUT: (f64, f64, f64) = (8.0, 4.0, 9.0);
 /// Cells on which noises are compared.
 const COMPARED: usize = 4;
-/// Degrees of freedom of an outlier's error.
-const STUDENT: f64 = 4.0;
 /// The error of ln v where nothing moves.
 const AT_REST: f64 = 1.5;
+/// A velocity this many standard errors from its neighbours, so many on either side, is not like them.
+const STANDS_OUT: f64 = 5.0;
+const NEIGHBOURS: usize = 3;
 /// Rates that say what the velocity of today is about.
 const CENTRE: usize = 9;
-
-/// The laws that the rates leave open; `None` where none has an evidence.
-pub(super) fn cells(rates: &[Rate]) -> Option<Vec<Cell>> {
-    let mut search = GridSearch::new(rates);
-    let all = vec![true; BLOCKS.len()];
-    let coarse = search.slopes((search.lowest, search.highest), search.coarse, &all);
-    let mut noises = noises(rates);
-    let mut scored: Vec<Scored> = Vec::new();
-    for _ in 0..2 {
-        let likeliest = scored.first().map_or(coarse.len() / 2, |best| best.slope);
-        scored = search.sweep(&coarse, likeliest, &noises[0]);
-        let best = *scored.first()?;
-        search.doubt(&coarse, &best, &noises[0]);
-        search.compare(&coarse, &scored, &mut noises);
-    }
-    let cells = search.fine(&scored, &noises);
-    (!cells.is_empty()).then_some(cells)
-}
 
 /// A shape at a slope.
 #[derive(Debug, Clone, Copy)]
@@ -63,43 +41,53 @@ struct Scored {
     slope: usize,
 }
 
-struct GridSearch {
-    record: RateRecord,
+pub(super) struct GridSearch {
+    pub(super) record: RateRecord,
+    pub(super) prior: SlopePrior,
     times: RecordTimes,
     /// The evidence of what came before each rate, by no law, for each scatter of the readings that was asked about since
     /// a rate was last doubted.
     befores: BTreeMap<u64, Vec<f64>>,
-    interval: f64,
-    lowest: f64,
-    highest: f64,
     coarse: usize,
-    room: Room,
+    room: Room<LANES>,
 }
 
 impl GridSearch {
-    fn new(rates: &[Rate]) -> Self {
-        let record = record(rates);
-        let length = record.from[0];
-        let interval = newest_interval_days(rates).unwrap_or(length).max(1e-6);
-        // A short record knows as well as a long one that most slopes take thousands of readings.
-        let lowest = (SLOPES.0 / length).min(SLOWEST / interval);
-        let highest = (SLOPES.1 / interval).max(2.0 * lowest);
+    pub(super) fn new(rates: &[Rate], assumed: &Assumptions) -> Self {
+        let record = record(rates, assumed);
+        let prior = SlopePrior::new(rates, record.from[0]);
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             reason = "a small positive number"
         )]
-        let coarse = ((highest / lowest).ln() / COARSE_STEP).ceil() as usize;
+        let coarse = ((prior.highest / prior.lowest).ln() / COARSE_STEP).ceil() as usize;
         Self {
             times: RecordTimes::of(&record),
             befores: BTreeMap::new(),
             record,
-            interval,
-            lowest,
-            highest,
+            prior,
             coarse: coarse.clamp(4, MOST.0),
             room: Room::default(),
         }
+    }
+
+    /// The laws that the rates leave open; `None` where none has an evidence.
+    pub(super) fn cells(&mut self, rates: &[Rate]) -> Option<Vec<Cell>> {
+        let all = vec![true; BLOCKS.len()];
+        let range = (self.prior.lowest, self.prior.highest);
+        let coarse = self.slopes(range, self.coarse, &all);
+        let mut noises = noises(rates);
+        let mut scored: Vec<Scored> = Vec::new();
+        for _ in 0..2 {
+            let likeliest = scored.first().map_or(coarse.len() / 2, |best| best.slope);
+            scored = self.sweep(&coarse, likeliest, &noises[0]);
+            let best = *scored.first()?;
+            self.doubt(&coarse, &best, &noises[0]);
+            self.compare(&coarse, &scored, &mut noises);
+        }
+        let cells = self.fine(&scored, &noises);
+        (!cells.is_empty()).then_some(cells)
     }
 
     /// `count` slopes at the middles of equal steps of ln r, to be asked about `blocks`.
@@ -121,12 +109,10 @@ impl GridSearch {
     /// Prior of a shape at a slope, with the velocity that it is found to have.
     fn ln_prior(&self, shape: usize, r: f64, evidence: &ShapeEvidence) -> f64 {
         let shape = &SHAPES[shape];
-        let resolved = r * self.interval / SLOPE_PER_INTERVAL;
-        let kept = shape.ln_kept().map_or(0.0, |growth| {
-            let ln_kept = evidence.ln_velocity + self.record.centre + growth;
-            ((ln_kept - KEPT.0.ln()) / KEPT.1).max(0.0)
-        });
-        shape.ln_prior - RARE * r.ln() - 0.5 * (resolved * resolved + kept * kept)
+        let now = evidence.ln_velocity + self.record.centre;
+        let kept = shape.ln_kept().map(|growth| now + growth);
+        let kept = kept.filter(|_| self.record.assumed.keeps_little);
+        self.prior.ln_prior(shape.ln_prior, r, kept)
     }
 
     /// The gains of a slope under a noise.
@@ -150,8 +136,8 @@ impl GridSearch {
             let gains = self.gains(slope, &memory);
             for (block, of) in BLOCKS.iter().enumerate() {
                 let least = best - LEFT_OUT.0 - most_ln_prior(block, slope.r);
-                let law = (block, slope);
-                let found = weigh(&self.record, law, &gains, least, &mut self.room);
+                let predicted = &slope.predicted[block];
+                let found = weigh(&self.record, predicted, &gains, least, &mut self.room);
                 for (lane, evidence) in found.iter().enumerate() {
                     let ln = evidence.ln + self.ln_prior(of.first + lane, slope.r, evidence);
                     if ln > best - LEFT_OUT.0 {
@@ -175,11 +161,10 @@ impl GridSearch {
     fn doubt(&mut self, slopes: &[SlopeTable], best: &Scored, noise: &LoadNoise) {
         let slope = &slopes[best.slope];
         let gains = self.gains(slope, &LoadMemory::new(&self.record, noise));
-        let law = (best.block, slope);
-        let squares = evidence::misses(&self.record, law, (best.lane, noise.scatter), &gains);
-        for (trust, square) in self.record.trust.iter_mut().zip(squares) {
-            *trust = ((STUDENT + 1.0) / (STUDENT + square)).min(1.0);
-        }
+        let predicted = &slope.predicted[best.block];
+        let at = (best.lane, noise.scatter);
+        let squares = evidence::misses(&self.record, predicted, at, &gains);
+        self.record.doubt(&squares);
         self.befores.clear();
     }
 
@@ -205,9 +190,9 @@ impl GridSearch {
                 let gains = self.gains(slope, &memory);
                 for of_block in of_slope.chunk_by(|one, other| one.block == other.block) {
                     let block = of_block[0].block;
-                    let law = (block, slope);
+                    let predicted = &slope.predicted[block];
                     let none = f64::NEG_INFINITY;
-                    let found = weigh(&self.record, law, &gains, none, &mut self.room);
+                    let found = weigh(&self.record, predicted, &gains, none, &mut self.room);
                     let each = of_block.iter().map(|one| {
                         found[one.lane].ln + SHAPES[BLOCKS[block].first + one.lane].ln_prior
                     });
@@ -228,7 +213,7 @@ impl GridSearch {
         let best = scored.first().map_or(first, |one| one.slope);
         let at = |index: f64| {
             let share = (index / self.coarse as f64).clamp(0.0, 1.0);
-            self.lowest * (self.highest / self.lowest).powf(share)
+            self.prior.lowest * (self.prior.highest / self.prior.lowest).powf(share)
         };
         let count = ((last - first + 3) * FINER).min(MOST.1);
         let range = (at(first as f64 - 1.0), at(last as f64 + 2.0));
@@ -243,9 +228,9 @@ impl GridSearch {
                 let slope = &slopes[index];
                 let gains = self.gains(slope, &memory);
                 for block in (0..BLOCKS.len()).filter(|block| blocks[*block]) {
-                    let law = (block, slope);
+                    let predicted = &slope.predicted[block];
                     let least = heaviest - LEFT_OUT.2 - most_ln_prior(block, slope.r);
-                    let found = weigh(&self.record, law, &gains, least, &mut self.room);
+                    let found = weigh(&self.record, predicted, &gains, least, &mut self.room);
                     for (lane, evidence) in found.iter().enumerate() {
                         let cell = self.cell(BLOCKS[block].first + lane, slope, noise, evidence);
                         if cell.weight > heaviest - LEFT_OUT.2 {
@@ -327,6 +312,7 @@ fn noises(rates: &[Rate]) -> Vec<LoadNoise> {
                     scatter,
                     sigma,
                     tau: (memory * span).max(1e-9),
+                    shared: 0.0,
                     ln_evidence: 0.0,
                 });
             }
@@ -340,7 +326,7 @@ fn noises(rates: &[Rate]) -> Vec<LoadNoise> {
 /// Rates as logarithms. One within its noise is read as little more than "no faster than its error": half
 /// of v + sqrt(v^2 + 4 s^2) is v where it is clear of its error s, and s at rest. One at rest or backward
 /// whose error is not known is read as half of the slowest that moved, give or take e^1.5.
-fn record(rates: &[Rate]) -> RateRecord {
+fn record(rates: &[Rate], assumed: &Assumptions) -> RateRecord {
     let now = rates.last().map_or(0.0, |rate| rate.to);
     let moving = rates.iter().map(|rate| rate.velocity).filter(|v| *v > 0.0);
     let at_rest = 0.5 * moving.fold(f64::INFINITY, f64::min);
@@ -358,7 +344,7 @@ fn record(rates: &[Rate]) -> RateRecord {
     let mut newest: Vec<f64> = rates.iter().rev().take(CENTRE).map(forward).collect();
     newest.sort_by(f64::total_cmp);
     let centre = newest[newest.len() / 2].ln();
-    RateRecord {
+    let mut record = RateRecord {
         ln_velocity: rates
             .iter()
             .map(|rate| forward(rate).ln() - centre)
@@ -369,6 +355,32 @@ fn record(rates: &[Rate]) -> RateRecord {
         to: rates.iter().map(|rate| now - rate.to).collect(),
         centre,
         trust: vec![1.0; rates.len()],
+        is_of_ends: vec![false; rates.len()],
+        white: vec![1.0; rates.len()],
+        assumed: *assumed,
+    };
+    if assumed.follows_errors {
+        follow_errors(&mut record, rates);
+    }
+    record
+}
+
+/// Errors by the readings that they come from. A rate within its noise of its neighbours' mean is read on a straight line about
+/// that, and not by its logarithm: noise moves both ways alike, and counts for as much where it is high.
+fn follow_errors(record: &mut RateRecord, rates: &[Rate]) {
+    for (index, rate) in rates.iter().enumerate() {
+        record.is_of_ends[index] = rate.error == ReadingError::OfEnds;
+        record.white[index] = 1.0 / f64::from(rate.readings.max(1));
+        let near = index.saturating_sub(NEIGHBOURS)..(index + NEIGHBOURS + 1).min(rates.len());
+        let others = (near.len() - 1).max(1) as f64;
+        let sum: f64 = rates[near].iter().map(|rate| rate.velocity).sum();
+        let about = (sum - rate.velocity) / others;
+        if rate.sigma > 0.0 && (rate.velocity - about).abs() <= STANDS_OUT * rate.sigma {
+            let about = about.max(0.5 * rate.sigma);
+            record.ln_velocity[index] =
+                about.ln() + (rate.velocity - about) / about - record.centre;
+            record.error[index] = rate.sigma / about;
+        }
     }
 }
 

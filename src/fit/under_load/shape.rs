@@ -2,7 +2,7 @@
 //!
 //! In units of the present slope, b - c = 1 or -1 and dy/dt = c y^p - b, where c is the present healing.
 
-use super::UNSTABLE;
+use super::prior::UNSTABLE;
 use crate::regime::Regime;
 use std::sync::LazyLock;
 
@@ -112,6 +112,11 @@ impl Shape {
     /// r and kappa, 1/day, of the law whose present slope is `r` in size.
     pub(super) fn slope_and_curvature(&self, r: f64) -> (f64, f64) {
         ((self.b - self.c) * r, self.p * self.c * r)
+    }
+
+    /// The lesser of loading and healing, in units of |r|.
+    pub(super) fn lesser(&self) -> f64 {
+        self.b.min(self.c)
     }
 
     /// ln of the velocity that it will keep over the velocity now, where it is stable and accelerates.

@@ -1,8 +1,8 @@
 //! Series drawn from the posterior's own prior, whose truth is therefore known.
 //!
-//! The law and its scatter are drawn as `fit::posterior::prior` states them, by the exact solution and an
-//! Ornstein-Uhlenbeck walk: nothing of the fit is used here. Only the size of the scatter is confined, to
-//! between 1 and 15 %.
+//! The law and its scatter are drawn as `fit::under_load` states them under a constant load, by the exact solution and an
+//! Ornstein-Uhlenbeck walk: nothing of the fit is used here. The sizes of the scatter are confined, to between 0.3 and 30 %, and
+//! before a late start the velocity is that of the start, or walks away from it.
 
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal, StudentT};
@@ -42,11 +42,21 @@ pub(crate) struct Drawn {
     pub(crate) onset_days: f64,
 }
 
-const CAUCHY_SCALE: f64 = 3.0;
+/// Slopes: from this share of 1/length to this many of 1/interval, the slowest at most in 1/interval, how much rarer the fast
+/// ones are, and the standard deviation of the slope times the newest interval.
+const SLOPES: (f64, f64) = (0.02, 2.0);
+const SLOWEST: f64 = 2e-4;
+const RARE: f64 = 0.1;
 const SLOPE_PER_INTERVAL: f64 = 1.5;
+/// Scale of the logistic ln of the lesser of loading and healing over the slope.
+const RATIO_SCALE: f64 = 1.2;
 const MOST_LN_Y: f64 = 14.0;
-const SCATTER: (f64, f64) = (0.05, 0.9);
-const SCATTERS: (f64, f64) = (0.01, 0.15);
+/// Medians of the scatter and of what remembers of it, the standard deviation of the log of either, and where both are kept.
+const SCATTER: (f64, f64) = (0.03, 1.0);
+const REMEMBERED: (f64, f64) = (0.04, 1.0);
+const SCATTERS: (f64, f64) = (0.003, 0.3);
+/// Standard deviations, from one reading to the next, of a velocity that follows no law yet.
+const DRIFTS_BEFORE: [f64; 4] = [0.0, 0.05, 0.15, 0.4];
 
 /// The `index`-th series of a family.
 pub(crate) fn drawn(index: u64, starts: Starts) -> Drawn {
@@ -70,10 +80,6 @@ fn normal(rng: &mut Pcg64) -> f64 {
     StandardNormal.sample(rng)
 }
 
-fn cauchy(rng: &mut Pcg64) -> f64 {
-    CAUCHY_SCALE * (std::f64::consts::PI * (rng.random::<f64>() - 0.5)).tan()
-}
-
 /// Reading times, evenly or at random, from 0 on.
 fn times(rng: &mut Pcg64) -> Vec<f64> {
     let wanted = log_uniform(rng, 15.0, 500.0).round();
@@ -94,18 +100,56 @@ fn times(rng: &mut Pcg64) -> Vec<f64> {
     times.iter().map(|time| time - first).collect()
 }
 
-/// A law for the last reading, from the prior; the window's length and newest interval in days.
+/// A law for the last reading, from the prior; the record's length and newest interval in days.
 fn law(rng: &mut Pcg64, length: f64, interval: f64) -> Option<Law> {
-    let (r, kappa) = (cauchy(rng) / length, cauchy(rng) / length);
-    let p = if kappa > 0.0 {
+    let lowest = (SLOPES.0 / length).min(SLOWEST / interval);
+    let size = log_uniform(rng, lowest, SLOPES.1 / interval);
+    let unresolved = size * interval / SLOPE_PER_INTERVAL;
+    let kept = (lowest / size).powf(RARE) * (-0.5 * unresolved * unresolved).exp();
+    if rng.random::<f64>() >= kept {
+        return None;
+    }
+    let u = uniform(rng, 1e-6, 1.0 - 1e-6);
+    let lesser = size * (RATIO_SCALE * (u / (1.0 - u)).ln()).exp();
+    let p = if rng.random::<bool>() {
         uniform(rng, 0.0, 0.6)
     } else {
         uniform(rng, -1.0, 0.0)
     };
-    let unresolved = r * interval / SLOPE_PER_INTERVAL;
-    let resolved = rng.random::<f64>() < (-0.5 * unresolved * unresolved).exp();
-    let law = Law::from_fit(10.0 * normal(rng).exp(), r, kappa, p);
-    (resolved && law.a + law.r > 0.0).then_some(law)
+    let (r, healing) = if rng.random::<bool>() {
+        (size, lesser)
+    } else {
+        (-size, lesser + size)
+    };
+    Some(Law::from_fit(10.0 * normal(rng).exp(), r, p * healing, p))
+}
+
+/// A size of the scatter.
+fn size(rng: &mut Pcg64, (median, spread): (f64, f64)) -> f64 {
+    loop {
+        let size = median * (spread * normal(rng)).exp();
+        if (SCATTERS.0..SCATTERS.1).contains(&size) {
+            return size;
+        }
+    }
+}
+
+/// ln of the velocity before the onset over that at it, at each time: a walk into the past.
+fn before_onset(rng: &mut Pcg64, times: &[f64], onset: f64) -> Vec<f64> {
+    let drift = DRIFTS_BEFORE[rng.random_range(0..DRIFTS_BEFORE.len())];
+    let mut ln = 0.0;
+    let mut back: Vec<f64> = times
+        .iter()
+        .rev()
+        .map(|time| {
+            if *time < onset {
+                ln += drift * normal(rng);
+            }
+            ln
+        })
+        .collect();
+    back.reverse();
+    back
 }
 
 /// The relative deviation of the motion at each time.
@@ -135,40 +179,33 @@ fn attempt(rng: &mut Pcg64, starts: Starts) -> Option<Drawn> {
     } else {
         0.0
     };
-    let newest = times[count - 4..].windows(2).map(|w| w[1] - w[0]);
-    let mut newest: Vec<f64> = newest.collect();
+    let mut newest: Vec<f64> = times[count - 4..].windows(2).map(|w| w[1] - w[0]).collect();
     newest.sort_by(f64::total_cmp);
-    let law = law(rng, end - onset, newest[1])?;
+    let law = law(rng, end, newest[1])?;
     let past = Trajectory::solve(&law.reversed(), end - onset, Accuracy::Full);
     let edge = past.at(end - onset)?;
     if edge.y.ln().abs() > MOST_LN_Y {
         return None;
     }
-    let size = loop {
-        let size = SCATTER.0 * (SCATTER.1 * normal(rng)).exp();
-        if (SCATTERS.0..SCATTERS.1).contains(&size) {
-            break size;
-        }
-    };
-    let slow = if rng.random::<f64>() < 0.4 {
-        0.0
-    } else {
-        1.0 - log_uniform(rng, 0.003, 0.9)
-    };
+    let scatter = (size(rng, SCATTER), size(rng, REMEMBERED));
     let memory = log_uniform(rng, end / count as f64, end);
     let measured = match rng.random_range(0..20) {
         0..9 => Measured::Velocity,
         9..12 => Measured::VelocityWithSigma,
         _ => Measured::Displacement,
     };
-    let motion = |time: f64| {
-        let ago = end - time.max(onset);
-        let at = past.at(ago)?;
-        let before = (onset - time).max(0.0) * edge.velocity;
-        Some((at.velocity, -at.displacement - before))
-    };
-    let clean: Option<Vec<(f64, f64)>> = times.iter().map(|time| motion(*time)).collect();
-    let values = measure(rng, (&times, &clean?), measured, (size, slow, memory));
+    let walked = before_onset(rng, &times, onset);
+    let first = times.partition_point(|time| *time < onset);
+    let motion = |time: &f64| past.at(end - time).map(|at| (at.velocity, -at.displacement));
+    let of_law: Option<Vec<(f64, f64)>> = times[first..].iter().map(motion).collect();
+    let mut clean = of_law?;
+    for index in (0..first).rev() {
+        let velocity = edge.velocity * walked[index].exp();
+        let (next, moved) = clean[0];
+        let days = times[index + 1] - times[index];
+        clean.insert(0, (velocity, moved - days * f64::midpoint(velocity, next)));
+    }
+    let values = measure(rng, (&times, &clean), measured, (scatter, memory));
     Some(Drawn {
         observations: observations(measured, values),
         measured,
@@ -182,11 +219,11 @@ fn measure(
     rng: &mut Pcg64,
     (times, clean): (&[f64], &[(f64, f64)]),
     measured: Measured,
-    (size, slow, memory): (f64, f64, f64),
+    ((size, remembered), memory): ((f64, f64), f64),
 ) -> Vec<Observation> {
     let heavy = StudentT::new(7.0).ok();
     let white = |rng: &mut Pcg64| heavy.map_or(0.0, |t| t.sample(rng));
-    let deviation = random_process(rng, times, size * slow.sqrt(), memory);
+    let deviation = random_process(rng, times, remembered, memory);
     let count = times.len();
     let slip = clean[count - 1].1 - clean[0].1;
     let error = size * slip / (count - 1) as f64;
@@ -198,7 +235,7 @@ fn measure(
         let (velocity, displacement) = clean[index];
         let (value, sigma) = match measured {
             Measured::Velocity | Measured::VelocityWithSigma => {
-                let scatter = deviation[index] + size * (1.0 - slow).sqrt() * white(rng);
+                let scatter = deviation[index] + size * white(rng);
                 let value = velocity * scatter.exp();
                 if measured == Measured::Velocity {
                     (value, None)
@@ -209,7 +246,8 @@ fn measure(
             Measured::Displacement => {
                 if index > 0 {
                     let middle = f64::midpoint(deviation[index - 1], deviation[index]);
-                    moved += (displacement - clean[index - 1].1) * middle.exp();
+                    let slipped = middle + size * white(rng);
+                    moved += (displacement - clean[index - 1].1) * slipped.exp();
                 }
                 (moved + error * normal(rng), None)
             }

@@ -1,8 +1,8 @@
-//! Whether the posterior's probabilities hold, on series drawn from its own prior.
+//! Whether the probabilities of the posterior of a constant load hold, on series drawn from its own prior.
 //!
 //! ```text
-//! cargo run --release -p studies --bin calibration            1,000 series, the law from the first reading on
-//! cargo run --release -p studies --bin calibration 1000 onset  the same with starts to be found, as `fit` does
+//! cargo run --release -p studies --bin calibration            1,000 series that keep the law from the first reading on
+//! cargo run --release -p studies --bin calibration 1000 onset  the same where half begin later
 //! ```
 //!
 //! A central interval of 90 % should hold the truth nine times in ten, and of what is said to have a

@@ -1,7 +1,7 @@
 //! How often intervals hold the truth, and how often what was said to be probable was so.
 
 use super::drawn::{Drawn, Measured, Starts};
-use slipwatch::fit::{LawSample, Posterior, RateOptions};
+use slipwatch::fit::{Assumptions, LawDraws, LawSample, RateOptions};
 use slipwatch::model::Law;
 use slipwatch::regime::Regime;
 use std::fmt::Write as _;
@@ -47,7 +47,6 @@ pub(crate) struct Tally {
     said: Vec<Said>,
     series: u32,
     without: u32,
-    worth: Vec<f64>,
     evaluations: usize,
 }
 
@@ -74,15 +73,11 @@ impl Tally {
         self.series += 1;
         let all = 0..drawn.observations.values.len();
         let rates = drawn.observations.rates(all, RateOptions::default());
-        let posterior = match starts {
-            Starts::First => Posterior::fit(&rates),
-            Starts::ToBeFound => Posterior::over_onsets(&rates),
-        };
+        let posterior = LawDraws::of(&rates, &Assumptions::CONSTANT_LOAD);
         let Some(posterior) = posterior else {
             self.without += 1;
             return;
         };
-        self.worth.push(posterior.effective_draws);
         self.evaluations += posterior.evaluations;
         self.regimes(drawn, &posterior.ensemble.samples);
         self.intervals(drawn, &posterior.ensemble.samples);
@@ -192,19 +187,12 @@ impl Tally {
     /// The table that is printed.
     pub(crate) fn table(&self) -> String {
         let mut out = String::new();
-        let mut worth = self.worth.clone();
-        worth.sort_by(f64::total_cmp);
-        let at = |part: usize| worth.get(worth.len() / part).copied().unwrap_or(0.0);
         // Writing to a string cannot fail.
         let _ = writeln!(
             out,
-            "{} series, {} without a posterior; worth {:.0} even draws at the median, {:.0} at 5 %, {:.0} at 1 %; \
-             {:.0} laws solved each\n",
+            "{} series, {} without a posterior; {:.0} laws weighed each\n",
             self.series,
             self.without,
-            at(2),
-            at(20),
-            at(100),
             self.evaluations as f64 / f64::from(self.series.max(1)),
         );
         let _ = writeln!(out, "share of truths in the central 90 % (how many)");

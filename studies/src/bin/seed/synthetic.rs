@@ -8,7 +8,9 @@ use anyhow::{Context, Result};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
-use slipwatch::fit::{ConstantLoad, Observation, Observations, Posterior, RateOptions};
+use slipwatch::fit::{
+    Assumptions, ConstantLoad, LawDraws, Observation, Observations, RateOptions,
+};
 use slipwatch::inversion::{Inversion, InversionOptions};
 use slipwatch::model::{Accuracy, Law, Trajectory};
 use slipwatch::reading::{
@@ -161,7 +163,7 @@ fn draw(series: &Series) -> Result<Draw> {
 }
 
 /// m does not change along a solution, so that the posterior's laws need not be followed back.
-fn posterior(series: &Series) -> Option<Posterior> {
+fn posterior(series: &Series) -> Option<LawDraws> {
     let first = series.readings.first()?.time;
     let values = series.readings.iter().map(|reading| Observation {
         t_days: days_since(first, reading.time),
@@ -174,7 +176,7 @@ fn posterior(series: &Series) -> Option<Posterior> {
         values: values.collect(),
     };
     let rates = observations.rates(0..observations.values.len(), RateOptions::default());
-    Posterior::fit(&rates)
+    LawDraws::of(&rates, &Assumptions::CONSTANT_LOAD)
 }
 
 /// Of (value, weight) pairs in increasing order.

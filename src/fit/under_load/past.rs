@@ -5,8 +5,8 @@
 //! slip are quintic polynomials of time. Within 1e-4, where readings scatter by a per cent: a fraction of the
 //! cost of [`crate::model::Trajectory`], which is as exact as f64 allows.
 
-/// Largest |ln y| within a window: velocities there stay within a factor of a million. Part of the prior.
-pub(super) const MOST_LN_Y: f64 = 14.0;
+/// Largest |ln y| that is followed: velocities beyond a factor of a million are held there.
+const MOST_LN_Y: f64 = 14.0;
 /// Longest panel in ln y, and the share of the distance to a pole ahead that a panel may take.
 const LONGEST_PANEL: f64 = 0.18;
 const SHARE_AHEAD: f64 = 0.5;
@@ -55,10 +55,11 @@ struct PastPanel {
 }
 
 impl PastSolution {
-    /// Solves over `span` days ago; false where the velocity left the prior's range within them.
+    /// Solves over `span` days ago; false where the velocity left the range that is followed within them.
     /// Before that the slope creeps at the velocity it had then.
     pub(super) fn solve(&mut self, shape: PastShape, span: f64) -> bool {
         self.panels.clear();
+        let mut is_whole = true;
         let mut node = shape.node(0.0, 0.0, 0.0);
         let toward = shape.r.signum();
         let pole = shape.steady();
@@ -82,12 +83,14 @@ impl PastSolution {
             }
             let next = shape.advance(&node, toward * clearance.min(LONGEST_PANEL));
             if !next.ago.is_finite() || next.ago < node.ago {
-                return false;
+                is_whole = false;
+                break;
             }
             self.panels.push(PastPanel::between(&node, &next));
             node = next;
             if node.ln_y.abs() > MOST_LN_Y && node.ago < span {
-                return false;
+                is_whole = false;
+                break;
             }
         }
         self.last = node;
@@ -104,7 +107,7 @@ impl PastSolution {
                 slip,
             };
         }
-        true
+        is_whole
     }
 
     /// (ln y, slip over the present velocity) `ago` days ago; `hint` moves along with growing `ago`.

@@ -1,0 +1,215 @@
+//! Laws drawn from the posterior, between those of the table: what intervals of parameters are made of.
+
+use super::assumptions::Assumptions;
+use super::search::GridSearch;
+use super::walk::{Drawn, Walk};
+use super::{Ensemble, FEWEST, LawSample};
+use crate::fit::Rate;
+use crate::model::Law;
+
+/// Rounds before anything is drawn, how often rates are doubted meanwhile, rounds after that, and in how many of those the
+/// population is taken.
+const BEFORE: usize = 40;
+const DOUBTED: usize = 20;
+const AFTER: usize = 96;
+const TAKEN: usize = 8;
+
+/// When the law began to hold, days since the epoch of the rates; the bounds hold 90 %.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Onset {
+    /// 5 % quantile.
+    pub low_days: f64,
+    /// Median: the first reading where that is the likelier.
+    pub median_days: f64,
+    /// 95 % quantile.
+    pub high_days: f64,
+}
+
+/// Laws drawn from the posterior, each since when it holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LawDraws {
+    /// The laws.
+    pub ensemble: Ensemble,
+    /// Start of the first rate used, days.
+    pub from_days: f64,
+    /// How far back from the present each law holds, days, in the order of the samples.
+    pub spans_days: Vec<f64>,
+    /// Laws that were weighed.
+    pub evaluations: usize,
+}
+
+impl LawDraws {
+    /// Draws laws that agree with `rates`, oldest first; `None` with fewer than five, or where none of them moves.
+    pub fn of(rates: &[Rate], assumed: &Assumptions) -> Option<Self> {
+        let (first, last) = (rates.first()?, rates.last()?);
+        let moves = rates.iter().any(|rate| rate.velocity > 0.0);
+        if rates.len() < FEWEST || !moves || last.to <= first.from {
+            return None;
+        }
+        let mut search = GridSearch::new(rates, assumed);
+        let cells = search.cells(rates)?;
+        let mut walk = Walk::about(&cells, search)?;
+        let env=|n:&str,d:usize| std::env::var(n).ok().and_then(|v| v.parse().ok()).unwrap_or(d);
+        for round in 1..=env("XB",BEFORE) {
+            walk.round();
+            if round.is_multiple_of(env("XD",DOUBTED)) {
+                walk.doubt();
+            }
+        }
+        let mut drawn: Vec<Drawn> = Vec::new();
+        for round in 1..=env("XA",AFTER) {
+            walk.round();
+            if round.is_multiple_of(env("XT",TAKEN)) {
+                drawn.extend(walk.draw());
+            }
+        }
+        Self::from(&walk, &drawn, (first.from, last.to))
+    }
+
+    fn from(walk: &Walk, drawn: &[Drawn], (from_days, now_days): (f64, f64)) -> Option<Self> {
+        let record = walk.record();
+        let count = record.from.len();
+        let weight = 1.0 / drawn.len() as f64;
+        let variance = drawn.iter().map(|one| one.variance).sum::<f64>() * weight;
+        let samples = drawn.iter().map(|one| LawSample {
+            law: one.law(record.centre, record.assumed.load_changes),
+            weight,
+        });
+        let spans = drawn.iter().map(|one| record.from[count - one.started.rates]);
+        (!drawn.is_empty()).then(|| Self {
+            ensemble: Ensemble {
+                now_days,
+                samples: samples.collect(),
+                scatter: variance.sqrt(),
+            },
+            from_days,
+            spans_days: spans.collect(),
+            evaluations: walk.evaluations(),
+        })
+    }
+
+    /// When the law began to hold.
+    pub fn onset(&self) -> Onset {
+        let mut spans = self.spans_days.clone();
+        // The longest span is the earliest start.
+        spans.sort_by(|a, b| b.total_cmp(a));
+        let at = |part: usize| {
+            let index = (part * spans.len() / 20).min(spans.len().saturating_sub(1));
+            let span = spans.get(index);
+            span.map_or(self.from_days, |span| self.ensemble.now_days - span)
+        };
+        Onset {
+            low_days: at(1),
+            median_days: at(10),
+            high_days: at(19),
+        }
+    }
+}
+
+impl Drawn {
+    /// The law now: under today's load where that changes, or else without what the readings scatter by.
+    fn law(&self, centre: f64, under_load: bool) -> Law {
+        let [of_velocity, of_load, both] = self.started.today;
+        let (mean, variance) = if under_load {
+            (self.started.ln_velocity, of_velocity)
+        } else {
+            (
+                self.started.ln_velocity - self.started.load,
+                of_velocity + of_load - 2.0 * both,
+            )
+        };
+        let ln_velocity = centre + mean + variance.max(0.0).sqrt() * self.deviate;
+        let past = &self.shape.past;
+        Law::from_fit(ln_velocity.exp(), past.r, past.kappa, past.p)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::{Observation, Observations, RateOptions};
+    use crate::model::{Accuracy, Trajectory};
+    use crate::reading::Quantity;
+    use crate::regime::Regime;
+
+    /// Sixty daily velocities of a law, which scatter by 3 %.
+    fn rates(law: &Law) -> Vec<Rate> {
+        let solution = Trajectory::solve(law, 60.0, Accuracy::Full);
+        let value = |day: u32| {
+            let share = (f64::from(day) * 0.618_033_988_75 + 0.37).fract();
+            let velocity = solution.at(f64::from(day)).unwrap().velocity;
+            velocity * (1.0 + 0.1 * (share - 0.5))
+        };
+        let values = (0..60).map(|day| Observation {
+            t_days: f64::from(day),
+            value: value(day),
+            sigma: None,
+        });
+        let observations = Observations {
+            quantity: Quantity::Velocity,
+            averaging_days: 0.0,
+            values: values.collect(),
+        };
+        observations.rates(0..60, RateOptions::default())
+    }
+
+    fn share(draws: &LawDraws, is: impl Fn(&Law) -> bool) -> f64 {
+        let samples = draws.ensemble.samples.iter();
+        samples.filter(|one| is(&one.law)).map(|one| one.weight).sum()
+    }
+
+    #[test]
+    fn the_truth_is_among_the_laws_of_a_constant_load_and_they_are_the_same_each_time() {
+        let law = Law::from_paper(1.35, 0.6, 70.0, 1.0).unwrap();
+        let rates = rates(&law);
+        let draws = LawDraws::of(&rates, &Assumptions::CONSTANT_LOAD).unwrap();
+        assert_eq!(LawDraws::of(&rates, &Assumptions::CONSTANT_LOAD).unwrap(), draws);
+        let now = law.from_y(Trajectory::solve(&law, 59.0, Accuracy::Full).at(59.0).unwrap().y);
+        for (name, of) in [
+            ("v", (|law: &Law| law.v_i) as fn(&Law) -> f64),
+            ("r", |law| law.r),
+            ("kappa", |law| law.kappa),
+            ("p", |law| law.p),
+        ] {
+            let below = share(&draws, |one| of(one) < of(&now));
+            assert!((0.02..0.98).contains(&below), "{name}: {below}");
+        }
+        assert!(draws.onset().low_days <= 1.0, "{:?}", draws.onset());
+        assert!(share(&draws, |one| one.r > 0.0) > 0.999);
+    }
+
+    #[test]
+    fn where_the_load_may_change_the_same_readings_leave_more_laws_open() {
+        let law = Law::from_paper(0.98, 39.0, 1.0, 80.0).unwrap();
+        let rates = rates(&law);
+        let spread = |assumed: &Assumptions| {
+            let draws = LawDraws::of(&rates, assumed).unwrap();
+            let samples = &draws.ensemble.samples;
+            let mean = samples.iter().map(|one| one.weight * one.law.r).sum::<f64>();
+            let square = |one: &LawSample| one.weight * (one.law.r - mean).powi(2);
+            samples.iter().map(square).sum::<f64>().sqrt()
+        };
+        let constant = spread(&Assumptions::CONSTANT_LOAD);
+        let changing = spread(&Assumptions::CHANGING_LOAD);
+        assert!(changing > 2.0 * constant, "{changing} {constant}");
+    }
+
+    #[test]
+    fn under_other_priors_the_laws_are_the_same_and_weigh_otherwise() {
+        let law = Law::from_paper(0.5, 0.1, 20.0, 1.0).unwrap();
+        let draws = LawDraws::of(&rates(&law), &Assumptions::CONSTANT_LOAD).unwrap();
+        for other in super::super::OtherPrior::ALL {
+            let under = draws.under(other);
+            assert_eq!(under.samples.len(), draws.ensemble.samples.len());
+            let total: f64 = under.samples.iter().map(|one| one.weight).sum();
+            assert!((total - 1.0).abs() < 1e-9, "{other:?}: {total}");
+        }
+        let watched = draws.under(super::super::OtherPrior::OfWatchedSlopes);
+        let unstable = |samples: &[LawSample]| {
+            let is = |one: &&LawSample| one.law.regime() == Regime::UnstableDecelerating;
+            samples.iter().filter(is).map(|one| one.weight).sum::<f64>()
+        };
+        let (before, after) = (unstable(&draws.ensemble.samples), unstable(&watched.samples));
+        assert!(after >= before, "{after} {before}");
+    }
+}

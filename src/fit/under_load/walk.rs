@@ -1,0 +1,281 @@
+//! A population of laws that walks over the posterior: each is moved along the difference of two others (differential
+//! evolution, ter Braak 2006), so that steps have the posterior's own shape and size.
+
+use super::Cell;
+use super::evidence::{self, Room, ShapeEvidence, StartedLaw};
+use super::gains::{Gains, LoadMemory, RateRecord};
+use super::past::PastSolution;
+use super::search::GridSearch;
+use super::space::{DrawnShape, Point, Space};
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64;
+use std::collections::BTreeMap;
+
+/// Laws in the population, and how many of those about the table's laws each is chosen from.
+const WALKERS_: usize = 64;
+fn env(n: &str, d: usize) -> usize { std::env::var(n).ok().and_then(|v| v.parse().ok()).unwrap_or(d) }
+const CHOSEN_FROM: usize = 3;
+/// Steps along differences, over the size that is best for a normal posterior: 2.38 over the root of twice its dimensions.
+const STEP: f64 = 0.636;
+/// One round in this many goes the whole difference, from one mode to another.
+const WHOLE: usize = 8;
+/// How much the size of a step varies, and what is added to it.
+const VARIED: f64 = 0.2;
+const SHAKEN: f64 = 1e-3;
+/// Steps of ln of the scatter at which what came before the law is weighed.
+const SCATTER_STEP: f64 = 0.1;
+/// The seed: the same readings give the same laws.
+const SEED: u64 = 2004;
+
+/// One law of the population.
+#[derive(Debug, Clone, Copy)]
+struct Walker {
+    at: Point,
+    ln: f64,
+}
+
+/// A law that was drawn, with where it starts.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Drawn {
+    pub(super) shape: DrawnShape,
+    pub(super) started: StartedLaw,
+    /// Variance of a reading about the law.
+    pub(super) variance: f64,
+    /// A standard normal number for its velocity.
+    pub(super) deviate: f64,
+}
+
+/// What a point is weighed with, used again and again.
+struct Scales {
+    record: RateRecord,
+    space: Space,
+    past: PastSolution,
+    predicted: Vec<[f64; 1]>,
+    /// ln(1 + |r| t) at the middle of each rate, where the law drifts by it.
+    e_folds: Vec<f64>,
+    /// The evidence of what came before each rate, by no law: at steps of ln of the scatter, and for the law at hand.
+    befores: BTreeMap<i32, Vec<f64>>,
+    before: Vec<f64>,
+    room: Room<1>,
+    evaluations: usize,
+}
+
+/// A population on its way.
+pub(super) struct Walk {
+    scales: Scales,
+    walkers: Vec<Walker>,
+    generator: Pcg64,
+    rounds: usize,
+}
+
+impl Scales {
+    /// The evidence of a law, and the gains that gave it.
+    fn weigh(&mut self, at: &Point, least: f64) -> (ShapeEvidence, Gains, DrawnShape) {
+        self.evaluations += 1;
+        let shape = self.space.shape(at);
+        self.predict(&shape);
+        let noise = Space::noise(at);
+        let memory = LoadMemory::new(&self.record, &noise);
+        self.before(noise.scatter);
+        let gains = Gains::new(&self.record, &memory, &self.e_folds, &self.before);
+        let [found] = evidence::weigh(
+            &self.record,
+            &self.predicted,
+            &gains,
+            least,
+            &mut self.room,
+        );
+        (found, gains, shape)
+    }
+
+    /// The evidence of what came before each rate, between two steps of ln of the scatter.
+    fn before(&mut self, scatter: f64) {
+        let at = scatter.ln().clamp(-20.0, 5.0) / SCATTER_STEP;
+        #[expect(clippy::cast_possible_truncation, reason = "within a few hundred")]
+        let below = at.floor() as i32;
+        let share = at - at.floor();
+        let record = &self.record;
+        for step in [below, below + 1] {
+            let scatter = || (f64::from(step) * SCATTER_STEP).exp();
+            let of = || evidence::before_the_law(record, scatter());
+            self.befores.entry(step).or_insert_with(of);
+        }
+        let both = self.befores.get(&below).zip(self.befores.get(&(below + 1)));
+        let Some((less, more)) = both else {
+            return;
+        };
+        self.before.clear();
+        let between = less.iter().zip(more).map(|(less, more)| less + share * (more - less));
+        self.before.extend(between);
+    }
+
+    /// ln of the posterior density; minus infinity where it cannot reach `least`.
+    fn ln_posterior(&mut self, at: &Point, least: f64) -> f64 {
+        let prior = self.space.ln_prior(at);
+        if prior == f64::NEG_INFINITY {
+            return prior;
+        }
+        let (found, _, shape) = self.weigh(at, least - prior);
+        let now = found.ln_velocity + self.record.centre;
+        found.ln + prior + self.space.ln_prior_of_kept(&shape, now)
+    }
+
+    /// ln of the mean rates in units of the velocity now.
+    fn predict(&mut self, shape: &DrawnShape) {
+        let record = &self.record;
+        self.past.solve(shape.past, record.from[0]);
+        let mut hint = 0;
+        let mut before: Option<(f64, f64)> = None;
+        for index in (0..record.from.len()).rev() {
+            let (from, to) = (record.from[index], record.to[index]);
+            let ln = if from > to {
+                let newer = match before {
+                    Some((ago, slip)) if ago.to_bits() == to.to_bits() => slip,
+                    _ => self.past.at(to, &mut hint).1,
+                };
+                let older = self.past.at(from, &mut hint).1;
+                before = Some((from, older));
+                ((older - newer) / (from - to)).max(1e-300).ln()
+            } else {
+                -self.past.at(to, &mut hint).0
+            };
+            self.predicted[index] = [ln];
+        }
+        if record.assumed.drift > 0.0 {
+            let size = shape.past.r.abs();
+            for (slot, middle) in self.e_folds.iter_mut().zip(&record.middle) {
+                *slot = (size * middle).ln_1p();
+            }
+        }
+    }
+}
+
+impl Walk {
+    /// A population about the laws of the table, each in proportion to its weight.
+    pub(super) fn about(cells: &[Cell], search: GridSearch) -> Option<Self> {
+        let GridSearch { record, prior, .. } = search;
+        let count = record.from.len();
+        let mut walk = Self {
+            scales: Scales {
+                space: Space::new(prior, &record),
+                record,
+                past: PastSolution::default(),
+                predicted: vec![[0.0]; count],
+                e_folds: vec![0.0; count],
+                befores: BTreeMap::new(),
+                before: Vec::with_capacity(count),
+                room: Room::default(),
+                evaluations: 0,
+            },
+            walkers: Vec::new(),
+            generator: Pcg64::seed_from_u64(SEED),
+            rounds: 0,
+        };
+        let wanted = env("XW", WALKERS_) * env("XC",CHOSEN_FROM);
+        let mut reached = 0.0;
+        let mut tried: Vec<Walker> = Vec::with_capacity(wanted);
+        for cell in cells {
+            reached += cell.weight;
+            while (tried.len() as f64 + 0.5) < reached * wanted as f64 && tried.len() < wanted {
+                let at = walk.scales.space.near(cell, &mut walk.generator);
+                let ln = walk.scales.ln_posterior(&at, f64::NEG_INFINITY);
+                tried.push(Walker { at, ln });
+            }
+        }
+        walk.choose(&tried);
+        (!walk.walkers.is_empty()).then_some(walk)
+    }
+
+    /// Chooses the population: by the root of the posterior, so that it is wider than that.
+    fn choose(&mut self, tried: &[Walker]) {
+        let best = tried.iter().map(|one| one.ln).fold(f64::NEG_INFINITY, f64::max);
+        if !best.is_finite() {
+            return;
+        }
+        let weight = |one: &Walker| (0.5 * (one.ln - best)).exp();
+        let total: f64 = tried.iter().map(weight).sum();
+        let mut reached = 0.0;
+        for one in tried {
+            reached += weight(one) / total;
+            while (self.walkers.len() as f64 + 0.5) < reached * env("XW", WALKERS_) as f64
+                && self.walkers.len() < env("XW", WALKERS_)
+            {
+                self.walkers.push(*one);
+            }
+        }
+    }
+
+    /// Moves each law of the population once.
+    pub(super) fn round(&mut self) {
+        self.rounds += 1;
+        let count = self.walkers.len();
+        let step = if self.rounds.is_multiple_of(env("XH", WHOLE)) {
+            1.0
+        } else {
+            STEP
+        };
+        for index in 0..count {
+            let other = |away: usize| (index + away) % count;
+            let one = other(self.generator.random_range(1..count.max(2)));
+            let two = other(self.generator.random_range(1..count.max(2)));
+            let size: f64 = self.generator.sample(StandardNormal);
+            let along = self.walkers[one].at - self.walkers[two].at;
+            let shake = Point::from_fn(|_, _| self.generator.sample::<f64, _>(StandardNormal));
+            let size = if step < 1.0 { env("XS",100) as f64/100.0 * step * (VARIED * size).exp() } else { step };
+            let at = self.walkers[index].at + along * size + shake * SHAKEN;
+            let luck = self.generator.random::<f64>().max(1e-300).ln();
+            let least = self.walkers[index].ln + luck;
+            let ln = self.scales.ln_posterior(&at, least);
+            if ln >= least {
+                self.walkers[index] = Walker { at, ln };
+            }
+        }
+    }
+
+    /// Doubts the rates that the best law so far cannot explain, and weighs the population again.
+    pub(super) fn doubt(&mut self) {
+        let best = self.walkers.iter().max_by(|a, b| a.ln.total_cmp(&b.ln));
+        let Some(at) = best.map(|best| best.at) else {
+            return;
+        };
+        let scales = &mut self.scales;
+        let (_, gains, _) = scales.weigh(&at, f64::NEG_INFINITY);
+        let lane = (0, Space::noise(&at).scatter);
+        let squares = evidence::misses(&scales.record, &scales.predicted, lane, &gains);
+        scales.record.doubt(&squares);
+        scales.befores.clear();
+        for walker in &mut self.walkers {
+            walker.ln = scales.ln_posterior(&walker.at, f64::NEG_INFINITY);
+        }
+    }
+
+    /// The population as it is, each law with a start and a velocity drawn.
+    pub(super) fn draw(&mut self) -> Vec<Drawn> {
+        let mut drawn = Vec::with_capacity(self.walkers.len());
+        for walker in &self.walkers {
+            let (_, gains, shape) = self.scales.weigh(&walker.at, f64::NEG_INFINITY);
+            let share = self.generator.random::<f64>();
+            let noise = Space::noise(&walker.at);
+            let deviate = self.generator.sample(StandardNormal);
+            let started = evidence::start_at(&gains, &self.scales.room, share);
+            drawn.extend(started.map(|started| Drawn {
+                shape,
+                started,
+                variance: noise.scatter.powi(2) + noise.sigma.powi(2),
+                deviate,
+            }));
+        }
+        drawn
+    }
+
+    /// The record that the laws are weighed with.
+    pub(super) fn record(&self) -> &RateRecord {
+        &self.scales.record
+    }
+
+    /// Laws weighed so far.
+    pub(super) fn evaluations(&self) -> usize {
+        self.scales.evaluations
+    }
+}
