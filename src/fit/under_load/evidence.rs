@@ -294,12 +294,81 @@ pub(super) fn misses<const TOGETHER: usize>(
     squares
 }
 
+/// What the rates before each one say of the velocity there, by one of the random walks: the share of that walk, and the mean and
+/// variance of ln v less the record's centre, by them and before them.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct WalkedLevel {
+    share: f64,
+    mean: f64,
+    variance: f64,
+    prior_variance: f64,
+}
+
+/// The most, in ln, that a start gains where the walk before it ends at the law's velocity.
+const MOST_JOINED: f64 = 8.0;
+
+/// What came before each rate, for joining a law to it.
+pub(super) type WalkedLevels = Vec<[WalkedLevel; MOST_DRIFTS]>;
+
+/// The evidence of one law that begins where the walk before it ends; its starts in the room are weighed anew. One whose
+/// evidence, ln, cannot reach `least` has none.
+pub(super) fn weigh_joined(
+    record: &RateRecord,
+    predicted: &[[f64; 1]],
+    (gains, levels): (&Gains, &WalkedLevels),
+    least: f64,
+    room: &mut Room<1>,
+) -> ShapeEvidence {
+    let [found] = weigh(record, predicted, gains, least - MOST_JOINED, room);
+    if !found.ln.is_finite() {
+        return found;
+    }
+    let count = record.ln_velocity.len();
+    let first = FEWEST_UNDER_THE_LAW.min(count) - 1;
+    let most = room.ln_evidence[first..].iter();
+    let most = most.map(|[ln]| *ln).fold(f64::NEG_INFINITY, f64::max);
+    let mut best = f64::NEG_INFINITY;
+    for step in first..room.ln_evidence.len() {
+        let [ln] = room.ln_evidence[step];
+        if ln > most - NEGLIGIBLE - MOST_JOINED {
+            let index = count - 1 - step;
+            let [[velocity_now], [load_now]] = room.today[step];
+            let [of_velocity, of_load, both] = gains.today[step];
+            let at_start = velocity_now - load_now + predicted[index][0];
+            let own = (of_velocity + of_load - 2.0 * both).max(0.0);
+            room.ln_evidence[step] = [ln + ln_joined(&levels[index], at_start, own)];
+        }
+        best = best.max(room.ln_evidence[step][0]);
+    }
+    over_starts(gains, room, (first, 0), best)
+}
+
+/// ln of how much likelier the walk is that ends at that velocity, known with that variance, than one that ends anywhere.
+fn ln_joined(levels: &[WalkedLevel; MOST_DRIFTS], at: f64, own: f64) -> f64 {
+    let density = |mean: f64, variance: f64| {
+        let miss = at - mean;
+        (-0.5 * miss * miss / variance).exp() / variance.sqrt()
+    };
+    let each = levels.iter().filter(|level| level.share > 1e-6);
+    let each = each.map(|level| {
+        level.share * density(level.mean, level.variance + own)
+            / density(0.0, level.prior_variance + own)
+    });
+    each.sum::<f64>().max(1e-300).ln()
+}
+
 /// ln of the evidence of the rates before each one, by a velocity that is a random walk, and of the prior of a start there.
 pub(super) fn before_the_law(record: &RateRecord, scatter: f64) -> Vec<f64> {
+    walks_before(record, scatter).0
+}
+
+/// The same, and where the walks end.
+pub(super) fn walks_before(record: &RateRecord, scatter: f64) -> (Vec<f64>, WalkedLevels) {
     let count = record.ln_velocity.len();
     let drifts = record.assumed.drifts_before;
     let mut total = vec![0.0_f64; count];
     let mut each = vec![[0.0_f64; MOST_DRIFTS]; count];
+    let mut levels = vec![[WalkedLevel::default(); MOST_DRIFTS]; count];
     for (which, drift) in drifts.iter().enumerate() {
         let (mut level, mut variance, mut ln) = (0.0, LEVEL_VARIANCE, 0.0);
         for (index, slot) in each.iter_mut().enumerate() {
@@ -307,6 +376,12 @@ pub(super) fn before_the_law(record: &RateRecord, scatter: f64) -> Vec<f64> {
             if index > 0 {
                 variance += drift * drift;
             }
+            levels[index][which] = WalkedLevel {
+                share: 0.0,
+                mean: level,
+                variance,
+                prior_variance: LEVEL_VARIANCE + index as f64 * drift * drift,
+            };
             let s = (variance + record.variance(index, scatter)).max(1e-12);
             let miss = record.ln_velocity[index] - level;
             ln -= 0.5 * (miss * miss / s + s.ln());
@@ -319,11 +394,14 @@ pub(super) fn before_the_law(record: &RateRecord, scatter: f64) -> Vec<f64> {
         let best = each.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let sum: f64 = each.iter().map(|ln| (ln - best).exp()).sum();
         *slot = best + (sum / drifts.len() as f64).ln();
+        for (level, ln) in levels[index].iter_mut().zip(each) {
+            level.share = (ln - best).exp() / sum;
+        }
         if let Some(first) = record.assumed.from_the_first {
             *slot += ln_prior_of_start(record, index, first);
         }
     }
-    total
+    (total, levels)
 }
 
 /// ln of the prior that the law begins with that rate: with the first one with that probability, or else later, even in the

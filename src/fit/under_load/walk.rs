@@ -2,7 +2,7 @@
 //! evolution, ter Braak 2006), so that steps have the posterior's own shape and size.
 
 use super::Cell;
-use super::evidence::{self, Room, ShapeEvidence, StartedLaw};
+use super::evidence::{self, Room, ShapeEvidence, StartedLaw, WalkedLevels};
 use super::gains::{Gains, LoadMemory, RateRecord};
 use super::past::PastSolution;
 use super::search::GridSearch;
@@ -55,7 +55,7 @@ struct Scales {
     /// ln(1 + |r| t) at the middle of each rate, where the law drifts by it.
     e_folds: Vec<f64>,
     /// The evidence of what came before each rate, by no law: at steps of ln of the scatter, and for the law at hand.
-    befores: BTreeMap<i32, Vec<f64>>,
+    befores: BTreeMap<i32, (Vec<f64>, WalkedLevels)>,
     before: Vec<f64>,
     room: Room<1>,
     evaluations: usize,
@@ -77,12 +77,15 @@ impl Scales {
         self.predict(&shape);
         let noise = Space::noise(at);
         let memory = LoadMemory::new(&self.record, &noise);
-        self.before(noise.scatter);
+        let below = self.before(noise.scatter);
         let gains = Gains::new(&self.record, &memory, &self.e_folds, &self.before);
-        let [found] = evidence::weigh(
+        let Some((_, levels)) = self.befores.get(&below) else {
+            return (evidence::NO_EVIDENCE, gains, shape);
+        };
+        let found = evidence::weigh_joined(
             &self.record,
             &self.predicted,
-            &gains,
+            (&gains, levels),
             least,
             &mut self.room,
         );
@@ -90,7 +93,7 @@ impl Scales {
     }
 
     /// The evidence of what came before each rate, between two steps of ln of the scatter.
-    fn before(&mut self, scatter: f64) {
+    fn before(&mut self, scatter: f64) -> i32 {
         let at = scatter.ln().clamp(-20.0, 5.0) / SCATTER_STEP;
         #[expect(clippy::cast_possible_truncation, reason = "within a few hundred")]
         let below = at.floor() as i32;
@@ -98,16 +101,17 @@ impl Scales {
         let record = &self.record;
         for step in [below, below + 1] {
             let scatter = || (f64::from(step) * SCATTER_STEP).exp();
-            let of = || evidence::before_the_law(record, scatter());
+            let of = || evidence::walks_before(record, scatter());
             self.befores.entry(step).or_insert_with(of);
         }
         let both = self.befores.get(&below).zip(self.befores.get(&(below + 1)));
-        let Some((less, more)) = both else {
-            return;
+        let Some(((less, _), (more, _))) = both else {
+            return below;
         };
         self.before.clear();
         let between = less.iter().zip(more).map(|(less, more)| less + share * (more - less));
         self.before.extend(between);
+        below
     }
 
     /// ln of the posterior density; minus infinity where it cannot reach `least`.
