@@ -4,13 +4,13 @@ use super::gains::{Gains, LEVEL_VARIANCE, RateRecord};
 use super::shape::{BLOCKS, Block, LANES, TablePlace};
 
 /// Rates that a law must explain, at least.
-const FEWEST_UNDER_THE_LAW: usize = 4;
+pub(super) const FEWEST_UNDER_THE_LAW: usize = 4;
 /// Most standard deviations, for one rate after another, of a velocity that follows no law.
-const MOST_DRIFTS: usize = 4;
+pub(super) const MOST_DRIFTS: usize = 4;
 /// Rates between two looks at whether a block can still count.
 const LOOKED: usize = 8;
 /// Starts this much less likely than the best, ln, are not counted.
-const NEGLIGIBLE: f64 = 10.0;
+pub(super) const NEGLIGIBLE: f64 = 10.0;
 
 /// The times of a record in units of one slope's time to failure.
 #[derive(Debug, Clone)]
@@ -27,8 +27,10 @@ pub(super) struct SlopeTable {
 /// Room for one evaluation of so many laws, used again and again.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Room<const TOGETHER: usize> {
-    ln_evidence: Vec<[f64; TOGETHER]>,
+    pub(super) ln_evidence: Vec<[f64; TOGETHER]>,
     today: Vec<[[f64; TOGETHER]; 2]>,
+    /// Level, load and error of the reading at the start of each rate, after it; where errors are followed.
+    pub(super) at_start: Vec<[[f64; TOGETHER]; 3]>,
 }
 
 /// A law that begins with one rate: its share of all of its starts is its probability.
@@ -152,6 +154,7 @@ fn weigh_with<const TOGETHER: usize, const SHARED: bool>(
 ) -> [ShapeEvidence; TOGETHER] {
     room.ln_evidence.clear();
     room.today.clear();
+    room.at_start.clear();
     let count = record.ln_velocity.len();
     let [mut load, mut level, mut velocity_now, mut load_now, mut ln] = [[0.0; TOGETHER]; 5];
     let mut end = [0.0; TOGETHER];
@@ -170,9 +173,13 @@ fn weigh_with<const TOGETHER: usize, const SHARED: bool>(
         let mut total = [0.0; TOGETHER];
         for lane in 0..TOGETHER {
             load[lane] *= gain.keep;
-            let mut miss = read - predicted[lane] - load[lane] - level[lane];
+            let seen = if SHARED {
+                gain.sees * load[lane] + gain.shared * end[lane]
+            } else {
+                load[lane]
+            };
+            let miss = read - predicted[lane] - seen - level[lane];
             if SHARED {
-                miss -= gain.shared * end[lane];
                 end[lane] = gain.end * miss;
             }
             ln[lane] -= 0.5 * miss * miss * gain.precision;
@@ -184,6 +191,9 @@ fn weigh_with<const TOGETHER: usize, const SHARED: bool>(
         }
         room.ln_evidence.push(total);
         room.today.push([velocity_now, load_now]);
+        if SHARED {
+            room.at_start.push([level, load, end]);
+        }
         if step >= first {
             for (best, total) in best.iter_mut().zip(total) {
                 *best = if total > *best { total } else { *best };
@@ -212,6 +222,16 @@ pub(super) const NO_EVIDENCE: ShapeEvidence = ShapeEvidence {
     load: 0.0,
     today: [0.0; 3],
 };
+
+/// Over the starts of the law weighed last, as they stand in the room, of which the best has that evidence, ln.
+pub(super) fn over_all_starts(gains: &Gains, room: &Room<1>, best: f64) -> ShapeEvidence {
+    let first = FEWEST_UNDER_THE_LAW.min(room.ln_evidence.len()) - 1;
+    if best.is_finite() {
+        over_starts(gains, room, (first, 0), best)
+    } else {
+        NO_EVIDENCE
+    }
+}
 
 /// Over the starts of a lane from the first that may be, of which the best has that evidence, ln.
 fn over_starts<const TOGETHER: usize>(
@@ -282,7 +302,7 @@ pub(super) fn misses<const TOGETHER: usize>(
         load *= gain.keep;
         let miss = record.ln_velocity[index]
             - predicted[index][lane]
-            - load
+            - gain.sees * load
             - level
             - gain.shared * end;
         let doubted = record.variance(index, scatter) * (1.0 - record.trust[index]);
@@ -294,81 +314,12 @@ pub(super) fn misses<const TOGETHER: usize>(
     squares
 }
 
-/// What the rates before each one say of the velocity there, by one of the random walks: the share of that walk, and the mean and
-/// variance of ln v less the record's centre, by them and before them.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct WalkedLevel {
-    share: f64,
-    mean: f64,
-    variance: f64,
-    prior_variance: f64,
-}
-
-/// The most, in ln, that a start gains where the walk before it ends at the law's velocity.
-const MOST_JOINED: f64 = 8.0;
-
-/// What came before each rate, for joining a law to it.
-pub(super) type WalkedLevels = Vec<[WalkedLevel; MOST_DRIFTS]>;
-
-/// The evidence of one law that begins where the walk before it ends; its starts in the room are weighed anew. One whose
-/// evidence, ln, cannot reach `least` has none.
-pub(super) fn weigh_joined(
-    record: &RateRecord,
-    predicted: &[[f64; 1]],
-    (gains, levels): (&Gains, &WalkedLevels),
-    least: f64,
-    room: &mut Room<1>,
-) -> ShapeEvidence {
-    let [found] = weigh(record, predicted, gains, least - MOST_JOINED, room);
-    if !found.ln.is_finite() {
-        return found;
-    }
-    let count = record.ln_velocity.len();
-    let first = FEWEST_UNDER_THE_LAW.min(count) - 1;
-    let most = room.ln_evidence[first..].iter();
-    let most = most.map(|[ln]| *ln).fold(f64::NEG_INFINITY, f64::max);
-    let mut best = f64::NEG_INFINITY;
-    for step in first..room.ln_evidence.len() {
-        let [ln] = room.ln_evidence[step];
-        if ln > most - NEGLIGIBLE - MOST_JOINED {
-            let index = count - 1 - step;
-            let [[velocity_now], [load_now]] = room.today[step];
-            let [of_velocity, of_load, both] = gains.today[step];
-            let at_start = velocity_now - load_now + predicted[index][0];
-            let own = (of_velocity + of_load - 2.0 * both).max(0.0);
-            room.ln_evidence[step] = [ln + ln_joined(&levels[index], at_start, own)];
-        }
-        best = best.max(room.ln_evidence[step][0]);
-    }
-    over_starts(gains, room, (first, 0), best)
-}
-
-/// ln of how much likelier the walk is that ends at that velocity, known with that variance, than one that ends anywhere.
-fn ln_joined(levels: &[WalkedLevel; MOST_DRIFTS], at: f64, own: f64) -> f64 {
-    let density = |mean: f64, variance: f64| {
-        let miss = at - mean;
-        (-0.5 * miss * miss / variance).exp() / variance.sqrt()
-    };
-    let each = levels.iter().filter(|level| level.share > 1e-6);
-    let each = each.map(|level| {
-        level.share * density(level.mean, level.variance + own)
-            / density(0.0, level.prior_variance + own)
-    });
-    each.sum::<f64>().max(1e-300).ln()
-}
-
 /// ln of the evidence of the rates before each one, by a velocity that is a random walk, and of the prior of a start there.
 pub(super) fn before_the_law(record: &RateRecord, scatter: f64) -> Vec<f64> {
-    walks_before(record, scatter).0
-}
-
-/// The same, and where the walks end.
-pub(super) fn walks_before(record: &RateRecord, scatter: f64) -> (Vec<f64>, WalkedLevels) {
     let count = record.ln_velocity.len();
     let drifts = record.assumed.drifts_before;
     let mut total = vec![0.0_f64; count];
     let mut each = vec![[0.0_f64; MOST_DRIFTS]; count];
-    let mut levels = vec![[WalkedLevel::default(); MOST_DRIFTS]; count];
     for (which, drift) in drifts.iter().enumerate() {
         let (mut level, mut variance, mut ln) = (0.0, LEVEL_VARIANCE, 0.0);
         for (index, slot) in each.iter_mut().enumerate() {
@@ -376,12 +327,6 @@ pub(super) fn walks_before(record: &RateRecord, scatter: f64) -> (Vec<f64>, Walk
             if index > 0 {
                 variance += drift * drift;
             }
-            levels[index][which] = WalkedLevel {
-                share: 0.0,
-                mean: level,
-                variance,
-                prior_variance: LEVEL_VARIANCE + index as f64 * drift * drift,
-            };
             let s = (variance + record.variance(index, scatter)).max(1e-12);
             let miss = record.ln_velocity[index] - level;
             ln -= 0.5 * (miss * miss / s + s.ln());
@@ -394,19 +339,16 @@ pub(super) fn walks_before(record: &RateRecord, scatter: f64) -> (Vec<f64>, Walk
         let best = each.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let sum: f64 = each.iter().map(|ln| (ln - best).exp()).sum();
         *slot = best + (sum / drifts.len() as f64).ln();
-        for (level, ln) in levels[index].iter_mut().zip(each) {
-            level.share = (ln - best).exp() / sum;
-        }
         if let Some(first) = record.assumed.from_the_first {
             *slot += ln_prior_of_start(record, index, first);
         }
     }
-    (total, levels)
+    total
 }
 
 /// ln of the prior that the law begins with that rate: with the first one with that probability, or else later, even in the
 /// logarithm of its distance from the present.
-fn ln_prior_of_start(record: &RateRecord, index: usize, first: f64) -> f64 {
+pub(super) fn ln_prior_of_start(record: &RateRecord, index: usize, first: f64) -> f64 {
     let newest = record.from.len().saturating_sub(FEWEST_UNDER_THE_LAW);
     if index == 0 || newest == 0 {
         return first.ln();
@@ -456,9 +398,7 @@ mod tests {
         let gains = Gains::new(&record, &memory, &[0.0; 5], &[0.0; 5]);
         let mut room = Room::default();
         weigh(&record, &[[0.05]; 5], &gains, f64::NEG_INFINITY, &mut room);
-        let ends = |index: usize| {
-            (0.5 * SHARED / record.trust[index]).sqrt() * record.error[index]
-        };
+        let ends = |index: usize| (0.5 * SHARED / record.trust[index]).sqrt() * record.error[index];
         let covariance = DMatrix::from_fn(5, 5, |i, j| {
             let level = LEVEL_VARIANCE;
             if i == j {

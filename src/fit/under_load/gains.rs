@@ -4,6 +4,7 @@
 //! f. Variances do not depend on what is read, so a table of gains serves every shape.
 
 use super::assumptions::Assumptions;
+use nalgebra::Matrix3;
 
 /// The rates as the filter sees them.
 #[derive(Debug, Clone)]
@@ -43,8 +44,9 @@ pub(super) const LEVEL_VARIANCE: f64 = 4.0;
 /// What one rate moves.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Gain {
-    /// The share of the load that is left from the rate after it.
+    /// The share of the load that is left from the rate after it, and how much of the load at its middle its mean shows.
     pub(super) keep: f64,
+    pub(super) sees: f64,
     /// What the error of the reading at its end moves it by, where the rate after it begins with that reading; and what it
     /// moves of the error of the reading at its start.
     pub(super) shared: f64,
@@ -68,6 +70,8 @@ pub(super) struct Gains {
     pub(super) most_outside: Vec<f64>,
     /// Variances of ln v and f of today, and their covariance, after each rate.
     pub(super) today: Vec<[f64; 3]>,
+    /// The covariance of level, load and error of the reading at the start of each rate, after it; where errors are followed.
+    pub(super) at_start: Vec<Matrix3<f64>>,
 }
 
 /// Degrees of freedom of an outlier's error.
@@ -88,7 +92,7 @@ impl RateRecord {
     }
 
     /// The same but for what is of the readings at its two ends, and how much the error of each of those moves it.
-    fn own_and_ends(&self, index: usize, noise: &LoadNoise) -> (f64, f64) {
+    pub(super) fn own_and_ends(&self, index: usize, noise: &LoadNoise) -> (f64, f64) {
         let all = self.variance(index, noise.scatter);
         if noise.shared > 0.0 && self.is_of_ends[index] {
             let of_ends = noise.shared * self.error[index].powi(2) / self.trust[index];
@@ -99,7 +103,7 @@ impl RateRecord {
     }
 
     /// Whether the rate ends with the reading that the one after it begins with.
-    fn ends_where_next_begins(&self, index: usize) -> bool {
+    pub(super) fn ends_where_next_begins(&self, index: usize) -> bool {
         let next = self.from.get(index + 1);
         next.is_some_and(|next| next.to_bits() == self.to[index].to_bits())
     }
@@ -111,8 +115,9 @@ pub(super) struct LoadMemory {
     noise: LoadNoise,
     /// The share of the load that is left from the rate after it.
     keep: Vec<f64>,
-    /// What the load's variance loses in the mean over each rate.
+    /// What the load's variance loses in the mean over each rate, beyond how much of the load at its middle that shows.
     smoothed: Vec<f64>,
+    sees: Vec<f64>,
 }
 
 impl LoadMemory {
@@ -121,21 +126,41 @@ impl LoadMemory {
         self.noise.scatter
     }
 
+    pub(super) fn noise(&self) -> &LoadNoise {
+        &self.noise
+    }
+
+    /// For one rate, by its index from the newest: the share of the load that is left from the rate after it, how much of the
+    /// load at its middle its mean shows, and what that lacks of the mean's variance.
+    pub(super) fn of_rate(&self, from_newest: usize) -> (f64, f64, f64) {
+        let at = |of: &[f64]| of.get(from_newest).copied().unwrap_or_default();
+        (at(&self.keep), at(&self.sees), -at(&self.smoothed))
+    }
+
     pub(super) fn new(record: &RateRecord, noise: &LoadNoise) -> Self {
         let variance = noise.sigma * noise.sigma;
         let mut ago = 0.0;
-        let (mut keep, mut smoothed) = (Vec::new(), Vec::new());
+        let (mut keep, mut smoothed, mut sees) = (Vec::new(), Vec::new(), Vec::new());
         for index in (0..record.middle.len()).rev() {
             let days = (record.middle[index] - ago).max(0.0);
             ago = record.middle[index];
             keep.push((-days / noise.tau).exp());
             let width = (record.from[index] - record.to[index]) / noise.tau;
-            smoothed.push(variance * (1.0 - variance_of_mean(width)));
+            if record.assumed.follows_errors {
+                // A filter that took the mean for the load at its middle would have negative variances in the end.
+                let seen = middle_in_mean(width);
+                sees.push(seen);
+                smoothed.push(variance * (seen * seen - variance_of_mean(width)));
+            } else {
+                sees.push(1.0);
+                smoothed.push(variance * (1.0 - variance_of_mean(width)));
+            }
         }
         Self {
             noise: *noise,
             keep,
             smoothed,
+            sees,
         }
     }
 }
@@ -152,10 +177,11 @@ impl Gains {
             outside: Vec::with_capacity(count),
             most_outside: Vec::new(),
             today: Vec::with_capacity(count),
+            at_start: Vec::new(),
         };
         let (mut u_before, mut normaliser) = (0.0, 0.0);
-        let of_time = memory.keep.iter().zip(&memory.smoothed);
-        for (index, (keep, smoothed)) in (0..count).rev().zip(of_time) {
+        let of_time = memory.keep.iter().zip(&memory.smoothed).zip(&memory.sees);
+        for (index, ((keep, smoothed), sees)) in (0..count).rev().zip(of_time) {
             let e_folds = (u[index] - u_before).max(0.0);
             u_before = u[index];
             filter.go_back(*keep, variance, record.assumed.drift.powi(2) * e_folds);
@@ -164,10 +190,11 @@ impl Gains {
                 filter.at_a_new_reading();
             }
             let (error, ends) = record.own_and_ends(index, noise);
-            let (gain, s) = filter.read(error, *smoothed, ends);
+            let (gain, s) = filter.read(error, *smoothed, ends, *sees);
             normaliser -= 0.5 * s.ln();
             gains.steps.push(Gain {
                 keep: *keep,
+                sees: *sees,
                 shared: if is_shared { gain.shared } else { 0.0 },
                 ..gain
             });
@@ -175,6 +202,9 @@ impl Gains {
             gains
                 .today
                 .push([filter.velocity, filter.now, filter.velocity_now]);
+            if record.assumed.follows_errors {
+                gains.at_start.push(filter.at_start());
+            }
         }
         let mut most = f64::NEG_INFINITY;
         gains.most_outside = gains.outside.clone();
@@ -247,20 +277,37 @@ impl FilterCovariance {
         self.end_now = 0.0;
     }
 
-    /// Takes a rate of that variance of its error, over which the load's variance loses `smoothed`, and which the readings at
-    /// its two ends move by `ends` each: its gain, all but what is kept of the load, and the variance of the innovation.
-    fn read(&mut self, error: f64, smoothed: f64, ends: f64) -> (Gain, f64) {
-        let load = self.load + self.load_level + ends * self.end_load;
-        let level = self.load_level + self.level + ends * self.end_level;
-        let velocity = self.load_velocity + self.level_velocity + ends * self.end_velocity;
-        let now = self.load_now + self.level_now + ends * self.end_now;
-        let of_ends = ends * (self.end_load + self.end_level + ends * (self.end + 1.0));
-        let s = (load + level + (error + of_ends) - smoothed)
+    /// Of level, load and the error of the reading at the start of the rate taken last.
+    fn at_start(&self) -> Matrix3<f64> {
+        Matrix3::new(
+            self.level,
+            self.load_level,
+            self.end_level,
+            self.load_level,
+            self.load,
+            self.end_load,
+            self.end_level,
+            self.end_load,
+            self.end,
+        )
+    }
+
+    /// Takes a rate of that variance of its error, whose mean `sees` so much of the load at its middle, over which the load's
+    /// variance loses `smoothed`, and which the readings at its two ends move by `ends` each: its gain, all but what is kept of
+    /// the load, and the variance of the innovation.
+    fn read(&mut self, error: f64, smoothed: f64, ends: f64, sees: f64) -> (Gain, f64) {
+        let load = sees * self.load + self.load_level + ends * self.end_load;
+        let level = sees * self.load_level + self.level + ends * self.end_level;
+        let velocity = sees * self.load_velocity + self.level_velocity + ends * self.end_velocity;
+        let now = sees * self.load_now + self.level_now + ends * self.end_now;
+        let of_ends = ends * (sees * self.end_load + self.end_level + ends * (self.end + 1.0));
+        let s = (sees * load + level + (error + of_ends) - smoothed)
             .max(error)
             .max(1e-12);
         let precision = 1.0 / s;
         let gain = Gain {
             keep: 1.0,
+            sees,
             shared: ends,
             end: -ends * precision,
             load: load * precision,
@@ -292,6 +339,15 @@ impl FilterCovariance {
 fn variance_of_mean(width: f64) -> f64 {
     if width > 1e-3 {
         2.0 * (width - 1.0 + (-width).exp()) / (width * width)
+    } else {
+        1.0
+    }
+}
+
+/// How much of an Ornstein-Uhlenbeck process at the middle of `width` memories its mean over them shows.
+fn middle_in_mean(width: f64) -> f64 {
+    if width > 1e-3 {
+        -2.0 * (-0.5 * width).exp_m1() / width
     } else {
         1.0
     }

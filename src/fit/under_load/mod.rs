@@ -30,6 +30,7 @@ mod draws;
 mod evidence;
 mod future;
 mod gains;
+mod joined;
 mod other_prior;
 mod past;
 mod prior;

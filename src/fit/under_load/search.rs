@@ -1,8 +1,8 @@
 //! The search over slopes, shapes and noises: coarse, then fine where the evidence is.
 
-use super::evidence::{self, RecordTimes, Room, ShapeEvidence, SlopeTable, weigh};
 use super::Cell;
 use super::assumptions::Assumptions;
+use super::evidence::{self, RecordTimes, Room, ShapeEvidence, SlopeTable, weigh};
 use super::gains::{Gains, LoadMemory, LoadNoise, RateRecord};
 use super::prior::{RARE, SlopePrior};
 use super::shape::{BLOCKS, LANES, SHAPES};

@@ -2,19 +2,18 @@
 //! evolution, ter Braak 2006), so that steps have the posterior's own shape and size.
 
 use super::Cell;
-use super::evidence::{self, Room, ShapeEvidence, StartedLaw, WalkedLevels};
+use super::evidence::{self, Room, ShapeEvidence, StartedLaw, weigh};
 use super::gains::{Gains, LoadMemory, RateRecord};
+use super::joined::{self, MOST_JOINED, WalksBefore};
 use super::past::PastSolution;
 use super::search::GridSearch;
 use super::space::{DrawnShape, Point, Space};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
-use std::collections::BTreeMap;
 
 /// Laws in the population, and how many of those about the table's laws each is chosen from.
-const WALKERS_: usize = 64;
-fn env(n: &str, d: usize) -> usize { std::env::var(n).ok().and_then(|v| v.parse().ok()).unwrap_or(d) }
+const WALKERS: usize = 64;
 const CHOSEN_FROM: usize = 3;
 /// Steps along differences, over the size that is best for a normal posterior: 2.38 over the root of twice its dimensions.
 const STEP: f64 = 0.636;
@@ -23,8 +22,6 @@ const WHOLE: usize = 8;
 /// How much the size of a step varies, and what is added to it.
 const VARIED: f64 = 0.2;
 const SHAKEN: f64 = 1e-3;
-/// Steps of ln of the scatter at which what came before the law is weighed.
-const SCATTER_STEP: f64 = 0.1;
 /// The seed: the same readings give the same laws.
 const SEED: u64 = 2004;
 
@@ -40,6 +37,9 @@ struct Walker {
 pub(super) struct Drawn {
     pub(super) shape: DrawnShape,
     pub(super) started: StartedLaw,
+    /// ln v less the record's centre, and its variance: of the law under today's load where that changes, or else without what
+    /// the readings scatter by.
+    pub(super) level: (f64, f64),
     /// Variance of a reading about the law.
     pub(super) variance: f64,
     /// A standard normal number for its velocity.
@@ -54,9 +54,8 @@ struct Scales {
     predicted: Vec<[f64; 1]>,
     /// ln(1 + |r| t) at the middle of each rate, where the law drifts by it.
     e_folds: Vec<f64>,
-    /// The evidence of what came before each rate, by no law: at steps of ln of the scatter, and for the law at hand.
-    befores: BTreeMap<i32, (Vec<f64>, WalkedLevels)>,
-    before: Vec<f64>,
+    /// What came before each rate, by no law.
+    before: WalksBefore,
     room: Room<1>,
     evaluations: usize,
 }
@@ -75,43 +74,22 @@ impl Scales {
         self.evaluations += 1;
         let shape = self.space.shape(at);
         self.predict(&shape);
-        let noise = Space::noise(at);
-        let memory = LoadMemory::new(&self.record, &noise);
-        let below = self.before(noise.scatter);
-        let gains = Gains::new(&self.record, &memory, &self.e_folds, &self.before);
-        let Some((_, levels)) = self.befores.get(&below) else {
-            return (evidence::NO_EVIDENCE, gains, shape);
-        };
-        let found = evidence::weigh_joined(
-            &self.record,
-            &self.predicted,
-            (&gains, levels),
-            least,
-            &mut self.room,
-        );
+        let memory = LoadMemory::new(&self.record, &Space::noise(at));
+        self.before.walk(&self.record, &memory);
+        let gains = Gains::new(&self.record, &memory, &self.e_folds, &self.before.ln);
+        let joins = self.joins();
+        let least = if joins { least - MOST_JOINED } else { least };
+        let [mut found] = weigh(&self.record, &self.predicted, &gains, least, &mut self.room);
+        if joins && found.ln.is_finite() {
+            let best = joined::join(&self.before, &self.predicted, &gains, &mut self.room);
+            found = evidence::over_all_starts(&gains, &self.room, best);
+        }
         (found, gains, shape)
     }
 
-    /// The evidence of what came before each rate, between two steps of ln of the scatter.
-    fn before(&mut self, scatter: f64) -> i32 {
-        let at = scatter.ln().clamp(-20.0, 5.0) / SCATTER_STEP;
-        #[expect(clippy::cast_possible_truncation, reason = "within a few hundred")]
-        let below = at.floor() as i32;
-        let share = at - at.floor();
-        let record = &self.record;
-        for step in [below, below + 1] {
-            let scatter = || (f64::from(step) * SCATTER_STEP).exp();
-            let of = || evidence::walks_before(record, scatter());
-            self.befores.entry(step).or_insert_with(of);
-        }
-        let both = self.befores.get(&below).zip(self.befores.get(&(below + 1)));
-        let Some(((less, _), (more, _))) = both else {
-            return below;
-        };
-        self.before.clear();
-        let between = less.iter().zip(more).map(|(less, more)| less + share * (more - less));
-        self.before.extend(between);
-        below
+    /// Whether a law begins where the walk before it ends: one that drifts had left that velocity.
+    fn joins(&self) -> bool {
+        self.record.assumed.drift == 0.0 && self.record.assumed.follows_errors
     }
 
     /// ln of the posterior density; minus infinity where it cannot reach `least`.
@@ -123,6 +101,26 @@ impl Scales {
         let (found, _, shape) = self.weigh(at, least - prior);
         let now = found.ln_velocity + self.record.centre;
         found.ln + prior + self.space.ln_prior_of_kept(&shape, now)
+    }
+
+    /// ln of the velocity of a law that begins there, less the record's centre, and its variance.
+    fn level(&self, gains: &Gains, started: &StartedLaw, share: f64) -> (f64, f64) {
+        let [of_velocity, of_load, both] = started.today;
+        if self.record.assumed.load_changes {
+            return (started.ln_velocity, of_velocity);
+        }
+        let joined = self
+            .joins()
+            .then(|| {
+                let of = (started.rates, self.predicted.as_slice());
+                joined::level_joined(&self.before, (gains, &self.room), of, share)
+            })
+            .flatten();
+        let alone = (
+            started.ln_velocity - started.load,
+            of_velocity + of_load - 2.0 * both,
+        );
+        joined.unwrap_or(alone)
     }
 
     /// ln of the mean rates in units of the velocity now.
@@ -167,8 +165,7 @@ impl Walk {
                 past: PastSolution::default(),
                 predicted: vec![[0.0]; count],
                 e_folds: vec![0.0; count],
-                befores: BTreeMap::new(),
-                before: Vec::with_capacity(count),
+                before: WalksBefore::default(),
                 room: Room::default(),
                 evaluations: 0,
             },
@@ -176,7 +173,7 @@ impl Walk {
             generator: Pcg64::seed_from_u64(SEED),
             rounds: 0,
         };
-        let wanted = env("XW", WALKERS_) * env("XC",CHOSEN_FROM);
+        let wanted = WALKERS * CHOSEN_FROM;
         let mut reached = 0.0;
         let mut tried: Vec<Walker> = Vec::with_capacity(wanted);
         for cell in cells {
@@ -193,7 +190,10 @@ impl Walk {
 
     /// Chooses the population: by the root of the posterior, so that it is wider than that.
     fn choose(&mut self, tried: &[Walker]) {
-        let best = tried.iter().map(|one| one.ln).fold(f64::NEG_INFINITY, f64::max);
+        let best = tried
+            .iter()
+            .map(|one| one.ln)
+            .fold(f64::NEG_INFINITY, f64::max);
         if !best.is_finite() {
             return;
         }
@@ -202,8 +202,8 @@ impl Walk {
         let mut reached = 0.0;
         for one in tried {
             reached += weight(one) / total;
-            while (self.walkers.len() as f64 + 0.5) < reached * env("XW", WALKERS_) as f64
-                && self.walkers.len() < env("XW", WALKERS_)
+            while (self.walkers.len() as f64 + 0.5) < reached * WALKERS as f64
+                && self.walkers.len() < WALKERS
             {
                 self.walkers.push(*one);
             }
@@ -214,7 +214,7 @@ impl Walk {
     pub(super) fn round(&mut self) {
         self.rounds += 1;
         let count = self.walkers.len();
-        let step = if self.rounds.is_multiple_of(env("XH", WHOLE)) {
+        let step = if self.rounds.is_multiple_of(WHOLE) {
             1.0
         } else {
             STEP
@@ -226,7 +226,11 @@ impl Walk {
             let size: f64 = self.generator.sample(StandardNormal);
             let along = self.walkers[one].at - self.walkers[two].at;
             let shake = Point::from_fn(|_, _| self.generator.sample::<f64, _>(StandardNormal));
-            let size = if step < 1.0 { env("XS",100) as f64/100.0 * step * (VARIED * size).exp() } else { step };
+            let size = if step < 1.0 {
+                step * (VARIED * size).exp()
+            } else {
+                step
+            };
             let at = self.walkers[index].at + along * size + shake * SHAKEN;
             let luck = self.generator.random::<f64>().max(1e-300).ln();
             let least = self.walkers[index].ln + luck;
@@ -248,7 +252,6 @@ impl Walk {
         let lane = (0, Space::noise(&at).scatter);
         let squares = evidence::misses(&scales.record, &scales.predicted, lane, &gains);
         scales.record.doubt(&squares);
-        scales.befores.clear();
         for walker in &mut self.walkers {
             walker.ln = scales.ln_posterior(&walker.at, f64::NEG_INFINITY);
         }
@@ -259,12 +262,14 @@ impl Walk {
         let mut drawn = Vec::with_capacity(self.walkers.len());
         for walker in &self.walkers {
             let (_, gains, shape) = self.scales.weigh(&walker.at, f64::NEG_INFINITY);
-            let share = self.generator.random::<f64>();
+            let shares = [0; 2].map(|_| self.generator.random::<f64>());
             let noise = Space::noise(&walker.at);
             let deviate = self.generator.sample(StandardNormal);
-            let started = evidence::start_at(&gains, &self.scales.room, share);
+            let scales = &self.scales;
+            let started = evidence::start_at(&gains, &scales.room, shares[0]);
             drawn.extend(started.map(|started| Drawn {
                 shape,
+                level: scales.level(&gains, &started, shares[1]),
                 started,
                 variance: noise.scatter.powi(2) + noise.sigma.powi(2),
                 deviate,

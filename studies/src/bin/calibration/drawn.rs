@@ -174,7 +174,7 @@ fn attempt(rng: &mut Pcg64, starts: Starts) -> Option<Drawn> {
     let end = times[count - 1];
     let late = starts == Starts::ToBeFound && rng.random::<bool>();
     let onset = if late {
-        let ago = log_uniform(rng, end - times[count - 9], end);
+        let ago = log_uniform(rng, end - times[count - 5], end);
         times.iter().copied().find(|time| *time >= end - ago)?
     } else {
         0.0
@@ -196,7 +196,10 @@ fn attempt(rng: &mut Pcg64, starts: Starts) -> Option<Drawn> {
     };
     let walked = before_onset(rng, &times, onset);
     let first = times.partition_point(|time| *time < onset);
-    let motion = |time: &f64| past.at(end - time).map(|at| (at.velocity, -at.displacement));
+    let motion = |time: &f64| {
+        past.at(end - time)
+            .map(|at| (at.velocity, -at.displacement))
+    };
     let of_law: Option<Vec<(f64, f64)>> = times[first..].iter().map(motion).collect();
     let mut clean = of_law?;
     for index in (0..first).rev() {

@@ -8,9 +8,7 @@ use anyhow::{Context, Result};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
-use slipwatch::fit::{
-    Assumptions, ConstantLoad, LawDraws, Observation, Observations, RateOptions,
-};
+use slipwatch::fit::{Assumptions, ConstantLoad, LawDraws, Observation, Observations, RateOptions};
 use slipwatch::inversion::{Inversion, InversionOptions};
 use slipwatch::model::{Accuracy, Law, Trajectory};
 use slipwatch::reading::{
