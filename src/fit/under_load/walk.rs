@@ -34,7 +34,7 @@ struct Walker {
 
 /// A law that was drawn, with where it starts.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Drawn {
+pub(super) struct DrawnLaw {
     pub(super) shape: DrawnShape,
     pub(super) started: StartedLaw,
     /// ln v less the record's centre, and its variance: of the law under today's load where that changes, or else without what
@@ -47,7 +47,7 @@ pub(super) struct Drawn {
 }
 
 /// What a point is weighed with, used again and again.
-struct Scales {
+struct LawWeigher {
     record: RateRecord,
     space: Space,
     past: PastSolution,
@@ -62,13 +62,13 @@ struct Scales {
 
 /// A population on its way.
 pub(super) struct Walk {
-    scales: Scales,
+    scales: LawWeigher,
     walkers: Vec<Walker>,
     generator: Pcg64,
     rounds: usize,
 }
 
-impl Scales {
+impl LawWeigher {
     /// The evidence of a law, and the gains that gave it.
     fn weigh(&mut self, at: &Point, least: f64) -> (ShapeEvidence, Gains, DrawnShape) {
         self.evaluations += 1;
@@ -159,7 +159,7 @@ impl Walk {
         let GridSearch { record, prior, .. } = search;
         let count = record.from.len();
         let mut walk = Self {
-            scales: Scales {
+            scales: LawWeigher {
                 space: Space::new(prior, &record),
                 record,
                 past: PastSolution::default(),
@@ -258,7 +258,7 @@ impl Walk {
     }
 
     /// The population as it is, each law with a start and a velocity drawn.
-    pub(super) fn draw(&mut self) -> Vec<Drawn> {
+    pub(super) fn draw(&mut self) -> Vec<DrawnLaw> {
         let mut drawn = Vec::with_capacity(self.walkers.len());
         for walker in &self.walkers {
             let (_, gains, shape) = self.scales.weigh(&walker.at, f64::NEG_INFINITY);
@@ -267,7 +267,7 @@ impl Walk {
             let deviate = self.generator.sample(StandardNormal);
             let scales = &self.scales;
             let started = evidence::start_at(&gains, &scales.room, shares[0]);
-            drawn.extend(started.map(|started| Drawn {
+            drawn.extend(started.map(|started| DrawnLaw {
                 shape,
                 level: scales.level(&gains, &started, shares[1]),
                 started,
