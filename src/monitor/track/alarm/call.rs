@@ -41,9 +41,16 @@ impl Alarm {
             events.push(record.fault(time, "moves-backwards", text));
         }
         if self.backwards {
-            self.attend(policy, time, AlertCause::MovesBackwards);
+            let cause = AlertCause::MovesBackwards;
+            if was_backwards {
+                self.occurrences.goes_on(policy, time, cause);
+            } else {
+                self.occurrences.note(policy, time, cause);
+            }
+            self.count(policy, time, cause);
             evidence.causes.push(AlertCause::MovesBackwards);
         }
+        evidence.unusual = self.occurrences.calling(time);
         evidence.early_quantile_days = forecast.and_then(|forecast| {
             let outlook = forecast.in_force(days(policy.outlook));
             outlook.collapse.quantile(EARLY, HORIZON_DAYS)
