@@ -4,6 +4,7 @@ mod address;
 mod alert;
 mod broker;
 mod check;
+mod covariate;
 mod declared;
 mod drill;
 mod duty;
@@ -26,6 +27,7 @@ mod vector;
 
 pub use broker::{Broker, BrokerAddress};
 pub use check::{ConfigSummary, check};
+pub use covariate::StatedCovariate;
 pub use drill::{Drill, EXERCISE};
 pub use duty::DutyHours;
 pub use heartbeat::Heartbeat;
@@ -66,8 +68,10 @@ pub struct Config {
     pub brokers: Vec<Broker>,
     /// `[[benchmark]]`; with none, whatever benchmarks the files name are taken.
     pub benchmarks: Vec<Benchmark>,
-    /// `[alert]` and the benchmarks' own, `[explain]` and `[[event]]`, as the monitor takes them.
+    /// `[alert]` and the benchmarks' own, `[explain]`, `[[event]]` and `[[covariate]]`, as the monitor takes them.
     pub settings: Settings,
+    /// `[[covariate]]`, which stands in the settings too.
+    pub covariates: Vec<StatedCovariate>,
     /// `[[hook]]`, `[[webhook]]`, `[[cap]]` and `[[mqtt_out]]`.
     pub hooks: Vec<HookConfig>,
     /// `[[heartbeat]]`.

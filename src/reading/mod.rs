@@ -4,6 +4,7 @@
 //! is the same readings; the science converts to millimetres and days where it takes them.
 
 mod conventions;
+mod covariate;
 mod dialect;
 mod figure;
 mod plain;
@@ -13,6 +14,7 @@ pub mod suspicion;
 mod unit;
 
 pub use conventions::{Conventions, LocalClock, MissingValues, SummerTime, TimeFault};
+pub use covariate::CovariateKind;
 pub use dialect::{DecimalMark, Delimiter, Dialect, MOST_SKIPPED, TimeFormat};
 pub use figure::{figure, whole_figure};
 pub use jiff::Timestamp;
