@@ -9,6 +9,7 @@ mod deadlines;
 mod declared;
 mod drift;
 mod event;
+mod event_shown;
 mod fallen;
 #[cfg(test)]
 mod fixture;
@@ -41,6 +42,7 @@ pub use event::{
     AlertState, CalledLevel, Event, EventKind, FailureTime, InverseVelocity, LevelChance, Plain,
     RESET_FOUND, RegimeReport, SUSPECT, SUSPECT_ENDS, SharedFailure, Summary, Unexplained,
 };
+pub use event_shown::KindShown;
 pub use given::{Given, OrderKind, OrderedBy};
 pub use measured::Measured;
 pub(crate) use motion::recent;

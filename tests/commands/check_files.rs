@@ -285,10 +285,10 @@ fn a_reading_of_three_hundred_digits_is_named_with_its_place_and_printed_nowhere
 
 #[test]
 fn check_shows_what_each_covariate_is_and_which_stated_one_is_in_no_file() {
-    let rows: String = (0..20)
-        .map(|hour| format!("2017-06-01T{hour:02}:00:00Z,{hour},0.5,3.1,{hour}\n"))
-        .collect();
-    let text = format!("time,P1_displacement_mm,Nied_1h,river_m3_s,box\n{rows}");
+    let mut text = "time,P1_displacement_mm,Nied_1h,river_m3_s,box\n".to_owned();
+    for hour in 0..20 {
+        writeln!(text, "2017-06-01T{hour:02}:00:00Z,{hour},0.5,3.1,{hour}").unwrap();
+    }
     let covariate = |column: &str, kind: &str| {
         format!("\n[[covariate]]\ncolumn = \"{column}\"\nkind = \"{kind}\"\n")
     };
