@@ -216,6 +216,7 @@ mod tests {
         "look",
         "lookback",
         "newest",
+        "occurrences",
         "others",
         "overdue",
         "owes",

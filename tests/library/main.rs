@@ -45,3 +45,4 @@ mod steady_creep;
 mod text_formats;
 mod together;
 mod under_load;
+mod ways_out;
