@@ -8,6 +8,7 @@ mod damped;
 mod descent;
 mod global_search;
 mod lattice;
+mod newest_slope;
 mod point_readings;
 mod posterior;
 mod quasi_random;

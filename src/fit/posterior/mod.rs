@@ -91,7 +91,7 @@ struct Effort {
     worth: f64,
 }
 
-/// Of 90 % intervals of 1,000 drawn series, 86 to 88 % hold the truth (studies/src/bin/calibration); 80 to 86 % where 128 laws a round were to
+/// Of 90 % intervals of 1,000 drawn series, 85 to 88 % hold the truth (studies/src/bin/calibration); 80 to 86 % where 128 laws a round were to
 /// be worth 110 even draws.
 const EFFORT: Effort = Effort {
     draws: 512,

@@ -1,10 +1,11 @@
 //! Where a posterior is highest on one side of kappa = 0, and how it falls off there.
 
 use super::past::{PastShape, PastSolution};
-use super::prior::{P_PRIOR, SLOPE_PER_INTERVAL, log_cauchy};
+use super::prior::{P_PRIOR, log_cauchy};
 use super::scatter::Texture;
 use super::window::Window;
 use crate::fit::damped::{Damping, Descendable, DescentEnd, StepOutcome, descend};
+use crate::fit::newest_slope::SLOPE_PER_INTERVAL;
 use nalgebra::{Matrix4, Vector4};
 
 /// The coordinates of every search and draw: p; asinh of kappa L; asinh of the change of ln y over the

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | ln of the present velocity | flat |
 //! | r L, kappa L | Cauchy, scale 3 |
-//! | r times the newest sampling interval | besides, normal with standard deviation 0.25: what would be over within one interval rests on one reading |
+//! | r times the newest sampling interval | besides, normal with standard deviation 1.5, as under a load: what would be over well within one interval rests on one reading |
 //! | p | uniform in (0, 0.6) where kappa > 0 (m from 1 to 2.5), in (-1, 0) where kappa < 0 (m from 0.5 to 1) |
 //! | the law | S > 0, and velocities within the window stay within a factor of e^14 |
 //! | scatter of a rate about the law, relative | log-normal, median 0.05, standard deviation of the log 0.9; Student t with 7 degrees of freedom |
@@ -14,8 +14,6 @@
 
 /// Scale of the prior on kappa L and on r L.
 pub(super) const CAUCHY_SCALE: f64 = 3.0;
-/// Standard deviation of the prior on r times the newest sampling interval.
-pub(super) const SLOPE_PER_INTERVAL: f64 = 0.25;
 /// The prior of p spans this, m from 0.5 to 2.5.
 pub const P_PRIOR: (f64, f64) = (-1.0, 0.6);
 /// Median of the prior on the relative scatter, and the standard deviation of its log.

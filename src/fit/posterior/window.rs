@@ -5,6 +5,7 @@
 //! and the scale is the data's alone, the same for every law.
 
 use super::past::{PastShape, PastSolution};
+use crate::fit::newest_slope::newest_interval_days;
 use crate::fit::rates::{Rate, ReadingError};
 
 /// A velocity this many of its own standard errors large is half-way from v to ln v.
@@ -64,7 +65,7 @@ impl Window {
         Some(Self {
             now_days: last.to,
             length_days: length,
-            interval_days: newest_interval(rates),
+            interval_days: newest_interval_days(rates).unwrap_or(length),
             seen: rates
                 .iter()
                 .zip(about(rates))
@@ -177,15 +178,6 @@ fn floor(rates: &[Rate]) -> f64 {
     let forwards = rates.iter().map(|rate| rate.velocity).filter(|v| *v > 0.0);
     let smallest = forwards.fold(f64::INFINITY, f64::min);
     mean_square.sqrt().max(0.5 * smallest)
-}
-
-/// The longest of the last three spacings between rates, days.
-fn newest_interval(rates: &[Rate]) -> f64 {
-    let newest = &rates[rates.len().saturating_sub(4)..];
-    newest
-        .windows(2)
-        .map(|pair| pair[1].to - pair[0].to)
-        .fold(0.0, f64::max)
 }
 
 /// To 1e-15 absolute; the library's is relative, and four times slower.

@@ -5,6 +5,7 @@ use super::gains::{Gains, LoadMemory, LoadNoise, RateRecord};
 use super::shape::{BLOCKS, LANES, SHAPES};
 use super::{Cell, KEPT};
 use crate::fit::Rate;
+use crate::fit::newest_slope::{SLOPE_PER_INTERVAL, newest_interval_days};
 use std::collections::BTreeMap;
 
 /// Grids of the scatter of the readings, of the load's standard deviation, and of its memory over the span
@@ -18,8 +19,6 @@ const SLOPES: (f64, f64) = (0.02, 2.0);
 const SLOWEST: f64 = 2e-4;
 /// The prior of ln r falls as r to the minus this: few slopes are met in their last days.
 const RARE: f64 = 0.1;
-/// Standard deviation of r times the newest sampling interval.
-const SLOPE_PER_INTERVAL: f64 = 1.5;
 /// Steps of ln r: in the coarse pass, and how many of the fine one make one of them.
 const COARSE_STEP: f64 = 0.45;
 const FINER: usize = 2;
@@ -81,13 +80,7 @@ impl GridSearch {
     fn new(rates: &[Rate]) -> Self {
         let record = record(rates);
         let length = record.from[0];
-        let newest = &rates[rates.len().saturating_sub(4)..];
-        let spacings = newest.windows(2).map(|pair| pair[1].to - pair[0].to);
-        // The middle one: a logger that was out before a collapse must not rule the collapse out.
-        let mut spacings: Vec<f64> = spacings.collect();
-        spacings.sort_by(f64::total_cmp);
-        let middle = spacings.get(spacings.len() / 2).copied();
-        let interval = middle.unwrap_or(length).max(1e-6);
+        let interval = newest_interval_days(rates).unwrap_or(length).max(1e-6);
         // A short record knows as well as a long one that most slopes take thousands of readings.
         let lowest = (SLOPES.0 / length).min(SLOWEST / interval);
         let highest = (SLOPES.1 / interval).max(2.0 * lowest);

@@ -43,7 +43,7 @@ pub(crate) struct Drawn {
 }
 
 const CAUCHY_SCALE: f64 = 3.0;
-const SLOPE_PER_INTERVAL: f64 = 0.25;
+const SLOPE_PER_INTERVAL: f64 = 1.5;
 const MOST_LN_Y: f64 = 14.0;
 const SCATTER: (f64, f64) = (0.05, 0.9);
 const SCATTERS: (f64, f64) = (0.01, 0.15);
@@ -136,7 +136,9 @@ fn attempt(rng: &mut Pcg64, starts: Starts) -> Option<Drawn> {
         0.0
     };
     let newest = times[count - 4..].windows(2).map(|w| w[1] - w[0]);
-    let law = law(rng, end - onset, newest.fold(0.0, f64::max))?;
+    let mut newest: Vec<f64> = newest.collect();
+    newest.sort_by(f64::total_cmp);
+    let law = law(rng, end - onset, newest[1])?;
     let past = Trajectory::solve(&law.reversed(), end - onset, Accuracy::Full);
     let edge = past.at(end - onset)?;
     if edge.y.ln().abs() > MOST_LN_Y {
