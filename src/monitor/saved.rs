@@ -199,7 +199,7 @@ mod tests {
     use std::path::Path;
 
     /// What the map of a benchmark held when a track had no parts: states with these fields are on disks.
-    const NAMES: [&str; 29] = [
+    const NAMES: [&str; 30] = [
         "accepted",
         "adopted",
         "ahead",
