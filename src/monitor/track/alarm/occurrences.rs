@@ -35,18 +35,14 @@ impl Occurrences {
     /// Something happened at `time`; where that is not usual it calls yellow for an evacuation time. After that the level falls as
     /// any other does.
     pub(super) fn note(&mut self, policy: &Policy, time: Timestamp, cause: AlertCause) {
-        let kind = match self.kinds.iter().position(|kind| kind.cause == cause) {
-            Some(index) => self.kinds.get_mut(index),
-            None => {
-                self.kinds.push(OfOneCause {
-                    cause,
-                    newest: VecDeque::new(),
-                    calls_until: None,
-                });
-                self.kinds.last_mut()
-            }
-        };
-        if let Some(kind) = kind {
+        if !self.kinds.iter().any(|kind| kind.cause == cause) {
+            self.kinds.push(OfOneCause {
+                cause,
+                newest: VecDeque::new(),
+                calls_until: None,
+            });
+        }
+        for kind in self.kinds.iter_mut().filter(|kind| kind.cause == cause) {
             kind.note(policy, time);
         }
     }
