@@ -5,7 +5,6 @@ use super::every_way::common;
 use super::table::Section;
 use super::{Destination, HookConfig, SharedDestination, address};
 use std::collections::BTreeSet;
-use std::fs::File;
 use std::path::{Path, PathBuf};
 
 /// `[[mqtt_out]]`: a topic, and the broker that it is at.
@@ -33,12 +32,7 @@ impl Destination for MqttTopic {
     }
 
     fn lacks(&self) -> Option<String> {
-        let file = self.ca_file.as_ref()?;
-        let error = File::open(file).err()?;
-        Some(format!(
-            "cannot read the ca_file {}: {error}",
-            file.display()
-        ))
+        address::unreadable(self.ca_file.as_ref()?)
     }
 }
 

@@ -4,7 +4,6 @@ use super::every_way::common;
 use super::table::Section;
 use super::{Destination, HookConfig, Secret, SharedDestination, address};
 use std::collections::BTreeSet;
-use std::fs::File;
 use std::path::{Path, PathBuf};
 
 /// `[[webhook]]`: an address that alerts are sent to.
@@ -55,17 +54,8 @@ impl Destination for Webhook {
         let secret = self.secret_file.as_deref();
         let secret = secret.and_then(|file| Secret::read(file).err());
         let secret = secret.map(|error| error.to_string());
-        secret.or_else(|| unreadable(self.ca_file.as_ref()?))
+        secret.or_else(|| address::unreadable(self.ca_file.as_ref()?))
     }
-}
-
-/// Why the certificate authorities in `file` cannot be read.
-fn unreadable(file: &PathBuf) -> Option<String> {
-    let error = File::open(file).err()?;
-    Some(format!(
-        "cannot read the ca_file {}: {error}",
-        file.display()
-    ))
 }
 
 /// Reads one; `taken` has what the ways out before it are called.

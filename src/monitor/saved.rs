@@ -198,7 +198,8 @@ mod tests {
     use std::io::Read;
     use std::path::Path;
 
-    /// What the map of a benchmark held when a track had no parts: states with these fields are on disks.
+    /// What the map of a benchmark holds: that of the track before it had parts, with which states are on disks, and what was
+    /// added since.
     const NAMES: [&str; 30] = [
         "accepted",
         "adopted",

@@ -48,11 +48,9 @@ impl History {
     /// `before` is by how much they were spoilt. Where they were, the neighbours need not agree: on a slope that grows fast they
     /// differ as well.
     pub(super) fn spoilt(&self, before: Option<f64>) -> Option<f64> {
-        let values = &self.observations.values;
-        let latest = &values[values.len().saturating_sub(*INSPECTED.end())..];
-        if latest.len() < *INSPECTED.start() {
+        let Some(latest) = self.inspected() else {
             return before;
-        }
+        };
         let is_many = |count: usize, share: f64| {
             let least = (share * (latest.len() - 2) as f64).max(FEWEST as f64);
             let factor = if before.is_some() { FEWER } else { 1.0 };
@@ -70,12 +68,8 @@ impl History {
     /// Whether the newest readings go back and forth by so much that a slope could pass `critical` mm/day and move so for
     /// `days`, or from one reading to the next, without its showing: the size of their steps.
     pub(super) fn noise_that_hides(&self, critical: f64, days: f64) -> Option<f64> {
-        let values = &self.observations.values;
-        let latest = &values[values.len().saturating_sub(*INSPECTED.end())..];
+        let latest = self.inspected()?;
         let (first, last) = (latest.first()?, latest.last()?);
-        if latest.len() < *INSPECTED.start() {
-            return None;
-        }
         let interval = (last.t_days - first.t_days) / (latest.len() - 1) as f64;
         let would_move = match self.observations.quantity {
             Quantity::Displacement => critical * days.max(interval),
@@ -88,6 +82,13 @@ impl History {
         let share = turns as f64 / (latest.len() - 2) as f64;
         let usual = of_all(each, 0.5)?;
         (share >= TURNS_OF_NOISE && usual >= HIDES * would_move).then_some(usual)
+    }
+
+    /// The newest readings, where there are enough to be examined.
+    fn inspected(&self) -> Option<&[Observation]> {
+        let values = &self.observations.values;
+        let latest = &values[values.len().saturating_sub(*INSPECTED.end())..];
+        (latest.len() >= *INSPECTED.start()).then_some(latest)
     }
 
     /// From what size on a step between two of the `latest` readings is a jump.

@@ -86,6 +86,11 @@ impl CovariateKind {
         known.ok_or_else(|| format!("write one of {}", Self::ALL.map(Self::name).join(", ")))
     }
 
+    /// As it is stated, or else by the column's unit and name.
+    pub fn stated_or_of(stated: Option<Self>, name: &str, unit: Option<&str>) -> Self {
+        stated.unwrap_or_else(|| Self::of(name, unit))
+    }
+
     /// By a column's unit and name. A unit of temperature or of discharge says it whatever the name is; then the words within the
     /// name do, in the order of temperature, rain, flow, humidity, level and pressure; then a unit of pressure.
     pub fn of(name: &str, unit: Option<&str>) -> Self {

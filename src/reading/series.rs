@@ -78,8 +78,7 @@ pub struct Channel {
 impl Channel {
     /// What it measures: as it is stated, or else as its unit and its name say.
     pub fn kind(&self) -> CovariateKind {
-        let by_name = || CovariateKind::of(&self.name, self.unit.as_deref());
-        self.stated.unwrap_or_else(by_name)
+        CovariateKind::stated_or_of(self.stated, &self.name, self.unit.as_deref())
     }
 
     /// Puts rows in order as [`Series::put_in_order`] does.

@@ -45,4 +45,3 @@ mod steady_creep;
 mod text_formats;
 mod together;
 mod under_load;
-mod ways_out;

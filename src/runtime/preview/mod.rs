@@ -293,9 +293,8 @@ impl PreviewSoFar {
             && let Input::Sample { channel, unit, .. } = arrival.input
         {
             let stated = self.stated.get(&channel).copied();
-            let by_name = || CovariateKind::of(&channel, unit.as_deref());
             self.sample(CovariateView {
-                kind: stated.unwrap_or_else(by_name),
+                kind: CovariateKind::stated_or_of(stated, &channel, unit.as_deref()),
                 is_stated: stated.is_some(),
                 name: channel,
                 unit,

@@ -26,8 +26,7 @@ use standing_floods::StandingFlood;
 use timekeeper::Timekeeper;
 
 use crate::monitor::{Event, EventKind, Input, Monitor, Order, RESET_FOUND, SUSPECT, Settings};
-pub use crate::reading::BEFORE_ALL;
-use crate::reading::{BenchmarkId, Timestamp};
+use crate::reading::{BEFORE_ALL, BenchmarkId, Timestamp};
 use crate::runtime::deliver::Dispatcher;
 use crate::runtime::hook::{Alert, Status};
 use crate::runtime::searches::Searches;

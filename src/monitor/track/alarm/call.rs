@@ -43,12 +43,11 @@ impl Alarm {
         if self.backwards {
             let cause = AlertCause::MovesBackwards;
             if was_backwards {
-                self.occurrences.goes_on(policy, time, cause);
+                self.attend_further(policy, time, cause);
             } else {
-                self.occurrences.note(policy, time, cause);
+                self.attend(policy, time, cause);
             }
-            self.count(policy, time, cause);
-            evidence.causes.push(AlertCause::MovesBackwards);
+            evidence.causes.push(cause);
         }
         evidence.unusual = self.occurrences.calling(time);
         evidence.early_quantile_days = forecast.and_then(|forecast| {

@@ -116,6 +116,12 @@ impl Alarm {
         self.count(policy, time, cause);
     }
 
+    /// What was attended to goes on at `time`: it counts for longer, and calls yellow for longer if it did.
+    fn attend_further(&mut self, policy: &Policy, time: Timestamp, cause: AlertCause) {
+        self.occurrences.goes_on(policy, time, cause);
+        self.count(policy, time, cause);
+    }
+
     fn count(&mut self, policy: &Policy, time: Timestamp, cause: AlertCause) {
         let until = time.checked_add(policy.steady_for).ok();
         self.attention_until = until.map(|until| (until, cause));

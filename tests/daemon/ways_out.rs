@@ -1,12 +1,11 @@
 //! The table of the ways out for alerts: a way out is one row, and everything else follows from it.
 
-use slipwatch::alert::Level;
+use crate::eventually::eventually;
+use crate::webhooks::{alert, quick, text};
 use slipwatch::config::{self, Destination, HookConfig, SharedDestination, way_out_tables};
-use slipwatch::monitor::{AlertState, Event, EventKind};
-use slipwatch::reading::BenchmarkId;
-use slipwatch::runtime::deliver::{Dispatcher, Retry, Runner, Senders};
+use slipwatch::runtime::deliver::{Dispatcher, Runner, Senders};
 use slipwatch::runtime::delivered::Delivered;
-use slipwatch::runtime::hook::{Alert, HookOutcome, Status};
+use slipwatch::runtime::hook::{Alert, HookOutcome};
 use slipwatch::runtime::way_out::{WayOut, destination};
 use slipwatch::runtime::ways_out::WAYS_OUT;
 use slipwatch::store::{DeliveryOutcome, Store};
@@ -57,14 +56,8 @@ impl Destination for Siren {
     }
 }
 
-const SITE: &str = r#"[site]
-name = "Monte Toc"
-state_dir = "state"
-[[source]]
-id = "logger"
-kind = "csv"
-path = "incoming/*.csv"
-[[hook]]
+/// One of each table that is a way out.
+const TABLES: &str = r#"[[hook]]
 run = ["true"]
 [[webhook]]
 url = "http://127.0.0.1:9/alerts"
@@ -80,7 +73,8 @@ topic = "toc/alerts"
 
 /// One of each way out that a config has.
 fn hooks() -> Vec<HookConfig> {
-    config::parse(SITE, Path::new("site.toml")).unwrap().hooks
+    let site = Path::new("site.toml");
+    config::parse(&text(TABLES), site).unwrap().hooks
 }
 
 fn siren(circuit: u8) -> HookConfig {
@@ -92,18 +86,7 @@ fn siren(circuit: u8) -> HookConfig {
 }
 
 fn red() -> Alert {
-    let event = Event {
-        time: "2017-06-06T17:00:00Z".parse().unwrap(),
-        benchmark: Some(BenchmarkId::new("5")),
-        kind: EventKind::Alert {
-            level: Level::Red,
-            state: AlertState::Firing,
-            key: "5/red/1".to_owned(),
-            rule: "chance".to_owned(),
-            text: "red at 5".to_owned(),
-        },
-    };
-    Alert::new(&event, "Monte Toc", None, Status::Actual).unwrap()
+    alert("5", "5/red/1")
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -112,25 +95,15 @@ async fn a_way_out_that_is_one_row_gets_alerts_and_tries_again() {
     let runner: Arc<dyn Runner> = Arc::new(Senders(ways));
     let folder = tempfile::tempdir().unwrap();
     let store = Arc::new(Store::open(folder.path()).unwrap());
-    let retry = Retry {
-        first_delay: Duration::from_millis(1),
-        ..Retry::default()
-    };
     let delivered = Delivered::of(Arc::clone(&store));
-    let dispatcher = Dispatcher::with(&runner, &[siren(7)], &retry, delivered);
+    let dispatcher = Dispatcher::with(&runner, &[siren(7)], &quick(), delivered);
     assert!(dispatcher.offer(&red()));
     let is_delivered = || {
         let identity = ("5/red/1", "red", "firing");
         let fate = Some(DeliveryOutcome::Delivered);
         store.is_noted(identity, Some("siren 7"), fate).unwrap()
     };
-    for _ in 0..600 {
-        if is_delivered() {
-            break;
-        }
-        tokio::time::sleep(Duration::from_millis(50)).await;
-    }
-    assert!(is_delivered());
+    eventually("the siren sounds", is_delivered).await;
     assert_eq!(dispatcher.close(Duration::from_secs(10)).await, Some(0));
     let sounded = SOUNDED.lock().unwrap().clone();
     let once = |attempt| (7, "5/red/1".to_owned(), attempt);
