@@ -80,6 +80,7 @@ fn slope() -> (Series, Vec<Channel>) {
     let channel = |(name, values): (&str, &Vec<f64>)| Channel {
         name: name.to_owned(),
         unit: Some("m".to_owned()),
+        stated: None,
         samples: (0..DAYS)
             .map(|day| Sample {
                 time: at(day),

@@ -25,8 +25,10 @@ pub struct AlertEvidence {
     pub displacement_mm: Option<f64>,
     /// Latest observed acceleration, mm/day per day.
     pub acceleration_mm_per_day2: Option<f64>,
-    /// What else calls for attention: a flip to instability, an intercept drifting in.
+    /// What else calls for attention: a flip to instability, an intercept drifting in. Declared rules ask for it.
     pub causes: Vec<AlertCause>,
+    /// The one of these that calls yellow: what happens again and again at a slope is usual there, and calls nothing.
+    pub unusual: Option<AlertCause>,
     /// Whether the newest search has found an effect that the law lacked.
     pub has_effect: bool,
     /// Days from the newest reading to the 5 % quantile of the time of collapse; `None` where it lies beyond the horizon, or

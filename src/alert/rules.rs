@@ -45,7 +45,7 @@ impl Policy {
                 level: Level::Yellow,
                 rule: "chance-within-outlook".into(),
             }
-        } else if let Some(cause) = evidence.causes.first() {
+        } else if let Some(cause) = evidence.unusual {
             Call {
                 level: Level::Yellow,
                 rule: cause.name().into(),

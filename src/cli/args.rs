@@ -4,8 +4,9 @@ use super::exit::{self, NoSuchReadings};
 use crate::alert::Policy;
 use crate::config::value;
 use crate::reading::{
-    BenchmarkId, Conventions, DecimalMark, Delimiter, Dialect, Disorder, LocalClock, MOST_SKIPPED,
-    MissingValues, Quantity, Recording, SelectError, Series, SummerTime, TimeFormat, Timestamp,
+    BenchmarkId, Conventions, CovariateKind, DecimalMark, Delimiter, Dialect, Disorder, LocalClock,
+    MOST_SKIPPED, MissingValues, Quantity, Recording, SelectError, Series, SummerTime, TimeFormat,
+    Timestamp,
 };
 use crate::runtime::ingest::{
     ColumnMap, FilesRead, IngestError, ReadOptions, read_channels, read_with_remarks,
@@ -224,6 +225,9 @@ pub struct ReadingArgs {
     /// Covariates that stand in a file of their own
     #[arg(long, value_name = "FILE")]
     pub channels: Vec<PathBuf>,
+    /// What a covariate measures whose name does not say it: rain, flow, level, temperature, humidity, pressure or other
+    #[arg(long = "covariate", value_name = "NAME=KIND", value_parser = stated)]
+    pub stated: Vec<(String, CovariateKind)>,
     /// The meaning of the files.
     #[command(flatten)]
     pub file: FileArgs,
@@ -280,11 +284,27 @@ impl ReadingArgs {
             disorder += met;
             disorder += overlap;
         }
+        self.state(&mut recording)?;
         warn_of(disorder);
         Ok(Loaded {
             recording,
             disorder,
         })
+    }
+
+    /// Puts to the covariates what is stated of them.
+    fn state(&self, recording: &mut Recording) -> Result<(), IngestError> {
+        let channels = &mut recording.channels;
+        for (name, kind) in &self.stated {
+            let Some(channel) = channels.iter_mut().find(|one| one.name == *name) else {
+                return Err(IngestError::NoSuchCovariate {
+                    name: name.clone(),
+                    available: channels.iter().map(|one| one.name.clone()).collect(),
+                });
+            };
+            channel.stated = Some(*kind);
+        }
+        Ok(())
     }
 
     /// The one series that `--benchmark` and `--quantity` mean.
@@ -404,6 +424,13 @@ pub(super) fn warn_of(disorder: Disorder) {
             ));
         }
     }
+}
+
+/// A column's name may hold `=`.
+fn stated(text: &str) -> Result<(String, CovariateKind), String> {
+    let parts = text.rsplit_once('=').filter(|(name, _)| !name.is_empty());
+    let (name, kind) = parts.ok_or("write NAME=KIND, such as Nied_1h=rain")?;
+    Ok((name.to_owned(), CovariateKind::parse(kind)?))
 }
 
 fn quantity(text: &str) -> Result<Quantity, String> {

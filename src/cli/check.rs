@@ -103,6 +103,8 @@ fn look(file: &Path, summary: &mut ConfigSummary) -> Result<Preview, ConfigError
     let config = config::load(file)?;
     let preview = preview(&config);
     let place = file.display();
+    let absent = preview.absent.iter().map(ToString::to_string);
+    summary.warnings.extend(absent);
     let sampling_warnings = sampling::sampling_warnings(&config, &preview).into_iter();
     summary
         .warnings

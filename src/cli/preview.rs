@@ -1,7 +1,7 @@
 //! What a site's files hold, for people.
 
 use super::text::{clock, plain};
-use crate::reading::{Timestamp, whole_figure};
+use crate::reading::{CovariateKind, Timestamp, whole_figure};
 use crate::runtime::ingest::Meaning;
 use crate::runtime::preview::{
     BenchmarkPreview, ColumnView, CovariateView, Preview, Refusal, SourceView,
@@ -175,17 +175,24 @@ fn covariate_line(text: &mut String, covariate: &CovariateView) {
     let CovariateView {
         name,
         unit,
+        kind,
+        is_stated,
         source,
         values,
         first,
         last,
     } = covariate;
+    let kind = match (kind, is_stated) {
+        (_, true) => format!("; {kind}, as the config states"),
+        (CovariateKind::Other, false) => String::new(),
+        (_, false) => format!("; {kind}"),
+    };
     let unit = unit
         .as_ref()
         .map_or(String::new(), |unit| format!(", {unit}"));
     text.push('\n');
     put(
         text,
-        &format!("covariate {name} ({source}): {values} values{unit}, {first} to {last}"),
+        &format!("covariate {name} ({source}): {values} values{unit}, {first} to {last}{kind}"),
     );
 }

@@ -1,6 +1,8 @@
 //! Addresses that the daemon connects to over HTTP, and whom it trusts there.
 
 use super::table::{Placed, Section};
+use std::fs::File;
+use std::path::Path;
 
 /// The address in `url`.
 pub(super) fn of(section: &Section<'_>, url: &Placed<String>) -> Option<hyper::Uri> {
@@ -48,4 +50,13 @@ pub(super) fn ca_file_where(section: &mut Section<'_>, is_secured: bool) -> Opti
         );
     }
     Some(given.value)
+}
+
+/// Why the certificate authorities in `file` cannot be read.
+pub(super) fn unreadable(file: &Path) -> Option<String> {
+    let error = File::open(file).err()?;
+    Some(format!(
+        "cannot read the ca_file {}: {error}",
+        file.display()
+    ))
 }

@@ -1,8 +1,8 @@
 //! `check`: the site file and what it names on this machine, without starting anything.
 
 use super::{
-    Config, ConfigError, DutyHours, FileSource, HookConfig, Secret, SiteConfig, Token, TokenError,
-    duty, load,
+    Config, ConfigError, DutyHours, FileSource, HookConfig, SiteConfig, Token, TokenError, duty,
+    load,
 };
 use crate::alert::{Level, Threshold};
 use crate::monitor::{Declaration, Order, SiteLevel};
@@ -207,31 +207,9 @@ fn missing_folder(source: &FileSource) -> Option<String> {
 }
 
 fn missing_program(hook: &HookConfig) -> Option<String> {
-    if let Some(webhook) = &hook.webhook {
-        let secret = webhook.secret_file.as_deref();
-        let secret = secret.and_then(|file| Secret::read(file).err());
-        let secret = secret.map(|error| error.to_string());
-        let unreadable = |file: &PathBuf| {
-            let error = std::fs::File::open(file).err()?;
-            Some(format!(
-                "cannot read the ca_file {}: {error}",
-                file.display()
-            ))
-        };
-        let error = secret.or_else(|| webhook.ca_file.as_ref().and_then(unreadable))?;
-        return Some(format!("webhook: {error}; alerts would go nowhere"));
-    }
-    if let Some(topic) = &hook.mqtt {
-        let file = topic.ca_file.as_ref()?;
-        let error = std::fs::File::open(file).err()?;
-        return Some(format!(
-            "mqtt_out: cannot read the ca_file {}: {error}; alerts would go nowhere",
-            file.display()
-        ));
-    }
-    if hook.cap.is_some() {
-        // It is made when the first message is written.
-        return None;
+    if let Some(to) = &hook.to {
+        let lack = to.lacks()?;
+        return Some(format!("{}: {lack}; alerts would go nowhere", to.table()));
     }
     let program = hook.program();
     let named_by_path = program.components().count() > 1;
@@ -365,6 +343,11 @@ impl SiteConfig {
 }
 
 impl HookConfig {
+    /// The table of the config that it stands in.
+    pub fn table(&self) -> &'static str {
+        self.to.as_ref().map_or("hook", |to| to.table())
+    }
+
     /// The program's path: a name with a slash starts at the config's folder, a bare one is looked
     /// up in `PATH`.
     pub fn program(&self) -> PathBuf {

@@ -3,10 +3,14 @@
 mod address;
 mod alert;
 mod broker;
+mod cap;
 mod check;
+mod covariate;
 mod declared;
+mod destination;
 mod drill;
 mod duty;
+mod every_way;
 mod heartbeat;
 mod hook;
 mod keys;
@@ -23,12 +27,17 @@ mod table;
 mod token;
 pub(crate) mod value;
 mod vector;
+mod webhook;
 
 pub use broker::{Broker, BrokerAddress};
+pub use cap::CapFolder;
 pub use check::{ConfigSummary, check};
+pub use covariate::StatedCovariate;
+pub use destination::{Destination, SharedDestination};
 pub use drill::{Drill, EXERCISE};
 pub use duty::DutyHours;
 pub use heartbeat::Heartbeat;
+pub use hook::way_out_tables;
 pub use keys::{Key, Keys, ValueShape};
 pub use link::Links;
 pub use mqtt_out::MqttTopic;
@@ -38,6 +47,7 @@ pub use record::RecordFiles;
 pub use secret::{Secret, SecretError};
 pub use token::{Token, TokenError};
 pub use vector::Vector;
+pub use webhook::{Webhook, WebhookFormat};
 
 use crate::alert::Level;
 use crate::monitor::Settings;
@@ -66,8 +76,10 @@ pub struct Config {
     pub brokers: Vec<Broker>,
     /// `[[benchmark]]`; with none, whatever benchmarks the files name are taken.
     pub benchmarks: Vec<Benchmark>,
-    /// `[alert]` and the benchmarks' own, `[explain]` and `[[event]]`, as the monitor takes them.
+    /// `[alert]` and the benchmarks' own, `[explain]`, `[[event]]` and `[[covariate]]`, as the monitor takes them.
     pub settings: Settings,
+    /// `[[covariate]]`, which stands in the settings too.
+    pub covariates: Vec<StatedCovariate>,
     /// `[[hook]]`, `[[webhook]]`, `[[cap]]` and `[[mqtt_out]]`.
     pub hooks: Vec<HookConfig>,
     /// `[[heartbeat]]`.
@@ -202,54 +214,6 @@ impl Benchmark {
     }
 }
 
-/// `[[webhook]]`: an address that alerts are sent to.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Webhook {
-    /// What logs and receipts call it.
-    pub name: String,
-    /// Where to, by `http` or `https`.
-    pub address: hyper::Uri,
-    /// The certificate authorities that are trusted instead of the machine's own, PEM.
-    pub ca_file: Option<PathBuf>,
-    /// What is sent.
-    pub format: WebhookFormat,
-    /// The file with the secret that signs what is sent; never absent of our own format.
-    pub secret_file: Option<PathBuf>,
-}
-
-/// What a webhook sends.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum WebhookFormat {
-    /// The JSON that hooks get.
-    Slipwatch,
-    /// What Prometheus Alertmanager takes at `/api/v2/alerts`.
-    Alertmanager,
-}
-
-impl WebhookFormat {
-    /// By the word in the config.
-    fn parse(word: &str) -> Result<Self, String> {
-        match word {
-            "slipwatch" => Ok(Self::Slipwatch),
-            "alertmanager" => Ok(Self::Alertmanager),
-            _ => Err("write \"slipwatch\" or \"alertmanager\"".to_owned()),
-        }
-    }
-}
-
-/// `[[cap]]`: a folder for messages of the Common Alerting Protocol.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct CapFolder {
-    /// The folder.
-    pub folder: PathBuf,
-    /// Who sends: a name that is unique in the world, such as an address.
-    pub sender: String,
-    /// What the area is called.
-    pub area: String,
-    /// Its outline, as CAP writes it: pairs of latitude and longitude, the first one again at the end.
-    pub polygon: Option<String>,
-}
-
 /// What reaches a hook only where it asks for it.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ExtraMessages {
@@ -262,14 +226,10 @@ pub struct ExtraMessages {
 /// `[[hook]]`: a program to run when a level is entered or left; or `[[webhook]]`, `[[cap]]` or `[[mqtt_out]]`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct HookConfig {
-    /// The program and its arguments; none of a webhook.
+    /// The program and its arguments; none where they go elsewhere.
     pub run: Vec<String>,
-    /// Where to send to instead of running a program.
-    pub webhook: Option<Webhook>,
-    /// Where to write messages to instead of running a program.
-    pub cap: Option<CapFolder>,
-    /// Where to publish to instead of running a program.
-    pub mqtt: Option<MqttTopic>,
+    /// Where its alerts go instead of to a program.
+    pub to: Option<SharedDestination>,
     /// Which levels it is run for.
     pub levels: Vec<Level>,
     /// Of which benchmarks it is notified; none: of all.

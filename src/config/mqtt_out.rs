@@ -1,8 +1,10 @@
 //! `[[mqtt_out]]`: a broker's topic that alerts are published to.
 
-use super::address;
 use super::broker::BrokerAddress;
+use super::every_way::common;
 use super::table::Section;
+use super::{Destination, HookConfig, SharedDestination, address};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// `[[mqtt_out]]`: a topic, and the broker that it is at.
@@ -20,8 +22,43 @@ pub struct MqttTopic {
     pub is_retained: bool,
 }
 
+impl Destination for MqttTopic {
+    fn table(&self) -> &'static str {
+        "mqtt_out"
+    }
+
+    fn name(&self) -> String {
+        self.name.clone()
+    }
+
+    fn lacks(&self) -> Option<String> {
+        address::unreadable(self.ca_file.as_ref()?)
+    }
+}
+
+/// Reads one; `taken` has what the ways out before it are called.
+pub(super) fn read(
+    mut section: Section<'_>,
+    base: &Path,
+    taken: &mut BTreeSet<String>,
+) -> Option<HookConfig> {
+    let topic = topic(&mut section, base);
+    let common = common(&mut section);
+    if let Some(one) = &topic
+        && !taken.insert(one.name.clone())
+    {
+        section.error(
+            section.at(),
+            format!("there are two ways out {:?}", one.name),
+            "give each its own name: name = \"control room\"",
+        );
+    }
+    section.finish();
+    Some(common.to(SharedDestination::new(topic?), base))
+}
+
 /// The keys of one, but for those that every way out has.
-pub(super) fn topic(section: &mut Section<'_>, base: &Path) -> Option<MqttTopic> {
+fn topic(section: &mut Section<'_>, base: &Path) -> Option<MqttTopic> {
     let broker = section
         .required("url", "\"mqtts://broker.example.org:8883\"")
         .and_then(|_| section.parsed("url", BrokerAddress::parse));

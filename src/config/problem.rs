@@ -108,16 +108,28 @@ impl ConfigProblems {
     }
 
     fn note(&mut self, severity: Severity, at: &Range<usize>, what: String, fix: String) {
+        let problem = self.problem(severity, at, what, fix);
+        self.problems.push(problem);
+    }
+
+    /// One that is not noted.
+    pub(super) fn problem(
+        &self,
+        severity: Severity,
+        at: &Range<usize>,
+        what: String,
+        fix: String,
+    ) -> ConfigProblem {
         let before = self.text.get(..at.start).unwrap_or(&self.text);
         let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
-        self.problems.push(ConfigProblem {
+        ConfigProblem {
             file: self.file.clone(),
             line: before.matches('\n').count() + 1,
             column: before[line_start..].chars().count() + 1,
             severity,
             what,
             fix,
-        });
+        }
     }
 
     /// All problems in the order of the file.

@@ -2,8 +2,8 @@
 
 use super::table::{Placed, Section, unique};
 use super::{
-    Benchmark, Broker, Config, FileSource, SiteConfig, alert, declared, drill, heartbeat, hook,
-    link, record, source, value, vector,
+    Benchmark, Broker, Config, FileSource, SiteConfig, alert, covariate, declared, drill,
+    heartbeat, hook, link, record, source, value, vector,
 };
 use crate::alert::Policy;
 use crate::monitor::{Explain, Settings, SiteLevel, Watched};
@@ -31,6 +31,7 @@ pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
         .collect();
     let (benchmarks, own) = benchmarks(root, &known, &policy);
     let declared = declared::events(root, &benchmarks);
+    let covariates = covariate::covariates(root, &benchmarks);
     let watched = watched(&sources, &brokers, &benchmarks);
     let mut hooks = hook::hooks(root, base);
     if let Some(site) = &site {
@@ -57,7 +58,11 @@ pub(super) fn document(root: &mut Section<'_>, file: &Path) -> Option<Config> {
             site: Some(site_level),
             accepted: own.accepted,
             holds_scale: true,
+            covariates: (covariates.iter())
+                .map(|one| (one.column.clone(), one.kind))
+                .collect(),
         },
+        covariates,
         hooks,
         heartbeats,
         drill,

@@ -1,7 +1,7 @@
 //! Typed reading of one TOML table: every key asked for is known, every other one is a problem.
 
 use super::keys::{Key, ValueShape};
-use super::problem::ConfigProblems;
+use super::problem::{ConfigProblem, ConfigProblems, Severity};
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -49,6 +49,12 @@ impl<'t> Section<'t> {
 
     pub(super) fn error(&self, at: &Range<usize>, what: String, fix: impl Into<String>) {
         self.notebook.borrow_mut().error(at, what, fix);
+    }
+
+    /// A warning that is given only where something else bears it out.
+    pub(super) fn doubt(&self, at: &Range<usize>, what: String, fix: &str) -> ConfigProblem {
+        let notebook = self.notebook.borrow();
+        notebook.problem(Severity::Warning, at, what, fix.to_owned())
     }
 
     pub(super) fn warning(&self, at: &Range<usize>, what: String, fix: impl Into<String>) {

@@ -44,13 +44,6 @@ fn same_values(one: &Channel, other: &Channel) -> bool {
     spread(&|pair| pair.0 - pair.1) < 1e-4 * spread(&|pair| pair.0)
 }
 
-/// Whether it is one that may stand in the reading itself.
-pub(super) fn is_temperature(channel: &Channel) -> bool {
-    let unit = channel.unit.as_deref().unwrap_or("");
-    let name = channel.name.to_lowercase();
-    ["c", "f", "k"].contains(&unit) || name.contains("temp")
-}
-
 /// The covariates that cover the record; the others are reported to the reader.
 pub(super) fn drivers(
     problem: &Problem,

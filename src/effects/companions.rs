@@ -4,6 +4,7 @@
 use super::frame::dot;
 use super::response::Driver;
 use super::term::{Act, Term};
+use crate::reading::CovariateKind;
 
 /// Responses that share half of their variance.
 const TOGETHER: f64 = std::f64::consts::FRAC_1_SQRT_2;
@@ -28,11 +29,7 @@ pub(super) fn is_rain(term: &Term, drivers: &[(usize, Driver)]) -> bool {
     let channel = drivers
         .iter()
         .find(|(index, _)| Some(*index) == term.channel);
-    channel.is_some_and(|(_, driver)| {
-        let name = driver.name.to_lowercase();
-        let mut parts = name.split(|c: char| !c.is_alphanumeric());
-        parts.any(|part| part.starts_with("rain") || part.starts_with("precip"))
-    })
+    channel.is_some_and(|(_, driver)| driver.kind == CovariateKind::Rain)
 }
 
 #[cfg(test)]

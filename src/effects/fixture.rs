@@ -63,6 +63,7 @@ pub(super) fn channel(name: &str, days: &[f64], values: &[f64]) -> Channel {
     Channel {
         name: name.to_owned(),
         unit: None,
+        stated: None,
         samples: samples.collect(),
     }
 }

@@ -1,6 +1,6 @@
 //! A series made ready for a search: its readings, its covariates, the plain law, and the noise models.
 
-use super::channels::{drivers, is_temperature};
+use super::channels::drivers;
 use super::noise::{Noise, Whitener};
 use super::options::Options;
 use super::problem::Problem;
@@ -8,7 +8,7 @@ use super::refit::Fitted;
 use super::response::Driver;
 use super::search::{Search, plain};
 use super::term::Scratch;
-use crate::reading::{Channel, Series};
+use crate::reading::{Channel, CovariateKind, Series};
 
 /// All that a search rests on.
 #[derive(Debug)]
@@ -33,7 +33,7 @@ impl Ready {
         let plain = plain(&problem, &mut Scratch::default())?;
         problem.see(&plain.velocity);
         let drivers = drivers(&problem, channels, remarks);
-        let temperature = |(index, _): &(usize, Driver)| is_temperature(&channels[*index]);
+        let temperature = |(_, one): &(usize, Driver)| one.kind == CovariateKind::Temperature;
         Some(Self {
             temperatures: drivers.iter().map(temperature).collect(),
             bank: Noise::bank(&problem),

@@ -1,12 +1,14 @@
 //! What a covariate does to the slope after a while: its exponential or gamma response, by level or by rate.
 
 use super::kind::Form;
-use crate::reading::{Channel, Timestamp, days_since};
+use crate::reading::{Channel, CovariateKind, Timestamp, days_since};
 
 /// A covariate's values on an even grid of days, standardised by nothing: in its own unit.
 #[derive(Debug, Clone)]
 pub(super) struct Driver {
     pub(super) name: String,
+    /// What it measures.
+    pub(super) kind: CovariateKind,
     /// Day of the first value.
     start: f64,
     /// Days from one to the next.
@@ -71,6 +73,7 @@ impl Driver {
         }
         Some(Self {
             name: channel.name.clone(),
+            kind: channel.kind(),
             start: first.0,
             step,
             values,

@@ -1,6 +1,6 @@
 //! The covariates of a site as the searches and the laws under known loads see them, bounded by count.
 
-use crate::reading::{Channel, Sample, Timestamp};
+use crate::reading::{Channel, CovariateKind, Sample, Timestamp};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -16,8 +16,14 @@ pub(super) struct Covariates {
 }
 
 impl Covariates {
-    /// Takes one value, wherever in time it belongs; of two for one time the later to arrive stands.
-    pub(super) fn take(&mut self, name: &str, unit: Option<&str>, sample: Sample) {
+    /// Takes one value of what the config states to be `stated`, wherever in time it belongs; of two for one time the later to
+    /// arrive stands.
+    pub(super) fn take(
+        &mut self,
+        (name, unit): (&str, Option<&str>),
+        stated: Option<CovariateKind>,
+        sample: Sample,
+    ) {
         if !self.channels.contains_key(name) && self.channels.len() >= MOST_CHANNELS {
             return;
         }
@@ -27,6 +33,7 @@ impl Covariates {
             .or_insert_with(|| Channel {
                 name: name.to_owned(),
                 unit: unit.map(str::to_owned),
+                stated,
                 samples: Vec::new(),
             });
         let samples = &mut channel.samples;
@@ -37,6 +44,13 @@ impl Covariates {
         }
         if samples.len() > MOST_SAMPLES {
             thin(samples);
+        }
+    }
+
+    /// The config states from here on what these measure, and of the others nothing.
+    pub(super) fn state(&mut self, kinds: &BTreeMap<String, CovariateKind>) {
+        for (name, channel) in &mut self.channels {
+            channel.stated = kinds.get(name).copied();
         }
     }
 
@@ -95,7 +109,7 @@ mod tests {
         let mut covariates = Covariates::default();
         for second in 0..20_000 {
             let value = f64::from(u8::from(second % 2 == 0));
-            covariates.take("rain_mm", Some("mm"), sample(second, value));
+            covariates.take(("rain_mm", Some("mm")), None, sample(second, value));
         }
         let channel = covariates.list()[0];
         assert!(channel.samples.len() <= MOST_SAMPLES);
@@ -109,7 +123,7 @@ mod tests {
     fn what_comes_late_finds_its_place_and_a_correction_stands() {
         let mut covariates = Covariates::default();
         for (second, value) in [(1, 1.0), (3, 3.0), (2, 2.0), (3, 9.0)] {
-            covariates.take("a", None, sample(second, value));
+            covariates.take(("a", None), None, sample(second, value));
         }
         let expected = [sample(1, 1.0), sample(2, 2.0), sample(3, 9.0)];
         assert_eq!(covariates.list()[0].samples, expected);
@@ -119,11 +133,32 @@ mod tests {
     fn the_channels_that_cover_the_readings_go_first() {
         let mut covariates = Covariates::default();
         for second in 0..10 {
-            covariates.take("short", None, sample(second, 0.0));
-            covariates.take("long", None, sample(10 * second, 0.0));
+            covariates.take(("short", None), None, sample(second, 0.0));
+            covariates.take(("long", None), None, sample(10 * second, 0.0));
         }
         let (first, last) = (sample(0, 0.0).time, sample(90, 0.0).time);
         let beside = covariates.beside(first, last, 1);
         assert_eq!(beside[0].name, "long");
+    }
+
+    #[test]
+    fn a_search_is_given_what_the_config_states_when_it_begins() {
+        let mut covariates = Covariates::default();
+        let rain = Some(CovariateKind::Rain);
+        for second in 0..10 {
+            covariates.take(("Nied.", None), rain, sample(second, 0.0));
+        }
+        let kind = |covariates: &Covariates| {
+            let (first, last) = (sample(0, 0.0).time, sample(9, 0.0).time);
+            covariates.beside(first, last, 1)[0].kind()
+        };
+        assert_eq!(kind(&covariates), CovariateKind::Rain);
+        covariates.state(&BTreeMap::new());
+        assert_eq!(kind(&covariates), CovariateKind::Other);
+        covariates.state(&BTreeMap::from([(
+            "Nied.".to_owned(),
+            CovariateKind::Level,
+        )]));
+        assert_eq!(kind(&covariates), CovariateKind::Level);
     }
 }

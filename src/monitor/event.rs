@@ -204,59 +204,6 @@ pub(super) const RESET_RETURNED: &str = "reset-returned";
 /// See [`SUSPECT`].
 pub const SUSPECT_ENDS: &str = "-ends";
 
-impl EventKind {
-    /// Every word that [`EventKind::name`] may give.
-    pub const NAMES: [&str; 14] = [
-        "refit",
-        "regime-flip",
-        "intercept-drift",
-        "transition-drift",
-        "unexplained-residual",
-        "effect-found",
-        "effect-dropped",
-        "alert",
-        "together",
-        "fault",
-        "declared",
-        "correction",
-        "order",
-        "summary",
-    ];
-
-    /// Whether it says what has changed over the whole record, which only who has gone through it knows.
-    pub(super) fn is_of_the_record(&self) -> bool {
-        matches!(
-            self,
-            Self::RegimeFlip { .. } | Self::InterceptDrift { .. } | Self::TransitionDrift { .. }
-        )
-    }
-
-    /// Whether it is about the data, not about the slope.
-    pub fn is_of_data(&self) -> bool {
-        matches!(self, Self::Fault { .. } | Self::Correction { .. })
-    }
-
-    /// The word in its JSON.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::Refit { .. } => "refit",
-            Self::RegimeFlip { .. } => "regime-flip",
-            Self::InterceptDrift { .. } => "intercept-drift",
-            Self::TransitionDrift { .. } => "transition-drift",
-            Self::UnexplainedResidual(_) => "unexplained-residual",
-            Self::EffectFound { .. } => "effect-found",
-            Self::EffectDropped { .. } => "effect-dropped",
-            Self::Alert { .. } => "alert",
-            Self::Together { .. } => "together",
-            Self::Fault { .. } => "fault",
-            Self::Declared { .. } => "declared",
-            Self::Correction { .. } => "correction",
-            Self::Order { .. } => "order",
-            Self::Summary(_) => "summary",
-        }
-    }
-}
-
 /// What is not explained.
 #[derive(Debug, Clone, Copy, PartialEq, JsonSchema, Serialize, Deserialize)]
 #[serde(untagged)]

@@ -9,6 +9,7 @@ mod deadlines;
 mod declared;
 mod drift;
 mod event;
+mod event_shown;
 mod fallen;
 #[cfg(test)]
 mod fixture;
@@ -41,6 +42,7 @@ pub use event::{
     AlertState, CalledLevel, Event, EventKind, FailureTime, InverseVelocity, LevelChance, Plain,
     RESET_FOUND, RegimeReport, SUSPECT, SUSPECT_ENDS, SharedFailure, Summary, Unexplained,
 };
+pub use event_shown::KindShown;
 pub use given::{Given, OrderKind, OrderedBy};
 pub use measured::Measured;
 pub(crate) use motion::recent;
@@ -53,7 +55,7 @@ pub use site::SiteLevel;
 pub use undeclared::UndeclaredLoad;
 
 use crate::alert::{Level, Policy};
-use crate::reading::{BenchmarkId, Reading, Sample, Suspicion, Timestamp, Unit};
+use crate::reading::{BenchmarkId, CovariateKind, Reading, Sample, Suspicion, Timestamp, Unit};
 use batches::Batches;
 use benchmarks::Benchmarks;
 use covariates::Covariates;
@@ -144,6 +146,9 @@ pub struct Settings {
     /// which it ended with the first reading that alone would not have raised it.
     #[serde(default)]
     pub holds_scale: bool,
+    /// What the covariates of these names measure, where their unit and name do not say it.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub covariates: BTreeMap<String, CovariateKind>,
 }
 
 impl Default for Settings {
@@ -157,6 +162,7 @@ impl Default for Settings {
             site: None,
             accepted: BTreeMap::new(),
             holds_scale: true,
+            covariates: BTreeMap::new(),
         }
     }
 }
@@ -293,7 +299,9 @@ impl Monitor {
                 unit,
                 sample,
             } => {
-                self.covariates.take(channel, unit.as_deref(), *sample);
+                let stated = self.settings.covariates.get(channel).copied();
+                let column = (channel.as_str(), unit.as_deref());
+                self.covariates.take(column, stated, *sample);
                 Vec::new()
             }
             Input::Settings(settings) => self.change_settings(now, settings),
@@ -358,6 +366,7 @@ impl Monitor {
     /// Goes by other settings from here on. What was in force at a benchmark that is no longer watched ends.
     fn change_settings(&mut self, now: Timestamp, settings: &Settings) -> Vec<Event> {
         let former = std::mem::replace(&mut self.settings, settings.clone());
+        self.covariates.state(&self.settings.covariates);
         let mut events = self.unwatch(now, &former.watched);
         let context = StepContext {
             phase: self.phase(now),

@@ -133,7 +133,7 @@ impl Monitor {
         if has_more {
             self.past.walk = Some(walk);
         } else {
-            events.extend(track.go_on_from(now, walk));
+            events.extend(track.go_on_from(policy, now, walk));
             self.benchmarks.note_changed(&id);
         }
         events

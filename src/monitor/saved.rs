@@ -198,8 +198,9 @@ mod tests {
     use std::io::Read;
     use std::path::Path;
 
-    /// What the map of a benchmark held when a track had no parts: states with these fields are on disks.
-    const NAMES: [&str; 29] = [
+    /// What the map of a benchmark holds: that of the track before it had parts, with which states are on disks, and what was
+    /// added since.
+    const NAMES: [&str; 30] = [
         "accepted",
         "adopted",
         "ahead",
@@ -216,6 +217,7 @@ mod tests {
         "look",
         "lookback",
         "newest",
+        "occurrences",
         "others",
         "overdue",
         "owes",

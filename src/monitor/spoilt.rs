@@ -36,6 +36,10 @@ const FEWEST_IN_ALL: usize = 100;
 const FEWEST_TINY: (f64, f64) = (4.0, 0.06);
 /// Velocities are noisier the faster the slope: a jump is at least this share of them.
 const OF_VELOCITY: f64 = 0.5;
+/// Noise hides a velocity where half of the steps are this share of what that velocity is and more, and this share of them go the
+/// other way than the one before: of a noise without memory two thirds do.
+const HIDES: f64 = 0.5;
+const TURNS_OF_NOISE: f64 = 0.5;
 
 impl History {
     /// Whether many of the newest readings lie far off both neighbours, which agree, or whether many of the steps between them are
@@ -44,11 +48,9 @@ impl History {
     /// `before` is by how much they were spoilt. Where they were, the neighbours need not agree: on a slope that grows fast they
     /// differ as well.
     pub(super) fn spoilt(&self, before: Option<f64>) -> Option<f64> {
-        let values = &self.observations.values;
-        let latest = &values[values.len().saturating_sub(*INSPECTED.end())..];
-        if latest.len() < *INSPECTED.start() {
+        let Some(latest) = self.inspected() else {
             return before;
-        }
+        };
         let is_many = |count: usize, share: f64| {
             let least = (share * (latest.len() - 2) as f64).max(FEWEST as f64);
             let factor = if before.is_some() { FEWER } else { 1.0 };
@@ -61,6 +63,32 @@ impl History {
         }
         let (turns, jumps) = jumps(latest, still.unwrap_or_else(|| self.jump_size(latest)));
         is_many(turns, TURNING).then(|| before.or_else(|| of_all(jumps, 0.5)))?
+    }
+
+    /// Whether the newest readings go back and forth by so much that a slope could pass `critical` mm/day and move so for
+    /// `days`, or from one reading to the next, without its showing: the size of their steps.
+    pub(super) fn noise_that_hides(&self, critical: f64, days: f64) -> Option<f64> {
+        let latest = self.inspected()?;
+        let (first, last) = (latest.first()?, latest.last()?);
+        let interval = (last.t_days - first.t_days) / (latest.len() - 1) as f64;
+        let would_move = match self.observations.quantity {
+            Quantity::Displacement => critical * days.max(interval),
+            Quantity::Velocity => {
+                let sizes = latest.iter().map(|one| one.value.abs()).collect();
+                critical.max(of_all(sizes, 0.5)?)
+            }
+        };
+        let (turns, each) = jumps(latest, 0.0);
+        let share = turns as f64 / (latest.len() - 2) as f64;
+        let usual = of_all(each, 0.5)?;
+        (share >= TURNS_OF_NOISE && usual >= HIDES * would_move).then_some(usual)
+    }
+
+    /// The newest readings, where there are enough to be examined.
+    fn inspected(&self) -> Option<&[Observation]> {
+        let values = &self.observations.values;
+        let latest = &values[values.len().saturating_sub(*INSPECTED.end())..];
+        (latest.len() >= *INSPECTED.start()).then_some(latest)
     }
 
     /// From what size on a step between two of the `latest` readings is a jump.
@@ -221,6 +249,26 @@ mod tests {
             let found = (0..20).filter(|seed| is_found(seed * 10_007)).count();
             assert!(found >= 18, "{share}, {since}: {found} of 20");
         }
+    }
+
+    #[test]
+    fn noise_that_hides_the_critical_velocity_is_found_and_a_slope_past_it_hides_nothing() {
+        let wild = |hour: u32| {
+            let by = 600.0 * (noise(hour + 7001) - 0.5);
+            slope(hour) + if noise(hour + 3001) < 0.7 { by } else { 0.0 }
+        };
+        let found = (18..119).filter(|end| {
+            let history = history((0..*end).map(wild));
+            history.noise_that_hides(1000.0, 0.125).is_some()
+        });
+        assert!(found.count() > 90);
+        for end in 18..120 {
+            let history = history((0..end).map(slope));
+            assert_eq!(history.noise_that_hides(1000.0, 0.125), None, "{end}");
+        }
+        // Surveys once a month within a centimetre: a slope at the critical velocity would be 30 m further.
+        let surveys = history((0..60).map(|hour| 10.0 * noise(hour)));
+        assert_eq!(surveys.noise_that_hides(1000.0, 30.0), None);
     }
 
     #[test]

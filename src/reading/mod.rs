@@ -4,6 +4,7 @@
 //! is the same readings; the science converts to millimetres and days where it takes them.
 
 mod conventions;
+mod covariate;
 mod dialect;
 mod figure;
 mod plain;
@@ -13,6 +14,7 @@ pub mod suspicion;
 mod unit;
 
 pub use conventions::{Conventions, LocalClock, MissingValues, SummerTime, TimeFault};
+pub use covariate::CovariateKind;
 pub use dialect::{DecimalMark, Delimiter, Dialect, MOST_SKIPPED, TimeFormat};
 pub use figure::{figure, whole_figure};
 pub use jiff::Timestamp;
@@ -28,6 +30,17 @@ use std::fmt;
 
 /// Seconds in a day, the unit of time inside the science.
 pub const SECONDS_PER_DAY: f64 = 86_400.0;
+
+/// Before all readings: the data time of what is said before there is one.
+pub const BEFORE_ALL: Timestamp = Timestamp::constant(-9_223_372_036, 0);
+
+/// To the minute, in UTC: people read this, and no forecast is finer.
+pub fn minute(time: Timestamp) -> String {
+    if time <= BEFORE_ALL {
+        return "before any reading".to_owned();
+    }
+    time.strftime("%Y-%m-%d %H:%MZ").to_string()
+}
 
 /// The name of one measured point on a slope.
 #[derive(

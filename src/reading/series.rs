@@ -1,6 +1,6 @@
 //! A benchmark's readings and the covariates beside them, in time order.
 
-use super::{BenchmarkId, Quantity, Timestamp, Unit};
+use super::{BenchmarkId, CovariateKind, Quantity, Timestamp, Unit};
 use jiff::SignedDuration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -68,11 +68,19 @@ pub struct Channel {
     pub name: String,
     /// The unit at the name's end, where it is one that is known.
     pub unit: Option<String>,
+    /// What it measures, where the config or a flag states it; see [`Channel::kind`].
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub stated: Option<CovariateKind>,
     /// The values, in strictly increasing time.
     pub samples: Vec<Sample>,
 }
 
 impl Channel {
+    /// What it measures: as it is stated, or else as its unit and its name say.
+    pub fn kind(&self) -> CovariateKind {
+        CovariateKind::stated_or_of(self.stated, &self.name, self.unit.as_deref())
+    }
+
     /// Puts rows in order as [`Series::put_in_order`] does.
     pub fn put_in_order(&mut self) -> Disorder {
         settle_rows(&mut self.samples, |sample| sample.time)
@@ -170,5 +178,19 @@ mod tests {
         let mut ordered = series(&[(1, 1.0), (1, 2.0), (1, 1.0)]);
         assert_eq!(ordered.put_in_order().corrected, 2);
         assert_eq!(ordered, series(&[(1, 1.0)]));
+    }
+
+    #[test]
+    fn what_is_stated_stands_over_the_name_and_a_channel_of_an_older_state_has_the_kind_of_its_name()
+     {
+        let old = r#"{"name":"rain_mm","unit":"mm","samples":[]}"#;
+        let mut channel: Channel = serde_json::from_str(old).unwrap();
+        assert_eq!(channel.kind(), CovariateKind::Rain);
+        assert_eq!(serde_json::to_string(&channel).unwrap(), old);
+        channel.stated = Some(CovariateKind::Level);
+        assert_eq!(channel.kind(), CovariateKind::Level);
+        let again: Channel =
+            serde_json::from_str(&serde_json::to_string(&channel).unwrap()).unwrap();
+        assert_eq!(again, channel);
     }
 }

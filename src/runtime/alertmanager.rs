@@ -1,10 +1,9 @@
 //! An alert, and what ends with it, as Prometheus Alertmanager takes them at `POST /api/v2/alerts`.
 
 use super::hook::{Alert, MessageState};
-use super::site::BEFORE_ALL;
 use crate::alert::Level;
 use crate::monitor::EventKind;
-use crate::reading::{BenchmarkId, Timestamp};
+use crate::reading::{BEFORE_ALL, BenchmarkId, Timestamp};
 use jiff::SignedDuration;
 use serde_json::json;
 

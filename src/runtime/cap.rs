@@ -7,10 +7,12 @@
 
 use super::clock;
 use super::hook::{Alert, HookOutcome, MessageState, state_name};
+use super::way_out::{DeliveryAttempt, WayOut, destination};
 use crate::alert::Level;
 use crate::config::CapFolder;
 use crate::monitor::EventKind;
 use crate::reading::Timestamp;
+use nix::unistd::{AccessFlags, access};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
@@ -42,8 +44,57 @@ enum MessageType {
     Cancel,
 }
 
+/// A folder of messages.
+pub(super) static CAP: WayOut = WayOut {
+    table: "cap",
+    send: |delivery| Box::pin(send(delivery)),
+    ready: |hook| {
+        let cap: &CapFolder = destination(hook)?;
+        let folder = cap.folder.display();
+        match writable(&cap.folder) {
+            Ok(()) => Ok(format!(
+                "{folder} can be written to; hook test writes a message"
+            )),
+            Err(error) => Err(format!("{folder}: {error}")),
+        }
+    },
+};
+
+async fn send(delivery: DeliveryAttempt) -> HookOutcome {
+    let cap: CapFolder = match delivery.to::<CapFolder>() {
+        Ok(cap) => cap.clone(),
+        Err(outcome) => return outcome,
+    };
+    let DeliveryAttempt {
+        hook,
+        alert,
+        attempt,
+    } = delivery;
+    let (name, key) = (hook.name(), alert.key.clone());
+    // A disk may hang: the worker does not wait with it.
+    let writing = tokio::task::spawn_blocking(move || write(&cap, &alert));
+    let outcome = match tokio::time::timeout(hook.timeout, writing).await {
+        Ok(written) => written.unwrap_or_else(|error| HookOutcome::NotStarted(error.to_string())),
+        Err(_elapsed) => HookOutcome::TimedOut,
+    };
+    tracing::info!(hook = name, key, attempt, ?outcome, "CAP message ended");
+    outcome
+}
+
+/// Whether a message could be written there, or the folder be made.
+fn writable(folder: &Path) -> nix::Result<()> {
+    // The last ancestor of a relative path is empty, and is the folder one is in.
+    let is_here = |folder: &Path| folder.as_os_str().is_empty();
+    let each = folder.ancestors();
+    let mut each = each.map(|one| if is_here(one) { Path::new(".") } else { one });
+    access(
+        each.find(|folder| folder.is_dir()).unwrap_or(folder),
+        AccessFlags::W_OK | AccessFlags::X_OK,
+    )
+}
+
 /// Writes `alert` into the folder; where its file is there already it is written again, the same.
-pub(super) fn write(cap: &CapFolder, alert: &Alert) -> HookOutcome {
+fn write(cap: &CapFolder, alert: &Alert) -> HookOutcome {
     let now = clock::now();
     let all = written(cap, alert, now).and_then(|()| end_members(cap, alert, now));
     match all {

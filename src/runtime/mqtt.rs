@@ -6,7 +6,7 @@
 mod publish;
 mod session;
 
-pub(super) use publish::publish;
+pub(super) use publish::MQTT_OUT;
 pub(super) use session::MOST_UNACKNOWLEDGED;
 
 use super::clock::Stopwatch;

@@ -10,7 +10,7 @@ use super::tail::Arrival;
 use super::workers::AllCores;
 use crate::config::HookConfig;
 use crate::monitor::{Event, Input, Monitor, Settings};
-use crate::reading::{Recording, Timestamp};
+use crate::reading::{Channel, Recording, Timestamp};
 use crate::store::{Store, StoreError};
 use std::io;
 use std::time::Duration;
@@ -97,6 +97,15 @@ pub fn arrivals(recording: &Recording) -> Vec<Arrival> {
     arrivals
 }
 
+/// The settings, and what is stated of the recording's covariates.
+fn with_stated(settings: &Settings, recording: &Recording) -> Settings {
+    let mut settings = settings.clone();
+    let stated = |channel: &Channel| Some((channel.name.clone(), channel.stated?));
+    let stated = recording.channels.iter().filter_map(stated);
+    settings.covariates.extend(stated);
+    settings
+}
+
 /// Plays `recording` and hands every event to `each`, the summary last; needs a multi-threaded
 /// tokio runtime where there are hooks. Neither the pace nor the hooks change the events, and those
 /// up to `plan.until` are the beginning of those of the whole recording.
@@ -118,7 +127,8 @@ pub async fn replay(
         let (until, first) = (end, first.time);
         return Err(ReplayError::NothingUntil { until, first });
     }
-    let mut site = Site::new(plan.site, plan.settings.clone(), sinks(plan.hooks));
+    let settings = with_stated(plan.settings, recording);
+    let mut site = Site::new(plan.site, settings, sinks(plan.hooks));
     let started = clock::later(Duration::ZERO);
     let mut prepared = 0;
     for (number, arrival) in arrivals.iter().enumerate() {
@@ -231,7 +241,7 @@ pub(super) fn wait(pace: ReplayPace, first: Timestamp, time: Timestamp) -> Optio
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reading::{BenchmarkId, Channel, Reading, Sample, Series, Unit};
+    use crate::reading::{BenchmarkId, Reading, Sample, Series, Unit};
 
     fn at(second: i64) -> Timestamp {
         Timestamp::from_second(second).unwrap()
@@ -258,6 +268,7 @@ mod tests {
             channels: vec![Channel {
                 name: "rain_mm".to_owned(),
                 unit: None,
+                stated: None,
                 samples: vec![Sample {
                     time: at(3),
                     value: 0.0,

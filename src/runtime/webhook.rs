@@ -1,9 +1,9 @@
 //! Sends one alert to an address once: POST of what a hook gets on stdin, signed as Standard Webhooks asks.
 
-use super::clock;
 use super::hook::{Alert, HookOutcome, state_name};
-use super::http;
-use crate::config::{Secret, Webhook};
+use super::way_out::{DeliveryAttempt, WayOut, destination};
+use super::{alertmanager, clock, http, link, tls};
+use crate::config::{Secret, Webhook, WebhookFormat};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use hmac::{Hmac, KeyInit, Mac};
@@ -39,13 +39,50 @@ fn signature(key: &[u8], id: &str, timestamp: i64, body: &[u8]) -> Option<String
     Some(format!("v1,{}", STANDARD.encode(sum)))
 }
 
+/// An address, by POST.
+pub(super) static WEBHOOK: WayOut = WayOut {
+    table: "webhook",
+    send: |delivery| Box::pin(send(delivery)),
+    ready: |hook| {
+        let webhook: &Webhook = destination(hook)?;
+        let name = &webhook.name;
+        let secret = webhook.secret_file.as_deref().map(Secret::read).transpose();
+        let secret = secret.map_err(|error| error.to_string());
+        let trusted = webhook.ca_file.as_deref().map(tls::own).transpose();
+        match secret.and(trusted) {
+            Ok(_) => Ok(format!("{name} has what it needs; hook test sends to it")),
+            Err(error) => Err(format!("{name}: {error}")),
+        }
+    },
+};
+
+async fn send(delivery: DeliveryAttempt) -> HookOutcome {
+    let to: &Webhook = match delivery.to() {
+        Ok(to) => to,
+        Err(outcome) => return outcome,
+    };
+    let (hook, alert, attempt) = (&delivery.hook, &delivery.alert, delivery.attempt);
+    let link = link::of(hook, alert).await;
+    let body = match to.format {
+        WebhookFormat::Slipwatch => alert.body(attempt, link.as_deref()),
+        WebhookFormat::Alertmanager => alertmanager::body(alert, &hook.levels, link.as_deref()),
+    };
+    let outcome = match body {
+        Ok(body) => post(to, alert, body, hook.timeout).await,
+        Err(error) => HookOutcome::NotStarted(error.to_string()),
+    };
+    tracing::info!(
+        webhook = to.name,
+        key = alert.key,
+        attempt,
+        ?outcome,
+        "webhook ended"
+    );
+    outcome
+}
+
 /// Sends `alert`, whose JSON is `body`, within `limit`.
-pub(super) async fn send(
-    webhook: &Webhook,
-    alert: &Alert,
-    body: Vec<u8>,
-    limit: Duration,
-) -> HookOutcome {
+async fn post(webhook: &Webhook, alert: &Alert, body: Vec<u8>, limit: Duration) -> HookOutcome {
     let request = match request(webhook, alert, body) {
         Ok(request) => request,
         Err(why) => return HookOutcome::NotStarted(why),

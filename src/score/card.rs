@@ -4,7 +4,7 @@ use super::measure::{Outcome, crps_days, is_covered, log_score, scored_days};
 use super::{Known, Method, WholeRecord};
 use crate::fit::Observations;
 use crate::forecast::{FEWEST_READINGS, HORIZON_DAYS, Passage};
-use crate::reading::{Channel, Series, Timestamp, after_days, days_since};
+use crate::reading::{Channel, CovariateKind, Series, Timestamp, after_days, days_since};
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -32,8 +32,6 @@ const FORECASTS: usize = 40;
 const FARTHEST_LEADS: f64 = 2.0;
 /// A reading at the lead itself is known, whatever the rounding of the two, days.
 const ROUNDING: f64 = 1e-9;
-/// Endings of the names of channels that are a river's flow.
-const FLOWS: [&str; 2] = ["m3_s", "cfs"];
 
 /// What came of a slope.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -106,10 +104,7 @@ impl WholeRecord {
     /// The readings of a series, with the first channel beside it that is a river's flow.
     pub fn of(series: &Series, channels: &[Channel], critical_mm_per_day: f64) -> Self {
         let epoch = series.readings.first().map(|reading| reading.time);
-        let is_flow = |channel: &&Channel| {
-            let unit = channel.unit.as_deref();
-            unit.is_some_and(|unit| FLOWS.contains(&unit))
-        };
+        let is_flow = |channel: &&Channel| channel.kind() == CovariateKind::Flow;
         let river = channels.iter().find(is_flow);
         let samples = river.into_iter().flat_map(|channel| &channel.samples);
         let days = |time| epoch.map_or(0.0, |epoch| days_since(epoch, time));
@@ -248,6 +243,35 @@ mod tests {
             flow: Vec::new(),
             critical_mm_per_day: 1000.0,
         }
+    }
+
+    #[test]
+    fn the_river_is_the_channel_that_is_a_flow_by_its_unit_by_its_name_or_because_it_is_stated() {
+        let channel = |name: &str, unit: Option<&str>, stated| Channel {
+            name: name.to_owned(),
+            unit: unit.map(str::to_owned),
+            stated,
+            samples: vec![crate::reading::Sample {
+                time: epoch(),
+                value: 7.0,
+            }],
+        };
+        let series = Series {
+            benchmark: crate::reading::BenchmarkId::new("a"),
+            unit: crate::reading::Unit::MM,
+            averaging: None,
+            readings: vec![crate::reading::Reading {
+                time: epoch(),
+                value: 0.0,
+                sigma: None,
+            }],
+        };
+        let river = |channel| !WholeRecord::of(&series, &[channel], 1.0).flow.is_empty();
+        assert!(river(channel("spring_l_s", Some("l_s"), None)));
+        assert!(river(channel("inflow", None, None)));
+        assert!(river(channel("Abfluss", None, Some(CovariateKind::Flow))));
+        assert!(!river(channel("Abfluss", None, None)));
+        assert!(!river(channel("inflow", None, Some(CovariateKind::Level))));
     }
 
     fn epoch() -> Timestamp {

@@ -282,3 +282,56 @@ fn a_reading_of_three_hundred_digits_is_named_with_its_place_and_printed_nowhere
         assert!(longest.map(str::len).max().unwrap_or(0) < 30, "{said}");
     }
 }
+
+#[test]
+fn check_shows_what_each_covariate_is_and_which_stated_one_is_in_no_file() {
+    let mut text = "time,P1_displacement_mm,Nied_1h,river_m3_s,box\n".to_owned();
+    for hour in 0..20 {
+        writeln!(text, "2017-06-01T{hour:02}:00:00Z,{hour},0.5,3.1,{hour}").unwrap();
+    }
+    let covariate = |column: &str, kind: &str| {
+        format!("\n[[covariate]]\ncolumn = \"{column}\"\nkind = \"{kind}\"\n")
+    };
+    let config = format!(
+        "{}{}{}",
+        site("slope.csv", ""),
+        covariate("Nied_1h", "rain"),
+        covariate("Nied_1d", "rain")
+    );
+    let office = Office::with(&[("slope.csv", &text), ("site.toml", &config)]);
+    let (code, out, err) = office.say(&["check", "site.toml"]);
+    assert_eq!(code, 0, "{out}{err}");
+    for part in [
+        "covariate Nied_1h (logger): 20 values, 2017-06-01T00:00:00Z to 2017-06-01T19:00:00Z; rain, as the config states\n",
+        "covariate river_m3_s (logger): 20 values, m3_s, 2017-06-01T00:00:00Z to 2017-06-01T19:00:00Z; flow\n",
+        "covariate box (logger): 20 values, 2017-06-01T00:00:00Z to 2017-06-01T19:00:00Z\n",
+    ] {
+        assert!(out.contains(part), "no {part:?} in {out}");
+    }
+    let line = config
+        .lines()
+        .position(|line| line.contains("Nied_1d"))
+        .unwrap()
+        + 1;
+    let warning = format!(
+        "site.toml:{line}:10: warning: covariate.column = \"Nied_1d\" is no covariate in the files; \
+         covariates in the files: Nied_1h, box, river_m3_s"
+    );
+    assert!(err.contains(&warning), "{err}");
+    let shown = &looked(&office)["covariates"];
+    let kinds: Vec<(&str, &str, bool)> = (shown.as_array().unwrap().iter())
+        .map(|one| {
+            (
+                one["name"].as_str().unwrap(),
+                one["kind"].as_str().unwrap(),
+                one["is_stated"].as_bool().unwrap(),
+            )
+        })
+        .collect();
+    let expected = [
+        ("Nied_1h", "rain", true),
+        ("box", "other", false),
+        ("river_m3_s", "flow", false),
+    ];
+    assert_eq!(kinds, expected);
+}

@@ -3,7 +3,7 @@
 use slipwatch::alert::Level;
 use slipwatch::config::{self, ConfigError, SourceKind};
 use slipwatch::monitor::Explain;
-use slipwatch::reading::{BenchmarkId, SummerTime};
+use slipwatch::reading::{BenchmarkId, CovariateKind, SummerTime};
 use std::path::Path;
 
 const RIGHT: &str = r#"[site]
@@ -374,6 +374,44 @@ fn a_bad_unit_is_named_with_its_line_and_the_fix() {
 }
 
 #[test]
+fn what_a_covariate_measures_is_read_and_what_cannot_be_is_refused_with_its_line() {
+    let one = |column: &str, kind: &str| {
+        format!("[[covariate]]\ncolumn = \"{column}\"\nkind = \"{kind}\"\n")
+    };
+    let right = format!("{RIGHT}{}{}", one("Nied_1h", "rain"), one("Pegel", "level"));
+    let config = config::parse(&right, Path::new("site.toml")).unwrap();
+    let stated: Vec<(&str, CovariateKind)> = (config.settings.covariates.iter())
+        .map(|(column, kind)| (column.as_str(), *kind))
+        .collect();
+    assert_eq!(
+        stated,
+        [
+            ("Nied_1h", CovariateKind::Rain),
+            ("Pegel", CovariateKind::Level)
+        ]
+    );
+    assert_eq!(
+        problem(&one("Nied_1h", "snow")),
+        "site.toml:12:8: error: covariate.kind = \"snow\" cannot be used; \
+         write one of rain, flow, level, temperature, humidity, pressure, other"
+    );
+    assert_eq!(
+        problem("[[covariate]]\ncolumn = \"Nied_1h\"\n"),
+        "site.toml:10:1: error: covariate.kind is missing; add kind = \"rain\""
+    );
+    assert_eq!(
+        problem(&one("Pegel", "level").repeat(2)),
+        "site.toml:14:10: error: covariate.column = \"Pegel\" is there twice; state each column once"
+    );
+    let benchmark = "[[benchmark]]\nid = \"5\"\ncolumn = \"ext_1\"\nunit = \"mm\"\n";
+    assert_eq!(
+        problem(&format!("{benchmark}{}", one("ext_1", "rain"))),
+        "site.toml:15:10: error: covariate.column = \"ext_1\" holds the readings of benchmark \"5\"; \
+         name a column that no [[benchmark]] takes"
+    );
+}
+
+#[test]
 fn an_unknown_key_is_refused_with_the_known_ones() {
     assert_eq!(
         problem("[alert]\nevacuation_tme = \"12h\"\n"),
@@ -383,7 +421,7 @@ fn an_unknown_key_is_refused_with_the_known_ones() {
     assert_eq!(
         problem("[allert]\n"),
         "site.toml:10:2: error: unknown key allert; known here: site, source, alert, explain, \
-         benchmark, event, hook, webhook, cap, mqtt_out, heartbeat, drill"
+         benchmark, event, covariate, hook, webhook, cap, mqtt_out, heartbeat, drill"
     );
 }
 

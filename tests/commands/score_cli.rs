@@ -56,6 +56,35 @@ fn a_slope_that_stood_is_scored_at_looks_and_was_never_red() {
 }
 
 #[test]
+fn a_covariate_is_what_it_is_stated_to_be() {
+    let what = [
+        "recordings/century-mine-2013.mcap",
+        "--benchmark",
+        "31-1930",
+        "--no-failure",
+    ];
+    let methods = |more: &[&str]| {
+        let card = json(&[&what[..], more].concat());
+        card["methods"].to_string()
+    };
+    assert!(!methods(&[]).contains("river-"));
+    assert!(methods(&["--covariate", "rain_mm=flow"]).contains("river-"));
+    let refused = |stated: &str, code: i32| {
+        let done = score(&[&what[..], &["--covariate", stated]].concat()).code(code);
+        String::from_utf8(done.get_output().stderr.clone()).unwrap()
+    };
+    let said = refused("rain_mm=snow", 2);
+    assert!(said.contains("write one of rain, flow, level"), "{said}");
+    let said = refused("flow", 2);
+    assert!(said.contains("write NAME=KIND"), "{said}");
+    let said = refused("Nied_1h=rain", 65);
+    assert!(
+        said.contains("no file has a covariate \"Nied_1h\": expected one of [\"rain_mm\"]"),
+        "{said}"
+    );
+}
+
+#[test]
 fn a_plot_is_one_svg_and_a_call_without_the_truth_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("life.svg");

@@ -20,4 +20,5 @@ mod serve;
 mod service;
 mod shown;
 mod site;
+mod ways_out;
 mod webhooks;

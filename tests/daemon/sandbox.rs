@@ -1,32 +1,16 @@
 //! Hooks within walls, run for real through the program that walls itself in.
 
+use crate::webhooks::alert;
 use slipwatch::alert::Level;
 use slipwatch::config::{ExtraMessages, HookConfig};
-use slipwatch::monitor::{AlertState, Event, EventKind};
-use slipwatch::reading::BenchmarkId;
 use slipwatch::runtime::deliver;
-use slipwatch::runtime::hook::{Alert, HookOutcome, Status};
+use slipwatch::runtime::hook::HookOutcome;
 use slipwatch::runtime::sandbox::{self, Walls};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tempfile::TempDir;
-
-fn alert() -> Alert {
-    let event = Event {
-        time: "2017-06-06T17:00:00Z".parse().unwrap(),
-        benchmark: Some(BenchmarkId::new("5")),
-        kind: EventKind::Alert {
-            level: Level::Red,
-            state: AlertState::Firing,
-            key: "5/red/1".to_owned(),
-            rule: "chance".to_owned(),
-            text: "text".to_owned(),
-        },
-    };
-    Alert::new(&event, "Toc", None, Status::Test).unwrap()
-}
 
 fn folder() -> TempDir {
     tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap()
@@ -50,9 +34,7 @@ fn walled(folder: &Path, run: &[&str]) -> HookConfig {
         extra: ExtraMessages::default(),
         links: None,
         site: false,
-        webhook: None,
-        cap: None,
-        mqtt: None,
+        to: None,
         escalate_after: None,
         hours: None,
         benchmarks: BTreeSet::new(),
@@ -85,7 +67,10 @@ async fn a_hook_writes_where_it_may_and_nowhere_else() {
     fs::write(at.join("own/hook.sh"), script).unwrap();
     let mut hook = walled(&at.join("own"), &["/bin/sh", "hook.sh"]);
     hook.writable = vec![at.join("allowed"), at.join("not-there")];
-    assert_eq!(deliver::run(&hook, &alert(), 1).await, HookOutcome::Done);
+    assert_eq!(
+        deliver::run(&hook, &alert("5", "5/red/1"), 1).await,
+        HookOutcome::Done
+    );
     let read = |name: &str| fs::read_to_string(at.join(name)).unwrap_or_default();
     assert_eq!(read("own/done"), "", "written elsewhere");
     assert_eq!(read("own/there"), "after\n");
@@ -108,7 +93,7 @@ async fn walls_change_neither_the_arguments_nor_the_environment_nor_stdin() {
         if !launcher {
             hook.launcher = None;
         }
-        outcomes.push(deliver::run(&hook, &alert(), 1).await);
+        outcomes.push(deliver::run(&hook, &alert("5", "5/red/1"), 1).await);
         let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
         assert_eq!(read("args"), "--writable|--|a b|$(touch no)||");
         assert!(read("env").contains("SLIPWATCH_KEY=5/red/1"));
@@ -125,13 +110,13 @@ async fn a_hook_within_walls_that_is_missing_fails_and_one_that_hangs_is_killed(
     let folder = folder();
     let missing = walled(folder.path(), &["./not-there.sh"]);
     assert_eq!(
-        deliver::run(&missing, &alert(), 1).await,
+        deliver::run(&missing, &alert("5", "5/red/1"), 1).await,
         HookOutcome::Failed(126)
     );
     let mut hanging = walled(folder.path(), &["/bin/sh", "-c", "sleep 300 & sleep 300"]);
     hanging.timeout = Duration::from_millis(500);
     assert_eq!(
-        deliver::run(&hanging, &alert(), 1).await,
+        deliver::run(&hanging, &alert("5", "5/red/1"), 1).await,
         HookOutcome::TimedOut
     );
 }
@@ -153,7 +138,10 @@ async fn a_hook_of_a_config_under_a_relative_path_is_found() {
         if !launcher {
             hook.launcher = None;
         }
-        assert_eq!(deliver::run(&hook, &alert(), 1).await, HookOutcome::Done);
+        assert_eq!(
+            deliver::run(&hook, &alert("5", "5/red/1"), 1).await,
+            HookOutcome::Done
+        );
         fs::remove_file(folder.path().join("ran")).unwrap();
     }
 }

@@ -45,6 +45,7 @@ fn recording(measured: &Measured) -> Recording {
         channels: vec![Channel {
             name: RESERVOIR.to_owned(),
             unit: Some("m".to_owned()),
+            stated: None,
             samples: measured.samples.clone(),
         }],
         ..Recording::default()

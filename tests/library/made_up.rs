@@ -37,6 +37,7 @@ pub(crate) fn made_up() -> Recording {
             Channel {
                 name: "lake_level_m".to_owned(),
                 unit: Some("m".to_owned()),
+                stated: None,
                 samples: vec![Sample {
                     time: "1963-08-01T12:00:00Z".parse().unwrap(),
                     value: 650.25,
@@ -45,6 +46,7 @@ pub(crate) fn made_up() -> Recording {
             Channel {
                 name: "quality/of day".to_owned(),
                 unit: None,
+                stated: None,
                 samples: vec![Sample {
                     time: "1963-08-01T12:00:00Z".parse().unwrap(),
                     value: f64::MIN_POSITIVE,

@@ -117,9 +117,11 @@ pub(super) fn of_state(args: &Args, file: &Path) -> anyhow::Result<Material> {
             value: one.value,
         });
         let samples = samples.collect();
+        let stated = config.settings.covariates.get(&name).copied();
         recording.channels.push(Channel {
             name,
             unit,
+            stated,
             samples,
         });
     }

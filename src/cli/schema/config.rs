@@ -1,18 +1,20 @@
 //! The schema of a site file: its keys from the reader itself, what they mean from the example with every key.
 
-use crate::config::{Key, Keys, ValueShape, keys};
+use crate::config::{Key, Keys, ValueShape, keys, way_out_tables};
 use anyhow::Context;
 use serde_json::{Map, Value, json};
 
 /// The config with every key, as it is tested; in lines that begin with `# ` stands what may be added.
 const EXAMPLE: &str = include_str!("../../../config/example.toml");
 /// Where a table says nothing of a key, this one may.
-const LIKE: [(&str, &str); 4] = [
-    ("benchmark.alert", "alert"),
-    ("webhook", "hook"),
-    ("cap", "hook"),
-    ("mqtt_out", "hook"),
-];
+const LIKE: [(&str, &str); 1] = [("benchmark.alert", "alert")];
+
+/// The other table, if there is one.
+fn like(table: &str) -> Option<&'static str> {
+    let stated = LIKE.iter().find(|(one, _)| *one == table);
+    let way_out = || way_out_tables().any(|one| one == table).then_some("hook");
+    stated.map(|(_, other)| *other).or_else(way_out)
+}
 
 /// The schema of the whole file and, by name, those of its tables.
 pub(super) fn schema() -> anyhow::Result<(Value, Map<String, Value>)> {
@@ -51,8 +53,7 @@ fn table(name: &str, keys: &Keys, notes: &[Note]) -> anyhow::Result<Value> {
 
 fn property(table: &str, key: &Key, notes: &[Note]) -> Value {
     let mut schema = of_shape(key.shape);
-    let like = LIKE.iter().find(|(one, _)| *one == table);
-    let tables = [Some(table), like.map(|(_, other)| *other)];
+    let tables = [Some(table), like(table)];
     let of = |table: &str| {
         let of_key = |note: &&Note| note.table == table && note.key == key.name;
         notes.iter().filter(of_key).collect::<Vec<_>>()

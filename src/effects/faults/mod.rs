@@ -215,7 +215,7 @@ impl FaultBench {
     fn take_out_stuck(&mut self) {
         for source in self.sources() {
             if let Source::Channel(index) = source
-                && self.natures[index] == Nature::Rain
+                && self.natures[index].is_rain()
             {
                 continue;
             }

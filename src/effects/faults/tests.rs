@@ -1,7 +1,7 @@
 //! Each fault is found in a made-up series, and its look-alike is left alone.
 
 use super::*;
-use crate::reading::{BenchmarkId, Reading, Sample, Unit, after_days};
+use crate::reading::{BenchmarkId, CovariateKind, Reading, Sample, Unit, after_days};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
@@ -59,6 +59,7 @@ fn channel(name: &str, unit: &str, rows: &[(Timestamp, f64)]) -> Channel {
     Channel {
         name: name.to_owned(),
         unit: Some(unit.to_owned()),
+        stated: None,
         samples: rows.iter().map(sample).collect(),
     }
 }
@@ -164,6 +165,21 @@ fn what_water_does_by_itself_is_no_reset() {
         }
     };
     faultless("rain_mm", "mm", &shower);
+}
+
+#[test]
+fn what_is_stated_of_a_channel_stands_over_its_dry_spells() {
+    let value = |day: usize| match day {
+        100..300 => 0.0,
+        350 => 400.0,
+        _ => 50.0 + noise(5)[day],
+    };
+    let mut gauge = channel("gauge_3", "m", &days(4, value));
+    let nothing = readings(Unit::MM, &[]);
+    let faults = |one: &Channel| found(&inspect(&nothing, std::slice::from_ref(one)));
+    assert_eq!(faults(&gauge), [], "what stands at zero for long is rain");
+    gauge.stated = Some(CovariateKind::Humidity);
+    assert!(faults(&gauge).contains(&(FaultKind::OutOfRange, day(350))));
 }
 
 #[test]

@@ -174,7 +174,7 @@ impl Track {
         events.extend(self.read_again(time, reading.time));
         events.extend(self.record.leave_out_clockless(time));
         if taken == Taken::Newest {
-            events.extend(self.doubt(source, time, context.phase));
+            events.extend(self.doubt(policy, source, time, context.phase));
             if !context.phase.in_batches {
                 events.extend(self.look_back(policy, time));
             }
@@ -199,13 +199,19 @@ impl Track {
     }
 
     /// After the newest reading, of `time`: whether what is read can be what a slope does.
-    fn doubt(&mut self, source: MeasuredAs, time: Timestamp, phase: Phase) -> Vec<Event> {
+    fn doubt(
+        &mut self,
+        policy: &Policy,
+        source: MeasuredAs,
+        time: Timestamp,
+        phase: Phase,
+    ) -> Vec<Event> {
         let mut events = Vec::new();
         if !self.quality.is_accepted(Suspicion::Fall) {
             events.extend(self.record.find_reset(time));
         }
         let level = self.level();
-        events.extend(self.quality.judge_sensor(&mut self.record, level, time));
+        events.extend((self.quality).judge_sensor(&mut self.record, policy, level, time));
         let doubts = (self.quality).suspect(&self.record, source, time, phase.holds_scale);
         events.extend(doubts);
         events

@@ -146,6 +146,7 @@ impl Track {
     /// The past has been gone through: goes on as it leads to. A level from there that has not ended is called.
     pub(in crate::monitor) fn go_on_from(
         &mut self,
+        policy: &Policy,
         now: Timestamp,
         past: PastReplay,
     ) -> Vec<Event> {
@@ -173,7 +174,7 @@ impl Track {
         };
         events.push(self.record.event(now, kind));
         // What a sensor at the end of its range gives is judged by the level.
-        events.extend(self.quality.judge_sensor(&mut self.record, level, now));
+        events.extend((self.quality).judge_sensor(&mut self.record, policy, level, now));
         events
     }
 }

@@ -3,7 +3,7 @@
 //! a map of its own before the parts take what is theirs, and a restart reads thousands of records.
 
 use super::Track;
-use super::alarm::{Alarm, Levels, Overdue};
+use super::alarm::{Alarm, Levels, Occurrences, Overdue};
 use super::forecaster::{Adopted, Forecaster, Pace, Watch};
 use super::pending::{Lookback, PastReview, Pending};
 use super::quality::{DataQuality, Unknown};
@@ -66,6 +66,8 @@ pub(super) struct SavedTrack {
     kept: Option<KeptForecast>,
     #[serde(default)]
     overdue: Option<Overdue>,
+    #[serde(default)]
+    occurrences: Occurrences,
 
     #[serde(default)]
     lookback: Option<Lookback>,
@@ -106,7 +108,8 @@ impl From<SavedTrack> for Track {
                 saved.levels,
                 saved.kept,
                 saved.overdue,
-            ),
+            )
+            .with(saved.occurrences),
             pending: Pending::from_saved(
                 saved.lookback,
                 saved.owes,

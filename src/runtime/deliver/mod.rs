@@ -9,7 +9,8 @@
 mod runner;
 mod worker;
 
-pub use runner::{Processes, Run, Runner, run};
+pub use super::way_out::Run;
+pub use runner::{Processes, Runner, Senders, run};
 
 use super::delivered::Delivered;
 use super::hook::{Alert, MessageState};
@@ -420,15 +421,10 @@ impl Dispatcher {
 }
 
 impl HookConfig {
-    /// What logs and receipts call it: its command line, the name of the webhook or topic, or `cap` and the folder.
+    /// What logs and receipts call it: its command line, or the name of where its alerts go.
     pub fn name(&self) -> String {
-        let webhook = self.webhook.as_ref().map(|webhook| webhook.name.clone());
-        let cap = (self.cap.as_ref()).map(|cap| format!("cap {}", cap.folder.display()));
-        let mqtt = self.mqtt.as_ref().map(|topic| topic.name.clone());
-        webhook
-            .or(cap)
-            .or(mqtt)
-            .unwrap_or_else(|| self.run.join(" "))
+        let to = self.to.as_ref();
+        to.map_or_else(|| self.run.join(" "), |to| to.name())
     }
 
     /// Whether its alerts may wait: for an acknowledgement that does not come in time, or for somebody on duty.

@@ -59,6 +59,7 @@ impl Collector {
                     .or_insert_with_key(|name| Channel {
                         name: name.clone(),
                         unit: unit.clone(),
+                        stated: None,
                         samples: Vec::new(),
                     });
                 if channel.unit != unit {

@@ -153,6 +153,14 @@ pub enum IngestError {
         /// The columns that there are.
         available: Vec<String>,
     },
+    /// A covariate given by name that no file has.
+    #[error("no file has a covariate {name:?}: expected one of {available:?}")]
+    NoSuchCovariate {
+        /// The name that was given.
+        name: String,
+        /// The covariates that there are.
+        available: Vec<String>,
+    },
     /// A file of covariates that holds none.
     #[error("{}: found benchmarks only, expected at least one covariate channel", file.display())]
     NoChannels {

@@ -5,6 +5,8 @@
 use super::session::{NoConnection, may_be_another_version, transport};
 use crate::config::MqttTopic;
 use crate::runtime::hook::HookOutcome;
+use crate::runtime::way_out::{DeliveryAttempt, WayOut, destination};
+use crate::runtime::{link, tls};
 use rumqttc::v5::mqttbytes::QoS as QoS5;
 use rumqttc::v5::mqttbytes::v5::{Packet as Packet5, PubAckReason};
 use rumqttc::{self as v3, QoS, v5};
@@ -16,12 +18,40 @@ const LONGEST_PACKET: u32 = 1 << 20;
 /// Requests of one connection: the message, and its end.
 const REQUESTS: usize = 2;
 
+/// A topic of a broker.
+pub(in crate::runtime) static MQTT_OUT: WayOut = WayOut {
+    table: "mqtt_out",
+    send: |delivery| Box::pin(send(delivery)),
+    ready: |hook| {
+        let topic: &MqttTopic = destination(hook)?;
+        let name = &topic.name;
+        match topic.ca_file.as_deref().map(tls::own).transpose() {
+            Ok(_) => Ok(format!(
+                "{name} has what it needs; hook test publishes to it"
+            )),
+            Err(error) => Err(format!("{name}: {error}")),
+        }
+    },
+};
+
+async fn send(delivery: DeliveryAttempt) -> HookOutcome {
+    let to: &MqttTopic = match delivery.to() {
+        Ok(to) => to,
+        Err(outcome) => return outcome,
+    };
+    let (hook, alert, attempt) = (&delivery.hook, &delivery.alert, delivery.attempt);
+    let link = link::of(hook, alert).await;
+    let outcome = match alert.body(attempt, link.as_deref()) {
+        Ok(body) => publish(to, body, hook.timeout).await,
+        Err(error) => HookOutcome::NotStarted(error.to_string()),
+    };
+    let (name, key) = (&to.name, &alert.key);
+    tracing::info!(name, key, attempt, ?outcome, "MQTT message ended");
+    outcome
+}
+
 /// Publishes `body` within `limit`.
-pub(in crate::runtime) async fn publish(
-    to: &MqttTopic,
-    body: Vec<u8>,
-    limit: Duration,
-) -> HookOutcome {
+async fn publish(to: &MqttTopic, body: Vec<u8>, limit: Duration) -> HookOutcome {
     match tokio::time::timeout(limit, published(to, body)).await {
         Ok(Ok(())) => HookOutcome::Done,
         Ok(Err(error)) => HookOutcome::NotStarted(format!("{}: {error}", to.name)),

@@ -2,6 +2,7 @@
 
 mod recording;
 mod refused;
+mod stated;
 mod track;
 mod unfed;
 mod view;
@@ -18,7 +19,8 @@ use super::tail::{Arrival, Decoder, LinesRead, TextReader, list};
 use crate::config::{Config, FileSource, SourceKind};
 use crate::monitor::Input;
 use crate::reading::{
-    BenchmarkId, LocalClock, MissingValues, Quantity, SummerTime, Suspicion, Timestamp, suspicion,
+    BenchmarkId, CovariateKind, LocalClock, MissingValues, Quantity, SummerTime, Suspicion,
+    Timestamp, suspicion,
 };
 use crate::store::Store;
 use recording::read_recording;
@@ -41,6 +43,7 @@ const AHEAD: &str = "ahead of the clock";
 pub fn preview(config: &Config) -> Preview {
     let mut look = PreviewSoFar {
         accepted: config.settings.accepted.clone(),
+        stated: config.settings.covariates.clone(),
         now: clock::now(),
         ..PreviewSoFar::default()
     };
@@ -49,6 +52,7 @@ pub fn preview(config: &Config) -> Preview {
     }
     let mut preview = look.finish(config);
     preview.unfed = unfed::unfed(&preview, config);
+    preview.absent = stated::absent(&preview, config);
     preview
 }
 
@@ -82,6 +86,8 @@ struct PreviewSoFar {
     /// Sources that have readings of a benchmark which the config takes from another one.
     elsewhere: BTreeSet<(String, BenchmarkId)>,
     accepted: BTreeMap<BenchmarkId, BTreeSet<Suspicion>>,
+    /// What the config states of covariates.
+    stated: BTreeMap<String, CovariateKind>,
     values: u64,
     now: Timestamp,
 }
@@ -286,7 +292,10 @@ impl PreviewSoFar {
         } else if why.is_none()
             && let Input::Sample { channel, unit, .. } = arrival.input
         {
+            let stated = self.stated.get(&channel).copied();
             self.sample(CovariateView {
+                kind: CovariateKind::stated_or_of(stated, &channel, unit.as_deref()),
+                is_stated: stated.is_some(),
                 name: channel,
                 unit,
                 source,
@@ -383,6 +392,7 @@ impl PreviewSoFar {
             benchmarks,
             covariates: self.covariates.into_values().collect(),
             unfed: Vec::new(),
+            absent: Vec::new(),
         }
     }
 }

@@ -126,6 +126,7 @@ fn kind_of(error: &IngestError) -> String {
         | IngestError::EmptyColumn { .. }
         | IngestError::Empty { .. }
         | IngestError::NoSuchColumn { .. }
+        | IngestError::NoSuchCovariate { .. }
         | IngestError::NoChannels { .. }
         | IngestError::Damaged { .. }
         | IngestError::MessageCount { .. }

@@ -1,6 +1,7 @@
 //! What a look at a site's files has found.
 
-use crate::reading::{BenchmarkId, Quantity, Timestamp, Unit};
+use crate::config::ConfigProblem;
+use crate::reading::{BenchmarkId, CovariateKind, Quantity, Timestamp, Unit};
 use crate::runtime::ingest::Meaning;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -20,6 +21,9 @@ pub struct Preview {
     pub unwatched: BTreeSet<BenchmarkId>,
     /// What no file feeds.
     pub unfed: Vec<Unfed>,
+    /// Covariates that the config states and no file has: these are among the warnings.
+    #[serde(skip)]
+    pub absent: Vec<ConfigProblem>,
     /// Whether everything was looked at, and not the first values of very many alone.
     pub is_whole: bool,
 }
@@ -151,6 +155,10 @@ pub struct CovariateView {
     pub name: String,
     /// Its unit, where the name says it.
     pub unit: Option<String>,
+    /// What it measures: as `[[covariate]]` states it, or else as its unit and its name say.
+    pub kind: CovariateKind,
+    /// Whether the config states that.
+    pub is_stated: bool,
     /// Where it comes from.
     pub source: String,
     /// How many values there are.

@@ -124,6 +124,7 @@ fn take(
             let one = (channels.entry(channel.to_owned())).or_insert_with_key(|name| Channel {
                 name: name.clone(),
                 unit: unit.map(str::to_owned),
+                stated: None,
                 samples: Vec::new(),
             });
             one.samples.push(*sample);

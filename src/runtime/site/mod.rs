@@ -26,7 +26,7 @@ use standing_floods::StandingFlood;
 use timekeeper::Timekeeper;
 
 use crate::monitor::{Event, EventKind, Input, Monitor, Order, RESET_FOUND, SUSPECT, Settings};
-use crate::reading::{BenchmarkId, Timestamp};
+use crate::reading::{BEFORE_ALL, BenchmarkId, Timestamp};
 use crate::runtime::deliver::Dispatcher;
 use crate::runtime::hook::{Alert, Status};
 use crate::runtime::searches::Searches;
@@ -54,8 +54,6 @@ const STEPS_A_BENCHMARK: usize = 20;
 const STEPS_UNJUDGED: usize = 10;
 /// The site's own part of the memory, beside those of the monitor.
 const OWN: &str = "\0site";
-/// Before all readings: the data time of what is said before there is one.
-pub const BEFORE_ALL: Timestamp = Timestamp::constant(-9_223_372_036, 0);
 
 /// Where a site's events go.
 #[derive(Debug)]

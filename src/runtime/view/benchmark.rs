@@ -5,7 +5,9 @@ use super::thin::{self, ThinPoint};
 use super::{EARLIEST, LATEST, SiteReader, held, read};
 use crate::fit::{Observations, Rate, RateOptions};
 use crate::forecast::InverseVelocityLine;
-use crate::monitor::{CalledLevel, Event, EventKind, FailureTime, LevelStretch, levels_in, recent};
+use crate::monitor::{
+    CalledLevel, Event, EventKind, FailureTime, KindShown, LevelStretch, levels_in, recent,
+};
 use crate::reading::{
     BenchmarkId, Quantity, Reading, SECONDS_PER_DAY, Series, Timestamp, Unit, days_since,
 };
@@ -14,7 +16,7 @@ use crate::runtime::standing::in_force;
 use crate::store::{StoreError, Value, Values};
 use schemars::JsonSchema;
 use serde::Serialize;
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 /// Readings that are looked at for one answer, the newest.
 const MOST_READINGS: usize = 200_000;
@@ -25,20 +27,6 @@ const BUCKETS: usize = 400;
 const VELOCITIES: usize = 400;
 /// Events of one kind that are listed, the newest.
 const MOST_EVENTS: usize = 300;
-/// What is marked on the axis of time.
-const MARKED: [&str; 10] = [
-    "regime-flip",
-    "intercept-drift",
-    "transition-drift",
-    "unexplained-residual",
-    "effect-found",
-    "effect-dropped",
-    "fault",
-    "declared",
-    "correction",
-    "order",
-];
-
 /// What is asked for.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct TimeWindow {
@@ -157,12 +145,20 @@ pub struct BenchmarkView {
     pub covariates: Vec<Covariate>,
     /// What was found, declared, ordered.
     pub marks: Vec<Event>,
+    /// The letter of each kind of them on the axis of time.
+    pub letters: BTreeMap<&'static str, char>,
     /// Alerts, newest first.
     pub alerts: Vec<Event>,
     /// Who has seen what is in force, on the whole site.
     pub acknowledged: Vec<Event>,
     /// The orders in force by which alerts are not reported, on the whole site.
     pub silences: Vec<Event>,
+}
+
+/// The kinds of event that are marked on the axis of time.
+fn marked() -> impl Iterator<Item = KindShown> {
+    let kinds = EventKind::SHOWN.into_iter();
+    kinds.filter(|kind| kind.letter.is_some())
 }
 
 impl SiteReader {
@@ -226,6 +222,9 @@ impl SiteReader {
             unknown,
             covariates: self.covariates((from, to), known, buckets)?,
             marks: self.marks(name, known)?,
+            letters: marked()
+                .filter_map(|kind| Some((kind.name, kind.letter?)))
+                .collect(),
             alerts,
         }))
     }
@@ -313,8 +312,8 @@ impl SiteReader {
 
     fn marks(&self, name: &str, until: Timestamp) -> Result<Vec<Event>, StoreError> {
         let mut marks = Vec::new();
-        for kind in MARKED {
-            marks.extend(self.events((name, kind), (EARLIEST, until))?);
+        for kind in marked() {
+            marks.extend(self.events((name, kind.name), (EARLIEST, until))?);
         }
         marks.sort_by_key(|event| event.time);
         Ok(marks)

@@ -197,17 +197,10 @@ impl SiteReader {
 
     fn log(&self, at: Option<Timestamp>) -> Result<Vec<Event>, StoreError> {
         let mut log = Vec::new();
-        for kind in [
-            "alert",
-            "together",
-            "fault",
-            "order",
-            "correction",
-            "declared",
-        ] {
+        for kind in EventKind::SHOWN.iter().filter(|kind| kind.is_listed) {
             for body in self
                 .store
-                .newest_events(kind, at.unwrap_or(LATEST), LISTED)?
+                .newest_events(kind.name, at.unwrap_or(LATEST), LISTED)?
             {
                 log.push(read::<Event>(&body)?);
             }

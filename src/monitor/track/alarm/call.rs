@@ -41,9 +41,15 @@ impl Alarm {
             events.push(record.fault(time, "moves-backwards", text));
         }
         if self.backwards {
-            self.attend(policy, time, AlertCause::MovesBackwards);
-            evidence.causes.push(AlertCause::MovesBackwards);
+            let cause = AlertCause::MovesBackwards;
+            if was_backwards {
+                self.attend_further(policy, time, cause);
+            } else {
+                self.attend(policy, time, cause);
+            }
+            evidence.causes.push(cause);
         }
+        evidence.unusual = self.occurrences.calling(time);
         evidence.early_quantile_days = forecast.and_then(|forecast| {
             let outlook = forecast.in_force(days(policy.outlook));
             outlook.collapse.quantile(EARLY, HORIZON_DAYS)

@@ -2,6 +2,7 @@
 
 mod call;
 mod levels;
+mod occurrences;
 mod overdue;
 mod resolved;
 
@@ -17,6 +18,7 @@ use crate::reading::Timestamp;
 use serde::Serialize;
 
 pub(super) use levels::Levels;
+pub(super) use occurrences::Occurrences;
 pub(super) use overdue::Overdue;
 
 /// What is called at one benchmark.
@@ -25,7 +27,7 @@ pub(super) struct Alarm {
     latch: Latch,
     /// Since when the site's own rules have held.
     held: Held,
-    /// What happened that calls at least yellow, and until when it does.
+    /// What happened that the site's own rules may ask for, and until when it counts.
     #[serde(rename = "look")]
     attention_until: Option<(Timestamp, AlertCause)>,
     /// Whether the slope is taken to move upslope.
@@ -35,6 +37,8 @@ pub(super) struct Alarm {
     kept: Option<KeptForecast>,
     /// What that leaves to the time after it.
     overdue: Option<Overdue>,
+    /// What happened, and whether it calls at least yellow.
+    occurrences: Occurrences,
 }
 
 /// What a level rests on beside the forecast.
@@ -75,6 +79,15 @@ impl Alarm {
             levels,
             kept,
             overdue,
+            occurrences: Occurrences::default(),
+        }
+    }
+
+    /// The same with what has happened of late.
+    pub(super) fn with(self, occurrences: Occurrences) -> Self {
+        Self {
+            occurrences,
+            ..self
         }
     }
 
@@ -96,8 +109,20 @@ impl Alarm {
         self.kept.as_ref()
     }
 
-    /// Something happened at `time` that calls at least yellow, for as long as a slope must be steady for its level to fall.
+    /// Something happened at `time` that counts for as long as a slope must be steady for its level to fall; where it is not
+    /// usual it calls yellow.
     pub(super) fn attend(&mut self, policy: &Policy, time: Timestamp, cause: AlertCause) {
+        self.occurrences.note(policy, time, cause);
+        self.count(policy, time, cause);
+    }
+
+    /// What was attended to goes on at `time`: it counts for longer, and calls yellow for longer if it did.
+    fn attend_further(&mut self, policy: &Policy, time: Timestamp, cause: AlertCause) {
+        self.occurrences.goes_on(policy, time, cause);
+        self.count(policy, time, cause);
+    }
+
+    fn count(&mut self, policy: &Policy, time: Timestamp, cause: AlertCause) {
         let until = time.checked_add(policy.steady_for).ok();
         self.attention_until = until.map(|until| (until, cause));
     }
@@ -124,6 +149,9 @@ impl Alarm {
             return;
         }
         events.append(&mut alerts);
+        if self.level() > Level::Yellow {
+            self.occurrences.led_to_more();
+        }
         match &forecast {
             Some(forecast) => self.await_red(policy, time, forecast),
             None => self.overdue = None,
@@ -139,6 +167,7 @@ impl Alarm {
     /// returned.
     pub(super) fn go_on_from(&mut self, past: Self) -> Option<(Level, Timestamp)> {
         self.held = past.held;
+        self.occurrences = past.occurrences;
         let (level, since) = past.latch.in_force()?;
         if level <= self.level() {
             return None;

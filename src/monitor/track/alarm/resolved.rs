@@ -22,6 +22,7 @@ impl Alarm {
         self.latch.resolve(now);
         self.levels.note(now, &self.latch);
         (self.attention_until, self.kept, self.overdue) = (None, None, None);
+        self.occurrences.end();
         let by = given.by.as_deref().unwrap_or("somebody");
         let why = (given.why.as_ref()).map_or_else(String::new, |why| format!(": {why}"));
         let text = format!(

@@ -3,8 +3,9 @@
 
 use super::DataQuality;
 use super::unknown::Reason;
-use crate::alert::Level;
+use crate::alert::{Level, Policy};
 use crate::monitor::event::Event;
+use crate::monitor::track::days;
 use crate::monitor::track::record::BenchmarkRecord;
 use crate::reading::{Timestamp, figure};
 
@@ -12,6 +13,8 @@ use crate::reading::{Timestamp, figure};
 const FEW_OTHERS: u32 = 3;
 /// And where it has.
 const MANY_OTHERS: u32 = 24;
+/// For so much of an evacuation time a slope at the critical velocity must show.
+const SHOWS_WITHIN: i32 = 4;
 /// A benchmark with fewer readings has hardly been read.
 const HARDLY_READ: usize = 3;
 
@@ -21,6 +24,7 @@ impl DataQuality {
     pub(in crate::monitor::track) fn judge_sensor(
         &mut self,
         record: &mut BenchmarkRecord,
+        policy: &Policy,
         level: Level,
         time: Timestamp,
     ) -> Vec<Event> {
@@ -36,7 +40,12 @@ impl DataQuality {
             events.extend(self.sticks(record, time, (count, since), what));
         }
         let before = self.spoilt_by;
-        self.spoilt_by = record.history().spoilt(before);
+        let shows_within = days(policy.evacuation_time / SHOWS_WITHIN);
+        let critical = policy.critical_velocity_mm_per_day;
+        let history = record.history();
+        self.spoilt_by = history
+            .spoilt(before)
+            .or_else(|| history.noise_that_hides(critical, shows_within));
         if let (None, Some(by)) = (before, self.spoilt_by) {
             let text = format!(
                 "benchmark {}: many of the latest readings jump back and forth by about {} {} from one reading to the next; \
@@ -188,7 +197,7 @@ mod tests {
         let moving = (0..20).map(|hour| f64::from(hour * hour));
         let mut record = record(moving.chain([400.0; 8]));
         let mut quality = DataQuality::default();
-        let events = quality.judge_sensor(&mut record, Level::Green, at(27));
+        let events = quality.judge_sensor(&mut record, &Policy::default(), Level::Green, at(27));
         assert!(is_fault(&events[0], "stuck-sensor") && events.len() == 2);
         assert!(quality.is_stuck() && quality.shows_motion());
         assert_eq!(record.observations().values.len(), 21);

@@ -4,7 +4,6 @@ import { axisDate, el, figure, minute, percent } from '/page/words.js';
 
 /* global uPlot */
 const LEVELS = ['green', 'yellow', 'orange', 'red', 'unknown'];
-const MARKS = { 'effect-found': 'E', 'effect-dropped': 'e', 'regime-flip': 'R', declared: 'D', fault: 'F', correction: 'C', 'unexplained-residual': '?', order: 'O', 'intercept-drift': 'i', 'transition-drift': 't' };
 /** What lies ahead of the moment, as a share of what lies before. */
 const AHEAD = 0.3;
 /** What lies after the moment, as a share of what lies before it, in a stretch that was chosen. */
@@ -463,7 +462,7 @@ function levels(view) {
     range: () => [0, 1],
     splits: () => [],
     series: () => [{ show: true, paths: () => null, points: { show: false } }],
-    keys: () => Object.entries(MARKS).filter(([kind]) => known.has(kind)).map(([kind, letter]) => [`${letter}: ${kind}`, 'transparent']),
+    keys: () => Object.entries(view.letters).filter(([kind]) => known.has(kind)).map(([kind, letter]) => [`${letter}: ${kind}`, 'transparent']),
     value: () => null,
     over: (plot, { shades }) => clipped(plot, (ctx, bbox) => {
       const x = (time) => plot.valToPos(seconds(time), 'x', true);
@@ -485,7 +484,7 @@ function levels(view) {
         if (!isBeside && seen[1] - seen[0] > ctx.measureText(one.level).width + 8) ctx.fillText(one.level, seen[0] + 4, top + height / 2);
       }
       ctx.fillStyle = shades.third;
-      for (const mark of view.marks) ctx.fillText(MARKS[mark.event] ?? '', x(mark.time), bbox.top + 0.2 * bbox.height);
+      for (const mark of view.marks) ctx.fillText(view.letters[mark.event] ?? '', x(mark.time), bbox.top + 0.2 * bbox.height);
     }),
   };
 }

@@ -213,6 +213,7 @@ fn recording(channel: &str, samples: &[(f64, f64)], read: &[(f64, f64)]) -> Resu
         channels: vec![Channel {
             name: channel.to_owned(),
             unit: None,
+            stated: None,
             samples: samples.collect::<Result<_>>()?,
         }],
         ..Recording::default()

@@ -271,6 +271,7 @@ fn channels(scene: &Scene) -> Option<Vec<Channel>> {
         Some(Channel {
             name: weather.covariate.name().to_owned(),
             unit: Some(weather.covariate.unit().to_owned()),
+            stated: None,
             samples: samples.collect::<Option<_>>()?,
         })
     };

@@ -145,6 +145,7 @@ pub(crate) fn recording() -> Result<Recording> {
     let channel = Channel {
         name: "tinee_flow_m3_s".to_owned(),
         unit: Some("m3_s".to_owned()),
+        stated: None,
         samples: flow.collect(),
     };
     Ok(Recording {

@@ -110,6 +110,7 @@ pub(crate) fn recording() -> Result<Recording> {
     let channel = Channel {
         name: "reservoir_level_m".to_owned(),
         unit: Some("m".to_owned()),
+        stated: None,
         samples: levels.collect(),
     };
     Ok(Recording {
