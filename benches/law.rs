@@ -5,7 +5,7 @@
 use divan::{Bencher, black_box};
 use slipwatch::fit::{Assumptions, LawDraws, Observation, Observations, RateOptions};
 use slipwatch::forecast::LawForecaster;
-use slipwatch::model::{Accuracy, Law, Load, LoadedLaw, Motion, Sensitivities, Trajectory};
+use slipwatch::model::{Accuracy, Law, Load, LoadedLaw, Motion, Trajectory};
 use slipwatch::reading::{BenchmarkId, Quantity, days_since};
 use slipwatch::runtime::ingest::{ReadOptions, read_files};
 use std::path::Path;
@@ -50,14 +50,6 @@ fn trajectory_of_an_unstable_slope(accuracy: Accuracy) -> Trajectory {
 fn trajectory_of_a_stable_slope(accuracy: Accuracy) -> Trajectory {
     let law = Law::from_paper(0.98, 39.0, 1.0, 1.0).unwrap();
     Trajectory::solve(black_box(&law), 400.0, accuracy)
-}
-
-/// With the derivatives by every parameter, to set beside the solution alone.
-#[divan::bench(args = [Accuracy::Fit, Accuracy::Full])]
-fn sensitivities_of_an_unstable_slope(bencher: Bencher, accuracy: Accuracy) {
-    let law = Law::from_paper(1.35, 0.6, 1.0, 1.0).unwrap();
-    let mut solution = Sensitivities::solve(&law, 1.28, accuracy);
-    bencher.bench_local(|| solution.solve_again(black_box(&law), 1.28, accuracy));
 }
 
 /// A year of daily loads, read on 67 days.

@@ -1,14 +1,14 @@
 //! Where a law goes: its slope, its steady state, its inflection, its failure, and when.
 
+use super::box_cox::inverse_box_cox_ln;
 use super::coefficients::Coefficients;
 use super::law::{Law, SteadyState};
-use super::scalar::inverse_box_cox_ln;
 use super::tail;
 
 impl Law {
     /// dy/dt at inverse velocity y, 1/day.
     pub fn slope(&self, y: f64) -> f64 {
-        Coefficients::<f64>::of(self).slope_at_ln(y.ln())
+        Coefficients::of(self).slope_at_ln(y.ln())
     }
 
     /// ln of the y at which dy/dt is zero, where there is one.
@@ -16,7 +16,7 @@ impl Law {
         if self.kappa == 0.0 {
             return None;
         }
-        let ln_y = Coefficients::<f64>::of(self).ln_y_steady();
+        let ln_y = Coefficients::of(self).ln_y_steady();
         ln_y.is_finite().then_some(ln_y)
     }
 

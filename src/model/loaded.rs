@@ -56,7 +56,7 @@ struct TaylorStep {
     y: PowerSeries,
     slip: PowerSeries,
     /// In place of the series, where the block stays beside a steady state.
-    relaxation: Option<Relaxation<f64>>,
+    relaxation: Option<Relaxation>,
 }
 
 /// What comes after a step.
@@ -168,7 +168,7 @@ impl<'a> LoadedLaw<'a> {
     }
 
     /// The rest of a stretch whose load stands still, beside a steady state that attracts.
-    fn relaxation(&self, block: &BlockState, stretch: LoadStretch) -> Option<Relaxation<f64>> {
+    fn relaxation(&self, block: &BlockState, stretch: LoadStretch) -> Option<Relaxation> {
         if stretch.per_day != 0.0 {
             return None;
         }

@@ -4,6 +4,7 @@
 //! `dy/dt = -r + kappa (y^p - 1)/p`, finite and smooth through m = 1.
 
 mod accuracy;
+mod box_cox;
 mod coefficients;
 mod driven;
 mod law;
@@ -12,8 +13,6 @@ mod load;
 mod loaded;
 mod path;
 mod relaxation;
-mod scalar;
-mod sensitivity;
 mod tail;
 mod taylor;
 mod trajectory;
@@ -23,5 +22,4 @@ pub use driven::{Drive, Driven, LoadEvent};
 pub use law::{Law, LawError, PaperParameters, StateSense, SteadyState};
 pub use load::Load;
 pub use loaded::LoadedLaw;
-pub use sensitivity::{DaysWithGradient, Gradient, MotionWithGradients, Sensitivities};
 pub use trajectory::{Motion, Trajectory};

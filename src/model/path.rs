@@ -4,39 +4,38 @@ use super::accuracy::Accuracy;
 use super::coefficients::Coefficients;
 use super::law::Law;
 use super::relaxation::Relaxation;
-use super::scalar::Scalar;
 use super::tail;
 use super::taylor::Segment;
 
 /// Where the segments stop and the last stretch before failure begins: (y, `slip / v_i`) then.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Tail<S> {
+pub(super) struct Tail {
     pub(super) start: f64,
-    pub(super) at: (S, S),
+    pub(super) at: (f64, f64),
     pub(super) failure_days: f64,
 }
 
 /// The pieces of a solution, in the order of time.
 #[derive(Debug, Clone)]
-pub(super) struct SolutionPath<S> {
-    departure: Option<Relaxation<S>>,
-    segments: Vec<Segment<S>>,
-    arrival: Option<Relaxation<S>>,
-    tail: Option<Tail<S>>,
+pub(super) struct SolutionPath {
+    departure: Option<Relaxation>,
+    segments: Vec<Segment>,
+    arrival: Option<Relaxation>,
+    tail: Option<Tail>,
 }
 
 /// What holds at a time asked for.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum PathPlace<S> {
+pub(super) enum PathPlace {
     /// (y, `slip / v_i`).
-    At((S, S)),
+    At((f64, f64)),
     /// So many days before the failure, on the tail.
     BeforeFailure(f64),
     /// Past the failure, or past what was solved.
     Nowhere,
 }
 
-impl<S: Scalar> SolutionPath<S> {
+impl SolutionPath {
     /// Room for a solution; what a slope needs is under 30 segments as a rule.
     pub(super) fn empty() -> Self {
         Self {
@@ -51,7 +50,7 @@ impl<S: Scalar> SolutionPath<S> {
     pub(super) fn solve(
         &mut self,
         law: &Law,
-        coefficients: &Coefficients<S>,
+        coefficients: &Coefficients,
         end_days: f64,
         accuracy: Accuracy,
     ) {
@@ -59,7 +58,7 @@ impl<S: Scalar> SolutionPath<S> {
         (self.departure, self.arrival, self.tail) = (None, None, None);
         let fails = tail::fails_from(law, 0.0);
         let order = accuracy.order();
-        let (mut t, mut at) = (0.0, (S::constant(1.0), S::constant(0.0)));
+        let (mut t, mut at) = (0.0, (1.0, 0.0));
         self.departure = Relaxation::new(coefficients, order, t, at);
         if let Some(departure) = &self.departure {
             if departure.end > end_days {
@@ -69,7 +68,7 @@ impl<S: Scalar> SolutionPath<S> {
             at = departure.at(t);
         }
         while t <= end_days && self.segments.len() < accuracy.most_segments() {
-            if fails && at.0.value().ln() < accuracy.ln_y_of_tail() {
+            if fails && at.0.ln() < accuracy.ln_y_of_tail() {
                 self.tail = Some(Tail {
                     start: t,
                     at,
@@ -90,7 +89,7 @@ impl<S: Scalar> SolutionPath<S> {
             let next = t + segment.span;
             at = segment.at(next);
             self.segments.push(segment);
-            let (y, slip) = (at.0.value(), at.1.value());
+            let (y, slip) = (at.0, at.1);
             if !(next > t && y > 0.0 && y.is_finite() && slip.is_finite()) {
                 return;
             }
@@ -98,12 +97,12 @@ impl<S: Scalar> SolutionPath<S> {
         }
     }
 
-    pub(super) fn tail(&self) -> Option<&Tail<S>> {
+    pub(super) fn tail(&self) -> Option<&Tail> {
         self.tail.as_ref()
     }
 
     /// What holds `t` days after the start.
-    pub(super) fn place(&self, t: f64) -> PathPlace<S> {
+    pub(super) fn place(&self, t: f64) -> PathPlace {
         if let Some(tail) = &self.tail
             && t > tail.start
         {
@@ -127,7 +126,7 @@ impl<S: Scalar> SolutionPath<S> {
         match self.segments.get(index) {
             Some(segment) if t <= segment.start + segment.span * (1.0 + 1e-9) => {
                 let at = segment.at(t);
-                if at.0.value() > 0.0 {
+                if at.0 > 0.0 {
                     PathPlace::At(at)
                 } else {
                     PathPlace::Nowhere

@@ -5,7 +5,6 @@
 
 use super::coefficients::Coefficients;
 use super::law::Law;
-use super::scalar::{box_cox_by_p, box_cox_of_ln};
 
 /// Nodes and weights of 16-point Gauss-Legendre quadrature on [-1, 1] (positive half).
 const NODES: [(f64, f64); 8] = [
@@ -35,11 +34,6 @@ pub(super) fn remaining_days(law: &Law, ln_y: f64) -> f64 {
     days_between(law, ln_y, ln_y - DEEPEST_E_FOLD)
 }
 
-/// The derivatives of [`remaining_days`] by r, kappa and p.
-pub(super) fn remaining_days_by(law: &Law, ln_y: f64) -> [f64; 3] {
-    days_between_by(law, ln_y, ln_y - DEEPEST_E_FOLD)
-}
-
 /// Days that the law takes to accelerate from one inverse velocity to a smaller one.
 pub(super) fn days_between(law: &Law, ln_y_from: f64, ln_y_to: f64) -> f64 {
     if law.kappa == 0.0 {
@@ -47,53 +41,26 @@ pub(super) fn days_between(law: &Law, ln_y_from: f64, ln_y_to: f64) -> f64 {
         return ln_y_from.exp() * -(ln_y_to - ln_y_from).exp_m1() / law.r;
     }
     // y = y_from exp(-s): days = y_from * integral of exp(-s) / (r - kappa bc(y)) ds
-    let integrand = |s: f64| [(-s).exp() / -slope_at_ln(law, ln_y_from - s)];
-    let [days] = integrate_down(law, (ln_y_from, ln_y_to), integrand);
-    ln_y_from.exp() * days
-}
-
-/// The derivatives of [`days_between`] by r, kappa and p.
-pub(super) fn days_between_by(law: &Law, ln_y_from: f64, ln_y_to: f64) -> [f64; 3] {
-    let integrand = |s: f64| pace_by(law, ln_y_from - s).map(|by| (-s).exp() * by);
-    integrate_down(law, (ln_y_from, ln_y_to), integrand).map(|days| ln_y_from.exp() * days)
+    let integrand = |s: f64| (-s).exp() / -slope_at_ln(law, ln_y_from - s);
+    ln_y_from.exp() * integrate_down(law, (ln_y_from, ln_y_to), integrand)
 }
 
 /// Slip over `v_i` between two inverse velocities of an acceleration: d slip / d ln y = 1 / slope.
 pub(super) fn slip_between(law: &Law, ln_y_from: f64, ln_y_to: f64) -> f64 {
-    let integrand = |s: f64| [1.0 / -slope_at_ln(law, ln_y_from - s)];
-    let [slip] = integrate_down(law, (ln_y_from, ln_y_to), integrand);
-    slip
-}
-
-/// The derivatives of [`slip_between`] by r, kappa and p.
-pub(super) fn slip_between_by(law: &Law, ln_y_from: f64, ln_y_to: f64) -> [f64; 3] {
-    integrate_down(law, (ln_y_from, ln_y_to), |s| pace_by(law, ln_y_from - s))
-}
-
-/// The derivatives of 1 / (r - kappa bc(y; p)) by r, kappa and p, at fixed y.
-fn pace_by(law: &Law, ln_y: f64) -> [f64; 3] {
-    let pace = 1.0 / slope_at_ln(law, ln_y);
-    let slopes = [
-        -1.0,
-        box_cox_of_ln(ln_y, law.p),
-        law.kappa * box_cox_by_p(ln_y, law.p),
-    ];
-    slopes.map(|slope| slope * pace * pace)
+    integrate_down(law, (ln_y_from, ln_y_to), |s| {
+        1.0 / -slope_at_ln(law, ln_y_from - s)
+    })
 }
 
 /// Integrates over s = `ln(y_from / y)`. Panels keep their distance from the pole of 1/slope (the steady
 /// state, behind or ahead), so that 16 nodes reach rounding on each.
-fn integrate_down<const N: usize>(
-    law: &Law,
-    span: (f64, f64),
-    integrand: impl Fn(f64) -> [f64; N],
-) -> [f64; N] {
+fn integrate_down(law: &Law, span: (f64, f64), integrand: impl Fn(f64) -> f64) -> f64 {
     let end = span.0 - span.1;
     let pole = law
         .ln_y_steady()
         .map_or(f64::INFINITY, |pole| span.0 - pole);
     let smoothest = 1.5 / law.p.abs().max(1.0);
-    let (mut from, mut sum, mut lost) = (0.0, [0.0; N], [0.0; N]);
+    let (mut from, mut sum, mut lost) = (0.0, 0.0, 0.0);
     for _ in 0..MOST_PANELS {
         if from >= end {
             break;
@@ -105,30 +72,24 @@ fn integrate_down<const N: usize>(
         };
         let least = (4.0 * f64::EPSILON * from).max(f64::MIN_POSITIVE);
         let to = (from + clearance.clamp(least, smoothest.max(0.5 * from).min(6.0))).min(end);
-        let panel = panel(&integrand, from, to);
-        for ((sum, lost), panel) in sum.iter_mut().zip(&mut lost).zip(panel) {
-            // Kahan's summation: a time to failure is asked to its last digits just before it.
-            let term = panel - *lost;
-            let next = *sum + term;
-            *lost = (next - *sum) - term;
-            *sum = next;
-        }
+        // Kahan's summation: a time to failure is asked to its last digits just before it.
+        let term = panel(&integrand, from, to) - lost;
+        let next = sum + term;
+        lost = (next - sum) - term;
+        sum = next;
         from = to;
     }
     sum
 }
 
 /// 16-point Gauss-Legendre quadrature over one panel.
-fn panel<const N: usize>(integrand: &impl Fn(f64) -> [f64; N], from: f64, to: f64) -> [f64; N] {
+fn panel(integrand: &impl Fn(f64) -> f64, from: f64, to: f64) -> f64 {
     let (middle, half) = (f64::midpoint(from, to), (to - from) / 2.0);
-    let mut sum = [0.0; N];
+    let mut sum = 0.0;
     for (x, w) in NODES {
-        let (below, above) = (integrand(middle - half * x), integrand(middle + half * x));
-        for (sum, (below, above)) in sum.iter_mut().zip(below.into_iter().zip(above)) {
-            *sum += w * (below + above);
-        }
+        sum += w * (integrand(middle - half * x) + integrand(middle + half * x));
     }
-    sum.map(|sum| half * sum)
+    half * sum
 }
 
 /// ln y with `remaining` days left, by Newton's method in logarithms from below `ln_y_start`.
@@ -149,5 +110,5 @@ pub(super) fn ln_y_with_remaining(law: &Law, remaining: f64, ln_y_start: f64) ->
 
 /// dy/dt at ln y, 1/day.
 pub(super) fn slope_at_ln(law: &Law, ln_y: f64) -> f64 {
-    Coefficients::<f64>::of(law).slope_at_ln(ln_y)
+    Coefficients::of(law).slope_at_ln(ln_y)
 }

@@ -1,58 +1,56 @@
 //! One Taylor step of the law: y, its Box-Cox transform and the slip, to any order by recurrence.
 
 use super::coefficients::Coefficients;
-use super::scalar::Scalar;
 
 /// The highest order that a segment can hold.
 pub(super) const MAX_ORDER: usize = 30;
 
 /// The coefficients of one polynomial.
-pub(super) type TaylorSeries<S> = [S; MAX_ORDER + 1];
+pub(super) type TaylorSeries = [f64; MAX_ORDER + 1];
 
 /// y(t) and the slip over `v_i` from `start`, as polynomials in (t - start) / `unit`, good up to `span`.
 ///
 /// The unit is the law's own time there: in days the coefficients of a slope that takes 1e12 of them, or
 /// 1e-13, leave the range of f64.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Segment<S> {
+pub(super) struct Segment {
     pub(super) start: f64,
     pub(super) span: f64,
     unit: f64,
     order: usize,
-    y: TaylorSeries<S>,
-    slip: TaylorSeries<S>,
+    y: TaylorSeries,
+    slip: TaylorSeries,
 }
 
-impl<S: Scalar> Segment<S> {
+impl Segment {
     /// Expands the law about `start`, where the inverse velocity is `y_0` and the slip `slip_0`.
     ///
     /// With G = kappa bc(y; p) and K = kappa y^p = kappa + p G: y' = -r + G and y G' = y' K; with u = 1/y:
     /// y u = 1. G and K are of the size of the law's own rates, where bc and y^p alone leave the range of f64.
-    pub(super) fn expand(law: &Coefficients<S>, order: usize, start: f64, at: (S, S)) -> Self {
-        let zero = S::constant(0.0);
+    pub(super) fn expand(law: &Coefficients, order: usize, start: f64, at: (f64, f64)) -> Self {
         let (y_0, slip_0) = at;
-        let mut y = [zero; MAX_ORDER + 1];
-        let mut slip = [zero; MAX_ORDER + 1];
-        let mut u = [zero; MAX_ORDER + 1];
+        let mut y = [0.0; MAX_ORDER + 1];
+        let mut slip = [0.0; MAX_ORDER + 1];
+        let mut u = [0.0; MAX_ORDER + 1];
         // G and G'; g[0] is never needed.
         let (mut g, mut g_slope) = (u, u);
         let ln_y = y_0.ln();
         let slope_per_day = law.slope_at_ln(ln_y);
         let k_per_day = law.kappa * (law.p * ln_y).exp();
         let unit = unit_days(slope_per_day / y_0, k_per_day / y_0);
-        let slope = slope_per_day.scaled(unit);
-        let k_0 = k_per_day.scaled(unit);
+        let slope = slope_per_day * unit;
+        let k_0 = k_per_day * unit;
         // Of slope p G + G K_0.
         let gain = slope * law.p + k_0;
         y[0] = y_0;
         slip[0] = slip_0;
-        u[0] = S::constant(1.0) / y_0;
+        u[0] = 1.0 / y_0;
         let minus_u_0 = -u[0];
         for k in 0..order {
             let over_next = 1.0 / (k + 1) as f64;
             let y_slope = if k == 0 { slope } else { g[k] };
-            y[k + 1] = y_slope.scaled(over_next);
-            slip[k + 1] = u[k].scaled(unit * over_next);
+            y[k + 1] = y_slope * over_next;
+            slip[k + 1] = u[k] * (unit * over_next);
             // Coefficient k of y' K, less the known part of y G'.
             let mut known = if k == 0 {
                 slope * k_0
@@ -61,11 +59,11 @@ impl<S: Scalar> Segment<S> {
             };
             let mut product = y[k + 1] * u[0];
             for j in 0..k {
-                known = known - g_slope[j] * y[k - j];
-                product = product + y[j + 1] * u[k - j];
+                known -= g_slope[j] * y[k - j];
+                product += y[j + 1] * u[k - j];
             }
             g_slope[k] = known * u[0];
-            g[k + 1] = g_slope[k].scaled(over_next);
+            g[k + 1] = g_slope[k] * over_next;
             u[k + 1] = product * minus_u_0;
         }
         let radius = radius(&y, order).min(radius(&u, order));
@@ -80,21 +78,21 @@ impl<S: Scalar> Segment<S> {
     }
 
     /// (y, `slip / v_i`) at time `t`.
-    pub(super) fn at(&self, t: f64) -> (S, S) {
+    pub(super) fn at(&self, t: f64) -> (f64, f64) {
         let h = (t - self.start) / self.unit;
         let mut y = self.y[self.order];
         let mut slip = self.slip[self.order];
         for k in (0..self.order).rev() {
-            y = y.scaled(h) + self.y[k];
-            slip = slip.scaled(h) + self.slip[k];
+            y = y * h + self.y[k];
+            slip = slip * h + self.slip[k];
         }
         (y, slip)
     }
 }
 
 /// Days in which y, or its slope, would change by its own size; 1 where they never do.
-fn unit_days<S: Scalar>(growth: S, curvature: S) -> f64 {
-    let fastest = growth.value().abs().max(curvature.value().abs());
+fn unit_days(growth: f64, curvature: f64) -> f64 {
+    let fastest = growth.abs().max(curvature.abs());
     let unit = 1.0 / fastest;
     if unit.is_finite() && unit > 0.0 {
         unit
@@ -104,12 +102,12 @@ fn unit_days<S: Scalar>(growth: S, curvature: S) -> f64 {
 }
 
 /// The sum of g_j g_(k-j) over 0 < j < k.
-fn square<S: Scalar>(g: &TaylorSeries<S>, k: usize) -> S {
-    let mut half = S::constant(0.0);
+fn square(g: &TaylorSeries, k: usize) -> f64 {
+    let mut half = 0.0;
     for j in 1..k.div_ceil(2) {
-        half = half + g[j] * g[k - j];
+        half += g[j] * g[k - j];
     }
-    let twice = half.scaled(2.0);
+    let twice = 2.0 * half;
     if k > 0 && k.is_multiple_of(2) {
         twice + g[k / 2] * g[k / 2]
     } else {
@@ -118,10 +116,10 @@ fn square<S: Scalar>(g: &TaylorSeries<S>, k: usize) -> S {
 }
 
 /// Estimates the radius of convergence from the two last coefficients.
-pub(super) fn radius<S: Scalar>(c: &TaylorSeries<S>, order: usize) -> f64 {
+pub(super) fn radius(c: &TaylorSeries, order: usize) -> f64 {
     let one = |k: usize| {
-        let share = (c[0].value() / c[k].value()).abs();
-        if c[k].value() == 0.0 {
+        let share = (c[0] / c[k]).abs();
+        if c[k] == 0.0 {
             f64::INFINITY
         } else {
             share.powf(1.0 / k as f64)

@@ -21,7 +21,7 @@ pub struct Motion {
 #[derive(Debug, Clone)]
 pub struct Trajectory {
     law: Law,
-    path: SolutionPath<f64>,
+    path: SolutionPath,
 }
 
 impl Trajectory {
@@ -39,7 +39,7 @@ impl Trajectory {
     /// the second of many like laws on, without allocating.
     pub fn solve_again(&mut self, law: &Law, end_days: f64, accuracy: Accuracy) {
         self.law = *law;
-        let coefficients = Coefficients::<f64>::of(law);
+        let coefficients = Coefficients::of(law);
         self.path.solve(law, &coefficients, end_days, accuracy);
     }
 

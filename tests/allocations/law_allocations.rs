@@ -1,7 +1,7 @@
 //! Solving a law again, reading it, and following it under a load allocate nothing.
 
 use allocation_counter::measure;
-use slipwatch::model::{Accuracy, Law, Load, LoadedLaw, Sensitivities, Trajectory};
+use slipwatch::model::{Accuracy, Law, Load, LoadedLaw, Trajectory};
 
 /// One of every kind: to failure, for ever slower, relaxing from far and from near, and at m = 1.
 fn laws() -> Vec<Law> {
@@ -30,27 +30,23 @@ fn solving_again_and_reading_allocates_nothing() {
     let laws = laws();
     for accuracy in [Accuracy::Fit, Accuracy::Full] {
         let mut solution = Trajectory::solve(&laws[0], 1.0, accuracy);
-        let mut with_gradients = Sensitivities::solve(&laws[0], 1.0, accuracy);
         // Once over all of them, to take the room that the longest needs.
         for law in &laws {
             solution.solve_again(law, 50.0, accuracy);
-            with_gradients.solve_again(law, 50.0, accuracy);
         }
         let mut read = 0;
         let counted = measure(|| {
             for law in &laws {
                 solution.solve_again(law, 50.0, accuracy);
-                with_gradients.solve_again(law, 50.0, accuracy);
                 for step in 0..100 {
                     let t = 0.5 * f64::from(step);
                     read += usize::from(solution.at(t).is_some());
-                    read += usize::from(with_gradients.at(t).is_some());
                 }
                 read += usize::from(solution.failure_days().is_some());
-                read += usize::from(law.days_to_velocity_with_gradient(1e3).is_some());
+                read += usize::from(law.days_to_velocity(1e3).is_some());
             }
         });
-        assert!(read > 600, "{read} motions");
+        assert!(read > 300, "{read} motions");
         assert_eq!(counted.count_total, 0, "{accuracy:?}");
     }
 }

@@ -25,7 +25,6 @@ mod inversion;
 mod late;
 mod law;
 mod law_limits;
-mod law_sensitivities;
 mod loaded;
 mod made_up;
 mod measured;

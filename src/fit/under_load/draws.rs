@@ -184,7 +184,7 @@ mod tests {
 
     #[test]
     fn where_the_load_may_change_the_same_readings_leave_more_laws_open() {
-        let law = Law::from_paper(0.98, 39.0, 1.0, 80.0).unwrap();
+        let law = Law::from_paper(1.35, 0.6, 70.0, 1.0).unwrap();
         let rates = rates(&law);
         let spread = |assumed: &Assumptions| {
             let draws = LawDraws::of(&rates, assumed).unwrap();

@@ -12,12 +12,35 @@ use nalgebra::{Matrix3, Vector3};
 pub(super) const MOST_JOINED: f64 = 8.0;
 /// Walks of less than this share of a start are not counted.
 const RARE_WALK: f64 = 1e-5;
+/// Products of variances are kept within this: far inside of what a float holds.
+const IN_RANGE: (f64, f64) = (1e-60, 1e60);
 
-/// What the rates before one say of the state there, by one walk: ln of their evidence, and of the state (level, what remembers,
-/// error of the reading at the rate's start) mean, covariance and, of the level, the variance before any reading.
+/// A number for each walk.
+type OfWalks = [f64; MOST_DRIFTS];
+
+/// What the rates before one say of the state there (level, what remembers, error of the reading at the rate's start), by each
+/// walk: its mean, its covariance and, of the level, the variance before any reading. Their evidence, ln, is less by half of the
+/// sum of the squares of their misses and of ln of their variances, of which the newest are a product.
+#[derive(Debug, Clone, Copy)]
+struct WalkEnds {
+    squares: OfWalks,
+    ln_variances: OfWalks,
+    variances: OfWalks,
+    level: OfWalks,
+    load: OfWalks,
+    end: OfWalks,
+    level_level: OfWalks,
+    level_load: OfWalks,
+    level_end: OfWalks,
+    load_load: OfWalks,
+    load_end: OfWalks,
+    end_end: OfWalks,
+    prior: OfWalks,
+}
+
+/// The state by one walk, as in [`WalkEnds`].
 #[derive(Debug, Clone, Copy)]
 struct WalkEnd {
-    ln: f64,
     mean: Vector3<f64>,
     covariance: Matrix3<f64>,
     prior: f64,
@@ -26,7 +49,7 @@ struct WalkEnd {
 /// What came before each rate, by every walk.
 #[derive(Debug, Clone, Default)]
 pub(super) struct WalksBefore {
-    ends: [Vec<WalkEnd>; MOST_DRIFTS],
+    ends: Vec<WalkEnds>,
     walks: usize,
     /// Variance of what remembers in the scatter.
     remembered: f64,
@@ -56,37 +79,53 @@ impl WalksBefore {
     pub(super) fn walk(&mut self, record: &RateRecord, memory: &LoadMemory) {
         let drifts = record.assumed.drifts_before;
         self.walks = drifts.len().min(MOST_DRIFTS);
-        self.remembered = memory.noise().sigma.powi(2);
-        for (ends, drift) in self.ends.iter_mut().zip(drifts) {
-            walk(ends, record, memory, *drift);
-        }
+        let noise = memory.noise();
+        let variance = noise.sigma.powi(2);
+        self.remembered = variance;
+        self.ends.clear();
         self.ln.clear();
-        for index in 0..record.from.len() {
-            let each = self.ends[..self.walks].iter().map(|ends| ends[index].ln);
-            let best = each.clone().fold(f64::NEG_INFINITY, f64::max);
-            let sum: f64 = each.map(|ln| (ln - best).exp()).sum();
+        let squares =
+            std::array::from_fn(|which| drifts.get(which).map_or(0.0, |drift| drift * drift));
+        let count = record.from.len();
+        let mut at = WalkEnds::before_any(variance);
+        for index in 0..count {
+            if index > 0 {
+                let (keep, ..) = memory.of_rate(count - index);
+                let both = record.white[index - 1].recip() + record.white[index].recip();
+                at.go_on(
+                    keep,
+                    variance,
+                    squares.map(|square: f64| 0.5 * square * both),
+                );
+                if !record.ends_where_next_begins(index - 1) {
+                    at.at_a_new_reading();
+                }
+            }
             let of_start = record
                 .assumed
                 .from_the_first
                 .map_or(0.0, |first| ln_prior_of_start(record, index, first));
-            self.ln
-                .push(best + (sum / self.walks as f64).ln() + of_start);
+            let (_, ln_sum) = at.likelihoods(self.walks);
+            self.ln.push(ln_sum - (self.walks as f64).ln() + of_start);
+            self.ends.push(at);
+            let (_, sees, lacks) = memory.of_rate(count - 1 - index);
+            let (error, of_ends) = record.own_and_ends(index, noise);
+            at.read(record.ln_velocity[index], (error + lacks, of_ends), sees);
         }
     }
 
     /// The walks before the rate `index`, each joined to a law that begins with it.
     fn joined(&self, index: usize, law: &FromTheStart) -> [Option<JoinedWalk>; MOST_DRIFTS] {
-        let ends = &self.ends[..self.walks];
-        let best = ends
-            .iter()
-            .map(|ends| ends[index].ln)
-            .fold(f64::NEG_INFINITY, f64::max);
-        let sum: f64 = ends.iter().map(|ends| (ends[index].ln - best).exp()).sum();
         let mut joined = [None; MOST_DRIFTS];
-        for (slot, ends) in joined.iter_mut().zip(ends) {
-            let end = &ends[index];
-            let share = (end.ln - best).exp() / sum;
+        let Some(ends) = self.ends.get(index) else {
+            return joined;
+        };
+        let (likelihoods, _) = ends.likelihoods(self.walks);
+        let sum: f64 = likelihoods.iter().sum();
+        for (which, (slot, likelihood)) in joined.iter_mut().zip(likelihoods).enumerate() {
+            let share = likelihood / sum;
             if share > RARE_WALK {
+                let end = ends.of_walk(which);
                 *slot = end.join(law, self.remembered).map(|found| JoinedWalk {
                     ln: found.ln + share.ln(),
                     ..found
@@ -97,75 +136,123 @@ impl WalksBefore {
     }
 }
 
-/// Walks once through the record, with that standard deviation of ln v from one reading to the next.
-fn walk(ends: &mut Vec<WalkEnd>, record: &RateRecord, memory: &LoadMemory, drift: f64) {
-    let count = record.from.len();
-    let noise = memory.noise();
-    let variance = noise.sigma.powi(2);
-    let mut at = WalkEnd {
-        ln: 0.0,
-        mean: Vector3::zeros(),
-        covariance: Matrix3::from_diagonal(&Vector3::new(LEVEL_VARIANCE, variance, 1.0)),
-        prior: LEVEL_VARIANCE,
-    };
-    ends.clear();
-    for index in 0..count {
-        if index > 0 {
-            let (keep, ..) = memory.of_rate(count - index);
-            let both = record.white[index - 1].recip() + record.white[index].recip();
-            let drifted = 0.5 * drift * drift * both;
-            at.go_on(keep, variance, drifted);
-            if !record.ends_where_next_begins(index - 1) {
-                at.at_a_new_reading();
-            }
+impl WalkEnds {
+    /// Before any reading: what remembers has this variance.
+    fn before_any(variance: f64) -> Self {
+        let none = [0.0; MOST_DRIFTS];
+        Self {
+            squares: none,
+            ln_variances: none,
+            variances: [1.0; MOST_DRIFTS],
+            level: none,
+            load: none,
+            end: none,
+            level_level: [LEVEL_VARIANCE; MOST_DRIFTS],
+            level_load: none,
+            level_end: none,
+            load_load: [variance; MOST_DRIFTS],
+            load_end: none,
+            end_end: [1.0; MOST_DRIFTS],
+            prior: [LEVEL_VARIANCE; MOST_DRIFTS],
         }
-        ends.push(at);
-        let (_, sees, lacks) = memory.of_rate(count - 1 - index);
-        let (error, of_ends) = record.own_and_ends(index, noise);
-        at.read(record.ln_velocity[index], (error + lacks, of_ends), sees);
     }
-}
 
-impl WalkEnd {
-    /// To the next rate: `keep` of what remembers is left, and the level drifts by the variance `drifted`.
-    fn go_on(&mut self, keep: f64, variance: f64, drifted: f64) {
-        let keeps = Matrix3::from_diagonal(&Vector3::new(1.0, keep, 1.0));
-        self.mean = keeps * self.mean;
-        self.covariance = keeps * self.covariance * keeps;
-        self.covariance[(0, 0)] += drifted;
-        self.covariance[(1, 1)] += variance * (1.0 - keep * keep);
-        self.prior += drifted;
+    /// To the next rate: `keep` of what remembers is left, and the levels drift by the variances `drifted`.
+    fn go_on(&mut self, keep: f64, variance: f64, drifted: OfWalks) {
+        for (walk, drifted) in drifted.iter().enumerate() {
+            self.load[walk] *= keep;
+            self.level_load[walk] *= keep;
+            self.load_end[walk] *= keep;
+            self.load_load[walk] =
+                keep * keep * self.load_load[walk] + variance * (1.0 - keep * keep);
+            self.level_level[walk] += drifted;
+            self.prior[walk] += drifted;
+        }
     }
 
     /// The next rate begins with a reading that no rate so far has ended with.
     fn at_a_new_reading(&mut self) {
-        self.mean[2] = 0.0;
-        for other in 0..2 {
-            self.covariance[(2, other)] = 0.0;
-            self.covariance[(other, 2)] = 0.0;
-        }
-        self.covariance[(2, 2)] = 1.0;
+        self.end = [0.0; MOST_DRIFTS];
+        self.level_end = [0.0; MOST_DRIFTS];
+        self.load_end = [0.0; MOST_DRIFTS];
+        self.end_end = [1.0; MOST_DRIFTS];
     }
 
     /// Takes a rate of that variance of its error, which the readings at its two ends move by so much each.
     fn read(&mut self, read: f64, (error, ends): (f64, f64), sees: f64) {
-        let seen = Vector3::new(1.0, sees, -ends);
-        let mut moved = self.covariance * seen;
-        let s = (seen.dot(&moved) + error + ends * ends).max(1e-12);
-        let miss = read - seen.dot(&self.mean);
-        self.ln -= 0.5 * (miss * miss / s + s.ln());
-        // From here on the third is the error of the reading at the rate's end.
-        moved[2] = ends;
-        self.mean[2] = 0.0;
-        for other in 0..2 {
-            self.covariance[(2, other)] = 0.0;
-            self.covariance[(other, 2)] = 0.0;
+        for walk in 0..MOST_DRIFTS {
+            let level =
+                self.level_level[walk] + sees * self.level_load[walk] - ends * self.level_end[walk];
+            let load =
+                self.level_load[walk] + sees * self.load_load[walk] - ends * self.load_end[walk];
+            let end = self.level_end[walk] + sees * self.load_end[walk] - ends * self.end_end[walk];
+            let s = (level + sees * load - ends * end + error + ends * ends).max(1e-12);
+            let expected = self.level[walk] + sees * self.load[walk] - ends * self.end[walk];
+            let miss = read - expected;
+            let (precision, gain) = (1.0 / s, miss / s);
+            self.squares[walk] += miss * gain;
+            self.variances[walk] *= s;
+            self.level[walk] += level * gain;
+            self.load[walk] += load * gain;
+            // From here on the third is the error of the reading at the rate's end.
+            self.end[walk] = ends * gain;
+            self.level_level[walk] -= level * level * precision;
+            self.level_load[walk] -= level * load * precision;
+            self.load_load[walk] -= load * load * precision;
+            self.level_end[walk] = -level * ends * precision;
+            self.load_end[walk] = -load * ends * precision;
+            self.end_end[walk] = 1.0 - ends * ends * precision;
         }
-        self.covariance[(2, 2)] = 1.0;
-        self.mean += moved * (miss / s);
-        self.covariance -= moved * moved.transpose() / s;
+        self.keep_products_in_range();
     }
 
+    fn keep_products_in_range(&mut self) {
+        let is_inside = |product: &f64| (IN_RANGE.0..IN_RANGE.1).contains(product);
+        if self.variances.iter().all(is_inside) {
+            return;
+        }
+        for (ln, product) in self.ln_variances.iter_mut().zip(&mut self.variances) {
+            *ln += product.ln();
+            *product = 1.0;
+        }
+    }
+
+    /// The likelihoods of the first so many walks, in the same units, and ln of the sum of their evidence.
+    fn likelihoods(&self, walks: usize) -> (OfWalks, f64) {
+        let twice: OfWalks =
+            std::array::from_fn(|walk| self.squares[walk] + self.ln_variances[walk]);
+        let least = twice[..walks].iter().copied().fold(f64::INFINITY, f64::min);
+        let mut likelihoods = [0.0; MOST_DRIFTS];
+        for (walk, likelihood) in likelihoods.iter_mut().enumerate().take(walks) {
+            let of_variances = (self.variances[0] / self.variances[walk]).sqrt();
+            *likelihood = (-0.5 * (twice[walk] - least)).exp() * of_variances;
+        }
+        let sum: f64 = likelihoods.iter().sum();
+        let ln_sum = -0.5 * least + (sum / self.variances[0].sqrt()).ln();
+        (likelihoods, ln_sum)
+    }
+
+    /// What one walk says of the state.
+    fn of_walk(&self, walk: usize) -> WalkEnd {
+        WalkEnd {
+            mean: Vector3::new(self.level[walk], self.load[walk], self.end[walk]),
+            covariance: Matrix3::new(
+                self.level_level[walk],
+                self.level_load[walk],
+                self.level_end[walk],
+                self.level_load[walk],
+                self.load_load[walk],
+                self.load_end[walk],
+                self.level_end[walk],
+                self.load_end[walk],
+                self.end_end[walk],
+            ),
+            prior: self.prior[walk],
+        }
+    }
+}
+
+impl WalkEnd {
     /// How much likelier the walk is together with what the law says of the state than apart, ln, and where its level is then.
     fn join(&self, law: &FromTheStart, remembered: f64) -> Option<JoinedWalk> {
         let own = self.covariance.try_inverse()?;
@@ -177,9 +264,8 @@ impl WalkEnd {
         let mean = covariance * pull;
         let squares = self.mean.dot(&(own * self.mean)) + law.mean.dot(&(law.precision * law.mean))
             - pull.dot(&mean);
-        let determinants = self.covariance.determinant().ln() + law.ln_determinant
-            - before.product().ln()
-            + precision.determinant().ln();
+        let determinants = self.covariance.determinant() * precision.determinant();
+        let determinants = (determinants / before.product()).ln() + law.ln_determinant;
         let ln = -0.5 * (squares + determinants);
         (ln.is_finite() && covariance[(0, 0)] > 0.0).then_some(JoinedWalk {
             ln,

@@ -23,6 +23,8 @@ const FAILED: f64 = 1e13;
 /// A start found within this factor of the true distance from the present is the true one.
 const SAME_START: f64 = 1.05;
 const BINS: u32 = 10;
+/// Multiples of this, less their whole part, are spread evenly over 0 to 1.
+const GOLDEN: f64 = 0.618_033_988_75;
 
 /// Whether the central 90 % of one distribution held the truth of one series.
 #[derive(Debug, Clone, Copy)]
@@ -115,10 +117,13 @@ impl Tally {
             let below = weight(samples, |law| value(law) < truth);
             self.place(what, drawn.measured, central(below));
         }
+        let fails = weight(samples, |law| failure_days(law).is_some());
         let Some(truth) = failure_days(&drawn.law) else {
+            // Never is one point with all of its probability: the truth lies anywhere in that, evenly.
+            let share = fails + (1.0 - fails) * (f64::from(self.series) * GOLDEN).fract();
+            self.place("failure", drawn.measured, central(share));
             return;
         };
-        let fails = weight(samples, |law| failure_days(law).is_some());
         let before = weight(samples, |law| {
             failure_days(law).is_some_and(|days| days < truth)
         });
