@@ -19,6 +19,11 @@ pub struct Assumptions {
     /// Probability of m > 1, and whether slopes that are stable mostly keep a low velocity.
     pub(super) unstable: f64,
     pub(super) keeps_little: bool,
+    /// Scale of the Cauchy prior of kappa times the length of the record, where laws that nearly keep m = 1 are as likely as others;
+    /// `None`: of the lesser of loading and healing over the slope, as slopes are watched.
+    pub(super) curvature: Option<f64>,
+    /// Probability that the scatter remembers nothing.
+    pub(super) without_memory: f64,
     /// Squares of standard deviations that no rate is doubted for.
     pub(super) undoubted: f64,
 }
@@ -34,10 +39,12 @@ impl Assumptions {
         follows_errors: false,
         unstable: UNSTABLE,
         keeps_little: true,
+        curvature: None,
+        without_memory: 0.0,
         undoubted: 1.0,
     };
     /// The special case of a load that never changed: the law does not drift, readings scatter about it, and nothing is taken
-    /// for granted of which side of m = 1 slopes are on, nor of what they keep.
+    /// for granted of which side of m = 1 slopes are on, how near to it, nor of what they keep.
     pub const CONSTANT_LOAD: Self = Self {
         drift: 0.0,
         load_changes: false,
@@ -46,6 +53,8 @@ impl Assumptions {
         follows_errors: true,
         unstable: 0.5,
         keeps_little: false,
+        curvature: Some(3.0),
+        without_memory: 0.4,
         undoubted: 9.0,
     };
 }

@@ -2,39 +2,38 @@
 
 use super::assumptions::Assumptions;
 use super::prior::{P_PRIOR, above_kept};
-use super::space::{RATIO_SCALE, ln_logistic};
 use super::{Ensemble, LawDraws, LawSample};
 use crate::model::Law;
 
-/// Scale of the wider prior of the healing over the slope.
-const WIDER_SCALE: f64 = 2.0 * RATIO_SCALE;
+/// Scale of the wider prior of kappa times the length of the record.
+const WIDER_SCALE: f64 = 10.0;
 
 /// A prior other than that of a constant load.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OtherPrior {
     /// Of the slopes that are watched: m above 1 the likelier, and what a stable one keeps mostly low.
     OfWatchedSlopes,
-    /// Curvature over slope less confined.
-    WiderCurvature,
+    /// The curvature less confined.
+    WiderKappa,
     /// m, not p, even in its range on either side of 1.
     EvenInM,
 }
 
 impl OtherPrior {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::OfWatchedSlopes, Self::WiderCurvature, Self::EvenInM];
+    pub const ALL: [Self; 3] = [Self::OfWatchedSlopes, Self::WiderKappa, Self::EvenInM];
 
     /// In words.
     pub fn label(self) -> &'static str {
         match self {
             Self::OfWatchedSlopes => "as the monitor's",
-            Self::WiderCurvature => "kappa over r wider (logistic scale 2.4)",
+            Self::WiderKappa => "kappa wider (Cauchy scale 10)",
             Self::EvenInM => "even in m",
         }
     }
 
     /// Its density over that of a constant load.
-    fn ratio(self, law: &Law) -> f64 {
+    fn ratio(self, law: &Law, length_days: f64) -> f64 {
         match self {
             Self::OfWatchedSlopes => {
                 let watched = Assumptions::CHANGING_LOAD.unstable;
@@ -51,9 +50,10 @@ impl OtherPrior {
                 let above = above_kept(law.v_i.ln() - (law.b / law.a).ln() / law.p);
                 of_side * (-0.5 * above * above).exp()
             }
-            Self::WiderCurvature => {
-                let ratio = (law.a.min(law.b) / law.r.abs()).ln();
-                (ln_logistic(ratio, WIDER_SCALE) - ln_logistic(ratio, RATIO_SCALE)).exp()
+            Self::WiderKappa => {
+                let scale = Assumptions::CONSTANT_LOAD.curvature.unwrap_or(1.0);
+                let cauchy = |scale: f64| 1.0 / (scale + (law.kappa * length_days).powi(2) / scale);
+                cauchy(WIDER_SCALE) / cauchy(scale)
             }
             Self::EvenInM => {
                 let edge = if law.kappa > 0.0 {
@@ -72,10 +72,11 @@ impl LawDraws {
     /// The ensemble under another prior, by weighing the same laws again.
     pub fn under(&self, prior: OtherPrior) -> Ensemble {
         let samples = self.ensemble.samples.iter();
+        let length = self.ensemble.now_days - self.from_days;
         let mut samples: Vec<LawSample> = samples
             .map(|sample| LawSample {
                 law: sample.law,
-                weight: sample.weight * prior.ratio(&sample.law),
+                weight: sample.weight * prior.ratio(&sample.law, length),
             })
             .collect();
         let total: f64 = samples.iter().map(|sample| sample.weight).sum();

@@ -4,8 +4,9 @@
 //! |---|---|
 //! | p | even on either side of 0, m from 0.5 to 2.5 |
 //! | slope r | as in the table of laws: either sign alike, nearly even in ln r |
-//! | the lesser of loading and healing over r | log-logistic about 1 |
-//! | scatter of a reading, and standard deviation of what remembers | log-normal |
+//! | the lesser of loading and healing over r, where the load may change | log-logistic about 1 |
+//! | or kappa times the length of the record, where it may not | Cauchy |
+//! | scatter of a reading, and standard deviation of what remembers | log-normal; the latter 0 with a probability of its own |
 //! | its memory | even in its log from one sampling interval to the length of the record |
 //! | what of the variance of a difference of readings is the readings' and not the motion's | even |
 
@@ -18,13 +19,13 @@ use nalgebra::SVector;
 use rand::RngExt;
 use rand_pcg::Pcg64;
 
-/// p; ln of the lesser of loading and healing, 1/day; ln of |r| over the lowest, with the sign of r; ln of the scatter, of the
+/// p; ln of the lesser of loading and healing or, where that has the prior, of |kappa|, 1/day; ln of |r| over the lowest, with the sign of r; ln of the scatter, of the
 /// standard deviation of what remembers, and of its memory in days; the readings' share of a difference's variance. Laws that hardly accelerate are next to those that hardly
 /// slow down, and m a little above 1 next to m a little below.
 pub(super) type Point = SVector<f64, 7>;
 
 const P: usize = 0;
-const LESSER: usize = 1;
+const CURVATURE: usize = 1;
 const SLOPE: usize = 2;
 const SCATTER: usize = 3;
 const SIGMA: usize = 4;
@@ -32,12 +33,16 @@ const MEMORY: usize = 5;
 const SHARED: usize = 6;
 
 /// Scale of the logistic prior of ln of the lesser of loading and healing over the slope.
-pub(super) const RATIO_SCALE: f64 = 1.2;
+const RATIO_SCALE: f64 = 1.2;
 /// Medians of the scatter and of the standard deviation of what remembers, and the standard deviation of the log of either.
 const SCATTER_PRIOR: (f64, f64) = (0.03, 1.0);
 const SIGMA_PRIOR: (f64, f64) = (0.04, 1.0);
 /// How far from a law of the table laws are looked for, in p and in the logarithms of the others.
 const AROUND: (f64, f64) = (0.25, 0.7);
+
+/// Where the coordinate of what remembers lies below the first of these standard deviations under its median, nothing remembers; the
+/// second is how far that goes.
+const NOTHING_REMEMBERS: (f64, f64) = (3.0, 3.0);
 
 /// Where points lie.
 #[derive(Debug, Clone, Copy)]
@@ -46,6 +51,8 @@ pub(super) struct Space {
     assumed: Assumptions,
     /// ln of the shortest and of the longest memory, days.
     memories: (f64, f64),
+    /// Days from the first reading to the last.
+    length: f64,
 }
 
 /// A law but for its velocity.
@@ -58,7 +65,7 @@ pub(super) struct DrawnShape {
 }
 
 /// ln of the density of a logistic number about 0.
-pub(super) fn ln_logistic(value: f64, scale: f64) -> f64 {
+fn ln_logistic(value: f64, scale: f64) -> f64 {
     let z = value.abs() / scale;
     -z - 2.0 * (-z).exp().ln_1p() - scale.ln()
 }
@@ -74,20 +81,22 @@ impl Space {
             slope,
             assumed: record.assumed,
             memories: (shortest.ln(), length.ln()),
+            length,
         }
     }
 
     pub(super) fn shape(&self, at: &Point) -> DrawnShape {
         let size = self.slope.lowest * at[SLOPE].abs().exp();
-        let lesser = at[LESSER].exp();
-        let (b, c) = if at[SLOPE] > 0.0 {
-            (lesser + size, lesser)
+        let r = size.copysign(at[SLOPE]);
+        let c = if self.assumed.curvature.is_some() {
+            at[CURVATURE].exp() / at[P].abs().max(1e-12)
         } else {
-            (lesser, lesser + size)
+            at[CURVATURE].exp() + (-r).max(0.0)
         };
+        let b = c + r;
         DrawnShape {
             past: PastShape {
-                r: size.copysign(at[SLOPE]),
+                r,
                 kappa: at[P] * c,
                 p: at[P],
             },
@@ -96,13 +105,54 @@ impl Space {
         }
     }
 
-    pub(super) fn noise(at: &Point) -> LoadNoise {
+    pub(super) fn noise(&self, at: &Point) -> LoadNoise {
         LoadNoise {
             scatter: at[SCATTER].exp(),
-            sigma: at[SIGMA].exp(),
+            sigma: if self.remembers(at) {
+                at[SIGMA].exp()
+            } else {
+                0.0
+            },
             tau: at[MEMORY].exp(),
             shared: at[SHARED],
             ln_evidence: 0.0,
+        }
+    }
+
+    /// Whether anything remembers in the scatter.
+    fn remembers(&self, at: &Point) -> bool {
+        let (median, spread) = SIGMA_PRIOR;
+        self.assumed.without_memory == 0.0 || at[SIGMA] > median.ln() - NOTHING_REMEMBERS.0 * spread
+    }
+
+    /// ln of the prior density of what remembers.
+    fn ln_prior_of_memory(&self, at: &Point) -> f64 {
+        let (median, spread) = SIGMA_PRIOR;
+        let z = (at[SIGMA] - median.ln()) / spread;
+        let without = self.assumed.without_memory;
+        if self.remembers(at) {
+            return (1.0 - without).ln() - 0.5 * z * z;
+        }
+        let (from, width) = NOTHING_REMEMBERS;
+        if z < -from - width {
+            return f64::NEG_INFINITY;
+        }
+        // The density that has the same whole as the normal one above it.
+        (without * std::f64::consts::TAU.sqrt() / width).ln()
+    }
+
+    /// ln of the prior density of the curvature.
+    fn ln_prior_of_curvature(&self, at: &Point, size: f64) -> f64 {
+        let Some(scale) = self.assumed.curvature else {
+            return ln_logistic(at[CURVATURE] - size.ln(), RATIO_SCALE);
+        };
+        let kappa = at[CURVATURE].exp() * self.length;
+        // A slope whose loading would be negative is none.
+        let is_loaded = at[SLOPE] > 0.0 || at[CURVATURE].exp() > size * at[P].abs();
+        if is_loaded {
+            at[CURVATURE] - (kappa / scale).powi(2).ln_1p()
+        } else {
+            f64::NEG_INFINITY
         }
     }
 
@@ -123,14 +173,14 @@ impl Space {
         } else {
             (1.0 - self.assumed.unstable) / -P_PRIOR.0
         };
-        let of_ratio = ln_logistic(at[LESSER] - size.ln(), RATIO_SCALE);
+        let of_curvature = self.ln_prior_of_curvature(at, size);
         let normal = |value: f64, (median, spread): (f64, f64)| {
             let z = (value - median.ln()) / spread;
             -0.5 * z * z
         };
-        self.slope.ln_prior(of_p.ln() + of_ratio, size, None)
+        self.slope.ln_prior(of_p.ln() + of_curvature, size, None)
             + normal(at[SCATTER], SCATTER_PRIOR)
-            + normal(at[SIGMA], SIGMA_PRIOR)
+            + self.ln_prior_of_memory(at)
     }
 
     /// ln of the prior of what the law of that shape will keep, ln of whose velocity (mm/day) that is.
@@ -151,11 +201,18 @@ impl Space {
         let p = (shape.p + spread(p_around)).clamp(P_PRIOR.0 + 1e-3, P_PRIOR.1 - 1e-3);
         let (r, _) = shape.slope_and_curvature(cell.r);
         let slope = (cell.r / self.slope.lowest).ln() + spread(0.3 * ln_around);
+        let lesser = (shape.lesser() * cell.r).ln() + spread(ln_around);
+        let curvature = if self.assumed.curvature.is_some() {
+            let healing = lesser.exp() + (-cell.r.copysign(r)).max(0.0);
+            (healing * p.abs().max(1e-6)).ln()
+        } else {
+            lesser
+        };
         let (shortest, longest) = self.memories;
         let memory = cell.tau.ln() + spread(ln_around);
         Point::from([
             p,
-            (shape.lesser() * cell.r).ln() + spread(ln_around),
+            curvature,
             slope.max(1e-6).copysign(r),
             cell.scatter.ln() + spread(ln_around),
             cell.sigma.ln() + spread(ln_around) - ln_around,

@@ -74,7 +74,7 @@ impl LawWeigher {
         self.evaluations += 1;
         let shape = self.space.shape(at);
         self.predict(&shape);
-        let memory = LoadMemory::new(&self.record, &Space::noise(at));
+        let memory = LoadMemory::new(&self.record, &self.space.noise(at));
         self.before.walk(&self.record, &memory);
         let gains = Gains::new(&self.record, &memory, &self.e_folds, &self.before.ln);
         let joins = self.joins();
@@ -249,7 +249,7 @@ impl Walk {
         };
         let scales = &mut self.scales;
         let (_, gains, _) = scales.weigh(&at, f64::NEG_INFINITY);
-        let lane = (0, Space::noise(&at).scatter);
+        let lane = (0, scales.space.noise(&at).scatter);
         let squares = evidence::misses(&scales.record, &scales.predicted, lane, &gains);
         scales.record.doubt(&squares);
         for walker in &mut self.walkers {
@@ -263,7 +263,7 @@ impl Walk {
         for walker in &self.walkers {
             let (_, gains, shape) = self.scales.weigh(&walker.at, f64::NEG_INFINITY);
             let shares = [0; 2].map(|_| self.generator.random::<f64>());
-            let noise = Space::noise(&walker.at);
+            let noise = self.scales.space.noise(&walker.at);
             let deviate = self.generator.sample(StandardNormal);
             let scales = &self.scales;
             let started = evidence::start_at(&gains, &scales.room, shares[0]);

@@ -48,13 +48,15 @@ const SLOPES: (f64, f64) = (0.02, 2.0);
 const SLOWEST: f64 = 2e-4;
 const RARE: f64 = 0.1;
 const SLOPE_PER_INTERVAL: f64 = 1.5;
-/// Scale of the logistic ln of the lesser of loading and healing over the slope.
-const RATIO_SCALE: f64 = 1.2;
+/// Scale of the Cauchy number that is kappa times the length of the record.
+const CURVATURE: f64 = 3.0;
 const MOST_LN_Y: f64 = 14.0;
 /// Medians of the scatter and of what remembers of it, the standard deviation of the log of either, and where both are kept.
 const SCATTER: (f64, f64) = (0.03, 1.0);
 const REMEMBERED: (f64, f64) = (0.04, 1.0);
 const SCATTERS: (f64, f64) = (0.003, 0.3);
+/// Share of the series whose scatter remembers nothing.
+const WITHOUT_MEMORY: f64 = 0.4;
 /// Standard deviations, from one reading to the next, of a velocity that follows no law yet.
 const DRIFTS_BEFORE: [f64; 4] = [0.0, 0.05, 0.15, 0.4];
 
@@ -109,19 +111,16 @@ fn law(rng: &mut Pcg64, length: f64, interval: f64) -> Option<Law> {
     if rng.random::<f64>() >= kept {
         return None;
     }
-    let u = uniform(rng, 1e-6, 1.0 - 1e-6);
-    let lesser = size * (RATIO_SCALE * (u / (1.0 - u)).ln()).exp();
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let kappa = CURVATURE * (quarter * rng.random::<f64>()).tan() / length;
     let p = if rng.random::<bool>() {
         uniform(rng, 0.0, 0.6)
     } else {
         uniform(rng, -1.0, 0.0)
     };
-    let (r, healing) = if rng.random::<bool>() {
-        (size, lesser)
-    } else {
-        (-size, lesser + size)
-    };
-    Some(Law::from_fit(10.0 * normal(rng).exp(), r, p * healing, p))
+    let r = if rng.random::<bool>() { size } else { -size };
+    let is_loaded = kappa / p.abs() + r > 0.0;
+    is_loaded.then(|| Law::from_fit(10.0 * normal(rng).exp(), r, kappa.copysign(p), p))
 }
 
 /// A size of the scatter.
@@ -187,7 +186,12 @@ fn attempt(rng: &mut Pcg64, starts: Starts) -> Option<Drawn> {
     if edge.y.ln().abs() > MOST_LN_Y {
         return None;
     }
-    let scatter = (size(rng, SCATTER), size(rng, REMEMBERED));
+    let remembered = if rng.random::<f64>() < WITHOUT_MEMORY {
+        0.0
+    } else {
+        size(rng, REMEMBERED)
+    };
+    let scatter = (size(rng, SCATTER), remembered);
     let memory = log_uniform(rng, end / count as f64, end);
     let measured = match rng.random_range(0..20) {
         0..9 => Measured::Velocity,
