@@ -121,6 +121,43 @@ fn corrected_readings_are_judged_once_a_batch_and_delay_no_red_of_another_benchm
 #[test]
 fn a_silence_has_a_longest_time_and_an_end_and_is_seen_everywhere() {
     let site = Site::new(POLICY);
+#[test]
+fn very_many_readings_of_one_time_delay_no_red_of_another_benchmark() {
+    let site = Site::new(POLICY);
+    site.append(
+        "incoming/5.csv",
+        &format!("time,displacement_mm\n{}", failing(0..60)),
+    );
+    let program = site.caught_up();
+    let time = clock::now() - SignedDuration::from_mins(5);
+    let same: String = (0..40_000)
+        .map(|row| format!("{time},{:.3}\n", 80.0 + f64::from(row) / 1000.0))
+        .collect();
+    site.append("incoming/6.csv", &format!("time,displacement_mm\n{same}"));
+    site.append("incoming/5.csv", &failing(60..114));
+    eventually("the other's red", || site.notified("5/red/", "firing") == 1);
+    eventually("all of them", || {
+        let values = site.values();
+        values.iter().filter(|(name, ..)| name == "6").count() == 40_000
+    });
+    // Read again from its start, as a file is that is put in another's place, it gives nothing new.
+    fs::write(
+        site.path("incoming/new"),
+        format!("time,displacement_mm\n{same}"),
+    )
+    .unwrap();
+    fs::rename(site.path("incoming/new"), site.path("incoming/6.csv")).unwrap();
+    site.append("incoming/6.csv", &format!("{time},1.5\n"));
+    eventually("what comes after them", || {
+        let values = site.values();
+        values
+            .iter()
+            .any(|(name, _, value)| name == "6" && *value < 2.0)
+    });
+    assert_eq!(site.values().len(), 40_115);
+    program.stop();
+}
+
     let listen = site.listen();
     site.append(
         "incoming/5.csv",
