@@ -111,8 +111,9 @@ impl Site {
         {
             return self.step(now, &arrival.input);
         }
+        let mut events = self.doubt_first(arrival, wall);
         self.keep_time(arrival, wall);
-        let mut events = self.pass(arrival.time);
+        events.extend(self.pass(arrival.time));
         let now = self.now.map_or(arrival.time, |now| now.max(arrival.time));
         if let Input::Reading { benchmark, .. } = &arrival.input
             && let Some(finding) = self.answer(benchmark, arrival.time)
@@ -226,6 +227,27 @@ impl Site {
             && !is_near(now)
             && !is_near(self.keeper.now(wall))
             && self.monitor.leaps(benchmark, arrival.time)
+    }
+
+    /// Has the only reading of a benchmark wait where this one, its second, lies far before it, and neither the time at the site
+    /// nor another benchmark is near to the first: with one wrong time stamp all honest readings would be late.
+    fn doubt_first(&mut self, arrival: &Arrival, wall: Timestamp) -> Vec<Event> {
+        let Input::Reading { benchmark, .. } = &arrival.input else {
+            return Vec::new();
+        };
+        let Some(now) = self.now.filter(|_| self.sinks.store.is_some()) else {
+            return Vec::new();
+        };
+        let Some(first) = self.monitor.first_ahead_of(benchmark, arrival.time) else {
+            return Vec::new();
+        };
+        let is_near = |time: Timestamp| first.duration_since(time).abs() <= NEAR;
+        let mut others = self.newest.iter().filter(|(one, _)| *one != benchmark);
+        if is_near(self.keeper.now(wall)) || others.any(|(_, newest)| is_near(*newest)) {
+            return Vec::new();
+        }
+        let (benchmark, time) = (benchmark.clone(), arrival.time);
+        self.step(now, &Input::Notice(Notice::FirstAhead { benchmark, time }))
     }
 
     /// Learns from a reading what time it is, and notes where it is one of a backlog.

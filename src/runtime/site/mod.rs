@@ -25,7 +25,9 @@ use returned::Returned;
 use standing_floods::StandingFlood;
 use timekeeper::Timekeeper;
 
-use crate::monitor::{Event, EventKind, Input, Monitor, Order, RESET_FOUND, SUSPECT, Settings};
+use crate::monitor::{
+    Event, EventKind, Input, Monitor, Notice, Order, RESET_FOUND, SUSPECT, Settings,
+};
 use crate::reading::{BEFORE_ALL, BenchmarkId, Timestamp};
 use crate::runtime::deliver::Dispatcher;
 use crate::runtime::hook::{Alert, Status};
@@ -301,6 +303,11 @@ impl Site {
             // Their readings come again, and are new to what is known from here on.
             let former = &self.monitor.settings().watched;
             let stays = |id: &BenchmarkId| !settings.watched.ends(id, former);
+        if let Input::Notice(Notice::FirstAhead { benchmark, .. }) = input
+            && let Some(first) = self.newest.remove(benchmark)
+        {
+            self.ahead.insert(benchmark.clone(), first);
+        }
             self.newest.retain(|id, _| stays(id));
             self.ahead.retain(|id, _| stays(id));
         }
