@@ -158,6 +158,11 @@ impl Monitor {
         track.first_ahead_of(time)
     }
 
+    /// What time it was when a reading of a silent benchmark came that was measured long before; `None` where none has.
+    pub fn behind(&self, benchmark: &BenchmarkId) -> Option<Timestamp> {
+        self.benchmarks.get(benchmark)?.behind()
+    }
+
     /// Whether nothing can be said of a benchmark now: of one of the config also before its first reading.
     pub fn is_unknown(&self, benchmark: &BenchmarkId) -> bool {
         match self.benchmarks.get(benchmark) {

@@ -66,6 +66,11 @@ impl Silence {
         self.newest = None;
     }
 
+    /// What time it was when a reading came that was measured long before; `None` where none has.
+    pub(super) fn behind(&self) -> Option<Timestamp> {
+        self.behind
+    }
+
     /// What comes now was measured before `time`, which it is by the clock.
     pub(super) fn is_behind(&mut self, time: Timestamp) {
         self.behind = Some(time);

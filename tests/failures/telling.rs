@@ -60,6 +60,9 @@ fn a_backlog_that_comes_in_row_by_row_is_one_silence_a_benchmark() {
         site.append("incoming/all.csv", &row);
         std::thread::sleep(Duration::from_millis(250));
     }
+    let events = site.events();
+    let has_ended = events.contains("\"level\":\"unknown\",\"state\":\"resolved\"");
+    assert!(!has_ended, "what is two days old is no end: {events}");
     site.append("incoming/all.csv", &rows(-48..1).concat());
     eventually("that they read again", || {
         let events = site.events();

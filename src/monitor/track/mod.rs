@@ -403,6 +403,11 @@ impl Track {
         self.record.is_behind(time);
     }
 
+    /// What time it was when one came that was measured long before.
+    pub(super) fn behind(&self) -> Option<Timestamp> {
+        self.record.behind()
+    }
+
     pub(super) fn level(&self) -> Level {
         self.alarm.level()
     }

@@ -261,15 +261,17 @@ impl Site {
         self.unproven.comes(benchmark, arrival.time);
         let is_live = self.at_rest.contains(benchmark);
         self.keeper.knows(arrival.time, is_live);
-        let time = self.keeper.now(wall);
-        let is_noted = self
-            .behind
-            .get(benchmark)
-            .is_some_and(|noted| time.duration_since(*noted) < NOTED_FOR);
+        if is_live {
+            self.keeper.comes(benchmark.as_str(), arrival.time, wall);
+        }
+        let time = self.keeper.latest(wall);
+        let noted = self.monitor.behind(benchmark);
+        let is_noted = noted.is_some_and(|noted| time.duration_since(noted).abs() < NOTED_FOR);
         let is_late = time.duration_since(arrival.time) > NOTED_FOR;
-        if is_live && is_late && !is_noted && self.monitor.is_silent(benchmark) {
+        // Where the time that was noted proves wrong, the reading is none of a backlog.
+        let is_news = !is_noted && (is_late || noted.is_some());
+        if is_live && is_news && self.monitor.is_silent(benchmark) {
             let benchmark = benchmark.clone();
-            self.behind.insert(benchmark.clone(), time);
             let now = self.now.map_or(arrival.time, |now| now.max(arrival.time));
             self.step(now, &Input::Notice(Notice::Behind { benchmark, time }));
         }
