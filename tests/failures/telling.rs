@@ -122,9 +122,6 @@ fn corrected_readings_are_judged_once_a_batch_and_delay_no_red_of_another_benchm
 }
 
 #[test]
-fn a_silence_has_a_longest_time_and_an_end_and_is_seen_everywhere() {
-    let site = Site::new(POLICY);
-#[test]
 fn very_many_readings_of_one_time_delay_no_red_of_another_benchmark() {
     let site = Site::new(POLICY);
     site.append(
@@ -161,6 +158,9 @@ fn very_many_readings_of_one_time_delay_no_red_of_another_benchmark() {
     program.stop();
 }
 
+#[test]
+fn a_silence_has_a_longest_time_and_an_end_and_is_seen_everywhere() {
+    let site = Site::new(POLICY);
     let listen = site.listen();
     site.append(
         "incoming/5.csv",
@@ -231,47 +231,58 @@ fn a_site_of_which_nobody_is_notified_that_a_sensor_is_dead_does_not_pass_the_ch
     assert!(said.contains("no hook has unknown"), "{said}");
 }
 
+/// How a hook's child detaches: in a session of its own, and besides that with nothing left in its environment and no parent.
+const DETACHED: [&str; 2] = ["setsid", "env -i setsid"];
+
 #[test]
 fn a_child_that_leaves_its_hooks_group_does_not_outlive_the_attempt() {
-    let site = Site::new(POLICY);
-    let text = fs::read_to_string(site.path("site.toml")).unwrap();
-    fs::write(site.path("site.toml"), format!("{text}timeout = \"1s\"\n")).unwrap();
-    let script =
-        "[ $SLIPWATCH_LEVEL = red ] || exit 0\nsetsid sh -c 'echo $$ >> children; sleep 300'\n";
-    fs::write(site.path("hook.sh"), script).unwrap();
-    site.append(
-        "incoming/5.csv",
-        &format!("time,displacement_mm\n{}", failing(0..114)),
-    );
-    let program = site.caught_up();
-    eventually("two attempts", || site.lines("children").len() >= 2);
-    let first = site.lines("children").swap_remove(0);
-    eventually("its end", || has_ended(&first));
-    program.let_go();
-    for child in site.lines("children") {
-        let _ = std::process::Command::new("kill").arg(child).status();
+    for detached in DETACHED {
+        let site = Site::new(POLICY);
+        let text = fs::read_to_string(site.path("site.toml")).unwrap();
+        fs::write(site.path("site.toml"), format!("{text}timeout = \"1s\"\n")).unwrap();
+        let script = format!(
+            "[ $SLIPWATCH_LEVEL = red ] || exit 0\n\
+             ({detached} sh -c 'echo $$ >> children; sleep 300' &)\nsleep 300\n"
+        );
+        fs::write(site.path("hook.sh"), script).unwrap();
+        site.append(
+            "incoming/5.csv",
+            &format!("time,displacement_mm\n{}", failing(0..114)),
+        );
+        let program = site.caught_up();
+        eventually("two attempts", || site.lines("children").len() >= 2);
+        let first = site.lines("children").swap_remove(0);
+        eventually("its end", || has_ended(&first));
+        program.let_go();
+        for child in site.lines("children") {
+            let _ = std::process::Command::new("kill").arg(child).status();
+        }
     }
 }
 
 #[test]
 fn what_a_hook_that_fails_leaves_behind_does_not_outlive_the_attempt_either() {
-    let site = Site::new(POLICY);
-    let script = "[ $SLIPWATCH_LEVEL = red ] || exit 0\n\
-                  setsid sh -c 'echo $$ >> children; sleep 300' &\nsleep 0.2\nexit 1\n";
-    fs::write(site.path("hook.sh"), script).unwrap();
-    site.append(
-        "incoming/5.csv",
-        &format!("time,displacement_mm\n{}", failing(0..114)),
-    );
-    let program = site.caught_up();
-    eventually("two attempts", || site.lines("children").len() >= 2);
-    let first = site.lines("children").swap_remove(0);
-    eventually("its end", || has_ended(&first));
-    program.stop();
-    for child in site.lines("children") {
-        let is_over = has_ended(&child);
-        let _ = std::process::Command::new("kill").arg(&child).status();
-        assert!(is_over, "one outlives the daemon");
+    for detached in DETACHED {
+        let site = Site::new(POLICY);
+        let script = format!(
+            "[ $SLIPWATCH_LEVEL = red ] || exit 0\n\
+             {detached} sh -c 'echo $$ >> children; sleep 300' &\nsleep 0.2\nexit 1\n"
+        );
+        fs::write(site.path("hook.sh"), script).unwrap();
+        site.append(
+            "incoming/5.csv",
+            &format!("time,displacement_mm\n{}", failing(0..114)),
+        );
+        let program = site.caught_up();
+        eventually("two attempts", || site.lines("children").len() >= 2);
+        let first = site.lines("children").swap_remove(0);
+        eventually("its end", || has_ended(&first));
+        program.stop();
+        for child in site.lines("children") {
+            let is_over = has_ended(&child);
+            let _ = std::process::Command::new("kill").arg(&child).status();
+            assert!(is_over, "one outlives the daemon: {detached}");
+        }
     }
 }
 
