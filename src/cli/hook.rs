@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 pub(super) enum HookCommand {
     /// Run a site's hooks once, as the daemon would, with an alert that is marked as a test
     Test(Test),
-    /// Become a program that can write only where it is allowed to
+    /// Run a program that can write only where it is allowed to, and end as it does
     #[command(hide = true)]
     Exec(Exec),
 }

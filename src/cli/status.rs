@@ -19,7 +19,7 @@ use crate::store::Store;
 use jiff::tz::TimeZone;
 use schemars::JsonSchema;
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::io::{self, IsTerminal, Write};
 use std::time::Duration;
@@ -123,6 +123,9 @@ pub(super) struct SiteStatus {
     sources_without_files: Vec<String>,
     /// What the files hold, where that was asked for.
     preview: Option<Preview>,
+    /// The sources that are brokers: what could not be used of them is in no file.
+    #[serde(skip)]
+    brokers: BTreeSet<String>,
 }
 
 /// Says how the site stands, once or until interrupted.
@@ -186,10 +189,8 @@ fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
         standing
     });
     let preview = args.sources.then(|| preview(&config));
-    let drill = config
-        .drill
-        .as_ref()
-        .and_then(|_| DrillRecord::read(&config.site.state_dir));
+    let drill = config.drill.as_ref();
+    let drill = drill.and_then(|_| DrillRecord::read(&config.site.state_dir));
     let sources_without_files = sources_without_files(&config);
     let is_running = Store::is_held(&config.site.state_dir);
     let zone = config.site.time_zone;
@@ -217,6 +218,7 @@ fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
         config_refusal: ConfigRefusal::read(&config.site.state_dir).filter(|_| is_running),
         sources_without_files,
         preview,
+        brokers: config.brokers.into_iter().map(|one| one.id).collect(),
     };
     Ok((status, zone))
 }
@@ -383,11 +385,17 @@ fn not_used(status: &SiteStatus) -> String {
         let _ = writeln!(lines, "{}", text::plain(line));
     }
     for (source, count) in &status.quarantined {
+        let (what, shown) = if status.brokers.contains(source) {
+            let shown = "the daemon's log has the first ones with topic and reason (message, or line of one, quarantined)";
+            ("messages and lines of them", shown)
+        } else {
+            let shown = "status --sources shows the first of each kind";
+            ("lines, records and files", shown)
+        };
         // Writing to a string cannot fail.
         let _ = writeln!(
             lines,
-            "source {source}: lines, records and files that could not be used: {count}; \
-             status --sources shows the first of each kind"
+            "source {source}: {what} that could not be used: {count}; {shown}"
         );
     }
     let serviced = status

@@ -222,6 +222,24 @@ impl History {
         instant_after_days(self.epoch, days)
     }
 
+    /// Whether there is one reading, and nothing that is declared has changed or left out any.
+    pub(super) fn is_single(&self) -> bool {
+        let is_plain = self.resets.is_empty() && self.aside.is_empty();
+        is_plain && self.observations.values.len() == 1
+    }
+
+    /// Takes out the only reading, in the science's unit; the record begins at `epoch` from here on.
+    pub(super) fn begin_again(&mut self, source: MeasuredAs, epoch: Timestamp) -> Option<Reading> {
+        let only = self.observations.values.pop()?;
+        let time = self.time(only.t_days)?;
+        *self = Self::new(source, epoch);
+        Some(Reading {
+            time,
+            value: only.value,
+            sigma: only.sigma,
+        })
+    }
+
     /// When the newest reading was taken.
     pub(super) fn newest(&self) -> Option<Timestamp> {
         self.time(self.observations.values.last()?.t_days)

@@ -42,6 +42,14 @@ pub enum Notice {
         /// What time it is.
         time: Timestamp,
     },
+    /// The only reading of this benchmark lies far ahead of the next one, of `time`, of the time that it is, and of all other
+    /// benchmarks: it waits until another one confirms it.
+    FirstAhead {
+        /// Whose.
+        benchmark: BenchmarkId,
+        /// When the next reading was measured.
+        time: Timestamp,
+    },
     /// The newest reading of a benchmark, of `time`, came while the host's clock said `clock`: perhaps ahead of it.
     Came {
         /// Whose.
@@ -94,6 +102,12 @@ impl Monitor {
                 }
                 Vec::new()
             }
+            Notice::FirstAhead { benchmark, time } => {
+                let track = self.benchmarks.get_mut(benchmark);
+                let event = track.and_then(|track| track.put_first_aside(now, *time));
+                self.benchmarks.note_changed(benchmark);
+                event.into_iter().collect()
+            }
             Notice::Came {
                 benchmark,
                 time,
@@ -136,6 +150,17 @@ impl Monitor {
     pub fn leaps(&self, benchmark: &BenchmarkId, time: Timestamp) -> bool {
         let track = self.benchmarks.get(benchmark);
         track.is_some_and(|track| track.leaps(time))
+    }
+
+    /// When the only reading of a benchmark was measured, where one of `time`, which comes after it, lies far before it.
+    pub fn first_ahead_of(&self, benchmark: &BenchmarkId, time: Timestamp) -> Option<Timestamp> {
+        let track = self.benchmarks.get(benchmark)?;
+        track.first_ahead_of(time)
+    }
+
+    /// What time it was when a reading of a silent benchmark came that was measured long before; `None` where none has.
+    pub fn behind(&self, benchmark: &BenchmarkId) -> Option<Timestamp> {
+        self.benchmarks.get(benchmark)?.behind()
     }
 
     /// Whether nothing can be said of a benchmark now: of one of the config also before its first reading.

@@ -52,12 +52,23 @@ impl Silence {
         if self.newest.is_some_and(|newest| time <= newest) {
             return None;
         }
-        let before = self.newest.replace(time);
+        let before = self.newest.replace(time).or(Some(time));
         if !self.silent || self.due().is_some_and(|due| Some(due) <= self.behind) {
             return None;
         }
         (self.silent, self.behind) = (false, None);
         before
+    }
+
+    /// The only reading does not count for now. A silence goes on, and ends with a reading as others do.
+    pub(super) fn begin_again(&mut self) {
+        self.spacings.clear();
+        self.newest = None;
+    }
+
+    /// What time it was when a reading came that was measured long before; `None` where none has.
+    pub(super) fn behind(&self) -> Option<Timestamp> {
+        self.behind
     }
 
     /// What comes now was measured before `time`, which it is by the clock.

@@ -51,15 +51,15 @@ impl History {
         let Some(latest) = self.inspected() else {
             return before;
         };
-        let is_many = |count: usize, share: f64| {
-            let least = (share * (latest.len() - 2) as f64).max(FEWEST as f64);
-            let factor = if before.is_some() { FEWER } else { 1.0 };
-            count as f64 >= factor * least
-        };
+        let factor = if before.is_some() { FEWER } else { 1.0 };
+        let is_many = |count: usize, share: f64| count as f64 >= factor * many(latest, share);
         let still = before.map(|before| STILL * before);
         let spikes = spikes(latest, still);
         if is_many(spikes.len(), SPOILT) {
             return before.or_else(|| of_all(spikes, 0.5));
+        }
+        if before.is_none() && !self.may_jump(latest) {
+            return None;
         }
         let (turns, jumps) = jumps(latest, still.unwrap_or_else(|| self.jump_size(latest)));
         is_many(turns, TURNING).then(|| before.or_else(|| of_all(jumps, 0.5)))?
@@ -80,8 +80,15 @@ impl History {
         };
         let (turns, each) = jumps(latest, 0.0);
         let share = turns as f64 / (latest.len() - 2) as f64;
-        let usual = of_all(each, 0.5)?;
-        (share >= TURNS_OF_NOISE && usual >= HIDES * would_move).then_some(usual)
+        let are_large = each
+            .iter()
+            .filter(|step| **step >= HIDES * would_move)
+            .count();
+        // Half of the steps: hardly any noise has so many.
+        if share < TURNS_OF_NOISE || are_large < each.len() / 2 {
+            return None;
+        }
+        of_all(each, 0.5).filter(|usual| *usual >= HIDES * would_move)
     }
 
     /// The newest readings, where there are enough to be examined.
@@ -89,6 +96,34 @@ impl History {
         let values = &self.observations.values;
         let latest = &values[values.len().saturating_sub(*INSPECTED.end())..];
         (latest.len() >= *INSPECTED.start()).then_some(latest)
+    }
+
+    /// Whether so many steps between the `latest` readings as there must be may be jumps: each reading is asked, and hardly any has
+    /// to go by [`History::jump_size`] then.
+    fn may_jump(&self, latest: &[Observation]) -> bool {
+        let inspected = steps(latest);
+        let least = many(latest, TURNING);
+        // As many turns have one step more.
+        let fewest = (0..inspected.len()).find(|count| *count as f64 >= least);
+        let Some(size) = fewest.and_then(|count| nth_largest(&inspected, count)) else {
+            return false;
+        };
+        let is_less = |usual: f64| usual < size;
+        if is_less(times(&inspected, QUARTER)) {
+            return true;
+        }
+        let values = &self.observations.values;
+        let (earlier, _) = values.split_at(values.len() - latest.len());
+        let earlier = steps(&earlier[earlier.len().saturating_sub(USUAL)..]);
+        let lies_under = |(share, factor): (f64, f64)| {
+            let under = earlier.iter().filter(|step| is_less(factor * **step));
+            index_of(share, earlier.len()).is_some_and(|at| under.count() > at)
+        };
+        if earlier.len() >= FEWEST_BEFORE && lies_under(HALF) && lies_under(NEARLY_ALL) {
+            return true;
+        }
+        let all = steps(&values[values.len().saturating_sub(USUAL)..]);
+        has_tiny_steps(&all, &inspected)
     }
 
     /// From what size on a step between two of the `latest` readings is a jump.
@@ -121,12 +156,28 @@ fn times(steps: &[f64], (share, factor): (f64, f64)) -> f64 {
     of_all(steps.to_vec(), share).map_or(f64::INFINITY, |usual| factor * usual)
 }
 
+/// Whether [`spoilt_from_the_beginning`] may find so many tiny ones among `steps`, of which these are the `latest`: where a limit
+/// that is larger than the step in the middle has too few below its share, that one has too few too.
+fn has_tiny_steps(steps: &[f64], latest: &[f64]) -> bool {
+    let Some(at) = index_of(MIDDLE, steps.len()).filter(|_| steps.len() >= FEWEST_IN_ALL) else {
+        return false;
+    };
+    let limit = 2.0 * times(latest, (MIDDLE, 1.0));
+    let holds = steps.iter().filter(|step| **step <= limit).count() > at;
+    let tiny = steps.iter().filter(|step| **step <= TINY * limit).count();
+    !holds || are_many_tiny(tiny, steps.len())
+}
+
+fn are_many_tiny(tiny: usize, of: usize) -> bool {
+    let (fewest, share) = FEWEST_TINY;
+    tiny as f64 >= fewest + share * of as f64
+}
+
 /// From what size on one of these steps is a jump where there are more tiny ones than noise has: its steps are tiny by chance.
 fn spoilt_from_the_beginning(steps: &[f64], resolution: f64) -> f64 {
     let middle = times(steps, (MIDDLE, 1.0));
     let tiny = steps.iter().filter(|step| **step <= TINY * middle).count();
-    let (fewest, share) = FEWEST_TINY;
-    let are_many = tiny as f64 >= fewest + share * steps.len() as f64;
+    let are_many = are_many_tiny(tiny, steps.len());
     let can_be_seen = steps.len() >= FEWEST_IN_ALL && TINY * middle > 2.0 * resolution;
     if are_many && can_be_seen {
         MIDDLE * middle
@@ -171,15 +222,34 @@ fn steps(values: &[Observation]) -> Vec<f64> {
 
 /// The one of `sizes` that this share of them lies under.
 fn of_all(mut sizes: Vec<f64>, share: f64) -> Option<f64> {
-    let last = sizes.len().checked_sub(1)?;
+    let at = index_of(share, sizes.len())?;
+    let (_, size, _) = sizes.select_nth_unstable_by(at, f64::total_cmp);
+    Some(*size)
+}
+
+/// Which of so many, by size, this share of them lies under.
+fn index_of(share: f64, count: usize) -> Option<usize> {
+    let last = count.checked_sub(1)?;
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "a share of a count"
     )]
-    let at = ((share * sizes.len() as f64) as usize).min(last);
+    let at = (share * count as f64) as usize;
+    Some(at.min(last))
+}
+
+/// The one of `sizes` of which so many are larger, or as large.
+fn nth_largest(sizes: &[f64], before: usize) -> Option<f64> {
+    let at = sizes.len().checked_sub(before + 1)?;
+    let mut sizes = sizes.to_vec();
     let (_, size, _) = sizes.select_nth_unstable_by(at, f64::total_cmp);
     Some(*size)
+}
+
+/// From how many spikes or turns on this share of them among the `latest` readings is many.
+fn many(latest: &[Observation], share: f64) -> f64 {
+    (share * (latest.len() - 2) as f64).max(FEWEST as f64)
 }
 
 /// The least that a reading differs by from one of the next two, where it does.
@@ -228,6 +298,41 @@ mod tests {
             let coarse = (end - 18..end).map(|hour| noise(hour).round());
             assert_eq!(history(coarse).spoilt(None), None, "{end}");
         }
+    }
+
+    #[test]
+    fn whether_there_may_be_jumps_is_answered_yes_wherever_there_are() {
+        let wild = |hour: u32| {
+            let by = 600.0 * (noise(hour + 7001) - 0.5);
+            slope(hour) + if noise(hour + 3001) < 0.6 { by } else { 0.0 }
+        };
+        let later = |hour: u32| if hour < 60 { slope(hour) } else { wild(hour) };
+        let block = |hour: u32| 300.0 * f64::from(u8::from((hour / 3).is_multiple_of(2)));
+        let tiny = |hour: u32| {
+            let by = 600.0 * (noise(hour + 7001) - 0.5);
+            noise(hour) / 1000.0 + if hour.is_multiple_of(5) { 0.0 } else { by }
+        };
+        let kinds: [&dyn Fn(u32) -> f64; 6] = [
+            &slope,
+            &wild,
+            &later,
+            &|hour| slope(hour) + block(hour),
+            &tiny,
+            &noise,
+        ];
+        let (mut jumping, mut still) = (0, 0);
+        for kind in kinds {
+            for end in 18..119 {
+                let history = history((0..end).map(kind));
+                let latest = history.inspected().unwrap();
+                let turns = super::jumps(latest, history.jump_size(latest)).0;
+                let has_jumps = turns as f64 >= super::many(latest, super::TURNING);
+                assert!(history.may_jump(latest) || !has_jumps, "{end}: {turns}");
+                jumping += u32::from(has_jumps);
+                still += u32::from(!history.may_jump(latest));
+            }
+        }
+        assert!(jumping > 100 && still > 100, "{jumping}, {still}");
     }
 
     #[test]

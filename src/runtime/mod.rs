@@ -9,6 +9,7 @@ pub mod clock;
 pub mod daemon;
 pub mod deliver;
 pub mod delivered;
+mod descendants;
 pub mod doctor;
 mod drill;
 pub mod drilled;

@@ -1,19 +1,24 @@
 //! Walls around a hook: it reads everything, and writes where it is allowed to.
 //!
 //! Landlock binds the process that asks for it and its children, so the daemon does not start a
-//! hook itself: it starts this program again, which walls itself in and then becomes the hook.
+//! hook itself: it starts this program again, which walls itself in, starts the hook and waits for its
+//! end. What the hook has left at work is this one's meanwhile, whatever it has done to be nobody's.
 
+use super::descendants::kill_descendants;
 use crate::config::HookConfig;
 use landlock::{
     ABI, Access, AccessFs, Ruleset, RulesetAttr, RulesetCreatedAttr, RulesetError, RulesetStatus,
     path_beneath_rules,
 };
+use nix::sys::prctl::set_child_subreaper;
+use nix::sys::signal::{SigSet, Signal, raise};
+use nix::unistd::Pid;
 use std::convert::Infallible;
 use std::ffi::{OsStr, OsString};
 use std::io;
-use std::os::unix::process::CommandExt;
+use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, ExitStatus};
 
 /// Linux 6.2: files can be kept from being truncated. Later ones would also bind devices' controls.
 const KERNEL: ABI = ABI::V3;
@@ -120,8 +125,8 @@ fn from_anywhere(path: &Path) -> PathBuf {
     }
 }
 
-/// Becomes `program`, which may write below `writable`, in `/tmp` and to `/dev/null`; without
-/// walls where the kernel has none.
+/// Runs `program`, which may write below `writable`, in `/tmp` and to `/dev/null`, without walls where the kernel has none, and
+/// ends as it does. What it leaves at work goes on where it went well, and is ended where not.
 ///
 /// # Errors
 /// [`SandboxError`]; on success this does not return.
@@ -131,9 +136,34 @@ pub fn become_hook(
     arguments: &[OsString],
 ) -> Result<Infallible, SandboxError> {
     wall_in(writable)?;
-    let source = Command::new(program).args(arguments).exec();
-    Err(SandboxError::NotStarted {
+    // A kernel that refuses it leaves what detaches itself to others, as before.
+    let _ = set_child_subreaper(true);
+    let started = Command::new(program).args(arguments).spawn();
+    // Not before: the hook would have them held back too. What asks the group to end is for it to take, and this one ends after it.
+    let asked = [
+        Signal::SIGHUP,
+        Signal::SIGINT,
+        Signal::SIGQUIT,
+        Signal::SIGTERM,
+    ];
+    let _ = SigSet::from_iter(asked).thread_block();
+    let ended = started.and_then(|mut hook| hook.wait());
+    let status = ended.map_err(|source| SandboxError::NotStarted {
         program: program.into(),
         source,
-    })
+    })?;
+    if !status.success() {
+        kill_descendants(Pid::this());
+    }
+    end_as(status)
+}
+
+/// Ends as another process has.
+fn end_as(status: ExitStatus) -> ! {
+    let signal = status.signal().unwrap_or_default();
+    if let Ok(signal) = Signal::try_from(signal) {
+        let _ = SigSet::all().thread_unblock();
+        let _ = raise(signal);
+    }
+    std::process::exit(status.code().unwrap_or(128 + signal))
 }

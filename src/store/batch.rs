@@ -107,7 +107,7 @@ impl Batch {
     }
 
     /// The values that this batch has for the same series and time, the newest first.
-    fn known(&self, measured: &Measured<'_>) -> Vec<f64> {
+    pub(super) fn known(&self, measured: &Measured<'_>) -> Vec<f64> {
         let from = match measured {
             Measured::Reading { benchmark, .. } => self.forgotten.get(*benchmark).copied(),
             Measured::Sample { .. } => None,
@@ -137,17 +137,6 @@ fn place(measured: &Measured<'_>) -> u64 {
     hasher.finish()
 }
 
-/// Whether a value is known.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Presence {
-    /// It has not been taken.
-    No,
-    /// It has, and another one of its time was taken after it: either a file is read again, or it was corrected back.
-    Corrected,
-    /// It has, and is the last of its time.
-    Yes,
-}
-
 impl Store {
     /// Writes the batch, all of it or nothing, and returns when it is on the disk.
     ///
@@ -161,46 +150,6 @@ impl Store {
         }
         let written = inner.write(batch);
         inner.committed(batch.steps.len() + batch.events.len(), written)
-    }
-
-    /// Whether the value has been taken before: in `batch`, or in what is written after step number `after`.
-    ///
-    /// # Errors
-    /// [`StoreError`].
-    pub fn has(&self, batch: &Batch, input: &Input, after: i64) -> Result<Presence, StoreError> {
-        let Some(measured) = input.measured() else {
-            return Ok(Presence::No);
-        };
-        let (time, value) = (measured.time(), measured.value());
-        let in_batch = batch.known(&measured);
-        if (in_batch.first()).is_some_and(|known| known.to_bits() == value.to_bits()) {
-            return Ok(Presence::Yes);
-        }
-        let inner = self.inner();
-        let factor = match &measured {
-            Measured::Reading { unit, .. } => unit.factor(),
-            Measured::Sample { .. } => 1.0,
-        };
-        let mut written: Vec<(i64, f64)> = Vec::new();
-        for (number, own) in inner.catalogue.alike(&measured) {
-            let mut query = inner.connection.prepare_cached(
-                "SELECT seq, value FROM step WHERE series = ?1 AND time = ?2 AND seq > ?3",
-            )?;
-            let mut rows = query.query(params![number, nanoseconds(time)?, after])?;
-            while let Some(row) = rows.next()? {
-                let value: f64 = row.get(1)?;
-                written.push((row.get(0)?, value * own));
-            }
-        }
-        written.sort_by_key(|(seq, _)| std::cmp::Reverse(*seq));
-        let in_batch = in_batch.into_iter().map(|known| known * factor);
-        let mut all = in_batch.chain(written.into_iter().map(|(_, known)| known));
-        let is_it = |known: f64| known.to_bits() == (value * factor).to_bits();
-        Ok(match all.position(is_it) {
-            None => Presence::No,
-            Some(0) => Presence::Yes,
-            Some(_) => Presence::Corrected,
-        })
     }
 }
 

@@ -8,6 +8,7 @@ mod access;
 mod batch;
 mod checkpoint;
 mod evidence;
+mod known;
 mod latest;
 mod link;
 mod outbox;
@@ -20,8 +21,9 @@ mod series;
 mod sum;
 mod verify;
 
-pub use batch::{Batch, Position, Presence};
+pub use batch::{Batch, Position};
 pub use evidence::{DeliveryRow, PlacedEvent};
+pub use known::Presence;
 pub use outbox::{Delivery, DeliveryOutcome};
 pub use past::{Heads, Value, Values};
 pub use read::{Recorded, StepRow};
@@ -187,6 +189,7 @@ struct Inner {
     /// The number of the last event.
     events: i64,
     log: checkpoint::Log,
+    written: known::WrittenValues,
 }
 
 impl Store {
@@ -252,6 +255,7 @@ impl Store {
             steps,
             events,
             log: checkpoint::Log::default(),
+            written: known::WrittenValues::default(),
         };
         Ok(Self {
             inner: Mutex::new(inner),

@@ -160,6 +160,24 @@ fn a_file_of_covariates_alone_goes_beside_one_with_readings() {
 }
 
 #[test]
+fn what_is_no_file_is_refused_at_once_and_bad_data_are_no_matter_of_flags() {
+    let bad = "time,remark\n2026-01-01T00:00:00Z,dry\n2026-01-01T01:00:00Z,wet snow\n";
+    let office = Office::with(&[("bad.csv", bad)]);
+    let pipe = office.path("pipe.csv");
+    nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).unwrap();
+    for name in ["pipe.csv", "-", "/dev/null"] {
+        let said = office.refused(2, &["init", name]);
+        assert!(
+            said.contains("is no file that a daemon could follow"),
+            "{said}"
+        );
+    }
+    let said = office.refused(65, &["init", "bad.csv"]);
+    assert!(said.contains("give a file that has some"), "{said}");
+    assert!(!office.path("site.toml").exists());
+}
+
+#[test]
 fn a_column_without_a_name_is_passed_over_where_it_is_empty() {
     let rows = rows(30, |time, value| format!("{time}+02:00;{value};\n"));
     let with = format!("time;P1_displacement_mm;\n{rows}");

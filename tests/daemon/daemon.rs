@@ -176,6 +176,59 @@ async fn while_a_long_past_is_read_what_is_current_is_judged_once_a_minute() {
     close(site, noon() + hours(200)).await;
 }
 
+/// Whether these events end that nothing can be said of a benchmark.
+fn end_the_silence(events: &[Event]) -> bool {
+    events.iter().any(|event| {
+        matches!(
+            event.kind,
+            EventKind::Alert {
+                level: Level::Unknown,
+                state: AlertState::Resolved,
+                ..
+            }
+        ) && event.benchmark.is_some()
+    })
+}
+
+/// Rows that lie forty days behind the clock of a daemon that was started within a silence are a backlog, or its clock is ahead.
+#[tokio::test(start_paused = true)]
+async fn far_behind_the_clock_a_silence_ends_once_four_readings_come_as_far_apart_as_they_were_measured()
+ {
+    for comes_each in [hours(0), hours(1)] {
+        let (_folder, config) = site_folder();
+        let mut site = site(&config);
+        let mut wall = noon() + hours(40 * 24);
+        let value = |hour: i64| 0.1 * hour as f64 + ((hour * 37) % 11) as f64 / 50.0;
+        for hour in -30..=0 {
+            site.take(&reading(noon() + hours(hour), value(hour)), wall)
+                .unwrap();
+        }
+        site.caught_up(wall).unwrap();
+        site.commit(wall).unwrap();
+        let silent = site.live(wall);
+        let is_silence = |event: &Event| matches!(&event.kind, EventKind::Fault { kind, .. } if kind == "no-data");
+        assert!(silent.iter().any(is_silence), "{silent:?}");
+        let mut ended = Vec::new();
+        for hour in 1..=12 {
+            tokio::time::advance(comes_each.unsigned_abs()).await;
+            wall += comes_each;
+            let arrival = reading(noon() + hours(hour), value(hour));
+            let mut events = site.take(&arrival, wall).unwrap();
+            events.extend(site.live(wall));
+            if end_the_silence(&events) {
+                ended.push(hour);
+            }
+        }
+        let wanted = if comes_each.is_zero() {
+            vec![]
+        } else {
+            vec![4]
+        };
+        assert_eq!(ended, wanted, "one each {comes_each}");
+        close(site, wall).await;
+    }
+}
+
 #[tokio::test]
 async fn attempts_are_counted_over_restarts() {
     let (folder, config) = site_folder();

@@ -292,6 +292,18 @@ async fn a_daemon_counts_a_message_that_is_too_long_and_takes_what_comes_after_i
     daemon.wait("what comes after it", |daemon| daemon.durable() == (1, 1));
     let log = daemon.text("log");
     assert!(log.contains("quarantined"), "{log}");
+    // It is in no file that `--sources` could look into.
+    let line =
+        "source radio: messages and lines of them that could not be used: 1; the daemon's log";
+    daemon.wait("that the status says so", |daemon| {
+        let status = Command::new(PROGRAM)
+            .args(["status", "--config", "site.toml"])
+            .current_dir(daemon.0.path())
+            .output();
+        let said = String::from_utf8(status.unwrap().stdout).unwrap();
+        let said: Vec<&str> = said.split_whitespace().collect();
+        said.join(" ").contains(line)
+    });
     writer.abort();
 }
 

@@ -145,3 +145,35 @@ async fn a_hook_of_a_config_under_a_relative_path_is_found() {
         fs::remove_file(folder.path().join("ran")).unwrap();
     }
 }
+
+#[tokio::test]
+async fn a_hook_within_walls_ends_as_its_program_does_and_leaves_at_work_what_it_left_if_that_went_well()
+ {
+    let folder = folder();
+    for (script, outcome) in [
+        ("exit 0", HookOutcome::Done),
+        ("exit 7", HookOutcome::Failed(7)),
+        ("kill -KILL $$", HookOutcome::Signalled(9)),
+        ("kill -TERM $$", HookOutcome::Signalled(15)),
+        // What asks its whole group to end is for it to take.
+        (
+            "trap 'exit 3' TERM; kill -TERM 0; exit 4",
+            HookOutcome::Failed(3),
+        ),
+    ] {
+        let hook = walled(folder.path(), &["/bin/sh", "-c", script]);
+        let ended = deliver::run(&hook, &alert("5", "5/red/1"), 1).await;
+        assert_eq!(ended, outcome, "{script}");
+    }
+    let script = "(env -i setsid sh -c 'sleep 1; touch later' > /dev/null 2>&1 &)\nexit 0";
+    let hook = walled(folder.path(), &["/bin/sh", "-c", script]);
+    let ended = deliver::run(&hook, &alert("5", "5/red/1"), 1).await;
+    assert_eq!(ended, HookOutcome::Done);
+    for _ in 0..300 {
+        if folder.path().join("later").exists() {
+            return;
+        }
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    panic!("what a hook left that went well was ended");
+}

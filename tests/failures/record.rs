@@ -101,6 +101,49 @@ fn an_alert_says_what_called_it_who_has_it_and_who_has_seen_it_why_and_over_whic
     site.proven_events();
 }
 
+#[test]
+fn an_alert_that_another_level_superseded_stands_as_its_place_does() {
+    let site = Site::new(POLICY);
+    let rows = |hours| format!("time,displacement_mm\n{}", failing(hours));
+    site.append("incoming/5.csv", &rows(0..60));
+    let program = site.caught_up();
+    eventually("orange", || site.notified("5/orange/", "firing") == 1);
+    site.append("incoming/5.csv", &failing(60..114));
+    site.awaits_red();
+    let of = |key: &str| -> Value {
+        let words = [
+            "alerts",
+            "show",
+            key,
+            "--config",
+            "site.toml",
+            "--format",
+            "json",
+        ];
+        serde_json::from_str(&site.printed(&words)).unwrap()
+    };
+    eventually("that it is superseded", || {
+        of("5/orange")["state"] == "superseded"
+    });
+    for key in ["5/orange", "5/red"] {
+        assert_eq!(of(key)["alarm_state"], "unacknowledged", "{key}");
+    }
+    let ack = [
+        "alerts",
+        "ack",
+        "--benchmark",
+        "5",
+        "--by",
+        "Ada",
+        "--config",
+        "site.toml",
+    ];
+    site.printed(&ack);
+    eventually("that it is seen", || of("5/red")["is_acknowledged"] == true);
+    assert_eq!(of("5/orange")["alarm_state"], of("5/red")["alarm_state"]);
+    program.stop();
+}
+
 /// Runs the command of the manifest in the folder of an unpacked bundle.
 fn reproduce(folder: &Path) -> Output {
     let manifest: Value =

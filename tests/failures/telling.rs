@@ -60,6 +60,9 @@ fn a_backlog_that_comes_in_row_by_row_is_one_silence_a_benchmark() {
         site.append("incoming/all.csv", &row);
         std::thread::sleep(Duration::from_millis(250));
     }
+    let events = site.events();
+    let has_ended = events.contains("\"level\":\"unknown\",\"state\":\"resolved\"");
+    assert!(!has_ended, "what is two days old is no end: {events}");
     site.append("incoming/all.csv", &rows(-48..1).concat());
     eventually("that they read again", || {
         let events = site.events();
@@ -116,6 +119,43 @@ fn corrected_readings_are_judged_once_a_batch_and_delay_no_red_of_another_benchm
     program.stop();
     assert!(refits() <= before + 20, "{} refits of {before}", refits());
     site.proven_events();
+}
+
+#[test]
+fn very_many_readings_of_one_time_delay_no_red_of_another_benchmark() {
+    let site = Site::new(POLICY);
+    site.append(
+        "incoming/5.csv",
+        &format!("time,displacement_mm\n{}", failing(0..60)),
+    );
+    let program = site.caught_up();
+    let time = clock::now() - SignedDuration::from_mins(5);
+    let same: String = (0..40_000)
+        .map(|row| format!("{time},{:.3}\n", 80.0 + f64::from(row) / 1000.0))
+        .collect();
+    site.append("incoming/6.csv", &format!("time,displacement_mm\n{same}"));
+    site.append("incoming/5.csv", &failing(60..114));
+    eventually("the other's red", || site.notified("5/red/", "firing") == 1);
+    eventually("all of them", || {
+        let values = site.values();
+        values.iter().filter(|(name, ..)| name == "6").count() == 40_000
+    });
+    // Read again from its start, as a file is that is put in another's place, it gives nothing new.
+    fs::write(
+        site.path("incoming/new"),
+        format!("time,displacement_mm\n{same}"),
+    )
+    .unwrap();
+    fs::rename(site.path("incoming/new"), site.path("incoming/6.csv")).unwrap();
+    site.append("incoming/6.csv", &format!("{time},1.5\n"));
+    eventually("what comes after them", || {
+        let values = site.values();
+        values
+            .iter()
+            .any(|(name, _, value)| name == "6" && *value < 2.0)
+    });
+    assert_eq!(site.values().len(), 40_115);
+    program.stop();
 }
 
 #[test]
@@ -191,47 +231,58 @@ fn a_site_of_which_nobody_is_notified_that_a_sensor_is_dead_does_not_pass_the_ch
     assert!(said.contains("no hook has unknown"), "{said}");
 }
 
+/// How a hook's child detaches: in a session of its own, and besides that with nothing left in its environment and no parent.
+const DETACHED: [&str; 2] = ["setsid", "env -i setsid"];
+
 #[test]
 fn a_child_that_leaves_its_hooks_group_does_not_outlive_the_attempt() {
-    let site = Site::new(POLICY);
-    let text = fs::read_to_string(site.path("site.toml")).unwrap();
-    fs::write(site.path("site.toml"), format!("{text}timeout = \"1s\"\n")).unwrap();
-    let script =
-        "[ $SLIPWATCH_LEVEL = red ] || exit 0\nsetsid sh -c 'echo $$ >> children; sleep 300'\n";
-    fs::write(site.path("hook.sh"), script).unwrap();
-    site.append(
-        "incoming/5.csv",
-        &format!("time,displacement_mm\n{}", failing(0..114)),
-    );
-    let program = site.caught_up();
-    eventually("two attempts", || site.lines("children").len() >= 2);
-    let first = site.lines("children").swap_remove(0);
-    eventually("its end", || has_ended(&first));
-    program.let_go();
-    for child in site.lines("children") {
-        let _ = std::process::Command::new("kill").arg(child).status();
+    for detached in DETACHED {
+        let site = Site::new(POLICY);
+        let text = fs::read_to_string(site.path("site.toml")).unwrap();
+        fs::write(site.path("site.toml"), format!("{text}timeout = \"1s\"\n")).unwrap();
+        let script = format!(
+            "[ $SLIPWATCH_LEVEL = red ] || exit 0\n\
+             ({detached} sh -c 'echo $$ >> children; sleep 300' &)\nsleep 300\n"
+        );
+        fs::write(site.path("hook.sh"), script).unwrap();
+        site.append(
+            "incoming/5.csv",
+            &format!("time,displacement_mm\n{}", failing(0..114)),
+        );
+        let program = site.caught_up();
+        eventually("two attempts", || site.lines("children").len() >= 2);
+        let first = site.lines("children").swap_remove(0);
+        eventually("its end", || has_ended(&first));
+        program.let_go();
+        for child in site.lines("children") {
+            let _ = std::process::Command::new("kill").arg(child).status();
+        }
     }
 }
 
 #[test]
 fn what_a_hook_that_fails_leaves_behind_does_not_outlive_the_attempt_either() {
-    let site = Site::new(POLICY);
-    let script = "[ $SLIPWATCH_LEVEL = red ] || exit 0\n\
-                  setsid sh -c 'echo $$ >> children; sleep 300' &\nsleep 0.2\nexit 1\n";
-    fs::write(site.path("hook.sh"), script).unwrap();
-    site.append(
-        "incoming/5.csv",
-        &format!("time,displacement_mm\n{}", failing(0..114)),
-    );
-    let program = site.caught_up();
-    eventually("two attempts", || site.lines("children").len() >= 2);
-    let first = site.lines("children").swap_remove(0);
-    eventually("its end", || has_ended(&first));
-    program.stop();
-    for child in site.lines("children") {
-        let is_over = has_ended(&child);
-        let _ = std::process::Command::new("kill").arg(&child).status();
-        assert!(is_over, "one outlives the daemon");
+    for detached in DETACHED {
+        let site = Site::new(POLICY);
+        let script = format!(
+            "[ $SLIPWATCH_LEVEL = red ] || exit 0\n\
+             {detached} sh -c 'echo $$ >> children; sleep 300' &\nsleep 0.2\nexit 1\n"
+        );
+        fs::write(site.path("hook.sh"), script).unwrap();
+        site.append(
+            "incoming/5.csv",
+            &format!("time,displacement_mm\n{}", failing(0..114)),
+        );
+        let program = site.caught_up();
+        eventually("two attempts", || site.lines("children").len() >= 2);
+        let first = site.lines("children").swap_remove(0);
+        eventually("its end", || has_ended(&first));
+        program.stop();
+        for child in site.lines("children") {
+            let is_over = has_ended(&child);
+            let _ = std::process::Command::new("kill").arg(&child).status();
+            assert!(is_over, "one outlives the daemon: {detached}");
+        }
     }
 }
 

@@ -121,6 +121,49 @@ fn stamped_ahead_after(before: i32) {
 }
 
 #[test]
+fn the_very_first_reading_stamped_a_month_ahead_keeps_no_later_one_from_counting() {
+    let ahead = clock::now() - SignedDuration::from_hours(28 * 24);
+    let policy = "[alert]\nevacuation_time = \"3h\"\n[[alert.threshold]]\nlevel = \"red\"\nvelocity = \"500 mm/day\"\n";
+    // As they come, and on a first start.
+    for is_live in [true, false] {
+        let site = Site::new(policy);
+        site.append("incoming/5.csv", &format!("{HEADER}{ahead},6.5\n"));
+        if !is_live {
+            site.append("incoming/5.csv", &old(0..113));
+        }
+        let program = site.caught_up();
+        if is_live {
+            for first in (0..113).step_by(10) {
+                site.append("incoming/5.csv", &old(first..(first + 10).min(113)));
+                std::thread::sleep(Duration::from_millis(50));
+            }
+            eventually("notified", || site.notified("5/red/", "firing") == 1);
+        }
+        eventually("red", || site.events().contains("\"key\":\"5/red/"));
+        eventually("everything", || site.values().len() == 114);
+        program.stop();
+        let events = site.proven_events();
+        for part in ["leaps-ahead", "its first, lies", "leapt-ahead"] {
+            assert!(events.contains(part), "{part}: {events}");
+        }
+        assert!(!events.contains("out-of-order"), "{events}");
+    }
+}
+
+#[test]
+fn a_first_reading_that_is_live_counts_although_a_backlog_comes_after_it() {
+    let site = Site::new(POLICY);
+    let now = clock::now();
+    site.append("incoming/5.csv", &format!("{HEADER}{now},6.5\n"));
+    let program = site.caught_up();
+    site.append("incoming/5.csv", &old(0..50));
+    eventually("the backlog", || site.values().len() == 51);
+    program.stop();
+    let events = site.proven_events();
+    assert!(!events.contains("leaps-ahead"), "{events}");
+}
+
+#[test]
 fn what_an_unset_clock_gave_first_does_not_disarm_a_displacement_threshold() {
     let site = Site::new("[[alert.threshold]]\nlevel = \"red\"\ndisplacement = \"96 mm\"\n");
     let now = clock::now();

@@ -9,7 +9,7 @@ mod unnamed;
 
 use super::args::{DialectArgs, FileArgs, OutputArgs};
 use super::check;
-use super::exit::{self, UsageError};
+use super::exit::{self, NoSuchReadings, UsageError};
 use crate::config::{SourceKind, value};
 use crate::reading::{BenchmarkId, Dialect, Quantity, SummerTime, TimeFormat, Timestamp, Unit};
 use crate::runtime::ingest::{
@@ -121,18 +121,52 @@ fn usage(problem: String) -> anyhow::Error {
     UsageError(problem).into()
 }
 
+/// What keeps a config from being written.
+#[derive(Debug, Default)]
+struct Problems {
+    /// What a flag decides, and what no flag mends.
+    open: Vec<String>,
+    bad: Vec<String>,
+}
+
+impl Problems {
+    fn leave_open(&mut self, problem: String) {
+        self.open.push(problem);
+    }
+
+    /// As an error, where there are some.
+    fn none(self) -> anyhow::Result<()> {
+        match (&self.open[..], &self.bad[..]) {
+            ([], []) => Ok(()),
+            ([], bad) => Err(NoSuchReadings(bad.join("\n")).into()),
+            (open, bad) => Err(usage([open, bad].concat().join("\n"))),
+        }
+    }
+}
+
+/// What comes from a pipe is there but once, and a daemon would not find it again.
+fn can_be_followed(file: &Path) -> anyhow::Result<()> {
+    if file == Path::new("-") || file.exists() && !file.is_file() {
+        let name = file.display();
+        return Err(usage(format!(
+            "{name}: is no file that a daemon could follow; write what it gives to a file, and name that"
+        )));
+    }
+    Ok(())
+}
+
 fn plan(args: &Args) -> anyhow::Result<InitPlan> {
-    let (mut problems, mut beside) = (Vec::new(), Vec::new());
+    let (mut problems, mut beside) = (Problems::default(), Vec::new());
     let (mut sources, mut benchmarks) = (Vec::new(), BTreeMap::new());
     for file in &args.files {
+        can_be_followed(file)?;
         let kind = kind_of(file)?;
         let written = match written(file, kind, args)? {
             Ok(written) => written,
             Err(open) => {
-                problems.extend(
-                    open.into_iter()
-                        .map(|one| format!("{}: {one}", file.display())),
-                );
+                for one in open {
+                    problems.leave_open(format!("{}: {one}", file.display()));
+                }
                 continue;
             }
         };
@@ -152,7 +186,7 @@ fn plan(args: &Args) -> anyhow::Result<InitPlan> {
             FoundInFile::Benchmarks(found) => {
                 for benchmark in found {
                     if let Some(other) = benchmarks.insert(benchmark.id.clone(), benchmark) {
-                        problems.push(twice(file, &other));
+                        problems.leave_open(twice(file, &other));
                     }
                 }
                 sources.push(source);
@@ -162,19 +196,18 @@ fn plan(args: &Args) -> anyhow::Result<InitPlan> {
                 source.is_beside = true;
                 sources.push(source);
             }
-            FoundInFile::Nothing(problem) => problems.push(problem),
+            FoundInFile::Open(problem) => problems.leave_open(problem),
+            FoundInFile::Bad(problem) => problems.bad.push(problem),
         }
     }
     for (file, names, problem) in beside {
         if benchmarks.is_empty() {
-            problems.push(problem);
+            problems.leave_open(problem);
         } else {
             say_beside(file, &names);
         }
     }
-    if !problems.is_empty() {
-        return Err(usage(problems.join("\n")));
-    }
+    problems.none()?;
     Ok(InitPlan {
         name: site_name(args),
         zone: args
@@ -319,8 +352,10 @@ enum FoundInFile {
     Benchmarks(Vec<PlannedBenchmark>),
     /// Covariates by their names, and what is said of it where no other file has a benchmark.
     Covariates(Vec<String>, String),
-    /// What is wrong with it, or which flag names its benchmarks.
-    Nothing(String),
+    /// Which flag names its benchmarks.
+    Open(String),
+    /// What is wrong with it, so that no flag mends it.
+    Bad(String),
 }
 
 fn held(file: &Path, source: &PlannedSource, args: &Args) -> anyhow::Result<FoundInFile> {
@@ -350,7 +385,9 @@ fn held(file: &Path, source: &PlannedSource, args: &Args) -> anyhow::Result<Foun
         let problem = without_readings(file, &looked);
         return Ok(match covariates_alone(&looked) {
             Some(names) => FoundInFile::Covariates(names, problem),
-            None => FoundInFile::Nothing(problem),
+            // Where a flag helps, what is said names it.
+            None if problem.contains("--") => FoundInFile::Open(problem),
+            None => FoundInFile::Bad(problem),
         });
     }
     Ok(FoundInFile::Benchmarks(one_quantity_each(found)))

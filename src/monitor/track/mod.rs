@@ -322,6 +322,17 @@ impl Track {
         vec![self.record.put_aside(now, source, reading)]
     }
 
+    /// When the only reading was measured, where one of `time`, which comes after it, lies far before it and nothing rests on it.
+    pub(super) fn first_ahead_of(&self, time: Timestamp) -> Option<Timestamp> {
+        let is_green = self.level() == Level::Green;
+        self.record.first_ahead_of(time).filter(|_| is_green)
+    }
+
+    /// The only reading waits from now on: the next one is of `time`, far before it.
+    pub(super) fn put_first_aside(&mut self, now: Timestamp, time: Timestamp) -> Option<Event> {
+        self.record.put_first_aside(now, time)
+    }
+
     /// Data time has come to `now` without a reading; `fault` is what the sensor gives instead.
     pub(super) fn pass(
         &mut self,
@@ -390,6 +401,11 @@ impl Track {
     /// What comes now was measured long before `time`, which it is by the clock.
     pub(super) fn is_behind(&mut self, time: Timestamp) {
         self.record.is_behind(time);
+    }
+
+    /// What time it was when one came that was measured long before.
+    pub(super) fn behind(&self) -> Option<Timestamp> {
+        self.record.behind()
     }
 
     pub(super) fn level(&self) -> Level {

@@ -1,5 +1,6 @@
 //! The processes of one run of a hook: what it has started, and how that is ended.
 
+use crate::runtime::descendants::kill_descendants;
 use nix::sys::signal::{Signal, kill, killpg};
 use nix::unistd::Pid;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -77,6 +78,7 @@ impl ProcessGroup {
 
     pub(super) fn kill(&mut self) {
         if let Some(group) = self.group.take() {
+            kill_descendants(group);
             let _ = killpg(group, Signal::SIGKILL);
             kill_all_of(&self.run);
         }

@@ -111,8 +111,9 @@ impl Site {
         {
             return self.step(now, &arrival.input);
         }
+        let mut events = self.doubt_first(arrival, wall);
         self.keep_time(arrival, wall);
-        let mut events = self.pass(arrival.time);
+        events.extend(self.pass(arrival.time));
         let now = self.now.map_or(arrival.time, |now| now.max(arrival.time));
         if let Input::Reading { benchmark, .. } = &arrival.input
             && let Some(finding) = self.answer(benchmark, arrival.time)
@@ -228,6 +229,27 @@ impl Site {
             && self.monitor.leaps(benchmark, arrival.time)
     }
 
+    /// Has the only reading of a benchmark wait where this one, its second, lies far before it, and neither the time at the site
+    /// nor another benchmark is near to the first: with one wrong time stamp all honest readings would be late.
+    fn doubt_first(&mut self, arrival: &Arrival, wall: Timestamp) -> Vec<Event> {
+        let Input::Reading { benchmark, .. } = &arrival.input else {
+            return Vec::new();
+        };
+        let Some(now) = self.now.filter(|_| self.sinks.store.is_some()) else {
+            return Vec::new();
+        };
+        let Some(first) = self.monitor.first_ahead_of(benchmark, arrival.time) else {
+            return Vec::new();
+        };
+        let is_near = |time: Timestamp| first.duration_since(time).abs() <= NEAR;
+        let mut others = self.newest.iter().filter(|(one, _)| *one != benchmark);
+        if is_near(self.keeper.now(wall)) || others.any(|(_, newest)| is_near(*newest)) {
+            return Vec::new();
+        }
+        let (benchmark, time) = (benchmark.clone(), arrival.time);
+        self.step(now, &Input::Notice(Notice::FirstAhead { benchmark, time }))
+    }
+
     /// Learns from a reading what time it is, and notes where it is one of a backlog.
     fn keep_time(&mut self, arrival: &Arrival, wall: Timestamp) {
         let Input::Reading { benchmark, .. } = &arrival.input else {
@@ -239,15 +261,17 @@ impl Site {
         self.unproven.comes(benchmark, arrival.time);
         let is_live = self.at_rest.contains(benchmark);
         self.keeper.knows(arrival.time, is_live);
-        let time = self.keeper.now(wall);
-        let is_noted = self
-            .behind
-            .get(benchmark)
-            .is_some_and(|noted| time.duration_since(*noted) < NOTED_FOR);
+        if is_live {
+            self.keeper.comes(benchmark.as_str(), arrival.time, wall);
+        }
+        let time = self.keeper.latest(wall);
+        let noted = self.monitor.behind(benchmark);
+        let is_noted = noted.is_some_and(|noted| time.duration_since(noted).abs() < NOTED_FOR);
         let is_late = time.duration_since(arrival.time) > NOTED_FOR;
-        if is_live && is_late && !is_noted && self.monitor.is_silent(benchmark) {
+        // Where the time that was noted proves wrong, the reading is none of a backlog.
+        let is_news = !is_noted && (is_late || noted.is_some());
+        if is_live && is_news && self.monitor.is_silent(benchmark) {
             let benchmark = benchmark.clone();
-            self.behind.insert(benchmark.clone(), time);
             let now = self.now.map_or(arrival.time, |now| now.max(arrival.time));
             self.step(now, &Input::Notice(Notice::Behind { benchmark, time }));
         }

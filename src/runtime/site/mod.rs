@@ -25,7 +25,9 @@ use returned::Returned;
 use standing_floods::StandingFlood;
 use timekeeper::Timekeeper;
 
-use crate::monitor::{Event, EventKind, Input, Monitor, Order, RESET_FOUND, SUSPECT, Settings};
+use crate::monitor::{
+    Event, EventKind, Input, Monitor, Notice, Order, RESET_FOUND, SUSPECT, Settings,
+};
 use crate::reading::{BEFORE_ALL, BenchmarkId, Timestamp};
 use crate::runtime::deliver::Dispatcher;
 use crate::runtime::hook::{Alert, Status};
@@ -154,8 +156,6 @@ pub struct Site {
     crowd: MessageRush,
     /// Up to which step the state has readings of a benchmark that do not count any more: they come again, and are new then.
     read_anew: BTreeMap<BenchmarkId, i64>,
-    /// Of which silent benchmarks it is known how late their readings come, and what time it was then.
-    behind: BTreeMap<BenchmarkId, Timestamp>,
 }
 
 impl Site {
@@ -187,7 +187,6 @@ impl Site {
             returned: Returned::default(),
             crowd: MessageRush::default(),
             read_anew: BTreeMap::new(),
-            behind: BTreeMap::new(),
         }
     }
 
@@ -303,6 +302,11 @@ impl Site {
             let stays = |id: &BenchmarkId| !settings.watched.ends(id, former);
             self.newest.retain(|id, _| stays(id));
             self.ahead.retain(|id, _| stays(id));
+        }
+        if let Input::Notice(Notice::FirstAhead { benchmark, .. }) = input
+            && let Some(first) = self.newest.remove(benchmark)
+        {
+            self.ahead.insert(benchmark.clone(), first);
         }
         if let Input::Order(order) = input {
             self.apply(order);

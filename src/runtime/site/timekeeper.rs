@@ -24,8 +24,35 @@ pub(super) struct Timekeeper {
     known: Option<(Timestamp, Stopwatch)>,
     /// Whether that reading came in live.
     is_live: bool,
+    /// Whether live readings have shown that they come when they are measured, and none of them is one of a backlog.
+    is_proven: bool,
+    /// Of each benchmark the latest live readings that lie far behind the clock, and how long ago they came.
+    behind: LatestReadings,
     /// Of each benchmark the latest readings that are held, and how long ago they came.
-    held: BTreeMap<String, VecDeque<(Timestamp, Stopwatch)>>,
+    held: LatestReadings,
+}
+
+/// The latest readings of each benchmark, and how long ago each came.
+#[derive(Debug, Default)]
+struct LatestReadings(BTreeMap<String, VecDeque<(Timestamp, Stopwatch)>>);
+
+impl LatestReadings {
+    /// Notes one more; whether the latest come as far apart as they were measured.
+    fn are_steady_with(&mut self, benchmark: &str, time: Timestamp) -> bool {
+        let latest = self.0.entry(benchmark.to_owned()).or_default();
+        let since = latest.back().map(|(last, _)| time.duration_since(*last));
+        // Of those that are read more often some are enough.
+        if since.is_some_and(|since| since <= SignedDuration::from_mins(2)) {
+            return false;
+        }
+        latest.push_back((time, Stopwatch::start()));
+        if latest.len() > STEADY {
+            latest.pop_front();
+        }
+        let pairs = latest.iter().zip(latest.iter().skip(1));
+        let mut each = pairs.map(|(before, after)| are_as_far_apart(*before, *after));
+        latest.len() == STEADY && each.all(|is_as_far| is_as_far)
+    }
 }
 
 impl Timekeeper {
@@ -67,21 +94,31 @@ impl Timekeeper {
         }
     }
 
+    /// A live reading of `benchmark` and `time` has come while the host's clock says `wall`.
+    pub(super) fn comes(&mut self, benchmark: &str, time: Timestamp, wall: Timestamp) {
+        if self.is_proven {
+            return;
+        }
+        let is_far_behind = wall.duration_since(time) > BEHIND;
+        self.is_proven = !is_far_behind || self.behind.are_steady_with(benchmark, time);
+        if self.is_proven {
+            self.behind = LatestReadings::default();
+        }
+    }
+
+    /// How late it may be at the site, while the host's clock says `wall`: as late as that where live readings lie far behind it
+    /// and may be a backlog as well as right.
+    pub(super) fn latest(&self, wall: Timestamp) -> Timestamp {
+        let now = self.now(wall);
+        if self.is_proven { now } else { now.max(wall) }
+    }
+
     /// A reading of `benchmark` and `time` lies beyond what the clock allows, and is held. Whether those of this
     /// benchmark come as far apart as they were measured: their time is right then.
     pub(super) fn holds(&mut self, benchmark: &str, time: Timestamp) -> bool {
-        let held = self.held.entry(benchmark.to_owned()).or_default();
-        held.push_back((time, Stopwatch::start()));
-        if held.len() > STEADY {
-            held.pop_front();
-        }
-        let is_steady = held.len() == STEADY
-            && held
-                .iter()
-                .zip(held.iter().skip(1))
-                .all(|(before, after)| are_as_far_apart(*before, *after));
+        let is_steady = self.held.are_steady_with(benchmark, time);
         if is_steady {
-            self.held.clear();
+            self.held = LatestReadings::default();
             self.known = Some((time, Stopwatch::start()));
         }
         is_steady
@@ -89,7 +126,7 @@ impl Timekeeper {
 
     /// Nothing is held any more.
     pub(super) fn releases(&mut self) {
-        self.held.clear();
+        self.held = LatestReadings::default();
     }
 }
 
@@ -144,6 +181,35 @@ mod tests {
         assert!(keeper.is_behind(now - 2.hours()));
         assert_eq!(keeper.now(now - 2.hours()), now);
         assert!(!keeper.is_behind(now));
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn far_behind_the_clock_readings_may_be_a_backlog_until_four_come_as_far_apart_as_measured()
+     {
+        let (mut keeper, wall) = (Timekeeper::default(), noon() + 1000.hours());
+        let comes = |keeper: &mut Timekeeper, minute: i64| {
+            keeper.knows(noon() + minute.minutes(), true);
+            keeper.comes("5", noon() + minute.minutes(), wall);
+        };
+        for minute in 0..30 {
+            comes(&mut keeper, minute);
+            assert_eq!(keeper.latest(wall), wall);
+        }
+        for minute in 40..44 {
+            assert_eq!(keeper.latest(wall), wall, "{minute}");
+            tokio::time::advance(Duration::from_secs(600)).await;
+            comes(&mut keeper, 10 * minute - 370);
+        }
+        assert!(keeper.latest(wall) < noon() + 2.hours());
+    }
+
+    #[test]
+    fn a_reading_in_time_shows_that_live_ones_are_no_backlog() {
+        let mut keeper = Timekeeper::default();
+        keeper.knows(noon(), true);
+        keeper.comes("5", noon(), noon() + 2.minutes());
+        let jumped = noon() + 1000.hours();
+        assert!(keeper.latest(jumped) < noon() + 1.hour());
     }
 
     #[test]

@@ -145,7 +145,7 @@ pub fn alert(store: &Store, site: &str, key: &str) -> Result<Option<AlertView>, 
         recommended: level.recommended(),
         valid_until: valid_until(store, level, ended, benchmark.as_ref(), since, policy)?,
         deliveries: store.deliveries_of(&key)?,
-        alarm_state: alarm_state(store, &call.event, is_acknowledged)?,
+        alarm_state: alarm_state(store, &call.event, state, is_acknowledged)?,
         is_acknowledged,
         audit,
         step: call.step,
@@ -280,6 +280,7 @@ fn is_seen_after(alerts: &[Event], call: &Event, order: &Event) -> bool {
 fn alarm_state(
     store: &Store,
     call: &Event,
+    life: AlertLife,
     is_acknowledged: bool,
 ) -> Result<AlarmState, StoreError> {
     let alarms = Alarms::read(store, None, clock::now())?;
@@ -291,6 +292,10 @@ fn alarm_state(
             None
         }
     });
+    if life == AlertLife::Superseded {
+        // It has not ended: another level has taken its place.
+        return Ok(alarms.state(call.benchmark.as_ref(), called.as_deref()));
+    }
     Ok(alarms.state_of(call, is_acknowledged, called.as_deref()))
 }
 

@@ -20,6 +20,9 @@ pub(in crate::monitor::track) struct HeldReading {
     reading: Reading,
     /// Readings of the time before it since it came.
     before: u32,
+    /// Whether it was the very first of its benchmark: data time went by it, and says nothing of it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    was_first: bool,
 }
 
 impl HeldReading {
@@ -50,8 +53,44 @@ impl BenchmarkRecord {
             averaging: source.averaging,
             reading: *reading,
             before: 0,
+            was_first: false,
         });
         self.fault(now, "leaps-ahead", text)
+    }
+
+    /// When the only reading that there is was measured, where one of `time`, which comes after it, lies as far before it as one lies
+    /// after all others that waits for another one.
+    pub(in crate::monitor::track) fn first_ahead_of(&self, time: Timestamp) -> Option<Timestamp> {
+        let newest = self.newest?;
+        let is_alone = self.history.is_single() && self.ahead.is_none();
+        (is_alone && newest.duration_since(time) > super::LEAST_LEAP).then_some(newest)
+    }
+
+    /// The only reading that there is waits from now on, and the record begins with one of `time`, which comes next.
+    pub(in crate::monitor::track) fn put_first_aside(
+        &mut self,
+        now: Timestamp,
+        time: Timestamp,
+    ) -> Option<Event> {
+        self.first_ahead_of(time)?;
+        let source = self.source();
+        let reading = self.history.begin_again(source, time)?;
+        let text = format!(
+            "benchmark {}: the reading of {}, its first, lies {:.1} days after the next one: it counts once another one confirms it",
+            self.benchmark,
+            reading.time,
+            days(reading.time.duration_since(time))
+        );
+        self.ahead = Some(HeldReading {
+            unit: source.unit,
+            averaging: source.averaging,
+            reading,
+            before: 0,
+            was_first: true,
+        });
+        self.newest = None;
+        self.silence.begin_again();
+        Some(self.fault(now, "leaps-ahead", text))
     }
 
     /// The reading that waits, where it waits no longer: one of `time` has come at `now`, and either is not before it.
@@ -60,8 +99,10 @@ impl BenchmarkRecord {
         time: Timestamp,
         now: Timestamp,
     ) -> Option<(MeasuredAs, Reading)> {
-        let ahead = (self.ahead)
-            .take_if(|ahead| time >= ahead.reading.time || now >= ahead.reading.time)?;
+        let ahead = (self.ahead).take_if(|ahead| {
+            let has_come = !ahead.was_first && now >= ahead.reading.time;
+            time >= ahead.reading.time || has_come
+        })?;
         let source = MeasuredAs {
             unit: ahead.unit,
             averaging: ahead.averaging,
@@ -86,6 +127,38 @@ impl BenchmarkRecord {
 #[cfg(test)]
 mod tests {
     use crate::monitor::track::fixture::{DISPLACEMENT, at, reading, record};
+
+    #[test]
+    fn a_first_reading_far_ahead_waits_as_any_other_does() {
+        let ahead = || {
+            let mut record = record([9.0]);
+            assert_eq!(record.first_ahead_of(at(-48)), None);
+            assert_eq!(record.first_ahead_of(at(-49)), Some(at(0)));
+            assert!(record.put_first_aside(at(0), at(-100)).is_some());
+            assert_eq!(record.observations().values.len(), 0);
+            record.take(DISPLACEMENT, &reading(-100, 1.0));
+            record.note_newest(at(-100));
+            record
+        };
+        // Data time went by it.
+        let mut wrong = ahead();
+        assert!(wrong.take_confirmed(at(-99), at(0)).is_none());
+        let said: Vec<bool> = (-99..-95)
+            .map(|hour| {
+                let event = wrong.contradict_ahead(at(hour));
+                wrong.note_newest(at(hour));
+                event.is_some()
+            })
+            .collect();
+        assert_eq!(said, [false, false, true, false]);
+        let (_, taken) = ahead().take_confirmed(at(1), at(1)).unwrap();
+        assert_eq!(taken, reading(0, 9.0));
+        assert!(
+            record([9.0, 9.5])
+                .put_first_aside(at(1), at(-100))
+                .is_none()
+        );
+    }
 
     #[test]
     fn a_reading_far_ahead_is_taken_when_its_time_has_come_and_dropped_after_three_before_it() {

@@ -178,6 +178,11 @@ impl BenchmarkRecord {
         self.silence.is_behind(time);
     }
 
+    /// What time it was when one came that was measured long before.
+    pub(super) fn behind(&self) -> Option<Timestamp> {
+        self.silence.behind()
+    }
+
     /// Whether a reading of `time` lies so far after the newest one that the logger's clock may have jumped. Where hardly
     /// anything has been read, the spacings that there are count.
     pub(super) fn leaps(&self, time: Timestamp) -> bool {
