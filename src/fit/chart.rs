@@ -136,7 +136,9 @@ impl Chart {
     pub(super) fn locate(
         branch: Branch,
         direction: Direction,
-        (slope, steady, ln_m): (f64, f64, f64),
+        slope: f64,
+        steady: f64,
+        ln_m: f64,
     ) -> (Self, ChartPoint) {
         let has_knee = match (branch, direction) {
             (Branch::BelowOne, Direction::Accelerating) => true,

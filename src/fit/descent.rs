@@ -368,7 +368,7 @@ mod tests {
             for direction in Direction::BOTH {
                 for m in sizes {
                     for excess in [0.4, 2.5] {
-                        places.push(Chart::locate(branch, direction, (2.0, excess, f64::ln(m))));
+                        places.push(Chart::locate(branch, direction, 2.0, excess, f64::ln(m)));
                     }
                 }
             }

@@ -275,7 +275,7 @@ impl<'a> GlobalSearch<'a> {
             };
             for beyond in BEYOND_LINE {
                 let excess = (fall + beyond).max(LEAST_EXCESS);
-                let (chart, at) = Chart::locate(branch, direction, (slope, excess, m.abs().ln()));
+                let (chart, at) = Chart::locate(branch, direction, slope, excess, m.abs().ln());
                 let at = super::descent::inside(chart, &at, self.holds_m());
                 let cost = self.descent.cost(merged, chart, &at, Fineness::MIDDLE);
                 if cost.is_finite() {

@@ -126,7 +126,7 @@ impl CurveFamily {
         let p = self
             .branch
             .p(if holds_m { self.m.abs().ln() } else { ln_m });
-        let (chart, _) = Chart::locate(self.branch, self.direction, (1.0, 1.0, ln_m));
+        let (chart, _) = Chart::locate(self.branch, self.direction, 1.0, 1.0, ln_m);
         let sign = chart.shape(&[0.0; 3]).slope.signum();
         let shape = CurveShape {
             slope: sign,
@@ -143,7 +143,7 @@ impl CurveFamily {
             let node = laid.window.first_node;
             let slope = descent.curve.growth(node) * laid.window.span;
             let excess = descent.curve.ln_excess(node).abs();
-            let (chart, at) = Chart::locate(self.branch, self.direction, (slope, excess, ln_m));
+            let (chart, at) = Chart::locate(self.branch, self.direction, slope, excess, ln_m);
             SearchPoint {
                 chart,
                 at,

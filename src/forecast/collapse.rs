@@ -128,7 +128,7 @@ impl Indicators {
     /// The inputs of every span with its length, days.
     pub fn questions(&self, members: &Members) -> Vec<(f64, [f64; INPUTS])> {
         let each = spans(&self.scales);
-        each.map(|(power, days)| (days, self.inputs(members, (power, days))))
+        each.map(|(power, days)| (days, self.inputs(members, power, days)))
             .collect()
     }
 
@@ -162,7 +162,7 @@ impl Indicators {
         let accelerating = self.accelerating();
         for (power, days) in spans(&self.scales) {
             let creeps = (1.0 - accelerating) * (1.0 - may_grow(&self.scales, (power, days)));
-            let chance = network.chance(&self.inputs(members, (power, days))) * (1.0 - creeps);
+            let chance = network.chance(&self.inputs(members, power, days)) * (1.0 - creeps);
             reached = reached.max(chance);
             sure = sure.max(self.most(days) * chance * goes_on(&self.scales, power));
             all.push((days, reached));
@@ -184,8 +184,8 @@ impl Indicators {
     }
 
     /// What the chance of a collapse within the span of scale `power`, which may lie beyond the scales, rests on.
-    fn inputs(&self, members: &Members, (power, days): (usize, f64)) -> [f64; INPUTS] {
-        let inputs = self.listed(members, (power, days));
+    fn inputs(&self, members: &Members, power: usize, days: f64) -> [f64; INPUTS] {
+        let inputs = self.listed(members, power, days);
         let mut all = [0.0; INPUTS];
         for (slot, value) in all.iter_mut().zip(inputs) {
             *slot = if value.is_finite() { value } else { 0.0 };
@@ -193,7 +193,7 @@ impl Indicators {
         all
     }
 
-    fn listed(&self, members: &Members, (power, days): (usize, f64)) -> Vec<f64> {
+    fn listed(&self, members: &Members, power: usize, days: f64) -> Vec<f64> {
         let view = View::at(&self.scales, power);
         let mut inputs = Vec::with_capacity(INPUTS);
         inputs.push(1.0);
@@ -461,7 +461,7 @@ mod tests {
     #[test]
     fn every_input_has_its_place() {
         let indicators = Indicators::of(&readings(400, 0.25, |t| t)).unwrap();
-        let all = indicators.listed(&Members::default(), (3, 2.0));
+        let all = indicators.listed(&Members::default(), 3, 2.0);
         assert_eq!(all.len(), INPUTS);
     }
 

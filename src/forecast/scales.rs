@@ -139,7 +139,7 @@ impl Scales {
         let mut blocks = Blocks::default();
         let (mut disturbed_days, mut is_usual) = (None::<f64>, false);
         for power in 0..MOST_SCALES {
-            blocks = curve.blocks(power, (base_days, interval_days), &blocks);
+            blocks = curve.blocks(power, base_days, interval_days, &blocks);
             let Some(scale) = blocks.scale(each.last(), stated, &curve) else {
                 break;
             };
@@ -224,12 +224,7 @@ impl Curve {
 
     /// The blocks of one scale, of which `shorter` are half as long. Sparse readings are taken as points at the two shortest
     /// scales: a mean over the line between two of them would blur the newest motion.
-    fn blocks(
-        &self,
-        power: usize,
-        (base_days, interval_days): (f64, f64),
-        shorter: &Blocks,
-    ) -> Blocks {
+    fn blocks(&self, power: usize, base_days: f64, interval_days: f64, shorter: &Blocks) -> Blocks {
         let days = base_days * f64::powi(2.0, i32::try_from(power).unwrap_or(i32::MAX));
         let length = -self.days[0];
         #[expect(

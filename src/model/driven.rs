@@ -115,7 +115,7 @@ impl Driven {
             ln_v: friction.ln_v_i,
             v: law.v_i,
         };
-        let mut state = friction.state((0.0, 0.0), first, still);
+        let mut state = friction.state(0.0, 0.0, first, still);
         let (mut extra, mut events) = (0.0, drive.events.iter().peekable());
         for (k, (&t, &f)) in drive.nodes.iter().zip(drive.log_load).enumerate() {
             // Where the block has come to, and the load declared there.
@@ -140,7 +140,7 @@ impl Driven {
                 extra += event.log_load;
                 friction.change(event);
                 let ln_y = state.ln_y + event.ln_y;
-                state = friction.state((ln_y, state.slip), here.1 + extra, state.speed);
+                state = friction.state(ln_y, state.slip, here.1 + extra, state.speed);
             }
             self.ln_y.push(state.ln_y);
             self.velocity.push(state.speed.v);
@@ -167,17 +167,17 @@ impl Friction {
     }
 
     /// The block under a log-load, its velocity somewhere near `last`.
-    fn state(&self, (ln_y, slip): (f64, f64), log_load: f64, last: Speed) -> State {
+    fn state(&self, ln_y: f64, slip: f64, log_load: f64, last: Speed) -> State {
         State {
             ln_y,
             slip,
-            speed: self.speed((ln_y, slip), log_load, last),
+            speed: self.speed(ln_y, slip, log_load, last),
             healing: self.healing(ln_y),
         }
     }
 
     /// v from ln v + eta v = `ln v_i` + f - ln y - k X; `last` is what it was before.
-    fn speed(&self, (ln_y, slip): (f64, f64), log_load: f64, last: Speed) -> Speed {
+    fn speed(&self, ln_y: f64, slip: f64, log_load: f64, last: Speed) -> Speed {
         let target = self.ln_v_i + log_load - ln_y - self.per_slip * slip;
         if self.per_velocity <= 0.0 {
             return Speed {
@@ -236,7 +236,7 @@ impl Friction {
             if span - t < 1.5 * h {
                 h = span - t;
             }
-            state = self.step(state, h, (from + per_day * t, per_day));
+            state = self.step(state, h, from + per_day * t, per_day);
             t += h;
             steps += 1;
             let sound = state.ln_y.is_finite() && state.speed.v.is_finite();
@@ -246,12 +246,12 @@ impl Friction {
         }
         if self.per_slip != 0.0 {
             // The step's own velocity is that of the slip as predicted.
-            state.speed = self.speed((state.ln_y, state.slip), to, state.speed);
+            state.speed = self.speed(state.ln_y, state.slip, to, state.speed);
         }
         Some(state)
     }
 
-    fn step(&self, state: State, h: f64, (f, per_day): (f64, f64)) -> State {
+    fn step(&self, state: State, h: f64, f: f64, per_day: f64) -> State {
         let State {
             ln_y,
             slip,
@@ -276,12 +276,12 @@ impl Friction {
         let k_1 = (slope + GAMMA * h * drift) / denominator;
         let f_end = f + per_day * h;
         let ln_y_trial = ln_y + h * k_1;
-        let trial = self.speed((ln_y_trial, slip + h * velocity), f_end, speed);
+        let trial = self.speed(ln_y_trial, slip + h * velocity, f_end, speed);
         let slope_trial = self.healing(ln_y_trial) - self.wear(trial.v);
         let k_2 = (slope_trial - 2.0 * k_1 - GAMMA * h * drift) / denominator;
         let next = ln_y + h * (1.5 * k_1 + 0.5 * k_2);
         let slip_next = slip + h * 0.5 * (velocity + trial.v);
-        let last = self.state((next, slip_next), f_end, trial);
+        let last = self.state(next, slip_next, f_end, trial);
         let v_next = last.speed.v;
         // Hermite's rule with the slopes of v at both ends.
         let growth = |v: f64, slope: f64| {

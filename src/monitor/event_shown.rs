@@ -225,7 +225,8 @@ impl EventKind {
                 });
                 drift(
                     "inverse-velocity intercept",
-                    (*from, *to),
+                    *from,
+                    *to,
                     *drift_days_per_day,
                 ) + &expected
             }
@@ -233,7 +234,7 @@ impl EventKind {
                 from,
                 to,
                 drift_days_per_day,
-            } => drift("transition time", (*from, *to), *drift_days_per_day),
+            } => drift("transition time", *from, *to, *drift_days_per_day),
             Self::UnexplainedResidual(what) => unexplained(what),
             Self::EffectFound { .. } => effect_found(self),
             Self::EffectDropped { effect, channel } => format!(
@@ -360,7 +361,7 @@ fn effect_found(kind: &EventKind) -> String {
     )
 }
 
-fn drift(name: &str, (from, to): (Timestamp, Timestamp), days_per_day: f64) -> String {
+fn drift(name: &str, from: Timestamp, to: Timestamp, days_per_day: f64) -> String {
     let (from, to) = (minute(from), minute(to));
     format!("{name} drifts: {from} to {to} ({days_per_day:+.2} days a day)")
 }

@@ -115,7 +115,7 @@ impl Monitor {
             } => {
                 let track = self.benchmarks.get_mut(benchmark);
                 let events =
-                    track.map_or_else(Vec::new, |track| track.suspect_ahead(now, (*time, *clock)));
+                    track.map_or_else(Vec::new, |track| track.suspect_ahead(now, *time, *clock));
                 self.benchmarks.note_changed(benchmark);
                 events
             }

@@ -88,7 +88,8 @@ impl SiteAlert {
         &mut self,
         rule: Option<SiteLevel>,
         now: Timestamp,
-        (unknown, all): (&[&BenchmarkId], usize),
+        unknown: &[&BenchmarkId],
+        all: usize,
     ) -> Option<Event> {
         let is_unknown = !unknown.is_empty()
             && rule.is_some_and(|rule| {
@@ -142,7 +143,7 @@ impl Monitor {
             let unknown = self.benchmarks.in_force().unknown().iter();
             let unknown: Vec<&BenchmarkId> = unknown.chain(awaited.clone()).collect();
             let all = self.benchmarks.all().len() + awaited.count();
-            of_site.extend(self.site.update_unknown(rule, now, (&unknown, all)));
+            of_site.extend(self.site.update_unknown(rule, now, &unknown, all));
         }
         of_site
     }

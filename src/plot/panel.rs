@@ -222,9 +222,9 @@ impl Panel {
                 );
             }
             Mark::Shade { from, to, colour } => {
-                self.shade(frame, (*from, *to), colour, OPACITY, out);
+                self.shade(frame, *from, *to, colour, OPACITY, out);
             }
-            Mark::Fill { from, to, .. } => self.fill(frame, (*from, *to), mark, out),
+            Mark::Fill { from, to, .. } => self.fill(frame, *from, *to, mark, out),
             Mark::Lying { .. } | Mark::Standing { .. } | Mark::Strokes { .. } => {
                 self.bars(frame, mark, out);
             }
@@ -245,7 +245,8 @@ impl Panel {
     fn shade(
         &self,
         frame: &PlotArea,
-        (from, to): (f64, f64),
+        from: f64,
+        to: f64,
         colour: &str,
         opacity: f64,
         out: &mut String,
@@ -263,14 +264,14 @@ impl Panel {
         );
     }
 
-    fn fill(&self, frame: &PlotArea, (from, to): (f64, f64), mark: &Mark, out: &mut String) {
+    fn fill(&self, frame: &PlotArea, from: f64, to: f64, mark: &Mark, out: &mut String) {
         let Mark::Fill {
             colour, ink, words, ..
         } = mark
         else {
             return;
         };
-        self.shade(frame, (from, to), colour, 1.0, out);
+        self.shade(frame, from, to, colour, 1.0, out);
         let (Some(from), Some(to)) = (self.x.share(from), self.x.share(to)) else {
             return;
         };

@@ -243,34 +243,32 @@ fn xml(cap: &CapFolder, alert: &Alert, message: &CapMessage, before: &[CapMessag
                    <alert xmlns=\"urn:oasis:names:tc:emergency:cap:1.2\">\n"
         .to_owned();
     let sent = |one: &CapMessage| one.sent.strftime(TIME).to_string();
-    element(&mut out, 1, ("identifier", &message.identifier));
-    element(&mut out, 1, ("sender", &cap.sender));
-    element(&mut out, 1, ("sent", &sent(message)));
-    element(&mut out, 1, ("status", alert.status.name()));
+    element(&mut out, 1, "identifier", &message.identifier);
+    element(&mut out, 1, "sender", &cap.sender);
+    element(&mut out, 1, "sent", &sent(message));
+    element(&mut out, 1, "status", alert.status.name());
     let kind_name = match kind {
         MessageType::Alert => "Alert",
         MessageType::Update => "Update",
         MessageType::Cancel => "Cancel",
     };
-    element(&mut out, 1, ("msgType", kind_name));
-    element(&mut out, 1, ("scope", "Restricted"));
+    element(&mut out, 1, "msgType", kind_name);
+    element(&mut out, 1, "scope", "Restricted");
     element(
         &mut out,
         1,
-        (
-            "restriction",
-            "For those who decide whether the public is warned",
-        ),
+        "restriction",
+        "For those who decide whether the public is warned",
     );
     if !before.is_empty() {
         let each = before
             .iter()
             .map(|one| format!("{},{},{}", cap.sender, one.identifier, sent(one)));
         let references = each.collect::<Vec<_>>().join(" ");
-        element(&mut out, 1, ("references", &references));
+        element(&mut out, 1, "references", &references);
     }
     let level = message.level.unwrap_or(alert.level);
-    info(&mut out, cap, (alert, level), kind);
+    info(&mut out, cap, alert, level, kind);
     out += "</alert>\n";
     out
 }
@@ -287,7 +285,7 @@ fn content(alert: &Alert) -> (&str, &str, Option<String>) {
 }
 
 /// `level`: what is in force, or has ended.
-fn info(out: &mut String, cap: &CapFolder, (alert, level): (&Alert, Level), kind: MessageType) {
+fn info(out: &mut String, cap: &CapFolder, alert: &Alert, level: Level, kind: MessageType) {
     let (rule, text, corrects) = content(alert);
     let is_over = kind == MessageType::Cancel;
     let (response, urgency, severity) = match level {
@@ -299,35 +297,37 @@ fn info(out: &mut String, cap: &CapFolder, (alert, level): (&Alert, Level), kind
     };
     let headline = headline(alert, level);
     *out += "  <info>\n";
-    element(out, 2, ("language", "en"));
-    element(out, 2, ("category", "Geo"));
-    element(out, 2, ("event", "Landslide"));
+    element(out, 2, "language", "en");
+    element(out, 2, "category", "Geo");
+    element(out, 2, "event", "Landslide");
     element(
         out,
         2,
-        ("responseType", if is_over { "Assess" } else { response }),
+        "responseType",
+        if is_over { "Assess" } else { response },
     );
-    element(out, 2, ("urgency", urgency));
-    element(out, 2, ("severity", severity));
-    element(out, 2, ("certainty", certainty(level, rule)));
+    element(out, 2, "urgency", urgency);
+    element(out, 2, "severity", severity);
+    element(out, 2, "certainty", certainty(level, rule));
     element(
         out,
         2,
-        ("senderName", &format!("slipwatch at {}", alert.site)),
+        "senderName",
+        &format!("slipwatch at {}", alert.site),
     );
-    element(out, 2, ("headline", &headline));
-    element(out, 2, ("description", text));
+    element(out, 2, "headline", &headline);
+    element(out, 2, "description", text);
     let instruction = if is_over {
         "The level has ended. People look at the slope before anybody goes back."
     } else {
         level.recommended()
     };
-    element(out, 2, ("instruction", instruction));
-    parameters(out, (alert, level), (rule, corrects));
+    element(out, 2, "instruction", instruction);
+    parameters(out, alert, level, rule, corrects);
     *out += "    <area>\n";
-    element(out, 3, ("areaDesc", &cap.area));
+    element(out, 3, "areaDesc", &cap.area);
     if let Some(polygon) = &cap.polygon {
-        element(out, 3, ("polygon", polygon));
+        element(out, 3, "polygon", polygon);
     }
     *out += "    </area>\n  </info>\n";
 }
@@ -349,11 +349,7 @@ fn headline(alert: &Alert, level: Level) -> String {
     format!("{}, {place}: {level}{what}", alert.site)
 }
 
-fn parameters(
-    out: &mut String,
-    (alert, level): (&Alert, Level),
-    (rule, corrects): (&str, Option<String>),
-) {
+fn parameters(out: &mut String, alert: &Alert, level: Level, rule: &str, corrects: Option<String>) {
     let median = alert.failure_time.map(|time| time.to_string());
     let parameters = [
         ("level", Some(level.name().to_owned())),
@@ -367,8 +363,8 @@ fn parameters(
     for (name, value) in parameters {
         let Some(value) = value else { continue };
         *out += "    <parameter>\n";
-        element(out, 3, ("valueName", name));
-        element(out, 3, ("value", &value));
+        element(out, 3, "valueName", name);
+        element(out, 3, "value", &value);
         *out += "    </parameter>\n";
     }
 }
@@ -386,7 +382,7 @@ fn certainty(level: Level, rule: &str) -> &'static str {
     }
 }
 
-fn element(out: &mut String, depth: usize, (name, text): (&str, &str)) {
+fn element(out: &mut String, depth: usize, name: &str, text: &str) {
     // Writing to a string cannot fail.
     let _ = writeln!(
         out,

@@ -166,14 +166,14 @@ impl Inner {
         let transaction =
             connection.transaction_with_behavior(rusqlite::TransactionBehavior::Immediate)?;
         let mut fresh = Catalogue::default();
-        let last_step = insert_steps(&transaction, *steps, batch, (catalogue, &mut fresh))?;
+        let last_step = insert_steps(&transaction, *steps, batch, catalogue, &mut fresh)?;
         let mut last_event = *events;
         let mut newest = BTreeMap::new();
         for (step, event) in &batch.events {
             last_event += 1;
             let is_past = batch.steps[*step].1.makes_up(event);
             let step = *steps + 1 + i64::try_from(*step).unwrap_or(0);
-            let body = insert_event(&transaction, (last_event, step), event)?;
+            let body = insert_event(&transaction, last_event, step, event)?;
             if let Some(benchmark) = &event.benchmark
                 && !is_past
             {
@@ -181,7 +181,7 @@ impl Inner {
             }
         }
         for ((benchmark, kind), body) in newest {
-            latest::keep(&transaction, (benchmark.as_str(), kind), &body)?;
+            latest::keep(&transaction, benchmark.as_str(), kind, &body)?;
         }
         for (name, body) in &batch.positions {
             keep(&transaction, "position", name, body.as_deref())?;
@@ -211,7 +211,8 @@ fn insert_steps(
     connection: &Connection,
     mut last: i64,
     batch: &Batch,
-    (catalogue, fresh): (&Catalogue, &mut Catalogue),
+    catalogue: &Catalogue,
+    fresh: &mut Catalogue,
 ) -> Result<i64, StoreError> {
     let mut insert = connection.prepare_cached(
         "INSERT INTO step (seq, now, series, time, value, sigma, body, sum) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
@@ -223,12 +224,12 @@ fn insert_steps(
                 let known = catalogue.number_of(&measured);
                 Some(match known.or_else(|| fresh.number_of(&measured)) {
                     Some(number) => number,
-                    None => add_series(connection, &measured, (catalogue, fresh))?,
+                    None => add_series(connection, &measured, catalogue, fresh)?,
                 })
             }
         };
         last += 1;
-        insert_step(&mut insert, (last, *now), input, number)?;
+        insert_step(&mut insert, last, *now, input, number)?;
     }
     Ok(last)
 }
@@ -237,7 +238,8 @@ fn insert_steps(
 fn add_series(
     connection: &Connection,
     measured: &Measured<'_>,
-    (catalogue, fresh): (&Catalogue, &mut Catalogue),
+    catalogue: &Catalogue,
+    fresh: &mut Catalogue,
 ) -> Result<i64, StoreError> {
     let number = catalogue.next() + i64::try_from(fresh.len()).unwrap_or(i64::MAX);
     let series = StoredSeries::of(measured);
@@ -248,7 +250,8 @@ fn add_series(
 
 fn insert_step(
     insert: &mut Statement<'_>,
-    (seq, now): (i64, Timestamp),
+    seq: i64,
+    now: Timestamp,
     input: &Input,
     number: Option<i64>,
 ) -> Result<(), StoreError> {
@@ -281,7 +284,8 @@ fn insert_step(
 /// Returns the event's JSON.
 fn insert_event(
     connection: &Connection,
-    (seq, step): (i64, i64),
+    seq: i64,
+    step: i64,
     event: &Event,
 ) -> Result<String, StoreError> {
     let body =

@@ -56,7 +56,8 @@ pub(super) fn seal_all(connection: &Connection) -> Result<(), StoreError> {
 /// Keeps the newest event of a kind at a benchmark.
 pub(super) fn keep(
     connection: &Connection,
-    (benchmark, kind): (&str, &str),
+    benchmark: &str,
+    kind: &str,
     body: &str,
 ) -> Result<(), StoreError> {
     let sum = sum(&[benchmark, kind, body].map(|text| ValueRef::Text(text.as_bytes())));

@@ -18,7 +18,8 @@ impl MarkScale {
     /// has none.
     pub(super) fn of(
         points: Vec<(Timestamp, f64)>,
-        (from, to): (Timestamp, Timestamp),
+        from: Timestamp,
+        to: Timestamp,
         count: usize,
     ) -> Self {
         let mut parts: Vec<Option<f64>> = vec![None; count];
@@ -100,12 +101,12 @@ mod tests {
     #[test]
     fn marks_rise_with_the_logarithm_and_are_blank_where_nothing_was_measured() {
         let points = vec![(hour(0), 1.0), (hour(1), 10.0), (hour(3), 100.0)];
-        let scale = MarkScale::of(points, (hour(0), hour(3)), 4);
+        let scale = MarkScale::of(points, hour(0), hour(3), 4);
         assert_eq!(
             (scale.marks.as_str(), scale.ends().as_str()),
             ("▁▄ █", "1.0-100")
         );
-        let none = MarkScale::of(Vec::new(), (hour(0), hour(3)), 4);
+        let none = MarkScale::of(Vec::new(), hour(0), hour(3), 4);
         assert_eq!(
             (none.marks.as_str(), none.ends().as_str()),
             ("    ", "none")

@@ -227,7 +227,7 @@ impl DemoRecord {
                 .moments
                 .iter()
                 .filter_map(|one| Some((one.time, values(one)?)));
-            MarkScale::of(points.collect(), (first.time, last.time), MARKS)
+            MarkScale::of(points.collect(), first.time, last.time, MARKS)
         };
         let velocity = over(&|one| one.velocity_mm_per_day.filter(|v| *v > 0.0));
         let left = over(&|one| {

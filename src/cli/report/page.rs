@@ -79,7 +79,7 @@ fn benchmark(args: &Args, material: &Material, index: usize) -> anyhow::Result<S
         let _ = writeln!(
             out,
             "<figure>\n{}</figure>",
-            own_names(&svg, (index, pictures))
+            own_names(&svg, index, pictures)
         );
         pictures += 1;
     }
@@ -90,18 +90,18 @@ fn benchmark(args: &Args, material: &Material, index: usize) -> anyhow::Result<S
     if args.config.is_none() && !args.no_search {
         out.push_str(&heading(3, "Closing the loop"));
         let found = sections::closing_the_loop(material, series);
-        out.push_str(&own_names(&found, (index, pictures)));
+        out.push_str(&own_names(&found, index, pictures));
     }
     if let Some(card) = sections::scorecard(args, material, series)? {
         out.push_str(&heading(3, "Scorecard"));
-        out.push_str(&own_names(&card, (index, pictures + 1)));
+        out.push_str(&own_names(&card, index, pictures + 1));
     }
     out.push_str("</section>\n");
     Ok(out)
 }
 
 /// The names within a picture, so that they are its own among all of the page.
-fn own_names(text: &str, (benchmark, picture): (usize, usize)) -> String {
+fn own_names(text: &str, benchmark: usize, picture: usize) -> String {
     let prefix = format!("b{benchmark}p{picture}-");
     text.replace(" id=\"", &format!(" id=\"{prefix}"))
         .replace("url(#", &format!("url(#{prefix}"))
@@ -143,7 +143,7 @@ mod tests {
     #[test]
     fn names_of_one_picture_are_not_those_of_another() {
         let svg = "<clipPath id=\"c0\"/><g clip-path=\"url(#c0)\"/>";
-        let own = own_names(svg, (1, 2));
+        let own = own_names(svg, 1, 2);
         assert_eq!(
             own,
             "<clipPath id=\"b1p2-c0\"/><g clip-path=\"url(#b1p2-c0)\"/>"

@@ -47,13 +47,14 @@ pub(super) fn of(
     };
     let events = replay::events(&recording, &settings, Some(until))?;
     let first = series.readings.first().map_or(until, |first| first.time);
-    Ok(warning(&events, &series.benchmark, (first, until)))
+    Ok(warning(&events, &series.benchmark, first, until))
 }
 
 fn warning(
     events: &[Event],
     benchmark: &BenchmarkId,
-    (first, until): (Timestamp, Timestamp),
+    first: Timestamp,
+    until: Timestamp,
 ) -> Warning {
     let (mut stretches, unknown) = levels_in(events, Some(benchmark), (first, until));
     stretches.retain(|stretch| stretch.level != Level::Green);
@@ -109,7 +110,7 @@ mod tests {
             change(15, Level::Orange, AlertState::Firing),
             change(20, Level::Red, AlertState::Firing),
         ];
-        let warning = warning(&events, &benchmark, (at(0), at(24)));
+        let warning = warning(&events, &benchmark, at(0), at(24));
         assert_eq!(warning.first_red, Some(at(20)));
         assert_eq!(warning.first_yellow, None);
         assert!((warning.hours_at[&Level::Orange] - 7.0).abs() < 1e-12);

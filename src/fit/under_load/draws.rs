@@ -62,10 +62,10 @@ impl LawDraws {
                 drawn.extend(walk.draw());
             }
         }
-        Self::from(&walk, &drawn, (first.from, last.to))
+        Self::from(&walk, &drawn, first.from, last.to)
     }
 
-    fn from(walk: &Walk, drawn: &[DrawnLaw], (from_days, now_days): (f64, f64)) -> Option<Self> {
+    fn from(walk: &Walk, drawn: &[DrawnLaw], from_days: f64, now_days: f64) -> Option<Self> {
         let record = walk.record();
         let count = record.from.len();
         let weight = 1.0 / drawn.len() as f64;

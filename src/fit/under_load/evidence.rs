@@ -202,7 +202,7 @@ fn weigh_with<const TOGETHER: usize, const SHARED: bool>(
     }
     std::array::from_fn(|lane| {
         if best[lane].is_finite() && best[lane] >= least {
-            over_starts(gains, room, (first, lane), best[lane])
+            over_starts(gains, room, first, lane, best[lane])
         } else {
             NO_EVIDENCE
         }
@@ -227,7 +227,7 @@ pub(super) const NO_EVIDENCE: ShapeEvidence = ShapeEvidence {
 pub(super) fn over_all_starts(gains: &Gains, room: &Room<1>, best: f64) -> ShapeEvidence {
     let first = FEWEST_UNDER_THE_LAW.min(room.ln_evidence.len()) - 1;
     if best.is_finite() {
-        over_starts(gains, room, (first, 0), best)
+        over_starts(gains, room, first, 0, best)
     } else {
         NO_EVIDENCE
     }
@@ -237,7 +237,8 @@ pub(super) fn over_all_starts(gains: &Gains, room: &Room<1>, best: f64) -> Shape
 fn over_starts<const TOGETHER: usize>(
     gains: &Gains,
     room: &Room<TOGETHER>,
-    (first, lane): (usize, usize),
+    first: usize,
+    lane: usize,
     best: f64,
 ) -> ShapeEvidence {
     let starts = &room.ln_evidence[first..];

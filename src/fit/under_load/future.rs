@@ -77,7 +77,7 @@ impl Cell {
                 f64::INFINITY
             };
             let keep = (-memories).exp();
-            let mean = self.mean_load(load, (memories, keep), z[2]);
+            let mean = self.mean_load(load, memories, keep, z[2]);
             let at_the_end =
                 load * keep + self.sigma * (1.0 - keep * keep).sqrt() * (0.6 * z[2] + 0.8 * z[3]);
             let law = shape.days_to(ln_velocity - (now - load) - at_the_end) / self.r;
@@ -99,7 +99,7 @@ impl Cell {
     }
 
     /// The mean load over the next `memories` of its own, after which the share `keep` of it is left, from `load` now.
-    fn mean_load(&self, load: f64, (memories, keep): (f64, f64), z: f64) -> f64 {
+    fn mean_load(&self, load: f64, memories: f64, keep: f64, z: f64) -> f64 {
         if memories < 1e-3 {
             return load;
         }

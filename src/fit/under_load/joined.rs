@@ -110,7 +110,7 @@ impl WalksBefore {
             self.ends.push(at);
             let (_, sees, lacks) = memory.of_rate(count - 1 - index);
             let (error, of_ends) = record.own_and_ends(index, noise);
-            at.read(record.ln_velocity[index], (error + lacks, of_ends), sees);
+            at.read(record.ln_velocity[index], error + lacks, of_ends, sees);
         }
     }
 
@@ -179,7 +179,7 @@ impl WalkEnds {
     }
 
     /// Takes a rate of that variance of its error, which the readings at its two ends move by so much each.
-    fn read(&mut self, read: f64, (error, ends): (f64, f64), sees: f64) {
+    fn read(&mut self, read: f64, error: f64, ends: f64, sees: f64) {
         for walk in 0..MOST_DRIFTS {
             let level =
                 self.level_level[walk] + sees * self.level_load[walk] - ends * self.level_end[walk];

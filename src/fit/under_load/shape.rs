@@ -74,20 +74,20 @@ fn shapes() -> Vec<Shape> {
         let of_sign = ACCELERATING_P.iter().filter(|q| **q * p > 0.0).count();
         for ratio in ACCELERATING_RATIO {
             let prior = 0.5 * unstable(p) / (of_sign * LANES) as f64;
-            shapes.push(Shape::new(p, (1.0 + ratio, ratio), prior));
+            shapes.push(Shape::new(p, 1.0 + ratio, ratio, prior));
         }
     }
     for p in SLOWING_P {
         for ratio in SLOWING_RATIO {
             let prior = 0.5 * unstable(p) / LANES as f64;
-            shapes.push(Shape::new(p, (ratio, 1.0 + ratio), prior));
+            shapes.push(Shape::new(p, ratio, 1.0 + ratio, prior));
         }
     }
     shapes
 }
 
 impl Shape {
-    fn new(p: f64, (b, c): (f64, f64), prior: f64) -> Self {
+    fn new(p: f64, b: f64, c: f64, prior: f64) -> Self {
         let mut shape = Self {
             p,
             accelerating: b > c,

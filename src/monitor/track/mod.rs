@@ -179,7 +179,7 @@ impl Track {
                 events.extend(self.look_back(policy, time));
             }
         }
-        events.extend(self.judge_where_due(policy, taken, (reading.time, time), context));
+        events.extend(self.judge_where_due(policy, taken, reading.time, time, context));
         events
     }
 
@@ -223,7 +223,8 @@ impl Track {
         &mut self,
         policy: &Policy,
         taken: Taken,
-        (time, newest): (Timestamp, Timestamp),
+        time: Timestamp,
+        newest: Timestamp,
         context: &StepContext<'_>,
     ) -> Vec<Event> {
         let waits_for_batch = context.phase.in_batches && taken != Taken::Newest;
@@ -386,16 +387,17 @@ impl Track {
             return None;
         }
         let beside = beside(&self.record, &self.forecaster, &self.quality);
-        (self.alarm).raise_by_change(beside, (before, now), newest)
+        (self.alarm).raise_by_change(beside, before, now, newest)
     }
 
     /// The newest reading, of `time`, came while the clock said `clock`.
     pub(super) fn suspect_ahead(
         &mut self,
         now: Timestamp,
-        (time, clock): (Timestamp, Timestamp),
+        time: Timestamp,
+        clock: Timestamp,
     ) -> Vec<Event> {
-        (self.quality).suspect_ahead(&self.record, now, (time, clock))
+        (self.quality).suspect_ahead(&self.record, now, time, clock)
     }
 
     /// What comes now was measured long before `time`, which it is by the clock.

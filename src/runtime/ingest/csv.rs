@@ -71,7 +71,7 @@ impl LineReader for CsvReader {
         if stands_before_header(line, text, &self.options.dialect) {
             return LineResult::default();
         }
-        let rows = CsvRows::at_line((line, text), &self.file, &self.options);
+        let rows = CsvRows::at_line(line, text, &self.file, &self.options);
         rows.map(|rows| {
             self.rows = Some(rows);
             Vec::new()
@@ -132,12 +132,13 @@ impl CsvRows {
     /// [`IngestError::Header`], [`IngestError::BadHeader`] or [`IngestError::Empty`] says what is wrong
     /// with the header.
     pub fn new(file: &Path, header: &str, options: &ReadOptions) -> Result<Self, IngestError> {
-        Self::at_line((1, header), file, options)
+        Self::at_line(1, header, file, options)
     }
 
     /// The same of a header on a later line.
     fn at_line(
-        (line, header): (u64, &str),
+        line: u64,
+        header: &str,
         file: &Path,
         options: &ReadOptions,
     ) -> Result<Self, IngestError> {

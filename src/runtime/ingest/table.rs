@@ -211,7 +211,7 @@ impl TableRow<'_> {
                         met.set_aside(fault);
                         None
                     });
-                    match self.reading(time, (index, benchmark), *unit, sigma) {
+                    match self.reading(time, index, benchmark, *unit, sigma) {
                         Ok(item) => met.items.extend(item),
                         Err(fault) => {
                             let what = self.cells[index].to_owned();
@@ -319,7 +319,8 @@ impl TableRow<'_> {
     fn reading(
         &self,
         time: Timestamp,
-        (index, benchmark): (usize, &BenchmarkId),
+        index: usize,
+        benchmark: &BenchmarkId,
         unit: Unit,
         sigma: Option<f64>,
     ) -> Result<Option<Item>, IngestError> {

@@ -107,7 +107,7 @@ impl Site {
     pub(super) fn take_new(&mut self, arrival: &Arrival, wall: Timestamp) -> Vec<Event> {
         self.counts.taken += 1;
         if let Some(now) = self.now
-            && self.has_leapt(arrival, (now, wall))
+            && self.has_leapt(arrival, now, wall)
         {
             return self.step(now, &arrival.input);
         }
@@ -121,7 +121,7 @@ impl Site {
             events.extend(self.step(now, &Input::Found(finding)));
         }
         events.extend(self.step(now, &arrival.input));
-        events.extend(self.compare_with_clock(arrival, (now, wall)));
+        events.extend(self.compare_with_clock(arrival, now, wall));
         for job in self.monitor.searches() {
             self.searches.start(job);
         }
@@ -217,7 +217,7 @@ impl Site {
     }
 
     /// Whether the time of a reading lies far ahead of everything that is known, and of the clock.
-    fn has_leapt(&self, arrival: &Arrival, (now, wall): (Timestamp, Timestamp)) -> bool {
+    fn has_leapt(&self, arrival: &Arrival, now: Timestamp, wall: Timestamp) -> bool {
         let Input::Reading { benchmark, .. } = &arrival.input else {
             return false;
         };
@@ -281,7 +281,8 @@ impl Site {
     fn compare_with_clock(
         &mut self,
         arrival: &Arrival,
-        (now, wall): (Timestamp, Timestamp),
+        now: Timestamp,
+        wall: Timestamp,
     ) -> Vec<Event> {
         let Input::Reading { benchmark, .. } = &arrival.input else {
             return Vec::new();

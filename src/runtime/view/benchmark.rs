@@ -181,9 +181,9 @@ impl SiteReader {
         let from = window.from.map_or(EARLIEST, held);
         let to = window.to.map_or(LATEST, held).min(known);
         let buckets = window.buckets.unwrap_or(BUCKETS).clamp(10, MOST_BUCKETS);
-        let all = self.series(&id, (EARLIEST, known), known)?;
+        let all = self.series(&id, EARLIEST, known, known)?;
         let is_cut = all.readings.len() >= MOST_READINGS;
-        let shown = within(&all, (from, to));
+        let shown = within(&all, from, to);
         let latest = self.store.event_at(name, "refit", known)?;
         let latest: Option<Event> = latest.as_deref().map(read).transpose()?;
         let mut alerts = self.events((name, "alert"), (EARLIEST, known))?;
@@ -205,7 +205,7 @@ impl SiteReader {
             takes_orders: self.facts().takes_orders,
             acknowledged: seen,
             silences: quiet,
-            standing: self.standing(id, (&levels_now, &alarms), at, moment)?,
+            standing: self.standing(id, &levels_now, &alarms, at, moment)?,
             at,
             now,
             first: span.map(|(first, _)| first),
@@ -220,7 +220,7 @@ impl SiteReader {
             latest,
             levels,
             unknown,
-            covariates: self.covariates((from, to), known, buckets)?,
+            covariates: self.covariates(from, to, known, buckets)?,
             marks: self.marks(name, known)?,
             letters: marked()
                 .filter_map(|kind| Some((kind.name, kind.letter?)))
@@ -233,7 +233,8 @@ impl SiteReader {
     fn series(
         &self,
         id: &BenchmarkId,
-        (from, to): (Timestamp, Timestamp),
+        from: Timestamp,
+        to: Timestamp,
         known: Timestamp,
     ) -> Result<Series, StoreError> {
         let values = self.store.values(&Values {
@@ -267,7 +268,8 @@ impl SiteReader {
 
     fn covariates(
         &self,
-        (from, to): (Timestamp, Timestamp),
+        from: Timestamp,
+        to: Timestamp,
         known: Timestamp,
         buckets: usize,
     ) -> Result<Vec<Covariate>, StoreError> {
@@ -351,7 +353,7 @@ fn points(series: &Series) -> Vec<ThinPoint> {
         .collect()
 }
 
-fn within(series: &Series, (from, to): (Timestamp, Timestamp)) -> Series {
+fn within(series: &Series, from: Timestamp, to: Timestamp) -> Series {
     let mut part = series.clone();
     part.readings
         .retain(|reading| (from..=to).contains(&reading.time));
@@ -392,7 +394,7 @@ fn line(series: &Series, latest: Option<&Event>) -> Option<[ThinPoint; 2]> {
         return None;
     };
     let start = series.readings.first()?.time;
-    let until = within(series, (start, *t_max));
+    let until = within(series, start, *t_max);
     let zero = days_since(start, inverse_velocity.failure_time?);
     let rates = rates(&until, RateOptions::default());
     let segment = InverseVelocityLine::segment(recent(&rates), zero)?;

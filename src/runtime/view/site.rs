@@ -105,7 +105,7 @@ impl SiteReader {
         let span = self.store.span(None)?;
         let benchmarks = self.known()?.into_iter();
         let alarms = Alarms::read(&self.store, at, moment)?;
-        let benchmarks = benchmarks.map(|one| self.standing(one, (&levels, &alarms), at, moment));
+        let benchmarks = benchmarks.map(|one| self.standing(one, &levels, &alarms, at, moment));
         let site_levels = levels.iter().filter(|((place, _), _)| place.is_none());
         let called = site_levels.map(|((_, level), _)| *level);
         let called = called.filter(|level| *level != Level::Unknown).max();
@@ -154,7 +154,8 @@ impl SiteReader {
     pub(super) fn standing(
         &self,
         benchmark: BenchmarkId,
-        (levels, alarms): (&InForce, &Alarms),
+        levels: &InForce,
+        alarms: &Alarms,
         at: Option<Timestamp>,
         moment: Timestamp,
     ) -> Result<Standing, StoreError> {

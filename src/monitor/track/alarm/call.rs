@@ -64,7 +64,7 @@ impl Alarm {
         self.levels.note(time, &self.latch);
         let reported = transitions
             .iter()
-            .map(|change| alert_event(record, time, policy, (&evidence, ahead), change));
+            .map(|change| alert_event(record, time, policy, &evidence, ahead, change));
         events.extend(reported);
         events
     }
@@ -108,7 +108,8 @@ impl Alarm {
     pub(in crate::monitor::track) fn raise_by_change(
         &mut self,
         beside: BesideForecast<'_>,
-        (former, policy): (&Policy, &Policy),
+        former: &Policy,
+        policy: &Policy,
         time: Timestamp,
     ) -> Option<Event> {
         if former.thresholds == policy.thresholds && former.rules == policy.rules {
@@ -151,13 +152,7 @@ impl Alarm {
         let change = self.latch.raise(policy, &evidence)?;
         self.levels.note(time, &self.latch);
         let ahead = LookAhead::of(policy, None);
-        Some(alert_event(
-            record,
-            time,
-            policy,
-            (&evidence, ahead),
-            &change,
-        ))
+        Some(alert_event(record, time, policy, &evidence, ahead, &change))
     }
 }
 
@@ -165,7 +160,8 @@ fn alert_event(
     record: &BenchmarkRecord,
     time: Timestamp,
     policy: &Policy,
-    (evidence, ahead): (&AlertEvidence, LookAhead),
+    evidence: &AlertEvidence,
+    ahead: LookAhead,
     change: &Transition,
 ) -> Event {
     let text = text(record, policy, evidence, ahead, change);

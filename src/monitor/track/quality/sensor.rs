@@ -31,13 +31,13 @@ impl DataQuality {
         let mut events = Vec::new();
         if let Some((count, since)) = record.history().stuck() {
             let what = "are the same, as this sensor never gave them before: it is stuck";
-            events.extend(self.sticks(record, time, (count, since), what));
+            events.extend(self.sticks(record, time, count, since, what));
         } else if level >= Level::Orange
             && let Some((count, since, around)) = record.history().stands_at_the_end()
         {
             record.note_range_end(Some(around));
             let what = "only jitter where a fast motion ended at once: the sensor is stuck, or at the end of its range";
-            events.extend(self.sticks(record, time, (count, since), what));
+            events.extend(self.sticks(record, time, count, since, what));
         }
         let before = self.spoilt_by;
         let shows_within = days(policy.evacuation_time / SHOWS_WITHIN);
@@ -55,13 +55,13 @@ impl DataQuality {
                 record.unit()
             );
             events.push(record.fault(time, "spoilt-readings", text.clone()));
-            events.extend(self.begins_unknown(record, (time, time), Reason::Spoilt, text));
+            events.extend(self.begins_unknown(record, time, time, Reason::Spoilt, text));
         } else if before.is_some() && self.spoilt_by.is_none() {
             let text = format!(
                 "benchmark {}: its readings no longer jump back and forth",
                 record.benchmark()
             );
-            events.extend(self.ends_unknown(record, (time, time), Reason::Spoilt, text));
+            events.extend(self.ends_unknown(record, time, time, Reason::Spoilt, text));
         }
         events
     }
@@ -71,7 +71,8 @@ impl DataQuality {
         &mut self,
         record: &mut BenchmarkRecord,
         time: Timestamp,
-        (count, since): (usize, Timestamp),
+        count: usize,
+        since: Timestamp,
         what: &str,
     ) -> Vec<Event> {
         record.forget_repeats(count);
@@ -80,7 +81,7 @@ impl DataQuality {
             record.benchmark()
         );
         let mut events = vec![record.fault(time, "stuck-sensor", text.clone())];
-        events.extend(self.begins_unknown(record, (time, since), Reason::Stuck, text));
+        events.extend(self.begins_unknown(record, time, since, Reason::Stuck, text));
         events
     }
 
@@ -98,7 +99,7 @@ impl DataQuality {
             "benchmark {}: its readings change again",
             record.benchmark()
         );
-        self.ends_unknown(record, (time, time), Reason::Stuck, text)
+        self.ends_unknown(record, time, time, Reason::Stuck, text)
     }
 
     /// One more reading of a second quantity.
@@ -122,7 +123,7 @@ impl DataQuality {
             record.benchmark(),
             observations.quantity.name()
         );
-        self.begins_unknown(record, (time, time), Reason::SecondQuantity, text)
+        self.begins_unknown(record, time, time, Reason::SecondQuantity, text)
     }
 
     /// A reading of the quantity that is monitored.
@@ -139,7 +140,7 @@ impl DataQuality {
             "benchmark {} gives what is monitored again",
             record.benchmark()
         );
-        self.ends_unknown(record, (time, time), Reason::SecondQuantity, text)
+        self.ends_unknown(record, time, time, Reason::SecondQuantity, text)
     }
 
     /// Data time has come to `now`, when silence is due; `fault` is what the sensor gives instead, and `level` what is in
@@ -166,7 +167,7 @@ impl DataQuality {
             record.benchmark()
         );
         let mut events = vec![record.fault(now, "no-data", text.clone())];
-        events.extend(self.begins_unknown(record, (now, newest), Reason::NoData, text));
+        events.extend(self.begins_unknown(record, now, newest, Reason::NoData, text));
         events
     }
 
@@ -179,7 +180,7 @@ impl DataQuality {
     ) -> Option<Event> {
         let since = record.break_silence(time)?;
         let text = format!("benchmark {} reads again", record.benchmark());
-        self.ends_unknown(record, (now, since), Reason::NoData, text)
+        self.ends_unknown(record, now, since, Reason::NoData, text)
     }
 }
 

@@ -61,7 +61,8 @@ impl DataQuality {
         &mut self,
         record: &BenchmarkRecord,
         now: Timestamp,
-        (time, clock): (Timestamp, Timestamp),
+        time: Timestamp,
+        clock: Timestamp,
     ) -> Vec<Event> {
         let evidence = suspicion::ahead(time, clock);
         self.weigh(record, now, Suspicion::Ahead, evidence.as_ref())
@@ -97,7 +98,7 @@ impl DataQuality {
             (Some(evidence), false) => {
                 let text = format!("benchmark {benchmark}: suspicion: {}", evidence.text);
                 events.push(record.fault(now, reason.name(), text.clone()));
-                events.extend(self.begins_unknown(record, (now, now), reason, text));
+                events.extend(self.begins_unknown(record, now, now, reason, text));
             }
             (None, true) => {
                 let text = format!(
@@ -105,7 +106,7 @@ impl DataQuality {
                     kind.name()
                 );
                 events.push(record.fault(now, &reason.end_name(), text.clone()));
-                events.extend(self.ends_unknown(record, (now, now), reason, text));
+                events.extend(self.ends_unknown(record, now, now, reason, text));
             }
             (Some(_), true) | (None, false) => {}
         }
@@ -122,7 +123,7 @@ mod tests {
     fn a_suspicion_that_people_accept_ends_and_does_not_come_back() {
         let (mut quality, record) = (DataQuality::default(), record([0.0]));
         let ahead = |quality: &mut DataQuality| {
-            let events = quality.suspect_ahead(&record, at(9), (at(9), at(1)));
+            let events = quality.suspect_ahead(&record, at(9), at(9), at(1));
             events.len()
         };
         assert_eq!(ahead(&mut quality), 2, "the fault and the alert");

@@ -73,7 +73,8 @@ impl DataQuality {
     pub(super) fn begins_unknown(
         &mut self,
         record: &BenchmarkRecord,
-        (now, since): (Timestamp, Timestamp),
+        now: Timestamp,
+        since: Timestamp,
         reason: Reason,
         text: String,
     ) -> Option<Event> {
@@ -88,7 +89,7 @@ impl DataQuality {
         let since = if is_other { since } else { now };
         unknown.since = Some(since);
         let state = AlertState::Firing;
-        Some(alert(record, (now, since), state, reason, text))
+        Some(alert(record, now, since, state, reason, text))
     }
 
     /// `reason` has ended, which began after the reading of `since` where nothing else was the matter; the end of the
@@ -96,7 +97,8 @@ impl DataQuality {
     pub(super) fn ends_unknown(
         &mut self,
         record: &BenchmarkRecord,
-        (now, since): (Timestamp, Timestamp),
+        now: Timestamp,
+        since: Timestamp,
         reason: Reason,
         text: String,
     ) -> Option<Event> {
@@ -108,7 +110,7 @@ impl DataQuality {
         let since = unknown.since.take().unwrap_or(since);
         unknown.before = Some(since);
         let state = AlertState::Resolved;
-        Some(alert(record, (now, since), state, reason, text))
+        Some(alert(record, now, since, state, reason, text))
     }
 
     /// Everything ends, the silence too; `None` where nothing was the matter.
@@ -126,14 +128,15 @@ impl DataQuality {
         unknown.before = Some(since);
         let reason = reason.unwrap_or(Reason::NoData);
         let (state, text) = (AlertState::Resolved, text.to_owned());
-        Some(alert(record, (now, since), state, reason, text))
+        Some(alert(record, now, since, state, reason, text))
     }
 }
 
 /// When it began is part of the key, so that each time is reported again.
 fn alert(
     record: &BenchmarkRecord,
-    (time, since): (Timestamp, Timestamp),
+    time: Timestamp,
+    since: Timestamp,
     state: AlertState,
     reason: Reason,
     text: String,
@@ -158,17 +161,17 @@ mod tests {
         let (mut quality, record) = (DataQuality::default(), record([0.0]));
         let stuck = Reason::Stuck;
         let begin = |quality: &mut DataQuality, hour, reason| {
-            quality.begins_unknown(&record, (at(hour), at(hour)), reason, String::new())
+            quality.begins_unknown(&record, at(hour), at(hour), reason, String::new())
         };
         let end = |quality: &mut DataQuality, hour, reason| {
-            quality.ends_unknown(&record, (at(hour), at(hour)), reason, String::new())
+            quality.ends_unknown(&record, at(hour), at(hour), reason, String::new())
         };
         assert!(begin(&mut quality, 1, stuck).is_some());
         assert!(begin(&mut quality, 2, Reason::Spoilt).is_none());
         assert!(end(&mut quality, 3, stuck).is_none() && quality.is_unknown());
         assert!(end(&mut quality, 4, Reason::Spoilt).is_some() && !quality.is_unknown());
         // What begins again no later than the one before began is another alert: its key has the time at which it is found.
-        let again = quality.begins_unknown(&record, (at(5), at(1)), stuck, String::new());
+        let again = quality.begins_unknown(&record, at(5), at(1), stuck, String::new());
         let kind = again.map(|event| event.kind);
         assert!(
             matches!(&kind, Some(EventKind::Alert { key, .. }) if key.ends_with(&at(5).to_string())),
