@@ -105,7 +105,7 @@ fn explain_1500_readings(bencher: Bencher) {
     bencher.bench(|| -> Explanation {
         let options = Options::default();
         let found = explain(black_box(&series), &channels, &[], &options, &mut |_| {});
-        assert_eq!(found.verdict.effect, Kind::Hydrological);
+        assert_eq!(found.verdict.effect, Kind::HYDROLOGICAL);
         found
     });
 }

@@ -1,6 +1,7 @@
 //! What happens at once, seen in velocities that are means over some time: a step of the load rises as slowly as a change
 //! of the friction would, and neither the step nor the mean gains much without the other. Both are tried together.
 
+use super::act::Act;
 use super::candidates;
 use super::judge::coefficients;
 use super::kind::Kind;
@@ -28,13 +29,14 @@ impl Search<'_> {
         if alone.gain < margin || alone.p_value >= SIGNIFICANT {
             return None;
         }
-        let mut feedbacks = candidates::feedbacks(self.problem).into_iter();
-        let mean = feedbacks.find(|term| term.kind == Kind::IntervalMean)?;
+        let kinds = self.options.effects.iter().map(|one| Kind::of(one));
+        let mut all_along = kinds.flat_map(|kind| candidates::all_along(self.problem, kind));
+        let mean = all_along.find(|term| matches!(term.act, Act::Averaging))?;
         if base.terms.iter().any(|term| term.kind == mean.kind) {
             return None;
         }
         let mut best: Option<Refitted> = None;
-        for spacings in mean.starts() {
+        for spacings in mean.act.starts() {
             for one in self.under_a_mean(base, &mean, *spacings) {
                 if best.as_ref().is_none_or(|best| one.gain > best.gain) {
                     best = Some(one);
@@ -81,8 +83,9 @@ impl Search<'_> {
         let mut terms: Vec<(f64, Term)> = Vec::new();
         if let Some(ground) = self.ground(&averaged) {
             for at in ground.event_times() {
-                let each = candidates::events(at).into_iter();
-                for term in each.filter(|term| term.kind.jumps()) {
+                let kinds = self.options.effects.iter().map(|one| Kind::of(one));
+                let jumps = kinds.filter(|kind| kind.jumps());
+                for term in jumps.flat_map(|kind| candidates::once(kind, at)) {
                     let trial = ground.trial(term);
                     match terms
                         .iter_mut()

@@ -1,23 +1,14 @@
 //! Everything that may be missing, as terms to be tried.
 
+use super::act::{Act, harmonics};
+use super::definition::SearchedRecord;
 use super::frame::dot;
 use super::kind::{Form, Kind};
 use super::problem::{Problem, median};
 use super::response::{Driver, Response};
-use super::term::{Act, MIDDLE, Term};
+use super::term::{MIDDLE, Term};
 use crate::reading::Quantity;
 
-/// One year, days.
-const YEAR: f64 = 365.25;
-/// A year and half a year, days.
-pub(super) const SEASON: [f64; 2] = [YEAR, 0.5 * YEAR];
-/// The tide's strongest periods, days: M2, S2, K1, O1.
-pub(super) const TIDE: [f64; 4] = [
-    12.420_6 / 24.0,
-    12.0 / 24.0,
-    23.934_5 / 24.0,
-    25.819_3 / 24.0,
-];
 /// A covariate follows the year if its harmonics hold this share of its variance.
 const SEASONAL_SHARE: f64 = 0.5;
 /// Times tried for what happens once.
@@ -42,6 +33,18 @@ fn plain(kind: Kind, act: Act) -> Term {
     }
 }
 
+/// What a definition is given to know of a record.
+fn record(problem: &Problem) -> SearchedRecord<'_> {
+    SearchedRecord {
+        quantity: problem.quantity,
+        epoch: problem.epoch,
+        days: &problem.nodes,
+        span_days: problem.span(),
+        spacing_days: problem.spacing,
+        averaging_days: problem.averaging_days,
+    }
+}
+
 /// The responses tried for each covariate: their mean delays, days.
 pub(super) fn delays(problem: &Problem, driver: &Driver) -> Vec<f64> {
     // No shorter than what the sampling of both resolves, no longer than a memory of half the record.
@@ -57,15 +60,16 @@ pub(super) fn delays(problem: &Problem, driver: &Driver) -> Vec<f64> {
     delays
 }
 
-/// A covariate's term for one response; `None` where it stands still.
-pub(super) fn of_channel(
+/// A covariate's term in the load for one response; `None` where it stands still.
+pub(super) fn in_load(
     problem: &Problem,
+    kind: Kind,
     (index, driver): (usize, &Driver),
     response: Response,
 ) -> Option<Term> {
     let column = driver.respond(response, &problem.nodes)?;
     Some(Term {
-        kind: Kind::Hydrological,
+        kind,
         channel: Some(index),
         response: Some(response),
         at: None,
@@ -93,45 +97,15 @@ pub(super) fn responses(form: Form, delays: &[f64]) -> Vec<Response> {
     responses
 }
 
-/// Sines and cosines of these periods, days, at `times`.
-fn harmonics(times: &[f64], periods: &[f64]) -> Vec<Vec<f64>> {
-    let mut columns = Vec::new();
-    for period in periods {
-        let phase = |t: &f64| std::f64::consts::TAU * t / period;
-        let root = std::f64::consts::SQRT_2;
-        columns.push(times.iter().map(|t| root * phase(t).cos()).collect());
-        columns.push(times.iter().map(|t| root * phase(t).sin()).collect());
-    }
-    columns
+/// What an effect may be all along, where it needs no covariate.
+pub(super) fn all_along(problem: &Problem, kind: Kind) -> Vec<Term> {
+    let acts = kind.definition().all_along(&record(problem));
+    acts.into_iter().map(|act| plain(kind, act)).collect()
 }
 
-/// The load's harmonics of these periods.
-pub(super) fn of_periods(problem: &Problem, kind: Kind, periods: &[f64]) -> Term {
-    plain(kind, Act::Load(harmonics(&problem.nodes, periods)))
-}
-
-/// A year's harmonics, where two cycles have been seen.
-pub(super) fn seasonal(problem: &Problem) -> Vec<Term> {
-    if problem.span() < 1.95 * YEAR || problem.spacing > 0.2 * YEAR {
-        return Vec::new();
-    }
-    [&SEASON[..1], &SEASON[..]]
-        .into_iter()
-        .map(|periods| of_periods(problem, Kind::Seasonal, periods))
-        .collect()
-}
-
-/// The tide, where the sampling resolves its periods and the record distinguishes them.
-pub(super) fn tides(problem: &Problem) -> Vec<Term> {
-    if problem.spacing > 0.2 || problem.span() < 2.0 {
-        return Vec::new();
-    }
-    let mut sets = vec![&TIDE[..1]];
-    if problem.span() > 14.0 {
-        sets.push(&TIDE[..]);
-    }
-    let term = |periods: &&[f64]| of_periods(problem, Kind::Tide, periods);
-    sets.iter().map(term).collect()
+/// Whether the record shows the year.
+pub(super) fn shows_the_year(problem: &Problem) -> bool {
+    !all_along(problem, Kind::SEASONAL).is_empty()
 }
 
 /// Whether a covariate's response mostly repeats itself from year to year: a year's harmonics hold this share of it.
@@ -139,7 +113,7 @@ pub(super) fn follows_season(problem: &Problem, term: &Term) -> bool {
     let (Act::Load(columns), Some(_)) = (&term.act, term.channel) else {
         return false;
     };
-    if seasonal(problem).is_empty() {
+    if !shows_the_year(problem) {
         return false;
     }
     let Some(column) = columns.first() else {
@@ -148,7 +122,7 @@ pub(super) fn follows_season(problem: &Problem, term: &Term) -> bool {
     let mut left = column.clone();
     let whole = dot(&left, &left);
     let mut directions: Vec<Vec<f64>> = Vec::new();
-    for harmonic in harmonics(&problem.nodes, &SEASON) {
+    for harmonic in harmonics(&problem.nodes, Kind::SEASONAL.definition().wave_periods) {
         let mut unit = harmonic;
         for known in &directions {
             let share = dot(known, &unit);
@@ -169,35 +143,18 @@ pub(super) fn follows_season(problem: &Problem, term: &Term) -> bool {
     dot(&left, &left) < (1.0 - SEASONAL_SHARE) * whole
 }
 
-/// What acts all along and needs no covariate.
-pub(super) fn feedbacks(problem: &Problem) -> Vec<Term> {
-    let mut terms = vec![
-        plain(Kind::RateLimit, Act::PerVelocity),
-        plain(Kind::Geometry, Act::PerSlip),
-    ];
-    if problem.quantity == Quantity::Velocity && problem.averaging_days <= 0.0 {
-        terms.push(plain(Kind::IntervalMean, Act::Averaging));
-    }
-    terms
-}
-
-/// What happened once, before reading `at`, in each way that it may.
-pub(super) fn events(at: usize) -> [Term; 4] {
-    [
-        (Kind::LoadStep, Act::Step),
-        (Kind::StateReset, Act::Reset),
-        (Kind::FrictionChange, Act::Friction(1)),
-        (Kind::FrictionChange, Act::Friction(3)),
-    ]
-    .map(|(kind, act)| Term {
+/// What of that kind happened once, before reading `at`, in each way that it may.
+pub(super) fn once(kind: Kind, at: usize) -> impl Iterator<Item = Term> {
+    let acts = kind.definition().once().iter();
+    acts.map(move |act| Term {
         at: Some(at),
-        ..plain(kind, act)
+        ..plain(kind, act.clone())
     })
 }
 
 /// A load of that course at the nodes, which nothing measures and no kind names.
 pub(super) fn slow(course: Vec<f64>) -> Term {
-    plain(Kind::Unexplained, Act::Load(vec![course]))
+    plain(Kind::UNEXPLAINED, Act::Load(vec![course]))
 }
 
 /// The readings at which an event is tried, evenly over the record.
@@ -221,11 +178,11 @@ pub(super) fn times_of_jumps(problem: &Problem, innovations: &[f64]) -> Vec<usiz
 }
 
 /// A jump of the reading before reading `at`.
-pub(super) fn offset(problem: &Problem, at: usize) -> Term {
+pub(super) fn jump(problem: &Problem, kind: Kind, at: usize) -> Term {
     let column = (0..problem.t.len()).map(|i| f64::from(u8::from(i >= at)));
     Term {
         at: Some(at),
-        ..plain(Kind::Offset, Act::Reading(vec![column.collect()]))
+        ..plain(kind, Act::Reading(vec![column.collect()]))
     }
 }
 
@@ -250,9 +207,10 @@ pub(super) fn jumps(problem: &Problem, residual: &[f64]) -> Vec<usize> {
     sizes.into_iter().map(|(i, _)| i).collect()
 }
 
-/// Temperature in the reading: of a displacement its delayed value, of a velocity the rate of that.
-pub(super) fn thermal(
+/// A covariate in the reading: of a displacement its delayed value, of a velocity the rate of that.
+pub(super) fn in_reading(
     problem: &Problem,
+    kind: Kind,
     (index, driver): (usize, &Driver),
     stages: u8,
     mean_days: f64,
@@ -268,7 +226,7 @@ pub(super) fn thermal(
     };
     let column = driver.respond(response, &problem.t)?;
     Some(Term {
-        kind: Kind::Thermal,
+        kind,
         channel: Some(index),
         response: Some(response),
         at: None,

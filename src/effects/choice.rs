@@ -1,5 +1,6 @@
 //! Which of the refitted candidates enters the law: the best that may be accepted, unless a load that nothing measures explains more.
 
+use super::act::Act;
 use super::companions::{go_together, is_rain};
 use super::judge::{block, named};
 use super::kind::Kind;
@@ -101,8 +102,7 @@ impl Search<'_> {
     /// What enters, or ends the search, in place of effects that gain `most`, the first of them being `one`, with why they are refused:
     /// a slow load that explains more by the margin, or an event that does as well as it. `None` where there is no such load.
     fn slower(&mut self, base: &Fitted, one: &Refitted, most: f64) -> Option<(OneMore, String)> {
-        // A jump of the reading, or its temperature, is no load, and nothing slow comes and goes with the moon.
-        if matches!(one.term.kind, Kind::Offset | Kind::Thermal | Kind::Tide) {
+        if !one.term.kind.definition().may_be_a_slow_load {
             return None;
         }
         // What has only just come says so by its date: whether it came at once or over a while nothing after it shows.
@@ -222,8 +222,10 @@ fn prefer_independent_evidence(refitted: &mut [Refitted], margin: f64) {
             .then(simpler)
             .then(b.gain.total_cmp(&a.gain))
     });
-    let place = |kind: Kind| refitted.iter().position(|one| one.term.kind == kind);
-    if let (Some(step), Some(friction)) = (place(Kind::LoadStep), place(Kind::FrictionChange))
+    let place = |is_so: fn(&Act) -> bool| refitted.iter().position(|one| is_so(&one.term.act));
+    let step = place(|act| matches!(act, Act::Step));
+    let friction = place(|act| matches!(act, Act::Friction(_)));
+    if let (Some(step), Some(friction)) = (step, friction)
         && step < friction
         && friction < near
         && refitted[step].hardly_jumps()
@@ -232,7 +234,7 @@ fn prefer_independent_evidence(refitted: &mut [Refitted], margin: f64) {
     }
     let season = refitted
         .iter()
-        .position(|one| one.term.kind == Kind::Seasonal);
+        .position(|one| one.term.kind == Kind::SEASONAL);
     let follower = refitted
         .iter()
         .position(|one| one.follows_season && one.p_value < SIGNIFICANT);

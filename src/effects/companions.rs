@@ -1,9 +1,10 @@
 //! Covariates that go together, as rain and the river that it feeds: readings that answer to one answer to the other, and
 //! do not say which of them acts.
 
+use super::act::Act;
 use super::frame::dot;
 use super::response::Driver;
-use super::term::{Act, Term};
+use super::term::Term;
 use crate::reading::CovariateKind;
 
 /// Responses that share half of their variance.

@@ -203,9 +203,9 @@ impl DeclaredLaw {
         };
         if stand.is_empty() {
             let kind = if is_left {
-                Kind::Unexplained
+                Kind::UNEXPLAINED
             } else {
-                Kind::None
+                Kind::NONE
             };
             stand.push(Effect::of(kind));
         }
@@ -279,7 +279,7 @@ impl Search<'_> {
             let null_gains = ground.null_gains_of_noise((&tried, kind), count, seed + 1);
             null_gains.p_value(one.gain)
         };
-        let p_value = if one.term.kind == Kind::Offset {
+        let p_value = if one.term.is_jump_of_reading() {
             of_noise(Innovations::WithoutJumps)
         } else if let Some(channel) = one.term.channel {
             let place = ground.drivers.iter().position(|own| own.0 == channel)?;

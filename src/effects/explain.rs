@@ -4,7 +4,6 @@ use super::channels::distinct;
 use super::explanation::{Candidate, Effect, Explained, Explanation, SettingsReport};
 use super::faults::inspect;
 use super::findings::{Findings, findings};
-use super::judge::fits_any_bend;
 use super::kind::{FaultKind, Kind};
 use super::options::Options;
 use super::outlook::forecast_change;
@@ -142,8 +141,8 @@ fn with_partition(
         findings.explained = Explained::Partly;
     }
     let own = std::mem::replace(&mut findings.verdict, partition);
-    let nothing = matches!(own.effect, Kind::Unexplained | Kind::None);
-    if !nothing && !fits_any_bend(own.effect) && !own.effect.is_of_the_reading() {
+    let nothing = own.effect.is_an_end();
+    if !nothing && !own.effect.fits_any_bend() && !own.effect.is_of_the_reading() {
         let partition = std::mem::replace(&mut findings.verdict, own);
         findings.also.insert(0, partition);
     } else if !nothing {
@@ -193,15 +192,15 @@ fn look(
 
 /// Of values that are not raw readings no noise is concluded, nor that nothing is there where something was withheld.
 fn without_conclusions(mut findings: Findings, has_withheld: bool) -> Findings {
-    if findings.verdict.effect == Kind::CorrelatedNoise {
-        findings.verdict = Effect::of(Kind::Unexplained);
+    if findings.verdict.effect == Kind::CORRELATED_NOISE {
+        findings.verdict = Effect::of(Kind::UNEXPLAINED);
         findings.explained = Explained::None;
     }
     findings
         .also
-        .retain(|also| also.effect != Kind::CorrelatedNoise);
-    if has_withheld && findings.verdict.effect == Kind::None {
-        findings.verdict = Effect::of(Kind::Unexplained);
+        .retain(|also| also.effect != Kind::CORRELATED_NOISE);
+    if has_withheld && findings.verdict.effect == Kind::NONE {
+        findings.verdict = Effect::of(Kind::UNEXPLAINED);
     }
     findings
 }

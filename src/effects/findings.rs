@@ -1,5 +1,6 @@
 //! What is reported of a search: figures before and after, tests, and the curves behind them.
 
+use super::act::Act;
 use super::diagnosis::{
     Judged, autocorrelation, innovations, is_clear, load_sd, runs, stoffer_toloi, undeclared_load,
 };
@@ -18,7 +19,7 @@ use super::refit::{Fitted, Start};
 use super::response::Driver;
 use super::rival::Rival;
 use super::search::SearchResult;
-use super::term::{Act, Scratch, Term};
+use super::term::{Scratch, Term};
 use super::verdict::{LARGEST_REST, Verdict, contribution};
 use crate::reading::{Unit, after_days};
 use std::collections::BTreeMap;
@@ -50,7 +51,7 @@ impl Findings {
     /// Where there was nothing to search, or no law to start from.
     pub(super) fn none(unit: Unit) -> Self {
         Self {
-            verdict: Effect::of(Kind::None),
+            verdict: Effect::of(Kind::NONE),
             explained: Explained::None,
             also: Vec::new(),
             cannot_separate_from: Vec::new(),

@@ -131,13 +131,13 @@ pub(super) fn driven_by_the_lake() -> (Series, Vec<Channel>) {
 pub(super) fn through(name: &str) -> Cause {
     Cause {
         channel: Some(name.to_owned()),
-        ..cause(Kind::Hydrological)
+        ..cause(Kind::HYDROLOGICAL)
     }
 }
 
 pub(super) fn jump() -> Cause {
     Cause {
         at: after_days(epoch(), 100.0),
-        ..cause(Kind::Offset)
+        ..cause(Kind::OFFSET)
     }
 }

@@ -1,10 +1,11 @@
 //! Fits that start from laws of their own, not from where a fit without the newest effect ended: the best law without an
 //! effect may be a poor one, beside which everything that is tried gains alike.
 
+use super::act::Act;
 use super::noise::{Noise, Whitener};
 use super::problem::{Problem, slips};
 use super::refit::{Fitted, Start, plain_starts, refit_from, towards};
-use super::term::{Act, Scratch, Term, law_parameters};
+use super::term::{Scratch, Term, law_parameters};
 use crate::reading::Quantity;
 
 /// So many steps from each start, and only the best so many starts are followed to the end.
@@ -19,12 +20,12 @@ const FEWEST_EARLY: usize = 12;
 
 /// Starts of the law with `terms`, at every size that they may start at.
 pub(super) fn fresh_starts(problem: &Problem, terms: &[Term]) -> Vec<Start> {
-    let sizes = terms.iter().map(|term| term.starts().len()).max();
+    let sizes = terms.iter().map(|term| term.act.starts().len()).max();
     let mut all = Vec::new();
     for size in 0..sizes.unwrap_or(1) {
         for plain in plain_starts(problem) {
             let joined = terms.iter().fold(plain, |start, term| {
-                let own = term.starts();
+                let own = term.act.starts();
                 start.with_size(term, own[size.min(own.len() - 1)])
             });
             all.push(joined);
@@ -42,7 +43,7 @@ pub(super) fn fresh_laws(problem: &Problem, base: &Fitted, term: &Term) -> Vec<S
         start
     };
     let laws: Vec<Start> = plain_starts(problem).into_iter().map(law).collect();
-    let sizes = term.starts().iter();
+    let sizes = term.act.starts().iter();
     sizes
         .flat_map(|size| laws.iter().map(|law| law.clone().with_size(term, *size)))
         .collect()
@@ -72,7 +73,7 @@ pub(super) fn from_the_first_readings(
     for count in wholes {
         let next = problem.until(count);
         let sizes = if known.terms.is_empty() {
-            term.starts()
+            term.act.starts()
         } else {
             &[0.0]
         };

@@ -1,12 +1,13 @@
 //! The law with causes that are known beforehand: what its error would be, and nothing judged.
 
-use super::candidates::{event_times, events, feedbacks, offset, seasonal, tides};
+use super::candidates::{all_along, event_times, jump, once};
 use super::channels::distinct;
+use super::definition::Trying;
 use super::explanation::{Change, ErrorChange};
 use super::faults::{Inspected, inspect};
 use super::findings::least_squares;
 use super::judge::{block, without_block};
-use super::kind::{Form, Kind};
+use super::kind::Kind;
 use super::options::Options;
 use super::problem::Problem;
 use super::ready::Ready;
@@ -148,43 +149,25 @@ fn promising(ground: &TrialBase, cause: &Cause) -> Vec<Trial> {
 
 /// Everything that a cause may look like: its delays, its times, its periods.
 pub(super) fn shapes(ground: &TrialBase, cause: &Cause) -> Vec<Term> {
-    let problem = ground.problem;
-    match cause.kind {
-        Kind::Hydrological | Kind::Thermal => of_cause(ground, cause),
-        Kind::LoadStep | Kind::StateReset | Kind::FrictionChange => times(problem, cause.at)
-            .into_iter()
-            .flat_map(events)
-            .filter(|term| term.kind == cause.kind)
-            .collect(),
-        Kind::Offset => times(problem, cause.at)
-            .into_iter()
-            .map(|at| offset(problem, at))
-            .collect(),
-        Kind::Seasonal | Kind::Tide | Kind::RateLimit | Kind::Geometry | Kind::IntervalMean => {
-            let all_along = seasonal(problem).into_iter().chain(tides(problem));
-            all_along
-                .chain(feedbacks(problem))
-                .filter(|term| term.kind == cause.kind)
-                .collect()
+    let (problem, kind) = (ground.problem, cause.kind);
+    match kind.definition().trying {
+        Trying::CovariateInLoad(_) | Trying::CovariateInReading(_) => {
+            let mut drivers = ground.drivers.iter();
+            let own = drivers.find(|(_, driver)| Some(&driver.name) == cause.channel.as_ref());
+            let through = own.map(|(index, driver)| ground.through(kind, (*index, driver)));
+            through.unwrap_or_default().into_iter().flatten().collect()
         }
-        Kind::Partition | Kind::CorrelatedNoise | Kind::Unexplained | Kind::None => Vec::new(),
+        Trying::Once(_) => times(problem, cause.at)
+            .into_iter()
+            .flat_map(|at| once(kind, at))
+            .collect(),
+        Trying::JumpOfReading => times(problem, cause.at)
+            .into_iter()
+            .map(|at| jump(problem, kind, at))
+            .collect(),
+        Trying::AllAlong(_) => all_along(problem, kind),
+        Trying::Elsewhere => Vec::new(),
     }
-}
-
-/// The responses of its covariate, in the load or, of a temperature, in the reading.
-fn of_cause(ground: &TrialBase, cause: &Cause) -> Vec<Term> {
-    let mut drivers = ground.drivers.iter();
-    let Some((index, driver)) =
-        drivers.find(|(_, driver)| Some(&driver.name) == cause.channel.as_ref())
-    else {
-        return Vec::new();
-    };
-    let own = (*index, driver);
-    if cause.kind == Kind::Thermal {
-        return ground.in_reading(own);
-    }
-    let forms = [Form::Level, Form::Rate].into_iter();
-    forms.flat_map(|form| ground.in_load(own, form)).collect()
 }
 
 /// The readings before which it may have happened: those that the search would try, or, where the time is known, all

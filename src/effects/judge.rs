@@ -1,13 +1,14 @@
 //! What an effect must show before it is accepted: sign, memory, bounds, and a later block that it helps to predict.
 
+use super::act::Act;
 use super::fresh::{best_of_starts, fresh_starts};
-use super::kind::{Form, Kind};
+use super::kind::Form;
 use super::noise::{Memory, Noise, Whitener};
 use super::problem::{Problem, median, slips};
 use super::refit::{Fitted, Start, likeliest, refit};
 use super::response::Driver;
 use super::rival::Rival;
-use super::term::{Act, Scratch, Term, law_parameters};
+use super::term::{Scratch, Term, law_parameters};
 use crate::reading::Quantity;
 
 /// The later block has at least so many readings.
@@ -68,7 +69,7 @@ pub(super) fn objection(
         Act::PerSlip if own[0] <= 0.0 => {
             Some("its sign is not physical: the slope would steepen under the block".to_owned())
         }
-        Act::Reading(_) if term.kind == Kind::Offset && own[0] > 0.0 => {
+        Act::Reading(_) if term.is_jump_of_reading() && own[0] > 0.0 => {
             slip_instead(problem, term.at?, own[0], drivers)
         }
         Act::Averaging if own[0] < 0.5 => {
@@ -95,7 +96,7 @@ fn jumps_at_once(problem: &Problem, fitted: &Fitted) -> bool {
         return false;
     }
     let is_offset = |i: usize| {
-        let mut offsets = fitted.terms.iter().filter(|term| term.kind == Kind::Offset);
+        let mut offsets = fitted.terms.iter().filter(|term| term.is_jump_of_reading());
         offsets.any(|term| term.at == Some(i))
     };
     let steps = (1..predicted.len()).filter(|i| !is_offset(*i));
@@ -388,15 +389,6 @@ pub(super) fn coefficients<'a>(problem: &Problem, fitted: &'a Fitted, index: usi
     let earlier: usize = fitted.terms[..index].iter().map(Term::coefficients).sum();
     let from = first + earlier;
     &fitted.parameters[from..from + fitted.terms[index].coefficients()]
-}
-
-/// Whether a kind is recognised by the shape of the readings alone, without a covariate or a date of its own: such a kind follows
-/// almost any bend, so it must account for everything that is left, or it explains nothing.
-pub(super) fn fits_any_bend(kind: Kind) -> bool {
-    matches!(
-        kind,
-        Kind::LoadStep | Kind::StateReset | Kind::FrictionChange | Kind::RateLimit | Kind::Geometry
-    )
 }
 
 #[cfg(test)]

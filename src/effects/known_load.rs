@@ -1,12 +1,12 @@
 //! The law with its effects as forecasts use it: the known log-load at any time, and what is in the reading.
 
+use super::act::Act;
 use super::judge::coefficients;
 use super::kind::{Form, Kind};
 use super::problem::Problem;
 use super::refit::Fitted;
 use super::response::{Driver, Response};
 use super::term::{Term, time_of};
-use super::{candidates, term::Act};
 use crate::reading::{Channel, Timestamp, days_since};
 use serde::{Deserialize, Serialize};
 
@@ -62,6 +62,13 @@ pub enum Part {
         filtered: Filtered,
         /// mm, or mm/day, for one standard deviation.
         gain: f64,
+    },
+    /// A part of one of the shapes above, of an effect of another kind than theirs.
+    Other {
+        /// The effect's.
+        kind: Kind,
+        /// Its shape.
+        part: Box<Self>,
     },
 }
 
@@ -130,12 +137,7 @@ impl KnownLoad {
     /// Whether every covariate in it still says something of `now`: its newest value is no older than the
     /// usual few spacings and the response's own delay.
     pub fn reaches(&self, channels: &[&Channel], now: Timestamp) -> bool {
-        self.parts.iter().all(|part| match part {
-            Part::Load { filtered, .. } | Part::Thermal { filtered, .. } => {
-                filtered.reaches(channels, now)
-            }
-            Part::Harmonics { .. } | Part::Step { .. } | Part::Offset { .. } => true,
-        })
+        self.parts.iter().all(|part| part.reaches(channels, now))
     }
 
     /// Whether an effect of this kind, through this channel, is in it.
@@ -152,11 +154,11 @@ impl Part {
     /// Its kind.
     pub fn kind(&self) -> Kind {
         match self {
-            Self::Load { .. } => Kind::Hydrological,
-            Self::Harmonics { kind, .. } => *kind,
-            Self::Step { .. } => Kind::LoadStep,
-            Self::Offset { .. } => Kind::Offset,
-            Self::Thermal { .. } => Kind::Thermal,
+            Self::Load { .. } => Kind::HYDROLOGICAL,
+            Self::Harmonics { kind, .. } | Self::Other { kind, .. } => *kind,
+            Self::Step { .. } => Kind::LOAD_STEP,
+            Self::Offset { .. } => Kind::OFFSET,
+            Self::Thermal { .. } => Kind::THERMAL,
         }
     }
 
@@ -164,7 +166,30 @@ impl Part {
     pub fn channel(&self) -> Option<&str> {
         match self {
             Self::Load { filtered, .. } | Self::Thermal { filtered, .. } => Some(&filtered.channel),
+            Self::Other { part, .. } => part.channel(),
             Self::Harmonics { .. } | Self::Step { .. } | Self::Offset { .. } => None,
+        }
+    }
+
+    /// Whether the load steps by it.
+    pub fn is_step(&self) -> bool {
+        match self {
+            Self::Step { .. } => true,
+            Self::Other { part, .. } => part.is_step(),
+            Self::Load { .. }
+            | Self::Harmonics { .. }
+            | Self::Offset { .. }
+            | Self::Thermal { .. } => false,
+        }
+    }
+
+    fn reaches(&self, channels: &[&Channel], now: Timestamp) -> bool {
+        match self {
+            Self::Load { filtered, .. } | Self::Thermal { filtered, .. } => {
+                filtered.reaches(channels, now)
+            }
+            Self::Other { part, .. } => part.reaches(channels, now),
+            Self::Harmonics { .. } | Self::Step { .. } | Self::Offset { .. } => true,
         }
     }
 
@@ -173,6 +198,7 @@ impl Part {
             Self::Load { filtered, gain } => filtered.times(*gain, channels, times),
             Self::Harmonics { epoch, waves, .. } => Some(harmonics(*epoch, waves, times)),
             Self::Step { at, size } => Some(step(*at, *size, times)),
+            Self::Other { part, .. } => part.log_load(channels, times),
             Self::Offset { .. } | Self::Thermal { .. } => None,
         }
     }
@@ -181,6 +207,7 @@ impl Part {
         match self {
             Self::Offset { at, size } => Some(step(*at, *size, times)),
             Self::Thermal { filtered, gain } => filtered.times(*gain, channels, times),
+            Self::Other { part, .. } => part.in_reading(channels, times),
             Self::Load { .. } | Self::Harmonics { .. } | Self::Step { .. } => None,
         }
     }
@@ -240,27 +267,36 @@ fn step(at: Timestamp, size: f64, times: &[Timestamp]) -> Vec<f64> {
 
 /// `None` for what has no say in times to come.
 fn part(problem: &Problem, term: &Term, own: &[f64], drivers: &[(usize, Driver)]) -> Option<Part> {
-    match (term.kind, &term.act) {
-        (Kind::Hydrological, Act::Load(_)) => Some(Part::Load {
+    let size = *own.first()?;
+    let part = match &term.act {
+        Act::Load(_) if term.channel.is_some() => Part::Load {
             filtered: filtered(term, drivers, &problem.nodes)?,
-            gain: *own.first()?,
-        }),
-        (Kind::Thermal, Act::Reading(_)) => Some(Part::Thermal {
+            gain: size,
+        },
+        Act::Load(_) => waves(problem, term.kind, own)?,
+        Act::Reading(_) if term.channel.is_some() => Part::Thermal {
             filtered: filtered(term, drivers, &problem.t)?,
-            gain: *own.first()?,
-        }),
-        (Kind::Seasonal, Act::Load(_)) => Some(waves(problem, term, own, &candidates::SEASON)),
-        (Kind::Tide, Act::Load(_)) => Some(waves(problem, term, own, &candidates::TIDE)),
-        (Kind::LoadStep, Act::Step) => Some(Part::Step {
+            gain: size,
+        },
+        Act::Reading(_) => Part::Offset {
             at: time_of(problem, term)?,
-            size: *own.first()?,
-        }),
-        (Kind::Offset, Act::Reading(_)) => Some(Part::Offset {
+            size,
+        },
+        Act::Step => Part::Step {
             at: time_of(problem, term)?,
-            size: *own.first()?,
-        }),
-        _ => None,
+            size,
+        },
+        Act::Reset | Act::Friction(_) | Act::PerVelocity | Act::PerSlip | Act::Averaging => {
+            return None;
+        }
+    };
+    if part.kind() == term.kind {
+        return Some(part);
     }
+    Some(Part::Other {
+        kind: term.kind,
+        part: Box::new(part),
+    })
 }
 
 fn filtered(term: &Term, drivers: &[(usize, Driver)], nodes: &[f64]) -> Option<Filtered> {
@@ -282,8 +318,12 @@ fn filtered(term: &Term, drivers: &[(usize, Driver)], nodes: &[f64]) -> Option<F
     })
 }
 
-/// The columns of a search are sqrt 2 times a cosine and a sine, for each period in turn.
-fn waves(problem: &Problem, term: &Term, own: &[f64], periods: &[f64]) -> Part {
+/// The columns of a search are sqrt 2 times a cosine and a sine, for each period in turn; `None` of a load that is not made of waves.
+fn waves(problem: &Problem, kind: Kind, own: &[f64]) -> Option<Part> {
+    let periods = kind.definition().wave_periods;
+    if periods.is_empty() {
+        return None;
+    }
     let root = std::f64::consts::SQRT_2;
     let pairs = periods.iter().zip(own.chunks_exact(2));
     let waves = pairs.map(|(period, pair)| Wave {
@@ -291,9 +331,9 @@ fn waves(problem: &Problem, term: &Term, own: &[f64], periods: &[f64]) -> Part {
         cosine: root * pair[0],
         sine: root * pair[1],
     });
-    Part::Harmonics {
-        kind: term.kind,
+    Some(Part::Harmonics {
+        kind,
         epoch: problem.epoch,
         waves: waves.collect(),
-    }
+    })
 }

@@ -1,7 +1,8 @@
 //! What a small effect would change in every reading: the law linearised about its fitted motion.
 
+use super::act::Act;
 use super::problem::Problem;
-use super::term::{Act, Feedback, MotionBefore, Scratch, Term, event_place, law, law_parameters};
+use super::term::{Feedback, MotionBefore, Scratch, Term, event_place, law, law_parameters};
 use crate::model::Driven;
 use crate::reading::Quantity;
 

@@ -1,5 +1,6 @@
 //! From the residual to the effect that the law lacks: the search, the joint refit, before and after.
 
+mod act;
 mod backward;
 mod blur;
 mod by_clock;
@@ -7,6 +8,7 @@ mod candidates;
 mod clock;
 mod companions;
 mod declared;
+mod definition;
 mod diagnosis;
 mod explain;
 mod explanation;
@@ -17,6 +19,7 @@ mod fresh;
 mod given;
 mod judge;
 mod kind;
+mod known;
 mod known_load;
 mod options;
 mod outlook;
@@ -45,8 +48,13 @@ mod trials;
 mod verdict;
 mod watch;
 
+pub use act::Act;
 pub use by_clock::ByClock;
 pub use declared::explain_given;
+pub use definition::{
+    EffectDefinition, EffectSize, FittedCoefficients, LiesIn, SearchedRecord, SizeInWords, Support,
+    Trying,
+};
 pub use explain::{TOO_FEW, explain};
 pub use explanation::{
     Candidate, Change, Curves, DeclaredEffect, Effect, ErrorChange, Explained, Explanation, Fault,
@@ -55,6 +63,7 @@ pub use explanation::{
 pub use faults::{Inspected, inspect};
 pub use given::{Cause, error_given};
 pub use kind::{FaultKind, Form, Kind};
+pub use known::EFFECTS;
 pub use known_load::{Filtered, KnownLoad, Part, Wave};
 pub use options::Options;
 pub use partition::{Partition, partition, partition_candidate};

@@ -1,5 +1,8 @@
 //! What is asked of a search.
 
+use super::definition::EffectDefinition;
+use super::known::EFFECTS;
+
 /// What is asked of a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
@@ -13,6 +16,8 @@ pub struct Options {
     pub bic_margin: f64,
     /// The share of the record held out at its end.
     pub held_out_share: f64,
+    /// The effects that are tried.
+    pub effects: &'static [&'static EffectDefinition],
 }
 
 impl Default for Options {
@@ -23,6 +28,7 @@ impl Default for Options {
             surrogates: 399,
             bic_margin: 10.0,
             held_out_share: 1.0 / 3.0,
+            effects: EFFECTS,
         }
     }
 }

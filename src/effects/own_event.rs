@@ -76,10 +76,10 @@ fn partition(
         p_value: event.p_value,
         groups: Some(vec![stayed, left]),
         bic_gain: event.bic_gain,
-        ..Effect::of(Kind::Partition)
+        ..Effect::of(Kind::PARTITION)
     };
     let candidate = Candidate {
-        effect: Kind::Partition,
+        effect: Kind::PARTITION,
         channel: None,
         form: None,
         at: event.at,

@@ -47,7 +47,7 @@ impl Prior {
         for term in terms {
             for index in 0..term.coefficients() {
                 centre.push(0.0);
-                deviation.push(term.prior(index));
+                deviation.push(term.act.prior(index));
             }
         }
         Self {

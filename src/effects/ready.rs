@@ -8,14 +8,13 @@ use super::refit::Fitted;
 use super::response::Driver;
 use super::search::{Search, plain};
 use super::term::Scratch;
-use crate::reading::{Channel, CovariateKind, Series};
+use crate::reading::{Channel, Series};
 
 /// All that a search rests on.
 #[derive(Debug)]
 pub(super) struct Ready {
     pub(super) problem: Problem,
     pub(super) drivers: Vec<(usize, Driver)>,
-    temperatures: Vec<bool>,
     pub(super) bank: Vec<Whitener>,
     /// The plain law by least squares.
     pub(super) plain: Fitted,
@@ -33,9 +32,7 @@ impl Ready {
         let plain = plain(&problem, &mut Scratch::default())?;
         problem.see(&plain.velocity);
         let drivers = drivers(&problem, channels, remarks);
-        let temperature = |(_, one): &(usize, Driver)| one.kind == CovariateKind::Temperature;
         Some(Self {
-            temperatures: drivers.iter().map(temperature).collect(),
             bank: Noise::bank(&problem),
             drivers,
             problem,
@@ -48,7 +45,6 @@ impl Ready {
         Search {
             problem: &self.problem,
             drivers: &self.drivers,
-            temperatures: &self.temperatures,
             bank: &self.bank,
             options,
             is_drawn,

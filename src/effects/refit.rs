@@ -1,11 +1,12 @@
 //! The joint fit of the law and its effects under one noise model, and under the best of several.
 
+use super::act::Act;
 use super::frame::{dot, likeliest as likeliest_noise};
 use super::linear::Linear;
 use super::noise::{Memory, Noise, Whitener};
 use super::prior::Prior;
 use super::problem::Problem;
-use super::term::{Act, Scratch, Term, law_parameters, read};
+use super::term::{Scratch, Term, law_parameters, read};
 use crate::fit::{Damping, Descendable, StepOutcome, descend};
 use crate::model::Driven;
 use crate::reading::Quantity;
@@ -77,7 +78,7 @@ impl Start {
     /// This start with these terms besides, their coefficients at the first of their starts.
     pub(super) fn joined(mut self, terms: &[Term]) -> Self {
         for term in terms {
-            self = self.with_size(term, term.starts()[0]);
+            self = self.with_size(term, term.act.starts()[0]);
         }
         self
     }

@@ -1,16 +1,16 @@
 //! One round of the search: the most promising trials refitted with the law, each with the p-value of its search.
 
+use super::act::Act;
 use super::candidates;
 use super::frame::Frames;
 use super::fresh::{best_of_starts, fresh_laws, from_the_first_readings, under_growing_means};
-use super::kind::Kind;
 use super::linear::Linear;
 use super::noise::{Noise, Whitener};
 use super::refit::{Fitted, Start, jacobian, likeliest, refit, under_likeliest};
 use super::response::Response;
 use super::search::{Refitted, SIGNIFICANT, Search};
 use super::surrogate::{Innovations, NullGains};
-use super::term::{Act, Term};
+use super::term::Term;
 use super::trials::{Trial, TrialBase, shortlist};
 use std::cell::LazyCell;
 
@@ -58,7 +58,7 @@ impl<'a> Search<'a> {
         Some(TrialBase {
             problem: self.problem,
             drivers: self.drivers,
-            temperatures: self.temperatures,
+            effects: self.options.effects,
             frames: Frames::new(&bank, &residual, &columns),
             linear,
             residual,
@@ -211,7 +211,7 @@ impl<'a> Search<'a> {
             levels.extend(grown.filter(|grown| grown.prediction.len() == problem.t.len()));
         }
         levels.extend(under_growing_means(problem, base, term, &mut self.scratch));
-        for size in term.starts() {
+        for size in term.act.starts() {
             let start = Start::at(base).with_size(term, *size);
             fits.extend(refit(problem, &start, bank, &mut self.scratch));
             levels.extend(refit(problem, &start, &white, &mut self.scratch));
@@ -343,9 +343,9 @@ impl<'a> Search<'a> {
             let Response {
                 stages, mean_days, ..
             } = response;
-            return candidates::thermal(self.problem, own, stages, mean_days);
+            return candidates::in_reading(self.problem, term.kind, own, stages, mean_days);
         }
-        candidates::of_channel(self.problem, own, response)
+        candidates::in_load(self.problem, term.kind, own, response)
     }
 
     fn at_another_time(&self, term: &Term, stride: Stride, later: bool) -> Option<Term> {
@@ -354,7 +354,7 @@ impl<'a> Search<'a> {
             Stride::Coarse => (self.problem.used / 128).max(1) as f64,
             Stride::Fine => 1.0,
             // A jump of the reading lies between the same two readings all the time.
-            Stride::Within(_) if term.kind == Kind::Offset => return None,
+            Stride::Within(_) if term.is_jump_of_reading() => return None,
             Stride::Within(share) => share,
         };
         let passed = (at as f64 + term.share + sign * by).max(0.0);
@@ -366,8 +366,8 @@ impl<'a> Search<'a> {
         let to = passed as usize;
         let inside = to >= 2 && to + 2 < self.problem.used;
         inside.then(|| {
-            if term.kind == Kind::Offset {
-                return candidates::offset(self.problem, to);
+            if term.is_jump_of_reading() {
+                return candidates::jump(self.problem, term.kind, to);
             }
             Term {
                 at: Some(to),
@@ -388,7 +388,7 @@ impl Refitted {
 
 /// Whether a term makes one large innovation of the reading, or, where the noise remembers, of the velocity.
 fn is_jump(term: &Term, frames: &Frames) -> bool {
-    term.kind == Kind::Offset || (term.kind.jumps() && frames.remembers())
+    term.is_jump_of_reading() || (term.kind.jumps() && frames.remembers())
 }
 
 fn best_of_each_kind(mut trials: Vec<Trial>) -> Vec<Trial> {

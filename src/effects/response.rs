@@ -1,5 +1,6 @@
 //! What a covariate does to the slope after a while: its exponential or gamma response, by level or by rate.
 
+use super::act::standardise;
 use super::kind::Form;
 use crate::reading::{Channel, CovariateKind, Timestamp, days_since};
 
@@ -198,22 +199,6 @@ fn filter(values: &mut [f64], step: f64, mean: f64) {
         before = now;
         *value = state;
     }
-}
-
-/// Mean 0, standard deviation 1.
-pub(super) fn standardise(mut values: Vec<f64>) -> Option<Vec<f64>> {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let variance = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / n;
-    let size = values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-    let deviation = variance.sqrt();
-    if !(deviation.is_finite() && deviation > 1e-9 * size) {
-        return None;
-    }
-    for value in &mut values {
-        *value = (*value - mean) / deviation;
-    }
-    Some(values)
 }
 
 #[cfg(test)]

@@ -1,10 +1,10 @@
 //! A rise that takes several readings is motion, and no reset of the instrument.
 
-use super::candidates::offset;
+use super::act::Act;
+use super::candidates::jump;
 use super::frame::{Frame, dot};
 use super::refit::{Fitted, jacobian};
 use super::search::Search;
-use super::term::Act;
 
 /// Readings on either side in which a reset has no second one beside it; so many of these places, and the jump took several readings.
 const BESIDE: usize = 3;
@@ -15,9 +15,12 @@ impl Search<'_> {
     /// or more, gain the margin. One alone may be a mean that straddles the reset.
     pub(super) fn takes_several_readings(&mut self, fitted: &Fitted) -> bool {
         let problem = self.problem;
-        let newest = fitted.terms.last().and_then(|term| term.at);
+        let Some(newest) = fitted.terms.last() else {
+            return false;
+        };
         let noise = self.bank.iter().find(|one| one.noise == fitted.noise);
-        let (Some(at), Some(noise), Some(size)) = (newest, noise, fitted.parameters.last()) else {
+        let (Some(at), Some(noise), Some(size)) = (newest.at, noise, fitted.parameters.last())
+        else {
             return false;
         };
         let columns = jacobian(problem, fitted, &mut self.scratch);
@@ -25,14 +28,14 @@ impl Search<'_> {
         let places = (at.saturating_sub(BESIDE).max(1)..=at + BESIDE)
             .filter(|place| *place != at && *place < problem.used);
         let steps = places.filter_map(|place| {
-            if let Act::Reading(steps) = offset(problem, place).act {
+            if let Act::Reading(steps) = jump(problem, newest.kind, place).act {
                 Some(steps)
             } else {
                 None
             }
         });
         let mut steps: Vec<Vec<f64>> = steps.flatten().collect();
-        let cost = offset(problem, at).parameters() * (problem.used as f64).ln();
+        let cost = newest.parameters() * (problem.used as f64).ln();
         let mut residual = frame.residual.clone();
         // One after the other: a jump beside another is like it, and gains with it.
         let mut taken = Vec::new();

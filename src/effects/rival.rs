@@ -55,9 +55,7 @@ impl TryFrom<String> for Rival {
             Some((name, channel)) => (name, Some(channel.to_owned())),
             None => (text.as_str(), None),
         };
-        let mut kinds = Kind::ALL.into_iter();
-        let kind = kinds.find(|kind| kind.name() == name);
-        let kind = kind.ok_or_else(|| format!("{name:?} is no kind of effect"))?;
+        let kind = Kind::named(name).ok_or_else(|| format!("{name:?} is no kind of effect"))?;
         Ok(Self { kind, channel })
     }
 }
@@ -68,7 +66,7 @@ mod tests {
 
     #[test]
     fn a_rival_is_read_back_from_its_name_whatever_its_channel_is_called() {
-        for kind in Kind::ALL {
+        for kind in Kind::all() {
             for channel in [None, Some("lake"), Some("hydrological station 2")] {
                 let channel = channel.map(str::to_owned);
                 let rival = Rival { kind, channel };

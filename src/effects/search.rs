@@ -1,9 +1,11 @@
 //! The search: one effect after another, each refitted with the law and judged, while any earns its place.
 
+use super::act::Act;
 use super::candidates;
+use super::definition::Support;
 use super::explanation::Candidate;
 use super::fresh::best_of_starts;
-use super::judge::{HeldOut, block, fits_any_bend, held_out, objection, step_errors};
+use super::judge::{HeldOut, block, held_out, objection, step_errors};
 use super::kind::Kind;
 use super::noise::Whitener;
 use super::options::Options;
@@ -12,7 +14,7 @@ use super::refit::{Fitted, Start, plain_starts, refit_every_memory};
 use super::response::Driver;
 use super::rival::Rival;
 use super::surrogate::NullGains;
-use super::term::{Act, Scratch, Term, law_parameters, time_of};
+use super::term::{Scratch, Term, law_parameters, time_of};
 use crate::reading::Timestamp;
 
 /// Most effects in one law.
@@ -89,7 +91,6 @@ pub(super) enum OneMore {
 pub(super) struct Search<'a> {
     pub(super) problem: &'a Problem,
     pub(super) drivers: &'a [(usize, Driver)],
-    pub(super) temperatures: &'a [bool],
     pub(super) bank: &'a [Whitener],
     pub(super) options: &'a Options,
     /// Whether the values are not raw readings: smoother than any instrument's.
@@ -114,8 +115,8 @@ pub(super) struct Refitted {
 impl Refitted {
     /// What follows the year cannot be distinguished from the season.
     pub(super) fn with_season(&self, mut how: Accepted, problem: &Problem) -> Accepted {
-        let season = Rival::from(Kind::Seasonal);
-        let seen = !candidates::seasonal(problem).is_empty();
+        let season = Rival::from(Kind::SEASONAL);
+        let seen = candidates::shows_the_year(problem);
         if self.follows_season && seen && !how.ties.contains(&season) {
             how.ties.push(season);
         }
@@ -142,7 +143,7 @@ impl Refitted {
     /// The periods of a tide are known beforehand: what a search over all kinds and times gains from nothing is no measure
     /// of it, and the likelihood that the gain stands for is enough.
     pub(super) fn judged_by_astronomy(self) -> Self {
-        if self.term.kind != Kind::Tide {
+        if self.term.kind.definition().support != Support::Astronomy {
             return self;
         }
         let by_chance = ASTRONOMICAL * (-0.5 * self.gain).exp();
@@ -252,16 +253,15 @@ impl Search<'_> {
         if let Some(reason) = objection(self.problem, &one.fitted, self.drivers) {
             return (None, Some(reason));
         }
-        if self.is_drawn && !has_independent_evidence(one.term.kind) {
+        if self.is_drawn && !one.term.kind.has_independent_evidence() {
             self.withhold(one);
             return (None, Some(NO_READINGS.to_owned()));
         }
-        if one.term.kind == Kind::Offset && self.takes_several_readings(&one.fitted) {
+        if one.term.is_jump_of_reading() && self.takes_several_readings(&one.fitted) {
             let reason = "the jump goes on over the readings beside it: motion looks the same";
             return (None, Some(reason.to_owned()));
         }
-        // A jump, or the blur of a mean, says nothing of what comes.
-        if matches!(one.term.kind, Kind::Offset | Kind::IntervalMean) {
+        if !one.term.kind.definition().says_what_comes {
             return (None, None);
         }
         self.held_out(base, one)
@@ -284,7 +284,7 @@ impl Search<'_> {
         if block(self.problem, &one.fitted.terms, share).is_none() {
             // A short record has none, and a step that has only just come says so by its date.
             let is_late =
-                block(self.problem, &[], share).is_some() && !fits_any_bend(one.term.kind);
+                block(self.problem, &[], share).is_some() && !one.term.kind.fits_any_bend();
             let reason =
                 "an event stands too late for a later block by which to judge it".to_owned();
             return (None, is_late.then_some(reason));
@@ -317,7 +317,7 @@ impl Search<'_> {
         let newest = one.fitted.terms.len() - base.terms.len();
         let models = (base, &one.fitted);
         let both = (held.from, newest);
-        let (before, after) = if fits_any_bend(one.term.kind) {
+        let (before, after) = if one.term.kind.fits_any_bend() {
             held.errors_of_changes(self.problem)
         } else {
             let steps = step_errors(self.problem, models, both, &mut self.scratch);
@@ -376,16 +376,9 @@ impl Search<'_> {
 /// By what factor the held-out error may grow where it is extrapolated over all of the block; what only the shape of the readings
 /// supports may change the law, and with it no error may grow.
 fn most_extrapolated(kind: Kind) -> f64 {
-    if kind == Kind::Tide {
-        MOST_OF_A_TIDE
-    } else if fits_any_bend(kind) {
-        1.0
-    } else {
-        MOST_EXTRAPOLATED
+    match kind.definition().support {
+        Support::Astronomy => MOST_OF_A_TIDE,
+        Support::Nothing => 1.0,
+        Support::Covariate | Support::Shape => MOST_EXTRAPOLATED,
     }
-}
-
-/// Whether a covariate or known astronomy supports a kind, and not the shape of the curve alone.
-fn has_independent_evidence(kind: Kind) -> bool {
-    matches!(kind, Kind::Hydrological | Kind::Thermal | Kind::Tide)
 }

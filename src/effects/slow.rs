@@ -2,7 +2,8 @@
 //! a load that answers to the motion, or a covariate follows such a load part of the way and gains much by it; so what is
 //! accepted of them must account for the readings as well as the slow load does.
 
-use super::candidates::{events, slow};
+use super::act::Act;
+use super::candidates::{once, slow};
 use super::explanation::Candidate;
 use super::kind::Kind;
 use super::noise::Whitener;
@@ -195,8 +196,9 @@ impl Search<'_> {
     ) -> Option<(Refitted, Vec<Rival>)> {
         let (problem, margin) = (self.problem, self.options.bic_margin);
         let mut each: Vec<Fitted> = Vec::new();
-        for kind in [Kind::LoadStep, Kind::StateReset, Kind::FrictionChange] {
-            let nearest = self.event_from(slow, kind);
+        let events = self.options.effects.iter();
+        for definition in events.filter(|definition| !definition.once().is_empty()) {
+            let nearest = self.event_from(slow, Kind::of(definition));
             each.extend(nearest.map(|mut fitted| {
                 self.sharpen(&mut fitted);
                 fitted
@@ -204,8 +206,8 @@ impl Search<'_> {
         }
         each.retain(|fitted| {
             // A change of the friction follows almost any bend, and is to account for the readings better than the slow load.
-            let newest = fitted.terms.last().map(|term| term.kind);
-            let least = if newest == Some(Kind::FrictionChange) {
+            let newest = fitted.terms.last();
+            let least = if newest.is_some_and(|term| matches!(term.act, Act::Friction(_))) {
                 slow.gain + margin
             } else {
                 slow.gain - margin
@@ -242,15 +244,15 @@ impl Search<'_> {
             if at < 2 || at + 2 >= problem.used {
                 continue;
             }
-            for term in events(at).iter().filter(|term| term.kind == kind) {
-                let first = if kind == Kind::LoadStep {
+            for term in once(kind, at) {
+                let first = if matches!(term.act, Act::Step) {
                     size
-                } else if kind == Kind::StateReset {
+                } else if matches!(term.act, Act::Reset) {
                     -size
                 } else {
-                    term.starts()[0]
+                    term.act.starts()[0]
                 };
-                let start = law.clone().with_size(term, first);
+                let start = law.clone().with_size(&term, first);
                 fits.extend(refit(problem, &start, self.bank, &mut self.scratch));
             }
         }
@@ -284,9 +286,9 @@ impl Search<'_> {
     pub(super) fn note_slow(&mut self, slow: &SlowFit, reason: String) {
         let [begins, _, _] = slow.load.turns();
         self.candidates
-            .retain(|old| old.effect != Kind::Unexplained);
+            .retain(|old| old.effect != Kind::UNEXPLAINED);
         self.candidates.push(Candidate {
-            effect: Kind::Unexplained,
+            effect: Kind::UNEXPLAINED,
             channel: None,
             form: None,
             at: after_days(self.problem.epoch, begins.max(0.0)),

@@ -1,8 +1,9 @@
 //! How much a search finds without any effect: covariates at the wrong time, and readings made of noise alone.
 
-use super::candidates::{delays, of_channel, responses, thermal};
+use super::candidates::{delays, in_load, in_reading, responses};
+use super::definition::{EffectDefinition, Trying};
 use super::frame::{Frame, Frames, dot};
-use super::kind::Form;
+use super::kind::{Form, Kind};
 use super::linear::Linear;
 use super::problem::{Problem, median};
 use super::response::Driver;
@@ -69,19 +70,14 @@ impl NullGains {
     }
 }
 
-/// A covariate that is searched: its place among the channels, and whether it may act on the reading too.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct SearchedDriver<'a> {
-    pub(super) index: usize,
-    pub(super) driver: &'a Driver,
-    pub(super) is_temperature: bool,
-}
+/// The readings, and the effects that a search tries.
+type SearchedEffects<'a> = (&'a Problem, &'static [&'static EffectDefinition]);
 
 /// The whole search over every covariate, on covariates shifted round in time (and in every other one run
 /// backwards): all by the same share, so that what they have in common stays.
 pub(super) fn shifted_covariates(
-    problem: &Problem,
-    drivers: &[SearchedDriver<'_>],
+    own: SearchedEffects<'_>,
+    drivers: &[(usize, Driver)],
     (linear, frames): (&Linear, &Frames),
     (count, seed): (usize, u64),
 ) -> NullGains {
@@ -89,19 +85,15 @@ pub(super) fn shifted_covariates(
     let before = frames.deviance();
     let finds = (0..count).filter_map(|k| {
         let share = random.random_range(LEAST_SHIFT..1.0 - LEAST_SHIFT);
-        let each = drivers.iter().filter_map(|one| {
+        let each = drivers.iter().filter_map(|(index, driver)| {
             #[expect(
                 clippy::cast_possible_truncation,
                 clippy::cast_sign_loss,
                 reason = "a share of a length"
             )]
-            let by = (share * one.driver.len() as f64) as usize;
-            let other = one.driver.shifted(by, k % 2 == 1);
-            let other = SearchedDriver {
-                driver: &other,
-                ..*one
-            };
-            best_response(problem, &other, (linear, frames))
+            let by = (share * driver.len() as f64) as usize;
+            let other = driver.shifted(by, k % 2 == 1);
+            best_response(own, (*index, &other), (linear, frames))
         });
         let best = each.min_by(|a, b| a.1.total_cmp(&b.1))?;
         Some((best.0, before - best.1))
@@ -119,21 +111,29 @@ pub(super) fn shifted_covariates(
 /// The likeliest response of one covariate with its -2 ln likelihood: a coarser search than that for the covariate
 /// itself, which gains less for it.
 fn best_response(
-    problem: &Problem,
-    one: &SearchedDriver<'_>,
+    (problem, effects): SearchedEffects<'_>,
+    own: (usize, &Driver),
     (linear, frames): (&Linear, &Frames),
 ) -> Option<(Term, f64)> {
-    let driver = (one.index, one.driver);
-    let delays = delays(problem, driver.1);
+    let driver = own.1;
+    let delays = delays(problem, driver);
     let coarse: Vec<f64> = delays.into_iter().step_by(2).collect();
-    let each = [Form::Level, Form::Rate]
-        .into_iter()
-        .flat_map(|form| responses(form, &coarse))
-        .filter(|response| response.stages == 2 || response.mean_days == 0.0)
-        .filter_map(|response| of_channel(problem, driver, response));
-    let warms = coarse.iter().filter(|_| one.is_temperature);
-    let in_reading = warms.filter_map(|days| thermal(problem, driver, 1, *days));
-    let each = each.chain(in_reading);
+    let tried = effects.iter();
+    let tried = tried.filter(|definition| definition.is_tried_through(driver.kind));
+    let each = tried.flat_map(|definition| {
+        let kind = Kind::of(definition);
+        if let Trying::CovariateInReading(_) = definition.trying {
+            let coarse = coarse.iter();
+            let terms = coarse.filter_map(|days| in_reading(problem, kind, own, 1, *days));
+            return terms.collect();
+        }
+        let forms = [Form::Level, Form::Rate].into_iter();
+        let terms = forms
+            .flat_map(|form| responses(form, &coarse))
+            .filter(|response| response.stages == 2 || response.mean_days == 0.0)
+            .filter_map(|response| in_load(problem, kind, own, response));
+        terms.collect::<Vec<Term>>()
+    });
     let mut terms = Vec::new();
     let mut columns = Vec::new();
     for term in each {

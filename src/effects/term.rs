@@ -1,5 +1,6 @@
 //! Effects as terms of the law and of the reading, and the prediction that they make together.
 
+use super::act::Act;
 use super::kind::Kind;
 use super::problem::Problem;
 use super::response::Response;
@@ -20,48 +21,15 @@ pub(super) struct Term {
     pub(super) act: Act,
 }
 
-/// How it acts.
-#[derive(Debug, Clone)]
-pub(super) enum Act {
-    /// On the log-load: columns at the nodes, each with standard deviation 1.
-    Load(Vec<Vec<f64>>),
-    /// The log-load steps.
-    Step,
-    /// ln y jumps.
-    Reset,
-    /// So many of b, ln a and p change, 1 to 3: b alone is the pace.
-    Friction(usize),
-    /// The load falls with the velocity.
-    PerVelocity,
-    /// The load falls with the slip.
-    PerSlip,
-    /// On the reading: columns at the readings.
-    Reading(Vec<Vec<f64>>),
-    /// Velocities are means over so many median spacings.
-    Averaging,
-}
-
 impl Term {
     /// How many coefficients it has.
     pub(super) fn coefficients(&self) -> usize {
-        match &self.act {
-            Act::Load(columns) | Act::Reading(columns) => columns.len(),
-            Act::Friction(count) => *count,
-            Act::Step | Act::Reset | Act::PerVelocity | Act::PerSlip | Act::Averaging => 1,
-        }
+        self.act.coefficients()
     }
 
-    /// Where its coefficients may start a fit: next to nothing, or, where nothing is the edge of what they may be, at
-    /// several sizes.
-    pub(super) fn starts(&self) -> &'static [f64] {
-        match self.act {
-            Act::PerVelocity => &[0.1, 0.4, 1.5, 5.0],
-            Act::PerSlip => &[0.3, 2.0],
-            Act::Averaging => &[2.0, 8.0],
-            // From next to nothing a fit seldom finds its way to a state that was halved or doubled.
-            Act::Reset => &[1e-3, -0.7, 0.7],
-            Act::Load(_) | Act::Step | Act::Friction(_) | Act::Reading(_) => &[1e-3],
-        }
+    /// Whether it is a jump of the reading, and not of the ground.
+    pub(super) fn is_jump_of_reading(&self) -> bool {
+        matches!(self.act, Act::Reading(_)) && self.at.is_some()
     }
 
     /// What it costs in the BIC: coefficients, and the shape that was searched for.
@@ -69,19 +37,6 @@ impl Term {
         let shape =
             f64::from(u8::from(self.at.is_some())) + f64::from(u8::from(self.response.is_some()));
         self.coefficients() as f64 + shape
-    }
-
-    /// Standard deviation of the prior of its coefficient of that index; infinite for those of the reading.
-    pub(super) fn prior(&self, index: usize) -> f64 {
-        match &self.act {
-            Act::Load(_) | Act::Step | Act::Reset => 1.5,
-            Act::Friction(_) if index == 2 => 0.6,
-            Act::Friction(_) if index == 1 => 2.0,
-            Act::Friction(_) => 10.0,
-            Act::PerVelocity | Act::PerSlip => 5.0,
-            Act::Reading(_) => f64::INFINITY,
-            Act::Averaging => 30.0,
-        }
     }
 }
 

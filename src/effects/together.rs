@@ -69,7 +69,7 @@ pub fn explain_together(
             .iter()
             .map(|series| series.benchmark.clone())
             .collect(),
-        verdict: found.map_or(Effect::of(Kind::None), |found| found.effect()),
+        verdict: found.map_or(Effect::of(Kind::NONE), |found| found.effect()),
         explained,
         also: Vec::new(),
         cannot_separate_from: Vec::new(),

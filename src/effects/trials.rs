@@ -1,18 +1,17 @@
 //! The linear search: everything that may be missing, by what it would take off the misfit.
 
 use super::candidates::{
-    delays, event_times, events, feedbacks, jumps, of_channel, offset, responses, seasonal,
-    thermal, tides, times_of_jumps,
+    all_along, delays, event_times, in_load, in_reading, jump, jumps, once, responses,
+    times_of_jumps,
 };
+use super::definition::{EffectDefinition, Trying};
 use super::frame::Frames;
 use super::kind::{Form, Kind};
 use super::linear::Linear;
 use super::noise::{Memory, Whitener};
 use super::problem::Problem;
 use super::response::Driver;
-use super::surrogate::{
-    Innovations, NullGains, SearchedDriver, Tried, noise_alone, shifted_covariates,
-};
+use super::surrogate::{Innovations, NullGains, Tried, noise_alone, shifted_covariates};
 use super::term::Term;
 
 /// A term with its linear gain.
@@ -27,8 +26,8 @@ pub(super) struct Trial {
 pub(super) struct TrialBase<'a> {
     pub(super) problem: &'a Problem,
     pub(super) drivers: &'a [(usize, Driver)],
-    /// Whether each driver is a temperature.
-    pub(super) temperatures: &'a [bool],
+    /// The effects that are tried.
+    pub(super) effects: &'static [&'static EffectDefinition],
     pub(super) linear: Linear,
     pub(super) frames: Frames,
     /// Readings less prediction.
@@ -74,18 +73,27 @@ impl TrialBase<'_> {
         Tried::new(&self.frames, &columns, self.cost(term))
     }
 
-    /// A covariate's responses in the load, by its level or by its rate.
-    pub(super) fn in_load(&self, (index, driver): (usize, &Driver), form: Form) -> Vec<Term> {
-        let responses = responses(form, &delays(self.problem, driver)).into_iter();
-        let each = responses.filter_map(|one| of_channel(self.problem, (index, driver), one));
-        each.collect()
-    }
-
-    /// A temperature's responses in the reading.
-    pub(super) fn in_reading(&self, (index, driver): (usize, &Driver)) -> Vec<Term> {
-        let delays = delays(self.problem, driver).into_iter();
-        let each = delays.filter_map(|days| thermal(self.problem, (index, driver), 1, days));
-        each.collect()
+    /// What an effect may be through a covariate, by kinds of response of which each has a best one: in the load those by its level
+    /// and those by its rate, in the reading those that the quantity has.
+    pub(super) fn through(&self, kind: Kind, own: (usize, &Driver)) -> Vec<Vec<Term>> {
+        let (problem, delays) = (self.problem, delays(self.problem, own.1));
+        match kind.definition().trying {
+            Trying::CovariateInLoad(_) => [Form::Level, Form::Rate]
+                .map(|form| {
+                    let each = responses(form, &delays).into_iter();
+                    let terms = each.filter_map(|one| in_load(problem, kind, own, one));
+                    terms.collect()
+                })
+                .into(),
+            Trying::CovariateInReading(_) => {
+                let each = delays.into_iter();
+                let terms = each.filter_map(|days| in_reading(problem, kind, own, 1, days));
+                vec![terms.collect()]
+            }
+            Trying::AllAlong(_) | Trying::Once(_) | Trying::JumpOfReading | Trying::Elsewhere => {
+                Vec::new()
+            }
+        }
     }
 
     pub(super) fn trial(&self, term: Term) -> Trial {
@@ -97,27 +105,25 @@ impl TrialBase<'_> {
     /// The best response of each covariate, by its level and by its rate, on the load, and of temperatures in the reading as well.
     pub(super) fn of_covariates(&self) -> Vec<Trial> {
         let mut trials = Vec::new();
-        for (driver, temperature) in self.drivers.iter().zip(self.temperatures) {
-            let present = |kind: Kind| {
-                let own = |term: &Term| term.kind == kind && term.channel == Some(driver.0);
-                self.present.iter().any(own)
-            };
-            let own = (driver.0, &driver.1);
-            for form in [Form::Level, Form::Rate] {
-                if present(Kind::Hydrological) {
+        for (index, driver) in self.drivers {
+            let is_tried = |kind: &Kind| kind.definition().is_tried_through(driver.kind);
+            for kind in self.kinds().filter(is_tried) {
+                let own = |term: &Term| term.kind == kind && term.channel == Some(*index);
+                if self.present.iter().any(own) {
                     continue;
                 }
-                let each = self.in_load(own, form).into_iter();
-                let each = each.map(|term| self.trial(term));
-                trials.extend(each.max_by(|a, b| a.gain.total_cmp(&b.gain)));
-            }
-            if *temperature && !present(Kind::Thermal) {
-                let each = self.in_reading(own).into_iter();
-                let each = each.map(|term| self.trial(term));
-                trials.extend(each.max_by(|a, b| a.gain.total_cmp(&b.gain)));
+                for terms in self.through(kind, (*index, driver)) {
+                    let each = terms.into_iter().map(|term| self.trial(term));
+                    trials.extend(each.max_by(|a, b| a.gain.total_cmp(&b.gain)));
+                }
             }
         }
         trials
+    }
+
+    /// The kinds of effects that are tried.
+    fn kinds(&self) -> impl Iterator<Item = Kind> {
+        self.effects.iter().map(|definition| Kind::of(definition))
     }
 
     /// The readings before which something that happens once is tried.
@@ -131,18 +137,19 @@ impl TrialBase<'_> {
 
     /// Everything that needs no covariate, with the directions it adds.
     pub(super) fn of_itself(&self) -> (Vec<Trial>, Vec<Tried>) {
-        let present = |kind: Kind| self.present.iter().any(|term| term.kind == kind);
+        let is_new = |kind: &Kind| self.present.iter().all(|term| term.kind != *kind);
         let mut terms = Vec::new();
-        let all_along = seasonal(self.problem)
-            .into_iter()
-            .chain(tides(self.problem))
-            .chain(feedbacks(self.problem));
-        terms.extend(all_along.filter(|term| !present(term.kind)));
+        for kind in self.kinds().filter(is_new) {
+            terms.extend(all_along(self.problem, kind));
+        }
         for at in self.event_times() {
-            terms.extend(events(at));
+            terms.extend(self.kinds().flat_map(|kind| once(kind, at)));
         }
         let jumps = jumps(self.problem, &self.residual);
-        terms.extend(jumps.into_iter().map(|at| offset(self.problem, at)));
+        let kinds = self.kinds();
+        for kind in kinds.filter(|kind| kind.definition().is_jump_of_reading()) {
+            terms.extend(jumps.iter().map(|at| jump(self.problem, kind, *at)));
+        }
         let (mut trials, mut tried) = (Vec::new(), Vec::new());
         for term in terms {
             let one = self.tried(&term);
@@ -163,14 +170,8 @@ impl TrialBase<'_> {
         seed: u64,
     ) -> NullGains {
         let both = (&self.linear, &self.frames);
-        let known = || self.drivers.iter().zip(self.temperatures);
-        let searched = drivers.iter().map(|(index, driver)| SearchedDriver {
-            index: *index,
-            driver,
-            is_temperature: known().any(|((own, _), is_one)| own == index && *is_one),
-        });
-        let searched: Vec<SearchedDriver<'_>> = searched.collect();
-        shifted_covariates(self.problem, &searched, both, (count, seed))
+        let own = (self.problem, self.effects);
+        shifted_covariates(own, drivers, both, (count, seed))
     }
 
     /// What the search without covariates gains without any effect.

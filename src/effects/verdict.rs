@@ -1,8 +1,10 @@
 //! From what a search accepted to what is said: the verdict, what stands beside it, and how much is explained.
 
+use super::act::Act;
+use super::definition::{EffectSize, FittedCoefficients};
 use super::diagnosis::Judged;
 use super::explanation::{Candidate, Effect, Explained};
-use super::judge::{coefficients, fits_any_bend, named};
+use super::judge::{coefficients, named};
 use super::kind::Kind;
 use super::noise::{Memory, Whitener};
 use super::problem::Problem;
@@ -10,7 +12,7 @@ use super::refit::{Fitted, Start, jacobian, refit, under_likeliest};
 use super::response::Driver;
 use super::rival::Rival;
 use super::search::{Accepted, SearchResult};
-use super::term::{Act, Scratch, Term, law_parameters, time_of};
+use super::term::{Scratch, Term, law_parameters, time_of};
 use crate::reading::{Quantity, Unit};
 
 /// What the search is concluded to mean.
@@ -54,7 +56,7 @@ pub(super) fn conclude(
     let load_gain = judged.as_ref().map_or(0.0, Judged::load_gain);
     let mut left = found.has_slow_load || load_gain > margin;
     let only_labels =
-        !accepted.is_empty() && full.terms.iter().all(|term| fits_any_bend(term.kind));
+        !accepted.is_empty() && full.terms.iter().all(|term| term.kind.fits_any_bend());
     let mut cannot_separate_from = Vec::new();
     let is_whole = !left && accounts_for_all(problem, &full);
     if only_labels && !is_whole {
@@ -78,14 +80,14 @@ pub(super) fn conclude(
         })
         .collect();
     // What independent data support comes first.
-    effects.sort_by_key(|effect| fits_any_bend(effect.effect));
+    effects.sort_by_key(|effect| effect.effect.fits_any_bend());
     let memory_gain = judged.as_ref().map_or(0.0, Judged::memory_gain);
     let remembers = memory_gain > margin && may_remember(&full);
     if remembers && !left && effects.is_empty() {
         // A slow load that nothing declares leaves what remembers as well.
         if judged.as_ref().is_some_and(is_a_load_alike) {
             left = true;
-            cannot_separate_from.push(Rival::from(Kind::CorrelatedNoise));
+            cannot_separate_from.push(Rival::from(Kind::CORRELATED_NOISE));
         } else if full.noise.memory == Memory::Load {
             full = under_memory_of_readings((problem, bank), &full, scratch).unwrap_or(full);
         }
@@ -102,9 +104,9 @@ pub(super) fn conclude(
     };
     if effects.is_empty() {
         effects.push(Effect::of(if left {
-            Kind::Unexplained
+            Kind::UNEXPLAINED
         } else {
-            Kind::None
+            Kind::NONE
         }));
     }
     Verdict {
@@ -279,7 +281,7 @@ fn correlated(unit: Unit, full: &Fitted, bic_gain: f64) -> Effect {
         size: Some(noise.ratio * full.sigma / unit.factor()),
         unit: Some(unit.to_string()),
         bic_gain,
-        ..Effect::of(Kind::CorrelatedNoise)
+        ..Effect::of(Kind::CORRELATED_NOISE)
     }
 }
 
@@ -298,6 +300,7 @@ pub(super) fn effect(
         .and_then(|channel| drivers.iter().find(|(known, _)| *known == channel))
         .map(|(_, driver)| driver.name.clone());
     let factor = unit.factor();
+    let size = size(term, own, (problem, unit));
     let mut said = Effect {
         channel,
         form: term.response.map(|response| response.form),
@@ -307,9 +310,12 @@ pub(super) fn effect(
         at: time_of(problem, term),
         bic_gain: how.bic_gain,
         contribution_rms: rms(&contribution(problem, full, index, scratch)).map(|c| c / factor),
+        gain_per_sd: size.gain_per_sd,
+        period_days: size.period_days,
+        size: size.size,
+        unit: size.unit,
         ..Effect::of(term.kind)
     };
-    size(&mut said, term, own, (problem, unit));
     if said.gain_per_sd.is_some() {
         let deviation = deviation(problem, bank, (full, index), scratch);
         let scale = if matches!(term.act, Act::Reading(_)) {
@@ -324,53 +330,15 @@ pub(super) fn effect(
 }
 
 /// Gain, size, period, as the kind has them.
-fn size(said: &mut Effect, term: &Term, own: &[f64], (problem, unit): (&Problem, Unit)) {
-    let span = problem.t[problem.t.len() - 1] - problem.t[0];
-    let typical = problem.typical_velocity();
-    let pairs = own.chunks(2).map(|pair| {
-        let sine = pair.get(1).copied().unwrap_or(0.0);
-        pair[0].hypot(sine) * std::f64::consts::SQRT_2
-    });
-    match term.kind {
-        Kind::Hydrological => said.gain_per_sd = Some(own[0]),
-        Kind::Thermal => {
-            said.gain_per_sd = Some(own[0] / unit.factor());
-            said.unit = Some(unit.to_string());
-        }
-        Kind::Seasonal | Kind::Tide => {
-            let strongest = pairs.enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
-            said.size = strongest.map(|(_, size)| size);
-            let periods: &[f64] = if term.kind == Kind::Tide {
-                &super::candidates::TIDE
-            } else {
-                &super::candidates::SEASON
-            };
-            said.period_days = strongest.and_then(|(k, _)| periods.get(k).copied());
-        }
-        Kind::LoadStep => said.size = Some(own[0]),
-        Kind::StateReset => said.size = Some(own[0].exp()),
-        Kind::RateLimit => {
-            said.size = Some(own[0].max(0.0) / typical);
-            said.unit = Some("day/mm".to_owned());
-        }
-        Kind::Geometry => {
-            said.size = Some(own[0] / (typical * span));
-            said.unit = Some("1/mm".to_owned());
-        }
-        Kind::Offset => {
-            said.size = Some(own[0] / unit.factor());
-            said.unit = Some(unit.to_string());
-        }
-        Kind::IntervalMean => {
-            said.size = Some(own[0] * problem.spacing);
-            said.unit = Some("day".to_owned());
-        }
-        Kind::FrictionChange
-        | Kind::Partition
-        | Kind::CorrelatedNoise
-        | Kind::Unexplained
-        | Kind::None => {}
-    }
+fn size(term: &Term, values: &[f64], (problem, unit): (&Problem, Unit)) -> EffectSize {
+    let fitted = FittedCoefficients {
+        values,
+        unit,
+        typical_mm_per_day: problem.typical_velocity(),
+        span_days: problem.whole_span(),
+        spacing_days: problem.spacing,
+    };
+    (term.kind.definition().size)(&fitted)
 }
 
 /// Standard deviation of a term's first coefficient, all others free.

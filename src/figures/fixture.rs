@@ -35,7 +35,7 @@ pub(crate) fn lake() -> Explanation {
         explained: Explained::Partly,
         also: vec![an_offset()],
         given: Vec::new(),
-        cannot_separate_from: vec![Kind::Seasonal.into()],
+        cannot_separate_from: vec![Kind::SEASONAL.into()],
         faults: vec![a_reset()],
         error: ErrorChange {
             unit: Unit::MM,
@@ -95,7 +95,7 @@ fn by_the_lake() -> Effect {
         gain_interval: Some([0.7, 1.05]),
         bic_gain: 612.0,
         contribution_rms: Some(6.1),
-        ..Effect::of(Kind::Hydrological)
+        ..Effect::of(Kind::HYDROLOGICAL)
     }
 }
 
@@ -108,7 +108,7 @@ pub(crate) fn an_offset() -> Effect {
         p_value: Some(0.005),
         bic_gain: 84.0,
         contribution_rms: Some(31.0),
-        ..Effect::of(Kind::Offset)
+        ..Effect::of(Kind::OFFSET)
     }
 }
 
@@ -139,32 +139,32 @@ fn candidates() -> Vec<Candidate> {
     };
     let margin = "within the margin of the one accepted, and it needs a year that the record has hardly seen twice";
     let mut tried = vec![
-        one(Kind::Hydrological, Some("lake_level_m"), 612.0, 0.54, None),
-        one(Kind::Seasonal, None, 192.0, 0.96, Some(margin)),
+        one(Kind::HYDROLOGICAL, Some("lake_level_m"), 612.0, 0.54, None),
+        one(Kind::SEASONAL, None, 192.0, 0.96, Some(margin)),
         one(
-            Kind::Hydrological,
+            Kind::HYDROLOGICAL,
             Some("creek_stage_m"),
             120.0,
             1.61,
             Some("held-out error rises"),
         ),
         one(
-            Kind::Hydrological,
+            Kind::HYDROLOGICAL,
             Some("air_temperature_c"),
             72.0,
             1.2,
             Some("held-out error rises"),
         ),
-        one(Kind::Offset, None, 84.0, 0.9, None),
+        one(Kind::OFFSET, None, 84.0, 0.9, None),
         one(
-            Kind::Geometry,
+            Kind::GEOMETRY,
             None,
             -4.0,
             1.0,
             Some("BIC gains less than 10"),
         ),
         one(
-            Kind::RateLimit,
+            Kind::RATE_LIMIT,
             None,
             -412.0,
             3.0,

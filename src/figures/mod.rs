@@ -75,7 +75,7 @@ mod tests {
             assert!(picture.svg.starts_with("<svg ") && picture.svg.ends_with("</svg>\n"));
             assert!(!picture.svg.contains("NaN"), "{}", picture.name);
         }
-        assert!(pictures(&fixture::bare(Kind::Unexplained)).is_empty());
+        assert!(pictures(&fixture::bare(Kind::UNEXPLAINED)).is_empty());
     }
 
     #[test]

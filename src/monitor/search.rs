@@ -10,7 +10,7 @@ use super::event::Event;
 use super::track::{Phase, StepContext, Track};
 use super::undeclared::UndeclaredLoad;
 use crate::alert::Policy;
-use crate::effects::{Effect, Explained, Kind, KnownLoad, Options, Rival, explain};
+use crate::effects::{Effect, Explained, KnownLoad, Options, Rival, explain};
 use crate::reading::{BenchmarkId, Channel, Series, Timestamp};
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
@@ -127,9 +127,7 @@ impl SearchJob {
         let effects = std::iter::once(said.verdict).chain(said.also);
         SearchFinding {
             benchmark: said.benchmark,
-            effects: effects
-                .filter(|one| !matches!(one.effect, Kind::None | Kind::Unexplained))
-                .collect(),
+            effects: effects.filter(|one| !one.effect.is_an_end()).collect(),
             explained: said.explained,
             cannot_separate_from: said.cannot_separate_from,
             known_load: said.known_load,

@@ -106,7 +106,7 @@ fn a_partition_is_the_verdict_on_all_and_a_candidate_for_each() {
     let all: Vec<&Series> = made.series.iter().collect();
     let mut current = 0.0;
     let together = explain_together(&all, &[], &options(), &mut |share| current = share);
-    assert_eq!(together.verdict.effect, Kind::Partition);
+    assert_eq!(together.verdict.effect, Kind::PARTITION);
     assert_ne!(together.explained, Explained::None);
     assert_eq!(together.each.len(), all.len());
     assert!((current - 1.0).abs() < 1e-12);

@@ -86,7 +86,7 @@ fn the_lake_drives(benchmark: &str, fit: f64, held_out: f64) {
     let file = measured("salmon_falls_2017.csv");
     let said = explained_in(&[file], Some(benchmark));
     let lake = &said.verdict;
-    assert_eq!(lake.effect, Kind::Hydrological);
+    assert_eq!(lake.effect, Kind::HYDROLOGICAL);
     let channel = lake.channel.as_deref().unwrap();
     assert!(channel == "lake_level_m" || channel == "lake_sensor_raw_m");
     let lag = lake.lag_days.unwrap();
@@ -174,7 +174,7 @@ fn an_uncorrected_lake_logger_alone_is_found_to_drive_blkm_with_its_reset_named(
         .channels
         .retain(|channel| channel.name.ends_with("_raw_m"));
     let said = explained(&recording, Some("blkm"));
-    assert_eq!(said.verdict.effect, Kind::Hydrological);
+    assert_eq!(said.verdict.effect, Kind::HYDROLOGICAL);
     assert_eq!(said.verdict.channel.as_deref(), Some("lake_sensor_raw_m"));
     assert!(said.verdict.gain_per_sd.unwrap() > 0.0);
     assert!(
@@ -191,7 +191,7 @@ fn the_falling_reservoir_takes_a_third_off_the_error_of_bazimens_monthly_rate_in
     let file = measured("bazimen_2006.csv");
     let said = explained_in(&[file], None);
     let first = &said.verdict;
-    assert_eq!(first.effect, Kind::Hydrological);
+    assert_eq!(first.effect, Kind::HYDROLOGICAL);
     assert_eq!(first.channel.as_deref(), Some("reservoir_level_m"));
     assert_eq!(first.form, Some(Form::Rate));
     assert!(
@@ -253,7 +253,7 @@ fn the_tide_of_columbia_glacier_is_the_moons_and_takes_a_fifth_off_the_scatter_a
     let files = ["columbia_1985_marker1.csv", "columbia_1985_rain.csv"];
     let [speed, rain] = files.map(measured);
     let said = explained_in(&[speed, rain], None);
-    assert_eq!(said.verdict.effect, Kind::Tide);
+    assert_eq!(said.verdict.effect, Kind::TIDE);
     let hours = 24.0 * said.verdict.period_days.unwrap();
     assert!((hours - 12.42).abs() < 0.01, "{hours} h");
     assert!(said.flags.iter().any(|flag| flag == "interpolated"));
@@ -276,7 +276,7 @@ fn houstons_height_steps_are_offsets_and_no_motion() {
     let said = explained_in(&[file], Some("up"));
     let large = effects(&said).into_iter().filter(|effect| {
         let size = effect.size.unwrap_or(0.0).abs();
-        effect.effect == Kind::Offset && (45.0..=85.0).contains(&size)
+        effect.effect == Kind::OFFSET && (45.0..=85.0).contains(&size)
     });
     assert!(large.count() >= 4, "{:?}", effects(&said));
     assert!(
@@ -363,7 +363,7 @@ fn the_rock_temperature_at_lanzada_is_no_load_and_does_not_move_the_collapse() {
     let files = ["lanzada_2025_f1.csv", "lanzada_2025_rock_temperature.csv"];
     let [velocity, temperature] = files.map(measured);
     let said = lanzada(&[velocity, temperature]);
-    assert!(!has(&said, Kind::Hydrological));
+    assert!(!has(&said, Kind::HYDROLOGICAL));
     the_collapse_stays(&said);
 }
 
@@ -371,9 +371,9 @@ fn the_rock_temperature_at_lanzada_is_no_load_and_does_not_move_the_collapse() {
 #[ignore = "not reached since the reconstruction gives back the paper's fits: the verdict over the whole record is an offset"]
 fn at_la_clapiere_the_river_then_the_loads_of_1987_are_found_and_not_the_season() {
     let said = explained(&recorded("la-clapiere-1982-1995-reconstruction.mcap"), None);
-    assert!(!has(&said, Kind::Seasonal));
+    assert!(!has(&said, Kind::SEASONAL));
     let river = &said.verdict;
-    assert_eq!(river.effect, Kind::Hydrological);
+    assert_eq!(river.effect, Kind::HYDROLOGICAL);
     assert_eq!(river.channel.as_deref(), Some("tinee_flow_m3_s"));
     assert!(river.gain_per_sd.unwrap() > 0.0);
     let after_it = said.also.iter().filter_map(|effect| effect.at);
@@ -395,9 +395,9 @@ fn at_la_clapiere_the_river_is_found_in_the_years_in_which_it_acts() {
     let readings = &mut recording.series[0].readings;
     readings.retain(|reading| reading.time < time("1986-02-01T00:00:00Z"));
     let said = explained(&recording, None);
-    assert!(!has(&said, Kind::Seasonal));
+    assert!(!has(&said, Kind::SEASONAL));
     let river = &said.verdict;
-    assert_eq!(river.effect, Kind::Hydrological);
+    assert_eq!(river.effect, Kind::HYDROLOGICAL);
     assert_eq!(river.channel.as_deref(), Some("tinee_flow_m3_s"));
     assert!(river.gain_per_sd.unwrap() > 0.0);
     let (before, after) = (said.error.fit.before, said.error.fit.after);
@@ -448,7 +448,7 @@ fn a_velocity_that_rises_while_the_load_falls_is_said_in_words_at_vaiont() {
 fn the_step_of_prism_40_1938_follows_the_rain() {
     let recording = recorded("century-mine-2013.mcap");
     let said = explained(&recording, Some("40-1938"));
-    assert_eq!(said.verdict.effect, Kind::Hydrological);
+    assert_eq!(said.verdict.effect, Kind::HYDROLOGICAL);
     assert_eq!(said.verdict.channel.as_deref(), Some("rain_mm"));
     assert!(said.error.fit.after.unwrap() < 0.2 * said.error.fit.before.unwrap());
 }

@@ -21,7 +21,7 @@ pub(crate) fn found(slope: Slope) -> SearchFinding {
     let effect = Effect {
         channel: Some(RESERVOIR.to_owned()),
         form: Some(Form::Level),
-        ..Effect::of(Kind::Hydrological)
+        ..Effect::of(Kind::HYDROLOGICAL)
     };
     let filtered = Filtered {
         channel: RESERVOIR.to_owned(),
@@ -360,11 +360,11 @@ fn what_another_kind_would_explain_as_well_and_a_step_that_only_the_motion_shows
         fails: None,
     };
     let rivalled = SearchFinding {
-        cannot_separate_from: vec![Kind::Seasonal.into()],
+        cannot_separate_from: vec![Kind::SEASONAL.into()],
         ..found(STANDS)
     };
     let step = SearchFinding {
-        effects: vec![Effect::of(Kind::LoadStep)],
+        effects: vec![Effect::of(Kind::LOAD_STEP)],
         known_load: KnownLoad {
             parts: vec![Part::Step {
                 at: wet.readings[40].time,

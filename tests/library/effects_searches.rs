@@ -199,7 +199,7 @@ async fn a_search_finds_the_reservoir_and_its_answer_comes_at_one_time_of_the_da
     let fast = adopted().await;
     let found = found(fast);
     let (day, kind, channel, adopted) = &found[0];
-    assert_eq!(*kind, Kind::Hydrological, "{found:?}");
+    assert_eq!(*kind, Kind::HYDROLOGICAL, "{found:?}");
     assert_eq!(channel.as_deref(), Some(RESERVOIR));
     assert!(*adopted);
     let load = loads(fast).remove(0);

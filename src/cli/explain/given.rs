@@ -39,14 +39,14 @@ pub(super) fn cause(text: &str) -> Result<Cause, String> {
 }
 
 fn kind(name: &str) -> Result<Kind, String> {
-    let known = Kind::ALL.into_iter().filter(|kind| kind.can_be_declared());
+    let known = Kind::all().filter(|kind| kind.can_be_declared());
     let known: Vec<Kind> = known.collect();
     if let Some(kind) = known.iter().find(|kind| kind.name() == name) {
         return Ok(*kind);
     }
     let names: Vec<&str> = known.iter().map(|kind| kind.name()).collect();
     let names = names.join(", ");
-    Err(if Kind::ALL.iter().any(|kind| kind.name() == name) {
+    Err(if Kind::named(name).is_some() {
         format!(
             "{name} is nothing that is put into the law of one benchmark; expected one of {names}"
         )

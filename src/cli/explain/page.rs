@@ -150,7 +150,7 @@ mod tests {
 
     #[test]
     fn a_page_without_numbers_is_a_page_without_figures() {
-        let page = page(&bare(Kind::None));
+        let page = page(&bare(Kind::NONE));
         assert!(!page.contains("<svg") && page.contains("cannot be distinguished from noise"));
     }
 

@@ -3,7 +3,7 @@
 use super::sentence::{brief, tail_probability};
 use crate::alert::percent_in_words;
 use crate::cli::table::{TextTable, time};
-use crate::effects::{Change, Effect, Explanation, Form, Kind};
+use crate::effects::{Change, Effect, Explanation, Form};
 use crate::reading::Timestamp;
 
 /// A table under its heading.
@@ -176,7 +176,7 @@ fn effects(explanation: &Explanation) -> Option<TextTable> {
 }
 
 fn is_an_effect(effect: &Effect) -> bool {
-    !matches!(effect.effect, Kind::None | Kind::Unexplained)
+    !effect.effect.is_an_end()
 }
 
 fn residual(explanation: &Explanation) -> TextTable {

@@ -2,7 +2,8 @@
 
 use crate::cli::table::time;
 use crate::effects::{
-    DeclaredEffect, Effect, Explained, Explanation, Form, Kind, Rival, Structure, TOO_FEW, Together,
+    DeclaredEffect, Effect, Explained, Explanation, Form, Kind, Rival, SizeInWords, Structure,
+    TOO_FEW, Together,
 };
 use crate::reading::BenchmarkId;
 
@@ -15,34 +16,23 @@ pub(super) fn verdict(explanation: &Explanation) -> String {
     let effect = &explanation.verdict;
     let benchmark = &explanation.benchmark;
     let is_declared = !explanation.given.is_empty();
-    match effect.effect {
-        Kind::None | Kind::Unexplained if is_declared => format!(
-            "{benchmark}: nothing of what was declared stands{}",
-            most_marked(&explanation.residual.structure)
-        ),
-        Kind::None if explanation.remarks.iter().any(|one| one == TOO_FEW) => {
-            format!("{benchmark}: nothing can be said of what the law lacks")
-        }
-        Kind::None => format!(
+    if !effect.effect.is_an_end() {
+        return format!("{benchmark}: consistent with {}", phrase(effect));
+    }
+    let structure = most_marked(&explanation.residual.structure);
+    let has_too_few = explanation.remarks.iter().any(|one| one == TOO_FEW);
+    if is_declared {
+        format!("{benchmark}: nothing of what was declared stands{structure}")
+    } else if effect.effect == Kind::UNEXPLAINED {
+        format!(
+            "{benchmark}: unexplained: the law lacks something here, and no effect that was tried explains it{structure}"
+        )
+    } else if has_too_few {
+        format!("{benchmark}: nothing can be said of what the law lacks")
+    } else {
+        format!(
             "{benchmark}: the residual cannot be distinguished from noise; these readings show nothing that the law lacks"
-        ),
-        Kind::Unexplained => format!(
-            "{benchmark}: unexplained: the law lacks something here, and no effect that was tried explains it{}",
-            most_marked(&explanation.residual.structure)
-        ),
-        Kind::Hydrological
-        | Kind::Seasonal
-        | Kind::Tide
-        | Kind::LoadStep
-        | Kind::StateReset
-        | Kind::FrictionChange
-        | Kind::RateLimit
-        | Kind::Geometry
-        | Kind::Partition
-        | Kind::Offset
-        | Kind::Thermal
-        | Kind::IntervalMean
-        | Kind::CorrelatedNoise => format!("{benchmark}: consistent with {}", phrase(effect)),
+        )
     }
 }
 
@@ -50,7 +40,7 @@ pub(super) fn verdict(explanation: &Explanation) -> String {
 pub(super) fn parting(found: &Together) -> String {
     let names: Vec<&str> = found.benchmarks.iter().map(BenchmarkId::as_str).collect();
     let names = names.join(", ");
-    if found.verdict.effect == Kind::Partition {
+    if found.verdict.effect == Kind::PARTITION {
         return format!("{names}: consistent with {}\n", phrase(&found.verdict));
     }
     let mut refused = found.candidates.iter();
@@ -65,7 +55,7 @@ pub(super) fn others(explanation: &Explanation) -> Vec<String> {
     let left = most_marked(&explanation.residual.structure);
     let mut rivals = explanation.cannot_separate_from.iter();
     let is_one_channel = rivals.all(|rival| rival.channel.is_none());
-    if !matches!(explanation.verdict.effect, Kind::None | Kind::Unexplained) {
+    if !explanation.verdict.effect.is_an_end() {
         said.push(match explanation.explained {
             Explained::Full => {
                 "Explained in full: the residual that is left passes for noise.".to_owned()
@@ -140,47 +130,23 @@ fn phrase(effect: &Effect) -> String {
     format!("{}{about}{p}", head(effect))
 }
 
+/// What it is called, with its covariate, its time, its groups and its size.
 fn head(effect: &Effect) -> String {
-    let at = effect
-        .at
-        .map_or(String::new(), |at| format!(" at {}", time(Some(at))));
-    let by = effect
-        .channel
-        .as_ref()
-        .map_or(String::new(), |name| format!(" by {name}"));
-    let size = effect.size.map(|size| match &effect.unit {
-        Some(unit) => format!("{} {unit}", brief(size)),
-        None => brief(size),
-    });
-    let of = |words: &str| {
-        size.as_ref()
-            .map_or(String::new(), |size| format!("{words}{size}"))
-    };
-    match effect.effect {
-        Kind::Hydrological => format!("hydrological forcing{by}"),
-        Kind::Seasonal => "a load that comes and goes with the year".to_owned(),
-        Kind::Tide => "tidal forcing".to_owned(),
-        Kind::LoadStep => format!("a step of the load{at}{}", step(effect)),
-        Kind::StateReset => format!(
-            "a reset of the contacts' state{at}{}",
-            of(", by a factor of ")
-        ),
-        Kind::FrictionChange => format!("a change of the friction's parameters{at}"),
-        Kind::RateLimit => "a load that falls with the velocity (damping or inertia)".to_owned(),
-        Kind::Geometry => {
-            "a load that falls with the slip (the slope flattens under the block)".to_owned()
+    let definition = effect.effect.definition();
+    let by = effect.channel.as_ref();
+    let by = by.map_or(String::new(), |name| format!(" by {name}"));
+    let at = effect.at;
+    let at = at.map_or(String::new(), |at| format!(" at {}", time(Some(at))));
+    let groups = groups(effect);
+    let size = effect.size.map_or(String::new(), |size| {
+        match (definition.size_in_words, &effect.unit) {
+            (SizeInWords::Left, _) => String::new(),
+            (SizeInWords::Behind(words), Some(unit)) => format!("{words}{} {unit}", brief(size)),
+            (SizeInWords::Behind(words), None) => format!("{words}{}", brief(size)),
+            (SizeInWords::JumpOfVelocity, _) => jump_of_velocity(size),
         }
-        Kind::Partition => format!(
-            "benchmarks that move as groups from then on{at}{}",
-            groups(effect)
-        ),
-        Kind::Offset => format!("an offset of the readings{at}{}", of(", of ")),
-        Kind::Thermal => format!("temperature in the readings{by}"),
-        Kind::IntervalMean => format!("velocities that are means over an interval{}", of(" of ")),
-        Kind::CorrelatedNoise => "noise of the readings that remembers".to_owned(),
-        Kind::Unexplained => "nothing that was tried".to_owned(),
-        Kind::None => "noise".to_owned(),
-    }
+    });
+    format!("{}{by}{at}{groups}{size}", definition.title)
 }
 
 fn details(effect: &Effect) -> Vec<String> {
@@ -195,7 +161,8 @@ fn details(effect: &Effect) -> Vec<String> {
         .lag_days
         .map(|days| format!("mean delay {}", span(days)));
     let memory = effect.memory_days.map(|days| {
-        if effect.effect == Kind::CorrelatedNoise {
+        // Noise has a memory, and no delay.
+        if effect.lag_days.is_none() {
             format!("over {}", span(days))
         } else {
             format!("95 % of the response within {}", span(days))
@@ -225,15 +192,13 @@ fn gain_words(effect: &Effect, gain: f64) -> String {
     )
 }
 
-/// The size of a step is a log-load.
-fn step(effect: &Effect) -> String {
-    effect.size.map_or(String::new(), |size| {
-        let verb = if size < 0.0 { "lowers" } else { "raises" };
-        format!(
-            ", which at once {verb} the velocity by a factor of {}",
-            brief(size.abs().exp())
-        )
-    })
+/// A size that is a log-load.
+fn jump_of_velocity(size: f64) -> String {
+    let verb = if size < 0.0 { "lowers" } else { "raises" };
+    format!(
+        ", which at once {verb} the velocity by a factor of {}",
+        brief(size.abs().exp())
+    )
 }
 
 fn groups(effect: &Effect) -> String {

@@ -45,7 +45,7 @@ mod tests {
     fn verdict(effect: Effect) -> String {
         let line = first_line(&Explanation {
             verdict: effect,
-            ..bare(Kind::None)
+            ..bare(Kind::NONE)
         });
         line.strip_prefix("BLKM: consistent with ")
             .unwrap()
@@ -85,12 +85,12 @@ mod tests {
 
     #[test]
     fn the_two_honest_ends_claim_no_effect() {
-        let none = text(&bare(Kind::None));
+        let none = text(&bare(Kind::NONE));
         assert!(
             none.starts_with("BLKM: the residual cannot be distinguished from noise"),
             "{none}"
         );
-        let unexplained = text(&bare(Kind::Unexplained));
+        let unexplained = text(&bare(Kind::UNEXPLAINED));
         assert!(
             unexplained.starts_with("BLKM: unexplained"),
             "{unexplained}"
@@ -108,7 +108,7 @@ mod tests {
 
     #[test]
     fn what_is_missing_is_a_dash() {
-        let text = text(&bare(Kind::None));
+        let text = text(&bare(Kind::NONE));
         let fit = text.lines().find(|line| line.starts_with("fit ")).unwrap();
         assert_eq!(
             fit.split_whitespace().collect::<Vec<_>>(),
@@ -147,7 +147,7 @@ mod tests {
         let step = Effect {
             at,
             size: Some(-0.7),
-            ..Effect::of(Kind::LoadStep)
+            ..Effect::of(Kind::LOAD_STEP)
         };
         assert_eq!(
             verdict(step),
@@ -156,7 +156,7 @@ mod tests {
         let tide = Effect {
             period_days: Some(12.42 / 24.0),
             p_value: Some(0.0),
-            ..Effect::of(Kind::Tide)
+            ..Effect::of(Kind::TIDE)
         };
         assert_eq!(
             verdict(tide),
@@ -166,7 +166,7 @@ mod tests {
             channel: Some("reservoir_level_m".to_owned()),
             form: Some(Form::Rate),
             gain_per_sd: Some(-1.0),
-            ..Effect::of(Kind::Hydrological)
+            ..Effect::of(Kind::HYDROLOGICAL)
         };
         assert_eq!(
             verdict(draw_down),
@@ -179,18 +179,18 @@ mod tests {
                 vec![BenchmarkId::new("5"), BenchmarkId::new("7")],
                 vec![BenchmarkId::new("9")],
             ]),
-            ..Effect::of(Kind::Partition)
+            ..Effect::of(Kind::PARTITION)
         };
         assert!(verdict(parted).ends_with(": [5, 7] and [9]"));
         let kinds = [
-            Kind::Seasonal,
-            Kind::StateReset,
-            Kind::FrictionChange,
-            Kind::RateLimit,
-            Kind::Geometry,
-            Kind::Thermal,
-            Kind::IntervalMean,
-            Kind::CorrelatedNoise,
+            Kind::SEASONAL,
+            Kind::STATE_RESET,
+            Kind::FRICTION_CHANGE,
+            Kind::RATE_LIMIT,
+            Kind::GEOMETRY,
+            Kind::THERMAL,
+            Kind::INTERVAL_MEAN,
+            Kind::CORRELATED_NOISE,
         ];
         let words: std::collections::BTreeSet<String> =
             kinds.map(|kind| verdict(Effect::of(kind))).into();

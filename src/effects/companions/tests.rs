@@ -53,7 +53,7 @@ fn beside_a_river(is_fed: bool) -> Explanation {
 #[test]
 fn of_rain_and_the_river_it_feeds_neither_is_claimed() {
     let found = beside_a_river(true);
-    assert_eq!(found.verdict.effect, Kind::Hydrological);
+    assert_eq!(found.verdict.effect, Kind::HYDROLOGICAL);
     let called = found.verdict.channel.as_deref();
     let rivals = found.cannot_separate_from.iter();
     let rivals: Vec<Option<&str>> = rivals.map(|rival| rival.channel.as_deref()).collect();

@@ -22,7 +22,7 @@ fn what_is_there_stands_in_the_order_in_which_it_was_declared_and_the_error_fall
         .iter()
         .map(|one| one.effect.as_ref().unwrap().effect)
         .collect();
-    assert_eq!(kinds, [Kind::Offset, Kind::Hydrological]);
+    assert_eq!(kinds, [Kind::OFFSET, Kind::HYDROLOGICAL]);
     let jump = said.given[0].effect.as_ref().unwrap();
     assert!((jump.size.unwrap() + 15.0).abs() < 1.0, "{jump:?}");
     assert!(said.given[1].held_out.unwrap() < 0.5, "{:?}", said.given[1]);
@@ -38,7 +38,7 @@ fn what_is_there_stands_in_the_order_in_which_it_was_declared_and_the_error_fall
     );
     let both = [said.verdict.effect, said.also[0].effect];
     assert!(
-        both.contains(&Kind::Offset) && both.contains(&Kind::Hydrological),
+        both.contains(&Kind::OFFSET) && both.contains(&Kind::HYDROLOGICAL),
         "{both:?}"
     );
     assert_eq!(said.candidates.len(), 2);
@@ -52,7 +52,7 @@ fn what_is_not_there_does_not_stand_and_what_is_there_stands_beside_it() {
         refusals[0].is_some() && refusals[1].is_none(),
         "{refusals:?}"
     );
-    assert_eq!(said.verdict.effect, Kind::Offset);
+    assert_eq!(said.verdict.effect, Kind::OFFSET);
     assert!(said.also.is_empty());
     assert_ne!(said.explained, Explained::Full);
     assert!(said.remarks.iter().any(|remark| remark == ALL_IN));
@@ -60,10 +60,10 @@ fn what_is_not_there_does_not_stand_and_what_is_there_stands_beside_it() {
 
 #[test]
 fn what_a_record_cannot_show_is_said_to_be_no_part_of_its_law() {
-    let said = judged(&[cause(Kind::IntervalMean), cause(Kind::Tide)]);
+    let said = judged(&[cause(Kind::INTERVAL_MEAN), cause(Kind::TIDE)]);
     assert_eq!(refusals(&said), [Some(NOT_SEEN); 2]);
     assert!(said.given.iter().all(|one| one.effect.is_none()));
-    assert_eq!(said.verdict.effect, Kind::Unexplained);
+    assert_eq!(said.verdict.effect, Kind::UNEXPLAINED);
     assert_eq!(said.explained, Explained::None);
 }
 

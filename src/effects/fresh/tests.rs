@@ -37,12 +37,12 @@ fn moves_alike(kind: Kind, act: Act) {
 
 #[test]
 fn a_law_with_a_rate_limit_moves_alike_in_the_terms_of_more_readings() {
-    moves_alike(Kind::RateLimit, Act::PerVelocity);
+    moves_alike(Kind::RATE_LIMIT, Act::PerVelocity);
 }
 
 #[test]
 fn a_law_with_a_changing_geometry_moves_alike_in_the_terms_of_more_readings() {
-    moves_alike(Kind::Geometry, Act::PerSlip);
+    moves_alike(Kind::GEOMETRY, Act::PerSlip);
 }
 
 /// Velocities that fall by half within two days, read daily with two gaps, with a noise of 0.6 % of each.
@@ -68,6 +68,6 @@ fn a_slope_that_slows_down_within_its_first_readings_lacks_nothing() {
         let values: Vec<f64> = both.map(|(v, noise)| v * (1.0 + 0.006 * noise)).collect();
         let series = series(Quantity::Velocity, &days, &values);
         let found = explain(&series, &[], &[], &Options::default(), &mut |_| {});
-        assert_eq!(found.verdict.effect, Kind::None, "seed {seed}");
+        assert_eq!(found.verdict.effect, Kind::NONE, "seed {seed}");
     }
 }

@@ -22,7 +22,7 @@ fn another_channel_and_a_kind_that_is_no_term_help_little() {
     let right = given(&[through("lake"), jump()], None).fit.after.unwrap();
     let wrong = given(&[through("other"), jump()], None).fit.after.unwrap();
     assert!(wrong > 2.0 * right, "{wrong} {right}");
-    let nothing = given(&[cause(Kind::Partition), through("missing")], None).fit;
+    let nothing = given(&[cause(Kind::PARTITION), through("missing")], None).fit;
     let (before, after) = (nothing.before.unwrap(), nothing.after.unwrap());
     assert!((after / before - 1.0).abs() < 0.01, "{nothing:?}");
 }

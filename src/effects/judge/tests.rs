@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::effects::fixture::{channel, daily, epoch, generator, normals, steady};
+use crate::effects::kind::Kind;
 use crate::effects::noise::Noise;
 use crate::effects::response::Response;
 use crate::reading::Quantity;
@@ -48,7 +49,7 @@ fn of_channel(name: &str, form: Form, mean_days: f64, gain: f64) -> Option<Strin
     let term = Term {
         channel: Some(0),
         response: Some(response),
-        ..term(Kind::Hydrological, load)
+        ..term(Kind::HYDROLOGICAL, load)
     };
     objection(&problem, &fitted(term, &[gain]), &drivers)
 }
@@ -103,13 +104,13 @@ fn a_load_may_not_grow_with_the_motion_and_a_mean_is_over_more_than_its_spacing(
     let said =
         |kind: Kind, act: Act, own: f64| objection(&problem, &fitted(term(kind, act), &[own]), &[]);
     for own in [0.0, -0.2] {
-        assert!(said(Kind::RateLimit, Act::PerVelocity, own).is_some());
-        assert!(said(Kind::Geometry, Act::PerSlip, own).is_some());
+        assert!(said(Kind::RATE_LIMIT, Act::PerVelocity, own).is_some());
+        assert!(said(Kind::GEOMETRY, Act::PerSlip, own).is_some());
     }
-    assert!(said(Kind::IntervalMean, Act::Averaging, 0.4).is_some());
-    assert_eq!(said(Kind::RateLimit, Act::PerVelocity, 0.2), None);
-    assert_eq!(said(Kind::Geometry, Act::PerSlip, 0.2), None);
-    assert_eq!(said(Kind::IntervalMean, Act::Averaging, 2.0), None);
+    assert!(said(Kind::INTERVAL_MEAN, Act::Averaging, 0.4).is_some());
+    assert_eq!(said(Kind::RATE_LIMIT, Act::PerVelocity, 0.2), None);
+    assert_eq!(said(Kind::GEOMETRY, Act::PerSlip, 0.2), None);
+    assert_eq!(said(Kind::INTERVAL_MEAN, Act::Averaging, 2.0), None);
 }
 
 /// What is said of a jump by `size` at reading 100, `days` after the reading before, with these covariates.
@@ -121,7 +122,7 @@ fn of_jump(size: f64, days: f64, back: f64, drivers: &[(usize, Driver)]) -> Opti
     }
     let offset = Term {
         at: Some(100),
-        ..term(Kind::Offset, Act::Reading(vec![vec![0.0; COUNT]]))
+        ..term(Kind::OFFSET, Act::Reading(vec![vec![0.0; COUNT]]))
     };
     objection(&problem, &fitted(offset, &[size]), drivers)
 }
@@ -155,7 +156,7 @@ fn the_later_block_is_the_last_share_or_what_follows_a_late_event() {
     let problem = steady(Quantity::Displacement, &daily(COUNT), 1);
     let event = |at: usize| Term {
         at: Some(at),
-        ..term(Kind::LoadStep, Act::Step)
+        ..term(Kind::LOAD_STEP, Act::Step)
     };
     assert_eq!(block(&problem, &[], 0.25), Some(225));
     assert_eq!(block(&problem, &[event(100)], 0.25), Some(225));
@@ -168,7 +169,7 @@ fn predicting(prediction: Vec<f64>) -> Fitted {
     Fitted {
         velocity: vec![1.0; prediction.len()],
         prediction,
-        ..fitted(term(Kind::LoadStep, Act::Step), &[0.0])
+        ..fitted(term(Kind::LOAD_STEP, Act::Step), &[0.0])
     }
 }
 
@@ -189,7 +190,7 @@ fn what_a_law_has_drifted_by_counts_once_from_reading_to_reading() {
 #[test]
 fn a_load_that_grows_with_the_velocity_is_judged_once_it_has_shown() {
     let problem = steady(Quantity::Displacement, &daily(COUNT), 1);
-    let mut limited = fitted(term(Kind::RateLimit, Act::PerVelocity), &[0.5]);
+    let mut limited = fitted(term(Kind::RATE_LIMIT, Act::PerVelocity), &[0.5]);
     limited.velocity = (0..COUNT)
         .map(|i| if i < 240 { 1.0 } else { 10.0 })
         .collect();
@@ -198,7 +199,7 @@ fn a_load_that_grows_with_the_velocity_is_judged_once_it_has_shown() {
         .map(|i| if i < 298 { 1.0 } else { 10.0 })
         .collect();
     assert_eq!(block_once_shown(&problem, &limited), Some(295));
-    let other = fitted(term(Kind::LoadStep, Act::Step), &[0.5]);
+    let other = fitted(term(Kind::LOAD_STEP, Act::Step), &[0.5]);
     assert_eq!(block_once_shown(&problem, &other), None);
 }
 

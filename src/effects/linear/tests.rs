@@ -1,7 +1,7 @@
 //! What the linearised law says of a small change is what solving again shows.
 
 use super::*;
-use crate::effects::candidates::of_periods;
+use crate::effects::act::harmonics;
 use crate::effects::fixture::{daily, generator, normals, series};
 use crate::effects::kind::Kind;
 
@@ -34,14 +34,16 @@ fn term(kind: Kind, act: Act) -> Term {
     }
 }
 
+fn wave(problem: &Problem, period: f64) -> Term {
+    let columns = harmonics(&problem.nodes, &[period]);
+    term(Kind::SEASONAL, Act::Load(columns))
+}
+
 /// The base of a test: one load already in the law.
 fn base(problem: &Problem, law: &[f64]) -> (Vec<Term>, Vec<f64>) {
     let mut parameters = law[..law_parameters(problem)].to_vec();
     parameters.extend([0.2, 0.1]);
-    (
-        vec![of_periods(problem, Kind::Seasonal, &[90.0])],
-        parameters,
-    )
+    (vec![wave(problem, 90.0)], parameters)
 }
 
 fn predicted(problem: &Problem, terms: &[Term], parameters: &[f64]) -> Vec<f64> {
@@ -126,7 +128,7 @@ fn a_small_change_of_each_of_the_laws_own_parameters_does_what_solving_again_sho
 #[test]
 fn a_small_load_does_what_solving_again_shows() {
     for problem in quantities() {
-        let wave = of_periods(&problem, Kind::Seasonal, &[40.0]);
+        let wave = wave(&problem, 40.0);
         let off = worst(&problem, &wave, BOTH);
         assert!(off < 0.02, "{:?} {off}", problem.quantity);
     }
@@ -136,9 +138,9 @@ fn a_small_load_does_what_solving_again_shows() {
 fn a_small_step_reset_and_change_of_friction_do_what_solving_again_shows() {
     for problem in quantities() {
         for (kind, act) in [
-            (Kind::LoadStep, Act::Step),
-            (Kind::StateReset, Act::Reset),
-            (Kind::FrictionChange, Act::Friction(3)),
+            (Kind::LOAD_STEP, Act::Step),
+            (Kind::STATE_RESET, Act::Reset),
+            (Kind::FRICTION_CHANGE, Act::Friction(3)),
         ] {
             let happened = Term {
                 at: Some(COUNT / 3),
@@ -154,8 +156,8 @@ fn a_small_step_reset_and_change_of_friction_do_what_solving_again_shows() {
 fn a_small_rate_limit_and_a_small_flattening_do_what_solving_again_shows() {
     for problem in quantities() {
         for (kind, act) in [
-            (Kind::RateLimit, Act::PerVelocity),
-            (Kind::Geometry, Act::PerSlip),
+            (Kind::RATE_LIMIT, Act::PerVelocity),
+            (Kind::GEOMETRY, Act::PerSlip),
         ] {
             let off = worst(&problem, &term(kind, act), ABOVE);
             assert!(off < 0.03, "{:?} {kind} {off}", problem.quantity);
@@ -169,7 +171,7 @@ fn a_column_of_the_reading_is_itself() {
     let column: Vec<f64> = (0..COUNT).map(|i| f64::from(u8::from(i > 100))).collect();
     let off = worst(
         &problem,
-        &term(Kind::Offset, Act::Reading(vec![column])),
+        &term(Kind::OFFSET, Act::Reading(vec![column])),
         BOTH,
     );
     assert!(off < 1e-6, "{off}");
@@ -181,7 +183,7 @@ fn a_mean_over_one_more_spacing_does_what_reading_again_shows() {
     let problem = problem(Quantity::Velocity);
     for law in LAWS {
         let (terms, parameters) = base(&problem, &law);
-        let mean = term(Kind::IntervalMean, Act::Averaging);
+        let mean = term(Kind::INTERVAL_MEAN, Act::Averaging);
         let columns = linear(&problem, (&terms, &parameters)).columns(&problem, &mean);
         let (mut joined, mut longer) = (terms.clone(), parameters.clone());
         joined.push(mean);
@@ -197,7 +199,7 @@ fn where_velocities_are_means_a_change_of_the_law_does_what_reading_again_shows(
     let problem = problem(Quantity::Velocity);
     for law in LAWS {
         let (mut terms, mut parameters) = base(&problem, &law);
-        terms.push(term(Kind::IntervalMean, Act::Averaging));
+        terms.push(term(Kind::INTERVAL_MEAN, Act::Averaging));
         parameters.push(12.0);
         let columns = linear(&problem, (&terms, &parameters)).of_law(&problem);
         for (k, column) in columns.iter().enumerate() {

@@ -37,12 +37,12 @@ fn groups(neighbours: &[Series]) -> Option<Vec<Vec<BenchmarkId>>> {
     let curves = Curves {
         times: times.collect(),
         after: after.clone(),
-        contributions: BTreeMap::from([(Kind::LoadStep.to_string(), added)]),
+        contributions: BTreeMap::from([(Kind::LOAD_STEP.to_string(), added)]),
         ..Curves::default()
     };
     let event = Effect {
         at: after_days(epoch(), AT),
-        ..Effect::of(Kind::LoadStep)
+        ..Effect::of(Kind::LOAD_STEP)
     };
     let own = series(Quantity::Displacement, &daily(DAYS), &after);
     let others: Vec<&Series> = neighbours.iter().collect();

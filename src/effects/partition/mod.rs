@@ -51,7 +51,7 @@ impl Partition {
             size: Some(self.size),
             bic_gain: self.bic_gain,
             p_value: Some(self.p_value),
-            ..Effect::of(Kind::Partition)
+            ..Effect::of(Kind::PARTITION)
         }
     }
 }
@@ -60,7 +60,7 @@ impl Partition {
 /// Deterministic for a seed of `options`, of which the number of surrogates and the margin count too.
 pub fn partition(series: &[&Series], options: &Options) -> (Option<Partition>, Candidate) {
     let mut candidate = Candidate {
-        effect: Kind::Partition,
+        effect: Kind::PARTITION,
         channel: None,
         form: None,
         at: None,

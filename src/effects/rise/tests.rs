@@ -1,6 +1,6 @@
 //! A reset is one jump, also where a mean straddles it; a rise over several readings is none.
 
-use crate::effects::candidates::offset;
+use crate::effects::candidates::jump;
 use crate::effects::fixture::{daily, generator, normals, series};
 use crate::effects::ready::Ready;
 use crate::effects::{Kind, Options};
@@ -24,8 +24,10 @@ fn goes_on(added: impl Fn(usize) -> f64) -> bool {
     let options = Options::default();
     let mut search = ready.search(&options, false);
     let base = search.null(&ready.plain).unwrap();
-    let found = search.refitted(&base, &offset(&ready.problem, AT)).unwrap();
-    assert_eq!(found.term.kind, Kind::Offset);
+    let found = search
+        .refitted(&base, &jump(&ready.problem, Kind::OFFSET, AT))
+        .unwrap();
+    assert_eq!(found.term.kind, Kind::OFFSET);
     search.takes_several_readings(&found.fitted)
 }
 

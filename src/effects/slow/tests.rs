@@ -27,9 +27,9 @@ fn under(log_load: impl Fn(f64) -> f64, seed: u64) -> Explanation {
 fn a_load_that_grew_for_three_months_is_not_called_a_change_of_the_friction() {
     for seed in [1, 2] {
         let said = under(|day| ((day - 100.0) / 90.0).clamp(0.0, 1.0), seed);
-        assert_eq!(said.verdict.effect, Kind::Unexplained, "seed {seed}");
+        assert_eq!(said.verdict.effect, Kind::UNEXPLAINED, "seed {seed}");
         let slow = said.candidates.iter();
-        let mut slow = slow.filter(|one| one.effect == Kind::Unexplained);
+        let mut slow = slow.filter(|one| one.effect == Kind::UNEXPLAINED);
         let slow = slow.next().unwrap();
         assert!(slow.bic_gain > 50.0, "{slow:?}");
     }

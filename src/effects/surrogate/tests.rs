@@ -96,7 +96,7 @@ fn finds_something(seed: u64) -> bool {
     };
     let series = series(Quantity::Displacement, &daily(COUNT), &values);
     let found = explain(&series, &decoys, &[], &options, &mut |_| {});
-    found.verdict.effect != Kind::None
+    found.verdict.effect != Kind::NONE
 }
 
 #[test]
@@ -118,6 +118,6 @@ fn a_jump_of_the_reading_in_a_walk_is_found_though_it_is_one_step_of_the_walk() 
     let values: Vec<f64> = values.collect();
     let series = series(Quantity::Displacement, &daily(COUNT), &values);
     let found = explain(&series, &[], &[], &Options::default(), &mut |_| {});
-    assert_eq!(found.verdict.effect, Kind::Offset, "{:?}", found.candidates);
+    assert_eq!(found.verdict.effect, Kind::OFFSET, "{:?}", found.candidates);
     assert!((found.verdict.size.unwrap() + 25.0).abs() < 4.0);
 }

@@ -299,7 +299,7 @@ fn effect_found(effect: &Effect, finding: &SearchFinding, adopted: bool) -> Even
 fn adoptable(finding: &SearchFinding, before: Option<&KnownLoad>, length_days: f64) -> KnownLoad {
     let is_separable = is_separable(finding);
     let stays = |part: &&Part| {
-        part.kind() != Kind::LoadStep
+        !part.is_step()
             && (is_separable || before.is_some_and(|law| has_offset(law, part, length_days)))
     };
     let parts = finding.known_load.parts.iter();
@@ -353,10 +353,10 @@ mod tests {
             at: after_days(Timestamp::UNIX_EPOCH, day).unwrap(),
             size: 100.0,
         };
-        let rival = Rival::from(Kind::RateLimit);
+        let rival = Rival::from(Kind::RATE_LIMIT);
         let mut finding = SearchFinding {
             benchmark: BenchmarkId::new("a"),
-            effects: vec![Effect::of(Kind::Offset), Effect::of(Kind::FrictionChange)],
+            effects: vec![Effect::of(Kind::OFFSET), Effect::of(Kind::FRICTION_CHANGE)],
             explained: Explained::Partly,
             cannot_separate_from: vec![rival],
             known_load: KnownLoad {

@@ -128,7 +128,7 @@ fn attempt(rng: &mut Pcg64, family: Family, recipe: &Recipe) -> Option<Drawn> {
             },
     };
     let remembers =
-        so(rng, REMEMBERS) && !plan.has(Kind::CorrelatedNoise) && !plan.effects.is_empty();
+        so(rng, REMEMBERS) && !plan.has(Kind::CORRELATED_NOISE) && !plan.effects.is_empty();
     let background = remembers.then(|| Instrument::Remembering {
         memory: uniform(rng, 2.0, 5.0) * scene.schedule.interval,
         noises: uniform(rng, 0.7, 1.2),
@@ -141,7 +141,7 @@ fn attempt(rng: &mut Pcg64, family: Family, recipe: &Recipe) -> Option<Drawn> {
     if !plan.slope_effects().is_empty() && !shows(&slope, &series, &prediction) {
         return None;
     }
-    let (neighbours, groups) = read::neighbours(rng, &slope, plan.has(Kind::Partition))?;
+    let (neighbours, groups) = read::neighbours(rng, &slope, plan.has(Kind::PARTITION))?;
     let truth = truth(family, &scene, plan, (&slope, background.as_ref()));
     let mut drawn = Drawn {
         channels: channels(&scene)?,
@@ -152,7 +152,7 @@ fn attempt(rng: &mut Pcg64, family: Family, recipe: &Recipe) -> Option<Drawn> {
     drawn.truth.prediction = prediction;
     drawn.truth.readings = drawn.series.readings.len();
     for effect in &mut drawn.truth.effects {
-        if effect.effect == Kind::Partition {
+        if effect.effect == Kind::PARTITION {
             effect.groups.clone_from(&groups);
         }
     }
@@ -315,8 +315,8 @@ fn truth(
                 Instrument::Offset { noises, .. } | Instrument::Thermal { noises, .. },
             ) => {
                 let gain = noises * slope.noise;
-                truth.gain_per_sd = (truth.effect == Kind::Thermal).then_some(gain);
-                truth.size = (truth.effect == Kind::Offset).then_some(gain);
+                truth.gain_per_sd = (truth.effect == Kind::THERMAL).then_some(gain);
+                truth.size = (truth.effect == Kind::OFFSET).then_some(gain);
             }
             // Where the slope slips so many mm instead of 1, the load falls by so much less for each.
             Place::SlopeEffect(

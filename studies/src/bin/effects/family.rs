@@ -9,7 +9,7 @@ use slipwatch::effects::Kind;
 /// What a family's series have in them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Family {
-    /// One effect of this kind; with `Kind::None` white noise alone.
+    /// One effect of this kind; with `Kind::NONE` white noise alone.
     Of(Kind),
     /// Two kinds at once.
     Mixed,
@@ -26,16 +26,16 @@ pub(crate) enum Range {
 
 /// Kinds that may stand together in one series.
 const PAIRS: [(f64, (Kind, Kind)); 10] = [
-    (0.18, (Kind::Hydrological, Kind::Offset)),
-    (0.14, (Kind::Seasonal, Kind::LoadStep)),
-    (0.12, (Kind::Hydrological, Kind::LoadStep)),
-    (0.10, (Kind::Seasonal, Kind::Offset)),
-    (0.10, (Kind::Tide, Kind::Offset)),
-    (0.08, (Kind::Hydrological, Kind::StateReset)),
-    (0.08, (Kind::Thermal, Kind::LoadStep)),
-    (0.08, (Kind::Hydrological, Kind::Thermal)),
-    (0.06, (Kind::Hydrological, Kind::CorrelatedNoise)),
-    (0.06, (Kind::LoadStep, Kind::Offset)),
+    (0.18, (Kind::HYDROLOGICAL, Kind::OFFSET)),
+    (0.14, (Kind::SEASONAL, Kind::LOAD_STEP)),
+    (0.12, (Kind::HYDROLOGICAL, Kind::LOAD_STEP)),
+    (0.10, (Kind::SEASONAL, Kind::OFFSET)),
+    (0.10, (Kind::TIDE, Kind::OFFSET)),
+    (0.08, (Kind::HYDROLOGICAL, Kind::STATE_RESET)),
+    (0.08, (Kind::THERMAL, Kind::LOAD_STEP)),
+    (0.08, (Kind::HYDROLOGICAL, Kind::THERMAL)),
+    (0.06, (Kind::HYDROLOGICAL, Kind::CORRELATED_NOISE)),
+    (0.06, (Kind::LOAD_STEP, Kind::OFFSET)),
 ];
 
 /// What is asked of a series before anything of it is drawn.
@@ -50,20 +50,20 @@ pub(crate) struct Recipe {
 
 impl Family {
     pub(crate) const ALL: [Self; 16] = [
-        Self::Of(Kind::Hydrological),
-        Self::Of(Kind::Seasonal),
-        Self::Of(Kind::Tide),
-        Self::Of(Kind::LoadStep),
-        Self::Of(Kind::StateReset),
-        Self::Of(Kind::FrictionChange),
-        Self::Of(Kind::RateLimit),
-        Self::Of(Kind::Geometry),
-        Self::Of(Kind::Partition),
-        Self::Of(Kind::Offset),
-        Self::Of(Kind::Thermal),
-        Self::Of(Kind::IntervalMean),
-        Self::Of(Kind::CorrelatedNoise),
-        Self::Of(Kind::None),
+        Self::Of(Kind::HYDROLOGICAL),
+        Self::Of(Kind::SEASONAL),
+        Self::Of(Kind::TIDE),
+        Self::Of(Kind::LOAD_STEP),
+        Self::Of(Kind::STATE_RESET),
+        Self::Of(Kind::FRICTION_CHANGE),
+        Self::Of(Kind::RATE_LIMIT),
+        Self::Of(Kind::GEOMETRY),
+        Self::Of(Kind::PARTITION),
+        Self::Of(Kind::OFFSET),
+        Self::Of(Kind::THERMAL),
+        Self::Of(Kind::INTERVAL_MEAN),
+        Self::Of(Kind::CORRELATED_NOISE),
+        Self::Of(Kind::NONE),
         Self::Mixed,
         Self::Outside,
     ];
@@ -92,47 +92,47 @@ impl Family {
 
     pub(crate) fn recipe(self, rng: &mut Pcg64) -> Recipe {
         let kinds = match self {
-            Self::Of(Kind::None) => Vec::new(),
+            Self::Of(kind) if kind == Kind::NONE => Vec::new(),
             // A mean is recognised by what it blurs: a step, or the last rise.
-            Self::Of(Kind::IntervalMean) if so(rng, 0.5) => {
-                vec![Kind::IntervalMean, Kind::LoadStep]
+            Self::Of(kind) if kind == Kind::INTERVAL_MEAN && so(rng, 0.5) => {
+                vec![Kind::INTERVAL_MEAN, Kind::LOAD_STEP]
             }
             Self::Of(kind) => vec![kind],
-            Self::Outside => vec![Kind::Unexplained],
+            Self::Outside => vec![Kind::UNEXPLAINED],
             Self::Mixed => {
                 let (one, other) = one_of(rng, &PAIRS);
                 vec![one, other]
             }
         };
         let any = |wanted: &[Kind]| kinds.iter().any(|kind| wanted.contains(kind));
-        let need = if any(&[Kind::Seasonal]) {
+        let need = if any(&[Kind::SEASONAL]) {
             Need::SEASON
-        } else if any(&[Kind::Tide]) {
+        } else if any(&[Kind::TIDE]) {
             Need::TIDE
-        } else if any(&[Kind::Thermal, Kind::IntervalMean]) {
+        } else if any(&[Kind::THERMAL, Kind::INTERVAL_MEAN]) {
             Need::FINE
         } else {
             Need::ANY
         };
-        let chance_of_velocity = if any(&[Kind::IntervalMean]) {
+        let chance_of_velocity = if any(&[Kind::INTERVAL_MEAN]) {
             1.0
         } else if any(&[
-            Kind::Offset,
-            Kind::Thermal,
-            Kind::CorrelatedNoise,
-            Kind::Partition,
+            Kind::OFFSET,
+            Kind::THERMAL,
+            Kind::CORRELATED_NOISE,
+            Kind::PARTITION,
         ]) {
             0.0
-        } else if any(&[Kind::Tide]) {
+        } else if any(&[Kind::TIDE]) {
             0.5
         } else {
             0.2
         };
-        let characters: &[_] = if any(&[Kind::RateLimit]) {
+        let characters: &[_] = if any(&[Kind::RATE_LIMIT]) {
             &[(1.0, Character::Failing)]
-        } else if any(&[Kind::Geometry]) {
+        } else if any(&[Kind::GEOMETRY]) {
             &[(0.7, Character::Accelerating), (0.3, Character::Failing)]
-        } else if kinds == [Kind::IntervalMean] {
+        } else if kinds == [Kind::INTERVAL_MEAN] {
             &[(1.0, Character::AtTheBrink)]
         } else {
             &laws::ANY

@@ -19,20 +19,18 @@ const O1: f64 = 25.819_342 / 24.0;
 
 /// Plans an effect of that kind; `None` where the scene has no place for it.
 pub(crate) fn plan(rng: &mut Pcg64, scene: &Scene, kind: Kind) -> Option<Planned> {
-    match kind {
-        Kind::Hydrological => hydrological(rng, scene),
-        Kind::Seasonal => seasonal(rng, scene),
-        Kind::Tide => tide(rng, scene),
-        Kind::LoadStep => Some(load_step(rng, scene)),
-        Kind::StateReset => Some(state_reset(rng, scene)),
-        Kind::FrictionChange => Some(friction_change(rng, scene)),
-        Kind::RateLimit => Some(rate_limit(rng)),
-        Kind::Geometry => Some(geometry(rng, scene)),
-        Kind::Unexplained => outside(rng, scene),
-        Kind::Partition => Some(parting(rng, scene)),
-        Kind::Offset | Kind::Thermal | Kind::IntervalMean | Kind::CorrelatedNoise | Kind::None => {
-            None
-        }
+    match kind.name() {
+        "hydrological" => hydrological(rng, scene),
+        "seasonal" => seasonal(rng, scene),
+        "tide" => tide(rng, scene),
+        "load-step" => Some(load_step(rng, scene)),
+        "state-reset" => Some(state_reset(rng, scene)),
+        "friction-change" => Some(friction_change(rng, scene)),
+        "rate-limit" => Some(rate_limit(rng)),
+        "geometry" => Some(geometry(rng, scene)),
+        "unexplained" => outside(rng, scene),
+        "partition" => Some(parting(rng, scene)),
+        _ => None,
     }
 }
 
@@ -78,7 +76,7 @@ fn driven(rng: &mut Pcg64, scene: &Scene, weather: &Weather) -> Option<Planned> 
         .into_iter()
         .map(|(day, value)| (day, gain * (value - mean) / spread))
         .collect();
-    let mut truth = TrueEffect::of(Kind::Hydrological);
+    let mut truth = TrueEffect::of(Kind::HYDROLOGICAL);
     truth.form = Some(form);
     truth.lag_days = Some(response.mean_delay);
     truth.response_shape = Some(response.shape);
@@ -109,7 +107,7 @@ fn seasonal(rng: &mut Pcg64, scene: &Scene) -> Option<Planned> {
         let angle = TAU * day / YEAR;
         yearly * (angle + phase).sin() + half * (2.0 * angle + other).sin()
     });
-    let mut truth = TrueEffect::of(Kind::Seasonal);
+    let mut truth = TrueEffect::of(Kind::SEASONAL);
     truth.period_days = Some(YEAR);
     truth.size = Some(yearly);
     (scene.length() > 2.5 * YEAR).then(|| Planned::ground(load, truth))
@@ -129,7 +127,7 @@ fn tide(rng: &mut Pcg64, scene: &Scene) -> Option<Planned> {
             .map(|(period, size, phase)| size * (TAU * day / period + phase).sin())
             .sum()
     });
-    let mut truth = TrueEffect::of(Kind::Tide);
+    let mut truth = TrueEffect::of(Kind::TIDE);
     truth.period_days = Some(M2);
     truth.size = Some(lunar);
     (scene.schedule.interval < M2 / 4.0).then(|| Planned::ground(load, truth))
@@ -141,7 +139,7 @@ fn step_of(rng: &mut Pcg64) -> f64 {
 
 fn load_step(rng: &mut Pcg64, scene: &Scene) -> Planned {
     let (day, size) = (scene.some_day(rng), step_of(rng));
-    let mut truth = TrueEffect::of(Kind::LoadStep);
+    let mut truth = TrueEffect::of(Kind::LOAD_STEP);
     truth.at = scene.time(day);
     truth.size = Some(size);
     let knots = vec![(0.0, 0.0), (day, 0.0), (day, size)];
@@ -156,7 +154,7 @@ fn state_reset(rng: &mut Pcg64, scene: &Scene) -> Planned {
             break factor;
         }
     };
-    let mut truth = TrueEffect::of(Kind::StateReset);
+    let mut truth = TrueEffect::of(Kind::STATE_RESET);
     truth.at = scene.time(day);
     truth.size = Some(factor);
     Planned::ground(SlopeEffect::StateReset { day, factor }, truth)
@@ -165,7 +163,7 @@ fn state_reset(rng: &mut Pcg64, scene: &Scene) -> Planned {
 fn friction_change(rng: &mut Pcg64, scene: &Scene) -> Planned {
     let day = scene.some_day(rng);
     let law = laws::draw(rng, &laws::ANY, scene.length() - day);
-    let mut truth = TrueEffect::of(Kind::FrictionChange);
+    let mut truth = TrueEffect::of(Kind::FRICTION_CHANGE);
     truth.at = scene.time(day);
     truth.what = format!(
         "after it r = {:.4e}, kappa = {:.4e}, p = {:.4} from y = 1, the velocity as it was",
@@ -176,7 +174,7 @@ fn friction_change(rng: &mut Pcg64, scene: &Scene) -> Planned {
 
 fn rate_limit(rng: &mut Pcg64) -> Planned {
     let eta = log_uniform(rng, 0.02, 0.6);
-    let mut truth = TrueEffect::of(Kind::RateLimit);
+    let mut truth = TrueEffect::of(Kind::RATE_LIMIT);
     truth.size = Some(eta);
     truth.unit = Some("day/mm".to_owned());
     Planned::ground(SlopeEffect::RateLimit { eta }, truth)
@@ -186,7 +184,7 @@ fn geometry(rng: &mut Pcg64, scene: &Scene) -> Planned {
     let alone = path(&scene.law, &[], &[0.0, scene.length()]);
     let slip = alone.map_or(scene.length(), |path| path.displacement[1]);
     let k = log_uniform(rng, 0.5, 8.0) / slip;
-    let mut truth = TrueEffect::of(Kind::Geometry);
+    let mut truth = TrueEffect::of(Kind::GEOMETRY);
     truth.size = Some(k);
     truth.unit = Some("1/mm".to_owned());
     Planned::ground(SlopeEffect::Geometry { k }, truth)
@@ -200,7 +198,7 @@ fn parting(rng: &mut Pcg64, scene: &Scene) -> Planned {
         _ => friction_change(rng, scene),
     };
     planned.truth.what = format!("by a {}: {}", planned.truth.effect, planned.truth.what);
-    planned.truth.effect = Kind::Partition;
+    planned.truth.effect = Kind::PARTITION;
     planned
 }
 
@@ -208,7 +206,7 @@ fn parting(rng: &mut Pcg64, scene: &Scene) -> Planned {
 fn outside(rng: &mut Pcg64, scene: &Scene) -> Option<Planned> {
     let length = scene.length();
     let size = sign(rng, 0.5) * log_uniform(rng, 0.5, 1.5);
-    let mut truth = TrueEffect::of(Kind::Unexplained);
+    let mut truth = TrueEffect::of(Kind::UNEXPLAINED);
     truth.size = Some(size);
     let fine = length / 2000.0;
     let (what, load) = match one_of(rng, &[(1.0, 0), (1.0, 1), (1.0, 2), (1.0, 3), (1.0, 4)]) {
@@ -252,7 +250,7 @@ fn outside(rng: &mut Pcg64, scene: &Scene) -> Option<Planned> {
             let hidden = Weather::draw(rng, covariate, length);
             let planned = driven(rng, scene, &hidden)?;
             truth = planned.truth;
-            truth.effect = Kind::Unexplained;
+            truth.effect = Kind::UNEXPLAINED;
             let Place::SlopeEffect(load) = planned.place else {
                 return None;
             };

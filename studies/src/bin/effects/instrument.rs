@@ -28,22 +28,12 @@ const LEAST_BETWEEN_OFFSETS: f64 = 15.0;
 
 /// Plans the effects of that kind; `None` where the scene has no place for them.
 pub(crate) fn plan(rng: &mut Pcg64, scene: &Scene, kind: Kind) -> Option<Vec<Planned>> {
-    match kind {
-        Kind::Offset => offsets(rng, scene),
-        Kind::Thermal => thermal(rng, scene).map(|one| vec![one]),
-        Kind::IntervalMean => Some(vec![interval_mean(rng, scene)]),
-        Kind::CorrelatedNoise => Some(vec![noise(rng, scene)]),
-        Kind::Hydrological
-        | Kind::Seasonal
-        | Kind::Tide
-        | Kind::LoadStep
-        | Kind::StateReset
-        | Kind::FrictionChange
-        | Kind::RateLimit
-        | Kind::Geometry
-        | Kind::Partition
-        | Kind::Unexplained
-        | Kind::None => None,
+    match kind.name() {
+        "offset" => offsets(rng, scene),
+        "thermal" => thermal(rng, scene).map(|one| vec![one]),
+        "interval-mean" => Some(vec![interval_mean(rng, scene)]),
+        "correlated-noise" => Some(vec![noise(rng, scene)]),
+        _ => None,
     }
 }
 
@@ -61,7 +51,7 @@ fn offsets(rng: &mut Pcg64, scene: &Scene) -> Option<Vec<Planned>> {
         let noises = sign(rng, 0.5) * log_uniform(rng, 8.0, 40.0);
         let read = &scene.schedule.days;
         let before = read.partition_point(|one| *one < day) as f64 / read.len() as f64;
-        let mut truth = TrueEffect::of(Kind::Offset);
+        let mut truth = TrueEffect::of(Kind::OFFSET);
         truth.at = scene.time(day);
         truth.unit = Some("mm".to_owned());
         truth.rms_over_noise = noises.abs() * (before * (1.0 - before)).sqrt();
@@ -99,7 +89,7 @@ fn thermal(rng: &mut Pcg64, scene: &Scene) -> Option<Planned> {
         return None;
     }
     let noises = sign(rng, 0.5) * log_uniform(rng, 3.0, 12.0);
-    let mut truth = TrueEffect::of(Kind::Thermal);
+    let mut truth = TrueEffect::of(Kind::THERMAL);
     truth.channel = Some(Covariate::Temperature.name().to_owned());
     truth.lag_days = Some(mean_delay);
     truth.response_shape = Some(1);
@@ -114,14 +104,14 @@ fn thermal(rng: &mut Pcg64, scene: &Scene) -> Option<Planned> {
 
 fn interval_mean(rng: &mut Pcg64, scene: &Scene) -> Planned {
     let window = log_uniform(rng, 2.0, 20.0).round() * scene.schedule.interval;
-    let mut truth = TrueEffect::of(Kind::IntervalMean);
+    let mut truth = TrueEffect::of(Kind::INTERVAL_MEAN);
     truth.size = Some(window);
     truth.unit = Some("day".to_owned());
     Planned::instrument(Instrument::IntervalMean { window }, truth)
 }
 
 fn noise(rng: &mut Pcg64, scene: &Scene) -> Planned {
-    let mut truth = TrueEffect::of(Kind::CorrelatedNoise);
+    let mut truth = TrueEffect::of(Kind::CORRELATED_NOISE);
     let interval = scene.schedule.interval;
     if so(rng, 0.3) {
         let noises = log_uniform(rng, 0.3, 1.0);

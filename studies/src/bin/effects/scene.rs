@@ -97,10 +97,10 @@ impl Scene {
 /// One to four, among them what the kinds need.
 fn covariates(rng: &mut Pcg64, kinds: &[Kind]) -> Vec<Covariate> {
     let mut chosen = Vec::new();
-    if kinds.contains(&Kind::Hydrological) {
+    if kinds.contains(&Kind::HYDROLOGICAL) {
         chosen.push(one_of(rng, &Covariate::WATER));
     }
-    if kinds.contains(&Kind::Thermal) {
+    if kinds.contains(&Kind::THERMAL) {
         chosen.push(Covariate::Temperature);
     }
     let wanted = count(rng, 1, 4).max(chosen.len());

@@ -100,28 +100,31 @@ impl Outcome {
 fn named<'a>(explanation: &'a Explanation, truth: &Truth) -> Vec<&'a Effect> {
     std::iter::once(&explanation.verdict)
         .chain(&explanation.also)
-        .filter(|one| !matches!(one.effect, Kind::None | Kind::Unexplained))
-        .filter(|one| !(truth.background_noise_remembers && one.effect == Kind::CorrelatedNoise))
+        .filter(|one| !one.effect.is_an_end())
+        .filter(|one| !(truth.background_noise_remembers && one.effect == Kind::CORRELATED_NOISE))
         .collect()
 }
 
 /// The honest end of an explanation that names nothing of the family.
 fn left(explanation: &Explanation) -> Kind {
-    match (explanation.verdict.effect, explanation.explained) {
-        (Kind::None, _) | (Kind::CorrelatedNoise, Explained::Full) => Kind::None,
-        _ => Kind::Unexplained,
+    let (called, explained) = (explanation.verdict.effect, explanation.explained);
+    let is_noise = called == Kind::CORRELATED_NOISE && explained == Explained::Full;
+    if called == Kind::NONE || is_noise {
+        Kind::NONE
+    } else {
+        Kind::UNEXPLAINED
     }
 }
 
 fn there(truth: &Truth) -> BTreeSet<Kind> {
     let kinds = truth.effects.iter().map(|one| one.effect);
-    kinds.filter(|kind| *kind != Kind::Unexplained).collect()
+    kinds.filter(|kind| *kind != Kind::UNEXPLAINED).collect()
 }
 
 fn is_right(family: Family, called: Kind, said: &BTreeSet<Kind>, there: &BTreeSet<Kind>) -> bool {
     match family {
-        Family::Of(Kind::None) => said.is_empty() && called == Kind::None,
-        Family::Outside => said.is_empty() && called == Kind::Unexplained,
+        Family::Of(kind) if kind == Kind::NONE => said.is_empty() && called == Kind::NONE,
+        Family::Outside => said.is_empty() && called == Kind::UNEXPLAINED,
         Family::Mixed => there.contains(&called),
         Family::Of(kind) => there.contains(&called) && said.contains(&kind),
     }
@@ -166,7 +169,7 @@ fn held_out(drawn: &Drawn, explanation: &Explanation) -> Option<f64> {
 
 /// The effects that are there as causes to be given to a law; none where no label fits the truth.
 pub(crate) fn causes(truth: &Truth) -> Option<Vec<Cause>> {
-    let label = |one: &TrueEffect| one.effect != Kind::Unexplained;
+    let label = |one: &TrueEffect| one.effect != Kind::UNEXPLAINED;
     let cause = |one: &TrueEffect| Cause {
         kind: one.effect,
         channel: one.channel.clone(),

@@ -74,7 +74,7 @@ fn table(outcomes: &[Outcome]) -> String {
     }
     let labelled: Vec<&Outcome> = families
         .iter()
-        .filter(|(family, _)| matches!(family, Family::Of(kind) if *kind != Kind::None))
+        .filter(|(family, _)| matches!(family, Family::Of(kind) if *kind != Kind::NONE))
         .flat_map(|(_, of)| of.iter().copied())
         .collect();
     text.push_str(&row("every single kind", &labelled));
@@ -114,7 +114,7 @@ fn row(name: &str, of: &[&Outcome]) -> String {
 
 /// Effects named where there is none.
 fn false_discoveries(outcomes: &[Outcome]) -> String {
-    let nothing = Family::Of(Kind::None);
+    let nothing = Family::Of(Kind::NONE);
     let of: Vec<_> = outcomes
         .iter()
         .filter(|one| one.family == nothing)

@@ -127,7 +127,7 @@ fn each_family(range: Range, mut see: impl FnMut(Family, &Drawn)) {
 fn every_effect_of_the_motion_shows_over_the_noise() {
     each_family(Range::Dev, |family, one| {
         for effect in &one.truth.effects {
-            let of_the_reading = [Kind::Offset, Kind::Thermal, Kind::CorrelatedNoise];
+            let of_the_reading = [Kind::OFFSET, Kind::THERMAL, Kind::CORRELATED_NOISE];
             let least = if of_the_reading.contains(&effect.effect) {
                 1.0
             } else {
@@ -137,7 +137,7 @@ fn every_effect_of_the_motion_shows_over_the_noise() {
             assert!(shows >= least, "{family:?}: {shows} of {effect:?}");
         }
         let is_empty = one.truth.effects.is_empty();
-        assert_eq!(is_empty, family == Family::Of(Kind::None));
+        assert_eq!(is_empty, family == Family::Of(Kind::NONE));
     });
 }
 
@@ -168,7 +168,7 @@ fn readings_scatter_about_the_true_prediction_as_the_truth_says() {
 
 #[test]
 fn a_seed_gives_one_series_and_what_is_judged_is_not_what_is_developed_on() {
-    let family = Family::Of(Kind::Hydrological);
+    let family = Family::Of(Kind::HYDROLOGICAL);
     let dev = drawn(family, Range::Dev, 3).unwrap();
     assert_eq!(dev.series, drawn(family, Range::Dev, 3).unwrap().series);
     assert_ne!(dev.series, drawn(family, Range::Judged, 3).unwrap().series);
@@ -177,7 +177,7 @@ fn a_seed_gives_one_series_and_what_is_judged_is_not_what_is_developed_on() {
 #[test]
 fn what_is_dumped_reads_back_as_what_was_drawn() {
     let folder = tempfile::tempdir().unwrap();
-    let one = drawn(Family::Of(Kind::Partition), Range::Dev, 0).unwrap();
+    let one = drawn(Family::Of(Kind::PARTITION), Range::Dev, 0).unwrap();
     crate::dump::write(folder.path(), "one", &one).unwrap();
     let file = folder.path().join("one.csv");
     let (recording, _) = read_files(&[file], &ReadOptions::default()).unwrap();
@@ -202,10 +202,10 @@ fn a_step_seen_through_a_mean_is_named_with_the_mean_and_a_step_read_at_once_wit
         all.map(|effect| effect.effect).collect()
     };
     for index in [0, 1] {
-        let kinds = named(Kind::IntervalMean, index);
-        assert_eq!(kinds, [Kind::IntervalMean, Kind::LoadStep], "{index}");
+        let kinds = named(Kind::INTERVAL_MEAN, index);
+        assert_eq!(kinds, [Kind::INTERVAL_MEAN, Kind::LOAD_STEP], "{index}");
     }
-    assert_eq!(named(Kind::LoadStep, 1), [Kind::LoadStep]);
+    assert_eq!(named(Kind::LOAD_STEP, 1), [Kind::LOAD_STEP]);
 }
 
 /// An explanation that names what is given and no more.
@@ -215,7 +215,7 @@ fn saying(one: &Drawn, named: Vec<Effect>) -> Explanation {
     let mut said = explain(&short, &[], &[], &Options::default(), &mut |_| {});
     said.cannot_separate_from.clear();
     let mut named = named.into_iter();
-    said.verdict = named.next().unwrap_or_else(|| Effect::of(Kind::None));
+    said.verdict = named.next().unwrap_or_else(|| Effect::of(Kind::NONE));
     said.also = named.collect();
     said
 }
@@ -234,9 +234,9 @@ fn plain(family: Family) -> Drawn {
 
 #[test]
 fn the_right_kind_through_the_wrong_channel_is_half_right() {
-    let family = Family::Of(Kind::Hydrological);
+    let family = Family::Of(Kind::HYDROLOGICAL);
     let one = plain(family);
-    let mut effect = Effect::of(Kind::Hydrological);
+    let mut effect = Effect::of(Kind::HYDROLOGICAL);
     effect.channel.clone_from(&one.truth.effects[0].channel);
     effect.gain_per_sd = one.truth.effects[0].gain_per_sd.map(|gain| 1.25 * gain);
     let right = score(family, &one, &saying(&one, vec![effect.clone()]));
@@ -249,24 +249,24 @@ fn the_right_kind_through_the_wrong_channel_is_half_right() {
 
 #[test]
 fn a_wrong_kind_is_left_open_where_the_right_one_could_not_be_separated() {
-    let family = Family::Of(Kind::LoadStep);
+    let family = Family::Of(Kind::LOAD_STEP);
     let one = plain(family);
-    let mut said = saying(&one, vec![Effect::of(Kind::StateReset)]);
+    let mut said = saying(&one, vec![Effect::of(Kind::STATE_RESET)]);
     let closed = score(family, &one, &said);
     assert_eq!(closed.grade, Grade::Wrong);
     assert!(!closed.exactly());
-    assert_eq!(closed.called, Kind::StateReset);
-    said.cannot_separate_from = vec![Kind::LoadStep.into()];
+    assert_eq!(closed.called, Kind::STATE_RESET);
+    said.cannot_separate_from = vec![Kind::LOAD_STEP.into()];
     assert_eq!(score(family, &one, &said).grade, Grade::LeftOpen);
 }
 
 #[test]
 fn an_effect_named_too_many_is_not_exactly_right() {
-    let family = Family::Of(Kind::LoadStep);
+    let family = Family::Of(Kind::LOAD_STEP);
     let one = plain(family);
-    let mut step = Effect::of(Kind::LoadStep);
+    let mut step = Effect::of(Kind::LOAD_STEP);
     step.at = one.truth.effects[0].at;
-    let both = vec![step, Effect::of(Kind::Seasonal)];
+    let both = vec![step, Effect::of(Kind::SEASONAL)];
     let score = score(family, &one, &saying(&one, both));
     assert!(score.right_kind() && !score.exactly());
     assert_eq!(score.at_errors, [0.0]);
@@ -274,15 +274,15 @@ fn an_effect_named_too_many_is_not_exactly_right() {
 
 #[test]
 fn nothing_is_the_right_answer_to_noise_and_unexplained_to_what_no_label_fits() {
-    let (none, outside) = (Family::Of(Kind::None), Family::Outside);
+    let (none, outside) = (Family::Of(Kind::NONE), Family::Outside);
     let (noise, unknown) = (plain(none), plain(outside));
     let nothing = |one| saying(one, Vec::new());
-    let open = |one| saying(one, vec![Effect::of(Kind::Unexplained)]);
+    let open = |one| saying(one, vec![Effect::of(Kind::UNEXPLAINED)]);
     assert!(score(none, &noise, &nothing(&noise)).right_kind());
     assert!(!score(none, &noise, &open(&noise)).right_kind());
     assert!(score(outside, &unknown, &open(&unknown)).right_kind());
     assert!(!score(outside, &unknown, &nothing(&unknown)).right_kind());
-    let step = saying(&unknown, vec![Effect::of(Kind::LoadStep)]);
+    let step = saying(&unknown, vec![Effect::of(Kind::LOAD_STEP)]);
     assert!(!score(outside, &unknown, &step).right_kind());
 }
 
@@ -304,15 +304,15 @@ fn called(family: Family, index: u64) -> Outcome {
 /// A load step of two per cent explains the same readings, by the pace that it changes and not by its jump.
 #[test]
 fn a_changed_pace_without_a_jump_is_a_change_of_friction() {
-    let friction = called(Family::Of(Kind::FrictionChange), 3);
-    assert_eq!(friction.called, Kind::FrictionChange);
+    let friction = called(Family::Of(Kind::FRICTION_CHANGE), 3);
+    assert_eq!(friction.called, Kind::FRICTION_CHANGE);
     assert!(friction.at_errors[0] < 20.0, "{:?}", friction.at_errors);
 }
 
 #[test]
 fn a_group_that_relaxes_after_it_parted_is_a_partition() {
-    let parted = called(Family::Of(Kind::Partition), 2);
-    assert_eq!(parted.called, Kind::Partition);
+    let parted = called(Family::Of(Kind::PARTITION), 2);
+    assert_eq!(parted.called, Kind::PARTITION);
     assert!(parted.at_errors[0] < 20.0, "{:?}", parted.at_errors);
 }
 

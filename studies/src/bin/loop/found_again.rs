@@ -61,7 +61,7 @@ impl Trial {
     pub(crate) fn found(&self) -> Option<Found> {
         let right = self.put_in.what.kind();
         self.nearest(&[right]).or_else(|| match self.put_in.what {
-            What::Step => self.nearest(&[Kind::StateReset, Kind::FrictionChange]),
+            What::Step => self.nearest(&[Kind::STATE_RESET, Kind::FRICTION_CHANGE]),
             What::Reset | What::Tide | What::Season => None,
         })
     }
@@ -101,11 +101,11 @@ impl Trial {
         let faults = self.with.faults.iter().filter(|fault| {
             fault.channel.is_none()
                 && fault.kind == FaultKind::Reset
-                && kinds.contains(&Kind::Offset)
+                && kinds.contains(&Kind::OFFSET)
         });
         // What has to be added to all that follows is the jump's opposite.
         let faults = faults.map(|fault| Found {
-            kind: Kind::Offset,
+            kind: Kind::OFFSET,
             as_fault: true,
             late_days: Some(late(fault.at)),
             size: fault.size.map(|size| -size),

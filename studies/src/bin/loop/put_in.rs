@@ -48,10 +48,10 @@ impl What {
     /// The kind that is right.
     pub(crate) fn kind(self) -> Kind {
         match self {
-            Self::Step => Kind::LoadStep,
-            Self::Reset => Kind::Offset,
-            Self::Tide => Kind::Tide,
-            Self::Season => Kind::Seasonal,
+            Self::Step => Kind::LOAD_STEP,
+            Self::Reset => Kind::OFFSET,
+            Self::Tide => Kind::TIDE,
+            Self::Season => Kind::SEASONAL,
         }
     }
 
@@ -185,7 +185,7 @@ impl Motion {
     fn of(said: &Explanation) -> Option<Self> {
         let mut values = said.curves.after.clone();
         for (name, added) in &said.curves.contributions {
-            if name.starts_with(Kind::Offset.name()) || name.starts_with(Kind::Thermal.name()) {
+            if name.starts_with(Kind::OFFSET.name()) || name.starts_with(Kind::THERMAL.name()) {
                 for (value, by) in values.iter_mut().zip(added) {
                     *value -= by;
                 }

@@ -48,7 +48,7 @@ pub(crate) fn effect(effect: &Effect) -> String {
         effect.period_days.map(|d| HOURS_PER_DAY * d),
         " h",
     );
-    if effect.effect == Kind::Offset || effect.effect == Kind::LoadStep {
+    if effect.effect == Kind::OFFSET || effect.effect == Kind::LOAD_STEP {
         let unit = effect
             .unit
             .as_deref()

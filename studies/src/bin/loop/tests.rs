@@ -39,7 +39,7 @@ fn trial_of(
 /// A reset is found at its date within an interval between readings, and its size within a share of it.
 fn the_reset_is_found(trial: &Trial, most_off: f64) {
     let found: Found = trial.found().unwrap();
-    assert_eq!(found.kind, Kind::Offset);
+    assert_eq!(found.kind, Kind::OFFSET);
     let intervals = trial.intervals(found.late_days.unwrap());
     assert!(intervals.abs() <= 1.0, "{intervals} intervals late");
     let off = found.size.unwrap() / trial.put_in.size - 1.0;
@@ -67,7 +67,7 @@ fn a_reset_put_into_either_benchmark_of_salmon_falls_is_found_beside_the_lake() 
         );
         the_reset_is_found(&trial, 0.05);
         let lake = trial.with.also.iter().chain([&trial.with.verdict]);
-        let mut lake = lake.filter(|one| one.effect == Kind::Hydrological);
+        let mut lake = lake.filter(|one| one.effect == Kind::HYDROLOGICAL);
         assert_eq!(
             lake.next().unwrap().channel.as_deref(),
             Some("lake_level_m")
@@ -139,7 +139,7 @@ fn a_wave_of_the_tides_period_put_into_columbia_glacier_is_found_with_its_size()
     let files = ["columbia_1985_marker1.csv", "columbia_1985_rain.csv"].map(measured);
     let trial = trial(&files, None, (What::Tide, TIDE));
     let found = trial.found().unwrap();
-    assert_eq!(found.kind, Kind::Tide);
+    assert_eq!(found.kind, Kind::TIDE);
     let off = found.size.unwrap() / trial.put_in.size - 1.0;
     assert!(off.abs() <= 0.1, "{found:?} for {:?}", trial.put_in);
     let held_out = &trial.with.error.held_out_step;
