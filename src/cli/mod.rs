@@ -32,6 +32,8 @@ mod table;
 mod text;
 mod watched;
 
+pub use explain::in_words as explanation_in_words;
+
 use crate::runtime::log;
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;

@@ -77,7 +77,7 @@ pub enum LiesIn {
 #[derive(Debug, Clone, Copy)]
 pub enum SizeInWords {
     /// Not at all.
-    Left,
+    Unsaid,
     /// As it is, in its unit, behind these words: `, of `.
     Behind(&'static str),
     /// As a log-load: by what factor the velocity jumps.
@@ -136,7 +136,7 @@ impl EffectDefinition {
         name: "",
         what: "",
         title: "",
-        size_in_words: SizeInWords::Left,
+        size_in_words: SizeInWords::Unsaid,
         trying: Trying::Elsewhere,
         support: Support::Shape,
         lies_in: LiesIn::Ground,

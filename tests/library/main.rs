@@ -12,6 +12,7 @@ mod effects_groups;
 mod effects_measured;
 mod effects_monitor;
 mod effects_searches;
+mod effects_table;
 mod few_readings;
 mod first_start;
 mod global_minimum;

@@ -58,6 +58,11 @@ pub(super) struct Args {
     output: OutputArgs,
 }
 
+/// An explanation as the terminal shows it: the verdict in one sentence, then what else there is to say, and tables.
+pub fn in_words(explanation: &Explanation) -> String {
+    text::text(explanation)
+}
+
 /// Reads the files, explains the series, prints the result and writes the page.
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let mut recording = args.readings.load()?.recording;

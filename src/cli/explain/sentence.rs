@@ -140,7 +140,7 @@ fn head(effect: &Effect) -> String {
     let groups = groups(effect);
     let size = effect.size.map_or(String::new(), |size| {
         match (definition.size_in_words, &effect.unit) {
-            (SizeInWords::Left, _) => String::new(),
+            (SizeInWords::Unsaid, _) => String::new(),
             (SizeInWords::Behind(words), Some(unit)) => format!("{words}{} {unit}", brief(size)),
             (SizeInWords::Behind(words), None) => format!("{words}{}", brief(size)),
             (SizeInWords::JumpOfVelocity, _) => jump_of_velocity(size),
