@@ -1,7 +1,7 @@
 //! The posterior's probabilities hold, on series drawn from its own prior.
 //!
-//! A subset of what `studies/src/bin/calibration` measures on 1,000. There intervals of 90 % hold 87 to 91 % of the truths (of the
-//! failure, among those that fail, 85 to 87 %): sampling makes them somewhat narrow. The bounds here are three standard deviations of a binomial count around that.
+//! A subset of what `studies/src/bin/calibration` measures on 1,000. There intervals of 90 % hold 87 to 92 % of the truths, and
+//! of the start 95 %. The bounds here are three standard deviations of a binomial count around that.
 
 use crate::drawn::Starts;
 use crate::score::{PLACED, SAID, Tally};
