@@ -42,20 +42,6 @@ fn metric(address: &str, name: &str) -> i64 {
     figure(address, name).round() as i64
 }
 
-fn acknowledge(site: &Site) {
-    let words = [
-        "alerts",
-        "ack",
-        "--benchmark",
-        "exercise",
-        "--by",
-        "Anna",
-        "--config",
-        "site.toml",
-    ];
-    site.printed(&words);
-}
-
 /// The site: who acknowledged, and nothing else. Its other hook was not run.
 fn nothing_of_it_is_the_sites(site: &Site) {
     let events = site.proven_events();
@@ -103,7 +89,7 @@ fn a_drill_goes_from_a_file_to_the_acknowledgement_and_nothing_of_it_reaches_the
         0,
         "nobody has acknowledged"
     );
-    acknowledge(&site);
+    site.acknowledge("exercise", "Anna");
     eventually("that it has passed", || {
         metric(&address, "drills_total") == 1
     });

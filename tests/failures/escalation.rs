@@ -91,17 +91,7 @@ fn an_acknowledgement_in_time_calls_an_escalation_off_for_good() {
     eventually("that it waits", || {
         standing(&site) == ("waiting".to_owned(), 0)
     });
-    let ack = [
-        "alerts",
-        "ack",
-        "--benchmark",
-        "5",
-        "--by",
-        "Ada",
-        "--config",
-        "site.toml",
-    ];
-    site.printed(&ack);
+    site.acknowledge("5", "Ada");
     eventually("that it is called off", || {
         standing(&site) == ("acknowledged".to_owned(), 0)
     });

@@ -128,17 +128,7 @@ fn an_alert_that_another_level_superseded_stands_as_its_place_does() {
     for key in ["5/orange", "5/red"] {
         assert_eq!(of(key)["alarm_state"], "unacknowledged", "{key}");
     }
-    let ack = [
-        "alerts",
-        "ack",
-        "--benchmark",
-        "5",
-        "--by",
-        "Ada",
-        "--config",
-        "site.toml",
-    ];
-    site.printed(&ack);
+    site.acknowledge("5", "Ada");
     eventually("that it is seen", || of("5/red")["is_acknowledged"] == true);
     assert_eq!(of("5/orange")["alarm_state"], of("5/red")["alarm_state"]);
     program.stop();

@@ -182,6 +182,13 @@ impl Site {
         String::from_utf8(output.stdout).unwrap()
     }
 
+    /// Acknowledges what is called at a benchmark, in somebody's name.
+    pub(crate) fn acknowledge(&self, benchmark: &str, by: &str) {
+        let of = ["alerts", "ack", "--benchmark", benchmark];
+        let config = ["--by", by, "--config", "site.toml"];
+        self.printed(&[of, config].concat());
+    }
+
     /// The event log.
     pub(crate) fn events(&self) -> String {
         self.printed(&["events", "--config", "site.toml", "--format", "json"])

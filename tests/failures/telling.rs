@@ -1,6 +1,6 @@
 //! Who is notified of what: in which order, how often, and what people ask for.
 
-use crate::site::{Site, eventually, get};
+use crate::site::{Program, Site, eventually, get};
 use jiff::{SignedDuration, Timestamp};
 use slipwatch::runtime::clock;
 use std::fs;
@@ -234,26 +234,29 @@ fn a_site_of_which_nobody_is_notified_that_a_sensor_is_dead_does_not_pass_the_ch
 /// How a hook's child detaches: in a session of its own, and besides that with nothing left in its environment and no parent.
 const DETACHED: [&str; 2] = ["setsid", "env -i setsid"];
 
+/// The daemon, once a red has had two attempts of `hook`, and what the first of them wrote into `children` has ended.
+fn until_the_first_child_ends(site: &Site, hook: &str) -> Program {
+    let script = format!("[ $SLIPWATCH_LEVEL = red ] || exit 0\n{hook}");
+    fs::write(site.path("hook.sh"), script).unwrap();
+    site.append(
+        "incoming/5.csv",
+        &format!("time,displacement_mm\n{}", failing(0..114)),
+    );
+    let program = site.caught_up();
+    eventually("two attempts", || site.lines("children").len() >= 2);
+    let first = site.lines("children").swap_remove(0);
+    eventually("its end", || has_ended(&first));
+    program
+}
+
 #[test]
 fn a_child_that_leaves_its_hooks_group_does_not_outlive_the_attempt() {
     for detached in DETACHED {
         let site = Site::new(POLICY);
         let text = fs::read_to_string(site.path("site.toml")).unwrap();
         fs::write(site.path("site.toml"), format!("{text}timeout = \"1s\"\n")).unwrap();
-        let script = format!(
-            "[ $SLIPWATCH_LEVEL = red ] || exit 0\n\
-             ({detached} sh -c 'echo $$ >> children; sleep 300' &)\nsleep 300\n"
-        );
-        fs::write(site.path("hook.sh"), script).unwrap();
-        site.append(
-            "incoming/5.csv",
-            &format!("time,displacement_mm\n{}", failing(0..114)),
-        );
-        let program = site.caught_up();
-        eventually("two attempts", || site.lines("children").len() >= 2);
-        let first = site.lines("children").swap_remove(0);
-        eventually("its end", || has_ended(&first));
-        program.let_go();
+        let hook = format!("({detached} sh -c 'echo $$ >> children; sleep 300' &)\nsleep 300\n");
+        until_the_first_child_ends(&site, &hook).let_go();
         for child in site.lines("children") {
             let _ = std::process::Command::new("kill").arg(child).status();
         }
@@ -264,20 +267,9 @@ fn a_child_that_leaves_its_hooks_group_does_not_outlive_the_attempt() {
 fn what_a_hook_that_fails_leaves_behind_does_not_outlive_the_attempt_either() {
     for detached in DETACHED {
         let site = Site::new(POLICY);
-        let script = format!(
-            "[ $SLIPWATCH_LEVEL = red ] || exit 0\n\
-             {detached} sh -c 'echo $$ >> children; sleep 300' &\nsleep 0.2\nexit 1\n"
-        );
-        fs::write(site.path("hook.sh"), script).unwrap();
-        site.append(
-            "incoming/5.csv",
-            &format!("time,displacement_mm\n{}", failing(0..114)),
-        );
-        let program = site.caught_up();
-        eventually("two attempts", || site.lines("children").len() >= 2);
-        let first = site.lines("children").swap_remove(0);
-        eventually("its end", || has_ended(&first));
-        program.stop();
+        let hook =
+            format!("{detached} sh -c 'echo $$ >> children; sleep 300' &\nsleep 0.2\nexit 1\n");
+        until_the_first_child_ends(&site, &hook).stop();
         for child in site.lines("children") {
             let is_over = has_ended(&child);
             let _ = std::process::Command::new("kill").arg(&child).status();

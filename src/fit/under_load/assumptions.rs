@@ -2,6 +2,9 @@
 
 use super::prior::UNSTABLE;
 
+/// Scale of the Cauchy prior of kappa times the length of the record, under a constant load.
+pub(super) const KAPPA_SCALE: f64 = 3.0;
+
 /// What is taken for granted besides the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Assumptions {
@@ -53,7 +56,7 @@ impl Assumptions {
         follows_errors: true,
         unstable: 0.5,
         keeps_little: false,
-        curvature: Some(3.0),
+        curvature: Some(KAPPA_SCALE),
         without_memory: 0.4,
         undoubted: 9.0,
     };

@@ -38,10 +38,8 @@ pub(super) struct Room<const TOGETHER: usize> {
 pub(super) struct StartedLaw {
     /// How many rates it explains.
     pub(super) rates: usize,
-    /// ln v less the record's centre, and the load, of today: means, variances and covariance.
-    pub(super) ln_velocity: f64,
-    pub(super) load: f64,
-    pub(super) today: [f64; 3],
+    /// What those say of it.
+    pub(super) evidence: ShapeEvidence,
 }
 
 /// What the readings say of one law.
@@ -279,11 +277,15 @@ pub(super) fn start_at(gains: &Gains, room: &Room<1>, share: f64) -> Option<Star
     });
     let step = first + found.unwrap_or(starts.len() - 1);
     let [[ln_velocity], [load]] = *room.today.get(step)?;
+    let [ln] = room.ln_evidence[step];
     Some(StartedLaw {
         rates: step + 1,
-        ln_velocity,
-        load,
-        today: gains.today[step],
+        evidence: ShapeEvidence {
+            ln,
+            ln_velocity,
+            load,
+            today: gains.today[step],
+        },
     })
 }
 
@@ -362,26 +364,17 @@ pub(super) fn ln_prior_of_start(record: &RateRecord, index: usize, first: f64) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::under_load::assumptions::Assumptions;
     use crate::fit::under_load::gains::{LoadMemory, LoadNoise};
     use nalgebra::{DMatrix, DVector};
 
     const SCATTER: f64 = 0.1;
     const SHARED: f64 = 0.7;
 
-    /// Five differences of six readings, but for a gap before the newest two.
     fn record() -> RateRecord {
         RateRecord {
             ln_velocity: vec![0.3, -0.2, 0.15, 0.4, -0.1],
-            error: vec![0.2, 0.3, 0.25, 0.2, 0.4],
-            middle: vec![5.5, 4.5, 3.5, 1.5, 0.5],
-            from: vec![6.0, 5.0, 4.0, 2.0, 1.0],
-            to: vec![5.0, 4.0, 3.0, 1.0, 0.0],
-            centre: 0.0,
-            trust: vec![1.0, 1.0, 0.5, 1.0, 1.0],
-            is_of_ends: vec![true; 5],
             white: vec![0.5, 1.0, 1.0, 1.0, 1.0],
-            assumed: Assumptions::CONSTANT_LOAD,
+            ..RateRecord::of_five()
         }
     }
 

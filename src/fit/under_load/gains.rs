@@ -109,6 +109,25 @@ impl RateRecord {
     }
 }
 
+#[cfg(test)]
+impl RateRecord {
+    /// Five differences of six readings, but for a gap before the newest two.
+    pub(super) fn of_five() -> Self {
+        Self {
+            ln_velocity: vec![0.6, -0.2, 0.15, 0.4, -0.1],
+            error: vec![0.2, 0.3, 0.25, 0.2, 0.4],
+            middle: vec![5.5, 4.5, 3.5, 1.5, 0.5],
+            from: vec![6.0, 5.0, 4.0, 2.0, 1.0],
+            to: vec![5.0, 4.0, 3.0, 1.0, 0.0],
+            centre: 0.0,
+            trust: vec![1.0, 1.0, 0.5, 1.0, 1.0],
+            is_of_ends: vec![true; 5],
+            white: vec![1.0; 5],
+            assumed: Assumptions::CONSTANT_LOAD,
+        }
+    }
+}
+
 /// What a noise makes of the times of a record, whatever the law: newest rate first.
 #[derive(Debug, Clone)]
 pub(super) struct LoadMemory {

@@ -354,7 +354,6 @@ pub(super) fn level_joined(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::under_load::assumptions::Assumptions;
     use crate::fit::under_load::evidence::weigh;
     use crate::fit::under_load::gains::LoadNoise;
     use nalgebra::{DMatrix, DVector};
@@ -367,22 +366,6 @@ mod tests {
         shared: 0.7,
         ln_evidence: 0.0,
     };
-
-    /// Five differences of six readings, but for a gap before the newest two.
-    fn record() -> RateRecord {
-        RateRecord {
-            ln_velocity: vec![0.6, -0.2, 0.15, 0.4, -0.1],
-            error: vec![0.2, 0.3, 0.25, 0.2, 0.4],
-            middle: vec![5.5, 4.5, 3.5, 1.5, 0.5],
-            from: vec![6.0, 5.0, 4.0, 2.0, 1.0],
-            to: vec![5.0, 4.0, 3.0, 1.0, 0.0],
-            centre: 0.0,
-            trust: vec![1.0, 1.0, 0.5, 1.0, 1.0],
-            is_of_ends: vec![true; 5],
-            white: vec![1.0; 5],
-            assumed: Assumptions::CONSTANT_LOAD,
-        }
-    }
 
     /// ln of the normal density of the record where the law begins with the second rate and a walk of that drift comes before,
     /// but for the constants; and the mean and variance of the law's level then.
@@ -424,7 +407,7 @@ mod tests {
 
     #[test]
     fn a_law_and_the_walk_before_it_are_as_likely_together_as_their_normal_density_says() {
-        let record = record();
+        let record = RateRecord::of_five();
         let memory = LoadMemory::new(&record, &NOISE);
         let mut walks = WalksBefore::default();
         walks.walk(&record, &memory);

@@ -22,7 +22,7 @@
 //! down alike. Where the load may change, of the slopes that are watched: m above 1 with probability 0.65, and ln of the velocity
 //! that a stable slope will keep half-normal above 2 mm/day with standard deviation 1 (a slope that keeps a velocity mostly
 //! keeps a low one: "very slow" ends at 4.4 mm/day, Cruden and Varnes 1996). Under a constant load either side of m = 1 alike,
-//! and any velocity: the readings alone decide. f, its memory and the scatter of the
+//! however near (kappa times the length of the record is Cauchy), and any velocity: the readings alone decide. f, its memory and the scatter of the
 //! readings over grids, each point alike; drawn laws have continuous ones (`space`). An outlier's error has the tails of Student's t.
 
 mod assumptions;

@@ -1,6 +1,6 @@
 //! The same laws under other priors: what the readings say, and what is taken for granted.
 
-use super::assumptions::Assumptions;
+use super::assumptions::{Assumptions, KAPPA_SCALE};
 use super::prior::{P_PRIOR, above_kept};
 use super::{Ensemble, LawDraws, LawSample};
 use crate::model::Law;
@@ -51,9 +51,8 @@ impl OtherPrior {
                 of_side * (-0.5 * above * above).exp()
             }
             Self::WiderKappa => {
-                let scale = Assumptions::CONSTANT_LOAD.curvature.unwrap_or(1.0);
                 let cauchy = |scale: f64| 1.0 / (scale + (law.kappa * length_days).powi(2) / scale);
-                cauchy(WIDER_SCALE) / cauchy(scale)
+                cauchy(WIDER_SCALE) / cauchy(KAPPA_SCALE)
             }
             Self::EvenInM => {
                 let edge = if law.kappa > 0.0 {

@@ -148,8 +148,7 @@ impl Space {
         };
         let kappa = at[CURVATURE].exp() * self.length;
         // A slope whose loading would be negative is none.
-        let is_loaded = at[SLOPE] > 0.0 || at[CURVATURE].exp() > size * at[P].abs();
-        if is_loaded {
+        if self.shape(at).b > 0.0 {
             at[CURVATURE] - (kappa / scale).powi(2).ln_1p()
         } else {
             f64::NEG_INFINITY

@@ -105,9 +105,10 @@ impl LawWeigher {
 
     /// ln of the velocity of a law that begins there, less the record's centre, and its variance.
     fn level(&self, gains: &Gains, started: &StartedLaw, share: f64) -> (f64, f64) {
-        let [of_velocity, of_load, both] = started.today;
+        let found = &started.evidence;
+        let [of_velocity, of_load, both] = found.today;
         if self.record.assumed.load_changes {
-            return (started.ln_velocity, of_velocity);
+            return (found.ln_velocity, of_velocity);
         }
         let joined = self
             .joins()
@@ -117,7 +118,7 @@ impl LawWeigher {
             })
             .flatten();
         let alone = (
-            started.ln_velocity - started.load,
+            found.ln_velocity - found.load,
             of_velocity + of_load - 2.0 * both,
         );
         joined.unwrap_or(alone)
