@@ -16,7 +16,7 @@ use nix::unistd::Pid;
 use std::convert::Infallible;
 use std::ffi::{OsStr, OsString};
 use std::io;
-use std::os::unix::process::ExitStatusExt;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus};
 
@@ -138,8 +138,13 @@ pub fn become_hook(
     wall_in(writable)?;
     // A kernel that refuses it leaves what detaches itself to others, as before.
     let _ = set_child_subreaper(true);
-    let started = Command::new(program).args(arguments).spawn();
-    // Not before: the hook would have them held back too. What asks the group to end is for it to take, and this one ends after it.
+    // A hook that signals its own group does not signal this process.
+    let started = Command::new(program)
+        .args(arguments)
+        .process_group(0)
+        .spawn();
+    // Not before the start: the hook would inherit the mask. What asks every process of the service to end is for the hook to take,
+    // and this process ends after it.
     let asked = [
         Signal::SIGHUP,
         Signal::SIGINT,
