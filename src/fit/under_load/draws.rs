@@ -11,7 +11,7 @@ use crate::model::Law;
 /// population is taken.
 const BEFORE: usize = 80;
 const DOUBTED: usize = 40;
-const AFTER: usize = 192;
+const AFTER: usize = 288;
 const TAKEN: usize = 16;
 
 /// When the law began to hold, days since the epoch of the rates; the bounds hold 90 %.
@@ -127,11 +127,16 @@ mod tests {
 
     /// Sixty daily velocities of a law, which scatter by 3 %.
     fn rates(law: &Law) -> Vec<Rate> {
+        scattered(law, 0.1)
+    }
+
+    /// Sixty daily velocities of a law, evenly within half of `width` of it.
+    fn scattered(law: &Law, width: f64) -> Vec<Rate> {
         let solution = Trajectory::solve(law, 60.0, Accuracy::Full);
         let value = |day: u32| {
             let share = (f64::from(day) * 0.618_033_988_75 + 0.37).fract();
             let velocity = solution.at(f64::from(day)).unwrap().velocity;
-            velocity * (1.0 + 0.1 * (share - 0.5))
+            velocity * (1.0 + width * (share - 0.5))
         };
         let values = (0..60).map(|day| Observation {
             t_days: f64::from(day),
@@ -180,6 +185,21 @@ mod tests {
         }
         assert!(draws.onset().low_days <= 1.0, "{:?}", draws.onset());
         assert!(share(&draws, |one| one.r > 0.0) > 0.999);
+    }
+
+    #[test]
+    fn the_less_readings_scatter_the_less_is_left_open() {
+        let law = Law::from_paper(1.35, 0.6, 70.0, 1.0).unwrap();
+        let width = |scatter: f64| {
+            let draws = LawDraws::of(&scattered(&law, scatter), &Assumptions::CONSTANT_LOAD);
+            let laws = draws.unwrap().ensemble.samples;
+            let mut all: Vec<f64> = laws.iter().map(|one| one.law.r).collect();
+            all.sort_by(f64::total_cmp);
+            let (low, high) = (all[all.len() / 20], all[all.len() * 19 / 20]);
+            high - low
+        };
+        let (wide, narrow) = (width(0.1), width(0.001));
+        assert!(narrow < 0.1 * wide, "{narrow} {wide}");
     }
 
     #[test]

@@ -31,6 +31,7 @@ mod evidence;
 mod future;
 mod gains;
 mod joined;
+mod modes;
 mod other_prior;
 mod past;
 mod prior;
@@ -38,6 +39,7 @@ mod search;
 mod shape;
 mod space;
 mod walk;
+mod weigher;
 
 pub use assumptions::Assumptions;
 pub use draws::{LawDraws, Onset};

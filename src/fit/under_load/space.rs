@@ -24,10 +24,10 @@ use rand_pcg::Pcg64;
 /// slow down, and m a little above 1 next to m a little below.
 pub(super) type Point = SVector<f64, 7>;
 
-const P: usize = 0;
-const CURVATURE: usize = 1;
-const SLOPE: usize = 2;
-const SCATTER: usize = 3;
+pub(super) const P: usize = 0;
+pub(super) const CURVATURE: usize = 1;
+pub(super) const SLOPE: usize = 2;
+pub(super) const SCATTER: usize = 3;
 const SIGMA: usize = 4;
 const MEMORY: usize = 5;
 const SHARED: usize = 6;
@@ -192,9 +192,31 @@ impl Space {
         -0.5 * above * above
     }
 
+    /// A law of the table as a point.
+    pub(super) fn at(&self, cell: &Cell) -> Point {
+        self.moved(cell, |_| 0.0)
+    }
+
     /// A point about a law of the table.
     pub(super) fn near(&self, cell: &Cell, generator: &mut Pcg64) -> Point {
-        let mut spread = |width: f64| width * (2.0 * generator.random::<f64>() - 1.0);
+        self.moved(cell, |width| {
+            width * (2.0 * generator.random::<f64>() - 1.0)
+        })
+    }
+
+    /// The same law where nothing remembers, if that may be.
+    pub(super) fn without_memory(&self, at: &Point, generator: &mut Pcg64) -> Point {
+        let mut without = *at;
+        if self.assumed.without_memory > 0.0 {
+            let ((median, spread), (from, width)) = (SIGMA_PRIOR, NOTHING_REMEMBERS);
+            let below = from + width * generator.random::<f64>();
+            without[SIGMA] = median.ln() - below * spread;
+        }
+        without
+    }
+
+    /// A law of the table, each coordinate moved by what `spread` gives for a width.
+    fn moved(&self, cell: &Cell, mut spread: impl FnMut(f64) -> f64) -> Point {
         let shape = cell.shape();
         let (p_around, ln_around) = AROUND;
         let p = (shape.p + spread(p_around)).clamp(P_PRIOR.0 + 1e-3, P_PRIOR.1 - 1e-3);

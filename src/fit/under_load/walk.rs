@@ -2,24 +2,25 @@
 //! evolution, ter Braak 2006), so that steps have the posterior's own shape and size.
 
 use super::Cell;
-use super::evidence::{self, Room, ShapeEvidence, StartedLaw, weigh};
-use super::gains::{Gains, LoadMemory, RateRecord};
-use super::joined::{self, MOST_JOINED, WalksBefore};
-use super::past::PastSolution;
+use super::evidence::{self, StartedLaw};
+use super::gains::RateRecord;
+use super::modes::modes;
 use super::search::GridSearch;
 use super::space::{DrawnShape, Point, Space};
+use super::weigher::LawWeigher;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 
-/// Laws in the population, and how many of those about the table's laws each is chosen from.
+/// Laws in the population, and of how many about the table's laws and about the likeliest ones each is chosen.
 const WALKERS: usize = 64;
 const CHOSEN_FROM: usize = 3;
+const CHOSEN_ABOUT_MODES: usize = 6;
 /// Steps along differences, over the size that is best for a normal posterior: 2.38 over the root of twice its dimensions.
 const STEP: f64 = 0.636;
 /// One round in this many goes the whole difference, from one mode to another.
 const WHOLE: usize = 8;
-/// How much the size of a step varies, and what is added to it.
+/// How much the size of a step varies, and what is added to it, in standard deviations of the population.
 const VARIED: f64 = 0.2;
 const SHAKEN: f64 = 1e-3;
 /// The seed: the same readings give the same laws.
@@ -46,20 +47,6 @@ pub(super) struct DrawnLaw {
     pub(super) deviate: f64,
 }
 
-/// What a point is weighed with, used again and again.
-struct LawWeigher {
-    record: RateRecord,
-    space: Space,
-    past: PastSolution,
-    predicted: Vec<[f64; 1]>,
-    /// ln(1 + |r| t) at the middle of each rate, where the law drifts by it.
-    e_folds: Vec<f64>,
-    /// What came before each rate, by no law.
-    before: WalksBefore,
-    room: Room<1>,
-    evaluations: usize,
-}
-
 /// A population on its way.
 pub(super) struct Walk {
     scales: LawWeigher,
@@ -68,108 +55,12 @@ pub(super) struct Walk {
     rounds: usize,
 }
 
-impl LawWeigher {
-    /// The evidence of a law, and the gains that gave it.
-    fn weigh(&mut self, at: &Point, least: f64) -> (ShapeEvidence, Gains, DrawnShape) {
-        self.evaluations += 1;
-        let shape = self.space.shape(at);
-        self.predict(&shape);
-        let memory = LoadMemory::new(&self.record, &self.space.noise(at));
-        self.before.walk(&self.record, &memory);
-        let gains = Gains::new(&self.record, &memory, &self.e_folds, &self.before.ln);
-        let joins = self.joins();
-        let least = if joins { least - MOST_JOINED } else { least };
-        let [mut found] = weigh(&self.record, &self.predicted, &gains, least, &mut self.room);
-        if joins && found.ln.is_finite() {
-            let best = joined::join(&self.before, &self.predicted, &gains, &mut self.room);
-            found = evidence::over_all_starts(&gains, &self.room, best);
-        }
-        (found, gains, shape)
-    }
-
-    /// Whether a law begins where the walk before it ends: one that drifts had left that velocity.
-    fn joins(&self) -> bool {
-        self.record.assumed.drift == 0.0 && self.record.assumed.follows_errors
-    }
-
-    /// ln of the posterior density; minus infinity where it cannot reach `least`.
-    fn ln_posterior(&mut self, at: &Point, least: f64) -> f64 {
-        let prior = self.space.ln_prior(at);
-        if prior == f64::NEG_INFINITY {
-            return prior;
-        }
-        let (found, _, shape) = self.weigh(at, least - prior);
-        let now = found.ln_velocity + self.record.centre;
-        found.ln + prior + self.space.ln_prior_of_kept(&shape, now)
-    }
-
-    /// ln of the velocity of a law that begins there, less the record's centre, and its variance.
-    fn level(&self, gains: &Gains, started: &StartedLaw, share: f64) -> (f64, f64) {
-        let found = &started.evidence;
-        let [of_velocity, of_load, both] = found.today;
-        if self.record.assumed.load_changes {
-            return (found.ln_velocity, of_velocity);
-        }
-        let joined = self
-            .joins()
-            .then(|| {
-                let of = (started.rates, self.predicted.as_slice());
-                joined::level_joined(&self.before, (gains, &self.room), of, share)
-            })
-            .flatten();
-        let alone = (
-            found.ln_velocity - found.load,
-            of_velocity + of_load - 2.0 * both,
-        );
-        joined.unwrap_or(alone)
-    }
-
-    /// ln of the mean rates in units of the velocity now.
-    fn predict(&mut self, shape: &DrawnShape) {
-        let record = &self.record;
-        self.past.solve(shape.past, record.from[0]);
-        let mut hint = 0;
-        let mut before: Option<(f64, f64)> = None;
-        for index in (0..record.from.len()).rev() {
-            let (from, to) = (record.from[index], record.to[index]);
-            let ln = if from > to {
-                let newer = match before {
-                    Some((ago, slip)) if ago.to_bits() == to.to_bits() => slip,
-                    _ => self.past.at(to, &mut hint).1,
-                };
-                let older = self.past.at(from, &mut hint).1;
-                before = Some((from, older));
-                ((older - newer) / (from - to)).max(1e-300).ln()
-            } else {
-                -self.past.at(to, &mut hint).0
-            };
-            self.predicted[index] = [ln];
-        }
-        if record.assumed.drift > 0.0 {
-            let size = shape.past.r.abs();
-            for (slot, middle) in self.e_folds.iter_mut().zip(&record.middle) {
-                *slot = (size * middle).ln_1p();
-            }
-        }
-    }
-}
-
 impl Walk {
     /// A population about the laws of the table, each in proportion to its weight.
     pub(super) fn about(cells: &[Cell], search: GridSearch) -> Option<Self> {
         let GridSearch { record, prior, .. } = search;
-        let count = record.from.len();
         let mut walk = Self {
-            scales: LawWeigher {
-                space: Space::new(prior, &record),
-                record,
-                past: PastSolution::default(),
-                predicted: vec![[0.0]; count],
-                e_folds: vec![0.0; count],
-                before: WalksBefore::default(),
-                room: Room::default(),
-                evaluations: 0,
-            },
+            scales: LawWeigher::new(Space::new(prior, &record), record),
             walkers: Vec::new(),
             generator: Pcg64::seed_from_u64(SEED),
             rounds: 0,
@@ -185,8 +76,36 @@ impl Walk {
                 tried.push(Walker { at, ln });
             }
         }
+        walk.try_modes(cells, &mut tried);
         walk.choose(&tried);
         (!walk.walkers.is_empty()).then_some(walk)
+    }
+
+    /// Laws about the likeliest ones, of each as many as it has of the root of the posterior.
+    fn try_modes(&mut self, cells: &[Cell], tried: &mut Vec<Walker>) {
+        let modes = modes(cells, &mut self.scales);
+        let best = modes
+            .iter()
+            .map(|mode| mode.ln)
+            .fold(f64::NEG_INFINITY, f64::max);
+        let weight = |ln: f64| (0.5 * (ln - best)).exp();
+        let total: f64 = modes.iter().map(|mode| weight(mode.ln)).sum();
+        let wanted = WALKERS * CHOSEN_ABOUT_MODES;
+        let (mut reached, mut drawn) = (0.0, 0);
+        for mode in modes.iter().filter(|_| best.is_finite()) {
+            reached += weight(mode.ln) / total;
+            while (drawn as f64 + 0.5) < reached * wanted as f64 && drawn < wanted {
+                let space = &self.scales.space;
+                let mut near = space.near(mode.cell, &mut self.generator);
+                if drawn % 2 == 0 {
+                    near = space.without_memory(&near, &mut self.generator);
+                }
+                let at = mode.draw(&near, &mut self.generator);
+                let ln = self.scales.ln_posterior(&at, f64::NEG_INFINITY);
+                tried.push(Walker { at, ln });
+                drawn += 1;
+            }
+        }
     }
 
     /// Chooses the population: by the root of the posterior, so that it is wider than that.
@@ -215,6 +134,7 @@ impl Walk {
     pub(super) fn round(&mut self) {
         self.rounds += 1;
         let count = self.walkers.len();
+        let shaken = self.spread() * SHAKEN;
         let step = if self.rounds.is_multiple_of(WHOLE) {
             1.0
         } else {
@@ -232,7 +152,7 @@ impl Walk {
             } else {
                 step
             };
-            let at = self.walkers[index].at + along * size + shake * SHAKEN;
+            let at = self.walkers[index].at + along * size + shake.component_mul(&shaken);
             let luck = self.generator.random::<f64>().max(1e-300).ln();
             let least = self.walkers[index].ln + luck;
             let ln = self.scales.ln_posterior(&at, least);
@@ -240,6 +160,17 @@ impl Walk {
                 self.walkers[index] = Walker { at, ln };
             }
         }
+    }
+
+    /// Standard deviations of the population.
+    fn spread(&self) -> Point {
+        let count = self.walkers.len() as f64;
+        let mean = self.walkers.iter().map(|one| one.at).sum::<Point>() / count;
+        let squares = self
+            .walkers
+            .iter()
+            .map(|one| (one.at - mean).map(|away| away * away));
+        (squares.sum::<Point>() / count).map(f64::sqrt)
     }
 
     /// Doubts the rates that the best law so far cannot explain, and weighs the population again.

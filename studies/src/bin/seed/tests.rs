@@ -337,7 +337,6 @@ fn the_more_the_slip_scatters_the_wider_the_interval_of_m() {
 }
 
 #[test]
-#[ignore = "not reached since one posterior: 0.39 wide where slip does not scatter, 0.76 where by 30 % (0.038 and 0.91 before)"]
 fn where_the_slip_does_not_scatter_the_interval_of_m_is_a_quarter_as_wide() {
     let (narrow, wide) = widths_of_m();
     assert!(narrow < 0.15 && wide > 4.0 * narrow, "{narrow} {wide}");
