@@ -24,6 +24,9 @@ impl Search<'_> {
         self.prefer_rain(&mut refitted);
         let judged = refitted.iter().map(|one| self.judged(base, one));
         let mut judged: Vec<Judgement> = judged.collect();
+        if let Some(found) = self.two_together(base, (&refitted, &judged), round) {
+            return Some(found);
+        }
         let first = self.first_of(&refitted, &judged);
         let open = |judged: &[Judgement], k: usize| judged[k].1.is_none();
         let most = (0..refitted.len()).filter(|k| open(&judged, *k));
@@ -101,7 +104,12 @@ impl Search<'_> {
 
     /// What enters, or ends the search, in place of effects that gain `most`, the first of them being `one`, with why they are refused:
     /// a slow load that explains more by the margin, or an event that does as well as it. `None` where there is no such load.
-    fn slower(&mut self, base: &Fitted, one: &Refitted, most: f64) -> Option<(OneMore, String)> {
+    pub(super) fn slower(
+        &mut self,
+        base: &Fitted,
+        one: &Refitted,
+        most: f64,
+    ) -> Option<(OneMore, String)> {
         if !one.term.kind.definition().may_be_a_slow_load {
             return None;
         }

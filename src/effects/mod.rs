@@ -24,6 +24,7 @@ mod known_load;
 mod options;
 mod outlook;
 mod own_event;
+mod pair;
 mod partition;
 pub mod remarks;
 mod together;
