@@ -45,9 +45,11 @@ const GROWN_SCALES: usize = 10;
 const UNEVEN: f64 = 0.4;
 const STEADY: f64 = 0.1;
 const ONE_SCALE: f64 = 3.0;
-/// The power of the chances within each time where a collapse is sure to come. Families of simulated slopes that taught
-/// a network nothing collapse sooner than it says (docs/families.md); chosen on these, with the measured series in view.
-const SOONER: f64 = 0.6;
+/// The power of the odds of the chances within each time where a collapse is sure to come, and ln of their factor. Families of
+/// simulated slopes that taught a network nothing collapse sooner than it says, and less surely when it says (docs/families.md);
+/// chosen on these, with the measured series in view.
+const SPREAD: f64 = 0.85;
+const SOONER: f64 = 1.2;
 /// The share of the chance by the readings since an event that counts for levels: most events are followed by others of their
 /// kind. Set on simulated slopes: the whole of it calls a tenth more reds on those that stand.
 const LATER: f64 = 0.6;
@@ -150,7 +152,7 @@ impl Indicators {
         let all = passage(&all, &members.law, self.scales.centred_before_days);
         let agreed = members.agreed();
         Collapse {
-            passage: self.sooner(&members.timed(&all, agreed), members.is_timed(agreed)),
+            passage: Self::sooner(&members.timed(&all, agreed), members.is_timed(agreed)),
             sure,
         }
     }
@@ -172,15 +174,14 @@ impl Indicators {
         (all, passage(&counted, &members.law, centred))
     }
 
-    /// `passage` with each chance within a time raised to a power that falls to [`SOONER`] as it is sure that the slope
-    /// accelerates, or as likely as not that it collapses at all. Steady slopes keep theirs, and so do slopes on whose time of
-    /// collapse law and lines agree, or that keep Voight's relation (`is_timed`, 0 to 1): with the power, lines of inverse
-    /// velocity that nothing bends came out at two thirds of the time that remained, and at four fifths without.
-    fn sooner(&self, passage: &Passage, is_timed: f64) -> Passage {
+    /// `passage` with the odds of each chance within a time by [`SPREAD`] and [`SOONER`], as far as it is likely that the slope
+    /// collapses at all. Steady slopes keep theirs, and so do slopes on whose time of collapse law and lines agree, or that keep
+    /// Voight's relation (`is_timed`, 0 to 1): put sooner, lines of inverse velocity that nothing bends came out at two thirds of
+    /// the time that remained, and at four fifths without.
+    fn sooner(passage: &Passage, is_timed: f64) -> Passage {
         let square = passage.chance_within(LONGEST_DAYS).powi(2);
-        let likely = square / (square + 0.25);
-        let coming = 1.0 - (1.0 - self.accelerating()) * (1.0 - likely);
-        passage.raised(1.0 - (1.0 - SOONER) * coming * (1.0 - is_timed))
+        let counts = square / (square + 0.25) * (1.0 - is_timed);
+        passage.by_odds(1.0 - (1.0 - SPREAD) * counts, SOONER * counts)
     }
 
     /// What the chance of a collapse within the span of scale `power`, which may lie beyond the scales, rests on.

@@ -9,6 +9,9 @@ pub struct Passage {
     by: Vec<f64>,
 }
 
+/// What a chance that is sure lacks, at least, so that it has odds.
+const LEAST_MISSING: f64 = 1e-12;
+
 impl Passage {
     /// From (days, probability) pairs in any order.
     pub fn from_times(mut times: Vec<(f64, f64)>) -> Self {
@@ -63,14 +66,16 @@ impl Passage {
         Self::of_sorted(times.collect())
     }
 
-    /// The same, each chance within a time raised to `power`.
+    /// The same, the odds of each chance within a time raised to `power` and e^`ln_factor` times as large.
     #[must_use]
-    pub fn raised(&self, power: f64) -> Self {
-        let mut before = 0.0_f64.powf(power);
+    pub fn by_odds(&self, power: f64, ln_factor: f64) -> Self {
+        let mut before = 0.0;
         let times = self.times.iter().zip(&self.by).map(|((days, _), by)| {
-            let raised = by.min(1.0).powf(power);
-            let share = raised - before;
-            before = raised;
+            let odds = by / (1.0 - by).max(LEAST_MISSING);
+            let odds = odds.powf(power) * ln_factor.exp();
+            let within = odds / (1.0 + odds);
+            let share = within - before;
+            before = within;
             (*days, share)
         });
         Self::of_sorted(times.collect())
@@ -112,13 +117,16 @@ mod tests {
     }
 
     #[test]
-    fn raised_chances_keep_their_times_and_grow_within_each() {
-        let passage = Passage::from_times(vec![(1.0, 0.04), (2.0, 0.12), (90.0, 0.84)]);
-        let raised = passage.raised(0.5);
-        assert!((raised.chance_within(1.0) - 0.2).abs() < 1e-12);
-        assert!((raised.chance_within(2.0) - 0.4).abs() < 1e-12);
-        assert!((raised.chance_within(90.0) - 1.0).abs() < 1e-12);
-        assert_eq!(passage.raised(1.0).times().len(), 3);
+    fn chances_by_other_odds_keep_their_times_and_grow_within_each() {
+        let passage = Passage::from_times(vec![(1.0, 0.1), (2.0, 0.1), (90.0, 0.8)]);
+        let sooner = passage.by_odds(0.5, 3.0_f64.ln());
+        // Odds of 1/9 and of 1/4 become 1 and 3/2.
+        assert!((sooner.chance_within(1.0) - 0.5).abs() < 1e-12);
+        assert!((sooner.chance_within(2.0) - 0.6).abs() < 1e-12);
+        assert!((sooner.chance_within(90.0) - 1.0).abs() < 1e-5);
+        let same = passage.by_odds(1.0, 0.0);
+        assert!((same.chance_within(2.0) - 0.2).abs() < 1e-12);
+        assert_eq!(same.times().len(), 3);
     }
 
     #[test]
