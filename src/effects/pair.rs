@@ -1,7 +1,7 @@
 //! Two effects at once. Where a law lacks two, either alone may bend it so that the later block is predicted worse, and neither would
 //! ever be accepted: what the readings refuse of the first for that reason alone is tried with a second beside it.
 
-use super::judge::objection;
+use super::judge::{held_out, objection, step_errors};
 use super::refit::Fitted;
 use super::search::{Accepted, Judgement, OneMore, Refitted, SIGNIFICANT, Search};
 
@@ -9,8 +9,9 @@ use super::search::{Accepted, Judgement, OneMore, Refitted, SIGNIFICANT, Search}
 const MOST_SECOND: usize = 2;
 
 impl Search<'_> {
-    /// The effect that gains most, where its later block alone speaks against it and it gains more than what may be accepted by the
-    /// margin, with a second one beside it: `None` where both together may not be accepted either.
+    /// Where nothing else may be accepted, the effect that gains most of those that their later block alone speaks against, with a second
+    /// one beside it: `None` where both together may not be accepted either, and where an effect was found already: what is left of
+    /// the law's drift would be credited to two more.
     pub(super) fn two_together(
         &mut self,
         base: &Fitted,
@@ -18,13 +19,11 @@ impl Search<'_> {
         round: usize,
     ) -> Option<OneMore> {
         let each = || refitted.iter().zip(judged);
-        let open = each().filter(|(_, (_, reason))| reason.is_none());
-        let most = open.map(|(one, _)| one.gain).fold(0.0, f64::max);
-        let refused = each().filter(|(_, (held, reason))| held.is_some() && reason.is_some());
-        let (first, _) = refused.max_by(|a, b| a.0.gain.total_cmp(&b.0.gain))?;
-        if first.gain < most + self.options.bic_margin {
+        if !base.terms.is_empty() || judged.iter().any(|(_, reason)| reason.is_none()) {
             return None;
         }
+        let refused = each().filter(|(_, (held, reason))| held.is_some() && reason.is_some());
+        let (first, _) = refused.max_by(|a, b| a.0.gain.total_cmp(&b.0.gain))?;
         let mut beside = self.refits(&first.fitted, round)?;
         beside.retain(|one| self.stands_beside(one));
         beside.sort_by(|a, b| b.gain.total_cmp(&a.gain));
@@ -38,7 +37,8 @@ impl Search<'_> {
                 ..second
             };
             let (held, reason) = self.judged(base, &both);
-            if reason.is_none() && self.slower(base, &both, both.gain).is_none() {
+            let is_taken = reason.is_none() && self.is_no_worse(base, &both.fitted);
+            if is_taken && self.slower(base, &both, both.gain).is_none() {
                 for (one, (held, reason)) in each() {
                     self.note(&one.term, one, *held, reason.clone());
                 }
@@ -54,6 +54,21 @@ impl Search<'_> {
             }
         }
         None
+    }
+
+    /// Whether both together predict the block no worse, in each way that a single effect may be judged by: what is forgiven of an
+    /// effect alone, because the law drifts without another, is not forgiven of both.
+    fn is_no_worse(&mut self, base: &Fitted, both: &Fitted) -> bool {
+        let (models, share) = ((base, both), self.options.held_out_share);
+        let Some(held) = held_out(self.problem, models, share, &mut self.scratch) else {
+            return false;
+        };
+        let count = (held.from, both.terms.len() - base.terms.len());
+        let steps = step_errors(self.problem, models, count, &mut self.scratch);
+        let by_steps =
+            steps.is_some_and(|steps| steps.after <= steps.before && steps.deviance <= 0.0);
+        let falls = |(before, after): (f64, f64)| after <= before;
+        by_steps && falls(held.errors(self.problem)) && falls(held.errors_of_changes(self.problem))
     }
 
     /// Whether it may be accepted beside another, but for the later block.

@@ -73,7 +73,8 @@ impl Passage {
         let times = self.times.iter().zip(&self.by).map(|((days, _), by)| {
             let odds = by / (1.0 - by).max(LEAST_MISSING);
             let odds = odds.powf(power) * ln_factor.exp();
-            let within = odds / (1.0 + odds);
+            // By rounding it may fall where the chance hardly grows.
+            let within = (odds / (1.0 + odds)).max(before);
             let share = within - before;
             before = within;
             (*days, share)

@@ -333,12 +333,6 @@ fn widths_of_m() -> (f64, f64) {
 #[test]
 fn the_more_the_slip_scatters_the_wider_the_interval_of_m() {
     let (narrow, wide) = widths_of_m();
-    assert!(wide > 0.5 && wide > 1.5 * narrow, "{narrow} {wide}");
-}
-
-#[test]
-fn where_the_slip_does_not_scatter_the_interval_of_m_is_a_quarter_as_wide() {
-    let (narrow, wide) = widths_of_m();
     assert!(narrow < 0.15 && wide > 4.0 * narrow, "{narrow} {wide}");
 }
 
