@@ -1,9 +1,9 @@
 //! Two effects at once. Where a law lacks two, either alone may bend it so that the later block is predicted worse, and neither would
 //! ever be accepted: what the readings refuse of the first for that reason alone is tried with a second beside it.
 
-use super::judge::{held_out, objection, step_errors};
+use super::judge::{held_out, step_errors};
 use super::refit::Fitted;
-use super::search::{Accepted, Judgement, OneMore, Refitted, SIGNIFICANT, Search};
+use super::search::{Accepted, Judgement, OneMore, Refitted, Search};
 
 /// Second effects that are tried beside the first.
 const MOST_SECOND: usize = 2;
@@ -25,7 +25,7 @@ impl Search<'_> {
         let refused = each().filter(|(_, (held, reason))| held.is_some() && reason.is_some());
         let (first, _) = refused.max_by(|a, b| a.0.gain.total_cmp(&b.0.gain))?;
         let mut beside = self.refits(&first.fitted, round)?;
-        beside.retain(|one| self.stands_beside(one));
+        beside.retain(|one| self.refused_at_once(one).is_none());
         beside.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         beside.truncate(MOST_SECOND);
         let (gain, p_value) = (first.gain, first.p_value);
@@ -69,12 +69,5 @@ impl Search<'_> {
             steps.is_some_and(|steps| steps.after <= steps.before && steps.deviance <= 0.0);
         let falls = |(before, after): (f64, f64)| after <= before;
         by_steps && falls(held.errors(self.problem)) && falls(held.errors_of_changes(self.problem))
-    }
-
-    /// Whether it may be accepted beside another, but for the later block.
-    fn stands_beside(&self, one: &Refitted) -> bool {
-        one.gain >= self.options.bic_margin
-            && one.p_value < SIGNIFICANT
-            && objection(self.problem, &one.fitted, self.drivers).is_none()
     }
 }

@@ -235,22 +235,7 @@ impl Search<'_> {
 
     /// Why not; `None` for what may be accepted. The held-out error with it over that without comes first.
     pub(super) fn judged(&mut self, base: &Fitted, one: &Refitted) -> Judgement {
-        let margin = self.options.bic_margin;
-        if one.gain < margin {
-            let reason = format!(
-                "the BIC falls by {:.1} only, {margin} is asked for",
-                one.gain
-            );
-            return (None, Some(reason));
-        }
-        if one.p_value >= SIGNIFICANT {
-            let reason = format!(
-                "without any effect a search gains as much in {:.0} % of cases",
-                100.0 * one.p_value
-            );
-            return (None, Some(reason));
-        }
-        if let Some(reason) = objection(self.problem, &one.fitted, self.drivers) {
+        if let Some(reason) = self.refused_at_once(one) {
             return (None, Some(reason));
         }
         if self.is_drawn && !one.term.kind.has_independent_evidence() {
@@ -265,6 +250,24 @@ impl Search<'_> {
             return (None, None);
         }
         self.held_out(base, one)
+    }
+
+    /// Why not, before any later block is looked at: what it gains, by chance too, and what the physics allow.
+    pub(super) fn refused_at_once(&self, one: &Refitted) -> Option<String> {
+        let margin = self.options.bic_margin;
+        if one.gain < margin {
+            return Some(format!(
+                "the BIC falls by {:.1} only, {margin} is asked for",
+                one.gain
+            ));
+        }
+        if one.p_value >= SIGNIFICANT {
+            return Some(format!(
+                "without any effect a search gains as much in {:.0} % of cases",
+                100.0 * one.p_value
+            ));
+        }
+        objection(self.problem, &one.fitted, self.drivers)
     }
 
     fn withhold(&mut self, one: &Refitted) {

@@ -55,6 +55,29 @@ pub(super) struct Walk {
     rounds: usize,
 }
 
+/// Which of those with these shares of 1 are taken, each as often as its share has it, `wanted` times in all.
+fn in_proportion(shares: impl Iterator<Item = f64>, wanted: usize) -> Vec<usize> {
+    let (mut reached, mut taken) = (0.0, Vec::with_capacity(wanted));
+    for (index, share) in shares.enumerate() {
+        reached += share;
+        while (taken.len() as f64 + 0.5) < reached * wanted as f64 && taken.len() < wanted {
+            taken.push(index);
+        }
+    }
+    taken
+}
+
+/// What each has of the root of the posterior, of whose density these are the logarithms; nothing where none has any.
+fn shares_of_root(lns: impl Iterator<Item = f64> + Clone) -> Vec<f64> {
+    let best = lns.clone().fold(f64::NEG_INFINITY, f64::max);
+    if !best.is_finite() {
+        return Vec::new();
+    }
+    let weights = lns.map(|ln| (0.5 * (ln - best)).exp());
+    let total: f64 = weights.clone().sum();
+    weights.map(|weight| weight / total).collect()
+}
+
 impl Walk {
     /// A population about the laws of the table, each in proportion to its weight.
     pub(super) fn about(cells: &[Cell], search: GridSearch) -> Option<Self> {
@@ -65,16 +88,12 @@ impl Walk {
             generator: Pcg64::seed_from_u64(SEED),
             rounds: 0,
         };
-        let wanted = WALKERS * CHOSEN_FROM;
-        let mut reached = 0.0;
-        let mut tried: Vec<Walker> = Vec::with_capacity(wanted);
-        for cell in cells {
-            reached += cell.weight;
-            while (tried.len() as f64 + 0.5) < reached * wanted as f64 && tried.len() < wanted {
-                let at = walk.scales.space.near(cell, &mut walk.generator);
-                let ln = walk.scales.ln_posterior(&at, f64::NEG_INFINITY);
-                tried.push(Walker { at, ln });
-            }
+        let mut tried: Vec<Walker> =
+            Vec::with_capacity(WALKERS * (CHOSEN_FROM + CHOSEN_ABOUT_MODES));
+        let weights = cells.iter().map(|cell| cell.weight);
+        for index in in_proportion(weights, WALKERS * CHOSEN_FROM) {
+            let at = walk.scales.space.near(&cells[index], &mut walk.generator);
+            tried.push(walk.walker(at));
         }
         walk.try_modes(cells, &mut tried);
         walk.choose(&tried);
@@ -84,50 +103,30 @@ impl Walk {
     /// Laws about the likeliest ones, of each as many as it has of the root of the posterior.
     fn try_modes(&mut self, cells: &[Cell], tried: &mut Vec<Walker>) {
         let modes = modes(cells, &mut self.scales);
-        let best = modes
-            .iter()
-            .map(|mode| mode.ln)
-            .fold(f64::NEG_INFINITY, f64::max);
-        let weight = |ln: f64| (0.5 * (ln - best)).exp();
-        let total: f64 = modes.iter().map(|mode| weight(mode.ln)).sum();
-        let wanted = WALKERS * CHOSEN_ABOUT_MODES;
-        let (mut reached, mut drawn) = (0.0, 0);
-        for mode in modes.iter().filter(|_| best.is_finite()) {
-            reached += weight(mode.ln) / total;
-            while (drawn as f64 + 0.5) < reached * wanted as f64 && drawn < wanted {
-                let space = &self.scales.space;
-                let mut near = space.near(mode.cell, &mut self.generator);
-                if drawn % 2 == 0 {
-                    near = space.without_memory(&near, &mut self.generator);
-                }
-                let at = mode.draw(&near, &mut self.generator);
-                let ln = self.scales.ln_posterior(&at, f64::NEG_INFINITY);
-                tried.push(Walker { at, ln });
-                drawn += 1;
+        let shares = shares_of_root(modes.iter().map(|mode| mode.ln));
+        let chosen = in_proportion(shares.into_iter(), WALKERS * CHOSEN_ABOUT_MODES);
+        for (drawn, index) in chosen.into_iter().enumerate() {
+            let (mode, space) = (&modes[index], &self.scales.space);
+            let mut near = space.near(mode.cell, &mut self.generator);
+            if drawn % 2 == 0 {
+                near = space.without_memory(&near, &mut self.generator);
             }
+            let at = mode.draw(&near, &mut self.generator);
+            tried.push(self.walker(at));
         }
+    }
+
+    /// A law of the population there.
+    fn walker(&mut self, at: Point) -> Walker {
+        let ln = self.scales.ln_posterior(&at, f64::NEG_INFINITY);
+        Walker { at, ln }
     }
 
     /// Chooses the population: by the root of the posterior, so that it is wider than that.
     fn choose(&mut self, tried: &[Walker]) {
-        let best = tried
-            .iter()
-            .map(|one| one.ln)
-            .fold(f64::NEG_INFINITY, f64::max);
-        if !best.is_finite() {
-            return;
-        }
-        let weight = |one: &Walker| (0.5 * (one.ln - best)).exp();
-        let total: f64 = tried.iter().map(weight).sum();
-        let mut reached = 0.0;
-        for one in tried {
-            reached += weight(one) / total;
-            while (self.walkers.len() as f64 + 0.5) < reached * WALKERS as f64
-                && self.walkers.len() < WALKERS
-            {
-                self.walkers.push(*one);
-            }
-        }
+        let shares = shares_of_root(tried.iter().map(|one| one.ln));
+        let chosen = in_proportion(shares.into_iter(), WALKERS);
+        self.walkers = chosen.into_iter().map(|index| tried[index]).collect();
     }
 
     /// Moves each law of the population once.
