@@ -6,7 +6,7 @@ use super::state::SiteArgs;
 use super::table::TextTable;
 use super::text;
 use crate::alert::{Level, chance_in_words};
-use crate::monitor::{CalledLevel, Event, EventKind, SUSPECT, SUSPECT_ENDS};
+use crate::monitor::{CalledLevel, ChancesOfCollapse, Event, EventKind, SUSPECT, SUSPECT_ENDS};
 use crate::reading::{BEFORE_ALL, BenchmarkId, Timestamp, figure};
 use crate::runtime::alarm_state::{AlarmState, Alarms};
 use crate::runtime::clock;
@@ -70,6 +70,8 @@ pub(super) struct StatusStanding {
     velocity_mm_per_day: Option<f64>,
     /// The median of the forecast of collapse then.
     failure_time: Option<Timestamp>,
+    /// How likely it was then that a collapse comes at all.
+    chances_of_collapse: Option<ChancesOfCollapse>,
     /// The chance of collapse within the evacuation time then.
     chance_within_evacuation_time: Option<f64>,
     /// The level that the newest forecast calls for, and the chances that levels are called by.
@@ -176,6 +178,7 @@ fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
             regime: None,
             velocity_mm_per_day: None,
             failure_time: None,
+            chances_of_collapse: None,
             chance_within_evacuation_time: None,
             called: None,
             alarm_state: AlarmState::Normal,
@@ -258,6 +261,7 @@ fn stands(
     if let Some(EventKind::Refit {
         regime,
         failure_time,
+        chances_of_collapse,
         velocity_mm_per_day,
         chance_within_evacuation_time,
         called,
@@ -267,6 +271,7 @@ fn stands(
         standing.regime = Some(regime.label.to_string());
         standing.velocity_mm_per_day = *velocity_mm_per_day;
         standing.failure_time = failure_time.median;
+        standing.chances_of_collapse = *chances_of_collapse;
         standing.chance_within_evacuation_time = Some(*chance_within_evacuation_time);
         standing.called = called.as_deref().cloned();
     }

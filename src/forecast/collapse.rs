@@ -3,8 +3,8 @@
 //! One small network gives the chance of a collapse within the span of a scale of [`Scales`] from the motion at that
 //! scale and those around it, in ratios, so that minutes and months are judged alike, and from what others expect
 //! ([`Members`]): the law, and straight lines through inverse velocity. It was taught by simulated slopes that fail and
-//! stand in many ways (`studies/src/world`); its weights are in [`super::learned`]. That is what is reported. Levels go by
-//! less: what it says counts for them as far as it is not unlikely that the slope accelerates at all ([`super::evidence`]), because
+//! stand in many ways (`studies/src/world`); its weights are in [`super::learned`]. That is what is reported as chances. The time that
+//! is reported is put sooner, and levels go by less: what it says counts for them as far as it is not unlikely that the slope accelerates at all ([`super::evidence`]), because
 //! they are asked at every reading; of the rest a small part is left, so that nothing is called impossible.
 
 use super::evidence::{self, Evidence};
@@ -60,8 +60,10 @@ const MOST_LATER: usize = 200_000;
 /// When a slope is expected to collapse.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Collapse {
-    /// Days to it from the newest reading, as the network has it.
+    /// Days to it from the newest reading: whose quantiles are reported. It is put sooner than is expected, by [`SPREAD`] and [`SOONER`].
     pub passage: Passage,
+    /// The same as it is expected: whose chances come true.
+    pub expected: Passage,
     /// The same as far as the slope is sure to accelerate: what levels go by.
     pub sure: Passage,
 }
@@ -151,8 +153,10 @@ impl Indicators {
         };
         let all = passage(&all, &members.law, self.scales.centred_before_days);
         let agreed = members.agreed();
+        let expected = members.timed(&all, agreed);
         Collapse {
-            passage: Self::sooner(&members.timed(&all, agreed), members.is_timed(agreed)),
+            passage: Self::sooner(&expected, members.is_timed(agreed)),
+            expected,
             sure,
         }
     }
@@ -477,6 +481,24 @@ mod tests {
         assert!(steady.sure.chance_within(30.0) < 0.1, "{steady:?}");
         assert!(steady.passage.chance_within(400.0) < 0.2, "{steady:?}");
         assert!(steady.sure.chance_within(1.0) < 0.02, "{steady:?}");
+    }
+
+    #[test]
+    fn the_time_is_put_sooner_than_is_expected_and_the_expected_chances_grow_too() {
+        // A slope that speeds up and then only creeps on: no line has its time for sure.
+        let uneven = readings(190, 0.5, |t| {
+            -60.0 * (1.0 - t / 140.0).ln() + 3.0 * (t * 0.3).sin()
+        });
+        let found = collapse(&uneven);
+        let days = [1.0, 2.0, 7.0, 30.0, 100.0];
+        let expected = days.map(|days| found.expected.chance_within(days));
+        assert!(expected.is_sorted(), "{expected:?}");
+        assert!(expected[4] > 0.2, "{expected:?}");
+        for (days, expected) in days.into_iter().zip(expected) {
+            let sooner = found.passage.chance_within(days);
+            assert!(sooner >= expected, "{days} {sooner} {expected}");
+        }
+        assert!(found.passage.chance_within(30.0) > found.expected.chance_within(30.0) + 0.02);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //! load averaged over its shapes and its starts, the regime and the passage of a critical velocity.
 
 use super::surprise::Surprise;
-use super::{Collapse, Indicators, Members, Passage};
+use super::{Indicators, Members, Passage};
 use crate::fit::{Ensemble, LoadPosterior, Observation, Observations, Rate, RateOptions};
 use crate::model::{Accuracy, Law, Trajectory};
 use crate::reading::Quantity;
@@ -26,8 +26,10 @@ pub const HORIZON_DAYS: f64 = 400.0;
 pub struct Outlook {
     /// The newest reading, days.
     pub now_days: f64,
-    /// Days to the collapse, from the newest reading: what is reported.
+    /// Days to the collapse, from the newest reading: whose quantiles are reported, put sooner than is expected.
     pub collapse: Passage,
+    /// The same as it is expected: whose chances are reported.
+    pub expected: Passage,
     /// The same as far as the slope is sure to accelerate: what levels go by.
     pub chances: Passage,
     /// Days to the critical velocity by the law, from the newest reading, as far as the slope is sure to accelerate.
@@ -162,7 +164,7 @@ pub(crate) fn outlook(
     let indicators = Indicators::of(observations)?;
     let accelerating = indicators.accelerating();
     let members = Members::by(&rates, posterior.as_ref(), now_days);
-    let Collapse { passage, sure } = indicators.collapse(&members);
+    let collapse = indicators.collapse(&members);
     let law = members.law_to(critical).map_or_else(
         || passages(&rates, posterior.as_ref(), critical, now_days),
         <[(f64, f64)]>::to_vec,
@@ -180,8 +182,9 @@ pub(crate) fn outlook(
     let outlook = Outlook {
         now_days,
         passage: Passage::from_times(passed),
-        collapse: passage,
-        chances: sure,
+        collapse: collapse.passage,
+        expected: collapse.expected,
+        chances: collapse.sure,
         accelerating,
         interval_days: indicators.interval_days(),
         surprise_nats: None,
@@ -241,6 +244,7 @@ impl Outlook {
         Self {
             passage: self.passage.pooled(&plain.passage, PLAIN_SHARE),
             collapse: self.collapse.pooled(&plain.collapse, PLAIN_SHARE),
+            expected: self.expected.pooled(&plain.expected, PLAIN_SHARE),
             chances: self.chances.pooled(&plain.chances, PLAIN_SHARE),
             accelerating,
             regimes,
@@ -254,6 +258,7 @@ impl Outlook {
         Self {
             passage: self.passage.sooner(pace),
             collapse: self.collapse.sooner(pace),
+            expected: self.expected.sooner(pace),
             chances: self.chances.sooner(pace),
             interval_days: self.interval_days / pace,
             ..self

@@ -33,8 +33,11 @@ pub enum EventKind {
         t_max: Timestamp,
         /// Which regime, with what probability.
         regime: RegimeReport,
-        /// When the slope collapses.
+        /// When the slope collapses: for people who have to be ready for it, put sooner than the chances have it.
         failure_time: FailureTime,
+        /// How likely it is that a collapse comes at all. Absent in states of older versions.
+        #[serde(skip_serializing_if = "Option::is_none", default)]
+        chances_of_collapse: Option<ChancesOfCollapse>,
         /// When the critical velocity is passed.
         #[serde(default)]
         critical_velocity_time: Box<FailureTime>,
@@ -47,9 +50,9 @@ pub enum EventKind {
         transition_time: Option<Timestamp>,
         /// The velocity now, mm/day.
         velocity_mm_per_day: Option<f64>,
-        /// Chance of failure within the evacuation time.
+        /// Chance of collapse within the evacuation time, as levels go by it.
         chance_within_evacuation_time: f64,
-        /// Chance of failure within the outlook.
+        /// Chance of collapse within the outlook, as levels go by it.
         chance_within_outlook: f64,
         /// The level that this forecast calls for, and the chances that the levels are called by. Absent in states of older
         /// versions.
@@ -295,6 +298,20 @@ pub struct RegimeReport {
     /// kappa of the same law, 1/day.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub kappa_per_day: Option<f64>,
+}
+
+/// The chances that a collapse comes within so many days of the newest reading. `failure_time` says when, if one does, and is put sooner; levels are
+/// called by less, by what the readings show beyond doubt ([`LevelChance`]).
+#[derive(Debug, Clone, Copy, Default, PartialEq, JsonSchema, Serialize, Deserialize)]
+pub struct ChancesOfCollapse {
+    /// Within a day.
+    pub within_1_day: f64,
+    /// Within two days.
+    pub within_2_days: f64,
+    /// Within a week.
+    pub within_7_days: f64,
+    /// Within thirty days.
+    pub within_30_days: f64,
 }
 
 /// The time of a collapse, or of the first passage of the critical velocity; quantiles are unconditional.

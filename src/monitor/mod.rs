@@ -39,8 +39,9 @@ mod undeclared;
 pub use course::{LevelStretch, by_time, levels_in};
 pub use declared::{Declaration, Declared};
 pub use event::{
-    AlertState, CalledLevel, Event, EventKind, FailureTime, InverseVelocity, LevelChance, Plain,
-    RESET_FOUND, RegimeReport, SUSPECT, SUSPECT_ENDS, SharedFailure, Summary, Unexplained,
+    AlertState, CalledLevel, ChancesOfCollapse, Event, EventKind, FailureTime, InverseVelocity,
+    LevelChance, Plain, RESET_FOUND, RegimeReport, SUSPECT, SUSPECT_ENDS, SharedFailure, Summary,
+    Unexplained,
 };
 pub use event_shown::KindShown;
 pub use given::{Given, OrderKind, OrderedBy};

@@ -84,6 +84,7 @@ fn evidence(alert: &AlertView, clock: &dyn Fn(Timestamp) -> String) -> Vec<Strin
             EventKind::Refit {
                 regime,
                 failure_time,
+                chances_of_collapse,
                 inverse_velocity,
                 velocity_mm_per_day,
                 chance_within_evacuation_time,
@@ -119,6 +120,13 @@ fn evidence(alert: &AlertView, clock: &dyn Fn(Timestamp) -> String) -> Vec<Strin
         percent_in_words(regime.probability_unstable)
     ));
     found.push(collapse(failure_time, clock));
+    if let Some(chances) = chances_of_collapse {
+        found.push(format!(
+            "chance that a collapse comes: {} within 2 days, {} within 30 days",
+            percent_in_words(chances.within_2_days),
+            percent_in_words(chances.within_30_days)
+        ));
+    }
     if let Some(intercept) = inverse_velocity.failure_time {
         found.push(format!(
             "the inverse-velocity line meets zero at {}",

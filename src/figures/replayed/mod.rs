@@ -235,6 +235,7 @@ mod tests {
                 kappa_per_day: None,
             },
             failure_time,
+            chances_of_collapse: None,
             critical_velocity_time: Box::default(),
             probability_of_acceleration: 0.5,
             inverse_velocity: InverseVelocity {

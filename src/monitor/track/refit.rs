@@ -7,7 +7,8 @@ use crate::alert::{AlertCause, Policy};
 use crate::forecast::{HORIZON_DAYS, InverseVelocityLine, Outlook, Passage};
 use crate::monitor::drift::{self, Drift};
 use crate::monitor::event::{
-    Event, EventKind, FailureTime, InverseVelocity, Plain, RegimeReport, Unexplained,
+    ChancesOfCollapse, Event, EventKind, FailureTime, InverseVelocity, Plain, RegimeReport,
+    Unexplained,
 };
 use crate::monitor::recent;
 use crate::reading::{Timestamp, after_days};
@@ -191,6 +192,7 @@ fn refit_event(
         t_max: time,
         regime: report(outlook),
         failure_time: reported(epoch, outlook.now_days, &outlook.collapse),
+        chances_of_collapse: Some(chances(&outlook.expected)),
         critical_velocity_time: Box::new(reported(epoch, outlook.now_days, &outlook.passage)),
         probability_of_acceleration: outlook.accelerating,
         inverse_velocity: InverseVelocity {
@@ -218,6 +220,17 @@ fn reported(epoch: Timestamp, now_days: f64, passage: &Passage) -> FailureTime {
         high: quantile(0.95),
         probability: passage.chance_within(HORIZON_DAYS),
         horizon_days: HORIZON_DAYS,
+    }
+}
+
+fn chances(expected: &Passage) -> ChancesOfCollapse {
+    let [within_1_day, within_2_days, within_7_days, within_30_days] =
+        [1.0, 2.0, 7.0, 30.0].map(|days| expected.chance_within(days));
+    ChancesOfCollapse {
+        within_1_day,
+        within_2_days,
+        within_7_days,
+        within_30_days,
     }
 }
 
@@ -267,7 +280,16 @@ mod tests {
             known_load: None,
         };
         let (events, causes) = FitChanges::default().refit(&record, &policy, at(47), &forecast);
-        assert!(matches!(events[0].kind, EventKind::Refit { .. }));
+        let EventKind::Refit {
+            chances_of_collapse: Some(chances),
+            ..
+        } = &events[0].kind
+        else {
+            panic!("{events:?}");
+        };
+        let expected = &forecast.plain.expected;
+        assert_eq!(chances.within_2_days, expected.chance_within(2.0));
+        assert_eq!(chances.within_30_days, expected.chance_within(30.0));
         assert!(
             causes.contains(&AlertCause::UnexplainedResidual),
             "{causes:?}"

@@ -15,6 +15,7 @@ pub(super) fn refit(event: &Event) -> Option<(Value, Value)> {
         t_max,
         regime,
         failure_time,
+        chances_of_collapse,
         critical_velocity_time,
         probability_of_acceleration,
         inverse_velocity,
@@ -56,6 +57,16 @@ pub(super) fn refit(event: &Event) -> Option<(Value, Value)> {
         ("chance_within_outlook", chance_within_outlook),
     ] {
         forecast.insert(key.to_owned(), json!(chance));
+    }
+    if let Some(chances) = chances_of_collapse {
+        forecast.insert(
+            "chance_within_2_days".to_owned(),
+            json!(chances.within_2_days),
+        );
+        forecast.insert(
+            "chance_within_30_days".to_owned(),
+            json!(chances.within_30_days),
+        );
     }
     Some((fit, present(Value::Object(forecast))))
 }

@@ -66,17 +66,27 @@ const QUANTILES: [Field; 8] = [
     ("horizon_days", "number", "How far the forecast looks, days"),
 ];
 
-const CHANCES: [Field; 3] = [
+const CHANCES: [Field; 5] = [
     ("time", "date-time", "When the forecast was made, data time"),
     (
         "chance_within_evacuation_time",
         "number",
-        "Chance of collapse within the evacuation time",
+        "Chance of collapse within the evacuation time, as levels go by it",
     ),
     (
         "chance_within_outlook",
         "number",
-        "Chance of collapse within the outlook",
+        "Chance of collapse within the outlook, as levels go by it",
+    ),
+    (
+        "chance_within_2_days",
+        "number?",
+        "Chance that a collapse comes within 2 days",
+    ),
+    (
+        "chance_within_30_days",
+        "number?",
+        "Chance that a collapse comes within 30 days",
     ),
 ];
 

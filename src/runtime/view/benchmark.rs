@@ -6,7 +6,8 @@ use super::{EARLIEST, LATEST, SiteReader, held, read};
 use crate::fit::{Observations, Rate, RateOptions};
 use crate::forecast::InverseVelocityLine;
 use crate::monitor::{
-    CalledLevel, Event, EventKind, FailureTime, KindShown, LevelStretch, levels_in, recent,
+    CalledLevel, ChancesOfCollapse, Event, EventKind, FailureTime, KindShown, LevelStretch,
+    levels_in, recent,
 };
 use crate::reading::{
     BenchmarkId, Quantity, Reading, SECONDS_PER_DAY, Series, Timestamp, Unit, days_since,
@@ -78,9 +79,11 @@ pub struct ForecastView {
     pub time: Timestamp,
     /// When the slope collapses.
     pub failure_time: FailureTime,
-    /// The chance of that within the evacuation time.
+    /// How likely it is that a collapse comes at all.
+    pub chances_of_collapse: Option<ChancesOfCollapse>,
+    /// The chance of that within the evacuation time, as levels go by it.
     pub chance_within_evacuation_time: f64,
-    /// The chance of that within the outlook.
+    /// The chance of that within the outlook, as levels go by it.
     pub chance_within_outlook: f64,
     /// The level that it calls for, and the chances that levels are called by.
     pub called: Option<CalledLevel>,
@@ -405,6 +408,7 @@ fn forecast(event: &Event) -> Option<ForecastView> {
     let EventKind::Refit {
         regime,
         failure_time,
+        chances_of_collapse,
         velocity_mm_per_day,
         chance_within_evacuation_time,
         chance_within_outlook,
@@ -418,6 +422,7 @@ fn forecast(event: &Event) -> Option<ForecastView> {
     Some(ForecastView {
         time: event.time,
         failure_time: *failure_time,
+        chances_of_collapse: *chances_of_collapse,
         chance_within_evacuation_time: *chance_within_evacuation_time,
         chance_within_outlook: *chance_within_outlook,
         called: called.as_deref().cloned(),

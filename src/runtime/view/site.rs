@@ -2,7 +2,7 @@
 
 use super::{LATEST, SiteReader, held, read};
 use crate::alert::Level;
-use crate::monitor::{CalledLevel, Event, EventKind, FailureTime};
+use crate::monitor::{CalledLevel, ChancesOfCollapse, Event, EventKind, FailureTime};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::regime::Regime;
 use crate::runtime::alarm_state::{AlarmState, Alarms};
@@ -42,9 +42,11 @@ pub struct Standing {
     pub regime: Option<Regime>,
     /// When it was forecast to collapse.
     pub failure_time: Option<FailureTime>,
-    /// The chance of that within the evacuation time.
+    /// How likely it was then that a collapse comes at all.
+    pub chances_of_collapse: Option<ChancesOfCollapse>,
+    /// The chance of that within the evacuation time, as levels go by it.
     pub chance_within_evacuation_time: Option<f64>,
-    /// The chance of that within the outlook.
+    /// The chance of that within the outlook, as levels go by it.
     pub chance_within_outlook: Option<f64>,
     /// The level that this forecast calls for, and the chances that levels are called by.
     pub called: Option<CalledLevel>,
@@ -180,6 +182,7 @@ impl SiteReader {
             velocity_mm_per_day: None,
             regime: None,
             failure_time: None,
+            chances_of_collapse: None,
             chance_within_evacuation_time: None,
             chance_within_outlook: None,
             called: None,
@@ -217,6 +220,7 @@ impl Standing {
         let EventKind::Refit {
             regime,
             failure_time,
+            chances_of_collapse,
             velocity_mm_per_day,
             chance_within_evacuation_time,
             chance_within_outlook,
@@ -230,6 +234,7 @@ impl Standing {
         self.velocity_mm_per_day = *velocity_mm_per_day;
         self.regime = Some(regime.label);
         self.failure_time = Some(*failure_time);
+        self.chances_of_collapse = *chances_of_collapse;
         self.chance_within_evacuation_time = Some(*chance_within_evacuation_time);
         self.chance_within_outlook = Some(*chance_within_outlook);
         self.called = called.as_deref().cloned();

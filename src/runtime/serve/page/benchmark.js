@@ -3,7 +3,7 @@
 import { get } from '/page/ask.js';
 import { AFTER, Charts } from '/page/charts.js';
 import { buttons } from '/page/site.js';
-import { badges, collapse, el, figure, left, list, outlookChance, percent, place, redChance, span, svg, described, when } from '/page/words.js';
+import { badges, collapse, el, expectedChance, figure, left, list, outlookChance, percent, place, redChance, span, svg, described, when } from '/page/words.js';
 
 const DAY = 86400;
 const SPANS = [[null, 'Whole record'], [365 * DAY, '1 year'], [30 * DAY, '30 days'], [7 * DAY, '7 days'], [DAY, '1 day']];
@@ -139,7 +139,7 @@ function facts(view) {
     ['Newest reading', reading],
     ['Velocity', [`${figure(standing.velocity_mm_per_day)} mm/day`]],
     ['Collapse forecast', [...collapse(standing.failure_time), left(standing.failure_time, view.at ?? view.now) ? el('small', {}, left(standing.failure_time, view.at ?? view.now)) : null]],
-    ['Chance of collapse', [redChance(standing)[0], el('small', {}, redChance(standing)[1]), el('small', {}, outlookChance(standing))]],
+    ['Chance of collapse', [redChance(standing)[0], el('small', {}, redChance(standing)[1]), el('small', {}, outlookChance(standing)), expectedChance(standing) && el('small', {}, expectedChance(standing))]],
     ['Alarm state', [standing.alarm_state]],
     ['Regime', [standing.regime ?? '-', view.latest ? el('small', {}, `unstable ${percent(view.latest.regime.probability_unstable)}, accelerating ${percent(view.latest.regime.probability_accelerating)}`) : null]],
   ];

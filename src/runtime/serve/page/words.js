@@ -112,6 +112,12 @@ export function outlookChance(one) {
   return `${percent(orange.chance)} within ${span(3600 * orange.within_hours)}, orange from ${percent(orange.at_least)}, yellow from ${percent(yellow.at_least)}`;
 }
 
+/** How likely it is that a collapse comes at all, whatever calls a level; null in older states. */
+export function expectedChance(one) {
+  const chances = one.chances_of_collapse;
+  return chances ? `that one comes: ${percent(chances.within_2_days)} in 2 days, ${percent(chances.within_30_days)} in 30 days` : null;
+}
+
 /** 5 %, < 1 %: no chance is shown as none, or as certain. */
 export function percent(chance) {
   if (chance === null || chance === undefined) return '-';

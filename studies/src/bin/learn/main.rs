@@ -20,6 +20,7 @@
 mod descent;
 mod judge;
 mod looks;
+mod reliability;
 mod source;
 mod steady;
 mod table;

@@ -1,7 +1,7 @@
 //! docs/families.md: each family by the network that never saw it.
 
 use crate::judge::{EVACUATIONS, Judged, Lead, Replay};
-use crate::source;
+use crate::{reliability, source};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use studies::GaugeKind;
@@ -24,6 +24,8 @@ fn text(families: &[Judged], slopes: u64) -> anyhow::Result<String> {
     );
     failing(&mut out, families)?;
     in_time(&mut out, families)?;
+    out += &reliability::section(slopes)?;
+    out += include_str!("notes.md");
     if families.iter().all(|one| one.family.fails()) {
         out += "\nFamilies that stand were not judged in this run. What the network in force calls on them, which was taught on others of the same \
                 families: [false-alarms.md](false-alarms.md).\n";
