@@ -271,7 +271,7 @@ fn stands(
         standing.regime = Some(regime.label.to_string());
         standing.velocity_mm_per_day = *velocity_mm_per_day;
         standing.failure_time = failure_time.median;
-        standing.chances_of_collapse = *chances_of_collapse;
+        standing.chances_of_collapse = chances_of_collapse.as_deref().copied();
         standing.chance_within_evacuation_time = Some(*chance_within_evacuation_time);
         standing.called = called.as_deref().cloned();
     }

@@ -64,13 +64,13 @@ pub(super) fn delays(problem: &Problem, driver: &Driver) -> Vec<f64> {
 pub(super) fn in_load(
     problem: &Problem,
     kind: Kind,
-    (index, driver): (usize, &Driver),
+    driver: &Driver,
     response: Response,
 ) -> Option<Term> {
     let column = driver.respond(response, &problem.nodes)?;
     Some(Term {
         kind,
-        channel: Some(index),
+        channel: Some(driver.index),
         response: Some(response),
         at: None,
         share: MIDDLE,
@@ -211,7 +211,7 @@ pub(super) fn jumps(problem: &Problem, residual: &[f64]) -> Vec<usize> {
 pub(super) fn in_reading(
     problem: &Problem,
     kind: Kind,
-    (index, driver): (usize, &Driver),
+    driver: &Driver,
     stages: u8,
     mean_days: f64,
 ) -> Option<Term> {
@@ -227,7 +227,7 @@ pub(super) fn in_reading(
     let column = driver.respond(response, &problem.t)?;
     Some(Term {
         kind,
-        channel: Some(index),
+        channel: Some(driver.index),
         response: Some(response),
         at: None,
         share: MIDDLE,

@@ -49,10 +49,10 @@ pub(super) fn drivers(
     problem: &Problem,
     channels: &[Channel],
     remarks: &mut Vec<String>,
-) -> Vec<(usize, Driver)> {
+) -> Vec<Driver> {
     let mut drivers = Vec::new();
     for (index, channel) in channels.iter().enumerate() {
-        let Some(driver) = Driver::new(channel, problem.epoch) else {
+        let Some(driver) = Driver::new(index, channel, problem.epoch) else {
             continue;
         };
         let share = driver.coverage(&problem.nodes);
@@ -64,7 +64,7 @@ pub(super) fn drivers(
             ));
             continue;
         }
-        drivers.push((index, driver));
+        drivers.push(driver);
     }
     drivers
 }

@@ -24,7 +24,7 @@ impl Search<'_> {
         self.prefer_rain(&mut refitted);
         let judged = refitted.iter().map(|one| self.judged(base, one));
         let mut judged: Vec<Judgement> = judged.collect();
-        if let Some(found) = self.two_together(base, (&refitted, &judged), round) {
+        if let Some(found) = self.two_together(base, &refitted, &judged, round) {
             return Some(found);
         }
         let first = self.first_of(&refitted, &judged);
@@ -38,7 +38,7 @@ impl Search<'_> {
             }
         }
         let chosen = first.filter(|_| slower.is_none());
-        let ties = chosen.map(|k| self.ties((&refitted, k), &judged));
+        let ties = chosen.map(|k| self.ties(&refitted, k, &judged));
         for (k, one) in refitted.iter().enumerate() {
             let (held, reason) = judged[k].clone();
             let beaten = chosen.filter(|first| *first != k && reason.is_none());
@@ -164,7 +164,7 @@ impl Search<'_> {
     }
 
     /// What may be accepted as well and cannot be separated from the one of that index.
-    fn ties(&self, (refitted, first): (&[Refitted], usize), judged: &[Judgement]) -> Vec<Rival> {
+    fn ties(&self, refitted: &[Refitted], first: usize, judged: &[Judgement]) -> Vec<Rival> {
         let best = &refitted[first];
         let each = refitted.iter().zip(judged).enumerate();
         let others = each.filter(|(k, (_, judged))| *k != first && judged.1.is_none());

@@ -26,11 +26,9 @@ pub(super) fn go_together(one: &Term, other: &Term) -> bool {
 }
 
 /// Whether its covariate is rain, which leads what it feeds: a river, a spring, the water in the slope.
-pub(super) fn is_rain(term: &Term, drivers: &[(usize, Driver)]) -> bool {
-    let channel = drivers
-        .iter()
-        .find(|(index, _)| Some(*index) == term.channel);
-    channel.is_some_and(|(_, driver)| driver.kind == CovariateKind::Rain)
+pub(super) fn is_rain(term: &Term, drivers: &[Driver]) -> bool {
+    let channel = Driver::at(drivers, term.channel);
+    channel.is_some_and(|driver| driver.kind == CovariateKind::Rain)
 }
 
 #[cfg(test)]

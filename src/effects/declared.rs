@@ -46,18 +46,18 @@ pub fn explain_given(
     };
     let channels: Vec<Channel> = channels.iter().filter(is_named).cloned().collect();
     let mut given = Vec::new();
-    let explanation = explained_by(series, &channels, options, |cleaned, is_drawn| {
+    let look = |cleaned: &Series, channels: &[Channel], is_drawn| {
         let mut remarks = Vec::new();
-        let ready = Ready::of(cleaned.0, cleaned.1, &mut remarks);
+        let ready = Ready::of(cleaned, channels, &mut remarks);
         let law = ready
             .as_ref()
             .and_then(|ready| DeclaredLaw::of(ready, causes, is_drawn, options, progress));
         let (Some(ready), Some(law)) = (&ready, law) else {
             remarks.push(TOO_FEW.to_owned());
             given = causes.iter().map(|one| not_put_in(one, TOO_FEW)).collect();
-            return (Findings::none(cleaned.0.unit), remarks);
+            return (Findings::none(cleaned.unit), remarks);
         };
-        let (findings, judged) = law.findings(cleaned.0, ready, causes, options);
+        let (findings, judged) = law.findings(ready, causes, options);
         let is_refused = |one: &DeclaredEffect| one.rejected_because.is_some();
         if judged.iter().any(is_refused) && !findings.known_load.parts.is_empty() {
             remarks.push(ALL_IN.to_owned());
@@ -65,7 +65,8 @@ pub fn explain_given(
         given = judged;
         progress(1.0);
         (findings, remarks)
-    });
+    };
+    let explanation = explained_by(series, &channels, options, look);
     Explanation {
         given,
         ..explanation
@@ -119,17 +120,13 @@ impl DeclaredLaw {
     /// What is reported of it, and each cause with its judgement.
     fn findings(
         self,
-        series: &Series,
         ready: &Ready,
         causes: &[Cause],
         options: &Options,
     ) -> (Findings, Vec<DeclaredEffect>) {
-        let (problem, bank) = (&ready.problem, ready.bank.as_slice());
-        let ground = (problem, bank, ready.drivers.as_slice());
         let mut scratch = Scratch::default();
         let of_term = |(index, (_, found)): (usize, &(usize, DeclaredTerm))| {
-            let term = (&self.full, index);
-            effect(ground, series.unit, term, &found.how, &mut scratch)
+            effect(ready, &self.full, index, &found.how, &mut scratch)
         };
         let effects: Vec<Effect> = self.terms.iter().enumerate().map(of_term).collect();
         let each = causes.iter().enumerate();
@@ -150,17 +147,14 @@ impl DeclaredLaw {
         } else {
             &self.full
         };
-        let judged = Judged::of((problem, last), bank, &mut scratch);
+        let judged = Judged::of(&ready.problem, last, &ready.bank, &mut scratch);
         // Noise that remembers is no effect that was declared, and without one it stands for all that is not explained.
         let is_left = judged.is_some_and(|judged| {
             let remembers = standing.is_empty() && judged.memory_gain() > options.bic_margin;
             judged.load_gain() > options.bic_margin || remembers
         });
-        let verdict = self.verdict(
-            (&effects, &standing),
-            is_left,
-            standing.len() < causes.len(),
-        );
+        let is_any_refused = standing.len() < causes.len();
+        let verdict = self.verdict(&effects, &standing, is_left, is_any_refused);
         let found = SearchResult {
             plain: ready.plain.clone(),
             null: self.null,
@@ -170,8 +164,7 @@ impl DeclaredLaw {
             withheld: None,
             has_slow_load: false,
         };
-        let of_all = (found, verdict);
-        let findings = findings(series.unit, ground, of_all, options, &mut scratch);
+        let findings = findings(ready, found, verdict, options, &mut scratch);
         (findings, given)
     }
 
@@ -188,7 +181,8 @@ impl DeclaredLaw {
     /// What stands, that first which gains most; `is_left`: structure is left in the residual.
     fn verdict(
         &self,
-        (effects, standing): (&[Effect], &[usize]),
+        effects: &[Effect],
+        standing: &[usize],
         is_left: bool,
         is_any_refused: bool,
     ) -> Verdict {
@@ -276,13 +270,13 @@ impl Search<'_> {
         let terms = shapes(&ground, cause);
         let of_noise = |kind| {
             let tried: Vec<Tried> = terms.iter().map(|term| ground.tried(term)).collect();
-            let null_gains = ground.null_gains_of_noise((&tried, kind), count, seed + 1);
+            let null_gains = ground.null_gains_of_noise(&tried, kind, count, seed + 1);
             null_gains.p_value(one.gain)
         };
         let p_value = if one.term.is_jump_of_reading() {
             of_noise(Innovations::WithoutJumps)
         } else if let Some(channel) = one.term.channel {
-            let place = ground.drivers.iter().position(|own| own.0 == channel)?;
+            let place = ground.drivers.iter().position(|own| own.index == channel)?;
             let own = &ground.drivers[place..=place];
             let null_gains = ground.null_gains_of(own, count, seed);
             // The null gains have paid for nothing.

@@ -113,7 +113,8 @@ pub(super) struct Judged<'a> {
 impl<'a> Judged<'a> {
     /// Of a fit's own residual, what its parameters can still take projected out.
     pub(super) fn of(
-        (problem, fitted): (&Problem, &Fitted),
+        problem: &Problem,
+        fitted: &Fitted,
         bank: &'a [Whitener],
         scratch: &mut Scratch,
     ) -> Option<Self> {

@@ -28,10 +28,10 @@ pub fn explain(
     options: &Options,
     progress: &mut dyn FnMut(f64),
 ) -> Explanation {
-    explained_by(series, channels, options, |cleaned, is_drawn| {
-        let (findings, remarks) = look(cleaned, is_drawn, options, progress);
-        let parted = partition_candidate(cleaned.0, neighbours, options);
-        let parted = by_own_event(&findings, parted, (cleaned.0, neighbours), options);
+    explained_by(series, channels, options, |cleaned, channels, is_drawn| {
+        let (findings, remarks) = look(cleaned, channels, is_drawn, options, progress);
+        let parted = partition_candidate(cleaned, neighbours, options);
+        let parted = by_own_event(&findings, parted, cleaned, neighbours, options);
         progress(1.0);
         (with_partition(findings, parted), remarks)
     })
@@ -43,7 +43,7 @@ pub(super) fn explained_by(
     series: &Series,
     channels: &[Channel],
     options: &Options,
-    look: impl FnOnce((&Series, &[Channel]), bool) -> (Findings, Vec<String>),
+    look: impl FnOnce(&Series, &[Channel], bool) -> (Findings, Vec<String>),
 ) -> Explanation {
     let data_hash = hash(series, channels);
     let (first, last) = (series.readings.first(), series.readings.last());
@@ -60,7 +60,7 @@ pub(super) fn explained_by(
         .faults
         .iter()
         .any(|fault| fault.kind == FaultKind::Interpolated && fault.channel.is_none());
-    let (findings, of_search) = look((series, channels), is_drawn);
+    let (findings, of_search) = look(series, channels, is_drawn);
     let critical = options.critical_velocity_mm_per_day;
     let forecast = forecast_change(series, channels, &findings.known_load, critical);
     let of_channels = remarks::of_channels(series, channels);
@@ -102,7 +102,8 @@ pub(super) fn explained_by(
 fn by_own_event(
     findings: &Findings,
     (mut found, candidate): (Option<Effect>, Option<Candidate>),
-    (series, neighbours): (&Series, &[&Series]),
+    series: &Series,
+    neighbours: &[&Series],
     options: &Options,
 ) -> (Option<Effect>, Option<Candidate>) {
     let effects: Vec<&Effect> = std::iter::once(&findings.verdict)
@@ -153,7 +154,8 @@ fn with_partition(
 
 /// Searches for what the law lacks; with what is to be remarked of it. `is_drawn`: the values are not raw readings.
 fn look(
-    (series, channels): (&Series, &[Channel]),
+    series: &Series,
+    channels: &[Channel],
     is_drawn: bool,
     options: &Options,
     progress: &mut dyn FnMut(f64),
@@ -170,19 +172,9 @@ fn look(
     let Some(mut found) = search.run(ready.plain.clone(), progress) else {
         return (none, remarks);
     };
-    let ground = (
-        &ready.problem,
-        ready.bank.as_slice(),
-        ready.drivers.as_slice(),
-    );
-    let verdict = conclude(
-        ground,
-        series.unit,
-        &mut found,
-        (options.bic_margin, &mut scratch),
-    );
+    let verdict = conclude(&ready, &mut found, options.bic_margin, &mut scratch);
     let withheld = found.withheld;
-    let findings = findings(series.unit, ground, (found, verdict), options, &mut scratch);
+    let findings = findings(&ready, found, verdict, options, &mut scratch);
     if !is_drawn {
         return (findings, remarks);
     }

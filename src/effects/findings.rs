@@ -9,14 +9,14 @@ use super::explanation::{
     Structure,
 };
 use super::fresh::{best_of_starts, fresh_starts};
-use super::judge::{HeldOut, held_out, named, step_errors};
+use super::judge::{Compared, HeldOut, held_out, named, step_errors};
 use super::kind::Kind;
 use super::known_load::KnownLoad;
-use super::noise::{Memory, Whitener};
+use super::noise::Memory;
 use super::options::Options;
 use super::problem::Problem;
+use super::ready::Ready;
 use super::refit::{Fitted, Start};
-use super::response::Driver;
 use super::rival::Rival;
 use super::search::SearchResult;
 use super::term::{Scratch, Term};
@@ -29,9 +29,6 @@ const LEFT_OVER: f64 = 0.001;
 
 /// Most stretches of structure that are reported.
 const MOST_STRETCHES: usize = 8;
-
-/// Readings, noise models, covariates.
-type SearchGround<'a> = (&'a Problem, &'a [Whitener], &'a [(usize, Driver)]);
 
 /// What a search found, with the figures, tests and curves that are reported of it.
 pub(super) struct Findings {
@@ -65,15 +62,15 @@ impl Findings {
     }
 }
 
-/// All that is reported of what was found and concluded, in `unit`.
+/// All that is reported of what was found and concluded.
 pub(super) fn findings(
-    unit: Unit,
-    ground: SearchGround,
-    (found, verdict): (SearchResult, Verdict),
+    ready: &Ready,
+    found: SearchResult,
+    verdict: Verdict,
     options: &Options,
     scratch: &mut Scratch,
 ) -> Findings {
-    let (problem, _, drivers) = ground;
+    let (problem, unit) = (&ready.problem, ready.unit);
     let Verdict {
         mut effects,
         explained,
@@ -83,22 +80,28 @@ pub(super) fn findings(
     let noise = noise_report(&full, unit);
     // Errors are those of least squares, before and after.
     let after = least_squares(problem, &full, scratch).unwrap_or_else(|| found.plain.clone());
-    let held = held_out(
-        problem,
-        (&found.plain, &full),
-        options.held_out_share,
-        scratch,
-    );
-    let both = (&found.null, &full);
-    let error = errors(problem, (&found.plain, &after), held.as_ref(), unit);
+    let by_least_squares = Compared {
+        before: &found.plain,
+        after: &after,
+    };
+    let both = Compared {
+        before: &found.plain,
+        after: &full,
+    };
+    let held = held_out(problem, both, options.held_out_share, scratch);
+    let both = Compared {
+        before: &found.null,
+        after: &full,
+    };
+    let error = errors(problem, by_least_squares, held.as_ref(), unit);
     let error = ErrorChange {
-        held_out_step: steps(problem, both, held.as_ref(), (unit, scratch)),
+        held_out_step: steps(ready, both, held.as_ref(), scratch),
         ..error
     };
-    let (residual, left) = residual_tests(ground, both, scratch);
-    let explained = confirmed(explained, (&full, &noise), &error, &residual);
-    let curves = curves(problem, (&found.plain, &after, held.as_ref()), unit, left);
-    let curves = with_effects(curves, ground, &full, unit, scratch);
+    let (residual, left) = residual_tests(ready, both, scratch);
+    let explained = confirmed(explained, &full, &noise, &error, &residual);
+    let curves = curves(problem, by_least_squares, held.as_ref(), unit, left);
+    let curves = with_effects(curves, ready, &full, scratch);
     let mut candidates = found.candidates;
     candidates.sort_by(|a, b| b.bic_gain.total_cmp(&a.bic_gain));
     Findings {
@@ -111,7 +114,7 @@ pub(super) fn findings(
         residual,
         noise,
         curves,
-        known_load: KnownLoad::of(problem, &full, drivers),
+        known_load: KnownLoad::of(problem, &full, &ready.drivers),
     }
 }
 
@@ -133,35 +136,40 @@ fn noise_report(full: &Fitted, unit: Unit) -> NoiseReport {
 /// Errors over the later block, each reading predicted from those before it; by what the law learned before the block moves
 /// where that cannot be fitted.
 fn steps(
-    problem: &Problem,
-    both: (&Fitted, &Fitted),
+    ready: &Ready,
+    both: Compared<'_>,
     held: Option<&HeldOut>,
-    (unit, scratch): (Unit, &mut Scratch),
+    scratch: &mut Scratch,
 ) -> Change {
+    let problem = &ready.problem;
     let Some(held) = held else {
         return Change::default();
     };
     // With nothing added there is nothing to compare.
-    let both = if both.1.terms.is_empty() {
-        (both.1, both.1)
+    let newest = both.after.terms.len();
+    let both = if newest == 0 {
+        Compared {
+            before: both.after,
+            ..both
+        }
     } else {
         both
     };
-    let known = step_errors(problem, both, (held.from, both.1.terms.len()), scratch);
+    let known = step_errors(problem, both, held.from, newest, scratch);
     let (before, after) = known.map_or_else(
         || held.errors_of_changes(problem),
         |steps| (steps.before, steps.after),
     );
     Change {
-        before: Some(before / unit.factor()),
-        after: Some(after / unit.factor()),
+        before: Some(before / ready.unit.factor()),
+        after: Some(after / ready.unit.factor()),
     }
 }
 
 /// Errors of the fit, and extrapolated over the later block.
 fn errors(
     problem: &Problem,
-    (before, after): (&Fitted, &Fitted),
+    Compared { before, after }: Compared<'_>,
     held: Option<&HeldOut>,
     unit: Unit,
 ) -> ErrorChange {
@@ -185,7 +193,8 @@ fn errors(
 /// What was concluded to be explained in full is so only where the figures and the tests say nothing else.
 fn confirmed(
     explained: Explained,
-    (full, noise): (&Fitted, &NoiseReport),
+    full: &Fitted,
+    noise: &NoiseReport,
     error: &ErrorChange,
     residual: &ResidualTests,
 ) -> Explained {
@@ -200,17 +209,12 @@ fn confirmed(
 }
 
 /// The curves with what each effect adds.
-fn with_effects(
-    mut curves: Curves,
-    (problem, _, drivers): SearchGround,
-    full: &Fitted,
-    unit: Unit,
-    scratch: &mut Scratch,
-) -> Curves {
+fn with_effects(mut curves: Curves, ready: &Ready, full: &Fitted, scratch: &mut Scratch) -> Curves {
+    let problem = &ready.problem;
     for (index, term) in full.terms.iter().enumerate() {
-        let name = unique(&curves, named(term, drivers).to_string());
+        let name = unique(&curves, named(term, &ready.drivers).to_string());
         let added = contribution(problem, full, index, scratch);
-        let added = added.into_iter().map(|value| value / unit.factor());
+        let added = added.into_iter().map(|value| value / ready.unit.factor());
         curves.contributions.insert(name.clone(), added.collect());
         if let Some(load) = log_load(problem, full, index) {
             curves.log_loads.insert(name, load);
@@ -274,7 +278,8 @@ fn log_load(problem: &Problem, full: &Fitted, index: usize) -> Option<Vec<f64>> 
 
 fn curves(
     problem: &Problem,
-    (before, after, held): (&Fitted, &Fitted, Option<&HeldOut>),
+    Compared { before, after }: Compared<'_>,
+    held: Option<&HeldOut>,
     unit: Unit,
     left: [Left; 2],
 ) -> Curves {
@@ -320,13 +325,14 @@ struct Tests {
 
 /// The tests of the residual, the undeclared load left in it, and its autocorrelation, before and after.
 fn residual_tests(
-    (problem, bank, _): SearchGround,
-    (null, full): (&Fitted, &Fitted),
+    ready: &Ready,
+    Compared { before, after }: Compared<'_>,
     scratch: &mut Scratch,
 ) -> (ResidualTests, [Left; 2]) {
-    let [(before, left_before), (after, left_after)] = [null, full]
+    let problem = &ready.problem;
+    let [(before, left_before), (after, left_after)] = [before, after]
         .map(|fitted| {
-            let judged = Judged::of((problem, fitted), bank, scratch)?;
+            let judged = Judged::of(problem, fitted, &ready.bank, scratch)?;
             let innovations = innovations(problem, fitted, judged.plain);
             let load = judged
                 .load

@@ -77,7 +77,7 @@ pub(super) fn from_the_first_readings(
         } else {
             &[0.0]
         };
-        let start = in_terms_of(&next, (&part, &known), term);
+        let start = in_terms_of(&next, &part, &known, term);
         let starts = sizes.iter().map(|size| {
             if known.terms.is_empty() {
                 start.clone().with_size(term, *size)
@@ -124,7 +124,7 @@ pub(super) fn under_growing_means(
 
 /// What was fitted to one part of the readings, in the parameters of another: these are in units of its span and of its
 /// usual velocity.
-fn in_terms_of(next: &Problem, (part, known): (&Problem, &Fitted), term: &Term) -> Start {
+fn in_terms_of(next: &Problem, part: &Problem, known: &Fitted, term: &Term) -> Start {
     let mut start = Start::at(known);
     let longer = next.whole_span() / part.whole_span();
     let faster = next.typical_velocity() / part.typical_velocity();

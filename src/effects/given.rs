@@ -153,8 +153,8 @@ pub(super) fn shapes(ground: &TrialBase, cause: &Cause) -> Vec<Term> {
     match kind.definition().trying {
         Trying::CovariateInLoad(_) | Trying::CovariateInReading(_) => {
             let mut drivers = ground.drivers.iter();
-            let own = drivers.find(|(_, driver)| Some(&driver.name) == cause.channel.as_ref());
-            let through = own.map(|(index, driver)| ground.through(kind, (*index, driver)));
+            let own = drivers.find(|driver| Some(&driver.name) == cause.channel.as_ref());
+            let through = own.map(|driver| ground.through(kind, driver));
             through.unwrap_or_default().into_iter().flatten().collect()
         }
         Trying::Once(_) => times(problem, cause.at)

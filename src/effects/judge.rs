@@ -11,6 +11,20 @@ use super::rival::Rival;
 use super::term::{Scratch, Term, law_parameters};
 use crate::reading::Quantity;
 
+/// A fit without effects that are judged, and one with them.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Compared<'a> {
+    pub(super) before: &'a Fitted,
+    pub(super) after: &'a Fitted,
+}
+
+impl Compared<'_> {
+    /// How many terms are judged: the newest ones.
+    pub(super) fn newest(self) -> usize {
+        self.after.terms.len() - self.before.terms.len()
+    }
+}
+
 /// The later block has at least so many readings.
 const FEWEST_HELD_OUT: usize = 5;
 
@@ -34,11 +48,7 @@ const LOOSENING: [&str; 9] = [
 ];
 
 /// Why `fitted` (the last of its terms being new) is not what the physics allow; `None` if it is.
-pub(super) fn objection(
-    problem: &Problem,
-    fitted: &Fitted,
-    drivers: &[(usize, Driver)],
-) -> Option<String> {
+pub(super) fn objection(problem: &Problem, fitted: &Fitted, drivers: &[Driver]) -> Option<String> {
     let term = fitted.terms.last()?;
     let own = &fitted.parameters[fitted.parameters.len() - term.coefficients()..];
     if let Some(response) = term.response
@@ -49,10 +59,8 @@ pub(super) fn objection(
             response.memory_days()
         ));
     }
-    let channel = term
-        .channel
-        .and_then(|index| drivers.iter().find(|(own, _)| *own == index));
-    let loosening = channel.is_some_and(|(_, driver)| is_loosening(&driver.name));
+    let channel = Driver::at(drivers, term.channel);
+    let loosening = channel.is_some_and(|driver| is_loosening(&driver.name));
     let level = term.response.is_some_and(|r| r.form == Form::Level);
     match term.act {
         Act::Load(_) if loosening && level && own[0] < 0.0 => {
@@ -109,12 +117,7 @@ fn jumps_at_once(problem: &Problem, fitted: &Fitted) -> bool {
 
 /// Why a jump in the sense of the motion may be slip and no offset; `None` where a jump back is evidence of the
 /// instrument, or nothing is evidence of slip.
-fn slip_instead(
-    problem: &Problem,
-    at: usize,
-    size: f64,
-    drivers: &[(usize, Driver)],
-) -> Option<String> {
+fn slip_instead(problem: &Problem, at: usize, size: f64, drivers: &[Driver]) -> Option<String> {
     let level = |range: std::ops::Range<usize>| median(problem.y[range].to_vec());
     let beside = 5;
     let comes_back = (beside..problem.t.len() - beside).any(|i| {
@@ -128,11 +131,11 @@ fn slip_instead(
     if gap > LONGEST_JUMP_DAYS {
         return Some(format!("in {gap:.0} days fast creep would look the same"));
     }
-    let wet = drivers.iter().find(|(_, driver)| {
+    let wet = drivers.iter().find(|driver| {
         is_loosening(&driver.name)
             && driver.is_high(problem.t[at] - LONGEST_JUMP_DAYS, problem.t[at])
     });
-    wet.map(|(_, driver)| {
+    wet.map(|driver| {
         format!(
             "{} is among its highest just before: slip would look the same",
             driver.name
@@ -225,7 +228,7 @@ fn shown(problem: &Problem, fitted: &Fitted, term: &Term) -> Option<usize> {
 /// block, because it had hardly acted, a later block is taken.
 pub(super) fn held_out(
     problem: &Problem,
-    (before, after): (&Fitted, &Fitted),
+    Compared { before, after }: Compared<'_>,
     share: f64,
     scratch: &mut Scratch,
 ) -> Option<HeldOut> {
@@ -259,7 +262,7 @@ pub(super) fn without_block(
 ) -> Option<Fitted> {
     let part = problem.trained_on(from);
     let mut starts = fresh_starts(&part, &fitted.terms);
-    starts.push(in_units_of(&part, (problem, fitted)));
+    starts.push(in_units_of(&part, problem, fitted));
     best_of_starts(&part, &starts, scratch)
 }
 
@@ -278,26 +281,22 @@ pub(super) struct StepErrors {
 /// question. `None` where it cannot be fitted.
 pub(super) fn step_errors(
     problem: &Problem,
-    (before, after): (&Fitted, &Fitted),
-    (from, newest): (usize, usize),
+    Compared { before, after }: Compared<'_>,
+    from: usize,
+    newest: usize,
     scratch: &mut Scratch,
 ) -> Option<StepErrors> {
     let part = problem.trained_on(from);
     let known = [Whitener::new(
         &part,
-        noise_in_units_of(&part, (problem, after.noise)),
+        noise_in_units_of(&part, problem, after.noise),
     )];
-    let early = refit(
-        &part,
-        &in_units_of(&part, (problem, after)),
-        &known,
-        scratch,
-    )?;
-    let early = in_units_of(problem, (&part, &early));
+    let early = refit(&part, &in_units_of(&part, problem, after), &known, scratch)?;
+    let early = in_units_of(problem, &part, &early);
     let newest = &after.terms[after.terms.len() - newest..];
     let learned: usize = newest.iter().map(Term::coefficients).sum();
     let whole = Whitener::new(problem, after.noise);
-    let frozen = under_learned(problem, after, (&early.parameters, learned), scratch)?;
+    let frozen = under_learned(problem, after, &early.parameters, learned, scratch)?;
     let own = Whitener::new(problem, before.noise);
     let errors = |fitted: &Fitted, whitener: &Whitener| {
         let residual = fitted.residual(problem);
@@ -318,7 +317,8 @@ pub(super) fn step_errors(
 fn under_learned(
     problem: &Problem,
     after: &Fitted,
-    (early, learned): (&[f64], usize),
+    early: &[f64],
+    learned: usize,
     scratch: &mut Scratch,
 ) -> Option<Fitted> {
     let whole = [Whitener::new(problem, after.noise)];
@@ -344,7 +344,7 @@ fn under_learned(
 
 /// A start at a fit to a part of the readings, or to all, in the units of `next`: coefficients of what answers to the
 /// motion are in units of the usual velocity.
-fn in_units_of(next: &Problem, (known, fitted): (&Problem, &Fitted)) -> Start {
+fn in_units_of(next: &Problem, known: &Problem, fitted: &Fitted) -> Start {
     let faster = next.typical_velocity() / known.typical_velocity();
     let mut start = Start::at(fitted);
     let mut from = law_parameters(known);
@@ -357,12 +357,12 @@ fn in_units_of(next: &Problem, (known, fitted): (&Problem, &Fitted)) -> Start {
         }
         from += term.coefficients();
     }
-    start.noise = noise_in_units_of(next, (known, fitted.noise));
+    start.noise = noise_in_units_of(next, known, fitted.noise);
     start
 }
 
 /// The same noise in the units of `next`: that of a load is in units of the usual velocity.
-fn noise_in_units_of(next: &Problem, (known, noise): (&Problem, Noise)) -> Noise {
+fn noise_in_units_of(next: &Problem, known: &Problem, noise: Noise) -> Noise {
     if noise.memory != Memory::Load {
         return noise;
     }
@@ -373,13 +373,11 @@ fn noise_in_units_of(next: &Problem, (known, noise): (&Problem, Noise)) -> Noise
 }
 
 /// What a term is called: its kind, and its channel where there is one.
-pub(super) fn named(term: &Term, drivers: &[(usize, Driver)]) -> Rival {
-    let channel = term
-        .channel
-        .and_then(|index| drivers.iter().find(|(own, _)| *own == index));
+pub(super) fn named(term: &Term, drivers: &[Driver]) -> Rival {
+    let channel = Driver::at(drivers, term.channel);
     Rival {
         kind: term.kind,
-        channel: channel.map(|(_, driver)| driver.name.clone()),
+        channel: channel.map(|driver| driver.name.clone()),
     }
 }
 

@@ -102,7 +102,7 @@ pub struct Wave {
 
 impl KnownLoad {
     /// What of `fitted` can be said of times to come.
-    pub(super) fn of(problem: &Problem, fitted: &Fitted, drivers: &[(usize, Driver)]) -> Self {
+    pub(super) fn of(problem: &Problem, fitted: &Fitted, drivers: &[Driver]) -> Self {
         let own = |(index, term): (usize, &Term)| {
             part(problem, term, coefficients(problem, fitted, index), drivers)
         };
@@ -223,7 +223,7 @@ impl Filtered {
 
     fn times(&self, gain: f64, channels: &[&Channel], times: &[Timestamp]) -> Option<Vec<f64>> {
         let epoch = *times.first()?;
-        let driver = Driver::new(self.channel(channels)?, epoch)?;
+        let driver = Driver::new(0, self.channel(channels)?, epoch)?;
         let days: Vec<f64> = times.iter().map(|time| days_since(epoch, *time)).collect();
         let response = Response {
             form: self.form,
@@ -266,7 +266,7 @@ fn step(at: Timestamp, size: f64, times: &[Timestamp]) -> Vec<f64> {
 }
 
 /// `None` for what has no say in times to come.
-fn part(problem: &Problem, term: &Term, own: &[f64], drivers: &[(usize, Driver)]) -> Option<Part> {
+fn part(problem: &Problem, term: &Term, own: &[f64], drivers: &[Driver]) -> Option<Part> {
     let size = *own.first()?;
     let part = match &term.act {
         Act::Load(_) if term.channel.is_some() => Part::Load {
@@ -299,10 +299,8 @@ fn part(problem: &Problem, term: &Term, own: &[f64], drivers: &[(usize, Driver)]
     })
 }
 
-fn filtered(term: &Term, drivers: &[(usize, Driver)], nodes: &[f64]) -> Option<Filtered> {
-    let (_, driver) = drivers
-        .iter()
-        .find(|(index, _)| Some(*index) == term.channel)?;
+fn filtered(term: &Term, drivers: &[Driver], nodes: &[f64]) -> Option<Filtered> {
+    let driver = Driver::at(drivers, term.channel)?;
     let response = term.response?;
     let values = driver.respond_in_unit(response, nodes);
     let n = values.len() as f64;

@@ -1,7 +1,7 @@
 //! Two effects at once. Where a law lacks two, either alone may bend it so that the later block is predicted worse, and neither would
 //! ever be accepted: what the readings refuse of the first for that reason alone is tried with a second beside it.
 
-use super::judge::{held_out, step_errors};
+use super::judge::{Compared, held_out, step_errors};
 use super::refit::Fitted;
 use super::search::{Accepted, Judgement, OneMore, Refitted, Search};
 
@@ -15,7 +15,8 @@ impl Search<'_> {
     pub(super) fn two_together(
         &mut self,
         base: &Fitted,
-        (refitted, judged): (&[Refitted], &[Judgement]),
+        refitted: &[Refitted],
+        judged: &[Judgement],
         round: usize,
     ) -> Option<OneMore> {
         let each = || refitted.iter().zip(judged);
@@ -59,12 +60,16 @@ impl Search<'_> {
     /// Whether both together predict the block no worse, in each way that a single effect may be judged by: what is forgiven of an
     /// effect alone, because the law drifts without another, is not forgiven of both.
     fn is_no_worse(&mut self, base: &Fitted, both: &Fitted) -> bool {
-        let (models, share) = ((base, both), self.options.held_out_share);
+        let models = Compared {
+            before: base,
+            after: both,
+        };
+        let share = self.options.held_out_share;
         let Some(held) = held_out(self.problem, models, share, &mut self.scratch) else {
             return false;
         };
-        let count = (held.from, both.terms.len() - base.terms.len());
-        let steps = step_errors(self.problem, models, count, &mut self.scratch);
+        let newest = models.newest();
+        let steps = step_errors(self.problem, models, held.from, newest, &mut self.scratch);
         let by_steps =
             steps.is_some_and(|steps| steps.after <= steps.before && steps.deviance <= 0.0);
         let falls = |(before, after): (f64, f64)| after <= before;

@@ -8,16 +8,18 @@ use super::refit::Fitted;
 use super::response::Driver;
 use super::search::{Search, plain};
 use super::term::Scratch;
-use crate::reading::{Channel, Series};
+use crate::reading::{Channel, Series, Unit};
 
 /// All that a search rests on.
 #[derive(Debug)]
 pub(super) struct Ready {
     pub(super) problem: Problem,
-    pub(super) drivers: Vec<(usize, Driver)>,
+    pub(super) drivers: Vec<Driver>,
     pub(super) bank: Vec<Whitener>,
     /// The plain law by least squares.
     pub(super) plain: Fitted,
+    /// In which it is reported.
+    pub(super) unit: Unit,
 }
 
 impl Ready {
@@ -37,6 +39,7 @@ impl Ready {
             drivers,
             problem,
             plain,
+            unit: series.unit,
         })
     }
 

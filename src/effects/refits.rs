@@ -7,7 +7,7 @@ use super::fresh::{best_of_starts, fresh_laws, from_the_first_readings, under_gr
 use super::linear::Linear;
 use super::noise::{Noise, Whitener};
 use super::refit::{Fitted, Start, jacobian, likeliest, refit, under_likeliest};
-use super::response::Response;
+use super::response::{Driver, Response};
 use super::search::{Refitted, SIGNIFICANT, Search};
 use super::surrogate::{Innovations, NullGains};
 use super::term::Term;
@@ -79,7 +79,7 @@ impl<'a> Search<'a> {
         let covariates = self.refit_each(base, covariates);
         let (others, tried) = ground.of_itself();
         // Only what passes the margin is judged by it.
-        let of_noise = |kind| ground.null_gains_of_noise((&tried, kind), count, seed + 1);
+        let of_noise = |kind| ground.null_gains_of_noise(&tried, kind, count, seed + 1);
         let alone = LazyCell::new(|| of_noise(Innovations::AsTheyAre));
         let without_jumps = LazyCell::new(|| of_noise(Innovations::WithoutJumps));
         let mut all = Vec::new();
@@ -317,10 +317,7 @@ impl<'a> Search<'a> {
             return self.at_another_time(term, stride, later);
         }
         let response = term.response?;
-        let (_, driver) = self
-            .drivers
-            .iter()
-            .find(|(index, _)| Some(*index) == term.channel)?;
+        let driver = Driver::at(self.drivers, term.channel)?;
         if response.mean_days <= 0.0 {
             return None;
         }
@@ -338,14 +335,13 @@ impl<'a> Search<'a> {
         if response.memory_days() > 0.5 * self.problem.span() || response.mean_days < shortest {
             return None;
         }
-        let own = (term.channel?, driver);
         if matches!(term.act, Act::Reading(_)) {
             let Response {
                 stages, mean_days, ..
             } = response;
-            return candidates::in_reading(self.problem, term.kind, own, stages, mean_days);
+            return candidates::in_reading(self.problem, term.kind, driver, stages, mean_days);
         }
-        candidates::in_load(self.problem, term.kind, own, response)
+        candidates::in_load(self.problem, term.kind, driver, response)
     }
 
     fn at_another_time(&self, term: &Term, stride: Stride, later: bool) -> Option<Term> {

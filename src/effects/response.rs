@@ -7,6 +7,8 @@ use crate::reading::{Channel, CovariateKind, Timestamp, days_since};
 /// A covariate's values on an even grid of days, standardised by nothing: in its own unit.
 #[derive(Debug, Clone)]
 pub(super) struct Driver {
+    /// Its place among the covariates that were given.
+    pub(super) index: usize,
     pub(super) name: String,
     /// What it measures.
     pub(super) kind: CovariateKind,
@@ -40,8 +42,14 @@ impl Response {
 }
 
 impl Driver {
-    /// The channel in days since `epoch`, linear between its samples; `None` where it holds no change.
-    pub(super) fn new(channel: &Channel, epoch: Timestamp) -> Option<Self> {
+    /// The one of `drivers` with this index.
+    pub(super) fn at(drivers: &[Self], index: Option<usize>) -> Option<&Self> {
+        drivers.iter().find(|one| Some(one.index) == index)
+    }
+
+    /// The channel, which stands at `index` among those that were given, in days since `epoch`, linear between its samples; `None`
+    /// where it holds no change.
+    pub(super) fn new(index: usize, channel: &Channel, epoch: Timestamp) -> Option<Self> {
         let samples: Vec<(f64, f64)> = channel
             .samples
             .iter()
@@ -73,6 +81,7 @@ impl Driver {
             k += 1.0;
         }
         Some(Self {
+            index,
             name: channel.name.clone(),
             kind: channel.kind(),
             start: first.0,

@@ -5,7 +5,7 @@ use super::candidates;
 use super::definition::Support;
 use super::explanation::Candidate;
 use super::fresh::best_of_starts;
-use super::judge::{HeldOut, block, held_out, objection, step_errors};
+use super::judge::{Compared, HeldOut, block, held_out, objection, step_errors};
 use super::kind::Kind;
 use super::noise::Whitener;
 use super::options::Options;
@@ -90,7 +90,7 @@ pub(super) enum OneMore {
 /// A search at work.
 pub(super) struct Search<'a> {
     pub(super) problem: &'a Problem,
-    pub(super) drivers: &'a [(usize, Driver)],
+    pub(super) drivers: &'a [Driver],
     pub(super) bank: &'a [Whitener],
     pub(super) options: &'a Options,
     /// Whether the values are not raw readings: smoother than any instrument's.
@@ -292,7 +292,10 @@ impl Search<'_> {
                 "an event stands too late for a later block by which to judge it".to_owned();
             return (None, is_late.then_some(reason));
         }
-        let models = (base, &one.fitted);
+        let models = Compared {
+            before: base,
+            after: &one.fitted,
+        };
         let Some(held) = held_out(self.problem, models, share, &mut self.scratch) else {
             let reason = "without the later block it cannot be fitted".to_owned();
             return (None, Some(reason));
@@ -317,13 +320,15 @@ impl Search<'_> {
         one: &Refitted,
         held: &HeldOut,
     ) -> Option<String> {
-        let newest = one.fitted.terms.len() - base.terms.len();
-        let models = (base, &one.fitted);
-        let both = (held.from, newest);
+        let models = Compared {
+            before: base,
+            after: &one.fitted,
+        };
+        let newest = models.newest();
         let (before, after) = if one.term.kind.fits_any_bend() {
             held.errors_of_changes(self.problem)
         } else {
-            let steps = step_errors(self.problem, models, both, &mut self.scratch);
+            let steps = step_errors(self.problem, models, held.from, newest, &mut self.scratch);
             match steps.filter(|steps| steps.after.is_finite() && steps.deviance.is_finite()) {
                 None => return Some("as it is learned before the later block, the readings cannot be fitted with it".to_owned()),
                 Some(steps) if steps.deviance > WORSE => {
@@ -348,10 +353,7 @@ impl Search<'_> {
         held: Option<f64>,
         reason: Option<String>,
     ) {
-        let channel = term
-            .channel
-            .and_then(|index| self.drivers.iter().find(|(own, _)| *own == index))
-            .map(|(_, driver)| driver.name.clone());
+        let channel = Driver::at(self.drivers, term.channel).map(|driver| driver.name.clone());
         let candidate = Candidate {
             effect: term.kind,
             channel,

@@ -70,22 +70,29 @@ impl NullGains {
     }
 }
 
-/// The readings, and the effects that a search tries.
-type SearchedEffects<'a> = (&'a Problem, &'static [&'static EffectDefinition]);
+/// What a search over covariates goes through.
+#[derive(Clone, Copy)]
+pub(super) struct SearchedCovariates<'a> {
+    pub(super) problem: &'a Problem,
+    /// The effects that are tried.
+    pub(super) effects: &'static [&'static EffectDefinition],
+    pub(super) linear: &'a Linear,
+    pub(super) frames: &'a Frames,
+}
 
 /// The whole search over every covariate, on covariates shifted round in time (and in every other one run
 /// backwards): all by the same share, so that what they have in common stays.
 pub(super) fn shifted_covariates(
-    own: SearchedEffects<'_>,
-    drivers: &[(usize, Driver)],
-    (linear, frames): (&Linear, &Frames),
-    (count, seed): (usize, u64),
+    searched: SearchedCovariates<'_>,
+    drivers: &[Driver],
+    count: usize,
+    seed: u64,
 ) -> NullGains {
     let mut random = Pcg64Mcg::seed_from_u64(seed);
-    let before = frames.deviance();
+    let before = searched.frames.deviance();
     let finds = (0..count).filter_map(|k| {
         let share = random.random_range(LEAST_SHIFT..1.0 - LEAST_SHIFT);
-        let each = drivers.iter().filter_map(|(index, driver)| {
+        let each = drivers.iter().filter_map(|driver| {
             #[expect(
                 clippy::cast_possible_truncation,
                 clippy::cast_sign_loss,
@@ -93,7 +100,7 @@ pub(super) fn shifted_covariates(
             )]
             let by = (share * driver.len() as f64) as usize;
             let other = driver.shifted(by, k % 2 == 1);
-            best_response(own, (*index, &other), (linear, frames))
+            best_response(searched, &other)
         });
         let best = each.min_by(|a, b| a.1.total_cmp(&b.1))?;
         Some((best.0, before - best.1))
@@ -110,37 +117,33 @@ pub(super) fn shifted_covariates(
 
 /// The likeliest response of one covariate with its -2 ln likelihood: a coarser search than that for the covariate
 /// itself, which gains less for it.
-fn best_response(
-    (problem, effects): SearchedEffects<'_>,
-    own: (usize, &Driver),
-    (linear, frames): (&Linear, &Frames),
-) -> Option<(Term, f64)> {
-    let driver = own.1;
+fn best_response(searched: SearchedCovariates<'_>, driver: &Driver) -> Option<(Term, f64)> {
+    let problem = searched.problem;
     let delays = delays(problem, driver);
     let coarse: Vec<f64> = delays.into_iter().step_by(2).collect();
-    let tried = effects.iter();
+    let tried = searched.effects.iter();
     let tried = tried.filter(|definition| definition.is_tried_through(driver.kind));
     let each = tried.flat_map(|definition| {
         let kind = Kind::of(definition);
         if let Trying::CovariateInReading(_) = definition.trying {
             let coarse = coarse.iter();
-            let terms = coarse.filter_map(|days| in_reading(problem, kind, own, 1, *days));
+            let terms = coarse.filter_map(|days| in_reading(problem, kind, driver, 1, *days));
             return terms.collect();
         }
         let forms = [Form::Level, Form::Rate].into_iter();
         let terms = forms
             .flat_map(|form| responses(form, &coarse))
             .filter(|response| response.stages == 2 || response.mean_days == 0.0)
-            .filter_map(|response| in_load(problem, kind, own, response));
+            .filter_map(|response| in_load(problem, kind, driver, response));
         terms.collect::<Vec<Term>>()
     });
     let mut terms = Vec::new();
     let mut columns = Vec::new();
     for term in each {
-        columns.extend(linear.columns(problem, &term));
+        columns.extend(searched.linear.columns(problem, &term));
         terms.push(term);
     }
-    let deviances = frames.deviance_with_each(&columns);
+    let deviances = searched.frames.deviance_with_each(&columns);
     let each = terms.into_iter().zip(deviances);
     each.min_by(|a, b| a.1.total_cmp(&b.1))
 }
@@ -187,8 +190,10 @@ pub(super) enum Innovations {
 /// another order.
 pub(super) fn noise_alone(
     frames: &Frames,
-    (tried, kind): (&[Tried], Innovations),
-    (count, seed): (usize, u64),
+    tried: &[Tried],
+    kind: Innovations,
+    count: usize,
+    seed: u64,
 ) -> NullGains {
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     let best = &frames.each[frames.best()];
@@ -213,7 +218,7 @@ pub(super) fn noise_alone(
         for (before, misfit) in before.iter_mut().zip(&noise.misfits) {
             *before = before.min(frame.deviance(*misfit) + frame.cost());
         }
-        noise.least(frame, (index, tried), &mut least);
+        noise.least(frame, index, tried, &mut least);
     }
     let gains = before.iter().zip(&least);
     NullGains {
@@ -243,7 +248,7 @@ impl NoiseInFrame {
 
     /// The least -2 ln likelihood of each series with one of `tried`, in this frame, which is the one of that index,
     /// where it is less than `least` has.
-    fn least(&self, frame: &Frame, (index, tried): (usize, &[Tried]), least: &mut [f64]) {
+    fn least(&self, frame: &Frame, index: usize, tried: &[Tried], least: &mut [f64]) {
         let mut from = 0;
         while from < tried.len() {
             let (mut rows, mut next) = (0, from);

@@ -11,7 +11,9 @@ use super::linear::Linear;
 use super::noise::{Memory, Whitener};
 use super::problem::Problem;
 use super::response::Driver;
-use super::surrogate::{Innovations, NullGains, Tried, noise_alone, shifted_covariates};
+use super::surrogate::{
+    Innovations, NullGains, SearchedCovariates, Tried, noise_alone, shifted_covariates,
+};
 use super::term::Term;
 
 /// A term with its linear gain.
@@ -25,7 +27,7 @@ pub(super) struct Trial {
 /// What stands before a search for one more effect.
 pub(super) struct TrialBase<'a> {
     pub(super) problem: &'a Problem,
-    pub(super) drivers: &'a [(usize, Driver)],
+    pub(super) drivers: &'a [Driver],
     /// The effects that are tried.
     pub(super) effects: &'static [&'static EffectDefinition],
     pub(super) linear: Linear,
@@ -75,8 +77,8 @@ impl TrialBase<'_> {
 
     /// What an effect may be through a covariate, by kinds of response of which each has a best one: in the load those by its level
     /// and those by its rate, in the reading those that the quantity has.
-    pub(super) fn through(&self, kind: Kind, own: (usize, &Driver)) -> Vec<Vec<Term>> {
-        let (problem, delays) = (self.problem, delays(self.problem, own.1));
+    pub(super) fn through(&self, kind: Kind, own: &Driver) -> Vec<Vec<Term>> {
+        let (problem, delays) = (self.problem, delays(self.problem, own));
         match kind.definition().trying {
             Trying::CovariateInLoad(_) => [Form::Level, Form::Rate]
                 .map(|form| {
@@ -105,14 +107,14 @@ impl TrialBase<'_> {
     /// The best response of each covariate, by its level and by its rate, on the load, and of temperatures in the reading as well.
     pub(super) fn of_covariates(&self) -> Vec<Trial> {
         let mut trials = Vec::new();
-        for (index, driver) in self.drivers {
+        for driver in self.drivers {
             let is_tried = |kind: &Kind| kind.definition().is_tried_through(driver.kind);
             for kind in self.kinds().filter(is_tried) {
-                let own = |term: &Term| term.kind == kind && term.channel == Some(*index);
+                let own = |term: &Term| term.kind == kind && term.channel == Some(driver.index);
                 if self.present.iter().any(own) {
                     continue;
                 }
-                for terms in self.through(kind, (*index, driver)) {
+                for terms in self.through(kind, driver) {
                     let each = terms.into_iter().map(|term| self.trial(term));
                     trials.extend(each.max_by(|a, b| a.gain.total_cmp(&b.gain)));
                 }
@@ -163,24 +165,24 @@ impl TrialBase<'_> {
     }
 
     /// What the search over these covariates gains without any effect.
-    pub(super) fn null_gains_of(
-        &self,
-        drivers: &[(usize, Driver)],
-        count: usize,
-        seed: u64,
-    ) -> NullGains {
-        let both = (&self.linear, &self.frames);
-        let own = (self.problem, self.effects);
-        shifted_covariates(own, drivers, both, (count, seed))
+    pub(super) fn null_gains_of(&self, drivers: &[Driver], count: usize, seed: u64) -> NullGains {
+        let searched = SearchedCovariates {
+            problem: self.problem,
+            effects: self.effects,
+            linear: &self.linear,
+            frames: &self.frames,
+        };
+        shifted_covariates(searched, drivers, count, seed)
     }
 
     /// What the search without covariates gains without any effect.
     pub(super) fn null_gains_of_noise(
         &self,
-        tried: (&[Tried], Innovations),
+        tried: &[Tried],
+        kind: Innovations,
         count: usize,
         seed: u64,
     ) -> NullGains {
-        noise_alone(&self.frames, tried, (count, seed))
+        noise_alone(&self.frames, tried, kind, count, seed)
     }
 }

@@ -8,6 +8,7 @@ use super::judge::{coefficients, named};
 use super::kind::Kind;
 use super::noise::{Memory, Whitener};
 use super::problem::Problem;
+use super::ready::Ready;
 use super::refit::{Fitted, Start, jacobian, refit, under_likeliest};
 use super::response::Driver;
 use super::rival::Rival;
@@ -45,14 +46,15 @@ const NINETY: f64 = 1.645;
 
 /// Concludes: a kind without independent evidence stands as the verdict only if nothing is left unexplained after it.
 pub(super) fn conclude(
-    (problem, bank, drivers): (&Problem, &[Whitener], &[(usize, Driver)]),
-    unit: Unit,
+    ready: &Ready,
     found: &mut SearchResult,
-    (margin, scratch): (f64, &mut Scratch),
+    margin: f64,
+    scratch: &mut Scratch,
 ) -> Verdict {
+    let problem = &ready.problem;
     let mut full = found.full.clone();
     let mut accepted = found.accepted.clone();
-    let mut judged = Judged::of((problem, &full), bank, scratch);
+    let mut judged = Judged::of(problem, &full, &ready.bank, scratch);
     let load_gain = judged.as_ref().map_or(0.0, Judged::load_gain);
     let mut left = found.has_slow_load || load_gain > margin;
     let only_labels =
@@ -61,22 +63,22 @@ pub(super) fn conclude(
     let is_whole = !left && accounts_for_all(problem, &full);
     if only_labels && !is_whole {
         left = true;
-        let (stays, kept) = what_stands((problem, bank), (found, &full), (margin, scratch));
+        let (stays, kept) = what_stands(ready, found, &full, margin, scratch);
         for (index, term) in full.terms.iter().enumerate() {
             if !kept.contains(&index) {
-                cannot_separate_from.push(named(term, drivers));
-                refuse(&mut found.candidates, (problem, term));
+                cannot_separate_from.push(named(term, &ready.drivers));
+                refuse(&mut found.candidates, problem, term);
             }
         }
         accepted = kept.iter().map(|index| accepted[*index].clone()).collect();
         full = stays;
-        judged = Judged::of((problem, &full), bank, scratch);
+        judged = Judged::of(problem, &full, &ready.bank, scratch);
     }
     let mut effects: Vec<Effect> = (0..full.terms.len())
         .map(|index| {
             let how = &accepted[index];
             cannot_separate_from.extend(how.ties.iter().cloned());
-            effect((problem, bank, drivers), unit, (&full, index), how, scratch)
+            effect(ready, &full, index, how, scratch)
         })
         .collect();
     // What independent data support comes first.
@@ -89,13 +91,13 @@ pub(super) fn conclude(
             left = true;
             cannot_separate_from.push(Rival::from(Kind::CORRELATED_NOISE));
         } else if full.noise.memory == Memory::Load {
-            full = under_memory_of_readings((problem, bank), &full, scratch).unwrap_or(full);
+            full = under_memory_of_readings(ready, &full, scratch).unwrap_or(full);
         }
     }
     let cannot_separate_from = separate(cannot_separate_from, &effects);
     let is_one_channel = cannot_separate_from.iter().all(|one| one.channel.is_none());
     if remembers && !left {
-        effects.push(correlated(unit, &full, memory_gain));
+        effects.push(correlated(ready.unit, &full, memory_gain));
     }
     let explained = match (effects.is_empty(), left || !is_one_channel) {
         (false, false) => Explained::Full,
@@ -146,12 +148,10 @@ fn is_a_load_alike(judged: &Judged) -> bool {
 }
 
 /// The same law under noise that the reading remembers.
-fn under_memory_of_readings(
-    (problem, bank): (&Problem, &[Whitener]),
-    full: &Fitted,
-    scratch: &mut Scratch,
-) -> Option<Fitted> {
-    let own = bank
+fn under_memory_of_readings(ready: &Ready, full: &Fitted, scratch: &mut Scratch) -> Option<Fitted> {
+    let problem = &ready.problem;
+    let own = ready
+        .bank
         .iter()
         .filter(|one| one.noise.memory == Memory::Reading);
     let own: Vec<Whitener> = own.cloned().collect();
@@ -192,30 +192,34 @@ fn stands_out(full: &Fitted, candidates: &[Candidate], margin: f64) -> bool {
 /// The law with those of the terms of `full` that stand beside what is left, all of them without independent evidence, and which
 /// these are.
 fn what_stands(
-    (problem, bank): (&Problem, &[Whitener]),
-    (found, full): (&SearchResult, &Fitted),
-    (margin, scratch): (f64, &mut Scratch),
+    ready: &Ready,
+    found: &SearchResult,
+    full: &Fitted,
+    margin: f64,
+    scratch: &mut Scratch,
 ) -> (Fitted, Vec<usize>) {
     if stands_out(full, &found.candidates, margin) {
         // What is left is little beside it.
         return (full.clone(), vec![0]);
     }
-    let own = (full, found.accepted.as_slice());
-    let sharp = sharp_alone((problem, bank), own, (margin, scratch));
+    let sharp = sharp_alone(ready, full, &found.accepted, margin, scratch);
     sharp.unwrap_or_else(|| (found.null.clone(), Vec::new()))
 }
 
 /// The law with those of the accepted terms alone that are jumps of the velocity, few, and each known to within a few readings,
 /// and which of the terms they are; `None` where there are none.
 fn sharp_alone(
-    (problem, bank): (&Problem, &[Whitener]),
-    (full, accepted): (&Fitted, &[Accepted]),
-    (margin, scratch): (f64, &mut Scratch),
+    ready: &Ready,
+    full: &Fitted,
+    accepted: &[Accepted],
+    margin: f64,
+    scratch: &mut Scratch,
 ) -> Option<(Fitted, Vec<usize>)> {
+    let problem = &ready.problem;
     let is_large = |index: &usize| accepted[*index].bic_gain > SHARP * margin;
     let sharp = (0..full.terms.len()).filter(is_large);
     let sharp: Vec<usize> = sharp
-        .filter(|index| is_sharp((problem, bank), (full, *index), (margin, scratch)))
+        .filter(|index| is_sharp(ready, full, *index, margin, scratch))
         .collect();
     if sharp.is_empty() || sharp.len() > MOST_LABELS {
         return None;
@@ -234,21 +238,24 @@ fn sharp_alone(
         let own = coefficients(problem, full, *index);
         start.parameters.extend(own);
     }
-    Some((refit(problem, &start, bank, scratch)?, sharp))
+    Some((refit(problem, &start, &ready.bank, scratch)?, sharp))
 }
 
 /// Whether a term is a jump of the velocity that a few readings earlier, or later, would gain far less.
 fn is_sharp(
-    (problem, bank): (&Problem, &[Whitener]),
-    (full, index): (&Fitted, usize),
-    (margin, scratch): (f64, &mut Scratch),
+    ready: &Ready,
+    full: &Fitted,
+    index: usize,
+    margin: f64,
+    scratch: &mut Scratch,
 ) -> bool {
+    let problem = &ready.problem;
     let term = &full.terms[index];
     let inside = |at: &usize| term.kind.jumps() && *at > APART && at + APART < problem.used;
     let Some(at) = term.at.filter(inside) else {
         return false;
     };
-    let own = bank.iter().filter(|one| one.noise == full.noise);
+    let own = ready.bank.iter().filter(|one| one.noise == full.noise);
     let own: Vec<Whitener> = own.cloned().collect();
     let mut loses = |at: usize| {
         let mut start = Start::at(full);
@@ -260,7 +267,7 @@ fn is_sharp(
 }
 
 /// Refuses what was accepted as this term.
-fn refuse(candidates: &mut [Candidate], (problem, term): (&Problem, &Term)) {
+fn refuse(candidates: &mut [Candidate], problem: &Problem, term: &Term) {
     let at = time_of(problem, term);
     let own = candidates
         .iter_mut()
@@ -287,20 +294,18 @@ fn correlated(unit: Unit, full: &Fitted, bic_gain: f64) -> Effect {
 
 /// Everything known of one term of the law.
 pub(super) fn effect(
-    (problem, bank, drivers): (&Problem, &[Whitener], &[(usize, Driver)]),
-    unit: Unit,
-    (full, index): (&Fitted, usize),
+    ready: &Ready,
+    full: &Fitted,
+    index: usize,
     how: &Accepted,
     scratch: &mut Scratch,
 ) -> Effect {
+    let problem = &ready.problem;
     let term = &full.terms[index];
     let own = coefficients(problem, full, index);
-    let channel = term
-        .channel
-        .and_then(|channel| drivers.iter().find(|(known, _)| *known == channel))
-        .map(|(_, driver)| driver.name.clone());
-    let factor = unit.factor();
-    let size = size(term, own, (problem, unit));
+    let channel = Driver::at(&ready.drivers, term.channel).map(|driver| driver.name.clone());
+    let factor = ready.unit.factor();
+    let size = size(ready, term, own);
     let mut said = Effect {
         channel,
         form: term.response.map(|response| response.form),
@@ -317,7 +322,7 @@ pub(super) fn effect(
         ..Effect::of(term.kind)
     };
     if said.gain_per_sd.is_some() {
-        let deviation = deviation(problem, bank, (full, index), scratch);
+        let deviation = deviation(ready, full, index, scratch);
         let scale = if matches!(term.act, Act::Reading(_)) {
             factor
         } else {
@@ -330,10 +335,11 @@ pub(super) fn effect(
 }
 
 /// Gain, size, period, as the kind has them.
-fn size(term: &Term, values: &[f64], (problem, unit): (&Problem, Unit)) -> EffectSize {
+fn size(ready: &Ready, term: &Term, values: &[f64]) -> EffectSize {
+    let problem = &ready.problem;
     let fitted = FittedCoefficients {
         values,
-        unit,
+        unit: ready.unit,
         typical_mm_per_day: problem.typical_velocity(),
         span_days: problem.whole_span(),
         spacing_days: problem.spacing,
@@ -342,13 +348,12 @@ fn size(term: &Term, values: &[f64], (problem, unit): (&Problem, Unit)) -> Effec
 }
 
 /// Standard deviation of a term's first coefficient, all others free.
-fn deviation(
-    problem: &Problem,
-    bank: &[Whitener],
-    (full, index): (&Fitted, usize),
-    scratch: &mut Scratch,
-) -> Option<f64> {
-    let whitener = bank.iter().find(|whitener| whitener.noise == full.noise)?;
+fn deviation(ready: &Ready, full: &Fitted, index: usize, scratch: &mut Scratch) -> Option<f64> {
+    let problem = &ready.problem;
+    let whitener = ready
+        .bank
+        .iter()
+        .find(|whitener| whitener.noise == full.noise)?;
     let mut columns = jacobian(problem, full, scratch);
     let earlier: usize = full.terms[..index].iter().map(Term::coefficients).sum();
     let own = columns.remove(super::term::law_parameters(problem) + earlier);

@@ -28,7 +28,7 @@ pub fn residual_structure(series: &Series) -> Option<Residual> {
     let fitted = plain(&problem, &mut scratch)?;
     problem.see(&fitted.velocity);
     let bank = Noise::bank(&problem);
-    let judged = Judged::of((&problem, &fitted), &bank, &mut scratch)?;
+    let judged = Judged::of(&problem, &fitted, &bank, &mut scratch)?;
     let (whitener, _) = judged.load?;
     let load = undeclared_load(&problem, &fitted, whitener);
     let first = load.iter().position(|one| is_clear(*one)).unwrap_or(0);

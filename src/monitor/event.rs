@@ -37,7 +37,7 @@ pub enum EventKind {
         failure_time: FailureTime,
         /// How likely it is that a collapse comes at all. Absent in states of older versions.
         #[serde(skip_serializing_if = "Option::is_none", default)]
-        chances_of_collapse: Option<ChancesOfCollapse>,
+        chances_of_collapse: Option<Box<ChancesOfCollapse>>,
         /// When the critical velocity is passed.
         #[serde(default)]
         critical_velocity_time: Box<FailureTime>,

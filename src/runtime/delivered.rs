@@ -77,12 +77,7 @@ impl Delivered {
 
     /// When `hook` was first to get this alert, by the host's clock; `None` where no state says it.
     pub(super) fn noted(&self, alert: &Alert, hook: &str) -> Option<Timestamp> {
-        let identity = (
-            alert.key.as_str(),
-            alert.level.name(),
-            state_name(alert.state),
-        );
-        self.store.as_ref()?.noted(identity, hook).ok()?
+        self.store.as_ref()?.noted(alert.identity(), hook).ok()?
     }
 
     /// What has become of this alert at `hook`; `None` where nothing says it.
@@ -94,18 +89,14 @@ impl Delivered {
         }
         let store = self.store.as_ref()?;
         // Twice is better than never.
-        let stored = store.outcome_of((&alert.key, level, state), hook);
+        let stored = store.outcome_of(alert.identity(), hook);
         stored.unwrap_or(None)
     }
 
     /// How often `hook` has been tried with this alert before this program ran.
     pub(super) fn attempts(&self, alert: &Alert, hook: &str) -> u32 {
-        let identity = (
-            alert.key.as_str(),
-            alert.level.name(),
-            state_name(alert.state),
-        );
-        let stored = (self.store.as_ref()).map(|store| store.attempts(identity, hook));
+        let stored = self.store.as_ref();
+        let stored = stored.map(|store| store.attempts(alert.identity(), hook));
         // It only numbers the attempts, and bounds them for what need not arrive.
         stored.map_or(0, |stored| stored.unwrap_or(0))
     }

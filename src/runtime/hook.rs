@@ -8,6 +8,7 @@ use crate::alert::Level;
 use crate::config::HookConfig;
 use crate::monitor::{AlertState, CLOCK_FAULT, Event, EventKind};
 use crate::reading::{BenchmarkId, Timestamp};
+use crate::store::AlertIdentity;
 use processes::{ProcessGroup, RUN, kill_all_of, run_name};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -141,6 +142,15 @@ struct CorrectionIdentity<'a> {
 }
 
 impl Alert {
+    /// What the outbox knows it by.
+    pub(super) fn identity(&self) -> AlertIdentity<'_> {
+        AlertIdentity {
+            key: &self.key,
+            level: self.level.name(),
+            state: state_name(self.state),
+        }
+    }
+
     /// The alert or the correction in `event`; `None` where it is an event of another kind.
     pub fn new(
         event: &Event,

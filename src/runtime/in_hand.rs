@@ -5,8 +5,13 @@ use crate::alert::Level;
 use crate::reading::BenchmarkId;
 use std::collections::BTreeMap;
 
-/// What distinguishes an alert from every other: its key, its level and its state.
-type AlertIdentity = (String, Level, &'static str);
+/// What distinguishes an alert from every other.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+struct InHandKey {
+    key: String,
+    level: Level,
+    state: &'static str,
+}
 
 #[derive(Debug)]
 struct Entry {
@@ -24,7 +29,7 @@ struct Entry {
 
 /// The alerts in one worker's hand, its queue included.
 #[derive(Debug, Default)]
-pub(super) struct InHand(BTreeMap<AlertIdentity, Entry>);
+pub(super) struct InHand(BTreeMap<InHandKey, Entry>);
 
 impl InHand {
     /// Takes `alert` in hand, for no attempt while `is_muted`; `false` when it is there already.
@@ -54,7 +59,7 @@ impl InHand {
 
     /// Notes of each alert whether it is silenced or shelved, by its place and level.
     pub(super) fn mute(&mut self, is_muted: &dyn Fn(Option<&BenchmarkId>, Level) -> bool) {
-        for ((_, level, _), entry) in &mut self.0 {
+        for (InHandKey { level, .. }, entry) in &mut self.0 {
             entry.is_muted = is_muted(entry.benchmark.as_ref(), *level);
         }
     }
@@ -86,11 +91,10 @@ impl InHand {
         {
             return false;
         }
-        let firing = (
-            alert.key.clone(),
-            alert.level,
-            state_name(MessageState::Firing),
-        );
+        let firing = InHandKey {
+            state: state_name(MessageState::Firing),
+            ..token(alert)
+        };
         match self.0.get_mut(&firing) {
             Some(entry) if !entry.is_tried => {
                 entry.is_over = true;
@@ -128,17 +132,21 @@ impl InHand {
             .filter(|(_, entry)| entry.of_many.is_none() && entry.state != MessageState::Correction)
         {
             let same_place = entry.benchmark == alert.event.benchmark
-                && (token.1 == Level::Unknown) == (alert.level == Level::Unknown);
+                && (token.level == Level::Unknown) == (alert.level == Level::Unknown);
             // An end does not make an earlier end untrue; a new beginning does.
             let is_touched =
                 alert.state == MessageState::Firing || entry.state == MessageState::Firing;
-            if same_place && is_touched && token.1 <= alert.level && *token != own {
+            if same_place && is_touched && token.level <= alert.level && *token != own {
                 entry.is_over = true;
             }
         }
     }
 }
 
-fn token(alert: &Alert) -> AlertIdentity {
-    (alert.key.clone(), alert.level, state_name(alert.state))
+fn token(alert: &Alert) -> InHandKey {
+    InHandKey {
+        key: alert.key.clone(),
+        level: alert.level,
+        state: state_name(alert.state),
+    }
 }

@@ -24,7 +24,7 @@ mod verify;
 pub use batch::{Batch, Position};
 pub use evidence::{DeliveryRow, PlacedEvent};
 pub use known::Presence;
-pub use outbox::{Delivery, DeliveryOutcome};
+pub use outbox::{AlertIdentity, Delivery, DeliveryOutcome};
 pub use past::{Heads, Value, Values};
 pub use read::{Recorded, StepRow};
 pub use verify::Verified;

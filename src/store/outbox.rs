@@ -10,6 +10,17 @@ use rusqlite::{Connection, Row, params};
 /// A delivery that no hook has taken yet.
 pub(super) const WAITING: &str = "waiting";
 
+/// Which message of which alert.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct AlertIdentity<'a> {
+    /// The alert's idempotency key.
+    pub key: &'a str,
+    /// Its level.
+    pub level: &'a str,
+    /// Firing, resolved or a correction.
+    pub state: &'a str,
+}
+
 /// One alert for one hook.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Delivery {
@@ -144,10 +155,8 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn awaited(
-        &self,
-        (key, level, state): (&str, &str, &str),
-    ) -> Result<Vec<String>, StoreError> {
+    pub fn awaited(&self, alert: AlertIdentity<'_>) -> Result<Vec<String>, StoreError> {
+        let AlertIdentity { key, level, state } = alert;
         let inner = self.inner();
         let mut query = inner.connection.prepare_cached(
             "SELECT hook FROM outbox WHERE key = ?1 AND level = ?2 AND state = ?3 AND status = 'waiting'",
@@ -210,10 +219,11 @@ impl Store {
     /// [`StoreError`].
     pub fn is_noted(
         &self,
-        (key, level, state): (&str, &str, &str),
+        alert: AlertIdentity<'_>,
         hook: Option<&str>,
         fate: Option<DeliveryOutcome>,
     ) -> Result<bool, StoreError> {
+        let AlertIdentity { key, level, state } = alert;
         let inner = self.inner();
         let mut query = inner.connection.prepare_cached(
             "SELECT 1 FROM outbox WHERE key = ?1 AND level = ?2 AND state = ?3
@@ -234,10 +244,10 @@ impl Store {
     /// [`StoreError`].
     pub fn outcome_of(
         &self,
-        identity: (&str, &str, &str),
+        alert: AlertIdentity<'_>,
         hook: &str,
     ) -> Result<Option<DeliveryOutcome>, StoreError> {
-        let status: Option<String> = self.of_delivery("status", identity, hook)?;
+        let status: Option<String> = self.of_delivery("status", alert, hook)?;
         Ok(status.and_then(|status| DeliveryOutcome::named(&status)))
     }
 
@@ -265,8 +275,8 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn attempts(&self, identity: (&str, &str, &str), hook: &str) -> Result<u32, StoreError> {
-        let attempts = self.of_delivery("attempts", identity, hook)?;
+    pub fn attempts(&self, alert: AlertIdentity<'_>, hook: &str) -> Result<u32, StoreError> {
+        let attempts = self.of_delivery("attempts", alert, hook)?;
         Ok(attempts.unwrap_or(0))
     }
 
@@ -276,10 +286,10 @@ impl Store {
     /// [`StoreError`].
     pub fn noted(
         &self,
-        identity: (&str, &str, &str),
+        alert: AlertIdentity<'_>,
         hook: &str,
     ) -> Result<Option<Timestamp>, StoreError> {
-        let noted: Option<Option<i64>> = self.of_delivery("noted", identity, hook)?;
+        let noted: Option<Option<i64>> = self.of_delivery("noted", alert, hook)?;
         noted.flatten().map(timestamp).transpose()
     }
 
@@ -287,9 +297,10 @@ impl Store {
     fn of_delivery<T: FromSql>(
         &self,
         column: &'static str,
-        (key, level, state): (&str, &str, &str),
+        alert: AlertIdentity<'_>,
         hook: &str,
     ) -> Result<Option<T>, StoreError> {
+        let AlertIdentity { key, level, state } = alert;
         let inner = self.inner();
         let mut query = inner.connection.prepare_cached(&format!(
             "SELECT {column} FROM outbox WHERE key = ?1 AND level = ?2 AND state = ?3 AND hook = ?4"
@@ -302,10 +313,8 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn time_given(
-        &self,
-        (key, level, state): (&str, &str, &str),
-    ) -> Result<Option<Timestamp>, StoreError> {
+    pub fn time_given(&self, alert: AlertIdentity<'_>) -> Result<Option<Timestamp>, StoreError> {
+        let AlertIdentity { key, level, state } = alert;
         let inner = self.inner();
         let mut query = inner.connection.prepare_cached(
             "SELECT min(time) FROM outbox WHERE key = ?1 AND level = ?2 AND state = ?3",

@@ -10,6 +10,13 @@ fn the_demo_says_what_will_be_seen_fits_eighty_columns_and_gives_a_reason_for_ea
         .unwrap();
     assert!(output.status.success());
     let text = String::from_utf8(output.stdout).unwrap();
+    for line in readme_example() {
+        let is_printed = text.lines().any(|printed| printed == line);
+        assert!(
+            is_printed,
+            "the README shows a line that is not printed: {line}"
+        );
+    }
     let (legend, rest) = text.split_once("=== ").unwrap();
     for level in ["green", "yellow", "orange", "red", "unknown"] {
         assert!(
@@ -46,4 +53,18 @@ fn the_demo_says_what_will_be_seen_fits_eighty_columns_and_gives_a_reason_for_ea
             "{point} is not in {card}"
         );
     }
+}
+
+/// What the README shows of it.
+fn readme_example() -> impl Iterator<Item = &'static str> {
+    let readme = include_str!("../../README.md");
+    let (_, after) = readme
+        .split_once("ends by itself within a minute:\n")
+        .unwrap();
+    let (example, _) = after.split_once("\nVaiont and La Clapi").unwrap();
+    let lines: Vec<&str> = example.lines().filter(|line| !line.is_empty()).collect();
+    assert!(lines.len() > 15, "{example}");
+    lines
+        .into_iter()
+        .map(|line| line.strip_prefix("    ").unwrap())
 }

@@ -6,6 +6,7 @@
     reason = "a test fails by panicking"
 )]
 
+use crate::identity::red_fires;
 use jiff::{SignedDuration, Timestamp};
 use slipwatch::alert::Level;
 use slipwatch::config::{self, Config};
@@ -146,11 +147,7 @@ async fn an_alert_is_reported_and_after_a_restart_not_again() {
     let key = format!("5/red/{}", noon().as_second());
     assert_eq!(lines(&folder, "notified"), [format!("{key} Actual")]);
     let store = Store::look(&config.site.state_dir).unwrap();
-    let taken = store.is_noted(
-        (&key, "red", "firing"),
-        None,
-        Some(DeliveryOutcome::Delivered),
-    );
+    let taken = store.is_noted(red_fires(&key), None, Some(DeliveryOutcome::Delivered));
     assert!(taken.unwrap());
 }
 

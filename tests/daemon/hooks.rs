@@ -7,6 +7,7 @@
 )]
 
 use crate::eventually::eventually;
+use crate::identity::red_fires;
 use slipwatch::alert::Level;
 use slipwatch::config::{ExtraMessages, HookConfig};
 use slipwatch::monitor::{AlertState, Event, EventKind};
@@ -14,7 +15,7 @@ use slipwatch::reading::BenchmarkId;
 use slipwatch::runtime::deliver::{self, Dispatcher, Retry};
 use slipwatch::runtime::delivered::Delivered;
 use slipwatch::runtime::hook::{Alert, HookOutcome, Status};
-use slipwatch::store::{DeliveryOutcome, Store};
+use slipwatch::store::{AlertIdentity, DeliveryOutcome, Store};
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
@@ -249,8 +250,13 @@ async fn an_escalation_reports_the_end_of_what_it_has_reported_and_nothing_of_wh
         dispatcher.offer(&ended(key));
         assert_eq!(dispatcher.close(LIMIT).await, Some(0));
         assert_eq!(read(&folder, "calls"), expected);
-        let is_over =
-            |state| store.is_noted((key, "red", state), None, Some(DeliveryOutcome::Over));
+        let is_over = |state| {
+            let alert = AlertIdentity {
+                state,
+                ..red_fires(key)
+            };
+            store.is_noted(alert, None, Some(DeliveryOutcome::Over))
+        };
         assert_eq!(is_over("firing").unwrap(), expected.is_empty());
     }
     assert!(store.waiting().unwrap().is_empty());
@@ -310,7 +316,10 @@ async fn an_orange_a_red_and_an_unknown_are_tried_until_the_hook_takes_them() {
         // What is in hand is not taken twice, what has been taken not again.
         assert!(dispatcher.offer(&alert));
         std::fs::write(folder.path().join("fixed"), "").unwrap();
-        let identity = (level.name(), level.name(), "firing");
+        let identity = AlertIdentity {
+            level: level.name(),
+            ..red_fires(level.name())
+        };
         eventually("its receipt", || {
             store
                 .is_noted(identity, None, Some(DeliveryOutcome::Delivered))

@@ -10,6 +10,7 @@ mod deploy;
 mod eventually;
 mod follow;
 mod hooks;
+mod identity;
 mod mqtt;
 mod mqtt_out;
 mod page;

@@ -1,6 +1,7 @@
 //! Alerts to a topic of a real Mosquitto: at QoS 1, tried again while it is away, over TLS only where it is trusted.
 
 use crate::eventually::eventually;
+use crate::identity::red_fires;
 use crate::mqtt::{Mosquitto, refusing_version_5};
 use crate::webhooks::{alert, quick, text};
 use rumqttc::{AsyncClient, Event, MqttOptions, Packet, Publish, QoS};
@@ -130,7 +131,7 @@ async fn an_alert_waits_for_a_broker_that_is_away_and_one_that_is_not_let_in_is_
     let store = Arc::new(Store::open(folder.path()).unwrap());
     let dispatcher = Dispatcher::start(&hooks, &quick(), Delivered::of(Arc::clone(&store)));
     let (alert, name) = (alert("5", "5/red/1"), hooks[0].name());
-    let identity = ("5/red/1", "red", "firing");
+    let identity = red_fires("5/red/1");
     assert!(dispatcher.offer(&alert));
     eventually("attempts", || store.attempts(identity, &name).unwrap() >= 2).await;
     assert!(

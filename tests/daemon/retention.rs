@@ -1,9 +1,11 @@
 //! What the state keeps over the years, and how large it becomes.
 
+use crate::identity::red_fires;
 use jiff::{SignedDuration, Timestamp};
 use slipwatch::alert::Level;
 use slipwatch::monitor::{
-    CalledLevel, Event, EventKind, FailureTime, Input, InverseVelocity, LevelChance, RegimeReport,
+    CalledLevel, ChancesOfCollapse, Event, EventKind, FailureTime, Input, InverseVelocity,
+    LevelChance, RegimeReport,
 };
 use slipwatch::reading::{BenchmarkId, Reading, Unit};
 use slipwatch::regime::Regime;
@@ -57,6 +59,12 @@ fn refit(time: Timestamp) -> EventKind {
             r_per_day: Some(0.012_345_678_901_234_56),
             kappa_per_day: Some(-0.012_345_678_901_234_56),
         },
+        chances_of_collapse: Some(Box::new(ChancesOfCollapse {
+            within_1_day: 0.123_456_789_012_345_6,
+            within_2_days: 0.123_456_789_012_345_6,
+            within_7_days: 0.123_456_789_012_345_6,
+            within_30_days: 0.123_456_789_012_345_6,
+        })),
         failure_time: FailureTime {
             low: later(3),
             median: later(30),
@@ -227,7 +235,7 @@ fn deliveries_stay_while_their_alert_stands_or_a_hook_waits() {
     batch.deliver(delivery("waits", "resolved", at(2 * DAY)));
     store.commit(&batch).unwrap();
     thin(&store, at(100 * DAY));
-    let is_there = |key: &str| store.is_noted((key, "red", "firing"), None, None).unwrap();
+    let is_there = |key: &str| store.is_noted(red_fires(key), None, None).unwrap();
     for key in ["stands", "just over", "given up", "waits"] {
         assert!(is_there(key), "{key}");
     }

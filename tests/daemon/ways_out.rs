@@ -1,6 +1,7 @@
 //! The table of the ways out for alerts: a way out is one row, and everything else follows from it.
 
 use crate::eventually::eventually;
+use crate::identity::red_fires;
 use crate::webhooks::{alert, quick, text};
 use slipwatch::config::{self, Destination, HookConfig, SharedDestination, way_out_tables};
 use slipwatch::runtime::deliver::{Dispatcher, Runner, Senders};
@@ -99,7 +100,7 @@ async fn a_way_out_that_is_one_row_gets_alerts_and_tries_again() {
     let dispatcher = Dispatcher::with(&runner, &[siren(7)], &quick(), delivered);
     assert!(dispatcher.offer(&red()));
     let is_delivered = || {
-        let identity = ("5/red/1", "red", "firing");
+        let identity = red_fires("5/red/1");
         let fate = Some(DeliveryOutcome::Delivered);
         store.is_noted(identity, Some("siren 7"), fate).unwrap()
     };

@@ -2,6 +2,7 @@
 
 use crate::certificates::Certified;
 use crate::eventually::eventually;
+use crate::identity::red_fires;
 use crate::site::free_address;
 use slipwatch::alert::Level;
 use slipwatch::config::{self, HookConfig};
@@ -204,7 +205,7 @@ async fn a_webhook_that_fails_is_tried_again_under_the_same_id_until_it_is_taken
     let dispatcher = Dispatcher::start(&hooks, &quick(), Delivered::of(Arc::clone(&store)));
     let red = alert("5", "toc/5/red/1");
     assert!(dispatcher.offer(&red));
-    let identity = ("toc/5/red/1", "red", "firing");
+    let identity = red_fires("toc/5/red/1");
     let is_taken = || {
         let noted = store.is_noted(
             identity,

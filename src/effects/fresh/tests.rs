@@ -24,7 +24,7 @@ fn moves_alike(kind: Kind, act: Act) {
     let start = plain_starts(&part).swap_remove(1).with_size(&term, 0.4);
     let white = [Whitener::new(&part, Noise::WHITE)];
     let fitted = refit_from(&part, &[start], &white, &mut scratch).unwrap();
-    let longer = in_terms_of(&whole, (&part, &fitted), &term);
+    let longer = in_terms_of(&whole, &part, &fitted, &term);
     assert!(scratch.predict(&whole, &longer.terms, &longer.parameters));
     let pairs = scratch.prediction.iter().zip(&fitted.prediction);
     for (longer, shorter) in pairs.take(PART) {

@@ -33,13 +33,13 @@ fn fitted(term: Term, own: &[f64]) -> Fitted {
 }
 
 fn driver(name: &str, values: &[f64]) -> Driver {
-    Driver::new(&channel(name, &daily(values.len()), values), epoch()).unwrap()
+    Driver::new(0, &channel(name, &daily(values.len()), values), epoch()).unwrap()
 }
 
 /// What is said of a channel's response with this gain and mean delay.
 fn of_channel(name: &str, form: Form, mean_days: f64, gain: f64) -> Option<String> {
     let problem = steady(Quantity::Displacement, &daily(COUNT), 1);
-    let drivers = [(0, driver(name, &normals(&mut generator(2), COUNT)))];
+    let drivers = [driver(name, &normals(&mut generator(2), COUNT))];
     let response = Response {
         form,
         stages: 1,
@@ -114,7 +114,7 @@ fn a_load_may_not_grow_with_the_motion_and_a_mean_is_over_more_than_its_spacing(
 }
 
 /// What is said of a jump by `size` at reading 100, `days` after the reading before, with these covariates.
-fn of_jump(size: f64, days: f64, back: f64, drivers: &[(usize, Driver)]) -> Option<String> {
+fn of_jump(size: f64, days: f64, back: f64, drivers: &[Driver]) -> Option<String> {
     let mut problem = steady(Quantity::Displacement, &daily(COUNT), 1);
     for i in 100..COUNT {
         problem.t[i] += days - 1.0;
@@ -143,7 +143,7 @@ fn a_jump_forwards_just_after_the_wettest_days_may_be_slip() {
         for (k, value) in values.iter_mut().enumerate().skip(day).take(3) {
             *value = 10.0 + k as f64;
         }
-        [(0, driver("rain_mm", &values))]
+        [driver("rain_mm", &values)]
     };
     let said = of_jump(60.0, 1.0, 0.0, &wet_on(98)).unwrap();
     assert!(said.contains("rain_mm"), "{said}");

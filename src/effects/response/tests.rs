@@ -16,7 +16,7 @@ fn step() -> (Driver, Vec<f64>) {
         .iter()
         .map(|day| f64::from(u8::from(*day >= START)))
         .collect();
-    let driver = Driver::new(&channel("step", &days, &values), epoch()).unwrap();
+    let driver = Driver::new(0, &channel("step", &days, &values), epoch()).unwrap();
     (driver, days)
 }
 
@@ -40,7 +40,7 @@ fn of(form: Form, stages: u8, mean_days: f64) -> Response {
 fn noise(count: usize) -> Driver {
     let days: Vec<f64> = (0..count).map(|day| day as f64).collect();
     let values = normals(&mut generator(4), count);
-    Driver::new(&channel("noise", &days, &values), epoch()).unwrap()
+    Driver::new(0, &channel("noise", &days, &values), epoch()).unwrap()
 }
 
 #[test]

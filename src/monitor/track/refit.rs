@@ -192,7 +192,7 @@ fn refit_event(
         t_max: time,
         regime: report(outlook),
         failure_time: reported(epoch, outlook.now_days, &outlook.collapse),
-        chances_of_collapse: Some(chances(&outlook.expected)),
+        chances_of_collapse: Some(Box::new(chances(&outlook.expected))),
         critical_velocity_time: Box::new(reported(epoch, outlook.now_days, &outlook.passage)),
         probability_of_acceleration: outlook.accelerating,
         inverse_velocity: InverseVelocity {
@@ -288,8 +288,9 @@ mod tests {
             panic!("{events:?}");
         };
         let expected = &forecast.plain.expected;
-        assert_eq!(chances.within_2_days, expected.chance_within(2.0));
-        assert_eq!(chances.within_30_days, expected.chance_within(30.0));
+        for (reported, days) in [(chances.within_2_days, 2.0), (chances.within_30_days, 30.0)] {
+            assert!((reported - expected.chance_within(days)).abs() < 1e-12);
+        }
         assert!(
             causes.contains(&AlertCause::UnexplainedResidual),
             "{causes:?}"

@@ -11,7 +11,7 @@ use crate::monitor::{
 };
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::delivered::delivery;
-use crate::runtime::hook::{Alert, MessageState, state_name};
+use crate::runtime::hook::{Alert, MessageState};
 use crate::runtime::standing::every;
 use crate::runtime::vitals::Vitals;
 use crate::store::{Delivery, DeliveryOutcome, Recorded, Store, StoreError};
@@ -168,12 +168,12 @@ impl Site {
     fn stand_again(&mut self, store: &Store) -> Result<(), StoreError> {
         for mut alert in std::mem::take(&mut self.fresh) {
             if alert.event.time <= BEFORE_ALL {
-                let given = store.time_given(identity(&alert))?;
+                let given = store.time_given(alert.identity())?;
                 alert.event.time = given.unwrap_or(BEFORE_ALL);
             }
             self.date_end(&mut alert);
             self.follow_on(&mut alert);
-            let is_sent = store.is_noted(identity(&alert), None, None)?;
+            let is_sent = store.is_noted(alert.identity(), None, None)?;
             // What is due is noted with the step itself: this one fell into a silence.
             if !is_sent && self.is_waited_for(&alert) {
                 self.put_off(&alert);
@@ -189,7 +189,7 @@ impl Site {
             return Ok(());
         };
         for one in self.standing.values_mut() {
-            let identity = identity(&one.alert);
+            let identity = one.alert.identity();
             one.is_sent |= store.is_noted(identity, None, None)?;
             one.was_notified |= one.is_sent;
             one.is_reported_together |=
@@ -231,7 +231,7 @@ impl Site {
             alerts.end(alert);
             return Ok(());
         }
-        let awaited = store.awaited(identity(alert))?;
+        let awaited = store.awaited(alert.identity())?;
         if is_beginning && standing.is_none() && self.is_over(store, alert, ended)? {
             alerts.leave_out(alert, &awaited);
             return Ok(());
@@ -276,7 +276,7 @@ impl Site {
         let (mut ended, mut instead, mut singly) = (Vec::new(), Vec::new(), Vec::new());
         for alert in waiting {
             let asking = dispatcher.asking(alert);
-            let awaited = store.awaited(identity(alert))?;
+            let awaited = store.awaited(alert.identity())?;
             let gone = awaited.iter().filter(|hook| !asking.contains(hook));
             let gone: Vec<&String> = gone.collect();
             for hook in &gone {
@@ -408,12 +408,4 @@ impl EndedKeys {
 /// Where an alert stands.
 fn place(alert: &Alert) -> AlertPlace {
     (alert.event.benchmark.clone(), alert.level == Level::Unknown)
-}
-
-/// What the outbox knows an alert by.
-pub(super) fn identity(alert: &Alert) -> (&str, &str, &str) {
-    let Alert {
-        key, level, state, ..
-    } = alert;
-    (key, level.name(), state_name(*state))
 }

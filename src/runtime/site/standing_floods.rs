@@ -1,6 +1,5 @@
 //! What was reported together stands by one key until all of it is over, and its end goes to those who received its beginning.
 
-use super::memory::identity;
 use super::{BEFORE_ALL, Site, flood};
 use crate::alert::Level;
 use crate::reading::Timestamp;
@@ -39,7 +38,7 @@ impl Site {
             self.stand_for_many(&alert);
             let seen = Some(DeliveryOutcome::Acknowledged);
             if let Some(one) = self.floods.get_mut(&alert.key) {
-                one.is_acknowledged = store.is_noted(identity(&alert), None, seen)?;
+                one.is_acknowledged = store.is_noted(alert.identity(), None, seen)?;
             }
         }
         Ok(())

@@ -422,7 +422,7 @@ fn forecast(event: &Event) -> Option<ForecastView> {
     Some(ForecastView {
         time: event.time,
         failure_time: *failure_time,
-        chances_of_collapse: *chances_of_collapse,
+        chances_of_collapse: chances_of_collapse.as_deref().copied(),
         chance_within_evacuation_time: *chance_within_evacuation_time,
         chance_within_outlook: *chance_within_outlook,
         called: called.as_deref().cloned(),

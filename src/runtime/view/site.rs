@@ -234,7 +234,7 @@ impl Standing {
         self.velocity_mm_per_day = *velocity_mm_per_day;
         self.regime = Some(regime.label);
         self.failure_time = Some(*failure_time);
-        self.chances_of_collapse = *chances_of_collapse;
+        self.chances_of_collapse = chances_of_collapse.as_deref().copied();
         self.chance_within_evacuation_time = Some(*chance_within_evacuation_time);
         self.chance_within_outlook = Some(*chance_within_outlook);
         self.called = called.as_deref().cloned();

@@ -1,6 +1,7 @@
 //! The daemon in a crisis, with the monitor's own alerts: old ones, silence, a full disk.
 
 use super::{Daemon, events, hours, lines, site_folder};
+use crate::identity::red_fires;
 use jiff::Timestamp;
 use slipwatch::alert::Level;
 use slipwatch::config::{self, Config};
@@ -245,7 +246,7 @@ async fn a_receipt_that_finds_no_room_still_keeps_the_hook_from_being_notified_t
             return false;
         };
         let store = Store::look(&folder.path().join("state")).unwrap();
-        let identity = (key.as_str(), "red", "firing");
+        let identity = red_fires(key);
         store.is_noted(identity, None, Some(DeliveryOutcome::Delivered)).unwrap()
     })
     .await;

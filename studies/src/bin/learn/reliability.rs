@@ -13,11 +13,13 @@ const FIRST_SEED: u64 = 5_000_000;
 const LIVES: u64 = 30;
 const LOOKS: usize = 100;
 /// Within how many days a collapse is said to come.
-const WITHIN: [f64; 3] = [0.5, 2.0, 30.0];
+const WITHIN: [f64; 4] = [1.0, 2.0, 7.0, 30.0];
 /// Bounds of the classes of what was said.
 const CLASSES: [f64; 8] = [0.01, 0.03, 0.1, 0.2, 0.35, 0.55, 0.75, 1.0];
+/// A distribution that a forecast has.
+type Distribution = fn(&Collapse) -> &Passage;
 /// What is said, with the chances that it says.
-const SAID: [(&str, fn(&Collapse) -> &Passage); 3] = [
+const SAID: [(&str, Distribution); 3] = [
     ("`chances_of_collapse`", |collapse| &collapse.expected),
     ("that `failure_time` rests on", |collapse| &collapse.passage),
     ("that levels go by", |collapse| &collapse.sure),
@@ -74,7 +76,7 @@ fn table(said: &[Said]) -> anyhow::Result<String> {
          | within | chances |"
     );
     for pair in CLASSES.windows(2) {
-        write!(out, " {} to {} % |", 100.0 * pair[0], 100.0 * pair[1])?;
+        write!(out, " {:.0} to {:.0} % |", 100.0 * pair[0], 100.0 * pair[1])?;
     }
     out += " log score |\n|---|---|";
     out += &"---|".repeat(CLASSES.len());

@@ -99,13 +99,15 @@ fn in_time(out: &mut String, families: &[Judged]) -> anyhow::Result<()> {
         "\n### Red in time\n\nOf the failing lives read at least four times an evacuation time and seen to accelerate for as long: the share for which red was called at least \
          that time before the collapse.\n\n| family | 12 h | 24 h | 72 h |\n|---|---|---|---|"
     )?;
-    for one in families.iter().filter(|one| one.family.fails()) {
-        write!(out, "| {:?} |", one.family)?;
+    let fails = families.iter().filter(|one| one.family.fails());
+    let each = fails.map(|one| (format!("{:?}", one.family), one.replays.iter().collect()));
+    let mut rows: Vec<(String, Vec<&Replay>)> = each.collect();
+    let all = rows.iter().flat_map(|(_, replays)| replays).copied();
+    rows.push(("all".to_owned(), all.collect()));
+    for (name, replays) in rows {
+        write!(out, "| {name} |")?;
         for index in 0..EVACUATIONS.len() {
-            let known = one
-                .replays
-                .iter()
-                .filter_map(|replay| replay.in_time[index]);
+            let known = replays.iter().filter_map(|replay| replay.in_time[index]);
             let known: Vec<bool> = known.collect();
             let came = known.iter().filter(|came| **came).count();
             write!(out, " {came} of {} |", known.len())?;
