@@ -302,9 +302,26 @@ pub fn keys(text: &str) -> Keys {
     taken(text, Path::new("")).1.keys
 }
 
+/// Whether a text that is no TOML begins as a table: cells parted as in a header, and again in the next line.
+fn is_table(text: &str) -> bool {
+    let mut lines = text.lines().filter(|line| !line.trim().is_empty());
+    let mut has_cells = || {
+        lines.next().is_some_and(|line| {
+            !line.starts_with(['[', '#']) && !line.contains('=') && line.contains([',', ';', '\t'])
+        })
+    };
+    has_cells() && has_cells()
+}
+
 fn taken(text: &str, file: &Path) -> (Option<Config>, ConfigProblems) {
     let notebook = RefCell::new(ConfigProblems::new(file, text));
     let (document, syntax) = toml::de::DeTable::parse_recoverable(text);
+    if !syntax.is_empty() && is_table(text) {
+        let problem = "it looks like a table of readings, not like the config of a site".to_owned();
+        let expected = "write its config with slipwatch init FILE, and give that";
+        notebook.borrow_mut().error(&(0..0), problem, expected);
+        return (None, notebook.into_inner());
+    }
     for error in &syntax {
         let at = error.span().unwrap_or(0..0);
         let message = error.message().replace('\n', ", ");

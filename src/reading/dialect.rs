@@ -3,6 +3,7 @@
 use super::{LocalClock, TimeFault};
 use jiff::civil::{Date, DateTime, Time};
 use jiff::fmt::strtime::BrokenDownTime;
+use jiff::tz::TimeZone;
 use jiff::{SignedDuration, Timestamp};
 
 /// What holds for every file of a source, where it is not as in CSV with RFC 3339 times.
@@ -24,11 +25,33 @@ pub struct Dialect {
 pub const MOST_SKIPPED: u64 = 1000;
 
 impl Dialect {
-    /// The instant that a time of such a file means.
+    /// The instant that a time of such a file means; 24:00 is the end of its day.
     ///
     /// # Errors
     /// [`TimeFault`] says what is wrong with it.
     pub fn instant(&self, text: &str, clock: &LocalClock) -> Result<Timestamp, TimeFault> {
+        self.within_day(text, clock).or_else(|fault| {
+            let end = day_that_ends(text).and_then(|day| self.day_after(&day, clock));
+            end.unwrap_or(Err(fault))
+        })
+    }
+
+    /// A day after the time that `text` gives, on the same clock; `None` where it gives none.
+    fn day_after(&self, text: &str, clock: &LocalClock) -> Option<Result<Timestamp, TimeFault>> {
+        // Without a zone only a time that states its offset can be read.
+        if let Ok(instant) = self.within_day(text, &LocalClock::default()) {
+            return Some(Ok(instant + SignedDuration::from_hours(24)));
+        }
+        let anywhere = LocalClock {
+            zone: Some(TimeZone::UTC),
+            ..LocalClock::default()
+        };
+        let begins = self.within_day(text, &anywhere).ok()?;
+        let local = begins.to_zoned(TimeZone::UTC).datetime();
+        Some(clock.of_local(local.checked_add(SignedDuration::from_hours(24)).ok()?))
+    }
+
+    fn within_day(&self, text: &str, clock: &LocalClock) -> Result<Timestamp, TimeFault> {
         match &self.time_format {
             TimeFormat::Rfc3339 => clock.instant(text).map_err(|fault| {
                 if fault == TimeFault::NotATime {
@@ -212,6 +235,15 @@ fn is_pattern(pattern: &str) -> bool {
         .is_ok_and(|date| date == TRIAL.date())
 }
 
+/// The time at which the day begins that ends at the time `text`: `2024-05-01 00:00` for `2024-05-01 24:00`.
+fn day_that_ends(text: &str) -> Option<String> {
+    let (date, time) = text.split_once([' ', 'T', 't'])?;
+    let rest = time.trim_start().strip_prefix("24:00")?;
+    let after = rest.strip_prefix(":00").unwrap_or(rest);
+    let is_end = !after.starts_with([':', '.']) || after.trim_start_matches(['.', '0']).is_empty();
+    is_end.then(|| format!("{date}{}00:00{rest}", &text[date.len()..=date.len()]))
+}
+
 fn by_pattern(pattern: &str, text: &str, clock: &LocalClock) -> Result<Timestamp, TimeFault> {
     let read = BrokenDownTime::parse(pattern, text).map_err(|_| TimeFault::NotThePattern)?;
     let date = read.to_date().map_err(|_| TimeFault::NotThePattern);
@@ -335,6 +367,25 @@ mod tests {
             ("rfc3339", "2017/07/06 17:00", "LikeAPattern"),
             ("rfc3339", "2017-07-06", "OnlyADate"),
             ("rfc3339", "noon", "NotATime"),
+        ];
+        for (format, text, expected) in cases {
+            assert_eq!(utc(format, text), expected, "{format}: {text}");
+        }
+    }
+
+    #[test]
+    fn hour_24_is_the_end_of_the_day_on_the_loggers_clock() {
+        let cases = [
+            ("rfc3339", "2017-07-06T24:00:00Z", "2017-07-07T00:00:00Z"),
+            ("rfc3339", "2017-07-06 24:00", "2017-07-06T22:00:00Z"),
+            // The clocks are put forward at 02:00 on the 26th, and the day before has 24 hours.
+            ("rfc3339", "2017-03-25 24:00:00", "2017-03-25T23:00:00Z"),
+            ("rfc3339", "2017-03-26 24:00:00.000", "2017-03-26T22:00:00Z"),
+            ("%d.%m.%Y %H:%M", "31.12.2017 24:00", "2017-12-31T23:00:00Z"),
+            ("rfc3339", "2017-07-06T24:01:00Z", "NotATime"),
+            ("rfc3339", "2017-07-06T24:00:01Z", "NotATime"),
+            ("%d.%m.%Y %H:%M", "31.12.2017 24:10", "NotThePattern"),
+            ("%d.%m.%Y %H:%M", "24:00", "NotThePattern"),
         ];
         for (format, text, expected) in cases {
             assert_eq!(utc(format, text), expected, "{format}: {text}");

@@ -12,6 +12,7 @@ mod explain_cli;
 mod first_day;
 mod first_site;
 mod init_flags;
+mod logger_exports;
 mod office;
 #[cfg(feature = "parquet")]
 mod parquet;

@@ -110,6 +110,13 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     let plan = plan(args)?;
     say_idle(&plan, args);
+    for map in &args.file.columns {
+        if let Measure::Reading(unit) = map.measure
+            && let Some(doubt) = unnamed::other_unit(&map.column, unit)
+        {
+            exit::complain(&doubt);
+        }
+    }
     std::fs::write(config, text::config(&plan))
         .with_context(|| format!("cannot write {}", config.display()))?;
     say_written(args, &plan)?;

@@ -3,8 +3,9 @@
 use crate::cli::args::DialectArgs;
 use crate::reading::{DecimalMark, Dialect, LocalClock, SummerTime, TimeFormat, Timestamp};
 use crate::runtime::ingest::Survey;
+use jiff::fmt::strtime::BrokenDownTime;
 use jiff::tz::TimeZone;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Ways to write a date that are tried.
 const DATES: [&str; 15] = [
@@ -19,6 +20,21 @@ const TIMES: [&str; 6] = [
     " %H:%M:%S%.f",
     " %I:%M %p",
     " %I:%M:%S %p",
+];
+/// The same without colons, after a year of four digits: behind two of them a blank need not stand, and `2017` would be a year and an hour.
+const TIMES_WITHOUT_COLONS: [&str; 5] = [" %H%M", " %H%M%S", " %H.%M", " %Hh%M", " %H"];
+/// Dates and times in one row of digits, by the number of these.
+const COMPACT: [(usize, &str); 4] = [
+    (8, "%Y%m%d"),
+    (10, "%Y%m%d%H"),
+    (12, "%Y%m%d%H%M"),
+    (14, "%Y%m%d%H%M%S"),
+];
+/// The years in which a number of so many digits is taken for such a date.
+const COMPACT_YEARS: std::ops::Range<i16> = 1900..2100;
+/// Parts of names of columns whose numbers may be times of day.
+const NAMES_OF_TIMES_OF_DAY: [&str; 9] = [
+    "time", "zeit", "uhr", "stunde", "ora", "heure", "hora", "hour", "hhmm",
 ];
 /// The first cells, which exclude most candidates.
 const FIRST_CELLS: usize = 200;
@@ -107,11 +123,10 @@ fn columns(survey: &Survey, decimal: DecimalMark) -> Result<TimeColumns, String>
             .iter()
             .position(|one| one.eq_ignore_ascii_case(name))
     };
-    if let Some(at) = named("time") {
-        let is_a_part = survey.columns[at].iter().all(|cell| is_time_of_day(cell));
-        if !is_a_part {
-            return Ok(TimeColumns::Times(vec![at]));
-        }
+    if let Some(at) = named("time")
+        && !is_all_times_of_day(survey, at)
+    {
+        return Ok(TimeColumns::Times(vec![at]));
     }
     if named("t_days").is_some() {
         return Ok(TimeColumns::Days);
@@ -120,7 +135,7 @@ fn columns(survey: &Survey, decimal: DecimalMark) -> Result<TimeColumns, String>
     let of_day: Vec<usize> = all
         .iter()
         .copied()
-        .filter(|at| is_all_times_of_day(&survey.columns[*at]))
+        .filter(|at| is_all_times_of_day(survey, *at))
         .collect();
     let dated = all
         .iter()
@@ -128,7 +143,10 @@ fn columns(survey: &Survey, decimal: DecimalMark) -> Result<TimeColumns, String>
         .filter(|at| is_dated(survey, *at, decimal));
     let dated: Vec<usize> = dated.collect();
     match (&dated[..], &of_day[..]) {
-        ([date], []) => Ok(TimeColumns::Times(vec![*date])),
+        ([date], []) => match days_alone(survey, *date, decimal) {
+            Some(problem) => Err(problem),
+            None => Ok(TimeColumns::Times(vec![*date])),
+        },
         ([date], [time]) => Ok(TimeColumns::Times(vec![*date, *time])),
         ([], _) => Err(format!(
             "no column gives a time that is known; the header has {:?}: give --time-column NAME (twice where date and \
@@ -149,16 +167,80 @@ fn columns(survey: &Survey, decimal: DecimalMark) -> Result<TimeColumns, String>
     }
 }
 
+/// What is wrong with a column that gives no more than the day of a row, where most rows have the day of another.
+fn days_alone(survey: &Survey, date: usize, decimal: DecimalMark) -> Option<String> {
+    let cells = joined(survey, &[date]);
+    let formats =
+        of_numbers(&cells, decimal).map_or_else(|| matching(&cells, decimal), |one| vec![one]);
+    let patterns = formats.iter().map(|format| match format {
+        TimeFormat::Pattern(pattern) if !pattern.contains("%H") && !pattern.contains("%I") => {
+            Some(pattern.as_str())
+        }
+        TimeFormat::Pattern(_)
+        | TimeFormat::Rfc3339
+        | TimeFormat::UnixSeconds
+        | TimeFormat::UnixMilliseconds
+        | TimeFormat::ExcelDays => None,
+    });
+    let patterns: Option<Vec<&str>> = patterns.collect();
+    let pattern = *patterns?.first()?;
+    let mut rows: BTreeMap<&String, usize> = BTreeMap::new();
+    for cell in &cells {
+        *rows.entry(cell).or_default() += 1;
+    }
+    let repeated: usize = rows.values().filter(|rows| **rows > 1).sum();
+    if 2 * repeated <= cells.len() {
+        return None;
+    }
+    let name = &survey.names[date];
+    Some(format!(
+        "column {name:?} gives no more than the day, and {repeated} of {} rows have the day of another one: give --time-column \
+         {name:?} and --time-column with the name of the column that has the time of day, and --time-format, such as \
+         \"{pattern} %H:%M\"; where each row does stand for a whole day, --time-column {name:?} alone. The header has {:?}",
+        cells.len(),
+        survey.names
+    ))
+}
+
+/// Whether a cell is hours, minutes and perhaps seconds, parted by colons, with `AM` or `PM` or without.
 fn is_time_of_day(cell: &str) -> bool {
-    let parts: Vec<&str> = cell.split(':').collect();
+    let plain = cell
+        .trim_end_matches(['A', 'P', 'a', 'p', 'M', 'm'])
+        .trim_end();
+    let has_half = ["AM", "PM", "am", "pm"]
+        .iter()
+        .any(|half| cell.ends_with(half));
+    let clock = if has_half { plain } else { cell };
+    let parts: Vec<&str> = clock.split(':').collect();
     let is_part =
         |part: &&str| (1..=2).contains(&part.len()) && part.bytes().all(|c| c.is_ascii_digit());
     (2..=3).contains(&parts.len()) && parts.iter().all(is_part)
 }
 
-fn is_all_times_of_day(cells: &[String]) -> bool {
-    let mut filled = cells.iter().filter(|cell| !cell.is_empty()).peekable();
-    filled.peek().is_some() && filled.all(|cell| is_time_of_day(cell))
+/// Whether a cell may be a time of day in a column that is named so: `0930`, `093000`, `09.30`, `09h30` or `09`.
+fn may_be_time_of_day(cell: &str) -> bool {
+    let digits: String = cell.replacen(['.', 'h'], "", 1);
+    let is_all = digits.bytes().all(|c| c.is_ascii_digit());
+    let part = |at: usize| {
+        digits
+            .get(at..at + 2)
+            .and_then(|part| part.parse::<u8>().ok())
+    };
+    let is_clock = match digits.len() {
+        2 => part(0) <= Some(24),
+        4 | 6 => part(0) <= Some(24) && part(2) < Some(60) && part(4) < Some(60),
+        _ => false,
+    };
+    is_all && is_clock
+}
+
+fn is_all_times_of_day(survey: &Survey, at: usize) -> bool {
+    let name = survey.names[at].to_lowercase();
+    let is_named = NAMES_OF_TIMES_OF_DAY.iter().any(|part| name.contains(part));
+    let cells = survey.columns[at].iter();
+    let mut filled = cells.filter(|cell| !cell.is_empty()).peekable();
+    filled.peek().is_some()
+        && filled.all(|cell| is_time_of_day(cell) || is_named && may_be_time_of_day(cell))
 }
 
 /// Whether a column holds dates: numbers only where its name says that too.
@@ -226,6 +308,9 @@ pub(super) fn word(format: &TimeFormat) -> &str {
 }
 
 fn of_numbers(cells: &[String], decimal: DecimalMark) -> Option<TimeFormat> {
+    if let Some(compact) = compact(cells) {
+        return Some(compact);
+    }
     let dialect = reader(decimal, TimeFormat::Rfc3339);
     let numbers: Option<Vec<f64>> = cells.iter().map(|cell| dialect.number(cell)).collect();
     let numbers = numbers.filter(|numbers| !numbers.is_empty())?;
@@ -239,6 +324,25 @@ fn of_numbers(cells: &[String], decimal: DecimalMark) -> Option<TimeFormat> {
     } else {
         None
     }
+}
+
+/// The format of rows of digits that are all dates of one length: a count of seconds is one by chance now and then, but not in all rows.
+fn compact(cells: &[String]) -> Option<TimeFormat> {
+    let digits = cells.first()?.len();
+    let (_, pattern) = COMPACT.iter().find(|(count, _)| *count == digits)?;
+    let is_date = |cell: &String| {
+        let year = cell.get(..4).and_then(|year| year.parse().ok());
+        let read = BrokenDownTime::parse(pattern, cell);
+        let date = read.and_then(|read| read.to_date());
+        cell.len() == digits
+            && cell.bytes().all(|digit| digit.is_ascii_digit())
+            && year.is_some_and(|year| COMPACT_YEARS.contains(&year))
+            && date.is_ok_and(|date| Some(date.year()) == year)
+    };
+    cells
+        .iter()
+        .all(is_date)
+        .then(|| TimeFormat::Pattern((*pattern).to_owned()))
 }
 
 /// Every way of writing a date in which all cells can be read, one time of day each. Where there is none, a few cells that are no
@@ -282,8 +386,11 @@ fn reading_all(cells: &[String], decimal: DecimalMark) -> Vec<TimeFormat> {
         return vec![TimeFormat::Rfc3339];
     }
     let of_date = |date: &&str| {
+        let others = TIMES_WITHOUT_COLONS.iter();
+        let others = others.filter(|_| date.contains("%Y"));
         let formats = TIMES
             .iter()
+            .chain(others)
             .map(|time| TimeFormat::Pattern(format!("{date}{time}")));
         formats.into_iter().find(&fits)
     };

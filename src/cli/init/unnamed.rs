@@ -1,7 +1,7 @@
 //! What is said of a file without readings.
 
 use crate::reading::Unit;
-use crate::runtime::ingest::{FileSurvey, Meaning, unit_in_name};
+use crate::runtime::ingest::{FileSurvey, Meaning, bracketed, unit_in_name};
 use std::path::Path;
 
 /// Which flag names the readings of a file where no column does; where one does, what is wrong with its rows.
@@ -46,8 +46,8 @@ pub(super) fn without_readings(file: &Path, looked: &FileSurvey) -> String {
     let (quantity, unit) = match unit_at_end(first) {
         Some(unit) => (unit.quantity().name(), unit.column_suffix()),
         // The name says nothing of a unit, or one that is not known.
-        None if first.contains("_per_") => ("velocity", "UNIT".to_owned()),
-        None if first.contains('_') => ("displacement", "UNIT".to_owned()),
+        None if first.contains("_per_") || first.contains('/') => ("velocity", "UNIT".to_owned()),
+        None if first.contains(['_', '[', '(']) => ("displacement", "UNIT".to_owned()),
         None => ("displacement", "mm".to_owned()),
     };
     let example = format!("{first}=P1:{quantity}:{unit}");
@@ -118,8 +118,17 @@ fn is_covariate(name: &str, meaning: &Meaning) -> bool {
     (of_covariates && !is_levelling) || unit.is_some_and(|unit| Unit::parse(unit).is_err())
 }
 
-/// The unit that a column's name ends with, after a `_`.
+/// The unit that a column's name ends with, after a `_` or in brackets.
 fn unit_at_end(column: &str) -> Option<Unit> {
     let ends = column.match_indices('_').map(|(at, _)| &column[at + 1..]);
+    let ends = ends.chain(bracketed(column));
     unit_in_name(column).or_else(|| ends.into_iter().find_map(|end| Unit::parse(end).ok()))
+}
+
+/// What is said of a column whose name has another unit than is stated of it.
+pub(super) fn other_unit(column: &str, stated: Unit) -> Option<String> {
+    let named = unit_at_end(column).filter(|named| *named != stated)?;
+    Some(format!(
+        "column {column:?} has the unit {named} in its name, and {stated} by --column: it is read in {stated}"
+    ))
 }

@@ -9,15 +9,20 @@ use super::columnar::TableArgs;
 use super::exit::NoSuchReadings;
 use super::{bar, exit, picture};
 use crate::alert::Policy;
+use crate::config::value;
 use crate::figures;
 use crate::plot::escaped;
 use crate::reading::{Recording, Series, Timestamp, days_since};
 use crate::score::{Card, METHODS, Truth, WholeRecord, card};
 use anyhow::ensure;
+use clap::ArgGroup;
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::path::PathBuf;
 use warning::Warning;
+
+/// How the slope ended, of which one of two flags says something.
+const OUTCOME: &str = "outcome";
 
 /// Score forecasts of the failure time as they would have been made, against rival methods
 ///
@@ -25,14 +30,15 @@ use warning::Warning;
 /// later. A method with nothing to say is scored as saying that no failure comes. The warnings are
 /// those of a replay of the record up to the failure.
 #[derive(Debug, clap::Args)]
+#[command(group(ArgGroup::new(OUTCOME).required(true)))]
 pub(super) struct Args {
     #[command(flatten)]
     readings: ReadingArgs,
     /// When the slope failed
-    #[arg(long, value_name = "TIME", required_unless_present = "no_failure")]
+    #[arg(long, value_name = "TIME", value_parser = value::instant, group = OUTCOME)]
     failure_time: Option<Timestamp>,
     /// It had not failed when the record ended
-    #[arg(long, conflicts_with = "failure_time")]
+    #[arg(long, group = OUTCOME)]
     no_failure: bool,
     /// Draw when each forecast said that the slope would fail, as PNG where the name ends in .png, else as SVG
     #[arg(long, value_name = "FILE")]

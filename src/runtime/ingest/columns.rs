@@ -163,23 +163,47 @@ fn in_brackets(rest: &str) -> Option<&str> {
     inner('[', ']').or_else(|| inner('(', ')')).map(str::trim)
 }
 
+/// What stands in brackets at the end of a name: `mm/h` of `E [mm/h]`.
+pub fn bracketed(name: &str) -> Option<&str> {
+    in_brackets(&name[name.rfind(['[', '('])?..])
+}
+
+/// Words of units of length and of velocity.
+const WORDS_OF_UNITS: [&str; 21] = [
+    "um", "mm", "cm", "dm", "m", "km", "in", "inch", "ft", "per", "s", "sec", "min", "h", "hr",
+    "hour", "d", "day", "month", "yr", "year",
+];
+
+/// Whether a text is a unit of length or of velocity, whether it can be read or not: `m_per_s`, `km`.
+fn is_unit_of_motion(text: &str) -> bool {
+    !text.is_empty()
+        && text
+            .split(['_', '/'])
+            .all(|word| WORDS_OF_UNITS.contains(&word))
+}
+
 /// What to know of a covariate that is named as readings are: `P1_displacement_mm/d` or `P1 displacement mm`.
 fn like_a_reading(name: &str) -> Option<Remark> {
     let plain = name.to_ascii_lowercase();
-    let is_one = ["displacement", "velocity"].into_iter().any(|keyword| {
-        plain.rsplit_once(keyword).is_some_and(|(_, rest)| {
+    let (quantity, unit) = ["displacement", "velocity"]
+        .into_iter()
+        .find_map(|keyword| {
+            let (_, rest) = plain.rsplit_once(keyword)?;
             let unit = rest.strip_prefix('_').or_else(|| in_brackets(rest));
-            rest.is_empty()
-                || unit.is_some_and(|unit| Unit::parse(unit).is_ok())
-                || channel_unit(name).is_none()
-        })
-    });
-    is_one.then(|| Remark {
+            let is_one = rest.is_empty()
+                || unit.is_some_and(is_unit_of_motion)
+                || channel_unit(name).is_none();
+            is_one.then_some((keyword, unit))
+        })?;
+    let unit = unit.and_then(|unit| Unit::parse(unit).ok());
+    let unit = unit.filter(|unit| unit.quantity().name() == quantity);
+    let unit = unit.map_or_else(|| "UNIT".to_owned(), Unit::column_suffix);
+    Some(Remark {
         about: format!("column {name:?}"),
         text: format!(
             "named like a reading, and taken as a covariate; expected [ID_]displacement_UNIT with mm, cm, m, in or ft, \
-             or [ID_]velocity_UNIT with one of these per h, day or yr; \
-             or say it with [[benchmark]] column = {name:?} and unit (--column {name:?}=ID:displacement:mm)"
+             or [ID_]velocity_UNIT with one of these per h, day or yr (what is in another unit must be converted first); \
+             or say it with [[benchmark]] column = {name:?} and unit (--column {name:?}=ID:{quantity}:{unit})"
         ),
     })
 }

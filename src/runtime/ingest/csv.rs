@@ -51,7 +51,11 @@ impl CsvReader {
 /// What a line of remarks begins with.
 const COMMENT: char = '#';
 
-/// Whether a line before the header is none: one of those that the config passes over, a remark, or a blank one after these. What
+/// What a spreadsheet writes in the first line to say what parts the cells.
+const STATED_DELIMITER: &str = "sep=";
+
+/// Whether a line before the header is none: one of those that the config passes over, a remark, a first one such as `sep=;`, or a blank
+/// one after these. What
 /// begins as a remark and has the columns of the time that the config names is the header.
 pub(super) fn stands_before_header(line: u64, text: &str, dialect: &Dialect) -> bool {
     if line <= dialect.skip_lines {
@@ -60,7 +64,9 @@ pub(super) fn stands_before_header(line: u64, text: &str, dialect: &Dialect) -> 
     let text = text.trim_start_matches('\u{feff}').trim();
     let has_times = !dialect.time_columns.is_empty()
         && dialect.time_columns.iter().all(|one| text.contains(one));
-    text.starts_with(COMMENT) && !has_times || text.is_empty() && line > 1
+    let states_delimiter = line == 1
+        && (text.strip_prefix(STATED_DELIMITER)).is_some_and(|rest| rest.chars().count() <= 1);
+    text.starts_with(COMMENT) && !has_times || text.is_empty() && line > 1 || states_delimiter
 }
 
 impl LineReader for CsvReader {
@@ -215,9 +221,20 @@ impl CsvRows {
         self.table.as_mut()?.take_fault()
     }
 
-    /// A logger that starts again writes its header again; no other row has the name of a time for a time.
+    /// A logger that starts again writes its header again; no other row has the name of a time for a time. So is a row without any
+    /// number that has the names of most columns: what the others are called is then another matter, and is not understood.
     fn is_header(&self) -> bool {
-        let stated = &self.options.dialect.time_columns;
+        let dialect = &self.options.dialect;
+        if !self.cells.iter().any(|cell| dialect.number(cell).is_some()) {
+            let names_again = self.cells.iter().filter(|cell| {
+                let mut names = self.columns().iter();
+                !cell.is_empty() && names.any(|name| name == cell)
+            });
+            if 2 * names_again.count() > self.cells.len() {
+                return true;
+            }
+        }
+        let stated = &dialect.time_columns;
         if !stated.is_empty() {
             return stated
                 .iter()

@@ -29,7 +29,7 @@ mod vector;
 
 pub use bytes::{is_packed, unpack, unpacked_name};
 pub use column_map::{ColumnMap, ColumnMapError, Measure};
-pub use columns::{Meaning, unit_in_name};
+pub use columns::{Meaning, bracketed, unit_in_name};
 pub use convert::{ChannelCount, ConvertReport, ConvertStage, SeriesCount, convert};
 pub use csv::{CSV, CsvRows};
 pub use encoding::{Transcoder, latin1};

@@ -73,6 +73,10 @@ pub fn survey(file: &Path, dialect: &Dialect) -> Result<Survey, IngestError> {
     let least = names.len() - unnamed.count();
     let (mut columns, mut is_other_table) = (vec![Vec::new(); names.len()], false);
     for line in lines.take(MOST_ROWS) {
+        // A logger that starts again writes its header again.
+        if line.trim_end() == header.trim_end() {
+            continue;
+        }
         if splitter.split(&line, &mut cells).is_ok() && (least..=names.len()).contains(&cells.len())
         {
             for (index, column) in columns.iter_mut().enumerate() {

@@ -224,27 +224,28 @@ impl PreviewTrack {
         texts.chain(self.moves_backwards()).collect()
     }
 
-    /// What to do where the displacement falls all along.
+    /// What to do where the displacement falls all along, or the velocity is negative.
     fn moves_backwards(&self) -> Option<String> {
-        let steps = self
-            .readings
-            .windows(2)
-            .map(|pair| pair[1].value - pair[0].value);
-        let (mut sum, mut sizes) = (0.0, 0.0);
-        for step in steps {
-            sum += step;
-            sizes += step.abs();
-        }
-        let is_displacement = self.view.quantity == Quantity::Displacement;
+        let (what, motion): (&str, Vec<f64>) = match self.view.quantity {
+            Quantity::Displacement => {
+                let pairs = self.readings.windows(2);
+                let steps = pairs.map(|pair| pair[1].value - pair[0].value);
+                ("displacement falls", steps.collect())
+            }
+            Quantity::Velocity => {
+                let values = self.readings.iter().map(|reading| reading.value);
+                ("velocity is negative", values.collect())
+            }
+        };
+        let sum: f64 = motion.iter().sum();
+        let sizes: f64 = motion.iter().map(|one| one.abs()).sum();
         let is_known = self.accepted.contains(&Suspicion::Fall);
-        let falls = is_displacement
-            && !is_known
-            && self.readings.len() >= FEWEST_STEPS
-            && sum < -HALF * sizes;
-        falls.then(|| {
-            "its displacement falls: motion counts as positive, and a slope that moves backwards calls no red; if its sign is \
-             the other way, write components = [\"COLUMN\"] and direction = [-1.0] for this benchmark"
-                .to_owned()
+        let is_backwards = !is_known && self.readings.len() >= FEWEST_STEPS && sum < -HALF * sizes;
+        is_backwards.then(|| {
+            format!(
+                "its {what}: motion counts as positive, and a slope that moves backwards calls no red; if its sign is \
+                 the other way, write components = [\"COLUMN\"] and direction = [-1.0] for this benchmark"
+            )
         })
     }
 }
