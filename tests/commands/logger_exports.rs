@@ -142,7 +142,7 @@ fn a_header_with_other_columns_ends_what_is_understood_until_a_known_one_comes()
             _ => "",
         };
         let time = time.strftime("%Y-%m-%d %H:%M");
-        if again.starts_with("Time") || value >= 12.0 && value < 24.0 {
+        if again.starts_with("Time") || (12.0..24.0).contains(&value) {
             format!("{again}{time};12.6;{value}\n")
         } else {
             format!("{again}{time};{value};12.6\n")
