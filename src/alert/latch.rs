@@ -13,6 +13,7 @@ use crate::reading::Timestamp;
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 
 /// A change of the level in force.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -50,6 +51,9 @@ pub struct Latch {
     slow: Option<SteadyStretch>,
     /// While the evidence calls for less: the motion under the critical velocity.
     steady: Option<SteadyStretch>,
+    /// Since when each level was in force that was the newest of it: that is in its key. None in states of earlier versions.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    newest: BTreeMap<Level, Timestamp>,
 }
 
 /// A stretch of motion that does not gain.
@@ -79,6 +83,7 @@ impl Default for Latch {
             peak_velocity: 0.0,
             slow: None,
             steady: None,
+            newest: BTreeMap::new(),
         }
     }
 }
@@ -157,6 +162,7 @@ impl Latch {
     pub fn resolve(&mut self, now: Timestamp) {
         *self = Self {
             since: self.since.max(Some(now)),
+            newest: std::mem::take(&mut self.newest),
             ..Self::default()
         };
     }
@@ -213,12 +219,15 @@ impl Latch {
 
     fn enter(&mut self, evidence: &AlertEvidence, call: &Call) -> Transition {
         // What has ended may be called again by what was measured before, or by a correction: as another alert.
-        let since = match (self.level, self.since) {
-            (Level::Green, Some(ended)) if ended >= evidence.now => ended
+        let ended = self.since.filter(|_| self.level == Level::Green);
+        let again = self.newest.get(&call.level).copied().max(ended);
+        let since = match again {
+            Some(again) if again >= evidence.now => again
                 .checked_add(SignedDuration::from_secs(1))
-                .unwrap_or(ended),
+                .unwrap_or(again),
             _ => evidence.now,
         };
+        self.newest.insert(call.level, since);
         self.begin(evidence, call.level);
         self.since = Some(since);
         Transition {
@@ -257,6 +266,7 @@ impl Latch {
             since: Some(evidence.now),
             first_velocity: velocity,
             peak_velocity: if has_stood_out { velocity } else { 0.0 },
+            newest: std::mem::take(&mut self.newest),
             ..Self::default()
         };
     }
@@ -287,6 +297,35 @@ mod tests {
             Level::Red
         );
         (policy, latch)
+    }
+
+    #[test]
+    fn a_level_that_is_called_again_at_the_time_of_an_ended_one_is_another_alert_whatever_stood_between()
+     {
+        let (policy, mut latch) = red_at_hundred();
+        let red = latch.in_force().unwrap().1;
+        latch.resolve(evidence(0, 0.0, 0.0).now);
+        let call = |level| Call {
+            level,
+            rule: "displacement".into(),
+        };
+        let mut seen = vec![red];
+        for level in [Level::Orange, Level::Red, Level::Red] {
+            let entered = latch.enter(&evidence(0, 0.0, 50.0), &call(level));
+            if level == Level::Red {
+                assert!(!seen.contains(&entered.since), "{seen:?} {entered:?}");
+                seen.push(entered.since);
+                let kept: Latch =
+                    serde_json::from_value(serde_json::to_value(&latch).unwrap()).unwrap();
+                latch = kept;
+                latch.resolve(evidence(0, 0.0, 0.0).now);
+                latch.enter(&evidence(0, 0.0, 50.0), &call(Level::Orange));
+            }
+        }
+        // A later one begins when it does.
+        let later = latch.enter(&evidence(1, 0.0, 50.0), &call(Level::Red));
+        assert_eq!(later.since, evidence(1, 0.0, 0.0).now);
+        assert!(policy.red_chance > 0.0);
     }
 
     #[test]

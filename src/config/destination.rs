@@ -14,6 +14,12 @@ pub trait Destination: Any + Debug + Send + Sync {
     /// What logs and receipts call it; of all that a site has each has its own.
     fn name(&self) -> String;
 
+    /// Whether it goes by the keys of alerts alone, whatever the order in which it gets them: the end of one reaches it after the beginning
+    /// of another too.
+    fn goes_by_keys(&self) -> bool {
+        false
+    }
+
     /// What it needs and this machine does not have, for `check`.
     fn lacks(&self) -> Option<String> {
         None

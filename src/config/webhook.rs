@@ -50,6 +50,10 @@ impl Destination for Webhook {
         self.name.clone()
     }
 
+    fn goes_by_keys(&self) -> bool {
+        self.format == WebhookFormat::Alertmanager
+    }
+
     fn lacks(&self) -> Option<String> {
         let secret = self.secret_file.as_deref();
         let secret = secret.and_then(|file| Secret::read(file).err());

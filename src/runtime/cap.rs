@@ -34,6 +34,9 @@ struct CapMessage {
     /// The level in force; none in chains of an earlier version.
     #[serde(default)]
     level: Option<Level>,
+    /// Whether it reports the beginning of an alert; not known in chains of an earlier version.
+    #[serde(default)]
+    begins: bool,
 }
 
 /// What a message is to those before it.
@@ -159,6 +162,16 @@ fn written(cap: &CapFolder, alert: &Alert, now: Timestamp) -> io::Result<()> {
         if chain.last().is_some_and(|last| last.is_cancel) {
             chain.clear();
         }
+        // The level that followed on it has taken its place already, and is not over.
+        let own = is_cancel.then(|| self::identifier(&alert.beginning()));
+        let own = own.and_then(|own| chain.iter().position(|one| one.identifier == own));
+        if own.is_some_and(|own| chain[own + 1..].iter().any(|one| one.begins)) {
+            tracing::info!(
+                key = alert.key,
+                "the end of what a later CAP message has replaced"
+            );
+            return Ok(());
+        }
         if chain.is_empty() && alert.state != MessageState::Firing {
             tracing::info!(
                 key = alert.key,
@@ -175,6 +188,7 @@ fn written(cap: &CapFolder, alert: &Alert, now: Timestamp) -> io::Result<()> {
             sent: now,
             is_cancel,
             level,
+            begins: alert.state == MessageState::Firing,
         });
         let excess = chain.len().saturating_sub(LONGEST_CHAIN);
         chain.drain(..excess);

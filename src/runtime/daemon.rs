@@ -57,6 +57,7 @@ pub struct Daemon {
     positions: Vec<Position>,
     /// Since the last commit.
     since_commit: Stopwatch,
+    since_orders: Stopwatch,
     /// Lines, records and files that could not be used, as the state has it.
     quarantined: BTreeMap<String, u64>,
     /// How far the rows of the state have been looked at.
@@ -93,6 +94,7 @@ impl Daemon {
             is_up_to_date: false,
             positions: Vec::new(),
             since_commit: Stopwatch::start(),
+            since_orders: Stopwatch::start(),
             quarantined: BTreeMap::new(),
             verified: Verified::default(),
             beside: None,
@@ -192,6 +194,10 @@ impl Daemon {
             self.commit_what_is_urgent()?;
         }
         self.positions.extend(batch.positions);
+        // Of a backlog one batch follows another, and time is not let pass.
+        if self.since_orders.elapsed() >= TICK {
+            self.take_orders()?;
+        }
         if batch.caught_up {
             self.decide();
         } else {
@@ -438,17 +444,24 @@ impl Daemon {
         }
     }
 
+    /// Takes what people have ordered.
+    fn take_orders(&mut self) -> Result<(), StoreError> {
+        self.since_orders = Stopwatch::start();
+        if !self.site.is_waiting() {
+            for (number, order) in self.store.orders()? {
+                self.site.order(number, order);
+            }
+        }
+        Ok(())
+    }
+
     /// What is due whether anything comes or not.
     ///
     /// # Errors
     /// When the state cannot be used any more.
     pub fn tick(&mut self) -> Result<(), StoreError> {
         let now = (self.wall)();
-        if !self.site.is_waiting() {
-            for (number, order) in self.store.orders()? {
-                self.site.order(number, order);
-            }
-        }
+        self.take_orders()?;
         // Data time is the clock's only once the past has been read.
         if self.is_caught_up {
             let events = self.site.live(now);

@@ -120,8 +120,9 @@ impl InHand {
     }
 
     /// `alert` has come: what it supersedes or resolves at its benchmark is over. A level ends
-    /// itself and the lower ones; `unknown` stands for itself, and so does a correction, which is of the past.
-    pub(super) fn supersede(&mut self, alert: &Alert) {
+    /// itself and the lower ones; `unknown` stands for itself, and so does a correction, which is of the past. `keeps_ends`: the ends of
+    /// other alerts are sent all the same.
+    pub(super) fn supersede(&mut self, alert: &Alert, keeps_ends: bool) {
         let own = token(alert);
         if alert.is_flood() || alert.is_correction() {
             return;
@@ -134,8 +135,8 @@ impl InHand {
             let same_place = entry.benchmark == alert.event.benchmark
                 && (token.level == Level::Unknown) == (alert.level == Level::Unknown);
             // An end does not make an earlier end untrue; a new beginning does.
-            let is_touched =
-                alert.state == MessageState::Firing || entry.state == MessageState::Firing;
+            let is_touched = entry.state == MessageState::Firing
+                || alert.state == MessageState::Firing && (!keeps_ends || token.key == own.key);
             if same_place && is_touched && token.level <= alert.level && *token != own {
                 entry.is_over = true;
             }

@@ -297,3 +297,19 @@ fn a_drill_writes_a_message_that_says_test_and_check_refuses_an_outline_that_is_
         assert!(said.contains(what), "{what}: {said}");
     }
 }
+
+#[tokio::test]
+async fn the_end_of_what_another_level_has_replaced_cancels_nothing() {
+    let (folder, hook) = folder();
+    let actual = |state| (state, Status::Actual);
+    let red = alert("5", Level::Red, actual(AlertState::Firing));
+    let orange = alert("5", Level::Orange, actual(AlertState::Firing));
+    assert!(written(folder.path(), &hook, &red).await.is_some());
+    assert!(written(folder.path(), &hook, &orange).await.is_some());
+    // The end of the red could not be written before, or came late.
+    let end = alert("5", Level::Red, actual(AlertState::Resolved));
+    assert_eq!(written(folder.path(), &hook, &end).await, None);
+    let end = alert("5", Level::Orange, actual(AlertState::Resolved));
+    let cancel = written(folder.path(), &hook, &end).await.unwrap();
+    assert!(cancel.contains("<msgType>Cancel</msgType>"), "{cancel}");
+}

@@ -6,6 +6,7 @@
     reason = "a test fails by panicking"
 )]
 
+use crate::eventually::eventually;
 use crate::identity::red_fires;
 use jiff::{SignedDuration, Timestamp};
 use slipwatch::alert::Level;
@@ -149,6 +150,33 @@ async fn an_alert_is_reported_and_after_a_restart_not_again() {
     let store = Store::look(&config.site.state_dir).unwrap();
     let taken = store.is_noted(red_fires(&key), None, Some(DeliveryOutcome::Delivered));
     assert!(taken.unwrap());
+}
+
+#[tokio::test]
+async fn a_level_that_begins_and_ends_at_once_is_reported_to_nobody_and_ends_what_was_before_it() {
+    let (folder, config) = site_folder();
+    let mut site = site(&config);
+    let orange = format!("5/orange/{}", noon().as_second());
+    site.handle(&alert(noon(), Level::Orange, AlertState::Firing));
+    site.commit(noon()).unwrap();
+    eventually("orange", || !lines(&folder, "notified").is_empty()).await;
+    // A logger hands in what it has of half a day.
+    let red = noon() + hours(1);
+    site.handle(&alert(red, Level::Red, AlertState::Firing));
+    let end = Event {
+        time: noon() + hours(9),
+        ..alert(red, Level::Red, AlertState::Resolved)
+    };
+    site.handle(&end);
+    site.commit(noon() + hours(9)).unwrap();
+    close(site, noon() + hours(9)).await;
+    let notified = lines(&folder, "notified");
+    assert_eq!(
+        notified,
+        [format!("{orange} Actual"), format!("{orange} Actual")]
+    );
+    let all = fs::read_to_string(folder.path().join("stdin")).unwrap();
+    assert!(all.contains("resolved") && !all.contains("/red/"), "{all}");
 }
 
 #[tokio::test(start_paused = true)]

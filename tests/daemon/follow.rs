@@ -685,3 +685,49 @@ fn a_packed_file_that_is_damaged_leaves_the_others_alone() {
     assert!(bench.news().contains(&"6:2".to_owned()));
     assert!(bench.news().is_empty());
 }
+
+#[test]
+fn what_comes_live_to_one_file_does_not_wait_for_the_backlog_of_another() {
+    let mut bench = Bench::new("csv");
+    bench.write("a.csv", &format!("{HEADER}{}", row(1, 1.0)));
+    assert_eq!(bench.news(), ["a:1"]);
+    let start: Timestamp = "2017-01-01T00:00:00Z".parse().unwrap();
+    let backlog = (0..3000).map(|hour| row_at(start + SignedDuration::from_hours(hour), hour));
+    bench.write("b.csv", &format!("{HEADER}{}", backlog.collect::<String>()));
+    let first = bench.follower.poll(bench.wall);
+    assert!(
+        !first.caught_up && first.arrivals.len() <= 100,
+        "{}",
+        first.arrivals.len()
+    );
+    bench.append("a.csv", &row(20, 7.0));
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    let next = bench.follower.poll(bench.wall);
+    let is_live = |arrival: &Arrival| {
+        matches!(&arrival.input, Input::Reading { benchmark, reading, .. }
+            if benchmark.as_str() == "a" && reading.value > 6.0)
+    };
+    assert!(next.arrivals.first().is_some_and(is_live), "{next:?}");
+    // Nothing is lost, taken twice or taken in another order.
+    let mut values: Vec<f64> = Vec::new();
+    let mut take = |batch: ArrivalBatch| {
+        values.extend(
+            batch
+                .arrivals
+                .into_iter()
+                .filter_map(|arrival| match arrival.input {
+                    Input::Reading {
+                        benchmark, reading, ..
+                    } if benchmark.as_str() == "b" => Some(reading.value),
+                    _ => None,
+                }),
+        );
+        batch.caught_up
+    };
+    let mut is_done = take(first);
+    is_done |= take(next);
+    while !is_done {
+        is_done = take(bench.follower.poll(bench.wall));
+    }
+    assert_eq!(values, (0..3000).map(f64::from).collect::<Vec<_>>());
+}

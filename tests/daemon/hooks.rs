@@ -505,3 +505,38 @@ fn the_sample_hook_says_it_in_one_line_for_a_person() {
         "[Test] Monte Toc: red firing at benchmark 5, 2017-06-06T17:00:00Z\n"
     );
 }
+
+/// A siren that goes by the order alone is off while nothing is in force, and on while something is.
+#[tokio::test]
+async fn the_end_of_a_level_is_sent_before_the_level_that_follows_on_it_and_holds_it_up_but_once() {
+    let ended = |mut alert: Alert| {
+        alert.state = AlertState::Resolved.into();
+        alert
+    };
+    for (ends, expected) in [
+        ("", ["red firing", "red resolved", "orange firing"]),
+        (
+            "if [ $SLIPWATCH_STATE = resolved ] && [ $SLIPWATCH_ATTEMPT = 1 ]; then exit 1; fi\n",
+            ["red firing", "orange firing", "red resolved"],
+        ),
+    ] {
+        let script = format!(
+            "{ends}[ -e begun ] || {{ touch begun; sleep 0.5; }}\necho $SLIPWATCH_LEVEL $SLIPWATCH_STATE >> calls\n"
+        );
+        let (folder, config) = hook(&script);
+        let retry = Retry {
+            first_delay: Duration::from_millis(300),
+            ..quick_retry()
+        };
+        let hooks = std::slice::from_ref(&config);
+        let dispatcher = Dispatcher::start(hooks, &retry, Delivered::default());
+        let red = alert_of(Level::Red, "5/red/1", "");
+        assert!(dispatcher.offer(&red));
+        eventually("the first run", || folder.path().join("begun").exists()).await;
+        assert!(dispatcher.offer(&ended(red)));
+        assert!(dispatcher.offer(&alert_of(Level::Orange, "5/orange/2", "")));
+        eventually("all", || read(&folder, "calls").lines().count() == 3).await;
+        assert_eq!(read(&folder, "calls").lines().collect::<Vec<_>>(), expected);
+        assert_eq!(dispatcher.close(LIMIT).await, Some(0));
+    }
+}

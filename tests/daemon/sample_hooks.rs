@@ -161,8 +161,24 @@ fn a_relay_is_switched_by_a_red_alone_and_by_a_drill_only_where_that_is_asked_fo
     ] {
         assert_eq!(after(other, &[]), "1\n", "{other:?}");
     }
-    assert_eq!(after(("red", "resolved", "Actual"), &[]), "0\n");
+    // Whether another benchmark is red is not known.
+    let ended = ("red", "resolved", "Actual");
+    let output = run("relay.sh", &[file], ended, &[]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        !output.status.success() && said.contains("site = true"),
+        "{said}"
+    );
+    assert_eq!(fs::read_to_string(&relay).unwrap(), "1\n");
+    assert_eq!(after(ended, &["--one-benchmark"]), "0\n");
     assert_eq!(after(("red", "firing", "Test"), &["--drills"]), "1\n");
+    let of_the_site = [("SLIPWATCH_BENCHMARK", Path::new(""))];
+    assert!(
+        run("relay.sh", &[file], ended, &of_the_site)
+            .status
+            .success()
+    );
+    assert_eq!(fs::read_to_string(&relay).unwrap(), "0\n");
     fs::remove_file(&relay).unwrap();
     fs::create_dir(&relay).unwrap();
     let output = run("relay.sh", &[file], RED, &[]);

@@ -444,6 +444,35 @@ async fn alertmanager_gets_a_list_with_the_same_labels_when_an_alert_fires_and_w
 }
 
 #[tokio::test]
+async fn the_end_of_a_red_that_alertmanager_did_not_take_comes_after_the_next_red_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let receiver = Receiver::answering(&[200, 503, 200]);
+    let table = format!(
+        "[[webhook]]\nurl = \"{}\"\nformat = \"alertmanager\"\n",
+        receiver.url
+    );
+    let hooks = webhooks(folder.path(), &table);
+    let retry = Retry {
+        first_delay: Duration::from_millis(300),
+        ..quick()
+    };
+    let dispatcher = Dispatcher::start(&hooks, &retry, Delivered::default());
+    let count = |count: usize| move |receiver: &Receiver| receiver.got().len() >= count;
+    assert!(dispatcher.offer(&alert("5", KEY)));
+    eventually("the first", || count(1)(&receiver)).await;
+    assert!(dispatcher.offer(&ended(alert("5", KEY), "2017-06-09T05:00:00Z")));
+    eventually("its end, refused", || count(2)(&receiver)).await;
+    assert!(dispatcher.offer(&alert("5", "5/red/2017-06-09T06:00:00Z")));
+    eventually("the next, and the end", || count(4)(&receiver)).await;
+    assert_eq!(dispatcher.close(Duration::from_secs(20)).await, Some(0));
+    let ends = receiver
+        .got()
+        .into_iter()
+        .filter(|one| one.body.contains("2017-06-09T05:00:00Z"));
+    assert_eq!(ends.count(), 2);
+}
+
+#[tokio::test]
 #[cfg_attr(not(has_alertmanager), ignore = "there is no prometheus-alertmanager")]
 async fn a_real_alertmanager_has_the_alert_in_force_until_its_end_comes() {
     let folder = tempfile::tempdir().unwrap();

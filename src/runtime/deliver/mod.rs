@@ -77,6 +77,33 @@ struct HookQueue {
     in_hand: Arc<Mutex<InHand>>,
 }
 
+/// Whether `alert` is the beginning of a level that one of those that come together with it, and after it, ends.
+fn is_over_by(alert: &Alert, later: &[Alert]) -> bool {
+    let ends = |end: &Alert| {
+        end.state == MessageState::Resolved
+            && !end.is_flood()
+            && end.event.benchmark == alert.event.benchmark
+            && (end.level == Level::Unknown) == (alert.level == Level::Unknown)
+            && end.level >= alert.level
+    };
+    alert.state == MessageState::Firing && !alert.is_flood() && later.iter().any(ends)
+}
+
+/// Whether `alert` is the end of one of those that come together with it, and before it.
+fn has_begun_in(alert: &Alert, earlier: &[Alert]) -> bool {
+    let begins = |one: &Alert| {
+        one.state == MessageState::Firing && one.key == alert.key && one.level == alert.level
+    };
+    alert.state == MessageState::Resolved && earlier.iter().any(begins)
+}
+
+impl HookQueue {
+    fn supersede(&self, alert: &Alert) {
+        let keeps_ends = (self.hook.to.as_ref()).is_some_and(|to| to.goes_by_keys());
+        locked(&self.in_hand).supersede(alert, keeps_ends);
+    }
+}
+
 /// What one hook is to receive.
 #[derive(Debug)]
 pub(super) struct HookShare {
@@ -182,7 +209,7 @@ impl Dispatcher {
             return;
         };
         for alert in alerts {
-            locked(&way.in_hand).supersede(alert);
+            way.supersede(alert);
             self.offer_to(way, alert, false);
         }
     }
@@ -192,8 +219,15 @@ impl Dispatcher {
         let each = self.hooks.iter().enumerate();
         each.map(|(place, way)| {
             let (mut own, mut unreported) = (Vec::new(), Vec::new());
-            for alert in alerts {
-                if let Some(share) = self.share(way, alert) {
+            for (number, alert) in alerts.iter().enumerate() {
+                let share = if is_over_by(alert, &alerts[number..]) {
+                    None
+                } else if has_begun_in(alert, &alerts[..number]) {
+                    self.end_of_earlier(way, alert)
+                } else {
+                    self.share(way, alert)
+                };
+                if let Some(share) = share {
                     own.push(share);
                 } else if way.hook.asks_for(alert) {
                     unreported.push(alert.clone());
@@ -223,14 +257,17 @@ impl Dispatcher {
         if is_its_own && self.has_received(way, &alert.beginning()) {
             return Some(alert.clone());
         }
-        let ends = alert.earlier.iter().rev().filter(|_| !alert.is_flood());
-        let ends = ends.map(|one| alert.end_of(one.benchmark.as_ref(), one.level, &one.key));
-        let mut received =
-            ends.filter(|end| way.hook.asks_for(end) && self.has_received(way, &end.beginning()));
-        received.next().or_else(|| {
+        self.end_of_earlier(way, alert).or_else(|| {
             let is_due = is_its_own && !self.is_unsent(way, &alert.beginning());
             is_due.then(|| alert.clone())
         })
+    }
+
+    /// With the end of `alert` that of the lower level which the hook has received the beginning of.
+    fn end_of_earlier(&self, way: &HookQueue, alert: &Alert) -> Option<Alert> {
+        let ends = alert.earlier.iter().rev().filter(|_| !alert.is_flood());
+        let mut ends = ends.map(|one| alert.end_of(one.benchmark.as_ref(), one.level, &one.key));
+        ends.find(|end| way.hook.asks_for(end) && self.has_received(way, &end.beginning()))
     }
 
     /// Whether this one, which the hook has not been run for, waited or was called off.
@@ -267,7 +304,7 @@ impl Dispatcher {
     /// What `alert` supersedes or resolves is not tried again, whether a hook is notified of `alert` or not.
     pub fn supersede(&self, alert: &Alert) {
         for way in &self.hooks {
-            locked(&way.in_hand).supersede(alert);
+            way.supersede(alert);
         }
     }
 

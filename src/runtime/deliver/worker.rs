@@ -63,6 +63,22 @@ fn place(alert: &Alert) -> Option<&BenchmarkId> {
 /// By when it is due, then in order of arrival.
 type Turn = (Instant, u64);
 
+/// The turn of `waiting`, or of an end at its place that came before it and has not been tried: a receiver that goes by the order takes
+/// the newest message for what holds. An end that has failed once keeps nothing waiting.
+fn end_before(turn: &Turn, waiting: &Waiting, free: &[(&Turn, &Waiting)]) -> Turn {
+    let is_before = |(other, end): &&(&Turn, &Waiting)| {
+        end.is_new
+            && end.alert.state == MessageState::Resolved
+            && other.1 < turn.1
+            && place(&end.alert) == place(&waiting.alert)
+    };
+    let mut ends = free.iter().filter(is_before);
+    if waiting.alert.state != MessageState::Firing {
+        return *turn;
+    }
+    ends.next().map_or(*turn, |(turn, _)| **turn)
+}
+
 #[derive(Debug)]
 pub(super) struct Worker {
     hook: Arc<HookConfig>,
@@ -152,11 +168,12 @@ impl Worker {
         let due = self.waiting.iter();
         let due = due.take_while(|((due, _), _)| !open || *due <= now);
         let due = due.filter(|(_, waiting)| !waiting.is_held);
-        let free = due.filter(|(_, waiting)| self.is_free(waiting));
-        let next = free.max_by_key(|((due, number), waiting)| {
+        let free: Vec<(&Turn, &Waiting)> =
+            due.filter(|(_, waiting)| self.is_free(waiting)).collect();
+        let next = free.iter().max_by_key(|((due, number), waiting)| {
             (gravity(&waiting.alert), std::cmp::Reverse((*due, *number)))
         });
-        let Some(turn) = next.map(|(turn, _)| *turn) else {
+        let Some(turn) = next.map(|(turn, waiting)| end_before(turn, waiting, &free)) else {
             return false;
         };
         let Some(waiting) = self.waiting.remove(&turn) else {

@@ -12,9 +12,13 @@ use jiff::SignedDuration;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 
-/// Values in one batch at most.
+/// Values in one batch at most: while the past is read, and later, when what comes live does not wait for a backlog.
 const BATCH: usize = 1000;
+const LIVE_BATCH: usize = 100;
+/// While a backlog is read the other files are looked at so often.
+const LOOK_BESIDE: Duration = Duration::from_millis(250);
 
 /// Values in the order of their measurement, as far as they had arrived.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -62,6 +66,8 @@ pub struct Follower {
     pub(super) missing: BTreeSet<PathBuf>,
     /// Runs since the last look at the files.
     looked: Option<Stopwatch>,
+    /// The files held no more once: what comes since is live, but for the backlog of one or another.
+    is_live: bool,
     /// Positions that are to be kept, or forgotten, whatever still waits.
     pub(super) at_once: Vec<Position>,
     /// What may be missing of files that are gone.
@@ -100,6 +106,7 @@ impl Follower {
             heads: BTreeSet::new(),
             missing: BTreeSet::new(),
             looked: None,
+            is_live: false,
             at_once: Vec::new(),
             lost: Vec::new(),
             not_text: BTreeSet::new(),
@@ -160,22 +167,17 @@ impl Follower {
             }
             hold_newest(self.files.values_mut());
         }
-        let (mut direct, mut read) = (Vec::new(), 0);
-        while read < BATCH
+        let mut direct = self.beside_a_backlog(wall);
+        let most = if self.is_live { LIVE_BATCH } else { BATCH };
+        let mut read = direct.len();
+        while read < most
             && let Some((.., key)) = self.heads.pop_first()
         {
             let Some(file) = self.files.get_mut(&key) else {
                 continue;
             };
             read += 1;
-            // What a restart could not read again does not wait.
-            let reorder = self.sources[key.0].reorder.as_mut();
-            let reorder = reorder.filter(|_| !file.is_nameless());
-            match (reorder, file.pending.pop_front()) {
-                (Some(reorder), Some(arrival)) => reorder.take(arrival, wall),
-                (None, arrival) => direct.extend(arrival),
-                (Some(_), None) => {}
-            }
+            direct.extend(next_of(file, &mut self.sources[key.0], wall));
             file.refill();
             self.heads.extend(head(key, file));
         }
@@ -183,16 +185,43 @@ impl Follower {
         arrivals.append(&mut self.lost);
         arrivals.extend(direct);
         let is_due = |source: &Followed| source.reorder.as_ref().is_some_and(Reorder::is_due);
+        let caught_up = self.heads.is_empty()
+            && !self.sources.iter().any(is_due)
+            && !self.files.values().any(FileTail::is_awaited);
+        self.is_live |= caught_up;
         ArrivalBatch {
             positions: self.positions(),
-            caught_up: self.heads.is_empty()
-                && !self.sources.iter().any(is_due)
-                && !self.files.values().any(FileTail::is_awaited),
+            caught_up,
             has_more: self.files.values().any(|file| file.has_more),
             found: self.looked.filter(|_| !arrivals.is_empty()),
             quarantined: self.newly_quarantined(),
             arrivals,
         }
+    }
+
+    /// What has come to files that held no more, while a backlog is read from others: it is live, and goes first. Until all files have held
+    /// no more once, every value has its place in the past.
+    fn beside_a_backlog(&mut self, wall: Timestamp) -> Vec<Arrival> {
+        let is_due = |looked: &Stopwatch| looked.elapsed() >= LOOK_BESIDE;
+        if !self.is_live || self.heads.is_empty() || !self.looked.as_ref().is_some_and(is_due) {
+            return Vec::new();
+        }
+        self.looked = Some(Stopwatch::start());
+        self.rescan();
+        let read: BTreeSet<FileKey> = self.heads.iter().map(|(.., key)| key.clone()).collect();
+        let mut live = Vec::new();
+        for (key, file) in &mut self.files {
+            if read.contains(key) {
+                continue;
+            }
+            file.refill();
+            while live.len() < LIVE_BATCH / 2 && !file.pending.is_empty() {
+                live.extend(next_of(file, &mut self.sources[key.0], wall));
+                file.refill();
+            }
+            self.heads.extend(head(key.clone(), file));
+        }
+        live
     }
 
     /// What has waited for long enough.
@@ -241,6 +270,19 @@ fn restored(sources: &[Followed], name: &str, body: &[u8]) -> Option<(FileKey, F
             tracing::warn!(file = %path.display(), %error, "no position: read from its start");
             None
         }
+    }
+}
+
+/// The next value of a file; `None` where it waits for earlier ones of its source.
+fn next_of(file: &mut FileTail, source: &mut Followed, wall: Timestamp) -> Option<Arrival> {
+    let arrival = file.pending.pop_front()?;
+    // What a restart could not read again does not wait.
+    match source.reorder.as_mut().filter(|_| !file.is_nameless()) {
+        Some(reorder) => {
+            reorder.take(arrival, wall);
+            None
+        }
+        None => Some(arrival),
     }
 }
 
