@@ -91,6 +91,7 @@ pub async fn follow(
     let mut session = Session::new(broker.clone(), client_id);
     let mut reader = Reader {
         source: broker.id.clone(),
+        filter: broker.topic.clone(),
         decoder: Decoder::of_messages(&broker, &benchmarks),
         quarantined: 0,
     };
@@ -156,6 +157,8 @@ async fn send(
 
 struct Reader {
     source: String,
+    /// The topics that it takes.
+    filter: String,
     decoder: Decoder,
     /// Lines and whole messages that could not be used.
     quarantined: u64,
@@ -180,6 +183,14 @@ impl Reader {
     fn read(&mut self, topic: &str, payload: &[u8]) -> (Vec<Arrival>, u64) {
         let mut arrivals = Vec::new();
         let mut faults: Vec<Box<dyn std::error::Error>> = Vec::new();
+        if !is_of(&self.filter, topic) {
+            // A session keeps what an earlier config subscribed to.
+            let filter = self.filter.clone();
+            return (
+                Vec::new(),
+                self.set_aside(topic, &[OtherTopic(filter).into()]),
+            );
+        }
         let rows = self.decoder.text_rows(Path::new(topic));
         match (rows, text(payload)) {
             (Some(mut rows), Ok(text)) => {
@@ -196,16 +207,35 @@ impl Reader {
         if arrivals.is_empty() && faults.is_empty() {
             faults.push(GivesNothing.into());
         }
-        for error in &faults {
+        (arrivals, self.set_aside(topic, &faults))
+    }
+
+    /// Counts what cannot be used, and logs it now and then.
+    fn set_aside(&mut self, topic: &str, faults: &[Box<dyn std::error::Error>]) -> u64 {
+        for error in faults {
             self.quarantined += 1;
             let total = self.quarantined;
             if is_logged(total) {
                 tracing::warn!(topic, %error, total, "message, or line of one, quarantined");
             }
         }
-        (arrivals, faults.len() as u64)
+        faults.len() as u64
     }
 }
+
+/// Whether a topic is one of those that `filter` subscribes to, alone or as one of a group that shares them.
+fn is_of(filter: &str, topic: &str) -> bool {
+    let shared = filter.strip_prefix("$share/");
+    let own = shared.and_then(|shared| shared.split_once('/'));
+    rumqttc::matches(topic, own.map_or(filter, |(_, own)| own))
+}
+
+/// A message that this site does not ask for any more.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "its topic is not of {0:?}, which this source takes: the broker has it from an earlier config"
+)]
+struct OtherTopic(String);
 
 /// A message that can be read, and in which nothing is for this site.
 #[derive(Debug, thiserror::Error)]
@@ -245,12 +275,26 @@ mod tests {
         let broker = &config.brokers[0];
         let mut reader = Reader {
             source: broker.id.clone(),
+            filter: broker.topic.clone(),
             decoder: Decoder::of_messages(broker, &config.benchmarks),
             quarantined: 0,
         };
         let (arrivals, quarantined) = reader.read("site/P1/displacement", payload.as_bytes());
         assert_eq!(reader.quarantined, quarantined);
         (arrivals.len(), quarantined)
+    }
+
+    #[test]
+    fn a_topic_that_only_an_earlier_config_asked_for_is_not_taken() {
+        for (filter, topic, takes) in [
+            ("site/+/displacement", "site/P1/displacement", true),
+            ("site/+/displacement", "test/P1/displacement", false),
+            ("site/#", "site/P1/displacement", true),
+            ("$share/two/site/#", "site/P1", true),
+            ("$share/two/site/#", "test/P1", false),
+        ] {
+            assert_eq!(is_of(filter, topic), takes, "{filter} {topic}");
+        }
     }
 
     #[test]
