@@ -61,6 +61,8 @@ pub struct Daemon {
     quarantined: BTreeMap<String, u64>,
     /// How far the rows of the state have been looked at.
     verified: Verified,
+    /// What it is to report once the past has been read: that its state holds nothing but readings of files that are not read.
+    pub(super) inherited: Option<String>,
     /// What works beside it; nothing in a simulation.
     pub(super) beside: Option<SideTasks>,
 }
@@ -95,6 +97,7 @@ impl Daemon {
             since_commit: Stopwatch::start(),
             quarantined: BTreeMap::new(),
             verified: Verified::default(),
+            inherited: None,
             beside: None,
         }
     }
@@ -225,6 +228,7 @@ impl Daemon {
                 quarantined,
                 "caught up"
             );
+            self.report_inherited()?;
         }
         Ok(())
     }
