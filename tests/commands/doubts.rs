@@ -4,6 +4,7 @@
 use crate::office::Office;
 use jiff::SignedDuration;
 use serde_json::Value;
+use slipwatch::reading::Timestamp;
 use slipwatch::runtime::clock;
 use std::fmt::Write as _;
 use std::fs;
@@ -24,6 +25,11 @@ fn to_collapse(slip_mm: f64, ends: SignedDuration) -> String {
         let _ = writeln!(text, "{time:.0},{value:.4}");
         text
     })
+}
+
+fn json(office: &Office, args: &[&str]) -> Value {
+    let args = [args, &["--config", "site.toml", "--format", "json"]].concat();
+    serde_json::from_str(&office.done(&args)).unwrap()
 }
 
 fn lines(office: &Office, args: &[&str]) -> Vec<Value> {
@@ -119,4 +125,45 @@ fn a_file_that_was_renamed_or_whose_folder_was_moved_is_no_other_site() {
     let (exit, _, err) = office.say(&["init", "c.csv", "--force"]);
     assert_eq!(exit, 0, "{err}");
     assert!(!err.contains("state folder"), "{err}");
+}
+
+#[test]
+fn after_a_first_start_on_history_a_level_its_date_and_its_figures_are_of_one_time() {
+    let office = Office::with(&[("a.csv", &to_collapse(10.0, SignedDuration::from_mins(-10)))]);
+    office.done(&["init", "a.csv"]);
+    run(&office);
+    let called = |event: &&Value| event["benchmark"] == "P1" && event["level"] == "orange";
+    let list = lines(&office, &["alerts", "list"]);
+    let alert = list.iter().find(called).unwrap();
+    let events = lines(&office, &["events", "--kind", "alert"]);
+    let of_then = |event: &&Value| called(event) && event["time"] == alert["time"];
+    let then = events.iter().find(of_then).unwrap();
+    let newest = events.iter().find(called).unwrap();
+    assert_ne!(
+        newest["time"], then["time"],
+        "the past called nothing: {events:?}"
+    );
+    assert_ne!(newest["text"], then["text"], "{events:?}");
+    assert_eq!(alert["text"], then["text"]);
+    assert_eq!(alert["key"], newest["key"], "what hooks were notified of");
+    let status = json(&office, &["status"]);
+    let one = &status["benchmarks"][0];
+    assert_eq!(
+        (&one["since"], &one["reason"]),
+        (&then["time"], &then["text"])
+    );
+    let shown = json(&office, &["alerts", "show", "P1/orange"]);
+    assert_eq!(
+        (&shown["since"], &shown["text"]),
+        (&then["time"], &then["text"])
+    );
+    assert_eq!(shown["evidence"]["time"], then["time"], "{shown}");
+    assert_eq!(
+        (&shown["key"], &shown["state"]),
+        (&alert["key"], &"firing".into())
+    );
+    let time = then["time"].as_str().unwrap().parse::<Timestamp>().unwrap();
+    let said = office.done(&["alerts", "show", "P1/orange", "--config", "site.toml"]);
+    let since = format!("in force since {}", time.strftime("%Y-%m-%d %H:%MZ"));
+    contains_all(&said, &[&since, then["text"].as_str().unwrap()]);
 }
