@@ -22,7 +22,7 @@ pub use plain::plain;
 pub use recording::{MergeError, Recording, SelectError};
 pub use series::{Channel, Disorder, Reading, Sample, Series};
 pub use suspicion::Suspicion;
-pub use unit::{FARTHEST, LengthUnit, Quantity, TimeUnit, Unit, UnitError};
+pub use unit::{LengthUnit, Quantity, TimeUnit, Unit, UnitError};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
