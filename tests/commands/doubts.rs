@@ -1,7 +1,7 @@
 //! What a person is to know at once: readings of another site, figures of another time, coordinates, rain as a total, rows that
 //! are refused.
 
-use crate::office::Office;
+use crate::office::{Office, site};
 use jiff::SignedDuration;
 use serde_json::Value;
 use slipwatch::reading::Timestamp;
@@ -10,6 +10,7 @@ use std::fmt::Write as _;
 use std::fs;
 
 const ROWS: i32 = 150;
+const START: &str = "2020-01-01T00:00:00Z";
 
 /// A number within a half of zero that looks drawn.
 fn drawn(row: i32) -> f64 {
@@ -166,4 +167,158 @@ fn after_a_first_start_on_history_a_level_its_date_and_its_figures_are_of_one_ti
     let said = office.done(&["alerts", "show", "P1/orange", "--config", "site.toml"]);
     let since = format!("in force since {}", time.strftime("%Y-%m-%d %H:%MZ"));
     contains_all(&said, &[&since, then["text"].as_str().unwrap()]);
+}
+
+const VECTOR: &str = "[[benchmark]]\nid = \"G1\"\nsource = \"logger\"\ncomponents = [\"G1_E_m\", \"G1_N_m\"]\ndirection = [0.7, 0.7]\n";
+
+/// Hourly coordinates, m, on the way to a collapse.
+fn coordinates(east: f64, north: f64) -> String {
+    let start = START.parse::<Timestamp>().unwrap();
+    (0..ROWS).fold("time,G1_E_m,G1_N_m,G2_E_m\n".to_owned(), |mut text, row| {
+        let time = start + SignedDuration::from_hours(i64::from(row));
+        let slip = -0.01 * (1.0 - f64::from(row) / 250.0).ln() + 5e-5 * drawn(row);
+        let _ = writeln!(text, "{time},{:.6},{:.6},1", east + slip, north + slip);
+        text
+    })
+}
+
+#[test]
+fn coordinates_of_a_map_projection_are_readings_and_what_is_too_large_is_named_itself() {
+    let velocity = |text: &str| {
+        let office = Office::with(&[("n.csv", text), ("site.toml", &site("n.csv", VECTOR))]);
+        let (exit, out, err) = office.say(&["check", "site.toml"]);
+        assert_eq!(exit, 0, "{out}{err}");
+        let said = office.done(&[
+            "replay",
+            "n.csv",
+            "--config",
+            "site.toml",
+            "--format",
+            "json",
+        ]);
+        let mut events = said
+            .lines()
+            .map(|line| serde_json::from_str::<Value>(line).unwrap());
+        let newest = events.rfind(|event| event["event"] == "refit").unwrap();
+        newest["velocity_mm_per_day"].as_f64().unwrap()
+    };
+    let local = velocity(&coordinates(0.0, 0.0));
+    // UTM with the number of the zone before the easting.
+    let far = velocity(&coordinates(32_612_345.0, 9_999_999.0));
+    assert!((far / local - 1.0).abs() < 1e-3, "{far} {local}");
+    let office = Office::with(&[("n.csv", &coordinates(612_345.0, 5_123_456.0))]);
+    let said = office.done(&["init", "n.csv", "--column", "G1_N_m=G1:displacement:m"]);
+    assert!(said.contains("150 readings of displacement"), "{said}");
+    let code = coordinates(612_345.0, 1e30);
+    let office = Office::with(&[("n.csv", &code), ("site.toml", &site("n.csv", VECTOR))]);
+    let (exit, out, err) = office.say(&["check", "site.toml"]);
+    assert_eq!(exit, 1, "{out}{err}");
+    contains_all(&out, &["column \"G1_N_m\"", "1e11 mm"]);
+    assert!(!out.contains("column \"G1_E_m\": found"), "{out}");
+    assert!(!err.contains("mark of no value"), "{err}");
+}
+
+/// Daily creep that rain drives, and rain as `given`, from the day's and the sum before it.
+fn in_the_rain(name: &str, given: impl Fn(i32, f64, &mut f64) -> f64) -> String {
+    let start = START.parse::<Timestamp>().unwrap();
+    let (mut total, mut soaked, mut moved) = (0.0, 0.0, 0.0);
+    (0..360).fold(
+        format!("time,P1_displacement_mm,{name}\n"),
+        |mut text, day| {
+            let time = start + SignedDuration::from_hours(24 * i64::from(day));
+            let rain = if (day * 7919 + 13) % 7 < 2 {
+                20.0 + 30.0 * drawn(day)
+            } else {
+                0.0
+            };
+            soaked += rain - soaked / 7.0;
+            moved += 0.05 + 0.002 * soaked;
+            let value = given(day, rain, &mut total);
+            let _ = writeln!(
+                text,
+                "{time},{:.3},{value:.1}",
+                moved + 0.1 * drawn(day + 500)
+            );
+            text
+        },
+    )
+}
+
+fn add(rain: f64, total: &mut f64) -> f64 {
+    *total += rain;
+    *total
+}
+
+fn set_back_on_day_200(day: i32, rain: f64, total: &mut f64) -> f64 {
+    if day == 200 {
+        *total = 0.0;
+    }
+    add(rain, total)
+}
+
+#[test]
+fn check_names_a_total_of_rain_that_is_set_back_and_codes_in_a_covariate() {
+    let check = |text: &str| {
+        let office = Office::with(&[("slope.csv", text), ("site.toml", &site("slope.csv", ""))]);
+        let (exit, out, err) = office.say(&["check", "site.toml"]);
+        assert_eq!(exit, 0, "{out}{err}");
+        (out, err)
+    };
+    let (out, _) = check(&in_the_rain("rain_mm", |_, rain, _| rain));
+    assert!(
+        !out.contains("running total") && !out.contains("suspicion"),
+        "{out}"
+    );
+    let (out, _) = check(&in_the_rain("rain_cum_mm", |_, rain, total| {
+        add(rain, total)
+    }));
+    assert!(
+        out.contains("a running total of rain, which is never set back"),
+        "{out}"
+    );
+    let (out, _) = check(&in_the_rain("rain_cum_mm", set_back_on_day_200));
+    contains_all(
+        &out,
+        &["a running total of rain, set back once, first at 2020-07-19T00:00:00Z"],
+    );
+    for name in ["rain_mm", "lake_level_m", "Temp"] {
+        let coded = |day: i32, rain: f64, _: &mut f64| if day % 30 == 7 { -9999.0 } else { rain };
+        let (out, err) = check(&in_the_rain(name, coded));
+        contains_all(&out, &["suspicion: -9999 stands 12 times"]);
+        contains_all(
+            &err,
+            &[
+                &format!("covariate {name:?}: -9999 stands 12 times"),
+                "missing = [-9999]",
+            ],
+        );
+    }
+}
+
+#[test]
+fn explain_goes_on_from_what_a_total_of_rain_was_when_it_is_set_back() {
+    let explain = |text: &str| {
+        let office = Office::with(&[("slope.csv", text)]);
+        let said = office.done(&["explain", "slope.csv", "--format", "json"]);
+        serde_json::from_str::<Value>(&said).unwrap()
+    };
+    let whole = explain(&in_the_rain("rain_cum_mm", |_, rain, total| {
+        add(rain, total)
+    }));
+    let broken = explain(&in_the_rain("rain_cum_mm", set_back_on_day_200));
+    assert!(
+        broken.to_string().contains("rain_cum_mm: its zero jumps"),
+        "{broken}"
+    );
+    assert!(broken.to_string().contains("covariate-reset"), "{broken}");
+    assert!(!whole.to_string().contains("covariate-reset"), "{whole}");
+    let (broken, whole) = (&broken["verdict"], &whole["verdict"]);
+    for key in ["effect", "channel", "form"] {
+        assert_eq!(broken[key], whole[key]);
+    }
+    let lag = |verdict: &Value| verdict["lag_days"].as_f64().unwrap();
+    assert!(
+        (lag(broken) / lag(whole) - 1.0).abs() < 0.02,
+        "{broken} {whole}"
+    );
 }
