@@ -322,3 +322,55 @@ fn explain_goes_on_from_what_a_total_of_rain_was_when_it_is_set_back() {
         "{broken} {whole}"
     );
 }
+
+/// So many rows in mm, and then more under a header in m.
+fn with_another_unit() -> String {
+    let start = START.parse::<Timestamp>().unwrap();
+    (0..300).fold("time,P1_displacement_mm\n".to_owned(), |mut text, row| {
+        if row == 100 {
+            text += "time,P1_displacement_m\n";
+        }
+        let value = 0.5 * f64::from(row) + drawn(row);
+        let value = if row < 100 { value } else { value / 1e3 };
+        let _ = writeln!(
+            text,
+            "{},{value:.6}",
+            start + SignedDuration::from_hours(i64::from(row))
+        );
+        text
+    })
+}
+
+#[test]
+fn a_unit_that_changes_within_a_file_is_named_by_init_and_what_is_refused_at_the_end_by_check() {
+    let office = Office::with(&[("uc.csv", &with_another_unit())]);
+    let (exit, out, err) = office.say(&["init", "uc.csv"]);
+    assert_ne!(exit, 0, "{out}");
+    contains_all(
+        &err,
+        &["uc.csv, line 102: benchmark \"P1\": the unit was mm and is m"],
+    );
+    assert!(!err.contains("give each its own id"), "{err}");
+    fs::write(office.path("site.toml"), site("uc.csv", "")).unwrap();
+    let (_, _, err) = office.say(&["check", "site.toml"]);
+    contains_all(
+        &err,
+        &[
+            "benchmark \"P1\": from",
+            "line 103 on all readings are refused (200 of them)",
+            "its unit was mm and is m",
+        ],
+    );
+    // Rows that are wrong in another way, to the end; and such that are followed by good ones.
+    let mut text = crate::office::plain(40);
+    for row in 0..9 {
+        let _ = writeln!(text, "2017-06-03T{row:02}:00:00Z;1;2");
+    }
+    let broken = ["line 42 on all rows are refused (9 of them)"];
+    for (more, is_said) in [("", true), ("2017-06-04T00:00:00Z,20\n", false)] {
+        let text = format!("{text}{more}");
+        let office = Office::with(&[("slope.csv", &text), ("site.toml", &site("slope.csv", ""))]);
+        let (_, _, err) = office.say(&["check", "site.toml"]);
+        assert_eq!(err.contains(broken[0]), is_said, "{err}");
+    }
+}

@@ -14,7 +14,7 @@ use super::exit::{self, NoSuchReadings, UsageError};
 use crate::config::{SourceKind, value};
 use crate::reading::{BenchmarkId, Dialect, Quantity, SummerTime, TimeFormat, Timestamp, Unit};
 use crate::runtime::ingest::{
-    FileSurvey, Measure, ReadOptions, TextFormat, look_through, read_with_remarks,
+    FileSurvey, Measure, ReadOptions, TextFormat, UnitChange, look_through, read_with_remarks,
     survey, text_format_of, unpacked_name,
 };
 use anyhow::Context;
@@ -278,6 +278,21 @@ fn twice(file: &Path, other: &PlannedBenchmark) -> String {
     )
 }
 
+fn another_unit(file: &Path, change: &UnitChange) -> String {
+    let UnitChange {
+        benchmark,
+        line,
+        was,
+        is,
+    } = change;
+    format!(
+        "{}, line {line}: benchmark {:?}: the unit was {was} and is {is}; a file has one unit for each benchmark, so put what follows into \
+         a file of its own, or write those rows in {was}",
+        file.display(),
+        benchmark.as_str()
+    )
+}
+
 fn summer_word(summer: SummerTime) -> Option<String> {
     let word = match summer {
         SummerTime::Reject => return None,
@@ -375,6 +390,9 @@ fn held(file: &Path, source: &PlannedSource, args: &Args) -> anyhow::Result<Foun
         ..args.file.options()
     };
     let looked = look(file, source.kind, &options)?;
+    if let Some(change) = &looked.unit_change {
+        return Ok(FoundInFile::Bad(another_unit(file, change)));
+    }
     let stated = |benchmark: &BenchmarkId, unit: Unit| {
         let mut maps = args.file.columns.iter();
         let map =
