@@ -4,6 +4,7 @@ use super::args::{OutputArgs, OutputFormat};
 use super::{exit, preview as text};
 use crate::config::{self, ConfigError, ConfigProblem, ConfigSummary};
 use crate::reading::plain;
+use crate::runtime::inherited::InheritedReadings;
 use crate::runtime::preview::{Preview, preview};
 use crate::runtime::sampling;
 use schemars::JsonSchema;
@@ -105,6 +106,10 @@ fn look(file: &Path, summary: &mut ConfigSummary) -> Result<Preview, ConfigError
     let place = file.display();
     let absent = preview.absent.iter().map(ToString::to_string);
     summary.warnings.extend(absent);
+    let inherited = InheritedReadings::of(&config).map(|inherited| inherited.text(&config));
+    summary
+        .warnings
+        .extend(inherited.map(|line| format!("{place}: warning: {line}")));
     let sampling_warnings = sampling::sampling_warnings(&config, &preview).into_iter();
     summary
         .warnings

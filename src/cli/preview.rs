@@ -181,6 +181,8 @@ fn covariate_line(text: &mut String, covariate: &CovariateView) {
         values,
         first,
         last,
+        suspicions,
+        remarks,
     } = covariate;
     let kind = match (kind, is_stated) {
         (_, true) => format!("; {kind}, as the config states"),
@@ -195,4 +197,10 @@ fn covariate_line(text: &mut String, covariate: &CovariateView) {
         text,
         &format!("covariate {name} ({source}): {values} values{unit}, {first} to {last}{kind}"),
     );
+    for line in remarks {
+        put(text, &format!("  {line}"));
+    }
+    for line in suspicions {
+        put(text, &format!("  suspicion: {line}"));
+    }
 }

@@ -4,7 +4,7 @@ use super::declared::Declarations;
 use super::motion::settled;
 use crate::fit::{Observation, Observations, Rate, RateOptions};
 use crate::reading::{
-    BenchmarkId, FARTHEST, Quantity, Reading, SECONDS_PER_DAY, Series, Timestamp, Unit, days_since,
+    BenchmarkId, Quantity, Reading, SECONDS_PER_DAY, Series, Timestamp, Unit, days_since,
     instant_after_days,
 };
 use jiff::SignedDuration;
@@ -30,7 +30,7 @@ pub(super) enum Taken {
     Corrected(f64),
     /// It was known.
     Known,
-    /// It is larger than [`FARTHEST`], in the science's unit.
+    /// It is larger than [`Quantity::farthest`], in the science's unit.
     OutOfRange(f64),
     /// It measures another quantity than the benchmark's first reading did.
     OtherQuantity,
@@ -108,7 +108,9 @@ impl History {
     pub(super) fn set_aside(&mut self, source: MeasuredAs, reading: &Reading) -> bool {
         let new = self.observation(source, reading);
         let is_ours = source.unit.quantity() == self.observations.quantity;
-        let is_used = is_ours && new.value.is_finite() && new.value.abs() <= FARTHEST;
+        let is_used = is_ours
+            && new.value.is_finite()
+            && new.value.abs() <= source.unit.quantity().farthest();
         if is_used {
             insert(&mut self.aside, new);
             let excess = self.aside.len().saturating_sub(MOST_ASIDE);
@@ -284,7 +286,7 @@ impl History {
             return Taken::OtherQuantity;
         }
         let mut new = self.observation(source, reading);
-        if !new.value.is_finite() || new.value.abs() > FARTHEST {
+        if !new.value.is_finite() || new.value.abs() > source.unit.quantity().farthest() {
             return Taken::OutOfRange(new.value);
         }
         let taken_off = self.taken_off(new.t_days);

@@ -257,6 +257,15 @@ fn mark(readings: &[(Timestamp, f64)]) -> Option<(f64, DatedSuspicion)> {
     })
 }
 
+/// The number in the values of a covariate, in order of time, that marks no value elsewhere, and the evidence for that.
+pub fn mark_in(values: &[(Timestamp, f64)]) -> Option<(f64, String)> {
+    if values.len() < FEWEST {
+        return None;
+    }
+    let (value, evidence) = mark(values)?;
+    Some((value, evidence.text))
+}
+
 fn span(readings: &[(Timestamp, f64)]) -> Option<(f64, f64)> {
     readings.iter().fold(None, |span, (_, value)| {
         let (low, high) = span.unwrap_or((*value, *value));

@@ -5,8 +5,10 @@ use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::fmt;
 
-/// No displacement in mm, or velocity in mm/day, is larger: a thousand kilometres.
-pub const FARTHEST: f64 = 1e9;
+/// No displacement in mm is larger, a coordinate of a map projection neither: a hundred thousand kilometres.
+const FARTHEST: f64 = 1e11;
+/// No velocity in mm/day is larger: a thousand kilometres a day.
+const FASTEST: f64 = 1e9;
 
 /// What a reading measures.
 #[derive(
@@ -26,6 +28,14 @@ impl Quantity {
         match self {
             Self::Displacement => "displacement",
             Self::Velocity => "velocity",
+        }
+    }
+
+    /// No reading of it is larger, mm or mm/day.
+    pub fn farthest(self) -> f64 {
+        match self {
+            Self::Displacement => FARTHEST,
+            Self::Velocity => FASTEST,
         }
     }
 }
@@ -165,9 +175,9 @@ impl Unit {
         }
     }
 
-    /// Whether a reading of `value` in this unit may be one of a slope: it is no larger than [`FARTHEST`].
+    /// Whether a reading of `value` in this unit may be one of a slope: it is no larger than [`Quantity::farthest`].
     pub fn is_within_reach(self, value: f64) -> bool {
-        (value * self.factor()).abs() <= FARTHEST
+        (value * self.factor()).abs() <= self.quantity().farthest()
     }
 
     /// The suffix of a file column: `mm`, `mm_per_day`.

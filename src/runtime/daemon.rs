@@ -62,6 +62,8 @@ pub struct Daemon {
     quarantined: BTreeMap<String, u64>,
     /// How far the rows of the state have been looked at.
     verified: Verified,
+    /// What it is to report once the past has been read: that its state holds nothing but readings of files that are not read.
+    pub(super) inherited: Option<String>,
     /// What works beside it; nothing in a simulation.
     pub(super) beside: Option<SideTasks>,
 }
@@ -97,6 +99,7 @@ impl Daemon {
             since_orders: Stopwatch::start(),
             quarantined: BTreeMap::new(),
             verified: Verified::default(),
+            inherited: None,
             beside: None,
         }
     }
@@ -231,6 +234,7 @@ impl Daemon {
                 quarantined,
                 "caught up"
             );
+            self.report_inherited()?;
         }
         Ok(())
     }

@@ -19,6 +19,7 @@ pub mod hook;
 mod http;
 mod in_hand;
 pub mod ingest;
+pub mod inherited;
 mod kept;
 mod link;
 pub mod log;

@@ -90,6 +90,7 @@ pub async fn run(
     let sources = Sources::start(config, &store).map_err(fail)?;
     let mut daemon = Daemon::new(config, store, site, sources, pulse, clock::now);
     daemon.beside = Some(beside);
+    daemon.note_inherited(config).map_err(fail)?;
     tracing::info!(site = name, state = %config.site.state_dir.display(), "started");
     let worked = daemon.work(shutdown, progress).await;
     let Daemon {

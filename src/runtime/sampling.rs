@@ -30,6 +30,17 @@ pub fn sampling_warnings(config: &Config, preview: &Preview) -> Vec<String> {
         let lines = benchmark.suspicions.iter();
         lines.map(move |line| format!("benchmark {id:?}: {line}"))
     });
+    let covariates = preview.covariates.iter().flat_map(|covariate| {
+        let name = &covariate.name;
+        let lines = covariate.suspicions.iter();
+        lines.map(move |line| format!("covariate {name:?}: {line}"))
+    });
+    let ends = preview.refused_ends.iter().cloned();
     let absent = preview.unfed.iter().map(|unfed| unfed.text.clone());
-    lines.chain(suspicions).chain(absent).collect()
+    lines
+        .chain(suspicions)
+        .chain(covariates)
+        .chain(ends)
+        .chain(absent)
+        .collect()
 }

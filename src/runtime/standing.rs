@@ -15,38 +15,75 @@ pub type InForce = BTreeMap<(Option<BenchmarkId>, Level), Event>;
 /// [`StoreError`].
 pub fn in_force(store: &Store, until: Option<Timestamp>) -> Result<InForce, StoreError> {
     let mut standing = InForce::new();
-    for mut event in by_time(every(store, "alert")?) {
-        if until.is_some_and(|until| event.time > until) {
-            continue;
-        }
-        let EventKind::Alert {
-            level, state, key, ..
-        } = &event.kind
-        else {
-            continue;
-        };
-        let (level, state, place) = (*level, *state, event.benchmark.clone());
-        match state {
-            AlertState::Firing => {
-                // One level stands here since it was first called, also where the past before a first start called it.
-                if let Some(called) = standing.get(&(place.clone(), level)) {
-                    event.time = called.time;
-                }
-                standing.retain(|(own, lower), _| {
-                    *own != place || (*lower == Level::Unknown) != (level == Level::Unknown)
-                });
-                standing.insert((place, level), event);
-            }
-            AlertState::Resolved => {
-                // One that was called by readings from before its predecessor was resolved stands before that in time.
-                let is_of = |standing: &Event| matches!(&standing.kind, EventKind::Alert { key: own, .. } if own == key);
-                if standing.get(&(place.clone(), level)).is_some_and(is_of) {
-                    standing.remove(&(place, level));
-                }
-            }
+    for event in by_time(every(store, "alert")?) {
+        if until.is_none_or(|until| event.time <= until) {
+            note(&mut standing, &event);
         }
     }
     Ok(standing)
+}
+
+/// The call since which the alert with this key stands, under its own key: that of the past before a first start where it had called
+/// the level already. `None` where no alert has the key.
+///
+/// # Errors
+/// [`StoreError`].
+pub(super) fn first_call(store: &Store, key: &str) -> Result<Option<Event>, StoreError> {
+    let mut standing = InForce::new();
+    for event in by_time(every(store, "alert")?) {
+        note(&mut standing, &event);
+        if let EventKind::Alert {
+            key: own,
+            state: AlertState::Firing,
+            level,
+            ..
+        } = event.kind
+            && own == key
+        {
+            return Ok(standing.remove(&(event.benchmark, level)));
+        }
+    }
+    Ok(None)
+}
+
+/// Goes on by an alert that is called or ends.
+fn note(standing: &mut InForce, event: &Event) {
+    let EventKind::Alert {
+        level, state, key, ..
+    } = &event.kind
+    else {
+        return;
+    };
+    let (level, state, place) = (*level, *state, event.benchmark.clone());
+    match state {
+        AlertState::Firing => {
+            let called = standing.get(&(place.clone(), level));
+            let event = called.map_or_else(|| event.clone(), |called| gone_on_with(called, event));
+            standing.retain(|(own, lower), _| {
+                *own != place || (*lower == Level::Unknown) != (level == Level::Unknown)
+            });
+            standing.insert((place, level), event);
+        }
+        AlertState::Resolved => {
+            // One that was called by readings from before its predecessor was resolved stands before that in time.
+            let is_of = |standing: &Event| matches!(&standing.kind, EventKind::Alert { key: own, .. } if own == key);
+            if standing.get(&(place.clone(), level)).is_some_and(is_of) {
+                standing.remove(&(place, level));
+            }
+        }
+    }
+}
+
+/// One level stands since it was first called, also where the past before a first start called it, and for what was read then; its key
+/// is that of the later event, which is the one that people have been notified of.
+fn gone_on_with(called: &Event, event: &Event) -> Event {
+    let mut first = called.clone();
+    if let (EventKind::Alert { key: own, .. }, EventKind::Alert { key, .. }) =
+        (&mut first.kind, &event.kind)
+    {
+        own.clone_from(key);
+    }
+    first
 }
 
 /// Every event of a kind, oldest first.

@@ -199,6 +199,26 @@ impl Store {
         Ok(newest)
     }
 
+    /// How many readings it holds of every benchmark.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn counts_of_readings(&self) -> Result<BTreeMap<BenchmarkId, u64>, StoreError> {
+        let inner = self.inner();
+        let mut query = inner.connection.prepare_cached(
+            "SELECT name, (SELECT count(*) FROM step WHERE series = series.id) FROM series WHERE is_reading",
+        )?;
+        let rows = query.query_map([], |row| {
+            Ok((row.get::<_, String>(0)?, row.get::<_, i64>(1)?))
+        })?;
+        let mut counts = BTreeMap::new();
+        for row in rows {
+            let (name, count) = row?;
+            *counts.entry(BenchmarkId::new(name)).or_default() += u64::try_from(count).unwrap_or(0);
+        }
+        Ok(counts)
+    }
+
     /// What people have asked for and the daemon has not taken yet, as (number, order).
     ///
     /// # Errors

@@ -268,7 +268,7 @@ fn a_reading_of_three_hundred_digits_is_named_with_its_place_and_printed_nowhere
     let text = plain(40).replacen(",10\n", ",1e308\n", 1);
     let office = Office::with(&[("slope.csv", &text), ("site.toml", &site("slope.csv", ""))]);
     let said = office.refused(65, &["replay", "slope.csv"]);
-    let parts = ["slope.csv, line 22", "1e308", "1e9 mm (1000 km)"];
+    let parts = ["slope.csv, line 22", "1e308", "1e11 mm (100,000 km)"];
     assert!(parts.iter().all(|part| said.contains(part)), "{said}");
     let daemon = office.run_logged(&["run", "site.toml"]);
     let status = office.status_until("2017-06-02 13:00");

@@ -7,6 +7,7 @@ mod cli;
 mod config;
 mod demo;
 mod doctor;
+mod doubts;
 mod drill;
 mod explain_cli;
 mod first_day;

@@ -1,6 +1,7 @@
 //! `init FILE...`: from files of readings to a site file.
 
 mod dialect;
+mod inherited;
 mod long;
 mod said;
 mod text;
@@ -13,11 +14,12 @@ use super::exit::{self, NoSuchReadings, UsageError};
 use crate::config::{SourceKind, value};
 use crate::reading::{BenchmarkId, Dialect, Quantity, SummerTime, TimeFormat, Timestamp, Unit};
 use crate::runtime::ingest::{
-    FileSurvey, Measure, ReadOptions, TextFormat, look_through, read_with_remarks, survey,
-    text_format_of, unpacked_name,
+    FileSurvey, Measure, ReadOptions, TextFormat, UnitChange, look_through, read_with_remarks,
+    survey, text_format_of, unpacked_name,
 };
 use anyhow::Context;
 use dialect::Written;
+use inherited::inherits_nothing;
 use jiff::SignedDuration;
 pub(super) use said::ConfigWritten;
 use said::{say_next, say_written};
@@ -39,6 +41,10 @@ pub(super) struct Args {
     /// What hooks call the site [default: the name of the config's folder]
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
+    /// Where the daemon keeps what it knows, from the config's folder [default: state]; one that another site's files were read
+    /// into is taken only where this names it
+    #[arg(long, value_name = "FOLDER")]
+    state_dir: Option<String>,
     /// A program to run when a level is entered or left, such as ./notify.sh
     #[arg(long, value_name = "PROGRAM")]
     hook: Option<String>,
@@ -58,6 +64,7 @@ pub(super) struct Args {
 #[derive(Debug)]
 struct InitPlan {
     name: String,
+    state_dir: String,
     zone: Option<String>,
     dst: Option<String>,
     missing: Vec<String>,
@@ -109,6 +116,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         )));
     }
     let plan = plan(args)?;
+    let text = text::config(&plan);
+    if args.state_dir.is_none() {
+        inherits_nothing(&text, args, &plan)?;
+    }
     say_idle(&plan, args);
     for map in &args.file.columns {
         if let Measure::Reading(unit) = map.measure
@@ -117,8 +128,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             exit::complain(&doubt);
         }
     }
-    std::fs::write(config, text::config(&plan))
-        .with_context(|| format!("cannot write {}", config.display()))?;
+    std::fs::write(config, text).with_context(|| format!("cannot write {}", config.display()))?;
     say_written(args, &plan)?;
     check::check(config, args.output, true)?;
     say_next(args)
@@ -217,6 +227,7 @@ fn plan(args: &Args) -> anyhow::Result<InitPlan> {
     problems.none()?;
     Ok(InitPlan {
         name: site_name(args),
+        state_dir: args.state_dir.clone().unwrap_or_else(|| "state".to_owned()),
         zone: args
             .file
             .time_zone
@@ -271,6 +282,21 @@ fn twice(file: &Path, other: &PlannedBenchmark) -> String {
         file.display(),
         other.id,
         other.source
+    )
+}
+
+fn another_unit(file: &Path, change: &UnitChange) -> String {
+    let UnitChange {
+        benchmark,
+        line,
+        was,
+        is,
+    } = change;
+    format!(
+        "{}, line {line}: benchmark {:?}: the unit was {was} and is {is}; a file has one unit for each benchmark, so put what follows into \
+         a file of its own, or write those rows in {was}",
+        file.display(),
+        benchmark.as_str()
     )
 }
 
@@ -371,6 +397,9 @@ fn held(file: &Path, source: &PlannedSource, args: &Args) -> anyhow::Result<Foun
         ..args.file.options()
     };
     let looked = look(file, source.kind, &options)?;
+    if let Some(change) = &looked.unit_change {
+        return Ok(FoundInFile::Bad(another_unit(file, change)));
+    }
     let stated = |benchmark: &BenchmarkId, unit: Unit| {
         let mut maps = args.file.columns.iter();
         let map =

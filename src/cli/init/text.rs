@@ -10,9 +10,10 @@ use std::fmt::Write as _;
 pub(super) fn config(plan: &InitPlan) -> String {
     let mut text = format!(
         "# What slipwatch watches here. Paths are relative to this file. After a change: slipwatch check FILE\n\n\
-         [site]\nname = {}\nstate_dir = \"state\"                # everything the daemon knows; created when missing\n\
+         [site]\nname = {}\n{:35}# everything the daemon knows; created when missing\n\
          # listen = \"127.0.0.1:8642\"        # /healthz, /readyz, /metrics, /api/status over HTTP\n",
-        quoted(&plan.name)
+        quoted(&plan.name),
+        format!("state_dir = {}", quoted(&plan.state_dir))
     );
     if let Some(zone) = &plan.zone {
         let _ = writeln!(text, "time_zone = {}", quoted(zone));

@@ -2,6 +2,7 @@
 
 use super::nature::Nature;
 use super::trace::{Trace, extreme, median, resolution, robust_deviation};
+use crate::reading::RunningTotal;
 
 /// Samples on either side whose steps a jump is measured against.
 const BESIDE: usize = 6;
@@ -47,6 +48,9 @@ pub(super) struct ChannelReset {
 
 /// The resets that one channel shows by itself, in time order.
 pub(super) fn resets(trace: &Trace, nature: Nature) -> Vec<ChannelReset> {
+    if nature.is_rain() {
+        return set_back(trace);
+    }
     if nature.has_peaks() {
         return Vec::new();
     }
@@ -62,6 +66,18 @@ pub(super) fn resets(trace: &Trace, nature: Nature) -> Vec<ChannelReset> {
         .collect();
     found.sort_by_key(|reset| reset.from);
     found
+}
+
+/// Where a running total of rain is set back: what it was counts on.
+fn set_back(trace: &Trace) -> Vec<ChannelReset> {
+    let total = RunningTotal::of(&trace.values);
+    let set_back = total.map_or_else(Vec::new, |total| total.set_back);
+    let resets = set_back.into_iter().map(|from| ChannelReset {
+        from,
+        settled: from,
+        size: -trace.values[from - 1],
+    });
+    resets.collect()
 }
 
 /// The largest jump of `trace` that begins within one sampling interval of `days` (on the trace's

@@ -3,6 +3,7 @@
 use super::{DRAIN_LIMIT, Daemon, TICK, dispatcher};
 use crate::config::{self, Config, Token};
 use crate::monitor::Input;
+use crate::runtime::inherited::InheritedReadings;
 use crate::runtime::link;
 use crate::runtime::reloaded::{ConfigRefusal, sources_without_files};
 use crate::runtime::sandbox::OURSELVES;
@@ -78,6 +79,25 @@ impl Daemon {
         self.commit()
     }
 
+    /// Says in the log where the state holds readings of files that `config` does not read; where it holds no others, that is
+    /// reported too, once the files have been read.
+    pub(in crate::runtime) fn note_inherited(&mut self, config: &Config) -> Result<(), StoreError> {
+        let Some(inherited) = InheritedReadings::in_store(&self.store, config)? else {
+            return Ok(());
+        };
+        let text = inherited.text(config);
+        tracing::warn!("{text}");
+        self.inherited = inherited.is_all.then_some(text);
+        Ok(())
+    }
+
+    pub(super) fn report_inherited(&mut self) -> Result<(), StoreError> {
+        match self.inherited.take() {
+            Some(text) => self.report("inherited-readings", text),
+            None => Ok(()),
+        }
+    }
+
     /// Goes by the config file as it is now, all of it or nothing.
     pub(super) async fn reload(&mut self, shutdown: &Shutdown) -> Result<(), StoreError> {
         let (fresh, token) = match self.fresh_config() {
@@ -104,6 +124,7 @@ impl Daemon {
         self.close_hooks().await;
         self.site.rehook(dispatcher(&fresh, &self.store))?;
         self.note_closed()?;
+        self.note_inherited(&fresh)?;
         self.sources = Sources::start(&fresh, &self.store)?;
         if let Some(beside) = &mut self.beside {
             beside.follow(&fresh).await;
@@ -113,6 +134,7 @@ impl Daemon {
         self.pulse.service.ready("watching");
         tracing::info!(file = %self.config.file.display(), "the config is taken");
         self.config_is_taken();
+        self.report_inherited()?;
         let fileless = sources_without_files(&self.config);
         for line in fileless
             .into_iter()

@@ -2,6 +2,7 @@
 
 use super::{CheckVerdict, Finding};
 use crate::config::Config;
+use crate::runtime::inherited::InheritedReadings;
 use crate::store::Store;
 use nix::unistd::geteuid;
 use std::fs::File;
@@ -16,6 +17,7 @@ pub(super) fn findings(config: &Config) -> Vec<Finding> {
     let site = &config.site;
     let mut findings = vec![user()];
     findings.extend(database(&site.state_dir));
+    findings.extend(inherited(config));
     findings.extend(site.token_file.as_deref().map(|_| token(config)));
     findings.extend(site.listen.map(|_| listen(config)));
     findings
@@ -52,6 +54,16 @@ fn database(folder: &Path) -> Option<Finding> {
         file.display()
     );
     Some(Finding::new(STATE, CheckVerdict::Wrong, text))
+}
+
+/// A state may have been begun by another site, of another config in the same folder.
+fn inherited(config: &Config) -> Option<Finding> {
+    let inherited = InheritedReadings::of(config)?;
+    Some(Finding::new(
+        STATE,
+        CheckVerdict::Doubtful,
+        inherited.text(config),
+    ))
 }
 
 fn token(config: &Config) -> Finding {

@@ -25,7 +25,7 @@ pub(super) const UNIX: &str = "unix";
 pub(super) const SINCE: &str = "seconds since ";
 
 /// What a reading may be.
-pub(super) const WITHIN_REACH: &str = "a reading of 1e9 mm (1000 km), or 1e9 mm/day, at most, which no slope exceeds; \
+pub(super) const WITHIN_REACH: &str = "a reading of 1e11 mm (100,000 km), or 1e9 mm/day, at most, which no slope exceeds; \
      if it means that there is no value, add it to missing (--missing)";
 
 /// A message on one of our topics that is no reading.

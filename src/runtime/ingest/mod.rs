@@ -44,7 +44,7 @@ pub use ndjson_write::write_ndjson;
 pub use survey::{Survey, survey};
 pub use table_write::{write_csv, write_toa5};
 pub use taken::{LineResult, Remark};
-pub use text::{FileSurvey, TextRows, look_through};
+pub use text::{FileSurvey, TextRows, UnitChange, look_through};
 pub use text_format::{LineReader, TextFormat};
 pub use text_formats::TEXT_FORMATS;
 pub use toa5::TOA5;

@@ -246,7 +246,7 @@ impl TableRow<'_> {
             match self.vector(time, vector) {
                 Ok(item) => met.items.extend(item),
                 Err(fault) => {
-                    let what = "a component that is no number".to_owned();
+                    let what = "a component that cannot be used".to_owned();
                     met.unread.push((vector.benchmark.clone(), what));
                     met.set_aside(fault);
                 }
@@ -286,10 +286,13 @@ impl TableRow<'_> {
                 what,
             })
         };
-        let (mut value, mut absent) = (0.0, Vec::new());
+        let (mut value, mut absent, mut numbers) = (0.0, Vec::new(), Vec::new());
         for &(index, part) in &vector.components {
             match self.cell(index)? {
-                TableCell::Number(component) => value += part * component,
+                TableCell::Number(component) => {
+                    value += part * component;
+                    numbers.push((index, component));
+                }
                 TableCell::Empty => absent.push(&names[index]),
                 TableCell::Missing => {
                     let what = format!("{} in {}", &self.cells[index], names[index]);
@@ -304,9 +307,18 @@ impl TableRow<'_> {
             return Ok(missing(format!("nothing in {name}")));
         }
         let (unit, sigma) = (vector.unit, None);
+        if let Some((index, _)) = numbers
+            .iter()
+            .find(|(_, value)| !unit.is_within_reach(*value))
+        {
+            return Err(self.fail(*index, WITHIN_REACH));
+        }
         if !unit.is_within_reach(value) {
-            let (index, _) = vector.components[0];
-            return Err(self.fail(index, "components whose sum is a finite number of 1e9 mm (1000 km), or 1e9 mm/day, at most"));
+            let largest = numbers
+                .iter()
+                .max_by(|one, other| one.1.abs().total_cmp(&other.1.abs()));
+            let index = largest.map_or(vector.components[0].0, |(index, _)| *index);
+            return Err(self.fail(index, "components whose sum along the direction is 1e11 mm (100,000 km), or 1e9 mm/day, at most"));
         }
         Ok(Some(Item::Reading {
             benchmark: vector.benchmark.clone(),

@@ -187,8 +187,23 @@ pub struct FileSurvey {
     pub columns: Vec<(String, Meaning)>,
     /// Whose readings it has, in which units.
     pub readings: BTreeSet<(BenchmarkId, Unit)>,
+    /// Where the unit of a benchmark first changes within the file.
+    pub unit_change: Option<UnitChange>,
     /// What is wrong with the first row that cannot be used.
     pub fault: Option<IngestError>,
+}
+
+/// Another unit of one quantity of a benchmark than before in the same file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct UnitChange {
+    /// Whose.
+    pub benchmark: BenchmarkId,
+    /// The line of the header that says so, or else of the reading.
+    pub line: u64,
+    /// The unit before.
+    pub was: Unit,
+    /// The unit from there on.
+    pub is: Unit,
 }
 
 /// Looks through a text file.
@@ -204,6 +219,7 @@ pub fn look_through(
     let bytes = Transcoder::default().feed(&bytes);
     let mut rows = TextRows::new(format, &super::bytes::shown_name(file), options);
     let mut looked = FileSurvey::default();
+    let (mut units, mut last_without) = (BTreeMap::new(), 0);
     for (text, line) in bytes.split(|byte| *byte == b'\n').zip(1..) {
         let text = match std::str::from_utf8(text) {
             Ok(text) => text.to_owned(),
@@ -214,14 +230,33 @@ pub fn look_through(
             Some(fault) if rows.is_lost() => return Err(fault),
             fault => looked.fault = looked.fault.or(fault),
         }
-        looked
-            .readings
-            .extend(taken.items.into_iter().filter_map(|item| match item {
-                Item::Reading {
-                    benchmark, unit, ..
-                } => Some((benchmark, unit)),
-                Item::Sample { .. } | Item::Missing { .. } => None,
-            }));
+        if taken.items.is_empty() {
+            last_without = line;
+        }
+        for item in taken.items {
+            let Item::Reading {
+                benchmark, unit, ..
+            } = item
+            else {
+                continue;
+            };
+            let key = (benchmark.clone(), unit.quantity());
+            let (since, was) = *units.entry(key).or_insert((line, unit));
+            if was != unit && since != line && looked.unit_change.is_none() {
+                looked.unit_change = Some(UnitChange {
+                    benchmark: benchmark.clone(),
+                    // A header stands before the first of its rows.
+                    line: if last_without + 1 == line {
+                        last_without
+                    } else {
+                        line
+                    },
+                    was,
+                    is: unit,
+                });
+            }
+            looked.readings.insert((benchmark, unit));
+        }
     }
     looked.columns = rows.meanings();
     Ok(looked)

@@ -1,5 +1,8 @@
 //! What the files of a site hold now, as the daemon would take it: a look before it starts.
 
+mod covariate;
+mod ending;
+mod layout;
 mod recording;
 mod refused;
 mod stated;
@@ -23,6 +26,9 @@ use crate::reading::{
     Timestamp, suspicion,
 };
 use crate::store::Store;
+use covariate::PreviewCovariate;
+use ending::RefusedEnds;
+use layout::keep_layout;
 use recording::read_recording;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -62,6 +68,8 @@ struct SourceSoFar {
     view: SourceView,
     files: Vec<PathBuf>,
     refused: RefusedKinds,
+    /// What stands for no value in its files.
+    marks: MissingValues,
 }
 
 impl SourceSoFar {
@@ -82,7 +90,8 @@ impl SourceSoFar {
 struct PreviewSoFar {
     sources: Vec<SourceSoFar>,
     benchmarks: BTreeMap<(String, BenchmarkId, Quantity), PreviewTrack>,
-    covariates: BTreeMap<(String, String), CovariateView>,
+    covariates: BTreeMap<(String, String), PreviewCovariate>,
+    ends: RefusedEnds,
     /// Sources that have readings of a benchmark which the config takes from another one.
     elsewhere: BTreeSet<(String, BenchmarkId)>,
     accepted: BTreeMap<BenchmarkId, BTreeSet<Suspicion>>,
@@ -106,9 +115,11 @@ impl PreviewSoFar {
                 remarks: Vec::new(),
                 unwatched: BTreeSet::new(),
                 missing: BTreeMap::new(),
+                unread: BTreeMap::new(),
             },
             files: Vec::new(),
             refused: RefusedKinds::default(),
+            marks: source.conventions.missing.clone(),
         };
         match list(&source.pattern, decoder) {
             Ok((files, not_text)) => {
@@ -225,6 +236,8 @@ impl PreviewSoFar {
     }
 
     fn fed(&mut self, fed: LinesRead, file: usize, decoder: &Decoder, so_far: &mut SourceSoFar) {
+        self.ends
+            .feed(&so_far.view.id, &fed, &so_far.name((file, 0)));
         for (line, item) in fed.items {
             self.item(item, (file, line), decoder, so_far);
         }
@@ -277,23 +290,16 @@ impl PreviewSoFar {
             benchmark, what, ..
         } = arrival.input
         {
-            if what.starts_with(UNIT_WAS) {
-                let at = so_far.name(place);
-                so_far.refused.count(&what, || {
-                    format!("{at}: {what}, expected the unit that the file began with")
-                });
-            } else {
-                let (all, out_of_range) = so_far.view.missing.entry(benchmark).or_default();
-                // Of a component the mark is followed by its column.
-                let mark = what.split(" in ").next().unwrap_or_default();
-                *all += 1;
-                *out_of_range += u64::from(MissingValues::is_out_of_range(mark));
-            }
+            self.missing(benchmark, &what, place, so_far);
         } else if why.is_none()
-            && let Input::Sample { channel, unit, .. } = arrival.input
+            && let Input::Sample {
+                channel,
+                unit,
+                sample,
+            } = arrival.input
         {
             let stated = self.stated.get(&channel).copied();
-            self.sample(CovariateView {
+            let view = CovariateView {
                 kind: CovariateKind::stated_or_of(stated, &channel, unit.as_deref()),
                 is_stated: stated.is_some(),
                 name: channel,
@@ -302,7 +308,10 @@ impl PreviewSoFar {
                 values: 0,
                 first: time,
                 last: time,
-            });
+                suspicions: Vec::new(),
+                remarks: Vec::new(),
+            };
+            self.sample(view, sample.value);
         } else if why.is_none_or(|why| why == Untimely::Future)
             && let Input::Reading {
                 benchmark,
@@ -311,6 +320,7 @@ impl PreviewSoFar {
                 ..
             } = arrival.input
         {
+            self.ends.take(&source, &benchmark);
             let key = (source.clone(), benchmark.clone(), unit.quantity());
             let accepted = self.accepted.get(&benchmark).cloned().unwrap_or_default();
             let here = (time, reading.value);
@@ -322,12 +332,42 @@ impl PreviewSoFar {
         }
     }
 
-    fn sample(&mut self, one: CovariateView) {
-        let (first, last) = (one.first, one.last);
+    /// A reading that should be there and is not.
+    fn missing(
+        &mut self,
+        benchmark: BenchmarkId,
+        what: &str,
+        place: FilePlace,
+        so_far: &mut SourceSoFar,
+    ) {
+        if what.starts_with(UNIT_WAS) {
+            let at = so_far.name(place);
+            let source = so_far.view.id.as_str();
+            (self.ends).refuse_unit(source, &benchmark, || at.clone(), what);
+            so_far.refused.count(what, || {
+                format!("{at}: {what}, expected the unit that the file began with")
+            });
+            return;
+        }
+        // Of a component the mark is followed by its column.
+        let mark = what.split(" in ").next().unwrap_or_default();
+        let is_mark = what.starts_with("nothing in ") || mark == "null" || so_far.marks.has(mark);
+        let view = &mut so_far.view;
+        if !is_mark {
+            *view.unread.entry(benchmark.clone()).or_default() += 1;
+        }
+        let (all, out_of_range) = view.missing.entry(benchmark).or_default();
+        *all += 1;
+        *out_of_range += u64::from(MissingValues::is_out_of_range(mark));
+    }
+
+    fn sample(&mut self, one: CovariateView, value: f64) {
+        let here = (one.first, value);
         let key = (one.source.clone(), one.name.clone());
-        let view = self.covariates.entry(key).or_insert(one);
-        view.values += 1;
-        (view.first, view.last) = (view.first.min(first), view.last.max(last));
+        let so_far = self.covariates.entry(key);
+        so_far
+            .or_insert_with(|| PreviewCovariate::new(one))
+            .take(here);
     }
 
     /// Why the readings that lie ahead of the clock are taken; `None` where they are refused. A daemon on a first start
@@ -390,7 +430,10 @@ impl PreviewSoFar {
                 .collect(),
             sources,
             benchmarks,
-            covariates: self.covariates.into_values().collect(),
+            covariates: (self.covariates.into_values())
+                .map(PreviewCovariate::finish)
+                .collect(),
+            refused_ends: self.ends.lines(),
             unfed: Vec::new(),
             absent: Vec::new(),
         }
@@ -437,28 +480,6 @@ fn doubt_second_quantities(benchmarks: &mut [BenchmarkPreview]) {
                 one.quantity
             ));
         }
-    }
-}
-
-fn keep_layout(view: &mut SourceView, file: &Path, meanings: Vec<(String, Meaning)>) {
-    let columns: Vec<ColumnView> = meanings
-        .into_iter()
-        .map(|(name, meaning)| ColumnView { name, meaning })
-        .collect();
-    if columns.is_empty() {
-        return;
-    }
-    match view
-        .layouts
-        .iter_mut()
-        .find(|layout| layout.columns == columns)
-    {
-        Some(layout) => layout.files += 1,
-        None => view.layouts.push(LayoutView {
-            file: file.to_owned(),
-            files: 1,
-            columns,
-        }),
     }
 }
 

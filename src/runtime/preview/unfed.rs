@@ -74,9 +74,12 @@ fn why(view: &SourceView, benchmark: Option<&BenchmarkId>) -> String {
             others.join(", ")
         )
     });
-    let missing = benchmark.and_then(|benchmark| view.missing.get(benchmark));
-    let missing = missing.map(|(all, _)| {
-        format!("they have a mark of no value where its readings should be ({all} times)")
+    let missing = benchmark.and_then(|benchmark| {
+        let (all, _) = view.missing.get(benchmark)?;
+        let marks = all - view.unread.get(benchmark).copied().unwrap_or_default();
+        (marks > 0).then(|| {
+            format!("they have a mark of no value where its readings should be ({marks} times)")
+        })
     });
     let hints: Vec<String> = [others, missing, refused].into_iter().flatten().collect();
     let hint = match &hints[..] {

@@ -21,6 +21,9 @@ pub struct Preview {
     pub unwatched: BTreeSet<BenchmarkId>,
     /// What no file feeds.
     pub unfed: Vec<Unfed>,
+    /// What the files end with and the daemon refuses, a line each: these are among the warnings.
+    #[serde(skip)]
+    pub refused_ends: Vec<String>,
     /// Covariates that the config states and no file has: these are among the warnings.
     #[serde(skip)]
     pub absent: Vec<ConfigProblem>,
@@ -53,6 +56,9 @@ pub struct SourceView {
     /// Marks of no value in the place of readings: how many, and how many of them for a value out of range.
     #[serde(skip)]
     pub(super) missing: BTreeMap<BenchmarkId, (u64, u64)>,
+    /// Of these, how many are no mark, and cannot be used for what stands there.
+    #[serde(skip)]
+    pub(super) unread: BTreeMap<BenchmarkId, u64>,
 }
 
 /// The columns of one file or of several.
@@ -167,6 +173,10 @@ pub struct CovariateView {
     pub first: Timestamp,
     /// When the latest was measured.
     pub last: Timestamp,
+    /// What in them hardly means what was intended, with its evidence.
+    pub suspicions: Vec<String>,
+    /// Whether rain is a running total, and how often that is set back.
+    pub remarks: Vec<String>,
 }
 
 /// A benchmark of the config without a reading, or a source without a benchmark.

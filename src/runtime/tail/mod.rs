@@ -12,6 +12,7 @@ mod departed;
 mod file;
 mod follow;
 mod gap;
+mod known;
 pub mod lines;
 mod position;
 pub mod records;
@@ -23,6 +24,7 @@ mod text;
 pub(super) use decode::Decoder;
 pub use decode::{Arrival, is_taken, options_of};
 pub use follow::{ArrivalBatch, Follower};
+pub use known::KnownFiles;
 pub(super) use rescan::list;
 pub(super) use text::{BadLine, LinesRead, TextReader};
 

@@ -252,7 +252,7 @@ impl Follower {
     }
 }
 
-fn is_ours(pattern: &FilePattern, decoder: &Decoder, name: &str) -> bool {
+pub(super) fn is_ours(pattern: &FilePattern, decoder: &Decoder, name: &str) -> bool {
     let packed = name.strip_suffix(".gz").filter(|_| decoder.takes_packed());
     pattern.matches(name) || packed.is_some_and(|name| pattern.matches(name))
 }

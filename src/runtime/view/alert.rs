@@ -6,7 +6,7 @@ use crate::monitor::{AlertState, Event, EventKind, OrderKind, Settings};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::alarm_state::{AlarmState, Alarms};
 use crate::runtime::clock;
-use crate::runtime::standing::{every, in_force, may_be_of};
+use crate::runtime::standing::{every, first_call, in_force, may_be_of};
 use crate::store::{DeliveryRow, Store, StoreError};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -36,7 +36,8 @@ pub struct AlertView {
     pub level: Level,
     /// Whether it is in force.
     pub state: AlertLife,
-    /// When it was called, data time.
+    /// When it was called, data time; where the past before a first start had called its level already, then: its rule, its line and its
+    /// evidence are of that time too.
     pub since: Timestamp,
     /// When it ended or was superseded, data time.
     pub ended: Option<Timestamp>,
@@ -98,6 +99,7 @@ pub fn alert(store: &Store, site: &str, key: &str) -> Result<Option<AlertView>, 
     let Some(call) = call(store, key)? else {
         return Ok(None);
     };
+    let call = from_its_first(store, call)?;
     let EventKind::Alert {
         level,
         key,
@@ -189,6 +191,43 @@ fn call(store: &Store, asked: &str) -> Result<Option<StoredCall>, StoreError> {
     Ok(found)
 }
 
+/// The call since which the alert stands, with its key: the past before a first start may have called the level already, by the figures
+/// of then.
+fn from_its_first(store: &Store, call: StoredCall) -> Result<StoredCall, StoreError> {
+    let EventKind::Alert { key, .. } = &call.event.kind else {
+        return Ok(call);
+    };
+    let Some(first) = first_call(store, key)?.filter(|first| first.time < call.event.time) else {
+        return Ok(call);
+    };
+    for placed in store.placed_events("alert")? {
+        let event: Event = read(&placed.body)?;
+        if is_same_call(&event, &first) {
+            return Ok(StoredCall {
+                event: first,
+                step: placed.step,
+                body: placed.body,
+            });
+        }
+    }
+    Ok(call)
+}
+
+/// Whether both are one call, whatever their keys.
+fn is_same_call(one: &Event, other: &Event) -> bool {
+    let words = |event: &Event| {
+        if let EventKind::Alert {
+            level, state, text, ..
+        } = &event.kind
+        {
+            Some((*level, *state, text.clone()))
+        } else {
+            None
+        }
+    };
+    (one.time, &one.benchmark) == (other.time, &other.benchmark) && words(one) == words(other)
+}
+
 /// How the alert stands by now, and since when it is over.
 fn end(alerts: &[Event], call: &Event) -> (AlertLife, Option<Timestamp>) {
     let EventKind::Alert {
@@ -238,8 +277,10 @@ fn audit(
     let EventKind::Alert { key: own_key, .. } = &call.kind else {
         return Ok(Vec::new());
     };
-    let is_own =
-        |event: &&Event| matches!(&event.kind, EventKind::Alert { key, .. } if key == own_key);
+    let is_own = |event: &&Event| {
+        matches!(&event.kind, EventKind::Alert { key, .. } if key == own_key)
+            || is_same_call(event, call)
+    };
     let mut audit: Vec<Event> = alerts.iter().filter(is_own).cloned().collect();
     let is_in_time =
         |event: &Event| event.time >= call.time && ended.is_none_or(|ended| event.time <= ended);

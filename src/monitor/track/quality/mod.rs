@@ -7,7 +7,7 @@ mod unknown;
 use super::record::BenchmarkRecord;
 use crate::monitor::event::Event;
 use crate::monitor::history::Taken;
-use crate::reading::{FARTHEST, Suspicion, Timestamp, whole_figure};
+use crate::reading::{Suspicion, Timestamp, whole_figure};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use unknown::Reason;
@@ -113,8 +113,9 @@ impl DataQuality {
                 ("corrected", text)
             }
             Taken::OutOfRange(value) => {
+                let farthest = record.observations().quantity.farthest();
                 let text = format!(
-                    "the reading of {time} is {value:e} {unit}: beyond {FARTHEST:e} {unit}, which no slope reaches; it is left out"
+                    "the reading of {time} is {value:e} {unit}: beyond {farthest:e} {unit}, which no slope reaches; it is left out"
                 );
                 ("out-of-range", text)
             }

@@ -1,0 +1,376 @@
+//! What a person is to know at once: readings of another site, figures of another time, coordinates, rain as a total, rows that
+//! are refused.
+
+use crate::office::{Office, site};
+use jiff::SignedDuration;
+use serde_json::Value;
+use slipwatch::reading::Timestamp;
+use slipwatch::runtime::clock;
+use std::fmt::Write as _;
+use std::fs;
+
+const ROWS: i32 = 150;
+const START: &str = "2020-01-01T00:00:00Z";
+
+/// A number within a half of zero that looks drawn.
+fn drawn(row: i32) -> f64 {
+    f64::from((row * 7919 + 104) % 1009) / 1009.0 - 0.5
+}
+
+/// Hourly readings up to `ends` from now, on the way to a collapse after 250 of them.
+fn to_collapse(slip_mm: f64, ends: SignedDuration) -> String {
+    let newest = clock::now() + ends;
+    (0..ROWS).fold("time,P1_displacement_mm\n".to_owned(), |mut text, row| {
+        let time = newest - SignedDuration::from_hours(i64::from(ROWS - 1 - row));
+        let value = -slip_mm * (1.0 - f64::from(row) / 250.0).ln() + 0.05 * drawn(row);
+        let _ = writeln!(text, "{time:.0},{value:.4}");
+        text
+    })
+}
+
+fn json(office: &Office, args: &[&str]) -> Value {
+    let args = [args, &["--config", "site.toml", "--format", "json"]].concat();
+    serde_json::from_str(&office.done(&args)).unwrap()
+}
+
+fn lines(office: &Office, args: &[&str]) -> Vec<Value> {
+    let args = [args, &["--config", "site.toml", "--format", "json"]].concat();
+    let said = office.done(&args);
+    said.lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect()
+}
+
+/// Runs the daemon until it has gone through the past.
+fn run(office: &Office) {
+    let daemon = office.run_logged(&["run", "site.toml"]);
+    office.until("all is read", || office.log().contains("caught up"));
+    office.until("the past is gone through", || {
+        office.log().contains("has been gone through") || !office.log().contains("of=0")
+    });
+    drop(daemon);
+}
+
+fn contains_all(said: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(said.contains(part), "no {part:?} in {said}");
+    }
+}
+
+#[test]
+fn the_readings_of_another_site_in_the_state_are_named_and_init_does_not_take_them_unasked() {
+    let (newest, later) = (
+        SignedDuration::from_mins(-90),
+        SignedDuration::from_mins(-40),
+    );
+    let office = Office::with(&[
+        ("a.csv", &to_collapse(10.0, newest)),
+        ("b.csv", &to_collapse(1.0, later)),
+    ]);
+    office.done(&["init", "a.csv"]);
+    run(&office);
+    let (_, _, err) = office.say(&["check", "site.toml"]);
+    assert!(!err.contains("state folder"), "{err}");
+    let said = office.refused(2, &["init", "b.csv", "--force"]);
+    contains_all(
+        &said,
+        &[
+            "150 readings of P1",
+            "a.csv",
+            "--state-dir \"state-b\"",
+            "--state-dir state ",
+        ],
+    );
+    let config = fs::read_to_string(office.path("site.toml")).unwrap();
+    assert!(config.contains("a.csv"), "{config}");
+    office.done(&["init", "b.csv", "--force", "--state-dir", "state-b"]);
+    let config = fs::read_to_string(office.path("site.toml")).unwrap();
+    contains_all(&config, &["state_dir = \"state-b\"", "b.csv"]);
+    let (exit, _, err) = office.say(&["init", "b.csv", "--force", "--state-dir", "state"]);
+    let wanted = [
+        "150 readings of P1 that were read from",
+        "a.csv",
+        "no source of this config reads",
+    ];
+    assert_eq!(exit, 0, "{err}");
+    contains_all(&err, &wanted);
+    let (_, _, err) = office.say(&["check", "site.toml"]);
+    contains_all(&err, &wanted);
+    let (_, out, _) = office.say(&["doctor", "site.toml"]);
+    contains_all(&out, &["doubtful  state: state folder", wanted[0]]);
+    run(&office);
+    contains_all(&office.log(), &wanted);
+    let events = office.done(&["events", "--config", "site.toml", "--kind", "fault"]);
+    contains_all(&events, &["150 readings of P1 that were read from"]);
+    let (_, _, err) = office.say(&["check", "site.toml"]);
+    contains_all(
+        &err,
+        &["300 readings of P1, a part of which was read from", "a.csv"],
+    );
+    // Once is enough.
+    run(&office);
+    let faults = lines(&office, &["events", "--kind", "fault"]);
+    let inherited = faults
+        .iter()
+        .filter(|event| event["kind"] == "inherited-readings");
+    assert_eq!(inherited.count(), 1, "{faults:?}");
+}
+
+#[test]
+fn a_file_that_was_renamed_or_whose_folder_was_moved_is_no_other_site() {
+    let office = Office::with(&[("a.csv", &to_collapse(10.0, SignedDuration::from_mins(-90)))]);
+    office.done(&["init", "a.csv"]);
+    run(&office);
+    fs::copy(office.path("a.csv"), office.path("c.csv")).unwrap();
+    fs::remove_file(office.path("a.csv")).unwrap();
+    let (exit, _, err) = office.say(&["init", "c.csv", "--force"]);
+    assert_eq!(exit, 0, "{err}");
+    assert!(!err.contains("state folder"), "{err}");
+}
+
+#[test]
+fn after_a_first_start_on_history_a_level_its_date_and_its_figures_are_of_one_time() {
+    let office = Office::with(&[("a.csv", &to_collapse(10.0, SignedDuration::from_mins(-10)))]);
+    office.done(&["init", "a.csv"]);
+    run(&office);
+    let called = |event: &&Value| event["benchmark"] == "P1" && event["level"] == "orange";
+    let list = lines(&office, &["alerts", "list"]);
+    let alert = list.iter().find(called).unwrap();
+    let events = lines(&office, &["events", "--kind", "alert"]);
+    let of_then = |event: &&Value| called(event) && event["time"] == alert["time"];
+    let then = events.iter().find(of_then).unwrap();
+    let newest = events.iter().find(called).unwrap();
+    assert_ne!(
+        newest["time"], then["time"],
+        "the past called nothing: {events:?}"
+    );
+    assert_ne!(newest["text"], then["text"], "{events:?}");
+    assert_eq!(alert["text"], then["text"]);
+    assert_eq!(alert["key"], newest["key"], "what hooks were notified of");
+    let status = json(&office, &["status"]);
+    let one = &status["benchmarks"][0];
+    assert_eq!(
+        (&one["since"], &one["reason"]),
+        (&then["time"], &then["text"])
+    );
+    let shown = json(&office, &["alerts", "show", "P1/orange"]);
+    assert_eq!(
+        (&shown["since"], &shown["text"]),
+        (&then["time"], &then["text"])
+    );
+    assert_eq!(shown["evidence"]["time"], then["time"], "{shown}");
+    assert_eq!(
+        (&shown["key"], &shown["state"]),
+        (&alert["key"], &"firing".into())
+    );
+    let time = then["time"].as_str().unwrap().parse::<Timestamp>().unwrap();
+    let said = office.done(&["alerts", "show", "P1/orange", "--config", "site.toml"]);
+    let since = format!("in force since {}", time.strftime("%Y-%m-%d %H:%MZ"));
+    contains_all(&said, &[&since, then["text"].as_str().unwrap()]);
+}
+
+const VECTOR: &str = "[[benchmark]]\nid = \"G1\"\nsource = \"logger\"\ncomponents = [\"G1_E_m\", \"G1_N_m\"]\ndirection = [0.7, 0.7]\n";
+
+/// Hourly coordinates, m, on the way to a collapse.
+fn coordinates(east: f64, north: f64) -> String {
+    let start = START.parse::<Timestamp>().unwrap();
+    (0..ROWS).fold("time,G1_E_m,G1_N_m,G2_E_m\n".to_owned(), |mut text, row| {
+        let time = start + SignedDuration::from_hours(i64::from(row));
+        let slip = -0.01 * (1.0 - f64::from(row) / 250.0).ln() + 5e-5 * drawn(row);
+        let _ = writeln!(text, "{time},{:.6},{:.6},1", east + slip, north + slip);
+        text
+    })
+}
+
+#[test]
+fn coordinates_of_a_map_projection_are_readings_and_what_is_too_large_is_named_itself() {
+    let velocity = |text: &str| {
+        let office = Office::with(&[("n.csv", text), ("site.toml", &site("n.csv", VECTOR))]);
+        let (exit, out, err) = office.say(&["check", "site.toml"]);
+        assert_eq!(exit, 0, "{out}{err}");
+        let said = office.done(&[
+            "replay",
+            "n.csv",
+            "--config",
+            "site.toml",
+            "--format",
+            "json",
+        ]);
+        let mut events = said
+            .lines()
+            .map(|line| serde_json::from_str::<Value>(line).unwrap());
+        let newest = events.rfind(|event| event["event"] == "refit").unwrap();
+        newest["velocity_mm_per_day"].as_f64().unwrap()
+    };
+    let local = velocity(&coordinates(0.0, 0.0));
+    // UTM with the number of the zone before the easting.
+    let far = velocity(&coordinates(32_612_345.0, 9_999_999.0));
+    assert!((far / local - 1.0).abs() < 1e-3, "{far} {local}");
+    let office = Office::with(&[("n.csv", &coordinates(612_345.0, 5_123_456.0))]);
+    let said = office.done(&["init", "n.csv", "--column", "G1_N_m=G1:displacement:m"]);
+    assert!(said.contains("150 readings of displacement"), "{said}");
+    let code = coordinates(612_345.0, 1e30);
+    let office = Office::with(&[("n.csv", &code), ("site.toml", &site("n.csv", VECTOR))]);
+    let (exit, out, err) = office.say(&["check", "site.toml"]);
+    assert_eq!(exit, 1, "{out}{err}");
+    contains_all(&out, &["column \"G1_N_m\"", "1e11 mm"]);
+    assert!(!out.contains("column \"G1_E_m\": found"), "{out}");
+    assert!(!err.contains("mark of no value"), "{err}");
+}
+
+/// Daily creep that rain drives, and rain as `given`, from the day's and the sum before it.
+fn in_the_rain(name: &str, given: impl Fn(i32, f64, &mut f64) -> f64) -> String {
+    let start = START.parse::<Timestamp>().unwrap();
+    let (mut total, mut soaked, mut moved) = (0.0, 0.0, 0.0);
+    (0..360).fold(
+        format!("time,P1_displacement_mm,{name}\n"),
+        |mut text, day| {
+            let time = start + SignedDuration::from_hours(24 * i64::from(day));
+            let rain = if (day * 7919 + 13) % 7 < 2 {
+                20.0 + 30.0 * drawn(day)
+            } else {
+                0.0
+            };
+            soaked += rain - soaked / 7.0;
+            moved += 0.05 + 0.002 * soaked;
+            let value = given(day, rain, &mut total);
+            let _ = writeln!(
+                text,
+                "{time},{:.3},{value:.1}",
+                moved + 0.1 * drawn(day + 500)
+            );
+            text
+        },
+    )
+}
+
+fn add(rain: f64, total: &mut f64) -> f64 {
+    *total += rain;
+    *total
+}
+
+fn set_back_on_day_200(day: i32, rain: f64, total: &mut f64) -> f64 {
+    if day == 200 {
+        *total = 0.0;
+    }
+    add(rain, total)
+}
+
+#[test]
+fn check_names_a_total_of_rain_that_is_set_back_and_codes_in_a_covariate() {
+    let check = |text: &str| {
+        let office = Office::with(&[("slope.csv", text), ("site.toml", &site("slope.csv", ""))]);
+        let (exit, out, err) = office.say(&["check", "site.toml"]);
+        assert_eq!(exit, 0, "{out}{err}");
+        (out, err)
+    };
+    let (out, _) = check(&in_the_rain("rain_mm", |_, rain, _| rain));
+    assert!(
+        !out.contains("running total") && !out.contains("suspicion"),
+        "{out}"
+    );
+    let (out, _) = check(&in_the_rain("rain_cum_mm", |_, rain, total| {
+        add(rain, total)
+    }));
+    assert!(
+        out.contains("a running total of rain, which is never set back"),
+        "{out}"
+    );
+    let (out, _) = check(&in_the_rain("rain_cum_mm", set_back_on_day_200));
+    contains_all(
+        &out,
+        &["a running total of rain, set back once, first at 2020-07-19T00:00:00Z"],
+    );
+    for name in ["rain_mm", "lake_level_m", "Temp"] {
+        let coded = |day: i32, rain: f64, _: &mut f64| if day % 30 == 7 { -9999.0 } else { rain };
+        let (out, err) = check(&in_the_rain(name, coded));
+        contains_all(&out, &["suspicion: -9999 stands 12 times"]);
+        contains_all(
+            &err,
+            &[
+                &format!("covariate {name:?}: -9999 stands 12 times"),
+                "missing = [-9999]",
+            ],
+        );
+    }
+}
+
+#[test]
+fn explain_goes_on_from_what_a_total_of_rain_was_when_it_is_set_back() {
+    let explain = |text: &str| {
+        let office = Office::with(&[("slope.csv", text)]);
+        let said = office.done(&["explain", "slope.csv", "--format", "json"]);
+        serde_json::from_str::<Value>(&said).unwrap()
+    };
+    let whole = explain(&in_the_rain("rain_cum_mm", |_, rain, total| {
+        add(rain, total)
+    }));
+    let broken = explain(&in_the_rain("rain_cum_mm", set_back_on_day_200));
+    assert!(
+        broken.to_string().contains("rain_cum_mm: its zero jumps"),
+        "{broken}"
+    );
+    assert!(broken.to_string().contains("covariate-reset"), "{broken}");
+    assert!(!whole.to_string().contains("covariate-reset"), "{whole}");
+    let (broken, whole) = (&broken["verdict"], &whole["verdict"]);
+    for key in ["effect", "channel", "form"] {
+        assert_eq!(broken[key], whole[key]);
+    }
+    let lag = |verdict: &Value| verdict["lag_days"].as_f64().unwrap();
+    assert!(
+        (lag(broken) / lag(whole) - 1.0).abs() < 0.02,
+        "{broken} {whole}"
+    );
+}
+
+/// So many rows in mm, and then more under a header in m.
+fn with_another_unit() -> String {
+    let start = START.parse::<Timestamp>().unwrap();
+    (0..300).fold("time,P1_displacement_mm\n".to_owned(), |mut text, row| {
+        if row == 100 {
+            text += "time,P1_displacement_m\n";
+        }
+        let value = 0.5 * f64::from(row) + drawn(row);
+        let value = if row < 100 { value } else { value / 1e3 };
+        let _ = writeln!(
+            text,
+            "{},{value:.6}",
+            start + SignedDuration::from_hours(i64::from(row))
+        );
+        text
+    })
+}
+
+#[test]
+fn a_unit_that_changes_within_a_file_is_named_by_init_and_what_is_refused_at_the_end_by_check() {
+    let office = Office::with(&[("uc.csv", &with_another_unit())]);
+    let (exit, out, err) = office.say(&["init", "uc.csv"]);
+    assert_ne!(exit, 0, "{out}");
+    contains_all(
+        &err,
+        &["uc.csv, line 102: benchmark \"P1\": the unit was mm and is m"],
+    );
+    assert!(!err.contains("give each its own id"), "{err}");
+    fs::write(office.path("site.toml"), site("uc.csv", "")).unwrap();
+    let (_, _, err) = office.say(&["check", "site.toml"]);
+    contains_all(
+        &err,
+        &[
+            "benchmark \"P1\": from",
+            "line 103 on all readings are refused (200 of them)",
+            "its unit was mm and is m",
+        ],
+    );
+    // Rows that are wrong in another way, to the end; and such that are followed by good ones.
+    let mut text = crate::office::plain(40);
+    for row in 0..9 {
+        let _ = writeln!(text, "2017-06-03T{row:02}:00:00Z;1;2");
+    }
+    let broken = ["line 42 on all rows are refused (9 of them)"];
+    for (more, is_said) in [("", true), ("2017-06-04T00:00:00Z,20\n", false)] {
+        let text = format!("{text}{more}");
+        let office = Office::with(&[("slope.csv", &text), ("site.toml", &site("slope.csv", ""))]);
+        let (_, _, err) = office.say(&["check", "site.toml"]);
+        assert_eq!(err.contains(broken[0]), is_said, "{err}");
+    }
+}
