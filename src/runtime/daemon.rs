@@ -1,6 +1,7 @@
 //! The daemon's work loop: takes what comes, lets time go by, carries out people's orders, takes up another config on request.
 
 mod reload;
+mod upkeep;
 
 use super::beside::SideTasks;
 use super::clock::Stopwatch;
@@ -404,48 +405,11 @@ impl Daemon {
         committed
     }
 
-    /// On a full disk it waits, as everything does.
-    fn thin(&self) -> Result<(), StoreError> {
-        match self.site.thin(self.config.site.keep_refits) {
-            Err(error) if !error.is_full() => Err(error),
-            Ok(_) | Err(_) => Ok(()),
-        }
-    }
-
-    /// Keeps how much could not be used, for those who ask the state; on a full disk the next time does.
-    fn note_quarantined(&mut self) -> Result<(), StoreError> {
-        let counts = self.pulse.vitals.health().quarantined;
-        if counts == self.quarantined {
-            return Ok(());
-        }
-        match self.store.note_quarantined(&counts) {
-            Ok(()) => {
-                self.quarantined = counts;
-                Ok(())
-            }
-            Err(error) if error.is_full() => Ok(()),
-            Err(error) => Err(error),
-        }
-    }
-
     /// Deliveries are closed where the hooks are set up: at the start and when a config is taken.
     fn note_closed(&self) -> Result<(), StoreError> {
         let closed = self.store.closed_deliveries()?.len();
         (self.pulse.vitals).update(|health| health.outbox_closed = closed);
         Ok(())
-    }
-
-    /// Looks at a few more rows of the state. Where one is damaged the work goes on, and people are to see to it.
-    fn verify(&mut self) {
-        let is_damaged = self.pulse.vitals.health().is_store_damaged;
-        if let Err(error) = self.store.verify(&mut self.verified)
-            && !is_damaged
-        {
-            tracing::error!(%error, "the state on the disk has changed by itself");
-            self.pulse
-                .vitals
-                .update(|health| health.is_store_damaged = true);
-        }
     }
 
     /// Takes what people have ordered.

@@ -6,6 +6,7 @@
 //! Orange, red and unknown are tried until the hook takes them, they are resolved or superseded, or
 //! the daemon stops; the next start then offers them again. Whatever else is given up in the end.
 
+mod at_once;
 mod runner;
 mod worker;
 
@@ -20,6 +21,7 @@ use crate::config::HookConfig;
 use crate::monitor::EventKind;
 use crate::reading::BenchmarkId;
 use crate::store::DeliveryOutcome;
+use at_once::{has_begun_in, is_over_by};
 use std::collections::BTreeSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -75,26 +77,6 @@ struct HookQueue {
     hook: HookConfig,
     queue: mpsc::Sender<Alert>,
     in_hand: Arc<Mutex<InHand>>,
-}
-
-/// Whether `alert` is the beginning of a level that one of those that come together with it, and after it, ends.
-fn is_over_by(alert: &Alert, later: &[Alert]) -> bool {
-    let ends = |end: &Alert| {
-        end.state == MessageState::Resolved
-            && !end.is_flood()
-            && end.event.benchmark == alert.event.benchmark
-            && (end.level == Level::Unknown) == (alert.level == Level::Unknown)
-            && end.level >= alert.level
-    };
-    alert.state == MessageState::Firing && !alert.is_flood() && later.iter().any(ends)
-}
-
-/// Whether `alert` is the end of one of those that come together with it, and before it.
-fn has_begun_in(alert: &Alert, earlier: &[Alert]) -> bool {
-    let begins = |one: &Alert| {
-        one.state == MessageState::Firing && one.key == alert.key && one.level == alert.level
-    };
-    alert.state == MessageState::Resolved && earlier.iter().any(begins)
 }
 
 impl HookQueue {
