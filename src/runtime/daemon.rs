@@ -445,8 +445,8 @@ impl Daemon {
     pub fn tick(&mut self) -> Result<(), StoreError> {
         let now = (self.wall)();
         if !self.site.is_waiting() {
-            for (number, order) in self.store.orders()? {
-                self.site.order(number, order);
+            for order in self.store.orders()? {
+                self.site.order(order)?;
             }
         }
         // Data time is the clock's only once the past has been read.

@@ -62,7 +62,16 @@ pub fn every(store: &Store, kind: &str) -> Result<Vec<Event>, StoreError> {
 /// # Errors
 /// [`StoreError`].
 pub(super) fn every_until(store: &Store, kind: &str, last: i64) -> Result<Vec<Event>, StoreError> {
-    let numbered = numbered_until(store, kind, last)?;
+    let numbered = numbered_between(store, kind, (0, last))?;
+    Ok(numbered.into_iter().map(|(_, event)| event).collect())
+}
+
+/// Every event of a kind after number `after`, oldest first.
+///
+/// # Errors
+/// [`StoreError`].
+pub(super) fn every_since(store: &Store, kind: &str, after: i64) -> Result<Vec<Event>, StoreError> {
+    let numbered = numbered_between(store, kind, (after, i64::MAX))?;
     Ok(numbered.into_iter().map(|(_, event)| event).collect())
 }
 
@@ -71,12 +80,15 @@ pub(super) fn every_until(store: &Store, kind: &str, last: i64) -> Result<Vec<Ev
 /// # Errors
 /// [`StoreError`].
 pub(super) fn numbered(store: &Store, kind: &str) -> Result<Vec<(i64, Event)>, StoreError> {
-    numbered_until(store, kind, i64::MAX)
+    numbered_between(store, kind, (0, i64::MAX))
 }
 
-fn numbered_until(store: &Store, kind: &str, last: i64) -> Result<Vec<(i64, Event)>, StoreError> {
+fn numbered_between(
+    store: &Store,
+    kind: &str,
+    (mut after, last): (i64, i64),
+) -> Result<Vec<(i64, Event)>, StoreError> {
     let mut all = Vec::new();
-    let mut after = 0;
     loop {
         let events = store.events(after, Some(kind), None)?;
         let Some((newest, _)) = events.last() else {
@@ -135,17 +147,22 @@ impl TakenOrders {
         taken.filter(move |(number, order)| self.concerns((*number, order), alert))
     }
 
-    /// Whether the order is of this alert: it had been called when the order was taken, and the order names it or all at its place.
+    /// Whether the order is of this alert: it had been called when the order was given and taken, and the order names it or all at
+    /// its place.
     pub(super) fn concerns(&self, (number, order): (i64, &Event), alert: &Event) -> bool {
         let EventKind::Alert { key, .. } = &alert.kind else {
             return false;
         };
-        let EventKind::Order { alert: only, .. } = &order.kind else {
+        let EventKind::Order {
+            alert: only, given, ..
+        } = &order.kind
+        else {
             return false;
         };
         let is_here = order.benchmark.is_none() || order.benchmark == alert.benchmark;
         let is_called = self.called.get(key).is_some_and(|called| *called < number);
-        is_here && is_called && only.as_ref().is_none_or(|only| only == key)
+        let is_seen = is_called && !given.called_since.contains(key);
+        is_here && is_seen && only.as_ref().is_none_or(|only| only == key)
     }
 
     /// Those in force at `now` by which no hook is run, as they were given.

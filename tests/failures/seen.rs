@@ -96,3 +96,42 @@ fn a_red_of_readings_that_came_late_is_not_acknowledged_by_an_order_taken_before
     program.stop();
     site.proven_events();
 }
+
+#[test]
+fn a_red_that_is_called_between_an_order_and_its_taking_is_not_what_that_is_of() {
+    let site = site(&["A", "B"]);
+    let program = site.caught_up();
+    for name in ["A", "B"] {
+        read(&site, name, 2, 70.0);
+        calls(&site, &format!("{name}/orange/"));
+    }
+    let order = |words: &[&str]| {
+        let config = ["--by", "Ada", "--config", "site.toml"];
+        site.printed(&[&["alerts"], words, &config].concat());
+    };
+    std::fs::rename(site.path("hook.sh"), site.path("kept.sh")).unwrap();
+    // Readings are taken as they come, orders within a second.
+    order(&["ack", "--benchmark", "A"]);
+    order(&["shelve", "--benchmark", "B", "--for", "20d"]);
+    read(&site, "A", 1, 170.0);
+    read(&site, "B", 1, 170.0);
+    eventually("that they are taken", || {
+        site.events().matches("\"event\":\"order\"").count() == 2
+    });
+    eventually("the reds", || {
+        ["A", "B"].iter().all(|name| {
+            let events = site.events();
+            events.contains(&format!("\"key\":\"{name}/red/"))
+        })
+    });
+    program.stop();
+    std::fs::rename(site.path("kept.sh"), site.path("hook.sh")).unwrap();
+    let program = site.caught_up();
+    calls(&site, "A/red/");
+    calls(&site, "B/red/");
+    assert_eq!(alarm_state(&site, "A"), "unacknowledged");
+    assert_eq!(alarm_state(&site, "B"), "unacknowledged");
+    assert_eq!(shown(&site, "A/red")["is_acknowledged"], false);
+    program.stop();
+    site.proven_events();
+}

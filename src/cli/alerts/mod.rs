@@ -50,6 +50,7 @@ impl GivenArgs {
             why: self.why.clone(),
             door: Some(OrderedBy::CommandLine),
             given_at: Some(clock::now()),
+            called_since: Vec::new(),
         }
     }
 }

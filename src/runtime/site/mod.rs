@@ -25,15 +25,13 @@ use returned::Returned;
 use standing_floods::StandingFlood;
 use timekeeper::Timekeeper;
 
-use crate::monitor::{
-    Event, EventKind, Input, Monitor, Notice, Order, RESET_FOUND, SUSPECT, Settings,
-};
+use crate::monitor::{Event, EventKind, Input, Monitor, Notice, RESET_FOUND, SUSPECT, Settings};
 use crate::reading::{BEFORE_ALL, BenchmarkId, Timestamp};
 use crate::runtime::deliver::Dispatcher;
 use crate::runtime::hook::{Alert, Status};
 use crate::runtime::searches::Searches;
 use crate::runtime::tail::Arrival;
-use crate::store::{Batch, Position, Store, StoreError};
+use crate::store::{Batch, LeftOrder, Position, Store, StoreError};
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -235,12 +233,20 @@ impl Site {
         events
     }
 
-    /// Takes an order of people, which stands under this number in the state.
-    pub fn order(&mut self, number: i64, order: Order) -> Vec<Event> {
-        self.batch.taken(number);
+    /// Takes an order of people. It is not of alerts that were called after it was given.
+    ///
+    /// # Errors
+    /// When the state cannot be asked for these.
+    pub fn order(&mut self, left: LeftOrder) -> Result<Vec<Event>, StoreError> {
+        let mut order = left.order;
+        if let Some(last) = left.last_event {
+            let since = self.called_since(last, order.benchmark())?;
+            order.was_given_before(since);
+        }
+        self.batch.taken(left.number);
         tracing::warn!(?order, "people ask for something");
         let now = self.data_now();
-        self.step(now, &Input::Order(order))
+        Ok(self.step(now, &Input::Order(order)))
     }
 
     /// How far the files had been read when the values taken since the last commit were all handed over.

@@ -1,11 +1,13 @@
 //! Who asked not to be notified, of what, until when: never for longer than an order may last, whatever the clock says.
 
-use super::{Attention, Site};
+use super::{AlertInForce, Attention, Site};
 use crate::alert::Level;
-use crate::monitor::Order;
+use crate::monitor::{AlertState, EventKind, Order};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::clock::TOLERANCE;
 use crate::runtime::hook::Alert;
+use crate::runtime::standing::every_since;
+use crate::store::StoreError;
 use jiff::SignedDuration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -55,11 +57,14 @@ impl Site {
     pub(super) fn apply(&mut self, order: &Order) {
         match order {
             Order::Acknowledge {
-                benchmark, alert, ..
+                benchmark,
+                alert,
+                given,
             } => {
-                let is_seen = |place: &Option<BenchmarkId>, key: &str| match alert {
+                let since = &given.called_since;
+                let is_seen = |place: &Option<BenchmarkId>, key: &String| match alert {
                     Some(only) => key == only,
-                    None => benchmark.is_none() || place == benchmark,
+                    None => (benchmark.is_none() || place == benchmark) && !since.contains(key),
                 };
                 let all = self.standing.iter_mut();
                 let seen = all.filter(|((place, _), one)| is_seen(place, &one.alert.key));
@@ -71,14 +76,16 @@ impl Site {
                     }
                 }
                 if let (None, None) = (benchmark, alert) {
-                    self.acknowledge_floods();
+                    self.acknowledge_floods(since);
                 }
                 self.keep_receipts();
             }
             Order::Shelve {
-                benchmark, until, ..
+                benchmark,
+                until,
+                given,
             } => {
-                let level = self.monitor.level(benchmark).unwrap_or(Level::Green);
+                let level = self.level_before(benchmark, &given.called_since);
                 self.mute(Some(benchmark), Some(level), *until);
             }
             Order::Silence {
@@ -91,6 +98,52 @@ impl Site {
                 self.mutes.retain(|mute| !ends(mute));
             }
         }
+    }
+
+    /// Keys of the alerts at a place, everywhere without one, that were called after event number `last`.
+    pub(super) fn called_since(
+        &self,
+        last: i64,
+        place: Option<&BenchmarkId>,
+    ) -> Result<Vec<String>, StoreError> {
+        let mut called = match &self.sinks.store {
+            Some(store) => every_since(store, "alert", last)?,
+            None => Vec::new(),
+        };
+        called.extend(self.fresh.iter().map(|alert| alert.event.clone()));
+        called.retain(|event| place.is_none() || event.benchmark.as_ref() == place);
+        let keys = called.into_iter().filter_map(|event| {
+            if let EventKind::Alert {
+                state: AlertState::Firing,
+                key,
+                ..
+            } = event.kind
+            {
+                Some(key)
+            } else {
+                None
+            }
+        });
+        Ok(keys.collect())
+    }
+
+    /// The level in force at a benchmark before the alerts with the keys `since` were called.
+    fn level_before(&self, benchmark: &BenchmarkId, since: &[String]) -> Level {
+        if since.is_empty() {
+            return self.monitor.level(benchmark).unwrap_or(Level::Green);
+        }
+        let standing = self.standing.get(&(Some(benchmark.clone()), false));
+        let Some(AlertInForce { alert, .. }) = standing else {
+            return Level::Green;
+        };
+        if !since.contains(&alert.key) {
+            return alert.level;
+        }
+        let earlier = alert
+            .earlier
+            .iter()
+            .filter(|one| one.benchmark.as_ref() == Some(benchmark) && !since.contains(&one.key));
+        earlier.map(|one| one.level).max().unwrap_or(Level::Green)
     }
 
     fn mute(&mut self, benchmark: Option<&BenchmarkId>, up_to: Option<Level>, until: Timestamp) {

@@ -104,13 +104,17 @@ impl Site {
         })
     }
 
-    /// Somebody has seen everything.
-    pub(super) fn acknowledge_floods(&mut self) {
+    /// Somebody has seen everything but the alerts with the keys `since`.
+    pub(super) fn acknowledge_floods(&mut self, since: &[String]) {
+        let is_seen = |flood: &Alert| {
+            let mut members = flood.many.iter().flat_map(|many| &many.members);
+            !members.any(|member| since.contains(&member.key))
+        };
         for one in self.floods.values_mut() {
-            one.is_acknowledged = true;
+            one.is_acknowledged |= is_seen(&one.alert);
         }
         if let Some(alerts) = &self.sinks.alerts {
-            alerts.end_those_of_many();
+            alerts.end_those_of_many(&is_seen);
         }
     }
 
