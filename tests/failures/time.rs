@@ -212,3 +212,37 @@ fn readings_that_are_whole_hours_ahead_are_said_to_be_perhaps_in_another_zone() 
     assert!(fault.contains("About 8 h ahead"), "{fault}");
     assert!(fault.contains("set time_zone in its [[source]]"), "{fault}");
 }
+
+/// Within what clocks may differ by.
+#[test]
+fn a_logger_whose_clock_is_ahead_makes_no_other_benchmark_silent() {
+    let site = Site::new("");
+    let time = |ahead: i64, ago: i64| {
+        clock::now() + SignedDuration::from_mins(ahead) - SignedDuration::from_mins(ago)
+    };
+    for (name, ahead) in [("A", 45), ("B", 0)] {
+        let rows = (1..10).rev().map(|ago| format!("{},1\n", time(ahead, ago)));
+        let rows: String = rows.collect();
+        let text = format!("time,{name}_displacement_mm\n{rows}");
+        site.append(&format!("incoming/{name}.csv"), &text);
+    }
+    let program = site.caught_up();
+    for round in 1..=3 {
+        for (name, ahead) in [("B", 0), ("A", 45)] {
+            let before = site.values().len();
+            let row = format!("{},1.0{round}\n", time(ahead, 0));
+            site.append(&format!("incoming/{name}.csv"), &row);
+            eventually("the reading", || site.values().len() > before);
+        }
+    }
+    eventually("that A is suspect", || {
+        site.events().contains("\"kind\":\"suspect-ahead\"")
+    });
+    program.stop();
+    let events = site.proven_events();
+    assert!(
+        !events.contains("benchmark B: no reading since"),
+        "{events}"
+    );
+    assert_eq!(site.notified("B/unknown/", ""), 0, "{events}");
+}

@@ -216,14 +216,25 @@ impl Site {
 
     /// Lets data time pass up to `until`: every deadline of the monitor on the way is kept.
     pub fn pass(&mut self, until: Timestamp) -> Vec<Event> {
+        self.pass_by(until, None)
+    }
+
+    /// As [`Site::pass`]; where data time lies ahead of the `clock`, only what is due by this is judged.
+    fn pass_by(&mut self, until: Timestamp, clock: Option<Timestamp>) -> Vec<Event> {
+        let until = clock.map_or(until, |clock| until.min(clock));
         let mut events = Vec::new();
         for _ in 0..MOST_TICKS {
             let due = self.monitor.next_deadline();
             let Some(due) = due.filter(|due| *due <= until) else {
                 return events;
             };
-            let due = self.now.map_or(due, |now| now.max(due));
-            events.extend(self.step(due, &Input::Tick));
+            let now = self.now.map_or(due, |now| now.max(due));
+            let (due, passed) = if clock.is_some_and(|clock| now > clock) {
+                (due, Input::Notice(Notice::Passed { until: due }))
+            } else {
+                (now, Input::Tick)
+            };
+            events.extend(self.step(now, &passed));
             if self.monitor.next_deadline().is_some_and(|next| next <= due) {
                 tracing::error!(%due, "the monitor's deadline does not move on");
                 return events;
