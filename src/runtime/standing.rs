@@ -3,6 +3,7 @@
 use crate::alert::Level;
 use crate::monitor::{AlertState, Event, EventKind, Order, OrderKind, by_time};
 use crate::reading::{BenchmarkId, Timestamp};
+use crate::runtime::clock::TOLERANCE;
 use crate::store::{Store, StoreError};
 use std::collections::BTreeMap;
 
@@ -114,6 +115,8 @@ pub struct TakenOrders {
     taken: Vec<(i64, Event)>,
     /// The number of the event that called an alert last, by its key.
     called: BTreeMap<String, i64>,
+    /// Whether they are those of the past, whose clock was another.
+    are_past: bool,
 }
 
 impl TakenOrders {
@@ -138,7 +141,11 @@ impl TakenOrders {
                 }
             }
         }
-        Ok(Self { taken, called })
+        Ok(Self {
+            taken,
+            called,
+            are_past: at.is_some(),
+        })
     }
 
     /// The orders that are of this alert, with their numbers, oldest first.
@@ -174,13 +181,20 @@ impl TakenOrders {
     pub(super) fn numbered_silences(&self, now: Timestamp) -> Vec<(i64, Event)> {
         let mut standing: Vec<(i64, Event)> = Vec::new();
         for (number, event) in &self.taken {
-            let EventKind::Order { order, until, .. } = &event.kind else {
+            let EventKind::Order {
+                order,
+                until,
+                given,
+                ..
+            } = &event.kind
+            else {
                 continue;
             };
+            let given_at = given.given_at.filter(|_| !self.are_past);
             if *order == OrderKind::Unsilence {
                 let place = &event.benchmark;
                 standing.retain(|(_, one)| place.is_some() && one.benchmark != *place);
-            } else if until.is_some_and(|until| until > now) {
+            } else if until.is_some_and(|until| lasts((given_at, until), now)) {
                 standing.push((*number, event.clone()));
             }
         }
@@ -208,6 +222,15 @@ impl TakenOrders {
         });
         each.collect()
     }
+}
+
+/// Whether an order lasts at `now`: until its end, by the clock by which it was given. Where that says that it is earlier than
+/// then, it has been set back since, and nobody knows how long ago that was.
+pub(super) fn lasts((given_at, until): (Option<Timestamp>, Timestamp), now: Timestamp) -> bool {
+    // Those of a replay that is shown as if it were live end at data times.
+    let given_at = given_at.filter(|given_at| *given_at < until);
+    let is_set_back = given_at.is_some_and(|at| at.duration_since(now) > TOLERANCE);
+    until > now && !is_set_back
 }
 
 /// Whether it is an order that says that somebody has seen an alert.

@@ -1,12 +1,13 @@
 //! Clocks that are wrong: the host's, and those of loggers.
 
-use crate::machine::by_another_clock;
-use crate::site::{Site, eventually};
+use crate::machine::{another_clock, by_another_clock};
+use crate::site::{PROGRAM, Site, eventually, get};
 use crate::telling::failing;
 use jiff::{SignedDuration, Timestamp};
 use nix::sys::signal::Signal;
 use slipwatch::runtime::clock;
 use std::fs;
+use std::process::Command;
 use std::time::Duration;
 
 const HEADER: &str = "time,displacement_mm\n";
@@ -245,4 +246,50 @@ fn a_logger_whose_clock_is_ahead_makes_no_other_benchmark_silent() {
         "{events}"
     );
     assert_eq!(site.notified("B/unknown/", ""), 0, "{events}");
+}
+
+/// It is given by that clock, and the daemon goes by the readings.
+#[test]
+#[cfg_attr(not(has_faketime), ignore = "libfaketime was not found by build.rs")]
+fn a_silence_lasts_as_long_as_it_was_given_for_where_the_hosts_clock_is_days_ahead() {
+    let site = Site::new(POLICY);
+    let address = site.listen();
+    site.append("incoming/5.csv", &format!("{HEADER}{}", failing(0..40)));
+    fs::write(site.path("ahead"), "+3d").unwrap();
+    let program = by_another_clock(&site);
+    for first in [40, 50] {
+        site.append("incoming/5.csv", &failing(first..first + 10));
+        std::thread::sleep(Duration::from_millis(300));
+    }
+    let ask = |words: &[&str]| {
+        let before = another_clock(&site);
+        let output = Command::new(&before[0])
+            .args(&before[1..])
+            .arg(PROGRAM)
+            .args(words)
+            .args(["--config", "site.toml"])
+            .current_dir(site.path(""))
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let silences = || get(&address, "/metrics").contains("slipwatch_silences 1");
+    let seen = || {
+        [
+            silences(),
+            ask(&["status"]).contains("silence by Ada"),
+            ask(&["alerts", "list"]).contains("silence by Ada"),
+            !get(&address, "/api/site").contains("\"silences\":[]"),
+        ]
+    };
+    ask(&["alerts", "silence", "--for", "6s", "--by", "Ada"]);
+    eventually("that it is taken", silences);
+    assert_eq!(seen(), [true; 4]);
+    eventually("its end", || !silences());
+    assert_eq!(seen(), [false; 4]);
+    site.append("incoming/5.csv", &failing(60..114));
+    eventually("the red", || site.notified("5/red/", "firing") == 1);
+    program.stop();
+    site.proven_events();
 }

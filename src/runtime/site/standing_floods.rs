@@ -126,14 +126,14 @@ impl Site {
     }
 
     /// Offers those again that are in force: a hook may have been added, or have had no room.
-    pub(super) fn offer_floods_again(&self, now: Timestamp) {
+    pub(super) fn offer_floods_again(&self, wall: Timestamp) {
         let Some(alerts) = &self.sinks.alerts else {
             return;
         };
         for one in self.floods.values() {
             let alert = &one.alert;
             let is_due = alert.must_arrive() && !one.is_acknowledged && self.has_in_force(alert);
-            if is_due && !self.is_muted(alert, now) {
+            if is_due && !self.is_muted(alert, wall) {
                 alerts.offer_where(alert, false, &|hook| hook.is_audience_of(alert));
             }
         }
