@@ -14,7 +14,7 @@ use crate::runtime::drilled::DrillRecord;
 use crate::runtime::preview::{Preview, preview};
 use crate::runtime::record::standing::RecordStanding;
 use crate::runtime::reloaded::{ConfigRefusal, sources_without_files};
-use crate::runtime::standing::{InForce, acknowledged, closed, every, in_force, orders, silences};
+use crate::runtime::standing::{InForce, TakenOrders, closed, every, in_force};
 use crate::store::Store;
 use jiff::tz::TimeZone;
 use schemars::JsonSchema;
@@ -154,7 +154,7 @@ pub(super) fn status(args: &StatusArgs) -> anyhow::Result<()> {
 
 fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
     let (config, store) = args.site.open()?;
-    let (levels, orders) = (in_force(&store, None)?, orders(&store)?);
+    let (levels, orders) = (in_force(&store, None)?, TakenOrders::read(&store, None)?);
     let mut refits = BTreeMap::new();
     for body in store.latest("refit")? {
         let event: Event = serde_json::from_str(&body)?;
@@ -205,9 +205,9 @@ fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
         bytes: store.bytes()?,
         site_unknown_since: levels.get(&(None, Level::Unknown)).and_then(dated),
         is_running,
-        acknowledged: acknowledged(&orders, &levels),
+        acknowledged: orders.acknowledged(&levels),
         returned: alarms.returned().into_iter().cloned().collect(),
-        silences: silences(&orders, clock::now()),
+        silences: orders.silences(clock::now()),
         closed: closed(&store, &levels)?,
         quarantined: store.quarantined()?,
         alerts: levels.into_values().collect(),

@@ -289,7 +289,15 @@ fn ordered(kind: &EventKind) -> String {
     let until = until.map_or_else(String::new, |until| format!(" until {}", minute(until)));
     let by = (given.by.as_ref()).map_or_else(String::new, |by| format!(" by {by}"));
     let why = (given.why.as_ref()).map_or_else(String::new, |why| format!(": {why}"));
-    format!("{}{by}{until}{why}", order.name())
+    let since = if given.called_since.is_empty() {
+        String::new()
+    } else {
+        format!(
+            "; not of what was called since: {}",
+            given.called_since.join(", ")
+        )
+    };
+    format!("{}{by}{until}{why}{since}", order.name())
 }
 
 fn unexplained(what: &Unexplained) -> String {

@@ -19,6 +19,10 @@ pub struct Given {
     /// When, by the host's clock.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub given_at: Option<Timestamp>,
+    /// Keys of alerts that were called after it was given and before it was taken: whoever gave it had not seen them, and it is
+    /// not of them.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub called_since: Vec<String>,
 }
 
 /// The way by which an order came in.

@@ -308,7 +308,7 @@ impl Monitor {
             Input::Settings(settings) => self.change_settings(now, settings),
             Input::Order(order) => self.take_order(now, order),
             Input::Trouble { kind, text } => vec![trouble(now, kind, text)],
-            Input::Tick => self.pass(now),
+            Input::Tick => self.pass(now, now),
         };
         self.benchmarks.note_levels(input, &events);
         let of_site = self.site_levels(now, input, &events);
@@ -352,12 +352,13 @@ impl Monitor {
         events
     }
 
-    fn pass(&mut self, now: Timestamp) -> Vec<Event> {
+    /// Judges the benchmarks that were due by `until`, at `now`.
+    fn pass(&mut self, now: Timestamp, until: Timestamp) -> Vec<Event> {
         let mut events = Vec::new();
-        for id in self.benchmarks.due(now) {
+        for id in self.benchmarks.due(until) {
             if let Some(track) = self.benchmarks.get_mut(&id) {
                 let policy = self.settings.policy(&id);
-                events.extend(track.pass(policy, now, self.outages.sensor_fault(&id)));
+                events.extend(track.pass(policy, (now, until), self.outages.sensor_fault(&id)));
             }
             self.benchmarks.note_changed(&id);
         }

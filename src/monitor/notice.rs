@@ -59,6 +59,12 @@ pub enum Notice {
         /// What the clock said.
         clock: Timestamp,
     },
+    /// Time has passed as far as `until`, and data time lies ahead of that, by readings of a logger whose clock is ahead: which
+    /// other benchmarks are silent goes by `until`.
+    Passed {
+        /// What time it is.
+        until: Timestamp,
+    },
     /// The host's clock is wrong: readings that are known lie after it.
     ClockWrong {
         /// One line for a person.
@@ -119,6 +125,7 @@ impl Monitor {
                 self.benchmarks.note_changed(benchmark);
                 events
             }
+            Notice::Passed { until } => self.pass(now, *until),
             Notice::ClockWrong { text } => {
                 let since = self.outages.begin_clock_wrong(now);
                 clock_fault(now, since, AlertState::Firing, text)

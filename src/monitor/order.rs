@@ -95,6 +95,21 @@ impl Order {
         }
     }
 
+    /// It was given before the alerts with these keys were called. What names an alert is of that, and what silences is of
+    /// whatever comes.
+    pub fn was_given_before(&mut self, keys: Vec<String>) {
+        match self {
+            Self::Acknowledge {
+                alert: None, given, ..
+            }
+            | Self::Shelve { given, .. }
+            | Self::Resolve { given, .. } => given.called_since = keys,
+            Self::Acknowledge { alert: Some(_), .. }
+            | Self::Silence { .. }
+            | Self::Unsilence { .. } => {}
+        }
+    }
+
     /// Whom it concerns; `None`: the whole site.
     pub fn benchmark(&self) -> Option<&BenchmarkId> {
         match self {

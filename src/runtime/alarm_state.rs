@@ -1,7 +1,7 @@
 //! How the alarm of each place stands, by the names of ISA-18.2 (ANSI/ISA-18.2-2016, "Management of Alarm Systems for the
 //! Process Industries"), from the events in a site's state.
 
-use super::standing::{every, may_be_of, orders, silences};
+use super::standing::{TakenOrders, every};
 use crate::alert::Level;
 use crate::monitor::{AlertState, CalledLevel, Event, EventKind, OrderKind, by_time};
 use crate::reading::{BenchmarkId, Timestamp};
@@ -66,8 +66,10 @@ pub struct Alarms {
     newest: BTreeMap<Option<BenchmarkId>, NewestAlert>,
     /// The alerts in force which say that nothing is known of a place: they stand beside its level.
     unknown: BTreeMap<Option<BenchmarkId>, Event>,
-    /// Orders by which nobody is notified.
-    silences: Vec<Event>,
+    /// What people have ordered.
+    orders: TakenOrders,
+    /// Orders by which nobody is notified, with their numbers among the events.
+    silences: Vec<(i64, Event)>,
     /// Benchmarks under declared maintenance; `None`: the whole site.
     out_of_service: Vec<Option<BenchmarkId>>,
 }
@@ -89,17 +91,17 @@ impl Alarms {
                 take(&mut newest, event);
             }
         }
-        let mut orders = orders(store)?;
-        orders.retain(is_known);
+        let orders = TakenOrders::read(store, at)?;
         for one in newest.values_mut() {
-            one.is_acknowledged = orders.iter().any(|order| is_seen_by(&one.event, order));
+            one.is_acknowledged = orders.of(&one.event).any(|(_, order)| says_seen(order));
         }
         let mut declared = every(store, "declared")?;
         declared.retain(is_known);
         Ok(Self {
             newest,
             unknown,
-            silences: silences(&orders, now),
+            silences: orders.numbered_silences(now),
+            orders,
             out_of_service: (declared.into_iter())
                 .filter(|event| is_under_maintenance(event, now))
                 .map(|event| event.benchmark)
@@ -196,9 +198,11 @@ impl Alarms {
         place: Option<&BenchmarkId>,
         newest: Option<&NewestAlert>,
     ) -> Option<AlarmState> {
-        let here = |event: &&Event| event.benchmark.is_none() || event.benchmark.as_ref() == place;
         let mut found = None;
-        for event in self.silences.iter().filter(here) {
+        for (number, event) in &self.silences {
+            if event.benchmark.is_some() && event.benchmark.as_ref() != place {
+                continue;
+            }
             let EventKind::Order { order, .. } = &event.kind else {
                 continue;
             };
@@ -206,7 +210,8 @@ impl Alarms {
                 return Some(AlarmState::Suppressed);
             }
             // A level that was called after the order is higher than the one that it is of.
-            let is_of_it = newest.is_none_or(|one| one.has_ended || one.event.time <= event.time);
+            let concerns = |alert: &Event| self.orders.concerns((*number, event), alert);
+            let is_of_it = newest.is_none_or(|one| one.has_ended || concerns(&one.event));
             found = found.or(is_of_it.then_some(AlarmState::Shelved));
         }
         found
@@ -277,14 +282,12 @@ fn take(newest: &mut BTreeMap<Option<BenchmarkId>, NewestAlert>, event: Event) {
     }
 }
 
-/// Whether an order says that people have seen the alert: an acknowledgement, or that they ended it.
-fn is_seen_by(alert: &Event, order: &Event) -> bool {
-    let is_here = order.benchmark.is_none() || order.benchmark == alert.benchmark;
+/// Whether it says that people have seen the alerts that it is of: an acknowledgement, or that they ended them.
+fn says_seen(order: &Event) -> bool {
     let EventKind::Order { order: kind, .. } = &order.kind else {
         return false;
     };
-    let says_so = matches!(kind, OrderKind::Acknowledge | OrderKind::Resolve);
-    says_so && is_here && order.time >= alert.time && may_be_of(order, alert)
+    matches!(kind, OrderKind::Acknowledge | OrderKind::Resolve)
 }
 
 /// Whether the declared maintenance of this event is going on.

@@ -416,8 +416,8 @@ impl Daemon {
     fn take_orders(&mut self) -> Result<(), StoreError> {
         self.since_orders = Stopwatch::start();
         if !self.site.is_waiting() {
-            for (number, order) in self.store.orders()? {
-                self.site.order(number, order);
+            for order in self.store.orders()? {
+                self.site.order(order)?;
             }
         }
         Ok(())

@@ -120,8 +120,8 @@ impl Stage {
     ) -> Result<(), StoreError> {
         loop {
             self.vitals.turned();
-            for (number, order) in self.store.orders()? {
-                self.site.order(number, order);
+            for order in self.store.orders()? {
+                self.site.order(order)?;
                 // The time of the data is all there is.
                 let now = self.store.newest_step()?.unwrap_or_else(clock::now);
                 self.site.commit(now)?;

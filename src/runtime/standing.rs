@@ -3,6 +3,7 @@
 use crate::alert::Level;
 use crate::monitor::{AlertState, Event, EventKind, Order, OrderKind, by_time};
 use crate::reading::{BenchmarkId, Timestamp};
+use crate::runtime::clock::TOLERANCE;
 use crate::store::{Store, StoreError};
 use std::collections::BTreeMap;
 
@@ -99,8 +100,33 @@ pub fn every(store: &Store, kind: &str) -> Result<Vec<Event>, StoreError> {
 /// # Errors
 /// [`StoreError`].
 pub(super) fn every_until(store: &Store, kind: &str, last: i64) -> Result<Vec<Event>, StoreError> {
+    let numbered = numbered_between(store, kind, (0, last))?;
+    Ok(numbered.into_iter().map(|(_, event)| event).collect())
+}
+
+/// Every event of a kind after number `after`, oldest first.
+///
+/// # Errors
+/// [`StoreError`].
+pub(super) fn every_since(store: &Store, kind: &str, after: i64) -> Result<Vec<Event>, StoreError> {
+    let numbered = numbered_between(store, kind, (after, i64::MAX))?;
+    Ok(numbered.into_iter().map(|(_, event)| event).collect())
+}
+
+/// Every event of a kind with its number, oldest first.
+///
+/// # Errors
+/// [`StoreError`].
+pub(super) fn numbered(store: &Store, kind: &str) -> Result<Vec<(i64, Event)>, StoreError> {
+    numbered_between(store, kind, (0, i64::MAX))
+}
+
+fn numbered_between(
+    store: &Store,
+    kind: &str,
+    (mut after, last): (i64, i64),
+) -> Result<Vec<(i64, Event)>, StoreError> {
     let mut all = Vec::new();
-    let mut after = 0;
     loop {
         let events = store.events(after, Some(kind), None)?;
         let Some((newest, _)) = events.last() else {
@@ -111,34 +137,148 @@ pub(super) fn every_until(store: &Store, kind: &str, last: i64) -> Result<Vec<Ev
             if *number > last {
                 return Ok(all);
             }
-            all.push(read(body)?);
+            all.push((*number, read(body)?));
         }
     }
 }
 
-/// Every order that was taken, oldest first.
+/// The orders that were taken, and when among the events each alert was called.
 ///
-/// # Errors
-/// [`StoreError`].
-pub fn orders(store: &Store) -> Result<Vec<Event>, StoreError> {
-    every(store, "order")
+/// An order is of what had been called when it was taken. Their order says that, not their times: an order stands at the data
+/// time at which it was taken, and what a logger delivers late was measured before.
+#[derive(Debug)]
+pub struct TakenOrders {
+    /// By number, oldest first.
+    taken: Vec<(i64, Event)>,
+    /// The number of the event that called an alert last, by its key.
+    called: BTreeMap<String, i64>,
+    /// Whether they are those of the past, whose clock was another.
+    are_past: bool,
 }
 
-/// The orders in force at `now` by which no hook is run, as they were given.
-pub fn silences(orders: &[Event], now: Timestamp) -> Vec<Event> {
-    let mut standing: Vec<Event> = Vec::new();
-    for event in orders {
-        let EventKind::Order { order, until, .. } = &event.kind else {
-            continue;
-        };
-        if *order == OrderKind::Unsilence {
-            let place = &event.benchmark;
-            standing.retain(|one| place.is_some() && one.benchmark != *place);
-        } else if until.is_some_and(|until| until > now) {
-            standing.push(event.clone());
+impl TakenOrders {
+    /// Those of the events until `at`, of all without it.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn read(store: &Store, at: Option<Timestamp>) -> Result<Self, StoreError> {
+        let is_known = |(_, event): &(i64, Event)| at.is_none_or(|at| event.time <= at);
+        let mut taken = numbered(store, "order")?;
+        taken.retain(is_known);
+        let mut called = BTreeMap::new();
+        if !taken.is_empty() {
+            for (number, event) in numbered(store, "alert")?.into_iter().filter(is_known) {
+                if let EventKind::Alert {
+                    state: AlertState::Firing,
+                    key,
+                    ..
+                } = event.kind
+                {
+                    called.insert(key, number);
+                }
+            }
         }
+        Ok(Self {
+            taken,
+            called,
+            are_past: at.is_some(),
+        })
     }
-    standing
+
+    /// The orders that are of this alert, with their numbers, oldest first.
+    pub(super) fn of<'a>(&'a self, alert: &'a Event) -> impl Iterator<Item = &'a (i64, Event)> {
+        let taken = self.taken.iter();
+        taken.filter(move |(number, order)| self.concerns((*number, order), alert))
+    }
+
+    /// Whether the order is of this alert: it had been called when the order was given and taken, and the order names it or all at
+    /// its place.
+    pub(super) fn concerns(&self, (number, order): (i64, &Event), alert: &Event) -> bool {
+        let EventKind::Alert { key, .. } = &alert.kind else {
+            return false;
+        };
+        let EventKind::Order {
+            alert: only, given, ..
+        } = &order.kind
+        else {
+            return false;
+        };
+        let is_here = order.benchmark.is_none() || order.benchmark == alert.benchmark;
+        let is_called = self.called.get(key).is_some_and(|called| *called < number);
+        let is_seen = is_called && !given.called_since.contains(key);
+        is_here && is_seen && only.as_ref().is_none_or(|only| only == key)
+    }
+
+    /// Those in force at `now` by which no hook is run, as they were given.
+    pub fn silences(&self, now: Timestamp) -> Vec<Event> {
+        let standing = self.numbered_silences(now).into_iter();
+        standing.map(|(_, event)| event).collect()
+    }
+
+    pub(super) fn numbered_silences(&self, now: Timestamp) -> Vec<(i64, Event)> {
+        let mut standing: Vec<(i64, Event)> = Vec::new();
+        for (number, event) in &self.taken {
+            let EventKind::Order {
+                order,
+                until,
+                given,
+                ..
+            } = &event.kind
+            else {
+                continue;
+            };
+            let given_at = given.given_at.filter(|_| !self.are_past);
+            if *order == OrderKind::Unsilence {
+                let place = &event.benchmark;
+                standing.retain(|(_, one)| place.is_some() && one.benchmark != *place);
+            } else if until.is_some_and(|until| lasts((given_at, until), now)) {
+                standing.push((*number, event.clone()));
+            }
+        }
+        standing
+    }
+
+    /// Who has seen what is in force.
+    pub fn acknowledged(&self, in_force: &InForce) -> Vec<Event> {
+        let is_of_one = |(number, order): &&(i64, Event)| {
+            is_acknowledgement(order)
+                && (in_force.values()).any(|alert| self.concerns((*number, order), alert))
+        };
+        let seen = self.taken.iter().filter(is_of_one);
+        seen.map(|(_, order)| order.clone()).collect()
+    }
+
+    /// The newest acknowledgement of each alert in force that has one, by the alert's key.
+    pub(super) fn acknowledged_by(&self, in_force: &InForce) -> BTreeMap<String, Event> {
+        let each = in_force.values().filter_map(|alert| {
+            let EventKind::Alert { key, .. } = &alert.kind else {
+                return None;
+            };
+            let seen = self.of(alert).filter(|(_, one)| is_acknowledgement(one));
+            Some((key.clone(), seen.last()?.1.clone()))
+        });
+        each.collect()
+    }
+}
+
+/// Whether an order lasts at `now`: until its end, by the clock by which it was given. Where that says that it is earlier than
+/// then, it has been set back since, and nobody knows how long ago that was.
+pub(super) fn lasts((given_at, until): (Option<Timestamp>, Timestamp), now: Timestamp) -> bool {
+    // Those of a replay that is shown as if it were live end at data times.
+    let given_at = given_at.filter(|given_at| *given_at < until);
+    let is_set_back = given_at.is_some_and(|at| at.duration_since(now) > TOLERANCE);
+    until > now && !is_set_back
+}
+
+/// Whether it is an order that says that somebody has seen an alert.
+pub(super) fn is_acknowledgement(event: &Event) -> bool {
+    matches!(
+        &event.kind,
+        EventKind::Order {
+            order: OrderKind::Acknowledge,
+            ..
+        }
+    )
 }
 
 /// The silence of the whole site that stands at `now` where `order` ends that of one benchmark alone: it would change nothing.
@@ -156,43 +296,8 @@ pub fn silence_of_the_site(
     else {
         return Ok(None);
     };
-    let standing = silences(&orders(store)?, now);
+    let standing = TakenOrders::read(store, None)?.silences(now);
     Ok(standing.into_iter().find(|one| one.benchmark.is_none()))
-}
-
-/// Who has seen what is in force: acknowledgements since its alert was called.
-pub fn acknowledged(orders: &[Event], in_force: &InForce) -> Vec<Event> {
-    let is_of = |ack: &Event, place: &Option<BenchmarkId>, alert: &Event| {
-        let is_here = ack.benchmark.is_none() || ack.benchmark == *place;
-        is_here && ack.time >= alert.time && may_be_of(ack, alert)
-    };
-    let is_one = |event: &&Event| {
-        let is_ack = matches!(
-            &event.kind,
-            EventKind::Order {
-                order: OrderKind::Acknowledge,
-                ..
-            }
-        );
-        is_ack
-            && in_force
-                .iter()
-                .any(|((place, _), alert)| is_of(event, place, alert))
-    };
-    orders.iter().filter(is_one).cloned().collect()
-}
-
-/// Whether an order names this alert, or none.
-pub(super) fn may_be_of(order: &Event, alert: &Event) -> bool {
-    match (&order.kind, &alert.kind) {
-        (
-            EventKind::Order {
-                alert: Some(only), ..
-            },
-            EventKind::Alert { key, .. },
-        ) => only == key,
-        _ => true,
-    }
 }
 
 /// The alerts in force that a hook did not take and will not: it left the config, or does not ask for them any more.

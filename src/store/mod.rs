@@ -26,7 +26,7 @@ pub use evidence::{DeliveryRow, PlacedEvent};
 pub use known::Presence;
 pub use outbox::{AlertIdentity, Delivery, DeliveryOutcome};
 pub use past::{Heads, Value, Values};
-pub use read::{Recorded, StepRow};
+pub use read::{LeftOrder, Recorded, StepRow};
 pub use verify::Verified;
 
 use crate::reading::Timestamp;

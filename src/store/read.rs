@@ -37,6 +37,25 @@ pub struct Recorded {
     pub step: i64,
 }
 
+/// An order that has been left in the state.
+#[derive(Debug, Clone)]
+pub struct LeftOrder {
+    /// Its number; 0 of one that came by another way.
+    pub number: i64,
+    /// What people ask for.
+    pub order: Order,
+    /// The number of the newest event when it was given; `None` of a link, which names its alert, and where an older version
+    /// left it.
+    pub last_event: Option<i64>,
+}
+
+/// What stands beside an order that has been left.
+#[derive(Deserialize)]
+struct OrderPlace {
+    #[serde(default)]
+    last_event: Option<i64>,
+}
+
 /// A step that is no value.
 #[derive(Serialize, Deserialize)]
 enum StoredInput {
@@ -219,11 +238,11 @@ impl Store {
         Ok(counts)
     }
 
-    /// What people have asked for and the daemon has not taken yet, as (number, order).
+    /// What people have asked for and the daemon has not taken yet.
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn orders(&self) -> Result<Vec<(i64, Order)>, StoreError> {
+    pub fn orders(&self) -> Result<Vec<LeftOrder>, StoreError> {
         let inner = self.inner();
         let mut query = inner
             .connection
@@ -231,17 +250,20 @@ impl Store {
         let rows = query.query_map([CHUNK], |row| Ok((row.get(0)?, row.get::<_, String>(1)?)))?;
         let mut orders = Vec::new();
         for row in rows {
-            let (id, body) = row?;
-            let order = serde_json::from_str(&body);
-            orders.push((
-                id,
-                order.map_err(|error| StoreError::Unreadable(error.to_string()))?,
-            ));
+            let (number, body) = row?;
+            let unreadable = |error: serde_json::Error| StoreError::Unreadable(error.to_string());
+            let place: OrderPlace = serde_json::from_str(&body).map_err(unreadable)?;
+            orders.push(LeftOrder {
+                number,
+                order: serde_json::from_str(&body).map_err(unreadable)?,
+                last_event: place.last_event,
+            });
         }
         Ok(orders)
     }
 
-    /// Leaves an order for the daemon, which takes it within a second, or at its next start.
+    /// Leaves an order for the daemon, which takes it within a second, or at its next start, with how far the events have got:
+    /// what is called after that, whoever gives it has not seen.
     ///
     /// # Errors
     /// [`StoreError`].
@@ -250,7 +272,11 @@ impl Store {
         let body = body.map_err(|error| StoreError::Unreadable(error.to_string()))?;
         let inner = self.inner();
         let connection = &inner.connection;
-        let written = connection.execute("INSERT INTO command (body) VALUES (?1)", [body]);
+        let written = connection.execute(
+            "INSERT INTO command (body) VALUES
+             (json_insert(?1, '$.last_event', (SELECT coalesce(max(seq), 0) FROM event)))",
+            [body],
+        );
         let folder = connection.path().map(Path::new).and_then(Path::parent);
         match (written, folder) {
             (Ok(_), _) => Ok(()),

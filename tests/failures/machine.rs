@@ -157,20 +157,25 @@ fn a_daemon_that_stood_still_reads_what_came_meanwhile() {
     site.proven_events();
 }
 
-/// The daemon by a clock that is ahead of ours by what stands in the file `ahead`.
-pub(crate) fn by_another_clock(site: &Site) -> Program {
+/// What to put before a program that is to go by a clock ahead of ours by what stands in the file `ahead`.
+pub(crate) fn another_clock(site: &Site) -> [String; 5] {
     let library = format!(
         "/usr/lib/{}-linux-gnu/faketime/libfaketime.so.1",
         std::env::consts::ARCH
     );
     let ahead = site.path("ahead");
-    let program = site.start(&[
-        "env",
-        &format!("LD_PRELOAD={library}"),
-        &format!("FAKETIME_TIMESTAMP_FILE={}", ahead.display()),
-        "FAKETIME_NO_CACHE=1",
-        "FAKETIME_DONT_FAKE_MONOTONIC=1",
-    ]);
+    [
+        "env".to_owned(),
+        format!("LD_PRELOAD={library}"),
+        format!("FAKETIME_TIMESTAMP_FILE={}", ahead.display()),
+        "FAKETIME_NO_CACHE=1".to_owned(),
+        "FAKETIME_DONT_FAKE_MONOTONIC=1".to_owned(),
+    ]
+}
+
+/// The daemon by that clock.
+pub(crate) fn by_another_clock(site: &Site) -> Program {
+    let program = site.start(&another_clock(site).each_ref().map(String::as_str));
     eventually("caught up", || site.log().contains("caught up"));
     program
 }

@@ -34,6 +34,7 @@
 //! | 32 | an alert's whole way breaks without anybody seeing it | `drill` |
 //! | 33 | the disk of the daemon's own record | `recorded` |
 //! | 34 | a state that an earlier version wrote | `upgrade` |
+//! | 35 | orders that people give while readings come late, or a red is called | `seen` |
 //!
 //! docs/failure-modes.md says the same for operators.
 //!
@@ -72,6 +73,7 @@ mod reach;
 mod record;
 mod recorded;
 mod reread;
+mod seen;
 mod sensors;
 mod site;
 mod telling;

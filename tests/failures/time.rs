@@ -1,12 +1,13 @@
 //! Clocks that are wrong: the host's, and those of loggers.
 
-use crate::machine::by_another_clock;
-use crate::site::{Site, eventually};
+use crate::machine::{another_clock, by_another_clock};
+use crate::site::{PROGRAM, Site, eventually, get};
 use crate::telling::failing;
 use jiff::{SignedDuration, Timestamp};
 use nix::sys::signal::Signal;
 use slipwatch::runtime::clock;
 use std::fs;
+use std::process::Command;
 use std::time::Duration;
 
 const HEADER: &str = "time,displacement_mm\n";
@@ -211,4 +212,84 @@ fn readings_that_are_whole_hours_ahead_are_said_to_be_perhaps_in_another_zone() 
     let fault = fault.unwrap_or_else(|| panic!("{events}"));
     assert!(fault.contains("About 8 h ahead"), "{fault}");
     assert!(fault.contains("set time_zone in its [[source]]"), "{fault}");
+}
+
+/// Within what clocks may differ by.
+#[test]
+fn a_logger_whose_clock_is_ahead_makes_no_other_benchmark_silent() {
+    let site = Site::new("");
+    let time = |ahead: i64, ago: i64| {
+        clock::now() + SignedDuration::from_mins(ahead) - SignedDuration::from_mins(ago)
+    };
+    for (name, ahead) in [("A", 45), ("B", 0)] {
+        let rows = (1..10).rev().map(|ago| format!("{},1\n", time(ahead, ago)));
+        let rows: String = rows.collect();
+        let text = format!("time,{name}_displacement_mm\n{rows}");
+        site.append(&format!("incoming/{name}.csv"), &text);
+    }
+    let program = site.caught_up();
+    for round in 1..=3 {
+        for (name, ahead) in [("B", 0), ("A", 45)] {
+            let before = site.values().len();
+            let row = format!("{},1.0{round}\n", time(ahead, 0));
+            site.append(&format!("incoming/{name}.csv"), &row);
+            eventually("the reading", || site.values().len() > before);
+        }
+    }
+    eventually("that A is suspect", || {
+        site.events().contains("\"kind\":\"suspect-ahead\"")
+    });
+    program.stop();
+    let events = site.proven_events();
+    assert!(
+        !events.contains("benchmark B: no reading since"),
+        "{events}"
+    );
+    assert_eq!(site.notified("B/unknown/", ""), 0, "{events}");
+}
+
+/// It is given by that clock, and the daemon goes by the readings.
+#[test]
+#[cfg_attr(not(has_faketime), ignore = "libfaketime was not found by build.rs")]
+fn a_silence_lasts_as_long_as_it_was_given_for_where_the_hosts_clock_is_days_ahead() {
+    let site = Site::new(POLICY);
+    let address = site.listen();
+    site.append("incoming/5.csv", &format!("{HEADER}{}", failing(0..40)));
+    fs::write(site.path("ahead"), "+3d").unwrap();
+    let program = by_another_clock(&site);
+    for first in [40, 50] {
+        site.append("incoming/5.csv", &failing(first..first + 10));
+        std::thread::sleep(Duration::from_millis(300));
+    }
+    let ask = |words: &[&str]| {
+        let before = another_clock(&site);
+        let output = Command::new(&before[0])
+            .args(&before[1..])
+            .arg(PROGRAM)
+            .args(words)
+            .args(["--config", "site.toml"])
+            .current_dir(site.path(""))
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let silences = || get(&address, "/metrics").contains("slipwatch_silences 1");
+    let seen = || {
+        [
+            silences(),
+            ask(&["status"]).contains("silence by Ada"),
+            ask(&["alerts", "list"]).contains("silence by Ada"),
+            !get(&address, "/api/site").contains("\"silences\":[]"),
+        ]
+    };
+    ask(&["alerts", "silence", "--for", "6s", "--by", "Ada"]);
+    eventually("that it is taken", silences);
+    assert_eq!(seen(), [true; 4]);
+    eventually("its end", || !silences());
+    assert_eq!(seen(), [false; 4]);
+    site.append("incoming/5.csv", &failing(60..114));
+    eventually("the red", || site.notified("5/red/", "firing") == 1);
+    program.stop();
+    site.proven_events();
 }

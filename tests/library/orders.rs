@@ -117,6 +117,24 @@ fn what_people_resolve_ends_there_and_at_the_site_and_is_called_again_under_anot
     assert_eq!((red[0].1, red[0].2), (Level::Red, AlertState::Firing));
 }
 
+#[test]
+fn what_was_called_after_an_order_was_given_is_not_resolved_by_it() {
+    let mut monitor = Monitor::new(settings());
+    let at = |hour: i64| start() + hour.hours();
+    read(&mut monitor, at(0), at(0), 0.0);
+    read(&mut monitor, at(1), at(1), 12.0);
+    let red = alerts(&read(&mut monitor, at(2), at(2), 25.0));
+    let given = Given {
+        called_since: vec![red[0].3.clone()],
+        ..Given::default()
+    };
+    let benchmark = Some(BenchmarkId::new("a"));
+    let order = Input::Order(Order::Resolve { benchmark, given });
+    assert!(alerts(&monitor.step(at(2), &order)).is_empty());
+    assert_eq!(monitor.level(&BenchmarkId::new("a")), Some(Level::Red));
+    assert_eq!(alerts(&resolve(&mut monitor, at(2))).len(), 2);
+}
+
 /// What happens next.
 #[derive(Debug, Clone)]
 enum Turn {

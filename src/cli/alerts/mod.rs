@@ -15,9 +15,7 @@ use crate::reading::BenchmarkId;
 use crate::runtime::alarm_state::Alarms;
 use crate::runtime::clock;
 use crate::runtime::hook::{Alert, MessageState};
-use crate::runtime::standing::{
-    acknowledged, closed, in_force, orders, silence_of_the_site, silences,
-};
+use crate::runtime::standing::{TakenOrders, closed, in_force, silence_of_the_site};
 use crate::store::Store;
 use anyhow::Context;
 use clap::Subcommand;
@@ -52,6 +50,7 @@ impl GivenArgs {
             why: self.why.clone(),
             door: Some(OrderedBy::CommandLine),
             given_at: Some(clock::now()),
+            called_since: Vec::new(),
         }
     }
 }
@@ -361,9 +360,9 @@ fn redeliver(site: &SiteArgs) -> anyhow::Result<()> {
 fn list(site: &SiteArgs) -> anyhow::Result<()> {
     let (config, store) = site.open()?;
     let mut stdout = std::io::stdout().lock();
-    let (in_force, orders) = (in_force(&store, None)?, orders(&store)?);
-    let mut standing = silences(&orders, clock::now());
-    standing.extend(acknowledged(&orders, &in_force));
+    let (in_force, orders) = (in_force(&store, None)?, TakenOrders::read(&store, None)?);
+    let mut standing = orders.silences(clock::now());
+    standing.extend(orders.acknowledged(&in_force));
     standing.extend(closed(&store, &in_force)?);
     standing.extend(in_force.into_values());
     standing.sort_by_key(|event| event.time);

@@ -338,12 +338,15 @@ impl Track {
     pub(super) fn pass(
         &mut self,
         policy: &Policy,
-        now: Timestamp,
+        (now, until): (Timestamp, Timestamp),
         fault: Option<&str>,
     ) -> Vec<Event> {
-        let overdue = self.alarm.judge_overdue(&self.record, policy, now);
-        let mut events: Vec<Event> = overdue.into_iter().collect();
-        if self.record.silent_at().is_some_and(|due| due <= now) {
+        let is_due = |due: Timestamp| due <= until;
+        let mut events = Vec::new();
+        if self.alarm.overdue_at(&self.record).is_some_and(is_due) {
+            events.extend(self.alarm.judge_overdue(&self.record, policy, now));
+        }
+        if self.record.silent_at().is_some_and(is_due) {
             let level = self.level();
             let silent = (self.quality).fall_silent(&mut self.record, now, fault, level);
             events.extend(silent);

@@ -311,11 +311,12 @@ impl Dispatcher {
         }
     }
 
-    /// Somebody has seen everything: what reports many benchmarks at once too.
-    pub fn end_those_of_many(&self) {
+    /// Somebody has seen everything: what reports many benchmarks at once too, where it `is_seen`.
+    pub fn end_those_of_many(&self, is_seen: &dyn Fn(&Alert) -> bool) {
         for way in &self.hooks {
             let of_many = locked(&way.in_hand).of_many();
-            for alert in (of_many.iter()).filter(|alert| alert.state != MessageState::Resolved) {
+            let is_meant = |one: &&Alert| one.state != MessageState::Resolved && is_seen(one);
+            for alert in of_many.iter().filter(is_meant) {
                 locked(&way.in_hand).end(alert);
                 self.call_off(way, alert, DeliveryOutcome::Acknowledged);
             }

@@ -17,7 +17,7 @@ use crate::runtime::shutdown::Shutdown;
 use crate::runtime::site::{Sinks, Site};
 use crate::runtime::sources::Sources;
 use crate::runtime::standing::every;
-use crate::store::Store;
+use crate::store::{LeftOrder, Store};
 use jiff::SignedDuration;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -262,7 +262,13 @@ impl Exercise {
                     given,
                 };
                 // It did not come through this state: it has no number there.
-                self.daemon.site.order(0, order);
+                let order = LeftOrder {
+                    number: 0,
+                    order,
+                    last_event: None,
+                };
+                let taken = self.daemon.site.order(order);
+                taken.map_err(|error| error.to_string())?;
                 return Ok(begun.elapsed());
             }
             if begun.elapsed() > within {

@@ -42,7 +42,7 @@ impl Site {
             let is_fresh =
                 age <= self.freshness(alert.event.benchmark.as_ref()) || self.never_read(&alert);
             let is_due = is_fresh && !self.ends_unreported(&alert) || self.is_waited_for(&alert);
-            let is_muted = self.is_muted(&alert, now);
+            let is_muted = self.is_muted(&alert, wall);
             let is_sent = is_due && !is_muted;
             if alert.is_correction() {
                 to_send.extend(is_sent.then_some(alert));
@@ -63,13 +63,13 @@ impl Site {
             self.stand(alert, is_sent);
         }
         for end in self.ended_floods(now) {
-            if self.is_muted(&end, now) {
+            if self.is_muted(&end, wall) {
                 self.put_off(&end);
             } else {
                 to_send.push(end);
             }
         }
-        self.mute_what_is_in_hand(now);
+        self.mute_what_is_in_hand(wall);
         self.record_and_send(&to_send)
     }
 
@@ -229,10 +229,10 @@ impl Site {
         self.put_off.drain(..excess);
     }
 
-    /// What was put off and can be sent at `now`.
-    fn no_longer_put_off(&mut self, now: Timestamp) -> Vec<Alert> {
+    /// What was put off and can be sent while the host's clock says `wall`.
+    fn no_longer_put_off(&mut self, wall: Timestamp) -> Vec<Alert> {
         let all = std::mem::take(&mut self.put_off);
-        let (muted, due) = all.into_iter().partition(|one| self.is_muted(one, now));
+        let (muted, due) = all.into_iter().partition(|one| self.is_muted(one, wall));
         self.put_off = muted;
         due
     }
@@ -308,7 +308,7 @@ impl Site {
             self.commit(wall)?;
         }
         let now = self.keeper.now(wall);
-        let mut to_send = self.no_longer_put_off(now);
+        let mut to_send = self.no_longer_put_off(wall);
         let mut standing = std::mem::take(&mut self.standing);
         for one in standing.values_mut() {
             if one.is_sent {
@@ -316,7 +316,7 @@ impl Site {
                 // Nor does one that was reported together go singly to those who received that.
                 if one.alert.must_arrive()
                     && one.attention == Attention::Awaited
-                    && !self.is_muted(&one.alert, now)
+                    && !self.is_muted(&one.alert, wall)
                 {
                     let together = one.is_reported_together;
                     self.send_where(&one.alert, false, &|hook| {
@@ -325,7 +325,7 @@ impl Site {
                 }
             } else if (self.never_read(&one.alert)
                 || self.is_watched(one.alert.event.benchmark.as_ref(), now))
-                && !self.is_muted(&one.alert, now)
+                && !self.is_muted(&one.alert, wall)
             {
                 if one.alert.event.time <= BEFORE_ALL {
                     one.alert.event.time = now;
@@ -337,7 +337,7 @@ impl Site {
             }
         }
         self.standing = standing;
-        self.offer_floods_again(now);
+        self.offer_floods_again(wall);
         if !to_send.is_empty() {
             self.record_and_send(&to_send)?;
         }

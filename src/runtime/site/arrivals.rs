@@ -113,7 +113,7 @@ impl Site {
         }
         let mut events = self.doubt_first(arrival, wall);
         self.keep_time(arrival, wall);
-        events.extend(self.pass(arrival.time));
+        events.extend(self.pass_by(arrival.time, self.clock(wall)));
         let now = self.now.map_or(arrival.time, |now| now.max(arrival.time));
         if let Input::Reading { benchmark, .. } = &arrival.input
             && let Some(finding) = self.answer(benchmark, arrival.time)
@@ -126,6 +126,12 @@ impl Site {
             self.searches.start(job);
         }
         events
+    }
+
+    /// What time it is at the site while the host's clock says `wall`; a replay has no clock but its readings.
+    fn clock(&self, wall: Timestamp) -> Option<Timestamp> {
+        let is_watched = self.sinks.store.is_some();
+        is_watched.then(|| self.keeper.now(wall))
     }
 
     fn answer(
@@ -370,7 +376,7 @@ impl Site {
     /// that clock is wrong.
     pub fn live(&mut self, wall: Timestamp) -> Vec<Event> {
         let now = self.keeper.now(wall);
-        let mut events = self.pass(now);
+        let mut events = self.pass_by(now, self.clock(wall));
         let is_behind = self.keeper.is_behind(wall);
         let notice = match (is_behind, self.monitor.clock_wrong()) {
             (true, None) => {

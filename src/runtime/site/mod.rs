@@ -25,15 +25,13 @@ use returned::Returned;
 use standing_floods::StandingFlood;
 use timekeeper::Timekeeper;
 
-use crate::monitor::{
-    Event, EventKind, Input, Monitor, Notice, Order, RESET_FOUND, SUSPECT, Settings,
-};
+use crate::monitor::{Event, EventKind, Input, Monitor, Notice, RESET_FOUND, SUSPECT, Settings};
 use crate::reading::{BEFORE_ALL, BenchmarkId, Timestamp};
 use crate::runtime::deliver::Dispatcher;
 use crate::runtime::hook::{Alert, Status};
 use crate::runtime::searches::Searches;
 use crate::runtime::tail::Arrival;
-use crate::store::{Batch, Position, Store, StoreError};
+use crate::store::{Batch, LeftOrder, Position, Store, StoreError};
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -218,14 +216,25 @@ impl Site {
 
     /// Lets data time pass up to `until`: every deadline of the monitor on the way is kept.
     pub fn pass(&mut self, until: Timestamp) -> Vec<Event> {
+        self.pass_by(until, None)
+    }
+
+    /// As [`Site::pass`]; where data time lies ahead of the `clock`, only what is due by this is judged.
+    fn pass_by(&mut self, until: Timestamp, clock: Option<Timestamp>) -> Vec<Event> {
+        let until = clock.map_or(until, |clock| until.min(clock));
         let mut events = Vec::new();
         for _ in 0..MOST_TICKS {
             let due = self.monitor.next_deadline();
             let Some(due) = due.filter(|due| *due <= until) else {
                 return events;
             };
-            let due = self.now.map_or(due, |now| now.max(due));
-            events.extend(self.step(due, &Input::Tick));
+            let now = self.now.map_or(due, |now| now.max(due));
+            let (due, passed) = if clock.is_some_and(|clock| now > clock) {
+                (due, Input::Notice(Notice::Passed { until: due }))
+            } else {
+                (now, Input::Tick)
+            };
+            events.extend(self.step(now, &passed));
             if self.monitor.next_deadline().is_some_and(|next| next <= due) {
                 tracing::error!(%due, "the monitor's deadline does not move on");
                 return events;
@@ -235,12 +244,20 @@ impl Site {
         events
     }
 
-    /// Takes an order of people, which stands under this number in the state.
-    pub fn order(&mut self, number: i64, order: Order) -> Vec<Event> {
-        self.batch.taken(number);
+    /// Takes an order of people. It is not of alerts that were called after it was given.
+    ///
+    /// # Errors
+    /// When the state cannot be asked for these.
+    pub fn order(&mut self, left: LeftOrder) -> Result<Vec<Event>, StoreError> {
+        let mut order = left.order;
+        if let Some(last) = left.last_event {
+            let since = self.called_since(last, order.benchmark())?;
+            order.was_given_before(since);
+        }
+        self.batch.taken(left.number);
         tracing::warn!(?order, "people ask for something");
         let now = self.data_now();
-        self.step(now, &Input::Order(order))
+        Ok(self.step(now, &Input::Order(order)))
     }
 
     /// How far the files had been read when the values taken since the last commit were all handed over.

@@ -1,12 +1,13 @@
 //! Who asked not to be notified, of what, until when: never for longer than an order may last, whatever the clock says.
 
-use super::{Attention, Site};
+use super::{AlertInForce, Attention, Site};
 use crate::alert::Level;
-use crate::monitor::Order;
+use crate::monitor::{AlertState, EventKind, Order};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::clock::TOLERANCE;
 use crate::runtime::hook::Alert;
-use jiff::SignedDuration;
+use crate::runtime::standing::{every_since, lasts};
+use crate::store::StoreError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -20,19 +21,23 @@ pub struct Mute {
     pub benchmark: Option<BenchmarkId>,
     /// Nothing above it is muted; `None`: everything is.
     pub up_to: Option<Level>,
-    /// Its end.
+    /// Its end, by the host's clock.
     pub until: Timestamp,
+    /// When it was given, by the host's clock; `None` where an older version took it.
+    #[serde(default)]
+    pub given_at: Option<Timestamp>,
 }
 
 impl Mute {
-    /// Whether it is in force at `now`. Of one that would last longer than it may, a clock is wrong.
-    fn is_in_force(&self, now: Timestamp) -> bool {
+    /// Whether it is in force while the host's clock says `wall`, by which it was given, right or wrong. Of one that would last
+    /// longer than it may, that clock has been set since.
+    fn is_in_force(&self, wall: Timestamp) -> bool {
         let longest = match self.up_to {
             Some(_) => Order::LONGEST_SHELVE,
             None => Order::LONGEST_SILENCE,
         };
-        let left = self.until.duration_since(now);
-        left > SignedDuration::ZERO && left <= longest + TOLERANCE
+        let left = self.until.duration_since(wall);
+        left <= longest + TOLERANCE && lasts((self.given_at, self.until), wall)
     }
 }
 
@@ -55,11 +60,14 @@ impl Site {
     pub(super) fn apply(&mut self, order: &Order) {
         match order {
             Order::Acknowledge {
-                benchmark, alert, ..
+                benchmark,
+                alert,
+                given,
             } => {
-                let is_seen = |place: &Option<BenchmarkId>, key: &str| match alert {
+                let since = &given.called_since;
+                let is_seen = |place: &Option<BenchmarkId>, key: &String| match alert {
                     Some(only) => key == only,
-                    None => benchmark.is_none() || place == benchmark,
+                    None => (benchmark.is_none() || place == benchmark) && !since.contains(key),
                 };
                 let all = self.standing.iter_mut();
                 let seen = all.filter(|((place, _), one)| is_seen(place, &one.alert.key));
@@ -71,19 +79,23 @@ impl Site {
                     }
                 }
                 if let (None, None) = (benchmark, alert) {
-                    self.acknowledge_floods();
+                    self.acknowledge_floods(since);
                 }
                 self.keep_receipts();
             }
             Order::Shelve {
-                benchmark, until, ..
+                benchmark,
+                until,
+                given,
             } => {
-                let level = self.monitor.level(benchmark).unwrap_or(Level::Green);
-                self.mute(Some(benchmark), Some(level), *until);
+                let level = self.level_before(benchmark, &given.called_since);
+                self.mute((Some(benchmark), Some(level)), *until, given.given_at);
             }
             Order::Silence {
-                benchmark, until, ..
-            } => self.mute(benchmark.as_ref(), None, *until),
+                benchmark,
+                until,
+                given,
+            } => self.mute((benchmark.as_ref(), None), *until, given.given_at),
             // The monitor ends it.
             Order::Resolve { .. } => {}
             Order::Unsilence { benchmark, .. } => {
@@ -93,11 +105,63 @@ impl Site {
         }
     }
 
-    fn mute(&mut self, benchmark: Option<&BenchmarkId>, up_to: Option<Level>, until: Timestamp) {
+    /// Keys of the alerts at a place, everywhere without one, that were called after event number `last`.
+    pub(super) fn called_since(
+        &self,
+        last: i64,
+        place: Option<&BenchmarkId>,
+    ) -> Result<Vec<String>, StoreError> {
+        let mut called = match &self.sinks.store {
+            Some(store) => every_since(store, "alert", last)?,
+            None => Vec::new(),
+        };
+        called.extend(self.fresh.iter().map(|alert| alert.event.clone()));
+        called.retain(|event| place.is_none() || event.benchmark.as_ref() == place);
+        let keys = called.into_iter().filter_map(|event| {
+            if let EventKind::Alert {
+                state: AlertState::Firing,
+                key,
+                ..
+            } = event.kind
+            {
+                Some(key)
+            } else {
+                None
+            }
+        });
+        Ok(keys.collect())
+    }
+
+    /// The level in force at a benchmark before the alerts with the keys `since` were called.
+    fn level_before(&self, benchmark: &BenchmarkId, since: &[String]) -> Level {
+        if since.is_empty() {
+            return self.monitor.level(benchmark).unwrap_or(Level::Green);
+        }
+        let standing = self.standing.get(&(Some(benchmark.clone()), false));
+        let Some(AlertInForce { alert, .. }) = standing else {
+            return Level::Green;
+        };
+        if !since.contains(&alert.key) {
+            return alert.level;
+        }
+        let earlier = alert
+            .earlier
+            .iter()
+            .filter(|one| one.benchmark.as_ref() == Some(benchmark) && !since.contains(&one.key));
+        earlier.map(|one| one.level).max().unwrap_or(Level::Green)
+    }
+
+    fn mute(
+        &mut self,
+        (benchmark, up_to): (Option<&BenchmarkId>, Option<Level>),
+        until: Timestamp,
+        given_at: Option<Timestamp>,
+    ) {
         self.mutes.push(Mute {
             benchmark: benchmark.cloned(),
             up_to,
             until,
+            given_at,
         });
         let excess = self.mutes.len().saturating_sub(MOST);
         self.mutes.drain(..excess);
@@ -129,15 +193,14 @@ impl Site {
 
     /// Who is not to be notified of what while the host's clock says `wall`.
     pub fn mutes(&self, wall: Timestamp) -> Vec<Mute> {
-        let now = self.keeper.now(wall);
         let all = self.mutes.iter();
-        all.filter(|mute| mute.is_in_force(now)).cloned().collect()
+        all.filter(|mute| mute.is_in_force(wall)).cloned().collect()
     }
 
-    /// Whether nobody is to be notified of this alert at `now`.
-    pub(super) fn is_muted(&self, alert: &Alert, now: Timestamp) -> bool {
+    /// Whether nobody is to be notified of this alert while the host's clock says `wall`.
+    pub(super) fn is_muted(&self, alert: &Alert, wall: Timestamp) -> bool {
         let place = (alert.event.benchmark.as_ref(), alert.level);
-        self.is_covered(place, |mute| mute.is_in_force(now))
+        self.is_covered(place, |mute| mute.is_in_force(wall))
     }
 
     /// Whether somebody asked not to be notified of it, and that may last still: until the next commit says it by the clock.
@@ -146,11 +209,11 @@ impl Site {
         self.is_covered(place, |_| true)
     }
 
-    /// Has the hooks wait with what they have in hand where nobody is to be notified of it at `now`.
-    pub(super) fn mute_what_is_in_hand(&self, now: Timestamp) {
+    /// Has the hooks wait with what they have in hand where nobody is to be notified of it while the host's clock says `wall`.
+    pub(super) fn mute_what_is_in_hand(&self, wall: Timestamp) {
         if let Some(alerts) = &self.sinks.alerts {
             alerts.mute(&|place, level| {
-                self.is_covered((place, level), |mute| mute.is_in_force(now))
+                self.is_covered((place, level), |mute| mute.is_in_force(wall))
             });
         }
     }

@@ -104,13 +104,17 @@ impl Site {
         })
     }
 
-    /// Somebody has seen everything.
-    pub(super) fn acknowledge_floods(&mut self) {
+    /// Somebody has seen everything but the alerts with the keys `since`.
+    pub(super) fn acknowledge_floods(&mut self, since: &[String]) {
+        let is_seen = |flood: &Alert| {
+            let mut members = flood.many.iter().flat_map(|many| &many.members);
+            !members.any(|member| since.contains(&member.key))
+        };
         for one in self.floods.values_mut() {
-            one.is_acknowledged = true;
+            one.is_acknowledged |= is_seen(&one.alert);
         }
         if let Some(alerts) = &self.sinks.alerts {
-            alerts.end_those_of_many();
+            alerts.end_those_of_many(&is_seen);
         }
     }
 
@@ -122,14 +126,14 @@ impl Site {
     }
 
     /// Offers those again that are in force: a hook may have been added, or have had no room.
-    pub(super) fn offer_floods_again(&self, now: Timestamp) {
+    pub(super) fn offer_floods_again(&self, wall: Timestamp) {
         let Some(alerts) = &self.sinks.alerts else {
             return;
         };
         for one in self.floods.values() {
             let alert = &one.alert;
             let is_due = alert.must_arrive() && !one.is_acknowledged && self.has_in_force(alert);
-            if is_due && !self.is_muted(alert, now) {
+            if is_due && !self.is_muted(alert, wall) {
                 alerts.offer_where(alert, false, &|hook| hook.is_audience_of(alert));
             }
         }

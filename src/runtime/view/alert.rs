@@ -2,11 +2,13 @@
 
 use super::{SiteReader, read};
 use crate::alert::{Level, Policy};
-use crate::monitor::{AlertState, Event, EventKind, OrderKind, Settings};
+use crate::monitor::{AlertState, Event, EventKind, Settings};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::alarm_state::{AlarmState, Alarms};
 use crate::runtime::clock;
-use crate::runtime::standing::{every, first_call, in_force, may_be_of};
+use crate::runtime::standing::{
+    TakenOrders, every, first_call, in_force, is_acknowledgement, numbered,
+};
 use crate::store::{DeliveryRow, Store, StoreError};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -87,8 +89,18 @@ impl SiteReader {
 /// A change of the alert, with its place in the state.
 struct StoredCall {
     event: Event,
+    number: i64,
     step: i64,
     body: String,
+}
+
+/// How an alert stands by now.
+struct AlertEnd {
+    state: AlertLife,
+    /// When it was over, data time.
+    time: Option<Timestamp>,
+    /// The number of the event by which it was over; `None` while it is in force.
+    number: Option<i64>,
 }
 
 /// As [`SiteReader::alert`], for those who have the state at hand.
@@ -111,23 +123,15 @@ pub fn alert(store: &Store, site: &str, key: &str) -> Result<Option<AlertView>, 
         return Ok(None);
     };
     let (since, benchmark) = (call.event.time, call.event.benchmark.clone());
-    let alerts = every(store, "alert")?;
-    let (state, ended) = end(&alerts, &call.event);
+    let alerts = numbered(store, "alert")?;
+    let end = end(&alerts, &call);
+    let (state, ended) = (end.state, end.time);
     let settings = store.settings_at(call.step)?.unwrap_or_default();
     let policy = benchmark
         .as_ref()
         .map_or(&settings.policy, |one| settings.policy(one));
-    let audit = audit(store, &alerts, &call.event, ended)?;
-    let is_ack = |event: &Event| {
-        matches!(
-            &event.kind,
-            EventKind::Order {
-                order: OrderKind::Acknowledge,
-                ..
-            }
-        )
-    };
-    let is_acknowledged = audit.iter().any(is_ack);
+    let audit = audit(store, &alerts, &call, &end)?;
+    let is_acknowledged = audit.iter().any(is_acknowledgement);
     let members = if benchmark.is_none() {
         members(store, level, since)?
     } else {
@@ -180,6 +184,7 @@ fn call(store: &Store, asked: &str) -> Result<Option<StoredCall>, StoreError> {
         if is_it || is_newer {
             found = Some(StoredCall {
                 event,
+                number: placed.seq,
                 step: placed.step,
                 body: placed.body,
             });
@@ -205,6 +210,8 @@ fn from_its_first(store: &Store, call: StoredCall) -> Result<StoredCall, StoreEr
         if is_same_call(&event, &first) {
             return Ok(StoredCall {
                 event: first,
+                // Orders are of what had been called, by whichever of both came first.
+                number: call.number.min(placed.seq),
                 step: placed.step,
                 body: placed.body,
             });
@@ -229,17 +236,23 @@ fn is_same_call(one: &Event, other: &Event) -> bool {
 }
 
 /// How the alert stands by now, and since when it is over.
-fn end(alerts: &[Event], call: &Event) -> (AlertLife, Option<Timestamp>) {
+fn end(alerts: &[(i64, Event)], call: &StoredCall) -> AlertEnd {
+    let mut end = AlertEnd {
+        state: AlertLife::Resolved,
+        time: None,
+        number: None,
+    };
     let EventKind::Alert {
         key: own_key,
         level: own_level,
         ..
-    } = &call.kind
+    } = &call.event.kind
     else {
-        return (AlertLife::Resolved, None);
+        return end;
     };
-    let mut superseded: Option<Timestamp> = None;
-    for event in alerts {
+    end.state = AlertLife::Firing;
+    let called = call.event.time;
+    for (number, event) in alerts {
         let EventKind::Alert {
             key, level, state, ..
         } = &event.kind
@@ -247,52 +260,52 @@ fn end(alerts: &[Event], call: &Event) -> (AlertLife, Option<Timestamp>) {
             continue;
         };
         if key == own_key && *state == AlertState::Resolved {
+            end.state = AlertLife::Resolved;
             // The end that a backlog brings is of readings from before the beginning.
-            return (AlertLife::Resolved, Some(event.time.max(call.time)));
+            end.time = Some(event.time.max(called));
+            end.number = Some(*number);
+            return end;
         }
         let is_beside = (*level == Level::Unknown) != (*own_level == Level::Unknown);
-        let replaces = event.benchmark == call.benchmark
+        let replaces = event.benchmark == call.event.benchmark
             && !is_beside
             && *state == AlertState::Firing
             && key != own_key
-            && (level > own_level && event.time >= call.time
-                || level == own_level && event.time > call.time);
+            && (level > own_level && event.time >= called
+                || level == own_level && event.time > called);
         if replaces {
-            superseded = Some(superseded.map_or(event.time, |known| known.min(event.time)));
+            end.state = AlertLife::Superseded;
+            end.time = Some(end.time.map_or(event.time, |known| known.min(event.time)));
+            end.number = end.number.or(Some(*number));
         }
     }
-    match superseded {
-        Some(time) => (AlertLife::Superseded, Some(time)),
-        None => (AlertLife::Firing, None),
-    }
+    end
 }
 
 /// Changes of the alert, orders that concern it and corrections of what it rests on.
 fn audit(
     store: &Store,
-    alerts: &[Event],
-    call: &Event,
-    ended: Option<Timestamp>,
+    alerts: &[(i64, Event)],
+    call: &StoredCall,
+    end: &AlertEnd,
 ) -> Result<Vec<Event>, StoreError> {
-    let EventKind::Alert { key: own_key, .. } = &call.kind else {
+    let EventKind::Alert { key: own_key, .. } = &call.event.kind else {
         return Ok(Vec::new());
     };
     let is_own = |event: &&Event| {
         matches!(&event.kind, EventKind::Alert { key, .. } if key == own_key)
-            || is_same_call(event, call)
+            || is_same_call(event, &call.event)
     };
-    let mut audit: Vec<Event> = alerts.iter().filter(is_own).cloned().collect();
-    let is_in_time =
-        |event: &Event| event.time >= call.time && ended.is_none_or(|ended| event.time <= ended);
-    for event in every(store, "order")? {
-        let concerns = event.benchmark.is_none() || event.benchmark == call.benchmark;
-        let is_in_time = is_in_time(&event) || is_seen_after(alerts, call, &event);
-        if concerns && is_in_time && may_be_of(&event, call) {
-            audit.push(event);
+    let each = alerts.iter().map(|(_, event)| event);
+    let mut audit: Vec<Event> = each.filter(is_own).cloned().collect();
+    for (number, event) in TakenOrders::read(store, None)?.of(&call.event) {
+        let is_in_time = end.number.is_none_or(|end| *number <= end);
+        if is_in_time || is_acknowledgement(event) && is_before_the_next(alerts, call, *number) {
+            audit.push(event.clone());
         }
     }
     for event in every(store, "correction")? {
-        if event.benchmark == call.benchmark && event.time >= call.time {
+        if event.benchmark == call.event.benchmark && event.time >= call.event.time {
             audit.push(event);
         }
     }
@@ -300,22 +313,16 @@ fn audit(
     Ok(audit)
 }
 
-/// Whether it acknowledges an alert that has ended, before another one is called in its place.
-fn is_seen_after(alerts: &[Event], call: &Event, order: &Event) -> bool {
-    let is_ack = matches!(
-        &order.kind,
-        EventKind::Order {
-            order: OrderKind::Acknowledge,
-            ..
-        }
-    );
-    let is_next = |event: &&Event| {
+/// Whether the event with this number came before another alert was called in the place of this one.
+fn is_before_the_next(alerts: &[(i64, Event)], call: &StoredCall, number: i64) -> bool {
+    let is_next = |(other, event): &&(i64, Event)| {
         matches!(&event.kind, EventKind::Alert { state: AlertState::Firing, level, .. } if *level != Level::Unknown)
-            && event.benchmark == call.benchmark
-            && event.time > call.time
+            && event.benchmark == call.event.benchmark
+            && *other > call.number
+            && event.time >= call.event.time
     };
-    let next = alerts.iter().filter(is_next).map(|event| event.time).min();
-    is_ack && order.time >= call.time && next.is_none_or(|next| order.time < next)
+    let next = alerts.iter().find(is_next);
+    next.is_none_or(|(next, _)| number < *next)
 }
 
 fn alarm_state(

@@ -13,7 +13,7 @@ use crate::reading::{
     BenchmarkId, Quantity, Reading, SECONDS_PER_DAY, Series, Timestamp, Unit, days_since,
 };
 use crate::runtime::alarm_state::Alarms;
-use crate::runtime::standing::in_force;
+use crate::runtime::standing::{TakenOrders, in_force};
 use crate::store::{StoreError, Value, Values};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -200,14 +200,14 @@ impl SiteReader {
         let levels_now = in_force(&self.store, at)?;
         let alarms = Alarms::read(&self.store, at, moment)?;
         let span = self.store.span(Some(name))?;
-        let (seen, quiet) = self.orders(&levels_now, at, moment)?;
+        let orders = TakenOrders::read(&self.store, at)?;
         Ok(Some(BenchmarkView {
             site: self.facts().name.clone(),
             version: env!("CARGO_PKG_VERSION"),
             time_zone: self.facts().time_zone.clone(),
             takes_orders: self.facts().takes_orders,
-            acknowledged: seen,
-            silences: quiet,
+            acknowledged: orders.acknowledged(&levels_now),
+            silences: orders.silences(moment),
             standing: self.standing(id, &levels_now, &alarms, at, moment)?,
             at,
             now,

@@ -110,6 +110,7 @@ impl SiteReader {
                 why: None,
                 door: Some(OrderedBy::Link),
                 given_at: Some(now),
+                called_since: Vec::new(),
             },
         });
         // Other messages of the same alert have links that are good for longer.

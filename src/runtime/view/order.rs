@@ -101,6 +101,7 @@ impl SiteReader {
             why: why.map(str::to_owned),
             door: Some(OrderedBy::Http),
             given_at: Some(clock::now()),
+            called_since: Vec::new(),
         };
         let benchmark = asked.benchmark.as_ref().map(BenchmarkId::new);
         let until = |longest: SignedDuration| {

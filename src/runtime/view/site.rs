@@ -6,11 +6,11 @@ use crate::monitor::{CalledLevel, ChancesOfCollapse, Event, EventKind, FailureTi
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::regime::Regime;
 use crate::runtime::alarm_state::{AlarmState, Alarms};
-use crate::runtime::standing::{InForce, acknowledged, in_force, orders, silences};
+use crate::runtime::standing::{InForce, TakenOrders, in_force};
 use crate::store::StoreError;
 use schemars::JsonSchema;
 use serde::Serialize;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Alerts, faults and orders that are listed, the newest.
 const LISTED: usize = 60;
@@ -88,6 +88,8 @@ pub struct SiteView {
     pub alerts: Vec<Event>,
     /// Who has seen them.
     pub acknowledged: Vec<Event>,
+    /// The newest acknowledgement of each alert in force that has one, by the alert's key.
+    pub acknowledged_by: BTreeMap<String, Event>,
     /// The orders in force by which alerts are not reported.
     pub silences: Vec<Event>,
     /// What was said last, newest first: alerts, faults, orders.
@@ -103,7 +105,7 @@ impl SiteReader {
         let now = self.now()?;
         let (at, moment) = (at.map(held), at.map_or(now, held));
         let levels = in_force(&self.store, at)?;
-        let (seen, quiet) = self.orders(&levels, at, moment)?;
+        let orders = TakenOrders::read(&self.store, at)?;
         let span = self.store.span(None)?;
         let benchmarks = self.known()?.into_iter();
         let alarms = Alarms::read(&self.store, at, moment)?;
@@ -126,23 +128,12 @@ impl SiteReader {
             level: called.unwrap_or(Level::Green),
             unknown_since: levels.get(&(None, Level::Unknown)).map(|event| event.time),
             benchmarks,
-            acknowledged: seen,
-            silences: quiet,
+            acknowledged: orders.acknowledged(&levels),
+            acknowledged_by: orders.acknowledged_by(&levels),
+            silences: orders.silences(moment),
             log: self.log(at)?,
             alerts: levels.into_values().collect(),
         })
-    }
-
-    /// Who had seen what was in force, and what was not reported, at `moment`.
-    pub(super) fn orders(
-        &self,
-        levels: &InForce,
-        at: Option<Timestamp>,
-        moment: Timestamp,
-    ) -> Result<(Vec<Event>, Vec<Event>), StoreError> {
-        let mut orders = orders(&self.store)?;
-        orders.retain(|order| at.is_none_or(|at| order.time <= at));
-        Ok((acknowledged(&orders, levels), silences(&orders, moment)))
     }
 
     /// Every benchmark that the config names or that has given a reading.

@@ -11,7 +11,8 @@ const BY_PEOPLE: &str = "resolved-by-people";
 
 impl Alarm {
     /// Ends the level in force. What is known of the slope stays, so that the next reading calls the level again, as a new
-    /// alert, if it still calls for it. What cannot be said (`unknown`) is no level and stays.
+    /// alert, if it still calls for it. What cannot be said (`unknown`) is no level and stays, and so does a level that was
+    /// called after the order was given.
     pub(in crate::monitor::track) fn resolve(
         &mut self,
         record: &BenchmarkRecord,
@@ -19,6 +20,10 @@ impl Alarm {
         given: &Given,
     ) -> Option<Event> {
         let (level, since) = self.latch.in_force()?;
+        let key = record.alert_key(level, since);
+        if given.called_since.contains(&key) {
+            return None;
+        }
         self.latch.resolve(now);
         self.levels.note(now, &self.latch);
         (self.attention_until, self.kept, self.overdue) = (None, None, None);
@@ -33,7 +38,7 @@ impl Alarm {
         let kind = EventKind::Alert {
             level,
             state: AlertState::Resolved,
-            key: record.alert_key(level, since),
+            key,
             rule: BY_PEOPLE.to_owned(),
             text,
         };

@@ -83,7 +83,7 @@ export class BenchmarkPage {
     const seen = view.acknowledged.filter((ack) => ack.benchmark === null || ack.benchmark === undefined || ack.benchmark === this.name).pop();
     const quiet = view.silences.filter((one) => !one.benchmark || one.benchmark === this.name);
     return [el('a', { href: place(null) }, 'All benchmarks'), el('h1', {}, this.name), ...badges(view.standing, 'big'),
-      ...(seen && view.standing.since && seen.time >= view.standing.since ? [el('span', { class: 'soft' }, `seen by ${seen.by ?? 'somebody'}`)] : []),
+      ...(seen && ['acknowledged', 'latched'].includes(view.standing.alarm_state) ? [el('span', { class: 'soft' }, `seen by ${seen.by ?? 'somebody'}`)] : []),
       ...quiet.map((one) => el('span', { class: 'soft' }, `not notified: ${described(one)}`))];
   }
 

@@ -58,7 +58,7 @@ export class SitePage {
   force(site, at) {
     const alerts = site.alerts.filter((alert) => alert.benchmark);
     const items = alerts.map((alert) => {
-      const seen = site.acknowledged.filter((ack) => (!ack.benchmark || ack.benchmark === alert.benchmark) && ack.time >= alert.time).pop();
+      const seen = site.acknowledged_by[alert.key];
       return el('li', {}, badge(alert.level), ' ', el('a', { href: place(alert.benchmark) }, alert.benchmark), ' since ', when(alert.time),
         el('div', {}, alert.text),
         seen ? el('div', { class: 'soft' }, `seen by ${seen.by ?? 'somebody'} at `, when(seen.time)) : null);
