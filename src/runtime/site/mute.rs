@@ -129,7 +129,15 @@ impl Site {
                 None
             }
         });
-        Ok(keys.collect())
+        Ok(keys.filter(|key| self.is_present(key)).collect())
+    }
+
+    /// Whether the alert with this key stands, or one that followed on it, or comes now: one that was found in the past does not.
+    fn is_present(&self, key: &String) -> bool {
+        let stands = |alert: &Alert| {
+            alert.key == *key || alert.earlier.iter().any(|earlier| earlier.key == *key)
+        };
+        self.standing.values().any(|one| stands(&one.alert)) || self.fresh.iter().any(stands)
     }
 
     /// The level in force at a benchmark before the alerts with the keys `since` were called.
