@@ -696,7 +696,7 @@ fn what_comes_live_to_one_file_does_not_wait_for_the_backlog_of_another() {
     bench.write("b.csv", &format!("{HEADER}{}", backlog.collect::<String>()));
     let first = bench.follower.poll(bench.wall);
     assert!(
-        !first.caught_up && first.arrivals.len() <= 100,
+        !first.caught_up && first.arrivals.len() <= 250,
         "{}",
         first.arrivals.len()
     );
@@ -711,17 +711,15 @@ fn what_comes_live_to_one_file_does_not_wait_for_the_backlog_of_another() {
     // Nothing is lost, taken twice or taken in another order.
     let mut values: Vec<f64> = Vec::new();
     let mut take = |batch: ArrivalBatch| {
-        values.extend(
-            batch
-                .arrivals
-                .into_iter()
-                .filter_map(|arrival| match arrival.input {
-                    Input::Reading {
-                        benchmark, reading, ..
-                    } if benchmark.as_str() == "b" => Some(reading.value),
-                    _ => None,
-                }),
-        );
+        for arrival in batch.arrivals {
+            if let Input::Reading {
+                benchmark, reading, ..
+            } = arrival.input
+                && benchmark.as_str() == "b"
+            {
+                values.push(reading.value);
+            }
+        }
         batch.caught_up
     };
     let mut is_done = take(first);

@@ -16,7 +16,7 @@ use std::time::Duration;
 
 /// Values in one batch at most: while the past is read, and later, when what comes live does not wait for a backlog.
 const BATCH: usize = 1000;
-const LIVE_BATCH: usize = 100;
+const LIVE_BATCH: usize = 250;
 /// While a backlog is read the other files are looked at so often.
 const LOOK_BESIDE: Duration = Duration::from_millis(250);
 
