@@ -60,7 +60,7 @@ const MOST_LATER: usize = 200_000;
 /// When a slope is expected to collapse.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Collapse {
-    /// Days to it from the newest reading: whose quantiles are reported. It is put sooner than is expected, by [`SPREAD`] and [`SOONER`].
+    /// Days to it from the newest reading: whose quantiles are reported. It is put sooner than is expected: collapses come sooner than networks that never saw their kind expect.
     pub passage: Passage,
     /// The same as it is expected: whose chances come true.
     pub expected: Passage,
