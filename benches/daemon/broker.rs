@@ -6,6 +6,7 @@ use jiff::Timestamp;
 use rumqttc::{AsyncClient, Event, MqttOptions, Packet, QoS};
 use slipwatch::config;
 use slipwatch::runtime::mqtt::follow;
+use slipwatch::runtime::service_faults::ServiceFaults;
 use slipwatch::runtime::shutdown;
 use slipwatch::store::{Batch, Store};
 use std::fs;
@@ -137,7 +138,15 @@ async fn without_the_monitor(broker: &Mosquitto, messages: &[String]) -> f64 {
         let (sender, deliveries) = mpsc::channel(AT_ONCE);
         let (stop, stopped) = shutdown::pair();
         let radio = config.brokers[0].clone();
-        let source = follow(radio, Vec::new(), "floor".to_owned(), sender, stopped);
+        let faults = ServiceFaults::default();
+        let source = follow(
+            radio,
+            Vec::new(),
+            "floor".to_owned(),
+            sender,
+            faults,
+            stopped,
+        );
         (deliveries, stop, tokio::spawn(source))
     };
     let (deliveries, stop, task) = start();

@@ -16,6 +16,7 @@ pub use chance::{chance_in_words, hours_in_words, percent_in_words};
 pub use declared::{Combination, Condition, DeclaredRule};
 pub use evidence::{AlertCause, AlertEvidence};
 pub use held::Held;
+pub(crate) use latch::another_since;
 pub use latch::{Entered, Latch, Transition};
 pub use level::Level;
 pub use policy::{Policy, Threshold, to_the_next_reading};

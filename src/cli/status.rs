@@ -14,6 +14,7 @@ use crate::runtime::drilled::DrillRecord;
 use crate::runtime::preview::{Preview, preview};
 use crate::runtime::record::standing::RecordStanding;
 use crate::runtime::reloaded::{ConfigRefusal, sources_without_files};
+use crate::runtime::service_faults::{ServiceFault, faults_in};
 use crate::runtime::standing::{InForce, TakenOrders, closed, every, in_force};
 use crate::store::Store;
 use jiff::tz::TimeZone;
@@ -121,6 +122,8 @@ pub(super) struct SiteStatus {
     record: Option<RecordStanding>,
     /// Why the config file as it is now is not in force; null where it is.
     config_refusal: Option<ConfigRefusal>,
+    /// What lasts and keeps the daemon that runs from its work.
+    faults: Vec<ServiceFault>,
     /// Sources of which there is no file now, a line each.
     sources_without_files: Vec<String>,
     /// What the files hold, where that was asked for.
@@ -155,13 +158,7 @@ pub(super) fn status(args: &StatusArgs) -> anyhow::Result<()> {
 fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
     let (config, store) = args.site.open()?;
     let (levels, orders) = (in_force(&store, None)?, TakenOrders::read(&store, None)?);
-    let mut refits = BTreeMap::new();
-    for body in store.latest("refit")? {
-        let event: Event = serde_json::from_str(&body)?;
-        if let Some(benchmark) = event.benchmark {
-            refits.insert(benchmark, event.kind);
-        }
-    }
+    let (refits, faults) = (newest_refits(&store)?, faults_in(&config.site.state_dir));
     let suspicions = suspicions(&store)?;
     let alarms = Alarms::read(&store, None, clock::now())?;
     let mut newest: BTreeMap<BenchmarkId, Option<Timestamp>> = BTreeMap::new();
@@ -219,11 +216,24 @@ fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
             .and_then(|_| RecordStanding::read(&config.site.state_dir)),
         // Nothing is in force where no daemon runs; the next one takes the file as it is then.
         config_refusal: ConfigRefusal::read(&config.site.state_dir).filter(|_| is_running),
+        faults: if is_running { faults } else { Vec::new() },
         sources_without_files,
         preview,
         brokers: config.brokers.into_iter().map(|one| one.id).collect(),
     };
     Ok((status, zone))
+}
+
+/// The newest refit of each benchmark.
+fn newest_refits(store: &Store) -> anyhow::Result<BTreeMap<BenchmarkId, EventKind>> {
+    let mut refits = BTreeMap::new();
+    for body in store.latest("refit")? {
+        let event: Event = serde_json::from_str(&body)?;
+        if let Some(benchmark) = event.benchmark {
+            refits.insert(benchmark, event.kind);
+        }
+    }
+    Ok(refits)
 }
 
 impl StatusStanding {
@@ -349,7 +359,7 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
     } else {
         "NO DAEMON RUNS: nothing is watched; what follows is as of its last reading\n"
     };
-    let refused = not_used(status);
+    let refused = not_used(status, zone);
     let suspicions = status.benchmarks.iter().flat_map(|one| &one.suspicions);
     let suspicions: String = suspicions
         .map(|one| text::local(&text::plain(one), zone) + "\n")
@@ -373,7 +383,7 @@ fn status_text(status: &SiteStatus, zone: &TimeZone) -> String {
 }
 
 /// What is not used or not judged, a line each: what sources could not give, and readings under maintenance.
-fn not_used(status: &SiteStatus) -> String {
+fn not_used(status: &SiteStatus, zone: &TimeZone) -> String {
     let mut lines = String::new();
     if let Some(why) = status
         .config_refusal
@@ -385,6 +395,13 @@ fn not_used(status: &SiteStatus) -> String {
             lines,
             "CONFIG NOT TAKEN at its reload, the one before is in force: {why}"
         );
+    }
+    for fault in &status.faults {
+        let source = fault.source.as_ref();
+        let source = source.map_or_else(String::new, |source| format!("source {source}: "));
+        let text = text::plain(&format!("{source}{}", fault.text));
+        let since = text::clock(fault.since, zone);
+        let _ = writeln!(lines, "FAULT since {since}: {text}");
     }
     for line in &status.sources_without_files {
         let _ = writeln!(lines, "{}", text::plain(line));

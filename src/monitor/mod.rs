@@ -35,6 +35,7 @@ mod tally;
 mod together;
 mod track;
 mod undeclared;
+mod watched;
 
 pub use course::{LevelStretch, by_time, levels_in};
 pub use declared::{Declaration, Declared};
@@ -54,6 +55,7 @@ pub use saved::{MemoryPart, SavedError};
 pub use search::{SearchFinding, SearchJob};
 pub use site::SiteLevel;
 pub use undeclared::UndeclaredLoad;
+pub use watched::Watched;
 
 use crate::alert::{Level, Policy};
 use crate::reading::{BenchmarkId, CovariateKind, Reading, Sample, Suspicion, Timestamp, Unit};
@@ -168,50 +170,6 @@ impl Default for Settings {
     }
 }
 
-/// The benchmarks that are watched.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Watched {
-    /// Those that have a name in the config.
-    pub named: BTreeSet<BenchmarkId>,
-    /// Whether whatever else comes is watched too.
-    pub is_open: bool,
-    /// What decides which numbers the readings of each are; none in a state of older versions.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub read_as: BTreeMap<BenchmarkId, String>,
-}
-
-/// Whatever comes.
-impl Default for Watched {
-    fn default() -> Self {
-        Self {
-            named: BTreeSet::new(),
-            is_open: true,
-            read_as: BTreeMap::new(),
-        }
-    }
-}
-
-impl Watched {
-    /// Whether `benchmark`, watched under `former`, no longer is: it was named and is not any more, or was not and
-    /// nothing else than what is named is watched from now on.
-    fn drops(&self, benchmark: &BenchmarkId, former: &Self) -> bool {
-        let was_named = former.named.contains(benchmark);
-        !self.named.contains(benchmark) && (was_named || !self.is_open)
-    }
-
-    /// What the readings of `benchmark` are read as, where that is something else than under `former`.
-    fn changed(&self, benchmark: &BenchmarkId, former: &Self) -> Option<&str> {
-        let now = self.read_as.get(benchmark)?;
-        let before = former.read_as.get(benchmark)?;
-        (now != before).then_some(now)
-    }
-
-    /// Whether what is known of `benchmark` ends when this follows on `former`.
-    pub(crate) fn ends(&self, benchmark: &BenchmarkId, former: &Self) -> bool {
-        self.drops(benchmark, former) || self.changed(benchmark, former).is_some()
-    }
-}
-
 /// What is done about a residual that the law does not explain; it is watched and reported in any case.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Explain {
@@ -250,6 +208,8 @@ pub struct Monitor {
     past: Past,
     /// How often what was known of a benchmark has been dropped.
     dropped: BTreeMap<BenchmarkId, u32>,
+    /// Those whose readings mean something else than what is known of them, and why: with the next one, they begin anew.
+    anew: BTreeMap<BenchmarkId, String>,
     batches: Batches,
     tally: Tally,
 }
@@ -267,6 +227,7 @@ impl Monitor {
             outages: Outages::default(),
             past: Past::default(),
             dropped: BTreeMap::new(),
+            anew: BTreeMap::new(),
             batches: Batches::default(),
             tally: Tally::default(),
         }
@@ -327,6 +288,8 @@ impl Monitor {
     ) -> Vec<Event> {
         self.tally.count_reading();
         self.outages.note_reading(benchmark, reading.time);
+        let mut events = Vec::new();
+        let former = self.begin_anew(benchmark);
         let context = StepContext {
             phase: self.phase(now),
             covariates: &self.covariates,
@@ -339,11 +302,14 @@ impl Monitor {
             track.accept(now, self.settings.accepted(benchmark));
             track
         });
-        let mut events = if reading.time > now {
+        if let Some((former, why)) = former {
+            events.extend(track.follow_on(former, now, &why));
+        }
+        events.extend(if reading.time > now {
             track.put_aside(now, source, reading)
         } else {
             track.take(policy, source, reading, &context)
-        };
+        });
         self.batches.note(benchmark, track);
         let critical = policy.critical_velocity_mm_per_day;
         self.searches.extend(track.search(critical, &context));
@@ -370,6 +336,7 @@ impl Monitor {
         let former = std::mem::replace(&mut self.settings, settings.clone());
         self.covariates.state(&self.settings.covariates);
         let mut events = self.unwatch(now, &former.watched);
+        events.extend(self.reread(now, &former.watched));
         let context = StepContext {
             phase: self.phase(now),
             covariates: &self.covariates,
@@ -387,48 +354,6 @@ impl Monitor {
         let all: Vec<BenchmarkId> = self.benchmarks.all().keys().cloned().collect();
         for id in &all {
             self.benchmarks.note_changed(id);
-        }
-        events
-    }
-
-    /// Ends what is known of benchmarks that are no longer watched, and of those whose readings mean something else from here on: to
-    /// these the sources give what the files hold anew.
-    fn unwatch(&mut self, now: Timestamp, former: &Watched) -> Vec<Event> {
-        let watched = &self.settings.watched;
-        let gone: Vec<(BenchmarkId, String)> = (self.benchmarks.all().keys())
-            .filter_map(|id| {
-                let why = if watched.drops(id, former) {
-                    "is no longer watched".to_owned()
-                } else {
-                    let read_as = watched.changed(id, former)?;
-                    format!("is read as {read_as} from here on: its readings are taken anew")
-                };
-                Some((id.clone(), format!("benchmark {id} {why}")))
-            })
-            .collect();
-        let mut events = Vec::new();
-        let awaited: Vec<BenchmarkId> = self.outages.awaited().cloned().collect();
-        for id in awaited {
-            if !self.settings.watched.named.contains(&id) {
-                events.extend(self.outages.end_awaiting(now, &id, "is no longer watched"));
-            }
-        }
-        for (id, why) in gone {
-            if let Some(mut track) = self.benchmarks.remove(&id) {
-                events.extend(track.close(now, &why));
-            }
-            let times = self.dropped.entry(id.clone()).or_default();
-            *times = times.saturating_add(1);
-            if self.settings.watched.named.contains(&id) {
-                events.push(Event {
-                    benchmark: Some(id.clone()),
-                    ..trouble(now, "read-anew", &why)
-                });
-            }
-            self.searches.retain(|job| job.benchmark != id);
-            self.past.forget(&id);
-            self.batches.forget(&id);
-            self.benchmarks.note_changed(&id);
         }
         events
     }
@@ -482,30 +407,5 @@ fn trouble(time: Timestamp, kind: &str, text: &str) -> Event {
         time,
         benchmark: None,
         kind: EventKind::Fault { kind, text },
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_loses_its_name_is_dropped_and_what_never_had_one_only_where_nothing_else_is_watched() {
-        let five = BenchmarkId::new("5");
-        let watched = |named: &[&str], is_open| Watched {
-            named: named.iter().copied().map(BenchmarkId::new).collect(),
-            is_open,
-            read_as: BTreeMap::new(),
-        };
-        for (former, now, is_dropped) in [
-            (watched(&["4", "5"], true), watched(&["4"], true), true),
-            (watched(&["4"], true), watched(&["4"], true), false),
-            (watched(&["4"], true), watched(&[], true), false),
-            (watched(&["4"], true), watched(&["4"], false), true),
-            (watched(&["4"], true), watched(&["5"], false), false),
-            (Watched::default(), watched(&[], false), true),
-        ] {
-            assert_eq!(now.drops(&five, &former), is_dropped, "{former:?} {now:?}");
-        }
     }
 }

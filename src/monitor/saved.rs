@@ -73,6 +73,8 @@ struct Rest {
     past: Past,
     #[serde(default)]
     dropped: BTreeMap<BenchmarkId, u32>,
+    #[serde(default)]
+    anew: BTreeMap<BenchmarkId, String>,
     #[serde(flatten)]
     batches: Batches,
     #[serde(flatten)]
@@ -92,6 +94,8 @@ struct RestOf<'a> {
     past: &'a Past,
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     dropped: &'a BTreeMap<BenchmarkId, u32>,
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    anew: &'a BTreeMap<BenchmarkId, String>,
     #[serde(flatten)]
     batches: &'a Batches,
     #[serde(flatten)]
@@ -120,6 +124,7 @@ impl Monitor {
             outages: &self.outages,
             past: &self.past,
             dropped: &self.dropped,
+            anew: &self.anew,
             batches: &self.batches,
             tally: &self.tally,
         };
@@ -166,6 +171,7 @@ impl Monitor {
             outages: rest.outages,
             past: rest.past.with_walk(walk),
             dropped: rest.dropped,
+            anew: rest.anew,
             batches: rest.batches,
             tally: rest.tally,
         })

@@ -3,9 +3,8 @@
 use super::event::{AlertState, Event, EventKind};
 use super::in_force::LevelsInForce;
 use super::{Input, Monitor};
-use crate::alert::Level;
+use crate::alert::{Level, another_since};
 use crate::reading::{BenchmarkId, Timestamp};
-use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -74,10 +73,7 @@ impl SiteAlert {
 
     /// Since when a level is in force that begins at `now`: what ended may begin again at the same data time, as another alert.
     fn begin(&mut self, level: Level, now: Timestamp) -> Timestamp {
-        let again = self.newest.get(&level).filter(|newest| **newest >= now);
-        let since = again
-            .and_then(|newest| newest.checked_add(SignedDuration::from_secs(1)).ok())
-            .unwrap_or(now);
+        let since = another_since(self.newest.get(&level).copied(), now);
         self.newest.insert(level, since);
         since
     }

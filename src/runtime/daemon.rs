@@ -12,6 +12,7 @@ use super::mqtt;
 use super::progress::Progress;
 use super::pulse::Reporting;
 use super::sandbox;
+use super::service_faults::ServiceFault;
 use super::shutdown::Shutdown;
 use super::site::{Site, announce_ends};
 use super::sources::Sources;
@@ -61,6 +62,8 @@ pub struct Daemon {
     since_orders: Stopwatch,
     /// Lines, records and files that could not be used, as the state has it.
     quarantined: BTreeMap<String, u64>,
+    /// What lasts and keeps it from its work, as the state folder has it.
+    faults: Vec<ServiceFault>,
     /// How far the rows of the state have been looked at.
     verified: Verified,
     /// What it is to report once the past has been read: that its state holds nothing but readings of files that are not read.
@@ -99,6 +102,7 @@ impl Daemon {
             since_commit: Stopwatch::start(),
             since_orders: Stopwatch::start(),
             quarantined: BTreeMap::new(),
+            faults: Vec::new(),
             verified: Verified::default(),
             inherited: None,
             beside: None,
@@ -113,6 +117,7 @@ impl Daemon {
     ) -> Result<(), StoreError> {
         self.note_closed()?;
         self.config_is_taken();
+        self.keep_faults(true);
         let mut hangup = signal(SignalKind::hangup())?;
         let (mut tick, mut asked) = (Self::ticks(), shutdown.clone());
         loop {
@@ -386,6 +391,7 @@ impl Daemon {
         let held = self.site.held() as u64;
         let silences = self.site.mutes((self.wall)());
         let is_in_place = self.store.is_in_place();
+        self.note_state(committed.as_ref().err(), is_waiting, is_in_place);
         self.pulse.vitals.update(|health| {
             health.is_store_writable = committed.is_ok() && !is_waiting && is_in_place;
             health.is_clock_wrong = self.site.is_clock_wrong();
@@ -450,6 +456,7 @@ impl Daemon {
         self.thin()?;
         self.verify();
         self.note_quarantined()?;
+        self.keep_faults(false);
         let ((outbox, oldest), bytes) = (self.store.outbox()?, self.store.bytes()?);
         self.pulse.vitals.update(|health| {
             (health.outbox, health.outbox_oldest) = (outbox, oldest);

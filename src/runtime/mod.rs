@@ -39,6 +39,7 @@ pub mod sandbox;
 mod searches;
 pub mod serve;
 pub mod service;
+pub mod service_faults;
 pub mod shutdown;
 pub mod site;
 pub mod sources;

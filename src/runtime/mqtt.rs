@@ -10,6 +10,7 @@ pub(super) use publish::MQTT_OUT;
 pub(super) use session::MOST_UNACKNOWLEDGED;
 
 use super::clock::Stopwatch;
+use super::service_faults::{FaultPlace, ServiceFaultKind, ServiceFaults};
 use super::shutdown::Shutdown;
 use super::site::is_logged;
 use super::tail::{Arrival, Decoder};
@@ -86,8 +87,14 @@ pub async fn follow(
     benchmarks: Vec<Benchmark>,
     client_id: String,
     deliveries: mpsc::Sender<ReceivedMessage>,
+    faults: ServiceFaults,
     mut shutdown: Shutdown,
 ) {
+    let [unreachable, refused] = [
+        ServiceFaultKind::BrokerUnreachable,
+        ServiceFaultKind::SubscriptionRefused,
+    ]
+    .map(|kind| FaultPlace::of_source(kind, &broker.id));
     let mut session = Session::new(broker.clone(), client_id);
     let mut reader = Reader {
         source: broker.id.clone(),
@@ -106,6 +113,7 @@ pub async fn follow(
                     let version = session.version();
                     tracing::info!(source = broker.id, ?broker.address, version, "connected");
                     wait = RECONNECT.0;
+                    faults.is_over(&unreachable);
                     // Again each time: a broker that lost its sessions has forgotten it.
                     if let Err(error) = session.subscribe(&broker.topic) {
                         tracing::error!(source = broker.id, %error, "cannot subscribe");
@@ -118,8 +126,11 @@ pub async fn follow(
                         () = shutdown.requested() => return,
                     }
                 }
+                Ok(SessionEvent::Subscribed) => faults.is_over(&refused),
                 Ok(SessionEvent::SubscriptionRefused) => {
                     let (source, topic) = (&broker.id, &broker.topic);
+                    let what = format!("the broker refuses the subscription to {topic:?}: nothing comes from it");
+                    faults.lasts(refused.clone(), &what);
                     tracing::error!(source, topic, ?RECONNECT, "the broker refuses the subscription: nothing comes from it");
                     // Asked again after a while: its rules may be others then.
                     session.disconnect();
@@ -131,6 +142,8 @@ pub async fn follow(
                 Ok(SessionEvent::Nothing) => {}
                 Err(error) => {
                     tracing::warn!(source = broker.id, %error, ?wait, "no connection; will connect again");
+                    let (host, port) = (&broker.address.host, broker.address.port);
+                    faults.lasts(unreachable.clone(), &format!("no connection to {host}:{port}: {error}"));
                     tokio::select! {
                         () = tokio::time::sleep(wait) => {}
                         () = shutdown.requested() => return,

@@ -87,7 +87,7 @@ pub async fn run(
         pulse.vitals.quarantined(&source, count);
     }
     let beside = SideTasks::start(config, &store, &pulse.vitals, &shutdown, words);
-    let sources = Sources::start(config, &store).map_err(fail)?;
+    let sources = Sources::start(config, &store, pulse.vitals.faults()).map_err(fail)?;
     let mut daemon = Daemon::new(config, store, site, sources, pulse, clock::now);
     daemon.beside = Some(beside);
     daemon.note_inherited(config).map_err(fail)?;

@@ -54,6 +54,11 @@ impl Searches {
         self.asked.remove(benchmark);
     }
 
+    /// Goes on with the searches at these benchmarks alone.
+    pub(super) fn retain(&mut self, goes_on: impl Fn(&BenchmarkId) -> bool) {
+        self.asked.retain(|benchmark, _| goes_on(benchmark));
+    }
+
     /// Has the search made as soon as a thread is free.
     pub(super) fn start(&mut self, job: SearchJob) {
         let (sender, answer) = channel();

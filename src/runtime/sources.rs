@@ -1,6 +1,7 @@
 //! Where a daemon's values come from: files that are followed, brokers that are listened to.
 
 use super::mqtt::{self, Receipt, ReceivedMessage};
+use super::service_faults::ServiceFaults;
 use super::shutdown::{self, Shutdown, Trigger};
 use super::tail::{self, ArrivalBatch, Follower};
 use crate::config::Config;
@@ -36,14 +37,19 @@ pub struct Sources {
 }
 
 impl Sources {
-    /// Goes on where `store` says that the files had been read to.
-    pub(super) fn start(config: &Config, store: &Store) -> Result<Self, StoreError> {
+    /// Goes on where `store` says that the files had been read to. What keeps them from being read is kept in `faults`.
+    pub(super) fn start(
+        config: &Config,
+        store: &Store,
+        faults: &ServiceFaults,
+    ) -> Result<Self, StoreError> {
+        faults.forget_sources();
         let (messages, deliveries) = mpsc::channel(MESSAGES);
         let (stop, stopped) = shutdown::pair();
-        listen(config, store.instance()?, &messages, &stopped);
+        listen(config, store.instance()?, &messages, &stopped, faults);
         let follower = Follower::new(&config.sources, &config.benchmarks, &store.positions()?);
         let (sender, batches) = mpsc::channel(BATCHES);
-        let task = tokio::spawn(tail::follow(follower, sender, stopped));
+        let task = tokio::spawn(tail::follow(follower, sender, faults.clone(), stopped));
         let mut sources = Self::of(messages, deliveries, stop);
         (sources.batches, sources.task) = (batches, task);
         Ok(sources)
@@ -129,6 +135,7 @@ fn listen(
     instance: i64,
     messages: &mpsc::Sender<ReceivedMessage>,
     stopped: &Shutdown,
+    faults: &ServiceFaults,
 ) {
     for broker in &config.brokers {
         // One session for each state and source, found again after a restart. Two daemons of one site's name would
@@ -142,6 +149,7 @@ fn listen(
             config.benchmarks.clone(),
             client,
             messages.clone(),
+            faults.clone(),
             stopped.clone(),
         ));
     }

@@ -3,6 +3,7 @@
 use super::clock::Stopwatch;
 use super::drilled::DrillRecord;
 use super::record::standing::RecordStanding;
+use super::service_faults::{ServiceFault, ServiceFaults};
 use super::site::Mute;
 use crate::alert::Level;
 use crate::monitor::{AlertState, Event, EventKind, Unexplained};
@@ -79,6 +80,8 @@ pub struct Health {
     pub record: Option<RecordStanding>,
     /// Why the config file as it is now was not taken at a reload; `None` where it is in force.
     pub config_refused: Option<String>,
+    /// What lasts and keeps it from its work: a broker out of reach, a file that cannot be read; the first of them.
+    pub faults: Vec<ServiceFault>,
 }
 
 impl Health {
@@ -177,6 +180,7 @@ pub struct Vitals {
     oldest: Mutex<Option<Stopwatch>>,
     points: Mutex<BTreeMap<BenchmarkId, VitalsPoint>>,
     refits: Histogram,
+    faults: ServiceFaults,
 }
 
 impl Default for Vitals {
@@ -188,6 +192,7 @@ impl Default for Vitals {
             oldest: Mutex::default(),
             points: Mutex::default(),
             refits: Histogram::new(REFIT_SECONDS),
+            faults: ServiceFaults::default(),
         }
     }
 }
@@ -215,8 +220,14 @@ impl Vitals {
         let oldest = *locked(&self.oldest);
         Health {
             lag_seconds: oldest.map_or(0.0, |found| found.elapsed().as_secs_f64()),
+            faults: self.faults.shown(),
             ..locked(&self.health).clone()
         }
+    }
+
+    /// What lasts and keeps the daemon from its work.
+    pub(super) fn faults(&self) -> &ServiceFaults {
+        &self.faults
     }
 
     /// Values found then are being taken; those before them may not be durable yet either.

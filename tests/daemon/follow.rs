@@ -660,6 +660,19 @@ fn a_packed_file_is_read_once_whole_and_its_last_line_needs_no_newline() {
 }
 
 #[test]
+fn what_is_added_to_a_packed_file_that_has_been_read_is_not_lost() {
+    let mut bench = Bench::new("csv");
+    let file = bench.path("5.csv.gz");
+    let first = pack(&file, &format!("{HEADER}{}", row(1, 1.0)));
+    assert_eq!(bench.news(), ["5:1"]);
+    let more = pack(&bench.path("more"), &row(2, 2.0));
+    fs::write(&file, [first, more].concat()).unwrap();
+    // Whole: whoever takes the values drops what is known.
+    assert_eq!(bench.news(), ["5:1", "5:2"]);
+    assert!(bench.news().is_empty());
+}
+
+#[test]
 fn a_packed_file_that_is_still_being_packed_is_read_when_it_is_whole() {
     let mut bench = Bench::new("csv");
     let text = format!("{HEADER}{}{}", row(1, 1.0), row(2, 2.0));

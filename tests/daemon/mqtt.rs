@@ -12,6 +12,7 @@ use rumqttc::{AsyncClient, Event, MqttOptions, Packet, QoS};
 use slipwatch::config::{self, Config};
 use slipwatch::monitor::Input;
 use slipwatch::runtime::mqtt::{ReceivedMessage, follow};
+use slipwatch::runtime::service_faults::ServiceFaults;
 use slipwatch::runtime::shutdown::{self, Trigger};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -189,7 +190,9 @@ impl Source {
         let (sender, deliveries) = mpsc::channel(8);
         let (stop, stopped) = shutdown::pair();
         let radio = config.brokers[0].clone();
-        let follow = follow(radio, config.benchmarks, id.to_owned(), sender, stopped);
+        let faults = ServiceFaults::default();
+        let id = id.to_owned();
+        let follow = follow(radio, config.benchmarks, id, sender, faults, stopped);
         let task = tokio::spawn(follow);
         Self {
             deliveries,
@@ -382,6 +385,7 @@ async fn messages_of_many_lines_wait_at_the_broker_until_those_before_have_been_
         config.benchmarks,
         "wide".to_owned(),
         sender,
+        ServiceFaults::default(),
         stopped,
     ));
     tokio::time::sleep(Duration::from_millis(1500)).await;
@@ -540,6 +544,24 @@ async fn a_broker_that_restarts_is_found_again_and_a_bad_line_stops_nothing() {
     assert_eq!(values(&delivery), [3.0]);
     delivery.receipt.acknowledge().await.unwrap();
     source.end().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+#[cfg_attr(not(has_mosquitto), ignore = "Mosquitto was not found by build.rs")]
+async fn a_broker_that_is_gone_stands_in_status_until_it_is_back() {
+    let mut broker = Mosquitto::start();
+    let daemon = Daemon::start(&broker);
+    let status = || daemon.printed(&["status", "--config", "site.toml"]);
+    daemon.wait("it connects", |one| one.text("log").contains("connected"));
+    let is_said = |status: &str| status.contains("source radio: no connection to 127.0.0.1:");
+    assert!(!is_said(&status()), "{}", status());
+    broker.process.kill().unwrap();
+    broker.process.wait().unwrap();
+    daemon.wait("that it is gone", |_| is_said(&status()));
+    let json = daemon.printed(&["status", "--config", "site.toml", "--format", "json"]);
+    assert!(json.contains(r#""kind":"broker-unreachable""#), "{json}");
+    broker.start_again();
+    daemon.wait("that it is back", |_| !is_said(&status()));
 }
 
 /// The config of a broker that lets anybody in and refuses each subscription; it needs the plug-in that comes with

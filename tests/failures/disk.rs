@@ -48,6 +48,13 @@ fn on_a_full_disk_alerts_go_out_and_what_was_taken_is_written_when_there_is_room
     let reds = || site.notified("5/red/", "");
     eventually("notified", || reds() > 0);
     assert_eq!(site.values().len(), 0, "there was room");
+    let status = || site.printed(&["status", "--config", "site.toml"]);
+    let is_said = || {
+        status()
+            .replace("\n    ", " ")
+            .contains("in force there: 5 red")
+    };
+    eventually("what the state does not hold", is_said);
     assert_eq!(program.ended(), None, "{}", site.log());
     fs::remove_file(state.join("ballast")).unwrap();
     eventually("written", || site.values().len() == 114);
@@ -55,6 +62,7 @@ fn on_a_full_disk_alerts_go_out_and_what_was_taken_is_written_when_there_is_room
     eventually("said", || {
         site.log().contains("there is room on the disk again")
     });
+    eventually("no fault", || !status().contains("FAULT"));
     let times: std::collections::BTreeSet<_> =
         (site.values().into_iter().map(|(_, time, _)| time)).collect();
     assert_eq!(times.len(), 114, "each once");

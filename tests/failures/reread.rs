@@ -3,6 +3,7 @@
 use crate::site::{Program, Site, eventually};
 use crate::telling::failing;
 use nix::sys::signal::Signal;
+use std::fs;
 
 const POLICY: &str = "[alert]\nevacuation_time = \"3h\"\n";
 const THRESHOLD: &str = "[[alert.threshold]]\nlevel = \"red\"\nvelocity = \"50 mm/day\"\n";
@@ -118,6 +119,37 @@ fn readings_that_mean_something_else_are_taken_anew_and_call_no_false_red() {
             "{now}: {events}"
         );
         assert!(!events.contains("its unit was"), "{now}: {events}");
+    }
+}
+
+/// A reload says in other words what is read, with the same numbers: where the file is there its rows come again, and where it is not
+/// nothing comes that could call the red again.
+#[test]
+fn a_red_stands_through_a_reload_that_reads_its_readings_otherwise() {
+    for stays in [true, false] {
+        let site = Site::new(&format!("{}{POLICY}", benchmark("b", "")));
+        let header = "time,b_displacement_mm\n";
+        site.append("incoming/x.csv", &format!("{header}{}", failing(0..112)));
+        let program = site.caught_up();
+        eventually("b's red", || site.notified("b/red/", "firing") == 1);
+        let taken = site.values().len();
+        if !stays {
+            fs::remove_file(site.path("incoming/x.csv")).unwrap();
+        }
+        let other = benchmark("b", "column = \"b_displacement_mm\"\nunit = \"mm\"");
+        reload(&site, &program, &format!("{other}{POLICY}"));
+        let anew = if stays { 112 } else { 0 };
+        eventually("its rows", || site.values().len() == taken + anew);
+        assert_eq!(site.level("b"), "red", "stays: {stays}");
+        // One more reading, the first of the new meaning where the file is gone.
+        site.append("incoming/y.csv", &format!("{header}{}", failing(112..114)));
+        eventually("the newest", || site.values().len() == taken + anew + 2);
+        assert_eq!(site.level("b"), "red", "stays: {stays}");
+        program.stop();
+        let events = site.proven_events();
+        assert_eq!(site.notified("b/red/", "firing"), 1, "{stays}: {events}");
+        assert_eq!(site.notified("b/red/", "resolved"), 0, "{stays}: {events}");
+        assert_eq!(events.matches("\"read-anew\"").count(), 1, "{events}");
     }
 }
 

@@ -2,6 +2,7 @@
 
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
+use serde_json::Value;
 use slipwatch::reading::Timestamp;
 use slipwatch::store::Store;
 use std::fs::{self, File, OpenOptions};
@@ -187,6 +188,15 @@ impl Site {
         let of = ["alerts", "ack", "--benchmark", benchmark];
         let config = ["--by", by, "--config", "site.toml"];
         self.printed(&[of, config].concat());
+    }
+
+    /// The level in force at a benchmark.
+    pub(crate) fn level(&self, benchmark: &str) -> String {
+        let text = self.printed(&["status", "--config", "site.toml", "--format", "json"]);
+        let status: Value = serde_json::from_str(&text).unwrap();
+        let all = status["benchmarks"].as_array().unwrap();
+        let one = all.iter().find(|one| one["benchmark"] == benchmark);
+        one.unwrap()["level"].as_str().unwrap().to_owned()
     }
 
     /// The event log.

@@ -8,11 +8,52 @@ use slipwatch::runtime::clock;
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::fs;
+use std::io::Write;
 use std::net::TcpStream;
 use std::os::unix::ffi::OsStrExt;
 use std::time::Duration;
 
 const HEADER: &str = "time,displacement_mm\n";
+
+#[test]
+fn what_cannot_be_read_is_seen_until_it_can() {
+    let site = Site::new("[[source]]\nid = \"far\"\nkind = \"csv\"\npath = \"mount/*.csv\"\n");
+    let listen = site.listen();
+    site.append("incoming/header.csv", "when,what\n1,2\n");
+    // It ends in the middle.
+    let mut packer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+    let text = format!("{HEADER}{}", failing(0..20));
+    packer.write_all(text.as_bytes()).unwrap();
+    let packed = packer.finish().unwrap();
+    let half = &packed[..packed.len() / 2];
+    fs::write(site.path("incoming/5.csv.gz"), half).unwrap();
+    let program = site.caught_up();
+    let status = || site.printed(&["status", "--config", "site.toml"]);
+    let faults = || status().matches("\nFAULT since ").count();
+    eventually("all three", || faults() == 3);
+    let said = status().replace("\n    ", " ");
+    for text in [
+        "mount cannot be listed",
+        "header.csv is refused",
+        "5.csv.gz cannot be read",
+    ] {
+        assert!(said.contains(text), "{said}");
+    }
+    for kind in ["folder-unreadable", "file-refused", "file-unreadable"] {
+        let metric = format!("slipwatch_faults{{kind=\"{kind}\",source=");
+        assert!(get(&listen, "/metrics").contains(&metric), "{kind}");
+        let key = format!("\"kind\":\"{kind}\"");
+        assert!(get(&listen, "/api/status").contains(&key), "{kind}");
+    }
+    fs::create_dir(site.path("mount")).unwrap();
+    fs::write(site.path("incoming/5.csv.gz"), &packed).unwrap();
+    fs::remove_file(site.path("incoming/header.csv")).unwrap();
+    eventually("none", || faults() == 0);
+    eventually("its readings", || site.values().len() == 20);
+    // Another daemon has met none of the last one's faults.
+    program.stop();
+    assert!(!status().contains("FAULT"), "{}", status());
+}
 
 #[test]
 fn a_benchmark_that_never_gave_a_reading_is_seen_and_unknown_from_the_start() {

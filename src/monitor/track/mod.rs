@@ -361,6 +361,13 @@ impl Track {
         unknown.into_iter().chain(removed).collect()
     }
 
+    /// What is in force at `former` goes on: the readings of the same benchmark, which mean something else from here on.
+    pub(super) fn follow_on(&mut self, mut former: Self, now: Timestamp, why: &str) -> Vec<Event> {
+        let unknown = (former.quality).ends_all_unknown(&mut former.record, now, why);
+        self.alarm.follow_on(former.alarm);
+        unknown.into_iter().collect()
+    }
+
     /// Whether the level in force would have been another one, had everything come in time.
     pub(super) fn look_back(&mut self, policy: &Policy, time: Timestamp) -> Option<Event> {
         self.pending.look_back(&self.record, policy, time)

@@ -125,7 +125,7 @@ impl Daemon {
         self.site.rehook(dispatcher(&fresh, &self.store))?;
         self.note_closed()?;
         self.note_inherited(&fresh)?;
-        self.sources = Sources::start(&fresh, &self.store)?;
+        self.sources = Sources::start(&fresh, &self.store, self.pulse.vitals.faults())?;
         if let Some(beside) = &mut self.beside {
             beside.follow(&fresh).await;
         }

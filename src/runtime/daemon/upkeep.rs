@@ -1,7 +1,12 @@
 //! What keeps the state in order while the daemon works.
 
 use super::Daemon;
+use crate::alert::Level;
+use crate::runtime::service_faults::{self, FaultPlace};
 use crate::store::StoreError;
+
+/// Benchmarks that a text names.
+const MOST_NAMED: usize = 10;
 
 impl Daemon {
     /// On a full disk it waits, as everything does.
@@ -25,6 +30,55 @@ impl Daemon {
             }
             Err(error) if error.is_full() => Ok(()),
             Err(error) => Err(error),
+        }
+    }
+
+    /// Keeps what lasts and keeps it from its work, for those who ask the state; `anew`: whatever is there from before.
+    pub(super) fn keep_faults(&mut self, anew: bool) {
+        let faults = self.pulse.vitals.faults().shown();
+        if faults == self.faults && !anew {
+            return;
+        }
+        match service_faults::write(&self.config.site.state_dir, &faults) {
+            Ok(()) => self.faults = faults,
+            Err(error) => {
+                tracing::debug!(%error, "faults are not kept for slipwatch status");
+            }
+        }
+    }
+
+    /// After a commit: whether the state holds all that is known.
+    pub(super) fn note_state(
+        &self,
+        error: Option<&StoreError>,
+        is_waiting: bool,
+        is_in_place: bool,
+    ) {
+        let faults = self.pulse.vitals.faults();
+        let why = match error {
+            Some(error) => error.to_string(),
+            None if is_waiting => "there is no room on the disk".to_owned(),
+            None if !is_in_place => "its folder or its files are gone".to_owned(),
+            None => return faults.is_over(&FaultPlace::of_state()),
+        };
+        let levels = self.levels_in_memory();
+        let text = format!(
+            "the state cannot be written ({why}): what comes waits unacknowledged, alerts go out from memory; in force there: {levels}"
+        );
+        faults.lasts(FaultPlace::of_state(), &text);
+    }
+
+    /// Where orange or red is in force.
+    fn levels_in_memory(&self) -> String {
+        let points = self.pulse.vitals.points();
+        let grave = points.iter().filter(|(_, one)| one.level >= Level::Orange);
+        let named: Vec<String> = (grave.take(MOST_NAMED))
+            .map(|(id, one)| format!("{id} {}", one.level.name()))
+            .collect();
+        if named.is_empty() {
+            "no orange or red".to_owned()
+        } else {
+            named.join(", ")
         }
     }
 

@@ -152,15 +152,9 @@ impl Exercise {
         };
         let name = &office.config.site.name;
         let site = Site::resume(name, config.settings.clone(), sinks, &mut || {})?;
-        let sources = Sources::start(&config, &store)?;
-        let daemon = Daemon::new(
-            &config,
-            store,
-            site,
-            sources,
-            Reporting::inward(),
-            clock::now,
-        );
+        let pulse = Reporting::inward();
+        let sources = Sources::start(&config, &store, pulse.vitals.faults())?;
+        let daemon = Daemon::new(&config, store, site, sources, pulse, clock::now);
         Ok(Self {
             daemon,
             watched,

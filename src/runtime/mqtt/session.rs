@@ -60,6 +60,7 @@ enum Link {
 pub(super) enum SessionEvent<M = BrokerMessage> {
     Connected,
     Message(M),
+    Subscribed,
     SubscriptionRefused,
     Nothing,
 }
@@ -171,6 +172,7 @@ impl Session {
                 self.is_accepted = true;
                 Ok(SessionEvent::Connected)
             }
+            Ok(SessionEvent::Subscribed) => Ok(SessionEvent::Subscribed),
             Ok(SessionEvent::SubscriptionRefused) => Ok(SessionEvent::SubscriptionRefused),
             Ok(SessionEvent::Nothing) => Ok(SessionEvent::Nothing),
             Err((may_be_another_version, error)) => {
@@ -275,7 +277,7 @@ fn came_by_five(client: &v5::AsyncClient, packet: packet5::Packet) -> SessionEve
         packet5::Packet::SubAck(answer) => {
             let is_granted = |code| matches!(code, &packet5::SubscribeReasonCode::Success(_));
             if answer.return_codes.iter().all(is_granted) {
-                SessionEvent::Nothing
+                SessionEvent::Subscribed
             } else {
                 SessionEvent::SubscriptionRefused
             }
@@ -306,13 +308,13 @@ fn came_by_three(client: &v3::AsyncClient, packet: v3::Packet) -> SessionEvent<P
         {
             SessionEvent::SubscriptionRefused
         }
+        v3::Packet::SubAck(_) => SessionEvent::Subscribed,
         v3::Packet::Connect(_)
         | v3::Packet::PubAck(_)
         | v3::Packet::PubRec(_)
         | v3::Packet::PubRel(_)
         | v3::Packet::PubComp(_)
         | v3::Packet::Subscribe(_)
-        | v3::Packet::SubAck(_)
         | v3::Packet::Unsubscribe(_)
         | v3::Packet::UnsubAck(_)
         | v3::Packet::PingReq

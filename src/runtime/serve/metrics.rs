@@ -4,6 +4,7 @@ use crate::alert::Level;
 use crate::reading::{BenchmarkId, Timestamp, plain};
 use crate::runtime::clock;
 use crate::runtime::drilled::DrillRecord;
+use crate::runtime::service_faults::{ServiceFaultKind, ServiceFaults};
 use crate::runtime::vitals::{Health, Vitals, VitalsPoint};
 use prometheus_client::collector::Collector;
 use prometheus_client::encoding::{DescriptorEncoder, EncodeMetric, text};
@@ -40,6 +41,7 @@ impl Collector for Vitals {
         )?;
         state(&mut sheet, &health)?;
         trouble(&mut sheet, &health)?;
+        faults(&mut sheet, self.faults())?;
         counts(&mut sheet, &health)?;
         drills(&mut sheet, health.drill.as_ref())?;
         let about = "Time to work in a reading that led to a refit";
@@ -97,6 +99,27 @@ fn trouble(sheet: &mut Sheet<'_>, health: &Health) -> fmt::Result {
     if let Some(until) = health.silences.iter().map(|mute| mute.until).max() {
         let about = "When the last order ends by which alerts are not reported, Unix time";
         sheet.gauge("silenced_until_timestamp_seconds", about, seconds(until))?;
+    }
+    Ok(())
+}
+
+/// What lasts and keeps the daemon from its work.
+fn faults(sheet: &mut Sheet<'_>, faults: &ServiceFaults) -> fmt::Result {
+    let about = "What lasts and keeps the daemon from its work: brokers out of reach, files that cannot be read, the state";
+    let mut family = (sheet.0).encode_descriptor("faults", about, None, MetricType::Gauge)?;
+    let mut counts = faults.counts();
+    for kind in ServiceFaultKind::ALL {
+        if counts.keys().all(|(lasts, _)| *lasts != kind) {
+            counts.insert((kind, None), 0);
+        }
+    }
+    for ((kind, source), count) in counts {
+        let source = source.unwrap_or_default();
+        let labels = [
+            ("kind", kind.name().to_owned()),
+            ("source", label_value(&source)),
+        ];
+        ConstGauge::new(count as f64).encode(family.encode_family(&labels)?)?;
     }
     Ok(())
 }

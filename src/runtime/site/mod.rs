@@ -319,6 +319,8 @@ impl Site {
             let stays = |id: &BenchmarkId| !settings.watched.ends(id, former);
             self.newest.retain(|id, _| stays(id));
             self.ahead.retain(|id, _| stays(id));
+            // What a search finds in the former readings says nothing of the new ones.
+            self.searches.retain(stays);
         }
         if let Input::Notice(Notice::FirstAhead { benchmark, .. }) = input
             && let Some(first) = self.newest.remove(benchmark)

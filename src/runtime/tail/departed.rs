@@ -38,7 +38,7 @@ pub(super) enum Departure {
 impl FileTail {
     /// The file is no longer under its name: finds where it is, so that what was, and is, written to it is read.
     pub(super) fn leave(&mut self) -> Departure {
-        if self.place.is_none() || matches!(self.content, Content::Complete | Content::Refused) {
+        if self.place.is_none() || matches!(self.content, Content::Complete | Content::Refused(_)) {
             return Departure::Over;
         }
         let (path, is_nameless) = match self.whereabouts() {

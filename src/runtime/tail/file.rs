@@ -88,8 +88,8 @@ pub(super) enum Content {
         /// A damaged last record may be one that is still being written: it gets a second look.
         suspect: Option<u64>,
     },
-    /// Not to be read until it is another file.
-    Refused,
+    /// Not to be read until it is another file: why.
+    Refused(String),
     /// Complete: nothing comes after it.
     Complete,
 }
@@ -171,7 +171,13 @@ impl FileTail {
                     turn += READ_BYTES as u64;
                     self.count_valueless();
                 }
-                Ok(false) => return,
+                Ok(false) => {
+                    // A packed file is tried again when it has changed, and the trouble with it lasts until then.
+                    if !matches!(self.content, Content::Packed(_)) {
+                        self.trouble = None;
+                    }
+                    return;
+                }
                 Err(error) => {
                     let trouble = error.to_string();
                     if self.trouble.as_ref() != Some(&trouble) {
@@ -234,9 +240,14 @@ impl FileTail {
         let file = self.open()?;
         self.is_restored = false;
         let glance = Glance::at(&file.metadata()?);
-        if !self.is_same(&file, glance)? {
+        if self.has_grown_packed(glance) {
+            // Known values are dropped as repeated.
+            tracing::info!(file = %self.path.display(), "a packed file that has grown since it was read: read from its start");
+            self.content = Content::of(&self.decoder, &self.origin);
+            self.at = 0;
+        } else if !self.is_same(&file, glance)? {
             let is_read =
-                self.at > 0 && !matches!(self.content, Content::Refused | Content::Complete);
+                self.at > 0 && !matches!(self.content, Content::Refused(_) | Content::Complete);
             if self.departed.is_some() {
                 // What has left its name is read on, and nothing else in its place.
                 if is_read {
@@ -262,7 +273,7 @@ impl FileTail {
             Content::Text(_) => self.read_text(&file)?,
             Content::Packed(_) => return self.read_packed(glance),
             Content::Mcap { .. } => self.read_record(&file, glance.size)?,
-            Content::Refused | Content::Complete => {}
+            Content::Refused(_) | Content::Complete => {}
         }
         let moved = self.at != before;
         if moved {
@@ -275,13 +286,22 @@ impl FileTail {
         Ok(moved)
     }
 
+    /// Whether more has been packed into the file, under its name, since it was read whole.
+    fn has_grown_packed(&self, glance: Glance) -> bool {
+        matches!(self.content, Content::Complete)
+            && is_packed(&self.origin)
+            && self.departed.is_none()
+            && self.place == Some(glance.place)
+            && glance.size > self.at
+    }
+
     pub(super) fn mark_start(&self) -> u64 {
         self.at.saturating_sub(MARK_BYTES)
     }
 
     fn is_same(&self, file: &File, glance: Glance) -> io::Result<bool> {
         if self.at == 0 {
-            return Ok(!matches!(self.content, Content::Refused));
+            return Ok(!matches!(self.content, Content::Refused(_)));
         }
         if self.place != Some(glance.place) || glance.size < self.at {
             return Ok(false);
@@ -377,7 +397,7 @@ impl FileTail {
     fn refuse(&mut self, error: &dyn std::error::Error) {
         self.quarantined += 1;
         tracing::warn!(file = %self.path.display(), %error, "file refused until it is replaced");
-        self.content = Content::Refused;
+        self.content = Content::Refused(error.to_string());
     }
 
     fn read_record(&mut self, file: &File, size: u64) -> io::Result<()> {

@@ -63,7 +63,8 @@ pub struct Follower {
     pub(super) files: BTreeMap<FileKey, FileTail>,
     /// The earliest pending value of each file; between two rounds there is none.
     heads: BTreeSet<Head>,
-    pub(super) missing: BTreeSet<PathBuf>,
+    /// Folders that cannot be listed, of which source, and why.
+    pub(super) unlisted: BTreeMap<PathBuf, (String, String)>,
     /// Runs since the last look at the files.
     looked: Option<Stopwatch>,
     /// The files held no more once: what comes since is live, but for the backlog of one or another.
@@ -104,7 +105,7 @@ impl Follower {
             files: files.collect(),
             sources,
             heads: BTreeSet::new(),
-            missing: BTreeSet::new(),
+            unlisted: BTreeMap::new(),
             looked: None,
             is_live: false,
             at_once: Vec::new(),

@@ -23,7 +23,7 @@ impl FileTail {
     /// Whether more may come: a file that has not been written to for days has ended. How it stands with one that has
     /// not been looked at since a restart is not known.
     pub(super) fn may_grow(&self) -> bool {
-        !matches!(self.content, Content::Refused | Content::Complete)
+        !matches!(self.content, Content::Refused(_) | Content::Complete)
             && (self.is_restored || !self.is_old())
     }
 

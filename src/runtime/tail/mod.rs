@@ -9,6 +9,7 @@
 
 mod decode;
 mod departed;
+mod faults;
 mod file;
 mod follow;
 mod gap;
@@ -29,6 +30,7 @@ pub(super) use rescan::list;
 pub(super) use text::{BadLine, LinesRead, TextReader};
 
 use super::clock::{self, Stopwatch};
+use super::service_faults::ServiceFaults;
 use super::shutdown::Shutdown;
 use notify::{RecommendedWatcher, RecursiveMode, Watcher};
 use std::collections::BTreeSet;
@@ -49,13 +51,15 @@ const LONGEST_REST: Duration = Duration::from_millis(200);
 
 /// Follows until `shutdown` is asked for or nobody takes the batches any more.
 ///
-/// Every round is sent, an empty one too: that the files hold no more is news.
+/// Every round is sent, an empty one too: that the files hold no more is news. Files and folders that cannot be read are kept in
+/// `faults`.
 ///
 /// # Errors
 /// When a reading task broke off.
 pub async fn follow(
     mut follower: Follower,
     batches: mpsc::Sender<ArrivalBatch>,
+    faults: ServiceFaults,
     mut shutdown: Shutdown,
 ) -> Result<(), tokio::task::JoinError> {
     let mut watch = FolderWatch::new(follower.folders());
@@ -71,6 +75,7 @@ pub async fn follow(
             (follower, batch)
         })
         .await?;
+        faults.are_of_files(follower.faults());
         let rest = (REST * looking.elapsed()).clamp(SHORTEST_REST, LONGEST_REST);
         let rested = clock::later(rest);
         let (waits, rests) = (

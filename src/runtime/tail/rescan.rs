@@ -226,7 +226,7 @@ impl Follower {
             let folder = source.pattern.folder();
             match list(&source.pattern, &source.decoder) {
                 Ok((files, not_text)) => {
-                    self.missing.remove(folder);
+                    self.unlisted.remove(folder);
                     for path in not_text {
                         if self.not_text.insert(path.clone()) {
                             tracing::warn!(file = ?path, "its name is no UTF-8: it is not read; rename it");
@@ -242,7 +242,8 @@ impl Follower {
                     if error.kind() != io::ErrorKind::NotFound {
                         listing.unlisted.insert(index);
                     }
-                    if self.missing.insert(folder.to_owned()) {
+                    let why = (source.id.clone(), error.to_string());
+                    if self.unlisted.insert(folder.to_owned(), why).is_none() {
                         tracing::warn!(folder = %folder.display(), %error, "cannot list; will look again");
                     }
                 }

@@ -75,7 +75,7 @@ impl FileTail {
             content: match &self.content {
                 Content::Text(_) => SavedContent::Text(SavedText::default()),
                 Content::Mcap { .. } => SavedContent::Mcap(Channels::default()),
-                Content::Packed(_) | Content::Refused | Content::Complete => SavedContent::Anew,
+                Content::Packed(_) | Content::Refused(_) | Content::Complete => SavedContent::Anew,
             },
             ..Saved::default()
         };
@@ -97,7 +97,7 @@ impl FileTail {
             Content::Mcap { channels, .. } => SavedContent::Mcap(channels.clone()),
             Content::Complete => SavedContent::Complete,
             // A packed file is read whole or not at all.
-            Content::Packed(_) | Content::Refused => SavedContent::Anew,
+            Content::Packed(_) | Content::Refused(_) => SavedContent::Anew,
         };
         self.safe = Saved {
             at: self.at,

@@ -178,6 +178,12 @@ impl Alarm {
         Some((level, since))
     }
 
+    /// Goes on with the level that is in force at `former`, of readings that meant something else.
+    pub(super) fn follow_on(&mut self, former: Self) {
+        self.latch = former.latch.measured_otherwise();
+        (self.levels, self.kept) = (former.levels, former.kept);
+    }
+
     /// That the level in force ends because the benchmark is no longer watched.
     pub(super) fn removed(
         &self,

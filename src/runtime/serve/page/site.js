@@ -34,6 +34,7 @@ export class SitePage {
     this.view.replaceChildren(
       this.head(site),
       ...(at ? [] : HEALTH.filter(([is]) => is(status)).map(([, text]) => el('p', { class: 'card level red' }, text))),
+      ...(at ? [] : status.faults.map((one) => el('p', { class: 'card level red' }, one.source ? `Source ${one.source}: ` : '', one.text, ', since ', when(one.since)))),
       el('section', { class: 'card', 'aria-label': 'Benchmarks' }, table(sorted, site)),
       el('div', { class: sorted.some((one) => one.position) ? 'two' : '' },
         sketch(sorted, site.positions_are),

@@ -1,0 +1,156 @@
+//! Which benchmarks are watched, and what becomes of them when the config says something else of them.
+
+use super::event::Event;
+use super::track::Track;
+use super::{Monitor, trouble};
+use crate::alert::Level;
+use crate::reading::{BenchmarkId, Timestamp};
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The benchmarks that are watched.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Watched {
+    /// Those that have a name in the config.
+    pub named: BTreeSet<BenchmarkId>,
+    /// Whether whatever else comes is watched too.
+    pub is_open: bool,
+    /// What decides which numbers the readings of each are; none in a state of older versions.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub read_as: BTreeMap<BenchmarkId, String>,
+}
+
+/// Whatever comes.
+impl Default for Watched {
+    fn default() -> Self {
+        Self {
+            named: BTreeSet::new(),
+            is_open: true,
+            read_as: BTreeMap::new(),
+        }
+    }
+}
+
+impl Watched {
+    /// Whether `benchmark`, watched under `former`, no longer is: it was named and is not any more, or was not and
+    /// nothing else than what is named is watched from now on.
+    fn drops(&self, benchmark: &BenchmarkId, former: &Self) -> bool {
+        let was_named = former.named.contains(benchmark);
+        !self.named.contains(benchmark) && (was_named || !self.is_open)
+    }
+
+    /// What the readings of `benchmark` are read as, where that is something else than under `former`.
+    fn changed(&self, benchmark: &BenchmarkId, former: &Self) -> Option<&str> {
+        let now = self.read_as.get(benchmark)?;
+        let before = former.read_as.get(benchmark)?;
+        (now != before).then_some(now)
+    }
+
+    /// Whether what is known of `benchmark` ends when this follows on `former`.
+    pub(crate) fn ends(&self, benchmark: &BenchmarkId, former: &Self) -> bool {
+        self.drops(benchmark, former) || self.changed(benchmark, former).is_some()
+    }
+}
+
+impl Monitor {
+    /// Ends what is known of benchmarks that are no longer watched.
+    pub(super) fn unwatch(&mut self, now: Timestamp, former: &Watched) -> Vec<Event> {
+        let watched = &self.settings.watched;
+        let dropped = |id: &&BenchmarkId| watched.drops(id, former);
+        let gone: Vec<BenchmarkId> =
+            (self.benchmarks.all().keys().filter(dropped).cloned()).collect();
+        let mut events = Vec::new();
+        let awaited: Vec<BenchmarkId> = self.outages.awaited().cloned().collect();
+        for id in awaited {
+            if !self.settings.watched.named.contains(&id) {
+                events.extend(self.outages.end_awaiting(now, &id, "is no longer watched"));
+            }
+        }
+        for id in gone {
+            self.anew.remove(&id);
+            if let Some(mut track) = self.benchmarks.remove(&id) {
+                let why = format!("benchmark {id} is no longer watched");
+                events.extend(track.close(now, &why));
+            }
+            self.note_dropped(&id);
+        }
+        events
+    }
+
+    /// Benchmarks whose readings mean something else from here on. The sources give what the files hold anew; until the first of it
+    /// comes, and none may where there is no file, what is known goes on to count.
+    pub(super) fn reread(&mut self, now: Timestamp, former: &Watched) -> Vec<Event> {
+        let watched = &self.settings.watched;
+        let changed: Vec<(BenchmarkId, String)> = (self.benchmarks.all().keys())
+            .filter_map(|id| {
+                let read_as = watched.changed(id, former)?;
+                let why = format!(
+                    "benchmark {id} is read as {read_as} from here on: its readings are taken anew; a level in force stays until \
+                     they, or people, end it"
+                );
+                Some((id.clone(), why))
+            })
+            .collect();
+        let mut events = Vec::new();
+        for (id, why) in changed {
+            events.push(Event {
+                benchmark: Some(id.clone()),
+                ..trouble(now, "read-anew", &why)
+            });
+            self.anew.insert(id, why);
+        }
+        events
+    }
+
+    /// What was known of `benchmark`, where this reading of it is the first that means something else, and why it does.
+    pub(super) fn begin_anew(&mut self, benchmark: &BenchmarkId) -> Option<(Track, String)> {
+        let why = self.anew.remove(benchmark)?;
+        let former = self.benchmarks.remove(benchmark)?;
+        // The key of an alert that stays in force must not change; one that begins later has another beginning.
+        if former.level() == Level::Green {
+            self.note_dropped(benchmark);
+        } else {
+            self.forget_work(benchmark);
+        }
+        Some((former, why))
+    }
+
+    fn note_dropped(&mut self, id: &BenchmarkId) {
+        let times = self.dropped.entry(id.clone()).or_default();
+        *times = times.saturating_add(1);
+        self.forget_work(id);
+    }
+
+    /// What is still to be done for `id` is not.
+    fn forget_work(&mut self, id: &BenchmarkId) {
+        self.searches.retain(|job| job.benchmark != *id);
+        self.past.forget(id);
+        self.batches.forget(id);
+        self.benchmarks.note_changed(id);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_loses_its_name_is_dropped_and_what_never_had_one_only_where_nothing_else_is_watched() {
+        let five = BenchmarkId::new("5");
+        let watched = |named: &[&str], is_open| Watched {
+            named: named.iter().copied().map(BenchmarkId::new).collect(),
+            is_open,
+            read_as: BTreeMap::new(),
+        };
+        for (former, now, is_dropped) in [
+            (watched(&["4", "5"], true), watched(&["4"], true), true),
+            (watched(&["4"], true), watched(&["4"], true), false),
+            (watched(&["4"], true), watched(&[], true), false),
+            (watched(&["4"], true), watched(&["4"], false), true),
+            (watched(&["4"], true), watched(&["5"], false), false),
+            (Watched::default(), watched(&[], false), true),
+        ] {
+            assert_eq!(now.drops(&five, &former), is_dropped, "{former:?} {now:?}");
+        }
+    }
+}
