@@ -13,6 +13,10 @@ recipients=$(printf '%s, ' "$@")
 # One line, whatever a benchmark is called.
 plain() { printf '%s' "$1" | tr -d '\000-\037\177'; }
 place=$(plain "${SLIPWATCH_BENCHMARK:-(site)}")
+# One message may stand for many benchmarks.
+if [ "${SLIPWATCH_COUNT:-1}" -gt 1 ]; then
+    place="$SLIPWATCH_COUNT benchmarks"
+fi
 site=$(plain "$SLIPWATCH_SITE")
 {
     printf 'To: %s\n' "${recipients%, }"

@@ -16,6 +16,10 @@ esac
 # One line, whatever a benchmark is called.
 plain() { printf '%s' "$1" | tr -d '\000-\037\177'; }
 place=$(plain "${SLIPWATCH_BENCHMARK:-(site)}")
+# One message may stand for many benchmarks.
+if [ "${SLIPWATCH_COUNT:-1}" -gt 1 ]; then
+    place="$SLIPWATCH_COUNT benchmarks"
+fi
 title="[$SLIPWATCH_STATUS] $(plain "$SLIPWATCH_SITE"): $SLIPWATCH_LEVEL $SLIPWATCH_STATE"
 text="$place, $SLIPWATCH_TIME${SLIPWATCH_FAILURE_TIME:+; median forecast of the collapse $SLIPWATCH_FAILURE_TIME}"
 token_file="$(dirname "$0")/ntfy.token"

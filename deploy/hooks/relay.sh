@@ -33,6 +33,10 @@ fi
 case "$SLIPWATCH_LEVEL/$SLIPWATCH_STATE" in
 red/firing) echo 1 >"$file" ;;
 red/resolved)
+    if [ "${SLIPWATCH_COUNT:-1}" -gt 1 ]; then
+        echo "relay.sh: the red of $SLIPWATCH_COUNT benchmarks has ended, others may be in force: set site = true" >&2
+        exit 1
+    fi
     if [ -n "${SLIPWATCH_BENCHMARK:-}" ] && [ -z "$one" ]; then
         echo "relay.sh: the red of benchmark $SLIPWATCH_BENCHMARK has ended, others may be in force: set site = true" >&2
         exit 1

@@ -58,6 +58,10 @@ def opened(path):
 def message(environment, alert):
     """What fits into one message, in letters that every modem has."""
     place = environment.get("SLIPWATCH_BENCHMARK") or "site"
+    # One message may stand for many benchmarks.
+    count = int(environment.get("SLIPWATCH_COUNT") or 1)
+    if count > 1:
+        place = f"{count} benchmarks"
     words = [
         f"[{environment['SLIPWATCH_STATUS']}]",
         f"{environment['SLIPWATCH_SITE']}:",

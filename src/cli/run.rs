@@ -38,7 +38,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     asynchronous()?.block_on(async {
         let shutdown = Shutdown::on_signals().context("cannot listen for signals")?;
         let (progress, _) = tokio::sync::watch::channel(Progress::default());
-        daemon::run(&config, shutdown, &progress, text::line).await?;
+        Box::pin(daemon::run(&config, shutdown, &progress, text::line)).await?;
         Ok(())
     })
 }

@@ -163,7 +163,10 @@ fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
     let alarms = Alarms::read(&store, None, clock::now())?;
     let mut newest: BTreeMap<BenchmarkId, Option<Timestamp>> = BTreeMap::new();
     newest.extend(config.benchmarks.iter().map(|one| (one.id.clone(), None)));
-    let read = store.benchmarks()?.into_iter();
+    let watched = &config.settings.watched;
+    // What is known of one that is not watched any more is of the past.
+    let is_watched = |id: &BenchmarkId| watched.is_open || watched.named.contains(id);
+    let read = (store.benchmarks()?.into_iter()).filter(|(id, _)| is_watched(id));
     newest.extend(read.map(|(benchmark, time)| (benchmark, Some(time))));
     let each = newest.into_iter().map(|(benchmark, newest)| {
         let standing = StatusStanding {

@@ -206,12 +206,20 @@ impl Benchmark {
             .averaging
             .map(|span| format!("averaging {} s", span.as_secs()));
         words.extend(span);
-        let zone = conventions.clock.zone.as_ref();
-        let zone = zone.and_then(jiff::tz::TimeZone::iana_name);
-        words.extend(zone.map(|zone| format!("time zone {zone}")));
-        words.extend(epoch.map(|epoch| format!("day 0 on {epoch}")));
+        let source = read_without_a_name(conventions, epoch);
+        words.extend(Some(source).filter(|source| !source.is_empty()));
         words.join(", ")
     }
+}
+
+/// The same of whatever comes from a source without a `[[benchmark]]`.
+fn read_without_a_name(conventions: &Conventions, epoch: Option<Timestamp>) -> String {
+    let mut words = Vec::new();
+    let zone = conventions.clock.zone.as_ref();
+    let zone = zone.and_then(jiff::tz::TimeZone::iana_name);
+    words.extend(zone.map(|zone| format!("time zone {zone}")));
+    words.extend(epoch.map(|epoch| format!("day 0 on {epoch}")));
+    words.join(", ")
 }
 
 /// What reaches a hook only where it asks for it.

@@ -3,7 +3,7 @@
 use super::table::{Placed, Section, unique};
 use super::{
     Benchmark, Broker, Config, FileSource, SiteConfig, alert, covariate, declared, drill,
-    heartbeat, hook, link, record, source, value, vector,
+    heartbeat, hook, link, read_without_a_name, record, source, value, vector,
 };
 use crate::alert::Policy;
 use crate::monitor::{Explain, Settings, SiteLevel, Watched};
@@ -169,10 +169,17 @@ fn watched(sources: &[FileSource], brokers: &[Broker], benchmarks: &[Benchmark])
         let (_, conventions, epoch) = source?;
         Some((benchmark.id.clone(), benchmark.read_as(conventions, *epoch)))
     });
+    let open = known.iter().filter(|source| !names_its_own(source));
+    let open = open
+        .map(|(id, conventions, epoch)| ((*id).clone(), read_without_a_name(conventions, *epoch)));
     Watched {
         named: benchmarks.iter().map(|one| one.id.clone()).collect(),
         is_open: !known.iter().all(names_its_own),
         read_as: read_as.collect(),
+        sources: (benchmarks.iter())
+            .map(|one| (one.id.clone(), one.source.clone()))
+            .collect(),
+        open: open.collect(),
     }
 }
 

@@ -18,6 +18,12 @@ pub struct Watched {
     /// What decides which numbers the readings of each are; none in a state of older versions.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub read_as: BTreeMap<BenchmarkId, String>,
+    /// The source that each named one is read from; none in a state of older versions.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub sources: BTreeMap<BenchmarkId, String>,
+    /// The sources from which whatever comes is taken, and what decides which numbers that is; none in a state of older versions.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub open: BTreeMap<String, String>,
 }
 
 /// Whatever comes.
@@ -27,23 +33,43 @@ impl Default for Watched {
             named: BTreeSet::new(),
             is_open: true,
             read_as: BTreeMap::new(),
+            sources: BTreeMap::new(),
+            open: BTreeMap::new(),
         }
     }
 }
 
 impl Watched {
     /// Whether `benchmark`, watched under `former`, no longer is: it was named and is not any more, or was not and
-    /// nothing else than what is named is watched from now on.
+    /// nothing else than what is named is watched from now on, or nothing else of its source.
     fn drops(&self, benchmark: &BenchmarkId, former: &Self) -> bool {
         let was_named = former.named.contains(benchmark);
+        if self.goes_on_unnamed(benchmark, former) {
+            return false;
+        }
         !self.named.contains(benchmark) && (was_named || !self.is_open)
     }
 
+    /// Whether `benchmark` is read without a name as it was with one, from the same source.
+    fn goes_on_unnamed(&self, benchmark: &BenchmarkId, former: &Self) -> bool {
+        let source = former.sources.get(benchmark);
+        let read_as = source.and_then(|source| self.open.get(source));
+        read_as.is_some() && read_as == former.read_as.get(benchmark)
+    }
+
     /// What the readings of `benchmark` are read as, where that is something else than under `former`.
-    fn changed(&self, benchmark: &BenchmarkId, former: &Self) -> Option<&str> {
+    fn changed(&self, benchmark: &BenchmarkId, former: &Self) -> Option<String> {
         let now = self.read_as.get(benchmark)?;
         let before = former.read_as.get(benchmark)?;
-        (now != before).then_some(now)
+        let source = self.sources.get(benchmark);
+        let former_source = former.sources.get(benchmark);
+        match (source, former_source) {
+            // Another instrument has another zero.
+            (Some(source), Some(former)) if source != former => {
+                Some(format!("source {source:?} {now}").trim_end().to_owned())
+            }
+            _ => (now != before).then(|| now.clone()),
+        }
     }
 
     /// Whether what is known of `benchmark` ends when this follows on `former`.
@@ -140,7 +166,7 @@ mod tests {
         let watched = |named: &[&str], is_open| Watched {
             named: named.iter().copied().map(BenchmarkId::new).collect(),
             is_open,
-            read_as: BTreeMap::new(),
+            ..Watched::default()
         };
         for (former, now, is_dropped) in [
             (watched(&["4", "5"], true), watched(&["4"], true), true),
@@ -152,5 +178,38 @@ mod tests {
         ] {
             assert_eq!(now.drops(&five, &former), is_dropped, "{former:?} {now:?}");
         }
+    }
+
+    #[test]
+    fn without_its_name_one_goes_on_where_its_source_is_open_and_read_alike_and_another_source_is_another_instrument()
+     {
+        let five = BenchmarkId::new("5");
+        let named = |source: &str, read_as: &str| Watched {
+            named: BTreeSet::from([five.clone()]),
+            read_as: BTreeMap::from([(five.clone(), read_as.to_owned())]),
+            sources: BTreeMap::from([(five.clone(), source.to_owned())]),
+            ..Watched::default()
+        };
+        let open = |source: &str, read_as: &str| Watched {
+            open: BTreeMap::from([(source.to_owned(), read_as.to_owned())]),
+            ..Watched::default()
+        };
+        let former = named("logger", "");
+        for (now, is_dropped) in [
+            (open("logger", ""), false),
+            (open("logger", "time zone Europe/Rome"), true),
+            (open("radio", ""), true),
+        ] {
+            assert_eq!(now.ends(&five, &former), is_dropped, "{now:?}");
+        }
+        assert!(open("logger", "").ends(&five, &named("logger", "unit m")));
+        assert!(named("radio", "").ends(&five, &former));
+        assert!(!named("logger", "").ends(&five, &former));
+        // An older state does not say which source it was.
+        let older = Watched {
+            sources: BTreeMap::new(),
+            ..former
+        };
+        assert!(!named("radio", "").ends(&five, &older));
     }
 }

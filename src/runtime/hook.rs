@@ -224,7 +224,11 @@ impl Alert {
     /// Whether it reports many benchmarks at once, each of which it stands for.
     pub fn is_flood(&self) -> bool {
         let is_of_many = self.event.benchmark.is_none() && self.is_correction();
-        is_of_many || matches!(&self.event.kind, EventKind::Alert { rule, .. } if rule == FLOOD)
+        // The end of one of its benchmarks has the same rule.
+        let is_of_one = self.event.benchmark.is_some();
+        is_of_many
+            || !is_of_one
+                && matches!(&self.event.kind, EventKind::Alert { rule, .. } if rule == FLOOD)
     }
 
     /// Whether it corrects what was called, and calls nothing itself.
@@ -237,8 +241,9 @@ impl Alert {
         matches!(&self.event.kind, EventKind::Alert { rule, .. } if rule == CLOCK_FAULT)
     }
 
-    fn variables(&self, attempt: u32, link: Option<&str>) -> [(&'static str, String); 11] {
+    fn variables(&self, attempt: u32, link: Option<&str>) -> [(&'static str, String); 12] {
         let benchmark = self.event.benchmark.as_ref();
+        let count = self.many.as_ref().map_or(1, |many| many.members.len());
         let optional_time = self.failure_time.map(|time| time.to_string());
         [
             ("SLIPWATCH_EVENT", self.event.kind.name().to_owned()),
@@ -248,6 +253,7 @@ impl Alert {
                 "SLIPWATCH_BENCHMARK",
                 benchmark.map(ToString::to_string).unwrap_or_default(),
             ),
+            ("SLIPWATCH_COUNT", count.to_string()),
             ("SLIPWATCH_LEVEL", self.level.name().to_owned()),
             ("SLIPWATCH_STATE", state_name(self.state).to_owned()),
             ("SLIPWATCH_TIME", self.event.time.to_string()),

@@ -2,7 +2,9 @@
 
 use super::preview::Preview;
 use crate::config::Config;
+use crate::reading::BenchmarkId;
 use jiff::SignedDuration;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// So many readings must fall into the time that an evacuation takes: a fit that sees the
 /// acceleration needs several, and the last of them must leave time to go.
@@ -35,12 +37,32 @@ pub fn sampling_warnings(config: &Config, preview: &Preview) -> Vec<String> {
         let lines = covariate.suspicions.iter();
         lines.map(move |line| format!("covariate {name:?}: {line}"))
     });
+    let shared = several_sources(preview);
     let ends = preview.refused_ends.iter().cloned();
     let absent = preview.unfed.iter().map(|unfed| unfed.text.clone());
     lines
         .chain(suspicions)
         .chain(covariates)
+        .chain(shared)
         .chain(ends)
         .chain(absent)
         .collect()
+}
+
+/// A line for each benchmark that comes from more than one source: what one instrument says would be mixed with what another does.
+fn several_sources(preview: &Preview) -> Vec<String> {
+    let mut sources: BTreeMap<&BenchmarkId, BTreeSet<&str>> = BTreeMap::new();
+    for one in &preview.benchmarks {
+        sources.entry(&one.id).or_default().insert(&one.source);
+    }
+    let several = sources.into_iter().filter(|(_, sources)| sources.len() > 1);
+    let lines = several.map(|(id, sources)| {
+        let sources: Vec<String> = sources.into_iter().map(|one| format!("{one:?}")).collect();
+        format!(
+            "benchmark {:?} comes from the sources {}, whose readings are taken as one series: name the one source in a [[benchmark]]",
+            id.as_str(),
+            sources.join(" and ")
+        )
+    });
+    lines.collect()
 }

@@ -124,6 +124,25 @@ impl Delivery {
         ])?;
         Ok(())
     }
+
+    /// It was noted when it was for the first hook of all: an escalation counts its time from there, whatever command line its hook
+    /// has meanwhile.
+    fn is_noted_as_others(&self, connection: &Connection) -> Result<(), StoreError> {
+        let Self {
+            key,
+            level,
+            state,
+            hook,
+            ..
+        } = self;
+        let mut update = connection.prepare_cached(
+            "UPDATE outbox SET noted = coalesce(
+                 (SELECT min(noted) FROM outbox WHERE key = ?1 AND level = ?2 AND state = ?3), noted)
+             WHERE key = ?1 AND level = ?2 AND state = ?3 AND hook = ?4",
+        )?;
+        update.execute(params![key, level, state, hook])?;
+        Ok(())
+    }
 }
 
 impl Store {
@@ -453,6 +472,7 @@ impl Inner {
         let transaction = self.connection.transaction()?;
         for delivery in instead {
             delivery.insert(&transaction, WAITING)?;
+            delivery.is_noted_as_others(&transaction)?;
         }
         for delivery in singly {
             delivery.insert(&transaction, WAITING)?;

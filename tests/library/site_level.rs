@@ -96,7 +96,7 @@ fn two_of_three_make_the_site_and_one_that_is_removed_no_longer_does() {
         watched: Watched {
             named: watched,
             is_open: false,
-            read_as: std::collections::BTreeMap::new(),
+            ..Watched::default()
         },
         ..settings(Some(SiteLevel::AtLeast(2)))
     };

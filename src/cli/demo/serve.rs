@@ -56,6 +56,7 @@ pub(super) fn serve(args: &Args, listen: SocketAddr, folder: &Path) -> anyhow::R
             name: crisis.site.to_owned(),
             time_zone: "Europe/Zurich".to_owned(),
             named: Vec::new(),
+            is_open: true,
             positions: positions(),
             positions_are: Some(POSITIONS_ARE),
             takes_orders: true,

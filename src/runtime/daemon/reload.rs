@@ -36,8 +36,9 @@ impl Daemon {
         fresh.wall_in_hooks(Path::new(OURSELVES));
         if fresh.site.state_dir != self.config.site.state_dir
             || fresh.site.listen != self.config.site.listen
+            || fresh.site.name != self.config.site.name
         {
-            return Err("another state_dir or listen needs a restart".to_owned());
+            return Err("another state_dir, listen or site name needs a restart".to_owned());
         }
         let token = fresh.site.token().map_err(|error| error.to_string())?;
         Ok((fresh, token))
@@ -120,6 +121,7 @@ impl Daemon {
         let events = self.site.change_settings(fresh.settings.clone());
         self.pulse.vitals.note(&events);
         self.site.show(&self.pulse.vitals);
+        (self.pulse.vitals).retain(|benchmark| self.site.shows(benchmark));
         self.commit()?;
         self.close_hooks().await;
         self.site.rehook(dispatcher(&fresh, &self.store))?;
@@ -129,12 +131,23 @@ impl Daemon {
         if let Some(beside) = &mut self.beside {
             beside.follow(&fresh).await;
         }
+        for warning in &fresh.warnings {
+            tracing::warn!("{warning}");
+        }
+        let has_lost_hooks = fresh.hooks.is_empty() && !self.config.hooks.is_empty();
         let were_fileless = sources_without_files(&self.config);
         (self.is_up_to_date, self.config) = (false, fresh);
         self.pulse.service.ready("watching");
         tracing::info!(file = %self.config.file.display(), "the config is taken");
         self.config_is_taken();
         self.report_inherited()?;
+        if has_lost_hooks {
+            // Perhaps it was read while it was being written.
+            let text =
+                "the config that was taken has no hook any more: nobody is notified".to_owned();
+            tracing::error!("{text}");
+            self.report("no-hooks", text)?;
+        }
         let fileless = sources_without_files(&self.config);
         for line in fileless
             .into_iter()

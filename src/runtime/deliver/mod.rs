@@ -239,6 +239,10 @@ impl Dispatcher {
         if is_its_own && self.has_received(way, &alert.beginning()) {
             return Some(alert.clone());
         }
+        // What stood for many was called off when nothing of it was in force any more.
+        if alert.is_flood() {
+            return None;
+        }
         self.end_of_earlier(way, alert).or_else(|| {
             let is_due = is_its_own && !self.is_unsent(way, &alert.beginning());
             is_due.then(|| alert.clone())
@@ -247,8 +251,11 @@ impl Dispatcher {
 
     /// With the end of `alert` that of the lower level which the hook has received the beginning of.
     fn end_of_earlier(&self, way: &HookQueue, alert: &Alert) -> Option<Alert> {
-        let ends = alert.earlier.iter().rev().filter(|_| !alert.is_flood());
-        let mut ends = ends.map(|one| alert.end_of(one.benchmark.as_ref(), one.level, &one.key));
+        let mut ends = alert
+            .earlier
+            .iter()
+            .rev()
+            .map(|one| alert.end_of(one.benchmark.as_ref(), one.level, &one.key));
         ends.find(|end| way.hook.asks_for(end) && self.has_received(way, &end.beginning()))
     }
 

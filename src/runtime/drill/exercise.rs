@@ -280,6 +280,8 @@ impl Exercise {
                 named: BTreeSet::new(),
                 is_open: false,
                 read_as: BTreeMap::new(),
+                sources: BTreeMap::new(),
+                open: BTreeMap::new(),
             },
             ..self.daemon.config.settings.clone()
         };

@@ -6,6 +6,7 @@ use super::columns::Meaning;
 use super::encoding::{Transcoder, latin1};
 use super::taken::{BadRows, LineResult, Remark};
 use super::text_format::{LineReader, TextFormat};
+use super::units::FileUnits;
 use super::{IngestError, Item, ReadOptions};
 use crate::reading::{BenchmarkId, Disorder, Recording, Unit};
 use std::borrow::Cow;
@@ -74,6 +75,11 @@ impl TextRows {
         self.0.is_lost()
     }
 
+    /// As [`LineReader::states_units`].
+    pub fn states_units(&self) -> bool {
+        self.0.states_units()
+    }
+
     /// As [`LineReader::header`].
     pub fn header(&self) -> &[String] {
         self.0.header()
@@ -106,7 +112,7 @@ pub(super) fn read_text(
     let bytes = Transcoder::default().feed(&bytes);
     let mut done = 0;
     let mut rows = TextRows::new(format, &super::bytes::shown_name(file), options);
-    let mut collected = Collector::default();
+    let (mut collected, mut units) = (Collector::default(), FileUnits::default());
     let mut remarks = Vec::new();
     for (text, line) in bytes.split(|byte| *byte == b'\n').zip(1..) {
         done += text.len() + 1;
@@ -129,6 +135,11 @@ pub(super) fn read_text(
             bad.meet(fault)?;
         }
         for item in taken.items {
+            let item = if rows.states_units() {
+                units.convert(item)
+            } else {
+                item
+            };
             if let Err(odd) = collected.add(item) {
                 bad.meet(IngestError::Inconsistent {
                     file: file.into(),

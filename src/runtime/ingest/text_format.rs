@@ -48,6 +48,11 @@ pub trait LineReader: Debug + Send {
         Vec::new()
     }
 
+    /// Whether each line states the unit of its value: another one than before is then no fault.
+    fn states_units(&self) -> bool {
+        false
+    }
+
     /// Whether a line that is not UTF-8 may be taken as Latin-1: in a table only column names and text could
     /// differ by it, never a number.
     fn takes_latin1(&self) -> bool {

@@ -1,4 +1,5 @@
-//! The units that a growing file began with: another one later is a fault, never another scale.
+//! The units that a file began with. In a table another one later is a fault, never another scale; where each line states the unit
+//! of its value, the value is given in the first one.
 
 use super::Item;
 use crate::reading::{BenchmarkId, Unit};
@@ -17,14 +18,48 @@ impl FileUnits {
     /// The item itself, or a missing reading where its unit is not the one that the file began with.
     #[must_use]
     pub fn guard(&mut self, item: Item) -> Item {
-        let Item::Reading {
+        let Some(known) = self.first(&item) else {
+            return item;
+        };
+        if let Item::Reading {
             benchmark,
             unit,
             reading,
             ..
         } = &item
+            && *unit != known
+        {
+            return Item::Missing {
+                benchmark: benchmark.clone(),
+                time: reading.time,
+                what: format!("{UNIT_WAS} {known} and is {unit}"),
+            };
+        }
+        item
+    }
+
+    /// The same value in the unit that the file began with.
+    #[must_use]
+    pub fn convert(&mut self, mut item: Item) -> Item {
+        if let Some(known) = self.first(&item)
+            && let Item::Reading { unit, reading, .. } = &mut item
+            && *unit != known
+        {
+            let factor = unit.factor() / known.factor();
+            reading.value *= factor;
+            reading.sigma = reading.sigma.map(|sigma| sigma * factor);
+            *unit = known;
+        }
+        item
+    }
+
+    /// The unit of the first value of the same quantity of a reading's benchmark, which may be this one.
+    fn first(&mut self, item: &Item) -> Option<Unit> {
+        let Item::Reading {
+            benchmark, unit, ..
+        } = item
         else {
-            return item;
+            return None;
         };
         // Not by entry(): nearly always it is there, and the name need not be copied.
         let known = match self.0.get_mut(benchmark) {
@@ -32,17 +67,46 @@ impl FileUnits {
             None => self.0.entry(benchmark.clone()).or_default(),
         };
         let quantity = unit.quantity();
-        match known.iter().find(|known| known.quantity() == quantity) {
-            None => known.push(*unit),
-            Some(known) if known == unit => {}
-            Some(known) => {
-                return Item::Missing {
-                    benchmark: benchmark.clone(),
-                    time: reading.time,
-                    what: format!("{UNIT_WAS} {known} and is {unit}"),
-                };
-            }
+        let first = known
+            .iter()
+            .copied()
+            .find(|known| known.quantity() == quantity);
+        if first.is_none() {
+            known.push(*unit);
         }
-        item
+        Some(first.unwrap_or(*unit))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reading::Reading;
+
+    fn item(value: f64, unit: &str) -> Item {
+        Item::Reading {
+            benchmark: BenchmarkId::new("5"),
+            unit: Unit::parse(unit).unwrap(),
+            averaging: None,
+            reading: Reading {
+                time: "2020-01-01T00:00:00Z".parse().unwrap(),
+                value,
+                sigma: Some(0.001),
+            },
+        }
+    }
+
+    #[test]
+    fn where_lines_state_their_units_a_value_is_given_in_the_first_one() {
+        let mut units = FileUnits::default();
+        assert_eq!(units.convert(item(1.0, "mm")), item(1.0, "mm"));
+        let Item::Reading { unit, reading, .. } = units.convert(item(0.25, "m")) else {
+            panic!("a reading");
+        };
+        assert_eq!((unit.to_string(), reading.value), ("mm".to_owned(), 250.0));
+        assert!((reading.sigma.unwrap() - 1.0).abs() < 1e-12);
+        // A velocity is another quantity, with a first unit of its own.
+        assert_eq!(units.convert(item(3.0, "mm/h")), item(3.0, "mm/h"));
+        assert!(matches!(units.guard(item(0.25, "m")), Item::Missing { .. }));
     }
 }

@@ -1,6 +1,7 @@
 //! Many alerts at once: the most severe are sent singly, the others are reported in one message.
 //!
-//! EEMUA 191 calls ten alarms in ten minutes a flood: beyond that nobody can act on them one by one.
+//! EEMUA 191 calls ten alarms in ten minutes a flood: beyond that nobody can act on them one by one. Whoever received the beginning
+//! of an alert singly receives its end by the same key, however many end at once.
 
 use crate::alert::Level;
 use crate::monitor::{AlertState, Event, EventKind};
@@ -31,7 +32,8 @@ impl OutgoingAlerts {
         let mut outgoing = Self::default();
         let mut groups: BTreeMap<(Level, &str), Vec<&Alert>> = BTreeMap::new();
         // The end of a flood stands for many already.
-        for alert in alerts.iter().filter(|alert| !alert.is_flood()) {
+        let is_single = |alert: &&Alert| alert.is_flood() || alert.state == MessageState::Resolved;
+        for alert in alerts.iter().filter(|alert| !is_single(alert)) {
             let group = (alert.level, state_name(alert.state));
             groups.entry(group).or_default().push(alert);
         }
@@ -39,8 +41,9 @@ impl OutgoingAlerts {
             alerts.clone_into(&mut outgoing.sent);
             return outgoing;
         }
-        let ends = alerts.iter().filter(|alert| alert.is_flood());
-        outgoing.sent.extend(ends.cloned());
+        outgoing
+            .sent
+            .extend(alerts.iter().filter(is_single).cloned());
         // The most severe level first.
         for mut group in groups.into_values().rev() {
             if group.len() > MOST_AT_ONCE + 1 {
@@ -86,7 +89,8 @@ fn together(others: &[&Alert], audience: &BTreeSet<BenchmarkId>) -> Option<Alert
     };
     let kind = match first.state {
         MessageState::Firing => alert(AlertState::Firing, "at"),
-        MessageState::Resolved => alert(AlertState::Resolved, "no longer at"),
+        // No ends are reported together but those of what began so.
+        MessageState::Resolved => return None,
         MessageState::Correction => corrections(others, |level_then| {
             format!(
                 "{count} more benchmarks: with the readings that came late or were corrected, {level} would have been \

@@ -66,6 +66,10 @@ impl Site {
         site.catch_up(&store, step, turn)?;
         site.sinks.alerts = alerts;
         site.recall_floods(&store)?;
+        // What people ordered meanwhile: no hook is to be tried first with what they have acknowledged, silenced or ended.
+        for order in store.orders()? {
+            site.order(order)?;
+        }
         site.wait_for_hooks()?;
         if *site.monitor.settings() != settings || store.last_step() == 0 {
             site.change_settings(settings);

@@ -122,10 +122,15 @@ impl TextReader {
         let taken = self.rows.take(number, &text);
         let mut items = taken.items;
         items.sort_by(|a, b| order(a).cmp(&order(b)));
-        let guarded = items
-            .into_iter()
-            .map(|item| (number, self.units.guard(item)));
-        fed.items.extend(guarded);
+        let states_units = self.rows.states_units();
+        for item in items {
+            let item = if states_units {
+                self.units.convert(item)
+            } else {
+                self.units.guard(item)
+            };
+            fed.items.push((number, item));
+        }
         fed.remarks.extend(taken.remarks);
         (text, taken.fault.map(Into::into))
     }

@@ -43,6 +43,8 @@ pub struct Facts {
     pub time_zone: String,
     /// Benchmarks that the config names; others show once they have given a reading.
     pub named: Vec<BenchmarkId>,
+    /// Whether there are such others.
+    pub is_open: bool,
     /// Where each stands, m.
     pub positions: BTreeMap<BenchmarkId, Vec<f64>>,
     /// Whether orders are taken: whoever gives one must know a secret.
@@ -81,6 +83,7 @@ impl Facts {
                 .unwrap_or("UTC")
                 .to_owned(),
             named: benchmarks.clone().map(|one| one.id.clone()).collect(),
+            is_open: config.settings.watched.is_open,
             positions: benchmarks
                 .filter_map(|one| Some((one.id.clone(), one.position.clone()?)))
                 .collect(),
@@ -91,6 +94,11 @@ impl Facts {
             ending: None,
             positions_are: None,
         }
+    }
+
+    /// Whether the config watches this one.
+    fn watches(&self, benchmark: &BenchmarkId) -> bool {
+        self.is_open || self.named.contains(benchmark)
     }
 }
 

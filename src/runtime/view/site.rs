@@ -107,7 +107,9 @@ impl SiteReader {
         let levels = in_force(&self.store, at)?;
         let orders = TakenOrders::read(&self.store, at)?;
         let span = self.store.span(None)?;
-        let benchmarks = self.known()?.into_iter();
+        let known = self.known()?.into_iter();
+        // What is known of one that is not watched any more is of the past.
+        let benchmarks = known.filter(|one| at.is_some() || self.facts().watches(one));
         let alarms = Alarms::read(&self.store, at, moment)?;
         let benchmarks = benchmarks.map(|one| self.standing(one, &levels, &alarms, at, moment));
         let site_levels = levels.iter().filter(|((place, _), _)| place.is_none());
