@@ -160,7 +160,7 @@ fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
     let (levels, orders) = (in_force(&store, None)?, TakenOrders::read(&store, None)?);
     let (refits, faults) = (newest_refits(&store)?, faults_in(&config.site.state_dir));
     let suspicions = suspicions(&store)?;
-    let alarms = Alarms::read(&store, None, clock::now())?;
+    let alarms = Alarms::read(&store, None, clock::now(), &config.settings.declared)?;
     let mut newest: BTreeMap<BenchmarkId, Option<Timestamp>> = BTreeMap::new();
     newest.extend(config.benchmarks.iter().map(|one| (one.id.clone(), None)));
     let watched = &config.settings.watched;

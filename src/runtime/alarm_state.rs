@@ -3,7 +3,9 @@
 
 use super::standing::{TakenOrders, every};
 use crate::alert::Level;
-use crate::monitor::{AlertState, CalledLevel, Event, EventKind, OrderKind, by_time};
+use crate::monitor::{
+    AlertState, CalledLevel, Declaration, Declared, Event, EventKind, OrderKind, by_time,
+};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::store::{Store, StoreError};
 use schemars::JsonSchema;
@@ -75,11 +77,17 @@ pub struct Alarms {
 }
 
 impl Alarms {
-    /// Those of the events until `at`, of all without it, at the moment `now`.
+    /// Those of the events until `at`, of all without it, at the moment `now`. Without `at` maintenance goes on where one of `declared`, what
+    /// is declared now, says so, whether a reading has come since or not.
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn read(store: &Store, at: Option<Timestamp>, now: Timestamp) -> Result<Self, StoreError> {
+    pub fn read(
+        store: &Store,
+        at: Option<Timestamp>,
+        now: Timestamp,
+        declared: &[Declared],
+    ) -> Result<Self, StoreError> {
         let is_known = |event: &Event| at.is_none_or(|at| event.time <= at);
         let mut alerts = by_time(every(store, "alert")?);
         alerts.retain(is_known);
@@ -95,17 +103,15 @@ impl Alarms {
         for one in newest.values_mut() {
             one.is_acknowledged = orders.of(&one.event).any(|(_, order)| says_seen(order));
         }
-        let mut declared = every(store, "declared")?;
-        declared.retain(is_known);
         Ok(Self {
             newest,
             unknown,
             silences: orders.numbered_silences(now),
             orders,
-            out_of_service: (declared.into_iter())
-                .filter(|event| is_under_maintenance(event, now))
-                .map(|event| event.benchmark)
-                .collect(),
+            out_of_service: match at {
+                Some(at) => reported_maintenance(store, at, now)?,
+                None => maintenance_in(declared, now),
+            },
         })
     }
 
@@ -288,6 +294,28 @@ fn says_seen(order: &Event) -> bool {
         return false;
     };
     matches!(kind, OrderKind::Acknowledge | OrderKind::Resolve)
+}
+
+/// Where maintenance was going on, by what was reported until `at`.
+fn reported_maintenance(
+    store: &Store,
+    at: Timestamp,
+    now: Timestamp,
+) -> Result<Vec<Option<BenchmarkId>>, StoreError> {
+    let mut declared = every(store, "declared")?;
+    declared.retain(|event| event.time <= at && is_under_maintenance(event, now));
+    Ok(declared.into_iter().map(|event| event.benchmark).collect())
+}
+
+/// Where maintenance goes on.
+fn maintenance_in(declared: &[Declared], now: Timestamp) -> Vec<Option<BenchmarkId>> {
+    let goes_on = declared.iter().filter(|one| {
+        let Declaration::Maintenance { until } = one.kind else {
+            return false;
+        };
+        one.time <= now && now < until
+    });
+    goes_on.map(|one| one.benchmark.clone()).collect()
 }
 
 /// Whether the declared maintenance of this event is going on.

@@ -62,6 +62,8 @@ pub struct Lead {
     pub known_until: Timestamp,
     /// From there to the failure, days.
     pub remaining_days: f64,
+    /// How far from there a forecast is scored, days. Of a failure beyond it the CRPS says nothing: it is 0 for who expects none.
+    pub scored_days: f64,
     /// By method; one that had nothing to say is scored as saying that no failure comes.
     pub scores: BTreeMap<&'static str, Score>,
 }
@@ -143,6 +145,7 @@ pub fn card(
                     lead_days: lead,
                     known_until: at,
                     remaining_days,
+                    scored_days: known.scored_days(),
                     scores: scores(methods, &known, at, Outcome::Failed(remaining_days)),
                 });
             }
@@ -188,15 +191,21 @@ fn looks(history: &WholeRecord, epoch: Timestamp, truth: Truth) -> Vec<(f64, Kno
     }
 }
 
+impl Known {
+    /// How far from it a forecast is scored, days.
+    fn scored_days(&self) -> f64 {
+        let first = self.observations.values.first();
+        scored_days(first.map_or(0.0, |first| self.now_days - first.t_days))
+    }
+}
+
 fn scores(
     methods: &[Method],
     known: &Known,
     at: Timestamp,
     outcome: Outcome,
 ) -> BTreeMap<&'static str, Score> {
-    let first = known.observations.values.first();
-    let length = first.map_or(0.0, |first| known.now_days - first.t_days);
-    let scored = scored_days(length);
+    let scored = known.scored_days();
     let each = methods.iter().map(|method| {
         let said = (method.forecast)(known);
         (method.name, score(said.as_ref(), at, outcome, scored))

@@ -335,3 +335,26 @@ fn check_shows_what_each_covariate_is_and_which_stated_one_is_in_no_file() {
     ];
     assert_eq!(kinds, expected);
 }
+
+#[test]
+fn a_benchmark_of_two_sources_is_warned_of_until_one_of_them_is_named() {
+    let sources = "[[source]]\nid = \"one\"\nkind = \"csv\"\npath = \"slope.csv\"\n\
+                   [[source]]\nid = \"two\"\nkind = \"csv\"\npath = \"other.csv\"\n";
+    let head = "[site]\nname = \"Toc\"\nstate_dir = \"state\"\n";
+    let text = format!("{HEADER}{}", half_hourly(-40..-1));
+    let said = |more: &str| {
+        let site = format!("{head}{sources}{more}");
+        let files = [
+            ("slope.csv", &text),
+            ("other.csv", &text),
+            ("site.toml", &site),
+        ];
+        let office = Office::with(&files.map(|(name, text)| (name, text.as_str())));
+        let (_, out, err) = office.say(&["check", "site.toml"]);
+        out + &err
+    };
+    let warning = "benchmark \"P1\" comes from the sources \"one\" and \"two\"";
+    assert!(said("").contains(warning), "{}", said(""));
+    let named = "[[benchmark]]\nid = \"P1\"\nsource = \"two\"\n";
+    assert!(!said(named).contains(warning), "{}", said(named));
+}

@@ -169,6 +169,13 @@ fn a_relay_is_switched_by_a_red_alone_and_by_a_drill_only_where_that_is_asked_fo
         !output.status.success() && said.contains("site = true"),
         "{said}"
     );
+    // A message of many benchmarks names none, and is not of the site.
+    let of_many = [
+        ("SLIPWATCH_BENCHMARK", Path::new("")),
+        ("SLIPWATCH_COUNT", Path::new("14")),
+    ];
+    let output = run("relay.sh", &[file, "--one-benchmark"], ended, &of_many);
+    assert!(!output.status.success(), "{output:?}");
     assert_eq!(fs::read_to_string(&relay).unwrap(), "1\n");
     assert_eq!(after(ended, &["--one-benchmark"]), "0\n");
     assert_eq!(after(("red", "firing", "Test"), &["--drills"]), "1\n");

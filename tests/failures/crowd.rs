@@ -1,6 +1,8 @@
 //! 19: everything moves at once.
 
 use crate::site::{Site, eventually};
+use std::collections::BTreeSet;
+use std::fs;
 
 /// Benchmarks of one file.
 const COLUMNS: usize = 300;
@@ -70,5 +72,45 @@ fn all_at_once(files: usize) {
     site.caught_up().stop();
     let again: Vec<String> = site.lines("notified").split_off(notified.len());
     assert!(again.is_empty(), "{again:?}");
+    site.proven_events();
+}
+
+/// 24 benchmarks go red in three groups, each of which is reported singly, and end at once.
+#[test]
+fn whoever_received_beginnings_singly_receives_each_end_by_its_key_however_many_end_at_once() {
+    let policy = "[[cap]]\nfolder = \"cap\"\nsender = \"toc@example.org\"\narea = \"Toc\"\nlevels = [\"red\"]\n\
+                  [alert]\nevacuation_time = \"1h\"\n\
+                  [[alert.threshold]]\nlevel = \"red\"\nvelocity = \"50 mm/day\"\n";
+    let site = Site::new(policy);
+    fs::create_dir(site.path("cap")).unwrap();
+    let program = site.caught_up();
+    let firing = |site: &Site| site.notified("p", "firing");
+    for group in 0..3_usize {
+        let text = run_away(group);
+        let eight = text.lines().map(|line| {
+            let cells: Vec<&str> = line.split(',').take(9).collect();
+            cells.join(",") + "\n"
+        });
+        site.append(&format!("incoming/{group}.csv"), &eight.collect::<String>());
+        eventually("the group's reds", || firing(&site) == 8 * (group + 1));
+    }
+    let by = ["--why", "a test", "--by", "Ada", "--config", "site.toml"];
+    site.printed(&[&["alerts", "resolve", "--all"][..], &by].concat());
+    eventually("all ends", || site.notified("p", "resolved") == 24);
+    let cancels = || {
+        let files = fs::read_dir(site.path("cap")).unwrap();
+        let texts = files.filter_map(|file| fs::read_to_string(file.unwrap().path()).ok());
+        let is_cancel = |text: &String| text.contains("<msgType>Cancel</msgType>");
+        texts.filter(is_cancel).count()
+    };
+    eventually("all of CAP", || cancels() == 24);
+    program.stop();
+    let keys = |state: &str| -> BTreeSet<String> {
+        let lines = site.lines("notified").into_iter();
+        let of_state = lines.filter(|line| line.ends_with(state));
+        let keys = of_state.map(|line| line.split(' ').next().unwrap().to_owned());
+        keys.collect()
+    };
+    assert_eq!(keys("firing"), keys("resolved"));
     site.proven_events();
 }

@@ -110,6 +110,47 @@ fn an_acknowledgement_in_time_calls_an_escalation_off_for_good() {
 }
 
 #[test]
+fn what_was_acknowledged_while_the_daemon_was_down_is_not_escalated_by_its_start() {
+    let site = site("1h");
+    let program = notified(&site);
+    eventually("that it waits", || {
+        standing(&site) == ("waiting".to_owned(), 0)
+    });
+    program.stop();
+    two_hours_later(&site);
+    site.acknowledge("5", "Ada");
+    let program = site.caught_up();
+    eventually("that it is called off", || {
+        standing(&site) == ("acknowledged".to_owned(), 0)
+    });
+    program.stop();
+    assert_eq!(escalated(&site), 0);
+    site.proven_events();
+}
+
+#[test]
+fn another_command_line_of_its_hook_does_not_begin_the_time_of_an_escalation_anew() {
+    let site = site("1h");
+    let program = notified(&site);
+    eventually("that it waits", || {
+        standing(&site) == ("waiting".to_owned(), 0)
+    });
+    program.stop();
+    let database = rusqlite::Connection::open(site.path("state/slipwatch.db")).unwrap();
+    let earlier = "UPDATE outbox SET noted = noted - 7200000000000";
+    assert!(database.execute(earlier, []).unwrap() > 0);
+    drop(database);
+    // Another name on the rota.
+    let text = std::fs::read_to_string(site.path("site.toml")).unwrap();
+    let other = text.replace("\"next.sh\"", "\"next.sh\", \"Bob\"");
+    std::fs::write(site.path("site.toml"), other).unwrap();
+    let program = site.caught_up();
+    eventually("that it is escalated", || escalated(&site) == 1);
+    program.stop();
+    site.proven_events();
+}
+
+#[test]
 fn a_silence_that_covers_an_alert_calls_its_escalation_off_and_one_elsewhere_does_not() {
     let site = site("1h");
     let program = notified(&site);

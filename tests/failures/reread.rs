@@ -2,7 +2,9 @@
 
 use crate::site::{Program, Site, eventually};
 use crate::telling::failing;
+use jiff::SignedDuration;
 use nix::sys::signal::Signal;
+use slipwatch::runtime::clock;
 use std::fs;
 
 const POLICY: &str = "[alert]\nevacuation_time = \"3h\"\n";
@@ -151,6 +153,126 @@ fn a_red_stands_through_a_reload_that_reads_its_readings_otherwise() {
         assert_eq!(site.notified("b/red/", "resolved"), 0, "{stays}: {events}");
         assert_eq!(events.matches("\"read-anew\"").count(), 1, "{events}");
     }
+}
+
+#[test]
+fn a_benchmark_that_loses_its_name_goes_on_where_its_source_is_open() {
+    let site = Site::new(&format!("{}{POLICY}", benchmark("b", "")));
+    let header = "time,b_displacement_mm\n";
+    site.append("incoming/x.csv", &format!("{header}{}", failing(0..112)));
+    let program = site.caught_up();
+    eventually("b's red", || site.notified("b/red/", "firing") == 1);
+    let taken = site.values().len();
+    reload(&site, &program, POLICY);
+    site.append("incoming/x.csv", &failing(112..114));
+    eventually("the newest", || site.values().len() == taken + 2);
+    assert_eq!(site.level("b"), "red");
+    program.stop();
+    assert_eq!(site.notified("b/red/", "resolved"), 0);
+    site.proven_events();
+}
+
+#[test]
+fn another_source_is_another_instrument_and_its_zero_is_no_motion() {
+    let second = "[[source]]\nid = \"second\"\nkind = \"csv\"\npath = \"second/*.csv\"\n";
+    let of = |source: &str| {
+        format!("[[benchmark]]\nid = \"b\"\nsource = \"{source}\"\n{second}{POLICY}{THRESHOLD}")
+    };
+    let site = Site::new(&of("logger"));
+    fs::create_dir(site.path("second")).unwrap();
+    let rows = failing(0..114);
+    let rows = rows.lines().zip(0_u32..).map(|(line, hour)| {
+        let (time, _) = line.split_once(',').unwrap();
+        (time.to_owned(), 0.08 * f64::from(hour))
+    });
+    let rows: Vec<(String, f64)> = rows.collect();
+    let text = |rows: &[(String, f64)], zero: f64| {
+        let rows = rows
+            .iter()
+            .map(|(time, value)| format!("{time},{:.3}\n", zero + value));
+        "time,b_displacement_mm\n".to_owned() + &rows.collect::<String>()
+    };
+    site.append("incoming/x.csv", &text(&rows[..100], 0.0));
+    let program = site.caught_up();
+    eventually("its readings", || site.values().len() == 100);
+    site.append("second/y.csv", &text(&rows[100..], 400.0));
+    reload(&site, &program, &of("second"));
+    eventually("the other's", || site.values().len() == 114);
+    program.stop();
+    let events = site.proven_events();
+    assert_eq!(site.notified("b/red/", ""), 0, "{events}");
+    assert_eq!(events.matches("\"read-anew\"").count(), 1, "{events}");
+}
+
+#[test]
+fn a_reload_that_leaves_the_hooks_as_they_are_does_not_wait_for_one_that_runs() {
+    let slow = "[[hook]]\nrun = [\"/bin/sh\", \"slow.sh\"]\nlevels = [\"red\"]\n\
+                timeout = \"60s\"\nbenchmarks = [\"b\"]\n";
+    let each = format!("{}{}", benchmark("b", ""), benchmark("c", ""));
+    let site = Site::new(&format!("{each}{slow}{POLICY}"));
+    let script = "touch begun; sleep 15; touch ended\n";
+    fs::write(site.path("slow.sh"), script).unwrap();
+    let program = site.caught_up();
+    let text = |name: &str| format!("time,{name}_displacement_mm\n{}", failing(0..114));
+    site.append("incoming/x.csv", &text("b"));
+    eventually("its run", || site.path("begun").exists());
+    reload(&site, &program, &format!("{each}{slow}{POLICY}"));
+    site.append("incoming/y.csv", &text("c"));
+    eventually("c's red", || site.notified("c/red/", "firing") == 1);
+    assert!(!site.path("ended").exists(), "it waited for the hook");
+    eventually("the end of the run", || site.path("ended").exists());
+    program.stop();
+    site.proven_events();
+}
+
+#[test]
+fn maintenance_shows_as_it_is_declared_now_whether_a_reading_comes_or_not() {
+    let site = Site::new(POLICY);
+    site.append(
+        "incoming/5.csv",
+        &format!("time,displacement_mm\n{}", failing(0..20)),
+    );
+    let program = site.caught_up();
+    eventually("the readings", || site.values().len() == 20);
+    let now = clock::now();
+    let (from, until) = (
+        now - SignedDuration::from_hours(1),
+        now + SignedDuration::from_hours(1),
+    );
+    let event =
+        format!("[[event]]\nkind = \"maintenance\"\ntime = \"{from}\"\nuntil = \"{until}\"\n");
+    let is_out = || {
+        let status = site.printed(&["status", "--config", "site.toml", "--format", "json"]);
+        status.contains("out-of-service")
+    };
+    assert!(!is_out());
+    reload(&site, &program, &format!("{POLICY}{event}"));
+    assert!(is_out(), "declared");
+    reload(&site, &program, POLICY);
+    assert!(!is_out(), "withdrawn");
+    program.stop();
+    site.proven_events();
+}
+
+/// As one that is read while it is being written.
+#[test]
+fn a_config_without_the_hooks_of_the_one_before_is_reported_and_another_site_name_is_refused() {
+    let site = Site::new(POLICY);
+    let program = site.caught_up();
+    let text = fs::read_to_string(site.path("site.toml")).unwrap();
+    let (before, _) = text.split_once("[[hook]]").unwrap();
+    fs::write(site.path("site.toml"), before).unwrap();
+    program.signal(Signal::SIGHUP);
+    eventually("the fault", || site.events().contains("\"no-hooks\""));
+    let other = text.replace("name = \"Toc\"", "name = \"Vajont\"");
+    fs::write(site.path("site.toml"), other).unwrap();
+    program.signal(Signal::SIGHUP);
+    eventually("that it is refused", || {
+        site.log().contains("needs a restart")
+    });
+    fs::write(site.path("site.toml"), &text).unwrap();
+    program.stop();
+    site.proven_events();
 }
 
 #[test]

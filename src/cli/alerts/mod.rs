@@ -211,7 +211,7 @@ fn needs_an_alert(store: &Store, order: &Order) -> anyhow::Result<()> {
     let mut here = (in_force.keys()).filter(|(at, _)| place.is_none() || at.as_ref() == place);
     match order {
         Order::Acknowledge { .. } => {
-            let alarms = Alarms::read(store, None, clock::now())?;
+            let alarms = Alarms::read(store, None, clock::now(), &[])?;
             if here.next().is_none() && alarms.is_all_seen(place) {
                 anyhow::bail!("no alert is in force {shown}: there is nothing to acknowledge");
             }

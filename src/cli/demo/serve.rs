@@ -57,6 +57,7 @@ pub(super) fn serve(args: &Args, listen: SocketAddr, folder: &Path) -> anyhow::R
             time_zone: "Europe/Zurich".to_owned(),
             named: Vec::new(),
             is_open: true,
+            declared: Vec::new(),
             positions: positions(),
             positions_are: Some(POSITIONS_ARE),
             takes_orders: true,

@@ -4,7 +4,7 @@ use super::{ScoreReport, hours};
 use crate::alert::{Level, chance_in_words};
 use crate::cli::table::{TextTable, time};
 use crate::reading::Timestamp;
-use crate::score::Score;
+use crate::score::{Lead, Score};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
@@ -33,7 +33,15 @@ pub(super) fn text(report: &ScoreReport) -> String {
 /// What the table's figures are.
 pub(super) fn meaning(report: &ScoreReport) -> String {
     if report.failure_time.is_some() {
-        "Median less failure, and in brackets the CRPS: above 0 the forecast is late, which is the unsafe side.".to_owned()
+        let line = "Median less failure, and in brackets the CRPS: above 0 the forecast is late, which is the unsafe side.";
+        let is_beyond = |lead: &Lead| lead.remaining_days > lead.scored_days;
+        if report.card.leads.iter().any(is_beyond) {
+            format!(
+                "{line}\nNo CRPS where the failure lies beyond what a forecast is scored to: five record lengths, at most 60 days."
+            )
+        } else {
+            line.to_owned()
+        }
     } else {
         let looks = report.card.looks.len();
         format!(
@@ -68,23 +76,25 @@ fn leads(report: &ScoreReport) -> TextTable {
             } else {
                 (1.0, "d")
             };
-            lead.scores
-                .get(method)
-                .map_or_else(String::new, |score| cell(score, factor, unit))
+            lead.scores.get(method).map_or_else(String::new, |score| {
+                let crps = factor * score.crps_days;
+                let is_scored = lead.remaining_days <= lead.scored_days;
+                let crps = is_scored.then(|| format!("{crps:.1}"));
+                cell(score, factor, unit, crps.as_deref().unwrap_or("-"))
+            })
         });
         table.row(std::iter::once((*method).to_owned()).chain(cells));
     }
     table
 }
 
-fn cell(score: &Score, factor: f64, unit: &str) -> String {
-    let crps = factor * score.crps_days;
+fn cell(score: &Score, factor: f64, unit: &str, crps: &str) -> String {
     if !score.said {
-        return format!("- ({crps:.1})");
+        return format!("- ({crps})");
     }
     match score.error_days {
-        Some(error) => format!("{:+.1} {unit} ({crps:.1})", factor * error),
-        None => format!("never ({crps:.1})"),
+        Some(error) => format!("{:+.1} {unit} ({crps})", factor * error),
+        None => format!("never ({crps})"),
     }
 }
 

@@ -30,6 +30,12 @@ impl Daemon {
         }
     }
 
+    /// Whether the hooks of `fresh` are those at work, none of which reads more than its config when it is set up. They go on then: no red
+    /// waits until a hook that runs has ended.
+    fn keeps_hooks(&self, fresh: &Config) -> bool {
+        fresh.hooks == self.config.hooks && fresh.hooks.iter().all(|hook| hook.to.is_none())
+    }
+
     /// The config file as it is now with its token, or why it cannot be taken.
     fn fresh_config(&self) -> Result<(Config, Option<Token>), String> {
         let mut fresh = config::load(&self.config.file).map_err(|error| error.to_string())?;
@@ -123,8 +129,10 @@ impl Daemon {
         self.site.show(&self.pulse.vitals);
         (self.pulse.vitals).retain(|benchmark| self.site.shows(benchmark));
         self.commit()?;
-        self.close_hooks().await;
-        self.site.rehook(dispatcher(&fresh, &self.store))?;
+        if !self.keeps_hooks(&fresh) {
+            self.close_hooks().await;
+            self.site.rehook(dispatcher(&fresh, &self.store))?;
+        }
         self.note_closed()?;
         self.note_inherited(&fresh)?;
         self.sources = Sources::start(&fresh, &self.store, self.pulse.vitals.faults())?;

@@ -331,7 +331,8 @@ fn alarm_state(
     life: AlertLife,
     is_acknowledged: bool,
 ) -> Result<AlarmState, StoreError> {
-    let alarms = Alarms::read(store, None, clock::now())?;
+    let now = store.settings_at(store.last_step())?.unwrap_or_default();
+    let alarms = Alarms::read(store, None, clock::now(), &now.declared)?;
     let newest = refit(store, call.benchmark.as_ref(), super::LATEST)?;
     let called = newest.and_then(|event| {
         if let EventKind::Refit { called, .. } = event.kind {

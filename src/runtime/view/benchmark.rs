@@ -198,7 +198,7 @@ impl SiteReader {
         alerts.reverse();
         alerts.truncate(MOST_EVENTS);
         let levels_now = in_force(&self.store, at)?;
-        let alarms = Alarms::read(&self.store, at, moment)?;
+        let alarms = Alarms::read(&self.store, at, moment, &self.facts().declared)?;
         let span = self.store.span(Some(name))?;
         let orders = TakenOrders::read(&self.store, at)?;
         Ok(Some(BenchmarkView {

@@ -15,6 +15,7 @@ pub use site::{SiteView, Standing};
 
 use super::clock;
 use crate::config::{Config, Links};
+use crate::monitor::Declared;
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::store::{Heads, Store, StoreError};
 use std::collections::BTreeMap;
@@ -45,6 +46,8 @@ pub struct Facts {
     pub named: Vec<BenchmarkId>,
     /// Whether there are such others.
     pub is_open: bool,
+    /// What people declare.
+    pub declared: Vec<Declared>,
     /// Where each stands, m.
     pub positions: BTreeMap<BenchmarkId, Vec<f64>>,
     /// Whether orders are taken: whoever gives one must know a secret.
@@ -84,6 +87,7 @@ impl Facts {
                 .to_owned(),
             named: benchmarks.clone().map(|one| one.id.clone()).collect(),
             is_open: config.settings.watched.is_open,
+            declared: config.settings.declared.clone(),
             positions: benchmarks
                 .filter_map(|one| Some((one.id.clone(), one.position.clone()?)))
                 .collect(),

@@ -110,7 +110,7 @@ impl SiteReader {
         let known = self.known()?.into_iter();
         // What is known of one that is not watched any more is of the past.
         let benchmarks = known.filter(|one| at.is_some() || self.facts().watches(one));
-        let alarms = Alarms::read(&self.store, at, moment)?;
+        let alarms = Alarms::read(&self.store, at, moment, &self.facts().declared)?;
         let benchmarks = benchmarks.map(|one| self.standing(one, &levels, &alarms, at, moment));
         let site_levels = levels.iter().filter(|((place, _), _)| place.is_none());
         let called = site_levels.map(|((_, level), _)| *level);
