@@ -98,7 +98,6 @@ mod tests {
     use super::super::explain::explain;
     use super::super::fixture::{channel, daily, driven_by_the_lake, lake};
     use super::super::options::Options;
-    use super::*;
 
     #[test]
     fn a_channel_that_holds_the_values_of_another_is_named_with_it() {
