@@ -45,7 +45,7 @@ pub(super) struct InversionArgs {
     /// Use no reading after this
     #[arg(long, value_name = "TIME", value_parser = value::instant)]
     until: Option<Timestamp>,
-    /// Hold m at this value
+    /// Hold m at this value: regime and intervals are then those of the laws with about this m, under a constant load
     #[arg(long, value_name = "m=M", value_parser = fixed)]
     fix: Option<f64>,
 }
@@ -231,6 +231,9 @@ fn notes(report: &FitReport) -> String {
              (see the minima below), the best one may be an extreme among them: go by the interval.\n",
         );
     }
+    if is_held(&report.parameters.m) {
+        out.push_str(HELD);
+    }
     if regimes_differ(&report.regime, report.regime_under_load.as_ref()) {
         out.push_str(REGIMES_DIFFER);
     }
@@ -246,6 +249,15 @@ pub(super) fn regimes_differ(constant: &FittedRegime, load: Option<&FittedRegime
     let unstable = |regime: &FittedRegime| regime.probability_unstable;
     let both = unstable(constant).zip(load.and_then(unstable));
     both.is_some_and(|(constant, load)| (constant - load).abs() > DISAGREE)
+}
+
+/// What is said where m is.
+const HELD: &str = "m is held. Regime, onset and intervals are those of the laws under a constant load whose m is about there, and - where\n\
+     hardly any law that fits the readings has it. The failure is the monitor's, which leaves m free.\n";
+
+/// Whether an estimate was given: its bounds are one number.
+fn is_held(m: &Estimate) -> bool {
+    m.low.is_some() && m.low.map(f64::to_bits) == m.high.map(f64::to_bits)
 }
 
 /// Whether the best fit lies outside of the interval.

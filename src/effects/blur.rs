@@ -15,11 +15,13 @@ const SHORTEST: f64 = 0.5;
 
 impl Search<'_> {
     /// The best event as a mean over some time shows it, both refitted with the law; `None` where it gains no more than
-    /// what was found one by one (`single`) by the margin, or where the readings may be no such means.
+    /// what was found one by one (`single`) by the margin, where either of the two gains less than the margin beside the other, or where
+    /// the readings may be no such means.
     pub(super) fn averaged_event(
         &mut self,
         base: &Fitted,
         single: &[Refitted],
+        round: usize,
     ) -> Option<(Refitted, Vec<Accepted>)> {
         let margin = self.options.bic_margin;
         let events = single.iter();
@@ -48,8 +50,7 @@ impl Search<'_> {
         if best.gain < most + margin {
             return None;
         }
-        let p_value = alone.p_value;
-        let share = |bic_gain: f64| Accepted {
+        let share = |bic_gain: f64, p_value: f64| Accepted {
             bic_gain,
             p_value,
             ties: Vec::new(),
@@ -58,12 +59,31 @@ impl Search<'_> {
         let event = self.refitted(base, &best.term)?;
         let spacings = coefficients(self.problem, &best.fitted, base.terms.len());
         if best.gain < event.gain + margin || spacings[0] < SHORTEST {
+            let p_value = alone.p_value;
             let is_better = event.gain > most + margin;
-            let shares = vec![share(event.gain)];
+            let shares = vec![share(event.gain, p_value)];
             return is_better.then_some((Refitted { p_value, ..event }, shares));
         }
-        let shares = vec![share(best.gain - event.gain), share(event.gain)];
-        Some((Refitted { p_value, ..best }, shares))
+        // What the BIC rises by without the one beside the other.
+        let of_mean = best.gain - event.gain;
+        let of_event = best.gain - self.gain_of_mean(base, &mean, single);
+        if of_event < margin {
+            return None;
+        }
+        let null_gains = self.null_gains_of_itself(base, round)?;
+        let shares = [of_mean, of_event].map(|gain| share(gain, null_gains.p_of_two(gain)));
+        let p_value = shares[0].p_value.max(shares[1].p_value);
+        Some((Refitted { p_value, ..best }, shares.into()))
+    }
+
+    /// What the mean gains without an event.
+    fn gain_of_mean(&mut self, base: &Fitted, mean: &Term, single: &[Refitted]) -> f64 {
+        let known = single.iter().find(|one| one.term.kind == mean.kind);
+        let gain = match known {
+            Some(known) => Some(known.gain),
+            None => self.refitted(base, mean).map(|one| one.gain),
+        };
+        gain.unwrap_or(0.0).max(0.0)
     }
 
     /// The best event of each kind where every reading is a mean over so many spacings to begin with.

@@ -33,6 +33,11 @@ fn plain(kind: Kind, act: Act) -> Term {
     }
 }
 
+/// Waves in the load of these periods, days.
+pub(super) fn waves(problem: &Problem, kind: Kind, periods: &[f64]) -> Term {
+    plain(kind, record(problem).waves(periods))
+}
+
 /// What a definition is given to know of a record.
 fn record(problem: &Problem) -> SearchedRecord<'_> {
     SearchedRecord {

@@ -7,19 +7,43 @@ use crate::reading::Channel;
 /// A covariate must cover this share of the record.
 const LEAST_COVERAGE: f64 = 0.8;
 
-/// The channels, each once: of two that hold the same values the one without faults stays.
-pub(super) fn distinct(channels: Vec<Channel>, faulty: &[String]) -> Vec<Channel> {
-    let mut kept: Vec<Channel> = Vec::new();
+/// A channel that counts for nothing, because another holds its values.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct ChannelCopy {
+    pub(super) copy: String,
+    pub(super) of: String,
+}
+
+impl ChannelCopy {
+    /// For people.
+    pub(super) fn remark(&self) -> String {
+        let Self { copy, of } = self;
+        format!(
+            "{copy} holds the same values as {of}, but for a constant: they count once, and what is said of {of} holds for {copy} as well."
+        )
+    }
+}
+
+/// The channels, each once, and those that were left out for another: of two that hold the same values the one without faults stays.
+pub(super) fn distinct(
+    channels: Vec<Channel>,
+    faulty: &[String],
+) -> (Vec<Channel>, Vec<ChannelCopy>) {
+    let (mut kept, mut copies): (Vec<Channel>, Vec<ChannelCopy>) = (Vec::new(), Vec::new());
     let (second, first): (Vec<Channel>, Vec<Channel>) = channels
         .into_iter()
         .partition(|channel| faulty.contains(&channel.name));
     for channel in first.into_iter().chain(second) {
-        if !kept.iter().any(|known| same_values(known, &channel)) {
-            kept.push(channel);
+        match kept.iter().find(|known| same_values(known, &channel)) {
+            Some(known) => copies.push(ChannelCopy {
+                of: known.name.clone(),
+                copy: channel.name,
+            }),
+            None => kept.push(channel),
         }
     }
     kept.sort_by(|a, b| a.name.cmp(&b.name));
-    kept
+    (kept, copies)
 }
 
 /// Whether two channels differ by a constant only, within a hundredth of their deviation, where both have values.
@@ -67,4 +91,38 @@ pub(super) fn drivers(
         drivers.push(driver);
     }
     drivers
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::explain::explain;
+    use super::super::fixture::{channel, daily, driven_by_the_lake, lake};
+    use super::super::options::Options;
+
+    #[test]
+    fn a_channel_that_holds_the_values_of_another_is_named_with_it() {
+        let (series, mut channels) = driven_by_the_lake();
+        let days = daily(series.readings.len());
+        let levels = lake(&days);
+        for (name, zero, unit) in [("lake b", 0.0, 1.0), ("lake over the sea", 312.5, 1.0)] {
+            let values: Vec<f64> = levels.iter().map(|one| zero + unit * one).collect();
+            channels.push(channel(name, &days, &values));
+        }
+        let in_feet: Vec<f64> = levels.iter().map(|one| one / 0.3048 + 3.0).collect();
+        channels.push(channel("level in feet", &days, &in_feet));
+        let options = Options {
+            surrogates: 99,
+            ..Options::default()
+        };
+        let said = explain(&series, &channels, &[], &options, &mut |_| ());
+        for copy in ["lake b", "lake over the sea", "level in feet"] {
+            let remark = said
+                .remarks
+                .iter()
+                .any(|one| one.contains(copy) && one.contains("lake "));
+            let mut rivals = said.cannot_separate_from.iter();
+            let is_rival = rivals.any(|one| one.channel.as_deref() == Some(copy));
+            assert!(remark || is_rival, "{copy}: {:?}", said.remarks);
+        }
+    }
 }

@@ -14,9 +14,9 @@ impl Search<'_> {
     /// The best effect that may be added to `base`, refitted with it; an event and the mean that it is seen through are
     /// added together.
     pub(super) fn one_more(&mut self, base: &Fitted, round: usize) -> Option<OneMore> {
-        self.withheld = None;
+        (self.withheld, self.is_daily) = (None, false);
         let mut refitted = self.refits(base, round)?;
-        if let Some(found) = self.averaged(base, &refitted) {
+        if let Some(found) = self.averaged(base, &refitted, round) {
             return Some(found);
         }
         refitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
@@ -55,7 +55,7 @@ impl Search<'_> {
             p_value: one.p_value,
             ties: ties.unwrap_or_default(),
         };
-        let how = one.with_season(how, self.problem);
+        let how = one.with_day(one.with_season(how, self.problem), self.problem);
         Some(OneMore::Effect(one.fitted, vec![how]))
     }
 
@@ -81,8 +81,8 @@ impl Search<'_> {
     }
 
     /// An event and the mean that it is seen through, where both together may be accepted.
-    fn averaged(&mut self, base: &Fitted, refitted: &[Refitted]) -> Option<OneMore> {
-        let (both, how) = self.averaged_event(base, refitted)?;
+    fn averaged(&mut self, base: &Fitted, refitted: &[Refitted], round: usize) -> Option<OneMore> {
+        let (both, how) = self.averaged_event(base, refitted, round)?;
         let (held, reason) = self.judged(base, &both);
         let is_taken = reason.is_none();
         let slower = if is_taken {

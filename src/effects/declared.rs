@@ -163,6 +163,7 @@ impl DeclaredLaw {
             candidates: self.candidates,
             withheld: None,
             has_slow_load: false,
+            is_daily: false,
         };
         let findings = findings(ready, found, verdict, options, &mut scratch);
         (findings, given)

@@ -158,7 +158,7 @@ pub(super) fn undeclared_load(
 ) -> Vec<(f64, f64)> {
     let residual = fitted.residual(problem);
     let misfit: f64 = whitener.innovations(&residual).iter().map(|u| u * u).sum();
-    let sigma = (misfit / problem.used as f64).sqrt();
+    let sigma = whitener.sigma(misfit);
     // From units of the state to e-folds.
     let typical = problem.typical_velocity();
     let e_folds = match problem.quantity {

@@ -1,6 +1,7 @@
 //! The way from a benchmark's readings to an explanation.
 
-use super::channels::distinct;
+use super::channels::{ChannelCopy, distinct};
+use super::daily::{self, has_daily_tide};
 use super::explanation::{Candidate, Effect, Explained, Explanation, SettingsReport};
 use super::faults::inspect;
 use super::findings::{Findings, findings};
@@ -54,7 +55,16 @@ pub(super) fn explained_by(
     );
     let inspected = inspect(series, channels);
     let faulty = inspected.faults.iter().filter_map(|f| f.channel.clone());
-    let channels = distinct(inspected.channels, &faulty.collect::<Vec<_>>());
+    let (channels, mut copies) = distinct(inspected.channels, &faulty.collect::<Vec<_>>());
+    // Of these two it is said already.
+    copies.retain(|one| {
+        let are_these = |(a, b): &(String, String)| {
+            [a, b]
+                .iter()
+                .all(|name| **name == one.copy || **name == one.of)
+        };
+        !inspected.twins.iter().any(are_these)
+    });
     let (series, channels) = (&inspected.series, channels.as_slice());
     let is_drawn = inspected
         .faults
@@ -82,7 +92,11 @@ pub(super) fn explained_by(
         forecast,
         candidates: findings.candidates,
         flags: inspected.flags,
-        remarks: remarks.chain(of_channels).chain(of_search).collect(),
+        remarks: remarks
+            .chain(copies.iter().map(ChannelCopy::remark))
+            .chain(of_channels)
+            .chain(of_search)
+            .collect(),
         residual: findings.residual,
         noise: findings.noise,
         settings: SettingsReport {
@@ -174,6 +188,9 @@ fn look(
     };
     let verdict = conclude(&ready, &mut found, options.bic_margin, &mut scratch);
     let withheld = found.withheld;
+    if found.is_daily || has_daily_tide(&verdict.effects, &ready.problem) {
+        remarks.push(daily::REMARK.to_owned());
+    }
     let findings = findings(&ready, found, verdict, options, &mut scratch);
     if !is_drawn {
         return (findings, remarks);

@@ -12,11 +12,11 @@ use super::fresh::{best_of_starts, fresh_starts};
 use super::judge::{Compared, HeldOut, held_out, named, step_errors};
 use super::kind::Kind;
 use super::known_load::KnownLoad;
-use super::noise::Memory;
+use super::noise::{Memory, Noise, Whitener};
 use super::options::Options;
 use super::problem::Problem;
 use super::ready::Ready;
-use super::refit::{Fitted, Start};
+use super::refit::{Fitted, Start, towards};
 use super::rival::Rival;
 use super::search::SearchResult;
 use super::term::{Scratch, Term};
@@ -79,18 +79,25 @@ pub(super) fn findings(
     } = verdict;
     let noise = noise_report(&full, unit);
     // Errors are those of least squares, before and after.
-    let after = least_squares(problem, &full, scratch).unwrap_or_else(|| found.plain.clone());
+    let plain = &found.plain;
+    let after = least_squares(problem, plain, &full, scratch).unwrap_or_else(|| plain.clone());
+    let both = Compared {
+        before: plain,
+        after: &full,
+    };
+    let mut held = held_out(problem, both, options.held_out_share, scratch);
+    let (mut before, mut null) = (plain, &found.null);
+    if full.terms.is_empty() {
+        // Nothing entered: what differs before and after are two fits of one law, of which the nearer counts for both.
+        (before, null) = (&after, &full);
+        held = held.map(HeldOut::by_the_nearer);
+    }
     let by_least_squares = Compared {
-        before: &found.plain,
+        before,
         after: &after,
     };
     let both = Compared {
-        before: &found.plain,
-        after: &full,
-    };
-    let held = held_out(problem, both, options.held_out_share, scratch);
-    let both = Compared {
-        before: &found.null,
+        before: null,
         after: &full,
     };
     let error = errors(problem, by_least_squares, held.as_ref(), unit);
@@ -145,21 +152,16 @@ fn steps(
     let Some(held) = held else {
         return Change::default();
     };
-    // With nothing added there is nothing to compare.
     let newest = both.after.terms.len();
-    let both = if newest == 0 {
-        Compared {
-            before: both.after,
-            ..both
-        }
-    } else {
-        both
-    };
     let known = step_errors(problem, both, held.from, newest, scratch);
-    let (before, after) = known.map_or_else(
+    let (before, mut after) = known.map_or_else(
         || held.errors_of_changes(problem),
         |steps| (steps.before, steps.after),
     );
+    if newest == 0 {
+        // With nothing added there is nothing to compare.
+        after = before;
+    }
     Change {
         before: Some(before / ready.unit.factor()),
         after: Some(after / ready.unit.factor()),
@@ -229,15 +231,40 @@ fn is_contradicted(residual: &ResidualTests) -> bool {
     values.into_iter().flatten().any(|p| p < LEFT_OVER)
 }
 
-/// The law with the effects of `full`, by least squares over all readings.
+/// The law with the effects of `full`, by least squares over all readings: no farther from them than the `plain` law, which is the
+/// same with effects of no size.
 pub(super) fn least_squares(
     problem: &Problem,
+    plain: &Fitted,
     full: &Fitted,
     scratch: &mut Scratch,
 ) -> Option<Fitted> {
+    let nothing = full.terms.iter();
+    let nothing = nothing.fold(Start::at(plain), |start, term| start.with_size(term, 0.0));
+    // The law's priors may lead away from the nearest.
+    let white = Whitener::new(problem, Noise::WHITE);
+    let as_plain = towards(problem, &nothing, &white, (0, scratch));
     let mut starts = fresh_starts(problem, &full.terms);
-    starts.push(Start::at(full));
-    best_of_starts(problem, &starts, scratch)
+    starts.extend([Start::at(full), nothing.clone()]);
+    let best = best_of_starts(problem, &starts, scratch);
+    let both = best.into_iter().chain(as_plain.clone());
+    let nearest = both.min_by(|a, b| a.deviance.total_cmp(&b.deviance))?;
+    let rms = |fitted: &Fitted| fitted.rms(problem, 0..problem.t.len());
+    if rms(&nearest) <= rms(plain) {
+        return Some(nearest);
+    }
+    if full.terms.is_empty() {
+        return Some(plain.clone());
+    }
+    // Readings that weigh little in a fit count in its error as all others do.
+    let even = Problem {
+        weight: vec![1.0; problem.t.len()],
+        ..problem.clone()
+    };
+    let starts = [Start::at(&nearest), nothing];
+    let best = best_of_starts(&even, &starts, scratch);
+    let all = best.into_iter().chain(as_plain).chain([nearest]);
+    all.min_by(|a, b| rms(a).total_cmp(&rms(b)))
 }
 
 /// A name that no curve has yet.
@@ -405,3 +432,6 @@ fn structure(problem: &Problem, load: &[(f64, f64)]) -> Vec<Structure> {
     stretches.truncate(MOST_STRETCHES);
     stretches
 }
+
+#[cfg(test)]
+mod tests;

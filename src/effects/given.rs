@@ -60,14 +60,14 @@ pub fn error_given(
         ..
     } = inspect(series, channels);
     let faulty: Vec<String> = faults.into_iter().filter_map(|f| f.channel).collect();
-    let channels = distinct(channels, &faulty);
+    let (channels, _) = distinct(channels, &faulty);
     let ready = Ready::of(&series, &channels, &mut Vec::new())?;
     let problem = &ready.problem;
     let mut search = ready.search(options, false);
     let null = search.null(&ready.plain)?;
     let (full, _) = put_in(&mut search, null, causes)?;
     let mut scratch = Scratch::default();
-    let after = least_squares(problem, &full, &mut scratch)?;
+    let after = least_squares(problem, &ready.plain, &full, &mut scratch)?;
     let all = 0..problem.t.len();
     let unit = series.unit;
     let of = |fitted: &Fitted, range: std::ops::Range<usize>| {

@@ -163,6 +163,16 @@ pub(super) struct HeldOut {
 }
 
 impl HeldOut {
+    /// Of two fits of one law that one for both which is nearer to the readings before the block.
+    pub(super) fn by_the_nearer(mut self) -> Self {
+        if self.after.deviance < self.before.deviance {
+            self.before.clone_from(&self.after);
+        } else {
+            self.after.clone_from(&self.before);
+        }
+        self
+    }
+
     /// Root mean square errors over the block, mm or mm/day.
     pub(super) fn errors(&self, problem: &Problem) -> (f64, f64) {
         let range = self.from..problem.t.len();

@@ -7,6 +7,7 @@ mod by_clock;
 mod candidates;
 mod clock;
 mod companions;
+mod daily;
 mod declared;
 mod definition;
 mod diagnosis;

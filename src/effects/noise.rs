@@ -126,6 +126,8 @@ pub(super) struct Whitener {
     pub(super) log_determinant: f64,
     /// Scale of one more reading, that of the whole motion.
     whole: f64,
+    /// The white noise is no smaller, mm or mm/day.
+    least: f64,
     quantity: Quantity,
 }
 
@@ -142,11 +144,7 @@ impl Whitener {
         let stationary = if noise.days.is_finite() { 1.0 } else { 0.0 };
         let mut p: Covariance = [0.0, 0.0, stationary];
         for (i, &speed) in problem.seen.iter().enumerate().take(used) {
-            let dt = if i > 0 {
-                problem.t[i] - problem.t[i - 1]
-            } else {
-                0.0
-            };
+            let dt = since_last(problem, i);
             let (gather, decay, q) = transition(problem, noise, dt, speed / typical);
             p = advance(p, gather, decay, q);
             let weight = problem.weight[i];
@@ -180,6 +178,7 @@ impl Whitener {
             steps,
             log_determinant,
             whole,
+            least: problem.rounding,
             quantity: problem.quantity,
         }
     }
@@ -216,8 +215,14 @@ impl Whitener {
 
     /// -2 ln likelihood of innovations whose squares sum up to `misfit`, the size of the noise profiled out.
     pub(super) fn deviance(&self, misfit: f64) -> f64 {
-        let n = self.steps.len() as f64;
-        n * (misfit.max(1e-300) / n).ln() + self.log_determinant
+        2.0 * self.steps.len() as f64 * self.sigma(misfit).ln() + self.log_determinant
+    }
+
+    /// The white noise whose innovations' squares sum up to `misfit`: what is nearer to the readings than they are written says nothing.
+    pub(super) fn sigma(&self, misfit: f64) -> f64 {
+        (misfit.max(0.0) / self.steps.len() as f64)
+            .sqrt()
+            .max(self.least)
     }
 
     /// What the noise's own parameters cost in the BIC.
@@ -320,6 +325,12 @@ impl Whitener {
     }
 }
 
+/// Days from the reading before; 0 of the first.
+fn since_last(problem: &Problem, i: usize) -> f64 {
+    i.checked_sub(1)
+        .map_or(0.0, |last| problem.t[i] - problem.t[last])
+}
+
 /// What the state does over `dt` days at a velocity `relative` to the typical one: (gather, decay, noise).
 fn transition(problem: &Problem, noise: Noise, dt: f64, relative: f64) -> (f64, f64, Covariance) {
     match noise.memory {
@@ -379,20 +390,12 @@ fn update(p: Covariance, reads: [f64; 2]) -> ([f64; 2], f64, Covariance) {
 impl Whitener {
     /// Posterior (mean, variance) of what remembers, at every fitted reading, for a column in units of the white noise.
     pub(super) fn smooth(&self, problem: &Problem, column: &[f64]) -> Vec<(f64, f64)> {
-        let stationary = if self.noise.days.is_finite() {
-            1.0
-        } else {
-            0.0
-        };
+        let stationary = f64::from(u8::from(self.noise.days.is_finite()));
         let (mut mean, mut p): ([f64; 2], Covariance) = ([0.0; 2], [0.0, 0.0, stationary]);
         let mut path = Vec::with_capacity(self.steps.len());
         let typical = problem.typical_velocity();
         for (i, step) in self.steps.iter().enumerate() {
-            let dt = if i > 0 {
-                problem.t[i] - problem.t[i - 1]
-            } else {
-                0.0
-            };
+            let dt = since_last(problem, i);
             let (gather, decay, q) = transition(problem, self.noise, dt, problem.seen[i] / typical);
             let ahead = [mean[0] + gather * mean[1], decay * mean[1]];
             let p_ahead = advance(p, gather, decay, q);

@@ -1,5 +1,6 @@
 //! The readings of one benchmark as the refits see them: days and mm, weights, and the nodes of the law's solution.
 
+use super::faults::resolution;
 use crate::fit::Observations;
 use crate::reading::{Channel, Quantity, SECONDS_PER_DAY, Series, Timestamp, days_since};
 
@@ -11,6 +12,8 @@ const NODES: f64 = 1500.0;
 const NODES_A_READING: f64 = 4.0;
 /// Readings about which the local line is drawn.
 const NEIGHBOURS: usize = 4;
+/// Of the largest reading.
+const FINEST: f64 = 1e-9;
 /// Share of the usual velocity under which a load has no hold on the noise: there the readings give no velocity.
 const LEAST_SEEN: f64 = 0.1;
 
@@ -38,6 +41,8 @@ pub(super) struct Problem {
     pub(super) spacing: f64,
     /// Rough white noise of a reading, in mm or mm/day.
     pub(super) scatter: f64,
+    /// Standard deviation of what the readings' own digits leave open, in mm or mm/day: no noise is smaller.
+    pub(super) rounding: f64,
     /// The velocity that an undeclared load multiplies, at each reading, mm/day: the plain law's by least
     /// squares, so that every model is judged under the same noise.
     pub(super) seen: Vec<f64>,
@@ -67,8 +72,8 @@ impl Problem {
         let is_relative =
             sigma.is_none() && weight.iter().any(|one| one.to_bits() != 1.0_f64.to_bits());
         let relative = misfits.iter().zip(&weight).map(|(m, w)| (m / w).abs());
-        let least = 1e-9 * y.iter().fold(1e-3_f64, |most, y| most.max(y.abs()));
-        let scatter = (median(relative.collect()) / 0.6745).max(least);
+        let rounding = rounding(series, &y);
+        let scatter = (median(relative.collect()) / 0.6745).max(rounding);
         let fine = channels
             .iter()
             .filter_map(channel_spacing)
@@ -89,6 +94,7 @@ impl Problem {
             node_of,
             spacing,
             scatter,
+            rounding,
         })
     }
 
@@ -165,6 +171,16 @@ fn blocks(observations: &Observations) -> (Vec<f64>, Vec<f64>, Option<Vec<f64>>)
         mean(&|i| values[i].value),
         sigma,
     )
+}
+
+/// That of readings which are rounded to the step on which they stand, or to their last digit; nothing is known better than to `FINEST`
+/// of the largest.
+fn rounding(series: &Series, y: &[f64]) -> f64 {
+    let values: Vec<f64> = series.readings.iter().map(|one| one.value).collect();
+    let step = resolution(&values) * series.unit.factor();
+    let most = y.iter().fold(1e-3_f64, |most, y| most.max(y.abs()));
+    let together = values.len() as f64 / y.len() as f64;
+    (step / 12.0_f64.sqrt() / together.sqrt()).max(FINEST * most)
 }
 
 fn channel_spacing(channel: &Channel) -> Option<f64> {

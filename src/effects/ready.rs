@@ -54,6 +54,7 @@ impl Ready {
             scratch: Scratch::default(),
             candidates: Vec::new(),
             withheld: None,
+            is_daily: false,
         }
     }
 }

@@ -290,7 +290,7 @@ impl ParameterPoint {
         Fitted {
             terms: terms.to_vec(),
             deviance: whitener.deviance(misfit),
-            sigma: (misfit / problem.used as f64).sqrt(),
+            sigma: whitener.sigma(misfit),
             noise: whitener.noise,
             parameters: self.parameters.clone(),
             prediction: self.prediction.clone(),

@@ -66,13 +66,27 @@ impl<'a> Search<'a> {
         })
     }
 
+    /// What a search for one more effect that needs no covariate gains without any.
+    pub(super) fn null_gains_of_itself(
+        &mut self,
+        base: &Fitted,
+        round: usize,
+    ) -> Option<NullGains> {
+        let ground = self.ground(base)?;
+        let (_, tried) = ground.of_itself();
+        let (count, seed) = (self.options.surrogates, self.seed_of(round) + 1);
+        Some(ground.null_gains_of_noise(&tried, Innovations::AsTheyAre, count, seed))
+    }
+
+    /// Of the surrogates of this round; the next number is that of those without covariates.
+    fn seed_of(&self, round: usize) -> u64 {
+        self.options.seed + 2 * round as u64
+    }
+
     /// The most promising trials refitted, each with the p-value of the search that found it.
     pub(super) fn refits(&mut self, base: &Fitted, round: usize) -> Option<Vec<Refitted>> {
         let ground = self.ground(base)?;
-        let (count, seed) = (
-            self.options.surrogates,
-            self.options.seed + 2 * round as u64,
-        );
+        let (count, seed) = (self.options.surrogates, self.seed_of(round));
         let mut covariates = ground.of_covariates();
         covariates.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         covariates.truncate(MOST_COVARIATES);

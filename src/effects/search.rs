@@ -74,6 +74,8 @@ pub(super) struct SearchResult {
     pub(super) withheld: Option<Withheld>,
     /// Whether a load that nothing measures accounts for what is left better than any effect.
     pub(super) has_slow_load: bool,
+    /// Whether a daily cycle is left that may be a tide's, melt water's or the instrument's.
+    pub(super) is_daily: bool,
 }
 
 /// What was said of a candidate: its held-out error over that without it, and why it is refused.
@@ -98,6 +100,8 @@ pub(super) struct Search<'a> {
     pub(super) scratch: Scratch,
     pub(super) candidates: Vec<Candidate>,
     pub(super) withheld: Option<Withheld>,
+    /// Whether a tide was refused in this round because a daily cycle explains the same.
+    pub(super) is_daily: bool,
 }
 
 /// A refitted candidate.
@@ -133,7 +137,7 @@ impl Refitted {
     /// Two searches were made, and either could have spoken.
     pub(super) fn judged_by(self, null_gains: &NullGains, gain: f64) -> Self {
         Self {
-            p_value: (2.0 * null_gains.p_value(gain)).min(1.0),
+            p_value: null_gains.p_of_two(gain),
             ..self
         }
     }
@@ -213,6 +217,7 @@ impl Search<'_> {
             candidates: self.candidates,
             withheld: self.withheld,
             has_slow_load,
+            is_daily: self.is_daily,
         })
     }
 
@@ -236,6 +241,9 @@ impl Search<'_> {
     /// Why not; `None` for what may be accepted. The held-out error with it over that without comes first.
     pub(super) fn judged(&mut self, base: &Fitted, one: &Refitted) -> Judgement {
         if let Some(reason) = self.refused_at_once(one) {
+            return (None, Some(reason));
+        }
+        if let Some(reason) = self.daily_instead(base, one) {
             return (None, Some(reason));
         }
         if self.is_drawn && !one.term.kind.has_independent_evidence() {

@@ -46,6 +46,11 @@ impl NullGains {
         self
     }
 
+    /// The chance that one of two searches without any effect gains as much.
+    pub(super) fn p_of_two(&self, gain: f64) -> f64 {
+        (2.0 * self.p_value(gain)).min(1.0)
+    }
+
     /// The chance that a search without any effect gains as much: by rank, and beyond the largest by Gumbel's law for maxima.
     pub(super) fn p_value(&self, gain: f64) -> f64 {
         let n = self.gains.len() as f64;

@@ -1,6 +1,7 @@
 //! From what a search accepted to what is said: the verdict, what stands beside it, and how much is explained.
 
 use super::act::Act;
+use super::daily;
 use super::definition::{EffectSize, FittedCoefficients};
 use super::diagnosis::Judged;
 use super::explanation::{Candidate, Effect, Explained};
@@ -41,6 +42,8 @@ const LOSES: f64 = 2.0;
 const ALIKE: f64 = 3.0;
 /// Most kinds without independent evidence that are accepted together.
 const MOST_LABELS: usize = 2;
+/// Steps of a finite length pass a failure: the law fails where it is so many times faster than it ever was with all its effects.
+const RUNS_AWAY: f64 = 30.0;
 /// 5 and 95 % of a normal distribution, in standard deviations.
 const NINETY: f64 = 1.645;
 
@@ -56,7 +59,7 @@ pub(super) fn conclude(
     let mut accepted = found.accepted.clone();
     let mut judged = Judged::of(problem, &full, &ready.bank, scratch);
     let load_gain = judged.as_ref().map_or(0.0, Judged::load_gain);
-    let mut left = found.has_slow_load || load_gain > margin;
+    let mut left = found.has_slow_load || found.is_daily || load_gain > margin;
     let only_labels =
         !accepted.is_empty() && full.terms.iter().all(|term| term.kind.fits_any_bend());
     let mut cannot_separate_from = Vec::new();
@@ -93,6 +96,10 @@ pub(super) fn conclude(
         } else if full.noise.memory == Memory::Load {
             full = under_memory_of_readings(ready, &full, scratch).unwrap_or(full);
         }
+    }
+    if found.is_daily && effects.is_empty() {
+        cannot_separate_from.push(Rival::from(Kind::TIDE));
+        cannot_separate_from.extend(daily::rivals());
     }
     let cannot_separate_from = separate(cannot_separate_from, &effects);
     let is_one_channel = cannot_separate_from.iter().all(|one| one.channel.is_none());
@@ -361,7 +368,8 @@ fn deviation(ready: &Ready, full: &Fitted, index: usize, scratch: &mut Scratch) 
     Some(full.sigma / frame.misfit.sqrt())
 }
 
-/// What a term adds to the prediction of every reading: with it, less without.
+/// What a term adds to the prediction of every reading: with it, less without. Not a number where the law without it fails within
+/// the record: there it has no prediction to be compared with.
 pub(super) fn contribution(
     problem: &Problem,
     full: &Fitted,
@@ -374,7 +382,9 @@ pub(super) fn contribution(
     for k in 0..full.terms[index].coefficients() {
         without[first + earlier + k] = 0.0;
     }
-    if !scratch.predict(problem, &full.terms, &without) {
+    let goes_on = scratch.predict(problem, &full.terms, &without);
+    let most = RUNS_AWAY * full.velocity.iter().copied().fold(0.0, f64::max);
+    if !goes_on || scratch.driven.velocity.iter().any(|v| *v > most) {
         return vec![f64::NAN; problem.t.len()];
     }
     let both = full.prediction.iter().zip(&scratch.prediction);
@@ -385,4 +395,40 @@ fn rms(values: &[f64]) -> Option<f64> {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     let square = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64;
     square.is_finite().then(|| square.sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixture::steady;
+    use super::*;
+
+    /// A law that speeds up over a hundred days, slowed by a load that steps down by so many e-folds before day 40.
+    fn slowed(by: f64) -> (Problem, Fitted) {
+        let days: Vec<f64> = (0..100).map(f64::from).collect();
+        let problem = steady(Quantity::Displacement, &days, 1);
+        let term = super::super::candidates::once(Kind::LOAD_STEP, 40)
+            .next()
+            .unwrap();
+        // Fails after some two thirds of the record where nothing slows it.
+        let law = vec![0.0, 1.5, -3.0, 0.0, 0.0];
+        let start = Start {
+            parameters: law,
+            terms: Vec::new(),
+            noise: super::super::noise::Noise::WHITE,
+            frozen: 0,
+        };
+        let start = start.with_size(&term, -by);
+        let white = Whitener::new(&problem, start.noise);
+        let scratch = &mut Scratch::default();
+        let fitted = super::super::refit::towards(&problem, &start, &white, (0, scratch));
+        (problem, fitted.unwrap())
+    }
+
+    #[test]
+    fn what_a_term_adds_to_a_law_that_fails_without_it_is_no_number() {
+        let (problem, full) = slowed(3.0);
+        let added = contribution(&problem, &full, 0, &mut Scratch::default());
+        assert!(added.iter().all(|value| value.is_nan()));
+        assert_eq!(rms(&added), None);
+    }
 }

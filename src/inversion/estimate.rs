@@ -82,9 +82,7 @@ pub(super) fn parameters(
 ) -> Parameters {
     let best = best(inversion, solution);
     let samples = posterior.map_or_else(Vec::new, |posterior| at_start(inversion, posterior));
-    let fixed = matches!(inversion.options.exponent, Exponent::Fixed(_));
-    // A posterior over m says nothing of what depends on m when that is given.
-    let of_m = if fixed { &[] } else { samples.as_slice() };
+    let of_m = samples.as_slice();
     // x_i, T and D have their pole at m = 1: bounds on either side of it would bound nothing.
     let of_x = if stands_on_both_sides(&samples) {
         &[]
@@ -179,7 +177,7 @@ fn values(inversion: &Inversion, law: &Law) -> ParameterValues {
 fn exponent(inversion: &Inversion, best: Option<f64>, samples: &[Drawn]) -> Estimate {
     if let Exponent::Fixed(m) = inversion.options.exponent {
         return Estimate {
-            best,
+            best: best.and(Some(m)),
             low: best.and(Some(m)),
             high: best.and(Some(m)),
         };

@@ -2,10 +2,11 @@
 //!
 //! The best fit and the alternatives are those of the constant-load law by unweighted least squares. The regime comes from the
 //! posterior twice: where the load may change, as the monitor has it, and in its special case of a constant load, of which the
-//! intervals of the parameters are too. The failure time comes from the panel that the monitor uses.
+//! intervals of the parameters are too; where m is given, of the laws of that posterior with about this m alone. The failure time comes from the panel that the monitor uses.
 
 mod estimate;
 mod growth;
+mod held;
 mod report;
 mod sweep;
 mod together;
@@ -123,7 +124,9 @@ impl Inversion {
         let is_informative = !least_squares.outcome.says_nothing();
         let posterior = is_informative
             .then(|| LawDraws::of(&rates, &Assumptions::CONSTANT_LOAD))
-            .flatten();
+            .flatten()
+            .and_then(|posterior| held::under(self.options.exponent, posterior));
+        let is_m_free = matches!(self.options.exponent, Exponent::Free);
         let onset = posterior.as_ref().map(LawDraws::onset);
         let regime = FittedRegime::of(posterior.as_ref());
         let best = least_squares.best();
@@ -153,7 +156,7 @@ impl Inversion {
             regime,
             regime_under_load: outlook
                 .as_ref()
-                .filter(|_| is_informative)
+                .filter(|_| is_informative && is_m_free)
                 .map(FittedRegime::under_load),
             rms: best.map(|best| best.rms).filter(|rms| rms.is_finite()),
             evaluations: least_squares.evaluations,

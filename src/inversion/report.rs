@@ -31,9 +31,10 @@ pub struct FitReport {
     pub onset_low: Option<Timestamp>,
     /// 95 % quantile.
     pub onset_high: Option<Timestamp>,
-    /// Which regime, with what probability, under a load that never changed.
+    /// Which regime, with what probability, under a load that never changed; where m is given, of the laws with about this m, and null with too
+    /// few of them.
     pub regime: FittedRegime,
-    /// The same where the load may change undeclared: what the monitor goes by. `None` with too few readings.
+    /// The same where the load may change undeclared: what the monitor goes by. `None` with too few readings, and where m is given.
     pub regime_under_load: Option<FittedRegime>,
     /// The law's parameters.
     pub parameters: Parameters,

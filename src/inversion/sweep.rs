@@ -56,7 +56,7 @@ pub struct SweepRow {
     pub readings: usize,
     /// Which regime, with what probability, the load being constant.
     pub regime: FittedRegime,
-    /// The same where the load may change undeclared: what the monitor goes by. `None` with too few readings.
+    /// The same where the load may change undeclared: what the monitor goes by. `None` with too few readings, and where m is given.
     pub regime_under_load: Option<FittedRegime>,
     /// m of the best fit.
     pub m: Option<f64>,

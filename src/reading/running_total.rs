@@ -4,8 +4,9 @@
 const FEWEST_RISES: usize = 10;
 /// so many of them for every fall: rain as it falls comes and goes.
 const RISES_A_FALL: usize = 10;
-/// A total that is set back begins again within this share of what it was.
-const NEAR_ZERO: f64 = 0.1;
+/// A total that is set back begins again within this share of what it was: with the rain that has fallen since, which on a wet day may
+/// be much of a young total.
+const SET_BACK: f64 = 0.5;
 /// One that falls by no more than this share of itself has evaporated, or jitters.
 const JITTER: f64 = 0.01;
 
@@ -29,7 +30,7 @@ impl RunningTotal {
                 rises += 1;
             } else if after < before {
                 falls += 1;
-                if after <= NEAR_ZERO * before {
+                if after <= SET_BACK * before {
                     set_back.push(place);
                 } else if after < (1.0 - JITTER) * before {
                     return None;
@@ -78,6 +79,11 @@ mod tests {
             let found = RunningTotal::of(&total(&rain, back_at)).unwrap();
             assert_eq!(found.set_back, back_at);
         }
+        // Set back within a storm: what has fallen since is a fifth of the total before.
+        let mut wet = rain.clone();
+        wet[60] = 0.2 * wet[..60].iter().sum::<f64>();
+        let found = RunningTotal::of(&total(&wet, &[60])).unwrap();
+        assert_eq!(found.set_back, [60]);
         assert_eq!(RunningTotal::of(&[0.0; 50]), None);
         assert_eq!(RunningTotal::of(&[]), None);
         let storm: Vec<f64> = (0..50)

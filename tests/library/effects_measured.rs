@@ -367,6 +367,50 @@ fn the_rock_temperature_at_lanzada_is_no_load_and_does_not_move_the_collapse() {
     the_collapse_stays(&said);
 }
 
+/// Every figure of the error is the same before and after.
+fn nothing_changes(said: &Explanation) {
+    for change in [
+        said.error.fit,
+        said.error.held_out,
+        said.error.held_out_step,
+    ] {
+        assert_eq!(change.before, change.after);
+    }
+}
+
+#[test]
+#[cfg_attr(not(measured_data), ignore = "no measured data here")]
+fn where_nothing_enters_at_lanzada_the_errors_before_and_after_are_the_same() {
+    let files = ["lanzada_2025_f1.csv", "lanzada_2025_rock_temperature.csv"];
+    let said = lanzada(&files.map(measured));
+    assert_eq!(said.verdict.effect, Kind::UNEXPLAINED);
+    nothing_changes(&said);
+}
+
+#[test]
+#[cfg_attr(not(measured_data), ignore = "no measured data here")]
+fn whatever_is_accepted_at_lanzada_gains_by_itself_and_the_law_with_it_fits_no_worse() {
+    let said = explained(&read(&[measured("lanzada_2025_f1.csv")]), None);
+    for one in effects(&said).iter().filter(|one| !one.effect.is_an_end()) {
+        assert!(one.bic_gain >= 10.0, "{one:?}");
+        assert!(one.p_value.unwrap() < 0.01, "{one:?}");
+    }
+    let fit = &said.error.fit;
+    assert!(fit.after <= fit.before, "{fit:?}");
+}
+
+#[test]
+#[cfg_attr(not(measured_data), ignore = "no measured data here")]
+fn without_its_step_the_law_of_preonzo_fails_and_nothing_is_compared_with_it() {
+    let said = explained_in(&[measured("preonzo_2012.csv")], Some("E3"));
+    assert!(has(&said, Kind::LOAD_STEP));
+    for one in effects(&said) {
+        if one.effect == Kind::LOAD_STEP {
+            assert_eq!(one.contribution_rms, None, "{one:?}");
+        }
+    }
+}
+
 #[test]
 #[ignore = "not reached since the reconstruction gives back the paper's fits: the verdict over the whole record is an offset"]
 fn at_la_clapiere_the_river_then_the_loads_of_1987_are_found_and_not_the_season() {

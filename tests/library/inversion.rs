@@ -176,7 +176,15 @@ fn a_fixed_m_is_held_and_fits_no_better_than_a_free_one() {
             held.rms.unwrap() >= free.rms.unwrap() * (1.0 - 1e-9),
             "m = {m}"
         );
-        assert_eq!(held.parameters.x_i.low, None);
+        assert_eq!(held.regime_under_load, None);
+        let unstable = held.regime.probability_unstable;
+        if m > 1.0 {
+            assert!(unstable.is_none_or(|share| share > 0.999), "{unstable:?}");
+        } else if m < 1.0 {
+            assert!(unstable.is_none_or(|share| share < 0.001), "{unstable:?}");
+        }
+        // No law of the posterior has an m below 0.
+        assert!(m > 0.0 || (unstable.is_none() && held.parameters.v_i.low.is_none()));
     }
     let none = Exponent::Fixed(0.0);
     let pairs = (0..20).map(|i| (f64::from(i), f64::from(i * i)));

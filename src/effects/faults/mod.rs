@@ -25,6 +25,8 @@ use smooth::Smoothness;
 use std::ops::Range;
 use trace::{Trace, median};
 
+pub(super) use trace::resolution;
+
 /// Readings and covariates without the faults that were found in them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Inspected {
@@ -39,6 +41,8 @@ pub struct Inspected {
     pub flags: Vec<String>,
     /// The same for people, a sentence each.
     pub remarks: Vec<String>,
+    /// Channels that are one instrument: the one with resets, and the other.
+    pub(super) twins: Vec<(String, String)>,
 }
 
 /// Looks for faults of the data in `series` and in each of `channels`, and takes out what can be.
@@ -66,6 +70,7 @@ pub fn inspect(series: &Series, channels: &[Channel]) -> Inspected {
         series: bench.series,
         channels: bench.channels,
         faults: bench.faults,
+        twins: bench.twins,
     }
 }
 

@@ -11,6 +11,12 @@ const FINEST_STEP: f64 = 1e-11;
 const FEWEST_ON_STEP: usize = 8;
 /// Values with this many decimals or more were computed, and say nothing of the instrument's step.
 const COMPUTED_DECIMALS: i32 = 6;
+/// A number has no more.
+const MOST_DECIMALS: i32 = 17;
+/// Values in a row whose common step is taken, one so many times the finest, and how near to a whole number of steps a value on it stands.
+const IN_A_ROW: usize = 4;
+const COARSE: f64 = 100.0;
+const ON_STEP: f64 = 1e-3;
 
 /// The values of a benchmark or a channel, in time order.
 #[derive(Debug, Clone, PartialEq)]
@@ -117,31 +123,77 @@ pub(super) fn symbols(values: &[f64], scale: f64) -> Vec<u32> {
 
 /// The resolution of each value: one in its last decimal, or the step on which all values with
 /// about as many decimals stand, where that is coarser (a converted unit has decimals without end).
+/// Of those with many, some may stand on no step: they are finer.
 pub(super) fn resolutions(values: &[f64]) -> Vec<f64> {
-    let decimals: Vec<i32> = values.iter().map(|&value| decimals(value)).collect();
-    let class = |computed: bool| {
+    let scale = extreme(values);
+    let decimals: Vec<i32> = values.iter().map(|&value| decimals(value, scale)).collect();
+    let class = |computed: bool| -> Vec<f64> {
         let of_class = values.iter().zip(&decimals);
         let members =
             of_class.filter(|(_, decimals)| (**decimals >= COMPUTED_DECIMALS) == computed);
-        common_step(&members.map(|(value, _)| *value).collect::<Vec<f64>>())
+        members.map(|(value, _)| *value).collect()
     };
-    let steps = [class(false), class(true)];
-    let of = |decimals: &i32| {
-        let step = steps[usize::from(*decimals >= COMPUTED_DECIMALS)];
+    let (printed, computed) = (common_step(&class(false)), class(true));
+    let of_computed = common_step(&computed);
+    let grid = CommonGrid::of(&computed).filter(|grid| grid.step > of_computed);
+    let of = |(value, decimals): (&f64, &i32)| {
+        let step = if *decimals < COMPUTED_DECIMALS {
+            printed
+        } else {
+            let own = grid.as_ref().filter(|grid| grid.holds(*value));
+            own.map_or(of_computed, |grid| grid.step)
+        };
         step.max(0.1_f64.powi(*decimals))
     };
-    decimals.iter().map(of).collect()
+    values.iter().zip(&decimals).map(of).collect()
 }
 
 /// The resolution of most values.
-pub(super) fn resolution(values: &[f64]) -> f64 {
+pub(in crate::effects) fn resolution(values: &[f64]) -> f64 {
     median(&resolutions(values))
 }
 
-fn decimals(value: f64) -> i32 {
-    let text = value.to_string();
-    let fraction = text.split_once('.').map_or(0, |(_, digits)| digits.len());
-    i32::try_from(fraction.min(17)).unwrap_or(17)
+/// How many decimals show a value; the arithmetic's last digits, among values as large as `scale`, do not count.
+fn decimals(value: f64, scale: f64) -> i32 {
+    let is_shown = |decimals: &i32| {
+        let unit = 10.0_f64.powi(*decimals);
+        ((value * unit).round() / unit - value).abs() <= SAME_NUMBER * scale
+    };
+    (0..MOST_DECIMALS).find(is_shown).unwrap_or(MOST_DECIMALS)
+}
+
+/// Values a step apart, on which most of a trace stand.
+struct CommonGrid {
+    anchor: f64,
+    step: f64,
+}
+
+impl CommonGrid {
+    /// The step that most groups of a few values in a row have in common, where most values stand on it.
+    fn of(values: &[f64]) -> Option<Self> {
+        let finest = FINEST_STEP * extreme(values);
+        if values.len() < FEWEST_ON_STEP {
+            return None;
+        }
+        let of_group = |group: &[f64]| {
+            let apart = group.iter().map(|value| (value - group[0]).abs());
+            let step = apart.fold(0.0, |step, apart| common_divisor(step, apart, finest));
+            let anchor = group[0];
+            (step > COARSE * finest).then_some(Self { anchor, step })
+        };
+        let mut grids: Vec<Self> = values.windows(IN_A_ROW).filter_map(of_group).collect();
+        grids.sort_by(|a, b| a.step.total_cmp(&b.step));
+        let alike = grids.chunk_by(|a, b| b.step - a.step < ON_STEP * a.step);
+        let grid = alike.max_by_key(|group| group.len())?.first()?;
+        let held = values.iter().filter(|value| grid.holds(**value)).count();
+        let Self { anchor, step } = *grid;
+        (2 * held > values.len()).then_some(Self { anchor, step })
+    }
+
+    fn holds(&self, value: f64) -> bool {
+        let steps = (value - self.anchor) / self.step;
+        (steps - steps.round()).abs() < ON_STEP
+    }
 }
 
 /// The largest step of which all differences are multiples; the arithmetic's own where there is none.
@@ -189,6 +241,43 @@ mod tests {
             .collect();
         let step = resolution(&hundredths_of_a_foot);
         assert!((step - 0.003_048).abs() < 1e-9, "{step}");
+    }
+
+    /// Tenths, and of every fifth value 13 digits more, in millimetres.
+    fn mostly_tenths() -> Vec<f64> {
+        let value = |index: u32| {
+            let tenths = f64::from(3000 + (index * 37) % 911) * 0.1;
+            let digits = f64::from((index * 7919) % 1013).sqrt() / 1013.0_f64.sqrt();
+            if index % 5 == 0 {
+                tenths + 0.1 * digits
+            } else {
+                (tenths * 10.0).round() / 10.0
+            }
+        };
+        (1..74).map(value).collect()
+    }
+
+    #[test]
+    fn the_same_values_in_other_units_have_the_same_resolution() {
+        let values = mostly_tenths();
+        let own = resolutions(&values);
+        assert!(
+            own.iter()
+                .filter(|step| (**step - 0.1).abs() < 1e-9)
+                .count()
+                > 50
+        );
+        for unit in [0.001, 1.0 / 25.4, 1.0 / 304.8, 0.1] {
+            let other: Vec<f64> = values.iter().map(|value| value * unit).collect();
+            for (own, other) in own.iter().zip(resolutions(&other)) {
+                let is_same = if *own > 1e-3 {
+                    (other - own * unit).abs() < 1e-6 * other
+                } else {
+                    other < 1e-3 * unit
+                };
+                assert!(is_same, "{own} as {other} in units of 1/{unit}");
+            }
+        }
     }
 
     #[test]

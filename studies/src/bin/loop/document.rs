@@ -41,7 +41,8 @@ The law is the slider block of Helmstetter et al. (2004) in one regular equation
    not in question. An effect that only the shape of the readings supports (no channel, no tide, no season) may have changed the law, and is
    judged with the law too as it was learned before the block. Extrapolated over the whole block, such an effect may not be
    worse at all, and another by a fifth at most; a tide, which comes back to where it was and cannot drift, by ten times at most:
-   the rest is the law's. What is no tide and not of the reading must also account for the readings as well, within the margin, as a load
+   the rest is the law's. A tide must gain as much more than a daily cycle of 24 and 12 hours,
+   which warmth and melt water have. What is no tide and not of the reading must also account for the readings as well, within the margin, as a load
    does that changes over a while, or comes and goes, and that nothing measures; a rise over several readings is no reset. Everything
    else is listed with the reason.
 5. Effects within the margin of each other stand under *cannot be separated from*; of jumps of the velocity that one comes first
