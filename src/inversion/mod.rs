@@ -2,7 +2,8 @@
 //!
 //! The best fit and the alternatives are those of the constant-load law by unweighted least squares. The regime comes from the
 //! posterior twice: where the load may change, as the monitor has it, and in its special case of a constant load, of which the
-//! intervals of the parameters are too; where m is given, of the laws of that posterior with about this m alone. The failure time comes from the panel that the monitor uses.
+//! intervals of the parameters are too; where m is given, of the laws of that posterior with about this m alone. The failure time
+//! comes from the panel that the monitor uses.
 
 mod estimate;
 mod growth;

@@ -1,3 +1,5 @@
+//! A wave of the sun's day is no tide, and one of the moon's is.
+
 use super::super::explain::explain;
 use super::super::explanation::Explanation;
 use super::super::fixture::{generator, normals, series};

@@ -1,3 +1,5 @@
+//! The figures before and after are those of one problem, and of fits that are no worse with more freedom.
+
 use super::super::explain::explain;
 use super::super::explanation::Explanation;
 use super::super::fixture::{daily, generator, lake, normals, series};
