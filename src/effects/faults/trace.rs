@@ -254,10 +254,11 @@ mod tests {
         assert!((step - 0.003_048).abs() < 1e-9, "{step}");
     }
 
-    /// Tenths, and of every fifth value 13 digits more, in millimetres.
+    /// Tenths, none of them a whole number, and of every fifth value 13 digits more, in millimetres.
     fn mostly_tenths() -> Vec<f64> {
         let value = |index: u32| {
-            let tenths = f64::from(3000 + (index * 37) % 911) * 0.1;
+            let last = 1 + (index * index) % 9;
+            let tenths = f64::from(3000 + 10 * ((index * index * 37) % 91) + last) * 0.1;
             let digits = f64::from((index * 7919) % 1013).sqrt() / 1013.0_f64.sqrt();
             if index % 5 == 0 {
                 tenths + 0.1 * digits
