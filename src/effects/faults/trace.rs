@@ -15,6 +15,8 @@ const COMPUTED_DECIMALS: i32 = 6;
 const MOST_DECIMALS: i32 = 17;
 /// Values in a row whose common step is taken, one so many times the finest, and how near to a whole number of steps a value on it stands.
 const IN_A_ROW: usize = 4;
+/// So many steps are tried.
+const MOST_STEPS: usize = 16;
 const COARSE: f64 = 100.0;
 const ON_STEP: f64 = 1e-3;
 
@@ -169,7 +171,7 @@ struct CommonGrid {
 }
 
 impl CommonGrid {
-    /// The step that most groups of a few values in a row have in common, where most values stand on it.
+    /// A step that groups of a few values in a row have in common, that of the most groups first, on which most values stand.
     fn of(values: &[f64]) -> Option<Self> {
         let finest = FINEST_STEP * extreme(values);
         if values.len() < FEWEST_ON_STEP {
@@ -184,10 +186,19 @@ impl CommonGrid {
         let mut grids: Vec<Self> = values.windows(IN_A_ROW).filter_map(of_group).collect();
         grids.sort_by(|a, b| a.step.total_cmp(&b.step));
         let alike = grids.chunk_by(|a, b| b.step - a.step < ON_STEP * a.step);
-        let grid = alike.max_by_key(|group| group.len())?.first()?;
-        let held = values.iter().filter(|value| grid.holds(**value)).count();
-        let Self { anchor, step } = *grid;
-        (2 * held > values.len()).then_some(Self { anchor, step })
+        let mut alike: Vec<&[Self]> = alike.collect();
+        alike.sort_by_key(|group| std::cmp::Reverse(group.len()));
+        // Where the values go evenly a few in a row have a multiple of the step in common.
+        let mut tried = alike
+            .iter()
+            .take(MOST_STEPS)
+            .filter_map(|group| group.first());
+        let holds_most = |grid: &&Self| {
+            let held = values.iter().filter(|value| grid.holds(**value));
+            2 * held.count() > values.len()
+        };
+        let Self { anchor, step } = *tried.find(holds_most)?;
+        Some(Self { anchor, step })
     }
 
     fn holds(&self, value: f64) -> bool {
@@ -243,10 +254,11 @@ mod tests {
         assert!((step - 0.003_048).abs() < 1e-9, "{step}");
     }
 
-    /// Tenths, and of every fifth value 13 digits more, in millimetres.
+    /// Tenths, none of them a whole number, and of every fifth value 13 digits more, in millimetres.
     fn mostly_tenths() -> Vec<f64> {
         let value = |index: u32| {
-            let tenths = f64::from(3000 + (index * 37) % 911) * 0.1;
+            let last = 1 + (index * index) % 9;
+            let tenths = f64::from(3000 + 10 * ((index * index * 37) % 91) + last) * 0.1;
             let digits = f64::from((index * 7919) % 1013).sqrt() / 1013.0_f64.sqrt();
             if index % 5 == 0 {
                 tenths + 0.1 * digits
