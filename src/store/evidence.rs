@@ -1,8 +1,9 @@
 //! What one alert rests on: the step that called it, the settings in force then, who got it, and the state up to it.
 
 use super::read::decode;
-use super::{Store, StoreError};
+use super::{Store, StoreError, timestamp};
 use crate::monitor::{Input, Settings};
+use crate::reading::Timestamp;
 use rusqlite::{Connection, params};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -72,6 +73,37 @@ impl Store {
             }
         }
         Ok(None)
+    }
+
+    /// The deliveries that were closed because nothing would have made them, as (hook, key, level, state), the
+    /// oldest first.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn closed_deliveries(&self) -> Result<Vec<[String; 4]>, StoreError> {
+        let inner = self.inner();
+        let mut query = inner.connection.prepare_cached(
+            "SELECT hook, key, level, state FROM outbox WHERE status = 'closed' ORDER BY id",
+        )?;
+        let rows = query.query_map([], |row| {
+            Ok([row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?])
+        })?;
+        Ok(rows.collect::<Result<_, _>>()?)
+    }
+
+    /// How many deliveries wait, and when the oldest of their alerts was called.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn outbox(&self) -> Result<(usize, Option<Timestamp>), StoreError> {
+        let inner = self.inner();
+        let mut query = inner
+            .connection
+            .prepare_cached("SELECT count(*), min(time) FROM outbox WHERE status = 'waiting'")?;
+        let (count, oldest): (i64, Option<i64>) =
+            query.query_row([], |row| Ok((row.get(0)?, row.get(1)?)))?;
+        let oldest = oldest.map(timestamp).transpose()?;
+        Ok((usize::try_from(count).unwrap_or(0), oldest))
     }
 
     /// Who is to get an alert, and how far that has come, in the order in which it was noted.

@@ -201,37 +201,6 @@ impl Store {
         inner.committed(ended.len(), written)
     }
 
-    /// The deliveries that were closed because nothing would have made them, as (hook, key, level, state), the
-    /// oldest first.
-    ///
-    /// # Errors
-    /// [`StoreError`].
-    pub fn closed_deliveries(&self) -> Result<Vec<[String; 4]>, StoreError> {
-        let inner = self.inner();
-        let mut query = inner.connection.prepare_cached(
-            "SELECT hook, key, level, state FROM outbox WHERE status = 'closed' ORDER BY id",
-        )?;
-        let rows = query.query_map([], |row| {
-            Ok([row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?])
-        })?;
-        Ok(rows.collect::<Result<_, _>>()?)
-    }
-
-    /// How many deliveries wait, and when the oldest of their alerts was called.
-    ///
-    /// # Errors
-    /// [`StoreError`].
-    pub fn outbox(&self) -> Result<(usize, Option<Timestamp>), StoreError> {
-        let inner = self.inner();
-        let mut query = inner
-            .connection
-            .prepare_cached("SELECT count(*), min(time) FROM outbox WHERE status = 'waiting'")?;
-        let (count, oldest): (i64, Option<i64>) =
-            query.query_row([], |row| Ok((row.get(0)?, row.get(1)?)))?;
-        let oldest = oldest.map(timestamp).transpose()?;
-        Ok((usize::try_from(count).unwrap_or(0), oldest))
-    }
-
     /// Whether a hook's delivery with this key, level and state was ever noted; with `status`, stands so.
     ///
     /// # Errors

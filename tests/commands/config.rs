@@ -319,6 +319,10 @@ fn the_least_config_is_taken_with_the_defaults() {
         config.settings,
         slipwatch::monitor::Settings {
             site: Some(slipwatch::monitor::SiteLevel::Worst),
+            watched: slipwatch::monitor::Watched {
+                open: [("logger".to_owned(), String::new())].into(),
+                ..slipwatch::monitor::Watched::default()
+            },
             ..slipwatch::monitor::Settings::default()
         },
         "nothing given, nothing changed but that there is a site"

@@ -189,7 +189,7 @@ fn the_end_of_an_alert_that_falls_into_a_silence_is_sent_after_it_and_a_red_keep
         ),
     ]);
     fs::set_permissions(office.path("notify.sh"), fs::Permissions::from_mode(0o755)).unwrap();
-    let daemon = office.run(&["run", "site.toml"]);
+    let daemon = office.run_logged(&["run", "site.toml"]);
     // Until then the level is dated by the newest reading.
     office.until("the past", || {
         office.log().contains("has been gone through")
