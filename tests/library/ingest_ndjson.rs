@@ -3,6 +3,7 @@
 use crate::made_up::{assert_identical, made_up, read};
 use crate::measured::measured;
 use jiff::SignedDuration;
+use slipwatch::reading::Unit;
 use slipwatch::runtime::ingest::{Item, NDJSON, ReadOptions, TextRows, convert, write_ndjson};
 use std::fs;
 use std::path::Path;
@@ -128,14 +129,25 @@ fn a_whole_file_with_a_bad_line_is_refused() {
         error.contains("line 2") && error.contains("toc.jsonl"),
         "{error}"
     );
+}
+
+#[test]
+fn a_line_in_another_unit_is_converted_to_that_of_the_first() {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("toc.jsonl");
     let two_units = format!(
         "{}\n{}\n",
         message("1"),
         message("2").replace("\"mm\"", "\"cm\"")
     );
     fs::write(&file, two_units).unwrap();
-    let error = read(&file).unwrap_err().to_string();
-    assert!(error.contains("line 2") && error.contains("cm"), "{error}");
+    let (recording, _) = read(&file).unwrap();
+    let [series] = &recording.series[..] else {
+        panic!("{recording:?}");
+    };
+    // Of one time: the later line corrects the earlier one.
+    let values: Vec<f64> = series.readings.iter().map(|one| one.value).collect();
+    assert_eq!((series.unit, values), (Unit::MM, vec![20.0]));
 }
 
 #[test]
