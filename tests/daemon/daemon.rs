@@ -448,9 +448,9 @@ impl Daemon {
         let (sender, progress) = watch::channel(Progress::default());
         let config = config.clone();
         let task = tokio::spawn(async move {
-            run(&config, shutdown, &sender, |event, _| {
+            Box::pin(run(&config, shutdown, &sender, |event, _| {
                 event.kind.name().to_owned()
-            })
+            }))
             .await
         });
         Self {

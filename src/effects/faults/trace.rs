@@ -260,7 +260,7 @@ mod tests {
             let last = 1 + (index * index) % 9;
             let tenths = f64::from(3000 + 10 * ((index * index * 37) % 91) + last) * 0.1;
             let digits = f64::from((index * 7919) % 1013).sqrt() / 1013.0_f64.sqrt();
-            if index % 5 == 0 {
+            if index.is_multiple_of(5) {
                 tenths + 0.1 * digits
             } else {
                 (tenths * 10.0).round() / 10.0
