@@ -109,9 +109,9 @@ async fn said_by_a_daemon() -> Vec<String> {
     let (sender, mut progress) = watch::channel(Progress::default());
     let own = config.clone();
     let task = tokio::spawn(async move {
-        run(&own, shutdown, &sender, |event, _| {
+        Box::pin(run(&own, shutdown, &sender, |event, _| {
             event.kind.name().to_owned()
-        })
+        }))
         .await
     });
     let caught_up = progress.wait_for(|progress| progress.is_caught_up);
