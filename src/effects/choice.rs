@@ -41,6 +41,12 @@ impl Search<'_> {
         let ties = chosen.map(|k| self.ties(&refitted, k, &judged));
         for (k, one) in refitted.iter().enumerate() {
             let (held, reason) = judged[k].clone();
+            // Of one effect with two delays that one stands which was chosen, or else the better.
+            let stands = chosen.filter(|first| refitted[*first].is_as(one));
+            let stands = stands.unwrap_or(refitted.iter().position(|known| known.is_as(one))?);
+            if one.term.channel.is_some() && stands != k {
+                continue;
+            }
             let beaten = chosen.filter(|first| *first != k && reason.is_none());
             let reason = beaten.map_or(reason, |first| Some(self.beaten_by(&refitted[first], one)));
             let term = one.fitted.terms.last()?;

@@ -14,6 +14,7 @@ use super::ready::Ready;
 use super::remarks;
 use super::search::Withheld;
 use super::term::Scratch;
+use super::upslope::{self, goes_upslope};
 use super::verdict::conclude;
 use crate::reading::{Channel, Series, Timestamp};
 
@@ -181,6 +182,11 @@ fn look(
         remarks.push(TOO_FEW.to_owned());
         return (none, remarks);
     };
+    if goes_upslope(&ready.problem) {
+        remarks.push(upslope::REMARK.to_owned());
+        let verdict = Effect::of(Kind::UNEXPLAINED);
+        return (Findings { verdict, ..none }, remarks);
+    }
     progress(0.05);
     let search = ready.search(options, is_drawn);
     let Some(mut found) = search.run(ready.plain.clone(), progress) else {

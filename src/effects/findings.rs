@@ -9,7 +9,7 @@ use super::explanation::{
     Structure,
 };
 use super::fresh::{best_of_starts, fresh_starts};
-use super::judge::{Compared, HeldOut, held_out, named, step_errors};
+use super::judge::{Compared, HeldOut, StepErrors, held_out, named, step_errors};
 use super::kind::Kind;
 use super::known_load::KnownLoad;
 use super::noise::{Memory, Noise, Whitener};
@@ -26,6 +26,10 @@ use std::collections::BTreeMap;
 
 /// What is left is no noise where a test gives it less than this p-value.
 const LEFT_OVER: f64 = 0.001;
+
+/// Extrapolated over the later block, a law that is off by more than so many times the range of the readings has failed before.
+const FAILED: f64 = 100.0;
+const FAILS: &str = "The law fails within the held-out readings: an error larger than all that the readings range over is no figure, and is not given.";
 
 /// Most stretches of structure that are reported.
 const MOST_STRETCHES: usize = 8;
@@ -101,8 +105,12 @@ pub(super) fn findings(
         after: &full,
     };
     let error = errors(problem, by_least_squares, held.as_ref(), unit);
+    let held_out_step = steps(ready, both, held.as_ref(), scratch);
+    let is_missing = held_out_step.before.is_none() || held_out_step.after.is_none();
+    let caveat = (held.is_some() && is_missing).then(|| FAILS.to_owned());
     let error = ErrorChange {
-        held_out_step: steps(ready, both, held.as_ref(), scratch),
+        held_out_step,
+        caveat: error.caveat.or(caveat),
         ..error
     };
     let (residual, left) = residual_tests(ready, both, scratch);
@@ -162,9 +170,13 @@ fn steps(
         // With nothing added there is nothing to compare.
         after = before;
     }
+    let shown = |error: f64| {
+        let figure = Some(error).filter(|error| StepErrors::is_a_figure(problem, *error));
+        figure.map(|error| error / ready.unit.factor())
+    };
     Change {
-        before: Some(before / ready.unit.factor()),
-        after: Some(after / ready.unit.factor()),
+        before: shown(before),
+        after: shown(after),
     }
 }
 
@@ -177,16 +189,22 @@ fn errors(
 ) -> ErrorChange {
     let factor = unit.factor();
     let n = problem.t.len();
-    let change = |errors: Option<(f64, f64)>| Change {
-        before: errors.map(|(before, _)| before / factor),
-        after: errors.map(|(_, after)| after / factor),
+    let is_a_figure = |error: &f64| *error <= FAILED * problem.range();
+    let extrapolated = held.map(|held| held.errors(problem));
+    let shown = |error: Option<f64>| error.filter(is_a_figure).map(|error| error / factor);
+    let held_out = Change {
+        before: shown(extrapolated.map(|(before, _)| before)),
+        after: shown(extrapolated.map(|(_, after)| after)),
     };
+    let has_failed =
+        extrapolated.is_some() && (held_out.before.is_none() || held_out.after.is_none());
     ErrorChange {
+        caveat: has_failed.then(|| FAILS.to_owned()),
         fit: Change {
             before: Some(before.rms(problem, 0..n) / factor),
             after: Some(after.rms(problem, 0..n) / factor),
         },
-        held_out: change(held.map(|held| held.errors(problem))),
+        held_out,
         held_out_from: held.and_then(|held| after_days(problem.epoch, problem.t[held.from])),
         ..ErrorChange::none(unit)
     }

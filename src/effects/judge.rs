@@ -9,7 +9,7 @@ use super::refit::{Fitted, Start, likeliest, refit};
 use super::response::Driver;
 use super::rival::Rival;
 use super::term::{Scratch, Term, law_parameters};
-use crate::reading::Quantity;
+use crate::reading::{CovariateKind, Quantity};
 
 /// A fit without effects that are judged, and one with them.
 #[derive(Debug, Clone, Copy)]
@@ -62,8 +62,10 @@ pub(super) fn objection(problem: &Problem, fitted: &Fitted, drivers: &[Driver]) 
     let channel = Driver::at(drivers, term.channel);
     let loosening = channel.is_some_and(|driver| is_loosening(&driver.name));
     let level = term.response.is_some_and(|r| r.form == Form::Level);
+    // Rain that begins slows nothing either: its rate has the sign of its level.
+    let is_rain = channel.is_some_and(|driver| driver.kind == CovariateKind::Rain);
     match term.act {
-        Act::Load(_) if loosening && level && own[0] < 0.0 => {
+        Act::Load(_) if (is_rain || loosening && level) && own[0] < 0.0 => {
             Some("its sign is not physical: more water would slow the slope".to_owned())
         }
         Act::PerVelocity | Act::PerSlip | Act::Step | Act::Reset | Act::Friction(_)
@@ -286,6 +288,14 @@ pub(super) struct StepErrors {
     pub(super) deviance: f64,
 }
 
+impl StepErrors {
+    /// Whether an error is one of a law that follows the readings: it is no larger than all that they range over. One that nearly fails
+    /// answers so strongly to what it has just read that its next reading may be predicted to be anything.
+    pub(super) fn is_a_figure(problem: &Problem, error: f64) -> bool {
+        error <= problem.range()
+    }
+}
+
 /// The later block by its innovations, without and with the newest terms of `after`, their coefficients as they were learned
 /// before the block. The law itself is fitted to all readings on both sides: its own extrapolation is not what is in
 /// question. `None` where it cannot be fitted.
@@ -305,15 +315,27 @@ pub(super) fn step_errors(
     let early = in_units_of(problem, &part, &early);
     let newest = &after.terms[after.terms.len() - newest..];
     let learned: usize = newest.iter().map(Term::coefficients).sum();
-    let whole = Whitener::new(problem, after.noise);
-    let frozen = under_learned(problem, after, &early.parameters, learned, scratch)?;
-    let own = Whitener::new(problem, before.noise);
-    let errors = |fitted: &Fitted, whitener: &Whitener| {
+    let errors = |fitted: &Fitted| {
+        let whitener = Whitener::new(problem, fitted.noise);
         let residual = fitted.residual(problem);
         let deviance = whitener.deviance_from(&residual, from, fitted.sigma);
         (whitener.step_errors_from(&residual, from), deviance)
     };
-    let (without, with) = (errors(before, &own), errors(&frozen, &whole));
+    let without = errors(before);
+    let own = under_learned(problem, after, &early.parameters, learned, scratch);
+    let mut with = own.as_ref().map(errors);
+    let is_worse = with.is_none_or(|with| with.0 > without.0 || with.1 > without.1);
+    if is_worse && before.noise != after.noise {
+        // Noise that follows the readings makes up for an effect that is a little too large or too small: both may have it.
+        let alike = Fitted {
+            noise: before.noise,
+            ..after.clone()
+        };
+        let alike = under_learned(problem, &alike, &early.parameters, learned, scratch);
+        let each = with.into_iter().chain(alike.as_ref().map(errors));
+        with = each.min_by(|a, b| a.1.total_cmp(&b.1));
+    }
+    let with = with?;
     Some(StepErrors {
         before: without.0,
         after: with.0,

@@ -10,6 +10,7 @@ mod companions;
 mod daily;
 mod declared;
 mod definition;
+mod delay;
 mod diagnosis;
 mod explain;
 mod explanation;
@@ -47,6 +48,7 @@ mod slow;
 mod surrogate;
 mod term;
 mod trials;
+mod upslope;
 mod verdict;
 mod watch;
 

@@ -105,6 +105,17 @@ impl Problem {
         self.seen = seen.collect();
     }
 
+    /// What all readings range over, those of the later block too, mm or mm/day; where they are equal no error is beyond it.
+    pub(super) fn range(&self) -> f64 {
+        let least = self.y.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = self.y.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        if most > least {
+            most - least
+        } else {
+            f64::INFINITY
+        }
+    }
+
     /// The same with only the first `used` readings fitted.
     pub(super) fn trained_on(&self, used: usize) -> Self {
         Self {

@@ -55,6 +55,7 @@ impl Ready {
             candidates: Vec::new(),
             withheld: None,
             is_daily: false,
+            null: None,
         }
     }
 }

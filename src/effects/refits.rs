@@ -90,7 +90,13 @@ impl<'a> Search<'a> {
         let mut covariates = ground.of_covariates();
         covariates.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         covariates.truncate(MOST_COVARIATES);
-        let covariates = self.refit_each(base, covariates);
+        covariates.extend(self.about_a_steady_law(base, &covariates));
+        let mut covariates = self.refit_each(base, covariates);
+        let again = covariates.iter();
+        let again = again.filter_map(|one| self.with_another_delay(base, one));
+        let again: Vec<Refitted> = again.collect();
+        covariates.extend(again);
+        let covariates = best_of_each_response(covariates, self.options.bic_margin);
         let (others, tried) = ground.of_itself();
         // Only what passes the margin is judged by it.
         let of_noise = |kind| ground.null_gains_of_noise(&tried, kind, count, seed + 1);
@@ -200,6 +206,12 @@ impl<'a> Search<'a> {
         if matches!(term.act, Act::Friction(_)) {
             fitted = self.fewer_or_more(base, fitted);
         }
+        self.known(base, fitted)
+    }
+
+    /// What a fit with one more term than `base` has comes to, before any search is made for its p-value.
+    pub(super) fn known(&mut self, base: &Fitted, fitted: Fitted) -> Option<Refitted> {
+        let problem = self.problem;
         let white = [Whitener::new(problem, Noise::WHITE)];
         let level = refit(problem, &Start::at(&fitted), &white, &mut self.scratch);
         let rms = level.map(|level| level.rms(problem, 0..problem.used));
@@ -399,6 +411,27 @@ impl Refitted {
 /// Whether a term makes one large innovation of the reading, or, where the noise remembers, of the velocity.
 fn is_jump(term: &Term, frames: &Frames) -> bool {
     term.is_jump_of_reading() || (term.kind.jumps() && frames.remembers())
+}
+
+/// The best of each covariate by its level, and by its rate, and a second with another delay where the BIC cannot separate them: the one may
+/// predict the later block where the other does not.
+fn best_of_each_response(mut all: Vec<Refitted>, margin: f64) -> Vec<Refitted> {
+    all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let mut best: Vec<Refitted> = Vec::new();
+    for one in all {
+        let mut alike = best.iter().filter(|known| known.is_as(&one));
+        let is_kept = match (alike.next(), alike.next()) {
+            (None, _) => true,
+            (Some(first), None) => {
+                first.gain - one.gain < margin && first.term.response != one.term.response
+            }
+            (Some(_), Some(_)) => false,
+        };
+        if is_kept {
+            best.push(one);
+        }
+    }
+    best
 }
 
 fn best_of_each_kind(mut trials: Vec<Trial>) -> Vec<Trial> {

@@ -17,10 +17,17 @@ pub(super) struct Driver {
     /// Days from one to the next.
     step: f64,
     values: Vec<f64>,
+    /// Whether each value is what came since the one before it, as of rain, and not what was at its time.
+    is_total: bool,
 }
 
 /// The covariate's values are kept on this many points at most.
 const MOST_VALUES: usize = 8192;
+
+/// This share of a step is rounding.
+const ROUNDING: f64 = 1e-6;
+/// A mean delay of less than this share of the step between values is none.
+const SHORTEST: f64 = 1e-3;
 
 /// A response: the mean of an exponential distribution, or of a gamma distribution of shape 2.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,8 +54,8 @@ impl Driver {
         drivers.iter().find(|one| Some(one.index) == index)
     }
 
-    /// The channel, which stands at `index` among those that were given, in days since `epoch`, linear between its samples; `None`
-    /// where it holds no change.
+    /// The channel, which stands at `index` among those that were given, in days since `epoch`: linear between its samples, rain evenly over
+    /// the time before each; `None` where it holds no change.
     pub(super) fn new(index: usize, channel: &Channel, epoch: Timestamp) -> Option<Self> {
         let samples: Vec<(f64, f64)> = channel
             .samples
@@ -63,30 +70,29 @@ impl Driver {
         {
             return None;
         }
-        let span = last.0 - first.0;
+        let (span, first_value) = (last.0 - first.0, first.1);
+        let start = first.0;
         let gaps = samples.windows(2).map(|pair| pair[1].0 - pair[0].0);
         let spacing = super::problem::median(gaps.collect()).max(span / (MOST_VALUES - 1) as f64);
         let count = (span / spacing).round().max(3.0);
         let step = span / count;
-        let mut later = 1;
-        let mut values = Vec::new();
-        let mut k = 0.0;
-        while k <= count {
-            let t = first.0 + k * step;
-            while later + 1 < samples.len() && samples[later].0 < t {
-                later += 1;
-            }
-            let ((t_0, u_0), (t_1, u_1)) = (samples[later - 1], samples[later]);
-            values.push(u_0 + (u_1 - u_0) * ((t - t_0) / (t_1 - t_0)).clamp(0.0, 1.0));
-            k += 1.0;
-        }
+        let is_total = channel.kind() == CovariateKind::Rain;
+        let samples = if is_total { summed(samples) } else { samples };
+        let values = on_a_grid(&samples, step, count);
+        let values = if is_total {
+            let each = values.windows(2).map(|pair| pair[1] - pair[0]);
+            [first_value].into_iter().chain(each).collect()
+        } else {
+            values
+        };
         Some(Self {
             index,
             name: channel.name.clone(),
             kind: channel.kind(),
-            start: first.0,
+            start,
             step,
             values,
+            is_total,
         })
     }
 
@@ -144,20 +150,22 @@ impl Driver {
     /// The same in the channel's own unit (per day, for a rate).
     pub(super) fn respond_in_unit(&self, response: Response, nodes: &[f64]) -> Vec<f64> {
         let mut level = self.values.clone();
+        // What one stage gives is linear between its values, whatever it was given.
+        let mut is_total = self.is_total;
         for _ in 0..response.stages {
             if response.form == Form::Rate && response.mean_days < 0.5 * self.step {
                 break;
             }
-            filter(
-                &mut level,
-                self.step,
-                response.mean_days / f64::from(response.stages),
-            );
+            let mean = response.mean_days / f64::from(response.stages);
+            if mean >= SHORTEST * self.step {
+                filter(&mut level, self.step, mean, is_total);
+                is_total = false;
+            }
         }
         if response.form == Form::Rate {
             level = self.rate(&level, response);
         }
-        self.read(&level, nodes)
+        self.read(&level, nodes, is_total)
     }
 
     /// d/dt of the response: by the exponential's own equation, or from one value to the next.
@@ -173,7 +181,8 @@ impl Driver {
         slopes
     }
 
-    fn read(&self, values: &[f64], nodes: &[f64]) -> Vec<f64> {
+    /// The values at `nodes`: linear between them, of totals that of the time in which a node lies.
+    fn read(&self, values: &[f64], nodes: &[f64], are_totals: bool) -> Vec<f64> {
         let last = values.len() - 1;
         let value = |t: &f64| {
             let place = ((t - self.start) / self.step).clamp(0.0, last as f64);
@@ -184,21 +193,56 @@ impl Driver {
             )]
             let before = (place.floor() as usize).min(last.saturating_sub(1));
             let share = place - before as f64;
+            let share = if are_totals {
+                // A node at the end of a total's time is in it, rounding or not.
+                (share - ROUNDING).ceil()
+            } else {
+                share
+            };
             values[before] + share * (values[before + 1] - values[before])
         };
         nodes.iter().map(value).collect()
     }
 }
 
-/// The exponential response of mean `mean` to values `step` apart, linear between them; settled at the first.
-fn filter(values: &mut [f64], step: f64, mean: f64) {
-    if mean < 1e-3 * step {
-        return;
+/// The running sum of amounts, each of which came since the sample before it; that of the first is not known to have come in any time.
+fn summed(samples: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+    let mut sum = -samples.first().map_or(0.0, |(_, value)| *value);
+    let each = samples.into_iter().map(|(t, value)| {
+        sum += value;
+        (t, sum)
+    });
+    each.collect()
+}
+
+/// Samples, linear between them, at `count` steps from the first on.
+fn on_a_grid(samples: &[(f64, f64)], step: f64, count: f64) -> Vec<f64> {
+    let mut later = 1;
+    let mut values = Vec::new();
+    let mut k = 0.0;
+    while k <= count {
+        let t = samples[0].0 + k * step;
+        while later + 1 < samples.len() && samples[later].0 < t {
+            later += 1;
+        }
+        let ((t_0, u_0), (t_1, u_1)) = (samples[later - 1], samples[later]);
+        values.push(u_0 + (u_1 - u_0) * ((t - t_0) / (t_1 - t_0)).clamp(0.0, 1.0));
+        k += 1.0;
     }
+    values
+}
+
+/// The exponential response of mean `mean` to values `step` apart; settled at the first. Between the values the input is linear; where they
+/// are totals it is the later one throughout.
+fn filter(values: &mut [f64], step: f64, mean: f64, are_totals: bool) {
     let ratio = step / mean;
     let decay = (-ratio).exp();
     // Of a linear input: the mean of the step's start and end under the exponential.
-    let late = 1.0 - (1.0 - decay) / ratio;
+    let late = if are_totals {
+        1.0 - decay
+    } else {
+        1.0 - (1.0 - decay) / ratio
+    };
     let early = 1.0 - decay - late;
     let mut state = values[0];
     let mut before = values[0];

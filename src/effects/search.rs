@@ -5,7 +5,7 @@ use super::candidates;
 use super::definition::Support;
 use super::explanation::Candidate;
 use super::fresh::best_of_starts;
-use super::judge::{Compared, HeldOut, block, held_out, objection, step_errors};
+use super::judge::{Compared, HeldOut, StepErrors, block, held_out, objection, step_errors};
 use super::kind::Kind;
 use super::noise::Whitener;
 use super::options::Options;
@@ -102,6 +102,8 @@ pub(super) struct Search<'a> {
     pub(super) withheld: Option<Withheld>,
     /// Whether a tide was refused in this round because a daily cycle explains the same.
     pub(super) is_daily: bool,
+    /// The law without any effect, by which all effects together are judged.
+    pub(super) null: Option<Fitted>,
 }
 
 /// A refitted candidate.
@@ -132,6 +134,13 @@ impl Refitted {
     pub(super) fn hardly_jumps(&self) -> bool {
         let size = self.fitted.parameters.last();
         matches!(self.term.act, Act::Step) && size.is_some_and(|size| size.abs() < LEAST_JUMP)
+    }
+
+    /// Whether it is the same effect, with whatever delay.
+    pub(super) fn is_as(&self, other: &Self) -> bool {
+        let form = |one: &Self| one.term.response.map(|response| response.form);
+        let same = self.term.kind == other.term.kind && self.term.channel == other.term.channel;
+        same && form(self) == form(other)
     }
 
     /// Two searches were made, and either could have spoken.
@@ -189,6 +198,7 @@ impl Search<'_> {
         for round in 0..MOST_EFFECTS {
             progress(0.1 + 0.8 * round as f64 / MOST_EFFECTS as f64);
             let noted = self.candidates.clone();
+            self.null = Some(null.clone());
             let (next, how) = match self.one_more(&full, round) {
                 Some(OneMore::Effect(next, how)) => (next, how),
                 Some(OneMore::SlowLoad(next)) => (next, Vec::new()),
@@ -314,10 +324,31 @@ impl Search<'_> {
             let reason = format!("the held-out error grows to {:.0} %", 100.0 * ratio);
             return (Some(ratio).filter(|ratio| ratio.is_finite()), Some(reason));
         }
-        (
-            Some(ratio),
-            self.worse_from_reading_to_reading(base, one, &held),
-        )
+        let reason = self.worse_from_reading_to_reading(base, one, &held);
+        let reason = reason.or_else(|| self.worse_than_without_any(base, one, &held));
+        (Some(ratio), reason)
+    }
+
+    /// Why not, by all effects together: what improves on a law with effects may in its own later block still be worse than the law
+    /// without any, and the errors that are reported are those.
+    fn worse_than_without_any(
+        &mut self,
+        base: &Fitted,
+        one: &Refitted,
+        held: &HeldOut,
+    ) -> Option<String> {
+        let null = self.null.clone().filter(|_| !base.terms.is_empty())?;
+        let models = Compared {
+            before: &null,
+            after: &one.fitted,
+        };
+        let (newest, scratch) = (models.newest(), &mut self.scratch);
+        let steps = step_errors(self.problem, models, held.from, newest, scratch)?;
+        let is_worse = steps.after > WORSE_STEPS * steps.before;
+        (is_worse && StepErrors::is_a_figure(self.problem, steps.before)).then(|| {
+            let share = 100.0 * steps.after / steps.before.max(1e-300);
+            format!("with it all effects together predict the held-out readings worse than none: {share:.0} % of the error from reading to reading")
+        })
     }
 
     /// Why not, by the held-out readings, each predicted from those before it: what only the shape of the readings supports may
@@ -348,7 +379,8 @@ impl Search<'_> {
                 Some(steps) => (steps.before, steps.after),
             }
         };
-        (after > WORSE_STEPS * before).then(|| {
+        let is_worse = after > WORSE_STEPS * before;
+        (is_worse && StepErrors::is_a_figure(self.problem, before)).then(|| {
             let share = 100.0 * after / before.max(1e-300);
             format!("from reading to reading the held-out error grows to {share:.0} %")
         })

@@ -106,7 +106,8 @@ fn a_step_of_the_velocity_put_into_lanzada_is_found_beside_what_is_left() {
     assert!(fit.after.unwrap() < 0.2 * fit.before.unwrap(), "{fit:?}");
 }
 
-/// The law's own failure time drifts in the held-out hours before the collapse, with the wave and without; the wave does not.
+/// The law's own failure time drifts in the held-out hours before the collapse, with the wave and without; the wave does not. Where the law
+/// without the wave fails there, its error is no figure.
 #[test]
 #[cfg_attr(not(measured_data), ignore = "no measured data here")]
 fn a_wave_of_the_tides_period_put_into_lanzada_is_found_with_its_size_though_the_law_drifts() {
@@ -121,7 +122,8 @@ fn a_wave_of_the_tides_period_put_into_lanzada_is_found_with_its_size_though_the
         let off = found.size.unwrap() / trial.put_in.size - 1.0;
         assert!(off.abs() <= 0.2, "{found:?} for {:?}", trial.put_in);
         let held_out = &trial.with.error.held_out_step;
-        assert!(held_out.after < held_out.before, "{held_out:?}");
+        let falls = |before: f64| held_out.after.is_some_and(|after| after < before);
+        assert!(held_out.before.is_none_or(falls), "{held_out:?}");
     }
 }
 

@@ -1,0 +1,104 @@
+//! A covariate's response chosen about other laws than the one that was fitted without it. That one has bent towards what the covariate
+//! does, and about it another delay explains more than the right one: about a steady law, and again about the law fitted with it.
+
+use super::frame::Frames;
+use super::linear::Linear;
+use super::noise::{Noise, Whitener};
+use super::refit::{Fitted, Start, jacobian, likeliest, plain_starts, refit, towards};
+use super::response::Driver;
+use super::search::{Refitted, Search};
+use super::term::Term;
+use super::trials::{Trial, TrialBase, shortlist};
+
+/// So many that promise most about a steady law are refitted too.
+const ABOUT_STEADY: usize = 3;
+/// So often at most.
+const ROUNDS: usize = 3;
+/// By how much of the BIC another response must promise more by the law linearised.
+const PROMISES: f64 = 1.0;
+
+impl Search<'_> {
+    /// The best responses about a law at a steady rate, of those that `known` has another response of: where the covariate is what
+    /// bends the readings, the law fitted without it is bent the same way. None beside effects that are in the law.
+    pub(super) fn about_a_steady_law(&mut self, base: &Fitted, known: &[Trial]) -> Vec<Trial> {
+        let steady = plain_starts(self.problem).into_iter().next();
+        let white = Whitener::new(self.problem, Noise::WHITE);
+        let steady = steady
+            .filter(|_| base.terms.is_empty())
+            .and_then(|start| towards(self.problem, &start, &white, (0, &mut self.scratch)));
+        let Some(ground) = steady.as_ref().and_then(|law| self.ground(law)) else {
+            return Vec::new();
+        };
+        let is_known = |trial: &Trial| {
+            let own = |known: &Trial| {
+                known.term.channel == trial.term.channel
+                    && known.term.response == trial.term.response
+            };
+            known.iter().any(own)
+        };
+        let mut trials = ground.of_covariates();
+        trials.retain(|trial| trial.gain > 0.0 && !is_known(trial));
+        trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        trials.truncate(ABOUT_STEADY);
+        trials
+    }
+
+    /// `one` with the response of its form that explains most; another is taken while it gains more. `None` where none does.
+    pub(super) fn with_another_delay(&mut self, base: &Fitted, one: &Refitted) -> Option<Refitted> {
+        let mut best: Option<Refitted> = None;
+        for _ in 0..ROUNDS {
+            let now = best.as_ref().unwrap_or(one);
+            let next = self.promising_delay(base, now);
+            let next = next.and_then(|term| self.under_delay(base, now, &term));
+            match next.filter(|next| next.gain > now.gain) {
+                Some(next) => best = Some(next),
+                None => break,
+            }
+        }
+        best
+    }
+
+    /// The response that explains most about the law fitted with `one`, where that is another; `None` of what has none.
+    fn promising_delay(&mut self, base: &Fitted, one: &Refitted) -> Option<Term> {
+        let (problem, fitted) = (self.problem, &one.fitted);
+        let response = one.term.response?;
+        let driver = Driver::at(self.drivers, one.term.channel)?;
+        let law = (fitted.terms.as_slice(), fitted.parameters.as_slice());
+        let linear = Linear::about(problem, law, &mut self.scratch)?;
+        let mut columns = jacobian(problem, fitted, &mut self.scratch);
+        // The readings as the law without the covariate leaves them.
+        let (own, size) = (columns.pop()?, *fitted.parameters.last()?);
+        let residual = fitted.residual(problem).into_iter().zip(own);
+        let residual: Vec<f64> = residual.map(|(left, by)| left + size * by).collect();
+        let bank = shortlist(&Frames::new(self.bank, &residual, &columns));
+        let ground = TrialBase {
+            problem,
+            drivers: self.drivers,
+            effects: self.options.effects,
+            frames: Frames::new(&bank, &residual, &columns),
+            linear,
+            residual,
+            present: &base.terms,
+        };
+        let known = ground.trial(one.term.clone()).gain;
+        let is_other = |term: &Term| {
+            let other = term.response;
+            other.is_some_and(|other| other.form == response.form && other != response)
+        };
+        let each = ground.through(one.term.kind, driver).into_iter().flatten();
+        let each = each.filter(is_other).map(|term| ground.trial(term));
+        let best = each.max_by(|a, b| a.gain.total_cmp(&b.gain))?;
+        (best.gain > known + PROMISES).then_some(best.term)
+    }
+
+    /// The joint fit with that term in place of the newest one of `one`, from its law and from others.
+    fn under_delay(&mut self, base: &Fitted, one: &Refitted, term: &Term) -> Option<Refitted> {
+        let mut start = Start::at(&one.fitted);
+        *start.terms.last_mut()? = term.clone();
+        let near = refit(self.problem, &start, self.bank, &mut self.scratch);
+        let far = self.best_start(base, term);
+        let mut fitted = likeliest(self.problem, near.into_iter().chain(far))?;
+        self.sharpen(&mut fitted);
+        self.known(base, fitted)
+    }
+}
