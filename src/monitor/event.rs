@@ -198,6 +198,8 @@ pub enum EventKind {
     Summary(Summary),
 }
 
+/// What the keys of alerts of the whole site begin with.
+pub(super) const SITE: &str = "site";
 /// How the kind of a fault begins that says a suspicion of readings, and how that of its end ends.
 pub const SUSPECT: &str = "suspect-";
 /// The kind of a fault that says that a reset was found which nobody declared.

@@ -53,7 +53,7 @@ pub use order::Order;
 pub use parallel::{Task, Workers};
 pub use saved::{MemoryPart, SavedError};
 pub use search::{SearchFinding, SearchJob};
-pub use site::SiteLevel;
+pub use site::{SiteLevel, site_text};
 pub use undeclared::UndeclaredLoad;
 pub use watched::Watched;
 

@@ -60,7 +60,8 @@ impl Input {
     /// present, and nobody is notified.
     pub fn makes_up(&self, event: &Event) -> bool {
         let is_past = if let EventKind::Alert { level, rule, .. } = &event.kind {
-            *level != Level::Unknown && rule != PAST
+            // The site's level follows from those of its benchmarks that are in force now, however they were called.
+            *level != Level::Unknown && rule != PAST && event.benchmark.is_some()
         } else {
             matches!(event.kind, EventKind::Refit { .. }) || event.kind.is_of_the_record()
         };

@@ -1,11 +1,12 @@
 //! One level for the whole site, from those of its benchmarks.
 
-use super::event::{AlertState, Event, EventKind};
+use super::event::{AlertState, Event, EventKind, SITE};
 use super::in_force::LevelsInForce;
 use super::{Input, Monitor};
 use crate::alert::{Level, another_since};
 use crate::reading::{BenchmarkId, Timestamp};
 use serde::{Deserialize, Serialize};
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
 /// Benchmarks that a text names.
@@ -22,6 +23,13 @@ pub enum SiteLevel {
 }
 
 impl SiteLevel {
+    /// What these levels of benchmarks make of the site; `None` where too few of them are in force.
+    pub fn of(self, levels: impl Iterator<Item = Level>) -> Option<Level> {
+        let mut levels: Vec<Level> = levels.filter(|level| *level != Level::Unknown).collect();
+        levels.sort_unstable_by_key(|level| Reverse(*level));
+        levels.get(self.needed() - 1).copied()
+    }
+
     /// Benchmarks, at least one.
     fn needed(self) -> usize {
         match self {
@@ -145,6 +153,19 @@ impl Monitor {
     }
 }
 
+/// One line for a person: the site's level, and the benchmarks that make it.
+pub fn site_text(level: Level, reach: &[&BenchmarkId]) -> String {
+    let mut names: Vec<&str> = reach.iter().map(|id| id.as_str()).collect();
+    names.truncate(MOST_NAMED);
+    let more = reach.len() - names.len();
+    let more = if more > 0 {
+        format!(" and {more} more")
+    } else {
+        String::new()
+    };
+    format!("the site: {level} (benchmarks {}{more})", names.join(", "))
+}
+
 fn event(
     time: Timestamp,
     level: Level,
@@ -153,17 +174,7 @@ fn event(
     reach: &[&BenchmarkId],
 ) -> Event {
     let text = match state {
-        AlertState::Firing => {
-            let mut names: Vec<&str> = reach.iter().map(|id| id.as_str()).collect();
-            names.truncate(MOST_NAMED);
-            let more = reach.len() - names.len();
-            let more = if more > 0 {
-                format!(" and {more} more")
-            } else {
-                String::new()
-            };
-            format!("the site: {level} (benchmarks {}{more})", names.join(", "))
-        }
+        AlertState::Firing => site_text(level, reach),
         AlertState::Resolved => format!("the site: {level} ends"),
     };
     Event {
@@ -172,7 +183,7 @@ fn event(
         kind: EventKind::Alert {
             level,
             state,
-            key: format!("site/{level}/{since}"),
+            key: format!("{SITE}/{level}/{since}"),
             rule: "site".to_owned(),
             text,
         },

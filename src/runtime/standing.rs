@@ -1,16 +1,18 @@
 //! What stands at a moment, from the events in a site's state: alerts in force, orders, who has seen what.
 
 use crate::alert::Level;
-use crate::monitor::{AlertState, Event, EventKind, Order, OrderKind, by_time};
+use crate::monitor::{AlertState, Event, EventKind, Order, OrderKind, by_time, site_text};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::clock::TOLERANCE;
 use crate::store::{Store, StoreError};
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
 /// The alerts in force, by place and level.
 pub type InForce = BTreeMap<(Option<BenchmarkId>, Level), Event>;
 
-/// The alerts in force: by benchmark and level, of each benchmark the highest, and `unknown` beside it.
+/// The alerts in force: by benchmark and level, of each benchmark the highest, and `unknown` beside it. That of the site names the benchmarks
+/// that make its level now; others may have made it when it was called.
 ///
 /// # Errors
 /// [`StoreError`].
@@ -21,7 +23,28 @@ pub fn in_force(store: &Store, until: Option<Timestamp>) -> Result<InForce, Stor
             note(&mut standing, &event);
         }
     }
+    name_those_in_force(&mut standing);
     Ok(standing)
+}
+
+/// Has the site's alert name the benchmarks that make its level.
+fn name_those_in_force(standing: &mut InForce) {
+    let each = standing.keys().filter_map(|(place, level)| {
+        let is_level = *level != Level::Unknown;
+        place.clone().filter(|_| is_level).map(|id| (*level, id))
+    });
+    let mut raised: Vec<(Level, BenchmarkId)> = each.collect();
+    raised.sort_by_key(|(level, _)| Reverse(*level));
+    for ((place, level), event) in standing.iter_mut() {
+        let reach = raised.iter().filter(|(own, _)| own >= level);
+        let reach: Vec<&BenchmarkId> = reach.map(|(_, id)| id).collect();
+        let is_named = place.is_none() && *level != Level::Unknown && !reach.is_empty();
+        if let EventKind::Alert { text, .. } = &mut event.kind
+            && is_named
+        {
+            *text = site_text(*level, &reach);
+        }
+    }
 }
 
 /// The call since which the alert with this key stands, under its own key: that of the past before a first start where it had called

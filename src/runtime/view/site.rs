@@ -109,12 +109,21 @@ impl SiteReader {
         let span = self.store.span(None)?;
         let known = self.known()?.into_iter();
         // What is known of one that is not watched any more is of the past.
-        let benchmarks = known.filter(|one| at.is_some() || self.facts().watches(one));
+        let benchmarks = known.filter(|one| at.is_some() || self.facts().watched.includes(one));
         let alarms = Alarms::read(&self.store, at, moment, &self.facts().declared)?;
         let benchmarks = benchmarks.map(|one| self.standing(one, &levels, &alarms, at, moment));
         let site_levels = levels.iter().filter(|((place, _), _)| place.is_none());
         let called = site_levels.map(|((_, level), _)| *level);
         let called = called.filter(|level| *level != Level::Unknown).max();
+        // Before the first start nothing was called for the site.
+        let of_benchmarks = levels.keys().filter(|(place, _)| place.is_some());
+        let of_benchmarks = of_benchmarks.map(|(_, level)| *level);
+        let called = called.or_else(|| {
+            self.facts()
+                .level
+                .of(of_benchmarks)
+                .filter(|_| at.is_some())
+        });
         let benchmarks: Vec<Standing> = benchmarks.collect::<Result<_, _>>()?;
         Ok(SiteView {
             site: self.facts().name.clone(),
@@ -141,7 +150,7 @@ impl SiteReader {
     /// Every benchmark that the config names or that has given a reading.
     pub(super) fn known(&self) -> Result<BTreeSet<BenchmarkId>, StoreError> {
         let mut known: BTreeSet<BenchmarkId> = self.store.benchmarks()?.into_keys().collect();
-        known.extend(self.facts().named.iter().cloned());
+        known.extend(self.facts().watched.named.iter().cloned());
         Ok(known)
     }
 

@@ -47,10 +47,10 @@ impl Occurrences {
         }
     }
 
-    /// What was noted goes on at `time`: it calls yellow for longer, if it did.
+    /// What was noted has gone on until `time`, however long ago the reading before was: it calls yellow for longer, if it did.
     pub(super) fn goes_on(&mut self, policy: &Policy, time: Timestamp, cause: AlertCause) {
         let kinds = self.kinds.iter_mut();
-        for kind in kinds.filter(|kind| kind.cause == cause && kind.calls(time)) {
+        for kind in kinds.filter(|kind| kind.cause == cause && kind.calls_until.is_some()) {
             kind.call(policy, time);
         }
     }
@@ -81,6 +81,8 @@ impl OfOneCause {
     fn note(&mut self, policy: &Policy, time: Timestamp) {
         if !self.is_usual(policy, time) {
             self.call(policy, time);
+        } else if !self.calls(time) {
+            self.calls_until = None;
         }
         let last = self.newest.back();
         if last.is_none_or(|last| is_apart(*last, time)) {
@@ -173,7 +175,22 @@ mod tests {
             occurrences.goes_on(&policy, hour(hours), cause);
         }
         assert!(occurrences.calling(hour(120)).is_some());
-        occurrences.goes_on(&policy, hour(200), cause);
-        assert!(occurrences.calling(hour(200)).is_none());
+        // Read once a week, it goes on all the same.
+        occurrences.goes_on(&policy, hour(288), cause);
+        assert!(occurrences.calling(hour(288)).is_some());
+        occurrences.end();
+        occurrences.goes_on(&policy, hour(289), cause);
+        assert!(occurrences.calling(hour(289)).is_none());
+    }
+
+    #[test]
+    fn what_is_usual_calls_nothing_while_it_goes_on() {
+        let (policy, mut occurrences) = (Policy::default(), Occurrences::default());
+        let cause = AlertCause::MovesBackwards;
+        for at in [0, 5, 9] {
+            occurrences.note(&policy, day(at), cause);
+        }
+        occurrences.goes_on(&policy, day(10), cause);
+        assert!(occurrences.calling(day(10)).is_none());
     }
 }

@@ -6,7 +6,7 @@ mod declared;
 use crate::alert::Level;
 use crate::fit::{Observations, Rate};
 use crate::monitor::declared::Declarations;
-use crate::monitor::event::{Event, EventKind};
+use crate::monitor::event::{Event, EventKind, SITE};
 use crate::monitor::history::{History, MeasuredAs, Taken};
 use crate::monitor::silence::Silence;
 use crate::reading::{BenchmarkId, Quantity, Reading, Timestamp, Unit};
@@ -103,11 +103,11 @@ impl BenchmarkRecord {
     }
 
     /// The key of an alert in force since `since`: no other one of this benchmark has it, an earlier one of the same readings
-    /// neither.
+    /// neither, nor one of the whole site where the benchmark bears its name.
     pub(super) fn alert_key(&self, level: Level, since: Timestamp) -> String {
         let benchmark = &self.benchmark;
         match self.dropped {
-            0 => format!("{benchmark}/{level}/{since}"),
+            0 if benchmark.as_str() != SITE => format!("{benchmark}/{level}/{since}"),
             times => format!("{benchmark}/{level}/{}/{since}", times.saturating_add(1)),
         }
     }
@@ -260,7 +260,20 @@ impl BenchmarkRecord {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::monitor::track::fixture::{DISPLACEMENT, at, reading, record, record_each};
+
+    #[test]
+    fn a_benchmark_called_site_shares_no_key_with_an_alert_of_the_whole_site() {
+        let key = |id: &str, dropped: u32| {
+            let (id, declared) = (BenchmarkId::new(id), Declarations::default());
+            let record = BenchmarkRecord::new(id, DISPLACEMENT, at(0), declared, dropped);
+            record.alert_key(Level::Red, at(3))
+        };
+        assert_eq!(key("p1", 0), "p1/red/2020-01-01T03:00:00Z");
+        assert_eq!(key("site", 0), "site/red/1/2020-01-01T03:00:00Z");
+        assert_eq!(key("site", 1), "site/red/2/2020-01-01T03:00:00Z");
+    }
 
     #[test]
     fn a_reading_leaps_only_far_beyond_the_usual_spacing_and_not_where_one_waits_before_it() {
