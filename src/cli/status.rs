@@ -165,8 +165,7 @@ fn gathered(args: &StatusArgs) -> anyhow::Result<(SiteStatus, TimeZone)> {
     newest.extend(config.benchmarks.iter().map(|one| (one.id.clone(), None)));
     let watched = &config.settings.watched;
     // What is known of one that is not watched any more is of the past.
-    let is_watched = |id: &BenchmarkId| watched.is_open || watched.named.contains(id);
-    let read = (store.benchmarks()?.into_iter()).filter(|(id, _)| is_watched(id));
+    let read = (store.benchmarks()?.into_iter()).filter(|(id, _)| watched.includes(id));
     newest.extend(read.map(|(benchmark, time)| (benchmark, Some(time))));
     let each = newest.into_iter().map(|(benchmark, newest)| {
         let standing = StatusStanding {

@@ -1,5 +1,5 @@
 //! The sun's day beside the tide. Heat and melt come and go with 24 and 12 hours; of the tide's own periods one is 12 hours, and another
-//! cannot be distinguished from 24 in less than a year. What tells a tide is the moon's.
+//! cannot be distinguished from 24 in less than a year. A tide is known by the moon's periods.
 
 use super::candidates;
 use super::definition::Support;

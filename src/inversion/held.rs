@@ -2,7 +2,7 @@
 
 use crate::fit::{Ensemble, Exponent, LawDraws, LawSample};
 
-/// p = 1 - 1/m is within this of that of the m given, and on the same side of 0: what tells the regimes apart.
+/// p = 1 - 1/m is within this of that of the m given, and on the same side of 0: which separates the regimes.
 const NEAR: f64 = 0.05;
 /// Fewer laws than this bound nothing.
 const FEWEST: usize = 50;

@@ -38,6 +38,22 @@ pub enum Declaration {
     Blast,
 }
 
+impl Declared {
+    /// From when until when there is maintenance, where it is one.
+    fn maintenance(&self) -> Option<(Timestamp, Timestamp)> {
+        match self.kind {
+            Declaration::Maintenance { until } => Some((self.time, until)),
+            Declaration::Reset { .. } | Declaration::Blast => None,
+        }
+    }
+
+    /// Whether it is maintenance that goes on at `time`.
+    pub fn is_maintenance_at(&self, time: Timestamp) -> bool {
+        let window = self.maintenance();
+        window.is_some_and(|(from, until)| from <= time && time < until)
+    }
+}
+
 impl Declaration {
     fn name(self) -> &'static str {
         match self {
@@ -125,16 +141,12 @@ impl Declarations {
     }
 
     fn windows(&self) -> impl Iterator<Item = (Timestamp, Timestamp)> {
-        self.all.iter().filter_map(|one| match one.kind {
-            Declaration::Maintenance { until } => Some((one.time, until)),
-            Declaration::Reset { .. } | Declaration::Blast => None,
-        })
+        self.all.iter().filter_map(Declared::maintenance)
     }
 
     /// Whether there is maintenance at `time`.
     pub(super) fn is_maintained(&self, time: Timestamp) -> bool {
-        self.windows()
-            .any(|(from, until)| from <= time && time < until)
+        self.all.iter().any(|one| one.is_maintenance_at(time))
     }
 
     /// Whether there is maintenance at any time between two readings.

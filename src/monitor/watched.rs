@@ -40,6 +40,11 @@ impl Default for Watched {
 }
 
 impl Watched {
+    /// Whether `benchmark` is watched where a source gives it.
+    pub fn includes(&self, benchmark: &BenchmarkId) -> bool {
+        self.is_open || self.named.contains(benchmark)
+    }
+
     /// Whether `benchmark`, watched under `former`, no longer is: it was named and is not any more, or was not and
     /// nothing else than what is named is watched from now on, or nothing else of its source.
     fn drops(&self, benchmark: &BenchmarkId, former: &Self) -> bool {

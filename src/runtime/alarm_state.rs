@@ -3,9 +3,7 @@
 
 use super::standing::{TakenOrders, every};
 use crate::alert::Level;
-use crate::monitor::{
-    AlertState, CalledLevel, Declaration, Declared, Event, EventKind, OrderKind, by_time,
-};
+use crate::monitor::{AlertState, CalledLevel, Declared, Event, EventKind, OrderKind, by_time};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::store::{Store, StoreError};
 use schemars::JsonSchema;
@@ -309,12 +307,7 @@ fn reported_maintenance(
 
 /// Where maintenance goes on.
 fn maintenance_in(declared: &[Declared], now: Timestamp) -> Vec<Option<BenchmarkId>> {
-    let goes_on = declared.iter().filter(|one| {
-        let Declaration::Maintenance { until } = one.kind else {
-            return false;
-        };
-        one.time <= now && now < until
-    });
+    let goes_on = declared.iter().filter(|one| one.is_maintenance_at(now));
     goes_on.map(|one| one.benchmark.clone()).collect()
 }
 

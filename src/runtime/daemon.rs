@@ -62,8 +62,8 @@ pub struct Daemon {
     since_orders: Stopwatch,
     /// Lines, records and files that could not be used, as the state has it.
     quarantined: BTreeMap<String, u64>,
-    /// What lasts and keeps it from its work, as the state folder has it.
-    faults: Vec<ServiceFault>,
+    /// What lasts and keeps it from its work, as it has written it into the state folder.
+    faults: Option<Vec<ServiceFault>>,
     /// How far the rows of the state have been looked at.
     verified: Verified,
     /// What it is to report once the past has been read: that its state holds nothing but readings of files that are not read.
@@ -102,7 +102,7 @@ impl Daemon {
             since_commit: Stopwatch::start(),
             since_orders: Stopwatch::start(),
             quarantined: BTreeMap::new(),
-            faults: Vec::new(),
+            faults: None,
             verified: Verified::default(),
             inherited: None,
             beside: None,
@@ -117,7 +117,7 @@ impl Daemon {
     ) -> Result<(), StoreError> {
         self.note_closed()?;
         self.config_is_taken();
-        self.keep_faults(true);
+        self.keep_faults();
         let mut hangup = signal(SignalKind::hangup())?;
         let (mut tick, mut asked) = (Self::ticks(), shutdown.clone());
         loop {
@@ -456,7 +456,7 @@ impl Daemon {
         self.thin()?;
         self.verify();
         self.note_quarantined()?;
-        self.keep_faults(false);
+        self.keep_faults();
         let ((outbox, oldest), bytes) = (self.store.outbox()?, self.store.bytes()?);
         self.pulse.vitals.update(|health| {
             (health.outbox, health.outbox_oldest) = (outbox, oldest);

@@ -8,6 +8,7 @@ use slipwatch::runtime::clock;
 use std::fs;
 
 const POLICY: &str = "[alert]\nevacuation_time = \"3h\"\n";
+const HEADER: &str = "time,b_displacement_mm\n";
 const THRESHOLD: &str = "[[alert.threshold]]\nlevel = \"red\"\nvelocity = \"50 mm/day\"\n";
 
 fn benchmark(id: &str, keys: &str) -> String {
@@ -22,6 +23,15 @@ fn both() -> String {
         format!("{time},{:.2},{value}\n", 0.07 * f64::from(hour))
     });
     "time,a_displacement_mm,b_displacement_mm\n".to_owned() + &each.collect::<String>()
+}
+
+/// A site whose only benchmark, `b`, is red; two more of its hourly readings are due.
+fn red() -> (Site, Program) {
+    let site = Site::new(&format!("{}{POLICY}", benchmark("b", "")));
+    site.append("incoming/x.csv", &format!("{HEADER}{}", failing(0..112)));
+    let program = site.caught_up();
+    eventually("b's red", || site.notified("b/red/", "firing") == 1);
+    (site, program)
 }
 
 fn reload(site: &Site, program: &Program, more: &str) {
@@ -129,11 +139,7 @@ fn readings_that_mean_something_else_are_taken_anew_and_call_no_false_red() {
 #[test]
 fn a_red_stands_through_a_reload_that_reads_its_readings_otherwise() {
     for stays in [true, false] {
-        let site = Site::new(&format!("{}{POLICY}", benchmark("b", "")));
-        let header = "time,b_displacement_mm\n";
-        site.append("incoming/x.csv", &format!("{header}{}", failing(0..112)));
-        let program = site.caught_up();
-        eventually("b's red", || site.notified("b/red/", "firing") == 1);
+        let (site, program) = red();
         let taken = site.values().len();
         if !stays {
             fs::remove_file(site.path("incoming/x.csv")).unwrap();
@@ -144,7 +150,7 @@ fn a_red_stands_through_a_reload_that_reads_its_readings_otherwise() {
         eventually("its rows", || site.values().len() == taken + anew);
         assert_eq!(site.level("b"), "red", "stays: {stays}");
         // One more reading, the first of the new meaning where the file is gone.
-        site.append("incoming/y.csv", &format!("{header}{}", failing(112..114)));
+        site.append("incoming/y.csv", &format!("{HEADER}{}", failing(112..114)));
         eventually("the newest", || site.values().len() == taken + anew + 2);
         assert_eq!(site.level("b"), "red", "stays: {stays}");
         program.stop();
@@ -157,11 +163,7 @@ fn a_red_stands_through_a_reload_that_reads_its_readings_otherwise() {
 
 #[test]
 fn a_benchmark_that_loses_its_name_goes_on_where_its_source_is_open() {
-    let site = Site::new(&format!("{}{POLICY}", benchmark("b", "")));
-    let header = "time,b_displacement_mm\n";
-    site.append("incoming/x.csv", &format!("{header}{}", failing(0..112)));
-    let program = site.caught_up();
-    eventually("b's red", || site.notified("b/red/", "firing") == 1);
+    let (site, program) = red();
     let taken = site.values().len();
     reload(&site, &program, POLICY);
     site.append("incoming/x.csv", &failing(112..114));

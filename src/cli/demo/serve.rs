@@ -3,7 +3,7 @@
 use super::{Args, CRISES, Crisis, WRITTEN, pace, policy, recording, sample_hook, show_hook};
 use crate::cli::run::asynchronous;
 use crate::config::Token;
-use crate::monitor::{Settings, SiteLevel};
+use crate::monitor::{Settings, SiteLevel, Watched};
 use crate::reading::{BenchmarkId, Recording};
 use crate::runtime::exhibit::{Exhibit, show};
 use crate::runtime::replay;
@@ -55,8 +55,8 @@ pub(super) fn serve(args: &Args, listen: SocketAddr, folder: &Path) -> anyhow::R
             links: None,
             name: crisis.site.to_owned(),
             time_zone: "Europe/Zurich".to_owned(),
-            named: Vec::new(),
-            is_open: true,
+            watched: Watched::default(),
+            level: SiteLevel::Worst,
             declared: Vec::new(),
             positions: positions(),
             positions_are: Some(POSITIONS_ARE),

@@ -33,14 +33,14 @@ impl Daemon {
         }
     }
 
-    /// Keeps what lasts and keeps it from its work, for those who ask the state; `anew`: whatever is there from before.
-    pub(super) fn keep_faults(&mut self, anew: bool) {
+    /// Keeps what lasts and keeps it from its work, for those who ask the state.
+    pub(super) fn keep_faults(&mut self) {
         let faults = self.pulse.vitals.faults().shown();
-        if faults == self.faults && !anew {
+        if self.faults.as_ref() == Some(&faults) {
             return;
         }
         match service_faults::write(&self.config.site.state_dir, &faults) {
-            Ok(()) => self.faults = faults,
+            Ok(()) => self.faults = Some(faults),
             Err(error) => {
                 tracing::debug!(%error, "faults are not kept for slipwatch status");
             }

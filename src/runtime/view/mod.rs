@@ -15,7 +15,7 @@ pub use site::{SiteView, Standing};
 
 use super::clock;
 use crate::config::{Config, Links};
-use crate::monitor::Declared;
+use crate::monitor::{Declared, SiteLevel, Watched};
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::store::{Heads, Store, StoreError};
 use std::collections::BTreeMap;
@@ -42,10 +42,10 @@ pub struct Facts {
     pub name: String,
     /// The zone that people there live in.
     pub time_zone: String,
-    /// Benchmarks that the config names; others show once they have given a reading.
-    pub named: Vec<BenchmarkId>,
-    /// Whether there are such others.
-    pub is_open: bool,
+    /// Benchmarks that the config names, and whether there are others, which show once they have given a reading.
+    pub watched: Watched,
+    /// How the benchmarks' levels make that of the site.
+    pub level: SiteLevel,
     /// What people declare.
     pub declared: Vec<Declared>,
     /// Where each stands, m.
@@ -85,8 +85,8 @@ impl Facts {
                 .iana_name()
                 .unwrap_or("UTC")
                 .to_owned(),
-            named: benchmarks.clone().map(|one| one.id.clone()).collect(),
-            is_open: config.settings.watched.is_open,
+            watched: config.settings.watched.clone(),
+            level: config.settings.site.unwrap_or(SiteLevel::Worst),
             declared: config.settings.declared.clone(),
             positions: benchmarks
                 .filter_map(|one| Some((one.id.clone(), one.position.clone()?)))
@@ -98,11 +98,6 @@ impl Facts {
             ending: None,
             positions_are: None,
         }
-    }
-
-    /// Whether the config watches this one.
-    fn watches(&self, benchmark: &BenchmarkId) -> bool {
-        self.is_open || self.named.contains(benchmark)
     }
 }
 
