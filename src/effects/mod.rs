@@ -18,6 +18,7 @@ mod findings;
 mod frame;
 mod fresh;
 mod given;
+mod inverted;
 mod judge;
 mod kind;
 mod known;
