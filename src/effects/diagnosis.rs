@@ -11,6 +11,10 @@ use statrs::function::gamma::checked_gamma_ur;
 
 /// An undeclared load this many of its standard errors from nothing is structure.
 const CLEAR: f64 = 3.0;
+/// The newest innovations that are looked at together, at most.
+const NEWEST: usize = 3;
+/// Half of all normal numbers are smaller than so many standard deviations.
+const NORMAL_MEDIAN: f64 = 0.6745;
 /// Lags of the autocorrelation.
 pub(super) const LAGS: usize = 20;
 
@@ -182,6 +186,18 @@ pub(super) fn is_clear((f, s): (f64, f64)) -> bool {
 pub(super) fn load_sd(load: &[(f64, f64)]) -> f64 {
     let squares = load.iter().map(|(f, s)| f * f + s * s).sum::<f64>();
     (squares / load.len().max(1) as f64).sqrt()
+}
+
+/// How far the last innovations, one to three of them, stand from nothing together: in standard deviations, taken from the median size of
+/// those before them.
+pub(super) fn newest_off(innovations: &[f64]) -> f64 {
+    let off = |count: usize| {
+        let (before, newest) = innovations.split_at(innovations.len().saturating_sub(count));
+        let sizes = before.iter().map(|u| u.abs()).collect();
+        let deviation = super::problem::median(sizes) / NORMAL_MEDIAN;
+        newest.iter().sum::<f64>().abs() / (newest.len() as f64).sqrt() / deviation.max(1e-300)
+    };
+    (1..=NEWEST).map(off).fold(0.0, f64::max)
 }
 
 /// Innovations of a fit under one noise model.

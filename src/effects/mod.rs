@@ -19,6 +19,7 @@ mod findings;
 mod frame;
 mod fresh;
 mod given;
+mod inverted;
 mod judge;
 mod kind;
 mod known;

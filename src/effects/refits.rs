@@ -34,6 +34,9 @@ enum Stride {
     Within(f64),
 }
 
+/// The shortest delay that is tried, spacings of the covariate; none becomes this when it is moved.
+const SHORTEST: f64 = 0.3;
+
 const STRIDES: [Stride; 4] = [
     Stride::Coarse,
     Stride::Fine,
@@ -344,20 +347,24 @@ impl<'a> Search<'a> {
         }
         let response = term.response?;
         let driver = Driver::at(self.drivers, term.channel)?;
-        if response.mean_days <= 0.0 {
-            return None;
-        }
         let factor = match stride {
             Stride::Coarse => 1.6,
             Stride::Fine => 1.25,
             Stride::Within(_) => return None,
         };
         let factor: f64 = if later { factor } else { 1.0 / factor };
+        let shortest = SHORTEST * driver.step();
+        let mean_days = if response.mean_days > 0.0 {
+            response.mean_days * factor
+        } else if later {
+            shortest
+        } else {
+            return None;
+        };
         let response = Response {
-            mean_days: response.mean_days * factor,
+            mean_days,
             ..response
         };
-        let shortest = 0.3 * driver.step();
         if response.memory_days() > 0.5 * self.problem.span() || response.mean_days < shortest {
             return None;
         }

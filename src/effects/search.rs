@@ -5,6 +5,7 @@ use super::candidates;
 use super::definition::Support;
 use super::explanation::Candidate;
 use super::fresh::best_of_starts;
+use super::inverted::inverted_starts;
 use super::judge::{Compared, HeldOut, StepErrors, block, held_out, objection, step_errors};
 use super::kind::Kind;
 use super::noise::Whitener;
@@ -167,9 +168,11 @@ impl Refitted {
     }
 }
 
-/// The plain law by least squares; `None` where no start leads to a motion.
+/// The plain law by least squares, from the usual starts and from where its inversion ends; `None` where no start leads to a motion.
 pub(super) fn plain(problem: &Problem, scratch: &mut Scratch) -> Option<Fitted> {
-    best_of_starts(problem, &plain_starts(problem), scratch)
+    let mut starts = plain_starts(problem);
+    starts.extend(inverted_starts(problem, scratch));
+    best_of_starts(problem, &starts, scratch)
 }
 
 impl Search<'_> {
@@ -427,3 +430,6 @@ fn most_extrapolated(kind: Kind) -> f64 {
         Support::Covariate | Support::Shape => MOST_EXTRAPOLATED,
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -86,6 +86,34 @@ impl Feedback {
 const LN_A_SPAN: (f64, f64) = (-7.0, 6.0);
 const P: (f64, f64) = (-3.0, 0.95);
 
+/// ln(a span) of a law of which a is not known: the middle of what is held to be likely of it.
+const ANY_LN_A: f64 = -1.0;
+/// p of a law that is bent the same way, where its own lies beyond what parameters stand for.
+const ANY_P: f64 = -1.0;
+/// Near m = 1 the curvature is all that shows: a law with a times the span larger than this, at a p smaller than that, is the same with
+/// the smaller a.
+const LARGE_A: f64 = 50.0;
+const SMALL_P: f64 = 0.05;
+/// Times the span, a curvature of the inverse velocity smaller than this is none.
+const STRAIGHT: f64 = 1e-3;
+
+/// The law's own parameters, but for the zero of displacements, that stand for `law`: for one as near to it as may be where m < 0,
+/// for which none stand.
+pub(super) fn parameters_of(law: &Law, span: f64) -> [f64; 4] {
+    let kappa = law.kappa * span;
+    let (ln_a, p) = if kappa.abs() < STRAIGHT {
+        (ANY_LN_A, 0.0)
+    } else if law.a > 0.0 && law.a * span < LARGE_A {
+        ((law.a * span).ln(), law.p)
+    } else if law.p.abs() < SMALL_P {
+        (LARGE_A.ln(), kappa / LARGE_A)
+    } else {
+        ((kappa / ANY_P).ln(), ANY_P)
+    };
+    let ln_a = ln_a.clamp(LN_A_SPAN.0, LN_A_SPAN.1);
+    [law.v_i.ln(), law.r * span, ln_a, p.clamp(P.0, P.1)]
+}
+
 /// Room for solutions, and the newest of them.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Scratch {

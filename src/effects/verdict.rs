@@ -3,7 +3,7 @@
 use super::act::Act;
 use super::daily;
 use super::definition::{EffectSize, FittedCoefficients};
-use super::diagnosis::Judged;
+use super::diagnosis::{Judged, innovations, newest_off};
 use super::explanation::{Candidate, Effect, Explained};
 use super::judge::{coefficients, named};
 use super::kind::Kind;
@@ -13,7 +13,7 @@ use super::ready::Ready;
 use super::refit::{Fitted, Start, jacobian, refit, under_likeliest};
 use super::response::Driver;
 use super::rival::Rival;
-use super::search::{Accepted, SearchResult};
+use super::search::{Accepted, SIGNIFICANT, SearchResult};
 use super::term::{Scratch, Term, law_parameters, time_of};
 use crate::reading::{Quantity, Unit};
 
@@ -40,6 +40,8 @@ const LOSES: f64 = 2.0;
 /// By so much of the BIC noise that a reading remembers is distinguished from an undeclared load. Set on simulated slopes: at the
 /// margin of the search 6 of 100 with such noise were said to lack a load, and 1 of 100 under such a load is called noise since.
 const ALIKE: f64 = 3.0;
+/// So many standard deviations off, the last innovations are not noise's.
+const OUT_OF_NOISE: f64 = 5.0;
 /// Most kinds without independent evidence that are accepted together.
 const MOST_LABELS: usize = 2;
 /// Steps of a finite length pass a failure: the law fails where it is so many times faster than it ever was with all its effects.
@@ -77,20 +79,18 @@ pub(super) fn conclude(
         full = stays;
         judged = Judged::of(problem, &full, &ready.bank, scratch);
     }
-    let mut effects: Vec<Effect> = (0..full.terms.len())
-        .map(|index| {
-            let how = &accepted[index];
-            cannot_separate_from.extend(how.ties.iter().cloned());
-            effect(ready, &full, index, how, scratch)
-        })
-        .collect();
-    // What independent data support comes first.
-    effects.sort_by_key(|effect| effect.effect.fits_any_bend());
+    let ties = accepted.iter().flat_map(|how| how.ties.iter().cloned());
+    cannot_separate_from.extend(ties);
+    let mut effects = effects_of(ready, &full, &accepted, scratch);
+    left |= effects.is_empty() && refused(&found.candidates, margin);
     let memory_gain = judged.as_ref().map_or(0.0, Judged::memory_gain);
     let remembers = memory_gain > margin && may_remember(&full);
     if remembers && !left && effects.is_empty() {
         // A slow load that nothing declares leaves what remembers as well.
-        if judged.as_ref().is_some_and(is_a_load_alike) {
+        if judged
+            .as_ref()
+            .is_some_and(|one| is_a_motion_alike(problem, &full, one))
+        {
             left = true;
             cannot_separate_from.push(Rival::from(Kind::CORRELATED_NOISE));
         } else if full.noise.memory == Memory::Load {
@@ -111,12 +111,9 @@ pub(super) fn conclude(
         (false, true) => Explained::Partly,
         (true, _) => Explained::None,
     };
+    let end = if left { Kind::UNEXPLAINED } else { Kind::NONE };
     if effects.is_empty() {
-        effects.push(Effect::of(if left {
-            Kind::UNEXPLAINED
-        } else {
-            Kind::NONE
-        }));
+        effects.push(Effect::of(end));
     }
     Verdict {
         effects,
@@ -124,6 +121,20 @@ pub(super) fn conclude(
         cannot_separate_from,
         full,
     }
+}
+
+/// The terms of the law as effects, what independent data support first.
+fn effects_of(
+    ready: &Ready,
+    full: &Fitted,
+    accepted: &[Accepted],
+    scratch: &mut Scratch,
+) -> Vec<Effect> {
+    let each = accepted.iter().enumerate();
+    let each = each.map(|(index, how)| effect(ready, full, index, how, scratch));
+    let mut effects: Vec<Effect> = each.collect();
+    effects.sort_by_key(|effect| effect.effect.fits_any_bend());
+    effects
 }
 
 /// Each rival once, without what was accepted beside it in the end.
@@ -152,6 +163,23 @@ fn may_remember(full: &Fitted) -> bool {
 /// Whether an undeclared load leaves what remembers about as well as noise of the reading does.
 fn is_a_load_alike(judged: &Judged) -> bool {
     judged.load.is_some() && judged.load_gain() > -ALIKE
+}
+
+/// Whether noise that the reading remembers would be no better an account than a motion is: an undeclared load leaves what remembers as
+/// well, or the record ends with readings to which that noise does not lead either, as what has just begun to move does.
+fn is_a_motion_alike(problem: &Problem, full: &Fitted, judged: &Judged) -> bool {
+    let newest = newest_off(&innovations(problem, full, judged.plain));
+    is_a_load_alike(judged) || newest > OUT_OF_NOISE
+}
+
+/// Whether something was refused that gains what is asked for and that noise does not do: then it is not the explanation, and something
+/// is left all the same.
+fn refused(candidates: &[Candidate], margin: f64) -> bool {
+    candidates.iter().any(|one| {
+        one.rejected_because.is_some()
+            && one.bic_gain >= margin
+            && one.p_value.is_some_and(|p| p < SIGNIFICANT)
+    })
 }
 
 /// The same law under noise that the reading remembers.

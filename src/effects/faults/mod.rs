@@ -64,9 +64,13 @@ pub fn inspect(series: &Series, channels: &[Channel]) -> Inspected {
         let key = |fault: &Fault| (fault.at, fault.channel.clone(), fault.kind);
         key(a).cmp(&key(b))
     });
+    let of_newest = bench.newest_alone();
     Inspected {
         flags: remarks::flags(&bench.faults),
-        remarks: remarks::remarks(&bench.faults, smoothness, &bench.twins),
+        remarks: remarks::remarks(&bench.faults, smoothness, &bench.twins)
+            .into_iter()
+            .chain(of_newest)
+            .collect(),
         series: bench.series,
         channels: bench.channels,
         faults: bench.faults,
@@ -326,6 +330,14 @@ impl FaultBench {
             sample.value = value;
         }
         self.drop_rows(source, &straddles);
+    }
+
+    /// What is to be said of a newest reading that stands far from those before it.
+    fn newest_alone(&self) -> Option<String> {
+        let trace = self.trace(Source::Benchmark);
+        let off = outlier::newest_alone(&trace)?;
+        let at = trace.times.last()?;
+        Some(remarks::of_newest(*at, off, self.series.unit))
     }
 
     /// Names what no instrument can have measured; it stays, since there is nothing else.

@@ -19,6 +19,12 @@ const FAR_IN_CHANNEL: f64 = 15.0;
 const COMES_BACK: f64 = 0.3;
 /// Between gaps of more usual intervals than this on both sides a value may be a motion not seen.
 const GAP: f64 = 3.0;
+/// Fewest readings before the newest that show where it should stand.
+const FEWEST_BEFORE: usize = 10;
+/// So many times as large as any of the steps before it is the step to a newest reading that has come all at once.
+const ALL_AT_ONCE: f64 = 5.0;
+/// A slope that accelerates to failure leads up to it: the last step before it is the largest, and so many times the usual one.
+const LEADS_UP: f64 = 2.0;
 /// Outliers are few; where there are more, the noise has heavy tails and none is a mistake.
 const FEW: f64 = 0.02;
 
@@ -38,6 +44,26 @@ pub(super) fn outlying_readings(trace: &Trace, quantity: Quantity) -> Vec<bool> 
         }
     }
     wrong
+}
+
+/// By how much the newest reading leaves the line of those before it, where it has left all at once: whether it is a mistake or the
+/// beginning of a motion only what follows can show.
+pub(super) fn newest_alone(trace: &Trace) -> Option<f64> {
+    let newest = trace.len().checked_sub(1)?;
+    let first = newest.checked_sub(FEWEST_BEFORE)?;
+    let steps = trace.values[first..].windows(2).map(|two| two[1] - two[0]);
+    let mut steps: Vec<f64> = absolute(&steps.collect::<Vec<f64>>());
+    let last = steps.pop()?;
+    let before: Vec<usize> = (first..newest).collect();
+    let line = RobustLine::through(trace, &before);
+    let off = trace.values[newest] - line.at(trace.days[newest]);
+    let is_far = off.abs() > FAR * usual_deviation(trace);
+    let largest = steps.iter().copied().fold(0.0, f64::max);
+    let leads_up = steps.last()? >= &largest && largest > LEADS_UP * median(&steps);
+    let gaps = trace.intervals();
+    let is_seen = gaps.last().is_some_and(|gap| *gap <= GAP * median(&gaps));
+    let is_alone = is_far && is_seen && !leads_up;
+    (is_alone && last > ALL_AT_ONCE * largest).then_some(off)
 }
 
 /// Which values of a covariate are mistakes: dips out of the scatter, and peaks that

@@ -3,7 +3,7 @@
 use super::super::explanation::Fault;
 use super::super::kind::FaultKind;
 use super::smooth::Smoothness;
-use crate::reading::Timestamp;
+use crate::reading::{Timestamp, Unit};
 
 /// More instances than this are counted and not listed.
 const LISTED: usize = 4;
@@ -93,6 +93,14 @@ fn sentence(
             interpolated(source, how)
         }
     }
+}
+
+/// That the newest reading, which is of that time, leaves those before it by `off`, all at once.
+pub(super) fn of_newest(at: Timestamp, off: f64, unit: Unit) -> String {
+    format!(
+        "The readings: the last one, of {}, is {off:+.3} {unit} off the line of those before it, all at once: a mistake of the instrument and the beginning of a motion look the same until more is read.",
+        date(at)
+    )
 }
 
 /// The first few faults, each with its size and date.

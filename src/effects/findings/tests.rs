@@ -38,6 +38,17 @@ fn where_no_effect_entered_all_figures_are_the_same_before_and_after() {
 }
 
 #[test]
+fn a_single_reading_far_off_at_the_end_is_not_nothing_and_not_explained() {
+    let said = explained(Quantity::Displacement, &WITH_A_SPIKE);
+    assert_eq!(said.verdict.effect, Kind::UNEXPLAINED);
+    assert_eq!(said.explained, Explained::None);
+    let of_newest = "until more is read";
+    assert!(said.remarks.iter().any(|one| one.contains(of_newest)));
+    let said = explained(Quantity::Displacement, &WITH_A_SPIKE[..18]);
+    assert!(!said.remarks.iter().any(|one| one.contains(of_newest)));
+}
+
+#[test]
 fn a_law_with_more_freedom_is_never_farther_from_the_readings() {
     let days = daily(120);
     for (seed, quantity) in [(1, Quantity::Velocity), (2, Quantity::Displacement)] {
