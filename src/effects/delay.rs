@@ -102,3 +102,51 @@ impl Search<'_> {
         self.known(base, fitted)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::explain::explain;
+    use super::super::fixture::{channel, daily, generator, normals, series};
+    use super::super::kind::{Form, Kind};
+    use super::super::options::Options;
+    use crate::reading::Quantity;
+
+    /// A lake that rises and falls by its own, and as it seeps in over so many days, about their means.
+    fn seeping(seed: u64, days: usize, mean_delay: f64) -> (Vec<f64>, Vec<f64>) {
+        let kicks = normals(&mut generator(seed), days);
+        let (mut trend, mut level, mut inside) = (0.0, 0.0, 0.0);
+        let both = kicks.into_iter().map(|kick| {
+            trend = 0.9 * trend + kick;
+            level = 0.97 * level + 0.1 * trend;
+            inside += (level - inside) * -(-1.0 / mean_delay).exp_m1();
+            (level, inside)
+        });
+        both.unzip()
+    }
+
+    #[test]
+    fn a_lake_that_seeps_in_over_days_is_found_with_its_delay() {
+        let count = 300;
+        let days = daily(count);
+        for (seed, delay, gain) in [(1, 12.0, 0.6), (2, 5.0, -0.6)] {
+            let (lake, inside) = seeping(seed, count, delay);
+            let mean = inside.iter().sum::<f64>() / count as f64;
+            let square = inside.iter().map(|one| (one - mean).powi(2)).sum::<f64>();
+            let deviation = (square / count as f64).sqrt();
+            let noise = normals(&mut generator(100 + seed), count);
+            let mut moved = 0.0;
+            let values = inside.iter().zip(noise).map(|(one, noise)| {
+                moved += (gain * (one - mean) / deviation).exp();
+                moved + noise
+            });
+            let series = series(Quantity::Displacement, &days, &values.collect::<Vec<f64>>());
+            let lake = channel("lake_level_m", &days, &lake);
+            let said = explain(&series, &[lake], &[], &Options::default(), &mut |_| ());
+            let found = &said.verdict;
+            assert_eq!(found.effect, Kind::HYDROLOGICAL, "{found:?}");
+            assert_eq!(found.form, Some(Form::Level), "{found:?}");
+            let ratio = found.lag_days.unwrap() / delay;
+            assert!((0.6..1.6).contains(&ratio), "{found:?} for {delay}");
+        }
+    }
+}

@@ -189,3 +189,17 @@ fn event(
         },
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_level_of_a_site_is_the_highest_that_enough_benchmarks_reach() {
+        let levels = [Level::Orange, Level::Unknown, Level::Red, Level::Yellow];
+        let of = |rule: SiteLevel| rule.of(levels.into_iter());
+        assert_eq!(of(SiteLevel::Worst), Some(Level::Red));
+        assert_eq!(of(SiteLevel::AtLeast(2)), Some(Level::Orange));
+        assert_eq!(of(SiteLevel::AtLeast(4)), None);
+    }
+}

@@ -355,3 +355,47 @@ pub fn closed(store: &Store, in_force: &InForce) -> Result<Vec<Event>, StoreErro
 fn read(body: &str) -> Result<Event, StoreError> {
     serde_json::from_str(body).map_err(|error| StoreError::Unreadable(error.to_string()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn alert(benchmark: Option<&str>, level: Level, state: AlertState) -> Event {
+        let place = benchmark.unwrap_or("site");
+        Event {
+            time: "2020-01-01T00:00:00Z".parse().unwrap(),
+            benchmark: benchmark.map(BenchmarkId::new),
+            kind: EventKind::Alert {
+                level,
+                state,
+                key: format!("{place}/{level}/2020-01-01T00:00:00Z"),
+                rule: "chance".to_owned(),
+                text: "as it was called".to_owned(),
+            },
+        }
+    }
+
+    #[test]
+    fn the_alert_of_the_site_names_the_benchmarks_that_make_its_level_now() {
+        let (mut standing, firing) = (InForce::new(), AlertState::Firing);
+        for event in [
+            alert(Some("a"), Level::Red, firing),
+            alert(None, Level::Red, firing),
+            alert(Some("b"), Level::Red, firing),
+            alert(Some("c"), Level::Orange, firing),
+            alert(Some("a"), Level::Red, AlertState::Resolved),
+        ] {
+            note(&mut standing, &event);
+        }
+        name_those_in_force(&mut standing);
+        let text = |place: Option<&str>, level| {
+            let place = place.map(BenchmarkId::new);
+            match &standing[&(place, level)].kind {
+                EventKind::Alert { text, .. } => text.clone(),
+                other => panic!("{other:?}"),
+            }
+        };
+        assert_eq!(text(None, Level::Red), "the site: red (benchmarks b)");
+        assert_eq!(text(Some("b"), Level::Red), "as it was called");
+    }
+}

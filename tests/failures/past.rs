@@ -92,12 +92,11 @@ fn site_newest(site: &Site) -> BTreeMap<String, String> {
 }
 
 /// Ten hours at twice the threshold, and twenty of creep: no evacuation time yet.
-#[test]
-fn a_red_of_the_past_that_nothing_has_ended_is_reported_after_a_first_start() {
-    let site = Site::new(
+fn past_red(hooks: &str) -> Site {
+    let site = Site::new(&format!(
         "[alert]\nevacuation_time = \"24h\"\n\
-         [[alert.threshold]]\nlevel = \"red\"\nvelocity = \"100 mm/day\"\n",
-    );
+         [[alert.threshold]]\nlevel = \"red\"\nvelocity = \"100 mm/day\"\n{hooks}"
+    ));
     let start = clock::now() - SignedDuration::from_hours(59);
     let rows: String = (0..60_i64)
         .map(|hour| {
@@ -108,8 +107,26 @@ fn a_red_of_the_past_that_nothing_has_ended_is_reported_after_a_first_start() {
         })
         .collect();
     site.append("incoming/5.csv", &format!("{HEADER}{rows}"));
+    site
+}
+
+#[test]
+fn a_red_of_the_past_that_nothing_has_ended_is_reported_after_a_first_start() {
+    let site = past_red("");
     let program = site.caught_up();
     eventually("the red notified", || site.notified("5/red/", "firing") > 0);
+    program.stop();
+    site.proven_events();
+}
+
+#[test]
+fn a_hook_of_the_whole_site_is_notified_of_a_red_of_the_past_too() {
+    let hook = "[[hook]]\nsite = true\nlevels = [\"red\"]\nrun = [\"/bin/sh\", \"hook.sh\"]\n";
+    let site = past_red(hook);
+    let program = site.caught_up();
+    eventually("the site's red notified", || {
+        site.notified("site/red/", "firing") == 1
+    });
     program.stop();
     site.proven_events();
 }

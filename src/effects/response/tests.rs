@@ -133,3 +133,64 @@ fn the_share_of_the_readings_time_that_a_channel_covers_is_counted() {
     let covered = driver.coverage(&nodes);
     assert!((covered - 0.51).abs() < 0.011, "{covered}");
 }
+
+/// Rain by the day, in showers; each day's total stands at the end of the day.
+fn rain(days: usize) -> (Driver, Vec<f64>) {
+    let totals: Vec<f64> = (0..days)
+        .map(|day| f64::from(day % 7 == 3) * 10.0 + f64::from(day % 11 == 5) * 4.0)
+        .collect();
+    let times: Vec<f64> = (1..=days).map(|day| day as f64).collect();
+    let driver = Driver::new(0, &channel("rain_mm", &times, &totals), epoch()).unwrap();
+    (driver, totals)
+}
+
+#[test]
+fn rain_acts_while_it_falls_and_not_from_the_end_of_its_day_on() {
+    let (driver, totals) = rain(120);
+    let mean = 5.0;
+    let nodes: Vec<f64> = (1..=4 * 119)
+        .map(|quarter| 1.0 + f64::from(quarter) / 4.0)
+        .collect();
+    let given = driver.respond_in_unit(of(Form::Level, 1, mean), &nodes);
+    // A store that fills evenly over each day, in small steps.
+    let (parts, mut store) = (1000, totals[0]);
+    let mut drained = vec![store];
+    for total in &totals[1..] {
+        for _ in 0..parts {
+            store += (total - store) / (mean * f64::from(parts));
+        }
+        drained.push(store);
+    }
+    let at_ends = nodes
+        .iter()
+        .zip(&given)
+        .filter(|(day, _)| day.fract() < 1e-9);
+    for (day, value) in at_ends {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a whole day"
+        )]
+        let right = drained[*day as usize - 1];
+        assert!(
+            (value - right).abs() < 0.01,
+            "day {day}: {value} for {right}"
+        );
+    }
+    // Without delay a quarter of the day on which it falls has its rain, and the quarter after that day has none.
+    let at_once = driver.respond_in_unit(of(Form::Level, 1, 0.0), &[3.25, 4.0, 4.25]);
+    assert_eq!(at_once, [10.0, 10.0, 0.0]);
+}
+
+#[test]
+fn a_total_after_a_gap_falls_over_all_of_it_and_none_is_lost() {
+    let times = [1.0, 2.0, 3.0, 4.0, 8.0, 9.0, 10.0];
+    let totals = [0.0, 2.0, 0.0, 0.0, 8.0, 0.0, 1.0];
+    let driver = Driver::new(0, &channel("rain_mm", &times, &totals), epoch()).unwrap();
+    let days: Vec<f64> = (1..=10).map(f64::from).collect();
+    let given = driver.respond_in_unit(of(Form::Level, 1, 0.0), &days);
+    let right = [0.0, 2.0, 0.0, 0.0, 2.0, 2.0, 2.0, 2.0, 0.0, 1.0];
+    for (given, right) in given.iter().zip(right) {
+        assert!((given - right).abs() < 1e-9, "{given} for {right}");
+    }
+}
