@@ -19,7 +19,7 @@ const LARGE: f64 = 5.0;
 /// Jumps of the reading tried, the largest first.
 const JUMPS: usize = 24;
 /// No event within so many readings of either end: what happens there cannot be distinguished from noise.
-const EVENT_MARGIN: usize = 5;
+pub(super) const EVENT_MARGIN: usize = 5;
 
 /// A term without covariate, response or time.
 fn plain(kind: Kind, act: Act) -> Term {

@@ -22,6 +22,7 @@ impl Search<'_> {
         refitted.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         prefer_independent_evidence(&mut refitted, self.options.bic_margin);
         self.prefer_rain(&mut refitted);
+        let mut refitted = with_other_delays_beside(refitted);
         let judged = refitted.iter().map(|one| self.judged(base, one));
         let mut judged: Vec<Judgement> = judged.collect();
         if let Some(found) = self.two_together(base, &refitted, &judged, round) {
@@ -219,6 +220,20 @@ impl Search<'_> {
             format!("{name} explains the same by {behind:.0} more of the BIC")
         }
     }
+}
+
+/// The same in the same order, but for an effect's second delay, which is judged right after the first.
+fn with_other_delays_beside(refitted: Vec<Refitted>) -> Vec<Refitted> {
+    let mut ordered: Vec<Refitted> = Vec::with_capacity(refitted.len());
+    for one in refitted {
+        let beside = ordered.iter().position(|known| {
+            let is_of_a_covariate = one.term.channel.is_some();
+            is_of_a_covariate && known.is_as(&one)
+        });
+        let place = beside.map_or(ordered.len(), |first| first + 1);
+        ordered.insert(place, one);
+    }
+    ordered
 }
 
 /// Among what the BIC cannot separate from the best, an effect that a covariate supports goes first, and then

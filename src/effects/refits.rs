@@ -393,7 +393,13 @@ impl<'a> Search<'a> {
             reason = "not negative, and a place among the readings"
         )]
         let to = passed as usize;
-        let inside = to >= 2 && to + 2 < self.problem.used;
+        // One wild reading at either end is no event of the ground; a jump of the reading may come back.
+        let margin = if term.is_jump_of_reading() {
+            2
+        } else {
+            candidates::EVENT_MARGIN
+        };
+        let inside = to >= margin && to + margin < self.problem.used;
         inside.then(|| {
             if term.is_jump_of_reading() {
                 return candidates::jump(self.problem, term.kind, to);

@@ -410,13 +410,19 @@ impl Search<'_> {
             held_out: held,
             rejected_because: reason,
         };
-        // The latest word on one thing stands, unless it had been accepted.
-        self.candidates.retain(|old| {
-            let same = old.effect == candidate.effect
+        let is_same = |old: &Candidate| {
+            old.effect == candidate.effect
                 && old.channel == candidate.channel
-                && old.form == candidate.form;
-            !same || old.rejected_because.is_none()
-        });
+                && old.form == candidate.form
+        };
+        // The latest word on one thing stands, unless it had been accepted, or what was accepted since accounts for what it gained.
+        let margin = self.options.bic_margin;
+        let is_accounted_for =
+            |old: &Candidate| is_same(old) && old.bic_gain >= margin && candidate.bic_gain < margin;
+        if self.candidates.iter().any(is_accounted_for) {
+            return;
+        }
+        (self.candidates).retain(|old| !is_same(old) || old.rejected_because.is_none());
         self.candidates.push(candidate);
     }
 }

@@ -390,10 +390,10 @@ mod tests {
         name_those_in_force(&mut standing);
         let text = |place: Option<&str>, level| {
             let place = place.map(BenchmarkId::new);
-            match &standing[&(place, level)].kind {
-                EventKind::Alert { text, .. } => text.clone(),
-                other => panic!("{other:?}"),
-            }
+            let EventKind::Alert { text, .. } = &standing[&(place, level)].kind else {
+                panic!("no alert");
+            };
+            text.clone()
         };
         assert_eq!(text(None, Level::Red), "the site: red (benchmarks b)");
         assert_eq!(text(Some("b"), Level::Red), "as it was called");
