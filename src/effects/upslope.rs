@@ -4,7 +4,8 @@ use super::problem::{Problem, median};
 use crate::reading::Quantity;
 
 /// What is remarked of them.
-pub(super) const REMARK: &str = "The readings fall: the slope would move upslope, which the law cannot. Is the sign of the readings right?";
+pub(super) const REMARK: &str = "The readings fall: the slope would move upslope, which the law cannot. Is their sign right? In a config components = [\"COLUMN\"] and \
+     direction = [-1.0] of the [[benchmark]] turn it.";
 /// The median of so many readings at either end says where they stand.
 const END: usize = 5;
 /// They fall by more than this share of their whole range,

@@ -30,7 +30,8 @@ The law is the slider block of Helmstetter et al. (2004) in one regular equation
 2. The law under a constant load is fitted (*before*). Its residual is judged by its innovations, under a bank of noises: white, AR(1)
    for irregular sampling, random walk.
 3. Every kind of effect is tried inside the law, with every channel, as level and as rate, through exponential and gamma
-   responses. The law's own parameters are refitted with it, from where they stood and from laws found again, because beside a poor law
+   responses; a value of rain is what fell since the one before it. The delay of a response is chosen about the law without it, about a
+   steady law, and again about the law that was fitted with it. The law's own parameters are refitted with it, from where they stood and from laws found again, because beside a poor law
    everything that is tried gains alike; an event lies between two readings. The best one enters, and the search begins again (*after*); but
    where the law that was found with it is the better one without it too, the law before was a poor fit, nothing enters, and the search begins
    again from that law. What entered early leaves again where the BIC rises by less than 10 without it.
@@ -41,7 +42,7 @@ The law is the slider block of Helmstetter et al. (2004) in one regular equation
    not in question. An effect that only the shape of the readings supports (no channel, no tide, no season) may have changed the law, and is
    judged with the law too as it was learned before the block. Extrapolated over the whole block, such an effect may not be
    worse at all, and another by a fifth at most; a tide, which comes back to where it was and cannot drift, by ten times at most:
-   the rest is the law's. A tide must gain as much more than a daily cycle of 24 and 12 hours,
+   the rest is the law's. All effects together may predict the block no worse than the law without any. A tide must gain as much more than a daily cycle of 24 and 12 hours,
    which warmth and melt water have. What is no tide and not of the reading must also account for the readings as well, within the margin, as a load
    does that changes over a while, or comes and goes, and that nothing measures; a rise over several readings is no reset. Everything
    else is listed with the reason.
