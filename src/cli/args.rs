@@ -414,7 +414,7 @@ pub(super) fn warn_of(disorder: Disorder) {
     if disorder.unended > 0 {
         let files = disorder.unended;
         exit::complain(&format_args!(
-            "warning: files of a daemon's record without an end: {files} (read as far as they go)"
+            "warning: files without an end: {files} (read as far as they go)"
         ));
     }
     for (what, values, remedy) in kinds {

@@ -36,6 +36,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     bar.finish_and_clear();
     let report = report?;
     warn_of(report.disorder);
+    for remark in &report.remarks {
+        exit::complain(&format_args!("{}: {remark}", args.input.display()));
+    }
     for what in &report.left_out {
         exit::complain(&format_args!("warning: left out: {what}"));
     }

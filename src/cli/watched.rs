@@ -25,15 +25,29 @@ pub(super) fn load(readings: &ReadingArgs, config: &Config) -> anyhow::Result<Lo
     refuse_idle_flags(readings, &sources)?;
     let options = readings.file.options();
     let (mut parts, mut all) = (Vec::new(), FilesRead::default());
+    let mut without_readings = None;
     for (file, source) in readings.files.iter().zip(&sources) {
         let own = source.map(|source| options_of(source, &config.benchmarks, file));
-        let mut read = read(file, own.as_ref().unwrap_or(&options))?;
+        let mut read = match read(file, own.as_ref().unwrap_or(&options)) {
+            Ok(read) => read,
+            Err(error) => {
+                let Some(remark) = error.left_out() else {
+                    return Err(error.into());
+                };
+                all.remarks.push((file.clone(), remark));
+                without_readings.get_or_insert(error);
+                continue;
+            }
+        };
         if let Some(source) = source {
             leave_out(&mut read.recording, source, config, file);
         }
         all.disorder += read.disorder;
         all.remarks.extend(read.remarks);
         parts.push(read.recording);
+    }
+    if let Some(none) = without_readings.filter(|_| parts.is_empty()) {
+        return Err(none.into());
     }
     let (recording, overlap) = Recording::merge(parts).map_err(IngestError::from)?;
     all.recording = recording;

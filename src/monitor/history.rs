@@ -329,7 +329,24 @@ impl History {
         read.collect()
     }
 
-    /// The values of the same readings.
+    /// The same readings with what resets have taken off.
+    pub(super) fn with_resets(&self, unit: Unit, most: usize) -> Vec<(Timestamp, f64)> {
+        let values = &self.observations.values;
+        let newest = &values[values.len().saturating_sub(most)..];
+        let read = newest.iter().filter_map(|one| {
+            let value = one.value + self.taken_off(one.t_days);
+            Some((self.time(one.t_days)?, value / unit.factor()))
+        });
+        read.collect()
+    }
+
+    /// Whether a reset after `time` has been taken off.
+    pub(super) fn is_reset_since(&self, time: Timestamp) -> bool {
+        let t_days = self.days(time);
+        self.resets.iter().any(|reset| reset.t_days > t_days)
+    }
+
+    /// The values of the newest `most` readings, as [`History::as_read`] gives them.
     pub(super) fn values_as_read(&self, unit: Unit, most: usize) -> Vec<f64> {
         let values = &self.observations.values;
         let newest = &values[values.len().saturating_sub(most)..];

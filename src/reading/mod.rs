@@ -7,6 +7,7 @@ mod conventions;
 mod covariate;
 mod dialect;
 mod figure;
+pub mod other_unit;
 mod plain;
 mod recording;
 mod running_total;

@@ -98,7 +98,7 @@ pub struct Disorder {
     pub out_of_order: usize,
     /// Readings that were a mark for no value, such as NAN; they are left out.
     pub missing: usize,
-    /// Files of a daemon's record that have no end: read as far as they go.
+    /// Files that have no end: read as far as they go.
     pub unended: usize,
 }
 

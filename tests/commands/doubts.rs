@@ -374,3 +374,53 @@ fn a_unit_that_changes_within_a_file_is_named_by_init_and_what_is_refused_at_the
         assert_eq!(err.contains(broken[0]), is_said, "{err}");
     }
 }
+
+#[test]
+fn a_unit_that_changes_under_the_same_header_is_doubted_by_check_and_no_reset() {
+    let newest = clock::now() - SignedDuration::from_mins(30);
+    let text = (0..300).fold("time,P1_displacement_mm\n".to_owned(), |mut text, row| {
+        let time = newest - SignedDuration::from_hours(i64::from(299 - row));
+        let value = 0.05 * f64::from(row) + 0.2 * drawn(row);
+        let value = if row < 200 { value } else { value / 1000.0 };
+        let _ = writeln!(text, "{time:.0},{value:.5}");
+        text
+    });
+    let office = Office::with(&[("p.csv", &text)]);
+    office.done(&["init", "p.csv"]);
+    let (_, out, err) = office.say(&["check", "site.toml"]);
+    let said = format!("{out}{err}");
+    contains_all(&said, &["multiplied by 1000", "accept = [\"scale\"]"]);
+    assert!(!said.contains("kind = \"reset\""), "{said}");
+    let config = fs::read_to_string(office.path("site.toml")).unwrap();
+    let accepting = config.replacen(
+        "[[benchmark]]\n",
+        "[[benchmark]]\naccept = [\"scale\"]\n",
+        1,
+    );
+    fs::write(office.path("site.toml"), accepting).unwrap();
+    let (_, out, err) = office.say(&["check", "site.toml"]);
+    let said = format!("{out}{err}");
+    assert!(!said.contains("multiplied by"), "{said}");
+}
+
+#[test]
+fn a_recording_that_was_cut_off_is_read_by_every_command_and_each_says_so() {
+    let newest = SignedDuration::from_mins(-90);
+    let office = Office::with(&[("p.csv", &to_collapse(10.0, newest))]);
+    office.done(&["convert", "p.csv", "p.mcap"]);
+    let bytes = fs::read(office.path("p.mcap")).unwrap();
+    fs::write(office.path("p.mcap"), &bytes[..bytes.len() - 7]).unwrap();
+    let commands: [&[&str]; 4] = [
+        &["init", "p.mcap"],
+        &["fit", "p.mcap"],
+        &["replay", "p.mcap"],
+        &["convert", "p.mcap", "back.csv"],
+    ];
+    for args in commands {
+        let (exit, out, err) = office.say(args);
+        assert_eq!(exit, 0, "{args:?}: {out}{err}");
+        contains_all(&err, &["p.mcap: has not ended", "message 150"]);
+    }
+    let back = fs::read_to_string(office.path("back.csv")).unwrap();
+    assert_eq!(back.lines().count(), 151);
+}

@@ -1,9 +1,11 @@
-//! An MCAP archive is read as it was written, or refused.
+//! An MCAP archive is read as it was written, or as far as it goes where it has no end, or refused.
 
 use crate::made_up::{assert_identical, made_up, read};
 use jiff::Timestamp;
 use slipwatch::reading::{Disorder, Reading, Recording};
-use slipwatch::runtime::ingest::{IngestError, encode_mcap, write_mcap};
+use slipwatch::runtime::ingest::{
+    IngestError, ReadOptions, encode_mcap, read_with_remarks, write_mcap,
+};
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
@@ -99,18 +101,43 @@ fn a_flipped_bit_is_refused_or_changes_nothing() {
 }
 
 #[test]
-fn a_truncated_archive_is_refused() {
+fn an_archive_without_its_end_is_read_as_far_as_its_whole_chunks_go_and_said_to_have_none() {
     let folder = TempDir::new().unwrap();
     let file = folder.path().join("a.mcap");
     let (recording, bytes) = archive();
-    for length in (0..bytes.len()).step_by(37).chain([bytes.len() - 1]) {
+    let whole = &recording.series[0].readings;
+    let (mut refused, mut read_whole) = (0, 0);
+    for length in (0..bytes.len()).step_by(37).chain([bytes.len() - 7]) {
         fs::write(&file, &bytes[..length]).unwrap();
-        let error = read(&file).unwrap_err();
-        assert!(
-            matches!(error, IngestError::Damaged { .. }),
-            "{length}: {error}"
-        );
+        match read_with_remarks(std::slice::from_ref(&file), &ReadOptions::default()) {
+            Ok(read) => {
+                assert_eq!(read.disorder.unended, 1, "{length}");
+                let (of, remark) = &read.remarks[0];
+                assert_eq!((of, remark.about.as_str()), (&file, "has not ended"));
+                let readings = &read.recording.series[0].readings;
+                assert!(whole.starts_with(readings), "{length}");
+                read_whole += usize::from(readings.len() == whole.len());
+            }
+            // Nothing of it is whole.
+            Err(error) => {
+                assert!(
+                    matches!(error, IngestError::Damaged { .. }),
+                    "{length}: {error}"
+                );
+                refused += 1;
+            }
+        }
     }
+    assert!(refused > 0 && read_whole > 0, "{refused}, {read_whole}");
+    // A length that leads past the end, which is there, is damage: the first chunk's.
+    let at = bytes
+        .windows(9)
+        .position(|nine| nine[0] == 6 && nine[3..] == [0; 6]);
+    let mut damaged = bytes.clone();
+    damaged[at.unwrap() + 3] = 1;
+    fs::write(&file, &damaged).unwrap();
+    let error = read(&file).unwrap_err();
+    assert!(matches!(error, IngestError::Damaged { .. }), "{error}");
     fs::write(&file, &bytes).unwrap();
     assert_identical(&recording, &read(&file).unwrap().0);
 }
@@ -176,4 +203,21 @@ fn a_bad_message_is_named_with_file_topic_and_number() {
         error.contains("/tf") && error.contains("/benchmarks/ID"),
         "{error}"
     );
+}
+
+#[test]
+fn a_file_without_readings_is_left_out_beside_others_and_refused_alone() {
+    let folder = TempDir::new().unwrap();
+    let [log, readings] = ["log.mcap", "readings.mcap"].map(|name| folder.path().join(name));
+    fs::write(&log, foreign(&[("/log", "{}")])).unwrap();
+    let reading = ("/benchmarks/5/velocity", r#"{"value": 7, "unit": "mm/h"}"#);
+    fs::write(&readings, foreign(&[reading])).unwrap();
+    let options = ReadOptions::default();
+    let read = read_with_remarks(&[log.clone(), readings], &options).unwrap();
+    assert_eq!(read.recording.series[0].readings.len(), 1);
+    let (of, remark) = &read.remarks[0];
+    assert_eq!(of, &log);
+    assert!(remark.to_string().contains("/log"), "{remark}");
+    let alone = read_with_remarks(&[log.clone(), log], &options).unwrap_err();
+    assert!(matches!(alone, IngestError::NoTopics { .. }), "{alone}");
 }

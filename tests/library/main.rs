@@ -32,6 +32,7 @@ mod measured;
 mod monitor;
 mod mutated_files;
 mod orders;
+mod other_unit;
 mod parallel;
 mod queue;
 mod recordings;

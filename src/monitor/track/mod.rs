@@ -207,11 +207,18 @@ impl Track {
         phase: Phase,
     ) -> Vec<Event> {
         let mut events = Vec::new();
-        if !self.quality.is_accepted(Suspicion::Fall) {
-            events.extend(self.record.find_reset(time));
+        // A state of an earlier version is gone through again as it was.
+        if phase.holds_scale {
+            self.quality.look_at_unit(&self.record, source.unit);
         }
-        let level = self.level();
-        events.extend((self.quality).judge_sensor(&mut self.record, policy, level, time));
+        if !self.quality.is_in_other_unit() {
+            if !self.quality.is_accepted(Suspicion::Fall) {
+                events.extend(self.record.find_reset(time));
+            }
+            let level = self.level();
+            let judged = (self.quality).judge_sensor(&mut self.record, policy, level, time);
+            events.extend(judged);
+        }
         let doubts = (self.quality).suspect(&self.record, source, time, phase.holds_scale);
         events.extend(doubts);
         events

@@ -16,6 +16,7 @@ use crate::monitor::drift::Drift;
 use crate::monitor::history::History;
 use crate::monitor::kept::KeptForecast;
 use crate::monitor::silence::Silence;
+use crate::reading::other_unit::OtherUnit;
 use crate::reading::{BenchmarkId, Suspicion, Timestamp};
 use crate::regime::Tracker;
 use serde::Deserialize;
@@ -44,6 +45,8 @@ pub(super) struct SavedTrack {
     faulted: bool,
     #[serde(default)]
     accepted: BTreeSet<Suspicion>,
+    #[serde(default)]
+    other_unit: Option<OtherUnit>,
 
     panel: LawForecaster,
     #[serde(default)]
@@ -97,6 +100,7 @@ impl From<SavedTrack> for Track {
                 saved.others,
                 saved.faulted,
                 saved.accepted,
+                saved.other_unit,
             ),
             forecaster: Forecaster::from_saved(saved.panel, saved.pace, saved.watch, saved.adopted),
             changes: FitChanges::from_saved(saved.regime, saved.intercept, saved.transition),

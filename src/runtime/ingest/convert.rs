@@ -1,7 +1,7 @@
 //! Turns a file of readings into another format.
 
 use super::atomic::write_atomically;
-use super::{Format, ReadOptions, encode_mcap, is_packed, read_watched};
+use super::{Format, ReadOptions, Remark, encode_mcap, is_packed, read_watched};
 use crate::reading::{BenchmarkId, Disorder, Quantity, Recording, Unit};
 use anyhow::Context;
 use schemars::JsonSchema;
@@ -20,6 +20,10 @@ pub struct ConvertReport {
     pub disorder: Disorder,
     /// What the input says and the output has no place for.
     pub left_out: Vec<String>,
+    /// What a person should know of the input.
+    #[serde(skip)]
+    #[schemars(skip)]
+    pub remarks: Vec<Remark>,
 }
 
 /// How much of a series was written.
@@ -100,6 +104,7 @@ pub fn convert(
         progress(ConvertStage::Read(share));
     })?;
     let (recording, disorder) = (read.recording, read.disorder);
+    let remarks = read.remarks.into_iter().map(|(_, remark)| remark);
     write_atomically(output, |out| {
         let bytes = 0;
         let out = CountedOutput {
@@ -113,7 +118,10 @@ pub fn convert(
         }
     })
     .with_context(|| format!("converting {} to {}", input.display(), output.display()))?;
-    Ok(report(&recording, disorder, format))
+    Ok(ConvertReport {
+        remarks: remarks.collect(),
+        ..report(&recording, disorder, format)
+    })
 }
 
 fn report(recording: &Recording, disorder: Disorder, format: Format) -> ConvertReport {
@@ -146,5 +154,6 @@ fn report(recording: &Recording, disorder: Disorder, format: Format) -> ConvertR
         channels: channels.collect(),
         disorder,
         left_out,
+        remarks: Vec::new(),
     }
 }

@@ -1,6 +1,6 @@
 //! What can be wrong with a file of readings, with the place where it is.
 
-use super::MessageError;
+use super::{MessageError, Remark};
 use crate::reading::MergeError;
 use std::io;
 use std::path::PathBuf;
@@ -167,7 +167,7 @@ pub enum IngestError {
         /// The file.
         file: PathBuf,
     },
-    /// An MCAP file that is truncated, fails a checksum or breaks the format.
+    /// An MCAP file that ends before its first reading, fails a checksum or breaks the format.
     #[error("{}: the file is damaged or incomplete, nothing of it is used", file.display())]
     Damaged {
         /// The file.
@@ -222,6 +222,17 @@ pub enum IngestError {
 }
 
 impl IngestError {
+    /// What to say of a file that is left out for it where others have readings; `None` where it is to be refused.
+    pub fn left_out(&self) -> Option<Remark> {
+        let Self::NoTopics { topics, .. } = self else {
+            return None;
+        };
+        Some(Remark {
+            about: "left out".to_owned(),
+            text: format!("it has no readings, but topics {topics:?}"),
+        })
+    }
+
     /// Whether the system failed us, rather than the data being bad.
     pub fn is_io(&self) -> bool {
         matches!(self, Self::Read { .. } | Self::Write { .. })

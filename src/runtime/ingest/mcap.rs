@@ -1,17 +1,17 @@
 //! Reads MCAP files, whole and checked: every checksum, every length, every value.
 //!
-//! A file that is truncated or fails a checksum is refused as a whole, since what can be read of it
-//! might be less, or other, than what was measured; but for the end of a record that a daemon writes, which is
-//! read as far as it goes. Topics that are neither benchmarks nor channels
-//! are left out.
+//! A file that fails a checksum is refused as a whole, since what can be read of it might be other than what was
+//! measured. One that ends before its end is written, because it is still being written or its writer had no power any
+//! more, is read as far as its whole records and chunks go, and that is said. Topics that are neither benchmarks nor
+//! channels are left out.
 
 use super::bytes::{is_stdin, stdin};
 use super::collect::Collector;
 use super::mcap_stream::{GROWING, PROVENANCE};
 use super::message::{MessageError, Topic, decode_message, is_said};
-use super::taken::BadRows;
-use super::{IngestError, Item, ReadOptions};
-use crate::reading::{Disorder, Recording};
+use super::taken::{BadRows, Remark};
+use super::{IngestError, Item, MCAP_MAGIC as MAGIC, ReadOptions};
+use crate::reading::{Disorder, Recording, Timestamp};
 use ::mcap::McapError;
 use ::mcap::records::{Channel, Record};
 use ::mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
@@ -24,13 +24,22 @@ use std::path::Path;
 /// allocation. Writers make chunks of about one megabyte unless set otherwise.
 const RECORD_LENGTH_LIMIT: usize = 64 << 20;
 
+/// What one file holds.
+#[derive(Debug)]
+pub(super) struct McapRead {
+    pub(super) recording: Recording,
+    pub(super) disorder: Disorder,
+    /// What a person should know of it.
+    pub(super) remark: Option<Remark>,
+}
+
 /// Reads one file.
 pub(super) fn read_mcap(
     file: &Path,
     options: &ReadOptions,
     bad: &mut BadRows<'_>,
     progress: &mut dyn FnMut(f64),
-) -> Result<(Recording, Disorder), IngestError> {
+) -> Result<McapRead, IngestError> {
     let length = file.metadata().map_or(0, |metadata| metadata.len());
     let mut done = 0;
     let fail = |source| IngestError::Read {
@@ -52,17 +61,22 @@ pub(super) fn read_mcap(
             .with_record_length_limit(RECORD_LENGTH_LIMIT),
     );
     let mut contents = Contents::new(file, options);
+    let mut last = Vec::new();
     while let Some(event) = reader.next_event() {
         let event = match event {
-            Err(McapError::UnexpectedEof) if contents.grows => {
-                contents.unended = 1;
+            // Where its end is there, it is a length that is wrong.
+            Err(McapError::UnexpectedEof) if last != MAGIC => {
+                contents.has_no_end = true;
                 break;
             }
             event => event.map_err(|source| contents.damaged(source))?,
         };
         match event {
             LinearReadEvent::ReadRequest(wanted) => {
-                let read = input.read(reader.insert(wanted)).map_err(fail)?;
+                let space = reader.insert(wanted);
+                let read = input.read(space).map_err(fail)?;
+                last.extend_from_slice(&space[read.saturating_sub(MAGIC.len())..read]);
+                last.drain(..last.len().saturating_sub(MAGIC.len()));
                 reader.notify_read(read);
                 done += read;
                 progress(done as f64 / length.max(1) as f64);
@@ -82,10 +96,12 @@ struct Contents<'a> {
     channels: BTreeMap<u16, Channel>,
     collected: Collector,
     provenance: BTreeMap<String, String>,
-    /// Whether it may have no end.
+    /// Whether it is a record that is read while a daemon writes it.
     grows: bool,
-    unended: usize,
+    has_no_end: bool,
     messages: u64,
+    /// The time of the last message that was taken.
+    newest: Option<Timestamp>,
     taken: u64,
     counted: Option<u64>,
 }
@@ -99,8 +115,9 @@ impl<'a> Contents<'a> {
             collected: Collector::default(),
             provenance: BTreeMap::new(),
             grows: false,
-            unended: 0,
+            has_no_end: false,
             messages: 0,
+            newest: None,
             taken: 0,
             counted: None,
         }
@@ -165,6 +182,7 @@ impl<'a> Contents<'a> {
             *averaging = self.options.averaging_of(*unit, *averaging);
         }
         self.taken += 1;
+        self.newest = Some(item.time());
         self.collected.add(item).map_err(|odd| {
             if odd.expected.contains("averaging") {
                 field = super::message::AVERAGING;
@@ -186,7 +204,7 @@ impl<'a> Contents<'a> {
         }
     }
 
-    fn finish(self) -> Result<(Recording, Disorder), IngestError> {
+    fn finish(self) -> Result<McapRead, IngestError> {
         if let Some(expected) = self.counted
             && expected != self.messages
         {
@@ -196,6 +214,10 @@ impl<'a> Contents<'a> {
                 expected,
             });
         }
+        if self.taken == 0 && self.has_no_end && !self.grows {
+            return Err(self.damaged(McapError::UnexpectedEof));
+        }
+        let remark = self.no_end();
         if self.taken == 0 {
             let topics = self.channels.into_values().map(|channel| channel.topic);
             return Err(IngestError::NoTopics {
@@ -204,8 +226,24 @@ impl<'a> Contents<'a> {
             });
         }
         let (recording, mut disorder) = self.collected.finish(self.provenance);
-        disorder.unended = self.unended;
-        Ok((recording, disorder))
+        disorder.unended = usize::from(self.has_no_end);
+        Ok(McapRead {
+            recording,
+            disorder,
+            remark,
+        })
+    }
+
+    /// What there is to say of a file without an end.
+    fn no_end(&self) -> Option<Remark> {
+        let newest = self.newest.filter(|_| self.has_no_end)?;
+        let messages = self.messages;
+        Some(Remark {
+            about: "has not ended".to_owned(),
+            text: format!(
+                "it is still being written, or was cut off; read up to message {messages}, the last value taken being that of {newest}"
+            ),
+        })
     }
 }
 

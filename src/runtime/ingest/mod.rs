@@ -143,6 +143,17 @@ pub enum Item {
     },
 }
 
+impl Item {
+    /// When it was measured, or should have been.
+    fn time(&self) -> Timestamp {
+        match self {
+            Self::Reading { reading, .. } => reading.time,
+            Self::Sample { sample, .. } => sample.time,
+            Self::Missing { time, .. } => *time,
+        }
+    }
+}
+
 #[derive(Debug, Clone, Copy)]
 enum Format {
     Text(&'static TextFormat),
@@ -223,7 +234,7 @@ pub struct FilesRead {
 ///
 /// # Errors
 /// [`IngestError`] names the first thing found wrong; nothing is silently left out but MCAP
-/// topics that are neither benchmarks nor channels.
+/// topics that are neither benchmarks nor channels, and, beside others, files without any other.
 pub fn read_files(
     paths: &[PathBuf],
     options: &ReadOptions,
@@ -283,6 +294,7 @@ fn read_taking(
     progress: &mut dyn FnMut(f64),
 ) -> Result<FilesRead, IngestError> {
     let (mut parts, mut read) = (Vec::new(), FilesRead::default());
+    let mut without_readings = None;
     for (path, options) in files {
         let (recording, met) = match Format::of(path)? {
             Format::Text(format) => {
@@ -293,10 +305,27 @@ fn read_taking(
                     .extend(remarks.map(|one| (path.to_path_buf(), one)));
                 (table.recording, table.disorder)
             }
-            Format::Mcap => mcap::read_mcap(path, options, bad, progress)?,
+            Format::Mcap => match mcap::read_mcap(path, options, bad, progress) {
+                Err(none @ IngestError::NoTopics { .. }) => {
+                    let file = path.to_path_buf();
+                    read.remarks.extend(none.left_out().map(|one| (file, one)));
+                    without_readings.get_or_insert(none);
+                    continue;
+                }
+                taken => {
+                    let taken = taken?;
+                    let remark = taken.remark.into_iter();
+                    read.remarks
+                        .extend(remark.map(|one| (path.to_path_buf(), one)));
+                    (taken.recording, taken.disorder)
+                }
+            },
         };
         parts.push(recording);
         read.disorder += met;
+    }
+    if let Some(none) = without_readings.filter(|_| parts.is_empty()) {
+        return Err(none);
     }
     let (recording, overlap) = Recording::merge(parts)?;
     read.disorder += overlap;

@@ -1,6 +1,7 @@
 //! The readings of one quantity of a benchmark, counted as the daemon takes them.
 
 use super::view::BenchmarkPreview;
+use crate::reading::other_unit::{self, OtherUnit};
 use crate::reading::{Quantity, Suspicion, Timestamp, Unit, suspicion};
 use jiff::tz::TimeZone;
 use std::collections::BTreeSet;
@@ -214,11 +215,17 @@ impl PreviewTrack {
             .iter()
             .map(|one| (one.time, one.value))
             .collect();
-        let all = ahead.chain(suspicion::of_values(
-            &values,
-            self.view.quantity,
-            &self.view.unit,
-        ));
+        let (quantity, unit) = (self.view.quantity, &self.view.unit);
+        let is_accepted = self.accepted.contains(&Suspicion::Scale);
+        let other = other_unit::standing(&values, quantity).filter(|_| !is_accepted);
+        let of_values = suspicion::of_values(&values, quantity, unit);
+        // One step is no fall of the slope and another unit.
+        let step = other.as_ref().map(OtherUnit::at);
+        let of_values = of_values.into_iter();
+        let of_values = of_values.filter(|one| one.kind != Suspicion::Fall || Some(one.at) != step);
+        let newest = values.last().map_or(Timestamp::UNIX_EPOCH, |last| last.0);
+        let other = other.map(|other| other.suspicion(newest, unit));
+        let all = ahead.chain(other).chain(of_values);
         let not_accepted = all.filter(|one| !self.accepted.contains(&one.kind));
         let texts = not_accepted.map(|one| one.text);
         texts.chain(self.moves_backwards()).collect()

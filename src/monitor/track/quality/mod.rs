@@ -7,6 +7,7 @@ mod unknown;
 use super::record::BenchmarkRecord;
 use crate::monitor::event::Event;
 use crate::monitor::history::Taken;
+use crate::reading::other_unit::OtherUnit;
 use crate::reading::{Suspicion, Timestamp, whole_figure};
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -31,6 +32,9 @@ pub(super) struct DataQuality {
     is_second_reported: bool,
     /// Suspicions that people have looked into, and that do not hold.
     accepted: BTreeSet<Suspicion>,
+    /// Since when its readings are in another unit than those before.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    other_unit: Option<OtherUnit>,
 }
 
 impl DataQuality {
@@ -40,6 +44,7 @@ impl DataQuality {
         others: u32,
         is_second_reported: bool,
         accepted: BTreeSet<Suspicion>,
+        other_unit: Option<OtherUnit>,
     ) -> Self {
         Self {
             unknown,
@@ -47,6 +52,7 @@ impl DataQuality {
             others,
             is_second_reported,
             accepted,
+            other_unit,
         }
     }
 
@@ -79,7 +85,13 @@ impl DataQuality {
             Reason::Suspect(Suspicion::Mark),
             Reason::Suspect(Suspicion::Fall),
         ];
-        !says_nothing.into_iter().any(|one| self.unknown.has(one))
+        !self.is_in_other_unit() && !says_nothing.into_iter().any(|one| self.unknown.has(one))
+    }
+
+    /// Whether its readings are in another unit than those before, as enough of them show.
+    pub(super) fn is_in_other_unit(&self) -> bool {
+        let other = self.other_unit.as_ref();
+        other.is_some_and(OtherUnit::is_confirmed)
     }
 
     /// Whether people have looked into this suspicion, and it does not hold.

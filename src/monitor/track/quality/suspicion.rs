@@ -4,8 +4,9 @@
 use super::DataQuality;
 use super::unknown::Reason;
 use crate::monitor::event::Event;
-use crate::monitor::history::MeasuredAs;
+use crate::monitor::history::{History, MeasuredAs};
 use crate::monitor::track::record::BenchmarkRecord;
+use crate::reading::other_unit::{self, OtherUnit};
 use crate::reading::suspicion::{self, DatedSuspicion};
 use crate::reading::{Suspicion, Timestamp, Unit};
 use std::borrow::Cow;
@@ -33,17 +34,27 @@ impl DataQuality {
             Unit::Rate(..) => Cow::Owned(unit.to_string()),
         };
         let mut found = Vec::new();
+        if let Some(other) = &self.other_unit {
+            found.push(other.suspicion(time, &name));
+        }
         if !suspicion::is_plain(&values, quantity, &name) {
             let readings = history.as_read(unit, INSPECTED);
             let since = readings.len().checked_sub(CALM);
             let is_late =
                 |one: &DatedSuspicion| since.is_none_or(|since| one.at >= readings[since].0);
-            found = suspicion::of_values(&readings, quantity, &name);
-            found.retain(is_late);
+            let all = suspicion::of_values(&readings, quantity, &name);
+            found.extend(all.into_iter().filter(is_late));
+            // One step is no fall of the slope and another unit.
+            let step = self.other_unit.as_ref().map(OtherUnit::at);
+            found.retain(|one| one.kind != Suspicion::Fall || Some(one.at) != step);
         }
         let mut events = Vec::new();
-        for kind in [Suspicion::Mark, Suspicion::Fall, Suspicion::Scale] {
-            let evidence = found.iter().find(|one| one.kind == kind);
+        let evidence = |kind: Suspicion| found.iter().find(|one| one.kind == kind);
+        let mut kinds = [Suspicion::Mark, Suspicion::Fall, Suspicion::Scale];
+        // Where one suspicion takes the place of another the alert goes on.
+        kinds.sort_by_key(|kind| evidence(*kind).is_none());
+        for kind in kinds {
+            let evidence = evidence(kind);
             let stands = kind == Suspicion::Scale
                 && holds_scale
                 && evidence.is_none()
@@ -54,6 +65,25 @@ impl DataQuality {
             events.extend(self.weigh(record, time, kind, evidence));
         }
         events
+    }
+
+    /// After the newest reading: whether the readings are in another unit from some time on.
+    pub(in crate::monitor::track) fn look_at_unit(&mut self, record: &BenchmarkRecord, unit: Unit) {
+        let stood = self.other_unit.take().filter(OtherUnit::is_confirmed);
+        if self.is_accepted(Suspicion::Scale) {
+            return;
+        }
+        let history = record.history();
+        let found = match stood {
+            Some(mut stands) => {
+                let newest = history.with_resets(unit, 1);
+                let mut newest = newest.iter().map(|(_, value)| value * unit.factor());
+                let goes_on = newest.all(|value| stands.goes_on(value));
+                goes_on.then_some(stands)
+            }
+            None => newly_in_other_unit(history, unit),
+        };
+        self.other_unit = found.filter(|other| !history.is_reset_since(other.before()));
     }
 
     /// Whether the newest reading came while its time lay ahead of the clock, which said `clock`.
@@ -112,6 +142,17 @@ impl DataQuality {
         }
         events
     }
+}
+
+fn newly_in_other_unit(history: &History, unit: Unit) -> Option<OtherUnit> {
+    let quantity = unit.quantity();
+    let newest = history.with_resets(unit, other_unit::looked_at(quantity));
+    if !other_unit::may_have_changed(&newest) {
+        return None;
+    }
+    let readings = history.with_resets(unit, other_unit::gone_by(quantity));
+    let found = OtherUnit::at_end(&readings, quantity)?;
+    Some(found.given_in(unit.factor()))
 }
 
 #[cfg(test)]
