@@ -1,5 +1,10 @@
 //! A logger that writes another unit from some reading on, under the same header.
 
+#![allow(
+    clippy::wildcard_enum_match_arm,
+    reason = "a test looks for the kinds it names"
+)]
+
 use jiff::ToSpan;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
