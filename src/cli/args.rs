@@ -9,7 +9,7 @@ use crate::reading::{
     Timestamp,
 };
 use crate::runtime::ingest::{
-    ColumnMap, FilesRead, IngestError, ReadOptions, read_channels, read_with_remarks,
+    ColumnMap, FilesRead, IngestError, ReadOptions, Remark, read_channels, read_with_remarks,
 };
 use jiff::SignedDuration;
 use jiff::tz::TimeZone;
@@ -270,9 +270,7 @@ impl ReadingArgs {
             remarks,
             ..
         } = read;
-        for (file, remark) in remarks {
-            exit::complain(&format_args!("{}: {remark}", file.display()));
-        }
+        say_remarks(&remarks);
         if !self.channels.is_empty() {
             let (channels, met) = read_channels(&self.channels, options)?;
             let covariates = Recording {
@@ -389,6 +387,13 @@ pub(super) fn refuse_empty(
         names.join(", "),
         window.collect::<String>()
     )))
+}
+
+/// What a person should know of files that were read.
+pub(super) fn say_remarks(remarks: &[(PathBuf, Remark)]) {
+    for (file, remark) in remarks {
+        exit::complain(&format_args!("{}: {remark}", file.display()));
+    }
 }
 
 /// Warns on stderr of values that were not in order.

@@ -31,6 +31,9 @@ const WORSE_STEPS: f64 = 1.005;
 const MOST_EXTRAPOLATED: f64 = 1.2;
 const MOST_OF_A_TIDE: f64 = 10.0;
 
+/// So much of the usual starts' error the law of an inversion must leave at most.
+const FAR_NEARER: f64 = 0.5;
+
 /// By how much of the BIC a fit is better for the search to begin with it again.
 const BETTER: f64 = 1.0;
 
@@ -168,11 +171,17 @@ impl Refitted {
     }
 }
 
-/// The plain law by least squares, from the usual starts and from where its inversion ends; `None` where no start leads to a motion.
+/// The plain law by least squares; `None` where no start leads to a motion. That which the law's inversion leads to is taken only where the
+/// usual starts miss it by far: one that is a little nearer to the readings has bent towards what an effect does, and hides it.
 pub(super) fn plain(problem: &Problem, scratch: &mut Scratch) -> Option<Fitted> {
-    let mut starts = plain_starts(problem);
-    starts.extend(inverted_starts(problem, scratch));
-    best_of_starts(problem, &starts, scratch)
+    let usual = best_of_starts(problem, &plain_starts(problem), scratch);
+    let inverted = best_of_starts(problem, &inverted_starts(problem, scratch), scratch);
+    let Some(usual) = usual else {
+        return inverted;
+    };
+    let rms = |fitted: &Fitted| fitted.rms(problem, 0..problem.used);
+    let is_far = |inverted: &Fitted| rms(inverted) < FAR_NEARER * rms(&usual);
+    inverted.filter(is_far).or(Some(usual))
 }
 
 impl Search<'_> {

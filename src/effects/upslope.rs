@@ -45,14 +45,14 @@ mod tests {
     use super::super::options::Options;
     use super::*;
 
-    /// Readings of a slope that speeds up, times `sign`, with their remarks.
+    /// What is said of the readings of a slope that creeps steadily, times `sign`, with its remarks.
     fn explained(quantity: Quantity, sign: f64) -> (Kind, Vec<String>) {
         let days = daily(60);
         let noise = normals(&mut generator(3), days.len());
         let values = days.iter().zip(noise).map(|(day, noise)| {
             let value = match quantity {
-                Quantity::Displacement => 200.0 * ((day / 30.0).exp() - 1.0) + noise,
-                Quantity::Velocity => 5.0 * (day / 30.0).exp() * (1.0 + 0.05 * noise),
+                Quantity::Displacement => 5.0 * day + noise,
+                Quantity::Velocity => 5.0 * (1.0 + 0.05 * noise),
             };
             sign * value
         });

@@ -91,7 +91,7 @@ fn readings_in_another_unit_are_unknown_while_they_come_and_no_reset() {
     let events = play(&mut monitor, &all);
     assert_eq!(faults(&events, "suspect-scale"), [at(480)]);
     for other in [
-        "suspect-scale-ended",
+        "suspect-scale-ends",
         "suspect-fall",
         "reset-found",
         "spoilt-readings",
@@ -108,7 +108,9 @@ fn readings_in_another_unit_are_unknown_while_they_come_and_no_reset() {
     assert_eq!(events, parts);
     let back: Vec<(Timestamp, f64)> = readings(1030, creep, 0, |value| value).split_off(1000);
     let ended = play(&mut after, &back);
-    assert_eq!(faults(&ended, "suspect-scale-ended"), [at(1003)]);
+    assert_eq!(faults(&ended, "suspect-scale-ends"), [at(1003)]);
+    let level = after.level(&BenchmarkId::new("a"));
+    assert!(level < Some(Level::Orange), "{level:?}");
 }
 
 #[test]

@@ -8,7 +8,7 @@ mod text;
 mod times;
 mod unnamed;
 
-use super::args::{DialectArgs, FileArgs, OutputArgs};
+use super::args::{DialectArgs, FileArgs, OutputArgs, say_remarks};
 use super::check;
 use super::exit::{self, NoSuchReadings, UsageError};
 use crate::config::{SourceKind, value};
@@ -446,9 +446,7 @@ fn one_quantity_each(mut found: Vec<PlannedBenchmark>) -> Vec<PlannedBenchmark> 
 fn look(file: &Path, kind: SourceKind, options: &ReadOptions) -> anyhow::Result<FileSurvey> {
     let Some(format) = TextFormat::named(kind.name()) else {
         let read = read_with_remarks(&[file.to_owned()], options)?;
-        for (_, remark) in &read.remarks {
-            exit::complain(&format_args!("{}: {remark}", file.display()));
-        }
+        say_remarks(&read.remarks);
         let series = read.recording.series.into_iter();
         return Ok(FileSurvey {
             readings: series.map(|one| (one.benchmark, one.unit)).collect(),
