@@ -245,7 +245,7 @@ pub(crate) const SUBJECTS: [Subject; 14] = [
         averaging_hours: None,
         until: Some("1988-04-01T00:00:00Z"),
         figures: &["readings"],
-        comment: "The river that was put in does not lower the BIC by enough. At the end of November 1987, where the law does change, a step of the load is found, from which a change of friction cannot be separated; structure is left beside it, and too few readings follow to hold a block out.",
+        comment: "The river that was put in gains no more than a search does by chance. Where the law does change, at the end of November 1987, too few readings follow for an event to be concluded: what is left is said to be unexplained.",
     },
     Subject {
         name: "vaiont",
