@@ -145,6 +145,7 @@ impl OtherUnit {
     }
 
     /// The same, to which readings are given in a unit of which there are so many in theirs.
+    #[must_use]
     pub fn given_in(self, factor: f64) -> Self {
         let newest = self.newest * factor;
         Self { newest, ..self }

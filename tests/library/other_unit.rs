@@ -73,7 +73,7 @@ fn faults(events: &[Event], of: &str) -> Vec<Timestamp> {
 
 /// Whether nothing can be said of the benchmark after these events.
 fn is_unknown(events: &[Event]) -> bool {
-    let states = events.iter().filter_map(|event| match &event.kind {
+    let mut states = events.iter().filter_map(|event| match &event.kind {
         EventKind::Alert {
             level: Level::Unknown,
             state,
@@ -81,7 +81,7 @@ fn is_unknown(events: &[Event]) -> bool {
         } => Some(*state),
         _ => None,
     });
-    states.last() == Some(AlertState::Firing)
+    states.next_back() == Some(AlertState::Firing)
 }
 
 #[test]
