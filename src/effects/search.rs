@@ -32,7 +32,7 @@ const MOST_EXTRAPOLATED: f64 = 1.2;
 const MOST_OF_A_TIDE: f64 = 10.0;
 
 /// So much of the usual starts' error the law of an inversion must leave at most.
-const FAR_NEARER: f64 = 0.5;
+const FAR_NEARER: f64 = 0.7;
 
 /// By how much of the BIC a fit is better for the search to begin with it again.
 const BETTER: f64 = 1.0;

@@ -53,7 +53,7 @@ The law is the slider block of Helmstetter et al. (2004) in one regular equation
 
 Two weak priors of the law (`src/effects/prior.rs`: a deviation of 1.5 of ln v, and of .2 of an approach to the steady state within one
 interval) were set with NTOE and Baishuihe below in view; the held-out error of NTOE lay between 12 and 18 mm under others that are as plausible.
-That the law of an inversion is taken for the plain one only where it leaves less than half of the error (`src/effects/search.rs`) was set with BLKM and
+That the law of an inversion is taken for the plain one only where it leaves less than seven tenths of the error (`src/effects/search.rs`) was set with BLKM and
 NTOE in view: taken whenever it is the nearer one, the held-out errors are 12.6 and 13.5 mm.
 
 What it assumes: the load acts through the ratio of shear to normal stress only (the state's direct response to normal stress is left
