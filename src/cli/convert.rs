@@ -1,6 +1,6 @@
 //! `convert IN OUT`: readings from one file format to another.
 
-use super::args::{FileArgs, OutputArgs, OutputFormat, warn_of};
+use super::args::{FileArgs, OutputArgs, OutputFormat, say_remarks, warn_of};
 use super::{bar, exit};
 use crate::runtime::ingest::{self, ConvertStage};
 use std::io::Write;
@@ -36,9 +36,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     bar.finish_and_clear();
     let report = report?;
     warn_of(report.disorder);
-    for remark in &report.remarks {
-        exit::complain(&format_args!("{}: {remark}", args.input.display()));
-    }
+    say_remarks(&report.remarks);
     for what in &report.left_out {
         exit::complain(&format_args!("warning: left out: {what}"));
     }

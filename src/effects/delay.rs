@@ -1,14 +1,13 @@
 //! A covariate's response chosen about other laws than the one that was fitted without it. That one has bent towards what the covariate
 //! does, and about it another delay explains more than the right one: about a steady law, and again about the law fitted with it.
 
-use super::frame::Frames;
 use super::linear::Linear;
 use super::noise::{Noise, Whitener};
 use super::refit::{Fitted, Start, jacobian, likeliest, plain_starts, refit, towards};
 use super::response::Driver;
 use super::search::{Refitted, Search};
 use super::term::Term;
-use super::trials::{Trial, TrialBase, shortlist};
+use super::trials::Trial;
 
 /// So many that promise most about a steady law are refitted too.
 const ABOUT_STEADY: usize = 3;
@@ -70,16 +69,7 @@ impl Search<'_> {
         let (own, size) = (columns.pop()?, *fitted.parameters.last()?);
         let residual = fitted.residual(problem).into_iter().zip(own);
         let residual: Vec<f64> = residual.map(|(left, by)| left + size * by).collect();
-        let bank = shortlist(&Frames::new(self.bank, &residual, &columns));
-        let ground = TrialBase {
-            problem,
-            drivers: self.drivers,
-            effects: self.options.effects,
-            frames: Frames::new(&bank, &residual, &columns),
-            linear,
-            residual,
-            present: &base.terms,
-        };
+        let ground = self.ground_about(linear, residual, &columns, &base.terms);
         let known = ground.trial(one.term.clone()).gain;
         let is_other = |term: &Term| {
             let other = term.response;

@@ -57,16 +57,30 @@ impl<'a> Search<'a> {
         )?;
         let columns = jacobian(self.problem, base, &mut self.scratch);
         let residual = base.residual(self.problem);
-        let bank = shortlist(&Frames::new(self.bank, &residual, &columns));
-        Some(TrialBase {
+        Some(self.ground_about(linear, residual, &columns, &base.terms))
+    }
+
+    /// The same of a law linearised, which leaves that residual and may go along those columns; `present` are the terms in it.
+    pub(super) fn ground_about<'b>(
+        &self,
+        linear: Linear,
+        residual: Vec<f64>,
+        columns: &[Vec<f64>],
+        present: &'b [Term],
+    ) -> TrialBase<'b>
+    where
+        'a: 'b,
+    {
+        let bank = shortlist(&Frames::new(self.bank, &residual, columns));
+        TrialBase {
             problem: self.problem,
             drivers: self.drivers,
             effects: self.options.effects,
-            frames: Frames::new(&bank, &residual, &columns),
+            frames: Frames::new(&bank, &residual, columns),
             linear,
             residual,
-            present: &base.terms,
-        })
+            present,
+        }
     }
 
     /// What a search for one more effect that needs no covariate gains without any.

@@ -349,16 +349,14 @@ impl Search<'_> {
         one: &Refitted,
         held: &HeldOut,
     ) -> Option<String> {
-        let null = self.null.clone().filter(|_| !base.terms.is_empty())?;
         let models = Compared {
-            before: &null,
+            before: (self.null.as_ref()).filter(|_| !base.terms.is_empty())?,
             after: &one.fitted,
         };
         let (newest, scratch) = (models.newest(), &mut self.scratch);
         let steps = step_errors(self.problem, models, held.from, newest, scratch)?;
-        let is_worse = steps.after > WORSE_STEPS * steps.before;
-        (is_worse && StepErrors::is_a_figure(self.problem, steps.before)).then(|| {
-            let share = 100.0 * steps.after / steps.before.max(1e-300);
+        let share = share_grown_to(self.problem, steps.before, steps.after);
+        share.map(|share| {
             format!("with it all effects together predict the held-out readings worse than none: {share:.0} % of the error from reading to reading")
         })
     }
@@ -391,9 +389,8 @@ impl Search<'_> {
                 Some(steps) => (steps.before, steps.after),
             }
         };
-        let is_worse = after > WORSE_STEPS * before;
-        (is_worse && StepErrors::is_a_figure(self.problem, before)).then(|| {
-            let share = 100.0 * after / before.max(1e-300);
+        let share = share_grown_to(self.problem, before, after);
+        share.map(|share| {
             format!("from reading to reading the held-out error grows to {share:.0} %")
         })
     }
@@ -434,6 +431,12 @@ impl Search<'_> {
         (self.candidates).retain(|old| !is_same(old) || old.rejected_because.is_none());
         self.candidates.push(candidate);
     }
+}
+
+/// To what share an error from reading to reading grows, %; `None` where it does not, or where the one before is no figure.
+fn share_grown_to(problem: &Problem, before: f64, after: f64) -> Option<f64> {
+    let is_worse = after > WORSE_STEPS * before && StepErrors::is_a_figure(problem, before);
+    is_worse.then(|| 100.0 * after / before.max(1e-300))
 }
 
 /// By what factor the held-out error may grow where it is extrapolated over all of the block; what only the shape of the readings

@@ -29,10 +29,8 @@ pub(super) fn goes_upslope(problem: &Problem) -> bool {
         Quantity::Displacement => {
             let end = |part: &[f64]| median(part.to_vec());
             let fall = end(&y[..END]) - end(&y[y.len() - END..]);
-            let least = y.iter().copied().fold(f64::INFINITY, f64::min);
-            let most = y.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             let off = y.windows(3).map(|w| (w[1] - 0.5 * (w[0] + w[2])).abs());
-            fall > SHARE * (most - least) && fall > CLEAR * median(off.collect())
+            fall > SHARE * problem.range() && fall > CLEAR * median(off.collect())
         }
     }
 }

@@ -7,7 +7,7 @@ use anyhow::Context;
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What was converted.
 #[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
@@ -23,7 +23,7 @@ pub struct ConvertReport {
     /// What a person should know of the input.
     #[serde(skip)]
     #[schemars(skip)]
-    pub remarks: Vec<Remark>,
+    pub remarks: Vec<(PathBuf, Remark)>,
 }
 
 /// How much of a series was written.
@@ -104,7 +104,6 @@ pub fn convert(
         progress(ConvertStage::Read(share));
     })?;
     let (recording, disorder) = (read.recording, read.disorder);
-    let remarks = read.remarks.into_iter().map(|(_, remark)| remark);
     write_atomically(output, |out| {
         let bytes = 0;
         let out = CountedOutput {
@@ -119,7 +118,7 @@ pub fn convert(
     })
     .with_context(|| format!("converting {} to {}", input.display(), output.display()))?;
     Ok(ConvertReport {
-        remarks: remarks.collect(),
+        remarks: read.remarks,
         ..report(&recording, disorder, format)
     })
 }
