@@ -9,6 +9,9 @@ use std::collections::VecDeque;
 const REMEMBERED: usize = 9;
 /// A benchmark may skip this many of its usual readings.
 const MAY_SKIP: i32 = 4;
+/// Gaps between bursts of readings that make a rhythm, and the most bursts that may have stayed away within one.
+const CYCLES: usize = 4;
+const MOST_MISSED: i64 = 8;
 /// A benchmark with a single reading is called silent after this time: it may be one that is read once a week.
 const FIRST: SignedDuration = SignedDuration::from_hours(8 * 24);
 /// No benchmark is called silent within this time.
@@ -19,6 +22,9 @@ const LEAST: SignedDuration = SignedDuration::from_mins(30);
 pub(super) struct Silence {
     newest: Option<Timestamp>,
     spacings: VecDeque<SignedDuration>,
+    /// When the newest gaps began that are far longer than the usual spacing, and how long they were.
+    #[serde(default)]
+    gaps: VecDeque<(Timestamp, SignedDuration)>,
     silent: bool,
     /// What time it was when a reading came that was measured long before.
     #[serde(default)]
@@ -35,6 +41,7 @@ impl Silence {
             // A silence says little of the usual spacing: after one of months the next would be reported months late. Where
             // the benchmark is read more seldom from now on, a few readings are enough to learn it.
             let spacing = time.duration_since(newest);
+            self.note_gap(newest, spacing);
             let most = self
                 .allowed()
                 .and_then(|allowed| allowed.checked_mul(MAY_SKIP));
@@ -116,6 +123,42 @@ impl Silence {
         self.newest?.checked_add(self.allowed()?).ok()
     }
 
+    /// Keeps a spacing that is no usual one. Where bursts have a rhythm, those that stayed away part it in gaps of the usual kind, so that
+    /// the rhythm is known when they come again.
+    fn note_gap(&mut self, from: Timestamp, spacing: SignedDuration) {
+        let usual = self.median().and_then(|usual| usual.checked_mul(MAY_SKIP));
+        if usual.is_none_or(|usual| spacing <= usual.max(LEAST)) {
+            return;
+        }
+        let seconds = spacing.as_secs();
+        let (missed, period_s) = self.rhythm().map_or((0, 0), |rhythm| {
+            let more = seconds - rhythm.gap_s + rhythm.period_s / 2;
+            (more.div_euclid(rhythm.period_s).max(0), rhythm.period_s)
+        });
+        let gap = SignedDuration::from_secs(seconds - missed * period_s);
+        for index in (missed - MOST_MISSED).max(0)..=missed {
+            let later = from.checked_add(SignedDuration::from_secs(index * period_s));
+            self.gaps.extend(later.ok().map(|from| (from, gap)));
+        }
+        let old = self.gaps.len().saturating_sub(CYCLES);
+        self.gaps.drain(..old);
+    }
+
+    /// The rhythm of a benchmark that is read in bursts, each so long after the one before; `None` where there is none.
+    fn rhythm(&self) -> Option<Rhythm> {
+        let begins: Vec<i64> = self.gaps.iter().map(|(from, _)| from.as_second()).collect();
+        let since = self.newest?.as_second() - begins.last()?;
+        let periods: Vec<i64> = begins.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let gaps: Vec<i64> = self.gaps.iter().map(|(_, gap)| gap.as_secs()).collect();
+        let mean = periods
+            .iter()
+            .sum::<i64>()
+            .checked_div(i64::try_from(periods.len()).ok()?);
+        let (period_s, gap_s) = (mean?, *gaps.iter().max()?);
+        let is_even = gaps.len() == CYCLES && is_even(&periods) && is_even(&gaps);
+        (is_even && since < outlasted(period_s)).then_some(Rhythm { period_s, gap_s })
+    }
+
     /// For how long it may be silent.
     fn allowed(&self) -> Option<SignedDuration> {
         let longest = self.spacings.iter().max().copied();
@@ -126,7 +169,10 @@ impl Silence {
             // The longest gap seen lately is no silence either.
             Some(longest) => self.median()?.checked_mul(MAY_SKIP)?.max(longest),
         };
-        Some(allowed.max(LEAST))
+        let rhythm = self.rhythm();
+        let between = rhythm.map_or(0, |rhythm| outlasted(rhythm.gap_s));
+        let between = SignedDuration::from_secs(between);
+        Some(allowed.max(LEAST).max(between))
     }
 
     /// Ends the silence that there is; the reading before which it began.
@@ -138,5 +184,75 @@ impl Silence {
     pub(super) fn begins(&mut self) -> Option<Timestamp> {
         self.silent = true;
         self.newest
+    }
+}
+
+/// Seconds from one burst of readings to the next in the mean, and the most of them without readings.
+#[derive(Debug, Clone, Copy)]
+struct Rhythm {
+    period_s: i64,
+    gap_s: i64,
+}
+
+/// Half as long again: a burst that has not come by then stays away.
+fn outlasted(seconds: i64) -> i64 {
+    seconds + seconds / 2
+}
+
+/// Whether the longest is at most a quarter longer than the shortest.
+fn is_even(spans: &[i64]) -> bool {
+    let ends = spans.iter().min().zip(spans.iter().max());
+    ends.is_some_and(|(shortest, longest)| 4 * longest <= 5 * shortest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(hours: f64) -> Timestamp {
+        let after = SignedDuration::from_secs_f64(3600.0 * hours);
+        Timestamp::UNIX_EPOCH + after
+    }
+
+    /// After bursts of twenty readings, five minutes apart, that begin at these hours.
+    fn after_bursts(begins: &[f64]) -> Silence {
+        let mut silence = Silence::default();
+        for begin in begins {
+            for index in 0..20 {
+                silence.broken_by(at(begin + f64::from(index) / 12.0));
+            }
+        }
+        silence
+    }
+
+    #[test]
+    fn between_bursts_at_the_same_time_of_each_day_nothing_is_silent_and_a_burst_that_is_missed_is()
+    {
+        let few = after_bursts(&[0.0, 24.0, 48.0]);
+        assert_eq!(few.deadline(), Some(at(48.0 + 19.0 / 12.0 + 0.5)));
+        let days = after_bursts(&[0.0, 24.0, 48.5, 72.0, 96.0]);
+        let due = days.deadline().unwrap();
+        assert!(at(96.0 + 24.0) < due && due < at(96.0 + 40.0), "{due}");
+        // One and more that stay away leave the rhythm known.
+        for next in [144.0, 14.0 * 24.0] {
+            let days = after_bursts(&[0.0, 24.0, 48.5, 72.0, 96.0, next]);
+            let due = days.deadline().unwrap();
+            assert!(at(next + 24.0) < due && due < at(next + 40.0), "{due}");
+        }
+    }
+
+    #[test]
+    fn gaps_without_a_rhythm_stay_silences_and_so_does_a_gap_long_after_a_rhythm_has_ended() {
+        let within_an_hour = |silence: &Silence, newest: f64| {
+            let due = silence.deadline().unwrap();
+            due < at(newest + 1.0)
+        };
+        let uneven = after_bursts(&[0.0, 24.0, 30.0, 72.0, 80.0, 130.0]);
+        assert!(within_an_hour(&uneven, 130.0 + 19.0 / 12.0));
+        let mut ended = after_bursts(&[0.0, 24.0, 48.0, 72.0, 96.0]);
+        for index in 0..600 {
+            ended.broken_by(at(96.0 + 2.0 + f64::from(index) / 12.0));
+        }
+        assert!(within_an_hour(&ended, 96.0 + 2.0 + 599.0 / 12.0));
     }
 }

@@ -25,7 +25,7 @@ const KEPT_VARIABLES: [&str; 4] = ["PATH", "HOME", "LANG", "TZ"];
 /// Longest value of a variable, bytes.
 const LONGEST_VALUE: usize = 4096;
 /// How much of a hook's output is kept, bytes a stream.
-const LONGEST_OUTPUT: usize = 64 * 1024;
+const LONGEST_OUTPUT: usize = 4096;
 /// After the hook's end: how long what it has just written may take to arrive.
 const OUTPUT_GRACE: Duration = Duration::from_millis(200);
 /// After the kill: how long the kernel may take to report the end.
@@ -423,20 +423,28 @@ fn outcome(status: ExitStatus) -> HookOutcome {
 /// that holds the stream open stops anything.
 #[derive(Debug)]
 struct Capture {
-    kept: Arc<Mutex<Vec<u8>>>,
+    kept: Arc<Mutex<Kept>>,
     reader: JoinHandle<()>,
+}
+
+/// The first part of a stream, and how many bytes came after it.
+#[derive(Debug, Default)]
+struct Kept {
+    first: Vec<u8>,
+    more: usize,
 }
 
 impl Capture {
     fn of(mut stream: impl AsyncRead + Unpin + Send + 'static) -> Self {
-        let kept = Arc::new(Mutex::new(Vec::new()));
+        let kept = Arc::new(Mutex::new(Kept::default()));
         let sink = Arc::clone(&kept);
         let reader = tokio::spawn(async move {
             let mut buffer = vec![0; 8192];
             while let Ok(count @ 1..) = stream.read(&mut buffer).await {
                 let mut kept = sink.lock().unwrap_or_else(PoisonError::into_inner);
-                let room = LONGEST_OUTPUT - kept.len();
-                kept.extend_from_slice(&buffer[..count.min(room)]);
+                let taken = count.min(LONGEST_OUTPUT - kept.first.len());
+                kept.first.extend_from_slice(&buffer[..taken]);
+                kept.more += count - taken;
             }
         });
         Self { kept, reader }
@@ -454,7 +462,11 @@ async fn finish(capture: Option<Capture>) -> String {
         capture.reader.abort();
     }
     let kept = capture.kept.lock().unwrap_or_else(PoisonError::into_inner);
-    String::from_utf8_lossy(&kept).trim_end().to_owned()
+    let first = String::from_utf8_lossy(&kept.first).trim_end().to_owned();
+    match kept.more {
+        0 => first,
+        more => format!("{first} ... and {more} bytes more"),
+    }
 }
 
 #[cfg(test)]
@@ -468,5 +480,21 @@ mod tests {
         assert_eq!(capped(&format!("a{long}")).len(), LONGEST_VALUE - 1);
         assert_eq!(capped("a\0b"), "a b");
         assert_eq!(capped("x\n7  red\u{1b}[2J"), "x 7  red [2J");
+    }
+
+    #[tokio::test]
+    async fn of_a_flood_the_first_part_is_kept_and_what_was_left_out_is_counted() {
+        use tokio::io::AsyncReadExt;
+        let flood = tokio::io::repeat(b'a').take(1_000_000);
+        let kept = finish(Some(Capture::of(flood))).await;
+        let left_out = 1_000_000 - LONGEST_OUTPUT;
+        assert_eq!(
+            kept,
+            format!(
+                "{} ... and {left_out} bytes more",
+                "a".repeat(LONGEST_OUTPUT)
+            )
+        );
+        assert_eq!(finish(Some(Capture::of(&b"short\n"[..]))).await, "short");
     }
 }

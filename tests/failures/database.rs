@@ -82,6 +82,7 @@ fn a_second_daemon_is_refused_and_the_first_goes_on() {
         said.contains("another slipwatch is at work on it"),
         "{said}"
     );
+    assert_eq!(said.matches("state folder").count(), 1, "{said}");
     assert_eq!(first.ended(), None);
     first.stop();
 }

@@ -268,16 +268,15 @@ impl Worker {
                 is_held: false,
             };
             self.wait(again, clock::later(delay));
-        } else {
+        } else if open {
             tracing::error!(hook, key, attempt, ?outcome, "alert not delivered");
             self.lost += 1;
-            // What is given up only because the daemon stops, the next start tries again.
-            let fate = if open {
-                DeliveryOutcome::Dead
-            } else {
-                DeliveryOutcome::Waiting
-            };
-            self.finish(&waiting.alert, fate);
+            self.finish(&waiting.alert, DeliveryOutcome::Dead);
+        } else {
+            let text = "alert not delivered yet: this stops, and the next start tries again";
+            tracing::warn!(hook, key, attempt, ?outcome, "{text}");
+            self.lost += 1;
+            self.finish(&waiting.alert, DeliveryOutcome::Waiting);
         }
     }
 
