@@ -70,7 +70,7 @@ impl InheritedReadings {
     /// What that means for a site that runs, and what to do.
     pub fn text(&self, config: &Config) -> String {
         format!(
-            "the state folder {} holds {}, which no source of this config reads: they count as readings of this site; if they are \
+            "state folder {}: it holds {}, which no source of this config reads: they count as readings of this site; if they are \
              another site's, give this one a state_dir of its own",
             config.site.state_dir.display(),
             self.what()
