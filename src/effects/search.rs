@@ -350,7 +350,7 @@ impl Search<'_> {
         held: &HeldOut,
     ) -> Option<String> {
         let models = Compared {
-            before: (self.null.as_ref()).filter(|_| !base.terms.is_empty())?,
+            before: self.null.as_ref().filter(|_| !base.terms.is_empty())?,
             after: &one.fitted,
         };
         let (newest, scratch) = (models.newest(), &mut self.scratch);

@@ -9,9 +9,8 @@ use std::collections::VecDeque;
 const REMEMBERED: usize = 9;
 /// A benchmark may skip this many of its usual readings.
 const MAY_SKIP: i32 = 4;
-/// Gaps between bursts of readings that make a rhythm, and the most bursts that may have stayed away within one.
-const CYCLES: usize = 4;
-const MOST_MISSED: i64 = 8;
+/// So many gaps between bursts of readings make a rhythm.
+const CYCLES: u8 = 4;
 /// A benchmark with a single reading is called silent after this time: it may be one that is read once a week.
 const FIRST: SignedDuration = SignedDuration::from_hours(8 * 24);
 /// No benchmark is called silent within this time.
@@ -136,27 +135,30 @@ impl Silence {
             (more.div_euclid(rhythm.period_s).max(0), rhythm.period_s)
         });
         let gap = SignedDuration::from_secs(seconds - missed * period_s);
-        for index in (missed - MOST_MISSED).max(0)..=missed {
+        // Of more than make a rhythm only the newest are kept.
+        for index in (missed - i64::from(CYCLES)).max(0)..=missed {
             let later = from.checked_add(SignedDuration::from_secs(index * period_s));
             self.gaps.extend(later.ok().map(|from| (from, gap)));
         }
-        let old = self.gaps.len().saturating_sub(CYCLES);
+        let old = self.gaps.len().saturating_sub(usize::from(CYCLES));
         self.gaps.drain(..old);
     }
 
     /// The rhythm of a benchmark that is read in bursts, each so long after the one before; `None` where there is none.
     fn rhythm(&self) -> Option<Rhythm> {
-        let begins: Vec<i64> = self.gaps.iter().map(|(from, _)| from.as_second()).collect();
-        let since = self.newest?.as_second() - begins.last()?;
-        let periods: Vec<i64> = begins.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        let gaps: Vec<i64> = self.gaps.iter().map(|(_, gap)| gap.as_secs()).collect();
-        let mean = periods
-            .iter()
-            .sum::<i64>()
-            .checked_div(i64::try_from(periods.len()).ok()?);
-        let (period_s, gap_s) = (mean?, *gaps.iter().max()?);
-        let is_even = gaps.len() == CYCLES && is_even(&periods) && is_even(&gaps);
-        (is_even && since < outlasted(period_s)).then_some(Rhythm { period_s, gap_s })
+        let (first, last) = (self.gaps.front()?.0, self.gaps.back()?.0);
+        let begins = self.gaps.iter().map(|(from, _)| from.as_second());
+        let periods = begins
+            .clone()
+            .zip(begins.skip(1))
+            .map(|(one, next)| next - one);
+        let gaps = self.gaps.iter().map(|(_, gap)| gap.as_secs());
+        let is_rhythm =
+            self.gaps.len() == usize::from(CYCLES) && is_even(periods) && is_even(gaps.clone());
+        let period_s = (last.as_second() - first.as_second()) / i64::from(CYCLES - 1);
+        let gap_s = gaps.max()?;
+        let since = self.newest?.as_second() - last.as_second();
+        (is_rhythm && since < outlasted(period_s)).then_some(Rhythm { period_s, gap_s })
     }
 
     /// For how long it may be silent.
@@ -170,8 +172,9 @@ impl Silence {
             Some(longest) => self.median()?.checked_mul(MAY_SKIP)?.max(longest),
         };
         let rhythm = self.rhythm();
-        let between = rhythm.map_or(0, |rhythm| outlasted(rhythm.gap_s));
-        let between = SignedDuration::from_secs(between);
+        let between = rhythm.map_or(LEAST, |rhythm| {
+            SignedDuration::from_secs(outlasted(rhythm.gap_s))
+        });
         Some(allowed.max(LEAST).max(between))
     }
 
@@ -200,8 +203,8 @@ fn outlasted(seconds: i64) -> i64 {
 }
 
 /// Whether the longest is at most a quarter longer than the shortest.
-fn is_even(spans: &[i64]) -> bool {
-    let ends = spans.iter().min().zip(spans.iter().max());
+fn is_even(spans: impl Iterator<Item = i64> + Clone) -> bool {
+    let ends = spans.clone().min().zip(spans.max());
     ends.is_some_and(|(shortest, longest)| 4 * longest <= 5 * shortest)
 }
 

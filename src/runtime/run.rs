@@ -20,7 +20,7 @@ use crate::config::Config;
 use crate::reading::BenchmarkId;
 use crate::store::{Store, StoreError};
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use tokio::sync::watch;
 
@@ -28,7 +28,7 @@ use tokio::sync::watch;
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// The state folder cannot be used, or no longer.
-    #[error("{}", placed(.folder, .source))]
+    #[error("state folder {}: {source}", .folder.display())]
     State {
         /// The folder.
         folder: PathBuf,
@@ -41,14 +41,6 @@ pub enum RunError {
     /// The part that follows the files broke off.
     #[error("following the files broke off: {0}")]
     Follow(#[from] tokio::task::JoinError),
-}
-
-/// An error with the folder that it is about, which some name themselves.
-fn placed(folder: &Path, error: &StoreError) -> String {
-    if matches!(error, StoreError::Missing { .. } | StoreError::InUse { .. }) {
-        return error.to_string();
-    }
-    format!("state folder {}: {error}", folder.display())
 }
 
 /// Runs the site until `shutdown` is asked for and returns what it has counted, which `progress`

@@ -81,11 +81,8 @@ pub enum StoreError {
         path: PathBuf,
     },
     /// Another daemon works on it.
-    #[error("state folder {}: another slipwatch is at work on it", .folder.display())]
-    InUse {
-        /// The folder.
-        folder: PathBuf,
-    },
+    #[error("another slipwatch is at work on it")]
+    InUse,
     /// Written by a later version.
     #[error(
         "the state has schema {version}, from a later slipwatch: this one knows {}; install that version, or restore a backup",
@@ -351,14 +348,14 @@ fn lock(folder: &Path) -> Result<Lock, StoreError> {
     let mut options = File::options();
     options.read(true).write(true).create(true).truncate(false);
     Ok(Lock {
-        _folder: locked(File::create(folder.join("lock"))?, folder)?,
+        _folder: locked(File::create(folder.join("lock"))?)?,
         // The database too: whoever removes the other file lets nobody in.
-        database: locked(options.open(&path)?, folder)?,
+        database: locked(options.open(&path)?)?,
         path,
     })
 }
 
-fn locked(file: File, folder: &Path) -> Result<File, StoreError> {
+fn locked(file: File) -> Result<File, StoreError> {
     for attempt in 0..LOCK_ATTEMPTS {
         if attempt > 0 {
             std::thread::sleep(LOCK_WAIT);
@@ -369,8 +366,7 @@ fn locked(file: File, folder: &Path) -> Result<File, StoreError> {
             Err(TryLockError::Error(error)) => return Err(error.into()),
         }
     }
-    let folder = folder.to_owned();
-    Err(StoreError::InUse { folder })
+    Err(StoreError::InUse)
 }
 
 /// Writes to a log from here on. Where that fails, SQLite keeps to its old ways and says no more than their name.

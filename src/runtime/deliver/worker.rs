@@ -268,15 +268,17 @@ impl Worker {
                 is_held: false,
             };
             self.wait(again, clock::later(delay));
-        } else if open {
-            tracing::error!(hook, key, attempt, ?outcome, "alert not delivered");
-            self.lost += 1;
-            self.finish(&waiting.alert, DeliveryOutcome::Dead);
         } else {
-            let text = "alert not delivered yet: this stops, and the next start tries again";
-            tracing::warn!(hook, key, attempt, ?outcome, "{text}");
             self.lost += 1;
-            self.finish(&waiting.alert, DeliveryOutcome::Waiting);
+            let fate = if open {
+                tracing::error!(hook, key, attempt, ?outcome, "alert not delivered");
+                DeliveryOutcome::Dead
+            } else {
+                let text = "alert not delivered yet: this stops, and the next start tries again";
+                tracing::warn!(hook, key, attempt, ?outcome, "{text}");
+                DeliveryOutcome::Waiting
+            };
+            self.finish(&waiting.alert, fate);
         }
     }
 
