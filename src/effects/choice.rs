@@ -7,7 +7,7 @@ use super::kind::Kind;
 use super::prior::Prior;
 use super::refit::Fitted;
 use super::rival::Rival;
-use super::search::{Accepted, Judgement, OneMore, Refitted, SIGNIFICANT, Search};
+use super::search::{Accepted, Judgement, Objection, OneMore, Refitted, SIGNIFICANT, Search};
 use super::slow::SlowFit;
 
 impl Search<'_> {
@@ -35,13 +35,14 @@ impl Search<'_> {
         let slower = first.and_then(|k| self.slower(base, &refitted[k], most));
         if let Some((_, reason)) = &slower {
             for one in judged.iter_mut().filter(|one| one.1.is_none()) {
-                one.1 = Some(reason.clone());
+                one.1 = Some(reason.clone().into());
             }
         }
         let chosen = first.filter(|_| slower.is_none());
         let ties = chosen.map(|k| self.ties(&refitted, k, &judged));
         for (k, one) in refitted.iter().enumerate() {
-            let (held, reason) = judged[k].clone();
+            let (held, objection) = judged[k].clone();
+            let reason = objection.map(|objection| objection.why);
             // Of one effect with two delays that one stands which was chosen, or else the better.
             let stands = chosen.filter(|first| refitted[*first].is_as(one));
             let stands = stands.unwrap_or(refitted.iter().position(|known| known.is_as(one))?);
@@ -90,7 +91,8 @@ impl Search<'_> {
     /// An event and the mean that it is seen through, where both together may be accepted.
     fn averaged(&mut self, base: &Fitted, refitted: &[Refitted], round: usize) -> Option<OneMore> {
         let (both, how) = self.averaged_event(base, refitted, round)?;
-        let (held, reason) = self.judged(base, &both);
+        let (held, objection) = self.judged(base, &both);
+        let reason = objection.map(|objection| objection.why);
         let is_taken = reason.is_none();
         let slower = if is_taken {
             self.slower(base, &both, both.gain)
@@ -170,11 +172,16 @@ impl Search<'_> {
         Some((OneMore::Effect(one.fitted, vec![how]), reason))
     }
 
-    /// What may be accepted as well and cannot be separated from the one of that index.
+    /// What cannot be separated from the one of that index: what may be accepted as well, and what gains more and is refused by so few
+    /// readings of the later block that chance may have done it.
     fn ties(&self, refitted: &[Refitted], first: usize, judged: &[Judgement]) -> Vec<Rival> {
         let best = &refitted[first];
         let each = refitted.iter().zip(judged).enumerate();
-        let others = each.filter(|(k, (_, judged))| *k != first && judged.1.is_none());
+        let may_be = |one: &Refitted, objection: Option<&Objection>| {
+            objection.is_none_or(|objection| objection.is_within_chance && one.gain >= best.gain)
+        };
+        let others =
+            each.filter(|(k, (one, judged))| *k != first && may_be(one, judged.1.as_ref()));
         let mut ties = Vec::new();
         for (_, (one, _)) in others {
             let Some(term) = one.fitted.terms.last() else {

@@ -250,7 +250,8 @@ impl Search<'_> {
             p_value: 1.0,
         };
         let one = self.as_declared(&base, one, cause)?;
-        let (held_out, rejected_because) = self.judged(&base, &one);
+        let (held_out, objection) = self.judged(&base, &one);
+        let rejected_because = objection.map(|objection| objection.why);
         self.note(&one.term, &one, held_out, rejected_because.clone());
         let how = Accepted {
             bic_gain: one.gain,

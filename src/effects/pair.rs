@@ -40,8 +40,9 @@ impl Search<'_> {
             let (held, reason) = self.judged(base, &both);
             let is_taken = reason.is_none() && self.is_no_worse(base, &both.fitted);
             if is_taken && self.slower(base, &both, both.gain).is_none() {
-                for (one, (held, reason)) in each() {
-                    self.note(&one.term, one, *held, reason.clone());
+                for (one, (held, objection)) in each() {
+                    let reason = objection.as_ref().map(|objection| objection.why.clone());
+                    self.note(&one.term, one, *held, reason);
                 }
                 for term in &both.fitted.terms[base.terms.len()..] {
                     self.note(term, &both, held, None);

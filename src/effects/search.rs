@@ -83,7 +83,24 @@ pub(super) struct SearchResult {
 }
 
 /// What was said of a candidate: its held-out error over that without it, and why it is refused.
-pub(super) type Judgement = (Option<f64>, Option<String>);
+pub(super) type Judgement = (Option<f64>, Option<Objection>);
+
+/// Why a candidate is refused.
+#[derive(Debug, Clone)]
+pub(super) struct Objection {
+    pub(super) why: String,
+    /// Whether it is the later block alone that speaks against it, by no more than chance may in so few readings.
+    pub(super) is_within_chance: bool,
+}
+
+impl From<String> for Objection {
+    fn from(why: String) -> Self {
+        Self {
+            why,
+            is_within_chance: false,
+        }
+    }
+}
 
 /// What may be added to a law.
 pub(super) enum OneMore {
@@ -263,18 +280,18 @@ impl Search<'_> {
     /// Why not; `None` for what may be accepted. The held-out error with it over that without comes first.
     pub(super) fn judged(&mut self, base: &Fitted, one: &Refitted) -> Judgement {
         if let Some(reason) = self.refused_at_once(one) {
-            return (None, Some(reason));
+            return (None, Some(reason.into()));
         }
         if let Some(reason) = self.daily_instead(base, one) {
-            return (None, Some(reason));
+            return (None, Some(reason.into()));
         }
         if self.is_drawn && !one.term.kind.has_independent_evidence() {
             self.withhold(one);
-            return (None, Some(NO_READINGS.to_owned()));
+            return (None, Some(NO_READINGS.to_owned().into()));
         }
         if one.term.is_jump_of_reading() && self.takes_several_readings(&one.fitted) {
             let reason = "the jump goes on over the readings beside it: motion looks the same";
-            return (None, Some(reason.to_owned()));
+            return (None, Some(reason.to_owned().into()));
         }
         if !one.term.kind.definition().says_what_comes {
             return (None, None);
@@ -320,7 +337,7 @@ impl Search<'_> {
                 block(self.problem, &[], share).is_some() && !one.term.kind.fits_any_bend();
             let reason =
                 "an event stands too late for a later block by which to judge it".to_owned();
-            return (None, is_late.then_some(reason));
+            return (None, is_late.then(|| reason.into()));
         }
         let models = Compared {
             before: base,
@@ -328,16 +345,19 @@ impl Search<'_> {
         };
         let Some(held) = held_out(self.problem, models, share, &mut self.scratch) else {
             let reason = "without the later block it cannot be fitted".to_owned();
-            return (None, Some(reason));
+            return (None, Some(reason.into()));
         };
         let (before, after) = held.errors(self.problem);
         let ratio = after / before.max(1e-300);
         if !ratio.is_finite() || ratio > most_extrapolated(one.term.kind) {
             let reason = format!("the held-out error grows to {:.0} %", 100.0 * ratio);
-            return (Some(ratio).filter(|ratio| ratio.is_finite()), Some(reason));
+            return (
+                Some(ratio).filter(|ratio| ratio.is_finite()),
+                Some(reason.into()),
+            );
         }
         let reason = self.worse_from_reading_to_reading(base, one, &held);
-        let reason = reason.or_else(|| self.worse_than_without_any(base, one, &held));
+        let reason = reason.or_else(|| Some(self.worse_than_without_any(base, one, &held)?.into()));
         (Some(ratio), reason)
     }
 
@@ -368,7 +388,7 @@ impl Search<'_> {
         base: &Fitted,
         one: &Refitted,
         held: &HeldOut,
-    ) -> Option<String> {
+    ) -> Option<Objection> {
         let models = Compared {
             before: base,
             after: &one.fitted,
@@ -379,19 +399,26 @@ impl Search<'_> {
         } else {
             let steps = step_errors(self.problem, models, held.from, newest, &mut self.scratch);
             match steps.filter(|steps| steps.after.is_finite() && steps.deviance.is_finite()) {
-                None => return Some("as it is learned before the later block, the readings cannot be fitted with it".to_owned()),
+                None => {
+                    let why = "as it is learned before the later block, the readings cannot be fitted with it";
+                    return Some(why.to_owned().into());
+                }
                 Some(steps) if steps.deviance > WORSE => {
                     let worse = steps.deviance;
-                    return Some(format!(
+                    let why = format!(
                         "the held-out readings are less likely with it, by {worse:.1} in -2 ln likelihood"
-                    ));
+                    );
+                    return Some(why.into());
                 }
                 Some(steps) => (steps.before, steps.after),
             }
         };
-        let share = share_grown_to(self.problem, before, after);
-        share.map(|share| {
-            format!("from reading to reading the held-out error grows to {share:.0} %")
+        let share = share_grown_to(self.problem, before, after)?;
+        // So much do the squares of so few errors grow at a likelihood that may be accepted.
+        let readings = self.problem.t.len() - held.from;
+        Some(Objection {
+            why: format!("from reading to reading the held-out error grows to {share:.0} %"),
+            is_within_chance: (share / 100.0).powi(2) <= 1.0 + WORSE / readings as f64,
         })
     }
 

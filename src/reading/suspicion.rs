@@ -28,6 +28,9 @@ const FEWEST_OF_SCALE: usize = 24;
 const SMALL_MM: f64 = 2.0;
 /// where two readings in a row differ by no more than this, as a total station's do in m.
 const SMALL_STEP_MM: f64 = 0.02;
+/// Given to more decimals than that, they may be in m where two in a row differ by no more than this: no instrument on a slope
+/// resolves it from hour to hour.
+const UNRESOLVED_MM: f64 = 5e-4;
 /// A slope that moved by more m than this may be in mm.
 const LARGE_M: f64 = 100.0;
 /// A suspicion of another unit goes on until a figure is so many times beyond where it begins: readings about there would raise and
@@ -180,12 +183,19 @@ pub fn may_still_have_another_scale(values: &[f64], unit: &str) -> bool {
         "mm" => {
             let steps = values.windows(2).map(|pair| (pair[1] - pair[0]).abs());
             let usual = median(steps);
-            moved < BEYOND * SMALL_MM
-                && usual.is_none_or(|usual| usual <= BEYOND * SMALL_STEP_MM)
-                && values.iter().all(|value| is_whole(value * 1e3))
+            let small = if are_in_thousandths(&values) {
+                SMALL_STEP_MM
+            } else {
+                UNRESOLVED_MM
+            };
+            moved < BEYOND * SMALL_MM && usual.is_none_or(|usual| usual <= BEYOND * small)
         }
         _ => false,
     }
+}
+
+fn are_in_thousandths<'a>(values: impl IntoIterator<Item = &'a f64>) -> bool {
+    values.into_iter().all(|value| is_whole(value * 1e3))
 }
 
 fn is_whole(value: f64) -> bool {
@@ -324,14 +334,23 @@ fn scale(readings: &[(Timestamp, f64)], unit: &str) -> Option<DatedSuspicion> {
             figure(moved, 0)
         )));
     }
-    let in_thousandths = readings.iter().all(|(_, value)| is_whole(value * 1e3))
-        && readings.iter().any(|(_, value)| !is_whole(value * 1e2));
-    let is_small = moved > 0.0
-        && moved < SMALL_MM
-        && median(steps(readings).map(|step| step.2.abs()))? <= SMALL_STEP_MM;
-    (unit == "mm" && is_small && in_thousandths).then(|| {
+    if unit != "mm" || moved <= 0.0 || moved >= SMALL_MM {
+        return None;
+    }
+    let step = median(steps(readings).map(|step| step.2.abs()))?;
+    let lies = format!("all readings lie within {moved:.3} mm");
+    if are_in_thousandths(readings.iter().map(|(_, value)| value)) {
+        let is_finer = readings.iter().any(|(_, value)| !is_whole(value * 1e2));
+        return (is_finer && step <= SMALL_STEP_MM).then(|| {
+            evidence(format!(
+                "{lies} and are given to 0.001 mm: if they are metres, say unit = \"m\""
+            ))
+        });
+    }
+    (step > 0.0 && step <= UNRESOLVED_MM).then(|| {
         evidence(format!(
-            "all readings lie within {moved:.3} mm and are given to 0.001 mm: if they are metres, say unit = \"m\""
+            "{lies}, and half of the steps from one to the next are at most {step:.6} mm, finer than instruments on slopes \
+             resolve: if they are metres, say unit = \"m\""
         ))
     })
 }
@@ -384,6 +403,37 @@ mod tests {
         }
         for seconds in [0, 660, 7 * 3600 + 1200, 40 * 86_400, -28_800] {
             assert_eq!(hint(seconds), None, "{seconds}");
+        }
+    }
+
+    #[test]
+    fn metres_that_are_called_millimetres_are_known_however_many_decimals_they_have() {
+        // Creep of 4 mm a day, and noise; in mm.
+        let mut rng = Pcg64::seed_from_u64(5);
+        let mut readings = |noise: f64, unit_mm: f64, decimals: i32| {
+            let value = |hour: i64, rng: &mut Pcg64| {
+                let mm = 4.0 / 24.0 * hour as f64 + noise * rng.random_range(-1.0..1.0);
+                let by = 10_f64.powi(decimals);
+                (mm / unit_mm * by).round() / by
+            };
+            let time = |hour: i64| Timestamp::UNIX_EPOCH + SignedDuration::from_hours(hour);
+            let all = (0..100).map(|hour| (time(hour), value(hour, &mut rng)));
+            all.collect::<Vec<(Timestamp, f64)>>()
+        };
+        let is_suspect = |readings: &[(Timestamp, f64)]| {
+            let values: Vec<f64> = readings.iter().map(|(_, value)| *value).collect();
+            let found = of_values(readings, Quantity::Displacement, "mm");
+            let found = found.iter().any(|one| one.kind == Suspicion::Scale);
+            assert!(!found || may_still_have_another_scale(&values, "mm"));
+            assert!(!found || !is_plain(&values, Quantity::Displacement, "mm"));
+            found
+        };
+        for decimals in 3..7 {
+            assert!(is_suspect(&readings(0.2, 1000.0, decimals)), "{decimals}");
+            assert!(!is_suspect(&readings(0.2, 1.0, decimals)), "{decimals}");
+            // A slope that creeps by a hundredth of that, as a crackmeter reads it.
+            let crackmeter = readings(0.4, 100.0, decimals);
+            assert!(decimals == 3 || !is_suspect(&crackmeter), "{decimals}");
         }
     }
 

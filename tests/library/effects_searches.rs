@@ -13,7 +13,9 @@ use jiff::SignedDuration;
 use slipwatch::config;
 use slipwatch::effects::{Kind, Options, explain};
 use slipwatch::monitor::{Event, EventKind, Explain, Settings, UndeclaredLoad};
-use slipwatch::reading::{BenchmarkId, Channel, Recording, Series, Timestamp, Unit};
+use slipwatch::reading::{
+    BenchmarkId, Channel, Reading, Recording, Sample, Series, Timestamp, Unit,
+};
 use slipwatch::runtime::progress::Progress;
 use slipwatch::runtime::replay::{ReplayPace, ReplayPlan, replay};
 use slipwatch::runtime::run::run;
@@ -270,4 +272,53 @@ fn the_load_that_forecasts_use_is_the_one_that_was_fitted() {
         let fitted: f64 = said.curves.log_loads.values().map(|load| load[index]).sum();
         assert!((told - fitted).abs() < 1e-6, "{index}: {told} {fitted}");
     }
+}
+
+/// A drawn slope that was unloaded in a moment on day 16, mm, and a river that has nothing to do with it, m³/s; one each a day.
+const UNLOADED: [f64; 40] = [
+    0.86, 1.74, 5.77, 4.64, 8.57, 9.39, 11.84, 15.00, 15.27, 18.10, 19.61, 21.81, 24.25, 25.25,
+    27.54, 30.31, 33.16, 32.90, 33.48, 34.86, 36.90, 36.12, 37.88, 39.65, 39.87, 40.54, 41.15,
+    40.31, 43.07, 44.78, 44.90, 44.36, 45.13, 45.58, 46.76, 49.91, 49.66, 48.62, 50.80, 50.88,
+];
+const RIVER: [f64; 40] = [
+    20.0000, 15.7480, 25.4573, 26.6317, 22.2856, 24.3590, 28.5660, 38.1285, 28.7376, 27.7065,
+    24.9266, 19.3631, 20.9043, 16.3959, 13.1655, 12.0414, 10.0454, 8.6152, 7.5904, 12.8940,
+    15.6737, 14.0937, 11.5159, 9.6689, 8.3454, 18.7925, 32.0610, 28.6421, 27.8081, 23.2136,
+    18.0506, 14.3512, 11.7004, 9.8011, 8.4401, 7.4649, 6.7662, 6.2655, 5.9068, 5.6498,
+];
+
+#[test]
+fn an_event_that_so_few_later_readings_refuse_by_a_hair_stands_beside_the_channel_that_gains_less()
+{
+    let day = |day: i64| start() + SignedDuration::from_hours(24 * day);
+    let readings = (0..).zip(UNLOADED).map(|(index, value)| Reading {
+        time: day(index),
+        value,
+        sigma: None,
+    });
+    let samples = (0..).zip(RIVER).map(|(index, value)| Sample {
+        time: day(index),
+        value,
+    });
+    let series = Series {
+        benchmark: BenchmarkId::new("a"),
+        unit: Unit::MM,
+        averaging: None,
+        readings: readings.collect(),
+    };
+    let river = Channel {
+        name: "river_flow_m3_s".to_owned(),
+        unit: Some("m3/s".to_owned()),
+        stated: None,
+        samples: samples.collect(),
+    };
+    let said = explain(&series, &[river], &[], &Options::default(), &mut |_| {});
+    let is_step = |kind: &Kind| *kind == Kind::LOAD_STEP;
+    let mut rivals = said.cannot_separate_from.iter();
+    assert!(
+        is_step(&said.verdict.effect) || rivals.any(|rival| is_step(&rival.kind)),
+        "{:?}: {:?}",
+        said.verdict,
+        said.cannot_separate_from
+    );
 }
