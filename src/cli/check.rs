@@ -20,7 +20,7 @@ pub(super) struct Args {
     /// The site's config; - reads stdin, with paths from the working folder
     #[arg(value_name = "CONFIG")]
     config: PathBuf,
-    /// Evaluation at the config alone, not at the files: for a service that must start while a logger is silent
+    /// Look at the config alone, not at the files: for a service that must start while a logger is silent
     #[arg(long)]
     config_only: bool,
     #[command(flatten)]

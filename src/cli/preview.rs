@@ -186,7 +186,9 @@ fn covariate_line(text: &mut String, covariate: &CovariateView) {
     } = covariate;
     let kind = match (kind, is_stated) {
         (_, true) => format!("; {kind}, as the config states"),
-        (CovariateKind::Other, false) => String::new(),
+        (CovariateKind::Other, false) => {
+            "; what it measures its name does not say: state it in [[covariate]]".to_owned()
+        }
         (_, false) => format!("; {kind}"),
     };
     let unit = unit

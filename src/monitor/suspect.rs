@@ -2,7 +2,7 @@
 
 use super::history::History;
 use crate::fit::Observation;
-use crate::reading::{SECONDS_PER_DAY, Timestamp};
+use crate::reading::{Quantity, SECONDS_PER_DAY, Timestamp};
 use jiff::{SignedDuration, civil::date, tz::TimeZone};
 use std::ops::RangeInclusive;
 
@@ -64,8 +64,11 @@ impl History {
     /// Whether the newest readings stand, but for a jitter, where those just before them moved to, ten times as far in the same
     /// time or more: how many, the time of the first, and between which values.
     ///
-    /// A slope that slows down has readings in between.
+    /// A slope that slows down has readings in between. A velocity that stays where it rose to is motion.
     pub(super) fn stands_at_the_end(&self) -> Option<(usize, Timestamp, (f64, f64))> {
+        if self.observations.quantity == Quantity::Velocity {
+            return None;
+        }
         STANDING.iter().find_map(|count| self.stands_for(*count))
     }
 
@@ -192,7 +195,7 @@ fn is_first_day(time: Timestamp) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::fixture::{history, noise};
+    use super::super::fixture::{history, history_of, noise};
     use super::super::history::MeasuredAs;
     use super::*;
     use crate::reading::{Reading, Unit};
@@ -230,6 +233,9 @@ mod tests {
                 .map(|value| -value),
         );
         assert!(downwards.stands_at_the_end().is_some());
+        let risen = (0..30).map(moving).chain((30..36).map(jitter));
+        let velocity = history_of(Unit::MM_PER_DAY, risen);
+        assert_eq!(velocity.stands_at_the_end(), None, "it is motion");
         // Ten millimetres a day each hour, and each ten minutes: what one interval moves is the noise.
         for (step, jitter, stand) in [(0.42, 0.1, 6..=12), (0.07, 0.04, 6..=48)] {
             let moving = move |hour: u32| f64::from(hour) * step + jitter * noise(hour);

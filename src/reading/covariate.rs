@@ -39,8 +39,21 @@ const PRESSURE_UNITS: [&str; 7] = ["pa", "hpa", "kpa", "mpa", "bar", "mbar", "ps
 
 /// Within a name: a temperature (`temp`, `air_temperature`).
 const TEMPERATURE: [&str; 1] = ["temp"];
-/// Within a name: rain and snow as they fall (`rainfall`, `precipitation`, `precip`, `snowfall`).
-const RAIN: [&str; 3] = ["rain", "precip", "snowfall"];
+/// Within a name: rain and snow as they fall (`rainfall`, `precipitation`, `precip`, `snowfall`), and rain as it is called in German,
+/// Italian, French, Spanish, Portuguese and the languages of Scandinavia.
+const RAIN: [&str; 11] = [
+    "rain",
+    "precip",
+    "snowfall",
+    "regen",
+    "niederschlag",
+    "pioggia",
+    "pluie",
+    "pluvio",
+    "lluvia",
+    "chuva",
+    "nedbør",
+];
 /// Words with `rain` in them that have nothing to do with it.
 const NO_RAIN: [&str; 5] = ["drain", "strain", "train", "terrain", "grain"];
 /// Within a name: a discharge (`inflow`, `river_flow`, `discharge`, `runoff`).
@@ -160,6 +173,9 @@ mod tests {
         let cases = [
             ("rain_mm", Some("mm"), CovariateKind::Rain),
             ("DailyRain", None, CovariateKind::Rain),
+            ("Regen_mm", Some("mm"), CovariateKind::Rain),
+            ("Niederschlag (mm)", Some("mm"), CovariateKind::Rain),
+            ("Pioggia [mm]", Some("mm"), CovariateKind::Rain),
             ("precipitation_mm", Some("mm"), CovariateKind::Rain),
             ("snowfall_cm", Some("cm"), CovariateKind::Rain),
             ("terrain_rain_mm", Some("mm"), CovariateKind::Rain),

@@ -9,6 +9,9 @@ use std::collections::{BTreeMap, BTreeSet};
 /// So many readings must fall into the time that an evacuation takes: a fit that sees the
 /// acceleration needs several, and the last of them must leave time to go.
 const READINGS_AN_EVACUATION: i32 = 4;
+/// Readings that end so long, and so many of their own intervals, before the newest of their source are left behind.
+const LEFT_BEHIND: SignedDuration = SignedDuration::from_hours(24);
+const LEFT_OUT: i32 = 12;
 
 /// A line for each benchmark that is measured too rarely for its evacuation time to mean anything, or not at all, or
 /// whose readings hardly mean what was intended.
@@ -38,15 +41,41 @@ pub fn sampling_warnings(config: &Config, preview: &Preview) -> Vec<String> {
         lines.map(move |line| format!("covariate {name:?}: {line}"))
     });
     let shared = several_sources(preview);
+    let behind = left_behind(preview);
     let ends = preview.refused_ends.iter().cloned();
     let absent = preview.unfed.iter().map(|unfed| unfed.text.clone());
     lines
         .chain(suspicions)
         .chain(covariates)
         .chain(shared)
+        .chain(behind)
         .chain(ends)
         .chain(absent)
         .collect()
+}
+
+/// A line for each benchmark whose readings end long before others of its source do: its column may be gone, or what stands there is
+/// refused.
+fn left_behind(preview: &Preview) -> Vec<String> {
+    let newest_of = |source: &str| {
+        let of_source = preview.benchmarks.iter().filter(|one| one.source == source);
+        of_source.map(|one| one.last.0).max()
+    };
+    let left = preview.benchmarks.iter().filter_map(|one| {
+        let newest = newest_of(&one.source)?;
+        let behind = newest.duration_since(one.last.0);
+        let every = SignedDuration::from_secs(one.every_s?.max(1));
+        let is_left = behind > LEFT_BEHIND && behind > every.saturating_mul(LEFT_OUT);
+        is_left.then(|| {
+            format!(
+                "benchmark {:?}: its readings end at {}, {behind:#} before the newest of its source: does its column still stand in the file, and are \
+                 its values taken?",
+                one.id.as_str(),
+                one.last.0
+            )
+        })
+    });
+    left.collect()
 }
 
 /// A line for each benchmark that comes from more than one source: what one instrument says would be mixed with what another does.

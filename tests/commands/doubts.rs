@@ -404,6 +404,39 @@ fn a_unit_that_changes_under_the_same_header_is_doubted_by_check_and_no_reset() 
 }
 
 #[test]
+fn a_benchmark_whose_readings_end_long_before_its_neighbours_is_named_by_check() {
+    let newest = clock::now() - SignedDuration::from_mins(30);
+    let head = "time,P1_displacement_mm,P2_displacement_mm\n".to_owned();
+    let text = (0..200).fold(head, |mut text, row| {
+        let time = newest - SignedDuration::from_hours(i64::from(199 - row));
+        let value = 990.0 + 0.1 * f64::from(row) + 0.2 * drawn(row);
+        // A mark of thousands, as the logger writes it from 1000 mm on.
+        let first = if value < 1000.0 {
+            format!("{value:.2}")
+        } else {
+            format!("1'{:06.2}", value - 1000.0)
+        };
+        let _ = writeln!(text, "{time:.0},{first},{value:.2}");
+        text
+    });
+    let office = Office::with(&[("p.csv", &text)]);
+    office.done(&["init", "p.csv"]);
+    let (_, out, err) = office.say(&["check", "site.toml"]);
+    let said = format!("{out}{err}");
+    contains_all(
+        &said,
+        &[
+            "benchmark \"P1\": its readings end at ",
+            "before the newest of its source",
+        ],
+    );
+    assert!(
+        !said.contains("benchmark \"P2\": its readings end"),
+        "{said}"
+    );
+}
+
+#[test]
 fn a_recording_that_was_cut_off_is_read_by_every_command_and_each_says_so() {
     let newest = SignedDuration::from_mins(-90);
     let office = Office::with(&[("p.csv", &to_collapse(10.0, newest))]);

@@ -405,9 +405,9 @@ impl PreviewSoFar {
         for ((id, ..), track) in std::mem::take(&mut self.benchmarks) {
             let so_far = self.sources.iter().find(|one| one.view.id == id);
             let source = config.sources.iter().find(|one| one.id == id);
-            let zone = source.and_then(|source| source.conventions.clock.zone.as_ref());
+            let clock = source.map(|source| &source.conventions.clock);
             let name = |place| so_far.map_or_else(String::new, |one| one.name(place));
-            let mut view = track.finish(self.now, taken.is_some(), zone, &name);
+            let mut view = track.finish(self.now, taken.is_some(), clock, &name);
             let missing = so_far.and_then(|one| one.view.missing.get(&view.id));
             (view.missing, view.out_of_range) = missing.copied().unwrap_or_default();
             benchmarks.push(view);

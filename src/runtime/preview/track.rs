@@ -2,7 +2,7 @@
 
 use super::view::BenchmarkPreview;
 use crate::reading::other_unit::{self, OtherUnit};
-use crate::reading::{Quantity, Suspicion, Timestamp, Unit, suspicion};
+use crate::reading::{LocalClock, Quantity, SummerTime, Suspicion, Timestamp, Unit, suspicion};
 use jiff::tz::TimeZone;
 use std::collections::BTreeSet;
 
@@ -126,7 +126,7 @@ impl PreviewTrack {
         mut self,
         now: Timestamp,
         ahead_count: bool,
-        zone: Option<&TimeZone>,
+        clock: Option<&LocalClock>,
         name: &dyn Fn(FilePlace) -> String,
     ) -> BenchmarkPreview {
         if ahead_count {
@@ -161,7 +161,7 @@ impl PreviewTrack {
         gaps.sort_unstable();
         self.view.every_s = gaps.get(gaps.len() / 2).copied();
         self.view.suspicions = self.suspicions(newest, now);
-        self.view.remarks = self.remarks(&merged, zone, name);
+        self.view.remarks = self.remarks(&merged, clock, name);
         self.view
     }
 
@@ -178,18 +178,17 @@ impl PreviewTrack {
     fn remarks(
         &self,
         merged: &MergedReadings,
-        zone: Option<&TimeZone>,
+        clock: Option<&LocalClock>,
         name: &dyn Fn(FilePlace) -> String,
     ) -> Vec<String> {
         let mut remarks = Vec::new();
         let unit = self.unit;
         if let Some((one, before)) = merged.first {
-            let twice = zone.filter(|zone| is_shown_twice(one.time, zone));
-            let why = twice.map_or(String::new(), |_| {
-                "; the clocks are put back then and show this hour twice: a logger that is never put back needs dst = \"standard\", \
-                 and another one times with an offset"
-                    .to_owned()
-            });
+            let zone = clock.and_then(|clock| clock.zone.as_ref());
+            let is_twice = zone.is_some_and(|zone| is_shown_twice(one.time, zone));
+            let why = clock
+                .filter(|_| is_twice)
+                .map_or("", |clock| put_back(clock.summer_time));
             remarks.push(format!(
                 "{}: another reading of {}: found {} {unit}, and {before} {unit} before; the last one counts{why}",
                 name(one.place),
@@ -254,6 +253,24 @@ impl PreviewTrack {
                  the other way, write components = [\"COLUMN\"] and direction = [-1.0] for this benchmark"
             )
         })
+    }
+}
+
+/// What two readings of an hour that the clocks show twice say of a logger that is taken to do so.
+fn put_back(summer_time: SummerTime) -> &'static str {
+    match summer_time {
+        SummerTime::Standard => {
+            "; the clocks are put back then and show this hour twice: if this logger's clock is put back with them, dst = \"standard\" is \
+             wrong, and its times of the summer are taken an hour late; let it write UTC, or times with an offset"
+        }
+        SummerTime::Earlier | SummerTime::Later => {
+            "; the clocks are put back then and show this hour twice: of its two readings one is lost, unless the logger writes UTC, or times with \
+             an offset"
+        }
+        SummerTime::Reject => {
+            "; the clocks are put back then and show this hour twice: a logger that is never put back needs dst = \"standard\", \
+             and another one times with an offset"
+        }
     }
 }
 
