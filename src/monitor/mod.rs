@@ -53,6 +53,7 @@ pub use order::Order;
 pub use parallel::{Task, Workers};
 pub use saved::{MemoryPart, SavedError};
 pub use search::{SearchFinding, SearchJob};
+pub use silence::MAY_SKIP;
 pub use site::{SiteLevel, site_text};
 pub use undeclared::UndeclaredLoad;
 pub use watched::Watched;

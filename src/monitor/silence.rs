@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 /// Spacings remembered.
 const REMEMBERED: usize = 9;
 /// A benchmark may skip this many of its usual readings.
-const MAY_SKIP: i32 = 4;
+pub const MAY_SKIP: i32 = 4;
 /// So many gaps between bursts of readings make a rhythm.
 const CYCLES: u8 = 4;
 /// A benchmark with a single reading is called silent after this time: it may be one that is read once a week.

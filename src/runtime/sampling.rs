@@ -2,6 +2,7 @@
 
 use super::preview::Preview;
 use crate::config::Config;
+use crate::monitor::MAY_SKIP;
 use crate::reading::BenchmarkId;
 use jiff::SignedDuration;
 use std::collections::{BTreeMap, BTreeSet};
@@ -42,6 +43,7 @@ pub fn sampling_warnings(config: &Config, preview: &Preview) -> Vec<String> {
     });
     let shared = several_sources(preview);
     let behind = left_behind(preview);
+    let waiting = held_back(config, preview);
     let ends = preview.refused_ends.iter().cloned();
     let absent = preview.unfed.iter().map(|unfed| unfed.text.clone());
     lines
@@ -49,9 +51,28 @@ pub fn sampling_warnings(config: &Config, preview: &Preview) -> Vec<String> {
         .chain(covariates)
         .chain(shared)
         .chain(behind)
+        .chain(waiting)
         .chain(ends)
         .chain(absent)
         .collect()
+}
+
+/// A line for each benchmark that is silent for as long as its source lets readings wait.
+fn held_back(config: &Config, preview: &Preview) -> Vec<String> {
+    let held = preview.benchmarks.iter().filter_map(|one| {
+        let source = config.sources.iter().find(|source| source.id == one.source)?;
+        let every = SignedDuration::from_secs(one.every_s?.max(1));
+        let is_long = source.reorder >= every.saturating_mul(MAY_SKIP);
+        is_long.then(|| {
+            format!(
+                "benchmark {:?}: measured every {every:#}, and its source lets each reading wait for {:#} (reorder): it is `unknown` \
+                 meanwhile, as one that is silent, and a warning comes so much later; make reorder shorter than {MAY_SKIP} of its readings take",
+                one.id.as_str(),
+                source.reorder
+            )
+        })
+    });
+    held.collect()
 }
 
 /// A line for each benchmark whose readings end long before others of its source do: its column may be gone, or what stands there is

@@ -431,9 +431,17 @@ fn a_benchmark_whose_readings_end_long_before_its_neighbours_is_named_by_check()
         ],
     );
     assert!(
-        !said.contains("benchmark \"P2\": its readings end"),
+        !said.contains("benchmark \"P2\": its readings end") && !said.contains("(reorder)"),
         "{said}"
     );
+    // So long a wait is silence, to whoever waits for a reading each hour.
+    let config = fs::read_to_string(office.path("site.toml")).unwrap();
+    let waiting = config.replacen("[[source]]\n", "[[source]]\nreorder = \"4h\"\n", 1);
+    fs::write(office.path("site.toml"), waiting).unwrap();
+    let (_, out, err) = office.say(&["check", "site.toml"]);
+    let said = format!("{out}{err}");
+    let part = "benchmark \"P2\": measured every 1h, and its source lets each reading wait for 4h (reorder)";
+    assert!(said.contains(part), "{said}");
 }
 
 #[test]
