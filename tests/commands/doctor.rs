@@ -187,9 +187,9 @@ fn a_recording_that_keeps_readings_back_in_an_open_chunk_is_reported_with_its_by
 fn check_warns_where_readings_come_too_rarely_for_the_evacuation_and_not_where_they_do_not() {
     let folder = site("#!/bin/sh\n");
     let series = |step_hours: i64| {
-        let start: jiff::Timestamp = "2017-06-01T00:00:00Z".parse().unwrap();
+        let end: jiff::Timestamp = "2017-07-10T00:00:00Z".parse().unwrap();
         let rows = (0..40).map(|number| {
-            let time = start + jiff::SignedDuration::from_hours(step_hours * number);
+            let time = end - jiff::SignedDuration::from_hours(step_hours * (39 - number));
             format!("{time},{number}\n")
         });
         format!("time,displacement_mm\n{}", rows.collect::<String>())

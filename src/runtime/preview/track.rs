@@ -265,7 +265,7 @@ fn put_back(summer_time: SummerTime) -> &'static str {
         }
         SummerTime::Earlier | SummerTime::Later => {
             "; the clocks are put back then and show this hour twice: of its two readings one is lost, unless the logger writes UTC, or times with \
-             an offset"
+             an offset; one that is never put back needs dst = \"standard\""
         }
         SummerTime::Reject => {
             "; the clocks are put back then and show this hour twice: a logger that is never put back needs dst = \"standard\", \
