@@ -357,7 +357,10 @@ impl Search<'_> {
             );
         }
         let reason = self.worse_from_reading_to_reading(base, one, &held);
-        let reason = reason.or_else(|| Some(self.worse_than_without_any(base, one, &held)?.into()));
+        let reason = reason.or_else(|| {
+            self.worse_than_without_any(base, one, &held)
+                .map(Objection::from)
+        });
         (Some(ratio), reason)
     }
 

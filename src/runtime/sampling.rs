@@ -3,7 +3,7 @@
 use super::preview::Preview;
 use crate::config::Config;
 use crate::monitor::MAY_SKIP;
-use crate::reading::BenchmarkId;
+use crate::reading::{BenchmarkId, Timestamp};
 use jiff::SignedDuration;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -78,13 +78,15 @@ fn held_back(config: &Config, preview: &Preview) -> Vec<String> {
 /// A line for each benchmark whose readings end long before others of its source do: its column may be gone, or what stands there is
 /// refused.
 fn left_behind(preview: &Preview) -> Vec<String> {
-    let newest_of = |source: &str| {
-        let of_source = preview.benchmarks.iter().filter(|one| one.source == source);
-        of_source.map(|one| one.last.0).max()
-    };
+    let mut newest: BTreeMap<&str, Timestamp> = BTreeMap::new();
+    for one in &preview.benchmarks {
+        let of_source = newest.entry(&one.source).or_insert(one.last.0);
+        *of_source = one.last.0.max(*of_source);
+    }
     let left = preview.benchmarks.iter().filter_map(|one| {
-        let newest = newest_of(&one.source)?;
-        let behind = newest.duration_since(one.last.0);
+        let behind = newest
+            .get(one.source.as_str())?
+            .duration_since(one.last.0);
         let every = SignedDuration::from_secs(one.every_s?.max(1));
         let is_left = behind > LEFT_BEHIND && behind > every.saturating_mul(LEFT_OUT);
         is_left.then(|| {

@@ -51,6 +51,12 @@ fn run(office: &Office) {
     drop(daemon);
 }
 
+/// All that `check` says of the site.
+fn by_check(office: &Office) -> String {
+    let (_, out, err) = office.say(&["check", "site.toml"]);
+    format!("{out}{err}")
+}
+
 fn contains_all(said: &str, parts: &[&str]) {
     for part in parts {
         assert!(said.contains(part), "no {part:?} in {said}");
@@ -387,8 +393,7 @@ fn a_unit_that_changes_under_the_same_header_is_doubted_by_check_and_no_reset() 
     });
     let office = Office::with(&[("p.csv", &text)]);
     office.done(&["init", "p.csv"]);
-    let (_, out, err) = office.say(&["check", "site.toml"]);
-    let said = format!("{out}{err}");
+    let said = by_check(&office);
     contains_all(&said, &["multiplied by 1000", "accept = [\"scale\"]"]);
     assert!(!said.contains("kind = \"reset\""), "{said}");
     let config = fs::read_to_string(office.path("site.toml")).unwrap();
@@ -398,8 +403,7 @@ fn a_unit_that_changes_under_the_same_header_is_doubted_by_check_and_no_reset() 
         1,
     );
     fs::write(office.path("site.toml"), accepting).unwrap();
-    let (_, out, err) = office.say(&["check", "site.toml"]);
-    let said = format!("{out}{err}");
+    let said = by_check(&office);
     assert!(!said.contains("multiplied by"), "{said}");
 }
 
@@ -421,8 +425,7 @@ fn a_benchmark_whose_readings_end_long_before_its_neighbours_is_named_by_check()
     });
     let office = Office::with(&[("p.csv", &text)]);
     office.done(&["init", "p.csv"]);
-    let (_, out, err) = office.say(&["check", "site.toml"]);
-    let said = format!("{out}{err}");
+    let said = by_check(&office);
     contains_all(
         &said,
         &[
@@ -438,8 +441,7 @@ fn a_benchmark_whose_readings_end_long_before_its_neighbours_is_named_by_check()
     let config = fs::read_to_string(office.path("site.toml")).unwrap();
     let waiting = config.replacen("[[source]]\n", "[[source]]\nreorder = \"4h\"\n", 1);
     fs::write(office.path("site.toml"), waiting).unwrap();
-    let (_, out, err) = office.say(&["check", "site.toml"]);
-    let said = format!("{out}{err}");
+    let said = by_check(&office);
     let part = "benchmark \"P2\": measured every 1h, and its source lets each reading wait for 4h (reorder)";
     assert!(said.contains(part), "{said}");
 }

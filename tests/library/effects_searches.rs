@@ -288,8 +288,8 @@ const RIVER: [f64; 40] = [
 ];
 
 #[test]
-fn an_event_that_so_few_later_readings_refuse_by_a_hair_stands_beside_the_channel_that_gains_less()
-{
+fn an_event_that_so_few_later_readings_refuse_within_chance_stands_beside_the_channel_that_gains_less()
+ {
     let day = |day: i64| start() + SignedDuration::from_hours(24 * day);
     let readings = (0..).zip(UNLOADED).map(|(index, value)| Reading {
         time: day(index),

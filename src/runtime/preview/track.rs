@@ -186,9 +186,10 @@ impl PreviewTrack {
         if let Some((one, before)) = merged.first {
             let zone = clock.and_then(|clock| clock.zone.as_ref());
             let is_twice = zone.is_some_and(|zone| is_shown_twice(one.time, zone));
-            let why = clock
-                .filter(|_| is_twice)
-                .map_or("", |clock| put_back(clock.summer_time));
+            let why = clock.filter(|_| is_twice).map_or(String::new(), |clock| {
+                let what = put_back(clock.summer_time);
+                format!("; the clocks are put back then and show this hour twice: {what}")
+            });
             remarks.push(format!(
                 "{}: another reading of {}: found {} {unit}, and {before} {unit} before; the last one counts{why}",
                 name(one.place),
@@ -260,15 +261,15 @@ impl PreviewTrack {
 fn put_back(summer_time: SummerTime) -> &'static str {
     match summer_time {
         SummerTime::Standard => {
-            "; the clocks are put back then and show this hour twice: if this logger's clock is put back with them, dst = \"standard\" is \
+            "if this logger's clock is put back with them, dst = \"standard\" is \
              wrong, and its times of the summer are taken an hour late; let it write UTC, or times with an offset"
         }
         SummerTime::Earlier | SummerTime::Later => {
-            "; the clocks are put back then and show this hour twice: of its two readings one is lost, unless the logger writes UTC, or times with \
+            "of its two readings one is lost, unless the logger writes UTC, or times with \
              an offset; one that is never put back needs dst = \"standard\""
         }
         SummerTime::Reject => {
-            "; the clocks are put back then and show this hour twice: a logger that is never put back needs dst = \"standard\", \
+            "a logger that is never put back needs dst = \"standard\", \
              and another one times with an offset"
         }
     }
