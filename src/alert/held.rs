@@ -78,6 +78,11 @@ struct Course {
 }
 
 impl Held {
+    /// Begins with the course of the chance that calls red as `earlier` has it.
+    pub fn begin_course(&mut self, earlier: Self) {
+        self.red = earlier.red;
+    }
+
     /// The rules whose conditions hold, and have not held for long enough yet.
     pub fn pending(&self, policy: &Policy, evidence: &AlertEvidence) -> Vec<String> {
         let is_pending = |(index, rule): &(usize, &DeclaredRule)| {

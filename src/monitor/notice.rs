@@ -42,6 +42,15 @@ pub enum Notice {
         /// What time it is.
         time: Timestamp,
     },
+    /// A reading of this benchmark, of `time`, has been read by `until` and waits for earlier ones: its silence counts from there.
+    Waits {
+        /// Whose.
+        benchmark: BenchmarkId,
+        /// When it was measured.
+        time: Timestamp,
+        /// What time it is.
+        until: Timestamp,
+    },
     /// The only reading of this benchmark lies far ahead of the next one, of `time`, of the time that it is, and of all other
     /// benchmarks: it waits until another one confirms it.
     FirstAhead {
@@ -107,6 +116,16 @@ impl Monitor {
                     self.benchmarks.note_changed(benchmark);
                 }
                 Vec::new()
+            }
+            Notice::Waits {
+                benchmark,
+                time,
+                until,
+            } => {
+                let track = self.benchmarks.get_mut(benchmark);
+                let event = track.and_then(|track| track.note_waiting(now, *time, *until));
+                self.benchmarks.note_changed(benchmark);
+                event.into_iter().collect()
             }
             Notice::FirstAhead { benchmark, time } => {
                 let track = self.benchmarks.get_mut(benchmark);
@@ -182,6 +201,20 @@ impl Monitor {
     pub fn is_silent(&self, benchmark: &BenchmarkId) -> bool {
         let track = self.benchmarks.get(benchmark);
         track.is_some_and(Track::is_silent)
+    }
+
+    /// The benchmarks that fall silent by `until`.
+    pub fn silent_by(&self, until: Timestamp) -> impl Iterator<Item = BenchmarkId> {
+        let due = self.benchmarks.due(until).into_iter();
+        due.filter(move |id| {
+            let track = self.benchmarks.get(id);
+            track.is_some_and(|track| track.is_silent_by(until))
+        })
+    }
+
+    /// When the newest reading of a benchmark was measured from which its silence counts, of those that wait for earlier ones too.
+    pub fn counted_from(&self, benchmark: &BenchmarkId) -> Option<Timestamp> {
+        self.benchmarks.get(benchmark)?.counted_from()
     }
 
     /// Whether the times of a benchmark's readings lie ahead of the clock.

@@ -20,6 +20,9 @@ const LEAST: SignedDuration = SignedDuration::from_mins(30);
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Silence {
     newest: Option<Timestamp>,
+    /// The newest that has been read and waits for earlier ones.
+    #[serde(default)]
+    waiting: Option<Timestamp>,
     spacings: VecDeque<SignedDuration>,
     /// When the newest gaps began that are far longer than the usual spacing, and how long they were.
     #[serde(default)]
@@ -58,18 +61,39 @@ impl Silence {
         if self.newest.is_some_and(|newest| time <= newest) {
             return None;
         }
-        let before = self.newest.replace(time).or(Some(time));
-        if !self.silent || self.due().is_some_and(|due| Some(due) <= self.behind) {
+        let before = self.counted_from().or(Some(time));
+        self.newest = Some(time);
+        // It was known, as it waited, when the silence began.
+        if Some(time) <= self.waiting {
             return None;
         }
+        self.ends_by(self.behind).then_some(before).flatten()
+    }
+
+    /// Notes a reading that has been read and waits for earlier ones, at `now`; when it ends a silence, the reading before which
+    /// that one began.
+    pub(super) fn note_waiting(&mut self, time: Timestamp, now: Timestamp) -> Option<Timestamp> {
+        let before = self.counted_from()?;
+        if time <= before {
+            return None;
+        }
+        self.waiting = Some(time);
+        self.ends_by(Some(now)).then_some(before)
+    }
+
+    /// Ends the silence that there is, where by `now` the benchmark is not silent; whether it did.
+    fn ends_by(&mut self, now: Option<Timestamp>) -> bool {
+        if !self.silent || self.due().is_some_and(|due| Some(due) <= now) {
+            return false;
+        }
         (self.silent, self.behind) = (false, None);
-        before
+        true
     }
 
     /// The only reading does not count for now. A silence goes on, and ends with a reading as others do.
     pub(super) fn begin_again(&mut self) {
         self.spacings.clear();
-        self.newest = None;
+        (self.newest, self.waiting) = (None, None);
     }
 
     /// What time it was when a reading came that was measured long before; `None` where none has.
@@ -113,13 +137,18 @@ impl Silence {
         self.newest
     }
 
+    /// When the last reading was that has been read, of those that wait for earlier ones too.
+    pub(super) fn counted_from(&self) -> Option<Timestamp> {
+        Some(self.newest?.max(self.waiting.unwrap_or(Timestamp::MIN)))
+    }
+
     /// When silence becomes a fault; `None` when it already is one.
     pub(super) fn deadline(&self) -> Option<Timestamp> {
         if self.silent { None } else { self.due() }
     }
 
     fn due(&self) -> Option<Timestamp> {
-        self.newest?.checked_add(self.allowed()?).ok()
+        self.counted_from()?.checked_add(self.allowed()?).ok()
     }
 
     /// Keeps a spacing that is no usual one. Where bursts have a rhythm, those that stayed away part it in gaps of the usual kind, so that
@@ -157,7 +186,7 @@ impl Silence {
             self.gaps.len() == usize::from(CYCLES) && is_even(periods) && is_even(gaps.clone());
         let period_s = (last.as_second() - first.as_second()) / i64::from(CYCLES - 1);
         let gap_s = gaps.max()?;
-        let since = self.newest?.as_second() - last.as_second();
+        let since = self.counted_from()?.as_second() - last.as_second();
         (is_rhythm && since < outlasted(period_s)).then_some(Rhythm { period_s, gap_s })
     }
 
@@ -180,13 +209,14 @@ impl Silence {
 
     /// Ends the silence that there is; the reading before which it began.
     pub(super) fn end(&mut self) -> Option<Timestamp> {
-        self.newest.filter(|_| std::mem::take(&mut self.silent))
+        self.counted_from()
+            .filter(|_| std::mem::take(&mut self.silent))
     }
 
     /// It is silent from now on; the time of the last reading.
     pub(super) fn begins(&mut self) -> Option<Timestamp> {
         self.silent = true;
-        self.newest
+        self.counted_from()
     }
 }
 
@@ -242,6 +272,27 @@ mod tests {
             let due = days.deadline().unwrap();
             assert!(at(next + 24.0) < due && due < at(next + 40.0), "{due}");
         }
+    }
+
+    #[test]
+    fn what_waits_for_earlier_readings_is_no_silence_and_does_not_end_one_again_when_its_turn_comes()
+     {
+        let mut silence = Silence::default();
+        for hour in 0..8 {
+            silence.broken_by(at(f64::from(hour)));
+        }
+        assert_eq!(silence.note_waiting(at(13.0), at(13.0)), None);
+        assert_eq!(silence.deadline(), Some(at(17.0)));
+        assert_eq!(silence.begins(), Some(at(13.0)));
+        for hour in 8..14 {
+            assert_eq!(silence.broken_by(at(f64::from(hour))), None);
+        }
+        // One of a backlog ends none.
+        assert_eq!(silence.note_waiting(at(20.0), at(40.0)), None);
+        assert_eq!(silence.note_waiting(at(39.0), at(40.0)), Some(at(20.0)));
+        assert_eq!(silence.deadline(), Some(at(43.0)));
+        silence.begins();
+        assert_eq!(silence.broken_by(at(44.0)), Some(at(39.0)));
     }
 
     #[test]

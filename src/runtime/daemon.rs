@@ -190,6 +190,7 @@ impl Daemon {
         for (source, more) in &batch.quarantined {
             vitals.quarantined(source, *more);
         }
+        self.site.note_waiting(batch.waiting);
         let mut prepared = 0;
         for (number, arrival) in batch.arrivals.iter().enumerate() {
             if shutdown.is_requested() {

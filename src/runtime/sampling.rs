@@ -57,7 +57,7 @@ pub fn sampling_warnings(config: &Config, preview: &Preview) -> Vec<String> {
         .collect()
 }
 
-/// A line for each benchmark that is silent for as long as its source lets readings wait.
+/// A line for each benchmark of which several readings wait before the first is judged.
 fn held_back(config: &Config, preview: &Preview) -> Vec<String> {
     let held = preview.benchmarks.iter().filter_map(|one| {
         let source = config.sources.iter().find(|source| source.id == one.source)?;
@@ -65,8 +65,8 @@ fn held_back(config: &Config, preview: &Preview) -> Vec<String> {
         let is_long = source.reorder >= every.saturating_mul(MAY_SKIP);
         is_long.then(|| {
             format!(
-                "benchmark {:?}: measured every {every:#}, and its source lets each reading wait for {:#} (reorder): it is `unknown` \
-                 meanwhile, as one that is silent, and a warning comes so much later; make reorder shorter than {MAY_SKIP} of its readings take",
+                "benchmark {:?}: measured every {every:#}, and its source lets each reading wait for {:#} (reorder): a \
+                 warning comes so much later; make reorder shorter than {MAY_SKIP} of its readings take",
                 one.id.as_str(),
                 source.reorder
             )

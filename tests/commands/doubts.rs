@@ -437,7 +437,7 @@ fn a_benchmark_whose_readings_end_long_before_its_neighbours_is_named_by_check()
         !said.contains("benchmark \"P2\": its readings end") && !said.contains("(reorder)"),
         "{said}"
     );
-    // So long a wait is silence, to whoever waits for a reading each hour.
+    // So long no level follows what is measured each hour.
     let config = fs::read_to_string(office.path("site.toml")).unwrap();
     let waiting = config.replacen("[[source]]\n", "[[source]]\nreorder = \"4h\"\n", 1);
     fs::write(office.path("site.toml"), waiting).unwrap();

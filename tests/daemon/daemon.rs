@@ -20,7 +20,7 @@ use slipwatch::runtime::progress::Progress;
 use slipwatch::runtime::run::{RunError, run};
 use slipwatch::runtime::shutdown::{self, Shutdown};
 use slipwatch::runtime::site::{Counts, Sinks, Site};
-use slipwatch::runtime::tail::Arrival;
+use slipwatch::runtime::tail::{Arrival, WaitingReading};
 use slipwatch::store::{DeliveryOutcome, Store, StoreError};
 use std::fs::{self, OpenOptions};
 use std::io::Write;
@@ -213,6 +213,50 @@ fn end_the_silence(events: &[Event]) -> bool {
             }
         ) && event.benchmark.is_some()
     })
+}
+
+/// Readings of each hour in a source that lets each wait for twelve: they are there, and the benchmark is not silent. One that falls
+/// silent is so once, from the newest that was read, though the waiting ones come meanwhile.
+#[tokio::test(start_paused = true)]
+async fn a_benchmark_whose_readings_wait_for_earlier_ones_is_silent_when_no_more_are_read() {
+    let (_folder, config) = site_folder();
+    let mut site = site(&config);
+    let mut wall = noon();
+    let value = |hour: i64| 0.1 * hour as f64 + ((hour * 37) % 11) as f64 / 50.0;
+    for hour in -30..=0 {
+        site.take(&reading(noon() + hours(hour), value(hour)), wall)
+            .unwrap();
+    }
+    site.caught_up(wall).unwrap();
+    let is_of_silence =
+        |event: &Event| matches!(&event.kind, EventKind::Alert { rule, .. } if rule == "no-data");
+    let mut said: Vec<(i64, Event)> = Vec::new();
+    for hour in 1..=60 {
+        tokio::time::advance(Duration::from_secs(3600)).await;
+        wall += hours(1);
+        let mut events = Vec::new();
+        // None is read for twenty hours.
+        let is_read = |hour: i64| hour > 0 && !(21..=40).contains(&hour);
+        if is_read(hour) {
+            let time = noon() + hours(hour);
+            let benchmark = BenchmarkId::new("5");
+            site.note_waiting(vec![WaitingReading { benchmark, time }]);
+        }
+        if is_read(hour - 12) {
+            let arrival = reading(noon() + hours(hour - 12), value(hour - 12));
+            events.extend(site.take(&arrival, wall).unwrap());
+        }
+        events.extend(site.live(wall));
+        site.commit(wall).unwrap();
+        said.extend(events.into_iter().map(|event| (hour, event)));
+    }
+    said.retain(|(_, event)| is_of_silence(event));
+    let hours_said: Vec<i64> = said.iter().map(|(hour, _)| *hour).collect();
+    assert_eq!(hours_said, [24, 41], "{said:?}");
+    assert!(end_the_silence(&[said[1].1.clone()]));
+    let since = format!("no reading since {}", noon() + hours(20));
+    assert!(matches!(&said[0].1.kind, EventKind::Alert { text, .. } if text.contains(&since)));
+    close(site, wall).await;
 }
 
 /// Rows that lie forty days behind the clock of a daemon that was started within a silence are a backlog, or its clock is ahead.

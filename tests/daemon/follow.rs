@@ -340,6 +340,51 @@ fn what_was_measured_at_one_time_comes_as_a_replay_has_it_whatever_the_files_are
     }
 }
 
+/// As in a replay: whichever comes first is watched.
+#[test]
+fn of_one_benchmark_and_time_the_displacement_comes_before_the_velocity() {
+    let time = "2026-03-01T00:00:00Z";
+    let mut bench = Bench::new("csv");
+    let header = "time,5_velocity_mm_per_day,5_displacement_mm\n";
+    bench.write("a.csv", &format!("{header}{time},24,1\n"));
+    assert_eq!(bench.news(), ["5:1", "5:24"]);
+    let mut bench = Bench::new("ndjson");
+    let line = |unit: &str, value: i64| {
+        format!(
+            "{{\"benchmark\":\"5\",\"time\":\"{time}\",\"value\":{value},\"unit\":\"{unit}\"}}\n"
+        )
+    };
+    let lines = line("mm/day", 24) + &line("mm", 1);
+    bench.write("a.ndjson", &lines);
+    assert_eq!(bench.news(), ["5:1", "5:24"]);
+    // From two files, whatever they are called.
+    let mut bench = Bench::new("csv");
+    bench.write("a.csv", &format!("time,5_velocity_mm_per_day\n{time},24\n"));
+    bench.write("b.csv", &format!("time,5_displacement_mm\n{time},1\n"));
+    assert_eq!(bench.news(), ["5:1", "5:24"]);
+}
+
+/// The benchmarks beside it would be silent for days, as far as the monitor knows.
+#[test]
+fn a_source_that_waits_for_earlier_values_is_not_ahead_of_those_beside_it_in_a_backlog() {
+    let mut bench = Bench::of(
+        &["a", "b"],
+        "[[source]]\nid = \"a\"\nkind = \"csv\"\npath = \"a/*.csv\"\nreorder = \"3h\"\n\
+         [[source]]\nid = \"b\"\nkind = \"csv\"\npath = \"b/*.csv\"\n",
+    );
+    let start: Timestamp = "2026-03-01T00:00:00Z".parse().unwrap();
+    let rows = |name: &str| {
+        let rows = (0..200).map(|hour| row_at(start + SignedDuration::from_hours(hour), hour));
+        format!("time,{name}_displacement_mm\n{}", rows.collect::<String>())
+    };
+    bench.write("a/p.csv", &rows("a"));
+    bench.write("b/p.csv", &rows("b"));
+    let came = bench.follower.poll(bench.wall).arrivals;
+    let waiting = came.iter().filter(|one| one.input.series_name() == "a");
+    assert_eq!((came.len(), waiting.count()), (397, 197));
+    assert!(came.is_sorted_by(|one, next| one.rank() <= next.rank()));
+}
+
 #[test]
 fn a_long_history_comes_whole_in_more_than_one_batch() {
     let mut bench = Bench::new("csv");

@@ -1,9 +1,13 @@
 //! A first start on history: what is current is judged first, and the refits of the past come after, as they would have come.
 
 use jiff::{SignedDuration, Timestamp, ToSpan};
+use rand::SeedableRng;
+use rand_distr::{Distribution, Normal};
+use rand_pcg::Pcg64;
 use slipwatch::alert::{Level, Policy, Threshold};
 use slipwatch::monitor::{AlertState, Event, EventKind, Input, Monitor, Notice, Settings};
 use slipwatch::reading::{BenchmarkId, Reading, Unit};
+use std::collections::BTreeMap;
 
 pub(crate) fn at(hour: i64) -> Timestamp {
     let start: Timestamp = "2026-01-01T00:00:00Z".parse().unwrap();
@@ -179,4 +183,90 @@ fn a_memory_saved_half_way_through_the_past_goes_on_from_there() {
         said.extend(notice(&mut restored, Notice::Retrace));
     }
     assert_eq!(refits(&said), refits(&whole));
+}
+
+/// An acceleration to a collapse after 372 h, each of these with another noise.
+fn failing(names: &[String]) -> Vec<(Timestamp, Input)> {
+    let tf = 15.5;
+    let of = |name: &String, number: usize| {
+        let mut random = Pcg64::seed_from_u64(number as u64);
+        let noise = Normal::new(0.0, 0.3).unwrap();
+        let each = (0..360).map(move |hour| {
+            let days = hour as f64 / 24.0;
+            let value = days - 80.0 * (1.0 - days / tf).ln() + noise.sample(&mut random);
+            (hour, value)
+        });
+        let name = name.clone();
+        each.map(move |(hour, value)| reading(&name, hour, value))
+    };
+    let all = names.iter().enumerate();
+    let mut all: Vec<_> = all.flat_map(|(number, name)| of(name, number)).collect();
+    all.sort_by_key(|(time, _)| *time);
+    all
+}
+
+/// When each benchmark was first called red.
+fn reds(events: &[Event]) -> BTreeMap<String, Timestamp> {
+    let mut first = BTreeMap::new();
+    for event in events {
+        if let EventKind::Alert {
+            level: Level::Red,
+            state: AlertState::Firing,
+            ..
+        } = event.kind
+            && let Some(benchmark) = &event.benchmark
+        {
+            first.entry(benchmark.to_string()).or_insert(event.time);
+        }
+    }
+    first
+}
+
+/// For hours the past may wait to be gone through, while readings come. A chance that is high at one of them calls no red that a
+/// daemon which was there does not call.
+#[test]
+fn before_the_past_has_been_gone_through_red_goes_by_the_course_of_its_chance_too() {
+    let names: Vec<String> = (0..5).map(|number| format!("p{number}")).collect();
+    let inputs = failing(&names);
+    let policy = Policy {
+        evacuation_time: SignedDuration::from_hours(12),
+        ..Policy::default()
+    };
+    let new = || {
+        Monitor::new(Settings {
+            policy: policy.clone(),
+            ..Settings::default()
+        })
+    };
+    let mut there = new();
+    let steps = inputs.iter();
+    let given: Vec<Event> = steps
+        .flat_map(|(now, input)| there.step(*now, input))
+        .collect();
+    let expected = reds(&given);
+    assert_eq!(expected.len(), names.len());
+    let first = expected.values().min().unwrap();
+    let started = inputs.partition_point(|(time, _)| *time < *first - 2.hours());
+    let mut late = new();
+    notice(&mut late, Notice::Past);
+    for (now, input) in &inputs[..started] {
+        late.step(*now, input);
+    }
+    let mut said = Vec::new();
+    let (now, _) = inputs[started - 1];
+    while late.owes_current() {
+        said.extend(late.step(now, &Input::Notice(Notice::Current)));
+    }
+    for (now, input) in &inputs[started..] {
+        said.extend(late.step(*now, input));
+    }
+    assert!(late.owes_past());
+    for (name, time) in reds(&said) {
+        let apart = time.duration_since(expected[&name]).abs();
+        assert!(
+            apart <= SignedDuration::from_hours(1),
+            "{name}: {time}, {}",
+            expected[&name]
+        );
+    }
 }

@@ -11,6 +11,7 @@ mod quality;
 mod record;
 mod refit;
 mod saved;
+mod timing;
 
 use super::Explain;
 use super::covariates::Covariates;
@@ -260,11 +261,25 @@ impl Track {
 
     /// What follows from the readings as they are now.
     fn judge(&mut self, policy: &Policy, time: Timestamp, context: &StepContext<'_>) -> Vec<Event> {
-        self.pending.is_judged();
-        let mut events = Vec::new();
+        let forecast = self.forecast(policy, context);
+        self.judge_by(policy, time, forecast, context)
+    }
+
+    fn forecast(&mut self, policy: &Policy, context: &StepContext<'_>) -> Option<Forecast> {
         let critical = policy.critical_velocity_mm_per_day;
         let history = self.record.history();
-        let forecast = self.forecaster.forecast(history, critical, context);
+        self.forecaster.forecast(history, critical, context)
+    }
+
+    fn judge_by(
+        &mut self,
+        policy: &Policy,
+        time: Timestamp,
+        forecast: Option<Forecast>,
+        context: &StepContext<'_>,
+    ) -> Vec<Event> {
+        self.pending.is_judged();
+        let mut events = Vec::new();
         if let Some(forecast) = &forecast {
             events.extend(self.refit(policy, time, forecast));
             let record = &self.record;
@@ -311,52 +326,9 @@ impl Track {
         if !changed.is_other || self.quality.is_stuck() {
             return events;
         }
-        let critical = policy.critical_velocity_mm_per_day;
-        let history = self.record.history();
-        if let Some(forecast) = self.forecaster.forecast(history, critical, context) {
+        if let Some(forecast) = self.forecast(policy, context) {
             events.extend(self.refit(policy, time, &forecast));
             self.decide(policy, time, Some(forecast), &mut events);
-        }
-        events
-    }
-
-    /// Keeps a reading of a time that has not come yet, as far as anybody knows.
-    pub(super) fn put_aside(
-        &mut self,
-        now: Timestamp,
-        source: MeasuredAs,
-        reading: &Reading,
-    ) -> Vec<Event> {
-        vec![self.record.put_aside(now, source, reading)]
-    }
-
-    /// When the only reading was measured, where one of `time`, which comes after it, lies far before it and nothing rests on it.
-    pub(super) fn first_ahead_of(&self, time: Timestamp) -> Option<Timestamp> {
-        let is_green = self.level() == Level::Green;
-        self.record.first_ahead_of(time).filter(|_| is_green)
-    }
-
-    /// The only reading waits from now on: the next one is of `time`, far before it.
-    pub(super) fn put_first_aside(&mut self, now: Timestamp, time: Timestamp) -> Option<Event> {
-        self.record.put_first_aside(now, time)
-    }
-
-    /// Data time has come to `now` without a reading; `fault` is what the sensor gives instead.
-    pub(super) fn pass(
-        &mut self,
-        policy: &Policy,
-        (now, until): (Timestamp, Timestamp),
-        fault: Option<&str>,
-    ) -> Vec<Event> {
-        let is_due = |due: Timestamp| due <= until;
-        let mut events = Vec::new();
-        if self.alarm.overdue_at(&self.record).is_some_and(is_due) {
-            events.extend(self.alarm.judge_overdue(&self.record, policy, now));
-        }
-        if self.record.silent_at().is_some_and(is_due) {
-            let level = self.level();
-            let silent = (self.quality).fall_silent(&mut self.record, now, fault, level);
-            events.extend(silent);
         }
         events
     }
@@ -407,26 +379,6 @@ impl Track {
         (self.alarm).raise_by_change(beside, before, now, newest)
     }
 
-    /// The newest reading, of `time`, came while the clock said `clock`.
-    pub(super) fn suspect_ahead(
-        &mut self,
-        now: Timestamp,
-        time: Timestamp,
-        clock: Timestamp,
-    ) -> Vec<Event> {
-        (self.quality).suspect_ahead(&self.record, now, time, clock)
-    }
-
-    /// What comes now was measured long before `time`, which it is by the clock.
-    pub(super) fn is_behind(&mut self, time: Timestamp) {
-        self.record.is_behind(time);
-    }
-
-    /// What time it was when one came that was measured long before.
-    pub(super) fn behind(&self) -> Option<Timestamp> {
-        self.record.behind()
-    }
-
     pub(super) fn level(&self) -> Level {
         self.alarm.level()
     }
@@ -434,12 +386,6 @@ impl Track {
     /// The newest forecast, while a level is in force.
     pub(super) fn kept_forecast(&self) -> Option<&KeptForecast> {
         self.alarm.kept_forecast()
-    }
-
-    /// When it becomes silent, or red without a reading.
-    pub(super) fn deadline(&self) -> Option<Timestamp> {
-        let each = [self.record.silent_at(), self.alarm.overdue_at(&self.record)];
-        each.into_iter().flatten().min()
     }
 
     /// Rates of the whole record, and `now` on its clock, days.
@@ -455,21 +401,6 @@ impl Track {
     /// Whether nothing can be said of it now.
     pub(super) fn is_unknown(&self) -> bool {
         self.quality.is_unknown() || self.record.is_silent()
-    }
-
-    /// Whether it gives no readings.
-    pub(super) fn is_silent(&self) -> bool {
-        self.record.is_silent()
-    }
-
-    /// Whether its times lie ahead of the clock.
-    pub(super) fn is_ahead(&self) -> bool {
-        self.quality.is_ahead()
-    }
-
-    /// Whether a reading of `time` lies so far after the newest one that the logger's clock may have jumped.
-    pub(super) fn leaps(&self, time: Timestamp) -> bool {
-        self.record.leaps(time)
     }
 }
 

@@ -1,8 +1,10 @@
 //! A benchmark's past, gone through after its newest reading has been judged: what would have been, had each reading
 //! been judged as it came.
 
-use super::{StepContext, Track};
+use super::forecast::{Forecast, LookAhead};
+use super::{StepContext, Track, days};
 use crate::alert::{Level, Policy};
+use crate::fit::Observation;
 use crate::monitor::declared::Declarations;
 use crate::monitor::event::{AlertState, Event, EventKind};
 use crate::reading::{BenchmarkId, Reading, Timestamp};
@@ -17,6 +19,10 @@ const MOST_READINGS: usize = 2000;
 const ALL_FOR: SignedDuration = SignedDuration::from_hours(90 * 24);
 /// The rule of a level that comes from the past.
 pub(in crate::monitor) const PAST: &str = "past";
+/// Before the reading that is judged first the course of the chance that calls red is begun so many of its spans earlier, with so many
+/// readings of each judged.
+const COURSES: i32 = 3;
+const JUDGED_A_COURSE: i32 = 12;
 const DAY: SignedDuration = SignedDuration::from_hours(24);
 
 /// A benchmark's past, as far as it has been gone through.
@@ -69,9 +75,54 @@ impl Track {
         if self.quality.is_stuck() {
             return Vec::new();
         }
-        let mut events = self.judge(policy, time, context);
+        let forecast = self.forecast(policy, context);
+        if let Some(forecast) = &forecast {
+            self.begin_course(policy, time, forecast, context);
+        }
+        let mut events = self.judge_by(policy, time, forecast, context);
         self.pending.hold_back(&mut events);
         events
+    }
+
+    /// Where the newest `forecast`, of `time`, is not far from calling red: its course is what readings before that would have led to. A
+    /// chance that is higher for one reading would call red without it.
+    fn begin_course(
+        &mut self,
+        policy: &Policy,
+        time: Timestamp,
+        forecast: &Forecast,
+        context: &StepContext<'_>,
+    ) {
+        let red_within = days(LookAhead::of(policy, Some(forecast)).red);
+        if forecast.chance_within(red_within) < policy.red_mean_chance() / 2.0 {
+            return;
+        }
+        let (mut earlier, mut context) = (self.past(time).track, *context);
+        let Ok(mut next) = time.checked_sub(COURSES * policy.red_course()) else {
+            return;
+        };
+        let readings = self.record.observations().values.iter();
+        let readings = readings.filter_map(|one| self.reading_of(one));
+        for reading in readings.take_while(|one| one.time < time) {
+            context.phase.now = reading.time;
+            (context.phase.is_past, context.phase.is_queue) = (true, false);
+            earlier.take(policy, self.record.source(), &reading, &context);
+            if reading.time >= next {
+                context.phase.is_past = false;
+                earlier.judge(policy, reading.time, &context);
+                next = reading.time + policy.red_course() / JUDGED_A_COURSE;
+            }
+        }
+        self.alarm.begin_course(earlier.alarm);
+    }
+
+    fn reading_of(&self, one: &Observation) -> Option<Reading> {
+        let time = self.record.history().time(one.t_days)?;
+        Some(Reading {
+            time,
+            value: one.value,
+            sigma: one.sigma,
+        })
     }
 
     /// The past of this benchmark up to `until`, at its beginning.
@@ -114,16 +165,11 @@ impl Track {
                 return (events, true);
             }
             walk.at_days = Some(one.t_days);
-            let Some(time) = self.record.history().time(one.t_days) else {
+            let Some(reading) = self.reading_of(one) else {
                 continue;
             };
-            let reading = Reading {
-                time,
-                value: one.value,
-                sigma: one.sigma,
-            };
             let mut context = *context;
-            context.phase.now = time;
+            context.phase.now = reading.time;
             let source = self.record.source();
             let said = walk.track.take(policy, source, &reading, &context);
             for event in said {

@@ -145,7 +145,7 @@ pub enum Item {
 
 impl Item {
     /// When it was measured, or should have been.
-    fn time(&self) -> Timestamp {
+    pub(in crate::runtime) fn time(&self) -> Timestamp {
         match self {
             Self::Reading { reading, .. } => reading.time,
             Self::Sample { sample, .. } => sample.time,

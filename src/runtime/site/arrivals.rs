@@ -74,6 +74,9 @@ impl Site {
         if matches!(arrival.input, Input::Trouble { .. }) {
             return Ok(self.step(self.data_now(), &arrival.input));
         }
+        if let Input::Reading { benchmark, .. } = &arrival.input {
+            self.waiting.are_taken(benchmark, arrival.time);
+        }
         if self.is_set_aside(arrival, wall) {
             return Ok(Vec::new());
         }
@@ -377,6 +380,7 @@ impl Site {
     pub fn live(&mut self, wall: Timestamp) -> Vec<Event> {
         let now = self.keeper.now(wall);
         let mut events = self.pass_by(now, self.clock(wall));
+        events.extend(self.end_silences(now));
         let is_behind = self.keeper.is_behind(wall);
         let notice = match (is_behind, self.monitor.clock_wrong()) {
             (true, None) => {

@@ -14,6 +14,7 @@ mod returned;
 mod standing_floods;
 mod timekeeper;
 mod unproven;
+mod waiting;
 
 pub(super) use arrivals::{Untimely, is_logged, untimely};
 pub use mute::Mute;
@@ -24,6 +25,7 @@ use crowd::MessageRush;
 use returned::Returned;
 use standing_floods::StandingFlood;
 use timekeeper::Timekeeper;
+use waiting::WaitingReadings;
 
 use crate::monitor::{Event, EventKind, Input, Monitor, Notice, RESET_FOUND, SUSPECT, Settings};
 use crate::reading::{BEFORE_ALL, BenchmarkId, Timestamp};
@@ -148,6 +150,8 @@ pub struct Site {
     at_rest: BTreeSet<BenchmarkId>,
     /// Values that wait, unacknowledged, until the host's clock is right.
     held: VecDeque<Arrival>,
+    /// What has been read, and waits for earlier values.
+    waiting: WaitingReadings,
     /// Values that were taken before, and corrected: until all that came with them has been seen.
     returned: Returned,
     /// Messages that come so fast that the past is not over yet.
@@ -182,6 +186,7 @@ impl Site {
             unproven: Unproven::default(),
             at_rest: BTreeSet::new(),
             held: VecDeque::new(),
+            waiting: WaitingReadings::default(),
             returned: Returned::default(),
             crowd: MessageRush::default(),
             read_anew: BTreeMap::new(),
@@ -210,6 +215,7 @@ impl Site {
     /// Goes by other settings from here on.
     pub fn change_settings(&mut self, settings: Settings) -> Vec<Event> {
         self.settings = settings.clone();
+        self.waiting.clear();
         let now = self.data_now();
         self.step(now, &Input::Settings(Box::new(settings)))
     }
@@ -229,6 +235,11 @@ impl Site {
                 return events;
             };
             let now = self.now.map_or(due, |now| now.max(due));
+            events.extend(self.count_from_waiting(now, until));
+            let next = self.monitor.next_deadline();
+            if next.is_none_or(|next| next > due) {
+                continue;
+            }
             let (due, passed) = if clock.is_some_and(|clock| now > clock) {
                 (due, Input::Notice(Notice::Passed { until: due }))
             } else {

@@ -1,7 +1,7 @@
 //! From a source's lines and messages to what the monitor takes: which benchmarks, which columns.
 
 use crate::config::{Benchmark, Broker, FileSource, SourceKind};
-use crate::monitor::Input;
+use crate::monitor::{Input, Measured};
 use crate::reading::{BenchmarkId, Conventions, Dialect, Quantity, Timestamp, Unit};
 use crate::runtime::ingest::{
     ColumnMap, Item, Measure, ReadOptions, Remark, TextFormat, TextRows, VectorMap, unit_in_name,
@@ -22,10 +22,15 @@ pub struct Arrival {
 }
 
 impl Arrival {
-    /// Where it stands among others: by time, and at one time the covariates before the readings, each by name.
-    pub fn rank(&self) -> (Timestamp, bool, &str) {
+    /// Where it stands among others: by time, and at one time the covariates before the readings, each by name, and of a benchmark the
+    /// displacement before the velocity: the first reading decides which of both is watched.
+    pub fn rank(&self) -> (Timestamp, bool, &str, Option<Quantity>) {
         let is_reading = self.input.read_benchmark().is_some();
-        (self.time, is_reading, self.input.series_name())
+        let quantity = match self.input.measured() {
+            Some(Measured::Reading { unit, .. }) => Some(unit.quantity()),
+            Some(Measured::Sample { .. }) | None => None,
+        };
+        (self.time, is_reading, self.input.series_name(), quantity)
     }
 }
 

@@ -3,9 +3,9 @@
 use super::decode::{Arrival, Decoder};
 use super::departed::hold_newest;
 use super::file::FileTail;
-use super::reorder::Reorder;
+use super::reorder::{Reorder, WaitingReading};
 use crate::config::{Benchmark, FilePattern, FileSource};
-use crate::reading::Timestamp;
+use crate::reading::{Quantity, Timestamp};
 use crate::runtime::clock::Stopwatch;
 use crate::store::Position;
 use jiff::SignedDuration;
@@ -33,6 +33,8 @@ pub struct ArrivalBatch {
     pub has_more: bool,
     /// Runs since the look that found the first of these values; also where the files held more than one batch.
     pub found: Option<Stopwatch>,
+    /// Readings that have been read and wait for earlier ones, or have done so: what is new.
+    pub waiting: Vec<WaitingReading>,
     /// Lines, records and files that could not be used, a source: what is new.
     pub quarantined: BTreeMap<String, u64>,
 }
@@ -41,7 +43,7 @@ pub struct ArrivalBatch {
 pub(super) type FileKey = (usize, PathBuf);
 
 /// The [`Arrival::rank`] of a file's next value, and the file.
-type Head = (Timestamp, bool, String, FileKey);
+type Head = (Timestamp, bool, String, Option<Quantity>, FileKey);
 
 /// One source.
 #[derive(Debug)]
@@ -168,9 +170,11 @@ impl Follower {
             }
             hold_newest(self.files.values_mut());
         }
-        let mut direct = self.beside_a_backlog(wall);
+        let mut arrivals = std::mem::take(&mut self.lost);
+        arrivals.extend(self.beside_a_backlog(wall));
         let most = if self.is_live { LIVE_BATCH } else { BATCH };
-        let mut read = direct.len();
+        let mut read = arrivals.len();
+        let mut direct = Vec::new();
         while read < most
             && let Some((.., key)) = self.heads.pop_first()
         {
@@ -182,9 +186,7 @@ impl Follower {
             file.refill();
             self.heads.extend(head(key, file));
         }
-        let mut arrivals = self.release(wall);
-        arrivals.append(&mut self.lost);
-        arrivals.extend(direct);
+        arrivals.extend(merged(self.release(wall), direct));
         let is_due = |source: &Followed| source.reorder.as_ref().is_some_and(Reorder::is_due);
         let caught_up = self.heads.is_empty()
             && !self.sources.iter().any(is_due)
@@ -194,6 +196,7 @@ impl Follower {
             positions: self.positions(),
             caught_up,
             has_more: self.files.values().any(|file| file.has_more),
+            waiting: self.newly_waiting(),
             found: self.looked.filter(|_| !arrivals.is_empty()),
             quarantined: self.newly_quarantined(),
             arrivals,
@@ -235,6 +238,12 @@ impl Follower {
         }
         arrivals.sort_by(|one, other| one.rank().cmp(&other.rank()));
         arrivals
+    }
+
+    fn newly_waiting(&mut self) -> Vec<WaitingReading> {
+        let reorders = self.sources.iter_mut();
+        let reorders = reorders.filter_map(|source| source.reorder.as_mut());
+        reorders.flat_map(Reorder::new_readings).collect()
     }
 
     /// What has changed of how far the files may be acknowledged: not past what still waits.
@@ -287,9 +296,24 @@ fn next_of(file: &mut FileTail, source: &mut Followed, wall: Timestamp) -> Optio
     }
 }
 
+/// What has waited and what has not, by [`Arrival::rank`]: a source that waits must not be days ahead of those beside it. Each keeps its
+/// own order.
+fn merged(waited: Vec<Arrival>, direct: Vec<Arrival>) -> Vec<Arrival> {
+    let mut all = Vec::with_capacity(waited.len() + direct.len());
+    let mut waited = waited.into_iter().peekable();
+    for next in direct {
+        while let Some(before) = waited.next_if(|one| one.rank() <= next.rank()) {
+            all.push(before);
+        }
+        all.push(next);
+    }
+    all.extend(waited);
+    all
+}
+
 fn head(key: FileKey, file: &FileTail) -> Option<Head> {
-    let (time, is_reading, name) = file.pending.front()?.rank();
-    Some((time, is_reading, name.to_owned(), key))
+    let (time, is_reading, name, quantity) = file.pending.front()?.rank();
+    Some((time, is_reading, name.to_owned(), quantity, key))
 }
 
 /// What a position is kept under: its source and its path.

@@ -26,6 +26,7 @@ pub(super) use decode::Decoder;
 pub use decode::{Arrival, is_taken, options_of};
 pub use follow::{ArrivalBatch, Follower};
 pub use known::KnownFiles;
+pub use reorder::WaitingReading;
 pub(super) use rescan::list;
 pub(super) use text::{BadLine, LinesRead, TextReader};
 

@@ -1,7 +1,8 @@
 //! A source's values wait for earlier ones, for a bounded time, and go out in the order of their measurement.
 
 use super::decode::Arrival;
-use crate::reading::Timestamp;
+use crate::monitor::Input;
+use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::clock;
 use crate::store::Position;
 use jiff::SignedDuration;
@@ -26,6 +27,8 @@ pub(super) struct Reorder {
     numbers: BTreeSet<u64>,
     /// When the held ones came, and some that have gone out, in that order.
     arrivals: VecDeque<(Timestamp, OrderKey)>,
+    /// Readings that have come since [`Reorder::new_readings`] was last asked.
+    new: Vec<WaitingReading>,
     /// The newest time measured, as far as it is not ahead of the wall clock.
     newest: Option<Timestamp>,
     /// Everything up to here is to go out.
@@ -34,6 +37,15 @@ pub(super) struct Reorder {
     positions: VecDeque<(u64, Position)>,
     /// What a restart goes on from, a file: what was acknowledged last.
     acknowledged: BTreeMap<String, Vec<u8>>,
+}
+
+/// A reading that has been read and waits for earlier ones.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WaitingReading {
+    /// Whose.
+    pub benchmark: BenchmarkId,
+    /// When it was measured.
+    pub time: Timestamp,
 }
 
 /// How it stood with a file that is under its name no more.
@@ -54,6 +66,7 @@ impl Reorder {
             held: BTreeMap::new(),
             numbers: BTreeSet::new(),
             arrivals: VecDeque::new(),
+            new: Vec::new(),
             newest: None,
             due: None,
             positions: VecDeque::new(),
@@ -72,12 +85,18 @@ impl Reorder {
 
     /// Holds a value that came at `wall`.
     pub(super) fn take(&mut self, arrival: Arrival, wall: Timestamp) {
-        let (_, is_reading, _) = arrival.rank();
+        let (_, is_reading, ..) = arrival.rank();
         let key = (arrival.time, is_reading, self.came);
         self.came += 1;
         // A clock that is wrong by years must not send everything out that waits.
         if arrival.time.duration_since(wall) <= clock::TOLERANCE {
             self.newest = self.newest.max(Some(arrival.time));
+        }
+        if let Input::Reading { benchmark, .. } = &arrival.input {
+            self.new.push(WaitingReading {
+                benchmark: benchmark.clone(),
+                time: arrival.time,
+            });
         }
         self.numbers.insert(key.2);
         self.arrivals.push_back((wall, key));
@@ -85,6 +104,11 @@ impl Reorder {
         if self.held.len() > MOST_HELD {
             self.due = self.due.max(self.held.keys().next().copied());
         }
+    }
+
+    /// The readings that have come since this was last asked; each of them waits, or has gone out by now.
+    pub(super) fn new_readings(&mut self) -> Vec<WaitingReading> {
+        std::mem::take(&mut self.new)
     }
 
     /// A file has been read so far; what that means may be acknowledged when all that has come by now has gone out.

@@ -1,6 +1,7 @@
 //! The text of one file on its way in: bytes to lines, lines to values and faults.
 
 use super::lines::{LineFault, Lines};
+use crate::reading::Quantity;
 use crate::runtime::ingest::{FileUnits, IngestError, Item, Meaning, Remark, TextRows, unpack};
 use serde::{Deserialize, Serialize};
 use std::error::Error;
@@ -107,6 +108,12 @@ impl TextReader {
                 break;
             }
         }
+        // Of one line, and of lines of one time that follow each other.
+        let of_one_time =
+            |(_, one): &(u64, Item), (_, next): &(u64, Item)| one.time() == next.time();
+        for same in fed.items.chunk_by_mut(of_one_time) {
+            same.sort_by(|(_, one), (_, next)| order(one).cmp(&order(next)));
+        }
         if self.lines.is_utf16() {
             fed.remarks.push(Remark::utf16());
         }
@@ -120,10 +127,8 @@ impl TextReader {
         fed: &mut LinesRead,
     ) -> (String, Option<DecodeFault>) {
         let taken = self.rows.take(number, &text);
-        let mut items = taken.items;
-        items.sort_by(|a, b| order(a).cmp(&order(b)));
         let states_units = self.rows.states_units();
-        for item in items {
+        for item in taken.items {
             let item = if states_units {
                 self.units.convert(item)
             } else {
@@ -154,13 +159,14 @@ pub(super) struct SavedText {
     units: FileUnits,
 }
 
-/// What was measured at one time comes as a replay has it: covariates first, each by name.
-fn order(item: &Item) -> (bool, &str) {
+/// What was measured at one time comes as a replay has it: covariates first, each by name, and of a benchmark the displacement first.
+fn order(item: &Item) -> (bool, &str, Option<Quantity>) {
     match item {
-        Item::Sample { channel, .. } => (false, channel),
-        Item::Reading { benchmark, .. } | Item::Missing { benchmark, .. } => {
-            (true, benchmark.as_str())
-        }
+        Item::Sample { channel, .. } => (false, channel, None),
+        Item::Missing { benchmark, .. } => (true, benchmark.as_str(), None),
+        Item::Reading {
+            benchmark, unit, ..
+        } => (true, benchmark.as_str(), Some(unit.quantity())),
     }
 }
 

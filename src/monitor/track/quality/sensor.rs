@@ -179,6 +179,26 @@ impl DataQuality {
         time: Timestamp,
     ) -> Option<Event> {
         let since = record.break_silence(time)?;
+        self.ends_silence(record, now, since)
+    }
+
+    /// The end of a silence, where the reading of `time`, which waits for earlier ones, is one at `until`.
+    pub(in crate::monitor::track) fn note_waiting(
+        &mut self,
+        record: &mut BenchmarkRecord,
+        now: Timestamp,
+        (time, until): (Timestamp, Timestamp),
+    ) -> Option<Event> {
+        let since = record.note_waiting(time, until)?;
+        self.ends_silence(record, now, since)
+    }
+
+    fn ends_silence(
+        &mut self,
+        record: &BenchmarkRecord,
+        now: Timestamp,
+        since: Timestamp,
+    ) -> Option<Event> {
         let text = format!("benchmark {} reads again", record.benchmark());
         self.ends_unknown(record, now, since, Reason::NoData, text)
     }

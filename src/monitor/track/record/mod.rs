@@ -148,7 +148,7 @@ impl BenchmarkRecord {
 
     /// When it becomes silent, if no reading comes.
     pub(super) fn silent_at(&self) -> Option<Timestamp> {
-        let (newest, due) = (self.silence.newest()?, self.silence.deadline()?);
+        let (newest, due) = (self.silence.counted_from()?, self.silence.deadline()?);
         Some(self.put_off(newest, due))
     }
 
@@ -171,6 +171,16 @@ impl BenchmarkRecord {
         } else {
             self.silence.broken_by(time)
         }
+    }
+
+    /// One of `time` has been read, and waits for earlier ones; where it ends a silence at `now`, the reading before which that began.
+    pub(super) fn note_waiting(&mut self, time: Timestamp, now: Timestamp) -> Option<Timestamp> {
+        self.silence.note_waiting(time, now)
+    }
+
+    /// When the last one was that has been read, of those that wait for earlier ones too.
+    pub(super) fn counted_from(&self) -> Option<Timestamp> {
+        self.silence.counted_from()
     }
 
     /// What comes now was measured long before `time`, which it is by the clock.
