@@ -5,8 +5,8 @@ use crate::alert::Policy;
 use crate::config::value;
 use crate::reading::{
     BenchmarkId, Conventions, CovariateKind, DecimalMark, Delimiter, Dialect, Disorder, LocalClock,
-    MOST_SKIPPED, MissingValues, Quantity, Recording, SelectError, Series, SummerTime, TimeFormat,
-    Timestamp,
+    MOST_SKIPPED, MissingValues, Quantity, Recording, SelectError, Series, SummerTime,
+    ThousandsMark, TimeFormat, Timestamp,
 };
 use crate::runtime::ingest::{
     ColumnMap, FilesRead, IngestError, ReadOptions, Remark, read_channels, read_with_remarks,
@@ -56,7 +56,7 @@ impl OutputArgs {
 }
 
 /// The names of the arguments that say what a file means.
-pub(super) const FILE_FLAGS: [&str; 11] = [
+pub(super) const FILE_FLAGS: [&str; 12] = [
     "columns",
     "averaging",
     "epoch",
@@ -65,6 +65,7 @@ pub(super) const FILE_FLAGS: [&str; 11] = [
     "missing",
     "delimiter",
     "decimal",
+    "thousands",
     "time_columns",
     "time_format",
     "skip_lines",
@@ -106,6 +107,9 @@ pub struct DialectArgs {
     /// What stands before the decimals: point or comma [default: point]
     #[arg(long, value_name = "MARK", value_parser = DecimalMark::parse)]
     pub decimal: Option<DecimalMark>,
+    /// What parts the thousands of numbers: comma, point, blank or apostrophe [default: nothing]
+    #[arg(long, value_name = "MARK", value_parser = ThousandsMark::parse)]
+    pub thousands: Option<ThousandsMark>,
     /// The column that gives the time; twice where date and time stand in two [default: time or t_days]
     #[arg(long = "time-column", value_name = "NAME")]
     pub time_columns: Vec<String>,
@@ -125,6 +129,7 @@ impl DialectArgs {
         Dialect {
             delimiter: self.delimiter,
             decimal: self.decimal.unwrap_or_default(),
+            thousands: self.thousands,
             time_columns: self.time_columns.clone(),
             time_format: self.time_format.clone().unwrap_or_default(),
             skip_lines: self.skip_lines.unwrap_or_default(),
@@ -187,6 +192,11 @@ impl FileArgs {
                 dialect.decimal.is_some(),
                 "--decimal",
                 "decimal of [[source]]",
+            ),
+            (
+                dialect.thousands.is_some(),
+                "--thousands",
+                "thousands of [[source]]",
             ),
             (
                 !dialect.time_columns.is_empty(),
@@ -255,33 +265,35 @@ impl ReadingArgs {
     /// [`IngestError`] as [`read_files`](crate::runtime::ingest::read_files) and [`read_channels`].
     pub fn load(&self) -> Result<Loaded, IngestError> {
         let options = self.file.options();
-        self.joined(read_with_remarks(&self.files, &options)?, &options)
+        self.joined(read_with_remarks(&self.files, &options)?, &|_| {
+            options.clone()
+        })
     }
 
-    /// With the covariates that stand in files of their own.
+    /// With the covariates that stand in files of their own, each read as `options` say of it.
     pub(super) fn joined(
         &self,
         read: FilesRead,
-        options: &ReadOptions,
+        options: &dyn Fn(&PathBuf) -> ReadOptions,
     ) -> Result<Loaded, IngestError> {
         let FilesRead {
-            mut recording,
+            recording,
             mut disorder,
             remarks,
             ..
         } = read;
         say_remarks(&remarks);
-        if !self.channels.is_empty() {
-            let (channels, met) = read_channels(&self.channels, options)?;
-            let covariates = Recording {
+        let mut parts = vec![recording];
+        for file in &self.channels {
+            let (channels, met) = read_channels(file, &options(file))?;
+            parts.push(Recording {
                 channels,
                 ..Recording::default()
-            };
-            let (merged, overlap) = Recording::merge(vec![recording, covariates])?;
-            recording = merged;
+            });
             disorder += met;
-            disorder += overlap;
         }
+        let (mut recording, overlap) = Recording::merge(parts)?;
+        disorder += overlap;
         self.state(&mut recording)?;
         warn_of(disorder);
         Ok(Loaded {

@@ -1,10 +1,11 @@
 //! `convert IN OUT`: readings from one file format to another.
 
 use super::args::{FileArgs, OutputArgs, OutputFormat, say_remarks, warn_of};
-use super::{bar, exit};
+use super::bar;
+use super::exit::{self, UsageError};
 use crate::runtime::ingest::{self, ConvertStage};
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Convert readings between CSV, NDJSON, TOA5 and MCAP, by the names' endings
 #[derive(Debug, clap::Args)]
@@ -23,6 +24,10 @@ pub(super) struct Args {
 
 /// Converts, and says what was written and what the output has no place for.
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
+    if args.out == Path::new("-") {
+        let text = "convert writes a file, whose ending says how: name one, such as out.ndjson";
+        return Err(UsageError(text.to_owned()).into());
+    }
     let bar = bar::shared();
     let mut progress = |stage: ConvertStage| match stage {
         ConvertStage::Read(share) => bar::share(&bar, share),

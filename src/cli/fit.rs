@@ -76,6 +76,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let mut table = args.output.table::<FitReport>()?;
     let format = args.output.lines();
     let output = OutputArgs { format };
+    let is_held = args.inversion.fix.is_some();
     let bar = bar::counted(count + 1, "{bar:40} {pos}/{len} inversions, {elapsed}");
     for (index, series) in recording.series.iter().enumerate() {
         let report = report(series, &options);
@@ -85,7 +86,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             continue;
         }
         let blank = if index == 0 { "" } else { "\n" };
-        bar.suspend(|| output.print(&report, |report| format!("{blank}{}", text(report))))?;
+        bar.suspend(|| {
+            output.print(&report, |report| {
+                format!("{blank}{}", text(report, is_held))
+            })
+        })?;
     }
     if let Some(table) = table {
         bar.finish_and_clear();
@@ -125,7 +130,7 @@ fn fixed(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "expected m=M with M from -20 to 29, not 0".to_owned())
 }
 
-fn text(report: &FitReport) -> String {
+fn text(report: &FitReport, is_held: bool) -> String {
     let mut out = String::new();
     // Writing to a string cannot fail.
     let _ = writeln!(
@@ -150,7 +155,7 @@ fn text(report: &FitReport) -> String {
     out.push_str(&summary(report).to_string());
     out.push('\n');
     out.push_str(&parameters(report).to_string());
-    out.push_str(&notes(report));
+    out.push_str(&notes(report, is_held));
     if !report.alternatives.0.is_empty() {
         out.push('\n');
         out.push_str(&alternatives(report).to_string());
@@ -204,6 +209,21 @@ fn summary(report: &FitReport) -> TextTable {
             .map(time)
             .join("  "),
     ]);
+    let passage = &report.critical_velocity_time;
+    table.row([
+        "critical velocity".to_owned(),
+        format!(
+            "passed in {} of cases within {:.0} days",
+            percent(passage.probability),
+            passage.horizon_days
+        ),
+    ]);
+    table.row([
+        "  5, 50, 95 %".to_owned(),
+        [passage.low, passage.median, passage.high]
+            .map(time)
+            .join("  "),
+    ]);
     table.row([
         "inverse velocity".to_owned(),
         format!(
@@ -222,7 +242,7 @@ fn summary(report: &FitReport) -> TextTable {
 }
 
 /// What needs an explanation where the report has it.
-fn notes(report: &FitReport) -> String {
+fn notes(report: &FitReport, is_held: bool) -> String {
     let mut out = String::new();
     if estimates(report).iter().any(|(_, one, _)| is_outside(one)) {
         out.push_str(
@@ -231,7 +251,7 @@ fn notes(report: &FitReport) -> String {
              (see the minima below), the best one may be an extreme among them: go by the interval.\n",
         );
     }
-    if is_held(&report.parameters.m) {
+    if is_held {
         out.push_str(HELD);
     }
     if regimes_differ(&report.regime, report.regime_under_load.as_ref()) {
@@ -254,11 +274,6 @@ pub(super) fn regimes_differ(constant: &FittedRegime, load: Option<&FittedRegime
 /// What is said where m is.
 const HELD: &str = "m is held. Regime, onset and intervals are those of the laws under a constant load whose m is about there, and - where\n\
      hardly any law that fits the readings has it. The failure is the monitor's, which leaves m free.\n";
-
-/// Whether an estimate was given: its bounds are one number.
-fn is_held(m: &Estimate) -> bool {
-    m.low.is_some() && m.low.map(f64::to_bits) == m.high.map(f64::to_bits)
-}
 
 /// Whether the best fit lies outside of the interval.
 fn is_outside(estimate: &Estimate) -> bool {

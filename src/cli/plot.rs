@@ -109,10 +109,12 @@ fn residual(args: &Args) -> anyhow::Result<String> {
     let found = pictures(&explanation);
     let picture = found.into_iter().find(|picture| picture.name == "residual");
     let picture = picture.ok_or_else(|| {
-        NoSuchReadings(format!(
-            "benchmark {}: too few readings for a residual",
-            series.benchmark
-        ))
+        let benchmark = &series.benchmark;
+        let why = explanation.remarks.first();
+        NoSuchReadings(match why {
+            Some(why) => format!("benchmark {benchmark}: no residual. {why}"),
+            None => format!("benchmark {benchmark}: too few readings for a residual"),
+        })
     })?;
     Ok(picture.svg)
 }

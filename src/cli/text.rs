@@ -1,6 +1,6 @@
 //! Events as lines for people.
 
-use crate::monitor::Event;
+use crate::monitor::{Event, EventKind};
 pub(super) use crate::reading::plain;
 use crate::reading::{BEFORE_ALL, Timestamp, minute};
 use jiff::tz::TimeZone;
@@ -9,8 +9,21 @@ use textwrap::{Options, WordSplitter};
 /// One event on one line: when, where, what, by the clocks of `zone`.
 pub(super) fn line(event: &Event, zone: &TimeZone) -> String {
     let place = event.benchmark.as_ref().map_or("site", |id| id.as_str());
-    let text = format!("{}  {place}  {}", minute(event.time), event.kind.sentence());
+    let (time, sentence) = (minute(event.time), event.kind.sentence());
+    let text = format!("{time}  {place}  {sentence}{}", ordered(event));
     local(&plain(&text), zone)
+}
+
+/// By which way an order came, and when by the host's clock: its event has the time of the newest reading.
+fn ordered(event: &Event) -> String {
+    let EventKind::Order { given, .. } = &event.kind else {
+        return String::new();
+    };
+    let door = (given.door).map_or_else(String::new, |door| format!(", over {}", door.name()));
+    let at = given
+        .given_at
+        .map_or_else(String::new, |at| format!(", given at {}", minute(at)));
+    format!("{door}{at}")
 }
 
 /// A line on as many lines of at most `columns` columns as its words need; those after the first begin with `indent`.

@@ -11,7 +11,8 @@ use crate::runtime::tail::{is_taken, options_of};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Reads the files: those of the config's sources as it says, of these only what it watches, and the others as the flags say.
+/// Reads the files, those of covariates too: those of the config's sources as it says, of these only what it watches, and the others as
+/// the flags say.
 /// Rows that cannot be used are set aside; what is left out is said on stderr.
 ///
 /// # Errors
@@ -21,13 +22,15 @@ pub(super) fn load(readings: &ReadingArgs, config: &Config) -> anyhow::Result<Lo
         let mut sources = config.sources.iter();
         sources.find(|source| source.pattern.is_of(file))
     };
+    let as_source = |file: &PathBuf| Some(options_of(of(file)?, &config.benchmarks, file));
     let sources: Vec<Option<&FileSource>> = readings.files.iter().map(of).collect();
-    refuse_idle_flags(readings, &sources)?;
+    let of_channels: Vec<Option<&FileSource>> = readings.channels.iter().map(of).collect();
+    refuse_idle_flags(readings, &sources, &of_channels)?;
     let options = readings.file.options();
     let (mut parts, mut all) = (Vec::new(), FilesRead::default());
     let mut without_readings = None;
     for (file, source) in readings.files.iter().zip(&sources) {
-        let own = source.map(|source| options_of(source, &config.benchmarks, file));
+        let own = as_source(file);
         let mut read = match read(file, own.as_ref().unwrap_or(&options)) {
             Ok(read) => read,
             Err(error) => {
@@ -52,13 +55,15 @@ pub(super) fn load(readings: &ReadingArgs, config: &Config) -> anyhow::Result<Lo
     let (recording, overlap) = Recording::merge(parts).map_err(IngestError::from)?;
     all.recording = recording;
     all.disorder += overlap;
-    Ok(readings.joined(all, &options)?)
+    let as_stated = |file: &PathBuf| as_source(file).unwrap_or_else(|| options.clone());
+    Ok(readings.joined(all, &as_stated)?)
 }
 
 /// Refuses flags that say how files are read, where the config says it of all files.
 fn refuse_idle_flags(
     readings: &ReadingArgs,
     sources: &[Option<&FileSource>],
+    of_channels: &[Option<&FileSource>],
 ) -> anyhow::Result<()> {
     let stated = readings.file.stated();
     let mut of_sources = readings.files.iter().zip(sources);
@@ -74,7 +79,7 @@ fn refuse_idle_flags(
         file.display(),
         source.id
     );
-    if sources.iter().any(Option::is_none) || !readings.channels.is_empty() {
+    if sources.iter().chain(of_channels).any(Option::is_none) {
         let flags: Vec<&str> = stated.iter().map(|(flag, _)| *flag).collect();
         exit::complain(&format_args!(
             "{place}; {} is for the other files",

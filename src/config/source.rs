@@ -4,7 +4,7 @@ use super::table::{Placed, Section, unique};
 use super::{Broker, FilePattern, FileSource, SourceKind, broker, value};
 use crate::reading::{
     Conventions, DecimalMark, Delimiter, Dialect, LocalClock, MOST_SKIPPED, MissingValues,
-    SummerTime, TimeFormat, Timestamp,
+    SummerTime, ThousandsMark, TimeFormat, Timestamp,
 };
 use jiff::SignedDuration;
 use std::collections::BTreeSet;
@@ -92,12 +92,14 @@ fn source(
 fn dialect(section: &mut Section<'_>, kind: Option<StatedKind>) -> Dialect {
     let delimiter = section.parsed("delimiter", Delimiter::parse);
     let decimal = section.parsed("decimal", DecimalMark::parse);
+    let thousands = section.parsed("thousands", ThousandsMark::parse);
     let time_columns = section.text_or_texts("time_column");
     let time_format = section.parsed("time_format", TimeFormat::parse);
     let skip_lines = skip_lines(section);
     let given = [
         ("delimiter", delimiter.as_ref().map(|given| &given.at)),
         ("decimal", decimal.as_ref().map(|given| &given.at)),
+        ("thousands", thousands.as_ref().map(|given| &given.at)),
         ("time_column", time_columns.as_ref().map(|given| &given.at)),
         ("time_format", time_format.as_ref().map(|given| &given.at)),
         ("skip_lines", skip_lines.as_ref().map(|given| &given.at)),
@@ -105,9 +107,22 @@ fn dialect(section: &mut Section<'_>, kind: Option<StatedKind>) -> Dialect {
     for (key, at) in given {
         refuse_idle(section, kind, key, at);
     }
+    let decimal = decimal.map_or_else(DecimalMark::default, |given| given.value);
+    if let Some(given) = &thousands
+        && given.value.is_decimal(decimal)
+    {
+        let name = given.value.name();
+        section.error(
+            &given.at,
+            format!("source.thousands = {name:?} is what stands before the decimals too"),
+            "write thousands = \"point\" beside decimal = \"comma\", or thousands = \"comma\""
+                .to_owned(),
+        );
+    }
     Dialect {
         delimiter: delimiter.map(|given| given.value),
-        decimal: decimal.map_or_else(DecimalMark::default, |given| given.value),
+        decimal,
+        thousands: thousands.map(|given| given.value),
         time_columns: time_columns.map_or_else(Vec::new, |given| given.value),
         time_format: time_format.map_or_else(TimeFormat::default, |given| given.value),
         skip_lines: skip_lines.map_or(0, |given| given.value),

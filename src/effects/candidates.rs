@@ -4,7 +4,8 @@ use super::act::{Act, harmonics};
 use super::definition::SearchedRecord;
 use super::frame::dot;
 use super::kind::{Form, Kind};
-use super::problem::{Problem, median};
+use super::problem::Problem;
+use super::quantiles::upper_median;
 use super::response::{Driver, Response};
 use super::term::{MIDDLE, Term};
 use crate::reading::Quantity;
@@ -175,7 +176,7 @@ pub(super) fn times_of_jumps(problem: &Problem, innovations: &[f64]) -> Vec<usiz
     let end = problem.used.saturating_sub(EVENT_MARGIN);
     let range = EVENT_MARGIN..end.min(innovations.len());
     let mut sizes: Vec<(usize, f64)> = range.map(|at| (at, innovations[at].abs())).collect();
-    let usual = median(sizes.iter().map(|(_, size)| *size).collect());
+    let usual = upper_median(sizes.iter().map(|(_, size)| *size).collect());
     sizes.retain(|(_, size)| *size > LARGE * usual);
     sizes.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     sizes.truncate(LARGE_INNOVATIONS);
@@ -197,7 +198,7 @@ pub(super) fn jumps(problem: &Problem, residual: &[f64]) -> Vec<usize> {
         return Vec::new();
     }
     let beside = 4;
-    let level = |range: &[f64]| median(range.to_vec());
+    let level = |range: &[f64]| upper_median(range.to_vec());
     let mut sizes: Vec<(usize, f64)> = (2..residual.len().saturating_sub(1))
         .map(|i| {
             let before = &residual[i.saturating_sub(beside)..i];

@@ -16,8 +16,9 @@ use super::refit::{Fitted, Start, refit};
 use super::search::{Accepted, Refitted, Search, SearchResult};
 use super::surrogate::{Innovations, Tried};
 use super::term::Scratch;
+use super::upslope::{self, goes_upslope};
 use super::verdict::{Verdict, effect};
-use crate::reading::{Channel, Series};
+use crate::reading::{Channel, Series, days_since};
 
 /// Why a cause is no part of the law of a record.
 const NOT_SEEN: &str = "it cannot be put into the law: the record is too short for it, too widely sampled, or of a quantity \
@@ -25,6 +26,8 @@ const NOT_SEEN: &str = "it cannot be put into the law: the record is too short f
 /// The same, of a covariate.
 const NO_COVER: &str =
     "it cannot be put into the law: the covariate stands still, or covers too little of the record";
+/// The same, of readings that fall.
+const UPSLOPE: &str = "the readings fall: nothing is judged before their sign is right";
 /// Of all figures, where something was refused.
 const ALL_IN: &str = "All that was declared is in the law of these errors and of this forecast, also what does not stand.";
 
@@ -49,6 +52,21 @@ pub fn explain_given(
     let look = |cleaned: &Series, channels: &[Channel], is_drawn| {
         let mut remarks = Vec::new();
         let ready = Ready::of(cleaned, channels, &mut remarks);
+        if ready
+            .as_ref()
+            .is_some_and(|ready| goes_upslope(&ready.problem))
+        {
+            remarks.push(upslope::REMARK.to_owned());
+            given = causes.iter().map(|one| not_put_in(one, UPSLOPE)).collect();
+            let verdict = Effect::of(Kind::UNEXPLAINED);
+            return (
+                Findings {
+                    verdict,
+                    ..Findings::none(cleaned.unit)
+                },
+                remarks,
+            );
+        }
         let law = ready
             .as_ref()
             .and_then(|ready| DeclaredLaw::of(ready, causes, is_drawn, options, progress));
@@ -62,6 +80,7 @@ pub fn explain_given(
         if judged.iter().any(is_refused) && !findings.known_load.parts.is_empty() {
             remarks.push(ALL_IN.to_owned());
         }
+        remarks.extend(moved(&judged, causes, &ready.problem));
         given = judged;
         progress(1.0);
         (findings, remarks)
@@ -214,6 +233,23 @@ impl DeclaredLaw {
             full: self.full.clone(),
         }
     }
+}
+
+/// Which causes fit best at another time than the one that was declared.
+fn moved(judged: &[DeclaredEffect], causes: &[Cause], problem: &Problem) -> Vec<String> {
+    let each = judged.iter().zip(causes).filter_map(|(one, cause)| {
+        let (declared, found) = (cause.at?, one.effect.as_ref()?.at?);
+        let days = days_since(declared, found);
+        (days.abs() > 1.5 * problem.spacing).then(|| {
+            format!(
+                "{}: it fits best at {found:.0}, {:.1} days {}.",
+                one.declared,
+                days.abs(),
+                if days > 0.0 { "later" } else { "earlier" }
+            )
+        })
+    });
+    each.collect()
 }
 
 fn reason(cause: &Cause) -> &'static str {

@@ -20,7 +20,7 @@ pub(super) const LAGS: usize = 20;
 
 /// p-value of the runs test of signs about the median (Wald and Wolfowitz); `None` with too few of either sign.
 pub(super) fn runs(innovations: &[f64]) -> Option<f64> {
-    let middle = super::problem::median(innovations.to_vec());
+    let middle = super::quantiles::upper_median(innovations.to_vec());
     let signs: Vec<bool> = innovations
         .iter()
         .filter(|u| (**u - middle).abs() > 0.0)
@@ -194,7 +194,7 @@ pub(super) fn newest_off(innovations: &[f64]) -> f64 {
     let off = |count: usize| {
         let (before, newest) = innovations.split_at(innovations.len().saturating_sub(count));
         let sizes = before.iter().map(|u| u.abs()).collect();
-        let deviation = super::problem::median(sizes) / NORMAL_MEDIAN;
+        let deviation = super::quantiles::upper_median(sizes) / NORMAL_MEDIAN;
         newest.iter().sum::<f64>().abs() / (newest.len() as f64).sqrt() / deviation.max(1e-300)
     };
     (1..=NEWEST).map(off).fold(0.0, f64::max)

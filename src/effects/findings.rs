@@ -27,6 +27,9 @@ use std::collections::BTreeMap;
 /// What is left is no noise where a test gives it less than this p-value.
 const LEFT_OVER: f64 = 0.001;
 
+/// A white noise of so many times what the readings' digits leave open is noise that they show.
+const CLEAR_OF_DIGITS: f64 = 1.5;
+
 /// Extrapolated over the later block, a law that is off by more than so many times the range of the readings has failed before.
 const FAILED: f64 = 100.0;
 const FAILS: &str = "The law fails within the held-out readings: an error larger than all that the readings range over is no figure, and is not given.";
@@ -115,6 +118,11 @@ pub(super) fn findings(
     };
     let (residual, left) = residual_tests(ready, both, scratch);
     let explained = confirmed(explained, &full, &noise, &error, &residual);
+    // Nothing was found, and yet what is left is no noise, nor what the digits leave open.
+    let is_read = full.sigma > CLEAR_OF_DIGITS * problem.rounding;
+    if effects[0].effect == Kind::NONE && is_read && is_contradicted(&residual) {
+        effects[0] = Effect::of(Kind::UNEXPLAINED);
+    }
     let curves = curves(problem, by_least_squares, held.as_ref(), unit, left);
     let curves = with_effects(curves, ready, &full, scratch);
     let mut candidates = found.candidates;
@@ -386,8 +394,8 @@ fn residual_tests(
             let tests = Tests {
                 runs: runs(&innovations),
                 stoffer_toloi: stoffer_toloi(problem, &innovations),
-                load_gain: Some(judged.load_gain()),
-                load_sd: Some(load_sd(&load)),
+                load_gain: judged.load.is_some().then(|| judged.load_gain()),
+                load_sd: (!load.is_empty()).then(|| load_sd(&load)),
             };
             let autocorrelation = autocorrelation(problem, &innovations);
             Some((

@@ -4,12 +4,16 @@ use super::act::Act;
 use super::fresh::{best_of_starts, fresh_starts};
 use super::kind::Form;
 use super::noise::{Memory, Noise, Whitener};
-use super::problem::{Problem, median, slips};
+use super::problem::{Problem, slips};
+use super::quantiles::upper_median;
 use super::refit::{Fitted, Start, likeliest, refit};
 use super::response::Driver;
 use super::rival::Rival;
 use super::term::{Scratch, Term, law_parameters};
 use crate::reading::{CovariateKind, Quantity};
+
+/// Velocities that are means over more of their own spacings would be smooth: their noise is shared by so many.
+const LONGEST_MEAN: f64 = 30.0;
 
 /// A fit without effects that are judged, and one with them.
 #[derive(Debug, Clone, Copy)]
@@ -85,6 +89,10 @@ pub(super) fn objection(problem: &Problem, fitted: &Fitted, drivers: &[Driver]) 
         Act::Averaging if own[0] < 0.5 => {
             Some("the readings are means over no more than their own spacing".to_owned())
         }
+        Act::Averaging if own[0] > LONGEST_MEAN => Some(format!(
+            "no instrument that is read so often gives means over {:.0} of its readings",
+            own[0]
+        )),
         Act::Load(_) if own.iter().any(|gain| gain.abs() > 4.5) => {
             Some("its gain lies on its bound".to_owned())
         }
@@ -120,7 +128,7 @@ fn jumps_at_once(problem: &Problem, fitted: &Fitted) -> bool {
 /// Why a jump in the sense of the motion may be slip and no offset; `None` where a jump back is evidence of the
 /// instrument, or nothing is evidence of slip.
 fn slip_instead(problem: &Problem, at: usize, size: f64, drivers: &[Driver]) -> Option<String> {
-    let level = |range: std::ops::Range<usize>| median(problem.y[range].to_vec());
+    let level = |range: std::ops::Range<usize>| upper_median(problem.y[range].to_vec());
     let beside = 5;
     let comes_back = (beside..problem.t.len() - beside).any(|i| {
         let fall = level(i - beside..i) - level(i..i + beside);

@@ -242,7 +242,7 @@ impl Filtered {
         let latest = &channel.samples[channel.samples.len().saturating_sub(LATEST)..];
         let gaps = latest.windows(2);
         let gaps = gaps.map(|pair| days_since(pair[0].time, pair[1].time));
-        let usual = super::problem::median(gaps.collect());
+        let usual = super::quantiles::upper_median(gaps.collect());
         latest.last().is_some_and(|newest| {
             days_since(newest.time, now) <= (MAY_SKIP * usual).max(self.mean_days)
         })

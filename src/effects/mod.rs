@@ -38,6 +38,7 @@ mod linear;
 mod noise;
 mod prior;
 mod problem;
+mod quantiles;
 mod ready;
 mod refit;
 mod refits;
@@ -52,6 +53,7 @@ mod trials;
 mod upslope;
 mod verdict;
 mod watch;
+mod weights;
 
 pub use act::Act;
 pub use by_clock::ByClock;

@@ -1,6 +1,8 @@
 //! The readings of one benchmark as the refits see them: days and mm, weights, and the nodes of the law's solution.
 
 use super::faults::resolution;
+use super::quantiles::upper_median;
+use super::weights::{local_misfits, unit_median, weights};
 use crate::fit::Observations;
 use crate::reading::{Channel, Quantity, SECONDS_PER_DAY, Series, Timestamp, days_since};
 
@@ -10,8 +12,6 @@ pub(super) const MOST_READINGS: usize = 3000;
 const NODES: f64 = 1500.0;
 /// No more nodes than this between two readings, where they stand evenly: a response smooths what is finer.
 const NODES_A_READING: f64 = 4.0;
-/// Readings about which the local line is drawn.
-const NEIGHBOURS: usize = 4;
 /// Of the largest reading.
 const FINEST: f64 = 1e-9;
 /// Share of the usual velocity under which a load has no hold on the noise: there the readings give no velocity.
@@ -46,7 +46,7 @@ pub(super) struct Problem {
     /// The velocity that an undeclared load multiplies, at each reading, mm/day: the plain law's by least
     /// squares, so that every model is judged under the same noise.
     pub(super) seen: Vec<f64>,
-    /// Whether the weights are in proportion to the velocities beside each reading.
+    /// Whether the weights go with the velocities beside each reading.
     pub(super) is_relative: bool,
 }
 
@@ -63,17 +63,17 @@ impl Problem {
         if t.len() < 8 {
             return None;
         }
-        let spacing = median(t.windows(2).map(|pair| pair[1] - pair[0]).collect());
+        let spacing = upper_median(t.windows(2).map(|pair| pair[1] - pair[0]).collect());
         let misfits = local_misfits(&t, &y);
         let weight = match &sigma {
             Some(sigma) => unit_median(sigma.clone()),
-            None => weights(observations.quantity, &y, &misfits),
+            None => weights(observations.quantity, &t, &y, &misfits),
         };
         let is_relative =
             sigma.is_none() && weight.iter().any(|one| one.to_bits() != 1.0_f64.to_bits());
         let relative = misfits.iter().zip(&weight).map(|(m, w)| (m / w).abs());
         let rounding = rounding(series, &y);
-        let scatter = (median(relative.collect()) / 0.6745).max(rounding);
+        let scatter = (upper_median(relative.collect()) / 0.6745).max(rounding);
         let fine = channels
             .iter()
             .filter_map(channel_spacing)
@@ -100,7 +100,7 @@ impl Problem {
 
     /// Takes the plain law's velocities for those that an undeclared load multiplies.
     pub(super) fn see(&mut self, velocity: &[f64]) {
-        let usual = median(velocity.to_vec());
+        let usual = upper_median(velocity.to_vec());
         let seen = velocity.iter().map(|v| v.max(LEAST_SEEN * usual));
         self.seen = seen.collect();
     }
@@ -199,13 +199,13 @@ fn channel_spacing(channel: &Channel) -> Option<f64> {
     let gaps: Vec<f64> = gaps
         .map(|pair| days_since(pair[0].time, pair[1].time))
         .collect();
-    (!gaps.is_empty()).then(|| median(gaps).max(1.0 / SECONDS_PER_DAY))
+    (!gaps.is_empty()).then(|| upper_median(gaps).max(1.0 / SECONDS_PER_DAY))
 }
 
 /// Reading times, and between them as many more as `fine` days ask for, within bounds.
 fn nodes(t: &[f64], averaging_days: f64, fine: f64) -> (Vec<f64>, Vec<usize>) {
     let span = t[t.len() - 1] - t[0];
-    let usual = median(t.windows(2).map(|pair| pair[1] - pair[0]).collect());
+    let usual = upper_median(t.windows(2).map(|pair| pair[1] - pair[0]).collect());
     let step = fine.max(span / NODES).max(usual / NODES_A_READING);
     let (mut nodes, mut node_of) = (Vec::new(), Vec::new());
     if averaging_days > 0.0 {
@@ -226,66 +226,6 @@ fn nodes(t: &[f64], averaging_days: f64, fine: f64) -> (Vec<f64>, Vec<usize>) {
     (nodes, node_of)
 }
 
-/// How far each reading stands from the line through its neighbours, scaled to one reading's own error.
-fn local_misfits(t: &[f64], y: &[f64]) -> Vec<f64> {
-    let inner = t.windows(3).zip(y.windows(3)).map(|(t, y)| {
-        let share = (t[1] - t[0]) / (t[2] - t[0]);
-        let line = y[0] + share * (y[2] - y[0]);
-        (y[1] - line) / (1.0 + share * share + (1.0 - share) * (1.0 - share)).sqrt()
-    });
-    let inner: Vec<f64> = inner.collect();
-    let first = inner.first().copied().unwrap_or(0.0);
-    let last = inner.last().copied().unwrap_or(0.0);
-    std::iter::once(first)
-        .chain(inner)
-        .chain(std::iter::once(last))
-        .collect()
-}
-
-/// Displacements are read with one error; of velocities, whichever of an absolute and a relative error
-/// makes their scatter likelier.
-fn weights(quantity: Quantity, y: &[f64], misfits: &[f64]) -> Vec<f64> {
-    let ones = vec![1.0; y.len()];
-    if quantity == Quantity::Displacement {
-        return ones;
-    }
-    let level: Vec<f64> = (0..y.len())
-        .map(|i| {
-            let from = i.saturating_sub(NEIGHBOURS);
-            let until = (i + NEIGHBOURS + 1).min(y.len());
-            median(y[from..until].iter().map(|y| y.abs()).collect())
-        })
-        .collect();
-    let floor = 0.05 * median(level.clone());
-    if floor <= 0.0 {
-        return ones;
-    }
-    let level = unit_median(level.iter().map(|v| v.max(floor)).collect());
-    let deviance = |weight: &[f64]| {
-        let scaled = misfits.iter().zip(weight).map(|(m, w)| (m / w).abs());
-        let size = median(scaled.collect()).max(1e-300);
-        let logs = weight.iter().map(|w| w.ln()).sum::<f64>();
-        let tails = misfits
-            .iter()
-            .zip(weight)
-            .map(|(m, w)| 2.0 * (m / w / size / 2.0).powi(2).ln_1p());
-        weight.len() as f64 * size.ln() + logs + tails.sum::<f64>()
-    };
-    if deviance(&level) < deviance(&ones) {
-        level
-    } else {
-        ones
-    }
-}
-
-fn unit_median(mut values: Vec<f64>) -> Vec<f64> {
-    let middle = median(values.clone());
-    for value in &mut values {
-        *value /= middle;
-    }
-    values
-}
-
 /// The slip from the first of the times, days, to each: velocities, one a time, by the trapezium rule.
 pub(super) fn slips(t: &[f64], velocity: &[f64]) -> Vec<f64> {
     let steps = velocity.windows(2).zip(t.windows(2));
@@ -295,15 +235,6 @@ pub(super) fn slips(t: &[f64], velocity: &[f64]) -> Vec<f64> {
         Some(*sum)
     });
     std::iter::once(0.0).chain(sums).collect()
-}
-
-/// The middle value; 0 of none.
-pub(super) fn median(mut values: Vec<f64>) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 #[cfg(test)]

@@ -73,7 +73,8 @@ impl Driver {
         let (span, first_value) = (last.0 - first.0, first.1);
         let start = first.0;
         let gaps = samples.windows(2).map(|pair| pair[1].0 - pair[0].0);
-        let spacing = super::problem::median(gaps.collect()).max(span / (MOST_VALUES - 1) as f64);
+        let spacing =
+            super::quantiles::upper_median(gaps.collect()).max(span / (MOST_VALUES - 1) as f64);
         let count = (span / spacing).round().max(3.0);
         let step = span / count;
         let is_total = channel.kind() == CovariateKind::Rain;

@@ -5,7 +5,8 @@ use super::definition::{EffectDefinition, Trying};
 use super::frame::{Frame, Frames, dot};
 use super::kind::{Form, Kind};
 use super::linear::Linear;
-use super::problem::{Problem, median};
+use super::problem::Problem;
+use super::quantiles::upper_median;
 use super::response::Driver;
 use super::term::Term;
 use nalgebra::DMatrix;
@@ -205,7 +206,7 @@ pub(super) fn noise_alone(
     let mut innovations = frames.innovations().to_vec();
     if kind == Innovations::WithoutJumps {
         let sizes = innovations.iter().map(|u| u.abs()).collect();
-        let most = LARGEST * median(sizes) / NORMAL_MEDIAN;
+        let most = LARGEST * upper_median(sizes) / NORMAL_MEDIAN;
         for innovation in &mut innovations {
             *innovation = innovation.clamp(-most, most);
         }

@@ -1,6 +1,7 @@
 //! Readings that go the wrong way: the law only moves downslope, and whatever is tried beside it only undoes that.
 
-use super::problem::{Problem, median};
+use super::problem::Problem;
+use super::quantiles::upper_median;
 use crate::reading::Quantity;
 
 /// What is remarked of them.
@@ -27,10 +28,10 @@ pub(super) fn goes_upslope(problem: &Problem) -> bool {
             below as f64 > MOSTLY * y.len() as f64
         }
         Quantity::Displacement => {
-            let end = |part: &[f64]| median(part.to_vec());
+            let end = |part: &[f64]| upper_median(part.to_vec());
             let fall = end(&y[..END]) - end(&y[y.len() - END..]);
             let off = y.windows(3).map(|w| (w[1] - 0.5 * (w[0] + w[2])).abs());
-            fall > SHARE * problem.range() && fall > CLEAR * median(off.collect())
+            fall > SHARE * problem.range() && fall > CLEAR * upper_median(off.collect())
         }
     }
 }

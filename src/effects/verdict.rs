@@ -11,7 +11,7 @@ use super::noise::{Memory, Whitener};
 use super::problem::Problem;
 use super::ready::Ready;
 use super::refit::{Fitted, Start, jacobian, refit, under_likeliest};
-use super::response::Driver;
+use super::response::{Driver, Response};
 use super::rival::Rival;
 use super::search::{Accepted, SIGNIFICANT, SearchResult};
 use super::term::{Scratch, Term, law_parameters, time_of};
@@ -25,6 +25,9 @@ pub(super) struct Verdict {
     /// The law with the effects that stand.
     pub(super) full: Fitted,
 }
+
+/// By so much of its ln a delay is moved to see what it changes.
+const NUDGE: f64 = 0.1;
 
 /// Explained in full, the residual is at most this many times the white noise.
 pub(super) const LARGEST_REST: f64 = 2.0;
@@ -382,7 +385,7 @@ fn size(ready: &Ready, term: &Term, values: &[f64]) -> EffectSize {
     (term.kind.definition().size)(&fitted)
 }
 
-/// Standard deviation of a term's first coefficient, all others free.
+/// Standard deviation of a term's first coefficient, all others free, and its delay.
 fn deviation(ready: &Ready, full: &Fitted, index: usize, scratch: &mut Scratch) -> Option<f64> {
     let problem = &ready.problem;
     let whitener = ready
@@ -392,8 +395,34 @@ fn deviation(ready: &Ready, full: &Fitted, index: usize, scratch: &mut Scratch) 
     let mut columns = jacobian(problem, full, scratch);
     let earlier: usize = full.terms[..index].iter().map(Term::coefficients).sum();
     let own = columns.remove(super::term::law_parameters(problem) + earlier);
+    columns.extend(by_delay(ready, full, index, scratch));
     let frame = super::frame::Frame::new(whitener.clone(), &own, &columns);
     Some(full.sigma / frame.misfit.sqrt())
+}
+
+/// What the delay of a term's response changes of the prediction of every reading, by its ln; `None` without one.
+fn by_delay(ready: &Ready, full: &Fitted, index: usize, scratch: &mut Scratch) -> Option<Vec<f64>> {
+    let (problem, term) = (&ready.problem, &full.terms[index]);
+    let own = term.response.filter(|own| own.mean_days > 0.0)?;
+    let longer = Response {
+        mean_days: own.mean_days * NUDGE.exp(),
+        ..own
+    };
+    let driver = Driver::at(&ready.drivers, term.channel)?;
+    let mut terms = full.terms.clone();
+    terms[index].act = match &term.act {
+        Act::Load(_) => Act::Load(vec![driver.respond(longer, &problem.nodes)?]),
+        Act::Reading(_) => Act::Reading(vec![driver.respond(longer, &problem.t)?]),
+        Act::PerVelocity
+        | Act::PerSlip
+        | Act::Averaging
+        | Act::Step
+        | Act::Reset
+        | Act::Friction(_) => return None,
+    };
+    let is_motion = scratch.predict(problem, &terms, &full.parameters);
+    let both = scratch.prediction.iter().zip(&full.prediction);
+    is_motion.then(|| both.map(|(then, now)| (then - now) / NUDGE).collect())
 }
 
 /// What a term adds to the prediction of every reading: with it, less without. Not a number where the law without it fails within

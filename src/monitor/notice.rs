@@ -4,7 +4,7 @@ use super::Monitor;
 use super::event::{AlertState, Event, EventKind};
 use super::track::Track;
 use crate::alert::Level;
-use crate::reading::{BenchmarkId, Timestamp};
+use crate::reading::{BenchmarkId, Quantity, Timestamp};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
@@ -203,13 +203,15 @@ impl Monitor {
         track.is_some_and(Track::is_silent)
     }
 
-    /// The benchmarks that fall silent by `until`.
-    pub fn silent_by(&self, until: Timestamp) -> impl Iterator<Item = BenchmarkId> {
-        let due = self.benchmarks.due(until).into_iter();
-        due.filter(move |id| {
-            let track = self.benchmarks.get(id);
-            track.is_some_and(|track| track.is_silent_by(until))
-        })
+    /// The benchmarks that are to be judged by `until` although no reading comes.
+    pub fn due_by(&self, until: Timestamp) -> impl Iterator<Item = BenchmarkId> {
+        self.benchmarks.due(until).into_iter()
+    }
+
+    /// Whether this is the quantity of the benchmark that is watched; also before its first reading.
+    pub fn watches(&self, benchmark: &BenchmarkId, quantity: Quantity) -> bool {
+        let track = self.benchmarks.get(benchmark);
+        track.is_none_or(|track| track.quantity() == quantity)
     }
 
     /// When the newest reading of a benchmark was measured from which its silence counts, of those that wait for earlier ones too.

@@ -13,6 +13,8 @@ pub struct Dialect {
     pub delimiter: Option<Delimiter>,
     /// What stands before the decimals.
     pub decimal: DecimalMark,
+    /// What parts the thousands of numbers, where something does.
+    pub thousands: Option<ThousandsMark>,
     /// The columns that give the time, joined by a blank; with none, the one named `time` or `t_days`.
     pub time_columns: Vec<String>,
     /// How a time is written.
@@ -84,6 +86,14 @@ impl Dialect {
 
     /// The finite number that a cell holds.
     pub fn number(&self, cell: &str) -> Option<f64> {
+        let plain;
+        let cell = match self.thousands {
+            Some(mark) if mark.stands_in(cell) => {
+                plain = self.without_thousands(cell, mark)?;
+                &plain
+            }
+            Some(_) | None => cell,
+        };
         let number: f64 = match self.decimal {
             DecimalMark::Point => cell.parse().ok()?,
             // A point beside a decimal comma parts thousands in some countries: nothing is guessed.
@@ -91,6 +101,25 @@ impl Dialect {
             DecimalMark::Comma => cell.replacen(',', ".", 1).parse().ok()?,
         };
         Some(number)
+    }
+
+    /// The same without the marks between thousands: at most three digits before the first, three after each, and none behind the
+    /// decimal mark. `None` where that is not so.
+    fn without_thousands(&self, cell: &str, mark: ThousandsMark) -> Option<String> {
+        let decimal = match self.decimal {
+            DecimalMark::Point => '.',
+            DecimalMark::Comma => ',',
+        };
+        let from = usize::from(cell.starts_with(['-', '+']));
+        let until = cell.find(decimal).unwrap_or(cell.len());
+        let groups: Vec<&str> = cell.get(from..until)?.split(|one| mark.is(one)).collect();
+        let are_digits = |group: &&str| group.bytes().all(|byte| byte.is_ascii_digit());
+        let (first, others) = groups.split_first()?;
+        let is_number = (1..=3).contains(&first.len())
+            && others.iter().all(|group| group.len() == 3)
+            && groups.iter().all(are_digits)
+            && !mark.stands_in(&cell[until..]);
+        is_number.then(|| [&cell[..from], &groups.concat(), &cell[until..]].concat())
     }
 }
 
@@ -169,6 +198,66 @@ impl DecimalMark {
             "," | "comma" => Ok(Self::Comma),
             _ => Err("write point or comma".to_owned()),
         }
+    }
+}
+
+/// What parts the thousands of numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ThousandsMark {
+    /// `1,234.5`
+    Comma,
+    /// `1.234,5`
+    Point,
+    /// `1 234.5`, also with blanks that no line is broken at.
+    Blank,
+    /// `1'234.5`
+    Apostrophe,
+}
+
+impl ThousandsMark {
+    /// Parses `,`, `.`, a blank or `'`, or `comma`, `point`, `blank`, `apostrophe`.
+    ///
+    /// # Errors
+    /// What to write instead.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        match text {
+            "," | "comma" => Ok(Self::Comma),
+            "." | "point" => Ok(Self::Point),
+            " " | "blank" => Ok(Self::Blank),
+            "'" | "apostrophe" => Ok(Self::Apostrophe),
+            _ => Err("write comma, point, blank or apostrophe".to_owned()),
+        }
+    }
+
+    /// The word of a config.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Comma => "comma",
+            Self::Point => "point",
+            Self::Blank => "blank",
+            Self::Apostrophe => "apostrophe",
+        }
+    }
+
+    /// Whether it is what stands before the decimals too.
+    pub fn is_decimal(self, decimal: DecimalMark) -> bool {
+        matches!(
+            (self, decimal),
+            (Self::Comma, DecimalMark::Comma) | (Self::Point, DecimalMark::Point)
+        )
+    }
+
+    fn is(self, one: char) -> bool {
+        match self {
+            Self::Comma => one == ',',
+            Self::Point => one == '.',
+            Self::Blank => matches!(one, ' ' | '\u{a0}' | '\u{202f}' | '\u{2009}'),
+            Self::Apostrophe => matches!(one, '\'' | '\u{2019}'),
+        }
+    }
+
+    fn stands_in(self, text: &str) -> bool {
+        text.contains(|one| self.is(one))
     }
 }
 
@@ -409,6 +498,42 @@ mod tests {
         assert_eq!(comma.number("12"), Some(12.0));
         assert_eq!(comma.number("1.234,5"), None);
         assert_eq!(Dialect::default().number("12,5"), None);
+    }
+
+    #[test]
+    fn thousands_are_parted_by_the_mark_that_is_said_and_by_no_other() {
+        let with = |decimal, thousands| Dialect {
+            decimal,
+            thousands: Some(thousands),
+            ..Dialect::default()
+        };
+        let german = with(DecimalMark::Comma, ThousandsMark::Point);
+        let english = with(DecimalMark::Point, ThousandsMark::Comma);
+        let swiss = with(DecimalMark::Point, ThousandsMark::Apostrophe);
+        let french = with(DecimalMark::Comma, ThousandsMark::Blank);
+        let cases = [
+            (&german, "-1.234.567,25", Some(-1_234_567.25)),
+            (&german, "1.234", Some(1234.0)),
+            (&german, "1234,5", Some(1234.5)),
+            (&german, "12,5", Some(12.5)),
+            (&german, "1.23", None),
+            (&german, "1.2345,5", None),
+            (&german, "1234.567,5", None),
+            (&german, ".234", None),
+            (&german, "1,234.5", None),
+            (&english, "+1,234.5", Some(1234.5)),
+            (&english, "1.234,5", None),
+            (&swiss, "1'234.5", Some(1234.5)),
+            (&swiss, "1\u{2019}234", Some(1234.0)),
+            (&french, "12\u{202f}345,5", Some(12345.5)),
+            (&french, "1 234 567", Some(1_234_567.0)),
+        ];
+        for (dialect, cell, number) in cases {
+            assert_eq!(dialect.number(cell), number, "{cell}");
+        }
+        // What would be both is neither.
+        let both = with(DecimalMark::Point, ThousandsMark::Point);
+        assert_eq!(both.number("1.234.567"), None);
     }
 
     #[test]

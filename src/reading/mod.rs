@@ -17,7 +17,7 @@ mod unit;
 
 pub use conventions::{Conventions, LocalClock, MissingValues, SummerTime, TimeFault};
 pub use covariate::CovariateKind;
-pub use dialect::{DecimalMark, Delimiter, Dialect, MOST_SKIPPED, TimeFormat};
+pub use dialect::{DecimalMark, Delimiter, Dialect, MOST_SKIPPED, ThousandsMark, TimeFormat};
 pub use figure::{figure, whole_figure};
 pub use jiff::Timestamp;
 pub use plain::plain;

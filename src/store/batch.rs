@@ -85,6 +85,11 @@ impl Batch {
         self.commands.push(command);
     }
 
+    /// Whether that command has been taken.
+    pub fn has_taken(&self, command: i64) -> bool {
+        self.commands.contains(&command)
+    }
+
     /// How many steps are in it.
     pub fn steps(&self) -> usize {
         self.steps.len()

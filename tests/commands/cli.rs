@@ -86,6 +86,7 @@ fn bad_data_is_65_and_is_shown_with_its_place() {
     slipwatch(&["replay", &vaiont(), "--benchmark", "6"]).code(65);
     slipwatch(&["replay", &vaiont(), "--until", "1900-01-01T00:00:00Z"]).code(65);
     slipwatch(&["convert", &path, "out.txt"]).code(65);
+    slipwatch(&["convert", &path, "-"]).code(2);
 }
 
 #[test]

@@ -610,6 +610,21 @@ fn how_a_source_writes_its_tables_is_checked() {
             "14:14: error: source.skip_lines does nothing for this kind; leave it out",
         ),
         (
+            "csv",
+            "thousands = \"point\"\n",
+            "14:13: error: source.thousands = \"point\" is what stands before the decimals too; write thousands = \"point\" beside",
+        ),
+        (
+            "csv",
+            "thousands = \"dot\"\n",
+            "14:13: error: source.thousands = \"dot\" cannot be used; write comma, point, blank or apostrophe",
+        ),
+        (
+            "toa5",
+            "thousands = \"comma\"\n",
+            "14:13: error: source.thousands does nothing for this kind; leave it out",
+        ),
+        (
             "toa5",
             "decimal = \"comma\"\n",
             "14:11: error: source.decimal does nothing for this kind; leave it out",

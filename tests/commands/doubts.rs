@@ -414,11 +414,11 @@ fn a_benchmark_whose_readings_end_long_before_its_neighbours_is_named_by_check()
     let text = (0..200).fold(head, |mut text, row| {
         let time = newest - SignedDuration::from_hours(i64::from(199 - row));
         let value = 990.0 + 0.1 * f64::from(row) + 0.2 * drawn(row);
-        // A mark of thousands, as the logger writes it from 1000 mm on.
+        // The logger writes the unit beside what is longer.
         let first = if value < 1000.0 {
             format!("{value:.2}")
         } else {
-            format!("1'{:06.2}", value - 1000.0)
+            format!("{value:.2} mm")
         };
         let _ = writeln!(text, "{time:.0},{first},{value:.2}");
         text

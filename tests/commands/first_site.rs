@@ -78,6 +78,45 @@ fn one_command_leads_from_a_file_of_the_office_to_a_watch_that_reads_it() {
 }
 
 #[test]
+fn marks_between_thousands_are_seen_where_a_number_shows_them_or_are_said() {
+    let text = |part: &str, decimal: &str| {
+        let body = rows(60, |time, value| {
+            let (whole, rest) = (
+                (value * 100.0).round() as i64 / 100,
+                (value * 100.0).round() as i64 % 100,
+            );
+            format!("{time}Z;7{part}{:03}{decimal}{rest:02}\n", whole)
+        });
+        format!("time;P1_displacement_mm\n{body}")
+    };
+    let german = text(".", ",");
+    let swiss = text("\u{2019}", ".");
+    let whole = german.replace(",00\n", "\n").replace(",50\n", "\n");
+    let cases: [(&str, &[&str], &str, &str); 3] = [
+        (
+            &german,
+            &[],
+            "thousands = \"point\"",
+            "last  2017-06-03T11:00:00Z  7029.5 mm",
+        ),
+        (&swiss, &[], "thousands = \"apostrophe\"", "7029.5 mm"),
+        (
+            &whole,
+            &["--thousands", "point"],
+            "thousands = \"point\"",
+            "7029 mm",
+        ),
+    ];
+    for (text, flags, line, newest) in cases {
+        let office = Office::with(&[("slope.csv", text)]);
+        let said = office.done(&[&["init", "slope.csv"], flags].concat());
+        assert!(said.contains(newest), "no {newest:?} in {said}");
+        let config = fs::read_to_string(office.path("site.toml")).unwrap();
+        assert!(config.contains(line), "no {line:?} in {config}");
+    }
+}
+
+#[test]
 fn init_writes_nothing_where_a_file_leaves_something_open_and_names_the_flag() {
     let ambiguous = rows(50, |time, value| {
         format!(
@@ -98,7 +137,7 @@ fn init_writes_nothing_where_a_file_leaves_something_open_and_names_the_flag() {
             &["%d/%m/%Y %H:%M", "%m/%d/%Y %H:%M"],
         ),
         (&local, &[], &["--time-zone"]),
-        (thousands, &[], &["--decimal comma"]),
+        (thousands, &[], &["--decimal comma or --thousands comma"]),
         (
             two,
             &["--time-zone", "UTC"],

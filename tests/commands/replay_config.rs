@@ -55,13 +55,14 @@ fn a_flag_that_the_config_stands_over_is_refused_with_the_key_to_set() {
         ),
         ("site.toml", &site("slope.csv", "")),
     ]);
-    let cases: [(&[&str], &str); 11] = [
+    let cases: [(&[&str], &str); 12] = [
         (&["--missing", "-7999"], "missing of [[source]]"),
         (&["--time-zone", "Europe/Rome"], "time_zone of [[source]]"),
         (&["--dst", "standard"], "dst of [[source]]"),
         (&["--epoch", "2021-03-01T00:00:00Z"], "epoch of [[source]]"),
         (&["--delimiter", "comma"], "delimiter of [[source]]"),
         (&["--decimal", "point"], "decimal of [[source]]"),
+        (&["--thousands", "blank"], "thousands of [[source]]"),
         (&["--time-column", "time"], "time_column of [[source]]"),
         (&["--time-format", "rfc3339"], "time_format of [[source]]"),
         (&["--skip-lines", "0"], "skip_lines of [[source]]"),
@@ -136,4 +137,34 @@ fn a_state_is_played_without_files_and_flags_about_them() {
         let said = office.refused(2, &[&state[..], more].concat());
         assert!(said.contains("--state"), "{said}");
     }
+}
+
+#[test]
+fn a_file_of_covariates_that_belongs_to_a_source_is_read_as_that_says() {
+    let rain = rows(60, |time, value| {
+        format!(
+            "{};{}\n",
+            time.strftime("%d.%m.%Y %H:%M"),
+            format!("{:.2}", value + 100.25).replace('.', ",")
+        )
+    });
+    let rain = format!("Zeit;rain_mm\n{rain}");
+    let more = "[[source]]\nid = \"rain\"\nkind = \"csv\"\npath = \"rain.csv\"\ndelimiter = \"semicolon\"\ndecimal = \"comma\"\n\
+                time_column = \"Zeit\"\ntime_format = \"%d.%m.%Y %H:%M\"\ntime_zone = \"Europe/Rome\"\n";
+    let office = Office::with(&[
+        ("slope.csv", &plain(60)),
+        ("rain.csv", &rain),
+        ("site.toml", &site("slope.csv", more)),
+    ]);
+    let record = ["--record", "all.mcap", "--channels", "rain.csv"];
+    office.done(&[&REPLAY[..], &record].concat());
+    office.done(&["convert", "all.mcap", "all.csv"]);
+    let all = fs::read_to_string(office.path("all.csv")).unwrap();
+    for part in ["rain_mm", "129.75"] {
+        assert!(all.contains(part), "{all}");
+    }
+    // Which leaves no file to a flag.
+    let flag = ["--channels", "rain.csv", "--decimal", "comma"];
+    let said = office.refused(2, &[&REPLAY[..], &flag].concat());
+    assert!(said.contains("decimal of [[source]]"), "{said}");
 }

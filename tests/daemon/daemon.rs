@@ -12,7 +12,7 @@ use jiff::{SignedDuration, Timestamp};
 use slipwatch::alert::Level;
 use slipwatch::config::{self, Config};
 use slipwatch::monitor::{AlertState, Event, EventKind, Input};
-use slipwatch::reading::{BenchmarkId, Reading, Unit};
+use slipwatch::reading::{BenchmarkId, Quantity, Reading, Unit};
 use slipwatch::runtime::deliver::{Dispatcher, Retry};
 use slipwatch::runtime::delivered::Delivered;
 use slipwatch::runtime::hook::Status;
@@ -240,7 +240,11 @@ async fn a_benchmark_whose_readings_wait_for_earlier_ones_is_silent_when_no_more
         if is_read(hour) {
             let time = noon() + hours(hour);
             let benchmark = BenchmarkId::new("5");
-            site.note_waiting(vec![WaitingReading { benchmark, time }]);
+            site.note_waiting(vec![WaitingReading {
+                benchmark,
+                quantity: Quantity::Displacement,
+                time,
+            }]);
         }
         if is_read(hour - 12) {
             let arrival = reading(noon() + hours(hour - 12), value(hour - 12));

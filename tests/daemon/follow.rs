@@ -50,7 +50,8 @@ impl Bench {
         let text = format!("[site]\nname = \"Toc\"\nstate_dir = \"state\"\n{sources}");
         let config = config::parse(&text, &folder.path().join("site.toml")).unwrap();
         let follower = Follower::new(&config.sources, &config.benchmarks, &[]);
-        let wall = "2030-01-01T00:00:00Z".parse().unwrap();
+        // What waits does so no longer than from when its file was written.
+        let wall = "2025-01-01T00:00:00Z".parse().unwrap();
         Self {
             folder,
             config,
@@ -340,6 +341,24 @@ fn what_was_measured_at_one_time_comes_as_a_replay_has_it_whatever_the_files_are
     }
 }
 
+#[test]
+fn what_waits_for_earlier_values_waits_no_longer_for_a_restart() {
+    let reorder = "reorder = \"2h\"\n";
+    let mut bench = Bench::with("csv", reorder);
+    let hours = SignedDuration::from_hours;
+    bench.wall = slipwatch::runtime::clock::now();
+    let row = row_at(bench.wall - hours(1), 5);
+    bench.write("a.csv", &format!("{HEADER}{row}"));
+    assert!(bench.news().is_empty());
+    for _each in 0..3 {
+        bench.wall += SignedDuration::from_mins(35);
+        bench.restart();
+        assert!(bench.news().is_empty());
+    }
+    bench.wall += SignedDuration::from_mins(20);
+    assert_eq!(bench.news().len(), 1);
+}
+
 /// As in a replay: whichever comes first is watched.
 #[test]
 fn of_one_benchmark_and_time_the_displacement_comes_before_the_velocity() {
@@ -372,7 +391,7 @@ fn a_source_that_waits_for_earlier_values_is_not_ahead_of_those_beside_it_in_a_b
         "[[source]]\nid = \"a\"\nkind = \"csv\"\npath = \"a/*.csv\"\nreorder = \"3h\"\n\
          [[source]]\nid = \"b\"\nkind = \"csv\"\npath = \"b/*.csv\"\n",
     );
-    let start: Timestamp = "2026-03-01T00:00:00Z".parse().unwrap();
+    let start: Timestamp = "2020-03-01T00:00:00Z".parse().unwrap();
     let rows = |name: &str| {
         let rows = (0..200).map(|hour| row_at(start + SignedDuration::from_hours(hour), hour));
         format!("time,{name}_displacement_mm\n{}", rows.collect::<String>())

@@ -129,6 +129,26 @@ fn what_was_acknowledged_while_the_daemon_was_down_is_not_escalated_by_its_start
 }
 
 #[test]
+fn what_was_ended_while_the_daemon_was_down_is_not_escalated_by_its_start_and_is_ended_once() {
+    let site = site("1h");
+    let program = notified(&site);
+    eventually("that it waits", || {
+        standing(&site) == ("waiting".to_owned(), 0)
+    });
+    program.stop();
+    let resolve = ["alerts", "resolve", "--benchmark", "5", "--by", "Ada"];
+    let why = ["--why", "rockfall on the wire", "--config", "site.toml"];
+    site.printed(&[&resolve[..], &why].concat());
+    two_hours_later(&site);
+    let program = site.caught_up();
+    eventually("the end", || site.notified("5/red/", "resolved") == 1);
+    program.stop();
+    assert_eq!(escalated(&site), 0);
+    let orders = site.events().matches("\"event\":\"order\"").count();
+    assert_eq!(orders, 1, "{}", site.events());
+}
+
+#[test]
 fn another_command_line_of_its_hook_does_not_begin_the_time_of_an_escalation_anew() {
     let site = site("1h");
     let program = notified(&site);

@@ -7,13 +7,13 @@ use slipwatch::reading::{BenchmarkId, Reading, Timestamp, Unit, after_days, days
 
 /// Six-hourly displacements until `last` days, then none until `end` days; when each level was entered, days.
 fn levels(mm: impl Fn(f64) -> f64, last: f64, end: f64) -> Vec<(f64, Level, String)> {
-    levels_with_late_ones(mm, last, end, f64::INFINITY)
+    levels_with_late_ones(mm, (last, last), end, f64::INFINITY)
 }
 
-/// The same where from `late_from` days on one more reading comes three hours late after each, in a batch with it.
+/// The same where those after `last` until `read` days are read, and wait for earlier ones to the end; and where from `late_from` days on one more reading comes three hours late after each, in a batch with it.
 fn levels_with_late_ones(
     mm: impl Fn(f64) -> f64,
-    last: f64,
+    (last, read): (f64, f64),
     end: f64,
     late_from: f64,
 ) -> Vec<(f64, Level, String)> {
@@ -47,6 +47,17 @@ fn levels_with_late_ones(
     }
     let end = after_days(start, end).unwrap();
     while let Some(due) = monitor.next_deadline().filter(|due| *due <= end) {
+        let until = days_since(start, due);
+        if at <= read.min(until) {
+            let waits = Notice::Waits {
+                benchmark: BenchmarkId::new("P"),
+                time: after_days(start, at).unwrap(),
+                until: due,
+            };
+            events.extend(monitor.step(due, &Input::Notice(waits)));
+            at += 0.25;
+            continue;
+        }
         events.extend(monitor.step(due, &Input::Tick));
         let next = monitor.next_deadline();
         assert!(next.is_none_or(|next| next > due), "{due} does not pass");
@@ -79,9 +90,25 @@ fn a_failing_slope_whose_sensor_is_lost_becomes_red_before_its_collapse_without_
 }
 
 #[test]
+fn while_later_readings_wait_for_earlier_ones_no_red_is_called_for_want_of_them() {
+    let failing = |t: f64| -60.0 * (1.0 - t / 80.0).ln();
+    let red = |read: f64| {
+        let entered = levels_with_late_ones(failing, (70.0, read), 90.0, f64::INFINITY);
+        let red = entered
+            .into_iter()
+            .find(|(_, level, _)| *level == Level::Red);
+        red.map(|(at, _, text)| (at, text)).unwrap()
+    };
+    assert!(red(70.0).0 < 76.0);
+    let (at, text) = red(76.0);
+    assert!(at >= 76.25, "{at} {text}");
+    assert!(text.contains("no reading since 2020-03-17"), "{text}");
+}
+
+#[test]
 fn what_comes_late_keeps_no_benchmark_from_being_judged_when_its_readings_end() {
     let failing = |t: f64| -60.0 * (1.0 - t / 80.0).ln();
-    let entered = levels_with_late_ones(failing, 70.0, 90.0, 60.0);
+    let entered = levels_with_late_ones(failing, (70.0, 70.0), 90.0, 60.0);
     let after = |level: Level| {
         let mut all = entered.iter().filter(|(at, _, _)| *at > 70.0);
         all.any(|(_, entered, _)| *entered == level)

@@ -56,7 +56,7 @@ pub(super) fn shown(alert: &AlertView, zone: &TimeZone) -> String {
     };
     out += "audit trail\n";
     for event in &alert.audit {
-        let _ = writeln!(out, "  {}{}", text::line(event, zone), door(event, &clock));
+        let _ = writeln!(out, "  {}", text::line(event, zone));
     }
     out
 }
@@ -197,16 +197,4 @@ fn deliveries(rows: &[DeliveryRow]) -> String {
         );
     }
     out
-}
-
-/// By which way an order came, and when by the host's clock.
-fn door(event: &Event, clock: &dyn Fn(Timestamp) -> String) -> String {
-    let EventKind::Order { given, .. } = &event.kind else {
-        return String::new();
-    };
-    let door = (given.door).map_or_else(String::new, |door| format!(", over {}", door.name()));
-    let at = given
-        .given_at
-        .map_or_else(String::new, |at| format!(", given at {}", clock(at)));
-    format!("{door}{at}")
 }

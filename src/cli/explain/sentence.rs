@@ -87,7 +87,7 @@ pub(super) fn others(explanation: &Explanation) -> Vec<String> {
 
 /// Why something that was declared does not stand; `None` of what does.
 fn refused(one: &DeclaredEffect) -> Option<String> {
-    let why = one.rejected_because.as_ref()?;
+    let why = one.rejected_because.as_ref()?.trim_end_matches('.');
     let fitted = one.effect.as_ref();
     let fitted = fitted.map_or(String::new(), |effect| {
         format!(" (fitted as {})", phrase(effect))

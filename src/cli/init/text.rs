@@ -105,6 +105,9 @@ fn source_lines(text: &mut String, source: &super::PlannedSource, plan: &InitPla
     if dialect.decimal == DecimalMark::Comma {
         text.push_str("decimal = \"comma\"\n");
     }
+    if let Some(thousands) = dialect.thousands {
+        let _ = writeln!(text, "thousands = \"{}\"", thousands.name());
+    }
     match &dialect.time_columns[..] {
         [] => {}
         [one] => {

@@ -75,3 +75,27 @@ fn of_too_few_readings_nothing_is_judged() {
     let said = explain_given(&series, &channels, &[jump()], &options, &mut |_| {});
     assert_eq!(refusals(&said), [Some(TOO_FEW)]);
 }
+
+#[test]
+fn of_readings_that_fall_nothing_that_is_declared_is_judged() {
+    let (mut series, _) = driven_by_the_lake();
+    for reading in &mut series.readings {
+        reading.value = -reading.value;
+    }
+    let said = explain_given(&series, &[], &[jump()], &Options::default(), &mut |_| {});
+    assert_eq!(refusals(&said), [Some(UPSLOPE)]);
+    assert_eq!(said.verdict.effect, Kind::UNEXPLAINED);
+    assert!(said.remarks.iter().any(|remark| remark == upslope::REMARK));
+}
+
+#[test]
+fn a_declared_time_that_is_not_the_one_that_fits_best_is_remarked() {
+    let said = |hours: i64| {
+        let at = jump()
+            .at
+            .map(|at| at + jiff::SignedDuration::from_hours(hours));
+        judged(&[Cause { at, ..jump() }, through("lake")]).remarks
+    };
+    let moved = |remarks: &[String]| remarks.iter().any(|one| one.contains("it fits best at"));
+    assert!(!moved(&said(0)) && moved(&said(96)), "{:?}", said(96));
+}

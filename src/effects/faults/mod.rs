@@ -17,13 +17,14 @@ mod twin;
 
 use super::explanation::Fault;
 use super::kind::FaultKind;
+use crate::effects::quantiles::median;
 use crate::reading::{Channel, Series, Timestamp, days_since};
 use copies::Copied;
 use nature::Nature;
 use reset::ChannelReset;
 use smooth::Smoothness;
 use std::ops::Range;
-use trace::{Trace, median};
+use trace::Trace;
 
 pub(super) use trace::resolution;
 

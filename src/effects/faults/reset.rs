@@ -1,7 +1,8 @@
 //! A covariate's zero jumps: its sensor was moved or set again. Found by quiet before and after.
 
 use super::nature::Nature;
-use super::trace::{Trace, extreme, median, resolution, robust_deviation};
+use super::trace::{Trace, extreme, resolution};
+use crate::effects::quantiles::{median, robust_deviation};
 use crate::reading::RunningTotal;
 
 /// Samples on either side whose steps a jump is measured against.

@@ -1,6 +1,7 @@
 //! Series smoother than any instrument: interpolated between sparse points, drawn, or digitised from a drawing.
 
-use super::trace::{Trace, extreme, median, quantile, resolution};
+use super::trace::{Trace, extreme, resolution};
+use crate::effects::quantiles::{median, quantile};
 
 /// Fewer values do not show it.
 const FEWEST: usize = 60;

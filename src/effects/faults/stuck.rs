@@ -1,6 +1,7 @@
 //! The same value over and over, where the instrument's own noise says that it should move.
 
-use super::trace::{Trace, extreme, median, resolutions, symbols};
+use super::trace::{Trace, extreme, resolutions, symbols};
+use crate::effects::quantiles::median;
 use std::ops::Range;
 
 /// Fewer equal values are never called stuck.

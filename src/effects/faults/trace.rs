@@ -1,5 +1,6 @@
 //! One instrument's values in time, and what the detectors ask of them alike: order, scale, resolution.
 
+use crate::effects::quantiles::median;
 use crate::reading::{Channel, SECONDS_PER_DAY, Series, Timestamp};
 use std::cmp::Ordering;
 
@@ -70,38 +71,6 @@ impl Trace {
     pub(super) fn intervals(&self) -> Vec<f64> {
         self.days.windows(2).map(|pair| pair[1] - pair[0]).collect()
     }
-}
-
-/// The middle of `values`; 0 where there are none.
-pub(super) fn median(values: &[f64]) -> f64 {
-    quantile(values, 0.5)
-}
-
-/// The value under which `share` of them lie, between the two nearest; 0 where there are none.
-pub(super) fn quantile(values: &[f64], share: f64) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let Some(last) = sorted.len().checked_sub(1) else {
-        return 0.0;
-    };
-    let place = share * last as f64;
-    let below = place.floor();
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a share of the length"
-    )]
-    let index = (below as usize).min(last);
-    let above = sorted[(index + 1).min(last)];
-    sorted[index] + (place - below) * (above - sorted[index])
-}
-
-/// Standard deviation of the middle of `values`, heavy tails left out: 1.4826 times their median
-/// distance from their median.
-pub(super) fn robust_deviation(values: &[f64]) -> f64 {
-    let middle = median(values);
-    let distances: Vec<f64> = values.iter().map(|value| (value - middle).abs()).collect();
-    1.4826 * median(&distances)
 }
 
 /// The largest distance from zero.
@@ -310,12 +279,5 @@ mod tests {
         let symbols = symbols(&values, 1437.0);
         assert_eq!(symbols[0], symbols[2]);
         assert_ne!(symbols[0], symbols[1]);
-    }
-
-    #[test]
-    fn quantiles_of_little_are_what_there_is() {
-        assert!((median(&[3.0, 1.0, 2.0]) - 2.0).abs() < 1e-12);
-        assert!((quantile(&[1.0, 2.0], 0.5) - 1.5).abs() < 1e-12);
-        assert!(median(&[]).abs() < 1e-12);
     }
 }

@@ -3,7 +3,7 @@
 use super::*;
 use crate::effects::fixture::{daily, generator, normals, series, steady, with_gaps};
 use crate::effects::frame::Frame;
-use crate::effects::problem::median;
+use crate::effects::quantiles::upper_median;
 
 const COUNT: usize = 900;
 /// Substeps from which the gathered load is summed.
@@ -201,7 +201,7 @@ fn a_walk_does_not_follow_a_jump_of_velocities_that_are_read_with_an_error_in_pr
     let settled = 60;
     let innovations = Whitener::new(&problem, walk).innovations(&problem.y);
     let sizes: Vec<f64> = innovations[settled..].iter().map(|one| one.abs()).collect();
-    let usual = median(sizes.clone());
+    let usual = upper_median(sizes.clone());
     let largest = (0..sizes.len()).max_by(|a, b| sizes[*a].total_cmp(&sizes[*b]));
     assert_eq!(largest, Some(jump - settled));
     let jump = sizes[jump - settled];

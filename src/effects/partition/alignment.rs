@@ -1,5 +1,6 @@
 //! Several benchmarks' displacements at the same times, without jumps and stray readings.
 
+use crate::effects::quantiles::{median, robust_deviation};
 use crate::reading::{Quantity, SECONDS_PER_DAY, Series, Timestamp, days_since};
 
 /// Times in common that are worth having: more would follow noise, not motion.
@@ -102,7 +103,7 @@ fn without_strays(path: &AlignmentPath) -> AlignmentPath {
         let share = (three[1].0 - three[0].0) / (three[2].0 - three[0].0).max(f64::MIN_POSITIVE);
         three[1].1 - three[0].1 - share * (three[2].1 - three[0].1)
     };
-    let limit = OUTLYING * spread(&path.windows(3).map(bend).collect::<Vec<f64>>());
+    let limit = OUTLYING * robust_deviation(&path.windows(3).map(bend).collect::<Vec<f64>>());
     let is_stray = |three: &[(f64, f64)]| {
         let (low, high) = (three[0].1.min(three[2].1), three[0].1.max(three[2].1));
         limit > 0.0 && (three[1].1 > high + limit || three[1].1 < low - limit)
@@ -220,11 +221,8 @@ fn without_jumps(days: &[f64], rows: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
     for (index, row) in rows.iter().enumerate() {
         let common = |step: usize| {
             let others = (0..rows.len()).filter(|other| *other != index);
-            median(
-                others
-                    .map(|other| steps[other][step] / scales[other])
-                    .collect(),
-            )
+            let shares = others.map(|other| steps[other][step] / scales[other]);
+            median(&shares.collect::<Vec<f64>>())
         };
         let own: Vec<f64> = (0..count)
             .map(|step| steps[index][step] / scales[index] - common(step))
@@ -250,13 +248,13 @@ fn without_jumps(days: &[f64], rows: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
 fn jumps(own: &[f64]) -> Vec<bool> {
     let mut found = vec![false; own.len()];
     let bends: Vec<f64> = own.windows(2).map(|two| two[1] - two[0]).collect();
-    let noise = |of: &[f64]| spread(of) / std::f64::consts::SQRT_2;
+    let noise = |of: &[f64]| robust_deviation(of) / std::f64::consts::SQRT_2;
     let least = noise(&bends).max(1e-9);
     for length in 1..=LONGEST_JUMP {
         for first in 3..own.len().saturating_sub(length + 2) {
-            let before = median(own[first.saturating_sub(6)..first].to_vec());
+            let before = median(&own[first.saturating_sub(6)..first]);
             let end = first + length;
-            let after = median(own[end..own.len().min(end + 6)].to_vec());
+            let after = median(&own[end..own.len().min(end + 6)]);
             let (low, high) = (before.min(after), before.max(after));
             // Faster motion is read with more noise.
             let near = &bends[first.saturating_sub(8)..bends.len().min(end + 8)];
@@ -272,11 +270,8 @@ fn jumps(own: &[f64]) -> Vec<bool> {
 
 fn local_level(own: &[f64], jumps: &[bool], step: usize) -> f64 {
     let near = step.saturating_sub(6)..own.len().min(step + 7);
-    median(
-        near.filter(|one| !jumps[*one])
-            .map(|one| own[one])
-            .collect(),
-    )
+    let level = near.filter(|one| !jumps[*one]).map(|one| own[one]);
+    median(&level.collect::<Vec<f64>>())
 }
 
 /// Differences of successive values.
@@ -293,21 +288,4 @@ fn scale(steps: &[f64]) -> f64 {
     } else {
         size / steps.len() as f64
     }
-}
-
-/// The middle value; 0 of none.
-pub(super) fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let half = values.len() / 2;
-    match values.len() {
-        0 => 0.0,
-        even if even % 2 == 0 => f64::midpoint(values[half - 1], values[half]),
-        _ => values[half],
-    }
-}
-
-/// The robust standard deviation about the median.
-pub(super) fn spread(values: &[f64]) -> f64 {
-    let middle = median(values.to_vec());
-    1.4826 * median(values.iter().map(|value| (value - middle).abs()).collect())
 }

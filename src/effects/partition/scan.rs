@@ -1,7 +1,8 @@
 //! When benchmarks part, and into which groups: motion in constant proportion is a matrix of rank one, and
 //! its loadings are other ones after a partition.
 
-use super::alignment::{differences, spread};
+use super::alignment::differences;
+use crate::effects::quantiles::robust_deviation;
 use nalgebra::{DMatrix, DVector};
 
 /// Fewest columns on either side of a break.
@@ -420,7 +421,7 @@ fn scales(rows: &[Vec<f64>]) -> Option<Vec<f64>> {
             .map(|(x, y)| x / amplitudes[i] - y / amplitudes[j])
             .collect();
         let bends: Vec<f64> = apart.windows(2).map(|two| two[1] - two[0]).collect();
-        (0.5 * spread(&bends)).powi(2).max(1e-24)
+        (0.5 * robust_deviation(&bends)).powi(2).max(1e-24)
     };
     let count = rows.len() as f64;
     let sums: Vec<f64> = (0..rows.len())

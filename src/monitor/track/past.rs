@@ -21,7 +21,7 @@ const ALL_FOR: SignedDuration = SignedDuration::from_hours(90 * 24);
 pub(in crate::monitor) const PAST: &str = "past";
 /// Before the reading that is judged first the course of the chance that calls red is begun so many of its spans earlier, with so many
 /// readings of each judged.
-const COURSES: i32 = 3;
+const COURSES: i32 = 4;
 const JUDGED_A_COURSE: i32 = 12;
 const DAY: SignedDuration = SignedDuration::from_hours(24);
 

@@ -4,7 +4,7 @@ use super::Track;
 use crate::alert::{Level, Policy};
 use crate::monitor::event::Event;
 use crate::monitor::history::MeasuredAs;
-use crate::reading::{Reading, Timestamp};
+use crate::reading::{Quantity, Reading, Timestamp};
 
 impl Track {
     /// Keeps a reading of a time that has not come yet, as far as anybody knows.
@@ -53,7 +53,7 @@ impl Track {
     }
 
     /// Whether it falls silent by `until`, if no reading comes.
-    pub(in crate::monitor) fn is_silent_by(&self, until: Timestamp) -> bool {
+    fn is_silent_by(&self, until: Timestamp) -> bool {
         self.record.silent_at().is_some_and(|due| due <= until)
     }
 
@@ -65,6 +65,11 @@ impl Track {
         until: Timestamp,
     ) -> Option<Event> {
         (self.quality).note_waiting(&mut self.record, now, (time, until))
+    }
+
+    /// What of it is watched.
+    pub(in crate::monitor) fn quantity(&self) -> Quantity {
+        self.record.source().unit.quantity()
     }
 
     /// When the newest reading was from which its silence counts.

@@ -333,30 +333,23 @@ fn read_taking(
     Ok(read)
 }
 
-/// Reads covariates kept in files of their own; benchmarks that stand there too are left out.
+/// Reads covariates kept in a file of their own; benchmarks that stand there too are left out.
 ///
 /// # Errors
 /// [`IngestError`] as [`read_files`]; also for a file without any channel.
 pub fn read_channels(
-    paths: &[PathBuf],
+    path: &Path,
     options: &ReadOptions,
 ) -> Result<(Vec<Channel>, Disorder), IngestError> {
     let options = ReadOptions {
         columns: Vec::new(),
         ..options.clone()
     };
-    let mut parts = Vec::new();
-    let mut disorder = Disorder::default();
-    for path in paths {
-        let (mut recording, met) = read_files(std::slice::from_ref(path), &options)?;
-        if recording.channels.is_empty() {
-            return Err(IngestError::NoChannels { file: path.clone() });
-        }
-        recording.series.clear();
-        parts.push(recording);
-        disorder += met;
+    let (recording, disorder) = read_files(&[path.to_owned()], &options)?;
+    if recording.channels.is_empty() {
+        return Err(IngestError::NoChannels {
+            file: path.to_owned(),
+        });
     }
-    let (recording, overlap) = Recording::merge(parts)?;
-    disorder += overlap;
     Ok((recording.channels, disorder))
 }

@@ -401,10 +401,10 @@ impl TableRow<'_> {
     fn a_number(&self) -> &'static str {
         match self.rows.options.dialect.decimal {
             DecimalMark::Point => {
-                "a finite number, or an empty cell where it is missing; for a decimal comma set decimal (--decimal) to comma, for another mark of no value missing (--missing)"
+                "a finite number, or an empty cell where it is missing; for a decimal comma set decimal (--decimal) to comma, for marks between thousands thousands (--thousands), for another mark of no value missing (--missing)"
             }
             DecimalMark::Comma => {
-                "a finite number with a decimal comma and without marks for thousands, or an empty cell where it is missing"
+                "a finite number with a decimal comma, or an empty cell where it is missing; for marks between thousands set thousands (--thousands)"
             }
         }
     }

@@ -230,13 +230,17 @@ impl Site {
         };
         let is_beginning = alert.state == MessageState::Firing;
         let standing = self.standing.get(&place(alert));
-        let standing = standing.filter(|one| one.alert.key == alert.key);
+        // What people ended while no daemon ran is not written yet.
+        let is_end = |one: &Alert| one.key == alert.key && one.state == MessageState::Resolved;
+        let is_ended = self.fresh.iter().any(is_end);
+        let standing = standing.filter(|one| one.alert.key == alert.key && !is_ended);
         if is_beginning && standing.is_some_and(|one| one.attention == Attention::Acknowledged) {
             alerts.end(alert);
             return Ok(());
         }
         let awaited = store.awaited(alert.identity())?;
-        if is_beginning && standing.is_none() && self.is_over(store, alert, ended)? {
+        let is_over = is_beginning && standing.is_none();
+        if is_over && (is_ended || self.is_over(store, alert, ended)?) {
             alerts.leave_out(alert, &awaited);
             return Ok(());
         }

@@ -255,11 +255,14 @@ impl Site {
         events
     }
 
-    /// Takes an order of people. It is not of alerts that were called after it was given.
+    /// Takes an order of people, once also where the state still has it. It is not of alerts that were called after it was given.
     ///
     /// # Errors
     /// When the state cannot be asked for these.
     pub fn order(&mut self, left: LeftOrder) -> Result<Vec<Event>, StoreError> {
+        if self.batch.has_taken(left.number) {
+            return Ok(Vec::new());
+        }
         let mut order = left.order;
         if let Some(last) = left.last_event {
             let since = self.called_since(last, order.benchmark())?;

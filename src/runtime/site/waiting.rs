@@ -36,19 +36,27 @@ impl WaitingReadings {
 impl Site {
     /// These have been read, and wait for earlier ones.
     pub fn note_waiting(&mut self, readings: Vec<WaitingReading>) {
-        for WaitingReading { benchmark, time } in readings {
-            let times = self.waiting.0.entry(benchmark).or_default();
-            times.insert(time);
+        for WaitingReading {
+            benchmark,
+            quantity,
+            time,
+        } in readings
+        {
+            if self.monitor.watches(&benchmark, quantity) {
+                let times = self.waiting.0.entry(benchmark).or_default();
+                times.insert(time);
+            }
         }
     }
 
-    /// Counts the silence of the benchmarks that would be silent by `until` from the newest reading that waits; `now` is data time.
+    /// Counts from the newest reading that waits, of the benchmarks that would be silent by `until`, or red without a reading; `now` is
+    /// data time.
     pub(super) fn count_from_waiting(&mut self, now: Timestamp, until: Timestamp) -> Vec<Event> {
         if self.waiting.0.is_empty() {
             return Vec::new();
         }
-        let silent: Vec<BenchmarkId> = self.monitor.silent_by(until).collect();
-        self.count_each_from_waiting(silent, now, until)
+        let due: Vec<BenchmarkId> = self.monitor.due_by(until).collect();
+        self.count_each_from_waiting(due, now, until)
     }
 
     /// Ends the silences of the benchmarks of which readings wait.
@@ -72,6 +80,12 @@ impl Site {
             let counted = self.monitor.counted_from(&benchmark);
             let newest = self.waiting.newest(&benchmark, until);
             if let Some(time) = newest.filter(|time| Some(*time) > counted) {
+                // Nothing ends before the reading that ends it.
+                let now = if self.monitor.is_silent(&benchmark) {
+                    now.max(time)
+                } else {
+                    now
+                };
                 let waits = Notice::Waits {
                     benchmark,
                     time,

@@ -45,6 +45,8 @@ pub(super) struct FileTail {
     pub(super) idle: Option<Glance>,
     /// When it was last written to, as of the last read.
     pub(super) modified: (i64, i64),
+    /// When it was last written to, or came under its name, by the host's clock, as of the last look.
+    pub(super) changed: Option<Timestamp>,
     pub(super) pending: VecDeque<Arrival>,
     pub(super) quarantined: u64,
     /// The last error, so that it is logged once.
@@ -112,6 +114,7 @@ pub(super) struct Glance {
     place: FileId,
     size: u64,
     modified: (i64, i64),
+    changed: Option<Timestamp>,
 }
 
 impl Glance {
@@ -120,6 +123,7 @@ impl Glance {
             place: FileId::of(metadata),
             size: metadata.size(),
             modified: (metadata.mtime(), metadata.mtime_nsec()),
+            changed: Timestamp::from_second(metadata.ctime()).ok(),
         }
     }
 }
@@ -136,6 +140,7 @@ impl FileTail {
             mark: Vec::new(),
             idle: None,
             modified: (0, 0),
+            changed: None,
             pending: VecDeque::new(),
             quarantined: 0,
             trouble: None,
@@ -268,6 +273,7 @@ impl FileTail {
         }
         self.place = Some(glance.place);
         self.modified = glance.modified;
+        self.changed = glance.changed;
         let before = self.at;
         match &self.content {
             Content::Text(_) => self.read_text(&file)?,

@@ -289,7 +289,7 @@ fn next_of(file: &mut FileTail, source: &mut Followed, wall: Timestamp) -> Optio
     // What a restart could not read again does not wait.
     match source.reorder.as_mut().filter(|_| !file.is_nameless()) {
         Some(reorder) => {
-            reorder.take(arrival, wall);
+            reorder.take(arrival, wall, file.changed);
             None
         }
         None => Some(arrival),

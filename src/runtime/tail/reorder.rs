@@ -2,7 +2,7 @@
 
 use super::decode::Arrival;
 use crate::monitor::Input;
-use crate::reading::{BenchmarkId, Timestamp};
+use crate::reading::{BenchmarkId, Quantity, Timestamp};
 use crate::runtime::clock;
 use crate::store::Position;
 use jiff::SignedDuration;
@@ -44,6 +44,8 @@ pub(super) struct Reorder {
 pub struct WaitingReading {
     /// Whose.
     pub benchmark: BenchmarkId,
+    /// Of which quantity.
+    pub quantity: Quantity,
     /// When it was measured.
     pub time: Timestamp,
 }
@@ -83,8 +85,9 @@ impl Reorder {
         self.acknowledged.extend(own.cloned());
     }
 
-    /// Holds a value that came at `wall`.
-    pub(super) fn take(&mut self, arrival: Arrival, wall: Timestamp) {
+    /// Holds a value that has been read at `wall`, of a file that was `changed` last at that time: it came no later, also where it is read
+    /// again after a restart.
+    pub(super) fn take(&mut self, arrival: Arrival, wall: Timestamp, changed: Option<Timestamp>) {
         let (_, is_reading, ..) = arrival.rank();
         let key = (arrival.time, is_reading, self.came);
         self.came += 1;
@@ -92,14 +95,19 @@ impl Reorder {
         if arrival.time.duration_since(wall) <= clock::TOLERANCE {
             self.newest = self.newest.max(Some(arrival.time));
         }
-        if let Input::Reading { benchmark, .. } = &arrival.input {
+        if let Input::Reading {
+            benchmark, unit, ..
+        } = &arrival.input
+        {
             self.new.push(WaitingReading {
                 benchmark: benchmark.clone(),
+                quantity: unit.quantity(),
                 time: arrival.time,
             });
         }
         self.numbers.insert(key.2);
-        self.arrivals.push_back((wall, key));
+        let came = changed.map_or(wall, |changed| changed.min(wall));
+        self.arrivals.push_back((came, key));
         self.held.insert(key, arrival);
         if self.held.len() > MOST_HELD {
             self.due = self.due.max(self.held.keys().next().copied());

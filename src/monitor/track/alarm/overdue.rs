@@ -59,6 +59,16 @@ impl Overdue {
     }
 }
 
+/// When the last reading was that has been read, of those that wait for earlier ones too: no collapse has come by then.
+fn read_last(record: &BenchmarkRecord) -> Option<Timestamp> {
+    let newest = record.newest()?;
+    Some(
+        record
+            .counted_from()
+            .map_or(newest, |read| read.max(newest)),
+    )
+}
+
 impl Alarm {
     /// Keeps what the forecast of `time` leaves to the time after it, while a level below red is in force.
     pub(super) fn await_red(&mut self, policy: &Policy, time: Timestamp, forecast: &Forecast) {
@@ -73,7 +83,7 @@ impl Alarm {
         &self,
         record: &BenchmarkRecord,
     ) -> Option<Timestamp> {
-        let newest = record.newest()?;
+        let newest = read_last(record)?;
         let due = self.overdue.as_ref()?.due(newest);
         Some(record.put_off(newest, due))
     }
@@ -86,7 +96,7 @@ impl Alarm {
         now: Timestamp,
     ) -> Option<Event> {
         self.overdue_at(record).filter(|due| *due <= now)?;
-        let (newest, overdue) = (record.newest()?, self.overdue.take()?);
+        let (newest, overdue) = (read_last(record)?, self.overdue.take()?);
         let chance = overdue
             .chances
             .chance_within(now, days(policy.red_within()));
