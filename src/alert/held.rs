@@ -79,7 +79,7 @@ struct Course {
 
 impl Held {
     /// Begins with the course of the chance that calls red as `earlier` has it.
-    pub fn begin_course(&mut self, earlier: Self) {
+    pub fn begin_course(&mut self, earlier: &Self) {
         self.red = earlier.red;
     }
 

@@ -8,8 +8,8 @@ use crate::alert::{Policy, percent_in_words};
 use crate::config::value;
 use crate::fit::Exponent;
 use crate::inversion::{
-    Estimate, FitReport, FittedRegime, Inversion, InversionOptions, TogetherReport, UnderPrior,
-    together,
+    Estimate, FitReport, FittedFailureTime, FittedRegime, Inversion, InversionOptions,
+    TogetherReport, UnderPrior, together,
 };
 use crate::reading::{BenchmarkId, Quantity, Series, Timestamp, Unit};
 use crate::runtime::clock::Stopwatch;
@@ -203,12 +203,7 @@ fn summary(report: &FitReport) -> TextTable {
             percent(failure.chance_within_evacuation_time),
         ),
     ]);
-    table.row([
-        "  5, 50, 95 %".to_owned(),
-        [failure.low, failure.median, failure.high]
-            .map(time)
-            .join("  "),
-    ]);
+    table.row(quantiles(failure));
     let passage = &report.critical_velocity_time;
     table.row([
         "critical velocity".to_owned(),
@@ -218,12 +213,7 @@ fn summary(report: &FitReport) -> TextTable {
             passage.horizon_days
         ),
     ]);
-    table.row([
-        "  5, 50, 95 %".to_owned(),
-        [passage.low, passage.median, passage.high]
-            .map(time)
-            .join("  "),
-    ]);
+    table.row(quantiles(passage));
     table.row([
         "inverse velocity".to_owned(),
         format!(
@@ -239,6 +229,11 @@ fn summary(report: &FitReport) -> TextTable {
     table.row(["  alpha".to_owned(), alpha]);
     table.row(["transition".to_owned(), time(report.transition_time)]);
     table
+}
+
+fn quantiles(of: &FittedFailureTime) -> [String; 2] {
+    let times = [of.low, of.median, of.high].map(time);
+    ["  5, 50, 95 %".to_owned(), times.join("  ")]
 }
 
 /// What needs an explanation where the report has it.

@@ -81,11 +81,8 @@ fn one_command_leads_from_a_file_of_the_office_to_a_watch_that_reads_it() {
 fn marks_between_thousands_are_seen_where_a_number_shows_them_or_are_said() {
     let text = |part: &str, decimal: &str| {
         let body = rows(60, |time, value| {
-            let (whole, rest) = (
-                (value * 100.0).round() as i64 / 100,
-                (value * 100.0).round() as i64 % 100,
-            );
-            format!("{time}Z;7{part}{:03}{decimal}{rest:02}\n", whole)
+            let digits = format!("{value:06.2}").replace('.', decimal);
+            format!("{time}Z;7{part}{digits}\n")
         });
         format!("time;P1_displacement_mm\n{body}")
     };

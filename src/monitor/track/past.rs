@@ -113,7 +113,7 @@ impl Track {
                 next = reading.time + policy.red_course() / JUDGED_A_COURSE;
             }
         }
-        self.alarm.begin_course(earlier.alarm);
+        self.alarm.begin_course(&earlier.alarm);
     }
 
     fn reading_of(&self, one: &Observation) -> Option<Reading> {

@@ -164,8 +164,8 @@ impl Alarm {
     }
 
     /// Begins with the course of the chance that calls red as `earlier` has it.
-    pub(super) fn begin_course(&mut self, earlier: Self) {
-        self.held.begin_course(earlier.held);
+    pub(super) fn begin_course(&mut self, earlier: &Self) {
+        self.held.begin_course(&earlier.held);
     }
 
     /// Goes by the rules that held at the end of the past; where a higher level was in force there, by that level, which is
