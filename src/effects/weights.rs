@@ -9,8 +9,9 @@ const NEIGHBOURS: usize = 4;
 const DISPLACED: usize = 8;
 /// Fewest of them.
 const FEWEST_BESIDE: usize = 3;
-/// Fewer displacements do not show whether their noise goes with the velocity.
-const FEWEST: usize = 40;
+/// Fewer displacements do not show whether their noise goes with the velocity: of monthly ones, of which each season moves the slope anew,
+/// the motion between two readings passes for it.
+const FEWEST: usize = 150;
 /// Below these shares of the usual velocity the noise of displacements goes no lower.
 const FLOORS: [f64; 3] = [0.1, 0.5, 2.0];
 /// The noise of displacements goes with the velocity where the readings are so much likelier for it, in -2 ln likelihood.
