@@ -277,23 +277,26 @@ impl ReadingArgs {
         options: &dyn Fn(&PathBuf) -> ReadOptions,
     ) -> Result<Loaded, IngestError> {
         let FilesRead {
-            recording,
+            mut recording,
             mut disorder,
             remarks,
             ..
         } = read;
         say_remarks(&remarks);
-        let mut parts = vec![recording];
-        for file in &self.channels {
-            let (channels, met) = read_channels(file, &options(file))?;
-            parts.push(Recording {
-                channels,
-                ..Recording::default()
-            });
-            disorder += met;
+        if !self.channels.is_empty() {
+            let mut parts = vec![recording];
+            for file in &self.channels {
+                let (channels, met) = read_channels(file, &options(file))?;
+                parts.push(Recording {
+                    channels,
+                    ..Recording::default()
+                });
+                disorder += met;
+            }
+            let (merged, overlap) = Recording::merge(parts)?;
+            recording = merged;
+            disorder += overlap;
         }
-        let (mut recording, overlap) = Recording::merge(parts)?;
-        disorder += overlap;
         self.state(&mut recording)?;
         warn_of(disorder);
         Ok(Loaded {

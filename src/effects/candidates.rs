@@ -84,6 +84,22 @@ pub(super) fn in_load(
     })
 }
 
+/// `term`, which works through `driver`, with another response; `None` where that stands still.
+pub(super) fn with_response(
+    problem: &Problem,
+    term: &Term,
+    driver: &Driver,
+    response: Response,
+) -> Option<Term> {
+    if matches!(term.act, Act::Reading(_)) {
+        let Response {
+            stages, mean_days, ..
+        } = response;
+        return in_reading(problem, term.kind, driver, stages, mean_days);
+    }
+    in_load(problem, term.kind, driver, response)
+}
+
 /// The responses of one form that a search goes through.
 pub(super) fn responses(form: Form, delays: &[f64]) -> Vec<Response> {
     let mut responses = Vec::new();

@@ -16,7 +16,7 @@ use super::refit::{Fitted, Start, refit};
 use super::search::{Accepted, Refitted, Search, SearchResult};
 use super::surrogate::{Innovations, Tried};
 use super::term::Scratch;
-use super::upslope::{self, goes_upslope};
+use super::upslope;
 use super::verdict::{Verdict, effect};
 use crate::reading::{Channel, Series, days_since};
 
@@ -52,20 +52,12 @@ pub fn explain_given(
     let look = |cleaned: &Series, channels: &[Channel], is_drawn| {
         let mut remarks = Vec::new();
         let ready = Ready::of(cleaned, channels, &mut remarks);
-        if ready
+        let refused = ready
             .as_ref()
-            .is_some_and(|ready| goes_upslope(&ready.problem))
-        {
-            remarks.push(upslope::REMARK.to_owned());
+            .and_then(|ready| upslope::refused(&ready.problem, cleaned.unit, &mut remarks));
+        if let Some(refused) = refused {
             given = causes.iter().map(|one| not_put_in(one, UPSLOPE)).collect();
-            let verdict = Effect::of(Kind::UNEXPLAINED);
-            return (
-                Findings {
-                    verdict,
-                    ..Findings::none(cleaned.unit)
-                },
-                remarks,
-            );
+            return (refused, remarks);
         }
         let law = ready
             .as_ref()

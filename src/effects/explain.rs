@@ -14,7 +14,7 @@ use super::ready::Ready;
 use super::remarks;
 use super::search::Withheld;
 use super::term::Scratch;
-use super::upslope::{self, goes_upslope};
+use super::upslope;
 use super::verdict::conclude;
 use crate::reading::{Channel, Series, Timestamp};
 
@@ -182,10 +182,8 @@ fn look(
         remarks.push(TOO_FEW.to_owned());
         return (none, remarks);
     };
-    if goes_upslope(&ready.problem) {
-        remarks.push(upslope::REMARK.to_owned());
-        let verdict = Effect::of(Kind::UNEXPLAINED);
-        return (Findings { verdict, ..none }, remarks);
+    if let Some(refused) = upslope::refused(&ready.problem, series.unit, &mut remarks) {
+        return (refused, remarks);
     }
     progress(0.05);
     let search = ready.search(options, is_drawn);

@@ -382,13 +382,7 @@ impl<'a> Search<'a> {
         if response.memory_days() > 0.5 * self.problem.span() || response.mean_days < shortest {
             return None;
         }
-        if matches!(term.act, Act::Reading(_)) {
-            let Response {
-                stages, mean_days, ..
-            } = response;
-            return candidates::in_reading(self.problem, term.kind, driver, stages, mean_days);
-        }
-        candidates::in_load(self.problem, term.kind, driver, response)
+        candidates::with_response(self.problem, term, driver, response)
     }
 
     fn at_another_time(&self, term: &Term, stride: Stride, later: bool) -> Option<Term> {

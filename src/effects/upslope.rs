@@ -1,8 +1,11 @@
 //! Readings that go the wrong way: the law only moves downslope, and whatever is tried beside it only undoes that.
 
+use super::explanation::Effect;
+use super::findings::Findings;
+use super::kind::Kind;
 use super::problem::Problem;
 use super::quantiles::upper_median;
-use crate::reading::Quantity;
+use crate::reading::{Quantity, Unit};
 
 /// What is remarked of them.
 pub(super) const REMARK: &str = "The readings fall: the slope would move upslope, which the law cannot. Is their sign right? In a config components = [\"COLUMN\"] and \
@@ -16,8 +19,24 @@ const CLEAR: f64 = 20.0;
 /// Of velocities this share is below zero.
 const MOSTLY: f64 = 0.9;
 
+/// What is found in readings that go upslope, with its remark; `None` of others.
+pub(super) fn refused(
+    problem: &Problem,
+    unit: Unit,
+    remarks: &mut Vec<String>,
+) -> Option<Findings> {
+    if !goes_upslope(problem) {
+        return None;
+    }
+    remarks.push(REMARK.to_owned());
+    Some(Findings {
+        verdict: Effect::of(Kind::UNEXPLAINED),
+        ..Findings::none(unit)
+    })
+}
+
 /// Whether the fitted readings go upslope on the whole, far beyond their noise.
-pub(super) fn goes_upslope(problem: &Problem) -> bool {
+fn goes_upslope(problem: &Problem) -> bool {
     let y = &problem.y[..problem.used];
     if y.len() < 2 * END {
         return false;

@@ -1,6 +1,7 @@
 //! From what a search accepted to what is said: the verdict, what stands beside it, and how much is explained.
 
 use super::act::Act;
+use super::candidates::with_response;
 use super::daily;
 use super::definition::{EffectSize, FittedCoefficients};
 use super::diagnosis::{Judged, innovations, newest_off};
@@ -410,16 +411,7 @@ fn by_delay(ready: &Ready, full: &Fitted, index: usize, scratch: &mut Scratch) -
     };
     let driver = Driver::at(&ready.drivers, term.channel)?;
     let mut terms = full.terms.clone();
-    terms[index].act = match &term.act {
-        Act::Load(_) => Act::Load(vec![driver.respond(longer, &problem.nodes)?]),
-        Act::Reading(_) => Act::Reading(vec![driver.respond(longer, &problem.t)?]),
-        Act::PerVelocity
-        | Act::PerSlip
-        | Act::Averaging
-        | Act::Step
-        | Act::Reset
-        | Act::Friction(_) => return None,
-    };
+    terms[index] = with_response(problem, term, driver, longer)?;
     let is_motion = scratch.predict(problem, &terms, &full.parameters);
     let both = scratch.prediction.iter().zip(&full.prediction);
     is_motion.then(|| both.map(|(then, now)| (then - now) / NUDGE).collect())

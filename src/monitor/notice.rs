@@ -204,8 +204,8 @@ impl Monitor {
     }
 
     /// The benchmarks that are to be judged by `until` although no reading comes.
-    pub fn due_by(&self, until: Timestamp) -> impl Iterator<Item = BenchmarkId> {
-        self.benchmarks.due(until).into_iter()
+    pub fn due_by(&self, until: Timestamp) -> BTreeSet<BenchmarkId> {
+        self.benchmarks.due(until)
     }
 
     /// Whether this is the quantity of the benchmark that is watched; also before its first reading.

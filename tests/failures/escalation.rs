@@ -25,6 +25,15 @@ fn notified(site: &Site) -> Program {
     program
 }
 
+/// The same, once the red waits for the second hook.
+fn waiting(site: &Site) -> Program {
+    let program = notified(site);
+    eventually("that it waits", || {
+        standing(site) == ("waiting".to_owned(), 0)
+    });
+    program
+}
+
 /// How the red's delivery to the second hook stands: status and attempts.
 fn standing(site: &Site) -> (String, i64) {
     let database = rusqlite::Connection::open(site.path("state/slipwatch.db")).unwrap();
@@ -65,10 +74,7 @@ fn what_nobody_acknowledges_in_time_is_escalated() {
 #[test]
 fn an_escalation_outlasts_a_restart_is_not_made_by_it_and_is_made_once() {
     let site = site("1h");
-    let program = notified(&site);
-    eventually("that it waits", || {
-        standing(&site) == ("waiting".to_owned(), 0)
-    });
+    let program = waiting(&site);
     program.stop();
     assert_eq!(escalated(&site), 0, "a stop makes no escalation");
     let program = site.caught_up();
@@ -87,10 +93,7 @@ fn an_escalation_outlasts_a_restart_is_not_made_by_it_and_is_made_once() {
 #[test]
 fn an_acknowledgement_in_time_calls_an_escalation_off_for_good() {
     let site = site("1h");
-    let program = notified(&site);
-    eventually("that it waits", || {
-        standing(&site) == ("waiting".to_owned(), 0)
-    });
+    let program = waiting(&site);
     site.acknowledge("5", "Ada");
     eventually("that it is called off", || {
         standing(&site) == ("acknowledged".to_owned(), 0)
@@ -112,10 +115,7 @@ fn an_acknowledgement_in_time_calls_an_escalation_off_for_good() {
 #[test]
 fn what_was_acknowledged_while_the_daemon_was_down_is_not_escalated_by_its_start() {
     let site = site("1h");
-    let program = notified(&site);
-    eventually("that it waits", || {
-        standing(&site) == ("waiting".to_owned(), 0)
-    });
+    let program = waiting(&site);
     program.stop();
     two_hours_later(&site);
     site.acknowledge("5", "Ada");
@@ -131,10 +131,7 @@ fn what_was_acknowledged_while_the_daemon_was_down_is_not_escalated_by_its_start
 #[test]
 fn what_was_ended_while_the_daemon_was_down_is_not_escalated_by_its_start_and_is_ended_once() {
     let site = site("1h");
-    let program = notified(&site);
-    eventually("that it waits", || {
-        standing(&site) == ("waiting".to_owned(), 0)
-    });
+    let program = waiting(&site);
     program.stop();
     let resolve = ["alerts", "resolve", "--benchmark", "5", "--by", "Ada"];
     let why = ["--why", "rockfall on the wire", "--config", "site.toml"];
@@ -151,10 +148,7 @@ fn what_was_ended_while_the_daemon_was_down_is_not_escalated_by_its_start_and_is
 #[test]
 fn another_command_line_of_its_hook_does_not_begin_the_time_of_an_escalation_anew() {
     let site = site("1h");
-    let program = notified(&site);
-    eventually("that it waits", || {
-        standing(&site) == ("waiting".to_owned(), 0)
-    });
+    let program = waiting(&site);
     program.stop();
     let database = rusqlite::Connection::open(site.path("state/slipwatch.db")).unwrap();
     let earlier = "UPDATE outbox SET noted = noted - 7200000000000";
@@ -173,10 +167,7 @@ fn another_command_line_of_its_hook_does_not_begin_the_time_of_an_escalation_ane
 #[test]
 fn a_silence_that_covers_an_alert_calls_its_escalation_off_and_one_elsewhere_does_not() {
     let site = site("1h");
-    let program = notified(&site);
-    eventually("that it waits", || {
-        standing(&site) == ("waiting".to_owned(), 0)
-    });
+    let program = waiting(&site);
     let silence = |more: &[&str]| {
         let words = [
             "alerts",

@@ -239,8 +239,8 @@ impl Site {
             return Ok(());
         }
         let awaited = store.awaited(alert.identity())?;
-        let is_over = is_beginning && standing.is_none();
-        if is_over && (is_ended || self.is_over(store, alert, ended)?) {
+        let is_gone = is_beginning && standing.is_none();
+        if is_gone && (is_ended || self.is_over(store, alert, ended)?) {
             alerts.leave_out(alert, &awaited);
             return Ok(());
         }

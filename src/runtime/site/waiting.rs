@@ -55,14 +55,14 @@ impl Site {
         if self.waiting.0.is_empty() {
             return Vec::new();
         }
-        let due: Vec<BenchmarkId> = self.monitor.due_by(until).collect();
+        let due = self.monitor.due_by(until);
         self.count_each_from_waiting(due, now, until)
     }
 
     /// Ends the silences of the benchmarks of which readings wait.
     pub(super) fn end_silences(&mut self, until: Timestamp) -> Vec<Event> {
         let waiting = self.waiting.0.keys();
-        let silent: Vec<BenchmarkId> = waiting
+        let silent: BTreeSet<BenchmarkId> = waiting
             .filter(|id| self.monitor.is_silent(id))
             .cloned()
             .collect();
@@ -71,7 +71,7 @@ impl Site {
 
     fn count_each_from_waiting(
         &mut self,
-        benchmarks: Vec<BenchmarkId>,
+        benchmarks: BTreeSet<BenchmarkId>,
         now: Timestamp,
         until: Timestamp,
     ) -> Vec<Event> {
