@@ -29,6 +29,8 @@ pub enum FitOutcome {
     },
     /// Every reading is the same number.
     AllEqual,
+    /// Displacements on one rising line, to the last digit: interpolated, or a constant velocity without an instrument's error.
+    StraightLine,
     /// No law that moves forward fits better than none.
     NoForwardMotion,
     /// The m asked for is no law, or outside the box.
@@ -39,7 +41,9 @@ impl FitOutcome {
     /// Whether the readings hold no motion that any law, or any regime, could be distinguished from.
     pub fn says_nothing(&self) -> bool {
         match self {
-            Self::TooFew { .. } | Self::AllEqual | Self::NoForwardMotion => true,
+            Self::TooFew { .. } | Self::AllEqual | Self::StraightLine | Self::NoForwardMotion => {
+                true
+            }
             Self::Converged | Self::AtBoundOfM(_) | Self::Stopped | Self::NotAnExponent(_) => false,
         }
     }
@@ -55,6 +59,9 @@ impl fmt::Display for FitOutcome {
                 write!(f, "too few readings: {given}, at least {needed} needed")
             }
             Self::AllEqual => f.write_str("all readings are equal"),
+            Self::StraightLine => f.write_str(
+                "all readings lie exactly on one straight line, without any scatter: they allow no judgement of the regime",
+            ),
             Self::NoForwardMotion => f.write_str("no forward motion"),
             Self::NotAnExponent(m) => write!(
                 f,
@@ -125,7 +132,12 @@ fn refuse(readings: &PointReadings, exponent: Exponent) -> Option<FitOutcome> {
     if given < needed {
         return Some(FitOutcome::TooFew { given, needed });
     }
-    readings.all_equal().then_some(FitOutcome::AllEqual)
+    if readings.all_equal() {
+        return Some(FitOutcome::AllEqual);
+    }
+    readings
+        .is_rising_line()
+        .then_some(FitOutcome::StraightLine)
 }
 
 /// Ranks what was found.

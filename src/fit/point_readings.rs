@@ -5,6 +5,9 @@ use super::solution::{EndOfSearch, Solution};
 use crate::model::Law;
 use crate::reading::Quantity;
 
+/// Roundings that a reading on a line may differ from it by: of the number, of its day, of the mean that it is taken about.
+const ROUNDINGS: f64 = 8.0;
+
 /// The readings of one benchmark as point values, in any unit of the quantity.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointReadings {
@@ -72,6 +75,20 @@ impl PointReadings {
         self.values
             .windows(2)
             .all(|pair| pair[0].total_cmp(&pair[1]).is_eq())
+    }
+
+    /// Whether they are displacements that rise along one line, to the rounding of the numbers that they were read from.
+    pub(super) fn is_rising_line(&self) -> bool {
+        let (Some(first), Some(last)) = (self.values.first(), self.values.last()) else {
+            return false;
+        };
+        let (rise, length) = (last - first, self.length_days());
+        let rounding = ROUNDINGS * f64::EPSILON * (1.0 + self.centre.abs() / self.scale);
+        let is_on_line =
+            |(day, value): (&f64, &f64)| (value - first - rise * day / length).abs() <= rounding;
+        self.quantity == Quantity::Displacement
+            && rise > rounding
+            && self.days.iter().zip(&self.values).all(is_on_line)
     }
 
     /// The unknowns of the law that are found by projection, without the nonlinear ones.

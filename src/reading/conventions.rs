@@ -102,6 +102,8 @@ pub enum TimeFault {
     LikeAPattern,
     /// It has no time of day.
     OnlyADate,
+    /// It is written as a date that no calendar has.
+    NoSuchDate,
 }
 
 impl TimeFault {
@@ -146,6 +148,7 @@ impl TimeFault {
             Self::OnlyADate => {
                 "an RFC 3339 time with its hour; if midnight is meant, set time_format (--time-format) to %Y-%m-%d, and time_zone (--time-zone)"
             }
+            Self::NoSuchDate => "a date that the calendar has",
         }
     }
 }

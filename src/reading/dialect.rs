@@ -386,8 +386,24 @@ fn likely_fault(text: &str) -> TimeFault {
         (1 | 2, b'.' | b'/' | b'-') => TimeFault::LikeDayOrMonthFirst,
         (4, b'/' | b'.') => TimeFault::LikeAPattern,
         (4, b'-') if text.parse::<Date>().is_ok() && !text.contains(':') => TimeFault::OnlyADate,
+        (4, b'-') if is_written_as_a_date(text) && text[..DATE_LENGTH].parse::<Date>().is_err() => {
+            TimeFault::NoSuchDate
+        }
         _ => TimeFault::NotATime,
     }
+}
+
+/// Characters of a date such as 2026-02-28.
+const DATE_LENGTH: usize = 10;
+
+/// Whether it begins with four digits, two and two, with dashes between.
+fn is_written_as_a_date(text: &str) -> bool {
+    let date = text.as_bytes().get(..DATE_LENGTH).unwrap_or_default();
+    let is_in_place = |(place, byte): (usize, &u8)| match place {
+        4 | 7 => *byte == b'-',
+        _ => byte.is_ascii_digit(),
+    };
+    date.len() == DATE_LENGTH && date.iter().enumerate().all(is_in_place)
 }
 
 #[cfg(test)]
@@ -455,6 +471,7 @@ mod tests {
             ("rfc3339", "1499353200", "LikeUnix"),
             ("rfc3339", "2017/07/06 17:00", "LikeAPattern"),
             ("rfc3339", "2017-07-06", "OnlyADate"),
+            ("rfc3339", "2026-02-29T10:00:00Z", "NoSuchDate"),
             ("rfc3339", "noon", "NotATime"),
         ];
         for (format, text, expected) in cases {

@@ -76,7 +76,10 @@ fn of_too_few_readings_nothing_is_scored_and_nothing_concluded() {
 
 #[test]
 fn a_sweep_has_the_regime_under_load_first_as_fit_has() {
-    let office = Office::with(&[("slope.csv", &plain(80))]);
+    // One reading off the line: on it to the last digit they have no regime.
+    let readings = plain(80).replacen(",20.5\n", ",20.6\n", 1);
+    assert_ne!(readings, plain(80));
+    let office = Office::with(&[("slope.csv", &readings)]);
     let sweep = ["sweep", "slope.csv", "--steps", "1"];
     let json = office.done(&[&sweep[..], &["--format", "json"]].concat());
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();

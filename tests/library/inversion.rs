@@ -212,6 +212,30 @@ fn readings_that_say_nothing_end_in_a_name_and_no_number() {
     }
 }
 
+/// Interpolated tables and made-up ones: without scatter nothing says how far another law may lie from them.
+#[test]
+fn displacements_on_one_line_to_the_last_digit_allow_no_judgement_of_the_regime() {
+    let line = |step: f64| {
+        (0..60)
+            .map(|i| 5e5 + step * f64::from(i))
+            .collect::<Vec<_>>()
+    };
+    let on_line = report(&series(Unit::MM, &line(0.3)), &InversionOptions::default());
+    assert!(
+        on_line.termination.contains("exactly on one straight line"),
+        "{}",
+        on_line.termination
+    );
+    assert_eq!(on_line.regime.probability_unstable, None);
+    // One reading that is the last digit off is a reading.
+    let mut read = line(0.3);
+    read[30] += 0.01;
+    let read = report(&series(Unit::MM, &read), &InversionOptions::default());
+    assert_eq!(read.termination, "converged");
+    let falling = report(&series(Unit::MM, &line(-0.3)), &InversionOptions::default());
+    assert_eq!(falling.termination, "no forward motion");
+}
+
 #[test]
 fn what_is_not_a_number_never_enters() {
     let mut values: Vec<f64> = (0..30).map(|day| 30.0 / (40.0 - f64::from(day))).collect();

@@ -36,8 +36,11 @@ pub(super) fn verdict(explanation: &Explanation) -> String {
     }
 }
 
-/// What several benchmarks show together, a line or two.
+/// What several benchmarks show together, a line or two; nothing where they are one, read as two quantities.
 pub(super) fn parting(found: &Together) -> String {
+    if found.benchmarks.len() < 2 {
+        return String::new();
+    }
     let names: Vec<&str> = found.benchmarks.iter().map(BenchmarkId::as_str).collect();
     let names = names.join(", ");
     if found.verdict.effect == Kind::PARTITION {

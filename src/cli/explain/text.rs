@@ -9,7 +9,13 @@ use std::fmt::Write as _;
 pub(super) fn together(found: &Together) -> String {
     let mut out = sentence::parting(found);
     for explanation in &found.each {
-        let _ = write!(out, "\n{:=<72}\n{}", "", text(explanation));
+        let line = if out.is_empty() {
+            String::new()
+        } else {
+            format!("\n{:=<72}\n", "")
+        };
+        out.push_str(&line);
+        out.push_str(&text(explanation));
     }
     out
 }

@@ -25,7 +25,7 @@ pub enum IngestError {
         source: io::Error,
     },
     /// The extension is none that is known.
-    #[error("{}: unknown kind of file, expected a name that ends in .csv, .ndjson, .jsonl, .dat (TOA5), one of these with .gz, or .mcap", file.display())]
+    #[error("{}: unknown kind of file, expected a name that ends in .csv, .tsv, .txt, .ndjson, .jsonl, .dat (TOA5), one of these with .gz, or .mcap", file.display())]
     UnknownFormat {
         /// The file.
         file: PathBuf,

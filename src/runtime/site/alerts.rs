@@ -1,22 +1,17 @@
 //! The commit: what has happened is made durable, then the hooks are notified.
 
 use super::flood::OutgoingAlerts;
-use super::{
-    AlertInForce, Attention, BEFORE_ALL, LEAST_FRESHNESS, LEAST_WATCHED, MOST_UNWRITTEN, Site,
-};
+use super::standing::Attention;
+use super::{BEFORE_ALL, LEAST_FRESHNESS, LEAST_WATCHED, MOST_UNWRITTEN, Site};
 use crate::alert::{Level, Policy};
 use crate::config::HookConfig;
 use crate::monitor::Event;
 use crate::reading::{BenchmarkId, Timestamp};
 use crate::runtime::deliver::Dispatcher;
 use crate::runtime::delivered::delivery;
-use crate::runtime::hook::{Alert, MessageState};
-use crate::runtime::many::EarlierLevel;
+use crate::runtime::hook::Alert;
 use crate::store::StoreError;
 use jiff::SignedDuration;
-
-/// Ends of alerts that are kept through a silence at most; the oldest goes.
-const MOST_PUT_OFF: usize = 4096;
 
 impl Site {
     /// Makes everything since the last commit durable in one transaction, then hands the alerts to the hooks, but
@@ -37,19 +32,20 @@ impl Site {
                 // Before the first reading there is no data time: people are given the time of the decision.
                 alert.event.time = now;
             }
-            self.date_end(&mut alert);
-            self.follow_on(&mut alert);
+            self.standing.date_end(&mut alert);
+            self.standing.follow_on(&mut alert);
             let is_fresh =
                 age <= self.freshness(alert.event.benchmark.as_ref()) || self.never_read(&alert);
-            let is_due = is_fresh && !self.ends_unreported(&alert) || self.is_waited_for(&alert);
-            let is_muted = self.is_muted(&alert, wall);
+            let is_waited_for = self.standing.is_waited_for(&alert);
+            let is_due = is_fresh && !self.standing.ends_unreported(&alert) || is_waited_for;
+            let is_muted = self.mutes.are_of(&alert, wall);
             let is_sent = is_due && !is_muted;
             if alert.is_correction() {
                 to_send.extend(is_sent.then_some(alert));
                 continue;
             }
-            if is_muted && self.is_waited_for(&alert) {
-                self.put_off(&alert);
+            if is_muted && is_waited_for {
+                self.mutes.put_off(&alert);
             }
             if is_sent {
                 to_send.push(alert.clone());
@@ -60,11 +56,11 @@ impl Site {
                     alerts.supersede(&alert);
                 }
             }
-            self.stand(alert, is_sent);
+            self.standing.stand(alert, is_sent);
         }
         for end in self.ended_floods(now) {
-            if self.is_muted(&end, wall) {
-                self.put_off(&end);
+            if self.mutes.are_of(&end, wall) {
+                self.mutes.put_off(&end);
             } else {
                 to_send.push(end);
             }
@@ -83,7 +79,7 @@ impl Site {
                 reported_together,
             } = OutgoingAlerts::of(&share.alerts, &share.audience);
             for alert in &sent {
-                self.stand_for_many(alert);
+                self.standing.stand_for_many(alert);
                 if self.sinks.store.is_some() {
                     self.batch.deliver(delivery(alert, &share.name)?);
                 }
@@ -108,10 +104,7 @@ impl Site {
 
     /// Notes that an alert of many benchmarks reports this one to a hook too.
     fn note_reported_together(&mut self, alert: &Alert, hook: &str) -> Result<(), StoreError> {
-        let place = (alert.event.benchmark.clone(), alert.level == Level::Unknown);
-        if let Some(standing) = self.standing.get_mut(&place) {
-            standing.is_reported_together |= standing.alert.key == alert.key;
-        }
+        self.standing.note_reported_together(alert);
         if self.sinks.store.is_some() {
             self.batch.deliver_together(delivery(alert, hook)?);
         }
@@ -194,103 +187,11 @@ impl Site {
         self.is_full && self.batch.steps() >= MOST_UNWRITTEN || self.holds_too_many()
     }
 
-    /// Notes what is in force: a level supersedes the lower ones of its benchmark, and its end
-    /// ends them too.
-    pub(super) fn stand(&mut self, alert: Alert, is_sent: bool) {
-        let is_unknown = alert.level == Level::Unknown;
-        let place = (alert.event.benchmark.clone(), is_unknown);
-        let had = self.standing.get(&place);
-        if alert.is_correction() || had.is_some_and(|had| had.alert.level > alert.level) {
-            return;
-        }
-        let was_notified = is_sent || had.is_some_and(|had| had.was_notified);
-        match alert.state {
-            MessageState::Firing if alert.level != Level::Green => {
-                let standing = AlertInForce {
-                    alert,
-                    is_sent,
-                    was_notified,
-                    is_reported_together: false,
-                    attention: Attention::Awaited,
-                };
-                self.standing.insert(place, standing);
-            }
-            MessageState::Firing | MessageState::Resolved => {
-                self.standing.remove(&place);
-            }
-            MessageState::Correction => (),
-        }
-    }
-
-    /// Keeps the end of an alert until the silence that it fell into is over.
-    pub(super) fn put_off(&mut self, alert: &Alert) {
-        self.put_off.push(alert.clone());
-        let excess = self.put_off.len().saturating_sub(MOST_PUT_OFF);
-        self.put_off.drain(..excess);
-    }
-
-    /// What was put off and can be sent while the host's clock says `wall`.
-    fn no_longer_put_off(&mut self, wall: Timestamp) -> Vec<Alert> {
-        let all = std::mem::take(&mut self.put_off);
-        let (muted, due) = all.into_iter().partition(|one| self.is_muted(one, wall));
-        self.put_off = muted;
-        due
-    }
-
-    /// Gives the end of an alert the time that people were given of its call: before the first reading that is the time of
-    /// the decision, and the reading that ends it may have been measured earlier.
-    pub(super) fn date_end(&self, alert: &mut Alert) {
-        let place = (alert.event.benchmark.clone(), alert.level == Level::Unknown);
-        let had = self.standing.get(&place);
-        if alert.state == MessageState::Resolved
-            && let Some(had) = had.filter(|had| had.alert.key == alert.key)
-            && had.alert.event.time > BEFORE_ALL
-        {
-            let called = had.alert.event.time;
-            alert.called = Some(called);
-            alert.event.time = alert.event.time.max(called);
-        }
-    }
-
-    /// Notes the lower levels that it follows on, or that end with it: who received one of these, and no higher one, receives
-    /// its end.
-    pub(super) fn follow_on(&self, alert: &mut Alert) {
-        let place = (alert.event.benchmark.clone(), alert.level == Level::Unknown);
-        let Some(AlertInForce { alert: had, .. }) = self.standing.get(&place) else {
-            return;
-        };
-        let follows = alert.state == MessageState::Firing && had.level < alert.level;
-        if follows || had.key == alert.key {
-            alert.earlier.clone_from(&had.earlier);
-        }
-        if follows {
-            alert.earlier.push(EarlierLevel {
-                benchmark: had.event.benchmark.clone(),
-                level: had.level,
-                key: had.key.clone(),
-            });
-        }
-    }
-
-    /// Whether it is the end of what people have been notified of.
-    pub(super) fn is_waited_for(&self, alert: &Alert) -> bool {
-        let place = (alert.event.benchmark.clone(), alert.level == Level::Unknown);
-        let had = self.standing.get(&place);
-        alert.state == MessageState::Resolved
-            && had.is_some_and(|had| had.was_notified && had.alert.level <= alert.level)
-    }
-
     /// Whether it says that a benchmark has given no reading: that is never long past.
     fn never_read(&self, alert: &Alert) -> bool {
         let benchmark = alert.event.benchmark.as_ref();
-        alert.level == Level::Unknown && benchmark.is_some_and(|one| !self.newest.contains_key(one))
-    }
-
-    /// Whether it is the end of what nobody has been notified of.
-    fn ends_unreported(&self, alert: &Alert) -> bool {
-        let place = (alert.event.benchmark.clone(), alert.level == Level::Unknown);
-        let had = self.standing.get(&place);
-        alert.state == MessageState::Resolved && had.is_some_and(|had| !had.was_notified)
+        alert.level == Level::Unknown
+            && benchmark.is_some_and(|one| self.read.newest(one).is_none())
     }
 
     /// Everything there is has been read: what is in force and was not sent because it began long
@@ -308,15 +209,15 @@ impl Site {
             self.commit(wall)?;
         }
         let now = self.keeper.now(wall);
-        let mut to_send = self.no_longer_put_off(wall);
+        let mut to_send = self.mutes.no_longer_put_off(wall);
         let mut standing = std::mem::take(&mut self.standing);
-        for one in standing.values_mut() {
+        for one in standing.all_mut() {
             if one.is_sent {
                 // Again: there may have been no room for it. The hooks that have it ignore it.
                 // Nor does one that was reported together go singly to those who received that.
                 if one.alert.must_arrive()
                     && one.attention == Attention::Awaited
-                    && !self.is_muted(&one.alert, wall)
+                    && !self.mutes.are_of(&one.alert, wall)
                 {
                     let together = one.is_reported_together;
                     self.send_where(&one.alert, false, &|hook| {
@@ -325,7 +226,7 @@ impl Site {
                 }
             } else if (self.never_read(&one.alert)
                 || self.is_watched(one.alert.event.benchmark.as_ref(), now))
-                && !self.is_muted(&one.alert, wall)
+                && !self.mutes.are_of(&one.alert, wall)
             {
                 if one.alert.event.time <= BEFORE_ALL {
                     one.alert.event.time = now;
@@ -355,13 +256,13 @@ impl Site {
 
     fn is_watched(&self, benchmark: Option<&BenchmarkId>, wall: Timestamp) -> bool {
         let newest = match benchmark {
-            Some(benchmark) => self.newest.get(benchmark),
-            None => self.newest.values().max(),
+            Some(benchmark) => self.read.newest(benchmark),
+            None => self.read.newest_of_all(),
         };
         let limit = (self.freshness(benchmark))
             .max(self.policy(benchmark).outlook)
             .max(LEAST_WATCHED);
-        newest.is_some_and(|newest| wall.duration_since(*newest) <= limit)
+        newest.is_some_and(|newest| wall.duration_since(newest) <= limit)
     }
 
     /// Offers it to those of the hooks that are `meant`; they wait with it while it `is_muted`.

@@ -83,9 +83,8 @@ impl Site {
         if let Some(store) = &self.sinks.store
             && !self.is_latest(arrival)
         {
-            let benchmark = arrival.input.read_benchmark();
-            let anew = benchmark.and_then(|one| self.read_anew.get(one));
-            let known = store.has(&self.batch, &arrival.input, anew.copied().unwrap_or(0))?;
+            let anew_after = self.read.anew_after(arrival.input.read_benchmark());
+            let known = store.has(&self.batch, &arrival.input, anew_after)?;
             if known == Presence::Corrected && self.returned.waits(arrival) {
                 self.counts.repeated += 1;
                 return Ok(Vec::new());
@@ -251,8 +250,9 @@ impl Site {
             return Vec::new();
         };
         let is_near = |time: Timestamp| first.duration_since(time).abs() <= NEAR;
-        let mut others = self.newest.iter().filter(|(one, _)| *one != benchmark);
-        if is_near(self.keeper.now(wall)) || others.any(|(_, newest)| is_near(*newest)) {
+        let is_other =
+            |(one, newest): (&BenchmarkId, Timestamp)| one != benchmark && is_near(newest);
+        if is_near(self.keeper.now(wall)) || self.read.each().any(is_other) {
             return Vec::new();
         }
         let (benchmark, time) = (benchmark.clone(), arrival.time);
@@ -268,7 +268,7 @@ impl Site {
             return;
         }
         self.unproven.comes(benchmark, arrival.time);
-        let is_live = self.at_rest.contains(benchmark);
+        let is_live = self.read.is_live(benchmark);
         self.keeper.knows(arrival.time, is_live);
         if is_live {
             self.keeper.comes(benchmark.as_str(), arrival.time, wall);
@@ -296,7 +296,7 @@ impl Site {
         let Input::Reading { benchmark, .. } = &arrival.input else {
             return Vec::new();
         };
-        let is_newest = self.newest.get(benchmark) == Some(&arrival.time);
+        let is_newest = self.read.newest(benchmark) == Some(arrival.time);
         let clock = self.keeper.now(wall).max(wall);
         let is_ahead = suspicion::ahead(arrival.time, clock).is_some();
         if self.sinks.store.is_none() || !is_newest || is_ahead == self.monitor.is_ahead(benchmark)
@@ -316,8 +316,7 @@ impl Site {
         let Input::Reading { benchmark, .. } = &arrival.input else {
             return false;
         };
-        let ahead = self.ahead.get(benchmark);
-        self.is_newest(arrival) && ahead.is_none_or(|ahead| *ahead < arrival.time)
+        self.read.is_latest(benchmark, arrival.time)
     }
 
     /// Whether the benchmark has given no reading as late as this one, of those that do not wait for another one.
@@ -325,33 +324,29 @@ impl Site {
         let Input::Reading { benchmark, .. } = &arrival.input else {
             return false;
         };
-        self.newest
-            .get(benchmark)
-            .is_none_or(|newest| *newest < arrival.time)
+        self.read.is_newest(benchmark, arrival.time)
     }
 
     /// What the monitor is to know before anything arrives.
     pub fn begin(&mut self) {
-        for time in self.newest.values() {
-            self.keeper.knows(*time, false);
+        for (_, time) in self.read.each() {
+            self.keeper.knows(time, false);
         }
         if !self.monitor.takes_batches() {
             self.step(self.data_now(), &Input::Notice(Notice::InBatches));
         }
-        if self.newest.is_empty() && !self.monitor.reads_past() {
+        if self.read.count() == 0 && !self.monitor.reads_past() {
             self.step(self.data_now(), &Input::Notice(Notice::Past));
         }
     }
 
     /// Everything there is has been read: what comes from now on is live, and what has given no reading is unknown.
     pub(super) fn rest(&mut self, wall: Timestamp) -> Vec<Event> {
-        if self.at_rest.len() != self.newest.len() {
-            self.at_rest = self.newest.keys().cloned().collect();
-        }
+        self.read.rest();
         self.prove(wall);
         let mut events = Vec::new();
         // Before the first reading there is no past that could be over.
-        let is_read = !self.newest.is_empty() && !self.is_crowded();
+        let is_read = self.read.count() > 0 && !self.is_crowded();
         for _ in 0..MOST_JUDGED {
             if is_read && self.monitor.owes_current() {
                 events.extend(self.judge_current());

@@ -1,9 +1,10 @@
 //! What a restart goes on from: the memory last saved, and the steps since.
 
-use super::mute::Mute;
+use super::mute::{Mute, Mutes};
+use super::read_times::ReadTimes;
+use super::standing::{AlertInForce, AlertPlace, Attention, StandingAlerts};
 use super::{
-    AlertInForce, AlertPlace, Attention, BEFORE_ALL, Counts, OWN, STEPS_A_BENCHMARK,
-    STEPS_A_MEMORY, STEPS_UNJUDGED, Sinks, Site,
+    BEFORE_ALL, Counts, OWN, STEPS_A_BENCHMARK, STEPS_A_MEMORY, STEPS_UNJUDGED, Sinks, Site,
 };
 use crate::alert::Level;
 use crate::monitor::{
@@ -80,13 +81,13 @@ impl Site {
 
     /// Shows how the benchmarks stand.
     pub fn show(&self, vitals: &Vitals) {
-        for (benchmark, newest) in &self.newest {
+        for (benchmark, newest) in self.read.each() {
             let level = self.monitor.level(benchmark).unwrap_or(Level::Green);
             let is_unknown = self.monitor.is_unknown(benchmark);
-            vitals.resume(benchmark, Some(*newest), level, is_unknown);
+            vitals.resume(benchmark, Some(newest), level, is_unknown);
         }
         for benchmark in &self.monitor.settings().watched.named {
-            if !self.newest.contains_key(benchmark) {
+            if self.read.newest(benchmark).is_none() {
                 let is_unknown = self.monitor.is_unknown(benchmark);
                 vitals.resume(benchmark, None, Level::Green, is_unknown);
             }
@@ -96,7 +97,7 @@ impl Site {
     /// Whether it is one of those that [`Site::show`] shows.
     pub(in crate::runtime) fn shows(&self, benchmark: &BenchmarkId) -> bool {
         let named = &self.monitor.settings().watched.named;
-        self.newest.contains_key(benchmark) || named.contains(benchmark)
+        self.read.newest(benchmark).is_some() || named.contains(benchmark)
     }
 
     fn remember(&mut self, recorded: &Recorded) -> Result<(), SavedError> {
@@ -119,12 +120,10 @@ impl Site {
             .into_iter()
             .for_each(|job| self.searches.note(job));
         self.now = own.now;
-        self.newest = own.newest;
-        (self.ahead, self.read_anew) = (own.ahead, own.read_anew);
+        self.read = ReadTimes::remembered((own.newest, own.ahead, own.read_anew));
         self.failure_times = own.failure_times;
-        self.standing = own.standing.into_iter().collect();
-        self.mutes = own.mutes;
-        self.put_off = own.put_off;
+        self.standing = StandingAlerts::remembered(own.standing);
+        self.mutes = Mutes::remembered(own.mutes, own.put_off);
         self.counts = own.counts;
         Ok(())
     }
@@ -175,14 +174,14 @@ impl Site {
                 let given = store.time_given(alert.identity())?;
                 alert.event.time = given.unwrap_or(BEFORE_ALL);
             }
-            self.date_end(&mut alert);
-            self.follow_on(&mut alert);
+            self.standing.date_end(&mut alert);
+            self.standing.follow_on(&mut alert);
             let is_sent = store.is_noted(alert.identity(), None, None)?;
             // What is due is noted with the step itself: this one fell into a silence.
-            if !is_sent && self.is_waited_for(&alert) {
-                self.put_off(&alert);
+            if !is_sent && self.standing.is_waited_for(&alert) {
+                self.mutes.put_off(&alert);
             }
-            self.stand(alert, is_sent);
+            self.standing.stand(alert, is_sent);
         }
         Ok(())
     }
@@ -192,7 +191,7 @@ impl Site {
         let Some(store) = self.sinks.store.clone() else {
             return Ok(());
         };
-        for one in self.standing.values_mut() {
+        for one in self.standing.all_mut() {
             let identity = one.alert.identity();
             one.is_sent |= store.is_noted(identity, None, None)?;
             one.was_notified |= one.is_sent;
@@ -229,7 +228,7 @@ impl Site {
             return Ok(());
         };
         let is_beginning = alert.state == MessageState::Firing;
-        let standing = self.standing.get(&place(alert));
+        let standing = self.standing.at_place_of(alert);
         // What people ended while no daemon ran is not written yet.
         let is_end = |one: &Alert| one.key == alert.key && one.state == MessageState::Resolved;
         let is_ended = self.fresh.iter().any(is_end);
@@ -246,7 +245,7 @@ impl Site {
         }
         // Of what is reported together, and of an end, others may have been notified by another message.
         let is_for_all = is_beginning && !alert.is_flood();
-        self.send_where(alert, self.may_be_muted(alert), &|hook| {
+        self.send_where(alert, self.mutes.may_be_of(alert), &|hook| {
             is_for_all || awaited.contains(&hook.name())
         });
         Ok(())
@@ -261,10 +260,10 @@ impl Site {
     ) -> Result<bool, StoreError> {
         if alert.is_flood() {
             // One of an older version does not name its members.
-            return Ok(alert.many.is_some() && !self.has_in_force(alert));
+            return Ok(alert.many.is_some() && !self.standing.has_in_force(alert));
         }
         // What is unknown for several reasons has one place for all of them.
-        if alert.level != Level::Unknown && self.standing.contains_key(&place(alert)) {
+        if alert.level != Level::Unknown && self.standing.at_place_of(alert).is_some() {
             return Ok(true);
         }
         ended.has(store, &alert.key)
@@ -296,7 +295,7 @@ impl Site {
             if gone.is_empty() || alert.state != MessageState::Firing {
                 continue;
             }
-            for member in self.members_in_force(alert) {
+            for member in self.standing.members_in_force(alert) {
                 for hook in dispatcher.asking(member) {
                     if gone.contains(&&hook) {
                         singly.push(delivery(member, &hook)?);
@@ -313,27 +312,25 @@ impl Site {
 
     /// The memory as of the last step, where it is time to save it.
     pub(super) fn memory(&self) -> Option<Vec<MemoryPart>> {
-        let mut many = STEPS_A_MEMORY.max(STEPS_A_BENCHMARK * self.newest.len());
+        let mut many = STEPS_A_MEMORY.max(STEPS_A_BENCHMARK * self.read.count());
         if self.monitor.reads_past() || self.monitor.queues() {
             many *= STEPS_UNJUDGED;
         }
         if self.steps_since_memory < many {
             return None;
         }
+        let (newest, ahead, read_anew) = self.read.to_remember();
+        let (mutes, put_off) = self.mutes.to_remember();
         let own = SiteMemory {
             asked: self.searches.jobs().cloned().collect(),
             now: self.now,
-            newest: self.newest.clone(),
-            ahead: self.ahead.clone(),
-            read_anew: self.read_anew.clone(),
+            newest,
+            ahead,
+            read_anew,
             failure_times: self.failure_times.clone(),
-            standing: self
-                .standing
-                .iter()
-                .map(|(place, one)| (place.clone(), one.clone()))
-                .collect(),
-            mutes: self.mutes.clone(),
-            put_off: self.put_off.clone(),
+            standing: self.standing.to_remember(),
+            mutes,
+            put_off,
             counts: self.counts,
         };
         let saved = self.monitor.save().map_err(|error| error.to_string());
@@ -411,9 +408,4 @@ impl EndedKeys {
         };
         Ok(keys.contains(key))
     }
-}
-
-/// Where an alert stands.
-fn place(alert: &Alert) -> AlertPlace {
-    (alert.event.benchmark.clone(), alert.level == Level::Unknown)
 }

@@ -10,7 +10,9 @@ mod crowd;
 mod flood;
 mod memory;
 mod mute;
+mod read_times;
 mod returned;
+mod standing;
 mod standing_floods;
 mod timekeeper;
 mod unproven;
@@ -22,8 +24,10 @@ pub(super) use mute::announce_ends;
 pub(super) use unproven::Unproven;
 
 use crowd::MessageRush;
+use mute::Mutes;
+use read_times::ReadTimes;
 use returned::Returned;
-use standing_floods::StandingFlood;
+use standing::StandingAlerts;
 use timekeeper::Timekeeper;
 use waiting::WaitingReadings;
 
@@ -36,7 +40,7 @@ use crate::runtime::tail::Arrival;
 use crate::store::{Batch, LeftOrder, Position, Store, StoreError};
 use jiff::SignedDuration;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -84,36 +88,6 @@ pub struct Counts {
     pub long_past: u64,
 }
 
-/// Where an alert stands: one level is in force at a benchmark, and beside it perhaps `unknown`.
-type AlertPlace = (Option<BenchmarkId>, bool);
-
-/// An alert in force.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-struct AlertInForce {
-    alert: Alert,
-    /// Whether it has been offered to the hooks.
-    is_sent: bool,
-    /// Whether this one, or a lower one that it superseded, has been offered to them: people wait for its end.
-    #[serde(default, rename = "was_told")]
-    was_notified: bool,
-    /// Whether an alert of many benchmarks has reported it too.
-    #[serde(default, rename = "is_told_together")]
-    is_reported_together: bool,
-    /// Whether somebody has seen it.
-    #[serde(default)]
-    attention: Attention,
-}
-
-/// What people do about an alert in force.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-enum Attention {
-    /// Nobody has acknowledged it.
-    #[default]
-    Awaited,
-    /// Somebody has: hooks that have not taken it are not notified of it any more, nor those that a config adds.
-    Acknowledged,
-}
-
 /// One site at work.
 #[derive(Debug)]
 pub struct Site {
@@ -129,25 +103,16 @@ pub struct Site {
     steps_since_memory: usize,
     /// The latest data time stepped to; it never goes back.
     now: Option<Timestamp>,
-    newest: BTreeMap<BenchmarkId, Timestamp>,
-    /// The latest of the readings of a benchmark that lay ahead of data time when they were taken.
-    ahead: BTreeMap<BenchmarkId, Timestamp>,
+    read: ReadTimes,
     failure_times: BTreeMap<Option<BenchmarkId>, Timestamp>,
     /// Alerts since the last commit.
     fresh: Vec<Alert>,
-    /// What is in force: neither resolved nor superseded.
-    standing: BTreeMap<AlertPlace, AlertInForce>,
-    /// What stands for many, by its key, until all of these are over.
-    floods: BTreeMap<String, StandingFlood>,
+    standing: StandingAlerts,
     /// Who asked not to be notified.
-    mutes: Vec<Mute>,
-    /// Ends of alerts that people were notified of, which fell into a silence: they are sent after it.
-    put_off: Vec<Alert>,
+    mutes: Mutes,
     counts: Counts,
     keeper: Timekeeper,
     unproven: Unproven,
-    /// Benchmarks that had given readings when everything there was had been read: what comes of them now is live.
-    at_rest: BTreeSet<BenchmarkId>,
     /// Values that wait, unacknowledged, until the host's clock is right.
     held: VecDeque<Arrival>,
     /// What has been read, and waits for earlier values.
@@ -156,8 +121,6 @@ pub struct Site {
     returned: Returned,
     /// Messages that come so fast that the past is not over yet.
     crowd: MessageRush,
-    /// Up to which step the state has readings of a benchmark that do not count any more: they come again, and are new then.
-    read_anew: BTreeMap<BenchmarkId, i64>,
 }
 
 impl Site {
@@ -173,23 +136,18 @@ impl Site {
             is_full: false,
             steps_since_memory: 0,
             now: None,
-            newest: BTreeMap::new(),
-            ahead: BTreeMap::new(),
+            read: ReadTimes::default(),
             failure_times: BTreeMap::new(),
             fresh: Vec::new(),
-            standing: BTreeMap::new(),
-            floods: BTreeMap::new(),
-            mutes: Vec::new(),
-            put_off: Vec::new(),
+            standing: StandingAlerts::default(),
+            mutes: Mutes::default(),
             counts: Counts::default(),
             keeper: Timekeeper::default(),
             unproven: Unproven::default(),
-            at_rest: BTreeSet::new(),
             held: VecDeque::new(),
             waiting: WaitingReadings::default(),
             returned: Returned::default(),
             crowd: MessageRush::default(),
-            read_anew: BTreeMap::new(),
         }
     }
 
@@ -300,14 +258,11 @@ impl Site {
     /// The readings up to step number `last` of what these settings end do not count any more.
     fn forget_values(&mut self, settings: &Settings, last: i64) {
         let former = &self.monitor.settings().watched;
-        let read = self.newest.keys().chain(self.ahead.keys());
-        let ended: BTreeSet<BenchmarkId> = read
-            .filter(|id| settings.watched.ends(id, former))
-            .cloned()
-            .collect();
+        let mut ended = self.read.of_any();
+        ended.retain(|id| settings.watched.ends(id, former));
         for id in ended {
             self.batch.forget(&id);
-            self.read_anew.insert(id, last);
+            self.read.are_read_anew(id, last);
         }
     }
 
@@ -318,28 +273,17 @@ impl Site {
             benchmark, reading, ..
         } = input
         {
-            // One that lies ahead of data time waits until another one confirms it.
-            let known = if reading.time <= now {
-                &mut self.newest
-            } else {
-                &mut self.ahead
-            };
-            let latest = known.entry(benchmark.clone()).or_insert(reading.time);
-            *latest = reading.time.max(*latest);
+            self.read.note(benchmark, reading.time, now);
         }
         if let Input::Settings(settings) = input {
-            // Their readings come again, and are new to what is known from here on.
             let former = &self.monitor.settings().watched;
             let stays = |id: &BenchmarkId| !settings.watched.ends(id, former);
-            self.newest.retain(|id, _| stays(id));
-            self.ahead.retain(|id, _| stays(id));
+            self.read.retain(stays);
             // What a search finds in the former readings says nothing of the new ones.
             self.searches.retain(stays);
         }
-        if let Input::Notice(Notice::FirstAhead { benchmark, .. }) = input
-            && let Some(first) = self.newest.remove(benchmark)
-        {
-            self.ahead.insert(benchmark.clone(), first);
+        if let Input::Notice(Notice::FirstAhead { benchmark, .. }) = input {
+            self.read.first_waits(benchmark);
         }
         if let Input::Order(order) = input {
             self.apply(order);

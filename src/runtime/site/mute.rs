@@ -1,6 +1,7 @@
 //! Who asked not to be notified, of what, until when: never for longer than an order may last, whatever the clock says.
 
-use super::{AlertInForce, Attention, Site};
+use super::Site;
+use super::standing::Attention;
 use crate::alert::Level;
 use crate::monitor::{AlertState, EventKind, Order};
 use crate::reading::{BenchmarkId, Timestamp};
@@ -13,6 +14,8 @@ use serde::{Deserialize, Serialize};
 
 /// Orders in force at most; the oldest goes.
 const MOST: usize = 256;
+/// Ends of alerts that are kept through a silence at most; the oldest goes.
+const MOST_PUT_OFF: usize = 4096;
 
 /// Alerts of which nobody is notified for a time.
 #[derive(Debug, Clone, PartialEq, Eq, JsonSchema, Serialize, Deserialize)]
@@ -38,6 +41,77 @@ impl Mute {
         };
         let left = self.until.duration_since(wall);
         left <= longest + TOLERANCE && lasts((self.given_at, self.until), wall)
+    }
+}
+
+/// Who asked not to be notified, and what waits for that to be over.
+#[derive(Debug, Default)]
+pub(super) struct Mutes {
+    orders: Vec<Mute>,
+    /// Ends of alerts that people were notified of, which fell into a silence: they are sent after it.
+    put_off: Vec<Alert>,
+}
+
+impl Mutes {
+    /// As the memory has them.
+    pub(super) fn remembered(orders: Vec<Mute>, put_off: Vec<Alert>) -> Self {
+        Self { orders, put_off }
+    }
+
+    /// For the memory: the orders, and the ends that were put off.
+    pub(super) fn to_remember(&self) -> (Vec<Mute>, Vec<Alert>) {
+        (self.orders.clone(), self.put_off.clone())
+    }
+
+    fn add(&mut self, mute: Mute) {
+        self.orders.push(mute);
+        let excess = self.orders.len().saturating_sub(MOST);
+        self.orders.drain(..excess);
+    }
+
+    /// Ends those of a benchmark, or all of them.
+    fn end(&mut self, benchmark: Option<&BenchmarkId>) {
+        let stays = |mute: &Mute| benchmark.is_some() && mute.benchmark.as_ref() != benchmark;
+        self.orders.retain(stays);
+    }
+
+    /// Keeps the end of an alert until the silence that it fell into is over.
+    pub(super) fn put_off(&mut self, alert: &Alert) {
+        self.put_off.push(alert.clone());
+        let excess = self.put_off.len().saturating_sub(MOST_PUT_OFF);
+        self.put_off.drain(..excess);
+    }
+
+    /// What was put off and can be sent while the host's clock says `wall`.
+    pub(super) fn no_longer_put_off(&mut self, wall: Timestamp) -> Vec<Alert> {
+        let all = std::mem::take(&mut self.put_off);
+        let (muted, due) = all.into_iter().partition(|one| self.are_of(one, wall));
+        self.put_off = muted;
+        due
+    }
+
+    /// Whether nobody is to be notified of this alert while the host's clock says `wall`.
+    pub(super) fn are_of(&self, alert: &Alert, wall: Timestamp) -> bool {
+        let place = (alert.event.benchmark.as_ref(), alert.level);
+        self.cover(place, |mute| mute.is_in_force(wall))
+    }
+
+    /// Whether somebody asked not to be notified of it, and that may last still: until the next commit says it by the clock.
+    pub(super) fn may_be_of(&self, alert: &Alert) -> bool {
+        let place = (alert.event.benchmark.as_ref(), alert.level);
+        self.cover(place, |_| true)
+    }
+
+    fn cover(
+        &self,
+        (place, level): (Option<&BenchmarkId>, Level),
+        lasts: impl Fn(&Mute) -> bool,
+    ) -> bool {
+        self.orders.iter().any(|mute| {
+            let here = mute.benchmark.is_none() || mute.benchmark.as_ref() == place;
+            let low = mute.up_to.is_none_or(|up_to| level <= up_to);
+            here && low && lasts(mute)
+        })
     }
 }
 
@@ -69,9 +143,10 @@ impl Site {
                     Some(only) => key == only,
                     None => (benchmark.is_none() || place == benchmark) && !since.contains(key),
                 };
-                let all = self.standing.iter_mut();
-                let seen = all.filter(|((place, _), one)| is_seen(place, &one.alert.key));
-                for (_, one) in seen {
+                for one in self.standing.all_mut() {
+                    if !is_seen(&one.alert.event.benchmark, &one.alert.key) {
+                        continue;
+                    }
                     (one.is_sent, one.was_notified) = (true, true);
                     one.attention = Attention::Acknowledged;
                     if let Some(alerts) = &self.sinks.alerts {
@@ -98,10 +173,7 @@ impl Site {
             } => self.mute((benchmark.as_ref(), None), *until, given.given_at),
             // The monitor ends it.
             Order::Resolve { .. } => {}
-            Order::Unsilence { benchmark, .. } => {
-                let ends = |mute: &Mute| benchmark.is_none() || mute.benchmark == *benchmark;
-                self.mutes.retain(|mute| !ends(mute));
-            }
+            Order::Unsilence { benchmark, .. } => self.mutes.end(benchmark.as_ref()),
         }
     }
 
@@ -137,7 +209,7 @@ impl Site {
         let stands = |alert: &Alert| {
             alert.key == *key || alert.earlier.iter().any(|earlier| earlier.key == *key)
         };
-        self.standing.values().any(|one| stands(&one.alert)) || self.fresh.iter().any(stands)
+        self.standing.all().any(|one| stands(&one.alert)) || self.fresh.iter().any(stands)
     }
 
     /// The level in force at a benchmark before the alerts with the keys `since` were called.
@@ -145,18 +217,7 @@ impl Site {
         if since.is_empty() {
             return self.monitor.level(benchmark).unwrap_or(Level::Green);
         }
-        let standing = self.standing.get(&(Some(benchmark.clone()), false));
-        let Some(AlertInForce { alert, .. }) = standing else {
-            return Level::Green;
-        };
-        if !since.contains(&alert.key) {
-            return alert.level;
-        }
-        let earlier = alert
-            .earlier
-            .iter()
-            .filter(|one| one.benchmark.as_ref() == Some(benchmark) && !since.contains(&one.key));
-        earlier.map(|one| one.level).max().unwrap_or(Level::Green)
+        self.standing.level_before(benchmark, since)
     }
 
     fn mute(
@@ -165,14 +226,12 @@ impl Site {
         until: Timestamp,
         given_at: Option<Timestamp>,
     ) {
-        self.mutes.push(Mute {
+        self.mutes.add(Mute {
             benchmark: benchmark.cloned(),
             up_to,
             until,
             given_at,
         });
-        let excess = self.mutes.len().saturating_sub(MOST);
-        self.mutes.drain(..excess);
         self.spare_what_is_muted(benchmark, up_to);
     }
 
@@ -181,8 +240,8 @@ impl Site {
         let Some(alerts) = &self.sinks.alerts else {
             return;
         };
-        for ((place, _), one) in &self.standing {
-            let is_here = benchmark.is_none() || place.as_ref() == benchmark;
+        for one in self.standing.all() {
+            let is_here = benchmark.is_none() || one.alert.event.benchmark.as_ref() == benchmark;
             if is_here && up_to.is_none_or(|up_to| one.alert.level <= up_to) {
                 alerts.spare(&one.alert);
             }
@@ -201,40 +260,17 @@ impl Site {
 
     /// Who is not to be notified of what while the host's clock says `wall`.
     pub fn mutes(&self, wall: Timestamp) -> Vec<Mute> {
-        let all = self.mutes.iter();
+        let all = self.mutes.orders.iter();
         all.filter(|mute| mute.is_in_force(wall)).cloned().collect()
-    }
-
-    /// Whether nobody is to be notified of this alert while the host's clock says `wall`.
-    pub(super) fn is_muted(&self, alert: &Alert, wall: Timestamp) -> bool {
-        let place = (alert.event.benchmark.as_ref(), alert.level);
-        self.is_covered(place, |mute| mute.is_in_force(wall))
-    }
-
-    /// Whether somebody asked not to be notified of it, and that may last still: until the next commit says it by the clock.
-    pub(super) fn may_be_muted(&self, alert: &Alert) -> bool {
-        let place = (alert.event.benchmark.as_ref(), alert.level);
-        self.is_covered(place, |_| true)
     }
 
     /// Has the hooks wait with what they have in hand where nobody is to be notified of it while the host's clock says `wall`.
     pub(super) fn mute_what_is_in_hand(&self, wall: Timestamp) {
         if let Some(alerts) = &self.sinks.alerts {
             alerts.mute(&|place, level| {
-                self.is_covered((place, level), |mute| mute.is_in_force(wall))
+                self.mutes
+                    .cover((place, level), |mute| mute.is_in_force(wall))
             });
         }
-    }
-
-    fn is_covered(
-        &self,
-        (place, level): (Option<&BenchmarkId>, Level),
-        lasts: impl Fn(&Mute) -> bool,
-    ) -> bool {
-        self.mutes.iter().any(|mute| {
-            let here = mute.benchmark.is_none() || mute.benchmark.as_ref() == place;
-            let low = mute.up_to.is_none_or(|up_to| level <= up_to);
-            here && low && lasts(mute)
-        })
     }
 }

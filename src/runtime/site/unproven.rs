@@ -83,7 +83,7 @@ impl Site {
         let Input::Reading { benchmark, .. } = &arrival.input else {
             return false;
         };
-        let newest = self.newest.get(benchmark).copied();
+        let newest = self.read.newest(benchmark);
         newest.is_some_and(|newest| self.unproven.continues(benchmark, arrival.time, newest))
     }
 
