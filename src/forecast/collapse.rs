@@ -62,7 +62,7 @@ const MOST_LATER: usize = 200_000;
 pub struct Collapse {
     /// Days to it from the newest reading: whose quantiles are reported. It is put sooner than is expected: collapses come sooner than networks that never saw their kind expect.
     pub passage: Passage,
-    /// The same as it is expected: whose chances come true.
+    /// The same as it is expected: whose chances come true. None is under that which levels go by.
     pub expected: Passage,
     /// The same as far as the slope is sure to accelerate: what levels go by.
     pub sure: Passage,
@@ -153,9 +153,11 @@ impl Indicators {
         };
         let all = passage(&all, &members.law, self.scales.centred_before_days);
         let agreed = members.agreed();
-        let expected = members.timed(&all, agreed);
+        // A line or a law that puts the collapse later takes nothing from what levels go by: a slope collapses at a finite velocity, before
+        // these meet zero or infinity.
+        let expected = members.timed(&all, agreed).at_least(&sure);
         Collapse {
-            passage: Self::sooner(&expected, members.is_timed(agreed)),
+            passage: Self::sooner(&expected, members.is_timed(agreed)).at_least(&sure),
             expected,
             sure,
         }

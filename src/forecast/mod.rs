@@ -11,6 +11,7 @@ mod network;
 mod panel;
 mod passage;
 mod scales;
+mod sessions;
 mod surprise;
 mod together;
 

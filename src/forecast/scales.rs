@@ -4,6 +4,7 @@
 //! A forecast rests on the newest velocity and the newest change of each scale, and on how large such changes were
 //! before: a change that is usual for the instrument or for the slope is no evidence of anything.
 
+use super::sessions::merged;
 use crate::fit::{Observation, Observations};
 use crate::reading::Quantity;
 
@@ -76,7 +77,7 @@ pub struct Scale {
 pub struct Scales {
     /// Days of the shortest blocks: the sampling interval, or a quarter of an hour.
     pub base_days: f64,
-    /// Median of the newest spans between readings, days.
+    /// Median of the newest spans between readings, or between sessions of them, days.
     pub interval_days: f64,
     /// From the first reading to the newest, days.
     pub length_days: f64,
@@ -131,6 +132,7 @@ impl Scales {
         if values.len() < FEWEST_READINGS {
             return None;
         }
+        let values = &*merged(values);
         let curve = Curve::of(observations.quantity, observations.averaging_days, values);
         let interval_days = curve.interval();
         let base_days = interval_days.max(FINEST_BLOCK_DAYS);
@@ -485,6 +487,34 @@ mod tests {
             averaging_days: 0.0,
             values: values.collect(),
         }
+    }
+
+    #[test]
+    fn readings_in_sessions_are_looked_at_as_their_means_are() {
+        let round = |index: u32| {
+            let (session, round) = (index / 3, index % 3);
+            let t_days = f64::from(session) + f64::from(round) / 480.0;
+            let scatter = [0.4, -0.7, 0.2][(index * 7 % 3) as usize];
+            Observation {
+                t_days,
+                value: 2.0 * t_days + scatter,
+                sigma: None,
+            }
+        };
+        let of = |values: Vec<Observation>| Observations {
+            quantity: Quantity::Displacement,
+            averaging_days: 0.0,
+            values,
+        };
+        let rounds: Vec<Observation> = (0..120).map(round).collect();
+        let means = rounds.chunks(3).map(|session| Observation {
+            t_days: session.iter().map(|one| one.t_days).sum::<f64>() / 3.0,
+            value: session.iter().map(|one| one.value).sum::<f64>() / 3.0,
+            sigma: None,
+        });
+        let means = Scales::of(&of(means.collect())).unwrap();
+        assert_eq!(Scales::of(&of(rounds)).unwrap(), means);
+        assert!((means.interval_days - 1.0).abs() < 1e-9);
     }
 
     #[test]

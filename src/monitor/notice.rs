@@ -74,7 +74,7 @@ pub enum Notice {
         /// What time it is.
         until: Timestamp,
     },
-    /// The host's clock is wrong: readings that are known lie after it.
+    /// The host's clock is wrong: readings that are known lie after it, or it has gone ahead of the time that ran since.
     ClockWrong {
         /// One line for a person.
         text: String,

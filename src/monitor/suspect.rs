@@ -22,6 +22,9 @@ const MOVING: usize = 4;
 /// They lie within this share of what the motion before them would have made in their time. Readings at the top of a daily wave
 /// lie within a sixth.
 const JITTER: f64 = 0.1;
+/// That is so many times as far as a reading of the motion was off the straight line from its first to its last: between readings that
+/// scatter as much, some lie together by chance.
+const SHOWN: f64 = 4.0;
 /// They have no trend of so many standard errors.
 const TREND: f64 = 3.0;
 
@@ -93,6 +96,7 @@ impl History {
         let stands = is_beyond
             && jitter > 0.0
             && jitter <= JITTER * slower * span
+            && slower * span >= SHOWN * off_the_chord(moving)
             && goes_to_and_fro(standing);
         let around = (low - jitter, high + jitter);
         stands.then(|| Some((count, self.time(standing[0].t_days)?, around)))?
@@ -149,6 +153,16 @@ fn mean_velocity(values: &[Observation]) -> f64 {
         [first, .., last] => (last.value - first.value) / (last.t_days - first.t_days),
         _ => 0.0,
     }
+}
+
+/// How far one of `values` is at most off the straight line from the first to the last.
+fn off_the_chord(values: &[Observation]) -> f64 {
+    let Some(first) = values.first() else {
+        return 0.0;
+    };
+    let velocity = mean_velocity(values);
+    let off = |one: &Observation| one.value - first.value - velocity * (one.t_days - first.t_days);
+    values.iter().map(|one| off(one).abs()).fold(0.0, f64::max)
 }
 
 /// The lowest and the highest of `values`.
@@ -275,6 +289,17 @@ mod tests {
                 |hour: u32| 200.0 * (120.0 / (120.0 - f64::from(hour))).ln() + noise(hour);
             assert!(history((0..end).map(failing)).stands_at_the_end().is_none());
         }
+    }
+
+    #[test]
+    fn readings_that_scatter_as_far_as_the_motion_before_them_and_lie_together_by_chance_do_not_stand()
+     {
+        // 4 mm a day, hourly, off by up to .5 mm: six in a row within .02 mm.
+        let scatter = [0.0, -0.5, 0.4, -0.3, 0.5, -0.45];
+        let read = |hour: u32| f64::from(hour) / 6.0 + scatter[hour as usize % 6];
+        let together = |hour: u32| 29.0 / 6.0 + 0.6 + 0.02 * noise(hour);
+        let readings = history((0..30).map(read).chain((30..36).map(together)));
+        assert_eq!(readings.stands_at_the_end(), None);
     }
 
     #[test]

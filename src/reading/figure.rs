@@ -24,9 +24,28 @@ pub fn whole_figure(value: f64) -> String {
     }
 }
 
+/// `value` without the last digits of a conversion of units: 26400, not 26400.000000000004.
+pub fn shortest(value: f64) -> String {
+    let twelve_digits = format!("{value:.11e}");
+    whole_figure(twelve_digits.parse().unwrap_or(value))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_converted_figure_has_no_digits_of_the_conversion() {
+        let cases = [
+            (1.1 * 24.0 * 1000.0, "26400"),
+            (0.07 * 24.0 * 1000.0, "1680"),
+            (1000.0, "1000"),
+            (0.1, "0.1"),
+        ];
+        for (value, expected) in cases {
+            assert_eq!(shortest(value), expected);
+        }
+    }
 
     #[test]
     fn a_figure_is_written_as_usual_until_nobody_could_read_it() {

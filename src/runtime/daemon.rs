@@ -55,6 +55,8 @@ pub struct Daemon {
     /// Once, and as of the last batch: a logger that was away hands in its backlog in several.
     is_caught_up: bool,
     is_up_to_date: bool,
+    /// The files; brokers may still have to send what they kept.
+    files_are_read: bool,
     /// How far files have been read by what was taken, while some of it is held.
     positions: Vec<Position>,
     /// Since the last commit.
@@ -98,6 +100,7 @@ impl Daemon {
             wall,
             is_caught_up: false,
             is_up_to_date: false,
+            files_are_read: false,
             positions: Vec::new(),
             since_commit: Stopwatch::start(),
             since_orders: Stopwatch::start(),
@@ -217,19 +220,27 @@ impl Daemon {
         self.release()?;
         self.end_batch()?;
         if !batch.caught_up && self.may_commit_later() {
-            self.is_up_to_date = false;
+            (self.files_are_read, self.is_up_to_date) = (false, false);
             return Ok(());
         }
         self.commit()?;
         // Also while years of backlog come in: the state is not to hold all of their refits at once.
         self.thin()?;
-        self.is_up_to_date = batch.caught_up;
-        if self.is_up_to_date {
-            let stopwatch = Stopwatch::start();
-            let events = self.site.caught_up((self.wall)())?;
-            self.pulse.vitals.judged(&events, stopwatch.elapsed());
+        self.files_are_read = batch.caught_up;
+        self.note_up_to_date()
+    }
+
+    /// Where all there is has been read, from files and from brokers, what of it is still in force is sent, and from then on time
+    /// passes without readings too.
+    fn note_up_to_date(&mut self) -> Result<(), StoreError> {
+        self.is_up_to_date = self.files_are_read && self.sources.have_begun();
+        if !self.is_up_to_date {
+            return Ok(());
         }
-        if self.is_up_to_date && !self.is_caught_up {
+        let stopwatch = Stopwatch::start();
+        let events = self.site.caught_up((self.wall)())?;
+        self.pulse.vitals.judged(&events, stopwatch.elapsed());
+        if !self.is_caught_up {
             self.is_caught_up = true;
             self.pulse.caught_up();
             let counts = self.site.counts();
@@ -450,10 +461,7 @@ impl Daemon {
             self.end_batch()?;
         }
         self.commit()?;
-        if self.is_up_to_date {
-            let events = self.site.caught_up(now)?;
-            self.pulse.vitals.note(&events);
-        }
+        self.note_up_to_date()?;
         self.thin()?;
         self.verify();
         self.note_quarantined()?;

@@ -17,7 +17,7 @@ use super::tail::{Arrival, Decoder};
 use crate::config::{Benchmark, Broker};
 use session::{BrokerMessage, NoConnection, Session, SessionEvent};
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
 
@@ -27,6 +27,25 @@ const LONGEST_MESSAGE: usize = 1 << 20;
 const MOST_VALUES: u32 = 1 << 16;
 /// First and longest wait before connecting again.
 const RECONNECT: (Duration, Duration) = (Duration::from_secs(1), Duration::from_secs(60));
+
+/// After so long with a subscription what the broker kept for us is coming in.
+const SETTLED: Duration = Duration::from_secs(2);
+
+/// Since when the subscription with a broker stands; it may come late, and with it what was sent while the daemon was off.
+#[derive(Debug, Clone, Default)]
+pub struct Subscription(Arc<OnceLock<Stopwatch>>);
+
+impl Subscription {
+    fn stands(&self) {
+        self.0.get_or_init(Stopwatch::start);
+    }
+
+    /// Whether it has stood for so long that what the broker kept for us is coming in.
+    pub(super) fn has_settled(&self) -> bool {
+        let since = self.0.get();
+        since.is_some_and(|since| since.elapsed() >= SETTLED)
+    }
+}
 
 /// One message, on its way to be made durable.
 #[derive(Debug)]
@@ -88,6 +107,7 @@ pub async fn follow(
     client_id: String,
     deliveries: mpsc::Sender<ReceivedMessage>,
     faults: ServiceFaults,
+    subscription: Subscription,
     mut shutdown: Shutdown,
 ) {
     let [unreachable, refused] = [
@@ -126,7 +146,10 @@ pub async fn follow(
                         () = shutdown.requested() => return,
                     }
                 }
-                Ok(SessionEvent::Subscribed) => faults.is_over(&refused),
+                Ok(SessionEvent::Subscribed) => {
+                    faults.is_over(&refused);
+                    subscription.stands();
+                }
                 Ok(SessionEvent::SubscriptionRefused) => {
                     let (source, topic) = (&broker.id, &broker.topic);
                     let what = format!("the broker refuses the subscription to {topic:?}: nothing comes from it");

@@ -1,6 +1,7 @@
 //! Where a daemon's values come from: files that are followed, brokers that are listened to.
 
-use super::mqtt::{self, Receipt, ReceivedMessage};
+use super::clock::Stopwatch;
+use super::mqtt::{self, Receipt, ReceivedMessage, Subscription};
 use super::service_faults::ServiceFaults;
 use super::shutdown::{self, Shutdown, Trigger};
 use super::tail::{self, ArrivalBatch, Follower};
@@ -8,6 +9,7 @@ use crate::config::Config;
 use crate::store::{Store, StoreError};
 use std::collections::VecDeque;
 use std::task::{Context, Waker};
+use std::time::Duration;
 use tokio::sync::mpsc;
 use tokio::task::{JoinError, JoinHandle};
 
@@ -20,6 +22,9 @@ pub(super) const MESSAGES: usize = mqtt::MOST_UNACKNOWLEDGED as usize;
 /// whoever waits for room in it.
 const FEW: usize = 256;
 
+/// A broker that cannot be reached within this time, or does not answer, is not waited for.
+const LONGEST_SILENT: Duration = Duration::from_secs(30);
+
 /// The sources at work.
 #[derive(Debug)]
 pub struct Sources {
@@ -31,6 +36,9 @@ pub struct Sources {
     unacknowledged: Vec<Receipt>,
     /// Held, so that without a broker the other end waits.
     _messages: mpsc::Sender<ReceivedMessage>,
+    /// Of each broker; and since when they are followed.
+    subscriptions: Vec<Subscription>,
+    started: Stopwatch,
     /// Stops them, also when it is dropped.
     stop: Trigger,
     task: JoinHandle<Result<(), JoinError>>,
@@ -46,12 +54,13 @@ impl Sources {
         faults.forget_sources();
         let (messages, deliveries) = mpsc::channel(MESSAGES);
         let (stop, stopped) = shutdown::pair();
-        listen(config, store.instance()?, &messages, &stopped, faults);
+        let subscriptions = listen(config, store.instance()?, &messages, &stopped, faults);
         let follower = Follower::new(&config.sources, &config.benchmarks, &store.positions()?);
         let (sender, batches) = mpsc::channel(BATCHES);
         let task = tokio::spawn(tail::follow(follower, sender, faults.clone(), stopped));
         let mut sources = Self::of(messages, deliveries, stop);
         (sources.batches, sources.task) = (batches, task);
+        sources.subscriptions = subscriptions;
         Ok(sources)
     }
 
@@ -67,9 +76,17 @@ impl Sources {
             deliveries,
             unacknowledged: Vec::new(),
             _messages: messages,
+            subscriptions: Vec::new(),
+            started: Stopwatch::start(),
             stop,
             task: tokio::spawn(async { Ok(()) }),
         }
+    }
+
+    /// Whether each broker sends what it kept for us, or has had its time to.
+    pub(super) fn have_begun(&self) -> bool {
+        self.subscriptions.iter().all(Subscription::has_settled)
+            || self.started.elapsed() >= LONGEST_SILENT
     }
 
     /// Asks them to stop; what they have read already can still be taken.
@@ -129,28 +146,32 @@ impl Sources {
     }
 }
 
-/// Listens to the brokers.
+/// Follows the brokers; the subscription with each.
 fn listen(
     config: &Config,
     instance: i64,
     messages: &mpsc::Sender<ReceivedMessage>,
     stopped: &Shutdown,
     faults: &ServiceFaults,
-) {
-    for broker in &config.brokers {
+) -> Vec<Subscription> {
+    let each = config.brokers.iter().map(|broker| {
         // One session for each state and source, found again after a restart. Two daemons of one site's name would
         // each get a part of the messages.
         let client = format!(
             "slipwatch-{}-{}-{instance:016x}",
             config.site.name, broker.id
         );
+        let subscription = Subscription::default();
         tokio::spawn(mqtt::follow(
             broker.clone(),
             config.benchmarks.clone(),
             client,
             messages.clone(),
             faults.clone(),
+            subscription.clone(),
             stopped.clone(),
         ));
-    }
+        subscription
+    });
+    each.collect()
 }

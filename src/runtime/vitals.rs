@@ -94,7 +94,9 @@ impl Health {
         } else if self.is_store_damaged {
             Some("the state is damaged: restore a backup")
         } else if self.is_clock_wrong {
-            Some("the host's clock is wrong: readings that are known lie after it")
+            Some(
+                "the host's clock and the readings disagree: it is wrong, or the host was suspended",
+            )
         } else {
             None
         }

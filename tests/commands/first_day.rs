@@ -99,6 +99,24 @@ fn a_suspicion_is_in_the_status_once_in_the_log_and_the_benchmark_is_unknown_liv
 }
 
 #[test]
+fn a_suspicion_that_is_put_right_in_the_config_is_over_in_status() {
+    let (_, text, evidence) = suspect_files().into_iter().nth(2).unwrap();
+    let benchmark = "[[benchmark]]\nid = \"P1\"\ncolumn = \"P1_displacement_mm\"\nquantity = \"displacement\"\n";
+    let config = |unit: &str| site("slope.csv", &format!("{benchmark}unit = \"{unit}\"\n"));
+    let office = Office::with(&[("slope.csv", &text), ("site.toml", &config("mm"))]);
+    let daemon = office.run_logged(&["run", "site.toml"]);
+    let status = office.status_until("suspicion");
+    assert!(status.replace("\n    ", " ").contains(evidence), "{status}");
+    drop(daemon);
+    std::fs::write(office.path("site.toml"), config("m")).unwrap();
+    let daemon = office.run_logged(&["run", "site.toml"]);
+    office.until("the unit is taken", || {
+        !office.done(&STATUS).contains("suspicion")
+    });
+    drop(daemon);
+}
+
+#[test]
 fn a_suspicion_that_people_have_looked_into_is_accepted_in_the_config() {
     for (name, text, _) in suspect_files() {
         let more = format!("[[benchmark]]\nid = \"P1\"\naccept = [\"{name}\"]\n");

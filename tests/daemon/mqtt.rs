@@ -11,7 +11,7 @@ use crate::site::free_address;
 use rumqttc::{AsyncClient, Event, MqttOptions, Packet, QoS};
 use slipwatch::config::{self, Config};
 use slipwatch::monitor::Input;
-use slipwatch::runtime::mqtt::{ReceivedMessage, follow};
+use slipwatch::runtime::mqtt::{ReceivedMessage, Subscription, follow};
 use slipwatch::runtime::service_faults::ServiceFaults;
 use slipwatch::runtime::shutdown::{self, Trigger};
 use std::path::{Path, PathBuf};
@@ -192,7 +192,15 @@ impl Source {
         let radio = config.brokers[0].clone();
         let faults = ServiceFaults::default();
         let id = id.to_owned();
-        let follow = follow(radio, config.benchmarks, id, sender, faults, stopped);
+        let follow = follow(
+            radio,
+            config.benchmarks,
+            id,
+            sender,
+            faults,
+            Subscription::default(),
+            stopped,
+        );
         let task = tokio::spawn(follow);
         Self {
             deliveries,
@@ -386,6 +394,7 @@ async fn messages_of_many_lines_wait_at_the_broker_until_those_before_have_been_
         "wide".to_owned(),
         sender,
         ServiceFaults::default(),
+        Subscription::default(),
         stopped,
     ));
     tokio::time::sleep(Duration::from_millis(1500)).await;
@@ -763,4 +772,67 @@ async fn messages_that_queue_are_judged_together_and_kills_in_the_midst_lose_and
     );
     let refits = daemon.refits() - known;
     assert!(3 * refits < BENCHMARKS * QUEUED, "{refits}");
+}
+
+/// Hourly readings of one benchmark, so many hours from now.
+fn hourly(hours: std::ops::RangeInclusive<i64>) -> Vec<String> {
+    let now = slipwatch::runtime::clock::now().as_second();
+    let line = |hour: i64| {
+        let time = jiff::Timestamp::from_second(now + 3600 * hour).unwrap();
+        let value = 0.1 * (hour + 200) as f64 + ((hour + 200) * 37 % 11) as f64 / 50.0;
+        format!(r#"{{"benchmark":"b0","time":"{time}","value":{value:.3},"unit":"mm"}}"#)
+    };
+    hours.map(line).collect()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+#[cfg_attr(
+    not(all(has_mosquitto, has_faketime)),
+    ignore = "Mosquitto or libfaketime was not found by build.rs"
+)]
+async fn what_a_slow_broker_kept_while_the_daemon_was_off_is_read_before_time_passes() {
+    let broker = Mosquitto::start_with(|_| "max_queued_messages 0\n".to_owned());
+    tokio::time::sleep(Duration::from_millis(500)).await;
+    let mut daemon = Daemon::start(&broker);
+    daemon.1.kill().unwrap();
+    daemon.1.wait().unwrap();
+    // The day before yesterday.
+    let library = format!(
+        "/usr/lib/{}-linux-gnu/faketime/libfaketime.so.1",
+        std::env::consts::ARCH
+    );
+    let process = Command::new(PROGRAM)
+        .args(["run", "site.toml"])
+        .current_dir(daemon.0.path())
+        .env("LD_PRELOAD", library)
+        .env("FAKETIME", "-36h")
+        .env("FAKETIME_DONT_FAKE_MONOTONIC", "1")
+        .stderr(std::fs::File::create(daemon.0.path().join("log")).unwrap())
+        .stdout(Stdio::null())
+        .spawn();
+    daemon.1 = process.unwrap();
+    daemon.wait("connected", |one| one.text("log").contains("connected"));
+    tokio::time::sleep(Duration::from_millis(1500)).await;
+    for some in hourly(-136..=-36).chunks(50) {
+        broker.publish(some).await;
+    }
+    daemon.wait("the past", |one| one.durable().0 == 101);
+    daemon.1.kill().unwrap();
+    daemon.1.wait().unwrap();
+    broker.publish(&hourly(-35..=0)).await;
+    let is_unknown = |one: &Daemon| one.events().contains(r#""rule":"no-data""#);
+    assert!(!is_unknown(&daemon), "{}", daemon.events());
+    let signal = |name: &str| {
+        let id = broker.process.id().to_string();
+        let status = Command::new("kill").args([name, &id]).status();
+        assert!(status.unwrap().success());
+    };
+    signal("-STOP");
+    daemon.restart();
+    tokio::time::sleep(Duration::from_secs(5)).await;
+    let was_unknown = is_unknown(&daemon);
+    signal("-CONT");
+    daemon.wait("all of it", |one| one.durable().0 == 137);
+    tokio::time::sleep(Duration::from_secs(4)).await;
+    assert!(!was_unknown && !is_unknown(&daemon), "{}", daemon.events());
 }

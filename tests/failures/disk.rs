@@ -55,6 +55,29 @@ fn on_a_full_disk_alerts_go_out_and_what_was_taken_is_written_when_there_is_room
             .contains("in force there: 5 red")
     };
     eventually("what the state does not hold", is_said);
+    for words in [
+        &["alerts", "list"][..],
+        &["alerts", "show", "5/red"],
+        &["alerts", "ack", "--benchmark", "5", "--by", "Ada"],
+        &[
+            "alerts",
+            "silence",
+            "--benchmark",
+            "5",
+            "--for",
+            "1h",
+            "--by",
+            "Ada",
+        ],
+    ] {
+        let output = site.ask(&[words, &["--config", "site.toml"]].concat());
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(
+            said.contains("the daemon cannot write the state")
+                && said.contains("in force there: 5 red"),
+            "{words:?}: {said}"
+        );
+    }
     assert_eq!(program.ended(), None, "{}", site.log());
     fs::remove_file(state.join("ballast")).unwrap();
     eventually("written", || site.values().len() == 114);

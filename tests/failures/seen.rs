@@ -135,3 +135,21 @@ fn a_red_that_is_called_between_an_order_and_its_taking_is_not_what_that_is_of()
     program.stop();
     site.proven_events();
 }
+
+#[test]
+fn what_is_only_unknown_is_not_shelved_and_the_order_names_silence() {
+    let site = site(&["A"]);
+    let program = site.caught_up();
+    calls(&site, "A/unknown/");
+    let order = ["alerts", "shelve", "--benchmark", "A", "--for", "1h"];
+    let output = site.ask(&[&order[..], &["--by", "Ada", "--config", "site.toml"]].concat());
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(!output.status.success());
+    assert!(
+        said.contains("only unknown is in force at benchmark A")
+            && said.contains("alerts silence --benchmark A"),
+        "{said}"
+    );
+    assert!(!site.events().contains("\"event\":\"order\""));
+    program.stop();
+}

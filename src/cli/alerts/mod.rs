@@ -2,6 +2,7 @@
 
 mod bundle;
 mod show;
+mod unwritten;
 mod words;
 
 use super::args::OutputFormat;
@@ -174,9 +175,10 @@ pub(super) fn run(args: &AlertsArgs) -> anyhow::Result<()> {
         );
     }
     if !is_of_a_drill && config.drill.is_none() {
-        needs_an_alert(&store, &order)?;
+        needs_an_alert(&store, &order).map_err(|error| unwritten::explained(&config, error))?;
     }
-    store.ask(&order)?;
+    let asked = store.ask(&order);
+    asked.map_err(|error| unwritten::explained(&config, error.into()))?;
     let is_running = Store::is_held(&config.site.state_dir);
     site.output.print(&order, |_| taken(&order, is_running))
 }
@@ -221,7 +223,18 @@ fn needs_an_alert(store: &Store, order: &Order) -> anyhow::Result<()> {
                 anyhow::bail!("no level is in force {shown}: there is nothing to resolve");
             }
         }
-        Order::Shelve { .. } | Order::Silence { .. } | Order::Unsilence { .. } => {}
+        Order::Shelve { benchmark, .. } => {
+            let is_unknown = here
+                .next()
+                .is_some_and(|(_, level)| *level == Level::Unknown);
+            if is_unknown && here.next().is_none() {
+                anyhow::bail!(
+                    "only unknown is in force {shown}, which is not shelved: `slipwatch alerts silence --benchmark {benchmark}` \
+                     holds back everything of it"
+                );
+            }
+        }
+        Order::Silence { .. } | Order::Unsilence { .. } => {}
     }
     Ok(())
 }
@@ -366,6 +379,9 @@ fn list(site: &SiteArgs) -> anyhow::Result<()> {
     standing.extend(closed(&store, &in_force)?);
     standing.extend(in_force.into_values());
     standing.sort_by_key(|event| event.time);
+    if let Some(fault) = unwritten::fault(&config) {
+        writeln!(std::io::stderr(), "warning: {fault}")?;
+    }
     for event in &standing {
         match site.output.format {
             OutputFormat::Json => writeln!(stdout, "{}", serde_json::to_string(event)?)?,

@@ -1,6 +1,6 @@
 //! `alerts show KEY`: everything of one alert, as text, JSON or a bundle that can be checked elsewhere.
 
-use super::{bundle, words};
+use super::{bundle, unwritten, words};
 use crate::cli::exit::UsageError;
 use crate::cli::state::SiteArgs;
 use crate::runtime::view;
@@ -27,7 +27,7 @@ pub(super) fn show(args: &ShowArgs) -> anyhow::Result<()> {
             "no alert {:?}: `slipwatch alerts list --format json` and `slipwatch events --kind alert --format json` show the keys",
             args.key
         );
-        return Err(UsageError(text).into());
+        return Err(unwritten::explained(&config, UsageError(text).into()));
     };
     let zone = &config.site.time_zone;
     if let Some(file) = &args.bundle {

@@ -335,16 +335,15 @@ impl Track {
 
     /// The benchmark is no longer watched: what is in force at it ends.
     pub(super) fn close(&mut self, now: Timestamp, why: &str) -> Vec<Event> {
-        let unknown = (self.quality).ends_all_unknown(&mut self.record, now, why);
-        let removed = self.alarm.removed(&self.record, now, why.to_owned());
-        unknown.into_iter().chain(removed).collect()
+        let mut events = (self.quality).ends_all_unknown(&mut self.record, now, why);
+        events.extend(self.alarm.removed(&self.record, now, why.to_owned()));
+        events
     }
 
     /// What is in force at `former` goes on: the readings of the same benchmark, which mean something else from here on.
     pub(super) fn follow_on(&mut self, mut former: Self, now: Timestamp, why: &str) -> Vec<Event> {
-        let unknown = (former.quality).ends_all_unknown(&mut former.record, now, why);
         self.alarm.follow_on(former.alarm);
-        unknown.into_iter().collect()
+        (former.quality).ends_all_unknown(&mut former.record, now, why)
     }
 
     /// Whether the level in force would have been another one, had everything come in time.

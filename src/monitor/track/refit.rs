@@ -256,7 +256,11 @@ fn report(outlook: &Outlook) -> RegimeReport {
         probability_accelerating: (of(Regime::UnstableAccelerating)
             + of(Regime::StableAccelerating))
         .min(1.0),
-        probabilities: outlook.regimes.clone(),
+        probabilities: outlook
+            .regimes
+            .iter()
+            .map(|(regime, share)| (*regime, share.min(1.0)))
+            .collect(),
         r_per_day: outlook.law.map(|law| law.r),
         kappa_per_day: outlook.law.map(|law| law.kappa),
     }

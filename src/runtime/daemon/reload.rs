@@ -144,7 +144,8 @@ impl Daemon {
         }
         let has_lost_hooks = fresh.hooks.is_empty() && !self.config.hooks.is_empty();
         let were_fileless = sources_without_files(&self.config);
-        (self.is_up_to_date, self.config) = (false, fresh);
+        (self.files_are_read, self.is_up_to_date) = (false, false);
+        self.config = fresh;
         self.pulse.service.ready("watching");
         tracing::info!(file = %self.config.file.display(), "the config is taken");
         self.config_is_taken();

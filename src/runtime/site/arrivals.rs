@@ -58,6 +58,14 @@ fn clock_wrong(now: Timestamp, wall: Timestamp) -> String {
     )
 }
 
+/// What to do where the host's clock says `wall`, and it is `now` by the readings and the time that ran since.
+fn clock_leapt(now: Timestamp, wall: Timestamp) -> String {
+    format!(
+        "the host's clock says {wall}, and by the newest readings and the time that ran since it is {now}: the host was suspended, \
+         or its clock is wrong and has to be set. Until a reading agrees with it, silences are counted in the time that ran"
+    )
+}
+
 /// Whether the value that is set aside as number `total` is logged.
 pub(in crate::runtime) fn is_logged(total: u64) -> bool {
     total <= LOGGED || total.is_power_of_two()
@@ -376,14 +384,17 @@ impl Site {
         let now = self.keeper.now(wall);
         let mut events = self.pass_by(now, self.clock(wall));
         events.extend(self.end_silences(now));
-        let is_behind = self.keeper.is_behind(wall);
-        let notice = match (is_behind, self.monitor.clock_wrong()) {
+        let (is_behind, has_leapt) = (self.keeper.is_behind(wall), self.keeper.has_leapt(wall));
+        let notice = match (is_behind || has_leapt, self.monitor.clock_wrong()) {
             (true, None) => {
                 let held = self.held.len();
-                tracing::error!(%wall, site_time = %now, held, "the host's clock is wrong: earlier than readings that are known");
-                Notice::ClockWrong {
-                    text: clock_wrong(now, wall),
-                }
+                let text = if is_behind {
+                    clock_wrong(now, wall)
+                } else {
+                    clock_leapt(now, wall)
+                };
+                tracing::error!(%wall, site_time = %now, held, "{text}");
+                Notice::ClockWrong { text }
             }
             (false, Some(_)) => {
                 tracing::warn!(%wall, "the host's clock is right again");

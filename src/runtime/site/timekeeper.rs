@@ -94,6 +94,13 @@ impl Timekeeper {
         }
     }
 
+    /// Whether the host's clock, which says `wall`, has gone on by far more than the time that ran since readings agreed with
+    /// it: the host was suspended, or its clock was set ahead.
+    pub(super) fn has_leapt(&self, wall: Timestamp) -> bool {
+        let is_far = |estimate| wall.duration_since(estimate) > BEHIND;
+        self.is_live && self.is_proven && self.estimate().is_some_and(is_far)
+    }
+
     /// A live reading of `benchmark` and `time` has come while the host's clock says `wall`.
     pub(super) fn comes(&mut self, benchmark: &str, time: Timestamp, wall: Timestamp) {
         if self.is_proven {
@@ -201,6 +208,20 @@ mod tests {
             comes(&mut keeper, 10 * minute - 370);
         }
         assert!(keeper.latest(wall) < noon() + 2.hours());
+    }
+
+    #[test]
+    fn a_clock_that_leaps_ahead_of_readings_in_time_is_doubted_until_one_agrees_with_it() {
+        let mut keeper = Timekeeper::default();
+        keeper.knows(noon(), false);
+        let leapt = noon() + 72.hours();
+        assert!(!keeper.has_leapt(leapt), "the daemon was off");
+        keeper.knows(noon() + 1.minute(), true);
+        keeper.comes("5", noon() + 1.minute(), noon() + 2.minutes());
+        assert!(!keeper.has_leapt(noon() + 20.hours()));
+        assert!(keeper.has_leapt(leapt));
+        keeper.knows(leapt, true);
+        assert!(!keeper.has_leapt(leapt));
     }
 
     #[test]

@@ -10,7 +10,7 @@ use crate::monitor::motion::{moves_backwards, settled};
 use crate::monitor::track::days;
 use crate::monitor::track::forecast::{EARLY, Forecast, LookAhead};
 use crate::monitor::track::record::BenchmarkRecord;
-use crate::reading::{Timestamp, figure};
+use crate::reading::{Timestamp, figure, shortest};
 use jiff::SignedDuration;
 
 impl Alarm {
@@ -233,7 +233,7 @@ fn text(
             ahead.red
         ),
         chance(&outlook, evidence.chance_within_outlook, ahead.orange),
-        policy.critical_velocity_mm_per_day,
+        shortest(policy.critical_velocity_mm_per_day),
     )
 }
 

@@ -113,22 +113,28 @@ impl DataQuality {
         Some(alert(record, now, since, state, reason, text))
     }
 
-    /// Everything ends, the silence too; `None` where nothing was the matter.
+    /// Everything ends, the silence and each suspicion too; nothing where nothing was the matter.
     pub(in crate::monitor::track) fn ends_all_unknown(
         &mut self,
         record: &mut BenchmarkRecord,
         now: Timestamp,
         text: &str,
-    ) -> Option<Event> {
+    ) -> Vec<Event> {
         let silent = record.end_silence();
         let unknown = &mut self.unknown;
-        let reason = unknown.reasons.first().copied();
-        unknown.reasons.clear();
-        let since = unknown.since.take().or(silent)?;
-        unknown.before = Some(since);
-        let reason = reason.unwrap_or(Reason::NoData);
-        let (state, text) = (AlertState::Resolved, text.to_owned());
-        Some(alert(record, now, since, state, reason, text))
+        let reasons = std::mem::take(&mut unknown.reasons);
+        let suspicions = reasons.iter().filter_map(|reason| {
+            let ended = matches!(reason, Reason::Suspect(_)).then(|| reason.end_name());
+            ended.map(|ended| record.fault(now, &ended, text.to_owned()))
+        });
+        let mut events: Vec<Event> = suspicions.collect();
+        if let Some(since) = unknown.since.take().or(silent) {
+            unknown.before = Some(since);
+            let reason = reasons.first().copied().unwrap_or(Reason::NoData);
+            let (state, text) = (AlertState::Resolved, text.to_owned());
+            events.push(alert(record, now, since, state, reason, text));
+        }
+        events
     }
 }
 

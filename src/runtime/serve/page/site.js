@@ -8,7 +8,7 @@ const HEALTH = [
   [(h) => !h.is_caught_up, 'The daemon is still reading the past.'],
   [(h) => h.is_paused || !h.is_store_writable, 'The state folder cannot be written to.'],
   [(h) => h.is_store_damaged, 'The state is damaged: restore a backup.'],
-  [(h) => h.is_clock_wrong, 'The host\u2019s clock is wrong: readings that are known lie after it.'],
+  [(h) => h.is_clock_wrong, 'The host\u2019s clock and the readings disagree: it is wrong, or the host was suspended.'],
   [(h) => h.config_refused, 'The config file was not taken at its reload: the one before stays in force. slipwatch check says why.'],
 ];
 
