@@ -163,9 +163,10 @@ pub(super) fn run(args: &AlertsArgs) -> anyhow::Result<()> {
         && !is_known(benchmark)
         && !store.benchmarks()?.contains_key(benchmark)
     {
-        anyhow::bail!(
+        let error = anyhow::anyhow!(
             "there is no benchmark {benchmark}: the config names none, and none has given a reading"
         );
+        return Err(unwritten::explained(&config, error));
     }
     if let Some(silence) = silence_of_the_site(&store, &order, clock::now())? {
         let silence = text::line(&silence, &config.site.time_zone);
