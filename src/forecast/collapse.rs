@@ -62,7 +62,8 @@ const MOST_LATER: usize = 200_000;
 pub struct Collapse {
     /// Days to it from the newest reading: whose quantiles are reported. It is put sooner than is expected: collapses come sooner than networks that never saw their kind expect.
     pub passage: Passage,
-    /// The same as it is expected: whose chances come true. None is under that which levels go by.
+    /// The same as it is expected: whose chances come true. None is under that which levels go by, but where the law and straight lines
+    /// through inverse velocity agree on another time.
     pub expected: Passage,
     /// The same as far as the slope is sure to accelerate: what levels go by.
     pub sure: Passage,
@@ -153,11 +154,12 @@ impl Indicators {
         };
         let all = passage(&all, &members.law, self.scales.centred_before_days);
         let agreed = members.agreed();
-        // A line or a law that puts the collapse later takes nothing from what levels go by: a slope collapses at a finite velocity, before
-        // these meet zero or infinity.
-        let expected = members.timed(&all, agreed).at_least(&sure);
+        // A relation that puts the collapse later takes nothing from what levels go by: a slope collapses at a finite velocity, before that
+        // relation ends. Straight lines that agree with the law end when slopes collapse.
+        let least = Passage::default().pooled(&sure, 1.0 - agreed);
+        let expected = members.timed(&all, agreed).at_least(&least);
         Collapse {
-            passage: Self::sooner(&expected, members.is_timed(agreed)).at_least(&sure),
+            passage: Self::sooner(&expected, members.is_timed(agreed)).at_least(&least),
             expected,
             sure,
         }
