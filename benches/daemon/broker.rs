@@ -5,7 +5,7 @@ use crate::{Daemon, floor, readings};
 use jiff::Timestamp;
 use rumqttc::{AsyncClient, Event, MqttOptions, Packet, QoS};
 use slipwatch::config;
-use slipwatch::runtime::mqtt::follow;
+use slipwatch::runtime::mqtt::{Subscription, follow};
 use slipwatch::runtime::service_faults::ServiceFaults;
 use slipwatch::runtime::shutdown;
 use slipwatch::store::{Batch, Store};
@@ -145,6 +145,7 @@ async fn without_the_monitor(broker: &Mosquitto, messages: &[String]) -> f64 {
             "floor".to_owned(),
             sender,
             faults,
+            Subscription::default(),
             stopped,
         );
         (deliveries, stop, tokio::spawn(source))
