@@ -4,7 +4,7 @@
 //! A forecast rests on the newest velocity and the newest change of each scale, and on how large such changes were
 //! before: a change that is usual for the instrument or for the slope is no evidence of anything.
 
-use super::sessions::merged;
+use super::sessions::{SPANS, merged};
 use crate::fit::{Observation, Observations};
 use crate::reading::Quantity;
 
@@ -15,8 +15,6 @@ const MOST_BLOCKS: usize = 512;
 const MOST_SCALES: usize = 24;
 /// Fewest readings.
 const FEWEST_READINGS: usize = 6;
-/// Newest spans between readings whose median is the sampling interval.
-const SPANS: usize = 256;
 /// A change is never known better than this, mm.
 const LEAST_CHANGE_MM: f64 = 1e-4;
 /// The usual change of the next shorter scale counts as much as so many observed ones.

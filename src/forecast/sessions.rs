@@ -6,8 +6,8 @@
 use crate::fit::Observation;
 use std::borrow::Cow;
 
-/// Newest spans between readings that are looked at.
-const SPANS: usize = 256;
+/// Newest spans between readings that say how a slope is sampled.
+pub(super) const SPANS: usize = 256;
 /// Fewest sessions.
 const FEWEST: usize = 6;
 /// Most rounds of a session: more of them, as in working hours, show motion.
